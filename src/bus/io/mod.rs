@@ -1,0 +1,3 @@
+//! The edge of the bus: ports, sockets, clocks.
+
+pub mod clock;

@@ -1,0 +1,125 @@
+//! What the plant remembers: DuckDB behind one thread. Everyone else asks it.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+use tokio::sync::oneshot;
+
+use crate::{
+    plant::{
+        def::TagId,
+        record::{ActionRecord, AlarmRecord},
+    },
+    report::{Period, ShiftReport},
+};
+
+/// A question on its way to the history thread, with the place for its answer.
+/// A dropped answer means: the store has gone.
+#[derive(Debug)]
+pub struct Query {
+    /// What is asked.
+    pub question: Question,
+    /// Where the answer goes.
+    pub reply: oneshot::Sender<Result<Answer, HistoryError>>,
+}
+
+/// What can be asked. Spans include `from` and exclude `to`.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Question {
+    /// Curves of some tags, reduced to at most `buckets` columns; one series a tag, in the order asked.
+    Series {
+        /// Which tags.
+        tags: Vec<TagId>,
+        /// From.
+        from: Timestamp,
+        /// To.
+        to: Timestamp,
+        /// Columns.
+        buckets: usize,
+    },
+    /// Steps of alarms, newest first.
+    Journal {
+        /// From.
+        from: Timestamp,
+        /// To.
+        to: Timestamp,
+        /// At most so many.
+        limit: usize,
+    },
+    /// Deeds of operators, newest first.
+    Actions {
+        /// From.
+        from: Timestamp,
+        /// To.
+        to: Timestamp,
+        /// At most so many.
+        limit: usize,
+    },
+    /// The report of a period.
+    Report {
+        /// Which period.
+        period: Period,
+    },
+}
+
+/// The answer to the question of the same name.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Answer {
+    /// One series a tag.
+    Series(Vec<Series>),
+    /// Steps of alarms.
+    Journal(Vec<AlarmRecord>),
+    /// Deeds of operators.
+    Actions(Vec<ActionRecord>),
+    /// The report.
+    Report(Box<ShiftReport>),
+}
+
+/// A curve reduced to columns of equal width.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Which tag.
+    pub tag: TagId,
+    /// Start of the first column.
+    pub from: Timestamp,
+    /// Width of a column.
+    pub step: Duration,
+    /// The columns; `None` where there was no good value: a gap is a gap.
+    pub buckets: Vec<Option<Bucket>>,
+    /// Of the whole span: (min, time-weighted mean, max) of good values.
+    pub summary: Option<(f64, f64, f64)>,
+    /// Share of the span with a good value, 0–1.
+    pub good: f64,
+}
+
+/// One column of a curve: good values only.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bucket {
+    /// Least.
+    pub min: f64,
+    /// Greatest.
+    pub max: f64,
+    /// Time-weighted mean.
+    pub mean: f64,
+    /// The value at the end of the column.
+    pub last: f64,
+}
+
+/// What can go wrong with the store.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum HistoryError {
+    /// Another process has the file.
+    #[error("history {path} is in use by {by}")]
+    Locked {
+        /// The file.
+        path: String,
+        /// `process 1234 (sightglass)`.
+        by: String,
+    },
+    /// The engine failed.
+    #[error("history: {0}")]
+    Engine(String),
+    /// The question makes no sense: empty or negative span.
+    #[error("empty period")]
+    EmptyPeriod,
+}

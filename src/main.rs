@@ -1,0 +1,3 @@
+//! Thin binary: arguments to `cli`, error to exit code.
+
+fn main() {}

@@ -1,0 +1,161 @@
+//! What an operator wants, how it travels to the bus, and how it ended.
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+
+use super::{
+    def::{AlarmId, DeviceId, LineId, TagId},
+    event::{ExceptionCode, Fault},
+};
+
+/// One wish of one operator.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Order {
+    /// Chosen by the terminal, so that it finds the outcome in a later snapshot.
+    pub id: OrderId,
+    /// Who wishes.
+    pub by: Arc<str>,
+    /// What.
+    pub command: Command,
+}
+
+/// Identifies an order: the terminal's number and its running count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct OrderId {
+    /// Which terminal.
+    pub terminal: u32,
+    /// Its running count.
+    pub number: u32,
+}
+
+/// What an operator can wish for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Command {
+    /// Write a value, in the tag's unit, and verify it.
+    Write {
+        /// What.
+        tag: TagId,
+        /// The new value.
+        value: f64,
+    },
+    /// Acknowledge one alarm.
+    Acknowledge(AlarmId),
+    /// Acknowledge every alarm that is unacknowledged now.
+    AcknowledgeAll,
+    /// Read all tags of a device now.
+    Refresh(DeviceId),
+    /// Open (`true`) or close a line.
+    Connect(LineId, bool),
+}
+
+/// How an order stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OrderStatus {
+    /// Which.
+    pub id: OrderId,
+    /// Who.
+    pub by: Arc<str>,
+    /// What was wished.
+    pub command: Command,
+    /// When it was taken.
+    pub at: Timestamp,
+    /// The tag's value when it was taken, for a write.
+    pub old: Option<f64>,
+    /// How it stands.
+    pub outcome: Outcome,
+}
+
+/// The outcome of an order. A write is never retried by itself.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// Under way.
+    Pending,
+    /// Read back and equal; for commands that write nothing: done.
+    Verified,
+    /// The device already had this value: nothing was written, memory is spared.
+    Unchanged,
+    /// Not done, and certainly without effect.
+    Refused(Refusal),
+    /// The device accepted it but the read-back differs or failed.
+    NotConfirmed(NotConfirmed),
+    /// No valid answer: it may or may not have taken effect.
+    Failed(Fault),
+}
+
+/// Why an order was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// The profile says read-only.
+    #[error("read only")]
+    ReadOnly,
+    /// Not a number, or outside the permitted range.
+    #[error("outside {min} … {max}")]
+    OutOfRange {
+        /// Lowest permitted, as text in the tag's unit; `−∞` if none.
+        min: String,
+        /// Highest permitted.
+        max: String,
+    },
+    /// A bound, the decimals or the present value is not known, so the write cannot be checked.
+    #[error("{0} is not known")]
+    Unknown(String),
+    /// Not one of the values of the enumeration.
+    #[error("not one of the values of this tag")]
+    NotAChoice,
+    /// The device said no.
+    #[error("{0}")]
+    Exception(ExceptionCode),
+    /// Nothing was sent: line closed, device resting.
+    #[error("{0}")]
+    NotSent(Fault),
+    /// The station's queue to the line is full.
+    #[error("line too busy")]
+    Busy,
+    /// Another write to this tag is still under way.
+    #[error("a write to this tag is under way")]
+    UnderWay,
+    /// Nothing to do: the alarm is not unacknowledged.
+    #[error("nothing to acknowledge")]
+    NothingToAcknowledge,
+}
+
+/// Why a write that the device accepted is not confirmed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NotConfirmed {
+    /// Read back, and different.
+    #[error("read back {0}")]
+    Different(f64),
+    /// Could not be read back.
+    #[error("not read back: {0}")]
+    NotRead(Fault),
+    /// The profile wants no read-back.
+    #[error("accepted, not read back")]
+    NoReadBack,
+}
+
+/// Identifies a write on its way through the bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct WriteId(pub u64);
+
+/// What the plant asks of a link task.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BusRequest {
+    /// Write one tag once, then read it back.
+    Write {
+        /// Answered by [`super::event::Event::Wrote`].
+        id: WriteId,
+        /// What.
+        tag: TagId,
+        /// The raw number, already unscaled.
+        raw: f64,
+        /// Another tag to write first (raw), if the device needs unlocking.
+        unlock: Option<(TagId, f64)>,
+        /// Read it back afterwards.
+        verify: bool,
+    },
+    /// Read every block of a device as soon as possible.
+    Refresh(DeviceId),
+    /// Open or close the port.
+    Connect(bool),
+}

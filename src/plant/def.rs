@@ -1,0 +1,549 @@
+//! The plant as its profile describes it: immutable, built once by `profile`, given to everyone at start.
+
+use std::time::Duration;
+
+use jiff::{civil::Time, tz::TimeZone};
+
+use super::tag::TagDef;
+
+macro_rules! id {
+    ($(#[$doc:meta])* $name:ident) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct $name(pub u16);
+        impl $name {
+            /// The position in the plant's list of these.
+            pub fn index(self) -> usize {
+                usize::from(self.0)
+            }
+        }
+    };
+}
+
+id!(
+    /// A line in [`PlantDef::lines`].
+    LineId
+);
+id!(
+    /// A device in [`PlantDef::devices`].
+    DeviceId
+);
+id!(
+    /// A tag in [`PlantDef::tags`].
+    TagId
+);
+id!(
+    /// An alarm in [`PlantDef::alarms`].
+    AlarmId
+);
+
+/// Everything that a plant file says, checked.
+#[derive(Debug, Clone)]
+pub struct PlantDef {
+    /// Short name, the stem of the file: `tank`.
+    pub name: String,
+    /// What the screens show: `Water tank`.
+    pub title: String,
+    /// Local time of the plant, for display, shifts and reports.
+    pub time_zone: TimeZone,
+    /// Lines, by [`LineId`].
+    pub lines: Vec<LineDef>,
+    /// Devices, by [`DeviceId`].
+    pub devices: Vec<DeviceDef>,
+    /// Tags of all devices, by [`TagId`].
+    pub tags: Vec<TagDef>,
+    /// Alarms, by [`AlarmId`].
+    pub alarms: Vec<AlarmDef>,
+    /// The picture of the process.
+    pub mimic: MimicDef,
+    /// Groups of pens for the trends tab; at least one.
+    pub trends: Vec<TrendGroup>,
+    /// Shifts in order of their start; may be empty (then only free periods are reported).
+    pub shifts: Vec<ShiftDef>,
+    /// What reports contain and where they go.
+    pub report: ReportDef,
+    /// The simulated process that `demo` and `sim` serve for this plant, by name (`tank`).
+    pub simulation: Option<String>,
+}
+
+impl PlantDef {
+    /// The line of an id. Ids come from this very definition, so they are always there.
+    pub fn line(&self, id: LineId) -> &LineDef {
+        &self.lines[id.index()]
+    }
+    /// The device of an id.
+    pub fn device(&self, id: DeviceId) -> &DeviceDef {
+        &self.devices[id.index()]
+    }
+    /// The tag of an id.
+    pub fn tag(&self, id: TagId) -> &TagDef {
+        &self.tags[id.index()]
+    }
+    /// The alarm of an id.
+    pub fn alarm(&self, id: AlarmId) -> &AlarmDef {
+        &self.alarms[id.index()]
+    }
+    /// Looks a tag up by its full name, `TIC-1.PV`.
+    pub fn tag_named(&self, name: &str) -> Option<TagId> {
+        self.tags.iter().find(|tag| tag.name == name).map(|tag| tag.id)
+    }
+    /// The tags of one device, in the order of its profile.
+    pub fn tags_of(&self, device: DeviceId) -> impl Iterator<Item = &TagDef> {
+        self.tags.iter().filter(move |tag| tag.device == device)
+    }
+}
+
+/// One serial line or TCP endpoint. Serial parameters and timeouts belong to the line, never to a device.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LineDef {
+    /// Its place.
+    pub id: LineId,
+    /// `L1`.
+    pub name: String,
+    /// How its bytes travel.
+    pub transport: Transport,
+    /// How long an answer may take, from the last byte of the request.
+    pub timeout: Duration,
+    /// Least silence before a request, beyond the 3.5 characters of the standard.
+    pub gap: Duration,
+}
+
+/// How the bytes of a line travel.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Transport {
+    /// Modbus RTU over a serial port.
+    Rtu {
+        /// Path of the port, best `/dev/serial/by-id/…`.
+        port: String,
+        /// Baud rate, framing and parity.
+        serial: Serial,
+    },
+    /// Modbus TCP.
+    Tcp {
+        /// Host name or address.
+        host: String,
+        /// TCP port, 502 by default.
+        port: u16,
+    },
+}
+
+/// Serial parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Serial {
+    /// Bits a second.
+    pub baud: u32,
+    /// 7 or 8.
+    pub data_bits: u8,
+    /// Parity bit.
+    pub parity: Parity,
+    /// 1 or 2.
+    pub stop_bits: u8,
+}
+
+impl Serial {
+    /// Bits of one character on the wire: start, data, parity, stop.
+    pub fn bits_per_char(self) -> u32 {
+        1 + u32::from(self.data_bits) + u32::from(self.parity != Parity::None) + u32::from(self.stop_bits)
+    }
+    /// Time of one character on the wire.
+    pub fn char_time(self) -> Duration {
+        Duration::from_nanos(u64::from(self.bits_per_char()) * 1_000_000_000 / u64::from(self.baud))
+    }
+    /// The silence between frames: 3.5 characters, fixed 1.75 ms above 19200 baud (Modbus serial line V1.02, 2.5.1.1).
+    pub fn silence(self) -> Duration {
+        if self.baud > 19_200 { Duration::from_micros(1_750) } else { self.char_time() * 7 / 2 }
+    }
+}
+
+/// Parity of a serial character.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Parity {
+    /// No parity bit.
+    None,
+    /// Even.
+    Even,
+    /// Odd.
+    Odd,
+}
+
+/// One device on a line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DeviceDef {
+    /// Its place.
+    pub id: DeviceId,
+    /// `TIC-1`.
+    pub name: String,
+    /// What it does in the plant: `tank temperature`.
+    pub title: String,
+    /// The line it sits on.
+    pub line: LineId,
+    /// Unit address: 1–247 on a serial line, 0–255 over TCP.
+    pub unit: u8,
+    /// Name of its profile: `fuji_pxr`.
+    pub profile: String,
+    /// `FUJI PXR4`.
+    pub model: String,
+    /// What one request may hold.
+    pub limits: Limits,
+    /// Least silence between two requests to this device (the PXR wants 10 ms).
+    pub gap: Duration,
+    /// Quiet time after a write before the next request.
+    pub write_gap: Duration,
+    /// Which tags play PV, SV and so on, if it is a controller.
+    pub faceplate: Option<Faceplate>,
+    /// Actions that are more than a write (save to non-volatile memory).
+    pub actions: Vec<ActionDef>,
+}
+
+/// What one request to a device may hold, and how blocks are cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Registers a read may ask for, at most 125.
+    pub read_words_max: u16,
+    /// Bits a read may ask for, at most 2000.
+    pub read_bits_max: u16,
+    /// Registers a write may carry, at most 123.
+    pub write_words_max: u16,
+    /// Unused registers that may be read over to join two tags into one block.
+    pub gap_words_max: u16,
+    /// Blocks start and end on multiples of this (2 for meters that refuse odd counts).
+    pub alignment: u16,
+}
+
+/// The tags that a controller is operated by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Faceplate {
+    /// Process value.
+    pub pv: TagId,
+    /// Set value.
+    pub sv: TagId,
+    /// Manipulated value, output in percent.
+    pub mv: Option<TagId>,
+    /// Run / standby, if it can be switched.
+    pub run: Option<TagId>,
+    /// Control method (PID, FUZZY, SELF).
+    pub mode: Option<TagId>,
+    /// Auto-tuning command and state.
+    pub tune: Option<TagId>,
+}
+
+/// An action on a device: a write that needs its own words, confirmation and quiet time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActionDef {
+    /// `FIX`.
+    pub name: String,
+    /// The tag it writes.
+    pub tag: TagId,
+    /// The value it writes.
+    pub value: f64,
+    /// How long the device is left alone afterwards.
+    pub settle: Duration,
+    /// What the operator is asked.
+    pub confirm: String,
+}
+
+/// An alarm: a condition on a tag or device, with what the operator should know and do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AlarmDef {
+    /// Its place.
+    pub id: AlarmId,
+    /// What it watches.
+    pub subject: Subject,
+    /// When it is active.
+    pub condition: Condition,
+    /// How urgent.
+    pub priority: Priority,
+    /// The condition must hold this long before the alarm is raised.
+    pub on_delay: Duration,
+    /// The condition must be gone this long before the alarm returns.
+    pub off_delay: Duration,
+    /// `temperature high`.
+    pub text: String,
+    /// Cause, effect, action.
+    pub guidance: Guidance,
+}
+
+/// What an alarm watches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Subject {
+    /// A tag.
+    Tag(TagId),
+    /// A device as a whole.
+    Device(DeviceId),
+}
+
+/// When an alarm is active. Limits and deadbands are in the tag's unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Condition {
+    /// A fixed limit; it returns when the value is back by the deadband.
+    Limit {
+        /// Which side, which level.
+        level: Level,
+        /// The limit.
+        limit: f64,
+        /// How far back inside before it returns.
+        deadband: f64,
+    },
+    /// The value is further than `limit` from another tag (its SV), either side.
+    Deviation {
+        /// The tag to compare with.
+        from: TagId,
+        /// Greatest distance.
+        limit: f64,
+        /// How far back inside before it returns.
+        deadband: f64,
+    },
+    /// A discrete tag has this value.
+    State {
+        /// The abnormal value.
+        is: f64,
+    },
+    /// The device does not answer.
+    NotAnswering,
+}
+
+/// The four levels of a limit alarm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    /// Above the high-high limit.
+    HighHigh,
+    /// Above the high limit.
+    High,
+    /// Below the low limit.
+    Low,
+    /// Below the low-low limit.
+    LowLow,
+}
+
+/// Priority of an alarm, the most urgent first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Priority {
+    /// `[1]!`
+    Critical,
+    /// `‹2›!`
+    High,
+    /// `(3)`
+    Medium,
+    /// ` 4 `
+    Low,
+}
+
+impl Priority {
+    /// 1 (critical) to 4 (low).
+    pub fn number(self) -> u8 {
+        match self {
+            Priority::Critical => 1,
+            Priority::High => 2,
+            Priority::Medium => 3,
+            Priority::Low => 4,
+        }
+    }
+    /// The word in TOML, SQL, CSV and on screen.
+    pub fn word(self) -> &'static str {
+        match self {
+            Priority::Critical => "critical",
+            Priority::High => "high",
+            Priority::Medium => "medium",
+            Priority::Low => "low",
+        }
+    }
+}
+
+/// What an operator should know about an alarm. Empty strings where the profile is silent.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Guidance {
+    /// Likely causes.
+    pub cause: String,
+    /// What happens if nothing is done.
+    pub effect: String,
+    /// What to do.
+    pub action: String,
+    /// How soon.
+    pub respond: Option<Duration>,
+}
+
+/// The picture of the process, on a canvas of nominal cells that is stretched to the screen.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct MimicDef {
+    /// Nominal size, columns and rows; 80 by 18 fits a terminal of 80 by 24.
+    pub size: (u16, u16),
+    /// What is drawn, in this order.
+    pub items: Vec<MimicItem>,
+    /// Commands offered on the mimic tab.
+    pub commands: Vec<MimicCommand>,
+}
+
+/// A rectangle on the nominal canvas.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Place {
+    /// Column of the left edge.
+    pub x: u16,
+    /// Row of the top edge.
+    pub y: u16,
+    /// Columns.
+    pub width: u16,
+    /// Rows.
+    pub height: u16,
+}
+
+/// One element of the picture.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MimicItem {
+    /// A vessel with liquid that follows a level tag.
+    Tank {
+        /// Where.
+        place: Place,
+        /// `TK-1 control`.
+        label: String,
+        /// Level, if measured; its range is the height of the vessel.
+        level: Option<TagId>,
+        /// Temperature shown inside.
+        temperature: Option<TagId>,
+        /// Heating power or output; drawn as a heater at the bottom while above zero.
+        heater: Option<TagId>,
+        /// Agitator run signal.
+        agitator: Option<TagId>,
+    },
+    /// A valve, open while its tag is not zero.
+    Valve {
+        /// Where (width and height unused).
+        place: Place,
+        /// `SV-1`.
+        label: String,
+        /// State.
+        tag: TagId,
+        /// Drawn in a vertical pipe.
+        vertical: bool,
+    },
+    /// A pump, running while its tag is not zero.
+    Pump {
+        /// Where.
+        place: Place,
+        /// `P-1`.
+        label: String,
+        /// State.
+        tag: TagId,
+    },
+    /// A pipe along points (column, row), with flow from first to last while every tag is not zero.
+    Pipe {
+        /// Corners of the pipe.
+        points: Vec<(u16, u16)>,
+        /// All of these must be on for flow.
+        flow: Vec<TagId>,
+    },
+    /// A value with unit and quality.
+    Value {
+        /// Where.
+        place: Place,
+        /// Shown before the value.
+        label: String,
+        /// What.
+        tag: TagId,
+    },
+    /// PV, SV, MV and bar of a controller.
+    Controller {
+        /// Where.
+        place: Place,
+        /// Which device; it has a faceplate.
+        device: DeviceId,
+    },
+    /// The steps of a sequence, the present one marked.
+    Sequence {
+        /// Where.
+        place: Place,
+        /// Heading.
+        label: String,
+        /// The step tag; its enum labels are the steps.
+        step: TagId,
+        /// Seconds left in the step.
+        remaining: Option<TagId>,
+        /// Run / stop and auto / manual, shown below.
+        states: Vec<TagId>,
+    },
+    /// A small trend of the last minutes.
+    Trend {
+        /// Where.
+        place: Place,
+        /// What.
+        tag: TagId,
+        /// How far back.
+        window: Duration,
+    },
+    /// Plain words.
+    Text {
+        /// Where.
+        place: Place,
+        /// The words.
+        text: String,
+    },
+}
+
+/// A command on the mimic tab: one key, one tag, one value or a toggle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MimicCommand {
+    /// The key: one lower-case letter.
+    pub key: char,
+    /// `run/stop`.
+    pub label: String,
+    /// What it writes.
+    pub tag: TagId,
+    /// A fixed value; `None` toggles a two-state tag or asks for a number.
+    pub value: Option<f64>,
+}
+
+/// A group of pens of the trends tab.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrendGroup {
+    /// `TIC-1`.
+    pub name: String,
+    /// The pens, at most eight.
+    pub pens: Vec<Pen>,
+}
+
+/// One curve: its tag and the scale it is drawn on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pen {
+    /// What.
+    pub tag: TagId,
+    /// Fixed scale (low, high); `None` fits the data.
+    pub scale: Option<(f64, f64)>,
+}
+
+/// A shift of the day.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ShiftDef {
+    /// `morning`.
+    pub name: String,
+    /// Local start; it lasts until the next shift starts.
+    pub start: Time,
+}
+
+/// What reports contain and how their CSV is written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReportDef {
+    /// Where reports are written, relative to the working folder.
+    pub folder: std::path::PathBuf,
+    /// Tags in the table; empty means every stored tag with a unit.
+    pub tags: Vec<TagId>,
+    /// The thesis's raw record (date, time, SV, PV, ER): the controller, and the interval.
+    pub record: Option<(DeviceId, Duration)>,
+    /// How CSV is written.
+    pub csv: CsvDialect,
+}
+
+/// How CSV is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CsvDialect {
+    /// `,` or `;`.
+    pub separator: char,
+    /// `.` or `,`; never the separator.
+    pub decimal: char,
+    /// Write a UTF-8 byte order mark first, for spreadsheets.
+    pub bom: bool,
+}
+
+impl Default for CsvDialect {
+    fn default() -> Self {
+        CsvDialect { separator: ',', decimal: '.', bom: false }
+    }
+}

@@ -1,0 +1,229 @@
+//! What the bus tells the plant: values read, requests that failed, states of lines, outcomes of writes.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+
+use super::{
+    command::WriteId,
+    def::{DeviceId, LineId, TagId},
+};
+
+/// One fact from the bus. Every event carries the time at which it became true.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Event {
+    /// A block was read: raw numbers (typed and ordered, not scaled) of its tags.
+    Read {
+        /// When the answer was complete.
+        at: Timestamp,
+        /// Who answered.
+        device: DeviceId,
+        /// Raw number of every tag in the block.
+        values: Vec<(TagId, f64)>,
+        /// From the last byte sent to the first byte received.
+        reply: Duration,
+    },
+    /// A block could not be read.
+    Failed {
+        /// When that was certain.
+        at: Timestamp,
+        /// Who was asked.
+        device: DeviceId,
+        /// The tags without a fresh value.
+        tags: Vec<TagId>,
+        /// Why.
+        fault: Fault,
+    },
+    /// A line changed its state.
+    Line {
+        /// When.
+        at: Timestamp,
+        /// Which.
+        line: LineId,
+        /// The new state.
+        state: LineState,
+    },
+    /// Counters of a line, about once a second.
+    Counters {
+        /// When.
+        at: Timestamp,
+        /// Which.
+        line: LineId,
+        /// Totals since the start.
+        counters: LineCounters,
+    },
+    /// A write came to its end on the wire.
+    Wrote {
+        /// When.
+        at: Timestamp,
+        /// Which.
+        id: WriteId,
+        /// What the device said.
+        result: WriteResult,
+    },
+}
+
+/// How a write ended on the wire. The plant compares and names the outcome.
+#[derive(Debug, Clone, PartialEq)]
+pub enum WriteResult {
+    /// The device accepted it; then it was read back: this raw number.
+    ReadBack(f64),
+    /// The device accepted it, but the read-back failed.
+    NotRead(Fault),
+    /// The device accepted it; the profile wants no read-back.
+    Accepted,
+    /// The device refused with an exception.
+    Refused(ExceptionCode),
+    /// No valid answer: it is not known whether the write took effect.
+    Lost(Fault),
+    /// Nothing was sent.
+    NotSent(Fault),
+}
+
+/// Why a request did not end in a valid normal answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Fault {
+    /// No answer at all, or not a whole one, before the deadline.
+    #[error("no answer in time")]
+    Timeout,
+    /// The check did not fit.
+    #[error("CRC error: got {got:04X}, computed {computed:04X}")]
+    Crc {
+        /// As received, low byte first on the wire.
+        got: u16,
+        /// Over the bytes received.
+        computed: u16,
+    },
+    /// The frame ended too early.
+    #[error("answer cut short: {got} of {expected} bytes")]
+    Truncated {
+        /// Bytes received.
+        got: u16,
+        /// Bytes expected.
+        expected: u16,
+    },
+    /// Another unit answered.
+    #[error("answer from unit {got}, asked unit {asked}")]
+    WrongUnit {
+        /// Unit in the answer.
+        got: u8,
+        /// Unit asked.
+        asked: u8,
+    },
+    /// The answer is to another function.
+    #[error("answer to function {got} / 0x{got:02X}, asked {asked} / 0x{asked:02X}")]
+    WrongFunction {
+        /// Function in the answer.
+        got: u8,
+        /// Function asked.
+        asked: u8,
+    },
+    /// The answer has another length than was asked for.
+    #[error("answer with {got} data bytes, asked {asked}")]
+    WrongLength {
+        /// Data bytes in the answer.
+        got: u16,
+        /// Data bytes asked.
+        asked: u16,
+    },
+    /// The echo of a write names another address or value.
+    #[error("echo of the write differs from the request")]
+    WrongEcho,
+    /// The device said no.
+    #[error("{0}")]
+    Exception(ExceptionCode),
+    /// The port or connection is not open.
+    #[error("line not connected")]
+    NotConnected,
+    /// The unit is resting after having failed; nothing was sent.
+    #[error("device not answering, next try later")]
+    Resting,
+}
+
+impl Fault {
+    /// Frames that came but were spoiled, as opposed to silence and refusals.
+    pub fn is_corrupt(self) -> bool {
+        match self {
+            Fault::Crc { .. }
+            | Fault::Truncated { .. }
+            | Fault::WrongUnit { .. }
+            | Fault::WrongFunction { .. }
+            | Fault::WrongLength { .. }
+            | Fault::WrongEcho => true,
+            Fault::Timeout | Fault::Exception(_) | Fault::NotConnected | Fault::Resting => false,
+        }
+    }
+}
+
+/// Exception code of an answer (Modbus application protocol V1.1b3, section 7).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
+#[error("exception {0:02X}, {words}", words = self.words())]
+pub struct ExceptionCode(pub u8);
+
+impl ExceptionCode {
+    /// The meaning in the words of the standard.
+    pub fn words(self) -> &'static str {
+        match self.0 {
+            0x01 => "illegal function",
+            0x02 => "illegal data address",
+            0x03 => "illegal data value",
+            0x04 => "device failure",
+            0x05 => "acknowledge, still working",
+            0x06 => "device busy",
+            0x08 => "memory parity error",
+            0x0A => "gateway path unavailable",
+            0x0B => "gateway target does not respond",
+            _ => "unknown exception",
+        }
+    }
+}
+
+/// State of a line. A wait names its end, so that a screen can count down.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum LineState {
+    /// The port or connection is being opened.
+    #[default]
+    Connecting,
+    /// Requests are running.
+    Connected,
+    /// It went away or would not open; the next try is at `retry_at`.
+    Waiting {
+        /// In the words of the system: `No such file or directory`.
+        why: String,
+        /// When it is tried again.
+        retry_at: Timestamp,
+    },
+    /// Closed by an operator.
+    Disconnected,
+}
+
+/// Counters of a line since the start of the station.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LineCounters {
+    /// Requests sent.
+    pub requests: u64,
+    /// Valid normal answers.
+    pub ok: u64,
+    /// No answer in time.
+    pub timeouts: u64,
+    /// Spoiled answers.
+    pub corrupt: u64,
+    /// Exception answers.
+    pub exceptions: u64,
+    /// Frames or bytes that nobody had asked for any more.
+    pub stale: u64,
+    /// Times the port or connection was opened.
+    pub opens: u64,
+    /// Polls that could not start in their period and were skipped.
+    pub missed: u64,
+    /// Bytes sent.
+    pub sent_bytes: u64,
+    /// Bytes received.
+    pub received_bytes: u64,
+    /// Share of the last ten seconds in which the line was busy, 0–1.
+    pub utilisation: f32,
+    /// Last byte sent.
+    pub last_tx: Option<Timestamp>,
+    /// Last byte received.
+    pub last_rx: Option<Timestamp>,
+}

@@ -1,0 +1,176 @@
+//! A value never travels alone: number, quality and time are one thing.
+
+use jiff::Timestamp;
+
+/// How far a value can be trusted. Ordered: `Good < Uncertain < Bad`, so `max` is "the worst of".
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Quality {
+    /// Read in time, in shape and in range.
+    Good,
+    /// The last known value, shown with its age: it may no longer be so.
+    Uncertain(Cause),
+    /// There is no value.
+    Bad(Cause),
+}
+
+/// Why a value is not good. The discriminant is what the history stores: never renumber.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum Cause {
+    /// Nothing has been read since the station started.
+    NotRead = 1,
+    /// The device did not answer the last request in time.
+    Timeout = 2,
+    /// The answer did not survive the line (CRC, length, wrong unit or function).
+    Corrupt = 3,
+    /// The device refused the request with an exception.
+    Exception = 4,
+    /// Older than three (uncertain) or ten (bad) poll periods.
+    Stale = 5,
+    /// The device has stopped answering.
+    DeviceDown = 6,
+    /// The port or connection is gone or was closed by the operator.
+    NotConnected = 7,
+    /// The device itself says that the measurement failed (status word, sentinel value).
+    SensorFault = 8,
+    /// A value that this one needs (decimals, unit, range) is not known.
+    Unscaled = 9,
+    /// Outside the range that the device can report.
+    OutOfRange = 10,
+    /// The station was not running.
+    StationOff = 11,
+}
+
+impl Cause {
+    /// Every cause, in the order of its number.
+    pub const ALL: [Cause; 11] = [
+        Cause::NotRead,
+        Cause::Timeout,
+        Cause::Corrupt,
+        Cause::Exception,
+        Cause::Stale,
+        Cause::DeviceDown,
+        Cause::NotConnected,
+        Cause::SensorFault,
+        Cause::Unscaled,
+        Cause::OutOfRange,
+        Cause::StationOff,
+    ];
+
+    /// A few words for the operator.
+    pub fn words(self) -> &'static str {
+        match self {
+            Cause::NotRead => "not read yet",
+            Cause::Timeout => "no answer in time",
+            Cause::Corrupt => "answer corrupt",
+            Cause::Exception => "refused by the device",
+            Cause::Stale => "too old",
+            Cause::DeviceDown => "device not answering",
+            Cause::NotConnected => "line not connected",
+            Cause::SensorFault => "sensor fault",
+            Cause::Unscaled => "scale not known",
+            Cause::OutOfRange => "out of range",
+            Cause::StationOff => "station was off",
+        }
+    }
+}
+
+impl Quality {
+    /// `true` only for [`Quality::Good`].
+    pub fn is_good(self) -> bool {
+        self == Quality::Good
+    }
+
+    /// `true` for [`Quality::Bad`].
+    pub fn is_bad(self) -> bool {
+        matches!(self, Quality::Bad(_))
+    }
+
+    /// The cause, unless good.
+    pub fn cause(self) -> Option<Cause> {
+        match self {
+            Quality::Good => None,
+            Quality::Uncertain(cause) | Quality::Bad(cause) => Some(cause),
+        }
+    }
+
+    /// The one-byte form that the history stores: 0 good, 64 + cause uncertain, 128 + cause bad
+    /// (the two top bits as in OPC UA severity: 00 good, 01 uncertain, 10 bad).
+    pub fn code(self) -> u8 {
+        match self {
+            Quality::Good => 0,
+            Quality::Uncertain(cause) => 64 + cause as u8,
+            Quality::Bad(cause) => 128 + cause as u8,
+        }
+    }
+
+    /// The quality of a stored code; `None` for a number that no version wrote.
+    pub fn from_code(code: u8) -> Option<Quality> {
+        let cause = |n: u8| Cause::ALL.into_iter().find(|cause| *cause as u8 == n);
+        match code {
+            0 => Some(Quality::Good),
+            64..=127 => cause(code - 64).map(Quality::Uncertain),
+            128..=191 => cause(code - 128).map(Quality::Bad),
+            _ => None,
+        }
+    }
+}
+
+/// A value with its quality and the instant at which the device said it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// In the tag's unit; bits are 0 or 1, enumerations their number. `None` exactly when the quality is bad.
+    pub value: Option<f64>,
+    /// How far to trust it.
+    pub quality: Quality,
+    /// When the answer arrived; for a value never read, when that was found.
+    pub at: Timestamp,
+}
+
+impl Sample {
+    /// A good value.
+    pub fn good(value: f64, at: Timestamp) -> Sample {
+        Sample { value: Some(value), quality: Quality::Good, at }
+    }
+
+    /// No value, and why.
+    pub fn bad(cause: Cause, at: Timestamp) -> Sample {
+        Sample { value: None, quality: Quality::Bad(cause), at }
+    }
+
+    /// The last value kept, but no longer trusted; a sample without a value becomes bad.
+    pub fn doubted(self, cause: Cause) -> Sample {
+        match self.value {
+            Some(_) => Sample { quality: Quality::Uncertain(cause), ..self },
+            None => Sample { quality: Quality::Bad(cause), ..self },
+        }
+    }
+
+    /// The value only if it is good.
+    pub fn trusted(self) -> Option<f64> {
+        self.value.filter(|_| self.quality.is_good())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_quality_survives_its_stored_code() {
+        let all = Cause::ALL.into_iter().flat_map(|c| [Quality::Uncertain(c), Quality::Bad(c)]);
+        for quality in all.chain([Quality::Good]) {
+            assert_eq!(Quality::from_code(quality.code()), Some(quality));
+        }
+        assert_eq!(Quality::from_code(63), None);
+        assert_eq!(Quality::from_code(255), None);
+    }
+
+    #[test]
+    fn a_doubted_value_is_kept_and_a_missing_one_stays_missing() {
+        let at = Timestamp::UNIX_EPOCH;
+        assert_eq!(Sample::good(1.5, at).doubted(Cause::Timeout).value, Some(1.5));
+        assert_eq!(Sample::bad(Cause::NotRead, at).doubted(Cause::Timeout).quality, Quality::Bad(Cause::Timeout));
+        assert_eq!(Sample::good(1.5, at).doubted(Cause::Stale).trusted(), None);
+    }
+}

@@ -1,0 +1,163 @@
+//! All that is true at one instant, as plain data: what screens draw and scripts print.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use super::{
+    alarm::AlarmState,
+    command::OrderStatus,
+    def::{AlarmId, DeviceId, LineId, PlantDef, TagId},
+    event::{Fault, LineCounters, LineState},
+    sample::Sample,
+};
+
+/// The plant at one instant. Losing an intermediate snapshot is harmless.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    /// The instant.
+    pub at: Timestamp,
+    /// What never changes.
+    pub def: Arc<PlantDef>,
+    /// Samples, by [`TagId`].
+    pub samples: Vec<Sample>,
+    /// Decimals to show, by [`TagId`] (they may come from the device).
+    pub decimals: Vec<u8>,
+    /// Lines, by [`LineId`].
+    pub lines: Vec<LineStatus>,
+    /// Devices, by [`DeviceId`].
+    pub devices: Vec<DeviceStatus>,
+    /// Alarms that are active or unacknowledged: most urgent first, then latest first.
+    pub alarms: Vec<ActiveAlarm>,
+    /// The latest orders, newest first, at most 32.
+    pub orders: Vec<OrderStatus>,
+    /// The history store.
+    pub history: HistoryStatus,
+    /// Plant seconds per real second; 1 except in demonstrations.
+    pub speed: f64,
+}
+
+impl Snapshot {
+    /// The sample of a tag.
+    pub fn sample(&self, tag: TagId) -> Sample {
+        self.samples[tag.index()]
+    }
+    /// Age of a sample at this instant, zero for one that is newer.
+    pub fn age(&self, tag: TagId) -> Duration {
+        Duration::try_from(self.at.duration_since(self.sample(tag).at)).unwrap_or_default()
+    }
+    /// The value of a tag as text with its decimals or enumeration label, without unit; `None` without a value.
+    pub fn text(&self, tag: TagId) -> Option<String> {
+        let value = self.sample(tag).value?;
+        Some(self.format(tag, value))
+    }
+    /// Any value of a tag as text with its decimals or enumeration label.
+    pub fn format(&self, tag: TagId, value: f64) -> String {
+        match self.def.tag(tag).label_of(value) {
+            Some(label) => label.to_owned(),
+            None => format!("{value:.*}", usize::from(self.decimals[tag.index()])),
+        }
+    }
+    /// The unit of a tag, which the device may choose (°C or °F).
+    pub fn unit(&self, tag: TagId) -> &str {
+        let def = self.def.tag(tag);
+        let chosen = def.unit_from.as_ref().and_then(|(from, units)| {
+            let value = self.sample(*from).trusted()?;
+            units.iter().find(|(number, _)| *number as f64 == value).map(|(_, unit)| unit.as_str())
+        });
+        chosen.unwrap_or(&def.unit)
+    }
+    /// Lowest and highest permitted value of a tag, where both are known now.
+    pub fn range(&self, tag: TagId) -> Option<(f64, f64)> {
+        let def = self.def.tag(tag);
+        let bound = |bound: Option<super::tag::Bound>| match bound? {
+            super::tag::Bound::Fixed(value) => Some(value),
+            super::tag::Bound::From(from) => self.sample(from).value,
+        };
+        Some((bound(def.min)?, bound(def.max)?))
+    }
+    /// The state of a line.
+    pub fn line(&self, id: LineId) -> &LineStatus {
+        &self.lines[id.index()]
+    }
+    /// The state of a device.
+    pub fn device(&self, id: DeviceId) -> &DeviceStatus {
+        &self.devices[id.index()]
+    }
+    /// The alarms of a tag, most urgent first.
+    pub fn alarms_of(&self, tag: TagId) -> impl Iterator<Item = &ActiveAlarm> {
+        use super::def::Subject;
+        self.alarms.iter().filter(move |alarm| self.def.alarm(alarm.id).subject == Subject::Tag(tag))
+    }
+}
+
+/// A line as it stands.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LineStatus {
+    /// Connected, waiting, closed.
+    pub state: LineState,
+    /// Totals since the start.
+    pub counters: LineCounters,
+}
+
+/// A device as it stands.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DeviceStatus {
+    /// Answering or not.
+    pub state: DeviceState,
+    /// Time of the last answer, from last byte sent to first byte received.
+    pub reply: Option<Duration>,
+    /// Valid answers since the start.
+    pub ok: u64,
+    /// Requests that failed since the start.
+    pub failed: u64,
+    /// The last failure and its time.
+    pub last_fault: Option<(Timestamp, Fault)>,
+}
+
+/// Whether a device answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DeviceState {
+    /// Not asked yet.
+    #[default]
+    Unknown,
+    /// Its last request was answered.
+    Answering,
+    /// The last `n` requests failed, not enough to give it up.
+    Failing(u32),
+    /// Given up, probed now and then.
+    Down {
+        /// Since when.
+        since: Timestamp,
+    },
+}
+
+/// An alarm that an operator should see.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActiveAlarm {
+    /// Which.
+    pub id: AlarmId,
+    /// Unacknowledged, acknowledged, returned.
+    pub state: AlarmState,
+    /// When it was raised.
+    pub raised_at: Timestamp,
+    /// When it returned to normal, if it did.
+    pub returned_at: Option<Timestamp>,
+    /// The value that raised it.
+    pub value: Option<f64>,
+}
+
+/// The history store as it stands.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct HistoryStatus {
+    /// Rows committed since the start.
+    pub rows: u64,
+    /// Records that had to be dropped because the store could not keep up.
+    pub lost: u64,
+    /// Last commit.
+    pub committed_at: Option<Timestamp>,
+    /// What is wrong with it, in words for the operator.
+    pub trouble: Option<String>,
+    /// Size of the file, bytes.
+    pub file_bytes: u64,
+}

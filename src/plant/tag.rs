@@ -1,0 +1,272 @@
+//! A tag: where a value lives in its device, what it means and what may be done with it.
+
+use std::time::Duration;
+
+use super::def::{DeviceId, TagId};
+
+/// Definition of a tag.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TagDef {
+    /// Its place.
+    pub id: TagId,
+    /// The device it belongs to.
+    pub device: DeviceId,
+    /// Full name, `TIC-1.PV`: device name, dot, short name.
+    pub name: String,
+    /// Short name, `PV`.
+    pub short: String,
+    /// A few words: `process value`.
+    pub label: String,
+    /// What the value does and means, for the controller tab.
+    pub meaning: String,
+    /// Where and how it is stored in the device.
+    pub point: Point,
+    /// `value = raw · scale · 10^-decimals_from + offset`.
+    pub scale: f64,
+    /// Added after scaling.
+    pub offset: f64,
+    /// Decimals to show, and where they come from.
+    pub decimals: Decimals,
+    /// `°C`, `%`, `s`; empty for none.
+    pub unit: String,
+    /// A tag whose value picks the unit from this list (PXR 41017: 0 °C, 1 °F).
+    pub unit_from: Option<(TagId, Vec<(i64, String)>)>,
+    /// Lowest value that may be written, and low end of bars.
+    pub min: Option<Bound>,
+    /// Highest value that may be written, and high end of bars.
+    pub max: Option<Bound>,
+    /// What may be done with it.
+    pub access: Access,
+    /// Asked before a write, beyond old and new value.
+    pub confirm: Option<String>,
+    /// Names of the numbers of an enumeration; empty for a quantity.
+    pub labels: Vec<(i64, String)>,
+    /// Names of the bits of a status word.
+    pub bit_labels: Vec<(u8, String)>,
+    /// Raw numbers (before scaling) that mean "no value".
+    pub bad_if: Vec<i64>,
+    /// Another tag that makes this one bad while `value & mask != 0` (PXR 31008 for PV).
+    pub quality_from: Option<(TagId, u64)>,
+    /// Function code to write with; `None` picks 5/6 for one word, 16 for more.
+    pub write_fc: Option<u8>,
+    /// Tag and value to write before this one (Delta DTB 0810H).
+    pub write_unlock: Option<(TagId, f64)>,
+    /// Group on the controller tab.
+    pub group: String,
+    /// How often it is read.
+    pub poll: Poll,
+    /// Smallest change that is stored; 0 stores every change.
+    pub deadband: f64,
+    /// Stored in the history.
+    pub store: bool,
+    /// How sure the register map is of this row.
+    pub confidence: Confidence,
+    /// Where the row comes from (manual, clause).
+    pub source: String,
+}
+
+impl TagDef {
+    /// May an operator write it?
+    pub fn writable(&self) -> bool {
+        self.access != Access::Read
+    }
+    /// The text of an enumeration's number.
+    pub fn label_of(&self, value: f64) -> Option<&str> {
+        self.labels.iter().find(|(number, _)| *number as f64 == value).map(|(_, text)| text.as_str())
+    }
+}
+
+/// Where a value lives in its device: wire address, 0-based.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Point {
+    /// Which of the four tables.
+    pub table: Table,
+    /// Address on the wire (PDU), 0-based.
+    pub address: u16,
+    /// Type of the raw value.
+    pub kind: Kind,
+    /// Order of bytes and words.
+    pub order: Order,
+    /// A field of bits inside a word: (lowest bit, number of bits).
+    pub field: Option<(u8, u8)>,
+}
+
+impl Point {
+    /// Registers (or bits, for the bit tables) that it takes.
+    pub fn len(self) -> u16 {
+        if self.table.is_bits() { 1 } else { self.kind.words() }
+    }
+    /// Never empty; here because clippy and readers expect it beside `len`.
+    pub fn is_empty(self) -> bool {
+        false
+    }
+}
+
+/// The four tables of Modbus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Table {
+    /// Read-write bits, FC 01 / 05 / 15.
+    Coil,
+    /// Read-only bits, FC 02.
+    Discrete,
+    /// Read-only registers, FC 04.
+    Input,
+    /// Read-write registers, FC 03 / 06 / 16.
+    Holding,
+}
+
+impl Table {
+    /// `true` for coils and discrete inputs.
+    pub fn is_bits(self) -> bool {
+        matches!(self, Table::Coil | Table::Discrete)
+    }
+    /// The read function code.
+    pub fn read_fc(self) -> u8 {
+        match self {
+            Table::Coil => 1,
+            Table::Discrete => 2,
+            Table::Holding => 3,
+            Table::Input => 4,
+        }
+    }
+    /// First digit of the Modicon number.
+    pub fn digit(self) -> u8 {
+        match self {
+            Table::Coil => 0,
+            Table::Discrete => 1,
+            Table::Input => 3,
+            Table::Holding => 4,
+        }
+    }
+    /// The word in TOML and on screen.
+    pub fn word(self) -> &'static str {
+        match self {
+            Table::Coil => "coil",
+            Table::Discrete => "discrete",
+            Table::Input => "input",
+            Table::Holding => "holding",
+        }
+    }
+    /// The Modicon number of a wire address: five digits up to address 9998, else six.
+    pub fn modicon(self, address: u16) -> String {
+        let number = u32::from(address) + 1;
+        if number <= 9_999 { format!("{}{number:04}", self.digit()) } else { format!("{}{number:05}", self.digit()) }
+    }
+}
+
+/// Type of a raw value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// One bit of a bit table, or a whole word not zero.
+    Bool,
+    /// 16 bits, two's complement.
+    I16,
+    /// 16 bits.
+    U16,
+    /// 32 bits, two's complement.
+    I32,
+    /// 32 bits.
+    U32,
+    /// 64 bits, two's complement.
+    I64,
+    /// 64 bits.
+    U64,
+    /// IEEE 754 single.
+    F32,
+    /// IEEE 754 double.
+    F64,
+    /// Four decimal digits.
+    Bcd16,
+    /// Eight decimal digits.
+    Bcd32,
+}
+
+impl Kind {
+    /// Registers it takes.
+    pub fn words(self) -> u16 {
+        match self {
+            Kind::Bool | Kind::I16 | Kind::U16 | Kind::Bcd16 => 1,
+            Kind::I32 | Kind::U32 | Kind::F32 | Kind::Bcd32 => 2,
+            Kind::I64 | Kind::U64 | Kind::F64 => 4,
+        }
+    }
+}
+
+/// Order of the bytes A B C D (A most significant) on the wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Order {
+    /// Big-endian, the default of the Modbus world.
+    #[default]
+    Abcd,
+    /// Low word first (DirectLOGIC).
+    Cdab,
+    /// Bytes swapped inside words.
+    Badc,
+    /// Little-endian.
+    Dcba,
+}
+
+/// Decimals of a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Decimals {
+    /// Always so many; they do not scale.
+    Fixed(u8),
+    /// Another tag says how many decimals the raw number has: it scales by 10^-n and shows n.
+    From(TagId),
+}
+
+/// A bound of a value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bound {
+    /// A number in the tag's unit.
+    Fixed(f64),
+    /// The present value of another tag.
+    From(TagId),
+}
+
+/// What may be done with a tag.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Access {
+    /// Read only.
+    Read,
+    /// Read and write.
+    ReadWrite,
+    /// Write only: it has no value of its own.
+    Write,
+}
+
+/// How often a tag is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Poll {
+    /// On an absolute grid with this period.
+    Every(Duration),
+    /// When the device appears, and when asked for.
+    Once,
+    /// Never by itself.
+    Never,
+}
+
+/// How sure a row of a register map is (see the profile's sources).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Confidence {
+    /// Recorded on a real device or read in the maker's manual.
+    Proven,
+    /// Two independent sources agree.
+    High,
+    /// One source: a write is flagged "not verified".
+    Medium,
+    /// Inference: shown only with `--experimental`.
+    Low,
+}
+
+impl Confidence {
+    /// The word in TOML and on screen.
+    pub fn word(self) -> &'static str {
+        match self {
+            Confidence::Proven => "proven",
+            Confidence::High => "high",
+            Confidence::Medium => "medium",
+            Confidence::Low => "low",
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! Reports: the shift calendar, the figures of a shift, and their CSV; pure, rows in and bytes out.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+
+use crate::plant::record::{ActionRecord, AlarmRecord};
+
+/// A span of time with a name: a shift, or a free period.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Period {
+    /// Name of the shift and its local date (`morning 2026-11-21`), or `period`.
+    pub name: String,
+    /// From, inclusive.
+    pub from: Timestamp,
+    /// To, exclusive; may lie in the future for a running shift.
+    pub to: Timestamp,
+}
+
+/// The figures of a period.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShiftReport {
+    /// Which period.
+    pub period: Period,
+    /// Up to when data were there: the end of the period, or earlier for a running shift.
+    pub until: Timestamp,
+    /// One row a tag.
+    pub tags: Vec<TagFigures>,
+    /// Steps of alarms in the period, oldest first.
+    pub alarms: Vec<AlarmRecord>,
+    /// Deeds of operators in the period, oldest first.
+    pub actions: Vec<ActionRecord>,
+    /// The thesis's raw record at a fixed interval.
+    pub record: Vec<RecordRow>,
+    /// Name and unit of the controller of `record`.
+    pub record_of: Option<(String, String)>,
+}
+
+/// Figures of one tag over a period; `None` where there was no good value.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TagFigures {
+    /// `TIC-1.PV`.
+    pub tag: String,
+    /// `°C`.
+    pub unit: String,
+    /// Decimals to print.
+    pub decimals: u8,
+    /// Least good value.
+    pub min: Option<f64>,
+    /// Time-weighted mean over good time.
+    pub mean: Option<f64>,
+    /// Greatest good value.
+    pub max: Option<f64>,
+    /// Last good value.
+    pub last: Option<f64>,
+    /// Time in which an alarm of this tag was active.
+    pub in_alarm: Duration,
+    /// Share of the period with a good value, 0–1.
+    pub good: f64,
+}
+
+/// One row of the thesis's record: `er = sv − pv`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RecordRow {
+    /// When.
+    pub at: Timestamp,
+    /// Set value, if good.
+    pub sv: Option<f64>,
+    /// Process value, if good.
+    pub pv: Option<f64>,
+    /// SV − PV, if both are good.
+    pub er: Option<f64>,
+}
