@@ -1,0 +1,360 @@
+//! The values of all tags: raw answers become samples, doubts and ages take their trust away, changes are stored.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use super::{
+    def::{DeviceId, PlantDef, TagId},
+    event::{ExceptionCode, Fault},
+    record::Record,
+    sample::{Cause, Quality, Sample},
+    scale,
+    tag::{Bound, Decimals, Poll, TagDef},
+};
+
+/// A value is uncertain after so many poll periods without an answer, and bad after [`PERIODS_BAD`].
+pub const PERIODS_UNCERTAIN: u32 = 3;
+/// See [`PERIODS_UNCERTAIN`].
+pub const PERIODS_BAD: u32 = 10;
+/// An unchanged good value is stored again after this time, so that a silent stretch in the history means "no data".
+pub const STORE_EVERY: Duration = Duration::from_secs(60);
+
+/// What is known of every tag.
+#[derive(Debug, Clone)]
+pub struct Board {
+    def: Arc<PlantDef>,
+    /// What was last read, by tag; `None` when there is no value to stand on.
+    raw: Vec<Option<Reading>>,
+    samples: Vec<Sample>,
+    /// What the history last got, by tag.
+    stored: Vec<Option<Sample>>,
+    /// Tags whose value depends on this one (decimals, fault word), by tag.
+    dependents: Vec<Vec<TagId>>,
+}
+
+/// A raw number, when it was read, and what has made it doubtful since.
+#[derive(Debug, Clone, Copy)]
+struct Reading {
+    raw: f64,
+    at: Timestamp,
+    doubt: Option<Cause>,
+}
+
+impl Board {
+    /// Nothing read yet, as of `at`.
+    pub fn new(def: Arc<PlantDef>, at: Timestamp) -> Board {
+        let count = def.tags.len();
+        let mut dependents = vec![Vec::new(); count];
+        for tag in &def.tags {
+            for from in needs(tag) {
+                dependents[from.index()].push(tag.id);
+            }
+        }
+        Board {
+            raw: vec![None; count],
+            samples: vec![Sample::bad(Cause::NotRead, at); count],
+            stored: vec![None; count],
+            dependents,
+            def,
+        }
+    }
+
+    /// All samples, by tag.
+    pub fn samples(&self) -> &[Sample] {
+        &self.samples
+    }
+
+    /// The sample of a tag.
+    pub fn sample(&self, tag: TagId) -> Sample {
+        self.samples[tag.index()]
+    }
+
+    /// Takes the raw numbers of one answer. A fault word or decimals among them count for their dependents at once.
+    pub fn read(&mut self, values: &[(TagId, f64)], at: Timestamp) {
+        for (tag, raw) in values {
+            self.raw[tag.index()] = Some(Reading { raw: *raw, at, doubt: None });
+        }
+        for (tag, _) in values {
+            self.settle(*tag);
+        }
+        for (tag, _) in values {
+            for dependent in self.dependents[tag.index()].clone() {
+                self.settle(dependent);
+            }
+        }
+    }
+
+    /// A request for these tags failed: they lose trust, and at once their value where the fault says that there is none.
+    pub fn failed(&mut self, tags: &[TagId], fault: Fault, at: Timestamp) {
+        for tag in tags {
+            match judge(fault) {
+                // The last value of a device that is known to be gone is not doubtful but past.
+                Verdict::Doubt(_) if self.sample(*tag).quality.is_bad() => {}
+                Verdict::Doubt(cause) => self.doubt(*tag, cause),
+                Verdict::Gone(cause) => self.drop_value(*tag, cause, at),
+            }
+        }
+    }
+
+    /// Everything of a device is gone at once.
+    pub fn gone(&mut self, device: DeviceId, cause: Cause, at: Timestamp) {
+        let def = self.def.clone();
+        for tag in def.tags_of(device) {
+            if self.sample(tag.id).quality != Quality::Bad(cause) {
+                self.drop_value(tag.id, cause, at);
+            }
+        }
+    }
+
+    /// Lets values age: uncertain after three missed periods, bad after ten.
+    pub fn age(&mut self, at: Timestamp) {
+        let def = self.def.clone();
+        for tag in &def.tags {
+            let Poll::Every(period) = tag.poll else { continue };
+            let sample = self.sample(tag.id);
+            let age = Duration::try_from(at.duration_since(sample.at)).unwrap_or_default();
+            if sample.quality.is_bad() {
+                continue;
+            } else if period * PERIODS_BAD < age {
+                self.drop_value(tag.id, Cause::Stale, at);
+            } else if period * PERIODS_UNCERTAIN < age && sample.quality.is_good() {
+                self.doubt(tag.id, Cause::Stale);
+            }
+        }
+    }
+
+    /// The records due at `at`: changes beyond the deadband, changes of quality, and unchanged values once a minute.
+    /// Doubts are stored with the time at which they arose, not with the time of the value that they doubt.
+    pub fn records(&mut self, at: Timestamp) -> Vec<Record> {
+        let mut records = Vec::new();
+        for tag in self.def.tags.iter().filter(|tag| tag.store) {
+            let sample = self.samples[tag.id.index()];
+            let stored = &mut self.stored[tag.id.index()];
+            if !is_due(tag, sample, *stored) {
+                continue;
+            }
+            let record = if sample.quality.is_good() { sample } else { Sample { at, ..sample } };
+            *stored = Some(record);
+            records.push(Record::Sample(tag.id, record));
+        }
+        records
+    }
+
+    /// Decimals that the device announces for a tag: they scale its raw number. 0 for tags with fixed decimals.
+    pub fn scaling_decimals(&self, tag: &TagDef) -> Option<u8> {
+        match tag.decimals {
+            Decimals::Fixed(_) => Some(0),
+            Decimals::From(from) => self.sample(from).trusted().map(|decimals| decimals as u8),
+        }
+    }
+
+    /// Decimals to show a tag with.
+    pub fn shown_decimals(&self, tag: &TagDef) -> u8 {
+        match tag.decimals {
+            Decimals::Fixed(decimals) => decimals,
+            Decimals::From(_) => self.scaling_decimals(tag).unwrap_or(0),
+        }
+    }
+
+    /// A bound as it stands now; `Err` names the tag that is not known.
+    pub fn bound(&self, bound: Bound) -> Result<f64, TagId> {
+        match bound {
+            Bound::Fixed(value) => Ok(value),
+            Bound::From(from) => self.sample(from).trusted().ok_or(from),
+        }
+    }
+
+    /// The raw number last read, if the sample still stands on it.
+    pub fn trusted_raw(&self, tag: TagId) -> Option<f64> {
+        self.sample(tag).trusted()?;
+        self.raw[tag.index()].map(|reading| reading.raw)
+    }
+
+    fn doubt(&mut self, tag: TagId, cause: Cause) {
+        if let Some(reading) = &mut self.raw[tag.index()] {
+            reading.doubt = Some(cause);
+        }
+        self.samples[tag.index()] = self.sample(tag).doubted(cause);
+    }
+
+    fn drop_value(&mut self, tag: TagId, cause: Cause, at: Timestamp) {
+        self.raw[tag.index()] = None;
+        self.samples[tag.index()] = Sample::bad(cause, at);
+    }
+
+    /// Makes the sample of a tag from its reading and all that it depends on. A doubt stays until the tag itself is
+    /// read again: nobody else's answer revives it.
+    fn settle(&mut self, tag: TagId) {
+        let Some(Reading { raw, at, doubt }) = self.raw[tag.index()] else { return };
+        let tag = self.def.tag(tag);
+        let fault_word = tag.quality_from.map(|(from, mask)| (self.sample(from), mask));
+        let sample = match (tag.bad_if.contains(&(raw as i64)), self.scaling_decimals(tag)) {
+            (true, _) => Sample::bad(Cause::SensorFault, at),
+            (false, None) => Sample::bad(Cause::Unscaled, at),
+            (false, Some(decimals)) => Sample::good(scale::to_value(tag, raw, decimals), at),
+        };
+        let sample = match fault_word {
+            None => sample,
+            Some((word, mask)) => match word.trusted() {
+                Some(bits) if bits as u64 & mask != 0 => Sample::bad(Cause::SensorFault, at),
+                Some(_) => sample,
+                None => sample.doubted(word.quality.cause().unwrap_or(Cause::NotRead)),
+            },
+        };
+        self.samples[tag.id.index()] = match doubt {
+            Some(cause) if !sample.quality.is_bad() => sample.doubted(cause),
+            Some(_) | None => sample,
+        };
+    }
+}
+
+/// The tags that a tag's value needs.
+fn needs(tag: &TagDef) -> impl Iterator<Item = TagId> {
+    let decimals = match tag.decimals {
+        Decimals::From(from) => Some(from),
+        Decimals::Fixed(_) => None,
+    };
+    decimals.into_iter().chain(tag.quality_from.map(|(from, _)| from))
+}
+
+enum Verdict {
+    Doubt(Cause),
+    Gone(Cause),
+}
+
+/// What a fault means for the values that were asked for.
+fn judge(fault: Fault) -> Verdict {
+    match fault {
+        Fault::Timeout => Verdict::Doubt(Cause::Timeout),
+        Fault::Crc { .. }
+        | Fault::Truncated { .. }
+        | Fault::WrongUnit { .. }
+        | Fault::WrongFunction { .. }
+        | Fault::WrongLength { .. }
+        | Fault::WrongEcho => Verdict::Doubt(Cause::Corrupt),
+        // 05 acknowledge and 06 busy pass; any other exception means that there is no such value.
+        Fault::Exception(ExceptionCode(0x05 | 0x06)) => Verdict::Doubt(Cause::Exception),
+        Fault::Exception(_) => Verdict::Gone(Cause::Exception),
+        Fault::NotConnected => Verdict::Gone(Cause::NotConnected),
+        Fault::Resting => Verdict::Gone(Cause::DeviceDown),
+    }
+}
+
+fn is_due(tag: &TagDef, sample: Sample, stored: Option<Sample>) -> bool {
+    let Some(stored) = stored else { return true };
+    let waited = sample.at.duration_since(stored.at);
+    stored.quality != sample.quality
+        || match (stored.value, sample.value) {
+            (Some(old), Some(new)) => {
+                tag.deadband < (new - old).abs()
+                    || (sample.quality.is_good() && STORE_EVERY <= Duration::try_from(waited).unwrap_or_default())
+            }
+            (None, None) => false,
+            (None, Some(_)) | (Some(_), None) => true,
+        }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::fixture::{self, DP, FAULT, PV, RUN, TIC};
+
+    fn at(second: i64) -> Timestamp {
+        Timestamp::from_second(second).expect("a small number")
+    }
+
+    fn board() -> Board {
+        let mut board = Board::new(fixture::shared(), at(0));
+        board.read(&[(PV, 724.0), (DP, 1.0), (FAULT, 0.0)], at(0));
+        board
+    }
+
+    #[test]
+    fn a_value_needs_its_decimals_and_a_silent_fault_word() {
+        let mut board = Board::new(fixture::shared(), at(0));
+        assert_eq!(board.sample(PV).quality, Quality::Bad(Cause::NotRead));
+        board.read(&[(PV, 724.0), (FAULT, 0.0)], at(1));
+        assert_eq!(board.sample(PV).quality, Quality::Bad(Cause::Unscaled), "never 724 for 72.4");
+        board.read(&[(DP, 1.0)], at(2));
+        assert_eq!(board.sample(PV), Sample::good(72.4, at(1)), "as old as its own reading");
+        board.read(&[(FAULT, 2.0)], at(3));
+        assert_eq!(board.sample(PV).quality, Quality::Bad(Cause::SensorFault));
+        assert_eq!(board.sample(PV).value, None);
+    }
+
+    #[test]
+    fn trust_goes_with_failures() {
+        use Quality::{Bad, Uncertain};
+        for (fault, quality) in [
+            (Fault::Timeout, Uncertain(Cause::Timeout)),
+            (Fault::Crc { got: 1, computed: 2 }, Uncertain(Cause::Corrupt)),
+            (Fault::Exception(ExceptionCode(2)), Bad(Cause::Exception)),
+            (Fault::Exception(ExceptionCode(6)), Uncertain(Cause::Exception)),
+            (Fault::NotConnected, Bad(Cause::NotConnected)),
+            (Fault::Resting, Bad(Cause::DeviceDown)),
+        ] {
+            let mut board = board();
+            board.failed(&[PV], fault, at(1));
+            let sample = board.sample(PV);
+            assert_eq!(sample.quality, quality);
+            assert_eq!(sample.value.is_none(), quality.is_bad(), "{fault}: a bad sample has no value");
+        }
+    }
+
+    #[test]
+    fn nobody_elses_answer_revives_a_doubtful_value() {
+        let mut board = board();
+        board.failed(&[PV], Fault::Timeout, at(1));
+        board.read(&[(FAULT, 0.0), (DP, 1.0)], at(2));
+        assert_eq!(board.sample(PV).quality, Quality::Uncertain(Cause::Timeout));
+        board.age(at(11));
+        board.read(&[(FAULT, 0.0), (DP, 1.0)], at(12));
+        assert_eq!(board.sample(PV).quality, Quality::Bad(Cause::Stale));
+        board.read(&[(PV, 725.0)], at(13));
+        assert_eq!(board.sample(PV), Sample::good(72.5, at(13)));
+    }
+
+    #[test]
+    fn values_age_by_their_own_period() {
+        let mut board = board();
+        for (second, quality) in [
+            (3, Quality::Good),
+            (4, Quality::Uncertain(Cause::Stale)),
+            (10, Quality::Uncertain(Cause::Stale)),
+            (11, Quality::Bad(Cause::Stale)),
+        ] {
+            board.age(at(second));
+            assert_eq!(board.sample(PV).quality, quality, "after {second} s");
+        }
+        assert_eq!(board.sample(RUN).quality, Quality::Bad(Cause::NotRead));
+    }
+
+    #[test]
+    fn a_device_that_is_gone_takes_its_values_with_it() {
+        let mut board = board();
+        board.gone(TIC, Cause::NotConnected, at(5));
+        assert_eq!(board.sample(PV), Sample::bad(Cause::NotConnected, at(5)));
+        board.failed(&[PV], Fault::Timeout, at(6));
+        assert_eq!(board.sample(PV).quality, Quality::Bad(Cause::NotConnected), "a probe in vain changes nothing");
+    }
+
+    #[test]
+    fn changes_are_stored_and_unchanged_values_once_a_minute() {
+        let mut board = board();
+        let count = |board: &mut Board, second| {
+            let pv = |record: &Record| matches!(record, Record::Sample(tag, _) if *tag == PV);
+            board.records(at(second)).iter().filter(|record| pv(record)).count()
+        };
+        assert_eq!(count(&mut board, 0), 1);
+        for (second, raw, expect) in [(1, 724.0, 0), (2, 725.0, 1), (61, 725.0, 0), (62, 725.0, 1)] {
+            board.read(&[(PV, raw)], at(second));
+            assert_eq!(count(&mut board, second), expect, "at {second} s");
+        }
+        board.failed(&[PV], Fault::Timeout, at(63));
+        let records = board.records(at(63));
+        let doubted = Sample { value: Some(72.5), quality: Quality::Uncertain(Cause::Timeout), at: at(63) };
+        assert!(records.contains(&Record::Sample(PV, doubted)), "the doubt begins at 63 s: {records:?}");
+        assert!(board.records(at(64)).is_empty());
+    }
+}

@@ -1,0 +1,162 @@
+//! A small plant for tests: one controller and one PLC on one line.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::tz::TimeZone;
+
+use super::{
+    def::{
+        AlarmDef, AlarmId, Condition, DeviceDef, DeviceId, Guidance, Level, Limits, LineDef, LineId, MimicDef, Parity,
+        PlantDef, Priority, ReportDef, Serial, Subject, TagId, Transport,
+    },
+    tag::{Access, Bound, Confidence, Decimals, Kind, Order, Point, Poll, Table, TagDef},
+};
+
+/// Process value, decimals from [`DP`], bad while [`FAULT`] is not zero.
+pub const PV: TagId = TagId(0);
+/// Set value, writable between 0 and 100.
+pub const SV: TagId = TagId(1);
+/// Decimals of PV and SV.
+pub const DP: TagId = TagId(2);
+/// Input fault word.
+pub const FAULT: TagId = TagId(3);
+/// Run / stop coil of the PLC, an enumeration.
+pub const RUN: TagId = TagId(4);
+/// The controller.
+pub const TIC: DeviceId = DeviceId(0);
+/// The PLC.
+pub const PLC: DeviceId = DeviceId(1);
+/// PV high at 75, deadband 1, on-delay 2 s.
+pub const HIGH: AlarmId = AlarmId(0);
+/// The controller does not answer.
+pub const SILENT: AlarmId = AlarmId(1);
+
+/// The plant.
+pub fn plant() -> PlantDef {
+    let device = |id: DeviceId, name: &str, unit| DeviceDef {
+        id,
+        name: name.into(),
+        title: String::new(),
+        line: LineId(0),
+        unit,
+        profile: "fixture".into(),
+        model: "FIXTURE".into(),
+        limits: Limits { read_words_max: 60, read_bits_max: 128, write_words_max: 60, gap_words_max: 8, alignment: 1 },
+        gap: Duration::ZERO,
+        write_gap: Duration::ZERO,
+        faceplate: None,
+        actions: Vec::new(),
+    };
+    let alarm = |id, subject, condition, on_delay| AlarmDef {
+        id,
+        subject,
+        condition,
+        priority: Priority::High,
+        on_delay,
+        off_delay: Duration::ZERO,
+        text: format!("alarm {}", id_number(id)),
+        guidance: Guidance::default(),
+    };
+    PlantDef {
+        name: "fixture".into(),
+        title: "Fixture".into(),
+        time_zone: TimeZone::UTC,
+        lines: vec![LineDef {
+            id: LineId(0),
+            name: "L1".into(),
+            transport: Transport::Rtu {
+                port: "/dev/null".into(),
+                serial: Serial { baud: 9600, data_bits: 8, parity: Parity::None, stop_bits: 1 },
+            },
+            timeout: Duration::from_millis(300),
+            gap: Duration::ZERO,
+        }],
+        devices: vec![device(TIC, "TIC-1", 1), device(PLC, "PLC-1", 2)],
+        tags: vec![
+            TagDef {
+                decimals: Decimals::From(DP),
+                quality_from: Some((FAULT, 0xFFFF)),
+                ..tag(PV, "PV", Table::Input, 1000)
+            },
+            TagDef {
+                decimals: Decimals::From(DP),
+                access: Access::ReadWrite,
+                min: Some(Bound::Fixed(0.0)),
+                max: Some(Bound::Fixed(100.0)),
+                ..tag(SV, "SV", Table::Holding, 1002)
+            },
+            tag(DP, "DP", Table::Holding, 1019),
+            tag(FAULT, "FAULT", Table::Input, 1007),
+            TagDef {
+                device: PLC,
+                name: "PLC-1.RUN".into(),
+                access: Access::ReadWrite,
+                labels: vec![(0, "STOP".into()), (1, "RUN".into())],
+                unit: String::new(),
+                ..tag(RUN, "RUN", Table::Coil, 3072)
+            },
+        ],
+        alarms: vec![
+            alarm(
+                HIGH,
+                Subject::Tag(PV),
+                Condition::Limit { level: Level::High, limit: 75.0, deadband: 1.0 },
+                Duration::from_secs(2),
+            ),
+            alarm(SILENT, Subject::Device(TIC), Condition::NotAnswering, Duration::ZERO),
+        ],
+        mimic: MimicDef::default(),
+        trends: Vec::new(),
+        shifts: Vec::new(),
+        report: ReportDef { folder: "reports".into(), tags: Vec::new(), record: None, csv: Default::default() },
+        simulation: None,
+    }
+}
+
+/// The same behind an [`Arc`].
+pub fn shared() -> Arc<PlantDef> {
+    Arc::new(plant())
+}
+
+fn id_number(id: AlarmId) -> u16 {
+    id.0
+}
+
+fn tag(id: TagId, short: &str, table: Table, address: u16) -> TagDef {
+    TagDef {
+        id,
+        device: TIC,
+        name: format!("TIC-1.{short}"),
+        short: short.into(),
+        label: short.to_lowercase(),
+        meaning: String::new(),
+        point: Point {
+            table,
+            address,
+            kind: if table.is_bits() { Kind::Bool } else { Kind::I16 },
+            order: Order::Abcd,
+            field: None,
+        },
+        scale: 1.0,
+        offset: 0.0,
+        decimals: Decimals::Fixed(0),
+        unit: "°C".into(),
+        unit_from: None,
+        min: None,
+        max: None,
+        access: Access::Read,
+        confirm: None,
+        labels: Vec::new(),
+        bit_labels: Vec::new(),
+        bad_if: Vec::new(),
+        quality_from: None,
+        write_fc: None,
+        write_unlock: None,
+        group: String::new(),
+        poll: Poll::Every(Duration::from_secs(1)),
+        deadband: 0.0,
+        store: true,
+        confidence: Confidence::Proven,
+        source: String::new(),
+    }
+}

@@ -1,0 +1,220 @@
+//! Orders of operators: checked, sent on, followed to their outcome and put on record.
+
+use std::{collections::VecDeque, sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use super::{
+    board::Board,
+    command::{BusRequest, Command, NotConfirmed, Order, OrderId, OrderStatus, Outcome, Refusal, WriteId},
+    def::{PlantDef, TagId},
+    event::{Fault, WriteResult},
+    record::ActionRecord,
+    scale,
+    tag::TagDef,
+};
+
+/// Orders that a snapshot shows.
+const SHOWN: usize = 32;
+/// A write that has heard nothing for so long is given up: it may or may not have taken effect.
+const PENDING_MAX: Duration = Duration::from_secs(120);
+
+/// The desk where orders lie until their outcome is known.
+#[derive(Debug, Clone)]
+pub struct Desk {
+    def: Arc<PlantDef>,
+    /// Newest first.
+    orders: VecDeque<OrderStatus>,
+    /// Writes under way: id on the bus, order, tag, raw number sent.
+    writes: Vec<(WriteId, OrderId, TagId, f64)>,
+    last_write: u64,
+}
+
+impl Desk {
+    /// Nothing ordered yet.
+    pub fn new(def: Arc<PlantDef>) -> Desk {
+        Desk { def, orders: VecDeque::new(), writes: Vec::new(), last_write: 0 }
+    }
+
+    /// The latest orders, newest first.
+    pub fn shown(&self) -> Vec<OrderStatus> {
+        self.orders.iter().cloned().collect()
+    }
+
+    /// Checks a write. `Ok` is the request for the bus; an order that needs none, or may not be, is closed at once.
+    pub fn write(
+        &mut self,
+        board: &Board,
+        order: &Order,
+        tag: TagId,
+        value: f64,
+        at: Timestamp,
+    ) -> Result<BusRequest, Option<ActionRecord>> {
+        let old = board.sample(tag).value;
+        self.open(order, old, at);
+        let checked = self.check(board, tag, value);
+        match checked {
+            Err(outcome) => Err(self.close(order.id, outcome, board)),
+            Ok((raw, unlock)) => {
+                self.last_write += 1;
+                let id = WriteId(self.last_write);
+                self.writes.push((id, order.id, tag, raw));
+                let verify = self.def.tag(tag).access != super::tag::Access::Write;
+                Ok(BusRequest::Write { id, tag, raw, unlock, verify })
+            }
+        }
+    }
+
+    /// Takes an order that needs nothing but to be on record.
+    pub fn note(&mut self, order: &Order, outcome: Outcome, board: &Board, at: Timestamp) -> Option<ActionRecord> {
+        self.open(order, None, at);
+        self.close(order.id, outcome, board)
+    }
+
+    /// A write came to its end on the wire.
+    pub fn wrote(&mut self, id: WriteId, result: WriteResult, board: &Board) -> Option<ActionRecord> {
+        let index = self.writes.iter().position(|write| write.0 == id)?;
+        let (_, order, tag, raw) = self.writes.swap_remove(index);
+        let def = self.def.tag(tag);
+        let outcome = match result {
+            WriteResult::ReadBack(back) if scale::same_raw(def.point.kind, raw, back) => Outcome::Verified,
+            WriteResult::ReadBack(back) => {
+                let decimals = board.scaling_decimals(def).unwrap_or(0);
+                Outcome::NotConfirmed(NotConfirmed::Different(scale::to_value(def, back, decimals)))
+            }
+            WriteResult::NotRead(fault) => Outcome::NotConfirmed(NotConfirmed::NotRead(fault)),
+            WriteResult::Accepted => Outcome::NotConfirmed(NotConfirmed::NoReadBack),
+            WriteResult::Refused(code) => Outcome::Refused(Refusal::Exception(code)),
+            WriteResult::Lost(fault) => Outcome::Failed(fault),
+            WriteResult::NotSent(fault) => Outcome::Refused(Refusal::NotSent(fault)),
+        };
+        self.close(order, outcome, board)
+    }
+
+    /// The line had no room for a write: it was not sent.
+    pub fn undeliverable(&mut self, id: WriteId, board: &Board) -> Option<ActionRecord> {
+        let index = self.writes.iter().position(|write| write.0 == id)?;
+        let (_, order, ..) = self.writes.swap_remove(index);
+        self.close(order, Outcome::Refused(Refusal::Busy), board)
+    }
+
+    /// Gives up writes that nobody has answered for.
+    pub fn expire(&mut self, at: Timestamp, board: &Board) -> Vec<ActionRecord> {
+        let late = |status: &OrderStatus| {
+            status.outcome == Outcome::Pending
+                && PENDING_MAX < Duration::try_from(at.duration_since(status.at)).unwrap_or_default()
+        };
+        let ids: Vec<OrderId> = self.orders.iter().filter(|status| late(status)).map(|status| status.id).collect();
+        self.writes.retain(|write| !ids.contains(&write.1));
+        ids.into_iter().filter_map(|id| self.close(id, Outcome::Failed(Fault::Timeout), board)).collect()
+    }
+
+    /// Checks a write against access, choices, bounds, type and what is under way; gives raw number and unlock.
+    #[allow(clippy::type_complexity)]
+    fn check(&self, board: &Board, tag: TagId, value: f64) -> Result<(f64, Option<(TagId, f64)>), Outcome> {
+        let refuse = |refusal| Err(Outcome::Refused(refusal));
+        let def = self.def.tag(tag);
+        if !def.writable() {
+            return refuse(Refusal::ReadOnly);
+        }
+        if self.writes.iter().any(|write| write.2 == tag) {
+            return refuse(Refusal::UnderWay);
+        }
+        if !def.labels.is_empty() && def.label_of(value).is_none() {
+            return refuse(Refusal::NotAChoice);
+        }
+        let bound = |bound: Option<super::tag::Bound>| bound.map(|bound| board.bound(bound)).transpose();
+        let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
+        let (min, max) = (bound(def.min).map_err(unknown)?, bound(def.max).map_err(unknown)?);
+        let Some(decimals) = board.scaling_decimals(def) else {
+            return refuse(Refusal::Unknown("number of decimals".into()));
+        };
+        let inside = value.is_finite() && min.is_none_or(|min| min <= value) && max.is_none_or(|max| value <= max);
+        let raw = scale::to_raw(def, value, decimals).filter(|_| inside);
+        let Some(raw) = raw else {
+            let shown = usize::from(board.shown_decimals(def));
+            let text = |bound: Option<f64>, none: &str| bound.map_or(none.into(), |bound| format!("{bound:.shown$}"));
+            return refuse(Refusal::OutOfRange { min: text(min, "−∞"), max: text(max, "∞") });
+        };
+        if board.trusted_raw(tag).is_some_and(|now| scale::same_raw(def.point.kind, now, raw)) {
+            return Err(Outcome::Unchanged);
+        }
+        let unlock = match def.write_unlock {
+            None => None,
+            Some((key, value)) => Some((key, scale::to_raw(self.def.tag(key), value, 0).unwrap_or(value))),
+        };
+        Ok((raw, unlock))
+    }
+
+    fn open(&mut self, order: &Order, old: Option<f64>, at: Timestamp) {
+        self.orders.push_front(OrderStatus {
+            id: order.id,
+            by: order.by.clone(),
+            command: order.command.clone(),
+            at,
+            old,
+            outcome: Outcome::Pending,
+        });
+        // An order under way is never forgotten, however many come after it.
+        while SHOWN < self.orders.len() {
+            let Some(index) = self.orders.iter().rposition(|status| status.outcome != Outcome::Pending) else { break };
+            self.orders.remove(index);
+        }
+    }
+
+    fn close(&mut self, id: OrderId, outcome: Outcome, board: &Board) -> Option<ActionRecord> {
+        let status = self.orders.iter_mut().find(|status| status.id == id && status.outcome == Outcome::Pending)?;
+        status.outcome = outcome;
+        Some(record(&self.def, status, board))
+    }
+}
+
+/// The words of an outcome, the same on screen, in the history and in CSV.
+pub fn outcome_words(outcome: &Outcome) -> String {
+    match outcome {
+        Outcome::Pending => "pending".into(),
+        Outcome::Verified => "verified".into(),
+        Outcome::Unchanged => "unchanged, not written".into(),
+        Outcome::Refused(why) => format!("refused: {why}"),
+        Outcome::NotConfirmed(why) => format!("not confirmed: {why}"),
+        Outcome::Failed(fault) => format!("failed: {fault}"),
+    }
+}
+
+fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
+    let (action, target, new): (&str, String, Option<String>) = match &status.command {
+        Command::Write { tag, value } => {
+            let tag = def.tag(*tag);
+            ("write", tag.name.clone(), Some(value_words(board, tag, *value)))
+        }
+        Command::Acknowledge(alarm) => {
+            let alarm = def.alarm(*alarm);
+            ("acknowledge", format!("{} {}", super::alarm::book::subject_name(def, alarm.subject), alarm.text), None)
+        }
+        Command::AcknowledgeAll => ("acknowledge", "all alarms".into(), None),
+        Command::Refresh(device) => ("refresh", def.device(*device).name.clone(), None),
+        Command::Connect(line, true) => ("connect", def.line(*line).name.clone(), None),
+        Command::Connect(line, false) => ("disconnect", def.line(*line).name.clone(), None),
+    };
+    let old = match &status.command {
+        Command::Write { tag, .. } => status.old.map(|old| value_words(board, def.tag(*tag), old)),
+        Command::Acknowledge(_) | Command::AcknowledgeAll | Command::Refresh(_) | Command::Connect(..) => None,
+    };
+    ActionRecord {
+        at: status.at,
+        by: status.by.clone(),
+        action: action.into(),
+        target: target.into(),
+        old: old.map(Into::into),
+        new: new.map(Into::into),
+        outcome: outcome_words(&status.outcome).into(),
+    }
+}
+
+/// A value as text with label or unit.
+fn value_words(board: &Board, tag: &TagDef, value: f64) -> String {
+    match tag.label_of(value) {
+        Some(label) => label.to_owned(),
+        None => format!("{value:.*} {}", usize::from(board.shown_decimals(tag)), tag.unit).trim_end().to_owned(),
+    }
+}

@@ -1,0 +1,110 @@
+//! Raw numbers to values in engineering units and back.
+
+use super::tag::{Kind, TagDef};
+
+/// The value of a raw number: `raw · scale · 10^-decimals + offset`. `decimals` are those that the device
+/// announces for this tag ([`super::tag::Decimals::From`]), 0 for all others.
+pub fn to_value(tag: &TagDef, raw: f64, decimals: u8) -> f64 {
+    multiply(multiply(raw, tag.scale), 10f64.powi(-i32::from(decimals))) + tag.offset
+}
+
+/// The raw number to write for a value, rounded to what the type can hold; `None` if it does not fit the type.
+pub fn to_raw(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
+    let exact = (value - tag.offset) / (tag.scale * 10f64.powi(-i32::from(decimals)));
+    let raw = match tag.point.kind {
+        Kind::F32 => f64::from(exact as f32),
+        Kind::F64 => exact,
+        Kind::Bool
+        | Kind::I16
+        | Kind::U16
+        | Kind::I32
+        | Kind::U32
+        | Kind::I64
+        | Kind::U64
+        | Kind::Bcd16
+        | Kind::Bcd32 => exact.round(),
+    };
+    let (low, high) = limits(tag);
+    (raw.is_finite() && low <= raw && raw <= high).then_some(raw)
+}
+
+/// Do two raw numbers mean the same stored value?
+pub fn same_raw(kind: Kind, one: f64, other: f64) -> bool {
+    match kind {
+        Kind::F32 => one as f32 == other as f32,
+        Kind::Bool => (one != 0.0) == (other != 0.0),
+        Kind::I16
+        | Kind::U16
+        | Kind::I32
+        | Kind::U32
+        | Kind::I64
+        | Kind::U64
+        | Kind::F64
+        | Kind::Bcd16
+        | Kind::Bcd32 => one == other,
+    }
+}
+
+/// Lowest and highest raw number of a tag's type or bit field.
+fn limits(tag: &TagDef) -> (f64, f64) {
+    if let Some((_, bits)) = tag.point.field {
+        return (0.0, 2f64.powi(i32::from(bits)) - 1.0);
+    }
+    // An f64 counts whole numbers up to 2^53; beyond, a 64-bit value would silently become another one.
+    let exact = 2f64.powi(53);
+    match tag.point.kind {
+        Kind::Bool => (0.0, 1.0),
+        Kind::I16 => (f64::from(i16::MIN), f64::from(i16::MAX)),
+        Kind::U16 => (0.0, f64::from(u16::MAX)),
+        Kind::I32 => (f64::from(i32::MIN), f64::from(i32::MAX)),
+        Kind::U32 => (0.0, f64::from(u32::MAX)),
+        Kind::I64 => (-exact, exact),
+        Kind::U64 => (0.0, exact),
+        Kind::F32 => (f64::from(f32::MIN), f64::from(f32::MAX)),
+        Kind::F64 => (f64::MIN, f64::MAX),
+        Kind::Bcd16 => (0.0, 9_999.0),
+        Kind::Bcd32 => (0.0, 99_999_999.0),
+    }
+}
+
+/// `raw · factor`, dividing where the factor is one over a whole number: 724 · 0.1 is 72.4, not 72.400000000000006.
+fn multiply(raw: f64, factor: f64) -> f64 {
+    let divisor = (1.0 / factor).round();
+    if 1.0 < divisor && (1.0 / divisor - factor).abs() < 1e-12 { raw / divisor } else { raw * factor }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::fixture;
+
+    #[test]
+    fn values_come_out_as_a_person_would_write_them() {
+        let mut tag = fixture::plant().tags[0].clone();
+        for (scale, offset, decimals, raw, value) in [
+            (1.0, 0.0, 1, 724.0, 72.4),
+            (0.1, 0.0, 0, 3.0, 0.3),
+            (0.01, 0.0, 0, 1234.0, 12.34),
+            (2.5, -10.0, 0, 8.0, 10.0),
+        ] {
+            (tag.scale, tag.offset) = (scale, offset);
+            assert_eq!(to_value(&tag, raw, decimals), value);
+            assert_eq!(to_raw(&tag, value, decimals), Some(raw));
+        }
+    }
+
+    #[test]
+    fn a_value_beyond_its_type_is_refused() {
+        let mut tag = fixture::plant().tags[0].clone();
+        for (kind, value, raw) in [
+            (Kind::I16, 3_276.7, Some(32_767.0)),
+            (Kind::I16, 3_276.8, None),
+            (Kind::U16, -0.1, None),
+            (Kind::Bcd16, 1_000.0, None),
+            (Kind::U32, f64::NAN, None),
+        ] {
+            tag.point.kind = kind;
+            assert_eq!(to_raw(&tag, value, 1), raw, "{kind:?} {value}");
+        }
+    }
+}
