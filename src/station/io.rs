@@ -1,0 +1,201 @@
+//! Starts the tasks of a station, carries effects between them, and stops them in order.
+
+use std::{path::PathBuf, sync::Arc, time::Duration};
+
+use tokio::{
+    sync::{mpsc, watch},
+    task::JoinHandle,
+    time::Instant,
+};
+
+use crate::{
+    bus::io::{clock::Clock, task, transport::Connector},
+    history::{HistoryError, io::thread as history},
+    plant::{
+        Effects, Plant, PlantDef, Snapshot,
+        command::{BusRequest, Order},
+        def::LineId,
+        event::Event,
+        record::Record,
+    },
+};
+
+use super::Session;
+
+/// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
+const EVENTS: usize = 256;
+/// Requests waiting for one link; a full queue refuses the order.
+const REQUESTS: usize = 16;
+/// Orders waiting for the plant; a full queue refuses the order.
+const ORDERS: usize = 64;
+/// Real time between two snapshots: what a person can follow.
+const SNAPSHOT_EVERY: Duration = Duration::from_millis(100);
+/// Real time between two ticks at the least; one second of plant time otherwise.
+const TICK_MIN: Duration = Duration::from_millis(20);
+
+/// What a station is started with.
+#[derive(Debug)]
+pub struct Options {
+    /// The plant.
+    pub def: Arc<PlantDef>,
+    /// Plant time.
+    pub clock: Clock,
+    /// The file of the history.
+    pub history: PathBuf,
+    /// How each line is opened, by [`LineId`].
+    pub connectors: Vec<Connector>,
+}
+
+/// A running station.
+#[derive(Debug)]
+pub struct Station {
+    snapshots: watch::Receiver<Arc<Snapshot>>,
+    orders: mpsc::Sender<Order>,
+    history: history::Handle,
+    stop: watch::Sender<bool>,
+    tasks: Vec<JoinHandle<()>>,
+    terminals: u32,
+}
+
+/// Starts history, links and plant, in this order: a store that cannot be opened stops the start.
+pub fn start(options: Options) -> Result<Station, HistoryError> {
+    let Options { def, clock, history, connectors } = options;
+    let history = history::start(&history, def.clone(), clock)?;
+    let (stop, stopped) = watch::channel(false);
+    let (events, event_queue) = mpsc::channel(EVENTS);
+    let (orders, order_queue) = mpsc::channel(ORDERS);
+    let mut tasks = Vec::new();
+    let mut links = Vec::new();
+    for (line, connector) in def.lines.iter().zip(connectors) {
+        let (requests, request_queue) = mpsc::channel(REQUESTS);
+        links.push(requests);
+        let link = task::run(def.clone(), line.id, clock, connector, events.clone(), request_queue, stopped.clone());
+        tasks.push(tokio::spawn(link));
+    }
+    let mut plant = Plant::new(def, clock.now(), clock.speed());
+    plant.restore(&history.restored);
+    let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
+    let desk = PlantTask {
+        plant,
+        clock,
+        links,
+        records: history.records.clone(),
+        store: history.status.clone(),
+        lost: 0,
+        publish,
+    };
+    tasks.push(tokio::spawn(desk.run(event_queue, order_queue)));
+    Ok(Station { snapshots, orders, history, stop, tasks, terminals: 0 })
+}
+
+impl Station {
+    /// Attaches a terminal.
+    pub fn session(&mut self, operator: &str) -> Session {
+        self.terminals += 1;
+        Session {
+            snapshots: self.snapshots.clone(),
+            orders: self.orders.clone(),
+            queries: self.history.queries.clone(),
+            terminal: self.terminals,
+            operator: operator.into(),
+        }
+    }
+
+    /// Stops downstream and waits until the last record is on disk.
+    pub async fn stop(self) {
+        let Station { snapshots: _, orders, history, stop, tasks, terminals: _ } = self;
+        // Links may have ended already; then nobody listens, which is fine.
+        let _ = stop.send(true);
+        drop(orders);
+        for task in tasks {
+            if let Err(error) = task.await {
+                tracing::error!(%error, "a task of the station ended badly");
+            }
+        }
+        history.finish().await;
+    }
+}
+
+/// The loop around the reducer: sole owner of the plant.
+struct PlantTask {
+    plant: Plant,
+    clock: Clock,
+    links: Vec<mpsc::Sender<BusRequest>>,
+    records: mpsc::Sender<Vec<Record>>,
+    store: watch::Receiver<crate::plant::snapshot::HistoryStatus>,
+    /// Records that the queue to the store had no room for.
+    lost: u64,
+    publish: watch::Sender<Arc<Snapshot>>,
+}
+
+impl PlantTask {
+    async fn run(mut self, mut events: mpsc::Receiver<Event>, mut orders: mpsc::Receiver<Order>) {
+        let tick_every = self.clock.real_span(Duration::from_secs(1)).max(TICK_MIN);
+        let mut tick = tokio::time::interval(tick_every);
+        tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
+        // Changed since the last snapshot, and when the next one may go out.
+        let (mut changed, mut next) = (false, Instant::now());
+        loop {
+            tokio::select! {
+                biased;
+                () = tokio::time::sleep_until(next), if changed => {
+                    self.publish.send_replace(Arc::new(self.plant.snapshot()));
+                    (changed, next) = (false, Instant::now() + SNAPSHOT_EVERY);
+                }
+                Some(order) = orders.recv() => {
+                    let effects = self.plant.on_order(order, self.clock.now());
+                    self.carry_out(effects);
+                    (changed, next) = (true, Instant::now());
+                }
+                event = events.recv() => {
+                    // The links have stopped: nothing can become true any more.
+                    let Some(event) = event else { break };
+                    let effects = self.plant.on_event(event);
+                    self.carry_out(effects);
+                    changed = true;
+                }
+                Ok(()) = self.store.changed() => {
+                    self.hear_store();
+                    changed = true;
+                }
+                _ = tick.tick() => {
+                    let effects = self.plant.on_tick(self.clock.now());
+                    self.carry_out(effects);
+                    changed = true;
+                }
+            }
+        }
+        self.publish.send_replace(Arc::new(self.plant.snapshot()));
+    }
+
+    fn carry_out(&mut self, effects: Effects) {
+        for (line, request) in effects.bus {
+            self.send(line, request);
+        }
+        self.keep(effects.records);
+    }
+
+    fn send(&mut self, line: LineId, request: BusRequest) {
+        let Err(refused) = self.links[line.index()].try_send(request) else { return };
+        if let BusRequest::Write { id, .. } = refused.into_inner() {
+            let effects = self.plant.on_undeliverable(id);
+            self.keep(effects.records);
+        }
+    }
+
+    fn keep(&mut self, records: Vec<Record>) {
+        if records.is_empty() {
+            return;
+        }
+        if let Err(refused) = self.records.try_send(records) {
+            self.lost += refused.into_inner().len() as u64;
+            self.hear_store();
+        }
+    }
+
+    fn hear_store(&mut self) {
+        let mut status = self.store.borrow_and_update().clone();
+        status.lost += self.lost;
+        self.plant.on_history(status);
+    }
+}

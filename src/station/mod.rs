@@ -1,0 +1,11 @@
+//! The station: links, plant, history, wired together. Polls whether or not anybody looks.
+//!
+//! There is exactly one awaited send (link → plant). Everything else is `try_send` or `watch`, so the plant task never
+//! blocks. Shutdown runs downstream: the links stop, the plant ends because nobody can send any more, the history
+//! thread drains, flushes and ends.
+
+pub mod session;
+pub mod teller;
+pub mod io;
+
+pub use session::Session;

@@ -1,0 +1,143 @@
+//! Tells in plain lines what changed between two snapshots: the voice of a station without a terminal.
+
+use crate::plant::{
+    Snapshot,
+    alarm::{AlarmState, book::subject_name},
+    event::LineState,
+    orders::outcome_words,
+    snapshot::DeviceState,
+};
+
+/// One line a change: lines, devices, alarms, orders, troubles of the store. Without time stamps.
+pub fn changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
+    let mut lines = Vec::new();
+    lines.extend(line_changes(before, after));
+    lines.extend(device_changes(before, after));
+    lines.extend(alarm_changes(before, after));
+    lines.extend(order_changes(before, after));
+    if before.history.trouble != after.history.trouble {
+        lines.push(match &after.history.trouble {
+            Some(trouble) => format!("history: {trouble}"),
+            None => "history: recovered".into(),
+        });
+    }
+    if before.history.lost != after.history.lost {
+        lines.push(format!("history: {} records lost so far", after.history.lost));
+    }
+    lines
+}
+
+fn line_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
+    let changed = |index: usize| {
+        let (old, new) = (&before.lines[index].state, &after.lines[index].state);
+        let words = match new {
+            LineState::Connecting => return None,
+            LineState::Connected => "connected".into(),
+            LineState::Disconnected => "closed by an operator".into(),
+            // Every failed try would be a line; the first says it all.
+            LineState::Waiting { .. } if matches!(old, LineState::Waiting { .. }) => return None,
+            LineState::Waiting { why, .. } => format!("not connected: {why}"),
+        };
+        let known = matches!(old, LineState::Connecting) && *new == LineState::Connecting;
+        (old != new && !known).then(|| format!("line {}: {words}", after.def.lines[index].name))
+    };
+    (0..after.lines.len()).filter_map(changed).collect()
+}
+
+fn device_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
+    let mut lines = Vec::new();
+    for device in &after.def.devices {
+        let (old, new) = (before.device(device.id).state, after.device(device.id).state);
+        let was_down = matches!(old, DeviceState::Down { .. } | DeviceState::Unknown);
+        match new {
+            DeviceState::Down { .. } if !matches!(old, DeviceState::Down { .. }) => {
+                let why = after.device(device.id).last_fault.map(|(_, fault)| format!(": {fault}")).unwrap_or_default();
+                lines.push(format!("device {} (unit {}): not answering{why}", device.name, device.unit));
+            }
+            DeviceState::Answering if was_down => {
+                lines.push(format!("device {} (unit {}): answers", device.name, device.unit));
+            }
+            DeviceState::Down { .. } | DeviceState::Answering | DeviceState::Failing(_) | DeviceState::Unknown => {}
+        }
+    }
+    lines
+}
+
+fn alarm_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
+    let state_in = |snapshot: &Snapshot, id| {
+        snapshot.alarms.iter().find(|alarm| alarm.id == id).map_or(AlarmState::Normal, |alarm| alarm.state)
+    };
+    let mut lines = Vec::new();
+    for alarm in &after.def.alarms {
+        let (old, new) = (state_in(before, alarm.id), state_in(after, alarm.id));
+        if old == new {
+            continue;
+        }
+        let word = match new {
+            AlarmState::Unacknowledged => "RAISED",
+            AlarmState::Acknowledged => "acknowledged",
+            AlarmState::Returned | AlarmState::Normal if old == AlarmState::Returned => "acknowledged",
+            AlarmState::Returned | AlarmState::Normal => "returned",
+        };
+        let subject = subject_name(&after.def, alarm.subject);
+        lines.push(format!("alarm {} {word}: {subject} {}", alarm.priority.number(), alarm.text));
+    }
+    lines
+}
+
+fn order_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
+    use crate::plant::command::{Command, Outcome};
+    let news = after.orders.iter().rev().filter(|order| {
+        order.outcome != Outcome::Pending
+            && before.orders.iter().find(|old| old.id == order.id).is_none_or(|old| old.outcome != order.outcome)
+    });
+    news.filter_map(|order| match order.command {
+        Command::Write { tag, value } => {
+            let (name, unit) = (&after.def.tag(tag).name, after.unit(tag));
+            let value = after.format(tag, value);
+            Some(format!("{}: {name} := {value} {unit} {}", order.by, outcome_words(&order.outcome)))
+        }
+        Command::Acknowledge(_) | Command::AcknowledgeAll | Command::Refresh(_) | Command::Connect(..) => None,
+    })
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use jiff::Timestamp;
+
+    use super::*;
+    use crate::plant::{
+        Plant,
+        def::LineId,
+        event::{Event, Fault},
+        fixture::{self, PV, TIC},
+    };
+
+    #[test]
+    fn each_change_is_told_once() {
+        let at = |second| Timestamp::from_second(second).expect("a small number");
+        let mut plant = Plant::new(fixture::shared(), at(0), 1.0);
+        let mut before = plant.snapshot();
+        let mut tell = |plant: &Plant| {
+            let after = plant.snapshot();
+            let lines = changes(&before, &after);
+            before = after;
+            lines
+        };
+        plant.on_event(Event::Line { at: at(0), line: LineId(0), state: LineState::Connected });
+        assert_eq!(tell(&plant), ["line L1: connected"]);
+        assert!(tell(&plant).is_empty());
+        plant.on_event(Event::Failed { at: at(1), device: TIC, tags: vec![PV], fault: Fault::Timeout });
+        plant.on_event(Event::Failed { at: at(3), device: TIC, tags: vec![PV], fault: Fault::Resting });
+        assert_eq!(
+            tell(&plant),
+            ["device TIC-1 (unit 1): not answering: no answer in time", "alarm 2 RAISED: TIC-1 alarm 1"]
+        );
+        for (second, why) in [(4, "gone"), (6, "still gone")] {
+            let state = LineState::Waiting { why: why.into(), retry_at: at(second + 1) };
+            plant.on_event(Event::Line { at: at(second), line: LineId(0), state });
+        }
+        assert_eq!(tell(&plant), ["line L1: not connected: still gone"]);
+    }
+}
