@@ -1,6 +1,68 @@
-//! sightglass: the control room of a small plant in a terminal.
+//! **sightglass**: the control room of a small plant in a terminal.
+//!
+//! A plant has Modbus controllers on an RS-485 line or on TCP. sightglass polls them, judges alarms, keeps everything
+//! in DuckDB, draws the process as a living mimic, sets controllers with verified writes and writes shift reports.
+//! It never shows a wrong value as a right one.
+//!
+//! # One binary, three ways to run it
+//!
+//! | command | what runs |
+//! |---|---|
+//! | `sightglass run PLANT` | the **station**: polls, alarms, history. No terminal: what an init system starts on a panel PC |
+//! | `sightglass PLANT` | station and **terminal** in one process |
+//! | `sightglass demo` | a simulated plant on a real pseudo-terminal line, station and terminal in one process |
+//!
+//! # How data flows
+//!
+//! ```text
+//!  profiles/*.toml ──> profile::load ──> Arc<PlantDef>       immutable, given to everyone at start
+//!
+//!   device <──> link task                 one per serial line / TCP endpoint, owns the port
+//!                  │   ▲
+//!    Event         │   │ BusRequest         mpsc, try_send: full = the order is refused, visibly
+//!    mpsc          │   │
+//!    send().await  ▼   │
+//!               plant task                sole owner of Plant; the only writer of facts
+//!                  │   │   ▲
+//!                  │   │   │ Order           mpsc, try_send: full = refused, visibly
+//!    Record        │   │   └────────────────────┐
+//!    mpsc,         │   │ watch<Arc<Snapshot>>   │
+//!    loss counted  ▼   ▼   latest only          │
+//!            history     Session ───────────── Session     one per terminal
+//!            thread  <─── Query / Answer        │
+//!            DuckDB                          terminal (ui)
+//! ```
+//!
+//! There is exactly one awaited send in the station (link → plant). Everything else is `try_send` or `watch`, so the
+//! plant task never blocks and deadlock is ruled out by shape. Shutdown runs downstream: the links stop, the plant ends
+//! because nobody can send any more, the history thread drains, flushes and ends.
+//!
+//! # Laws
+//!
+//! 1. **One owner per fact.** The plant task owns what is true, each link task its port, the history thread the database
+//!    file, the terminal only what its operator looks at.
+//! 2. **One way.** device → [`bus`] → [`plant`] → snapshot → ([`history`], terminals). Back only as orders, whose
+//!    outcome comes back inside a later snapshot.
+//! 3. **Two pure reducers**: [`plant::Plant`] for facts and [`ui::update`] for the view. Everything asynchronous is a
+//!    thin loop around one of them.
+//! 4. **The outside world is spelled `io`.** Only `io` files, the station and the command line may name tokio, DuckDB,
+//!    files, sockets, the terminal or a clock. Time is an argument everywhere else.
+//! 5. **A value never travels alone**: [`plant::sample::Sample`] is value, quality and time, on screen, in alarms, in the
+//!    history and in CSV. Never a silent last value, never 0 for "no answer".
+//! 6. **A write is never retried by itself and always read back.** Its outcome is a state in the snapshot.
+//! 7. Every queue, list, wait and retry has a bound, and an overflow that an operator can see.
+//! 8. UTC microseconds are stored; local time is a matter of display and of reports.
+//!
+//! # Modules, in reading order
+//!
+//! They form a line, not a graph: a module uses only what stands above it. A test holds this and law 4.
 
 pub mod plant;
+pub mod profile;
 pub mod bus;
+pub mod sim;
 pub mod report;
 pub mod history;
+pub mod station;
+pub mod ui;
+pub mod cli;

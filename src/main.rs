@@ -1,3 +1,7 @@
 //! Thin binary: arguments to `cli`, error to exit code.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    sightglass::cli::main()
+}

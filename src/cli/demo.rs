@@ -1,0 +1,172 @@
+//! `sightglass demo`: a simulated plant on a real pseudo-terminal line, station and terminal in one process.
+
+use std::{path::PathBuf, sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use tokio::sync::oneshot;
+
+use crate::{
+    bus::io::{clock::Clock, transport::Connector},
+    history::{Answer, HistoryError, Question, Query},
+    plant::{PlantDef, Snapshot, def::Transport},
+    report::{Period, ShiftReport, csv},
+    sim,
+    station::{Session, io as station},
+    ui,
+};
+
+use super::{CliError, StationArgs, load, log, paths, run, runtime, say, span, speed};
+
+/// Arguments of `demo`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A plant with a simulation
+    #[arg(default_value = "tank")]
+    plant: String,
+    /// Run the plant, its line and its clock so many times faster
+    #[arg(long, value_name = "N", default_value = "1", value_parser = speed)]
+    speed: f64,
+    /// Without a terminal: do the whole job and print what was done
+    #[arg(long)]
+    headless: bool,
+    /// End after this plant time
+    #[arg(long = "for", value_name = "TIME", value_parser = span)]
+    duration: Option<Duration>,
+    /// Write a report of the whole run at the end, as CSV
+    #[arg(long, value_name = "FILE", requires = "headless")]
+    report: Option<PathBuf>,
+    #[command(flatten)]
+    station: StationArgs,
+}
+
+/// Runs the demonstration.
+pub fn main(args: Args) -> Result<(), CliError> {
+    let mut def = load(&args.plant, &args.station)?;
+    if !args.headless {
+        ui::io::require_terminal()?;
+    }
+    let _log = log::start(args.station.log.as_deref())?;
+    // A history of its own, gone with the demonstration, unless the user wants to keep one.
+    let scratch = Scratch::new(&args.station)?;
+    runtime()?.block_on(async {
+        let clock = Clock::starting_at(Timestamp::now(), args.speed);
+        let simulated = sim::io::start_pty(&def, clock).map_err(|error| simulation_error(&args.plant, error))?;
+        plug_into(&mut def, &simulated.path);
+        let def = Arc::new(def);
+        let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
+        let history = scratch.history.clone();
+        let mut station = station::start(station::Options { def: def.clone(), clock, history, connectors })?;
+        let result = if args.headless {
+            say(&format!("{}: simulated on {}", def.title, simulated.path.display()));
+            headless(station.session("demo"), clock, &args).await
+        } else {
+            let session = station.session(&paths::operator());
+            let options = ui::io::Options { duration: args.duration.map(|span| clock.real_span(span)), ..Default::default() };
+            ui::io::run(session, options).await.map_err(CliError::from)
+        };
+        station.stop().await;
+        simulated.stop().await;
+        result
+    })
+}
+
+/// Puts every line of the plant on the simulated one.
+fn plug_into(def: &mut PlantDef, path: &std::path::Path) {
+    for line in &mut def.lines {
+        if let Transport::Rtu { port, .. } = &mut line.transport {
+            *port = path.display().to_string();
+        }
+    }
+}
+
+/// Tells what happens until the time is over, then sums up and writes the report.
+async fn headless(session: Session, clock: Clock, args: &Args) -> Result<(), CliError> {
+    let from = clock.now();
+    let queries = session.queries.clone();
+    let last = run::follow(session, clock, args.duration).await;
+    let period = Period { name: "demo".into(), from, to: clock.now() };
+    let report = ask_report(&queries, period).await?;
+    for line in summary(&last, &report) {
+        say(&line);
+    }
+    if let Some(path) = &args.report {
+        let bytes = csv::shift_csv(&report, &last.def, last.def.report.csv);
+        std::fs::write(path, bytes)
+            .map_err(|error| CliError::Io { what: format!("cannot write {}", path.display()), error })?;
+        say(&format!("report written: {}", path.display()));
+    }
+    Ok(())
+}
+
+async fn ask_report(
+    queries: &tokio::sync::mpsc::Sender<Query>,
+    period: Period,
+) -> Result<Box<ShiftReport>, HistoryError> {
+    let (reply, answer) = oneshot::channel();
+    let gone = || HistoryError::Engine("the store has stopped".into());
+    queries.send(Query { question: Question::Report { period }, reply }).await.map_err(|_| gone())?;
+    match answer.await.map_err(|_| gone())?? {
+        Answer::Report(report) => Ok(report),
+        Answer::Series(_) | Answer::Journal(_) | Answer::Actions(_) => {
+            Err(HistoryError::Engine("answered another question".into()))
+        }
+    }
+}
+
+/// What was done, for people and scripts: one `name value` a line.
+fn summary(last: &Snapshot, report: &ShiftReport) -> Vec<String> {
+    use crate::plant::record::AlarmStep;
+    let lines = last.lines.iter().map(|line| line.counters);
+    let (mut polls, mut ok, mut timeouts, mut corrupt, mut exceptions) = (0, 0, 0, 0, 0);
+    for counters in lines {
+        polls += counters.requests;
+        ok += counters.ok;
+        timeouts += counters.timeouts;
+        corrupt += counters.corrupt;
+        exceptions += counters.exceptions;
+    }
+    let values: u64 = last.devices.iter().map(|device| device.values).sum();
+    let raised = report.alarms.iter().filter(|step| step.step == AlarmStep::Raised).count();
+    let span = Duration::try_from(report.until.duration_since(report.period.from)).unwrap_or_default();
+    vec![
+        format!("plant time     {} s", span.as_secs()),
+        format!("polls          {polls} ({ok} good, {timeouts} timeouts, {corrupt} corrupt, {exceptions} exceptions)"),
+        format!("values         {values} read"),
+        format!("alarms         {raised} raised"),
+        format!("rows stored    {} ({} lost)", last.history.rows, last.history.lost),
+    ]
+}
+
+/// The folder of a history that nobody wants to keep.
+struct Scratch {
+    history: PathBuf,
+    folder: Option<PathBuf>,
+}
+
+impl Scratch {
+    fn new(args: &StationArgs) -> Result<Scratch, CliError> {
+        if let Some(history) = &args.history {
+            return Ok(Scratch { history: history.clone(), folder: None });
+        }
+        let folder = std::env::temp_dir().join(format!("sightglass-demo-{}", std::process::id()));
+        std::fs::create_dir_all(&folder)
+            .map_err(|error| CliError::Io { what: format!("cannot make {}", folder.display()), error })?;
+        Ok(Scratch { history: folder.join("demo.duckdb"), folder: Some(folder) })
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        if let Some(folder) = &self.folder {
+            // A folder that will not go is the temporary folder's business, not the operator's.
+            let _ = std::fs::remove_dir_all(folder);
+        }
+    }
+}
+
+pub(super) fn simulation_error(plant: &str, error: sim::io::SimError) -> CliError {
+    match error {
+        sim::io::SimError::NoSimulation => CliError::Usage(format!("plant `{plant}` has no simulation, try `tank`")),
+        sim::io::SimError::Io(error) => CliError::Io { what: "cannot serve the simulated plant".into(), error },
+    }
+}

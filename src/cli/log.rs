@@ -1,0 +1,41 @@
+//! The log: a file, never the screen that the interface draws on.
+
+use std::path::{Path, PathBuf};
+
+use tracing_appender::{non_blocking::WorkerGuard, rolling};
+use tracing_subscriber::{EnvFilter, fmt};
+
+use super::{CliError, paths};
+
+/// Days of logs that are kept.
+const DAYS: usize = 7;
+
+/// Starts logging; the guard writes what is left when it is dropped. `SIGHTGLASS_LOG` sets the level (`debug`).
+pub fn start(file: Option<&Path>) -> Result<WorkerGuard, CliError> {
+    let failed = |error: std::io::Error| CliError::Io { what: "cannot open the log".into(), error };
+    let writer = match file {
+        Some(file) => {
+            let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+            let folder = folder.map_or_else(|| PathBuf::from("."), Path::to_path_buf);
+            let name = file.file_name().ok_or_else(|| CliError::Usage("--log: expected a file name".into()))?;
+            std::fs::create_dir_all(&folder).map_err(failed)?;
+            rolling::never(folder, name)
+        }
+        None => {
+            let folder = paths::state_folder();
+            std::fs::create_dir_all(&folder).map_err(failed)?;
+            rolling::Builder::new()
+                .rotation(rolling::Rotation::DAILY)
+                .filename_prefix("sightglass")
+                .filename_suffix("log")
+                .max_log_files(DAYS)
+                .build(folder)
+                .map_err(|error| failed(std::io::Error::other(error)))?
+        }
+    };
+    let (writer, guard) = tracing_appender::non_blocking(writer);
+    let level = EnvFilter::try_from_env("SIGHTGLASS_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
+    // A second start in one process (tests) keeps the first log.
+    let _ = fmt().with_writer(writer).with_ansi(false).with_env_filter(level).try_init();
+    Ok(guard)
+}

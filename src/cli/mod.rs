@@ -1,0 +1,178 @@
+//! The command line: one file a subcommand, one place for exit codes.
+
+mod check;
+mod demo;
+mod log;
+mod paths;
+mod profiles;
+mod report;
+mod run;
+mod sim;
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::{Parser, Subcommand};
+
+use crate::{history::HistoryError, profile, ui};
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done, or left by the operator
+  1  failed while running (the message says why)
+  2  wrong arguments, or errors in a profile
+  3  the history is in use by another process";
+
+/// The control room of a small plant in a terminal: process mimic, trends, alarms, controllers and shift reports over
+/// Modbus RTU and TCP.
+#[derive(Debug, Parser)]
+#[command(version, after_help = EXIT_CODES, args_conflicts_with_subcommands = true, arg_required_else_help = true)]
+struct Args {
+    #[command(subcommand)]
+    command: Option<Command>,
+    /// A plant file, or the name of a shipped plant: station and terminal in one process
+    #[arg(value_name = "PLANT")]
+    plant: Option<String>,
+    #[command(flatten)]
+    station: StationArgs,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// A simulated plant on a real pseudo-terminal line, with station and terminal in one process
+    Demo(demo::Args),
+    /// The station alone: polls, judges alarms, keeps the history; no terminal
+    Run(run::Args),
+    /// Serves the simulated devices of a plant to other masters, over a pseudo-terminal or TCP
+    Sim(sim::Args),
+    /// Checks a plant or device file: every error at once, or the read plan of each line
+    Check(check::Args),
+    /// Lists the known profiles, or prints one
+    Profiles(profiles::Args),
+    /// Writes the report of a shift or period from the history as CSV
+    Report(report::Args),
+}
+
+/// What every command that starts a station takes.
+#[derive(Debug, Clone, Default, clap::Args)]
+struct StationArgs {
+    /// File of the history [default: the user's state folder, one file a plant]
+    #[arg(long, value_name = "FILE")]
+    history: Option<PathBuf>,
+    /// Use another port for a line: LINE=/dev/ttyUSB0 or LINE=HOST:TCPPORT
+    #[arg(long = "port", value_name = "LINE=PORT")]
+    ports: Vec<String>,
+    /// File of the log [default: the user's state folder, a file a day, seven days]
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+}
+
+/// Why a command failed.
+#[derive(Debug, thiserror::Error)]
+enum CliError {
+    #[error("{0}")]
+    Profile(String),
+    #[error("{0}")]
+    Usage(String),
+    #[error(transparent)]
+    History(#[from] HistoryError),
+    #[error(transparent)]
+    Ui(#[from] ui::io::UiError),
+    #[error("{what}: {error}")]
+    Io { what: String, error: std::io::Error },
+}
+
+impl CliError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            CliError::Profile(_) | CliError::Usage(_) => 2,
+            CliError::History(HistoryError::Locked { .. }) => 3,
+            CliError::History(_) | CliError::Ui(_) | CliError::Io { .. } => 1,
+        }
+    }
+}
+
+/// Parses the arguments of this process, does what they say, and names the exit code.
+pub fn main() -> ExitCode {
+    let args = Args::parse();
+    let result = match args.command {
+        None => run::with_terminal(&args.plant.unwrap_or_default(), &args.station),
+        Some(Command::Demo(args)) => demo::main(args),
+        Some(Command::Run(args)) => run::main(args),
+        Some(Command::Sim(args)) => sim::main(args),
+        Some(Command::Check(args)) => check::main(args),
+        Some(Command::Profiles(args)) => profiles::main(args),
+        Some(Command::Report(args)) => report::main(args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            say_error(&error.to_string());
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// Prints one line to standard output. A reader that has gone away (`| head`) is no error worth a word.
+fn say(line: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stdout(), "{line}");
+}
+
+/// Prints a message to standard error.
+fn say_error(message: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "sightglass: {message}");
+}
+
+/// A runtime for the tasks of a station: two workers are plenty, and the terminal stays quick.
+fn runtime() -> Result<tokio::runtime::Runtime, CliError> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .map_err(|error| CliError::Io { what: "cannot start".into(), error })
+}
+
+/// A span as people write it: `10m`, `1h 30m`, `500ms`.
+fn span(text: &str) -> Result<std::time::Duration, String> {
+    let span: jiff::SignedDuration = text.parse().map_err(|_| format!("found `{text}`, expected a time like 10m or 8h"))?;
+    std::time::Duration::try_from(span).map_err(|_| format!("found `{text}`, expected a time above zero"))
+}
+
+/// A factor of time, at least one.
+fn speed(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(speed) if (1.0..=1000.0).contains(&speed) => Ok(speed),
+        Ok(_) | Err(_) => Err(format!("found `{text}`, expected a number from 1 to 1000")),
+    }
+}
+
+fn load(plant: &str, station: &StationArgs) -> Result<crate::plant::PlantDef, CliError> {
+    let def = profile::load(plant).map_err(|errors| CliError::Profile(errors.to_string()))?;
+    let mut def = std::sync::Arc::unwrap_or_clone(def);
+    for port in &station.ports {
+        paths::replace_port(&mut def, port).map_err(CliError::Usage)?;
+    }
+    Ok(def)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_arguments_are_well_formed() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn spans_and_speeds_are_checked() {
+        assert_eq!(span("10m"), Ok(std::time::Duration::from_secs(600)));
+        assert!(span("ten").unwrap_err().contains("found `ten`, expected"));
+        assert!(span("-5s").is_err());
+        assert_eq!(speed("60"), Ok(60.0));
+        assert!(speed("0").is_err());
+    }
+}

@@ -1,0 +1,81 @@
+//! Where files live when nobody says otherwise, and which port a line uses when somebody does.
+
+use std::{env, path::PathBuf};
+
+use crate::plant::{
+    PlantDef,
+    def::{Parity, Serial, Transport},
+};
+
+/// `$XDG_STATE_HOME/sightglass` or `~/.local/state/sightglass`: histories and logs.
+pub fn state_folder() -> PathBuf {
+    let absolute = |path: std::ffi::OsString| Some(PathBuf::from(path)).filter(|path| path.is_absolute());
+    let state = env::var_os("XDG_STATE_HOME").and_then(absolute);
+    let home = || env::var_os("HOME").and_then(absolute).map(|home| home.join(".local/state"));
+    state.or_else(home).unwrap_or_else(env::temp_dir).join("sightglass")
+}
+
+/// The history of a plant.
+pub fn history_of(plant: &str) -> PathBuf {
+    state_folder().join(format!("{plant}.duckdb"))
+}
+
+/// Who sits at this terminal: the login name.
+pub fn operator() -> String {
+    ["USER", "LOGNAME"].into_iter().find_map(|name| env::var(name).ok()).unwrap_or_else(|| "operator".into())
+}
+
+/// Puts a line of the plant on another port: `L1=/dev/ttyUSB0` or `L1=host:502`.
+pub fn replace_port(def: &mut PlantDef, text: &str) -> Result<(), String> {
+    let (name, port) = text
+        .split_once('=')
+        .ok_or_else(|| format!("--port: found `{text}`, expected LINE=/dev/… or LINE=HOST:TCPPORT"))?;
+    let names: Vec<String> = def.lines.iter().map(|line| line.name.clone()).collect();
+    let line = def
+        .lines
+        .iter_mut()
+        .find(|line| line.name == name)
+        .ok_or_else(|| format!("--port: no line `{name}`, the plant has {}", names.join(", ")))?;
+    line.transport = if port.starts_with('/') {
+        let serial = match &line.transport {
+            Transport::Rtu { serial, .. } => *serial,
+            Transport::Tcp { .. } => Serial { baud: 9600, data_bits: 8, parity: Parity::None, stop_bits: 1 },
+        };
+        Transport::Rtu { port: port.to_owned(), serial }
+    } else {
+        let parsed = port.rsplit_once(':').and_then(|(host, port)| Some((host.to_owned(), port.parse().ok()?)));
+        let (host, port) =
+            parsed.ok_or_else(|| format!("--port: found `{port}`, expected an absolute path or HOST:TCPPORT"))?;
+        Transport::Tcp { host, port }
+    };
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::fixture;
+
+    #[test]
+    fn a_line_moves_to_another_port_and_keeps_its_baud_rate() {
+        let mut def = fixture::plant();
+        replace_port(&mut def, "L1=/dev/ttyUSB0").expect("a good port");
+        let Transport::Rtu { port, serial } = &def.lines[0].transport else { panic!("not serial") };
+        assert_eq!((port.as_str(), serial.baud), ("/dev/ttyUSB0", 9600));
+        replace_port(&mut def, "L1=localhost:1502").expect("a good port");
+        assert_eq!(def.lines[0].transport, Transport::Tcp { host: "localhost".into(), port: 1502 });
+    }
+
+    #[test]
+    fn a_wrong_port_is_told_with_what_was_expected() {
+        for (text, part) in [
+            ("L1", "expected LINE=/dev/"),
+            ("L9=/dev/ttyUSB0", "no line `L9`, the plant has L1"),
+            ("L1=ttyUSB0", "expected an absolute path or HOST:TCPPORT"),
+            ("L1=host:99999", "expected an absolute path or HOST:TCPPORT"),
+        ] {
+            let error = replace_port(&mut fixture::plant(), text).expect_err(text);
+            assert!(error.contains(part), "{error}");
+        }
+    }
+}

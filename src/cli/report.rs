@@ -1,0 +1,93 @@
+//! `sightglass report`: the report of a shift or period from the history as CSV.
+
+use std::{io::Write, path::PathBuf};
+
+use crate::{
+    history::io::store::Store,
+    plant::def::CsvDialect,
+    report::{csv, shift},
+};
+
+use super::{CliError, StationArgs, load, paths, say};
+
+/// Arguments of `report`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A plant file, or the name of a shipped plant
+    plant: String,
+    /// Which shift: last, current, NAME or NAME@YYYY-MM-DD
+    #[arg(long, value_name = "SHIFT", conflicts_with_all = ["from", "to"], required_unless_present = "from")]
+    shift: Option<String>,
+    /// From this local time (2026-11-21T06:00) or instant with offset
+    #[arg(long, value_name = "TIME", requires = "to")]
+    from: Option<String>,
+    /// To this local time or instant
+    #[arg(long, value_name = "TIME", requires = "from")]
+    to: Option<String>,
+    /// File to write, `-` for standard output [default: the plant's report folder]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Separator of cells: `,` or `;` (then the decimal mark is a comma)
+    #[arg(long, value_name = "MARK", value_parser = [",", ";"])]
+    separator: Option<String>,
+    /// Begin with a byte order mark, for spreadsheets
+    #[arg(long)]
+    bom: bool,
+    /// Only the record of date, time, SV, PV and ER
+    #[arg(long)]
+    record: bool,
+    #[command(flatten)]
+    station: StationArgs,
+}
+
+/// Reads the store and writes the report.
+pub fn main(args: Args) -> Result<(), CliError> {
+    let def = load(&args.plant, &args.station)?;
+    let now = jiff::Timestamp::now();
+    let period = match (&args.shift, &args.from, &args.to) {
+        (Some(shift), _, _) => shift::find(&def, shift, now),
+        (None, Some(from), Some(to)) => shift::period(&def, from, to),
+        (None, _, _) => return Err(CliError::Usage("expected --shift, or --from and --to".into())),
+    }
+    .map_err(|error| CliError::Usage(error.to_string()))?;
+    let history = args.station.history.clone().unwrap_or_else(|| paths::history_of(&def.name));
+    let report = Store::open_read_only(&history)?.report(&def, &period, now)?;
+    let dialect = dialect(def.report.csv, args.separator.as_deref(), args.bom);
+    let bytes = match args.record {
+        true => csv::record_csv(&report, &def, dialect),
+        false => csv::shift_csv(&report, &def, dialect),
+    };
+    let path = args.out.unwrap_or_else(|| def.report.folder.join(csv::file_name(&report.period)));
+    let failed = |error| CliError::Io { what: format!("cannot write {}", path.display()), error };
+    if path.as_os_str() == "-" {
+        return std::io::stdout().write_all(&bytes).map_err(failed);
+    }
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(failed)?;
+    }
+    std::fs::write(&path, bytes).map_err(failed)?;
+    say(&path.display().to_string());
+    Ok(())
+}
+
+fn dialect(plant: CsvDialect, separator: Option<&str>, bom: bool) -> CsvDialect {
+    let (separator, decimal) = match separator {
+        Some(";") => (';', ','),
+        Some(_) => (',', '.'),
+        None => (plant.separator, plant.decimal),
+    };
+    CsvDialect { separator, decimal, bom: bom || plant.bom }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_decimal_mark_follows_the_separator() {
+        let german = CsvDialect { separator: ';', decimal: ',', bom: false };
+        assert_eq!(dialect(CsvDialect::default(), Some(";"), false), german);
+        assert_eq!(dialect(german, Some(","), true), CsvDialect { bom: true, ..CsvDialect::default() });
+        assert_eq!(dialect(german, None, false), german);
+    }
+}

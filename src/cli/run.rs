@@ -1,0 +1,119 @@
+//! `sightglass run PLANT` and `sightglass PLANT`: a station on real lines, without or with a terminal.
+
+use std::{path::PathBuf, sync::Arc, time::Duration};
+
+use tokio::signal::unix::{SignalKind, signal};
+
+use crate::{
+    bus::io::{clock::Clock, transport::Connector},
+    plant::{PlantDef, Snapshot},
+    station::{Session, io as station, teller},
+    ui,
+};
+
+use super::{CliError, StationArgs, load, log, paths, runtime, say, span};
+
+/// Arguments of `run`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A plant file, or the name of a shipped plant
+    plant: String,
+    /// End after this time
+    #[arg(long = "for", value_name = "TIME", value_parser = span)]
+    duration: Option<Duration>,
+    #[command(flatten)]
+    station: StationArgs,
+}
+
+/// Runs the station until it is told to stop; says on standard output what changes.
+pub fn main(args: Args) -> Result<(), CliError> {
+    let def = Arc::new(load(&args.plant, &args.station)?);
+    let _log = log::start(args.station.log.as_deref())?;
+    runtime()?.block_on(async {
+        let clock = Clock::real();
+        let mut station = start(&def, clock, history_file(&def, &args.station))?;
+        say(&format!("{}: {} tags on {} lines", def.title, def.tags.len(), def.lines.len()));
+        let session = station.session("station");
+        follow(session, clock, args.duration).await;
+        station.stop().await;
+        say("stopped");
+        Ok(())
+    })
+}
+
+/// Station and terminal in one process.
+pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
+    let def = Arc::new(load(plant, args)?);
+    ui::io::require_terminal()?;
+    let _log = log::start(args.log.as_deref())?;
+    runtime()?.block_on(async {
+        let mut station = start(&def, Clock::real(), history_file(&def, args))?;
+        let session = station.session(&paths::operator());
+        let result = ui::io::run(session, ui::io::Options::default()).await;
+        station.stop().await;
+        Ok(result?)
+    })
+}
+
+/// The history file that the arguments name, or the plant's own.
+pub fn history_file(def: &PlantDef, args: &StationArgs) -> PathBuf {
+    args.history.clone().unwrap_or_else(|| paths::history_of(&def.name))
+}
+
+/// A station on the lines of its plant.
+fn start(def: &Arc<PlantDef>, clock: Clock, history: PathBuf) -> Result<station::Station, CliError> {
+    if let Some(folder) = history.parent() {
+        std::fs::create_dir_all(folder)
+            .map_err(|error| CliError::Io { what: format!("cannot make {}", folder.display()), error })?;
+    }
+    let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
+    Ok(station::start(station::Options { def: def.clone(), clock, history, connectors })?)
+}
+
+/// Tells what changes until the time is over, a signal comes, or the station ends; gives the last snapshot.
+pub async fn follow(mut session: Session, clock: Clock, duration: Option<Duration>) -> Arc<Snapshot> {
+    let mut before = session.snapshots.borrow_and_update().clone();
+    let end = async {
+        match duration {
+            Some(duration) => clock.sleep(duration).await,
+            None => std::future::pending().await,
+        }
+    };
+    tokio::pin!(end);
+    let told_to_stop = signalled();
+    tokio::pin!(told_to_stop);
+    loop {
+        tokio::select! {
+            () = &mut end => break,
+            () = &mut told_to_stop => break,
+            changed = session.snapshots.changed() => {
+                if changed.is_err() {
+                    break;
+                }
+                let after = session.snapshots.borrow_and_update().clone();
+                let time = after.at.to_zoned(after.def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S");
+                for line in teller::changes(&before, &after) {
+                    say(&format!("{time} {line}"));
+                }
+                before = after;
+            }
+        }
+    }
+    session.snapshots.borrow().clone()
+}
+
+/// Returns when the process is asked to end.
+pub async fn signalled() {
+    let wait = |kind| async move {
+        match signal(kind) {
+            Ok(mut signal) => drop(signal.recv().await),
+            // Without a handler the system ends the process by itself.
+            Err(_) => std::future::pending().await,
+        }
+    };
+    tokio::select! {
+        () = wait(SignalKind::interrupt()) => {}
+        () = wait(SignalKind::terminate()) => {}
+        () = wait(SignalKind::hangup()) => {}
+    }
+}

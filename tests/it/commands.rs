@@ -1,0 +1,125 @@
+//! The program as scripts see it.
+
+use std::{fs, path::Path, process::Output};
+
+use crate::support::{Process, folder, sightglass};
+
+fn run(args: &[&str]) -> (Option<i32>, String, String) {
+    let Output { status, stdout, stderr } = sightglass().args(args).output().unwrap();
+    (status.code(), String::from_utf8(stdout).unwrap(), String::from_utf8(stderr).unwrap())
+}
+
+#[test]
+fn help_names_every_command_and_the_exit_codes() {
+    let (code, out, _) = run(&["--help"]);
+    assert_eq!(code, Some(0));
+    for word in ["demo", "run", "sim", "check", "profiles", "report", "Exit codes:"] {
+        assert!(out.contains(word), "no `{word}` in:\n{out}");
+    }
+    let (code, out, _) = run(&["--version"]);
+    assert_eq!((code, out.trim()), (Some(0), concat!("sightglass ", env!("CARGO_PKG_VERSION"))));
+}
+
+#[test]
+fn a_missing_plant_is_told_by_name_with_exit_code_2() {
+    for args in [["run", "nowhere.toml"], ["check", "nowhere.toml"]] {
+        let (code, _, err) = run(&args);
+        assert_eq!(code, Some(2), "{err}");
+        assert!(err.contains("nowhere.toml"), "{err}");
+    }
+    assert_eq!(run(&["demo", "--speed", "fast"]).0, Some(2));
+    assert_eq!(run(&["run", "tank", "--port", "L9=/dev/null"]).0, Some(2));
+}
+
+#[test]
+fn check_prints_the_read_plan_or_every_error() {
+    let (code, out, err) = run(&["check", "tank"]);
+    assert_eq!(code, Some(0), "{err}");
+    for word in ["L1", "TIC-1", "PLC-1", "4 / 0x04", "%"] {
+        assert!(out.contains(word), "no `{word}` in:\n{out}");
+    }
+    let folder = folder();
+    let file = folder.path().join("bad.toml");
+    fs::write(
+        &file,
+        "title = \"Bad\"\ntime_zone = \"Asia/Bangkok\"\n\n[[line]]\nname = \"L1\"\nmode = \"rtu\"\nport = \"/dev/ttyUSB0\"\nbaud = 9600\nparity = \"X\"\n\n\
+         [[device]]\nname = \"TIC-1\"\nprofile = \"fuji_prx\"\nline = \"L1\"\nunit = 1\n",
+    )
+    .unwrap();
+    let (code, _, err) = run(&["check", file.to_str().unwrap()]);
+    assert_eq!(code, Some(2), "{err}");
+    for word in ["bad.toml:9", "bad.toml:13", "fuji_prx", "fuji_pxr"] {
+        assert!(err.contains(word), "no `{word}` in:\n{err}");
+    }
+}
+
+#[test]
+fn shipped_profiles_are_in_the_binary() {
+    let (code, out, _) = run(&["profiles"]);
+    assert_eq!(code, Some(0));
+    for name in ["fuji_pxr", "koyo_dl06", "tank"] {
+        assert!(out.contains(name), "no `{name}` in:\n{out}");
+    }
+    let (code, out, _) = run(&["profiles", "fuji_pxr"]);
+    assert_eq!(code, Some(0));
+    assert!(out.contains("FUJI") && out.parse::<toml::Table>().is_ok(), "{out}");
+    let (code, _, err) = run(&["profiles", "fuji_prx"]);
+    assert!(code == Some(2) && err.contains("fuji_pxr"), "{err}");
+}
+
+#[test]
+fn the_demo_without_a_terminal_says_so() {
+    let (code, _, err) = run(&["demo"]);
+    assert_eq!(code, Some(1));
+    assert!(err.contains("--headless"), "{err}");
+}
+
+/// Ten minutes of plant in ten seconds: polled over a real pseudo-terminal, stored, reported.
+#[test]
+fn the_headless_demo_does_the_whole_job() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (report, history) = (path("report.csv"), path("demo.duckdb"));
+    let (code, out, err) =
+        run(&["demo", "--headless", "--for", "10m", "--speed", "60", "--report", &report, "--history", &history]);
+    assert_eq!(code, Some(0), "{out}\n{err}");
+    for word in ["polls", "values", "alarms", "rows stored", "report written"] {
+        assert!(out.contains(word), "no `{word}` in:\n{out}");
+    }
+    let rows = rows_of(Path::new(&report));
+    let pv = rows.iter().find(|row| row.iter().any(|cell| cell == "TIC-1.PV")).expect("PV is in the report");
+    let numbers: Vec<f64> = pv.iter().filter_map(|cell| cell.parse().ok()).collect();
+    assert!(numbers.iter().any(|value| (20.0..110.0).contains(value)), "a water temperature: {pv:?}");
+
+    // The same period again from the closed store: byte for byte the same.
+    let again = [path("one.csv"), path("two.csv")];
+    for file in &again {
+        let (code, _, err) =
+            run(&["report", "tank", "--history", &history, "--from", "2000-01-01T00:00", "--to", "2100-01-01T00:00", "--out", file]);
+        assert_eq!(code, Some(0), "{err}");
+    }
+    assert_eq!(fs::read(&again[0]).unwrap(), fs::read(&again[1]).unwrap());
+    let (code, out, _) = run(&["report", "tank", "--history", &history, "--from", "2000-01-01", "--to", "2100-01-01", "--out", "-"]);
+    assert_eq!(code, Some(0));
+    assert_eq!(out.as_bytes(), fs::read(&again[0]).unwrap());
+}
+
+#[test]
+fn a_history_in_use_is_named_with_its_process() {
+    let folder = folder();
+    let history = folder.path().join("demo.duckdb");
+    let history = history.to_str().unwrap();
+    let mut demo = Process::start(sightglass().args(["demo", "--headless", "--for", "1h", "--history", history]));
+    demo.wait_for("connected");
+    let (code, _, err) = run(&["report", "tank", "--history", history, "--shift", "last", "--out", "-"]);
+    assert_eq!(code, Some(3), "{err}");
+    assert!(err.contains(&demo.child.id().to_string()) && err.contains("sightglass"), "{err}");
+    demo.signal("TERM");
+    assert_eq!(demo.end(), Some(0));
+}
+
+/// Rows of a CSV file by a strict reader: every row has the same number of cells.
+fn rows_of(path: &Path) -> Vec<csv::StringRecord> {
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(false).from_path(path).unwrap();
+    reader.records().map(|row| row.unwrap()).collect()
+}

@@ -1,0 +1,18 @@
+//! The integration tests: one binary, so that it links once. A new test belongs to one of these files:
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `architecture` | the rules of the house: the line of modules, the io edge, file headers |
+//! | `commands` | the program as scripts see it: help, exit codes, messages, the headless demo and its report |
+//! | `terminal` | the program as a person sees it, in a pseudo-terminal: starts, keys, leaves the terminal as it was |
+//! | `peers` | against programs that we did not write: pymodbus, mbpoll, over a pseudo-terminal pair and TCP |
+//! | `durability` | killed, unplugged, locked, damaged |
+//! | `support` | what the others share: processes with deadlines, peers and their installation |
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod architecture;
+mod commands;
+mod durability;
+mod peers;
+mod support;
+mod terminal;

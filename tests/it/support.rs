@@ -1,0 +1,164 @@
+//! What the tests share: processes that cannot outlive their test, output with deadlines, peers and their installation.
+
+use std::{
+    io::{BufRead, BufReader, Read},
+    net::TcpListener,
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    sync::{
+        OnceLock,
+        mpsc::{Receiver, RecvTimeoutError, channel},
+    },
+    time::{Duration, Instant},
+};
+
+/// Nothing that these tests wait for takes so long, even on a busy machine.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// The program under test.
+pub fn sightglass() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sightglass"));
+    command.env_remove("NO_COLOR").env("SIGHTGLASS_LOG", "debug");
+    command
+}
+
+/// A folder of its own for the state of a program.
+pub fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+/// A process whose lines can be waited for; it ends with the test.
+pub struct Process {
+    pub child: Child,
+    lines: Receiver<String>,
+    /// All lines so far.
+    pub said: Vec<String>,
+}
+
+impl Process {
+    pub fn start(command: &mut Command) -> Process {
+        let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let (sender, lines) = channel();
+        let errors = sender.clone();
+        let read = |pipe: Box<dyn Read + Send>, sender: std::sync::mpsc::Sender<String>| {
+            std::thread::spawn(move || {
+                for line in BufReader::new(pipe).lines().map_while(Result::ok) {
+                    if sender.send(line).is_err() {
+                        break;
+                    }
+                }
+            });
+        };
+        read(Box::new(child.stdout.take().unwrap()), sender);
+        read(Box::new(child.stderr.take().unwrap()), errors);
+        Process { child, lines, said: Vec::new() }
+    }
+
+    /// Waits for a line with this text and gives it.
+    pub fn wait_for(&mut self, text: &str) -> String {
+        let end = Instant::now() + PATIENCE;
+        loop {
+            match self.lines.recv_timeout(end.saturating_duration_since(Instant::now())) {
+                Ok(line) => {
+                    self.said.push(line.clone());
+                    if line.contains(text) {
+                        return line;
+                    }
+                }
+                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
+                    panic!("`{text}` was never said, but:\n{}", self.said.join("\n"))
+                }
+            }
+        }
+    }
+
+    /// Sends a signal by name.
+    pub fn signal(&self, name: &str) {
+        let sent = Command::new("kill").args([&format!("-{name}"), &self.child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+    }
+
+    /// Waits for the end and gives the exit code (`None`: killed by a signal).
+    pub fn end(&mut self) -> Option<i32> {
+        // The pipes close when the process ends; that is the event to wait for.
+        let end = Instant::now() + PATIENCE;
+        loop {
+            match self.lines.recv_timeout(end.saturating_duration_since(Instant::now())) {
+                Ok(line) => self.said.push(line),
+                Err(RecvTimeoutError::Disconnected) => return self.child.wait().unwrap().code(),
+                Err(RecvTimeoutError::Timeout) => panic!("it did not end; it said:\n{}", self.said.join("\n")),
+            }
+        }
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// A TCP port that was free a moment ago.
+pub fn free_port() -> u16 {
+    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}
+
+/// A pair of pseudo-terminals joined by socat, as a cable that can be pulled.
+pub struct Cable {
+    pub ends: [PathBuf; 2],
+    _process: Process,
+}
+
+impl Cable {
+    pub fn plug(folder: &Path) -> Cable {
+        let ends = [folder.join("ttyA"), folder.join("ttyB")];
+        let end = |path: &Path| format!("pty,raw,echo=0,link={}", path.display());
+        let mut process = Process::start(Command::new("socat").args(["-d", "-d", &end(&ends[0]), &end(&ends[1])]));
+        process.wait_for("starting data transfer loop");
+        Cable { ends, _process: process }
+    }
+}
+
+/// `true` if a Debian program is here or could be installed. Without it a test says so and passes, except under CI.
+pub fn have(program: &str, package: &str) -> bool {
+    let found = || Command::new("which").arg(program).stdout(Stdio::null()).status().is_ok_and(|status| status.success());
+    if !found() {
+        let _ = Command::new("sh")
+            .args(["-c", &format!("(apt-get install -y -qq {package} || (apt-get update -qq && apt-get install -y -qq {package})) >/dev/null 2>&1")])
+            .status();
+    }
+    present(found(), &format!("{program} (Debian package {package})"))
+}
+
+/// The Python with pymodbus, in a virtual environment of the tests.
+pub fn python() -> Option<PathBuf> {
+    static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
+    PYTHON
+        .get_or_init(|| {
+            let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("peers-venv");
+            let python = folder.join("bin/python");
+            let works = || {
+                Command::new(&python)
+                    .args(["-c", "import pymodbus, serial; assert pymodbus.__version__ == '3.16.1'"])
+                    .stderr(Stdio::null())
+                    .status()
+                    .is_ok_and(|status| status.success())
+            };
+            if !works() {
+                let _ = Command::new("python3").args(["-m", "venv"]).arg(&folder).status();
+                let pip = ["-m", "pip", "-q", "install", "pymodbus[serial]==3.16.1"];
+                let _ = Command::new(&python).args(pip).status();
+            }
+            present(works(), "pymodbus 3.16.1 (PyPI, through python3 -m venv)").then_some(python)
+        })
+        .clone()
+}
+
+fn present(found: bool, what: &str) -> bool {
+    assert!(found || std::env::var_os("CI").is_none(), "under CI the peer must be there: {what}");
+    if !found {
+        eprintln!("SKIPPED: {what} is not installed and could not be");
+    }
+    found
+}
