@@ -10,9 +10,15 @@ use super::{CliError, paths};
 /// Days of logs that are kept.
 const DAYS: usize = 7;
 
-/// Starts logging; the guard writes what is left when it is dropped. `SIGHTGLASS_LOG` sets the level (`debug`).
+/// Starts logging; the guard writes what is left when it is dropped. `SIGHTGLASS_LOG` sets the level (`debug`);
+/// the file `-` is standard error, for an init system that keeps it.
 pub fn start(file: Option<&Path>) -> Result<WorkerGuard, CliError> {
     let failed = |error: std::io::Error| CliError::Io { what: "cannot open the log".into(), error };
+    if file.is_some_and(|file| file.as_os_str() == "-") {
+        let (writer, guard) = tracing_appender::non_blocking(std::io::stderr());
+        init(writer);
+        return Ok(guard);
+    }
     let writer = match file {
         Some(file) => {
             let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -34,8 +40,12 @@ pub fn start(file: Option<&Path>) -> Result<WorkerGuard, CliError> {
         }
     };
     let (writer, guard) = tracing_appender::non_blocking(writer);
+    init(writer);
+    Ok(guard)
+}
+
+fn init(writer: tracing_appender::non_blocking::NonBlocking) {
     let level = EnvFilter::try_from_env("SIGHTGLASS_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
     // A second start in one process (tests) keeps the first log.
     let _ = fmt().with_writer(writer).with_ansi(false).with_env_filter(level).try_init();
-    Ok(guard)
 }

@@ -6,7 +6,7 @@ use tokio::signal::unix::{SignalKind, signal};
 
 use crate::{
     bus::io::{clock::Clock, transport::Connector},
-    plant::{PlantDef, Snapshot},
+    plant::{PlantDef, Snapshot, sample::Quality},
     station::{Session, io as station, teller},
     ui,
 };
@@ -21,6 +21,9 @@ pub struct Args {
     /// End after this time
     #[arg(long = "for", value_name = "TIME", value_parser = span)]
     duration: Option<Duration>,
+    /// At the end print every tag with value, quality and age
+    #[arg(long)]
+    print: bool,
     #[command(flatten)]
     station: StationArgs,
 }
@@ -34,7 +37,10 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let mut station = start(&def, clock, history_file(&def, &args.station))?;
         say(&format!("{}: {} tags on {} lines", def.title, def.tags.len(), def.lines.len()));
         let session = station.session("station");
-        follow(session, clock, args.duration).await;
+        let last = follow(session, clock, args.duration).await;
+        if args.print {
+            values(&last).iter().for_each(|line| say(line));
+        }
         station.stop().await;
         say("stopped");
         Ok(())
@@ -53,6 +59,21 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
         station.stop().await;
         Ok(result?)
     })
+}
+
+/// One line a tag: name, value with unit, quality, age.
+fn values(snapshot: &Snapshot) -> Vec<String> {
+    let row = |tag: &crate::plant::tag::TagDef| {
+        let sample = snapshot.sample(tag.id);
+        let value = snapshot.text(tag.id).map_or_else(|| "----".into(), |text| format!("{text} {}", snapshot.unit(tag.id)));
+        let quality = match sample.quality {
+            Quality::Good => "good".to_owned(),
+            Quality::Uncertain(cause) => format!("uncertain: {}", cause.words()),
+            Quality::Bad(cause) => format!("bad: {}", cause.words()),
+        };
+        format!("{:20} {:>14}  {quality}  {:.1} s", tag.name, value.trim_end(), snapshot.age(tag.id).as_secs_f64())
+    };
+    snapshot.def.tags.iter().map(row).collect()
 }
 
 /// The history file that the arguments name, or the plant's own.

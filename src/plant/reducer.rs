@@ -69,6 +69,7 @@ impl Plant {
                 status.state = DeviceState::Answering;
                 status.reply = Some(reply);
                 status.ok += 1;
+                status.values += values.len() as u64;
                 (at, None)
             }
             Event::Failed { at, device, tags, fault } => {

@@ -109,6 +109,8 @@ pub struct DeviceStatus {
     pub reply: Option<Duration>,
     /// Valid answers since the start.
     pub ok: u64,
+    /// Values in those answers.
+    pub values: u64,
     /// Requests that failed since the start.
     pub failed: u64,
     /// The last failure and its time.
