@@ -1,4 +1,11 @@
-//! Frames as bytes: checks, lengths, shapes.
+//! Frames as bytes: checks, lengths, shapes, and whether an answer belongs to its request.
+//!
+//! A *message* is unit and PDU without any check: `01 03 03 EA 00 01`. RTU appends a CRC, TCP prepends the MBAP header.
+
+use crate::plant::event::{ExceptionCode, Fault};
+
+/// Longest message: unit and 253 bytes of PDU.
+pub const MESSAGE_MAX: usize = 254;
 
 /// CRC-16 of Modbus RTU (polynomial 0xA001 reflected, start 0xFFFF); sent low byte first.
 pub fn crc16(bytes: &[u8]) -> u16 {
@@ -7,14 +14,152 @@ pub fn crc16(bytes: &[u8]) -> u16 {
     })
 }
 
-/// Appends the CRC to unit and PDU.
+/// Appends the CRC to a message.
 pub fn with_crc(message: &[u8]) -> Vec<u8> {
     let mut frame = message.to_vec();
     frame.extend_from_slice(&crc16(message).to_le_bytes());
     frame
 }
 
+/// The message of an RTU frame, if its CRC fits.
+pub fn without_crc(frame: &[u8]) -> Result<&[u8], Fault> {
+    let Some((message, check)) = frame.split_last_chunk::<2>() else {
+        return Err(Fault::Truncated { got: frame.len() as u16, expected: 4 });
+    };
+    let (got, computed) = (u16::from_le_bytes(*check), crc16(message));
+    if got == computed { Ok(message) } else { Err(Fault::Crc { got, computed }) }
+}
+
+/// Prepends the MBAP header: transaction, protocol 0, length, then the message.
+pub fn with_mbap(transaction: u16, message: &[u8]) -> Vec<u8> {
+    let mut frame = Vec::with_capacity(6 + message.len());
+    frame.extend_from_slice(&transaction.to_be_bytes());
+    frame.extend_from_slice(&[0, 0]);
+    frame.extend_from_slice(&(message.len() as u16).to_be_bytes());
+    frame.extend_from_slice(message);
+    frame
+}
+
+/// What stands at the beginning of a TCP stream.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Mbap {
+    /// Not all of it has come yet.
+    Incomplete,
+    /// A whole frame: its transaction and the end of its message (which begins at byte 6).
+    Whole {
+        /// Transaction id.
+        transaction: u16,
+        /// End of the message in the buffer.
+        end: usize,
+    },
+    /// No MBAP header: the stream is out of step and must be closed.
+    Broken,
+}
+
+/// Looks at the beginning of a TCP stream.
+pub fn mbap(buffer: &[u8]) -> Mbap {
+    let Some((header, _)) = buffer.split_first_chunk::<6>() else { return Mbap::Incomplete };
+    let length = usize::from(u16::from_be_bytes([header[4], header[5]]));
+    if header[2..4] != [0, 0] || !(2..=MESSAGE_MAX).contains(&length) {
+        return Mbap::Broken;
+    }
+    if buffer.len() < 6 + length {
+        return Mbap::Incomplete;
+    }
+    Mbap::Whole { transaction: u16::from_be_bytes([header[0], header[1]]), end: 6 + length }
+}
+
+/// Length of the answer message (unit and PDU) that begins in `received`; `None` while too little has come to tell, or
+/// for a function whose length only silence can tell.
+pub fn answer_length(received: &[u8]) -> Option<usize> {
+    let at = |index: usize| received.get(index).map(|byte| usize::from(*byte));
+    match received.get(1)? {
+        0x80.. => Some(3),
+        0x01..=0x04 | 0x0C | 0x11 | 0x17 => Some(3 + at(2)?),
+        0x05 | 0x06 | 0x08 | 0x0B | 0x0F | 0x10 => Some(6),
+        0x07 => Some(3),
+        0x16 => Some(8),
+        0x18 => Some(4 + (at(2)? << 8 | at(3)?)),
+        0x2B => device_identification_length(received),
+        _ => None,
+    }
+}
+
+/// 2B/0E answers carry a list of objects, each with its length: unit 2B 0E code conformity more next count, then id len bytes.
+fn device_identification_length(received: &[u8]) -> Option<usize> {
+    let count = *received.get(7)?;
+    (0..count).try_fold(8, |end: usize, _| Some(end + 2 + usize::from(*received.get(end + 1)?)))
+}
+
+/// What an answer looks like from outside. RTU answers carry no transaction id: two answers of one shape cannot be told
+/// apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Shape {
+    function: u8,
+    /// Length of the message.
+    length: usize,
+    /// Address and value, or address and count, that an echo repeats.
+    echo: Option<[u8; 4]>,
+}
+
+/// The shape of the normal answer to a request message; `None` for functions whose answer length is not known before.
+pub fn shape_of(request: &[u8]) -> Option<Shape> {
+    let function = *request.get(1)?;
+    let word = |index: usize| Some(usize::from(u16::from_be_bytes([*request.get(index)?, *request.get(index + 1)?])));
+    let shape = |length: usize, echo: Option<[u8; 4]>| Some(Shape { function, length, echo });
+    match function {
+        0x01 | 0x02 => shape(3 + word(4)?.div_ceil(8), None),
+        0x03 | 0x04 | 0x17 => shape(3 + 2 * word(4)?, None),
+        0x05 | 0x06 | 0x08 | 0x0F | 0x10 => shape(6, request.get(2..6)?.try_into().ok()),
+        0x16 => shape(8, request.get(2..6)?.try_into().ok()),
+        _ => None,
+    }
+}
+
+impl Shape {
+    /// Would this answer message be taken for one of this shape?
+    pub fn fits(self, answer: &[u8]) -> bool {
+        answer.get(1) == Some(&self.function)
+            && answer.len() == self.length
+            && self.echo.is_none_or(|echo| answer.get(2..6) == Some(&echo[..]))
+    }
+
+    /// Length of the message.
+    pub fn length(self) -> usize {
+        self.length
+    }
+}
+
+/// Checks a whole answer message, free of line errors, against its request: unit, function, byte count, echo.
+/// An exception answer is [`Fault::Exception`].
+pub fn check_answer(request: &[u8], answer: &[u8]) -> Result<(), Fault> {
+    let (&[asked_unit, asked, ..], &[unit, function, ..]) = (request, answer) else {
+        return Err(Fault::Truncated { got: answer.len() as u16, expected: 3 });
+    };
+    if unit != asked_unit {
+        return Err(Fault::WrongUnit { got: unit, asked: asked_unit });
+    }
+    if function == asked | 0x80 {
+        return match answer {
+            [_, _, code] => Err(Fault::Exception(ExceptionCode(*code))),
+            _ => Err(Fault::WrongLength { got: answer.len() as u16, asked: 3 }),
+        };
+    }
+    if function != asked {
+        return Err(Fault::WrongFunction { got: function, asked });
+    }
+    let Some(shape) = shape_of(request) else { return Ok(()) };
+    if answer.len() != shape.length {
+        return Err(Fault::WrongLength { got: answer.len() as u16, asked: shape.length as u16 });
+    }
+    if matches!(asked, 0x01..=0x04 | 0x17) && usize::from(answer[2]) != shape.length - 3 {
+        return Err(Fault::WrongLength { got: u16::from(answer[2]), asked: (shape.length - 3) as u16 });
+    }
+    if shape.fits(answer) { Ok(()) } else { Err(Fault::WrongEcho) }
+}
+
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 
@@ -22,5 +167,83 @@ mod tests {
     fn the_check_value_of_the_standard() {
         assert_eq!(crc16(b"123456789"), 0x4B37);
         assert_eq!(with_crc(&[0x01, 0x06, 0x03, 0xEA, 0x00, 0x32]), [0x01, 0x06, 0x03, 0xEA, 0x00, 0x32, 0x29, 0xAF]);
+    }
+
+    /// Rows of the published examples: kind, message, CRC as sent.
+    fn vectors() -> Vec<(String, String, Vec<u8>, String)> {
+        let mut rows = csv::Reader::from_reader(include_str!("../../tests/vectors/frames.csv").as_bytes());
+        rows.records()
+            .map(|row| {
+                let row = row.unwrap();
+                let bytes = row[3].split(' ').map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect();
+                (row[0].to_owned(), row[1].to_owned(), bytes, row[4].replace(' ', ""))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_published_frame_has_its_check_and_its_length() {
+        let mut seen = 0;
+        for (id, kind, message, crc) in vectors() {
+            if crc.is_empty() {
+                continue;
+            }
+            let check: String = crc16(&message).to_le_bytes().iter().map(|byte| format!("{byte:02X}")).collect();
+            assert_eq!(check, crc, "{id}");
+            assert_eq!(without_crc(&with_crc(&message)), Ok(&message[..]), "{id}");
+            if kind == "response" || kind == "exception" {
+                assert_eq!(answer_length(&message), Some(message.len()), "{id}");
+            }
+            seen += 1;
+        }
+        assert_eq!(seen, 23);
+    }
+
+    #[test]
+    fn every_published_answer_belongs_to_its_request_and_to_no_other() {
+        let rows = vectors();
+        let of = |wanted: &'static str| rows.iter().filter(move |row| row.1 == wanted);
+        for (id, _, answer, _) in of("response") {
+            for (other, _, request, _) in of("request") {
+                let verdict = check_answer(request, answer);
+                assert_eq!(verdict.is_ok(), id == other, "{id} as an answer to {other}: {verdict:?}");
+            }
+        }
+        let (_, _, request, _) = of("request").find(|row| row.0 == "illegal-address").unwrap();
+        let (_, _, exception, _) = of("exception").next().unwrap();
+        assert_eq!(check_answer(request, exception), Err(Fault::Exception(ExceptionCode(2))));
+    }
+
+    #[test]
+    fn each_way_of_being_wrong_has_its_name() {
+        let request = [1, 3, 0, 10, 0, 2];
+        for (answer, fault) in [
+            (&[2, 3, 4, 0, 1, 0, 2][..], Fault::WrongUnit { got: 2, asked: 1 }),
+            (&[1, 4, 4, 0, 1, 0, 2], Fault::WrongFunction { got: 4, asked: 3 }),
+            (&[1, 3, 2, 0, 1], Fault::WrongLength { got: 5, asked: 7 }),
+            (&[1, 3, 2, 0, 1, 0, 2], Fault::WrongLength { got: 2, asked: 4 }),
+            (&[1, 0x83, 2], Fault::Exception(ExceptionCode(2))),
+        ] {
+            assert_eq!(check_answer(&request, answer), Err(fault));
+        }
+        assert_eq!(check_answer(&[1, 6, 0, 1, 0, 3], &[1, 6, 0, 1, 0, 4]), Err(Fault::WrongEcho));
+    }
+
+    #[test]
+    fn a_tcp_stream_is_cut_by_its_header() {
+        let frame = with_mbap(7, &[1, 3, 2, 0, 5]);
+        assert_eq!(mbap(&frame), Mbap::Whole { transaction: 7, end: 11 });
+        for cut in 0..frame.len() {
+            assert_eq!(mbap(&frame[..cut]), Mbap::Incomplete, "cut at {cut}");
+        }
+        assert_eq!(mbap(&[0, 1, 9, 9, 0, 5]), Mbap::Broken);
+        assert_eq!(mbap(&[0, 1, 0, 0, 255, 255]), Mbap::Broken);
+    }
+
+    #[test]
+    fn lists_of_identification_objects_are_measured() {
+        let answer = [1, 0x2B, 0x0E, 1, 1, 0, 0, 2, 0, 3, b'a', b'b', b'c', 1, 1, b'x'];
+        assert_eq!(answer_length(&answer), Some(answer.len()));
+        assert_eq!(answer_length(&answer[..9]), None);
     }
 }

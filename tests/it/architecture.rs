@@ -70,8 +70,16 @@ fn lib_names_the_modules_in_their_order() {
 #[test]
 fn the_outside_world_is_spelled_io() {
     let outside = [
-        "tokio", "duckdb", "std::fs", "std::net", "std::process", "crossterm", "SystemTime", "Instant::now",
-        "Timestamp::now", "Zoned::now",
+        "tokio",
+        "duckdb",
+        "std::fs",
+        "std::net",
+        "std::process",
+        "crossterm",
+        "SystemTime",
+        "Instant::now",
+        "Timestamp::now",
+        "Zoned::now",
     ];
     let mut wrong = Vec::new();
     for (path, text) in sources() {
@@ -88,6 +96,7 @@ fn the_outside_world_is_spelled_io() {
 
 #[test]
 fn every_file_says_its_duty_first() {
-    let silent: Vec<_> = sources().into_iter().filter(|(_, text)| !text.starts_with("//! ")).map(|(path, _)| path).collect();
+    let silent: Vec<_> =
+        sources().into_iter().filter(|(_, text)| !text.starts_with("//! ")).map(|(path, _)| path).collect();
     assert!(silent.is_empty(), "{silent:?}");
 }

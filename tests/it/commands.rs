@@ -94,12 +94,23 @@ fn the_headless_demo_does_the_whole_job() {
     // The same period again from the closed store: byte for byte the same.
     let again = [path("one.csv"), path("two.csv")];
     for file in &again {
-        let (code, _, err) =
-            run(&["report", "tank", "--history", &history, "--from", "2000-01-01T00:00", "--to", "2100-01-01T00:00", "--out", file]);
+        let (code, _, err) = run(&[
+            "report",
+            "tank",
+            "--history",
+            &history,
+            "--from",
+            "2000-01-01T00:00",
+            "--to",
+            "2100-01-01T00:00",
+            "--out",
+            file,
+        ]);
         assert_eq!(code, Some(0), "{err}");
     }
     assert_eq!(fs::read(&again[0]).unwrap(), fs::read(&again[1]).unwrap());
-    let (code, out, _) = run(&["report", "tank", "--history", &history, "--from", "2000-01-01", "--to", "2100-01-01", "--out", "-"]);
+    let (code, out, _) =
+        run(&["report", "tank", "--history", &history, "--from", "2000-01-01", "--to", "2100-01-01", "--out", "-"]);
     assert_eq!(code, Some(0));
     assert_eq!(out.as_bytes(), fs::read(&again[0]).unwrap());
 }

@@ -104,7 +104,8 @@ fn mbpoll_reads_the_simulated_plant_over_tcp() {
     }
     let (_sim, place) = sim(&["--tcp", "127.0.0.1:0"], "serves");
     let port = place.rsplit(':').next().unwrap();
-    let (ok, out) = mbpoll(&["-m", "tcp", "-p", port, "-a", "1", "-0", "-1", "-t", "4", "-r", "1002", "-c", "1", "127.0.0.1"]);
+    let (ok, out) =
+        mbpoll(&["-m", "tcp", "-p", port, "-a", "1", "-0", "-1", "-t", "4", "-r", "1002", "-c", "1", "127.0.0.1"]);
     assert!(ok && out.contains("[1002]: \t700"), "{out}");
 }
 

@@ -122,7 +122,8 @@ impl Cable {
 
 /// `true` if a Debian program is here or could be installed. Without it a test says so and passes, except under CI.
 pub fn have(program: &str, package: &str) -> bool {
-    let found = || Command::new("which").arg(program).stdout(Stdio::null()).status().is_ok_and(|status| status.success());
+    let found =
+        || Command::new("which").arg(program).stdout(Stdio::null()).status().is_ok_and(|status| status.success());
     if !found() {
         let _ = Command::new("sh")
             .args(["-c", &format!("(apt-get install -y -qq {package} || (apt-get update -qq && apt-get install -y -qq {package})) >/dev/null 2>&1")])

@@ -89,7 +89,9 @@ impl Terminal {
     /// The terminal is as it was: main screen, cursor shown, paste marks off, each undone exactly as often as done.
     fn assert_restored(&self) {
         let text = String::from_utf8_lossy(&self.raw);
-        for (done, undone) in [("\x1b[?1049h", "\x1b[?1049l"), ("\x1b[?2004h", "\x1b[?2004l"), ("\x1b[?2026h", "\x1b[?2026l")] {
+        for (done, undone) in
+            [("\x1b[?1049h", "\x1b[?1049l"), ("\x1b[?2004h", "\x1b[?2004l"), ("\x1b[?2026h", "\x1b[?2026l")]
+        {
             assert_eq!(text.matches(done).count(), text.matches(undone).count(), "{done:?} and {undone:?}");
         }
         assert!(!self.parser.screen().alternate_screen());

@@ -1,3 +1,6 @@
 //! The edge of the bus: ports, sockets, clocks.
 
 pub mod clock;
+pub mod transport;
+pub mod link;
+pub mod task;

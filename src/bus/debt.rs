@@ -1,0 +1,106 @@
+//! Protection against late answers where frames carry no transaction id (RTU).
+//!
+//! After a timeout a unit *owes* an answer. It may come at any later moment and would then be taken for the answer to the
+//! next request of the same shape: the value of another tag, called good. So while a unit owes, only a request is sent
+//! whose answer cannot be mistaken for an owed one. A serial device answers in order; a valid answer to such a request
+//! therefore proves that nothing older is still to come, and the debt is cleared.
+
+use super::{
+    frame::{Shape, shape_of},
+    plan::Block,
+};
+
+/// Most answers that are remembered as owed; a unit that owes more is asked nothing until it has rested.
+const OWED_MAX: usize = 16;
+
+/// What one unit owes.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Debt {
+    owed: Vec<Shape>,
+}
+
+impl Debt {
+    /// A request of this shape was not answered in time.
+    pub fn owe(&mut self, shape: Shape) {
+        if !self.owed.contains(&shape) && self.owed.len() < OWED_MAX {
+            self.owed.push(shape);
+        }
+    }
+
+    /// Could an answer of this shape be an owed one?
+    pub fn is_ambiguous(&self, shape: Shape) -> bool {
+        self.owed.contains(&shape) || self.owed.len() == OWED_MAX
+    }
+
+    /// Nothing older can come any more.
+    pub fn clear(&mut self) {
+        self.owed.clear();
+    }
+
+    /// Does the unit owe nothing?
+    pub fn is_clear(&self) -> bool {
+        self.owed.is_empty()
+    }
+
+    /// A read that brings the unit back into step: part of a block that is read anyway, with a count whose answer cannot
+    /// be mistaken. `None`: there is none, only rest helps.
+    pub fn probe<'a>(&self, blocks: impl Iterator<Item = &'a Block>) -> Option<[u8; 6]> {
+        blocks.flat_map(probes).find(|request| shape_of(request).is_some_and(|shape| !self.is_ambiguous(shape)))
+    }
+}
+
+/// Reads of the first part of a block, the shortest first: each has a shape of its own.
+fn probes(block: &Block) -> impl Iterator<Item = [u8; 6]> {
+    let step = if block.table.is_bits() { 8 } else { 1 };
+    let counts = (1..block.count).step_by(step).chain([block.count]);
+    let block = block.clone();
+    counts.map(move |count| Block { count, ..block.clone() }.request())
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::{
+        bus::plan,
+        plant::{def::LineId, fixture},
+    };
+
+    #[test]
+    fn a_probe_is_never_of_an_owed_shape() {
+        let blocks = plan::blocks(&fixture::plant(), LineId(0));
+        let inputs = &blocks[0];
+        let mut debt = Debt::default();
+        assert!(debt.is_clear());
+        let mut asked = Vec::new();
+        // Every probe in vain is owed too; each next one differs until the block has no more shapes to offer.
+        debt.owe(shape_of(&inputs.request()).unwrap());
+        assert!(debt.is_ambiguous(shape_of(&inputs.request()).unwrap()));
+        while let Some(probe) = debt.probe([inputs].into_iter()) {
+            assert!(!asked.contains(&probe));
+            assert!(probe[5] < inputs.count as u8);
+            debt.owe(shape_of(&probe).unwrap());
+            asked.push(probe);
+        }
+        assert_eq!(asked.len(), 7, "one to seven of eight registers");
+        debt.clear();
+        assert!(!debt.is_ambiguous(shape_of(&inputs.request()).unwrap()));
+    }
+
+    #[test]
+    fn a_unit_that_owes_too_much_is_asked_nothing() {
+        let mut debt = Debt::default();
+        for count in 1..=OWED_MAX as u8 {
+            debt.owe(shape_of(&[1, 3, 0, 0, 0, count]).unwrap());
+        }
+        assert!(debt.is_ambiguous(shape_of(&[1, 4, 0, 0, 0, 99]).unwrap()));
+    }
+
+    #[test]
+    fn writes_are_told_apart_by_their_echo() {
+        let mut debt = Debt::default();
+        debt.owe(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap());
+        assert!(!debt.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 6]).unwrap()));
+        assert!(debt.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap()));
+    }
+}

@@ -1,0 +1,118 @@
+//! Opens what the bytes travel on: a serial port or a TCP connection, with errors that say what to do.
+
+use std::{io, time::Duration};
+
+use tokio::{
+    io::{AsyncRead, AsyncWrite, DuplexStream},
+    net::TcpStream,
+    sync::mpsc,
+};
+use tokio_serial::SerialPortBuilderExt;
+
+use crate::plant::def::{Parity, Serial, Transport};
+
+/// A TCP connection must stand within this time.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
+
+/// An open port or connection.
+pub trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
+impl<T: AsyncRead + AsyncWrite + Send + Unpin> Stream for T {}
+
+/// How a line is opened.
+#[derive(Debug)]
+pub enum Connector {
+    /// As the plant says.
+    Real(Transport),
+    /// In memory: each opening takes the next stream; none left means that there is no port now.
+    Memory(mpsc::Receiver<DuplexStream>),
+}
+
+impl Connector {
+    /// Opens the port or connection; the error is in words for an operator.
+    pub async fn open(&mut self) -> Result<Box<dyn Stream>, String> {
+        match self {
+            Connector::Real(Transport::Rtu { port, serial }) => open_serial(port, *serial),
+            Connector::Real(Transport::Tcp { host, port }) => open_tcp(host, *port).await,
+            Connector::Memory(streams) => match streams.try_recv() {
+                Ok(stream) => Ok(Box::new(stream)),
+                Err(_) => Err("no such port".into()),
+            },
+        }
+    }
+}
+
+fn open_serial(path: &str, serial: Serial) -> Result<Box<dyn Stream>, String> {
+    use tokio_serial::{DataBits, FlowControl, StopBits};
+    let builder = tokio_serial::new(path, serial.baud)
+        .data_bits(if serial.data_bits == 7 { DataBits::Seven } else { DataBits::Eight })
+        .parity(match serial.parity {
+            Parity::None => tokio_serial::Parity::None,
+            Parity::Even => tokio_serial::Parity::Even,
+            Parity::Odd => tokio_serial::Parity::Odd,
+        })
+        .stop_bits(if serial.stop_bits == 2 { StopBits::Two } else { StopBits::One })
+        .flow_control(FlowControl::None);
+    // The port is taken exclusively: a second master on the line is refused by the system.
+    match builder.open_native_async() {
+        Ok(stream) => Ok(Box::new(stream)),
+        Err(error) => Err(serial_words(path, &error)),
+    }
+}
+
+fn serial_words(path: &str, error: &tokio_serial::Error) -> String {
+    use tokio_serial::ErrorKind;
+    let words = error.to_string();
+    match error.kind {
+        ErrorKind::Io(io::ErrorKind::NotFound) => format!("{path}: no such port"),
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
+            format!("{path}: no permission (is the user in the group dialout?)")
+        }
+        ErrorKind::NoDevice if words.to_lowercase().contains("busy") => format!("{path}: in use by another program"),
+        ErrorKind::NoDevice | ErrorKind::InvalidInput | ErrorKind::Unknown | ErrorKind::Io(_) => {
+            format!("{path}: {words}")
+        }
+    }
+}
+
+async fn open_tcp(host: &str, port: u16) -> Result<Box<dyn Stream>, String> {
+    let connect = TcpStream::connect((host, port));
+    let stream = match tokio::time::timeout(CONNECT_TIMEOUT, connect).await {
+        Err(_) => return Err(format!("{host}:{port}: no connection within {} s", CONNECT_TIMEOUT.as_secs())),
+        Ok(Err(error)) => return Err(format!("{host}:{port}: {}", tcp_words(&error))),
+        Ok(Ok(stream)) => stream,
+    };
+    // Small frames must not wait for each other.
+    stream.set_nodelay(true).map_err(|error| format!("{host}:{port}: {error}"))?;
+    // A peer that vanished without a word is noticed even while nothing is sent.
+    if let Err(error) = rustix::net::sockopt::set_socket_keepalive(&stream, true) {
+        tracing::debug!(%error, "no keepalive on {host}:{port}");
+    }
+    Ok(Box::new(stream))
+}
+
+fn tcp_words(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::ConnectionRefused => "refused (is the device on, is the TCP port right?)".into(),
+        io::ErrorKind::HostUnreachable | io::ErrorKind::NetworkUnreachable => "no way to this address".into(),
+        _ => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn errors_say_what_to_do() {
+        let serial = Serial { baud: 9600, data_bits: 8, parity: Parity::None, stop_bits: 1 };
+        let missing = Transport::Rtu { port: "/dev/no-such-port".into(), serial };
+        let words = Connector::Real(missing).open().await.err().unwrap();
+        assert_eq!(words, "/dev/no-such-port: no such port");
+        // A port that was just free and is closed again refuses.
+        let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let closed = Transport::Tcp { host: "127.0.0.1".into(), port };
+        let words = Connector::Real(closed).open().await.err().unwrap();
+        assert!(words.contains("refused"), "{words}");
+    }
+}
