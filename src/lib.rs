@@ -2,5 +2,6 @@
 
 pub mod plant;
 pub mod bus;
+pub mod sim;
 pub mod report;
 pub mod history;
