@@ -146,6 +146,8 @@ pub fn reply_delay(unit: u8) -> Duration {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
     use crate::bus::frame::with_crc;
 
@@ -266,7 +268,7 @@ mod tests {
         let reply = rig.respond(1, &[3, 0x03, 0xEC, 0, 4]).expect("the controller answers");
         let [tune, p, i, d] = [2, 4, 6, 8].map(|at| u16::from_be_bytes([reply[at], reply[at + 1]]));
         assert_eq!(tune, 0);
-        assert!((5..50).contains(&p) && (300..2400).contains(&i) && d < i, "P {p} I {i} D {d}");
+        assert!((8..20).contains(&p) && (500..1000).contains(&i) && (90..200).contains(&d), "P {p} I {i} D {d}");
         rig.advance(Duration::from_secs(3600));
         assert!((rig.truth().pv_c - 70.0).abs() < 1.0, "{:?}", rig.truth());
     }
@@ -282,6 +284,44 @@ mod tests {
         rig.advance(Duration::from_secs(2 * 3600));
         assert!(rig.truth().fault);
         assert_eq!(rig.truth().outputs, Outputs::default());
+    }
+
+    /// What an operator may write: a coil of the PLC, all outputs at once, a setting of the controller.
+    fn any_write() -> impl Strategy<Value = (u8, Vec<u8>)> {
+        let coil = |first: u16| {
+            (0..8_u16, any::<bool>()).prop_map(move |(number, on)| {
+                let [high, low] = (first + number).to_be_bytes();
+                (DL06_UNIT, vec![5, high, low, if on { 0xFF } else { 0 }, 0])
+            })
+        };
+        let setting = (1000..1083_u16, any::<u16>()).prop_map(|(address, value)| {
+            let [[a, b], [c, d]] = [address.to_be_bytes(), value.to_be_bytes()];
+            (PXR_UNIT, vec![6, a, b, c, d])
+        });
+        prop_oneof![coil(3072), coil(2048), setting, Just((DL06_UNIT, vec![6, 0x41, 0x40, 0xFF, 0xFF]))]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn whatever_is_written_nothing_boils_dry_or_overflows(
+            demo in any::<bool>(),
+            writes in prop::collection::vec((any_write(), 1_u64..900), 1..25),
+        ) {
+            let mut rig = if demo { Rig::demo() } else { Rig::new() };
+            for ((unit, pdu), seconds) in writes {
+                prop_assert!(rig.respond(unit, &pdu).is_some());
+                for _ in 0..seconds {
+                    rig.advance(Duration::from_secs(1));
+                    let Readings { level_cm, heater_w, .. } = rig.truth().readings;
+                    // The heating element needs some seconds to cool after the interlock has opened.
+                    prop_assert!(level_cm >= 4.5 || heater_w < 500.0, "{heater_w} W at {level_cm} cm");
+                    prop_assert!(level_cm <= 28.1, "{level_cm} cm");
+                    prop_assert!(rig.tank.control.temperature_c < 100.0);
+                    prop_assert!((0.0..=100.0).contains(&rig.truth().mv_percent));
+                }
+            }
+        }
     }
 
     #[test]

@@ -248,6 +248,24 @@ mod tests {
     }
 
     #[test]
+    fn in_manual_the_sequence_waits_where_it_is() {
+        let plc = &mut Dl06::new();
+        plc.start();
+        plc.scan(false, &HALF_FULL);
+        plc.scan(false, &HALF_FULL);
+        assert_eq!(plc.step(), Step::Heat);
+        ask(plc, &[5, 0x0C, 1, 0, 0], &[5, 0x0C, 1, 0, 0]);
+        plc.scan(true, &HALF_FULL);
+        assert_eq!((plc.step(), plc.outputs()), (Step::Heat, Outputs::default()));
+        ask(plc, &[5, 0x0C, 1, 0xFF, 0], &[5, 0x0C, 1, 0xFF, 0]);
+        plc.scan(true, &HALF_FULL);
+        assert_eq!(plc.step(), Step::Hold);
+        ask(plc, &[5, 0x0C, 0, 0, 0], &[5, 0x0C, 0, 0, 0]);
+        plc.scan(true, &HALF_FULL);
+        assert_eq!(plc.step(), Step::Idle);
+    }
+
+    #[test]
     fn stopping_turns_everything_off_once() {
         let plc = &mut Dl06::new();
         ask(plc, &[15, 0x0C, 0, 0, 4, 1, 0b1101], &[15, 0x0C, 0, 0, 4]);

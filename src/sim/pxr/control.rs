@@ -2,8 +2,10 @@
 
 /// Output at SV when there is no integral part (lumped model of the six experiments).
 const BIAS_PERCENT: f64 = 21.0;
-/// The integral acts only this near to SV, as a share of the range: 6.4 °C of 185 °C in the lumped model.
+/// The integral acts only this near to SV, as a share of the range: 6.4 °C of 185 °C in the lumped model, P 5 %.
 const INTEGRAL_REACH: f64 = 6.4 / 185.0;
+/// The same as a share of the proportional band, so that a wider band does not stall before the integral sets in.
+const INTEGRAL_REACH_OF_BAND: f64 = 0.69;
 /// The derivative is filtered over this share of D.
 const DERIVATIVE_FILTER: f64 = 0.125;
 /// The fuzzy law heats fully until PV, drawn out this far along its slope, meets SV.
@@ -66,16 +68,20 @@ impl Control {
     }
 
     fn pid(&mut self, dt_s: f64, error_c: f64, set: &Settings) -> f64 {
-        let gain = 100.0 / (set.p_percent / 100.0 * set.span_c);
+        let band_c = set.p_percent / 100.0 * set.span_c;
+        let gain = 100.0 / band_c;
         let wanted = gain * (error_c - set.d_s * self.rate_c_per_s);
         if set.i_s <= 0.0 {
             self.integral_percent = 0.0;
             return (wanted + BIAS_PERCENT).clamp(0.0, 100.0);
         }
-        // Outside its reach the integral rests, or it would fill up during the whole heating and overshoot.
-        if error_c.abs() <= INTEGRAL_REACH * set.span_c {
-            self.integral_percent = (self.integral_percent + gain * error_c * dt_s / set.i_s).clamp(0.0, 100.0);
-        }
+        // Outside its reach the integral is empty, or it would fill up during the whole heating and overshoot.
+        let reach_c = (INTEGRAL_REACH * set.span_c).max(INTEGRAL_REACH_OF_BAND * band_c);
+        self.integral_percent = if error_c.abs() <= reach_c {
+            (self.integral_percent + gain * error_c * dt_s / set.i_s).clamp(0.0, 100.0)
+        } else {
+            0.0
+        };
         (wanted + self.integral_percent).clamp(0.0, 100.0)
     }
 }
@@ -103,6 +109,7 @@ mod tests {
         check(Settings { i_s: 240.0, ..SET }, &[0.0], 0.0);
         check(Settings { i_s: 240.0, ..SET }, &[1.0; 480], 10.8 * 2.0);
         check(Settings { i_s: 240.0, ..SET }, &[9.0; 4800], 97.3);
+        check(Settings { i_s: 240.0, p_percent: 50.0, ..SET }, &[20.0; 480], 21.6 * 2.0);
         check(Settings { d_s: 60.0, ..SET }, &[4.0, 3.9, 3.8, 3.7, 3.6, 3.5, 3.4, 3.3], 9.5);
         check(Settings { p_percent: 0.0, ..SET }, &[0.5], 0.0);
         check(Settings { p_percent: 0.0, ..SET }, &[1.5, 0.5], 100.0);

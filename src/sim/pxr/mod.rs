@@ -19,8 +19,9 @@ const SAMPLE_S: f64 = 0.5;
 /// Deviation alarm 1: on above SV + 5 °C, off again 1 °C lower. Its registers are not known, so it is fixed here.
 const ALARM_DEVIATION_C: f64 = 5.0;
 const ALARM_HYSTERESIS_C: f64 = 1.0;
-/// Fault word 31008: input open on the upper side, above the range.
+/// Fault word 31008: input open on the upper side, below the range, above it.
 const OPEN_UPPER: u16 = 1 << 1;
+const BELOW_RANGE: u16 = 1 << 2;
 const ABOVE_RANGE: u16 = 1 << 3;
 /// PV runs from −5 to 105 % of the range.
 const OVER_RANGE: f64 = 0.05;
@@ -124,6 +125,7 @@ impl Pxr {
         self.faults = match sensor {
             Sensor::Open => OPEN_UPPER | ABOVE_RANGE,
             Sensor::Pt100(c) if c > high_c + margin_c => ABOVE_RANGE,
+            Sensor::Pt100(c) if c < low_c - margin_c => BELOW_RANGE,
             Sensor::Pt100(_) => 0,
         };
         let seen_c = input_c.clamp(low_c - margin_c, high_c + margin_c);
