@@ -40,8 +40,8 @@ pub enum Words {
     Input,
 }
 
-/// What a device has behind its addresses. Writes come in two moves, so that one bad value refuses a whole block.
-pub trait Registers {
+/// What a device has behind its addresses. A write of several is tried on a copy, so one bad value refuses the whole block.
+pub trait Registers: Clone {
     /// The functions it knows.
     const FUNCTIONS: &'static [u8];
     /// Words that one request may read or write.
@@ -49,16 +49,12 @@ pub trait Registers {
 
     /// One bit.
     fn bit(&self, kind: Bits, address: u16) -> Result<bool, Refusal>;
-    /// Whether this coil may be written.
-    fn admit_bit(&self, address: u16) -> Result<(), Refusal>;
-    /// Writes a coil that was admitted.
-    fn set_bit(&mut self, address: u16, on: bool);
+    /// Writes one coil.
+    fn write_bit(&mut self, address: u16, on: bool) -> Result<(), Refusal>;
     /// One word.
     fn word(&self, kind: Words, address: u16) -> Result<u16, Refusal>;
-    /// Whether this value may be written to this holding register.
-    fn admit_word(&self, address: u16, value: u16) -> Result<(), Refusal>;
-    /// Writes a value that was admitted.
-    fn set_word(&mut self, address: u16, value: u16);
+    /// Writes one holding register.
+    fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal>;
 }
 
 /// Answers a request. The PDU holds function and data, neither unit nor check; an empty one has no answer.
@@ -129,8 +125,7 @@ fn write_bit<D: Registers>(device: &mut D, address: u16, operand: u16) -> Result
         0x0000 => false,
         _ => return Err(Refusal::Value),
     };
-    device.admit_bit(address)?;
-    device.set_bit(address, on);
+    device.write_bit(address, on)?;
     Ok(Written)
 }
 
@@ -140,10 +135,11 @@ fn write_bits<D: Registers>(device: &mut D, address: u16, count: u16, rest: &[u8
     if usize::from(*bytes) != packed.len() || packed.len() != usize::from(count.div_ceil(8)) {
         return Err(Refusal::Value);
     }
-    addresses.clone().try_for_each(|at| device.admit_bit(at))?;
+    let mut trial = device.clone();
     for (place, at) in addresses.enumerate() {
-        device.set_bit(at, packed[place / 8] >> (place % 8) & 1 == 1);
+        trial.write_bit(at, packed[place / 8] >> (place % 8) & 1 == 1)?;
     }
+    *device = trial;
     Ok(Written)
 }
 
@@ -158,8 +154,9 @@ fn block_of_words(count: u16, max: u16, rest: &[u8]) -> Result<Vec<u16>, Refusal
 
 fn write_words<D: Registers>(device: &mut D, address: u16, values: &[u16]) -> Result<Written, Refusal> {
     let addresses = span(address, values.len() as u16, WRITE_WORDS_MAX)?;
-    addresses.clone().zip(values).try_for_each(|(at, value)| device.admit_word(at, *value))?;
-    addresses.zip(values).for_each(|(at, value)| device.set_word(at, *value));
+    let mut trial = device.clone();
+    addresses.zip(values).try_for_each(|(at, value)| trial.write_word(at, *value))?;
+    *device = trial;
     Ok(Written)
 }
 
@@ -189,7 +186,7 @@ mod tests {
     use super::*;
 
     /// Eight coils and eight registers at 100; registers take values below 1000.
-    #[derive(Default)]
+    #[derive(Clone, Default)]
     struct Small {
         bits: [bool; 8],
         words: [u16; 8],
@@ -206,21 +203,17 @@ mod tests {
         fn bit(&self, _: Bits, address: u16) -> Result<bool, Refusal> {
             Ok(self.bits[place(address)?])
         }
-        fn admit_bit(&self, address: u16) -> Result<(), Refusal> {
-            place(address).map(|_| ())
-        }
-        fn set_bit(&mut self, address: u16, on: bool) {
-            self.bits[usize::from(address) - 100] = on;
+        fn write_bit(&mut self, address: u16, on: bool) -> Result<(), Refusal> {
+            self.bits[place(address)?] = on;
+            Ok(())
         }
         fn word(&self, _: Words, address: u16) -> Result<u16, Refusal> {
             Ok(self.words[place(address)?])
         }
-        fn admit_word(&self, address: u16, value: u16) -> Result<(), Refusal> {
-            place(address)?;
-            if value < 1000 { Ok(()) } else { Err(Refusal::Value) }
-        }
-        fn set_word(&mut self, address: u16, value: u16) {
-            self.words[usize::from(address) - 100] = value;
+        fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
+            let place = place(address)?;
+            self.words[place] = if value < 1000 { value } else { return Err(Refusal::Value) };
+            Ok(())
         }
     }
 

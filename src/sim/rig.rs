@@ -324,6 +324,35 @@ mod tests {
         }
     }
 
+    proptest! {
+        #[test]
+        fn no_request_breaks_the_rig(
+            requests in prop::collection::vec(
+                (
+                    1..3_u8,
+                    prop::sample::select(vec![1_u8, 2, 3, 4, 5, 6, 15, 16, 43]),
+                    prop::sample::select(vec![0_u16, 990, 1024, 2040, 3072, 16_384, 65_500]),
+                    0..60_u16,
+                    prop::collection::vec(any::<u8>(), 2..40),
+                ),
+                1..60,
+            ),
+        ) {
+            let mut rig = Rig::demo();
+            for (unit, function, base, above, mut rest) in requests {
+                if function >= 15 {
+                    // A block that fits its own counts reaches the registers, not only the parser.
+                    let words = rest.len() / 2;
+                    rest.truncate(2 * words);
+                    rest.splice(0..0, [0, if function == 16 { words } else { words * 16 } as u8, 2 * words as u8]);
+                }
+                let pdu = [&[function], &(base + above.min(35)).to_be_bytes()[..], &rest].concat();
+                prop_assert!(rig.respond(unit, &pdu).is_some());
+                rig.advance(Duration::from_secs(2));
+            }
+        }
+    }
+
     #[test]
     fn after_a_power_cut_the_plant_stands_still() {
         let rig = &mut Rig::demo();

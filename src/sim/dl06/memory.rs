@@ -128,17 +128,14 @@ impl Memory {
         Ok(self.bank(place.kind).get(number))
     }
 
-    /// The number of a coil within its bank, if it may be written.
-    pub fn coil(&self, address: u16) -> Result<(Kind, u16), Refusal> {
+    /// Writes a coil by its wire address.
+    pub fn write_coil(&mut self, address: u16, on: bool) -> Result<(), Refusal> {
         let (place, number) = find_bit(Bits::Coils, address)?;
-        if place.writable { Ok((place.kind, number)) } else { Err(Refusal::Address) }
-    }
-
-    /// Writes a coil; nothing happens where none may be written.
-    pub fn set_coil(&mut self, address: u16, on: bool) {
-        if let Ok((kind, number)) = self.coil(address) {
-            self.bank_mut(kind).set(number, on);
+        if !place.writable {
+            return Err(Refusal::Address);
         }
+        self.bank_mut(place.kind).set(number, on);
+        Ok(())
     }
 
     /// One word by its wire address.
@@ -149,28 +146,20 @@ impl Memory {
         }
     }
 
-    /// Whether a word may be written.
-    pub fn admit_word(&self, address: u16) -> Result<(), Refusal> {
-        let writable = match find_word(address)? {
-            Word::Own { writable } => writable,
-            Word::Bits { place, .. } => place.writable,
-        };
-        if writable { Ok(()) } else { Err(Refusal::Address) }
-    }
-
-    /// Writes a word wherever there is one.
-    pub fn set_word(&mut self, address: u16, value: u16) {
-        match find_word(address) {
-            Ok(Word::Own { .. }) => self.v[usize::from(address)] = value,
-            Ok(Word::Bits { place, index }) => self.bank_mut(place.kind).0[index] = value,
-            Err(_) => {}
+    /// Writes a word by its wire address.
+    pub fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
+        match find_word(address)? {
+            Word::Own { writable: true } => self.v[usize::from(address)] = value,
+            Word::Bits { place, index } if place.writable => self.bank_mut(place.kind).0[index] = value,
+            Word::Own { .. } | Word::Bits { .. } => return Err(Refusal::Address),
         }
+        Ok(())
     }
 
-    /// Writes words one after the other, as the programme does.
+    /// Writes consecutive words of V memory from inside, as the programme does; what falls outside is dropped.
     pub fn set_block(&mut self, first: u16, values: &[u16]) {
-        for (address, value) in (first..).zip(values) {
-            self.set_word(address, *value);
+        for (word, value) in self.v.iter_mut().skip(usize::from(first)).zip(values) {
+            *word = *value;
         }
     }
 
@@ -249,9 +238,9 @@ mod tests {
     #[test]
     fn words_can_be_written_where_users_own_them() {
         let check = |address, expect: Result<bool, Refusal>| {
-            let memory = Memory::new();
+            let mut memory = Memory::new();
             let read = memory.word(address);
-            assert_eq!(read.map(|_| memory.admit_word(address).is_ok()), expect, "V{address:o}");
+            assert_eq!(read.map(|_| memory.write_word(address, 1).is_ok()), expect, "V{address:o}");
         };
         check(0o0, Ok(false));
         check(0o377, Ok(false));
@@ -273,11 +262,12 @@ mod tests {
     #[test]
     fn a_coil_and_its_word_are_one() {
         let mut memory = Memory::new();
-        memory.set_coil(2048 + 9, true);
+        assert_eq!(memory.write_coil(2048 + 9, true), Ok(()));
         assert_eq!(memory.word(0o40500), Ok(0x0200));
-        memory.set_word(0o40600, 0x8001);
+        assert_eq!(memory.write_word(0o40600, 0x8001), Ok(()));
         assert_eq!([0, 1, 15].map(|relay| memory.c.get(relay)), [true, false, true]);
-        memory.set_coil(2048 + 9, false);
+        assert_eq!(memory.write_coil(2048 + 9, false), Ok(()));
         assert_eq!(memory.word(0o40500), Ok(0));
+        assert_eq!(memory.write_coil(5120, true), Err(Refusal::Address));
     }
 }

@@ -193,12 +193,8 @@ impl Registers for Dl06 {
         self.memory.bit(kind, address)
     }
 
-    fn admit_bit(&self, address: u16) -> Result<(), Refusal> {
-        self.memory.coil(address).map(|_| ())
-    }
-
-    fn set_bit(&mut self, address: u16, on: bool) {
-        self.memory.set_coil(address, on);
+    fn write_bit(&mut self, address: u16, on: bool) -> Result<(), Refusal> {
+        self.memory.write_coil(address, on)
     }
 
     /// Functions 03 and 04 both read V memory.
@@ -206,12 +202,8 @@ impl Registers for Dl06 {
         self.memory.word(address)
     }
 
-    fn admit_word(&self, address: u16, _: u16) -> Result<(), Refusal> {
-        self.memory.admit_word(address)
-    }
-
-    fn set_word(&mut self, address: u16, value: u16) {
-        self.memory.set_word(address, value);
+    fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
+        self.memory.write_word(address, value)
     }
 }
 

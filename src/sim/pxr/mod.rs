@@ -141,11 +141,13 @@ impl Pxr {
             _ => Command::Off,
         };
         let plan = self.plan();
-        let sv_c = self.program.step(SAMPLE_S, command, &plan, self.pv_c).unwrap_or_else(|| self.tenths(map::SV));
+        let moving_c = self.program.step(SAMPLE_S, command, &plan, self.pv_c);
         if self.program.ended() && command == Command::Run {
             self.settings[map::PROGRAM] = 3;
         }
-        sv_c
+        // The limits of SV hold for a programme that was written before they were.
+        let sv_c = moving_c.unwrap_or_else(|| self.tenths(map::SV));
+        sv_c.clamp(self.tenths(map::SV_LOW), self.tenths(map::SV_HIGH))
     }
 
     /// Steps 1–4, 5–8 or 1–8, as register 41083 selects.

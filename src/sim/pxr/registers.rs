@@ -4,21 +4,6 @@ use super::Pxr;
 use super::map::{self, Meaning, Row};
 use crate::sim::pdu::{Bits, Refusal, Registers, Words};
 
-/// The two copies of every word (manual of the sibling series): engineering = internal + 1000.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Area {
-    Internal,
-    Engineering,
-}
-
-fn area(address: u16) -> Result<(Area, usize), Refusal> {
-    match usize::from(address) {
-        place @ 0..map::COUNT => Ok((Area::Internal, place)),
-        place if (1000..1000 + map::COUNT).contains(&place) => Ok((Area::Engineering, place - 1000)),
-        _ => Err(Refusal::Address),
-    }
-}
-
 impl Registers for Pxr {
     const FUNCTIONS: &'static [u8] = &[0x03, 0x04, 0x06, 0x10];
     const WORDS_MAX: u16 = 60;
@@ -27,11 +12,9 @@ impl Registers for Pxr {
         Err(Refusal::Function)
     }
 
-    fn admit_bit(&self, _: u16) -> Result<(), Refusal> {
+    fn write_bit(&mut self, _: u16, _: bool) -> Result<(), Refusal> {
         Err(Refusal::Function)
     }
-
-    fn set_bit(&mut self, _: u16, _: bool) {}
 
     /// Places between the known settings read as 0, as in the sibling series.
     fn word(&self, kind: Words, address: u16) -> Result<u16, Refusal> {
@@ -43,14 +26,12 @@ impl Registers for Pxr {
         Ok(if area == Area::Internal { self.to_internal(raw, meaning) } else { raw } as u16)
     }
 
-    fn admit_word(&self, address: u16, value: u16) -> Result<(), Refusal> {
+    fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
         let (row, value) = self.target(address, value)?;
         let (min, max) = self.limits(row);
-        if (min..=max).contains(&value) { Ok(()) } else { Err(Refusal::Value) }
-    }
-
-    fn set_word(&mut self, address: u16, value: u16) {
-        let Ok((row, value)) = self.target(address, value) else { return };
+        if !(min..=max).contains(&value) {
+            return Err(Refusal::Value);
+        }
         let place = usize::from(row.place);
         self.settings[place] = value;
         match place {
@@ -61,6 +42,7 @@ impl Registers for Pxr {
             }
             _ => {}
         }
+        Ok(())
     }
 }
 
@@ -103,7 +85,7 @@ impl Pxr {
         }
     }
 
-    fn from_internal(&self, raw: i16, meaning: Meaning) -> i16 {
+    fn to_display(&self, raw: i16, meaning: Meaning) -> i16 {
         let (low, span) = self.scale();
         match meaning {
             Meaning::Temperature => (f64::from(raw) / 10_000.0 * span + low).round() as i16,
@@ -132,7 +114,22 @@ impl Pxr {
         let (area, place) = area(address)?;
         let row = map::row(place).ok_or(Refusal::Address)?;
         let raw = value as i16;
-        Ok((row, if area == Area::Internal { self.from_internal(raw, row.meaning) } else { raw }))
+        Ok((row, if area == Area::Internal { self.to_display(raw, row.meaning) } else { raw }))
+    }
+}
+
+/// The two copies of every word (manual of the sibling series): engineering = internal + 1000.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Area {
+    Internal,
+    Engineering,
+}
+
+fn area(address: u16) -> Result<(Area, usize), Refusal> {
+    match usize::from(address) {
+        place @ 0..map::COUNT => Ok((Area::Internal, place)),
+        place if (1000..1000 + map::COUNT).contains(&place) => Ok((Area::Engineering, place - 1000)),
+        _ => Err(Refusal::Address),
     }
 }
 
@@ -157,6 +154,9 @@ mod tests {
         check(pxr, &[3, 0x03, 0xEA, 0, 1], &[3, 2, 0x01, 0xF4]);
         // The lower limit cannot pass the upper one.
         check(pxr, &[6, 0x04, 0x06, 0x01, 0xF5], &[0x86, 3]);
+        // Nor can both change places in one block.
+        check(pxr, &[16, 0x04, 0x06, 0, 2, 4, 0x01, 0xF4, 0, 100], &[0x90, 3]);
+        check(pxr, &[3, 0x04, 0x06, 0, 2], &[3, 4, 0, 0, 0x01, 0xF4]);
     }
 
     #[test]
