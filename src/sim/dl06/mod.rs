@@ -1,0 +1,319 @@
+//! The PLC KOYO DL06: inputs, outputs, relays and V memory at their true addresses, and the scan that runs the plant.
+
+mod memory;
+pub mod sequence;
+
+use std::time::Duration;
+
+use memory::Memory;
+use sequence::{Conditions, Sequence, Step};
+
+use super::pdu::{Bits, Refusal, Registers, Words};
+use super::tank::{Actuators, Readings};
+
+/// Time of one scan.
+pub const SCAN: Duration = Duration::from_millis(100);
+
+/// No heating below this level of TK-1, in cm.
+const HEAT_MIN_CM: f64 = 5.0;
+/// No filling above this level of TK-1, in cm.
+const FILL_MAX_CM: f64 = 28.0;
+
+/// Panel switch X0–X3 and the controller's signal X4.
+const X_AT_SV: u16 = 4;
+/// Our allocation of the C relays. Levels, not pulses: a write can be verified by reading it back.
+const C_RUN: u16 = 0;
+const C_AUTO: u16 = 1;
+const C_PUMP: u16 = 2;
+const C_AGITATOR: u16 = 3;
+const C_DRAIN: u16 = 4;
+const C_FILL: u16 = 5;
+const C_HEATER: u16 = 6;
+const C_FAULT: u16 = 7;
+/// V2000 step, V2001 seconds left in a timed step, V2002 batches done: BCD, as ladder programs keep numbers.
+const V_STEP: u16 = 0o2000;
+/// V2010 and on: measurements that the real rig lacks, as plain binary words.
+const V_SIGNALS: u16 = 0o2010;
+
+/// The outputs as the lamps show them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Outputs {
+    /// Y0: pump P-1.
+    pub pump: bool,
+    /// Y1: agitator M-1.
+    pub agitator: bool,
+    /// Y2: valve SV-1, drains TK-1.
+    pub drain_valve: bool,
+    /// Y3: valve SV-2, fills TK-1.
+    pub fill_valve: bool,
+    /// Y4: contactor of the heater; the controller sets its power.
+    pub heater: bool,
+}
+
+/// The PLC with its memory and its programme.
+#[derive(Debug, Clone)]
+pub struct Dl06 {
+    memory: Memory,
+    sequence: Sequence,
+    driving: bool,
+}
+
+impl Dl06 {
+    /// Stopped, in manual, everything off.
+    pub fn new() -> Dl06 {
+        Dl06 { memory: Memory::new(), sequence: Sequence::default(), driving: false }
+    }
+
+    /// Sets RUN and AUTO, as an operator would.
+    pub fn start(&mut self) {
+        self.memory.c.set(C_RUN, true);
+        self.memory.c.set(C_AUTO, true);
+    }
+
+    /// Turns a panel switch X0–X3 (pump, agitator, valve SV-1, valve SV-2); others do not exist.
+    pub fn set_switch(&mut self, switch: u16, on: bool) {
+        if switch < X_AT_SV {
+            self.memory.x.set(switch, on);
+        }
+    }
+
+    /// One scan: reads inputs, runs the programme, writes outputs and V memory. While stopped, outputs stay as written.
+    pub fn scan(&mut self, at_sv: bool, readings: &Readings) {
+        self.memory.x.set(X_AT_SV, at_sv);
+        let c = |relay| self.memory.c.get(relay);
+        let (run, auto) = (c(C_RUN), c(C_AUTO));
+        if run && auto {
+            self.sequence.advance(SCAN, &Conditions { at_sv, readings });
+        } else if !run {
+            self.sequence.stop();
+        }
+        if run {
+            let wanted = if auto { self.sequence.outputs() } else { self.manual() };
+            self.set_outputs(permit(wanted, readings));
+        } else if self.driving {
+            self.set_outputs(Outputs::default());
+        }
+        self.driving = run;
+        self.memory.c.set(C_FAULT, self.sequence.fault());
+        self.publish(readings);
+    }
+
+    /// What reaches the plant. The interlocks are wired behind the outputs: they hold even where lamps were forced on.
+    pub fn actuators(&self, readings: &Readings, mv_percent: f64) -> Actuators {
+        let outputs = permit(self.outputs(), readings);
+        Actuators {
+            pump: outputs.pump,
+            agitator: outputs.agitator,
+            drain_valve: outputs.drain_valve,
+            fill_valve: outputs.fill_valve,
+            heater_percent: if outputs.heater { mv_percent } else { 0.0 },
+        }
+    }
+
+    /// The outputs as they are now.
+    pub fn outputs(&self) -> Outputs {
+        let y = |output| self.memory.y.get(output);
+        Outputs { pump: y(0), agitator: y(1), drain_valve: y(2), fill_valve: y(3), heater: y(4) }
+    }
+
+    /// The step of the sequence.
+    pub fn step(&self) -> Step {
+        self.sequence.step()
+    }
+
+    /// Whether the sequence stands because a step took too long.
+    pub fn fault(&self) -> bool {
+        self.sequence.fault()
+    }
+
+    /// Each output follows its panel switch or its relay.
+    fn manual(&self) -> Outputs {
+        let on = |switch, relay| self.memory.x.get(switch) || self.memory.c.get(relay);
+        Outputs {
+            pump: on(0, C_PUMP),
+            agitator: on(1, C_AGITATOR),
+            drain_valve: on(2, C_DRAIN),
+            fill_valve: on(3, C_FILL),
+            heater: self.memory.c.get(C_HEATER),
+        }
+    }
+
+    fn set_outputs(&mut self, outputs: Outputs) {
+        let lit = [outputs.pump, outputs.agitator, outputs.drain_valve, outputs.fill_valve, outputs.heater];
+        for output in 0..16 {
+            self.memory.y.set(output, lit.get(usize::from(output)).copied().unwrap_or(false));
+        }
+    }
+
+    fn publish(&mut self, readings: &Readings) {
+        let bcd_words =
+            [u16::from(self.step().number()), self.sequence.seconds_left(), self.sequence.batches()].map(bcd);
+        let word = |value: f64, per_unit: f64| (value * per_unit).round().clamp(0.0, 65_535.0) as u16;
+        let signals = [
+            word(readings.level_cm, 10.0),
+            word(readings.cold_l, 10.0),
+            word(readings.hot_l, 10.0),
+            word(readings.flow_in, 100.0),
+            word(readings.flow_out, 100.0),
+            word(readings.flow_pump, 100.0),
+            word(readings.heater_w, 1.0),
+        ];
+        self.memory.set_block(V_STEP, &bcd_words);
+        self.memory.set_block(V_SIGNALS, &signals);
+    }
+}
+
+impl Default for Dl06 {
+    fn default() -> Dl06 {
+        Dl06::new()
+    }
+}
+
+/// The interlocks: no heating with too little water, no filling of a full TK-1, no pumping into a full TK-2.
+pub fn permit(outputs: Outputs, readings: &Readings) -> Outputs {
+    Outputs {
+        heater: outputs.heater && readings.level_cm >= HEAT_MIN_CM,
+        fill_valve: outputs.fill_valve && readings.level_cm <= FILL_MAX_CM,
+        pump: outputs.pump && !readings.cold_full,
+        ..outputs
+    }
+}
+
+/// Four decimal digits in one word; 9999 is the most it can say.
+fn bcd(value: u16) -> u16 {
+    let digit = |weight: u16| value.min(9999) / weight % 10;
+    digit(1000) << 12 | digit(100) << 8 | digit(10) << 4 | digit(1)
+}
+
+impl Registers for Dl06 {
+    const FUNCTIONS: &'static [u8] = &[0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F, 0x10];
+    const WORDS_MAX: u16 = 125;
+
+    fn bit(&self, kind: Bits, address: u16) -> Result<bool, Refusal> {
+        self.memory.bit(kind, address)
+    }
+
+    fn write_bit(&mut self, address: u16, on: bool) -> Result<(), Refusal> {
+        self.memory.write_coil(address, on)
+    }
+
+    /// Functions 03 and 04 both read V memory.
+    fn word(&self, _: Words, address: u16) -> Result<u16, Refusal> {
+        self.memory.word(address)
+    }
+
+    fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
+        self.memory.write_word(address, value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::pdu::serve;
+
+    const HALF_FULL: Readings = Readings {
+        level_cm: 10.2,
+        cold_l: 15.0,
+        hot_l: 0.0,
+        cold_full: false,
+        flow_in: 0.0,
+        flow_out: 0.0,
+        flow_pump: 0.0,
+        heater_w: 0.0,
+    };
+
+    fn ask(plc: &mut Dl06, request: &[u8], expect: &[u8]) {
+        assert_eq!(serve(plc, request).as_deref(), Some(expect), "request {request:02X?}");
+    }
+
+    #[test]
+    fn a_written_output_stays_while_stopped_and_is_overwritten_while_driven() {
+        let plc = &mut Dl06::new();
+        plc.scan(false, &HALF_FULL);
+        ask(plc, &[6, 0x41, 0x40, 0xFF, 0xFF], &[6, 0x41, 0x40, 0xFF, 0xFF]);
+        plc.scan(false, &HALF_FULL);
+        ask(plc, &[1, 8, 0, 0, 16], &[1, 2, 0xFF, 0xFF]);
+        ask(plc, &[5, 0x0C, 0, 0xFF, 0], &[5, 0x0C, 0, 0xFF, 0]);
+        plc.scan(false, &HALF_FULL);
+        ask(plc, &[3, 0x41, 0x40, 0, 1], &[3, 2, 0, 0]);
+    }
+
+    #[test]
+    fn in_manual_the_sequence_waits_where_it_is() {
+        let plc = &mut Dl06::new();
+        plc.start();
+        plc.scan(false, &HALF_FULL);
+        plc.scan(false, &HALF_FULL);
+        assert_eq!(plc.step(), Step::Heat);
+        ask(plc, &[5, 0x0C, 1, 0, 0], &[5, 0x0C, 1, 0, 0]);
+        plc.scan(true, &HALF_FULL);
+        assert_eq!((plc.step(), plc.outputs()), (Step::Heat, Outputs::default()));
+        ask(plc, &[5, 0x0C, 1, 0xFF, 0], &[5, 0x0C, 1, 0xFF, 0]);
+        plc.scan(true, &HALF_FULL);
+        assert_eq!(plc.step(), Step::Hold);
+        ask(plc, &[5, 0x0C, 0, 0, 0], &[5, 0x0C, 0, 0, 0]);
+        plc.scan(true, &HALF_FULL);
+        assert_eq!(plc.step(), Step::Idle);
+    }
+
+    #[test]
+    fn stopping_turns_everything_off_once() {
+        let plc = &mut Dl06::new();
+        ask(plc, &[15, 0x0C, 0, 0, 4, 1, 0b1101], &[15, 0x0C, 0, 0, 4]);
+        plc.scan(false, &HALF_FULL);
+        assert_eq!(plc.outputs(), Outputs { pump: true, agitator: true, ..Outputs::default() });
+        ask(plc, &[5, 0x0C, 0, 0, 0], &[5, 0x0C, 0, 0, 0]);
+        plc.scan(false, &HALF_FULL);
+        assert_eq!(plc.outputs(), Outputs::default());
+    }
+
+    #[test]
+    fn the_interlocks_hold_in_manual_and_behind_forced_lamps() {
+        let check = |readings: Readings, blocked: fn(&mut Outputs)| {
+            let mut expect = Outputs { pump: true, agitator: true, drain_valve: true, fill_valve: true, heater: true };
+            blocked(&mut expect);
+            let mut plc = Dl06::new();
+            ask(&mut plc, &[15, 0x0C, 0, 0, 7, 1, 0b111_1101], &[15, 0x0C, 0, 0, 7]);
+            plc.scan(false, &readings);
+            assert_eq!(plc.outputs(), expect, "in manual at {readings:?}");
+            let mut forced = Dl06::new();
+            ask(&mut forced, &[6, 0x41, 0x40, 0xFF, 0xFF], &[6, 0x41, 0x40, 0xFF, 0xFF]);
+            let actuators = forced.actuators(&readings, 100.0);
+            let reached = Outputs {
+                pump: actuators.pump,
+                agitator: actuators.agitator,
+                drain_valve: actuators.drain_valve,
+                fill_valve: actuators.fill_valve,
+                heater: actuators.heater_percent > 0.0,
+            };
+            assert_eq!(reached, expect, "behind forced lamps at {readings:?}");
+        };
+        check(HALF_FULL, |_| {});
+        check(Readings { level_cm: 4.9, ..HALF_FULL }, |outputs| outputs.heater = false);
+        check(Readings { level_cm: 28.1, ..HALF_FULL }, |outputs| outputs.fill_valve = false);
+        check(Readings { cold_full: true, ..HALF_FULL }, |outputs| outputs.pump = false);
+    }
+
+    #[test]
+    fn panel_switches_drive_in_manual() {
+        let plc = &mut Dl06::new();
+        ask(plc, &[5, 0x0C, 0, 0xFF, 0], &[5, 0x0C, 0, 0xFF, 0]);
+        plc.set_switch(2, true);
+        plc.set_switch(4, true);
+        plc.scan(false, &HALF_FULL);
+        assert_eq!(plc.outputs(), Outputs { drain_valve: true, ..Outputs::default() });
+        ask(plc, &[2, 8, 0, 0, 20], &[2, 3, 0b100, 0, 0]);
+    }
+
+    #[test]
+    fn numbers_stand_in_v_memory_as_documented() {
+        let plc = &mut Dl06::new();
+        plc.scan(true, &Readings { flow_in: 0.75, heater_w: 1600.0, ..HALF_FULL });
+        ask(plc, &[4, 4, 8, 0, 7], &[4, 14, 0, 102, 0, 150, 0, 0, 0, 75, 0, 0, 0, 0, 0x06, 0x40]);
+        ask(plc, &[3, 0x41, 0, 0, 2], &[3, 4, 0, 0b1_0000, 0, 0]);
+        for (value, expect) in [(0, 0), (7, 7), (180, 0x180), (1234, 0x1234), (10_000, 0x9999)] {
+            assert_eq!(bcd(value), expect);
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! Serves the rig as slaves on a serial line that takes the time of a real one.
+//!
+//! ```text
+//!  request arrives     its last byte        slave knows       answer begins      last byte of answer: written here
+//!  |— bytes · char ————|— 3.5 characters ———|— device delay ——|— bytes · char ————|
+//! ```
+
+use std::io;
+use std::time::Duration;
+
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::time::{Instant, sleep_until, timeout};
+
+use super::RigHandle;
+use crate::bus::io::clock::Clock;
+use crate::plant::def::Serial;
+use crate::sim::wire::Receiver;
+
+/// Requests and answers under way at once; a request beyond that is not heard.
+const JOBS_MAX: usize = 8;
+/// Silence that ends a frame of unknown length, in real time: bytes of one write may come in pieces.
+const SILENCE_REAL_MIN: Duration = Duration::from_millis(20);
+/// An answer that nobody takes for this long is dropped (the other end of a pty is closed and its buffer full).
+const WRITE_MAX: Duration = Duration::from_secs(1);
+/// Timers tick in 1 ms, so an answer may be this late for no other reason; the next request is credited with it.
+const TICK: Duration = Duration::from_millis(2);
+
+/// Serves until the stream ends or fails. Everything on the wire runs in the plant time of the rig's clock.
+pub async fn serve_rtu<S>(mut stream: S, rig: RigHandle, serial: Serial) -> io::Result<()>
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
+    let mut line = Line::new(rig.clock(), serial);
+    let mut bytes = [0; 256];
+    loop {
+        tokio::select! {
+            read = stream.read(&mut bytes) => match read? {
+                0 => return Ok(()),
+                count => line.heard(Instant::now(), &bytes[..count]),
+            },
+            () = sleep_until(line.next()), if line.waits() => match line.due(Instant::now()) {
+                Due::Nothing => {}
+                Due::Execute { at, request } => line.execute(at, &request, &rig).await,
+                Due::Send(frame) => match timeout(WRITE_MAX, stream.write_all(&frame)).await {
+                    Ok(written) => written?,
+                    Err(_nobody_takes_it) => {}
+                },
+            },
+        }
+    }
+}
+
+/// What happens on the line, and when.
+struct Line {
+    clock: Clock,
+    serial: Serial,
+    receiver: Receiver,
+    /// Since when the request that is arriving has been on the wire, and when its latest bytes came.
+    began: Instant,
+    latest: Instant,
+    /// When the last answer was written, and how late that was by the grain of the timers.
+    sent: Instant,
+    credit: Duration,
+    jobs: Vec<Job>,
+}
+
+struct Job {
+    at: Instant,
+    what: What,
+}
+
+enum What {
+    Execute(Vec<u8>),
+    Send(Vec<u8>),
+}
+
+enum Due {
+    Nothing,
+    Execute { at: Instant, request: Vec<u8> },
+    Send(Vec<u8>),
+}
+
+impl Line {
+    fn new(clock: Clock, serial: Serial) -> Line {
+        let now = Instant::now();
+        Line {
+            clock,
+            serial,
+            receiver: Receiver::default(),
+            began: now,
+            latest: now,
+            sent: now,
+            credit: Duration::ZERO,
+            jobs: Vec::with_capacity(JOBS_MAX),
+        }
+    }
+
+    /// Bytes have arrived. They come at once, but the request is not over before its time on the wire.
+    fn heard(&mut self, now: Instant, bytes: &[u8]) {
+        if self.receiver.is_empty() {
+            // A master that asks again at once was held up by the late answer; the lateness must not add up.
+            let at_once = now - self.sent < SILENCE_REAL_MIN;
+            self.began = if at_once { now.checked_sub(self.credit).unwrap_or(now) } else { now };
+            self.credit = Duration::ZERO;
+        }
+        self.latest = now;
+        self.receiver.push(bytes);
+        while let Some(request) = self.receiver.take() {
+            self.accept(request);
+        }
+    }
+
+    fn accept(&mut self, request: Vec<u8>) {
+        let on_wire = self.began + self.time_of(request.len());
+        // Bytes that really came later than the line's pace count from when they came.
+        let over = if on_wire + TICK < self.latest { self.latest } else { on_wire };
+        self.began = over;
+        if self.jobs.len() < JOBS_MAX {
+            let at = over + self.clock.real_span(self.serial.silence());
+            self.jobs.push(Job { at, what: What::Execute(request) });
+        }
+    }
+
+    /// The next moment at which something is due.
+    fn next(&self) -> Instant {
+        let silence = (!self.receiver.is_empty()).then(|| self.silent_at());
+        self.jobs.iter().map(|job| job.at).chain(silence).min().unwrap_or(self.latest)
+    }
+
+    fn waits(&self) -> bool {
+        !self.jobs.is_empty() || !self.receiver.is_empty()
+    }
+
+    fn silent_at(&self) -> Instant {
+        self.latest + self.clock.real_span(self.serial.silence()).max(SILENCE_REAL_MIN)
+    }
+
+    fn due(&mut self, now: Instant) -> Due {
+        if !self.receiver.is_empty() && self.silent_at() <= now {
+            if let Some(request) = self.receiver.silence() {
+                self.accept(request);
+            }
+            return Due::Nothing;
+        }
+        let first = (0..self.jobs.len()).min_by_key(|place| self.jobs[*place].at);
+        let Some(job) = first.filter(|place| self.jobs[*place].at <= now).map(|place| self.jobs.remove(place)) else {
+            return Due::Nothing;
+        };
+        match job.what {
+            What::Execute(request) => Due::Execute { at: job.at, request },
+            What::Send(frame) => {
+                (self.sent, self.credit) = (now, (now - job.at).min(TICK));
+                Due::Send(frame)
+            }
+        }
+    }
+
+    /// The device acts now, and its answer is over after its delay and its time on the wire.
+    async fn execute(&mut self, at: Instant, request: &[u8], rig: &RigHandle) {
+        let [unit, pdu @ .., _, _] = request else { return };
+        if let Some(answer) = rig.ask(*unit, pdu).await {
+            let frame = answer.rtu();
+            let at = at + self.clock.real_span(answer.delay) + self.time_of(frame.len());
+            self.jobs.push(Job { at, what: What::Send(frame) });
+        }
+    }
+
+    /// Real time of so many characters.
+    fn time_of(&self, characters: usize) -> Duration {
+        let bits = characters as f64 * f64::from(self.serial.bits_per_char());
+        self.clock.real_span(Duration::from_secs_f64(bits / f64::from(self.serial.baud)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use jiff::Timestamp;
+    use tokio::io::{DuplexStream, duplex};
+
+    use super::*;
+    use crate::bus::frame::with_crc;
+    use crate::plant::def::Parity;
+    use crate::sim::faults::Fault;
+    use crate::sim::rig::Rig;
+
+    const READ_TEN: &[u8] = &[1, 4, 0x03, 0xE8, 0, 10];
+    const READ_STEP: &[u8] = &[2, 3, 4, 0, 0, 1];
+
+    fn line(baud: u32, parity: Parity, speed: f64) -> (DuplexStream, RigHandle) {
+        let serial = Serial { baud, data_bits: 8, parity, stop_bits: 1 };
+        let rig = RigHandle::spawn(Rig::demo(), Clock::starting_at(Timestamp::UNIX_EPOCH, speed));
+        let (master, slave) = duplex(1024);
+        tokio::spawn(serve_rtu(slave, rig.clone(), serial));
+        (master, rig)
+    }
+
+    /// What arrives until nothing has come for two seconds, and when its last byte came.
+    async fn gather(master: &mut DuplexStream) -> (Vec<u8>, Duration) {
+        let (asked, mut frame, mut took) = (Instant::now(), Vec::new(), Duration::ZERO);
+        let mut bytes = [0; 256];
+        while let Ok(Ok(count)) = timeout(Duration::from_secs(2), master.read(&mut bytes)).await {
+            if count == 0 {
+                break;
+            }
+            frame.extend_from_slice(&bytes[..count]);
+            took = asked.elapsed();
+        }
+        (frame, took)
+    }
+
+    async fn ask(master: &mut DuplexStream, message: &[u8]) -> (Vec<u8>, Duration) {
+        master.write_all(&with_crc(message)).await.expect("the line takes requests");
+        gather(master).await
+    }
+
+    async fn check(baud: u32, parity: Parity, speed: f64, expect_ms: f64) {
+        let (mut master, _rig) = line(baud, parity, speed);
+        let (frame, took) = ask(&mut master, READ_TEN).await;
+        assert_eq!(frame.len(), 25);
+        let took_ms = took.as_secs_f64() * 1e3;
+        assert!((expect_ms..expect_ms + 2.0).contains(&took_ms), "{took_ms} ms at {baud}, expected {expect_ms} ms");
+    }
+
+    /// (8 + 25) characters, one silence before the answer, 5 ms of the device; the second silence is the master's.
+    #[tokio::test(start_paused = true)]
+    async fn an_answer_takes_the_time_of_the_wire() {
+        check(9600, Parity::None, 1.0, 330.0 / 9.6 + 35.0 / 9.6 + 5.0).await;
+        check(9600, Parity::Even, 1.0, 45.8 - 4.01 + 5.0).await;
+        check(19_200, Parity::Even, 1.0, 22.9 - 2.0 + 5.0).await;
+        check(115_200, Parity::Even, 1.0, 6.7 - 1.75 + 5.0).await;
+        check(9600, Parity::None, 10.0, 4.3).await;
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn the_grain_of_the_timers_does_not_add_up() {
+        let (mut master, _rig) = line(115_200, Parity::None, 1.0);
+        let (began, mut reply, rounds) = (Instant::now(), [0; 25], 200);
+        for _ in 0..rounds {
+            master.write_all(&with_crc(READ_TEN)).await.expect("the line takes requests");
+            master.read_exact(&mut reply).await.expect("the line answers");
+        }
+        let each_ms = began.elapsed().as_secs_f64() * 1e3 / f64::from(rounds);
+        let wire_ms = 330.0 / 115.2 + 1.75 + 5.0;
+        assert!((each_ms / wire_ms - 1.0).abs() < 0.01, "{each_ms} ms each, the wire needs {wire_ms} ms");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_request_in_pieces_and_one_after_noise_are_understood() {
+        let (mut master, _rig) = line(9600, Parity::None, 1.0);
+        let request = with_crc(READ_STEP);
+        master.write_all(&request[..3]).await.expect("the line takes bytes");
+        tokio::time::advance(Duration::from_millis(5)).await;
+        master.write_all(&request[3..]).await.expect("the line takes bytes");
+        assert_eq!(gather(&mut master).await.0.len(), 7);
+        master.write_all(&[0xFF, 0x00, 0x55]).await.expect("the line takes bytes");
+        assert_eq!(gather(&mut master).await.0, []);
+        assert_eq!(ask(&mut master, READ_STEP).await.0.len(), 7);
+        assert_eq!(ask(&mut master, &[1, 0x2B, 14, 1, 0]).await.0, with_crc(&[1, 0xAB, 1]));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn faults_look_as_they_do_on_a_line() {
+        let (mut master, rig) = line(9600, Parity::None, 1.0);
+        rig.set_fault(1, Fault::Silent).await;
+        assert_eq!(ask(&mut master, READ_TEN).await.0, []);
+        assert_eq!(ask(&mut master, READ_STEP).await.0.len(), 7);
+        rig.set_fault(1, Fault::Truncated).await;
+        assert_eq!(ask(&mut master, READ_TEN).await.0.len(), 12);
+        rig.set_fault(1, Fault::Late(Duration::from_millis(700))).await;
+        let (frame, took) = ask(&mut master, READ_TEN).await;
+        assert!(frame.len() == 25 && took > Duration::from_millis(743), "{took:?}");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn another_unit_answers_while_one_is_late() {
+        let (mut master, rig) = line(9600, Parity::None, 1.0);
+        rig.set_fault(1, Fault::Late(Duration::from_millis(500))).await;
+        master.write_all(&with_crc(READ_TEN)).await.expect("the line takes requests");
+        tokio::time::advance(Duration::from_millis(100)).await;
+        let (frames, _) = ask(&mut master, READ_STEP).await;
+        assert_eq!((frames.len(), frames[0], frames[7]), (32, 2, 1));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_broadcast_and_a_stranger_are_not_answered() {
+        let (mut master, _rig) = line(9600, Parity::None, 1.0);
+        assert_eq!(ask(&mut master, &[0, 6, 0x03, 0xEA, 0, 1]).await.0, []);
+        assert_eq!(ask(&mut master, &[9, 3, 0, 0, 0, 1]).await.0, []);
+    }
+}

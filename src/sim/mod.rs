@@ -1,0 +1,18 @@
+//! A world to test against: the water tank, its controller and its PLC as Modbus slaves. Bytes and time move only in [`io`].
+//!
+//! ```text
+//!  tank  <── actuators ── dl06 <── at SV ── pxr <── probe ── tank        one step of 0.1 s in `rig`
+//!                          │                 │
+//!                          └─ pdu::serve ────┘                           one Modbus server for both devices
+//!                                  │
+//!                          faults: silent, late, damaged ── io: RTU on a pty, TCP
+//! ```
+
+pub mod tank;
+pub mod pdu;
+pub mod pxr;
+pub mod dl06;
+pub mod rig;
+pub mod faults;
+pub mod wire;
+pub mod io;

@@ -1,0 +1,137 @@
+//! The ramp/soak programme: a set value that moves by itself through up to eight steps.
+
+/// What register 41082 asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Command {
+    /// No programme: the SV of the face holds.
+    Off,
+    /// Run from the beginning, or on from a halt.
+    Run,
+    /// Stand still.
+    Halt,
+    /// It has run to its end, and the last SV holds.
+    End,
+}
+
+/// One step: a ramp to a temperature, then a soak at it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Segment {
+    /// SV at the end of the ramp.
+    pub target_c: f64,
+    /// Duration of the ramp.
+    pub ramp_s: f64,
+    /// Duration of the soak.
+    pub soak_s: f64,
+}
+
+/// The selected steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Place of the first selected step, 0 or 4.
+    pub first: usize,
+    /// The steps in order.
+    pub segments: Vec<Segment>,
+}
+
+/// Where the programme is.
+#[derive(Debug, Clone, Default)]
+pub struct Program {
+    position: u16,
+    elapsed_s: f64,
+    start_c: f64,
+    sv_c: f64,
+}
+
+/// Position after the last soak (register 31009).
+const END: u16 = 17;
+
+impl Program {
+    /// The set value in use, or `None` when the SV of the face holds. The first ramp begins at PV.
+    pub fn step(&mut self, dt_s: f64, command: Command, plan: &Plan, pv_c: f64) -> Option<f64> {
+        match command {
+            Command::Off => *self = Program::default(),
+            Command::Run if self.position == 0 || self.ended() => {
+                *self = Program { position: 1, elapsed_s: 0.0, start_c: pv_c, sv_c: pv_c };
+                self.advance(dt_s, plan);
+            }
+            Command::Run => self.advance(dt_s, plan),
+            Command::Halt | Command::End => {}
+        }
+        (self.position != 0).then_some(self.sv_c)
+    }
+
+    /// Position for register 31009: 0 off, 1 ramp 1, 2 soak 1 … 16 soak 8, 17 end.
+    pub fn position(&self) -> u16 {
+        self.position
+    }
+
+    /// Whether the last soak is over.
+    pub fn ended(&self) -> bool {
+        self.position == END
+    }
+
+    /// Each pass leaves one ramp or soak behind, so the loop ends after 16 at most.
+    fn advance(&mut self, dt_s: f64, plan: &Plan) {
+        self.elapsed_s += dt_s;
+        if self.position == 1 && plan.first != 0 {
+            self.position = 1 + 2 * plan.first as u16;
+        }
+        while !self.ended() {
+            // Another pattern may have been selected meanwhile; then the step is not in the plan, and that is the end.
+            let index = (usize::from(self.position - 1) / 2).checked_sub(plan.first);
+            let Some(segment) = index.and_then(|index| plan.segments.get(index)) else {
+                self.position = END;
+                return;
+            };
+            let ramping = self.position % 2 == 1;
+            let length_s = if ramping { segment.ramp_s } else { segment.soak_s };
+            let along = if ramping && length_s > 0.0 { (self.elapsed_s / length_s).min(1.0) } else { 1.0 };
+            self.sv_c = self.start_c + (segment.target_c - self.start_c) * along;
+            if self.elapsed_s < length_s {
+                return;
+            }
+            self.elapsed_s -= length_s;
+            self.start_c = segment.target_c;
+            self.position += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(first: usize, at_s: f64, expect: (f64, u16)) {
+        let segments = vec![
+            Segment { target_c: 50.0, ramp_s: 60.0, soak_s: 120.0 },
+            Segment { target_c: 80.0, ramp_s: 0.0, soak_s: 60.0 },
+        ];
+        let plan = Plan { first, segments };
+        let mut program = Program::default();
+        let mut sv_c = None;
+        for _ in 0..(at_s / 0.5) as usize {
+            let command = if program.ended() { Command::End } else { Command::Run };
+            sv_c = program.step(0.5, command, &plan, 20.0);
+        }
+        let sv_c = sv_c.expect("a running programme has a set value");
+        assert!((sv_c - expect.0).abs() < 1e-6 && program.position() == expect.1, "{at_s} s: {sv_c} {program:?}");
+    }
+
+    #[test]
+    fn the_set_value_ramps_and_soaks() {
+        check(0, 30.0, (35.0, 1));
+        check(0, 90.0, (50.0, 2));
+        check(0, 200.0, (80.0, 4));
+        check(0, 300.0, (80.0, 17));
+        check(4, 30.0, (35.0, 9));
+    }
+
+    #[test]
+    fn halt_stands_still_and_off_gives_the_face_back() {
+        let plan = Plan { first: 0, segments: vec![Segment { target_c: 50.0, ramp_s: 60.0, soak_s: 0.0 }] };
+        let mut program = Program::default();
+        let running = program.step(0.5, Command::Run, &plan, 20.0);
+        assert_eq!(program.step(0.5, Command::Halt, &plan, 20.0), running);
+        assert_eq!(program.step(0.5, Command::Off, &plan, 20.0), None);
+    }
+}

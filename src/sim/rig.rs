@@ -1,0 +1,364 @@
+//! The whole rig: tank, controller and PLC wired together, in steps of 0.1 s.
+
+use std::time::Duration;
+
+use super::dl06::sequence::Step;
+use super::dl06::{Dl06, Outputs, SCAN};
+use super::pdu;
+use super::pxr::{Pxr, SAMPLE, Sensor};
+use super::tank::{AMBIENT_C, Readings, Tank};
+
+/// Unit address of the PXR4.
+pub const PXR_UNIT: u8 = 1;
+/// Unit address of the DL06.
+pub const DL06_UNIT: u8 = 2;
+
+/// Time that a device takes between a request and its answer.
+const PXR_DELAY: Duration = Duration::from_millis(5);
+const DL06_DELAY: Duration = Duration::from_millis(3);
+
+/// Scans of the PLC, which are the inner steps, per sample of the controller.
+const SCANS_PER_SAMPLE: u32 = (SAMPLE.as_millis() / SCAN.as_millis()) as u32;
+
+/// The simulated plant.
+#[derive(Debug, Clone)]
+pub struct Rig {
+    tank: Tank,
+    pxr: Pxr,
+    plc: Dl06,
+    sensor_open: bool,
+    owed: Duration,
+    steps: u32,
+}
+
+/// What is really so in the rig, whatever the devices and the wire say: for tests and training.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Truth {
+    /// Water at the probe in °C.
+    pub probe_c: f64,
+    /// The controller's process value in °C.
+    pub pv_c: f64,
+    /// The controller's set value in use in °C.
+    pub sv_c: f64,
+    /// The controller's output in percent.
+    pub mv_percent: f64,
+    /// Levels, volumes, flows and power.
+    pub readings: Readings,
+    /// The PLC's outputs.
+    pub outputs: Outputs,
+    /// The PLC's step.
+    pub step: Step,
+    /// Whether the sequence has failed.
+    pub fault: bool,
+    /// How often the controller saved its settings.
+    pub saves: u32,
+}
+
+impl Rig {
+    /// At rest: all water cold in TK-2, PLC stopped, controller in operation.
+    pub fn new() -> Rig {
+        Rig::filled(0.0)
+    }
+
+    /// In the middle of work: running in automatic with TK-1 nearly full, so that something moves at once.
+    pub fn demo() -> Rig {
+        let mut rig = Rig::filled(4.7);
+        rig.plc.start();
+        rig
+    }
+
+    fn filled(control_l: f64) -> Rig {
+        let (tank, pxr) = (Tank::new(control_l, AMBIENT_C), Pxr::new(AMBIENT_C));
+        Rig { tank, pxr, plc: Dl06::new(), sensor_open: false, owed: Duration::ZERO, steps: 0 }
+    }
+
+    /// Lets plant time pass. What is left over below one step is kept for the next call.
+    pub fn advance(&mut self, dt: Duration) {
+        self.owed += dt;
+        while self.owed >= SCAN {
+            self.owed -= SCAN;
+            self.step();
+        }
+    }
+
+    /// Answers a request, or `None`: no such unit, a broadcast, an empty request.
+    pub fn respond(&mut self, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
+        match unit {
+            PXR_UNIT => pdu::serve(&mut self.pxr, pdu),
+            DL06_UNIT => pdu::serve(&mut self.plc, pdu),
+            _ => None,
+        }
+    }
+
+    /// Breaks or repairs the wire of the temperature sensor.
+    pub fn set_sensor_open(&mut self, open: bool) {
+        self.sensor_open = open;
+    }
+
+    /// Turns a panel switch X0–X3 of the PLC.
+    pub fn set_switch(&mut self, switch: u16, on: bool) {
+        self.plc.set_switch(switch, on);
+    }
+
+    /// Takes the power away and gives it back: the controller loses what it did not save, the PLC stops.
+    pub fn power_cycle(&mut self) {
+        self.pxr.power_cycle();
+        self.plc = Dl06::new();
+    }
+
+    /// What is really so.
+    pub fn truth(&self) -> Truth {
+        Truth {
+            probe_c: self.tank.probe_c(),
+            pv_c: self.pxr.pv_c(),
+            sv_c: self.pxr.sv_c(),
+            mv_percent: self.pxr.mv_percent(),
+            readings: self.tank.readings(),
+            outputs: self.plc.outputs(),
+            step: self.plc.step(),
+            fault: self.plc.fault(),
+            saves: self.pxr.saves(),
+        }
+    }
+
+    fn step(&mut self) {
+        let readings = self.tank.readings();
+        if self.steps.is_multiple_of(SCANS_PER_SAMPLE) {
+            let sensor = if self.sensor_open { Sensor::Open } else { Sensor::Pt100(self.tank.probe_c()) };
+            self.pxr.sample(sensor, readings.heater_w);
+        }
+        self.plc.scan(self.pxr.at_sv(), &readings);
+        self.tank.step(SCAN.as_secs_f64(), &self.plc.actuators(&readings, self.pxr.mv_percent()));
+        self.steps = self.steps.wrapping_add(1);
+    }
+}
+
+impl Default for Rig {
+    fn default() -> Rig {
+        Rig::new()
+    }
+}
+
+/// The time that a unit takes between a request and its answer.
+pub fn reply_delay(unit: u8) -> Duration {
+    if unit == PXR_UNIT { PXR_DELAY } else { DL06_DELAY }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::bus::frame::with_crc;
+
+    fn bytes(hex: &str) -> Vec<u8> {
+        hex.split(' ').map(|byte| u8::from_str_radix(byte, 16).expect("two hex digits")).collect()
+    }
+
+    /// Sends a frame as it is written in the manuals and notes, and compares what a master would see.
+    fn exchange(rig: &mut Rig, sent: &str, answered: &str) {
+        let frame = bytes(sent);
+        let (message, _) = frame.split_at(frame.len() - 2);
+        assert_eq!(with_crc(message), frame, "{sent} has a wrong check");
+        let reply = rig.respond(message[0], &message[1..]).map(|pdu| with_crc(&[&message[..1], &pdu].concat()));
+        assert_eq!(reply, Some(bytes(answered)), "{sent}");
+    }
+
+    #[test]
+    fn the_golden_frames_are_answered_byte_for_byte() {
+        let rig = &mut Rig::new();
+        rig.advance(Duration::from_secs(1));
+        let mut echo = |sent| exchange(rig, sent, sent);
+        echo("01 06 03 EB 00 00 F9 BA");
+        echo("01 06 03 EB 00 01 38 7A");
+        echo("01 06 03 E8 00 01 C8 7A");
+        echo("02 05 08 00 FF 00 8E 69");
+        exchange(rig, "02 01 08 00 00 10 3F 95", "02 01 02 01 00 FC 6C");
+        exchange(rig, "02 02 08 00 00 14 7A 56", "02 02 03 00 00 00 78 7D");
+        exchange(rig, "02 03 41 40 00 01 91 D1", "02 03 02 00 01 3D 84");
+        exchange(rig, "02 03 41 00 00 02 D0 04", "02 03 04 00 00 00 00 C9 33");
+        exchange(rig, "02 03 04 00 00 01 85 09", "02 03 02 00 00 FC 44");
+        exchange(rig, "01 03 03 EA 00 01 A5 BA", "01 03 02 02 BC B8 95");
+        let measured = "01 04 14 01 0E 02 BC 01 AE 27 10 00 00 00 01 00 00 00 00 00 00 00 00";
+        exchange(rig, "01 04 03 E8 00 0A F0 7D", &spell(measured));
+        let settings = "01 03 14 00 00 02 BC 00 01 00 00 00 32 09 60 02 58 00 0A 00 0A 00 00";
+        exchange(rig, "01 03 03 E9 00 0A 14 7D", &spell(settings));
+        exchange(rig, "01 03 03 F7 00 05 34 7F", &spell("01 03 0A 00 01 00 00 00 00 07 3A 00 01"));
+        exchange(rig, &spell("01 03 07 D0 00 01"), "01 83 02 C0 F1");
+        exchange(rig, &spell("01 04 07 D0 00 01"), "01 84 02 C2 C1");
+    }
+
+    fn spell(message: &str) -> String {
+        with_crc(&bytes(message)).iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ")
+    }
+
+    #[test]
+    fn the_two_recorded_exchanges_happen_again() {
+        let rig = &mut Rig::new();
+        // The thesis's controller showed no decimals, so its 50 is 5.0 °C on our face.
+        exchange(rig, "01 06 03 EA 00 32 29 AF", "01 06 03 EA 00 32 29 AF");
+        exchange(rig, "02 06 41 40 FF FF 9D A1", "02 06 41 40 FF FF 9D A1");
+        rig.advance(Duration::from_secs(2));
+        assert_eq!(rig.truth().sv_c, 5.0);
+        assert_eq!(rig.respond(2, &[1, 8, 0, 0, 16]), Some(vec![1, 2, 0xFF, 0xFF]));
+    }
+
+    #[test]
+    fn a_stranger_and_a_broadcast_get_no_answer() {
+        let mut rig = Rig::new();
+        for unit in [0, 3, 247] {
+            assert_eq!(rig.respond(unit, &[3, 0, 0, 0, 1]), None);
+        }
+    }
+
+    /// Advances second by second until the sequence has left a step; says how long that took.
+    fn until_left(rig: &mut Rig, step: Step, longest_s: u64) -> u64 {
+        let left = (0..longest_s).find(|_| {
+            rig.advance(Duration::from_secs(1));
+            rig.truth().step != step
+        });
+        left.unwrap_or_else(|| panic!("still {step:?} after {longest_s} s: {:?}", rig.truth()))
+    }
+
+    #[test]
+    fn a_batch_runs_through_and_begins_again() {
+        let rig = &mut Rig::demo();
+        rig.advance(Duration::from_secs(1));
+        assert_eq!(rig.truth().step, Step::Fill);
+        assert!(until_left(rig, Step::Fill, 60) > 5);
+        let heating_s = until_left(rig, Step::Heat, 1500);
+        assert!((9 * 60..16 * 60).contains(&heating_s), "heating took {heating_s} s");
+        assert!((rig.truth().pv_c - 70.0).abs() <= 1.1);
+        let holding_s = until_left(rig, Step::Hold, 200);
+        assert!((178..182).contains(&holding_s));
+        assert!((rig.truth().pv_c - 70.0).abs() < 3.0, "{:?}", rig.truth());
+        for (step, longest_s) in [(Step::Drain, 900), (Step::Cool, 65), (Step::Return, 300)] {
+            assert_eq!(rig.truth().step, step);
+            until_left(rig, step, longest_s);
+        }
+        assert_eq!(rig.truth().step, Step::Fill);
+        assert_eq!(rig.respond(2, &[3, 4, 2, 0, 1]), Some(vec![3, 2, 0, 1]));
+        assert!(!rig.truth().fault);
+    }
+
+    #[test]
+    fn many_batches_do_not_warm_up_the_cold_water() {
+        let mut rig = Rig::demo();
+        rig.advance(Duration::from_secs(24 * 3600));
+        let batches = rig.respond(2, &[3, 4, 2, 0, 1]).expect("the PLC answers");
+        assert!(u16::from_be_bytes([batches[2], batches[3]]) >= 0x30, "batches (BCD) {batches:02X?}");
+        assert!(rig.tank.cold.temperature_c < 40.0, "cold water at {} °C", rig.tank.cold.temperature_c);
+    }
+
+    #[test]
+    fn it_does_not_matter_in_what_pieces_time_passes() {
+        let (mut whole, mut pieces) = (Rig::demo(), Rig::demo());
+        whole.advance(Duration::from_millis(70_000));
+        (0..10_000).for_each(|_| pieces.advance(Duration::from_millis(7)));
+        assert_eq!(whole.truth(), pieces.truth());
+    }
+
+    #[test]
+    fn auto_tuning_on_the_tank_ends_with_usable_values() {
+        let rig = &mut Rig::filled(5.0);
+        // Manual, running, agitator and heater on.
+        assert!(rig.respond(2, &[15, 0x0C, 0, 0, 7, 1, 0b100_1001]).is_some());
+        assert!(rig.respond(1, &[6, 0x03, 0xEC, 0, 1]).is_some());
+        rig.advance(Duration::from_secs(3 * 3600));
+        let reply = rig.respond(1, &[3, 0x03, 0xEC, 0, 4]).expect("the controller answers");
+        let [tune, p, i, d] = [2, 4, 6, 8].map(|at| u16::from_be_bytes([reply[at], reply[at + 1]]));
+        assert_eq!(tune, 0);
+        assert!((8..20).contains(&p) && (500..1000).contains(&i) && (90..200).contains(&d), "P {p} I {i} D {d}");
+        rig.advance(Duration::from_secs(3600));
+        assert!((rig.truth().pv_c - 70.0).abs() < 1.0, "{:?}", rig.truth());
+    }
+
+    #[test]
+    fn a_broken_sensor_stops_the_heating_and_in_time_the_sequence() {
+        let rig = &mut Rig::demo();
+        rig.advance(Duration::from_secs(300));
+        assert!(rig.truth().readings.heater_w > 1500.0);
+        rig.set_sensor_open(true);
+        rig.advance(Duration::from_secs(30));
+        assert!(rig.truth().readings.heater_w < 1.0);
+        rig.advance(Duration::from_secs(2 * 3600));
+        assert!(rig.truth().fault);
+        assert_eq!(rig.truth().outputs, Outputs::default());
+    }
+
+    /// What an operator may write: a coil of the PLC, all outputs at once, a setting of the controller.
+    fn any_write() -> impl Strategy<Value = (u8, Vec<u8>)> {
+        let coil = |first: u16| {
+            (0..8_u16, any::<bool>()).prop_map(move |(number, on)| {
+                let [high, low] = (first + number).to_be_bytes();
+                (DL06_UNIT, vec![5, high, low, if on { 0xFF } else { 0 }, 0])
+            })
+        };
+        let setting = (1000..1083_u16, any::<u16>()).prop_map(|(address, value)| {
+            let [[a, b], [c, d]] = [address.to_be_bytes(), value.to_be_bytes()];
+            (PXR_UNIT, vec![6, a, b, c, d])
+        });
+        prop_oneof![coil(3072), coil(2048), setting, Just((DL06_UNIT, vec![6, 0x41, 0x40, 0xFF, 0xFF]))]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn whatever_is_written_nothing_boils_dry_or_overflows(
+            demo in any::<bool>(),
+            writes in prop::collection::vec((any_write(), 1_u64..900), 1..25),
+        ) {
+            let mut rig = if demo { Rig::demo() } else { Rig::new() };
+            for ((unit, pdu), seconds) in writes {
+                prop_assert!(rig.respond(unit, &pdu).is_some());
+                for _ in 0..seconds {
+                    rig.advance(Duration::from_secs(1));
+                    let Readings { level_cm, heater_w, .. } = rig.truth().readings;
+                    // The heating element needs some seconds to cool after the interlock has opened.
+                    prop_assert!(level_cm >= 4.5 || heater_w < 500.0, "{heater_w} W at {level_cm} cm");
+                    prop_assert!(level_cm <= 28.1, "{level_cm} cm");
+                    prop_assert!(rig.tank.control.temperature_c < 100.0);
+                    prop_assert!((0.0..=100.0).contains(&rig.truth().mv_percent));
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_request_breaks_the_rig(
+            requests in prop::collection::vec(
+                (
+                    1..3_u8,
+                    prop::sample::select(vec![1_u8, 2, 3, 4, 5, 6, 15, 16, 43]),
+                    prop::sample::select(vec![0_u16, 990, 1024, 2040, 3072, 16_384, 65_500]),
+                    0..60_u16,
+                    prop::collection::vec(any::<u8>(), 2..40),
+                ),
+                1..60,
+            ),
+        ) {
+            let mut rig = Rig::demo();
+            for (unit, function, base, above, mut rest) in requests {
+                if function >= 15 {
+                    // A block that fits its own counts reaches the registers, not only the parser.
+                    let words = rest.len() / 2;
+                    rest.truncate(2 * words);
+                    rest.splice(0..0, [0, if function == 16 { words } else { words * 16 } as u8, 2 * words as u8]);
+                }
+                let pdu = [&[function], &(base + above.min(35)).to_be_bytes()[..], &rest].concat();
+                prop_assert!(rig.respond(unit, &pdu).is_some());
+                rig.advance(Duration::from_secs(2));
+            }
+        }
+    }
+
+    #[test]
+    fn after_a_power_cut_the_plant_stands_still() {
+        let rig = &mut Rig::demo();
+        rig.advance(Duration::from_secs(300));
+        rig.power_cycle();
+        rig.advance(Duration::from_secs(60));
+        assert_eq!((rig.truth().step, rig.truth().outputs), (Step::Idle, Outputs::default()));
+    }
+}

@@ -1,0 +1,143 @@
+//! Requests on a serial line as a slave finds them: by the length that the function tells, by silence where it does not.
+
+use crate::bus::frame::crc16;
+
+/// Twice the longest frame of a serial line (Modbus serial line V1.02, 2.5.1): one whole and the beginning of a next.
+const BYTES_MAX: usize = 2 * 256;
+
+/// Collects bytes and cuts whole requests with a right check out of them.
+#[derive(Debug, Clone, Default)]
+pub struct Receiver {
+    bytes: Vec<u8>,
+    lost: bool,
+}
+
+impl Receiver {
+    /// Adds bytes as they arrive. Once the place of a frame is lost, everything up to the next silence is thrown away.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.bytes.extend_from_slice(bytes);
+        self.lost |= self.bytes.len() > BYTES_MAX;
+        if self.lost {
+            self.bytes.truncate(1);
+        }
+    }
+
+    /// The next request that is complete by its length.
+    pub fn take(&mut self) -> Option<Vec<u8>> {
+        match self.length() {
+            Length::Known(length) if !self.lost && self.bytes.len() >= length => {
+                self.lost = crc16(&self.bytes[..length]) != 0;
+                (!self.lost).then(|| self.bytes.drain(..length).collect())
+            }
+            Length::Known(_) | Length::TooEarly | Length::BySilence => None,
+        }
+    }
+
+    /// The line was silent: what is here is one whole request, or rubbish.
+    pub fn silence(&mut self) -> Option<Vec<u8>> {
+        let (frame, lost) = (std::mem::take(&mut self.bytes), std::mem::take(&mut self.lost));
+        (!lost && frame.len() >= 4 && crc16(&frame) == 0).then_some(frame)
+    }
+
+    /// Whether nothing waits for its rest.
+    pub fn is_empty(&self) -> bool {
+        self.bytes.is_empty()
+    }
+
+    fn length(&self) -> Length {
+        let counted = |place: usize, around: usize| match self.bytes.get(place) {
+            Some(count) => Length::Known(around + usize::from(*count)),
+            None => Length::TooEarly,
+        };
+        match self.bytes.get(1) {
+            None => Length::TooEarly,
+            Some(0x01..=0x06 | 0x08) => Length::Known(8),
+            Some(0x07 | 0x0B | 0x0C | 0x11) => Length::Known(4),
+            Some(0x0F | 0x10) => counted(6, 9),
+            Some(0x16) => Length::Known(10),
+            Some(0x17) => counted(10, 13),
+            Some(_) => Length::BySilence,
+        }
+    }
+}
+
+/// Length of a request with unit and check.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Length {
+    Known(usize),
+    TooEarly,
+    BySilence,
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::bus::frame::with_crc;
+
+    fn requests() -> Vec<Vec<u8>> {
+        let messages: [&[u8]; 5] = [
+            &[1, 3, 3, 0xEA, 0, 1],
+            &[2, 15, 12, 0, 0, 9, 2, 0xFF, 1],
+            &[1, 16, 3, 0xED, 0, 2, 4, 0, 50, 0, 0],
+            &[2, 0x11],
+            &[2, 0x17, 0, 0, 0, 1, 0, 0, 0, 1, 2, 0, 0],
+        ];
+        messages.iter().map(|message| with_crc(message)).collect()
+    }
+
+    fn take_all(receiver: &mut Receiver) -> Vec<Vec<u8>> {
+        std::iter::from_fn(|| receiver.take()).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn requests_are_found_however_they_are_cut(cuts in prop::collection::vec(1_usize..20, 1..40)) {
+            let stream = requests().concat();
+            let (mut receiver, mut found, mut rest) = (Receiver::default(), Vec::new(), &stream[..]);
+            for cut in cuts.iter().cycle() {
+                let (now, later) = rest.split_at((*cut).min(rest.len()));
+                receiver.push(now);
+                found.extend(take_all(&mut receiver));
+                rest = later;
+                if rest.is_empty() {
+                    break;
+                }
+            }
+            prop_assert_eq!(found, requests());
+            prop_assert!(receiver.is_empty());
+        }
+
+        #[test]
+        fn rubbish_is_forgotten_at_the_next_silence(rubbish in prop::collection::vec(any::<u8>(), 0..1200)) {
+            let mut receiver = Receiver::default();
+            receiver.push(&rubbish);
+            take_all(&mut receiver);
+            receiver.silence();
+            receiver.push(&requests()[0]);
+            prop_assert_eq!(receiver.take(), Some(requests()[0].clone()));
+        }
+    }
+
+    #[test]
+    fn a_wrong_check_spoils_everything_up_to_the_silence() {
+        let mut receiver = Receiver::default();
+        receiver.push(&[1, 3, 3, 0xEA, 0, 1, 0, 0]);
+        assert_eq!(receiver.take(), None);
+        receiver.push(&requests()[0]);
+        assert_eq!(receiver.take(), None);
+        assert_eq!(receiver.silence(), None);
+        receiver.push(&requests()[0]);
+        assert_eq!(receiver.take(), Some(requests()[0].clone()));
+    }
+
+    #[test]
+    fn an_unknown_function_ends_with_the_silence() {
+        let mut receiver = Receiver::default();
+        let identify = with_crc(&[1, 0x2B, 14, 1, 0]);
+        receiver.push(&identify);
+        assert_eq!(receiver.take(), None);
+        assert_eq!(receiver.silence(), Some(identify));
+    }
+}
