@@ -26,7 +26,8 @@ impl Clock {
 
     /// Plant time now, in whole microseconds (what the history stores).
     pub fn now(&self) -> Timestamp {
-        let micros = self.start.elapsed().as_secs_f64() * self.speed * 1e6;
+        // Rounded, not cut off: who slept until a moment must find that it has come.
+        let micros = (self.start.elapsed().as_secs_f64() * self.speed * 1e6).round();
         self.base + SignedDuration::from_micros(micros as i64)
     }
 

@@ -4,3 +4,6 @@ pub mod clock;
 pub mod transport;
 pub mod link;
 pub mod task;
+
+#[cfg(test)]
+mod tests;

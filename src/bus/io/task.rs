@@ -242,7 +242,7 @@ impl Task {
     ) -> Result<Result<(), Leave>, Ended> {
         let block = self.blocks[index].clone();
         let outcome = match self.in_step(link, schedule, &block).await {
-            Ok(true) => self.read_twice(link, &block).await,
+            Ok(true) => self.read_twice(link, schedule, &block).await,
             // The unit must rest before it can be asked anything that could be mistaken.
             Ok(false) => return Ok(Ok(())),
             Err(trouble) => Err(trouble),
@@ -296,18 +296,13 @@ impl Task {
         }
     }
 
-    /// Reads a block; a spoiled answer is asked for once more.
-    async fn read_twice(&mut self, link: &mut Link, block: &Block) -> Result<Answer, Trouble> {
+    /// Reads a block; a spoiled answer is asked for once more. It counts as owed, so the unit is brought into step first.
+    async fn read_twice(&mut self, link: &mut Link, schedule: &mut Schedule, block: &Block) -> Result<Answer, Trouble> {
         match read(link, block).await {
-            Err(Trouble::Fault(fault)) if fault.is_corrupt() => {
-                // The spoiled answer counts as owed: a probe must bring the unit into step first.
-                if let Some(probe) = link.debt(block.unit).probe(std::iter::once(block)) {
-                    link.exchange(&probe).await?;
-                } else if link.is_ambiguous(&block.request()) {
-                    return Err(fault.into());
-                }
-                read(link, block).await
-            }
+            Err(Trouble::Fault(fault)) if fault.is_corrupt() => match self.in_step(link, schedule, block).await? {
+                true => read(link, block).await,
+                false => Err(fault.into()),
+            },
             other => other,
         }
     }
@@ -349,7 +344,7 @@ impl Task {
             Err(Trouble::Gone(why)) => return Err(why),
             Err(Trouble::Fault(fault)) => return Ok(WriteResult::NotRead(fault)),
         }
-        match self.read_twice(link, &block).await {
+        match self.read_twice(link, schedule, &block).await {
             Ok(values) => Ok(match value_of(tag, &block, &values) {
                 Some(back) => WriteResult::ReadBack(back),
                 None => WriteResult::NotRead(Fault::WrongLength { got: 0, asked: tag.point.len() }),
