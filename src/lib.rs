@@ -1,6 +1,7 @@
 //! sightglass: the control room of a small plant in a terminal.
 
 pub mod plant;
+pub mod profile;
 pub mod bus;
 pub mod report;
 pub mod history;
