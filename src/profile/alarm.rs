@@ -19,7 +19,8 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
     let mut alarms = Vec::new();
     for table in tables.iter().map(|table| &table.value) {
         let id = AlarmId(alarms.len() as u16);
-        let Some((subject, condition)) = subject(table, defs, problems) else { continue };
+        let found = if table.sound { subject(table, defs, problems) } else { None };
+        let Some((subject, condition)) = found else { continue };
         alarms.push(AlarmDef {
             id,
             subject,
@@ -36,6 +37,7 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
             },
         });
     }
+    check_order(tables, problems);
     for device in defs.devices {
         let own = |alarm: &AlarmDef| alarm.subject == Subject::Device(device.id);
         if !alarms.iter().any(own) {
@@ -43,6 +45,25 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
         }
     }
     alarms
+}
+
+/// Limits of one tag that stand in the wrong order, such as a high above the high-high.
+fn check_order(tables: &[At<AlarmTable>], problems: &mut Problems) {
+    let limit_of = |table: &AlarmTable| {
+        let levels =
+            [(table.low_low, "low_low"), (table.low, "low"), (table.high, "high"), (table.high_high, "high_high")];
+        let rank = levels.iter().position(|(limit, _)| limit.is_some())?;
+        Some((table.tag.as_ref()?.value.clone(), rank, levels[rank].0?, levels[rank].1))
+    };
+    let limits: Vec<_> = tables.iter().filter_map(|table| limit_of(&table.value)).collect();
+    for (tag, rank, limit, word) in &limits {
+        let lower = limits.iter().filter(|(other, below, ..)| other == tag && below < rank);
+        for (_, _, wrong, below) in lower.filter(|(_, _, lower, _)| lower.value >= limit.value) {
+            let problem =
+                problems.add(wrong.at, format!("{below} {} is not below {word} {} of {tag}", wrong.value, limit.value));
+            problem.label("out of order").also(limit.at, *word);
+        }
+    }
 }
 
 fn not_answering(id: AlarmId, device: &DeviceDef) -> AlarmDef {
@@ -56,7 +77,10 @@ fn not_answering(id: AlarmId, device: &DeviceDef) -> AlarmDef {
         off_delay: Duration::ZERO,
         text: "not answering".to_owned(),
         guidance: Guidance {
-            cause: format!("{} has no power, its cable is open, or its unit address or serial parameters differ", device.name),
+            cause: format!(
+                "{} has no power, its cable is open, or its unit address or serial parameters differ",
+                device.name
+            ),
             effect: "its values are unknown and it cannot be operated from here".to_owned(),
             action: "look at the device itself; then at supply, cable, terminator and the Bus tab".to_owned(),
             respond: Some(Duration::from_secs(600)),
@@ -74,12 +98,19 @@ fn subject(table: &AlarmTable, defs: &Defs, problems: &mut Problems) -> Option<(
             let id: DeviceId = defs.device(device, problems)?;
             let conditions = conditions_of(table);
             if let Some((at, word)) = conditions.first() {
-                problems.add(*at, format!("a device has no `{word}`")).label("expected a tag").help("the alarm of a device means: not answering");
+                problems
+                    .add(*at, format!("a device has no `{word}`"))
+                    .label("expected a tag")
+                    .help("the alarm of a device means: not answering");
             }
             Some((Subject::Device(id), Condition::NotAnswering))
         }
         (tag, _) => {
-            let message = if tag.is_some() { "an alarm watches a tag or a device, not both" } else { "an alarm needs `tag` or `device`" };
+            let message = if tag.is_some() {
+                "an alarm watches a tag or a device, not both"
+            } else {
+                "an alarm needs `tag` or `device`"
+            };
             problems.add(table.at, message).label("here");
             None
         }
@@ -104,7 +135,9 @@ fn condition(table: &AlarmTable, tag: &TagDef, defs: &Defs, problems: &mut Probl
     let [(at, _)] = found.as_slice() else {
         let words = "`high`, `high_high`, `low`, `low_low`, `deviation` or `is`";
         match found.get(1) {
-            Some((second, word)) => problems.add(*second, "an alarm has one condition").label(format!("`{word}` needs an [[alarm]] of its own")),
+            Some((second, word)) => problems
+                .add(*second, "an alarm has one condition")
+                .label(format!("`{word}` needs an [[alarm]] of its own")),
             None => problems.add(table.at, "an alarm needs a condition").label(format!("expected {words}")),
         };
         return None;

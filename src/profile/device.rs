@@ -1,6 +1,6 @@
 //! A device of the plant: its profile, its limits, the rows of its tags, its faceplate and its actions.
 
-use std::{collections::BTreeMap, rc::Rc, time::Duration};
+use std::time::Duration;
 
 use super::{
     diagnostic::{Problems, Span},
@@ -8,10 +8,11 @@ use super::{
     reader::{At, Node, Raw, text},
     schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile},
     tag::Defined,
+    units,
 };
 use crate::plant::{
     def::{ActionDef, Faceplate, Limits, TagId},
-    tag::{Access, Poll, TagDef},
+    tag::{Access, Point, Poll, TagDef},
 };
 
 /// One tag before it is defined: a plant file's keys lie on the profile's, which lie on the profile's defaults.
@@ -28,7 +29,7 @@ pub(super) fn rows(device: &DeviceTable, profile: &ProfileFile, problems: &mut P
         let mut seen = Unique::default();
         for tag in tags {
             let (short, at) = short_name(&tag.value);
-            if !short.is_empty() && !seen.insert(&short, at, "tag", problems) {
+            if !short.is_empty() && !seen.insert(&short, at, format!("duplicate tag `{short}`"), problems) {
                 continue;
             }
             let raw = tag.value.clone();
@@ -50,9 +51,15 @@ fn short_name(raw: &Raw) -> (String, Span) {
 }
 
 /// What the device and its profile say about requests, over the limits of the standard.
-pub(super) fn limits(device: &DeviceTable, profile: &ProfileFile, problems: &mut Problems) -> (Limits, Duration, Duration) {
-    let layers: Vec<Raw> = [&device.limits, &profile.limits].into_iter().flatten().map(|raw| raw.value.clone()).collect();
-    let standard = Limits { read_words_max: 125, read_bits_max: 2000, write_words_max: 123, gap_words_max: 8, alignment: 1 };
+pub(super) fn limits(
+    device: &DeviceTable,
+    profile: &ProfileFile,
+    problems: &mut Problems,
+) -> (Limits, Duration, Duration) {
+    let layers: Vec<Raw> =
+        [&device.limits, &profile.limits].into_iter().flatten().map(|raw| raw.value.clone()).collect();
+    let standard =
+        Limits { read_words_max: 125, read_bits_max: 2000, write_words_max: 123, gap_words_max: 8, alignment: 1 };
     if layers.is_empty() {
         return (standard, Duration::ZERO, Duration::ZERO);
     }
@@ -87,9 +94,9 @@ pub(super) fn check_overlaps(tags: &[Defined], problems: &mut Problems) {
     placed.sort_by_key(|(tag, _)| (tag.point.table, tag.point.address));
     for (index, (tag, at)) in placed.iter().enumerate() {
         let end = u32::from(tag.point.address) + u32::from(tag.point.len());
-        let neighbours = placed[index + 1..].iter().take_while(|(next, _)| {
-            next.point.table == tag.point.table && u32::from(next.point.address) < end
-        });
+        let neighbours = placed[index + 1..]
+            .iter()
+            .take_while(|(next, _)| next.point.table == tag.point.table && u32::from(next.point.address) < end);
         for (next, next_at) in neighbours {
             let (a, b) = (tag.point, next.point);
             let same = a.address == b.address && (a.kind, a.order) == (b.kind, b.order);
@@ -102,9 +109,18 @@ pub(super) fn check_overlaps(tags: &[Defined], problems: &mut Problems) {
             let (later, earlier) = if next_at > at { (next, tag) } else { (tag, next) };
             problems
                 .add(*late, format!("{} and {} overlap with different types", earlier.name, later.name))
-                .label(format!("{} {} to {}", b.table.word(), later.point.address, later.point.address + later.point.len() - 1))
+                .label(extent(later.point))
                 .also(*early, format!("{} begins at {}", earlier.name, earlier.point.address));
         }
+    }
+}
+
+/// `holding 1004 to 1005`.
+fn extent(point: Point) -> String {
+    let (word, first) = (point.table.word(), point.address);
+    match point.len() {
+        1 => format!("{word} {first}"),
+        length => format!("{word} {first} to {}", first + length - 1),
     }
 }
 
@@ -115,17 +131,26 @@ pub(super) fn link(defined: Vec<Defined>, problems: &mut Problems) -> Vec<TagDef
         let mut tag = defined.tag;
         for (need, what) in &defined.needs {
             let target = &all[need.value.index()];
+            let foreign = target.labels.iter().find(|(_, unit)| !units::known(unit));
+            if *what == "unit_from" && (target.labels.is_empty() || foreign.is_some()) {
+                let found = foreign.map_or("it has no `enum`".to_owned(), |(_, unit)| format!("`{unit}` is no unit"));
+                problems.add(need.at, format!("{} does not tell a unit: {found}", target.name)).label("unit_from");
+            }
             if target.id == tag.id {
                 problems.add(need.at, format!("{} needs itself", tag.name)).label("expected another tag");
             } else if tag.poll != Poll::Never && (target.poll == Poll::Never || target.access == Access::Write) {
-                let problem = problems.add(need.at, format!("{} is never read, so {} can never be shown", target.name, tag.name));
-                problem.label(*what).help(format!("give {} poll = \"slow\" and access = \"r\" or \"rw\"", target.short));
+                let problem =
+                    problems.add(need.at, format!("{} is never read, so {} can never be shown", target.name, tag.name));
+                problem
+                    .label(*what)
+                    .help(format!("give {} poll = \"slow\" and access = \"r\" or \"rw\"", target.short));
             }
         }
         if let Some((target, units)) = &mut tag.unit_from {
             *units = all[target.index()].labels.clone();
             // Until the device was asked, the first of its units stands in columns and headings.
-            tag.unit = if tag.unit.is_empty() { units.first().map(|(_, u)| u.clone()).unwrap_or_default() } else { tag.unit };
+            let first = units.first().map(|(_, unit)| unit.clone()).unwrap_or_default();
+            tag.unit = Some(tag.unit).filter(|unit| !unit.is_empty()).unwrap_or(first);
         }
         if let Some((target, choice)) = &defined.unlock {
             let value = number_of(choice, &all[target.index()], problems);
@@ -137,26 +162,42 @@ pub(super) fn link(defined: Vec<Defined>, problems: &mut Problems) -> Vec<TagDef
 }
 
 /// The tags that the controller is operated by.
-pub(super) fn faceplate(table: &FaceplateTable, device: &str, names: &Names, tags: &[TagDef], problems: &mut Problems) -> Option<Faceplate> {
+pub(super) fn faceplate(
+    table: &FaceplateTable,
+    device: &str,
+    names: &Names,
+    tags: &[TagDef],
+    problems: &mut Problems,
+) -> Option<Faceplate> {
     let mut find = |name: &Option<At<String>>| name.as_ref().and_then(|name| names.near(name, device, problems));
     let (pv, sv) = (find(&table.pv), find(&table.sv));
     let (mv, run, mode, tune) = (find(&table.mv), find(&table.run), find(&table.mode), find(&table.tune));
     let (pv, sv): (TagId, TagId) = (pv?, sv?);
     if let Some(name) = table.sv.as_ref().filter(|_| !tags[sv.index()].writable()) {
-        problems.add(name.at, format!("the set value {} cannot be written", tags[sv.index()].name)).label("expected access = \"rw\"");
+        problems
+            .add(name.at, format!("the set value {} cannot be written", tags[sv.index()].name))
+            .label("expected access = \"rw\"");
     }
     Some(Faceplate { pv, sv, mv, run, mode, tune })
 }
 
 /// The actions of a device.
-pub(super) fn actions(tables: &[At<ActionTable>], device: &str, names: &Names, tags: &[TagDef], problems: &mut Problems) -> Vec<ActionDef> {
+pub(super) fn actions(
+    tables: &[At<ActionTable>],
+    device: &str,
+    names: &Names,
+    tags: &[TagDef],
+    problems: &mut Problems,
+) -> Vec<ActionDef> {
     let mut found = Vec::new();
     for action in tables.iter().map(|table| &table.value) {
         let (Some(name), Some(tag_name), Some(choice)) = (&action.name, &action.tag, &action.value) else { continue };
         let Some(tag) = names.near(tag_name, device, problems) else { continue };
         let target = &tags[tag.index()];
         if !target.writable() {
-            problems.add(tag_name.at, format!("{} cannot be written", target.name)).label("expected access = \"w\" or \"rw\"");
+            problems
+                .add(tag_name.at, format!("{} cannot be written", target.name))
+                .label("expected access = \"w\" or \"rw\"");
         }
         let Some(value) = number_of(choice, target, problems) else { continue };
         found.push(ActionDef {
@@ -169,6 +210,3 @@ pub(super) fn actions(tables: &[At<ActionTable>], device: &str, names: &Names, t
     }
     found
 }
-
-/// The profiles of a plant, each read once.
-pub(super) type Profiles = BTreeMap<String, Option<Rc<ProfileFile>>>;

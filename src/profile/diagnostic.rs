@@ -100,9 +100,6 @@ impl Span {
         let start = (self.start + 1 + skip).min(self.end);
         Span { start, end: (start + length).min(self.end), ..self }
     }
-    fn labeled(self, text: &str) -> LabeledSpan {
-        LabeledSpan::new(Some(text.to_owned()).filter(|text| !text.is_empty()), self.start, self.end - self.start)
-    }
 }
 
 /// One problem.
@@ -145,7 +142,10 @@ impl Problem {
         diagnostic.help = self.help.clone();
         let Some(at) = self.at else { return Report::new(diagnostic) };
         let second = self.also.iter().filter(|(span, _)| span.source == at.source);
-        let labels = std::iter::once(at.labeled(&self.label)).chain(second.map(|(span, text)| span.labeled(text)));
+        // The primary label is the place that the heading names.
+        let primary = LabeledSpan::new_primary_with_span(Some(self.label.clone()), at.start..at.end);
+        let labels =
+            std::iter::once(primary).chain(second.map(|(span, text)| LabeledSpan::at(span.start..span.end, text)));
         let source = &sources[at.source];
         Report::new(diagnostic.with_labels(labels))
             .with_source_code(NamedSource::new(source.file.clone(), source.text.clone()))
@@ -175,13 +175,17 @@ impl Problems {
         self.list.push(Problem { at, message: message.into(), label: String::new(), also: None, help: None });
         self.list.last_mut().expect("it was pushed one line above")
     }
+    /// How many there are by now.
+    pub fn count(&self) -> usize {
+        self.list.len()
+    }
     /// The result, if there were no problems; else all problems in the order of the files.
     /// A profile that two devices use is read twice but complains once.
     pub fn finish<T>(mut self, value: T) -> Result<T, Errors> {
         if self.list.is_empty() {
             return Ok(value);
         }
-        self.list.sort_by_key(|problem| problem.at);
+        self.list.sort_by(|a, b| (a.at, &a.message).cmp(&(b.at, &b.message)));
         self.list.dedup();
         Err(Errors { sources: self.sources, list: self.list })
     }
@@ -194,7 +198,12 @@ fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     let allowed = (word.chars().count() / 3).max(1);
     // A one-letter word is one edit from every other: only its other case counts as near.
     let allowed = if word.chars().count() == 1 { 0 } else { allowed };
-    known.iter().map(|candidate| (distance(candidate), *candidate)).filter(|(edits, _)| *edits <= allowed).min().map(|(_, near)| near)
+    known
+        .iter()
+        .map(|candidate| (distance(candidate), *candidate))
+        .filter(|(edits, _)| *edits <= allowed)
+        .min()
+        .map(|(_, near)| near)
 }
 
 #[cfg(test)]

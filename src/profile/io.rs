@@ -70,7 +70,8 @@ pub(super) fn plant(argument: &Path, search: &Search) -> Result<Found, Errors> {
     let path = std::iter::once(argument.to_path_buf()).chain(in_folders).find(|path| path.is_file());
     if let Some(path) = path {
         let file = path.display().to_string();
-        let bytes = read(&path).map_err(|why| Errors::unreadable(format!("{file} cannot be read: {why}"), String::new()))?;
+        let bytes =
+            read(&path).map_err(|why| Errors::unreadable(format!("{file} cannot be read: {why}"), String::new()))?;
         return Ok(Found { name, text: Text { file, bytes }, path: Some(path) });
     }
     let inside = match &by_name {
@@ -132,7 +133,8 @@ pub(super) fn text_of(name: &str, search: &Search) -> Option<String> {
 /// Where the file of a name lies on disk; a device profile may also lie in the folder itself.
 fn path_of(folder: &str, name: &str, search: &Search) -> Option<PathBuf> {
     let file = format!("{name}.toml");
-    let places = |base: &PathBuf| [Some(base.join(folder).join(&file)), (folder == "devices").then(|| base.join(&file))];
+    let places =
+        |base: &PathBuf| [Some(base.join(folder).join(&file)), (folder == "devices").then(|| base.join(&file))];
     search.folders.iter().flat_map(places).flatten().find(|path| path.is_file())
 }
 

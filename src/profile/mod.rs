@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  plant file ─┐                      ┌─ tag ─── address, units
-//!              ├─ reader ── schema ── plant ─ device
+//!              ├─ reader ── schema ── plant ─ line, device
 //!  profiles  ──┘  (layers,  (words)   ├─ alarm
 //!                 spans)              ├─ picture, report
 //!                                     └─ Arc<PlantDef>   or   diagnostic::Errors
@@ -15,6 +15,7 @@ mod alarm;
 mod device;
 mod diagnostic;
 mod io;
+mod line;
 mod names;
 mod picture;
 mod plant;

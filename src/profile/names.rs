@@ -13,31 +13,40 @@ use crate::plant::{
 
 /// The full names of all tags, known before the tags themselves are, since tags refer to each other.
 #[derive(Debug, Default)]
-pub(super) struct Names(BTreeMap<String, TagId>);
+pub(super) struct Names {
+    tags: BTreeMap<String, TagId>,
+    /// Devices whose profile could not be read. Their tags are not missing, only unknown: one mistake, one message.
+    unread: Vec<String>,
+}
 
 impl Names {
     /// Adds a tag.
     pub fn insert(&mut self, full: String, id: TagId) {
-        self.0.insert(full, id);
+        self.tags.insert(full, id);
+    }
+    /// Remembers a device whose tags cannot be known.
+    pub fn unread(&mut self, device: &str) {
+        self.unread.push(device.to_owned());
     }
     /// A tag that is named beside a tag of `device`: `SV-L`, or in full `TIC-1.SV-L`.
     pub fn near(&self, name: &At<String>, device: &str, problems: &mut Problems) -> Option<TagId> {
         let inside = format!("{device}.{}", name.value);
-        if let Some(id) = self.0.get(&inside).or_else(|| self.0.get(&name.value)) {
+        if let Some(id) = self.tags.get(&inside).or_else(|| self.tags.get(&name.value)) {
             return Some(*id);
         }
         let prefix = format!("{device}.");
-        let known = self.0.keys().filter_map(|full| full.strip_prefix(&prefix));
+        let known = self.tags.keys().filter_map(|full| full.strip_prefix(&prefix));
         let problem = problems.add(name.at, format!("unknown tag `{}` in {device}", name.value));
         problem.label("no tag of this device").suggest(&name.value, known);
         None
     }
     /// A tag by its full name.
     pub fn full(&self, name: &At<String>, problems: &mut Problems) -> Option<TagId> {
-        let found = self.0.get(&name.value).copied();
-        if found.is_none() {
+        let found = self.tags.get(&name.value).copied();
+        let unread = name.value.split_once('.').is_some_and(|(device, _)| self.unread.iter().any(|d| d == device));
+        if found.is_none() && !unread {
             let problem = problems.add(name.at, format!("unknown tag `{}`", name.value));
-            problem.label("expected DEVICE.TAG").suggest(&name.value, self.0.keys().map(String::as_str));
+            problem.label("expected DEVICE.TAG").suggest(&name.value, self.tags.keys().map(String::as_str));
         }
         found
     }
@@ -62,7 +71,7 @@ impl Defs<'_> {
     /// A device by its name.
     pub fn device(&self, name: &At<String>, problems: &mut Problems) -> Option<DeviceId> {
         let found = self.devices.iter().find(|device| device.name == name.value).map(|device| device.id);
-        if found.is_none() {
+        if found.is_none() && !self.names.unread.contains(&name.value) {
             let problem = problems.add(name.at, format!("unknown device `{}`", name.value));
             problem.label("no such device").suggest(&name.value, self.devices.iter().map(|d| d.name.as_str()));
         }
@@ -85,11 +94,11 @@ pub(super) fn check_name(name: &At<String>, what: &str, problems: &mut Problems)
 pub(super) struct Unique(BTreeMap<String, Span>);
 
 impl Unique {
-    /// `true` if the name is new.
-    pub fn insert(&mut self, name: &str, at: Span, what: &str, problems: &mut Problems) -> bool {
+    /// `true` if the name is new; else the problem with this message was added.
+    pub fn insert(&mut self, name: &str, at: Span, message: impl Into<String>, problems: &mut Problems) -> bool {
         match self.0.get(name) {
             Some(first) => {
-                problems.add(at, format!("duplicate {what} `{name}`")).label("again").also(*first, "first here");
+                problems.add(at, message).label("again").also(*first, "first here");
                 false
             }
             None => {

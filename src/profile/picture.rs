@@ -120,7 +120,11 @@ fn item_of(raw: Raw, defs: &Defs, problems: &mut Problems) -> Option<At<MimicIte
         "trend" => {
             let item = TrendItem::of(layers, problems);
             let tag = defs.tag_id(&item.tag, problems)?;
-            MimicItem::Trend { place: item.place(), tag, window: item.window.map_or(Duration::ZERO, |window| window.value) }
+            MimicItem::Trend {
+                place: item.place(),
+                tag,
+                window: item.window.map_or(Duration::ZERO, |window| window.value),
+            }
         }
         _ => {
             let item = TextItem::of(layers, problems);
@@ -132,7 +136,10 @@ fn item_of(raw: Raw, defs: &Defs, problems: &mut Problems) -> Option<At<MimicIte
 
 fn kind(raw: &Raw, problems: &mut Problems) -> Option<String> {
     let Some((_, value)) = raw.table.get("kind") else {
-        problems.add(raw.at, "a mimic item needs `kind`").label("missing here").help(format!("known: {}", KINDS.join(", ")));
+        problems
+            .add(raw.at, "a mimic item needs `kind`")
+            .label("missing here")
+            .help(format!("known: {}", KINDS.join(", ")));
         return None;
     };
     let at = value.at;
@@ -196,9 +203,9 @@ fn check_inside(item: &MimicItem, at: Span, size: (u16, u16), problems: &mut Pro
         | MimicItem::Sequence { place, .. }
         | MimicItem::Trend { place, .. }
         | MimicItem::Text { place, .. } => corner(place),
-        MimicItem::Pipe { points, .. } => {
-            points.iter().fold((0, 0), |(x, y), point| (x.max(point.0.saturating_add(1)), y.max(point.1.saturating_add(1))))
-        }
+        MimicItem::Pipe { points, .. } => points
+            .iter()
+            .fold((0, 0), |(x, y), point| (x.max(point.0.saturating_add(1)), y.max(point.1.saturating_add(1)))),
     };
     if right > size.0 || bottom > size.1 {
         let problem = problems.add(at, "this item reaches out of the picture");
@@ -213,7 +220,7 @@ fn command(table: &CommandTable, defs: &Defs, keys: &mut Unique, problems: &mut 
     if letter.is_none() {
         problems.add(key.at, format!("`{}` is not a key", key.value)).label("expected one lower-case letter");
     }
-    keys.insert(&key.value, key.at, "key", problems);
+    keys.insert(&key.value, key.at, format!("duplicate key `{}`", key.value), problems);
     let tag = defs.tag(name, problems)?;
     if !tag.writable() {
         problems.add(name.at, format!("{} cannot be written", tag.name)).label("expected a tag with access = \"rw\"");
@@ -234,9 +241,11 @@ pub(super) fn trends(tables: &[At<TrendTable>], defs: &Defs, problems: &mut Prob
     let mut groups = Vec::new();
     for table in tables.iter().map(|table| &table.value) {
         let Some(name) = &table.name else { continue };
-        seen.insert(&name.value, name.at, "trend", problems);
+        seen.insert(&name.value, name.at, format!("duplicate trend `{}`", name.value), problems);
         if table.pens.is_empty() || table.pens.len() > PENS_MAX {
-            problems.add(table.at, format!("a trend with {} pens", table.pens.len())).label(format!("expected 1 to {PENS_MAX}"));
+            problems
+                .add(table.at, format!("a trend with {} pens", table.pens.len()))
+                .label(format!("expected 1 to {PENS_MAX}"));
         }
         let pens = table.pens.iter().filter_map(|pen| {
             let scale = pen.value.scale.map(|scale| (scale.value[0], scale.value[1]));

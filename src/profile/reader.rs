@@ -71,7 +71,9 @@ pub(super) fn parse(file: &str, bytes: &[u8], problems: &mut Problems) -> Option
             .label("here the TOML breaks");
     }
     if errors.is_empty() && table.is_empty() {
-        problems.add(Span { source, start: 0, end: 0 }, format!("{file} is empty")).help("see `sightglass profiles tank`");
+        problems
+            .add(Span { source, start: 0, end: 0 }, format!("{file} is empty"))
+            .help("see `sightglass profiles tank`");
     }
     let at = Span { source, start: 0, end: 0 };
     (errors.is_empty() && !table.is_empty()).then_some(Raw { at, table })
@@ -89,7 +91,9 @@ fn node_of(value: &Spanned<DeValue<'_>>, source: usize) -> At<Node> {
     let node = match value.get_ref() {
         DeValue::String(text) => Node::Text(text.as_ref().to_owned()),
         // TOML itself promises 64 bits; a longer number is as wrong as a number that is not finite.
-        DeValue::Integer(number) => i128::from_str_radix(number.as_str(), number.radix()).map_or(Node::Number(f64::NAN), Node::Whole),
+        DeValue::Integer(number) => {
+            i128::from_str_radix(number.as_str(), number.radix()).map_or(Node::Number(f64::NAN), Node::Whole)
+        }
         DeValue::Float(number) => Node::Number(number.as_str().parse().unwrap_or(f64::NAN)),
         DeValue::Boolean(flag) => Node::Flag(*flag),
         DeValue::Datetime(time) => Node::Time(time.to_string()),
@@ -146,7 +150,10 @@ impl<'a> Fields<'a> {
             wrong_type::<T>(value, at, "an array", problems);
             return Vec::new();
         };
-        array.iter().filter_map(|At { value, at }| T::read(value, *at, problems).map(|value| At { value, at: *at })).collect()
+        array
+            .iter()
+            .filter_map(|At { value, at }| T::read(value, *at, problems).map(|value| At { value, at: *at }))
+            .collect()
     }
     fn find(&self, key: &str) -> Option<(&'a Node, Span)> {
         self.layers.iter().find_map(|layer| layer.table.get(key).map(|(_, node)| (&node.value, node.at)))
@@ -184,12 +191,16 @@ macro_rules! table {
         pub(super) struct $name {
             /// Where the table stands.
             pub at: $crate::profile::diagnostic::Span,
+            /// Nothing in it was wrong by itself. If something was, what seems missing is better not asked for.
+            pub sound: bool,
             $($(#[$note])* pub $field: $crate::profile::reader::table!(@type $mode $type),)*
         }
         impl $name {
             pub fn of(layers: &[$crate::profile::reader::Raw], problems: &mut $crate::profile::diagnostic::Problems) -> Self {
+                let before = problems.count();
                 let fields = $crate::profile::reader::Fields::new(layers, $what, &[$($key),*], problems);
-                $name { at: fields.at(), $($field: fields.$mode::<$type>($key, problems),)* }
+                $(let $field = fields.$mode::<$type>($key, problems);)*
+                $name { at: fields.at(), sound: problems.count() == before, $($field,)* }
             }
         }
         impl $crate::profile::reader::Value for $name {
@@ -298,7 +309,10 @@ impl Value for Duration {
         // A hundred days is beyond every use, and keeps sums of times far from overflow.
         let usable = duration.filter(|duration| *duration <= Duration::from_secs(100 * 86_400));
         if usable.is_none() {
-            problems.add(at, format!("`{text}` is not a duration")).label("not understood").help(format!("write {FORM}"));
+            problems
+                .add(at, format!("`{text}` is not a duration"))
+                .label("not understood")
+                .help(format!("write {FORM}"));
         }
         usable
     }
@@ -377,6 +391,15 @@ impl Value for Choice {
 /// The words of an optional string; empty if it is not there.
 pub(super) fn text(value: &Option<At<String>>) -> String {
     value.as_ref().map(|text| text.value.clone()).unwrap_or_default()
+}
+
+/// If a layer has `key`, takes `stale` out of the layers below: it belonged to their `key`.
+pub(super) fn supersede(layers: &mut [Raw], key: &str, stale: &str) {
+    if let Some(top) = layers.iter().position(|layer| layer.table.contains_key(key)) {
+        for below in &mut layers[top + 1..] {
+            below.table.remove(stale);
+        }
+    }
 }
 
 fn wrong_type<T>(value: &Node, at: Span, expected: &str, problems: &mut Problems) -> Option<T> {

@@ -16,8 +16,8 @@ pub(super) fn shifts(tables: &[At<ShiftTable>], problems: &mut Problems) -> Vec<
     let mut shifts = Vec::new();
     for table in tables.iter().map(|table| &table.value) {
         let (Some(name), Some(start)) = (&table.name, table.start) else { continue };
-        names.insert(&name.value, name.at, "shift", problems);
-        starts.insert(&start.value.to_string(), start.at, "start of a shift", problems);
+        names.insert(&name.value, name.at, format!("duplicate shift `{}`", name.value), problems);
+        starts.insert(&start.value.to_string(), start.at, "two shifts start at the same time", problems);
         shifts.push(ShiftDef { name: name.value.clone(), start: start.value });
     }
     shifts.sort_by_key(|shift| shift.start);
@@ -41,7 +41,9 @@ pub(super) fn report(table: Option<&ReportTable>, defs: &Defs, problems: &mut Pr
         }
         let id = defs.device(device, problems);
         if id.is_some_and(|id| defs.devices[id.index()].faceplate.is_none()) {
-            problems.add(device.at, format!("{} is no controller", device.value)).label("it has no faceplate with PV and SV");
+            problems
+                .add(device.at, format!("{} is no controller", device.value))
+                .label("it has no faceplate with PV and SV");
         }
         report.record = id.map(|id| (id, every.value));
     }
@@ -67,7 +69,9 @@ fn one_of(word: &Option<At<String>>, known: &[char], usual: char, problems: &mut
     let Some(word) = word else { return usual };
     let found = known.iter().find(|c| word.value == c.to_string());
     if found.is_none() {
-        problems.add(word.at, format!("{:?} cannot be used here", word.value)).label(format!("expected one of {known:?}"));
+        problems
+            .add(word.at, format!("{:?} cannot be used here", word.value))
+            .label(format!("expected one of {known:?}"));
     }
     found.copied().unwrap_or(usual)
 }

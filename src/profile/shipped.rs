@@ -129,7 +129,8 @@ fn the_file_beside_the_plant_wins_then_the_users_then_the_shipped_one() {
     std::fs::write(here.join("mine.toml"), &tank).unwrap();
     let search = Search::folders(vec![user.clone()]);
     let model = || load(&here.join("mine.toml"), &search).map(|plant| plant.devices[1].model.clone()).unwrap();
-    let koyo = |model: &str| text_of("koyo_dl06", &Search::shipped()).unwrap().replace("\"DL06\"", &format!("\"{model}\""));
+    let koyo =
+        |model: &str| text_of("koyo_dl06", &Search::shipped()).unwrap().replace("\"DL06\"", &format!("\"{model}\""));
     assert_eq!(model(), "KOYO DL06");
     std::fs::write(user.join("devices/koyo_dl06.toml"), koyo("USER")).unwrap();
     assert_eq!(model(), "KOYO USER");

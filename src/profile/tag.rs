@@ -6,7 +6,7 @@ use super::{
     address::{check_modicon, locate},
     diagnostic::{Problems, Span},
     names::{Names, check_name},
-    reader::{At, Choice, Numbered, Raw, either, text},
+    reader::{At, Choice, Numbered, Raw, either, supersede, text},
     schema::{PollWord, Scheme, TagTable},
     units,
 };
@@ -42,6 +42,8 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
     for (first, second) in [("min", "min_from"), ("max", "max_from"), ("decimals", "decimals_from")] {
         either(&mut layers, first, second, problems);
     }
+    // A plant file that moves a tag need not repeat the number of the manual.
+    supersede(&mut layers, "address", "modicon");
     let row = TagTable::of(&layers, problems);
     let point = point(&row, around, problems);
     let kind = point.map(|point| (point.kind, point.field.map(|(_, bits)| bits)));
@@ -111,19 +113,14 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
 }
 
 /// Stands in for an address that is wrong; it never leaves the loader.
-const NOWHERE: Point = Point {
-    table: Table::Holding,
-    address: 0,
-    kind: Kind::U16,
-    order: crate::plant::tag::Order::Abcd,
-    field: None,
-};
+const NOWHERE: Point =
+    Point { table: Table::Holding, address: 0, kind: Kind::U16, order: crate::plant::tag::Order::Abcd, field: None };
 
 /// Raw type and, for a field, its number of bits.
 type Raws = (Kind, Option<u8>);
 
 fn point(row: &TagTable, around: &Surroundings, problems: &mut Problems) -> Option<Point> {
-    let location = row.address.as_ref()?;
+    let location = row.address.as_ref().filter(|_| row.sound)?;
     let (named, address) = locate(location, around.scheme, problems)?;
     let table = table(row, named, problems)?;
     if let Some(modicon) = &row.modicon {
@@ -137,7 +134,10 @@ fn point(row: &TagTable, around: &Surroundings, problems: &mut Problems) -> Opti
         (None, true) => Kind::Bool,
         (Some(kind), _) => kind.value.0,
         (None, false) => {
-            problems.add(row.at, "a tag in a register needs `type`").label("missing here").help("for example type = \"int16\"");
+            problems
+                .add(row.at, "a tag in a register needs `type`")
+                .label("missing here")
+                .help("for example type = \"int16\"");
             return None;
         }
     };
@@ -154,7 +154,8 @@ fn table(row: &TagTable, named: Option<Table>, problems: &mut Problems) -> Optio
         // V memory answers to both register functions, so the table may be named for it.
         (Some(written), Some(Table::Holding)) if !written.value.is_bits() => Some(written.value),
         (Some(written), Some(named)) if written.value != named => {
-            let problem = problems.add(written.at, format!("this address is a {}, not a {}", named.word(), written.value.word()));
+            let problem =
+                problems.add(written.at, format!("this address is a {}, not a {}", named.word(), written.value.word()));
             problem.label("leave it out: the address says it");
             None
         }
@@ -176,12 +177,17 @@ fn check_place(point: Point, at: Span, limits: Limits, problems: &mut Problems) 
     }
     if words > 1 && !point.address.is_multiple_of(limits.alignment.max(1)) {
         let alignment = limits.alignment;
-        let problem = problems.add(at, format!("a value of {words} registers at address {} breaks alignment = {alignment}", point.address));
+        let problem = problems.add(
+            at,
+            format!("a value of {words} registers at address {} breaks alignment = {alignment}", point.address),
+        );
         problem.label(format!("expected a multiple of {alignment}"));
     }
     if !point.table.is_bits() && words > limits.read_words_max {
         let max = limits.read_words_max;
-        problems.add(at, format!("the value takes {words} registers, the device reads at most {max}")).label("too long");
+        problems
+            .add(at, format!("the value takes {words} registers, the device reads at most {max}"))
+            .label("too long");
     }
     true
 }
@@ -218,7 +224,9 @@ fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {
         return 2;
     }
     let scale = row.scale.map_or(1.0, |scale| scale.value);
-    let whole = |digits: &u8| ((scale * 10f64.powi(i32::from(*digits))).round() / 10f64.powi(i32::from(*digits)) - scale).abs() < 1e-9;
+    let whole = |digits: &u8| {
+        ((scale * 10f64.powi(i32::from(*digits))).round() / 10f64.powi(i32::from(*digits)) - scale).abs() < 1e-9
+    };
     (0..=6).find(whole).unwrap_or(6)
 }
 
@@ -234,7 +242,10 @@ fn check_scaling(row: &TagTable, kind: Option<Raws>, decimals: Decimals, problem
     if let (Some(min), Some(max)) = (row.min, row.max)
         && min.value >= max.value
     {
-        problems.add(max.at, format!("max {} is not above min {}", max.value, min.value)).label("too low").also(min.at, "min");
+        problems
+            .add(max.at, format!("max {} is not above min {}", max.value, min.value))
+            .label("too low")
+            .also(min.at, "min");
     }
     let (Some(kind), Decimals::Fixed(_)) = (kind, decimals) else { return };
     let scale = row.scale.map_or(1.0, |scale| scale.value);
@@ -312,7 +323,8 @@ fn labels(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> Vec<(i
     for (number, text) in rows {
         let outside = range.filter(|(low, high)| (number.value as f64) < *low || (number.value as f64) > *high);
         if let Some((low, high)) = outside {
-            let problem = problems.add(number.at, format!("enum value {} ({text}) does not fit the type", number.value));
+            let problem =
+                problems.add(number.at, format!("enum value {} ({text}) does not fit the type", number.value));
             problem.label(format!("the type holds {low} to {high}"));
         }
     }

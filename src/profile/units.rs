@@ -2,10 +2,15 @@
 
 use super::{diagnostic::Problems, reader::At};
 
+/// `true` for a unit that a tag may have.
+pub(super) fn known(unit: &str) -> bool {
+    KNOWN.contains(&unit)
+}
+
 /// The unit if it is known; else its problem, with the unit that was meant.
 pub(super) fn check(unit: &At<String>, problems: &mut Problems) -> String {
     let written = unit.value.as_str();
-    if !KNOWN.contains(&written) {
+    if !known(written) {
         let problem = problems.add(unit.at, format!("unknown unit `{written}`"));
         problem.label("not in the list of units");
         match OTHER_SPELLINGS.iter().find(|(other, _)| other.eq_ignore_ascii_case(written)) {
