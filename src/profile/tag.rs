@@ -47,25 +47,11 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
     let row = TagTable::of(&layers, problems);
     let point = point(&row, around, problems);
     let kind = point.map(|point| (point.kind, point.field.map(|(_, bits)| bits)));
-    let mut needs = Vec::new();
-    let mut refer = |name: &Option<At<String>>, what, problems: &mut Problems| {
-        let name = name.as_ref()?;
-        let value = around.names.near(name, around.device_name, problems)?;
-        needs.push((At { value, at: name.at }, what));
-        Some(value)
-    };
-    let decimals = match refer(&row.decimals_from, "decimals_from", problems) {
+    let links = links(&row, around, problems);
+    let decimals = match links.decimals {
         Some(tag) => Decimals::From(tag),
         None => Decimals::Fixed(decimals(&row, kind, problems)),
     };
-    let min = refer(&row.min_from, "min_from", problems).map(Bound::From).or(fixed(&row.min));
-    let max = refer(&row.max_from, "max_from", problems).map(Bound::From).or(fixed(&row.max));
-    let quality_from = refer(&row.quality_from, "quality_from", problems);
-    let unit_from = refer(&row.unit_from, "unit_from", problems).map(|tag| (tag, Vec::new()));
-    let unlock = row.write_unlock.as_ref().and_then(|unlock| {
-        let tag = around.names.near(unlock.value.tag.as_ref()?, around.device_name, problems)?;
-        Some((tag, unlock.value.value.clone()?))
-    });
     check_scaling(&row, kind, decimals, problems);
     let access = access(&row, point, problems);
     let poll = match row.poll.map_or(PollWord::Slow, |poll| poll.value) {
@@ -90,15 +76,15 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
         offset: row.offset.map_or(0.0, |offset| offset.value),
         decimals,
         unit: row.unit.as_ref().map(|unit| units::check(unit, problems)).unwrap_or_default(),
-        unit_from,
-        min,
-        max,
+        unit_from: links.unit.map(|tag| (tag, Vec::new())),
+        min: links.min.map(Bound::From).or(fixed(&row.min)),
+        max: links.max.map(Bound::From).or(fixed(&row.max)),
         access,
         confirm: row.confirm.as_ref().map(|confirm| confirm.value.clone()),
         labels: labels(&row, kind, problems),
         bit_labels: bit_labels(&row.bits, kind, problems),
         bad_if: row.bad_if.iter().map(|raw| raw.value).collect(),
-        quality_from: quality_from.map(|tag| (tag, row.quality_mask.map_or(u64::MAX, |mask| mask.value))),
+        quality_from: links.quality.map(|tag| (tag, row.quality_mask.map_or(u64::MAX, |mask| mask.value))),
         write_fc: row.write_fc.map(|fc| fc.value),
         write_unlock: None,
         group: text(&row.group),
@@ -109,12 +95,46 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
         source: text(&row.source),
     };
     let address_at = point.and(row.address.map(|address| address.at));
-    Defined { tag, address_at, needs, unlock }
+    Defined { tag, address_at, needs: links.needs, unlock: links.unlock }
 }
 
 /// Stands in for an address that is wrong; it never leaves the loader.
 const NOWHERE: Point =
     Point { table: Table::Holding, address: 0, kind: Kind::U16, order: crate::plant::tag::Order::Abcd, field: None };
+
+/// The other tags that a row names.
+struct Links {
+    decimals: Option<TagId>,
+    unit: Option<TagId>,
+    min: Option<TagId>,
+    max: Option<TagId>,
+    quality: Option<TagId>,
+    needs: Vec<(At<TagId>, &'static str)>,
+    unlock: Option<(TagId, At<Choice>)>,
+}
+
+fn links(row: &TagTable, around: &Surroundings, problems: &mut Problems) -> Links {
+    let mut needs = Vec::new();
+    let mut refer = |name: &Option<At<String>>, what, problems: &mut Problems| {
+        let name = name.as_ref()?;
+        let value = around.names.near(name, around.device_name, problems)?;
+        needs.push((At { value, at: name.at }, what));
+        Some(value)
+    };
+    let unlock = row.write_unlock.as_ref().and_then(|unlock| {
+        let tag = around.names.near(unlock.value.tag.as_ref()?, around.device_name, problems)?;
+        Some((tag, unlock.value.value.clone()?))
+    });
+    Links {
+        decimals: refer(&row.decimals_from, "decimals_from", problems),
+        unit: refer(&row.unit_from, "unit_from", problems),
+        min: refer(&row.min_from, "min_from", problems),
+        max: refer(&row.max_from, "max_from", problems),
+        quality: refer(&row.quality_from, "quality_from", problems),
+        needs,
+        unlock,
+    }
+}
 
 /// Raw type and, for a field, its number of bits.
 type Raws = (Kind, Option<u8>);

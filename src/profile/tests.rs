@@ -304,13 +304,14 @@ fn limits_of_one_tag_stand_in_order() {
 
 #[test]
 fn a_plant_file_changes_a_tag_and_says_so_only_where_it_contradicts_itself() {
-    let moved = "unit = 1\n[[device.tag]]\nname = \"T\"\naddress = 1010\nmax = 90";
-    let plant = load(PLANT.replacen("unit = 1", moved, 1).as_bytes(), METER, PLC).unwrap_or_else(|e| panic!("{e}"));
+    let moved = "fast = \"1s\"\n[[device.tag]]\nname = \"T\"\naddress = 1010\nmax = 90";
+    let plant =
+        load(PLANT.replacen("fast = \"1s\"", moved, 1).as_bytes(), METER, PLC).unwrap_or_else(|e| panic!("{e}"));
     let tag = plant.tag(plant.tag_named("D1.T").unwrap());
     assert_eq!((tag.point.address, tag.max, tag.min), (1010, Some(Bound::Fixed(90.0)), Some(Bound::Fixed(0.0))));
     assert_eq!(tag.unit, "°C", "what the plant file does not say stays as the profile has it");
-    let both = "unit = 1\n[[device.tag]]\nname = \"T\"\nmax = 90\nmax_from = \"DP\"";
-    check("unit = 1", both, &["`max` and `max_from` exclude each other"]);
+    let both = "fast = \"1s\"\n[[device.tag]]\nname = \"T\"\nmax = 90\nmax_from = \"DP\"";
+    check("fast = \"1s\"", both, &["`max` and `max_from` exclude each other"]);
     check("unit = \"°C\"", "unit_from = \"MODE\"", &["D1.MODE does not tell a unit: `off` is no unit"]);
 }
 
