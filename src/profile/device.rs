@@ -1,0 +1,212 @@
+//! A device of the plant: its profile, its limits, the rows of its tags, its faceplate and its actions.
+
+use std::time::Duration;
+
+use super::{
+    diagnostic::{Problems, Span},
+    names::{Names, Unique, number_of},
+    reader::{At, Node, Raw, text},
+    schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile},
+    tag::Defined,
+    units,
+};
+use crate::plant::{
+    def::{ActionDef, Faceplate, Limits, TagId},
+    tag::{Access, Point, Poll, TagDef},
+};
+
+/// One tag before it is defined: a plant file's keys lie on the profile's, which lie on the profile's defaults.
+pub(super) struct Row {
+    pub short: String,
+    pub layers: Vec<Raw>,
+}
+
+/// The rows of a device. A `[[device.tag]]` with the name of a profile's tag changes it, any other is a new tag.
+pub(super) fn rows(device: &DeviceTable, profile: &ProfileFile, problems: &mut Problems) -> Vec<Row> {
+    let default = profile.default.as_ref().map(|default| default.value.clone());
+    let mut rows = Vec::new();
+    for tags in [&profile.tags, &device.tags] {
+        let mut seen = Unique::default();
+        for tag in tags {
+            let (short, at) = short_name(&tag.value);
+            if !short.is_empty() && !seen.insert(&short, at, format!("duplicate tag `{short}`"), problems) {
+                continue;
+            }
+            let raw = tag.value.clone();
+            match rows.iter_mut().find(|row: &&mut Row| row.short == short && !short.is_empty()) {
+                Some(row) => row.layers.insert(0, raw),
+                None => rows.push(Row { short, layers: std::iter::once(raw).chain(default.clone()).collect() }),
+            }
+        }
+    }
+    rows
+}
+
+/// The name of a row and where it stands; empty if it has none, which is reported when the row is read.
+fn short_name(raw: &Raw) -> (String, Span) {
+    match raw.table.get("name") {
+        Some((_, At { value: Node::Text(name), at })) => (name.clone(), *at),
+        _ => (String::new(), raw.at),
+    }
+}
+
+/// What the device and its profile say about requests, over the limits of the standard.
+pub(super) fn limits(
+    device: &DeviceTable,
+    profile: &ProfileFile,
+    problems: &mut Problems,
+) -> (Limits, Duration, Duration) {
+    let layers: Vec<Raw> =
+        [&device.limits, &profile.limits].into_iter().flatten().map(|raw| raw.value.clone()).collect();
+    let standard =
+        Limits { read_words_max: 125, read_bits_max: 2000, write_words_max: 123, gap_words_max: 8, alignment: 1 };
+    if layers.is_empty() {
+        return (standard, Duration::ZERO, Duration::ZERO);
+    }
+    let table = LimitsTable::of(&layers, problems);
+    let mut within = |value: Option<At<u16>>, default: u16, word: &str| {
+        let Some(value) = value else { return default };
+        if value.value == 0 || value.value > default {
+            let problem = problems.add(value.at, format!("{word} = {} is not possible", value.value));
+            problem.label(format!("the Modbus standard allows 1 to {default}"));
+            return default;
+        }
+        value.value
+    };
+    let limits = Limits {
+        read_words_max: within(table.read_words_max, 125, "read_words_max"),
+        read_bits_max: within(table.read_bits_max, 2000, "read_bits_max"),
+        write_words_max: within(table.write_words_max, 123, "write_words_max"),
+        gap_words_max: table.gap_words_max.map_or(8, |gap| gap.value),
+        alignment: table.alignment.map_or(1, |alignment| alignment.value),
+    };
+    if let Some(alignment) = table.alignment.filter(|alignment| !matches!(alignment.value, 1 | 2 | 4)) {
+        problems.add(alignment.at, format!("alignment = {} is not known", alignment.value)).label("expected 1, 2 or 4");
+    }
+    let millis = |value: Option<At<u16>>| Duration::from_millis(value.map_or(0, |value| u64::from(value.value)));
+    (limits, millis(table.gap_ms), millis(table.write_gap_ms))
+}
+
+/// Reports tags of one device that see the same registers with different eyes.
+/// The same place with the same type is fine, and so are fields of one word.
+pub(super) fn check_overlaps(tags: &[Defined], problems: &mut Problems) {
+    let mut placed: Vec<(&TagDef, Span)> = tags.iter().filter_map(|d| Some((&d.tag, d.address_at?))).collect();
+    placed.sort_by_key(|(tag, _)| (tag.point.table, tag.point.address));
+    for (index, (tag, at)) in placed.iter().enumerate() {
+        let end = u32::from(tag.point.address) + u32::from(tag.point.len());
+        let neighbours = placed[index + 1..]
+            .iter()
+            .take_while(|(next, _)| next.point.table == tag.point.table && u32::from(next.point.address) < end);
+        for (next, next_at) in neighbours {
+            let (a, b) = (tag.point, next.point);
+            let same = a.address == b.address && (a.kind, a.order) == (b.kind, b.order);
+            let fields = a.len() == 1 && b.len() == 1 && (a.field.is_some() || b.field.is_some());
+            if same || fields {
+                continue;
+            }
+            // The later of the two lines is the one that is probably wrong.
+            let (late, early) = if next_at > at { (next_at, at) } else { (at, next_at) };
+            let (later, earlier) = if next_at > at { (next, tag) } else { (tag, next) };
+            problems
+                .add(*late, format!("{} and {} overlap with different types", earlier.name, later.name))
+                .label(extent(later.point))
+                .also(*early, format!("{} begins at {}", earlier.name, earlier.point.address));
+        }
+    }
+}
+
+/// `holding 1004 to 1005`.
+fn extent(point: Point) -> String {
+    let (word, first) = (point.table.word(), point.address);
+    match point.len() {
+        1 => format!("{word} {first}"),
+        length => format!("{word} {first} to {}", first + length - 1),
+    }
+}
+
+/// Finishes what needs other tags: names of units, unlock values, and that a needed tag is read at all.
+pub(super) fn link(defined: Vec<Defined>, problems: &mut Problems) -> Vec<TagDef> {
+    let all: Vec<TagDef> = defined.iter().map(|defined| defined.tag.clone()).collect();
+    let finish = |defined: Defined| {
+        let mut tag = defined.tag;
+        for (need, what) in &defined.needs {
+            let target = &all[need.value.index()];
+            let foreign = target.labels.iter().find(|(_, unit)| !units::known(unit));
+            if *what == "unit_from" && (target.labels.is_empty() || foreign.is_some()) {
+                let found = foreign.map_or("it has no `enum`".to_owned(), |(_, unit)| format!("`{unit}` is no unit"));
+                problems.add(need.at, format!("{} does not tell a unit: {found}", target.name)).label("unit_from");
+            }
+            if target.id == tag.id {
+                problems.add(need.at, format!("{} needs itself", tag.name)).label("expected another tag");
+            } else if tag.poll != Poll::Never && (target.poll == Poll::Never || target.access == Access::Write) {
+                let problem =
+                    problems.add(need.at, format!("{} is never read, so {} can never be shown", target.name, tag.name));
+                problem
+                    .label(*what)
+                    .help(format!("give {} poll = \"slow\" and access = \"r\" or \"rw\"", target.short));
+            }
+        }
+        if let Some((target, units)) = &mut tag.unit_from {
+            *units = all[target.index()].labels.clone();
+            // Until the device was asked, the first of its units stands in columns and headings.
+            let first = units.first().map(|(_, unit)| unit.clone()).unwrap_or_default();
+            tag.unit = Some(tag.unit).filter(|unit| !unit.is_empty()).unwrap_or(first);
+        }
+        if let Some((target, choice)) = &defined.unlock {
+            let value = number_of(choice, &all[target.index()], problems);
+            tag.write_unlock = value.map(|value| (*target, value));
+        }
+        tag
+    };
+    defined.into_iter().map(finish).collect()
+}
+
+/// The tags that the controller is operated by.
+pub(super) fn faceplate(
+    table: &FaceplateTable,
+    device: &str,
+    names: &Names,
+    tags: &[TagDef],
+    problems: &mut Problems,
+) -> Option<Faceplate> {
+    let mut find = |name: &Option<At<String>>| name.as_ref().and_then(|name| names.near(name, device, problems));
+    let (pv, sv) = (find(&table.pv), find(&table.sv));
+    let (mv, run, mode, tune) = (find(&table.mv), find(&table.run), find(&table.mode), find(&table.tune));
+    let (pv, sv): (TagId, TagId) = (pv?, sv?);
+    if let Some(name) = table.sv.as_ref().filter(|_| !tags[sv.index()].writable()) {
+        problems
+            .add(name.at, format!("the set value {} cannot be written", tags[sv.index()].name))
+            .label("expected access = \"rw\"");
+    }
+    Some(Faceplate { pv, sv, mv, run, mode, tune })
+}
+
+/// The actions of a device.
+pub(super) fn actions(
+    tables: &[At<ActionTable>],
+    device: &str,
+    names: &Names,
+    tags: &[TagDef],
+    problems: &mut Problems,
+) -> Vec<ActionDef> {
+    let mut found = Vec::new();
+    for action in tables.iter().map(|table| &table.value) {
+        let (Some(name), Some(tag_name), Some(choice)) = (&action.name, &action.tag, &action.value) else { continue };
+        let Some(tag) = names.near(tag_name, device, problems) else { continue };
+        let target = &tags[tag.index()];
+        if !target.writable() {
+            problems
+                .add(tag_name.at, format!("{} cannot be written", target.name))
+                .label("expected access = \"w\" or \"rw\"");
+        }
+        let Some(value) = number_of(choice, target, problems) else { continue };
+        found.push(ActionDef {
+            name: name.value.clone(),
+            tag,
+            value,
+            settle: Duration::from_millis(action.settle_ms.map_or(0, |ms| u64::from(ms.value))),
+            confirm: text(&action.confirm),
+        });
+    }
+    found
+}

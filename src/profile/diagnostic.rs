@@ -1,0 +1,234 @@
+//! Every problem of a profile: where it stands, what was found, what was expected, and what was probably meant.
+
+use std::fmt;
+
+use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
+
+/// Most problems that are drawn at once; the rest are counted.
+const SHOWN_MAX: usize = 40;
+
+/// Everything that is wrong with a plant file and its profiles, in the order of the files.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Errors {
+    sources: Vec<Source>,
+    list: Vec<Problem>,
+}
+
+/// Draws the errors with file, line, column, the text in question and a caret.
+/// `color` is for a terminal; without it the text is fit for a log or a pipe.
+pub fn render(errors: &Errors, color: bool) -> String {
+    let theme = if color { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
+    let handler = GraphicalReportHandler::new_themed(theme).with_links(false).with_width(110);
+    let mut out = String::new();
+    for problem in errors.list.iter().take(SHOWN_MAX) {
+        let report = problem.report(&errors.sources);
+        // Writing into a string does not fail; should it ever, the plain message still gets out.
+        if handler.render_report(&mut out, report.as_ref()).is_err() {
+            out.push_str(&problem.message);
+        }
+        out.push('\n');
+    }
+    let hidden = errors.list.len().saturating_sub(SHOWN_MAX);
+    if hidden > 0 {
+        out.push_str(&format!("and {hidden} more problems\n"));
+    }
+    let count = errors.list.len();
+    out.push_str(&format!("{count} problem{}\n", if count == 1 { "" } else { "s" }));
+    out
+}
+
+impl Errors {
+    /// A failure before any text could be looked at, such as a missing file.
+    pub(super) fn unreadable(message: String, help: String) -> Errors {
+        Errors {
+            sources: Vec::new(),
+            list: vec![Problem { message, help: Some(help), at: None, label: String::new(), also: None }],
+        }
+    }
+    /// How many problems there are.
+    pub fn count(&self) -> usize {
+        self.list.len()
+    }
+    /// One line for each problem: `tank.toml:12:8: unknown line `L2``.
+    pub fn lines(&self) -> impl Iterator<Item = String> {
+        self.list.iter().map(|problem| match problem.at {
+            Some(at) => {
+                let source = &self.sources[at.source];
+                let (line, column) = source.position(at.start);
+                format!("{}:{line}:{column}: {}", source.file, problem.message)
+            }
+            None => problem.message.clone(),
+        })
+    }
+}
+
+impl fmt::Display for Errors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&render(self, false))
+    }
+}
+
+impl std::error::Error for Errors {}
+
+/// A text that was read, by the name the user knows it under.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Source {
+    pub file: String,
+    pub text: String,
+}
+
+impl Source {
+    /// Line and column of a byte, both from 1; columns count characters.
+    pub fn position(&self, byte: usize) -> (usize, usize) {
+        let before = self.text.get(..byte).unwrap_or(&self.text);
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+    }
+}
+
+/// A piece of one of the texts, in bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) struct Span {
+    pub source: usize,
+    pub start: usize,
+    pub end: usize,
+}
+
+impl Span {
+    /// The part of a quoted string that begins at its `skip`-th byte and is `length` bytes long.
+    pub fn inside_quotes(self, skip: usize, length: usize) -> Span {
+        let start = (self.start + 1 + skip).min(self.end);
+        Span { start, end: (start + length).min(self.end), ..self }
+    }
+}
+
+/// One problem.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Problem {
+    at: Option<Span>,
+    message: String,
+    label: String,
+    also: Option<(Span, String)>,
+    help: Option<String>,
+}
+
+impl Problem {
+    /// What stands at the caret.
+    pub fn label(&mut self, text: impl Into<String>) -> &mut Self {
+        self.label = text.into();
+        self
+    }
+    /// What to do about it.
+    pub fn help(&mut self, text: impl Into<String>) -> &mut Self {
+        self.help = Some(text.into());
+        self
+    }
+    /// A second place that belongs to it, such as the first use of a name. Shown if it is in the same file.
+    pub fn also(&mut self, at: Span, text: impl Into<String>) -> &mut Self {
+        self.also = Some((at, text.into()));
+        self
+    }
+    /// Offers the nearest of the known words, or all of them if they are few and none is near.
+    pub fn suggest<'a>(&mut self, word: &str, known: impl IntoIterator<Item = &'a str>) -> &mut Self {
+        let known: Vec<&str> = known.into_iter().collect();
+        match nearest(word, &known) {
+            Some(near) => self.help(format!("did you mean `{near}`?")),
+            None if known.is_empty() || known.len() > 12 => self,
+            None => self.help(format!("known: {}", known.join(", "))),
+        }
+    }
+    fn report(&self, sources: &[Source]) -> Report {
+        let mut diagnostic = MietteDiagnostic::new(self.message.clone());
+        diagnostic.help = self.help.clone();
+        let Some(at) = self.at else { return Report::new(diagnostic) };
+        let second = self.also.iter().filter(|(span, _)| span.source == at.source);
+        // The primary label is the place that the heading names.
+        let primary = LabeledSpan::new_primary_with_span(Some(self.label.clone()), at.start..at.end);
+        let labels =
+            std::iter::once(primary).chain(second.map(|(span, text)| LabeledSpan::at(span.start..span.end, text)));
+        let source = &sources[at.source];
+        Report::new(diagnostic.with_labels(labels))
+            .with_source_code(NamedSource::new(source.file.clone(), source.text.clone()))
+    }
+}
+
+/// Collects the problems while files are read, so that all of them come out at once.
+#[derive(Debug, Default)]
+pub(super) struct Problems {
+    sources: Vec<Source>,
+    list: Vec<Problem>,
+}
+
+impl Problems {
+    /// Registers a text; its number goes into every [`Span`].
+    pub fn source(&mut self, file: &str, text: String) -> usize {
+        self.sources.push(Source { file: file.to_owned(), text });
+        self.sources.len() - 1
+    }
+    /// The text of a source.
+    pub fn text(&self, source: usize) -> &str {
+        &self.sources[source].text
+    }
+    /// Adds a problem at a place.
+    pub fn add(&mut self, at: Span, message: impl Into<String>) -> &mut Problem {
+        let at = Some(at);
+        self.list.push(Problem { at, message: message.into(), label: String::new(), also: None, help: None });
+        self.list.last_mut().expect("it was pushed one line above")
+    }
+    /// How many there are by now.
+    pub fn count(&self) -> usize {
+        self.list.len()
+    }
+    /// The result, if there were no problems; else all problems in the order of the files.
+    /// A profile that two devices use is read twice but complains once.
+    pub fn finish<T>(mut self, value: T) -> Result<T, Errors> {
+        if self.list.is_empty() {
+            return Ok(value);
+        }
+        self.list.sort_by(|a, b| (a.at, &a.message).cmp(&(b.at, &b.message)));
+        self.list.dedup();
+        Err(Errors { sources: self.sources, list: self.list })
+    }
+}
+
+/// The known word that was probably meant: at most one edit in three letters away.
+fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
+    let lower = word.to_lowercase();
+    let distance = |candidate: &str| strsim::damerau_levenshtein(&lower, &candidate.to_lowercase());
+    let allowed = (word.chars().count() / 3).max(1);
+    // A one-letter word is one edit from every other: only its other case counts as near.
+    let allowed = if word.chars().count() == 1 { 0 } else { allowed };
+    known
+        .iter()
+        .map(|candidate| (distance(candidate), *candidate))
+        .filter(|(edits, _)| *edits <= allowed)
+        .min()
+        .map(|(_, near)| near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_word_that_was_meant_is_offered_and_a_far_one_is_not() {
+        let check = |word: &str, expect: Option<&str>| {
+            assert_eq!(nearest(word, &["holding", "input", "coil", "l/min"]), expect, "{word}");
+        };
+        check("holdng", Some("holding"));
+        check("HOLDING", Some("holding"));
+        check("coils", Some("coil"));
+        check("L/min", Some("l/min"));
+        check("register", None);
+        check("c", None);
+    }
+
+    #[test]
+    fn positions_count_lines_and_characters_from_one() {
+        let source = Source { file: "a".into(), text: "ab\nü = 1\n".into() };
+        assert_eq!(source.position(0), (1, 1));
+        assert_eq!(source.position(3), (2, 1));
+        assert_eq!(source.position(6), (2, 3), "ü is two bytes and one column");
+        assert_eq!(source.position(99), (3, 1));
+    }
+}

@@ -1,0 +1,160 @@
+//! Finds and reads plant files and device profiles: beside the plant file, in configuration folders, or in the binary.
+
+use std::{
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+use include_dir::{Dir, include_dir};
+
+use super::{Kind, Listed, diagnostic::Errors, plant::Text};
+
+/// The profiles that come with the program: a new device is one more file here and no Rust.
+static SHIPPED: Dir = include_dir!("$CARGO_MANIFEST_DIR/profiles");
+
+/// A profile is some kilobytes; whatever is larger than this is something else.
+const BYTES_MAX: u64 = 4 << 20;
+
+/// Configuration folders that are looked into before the shipped profiles, the first one first.
+///
+/// In each, a device profile is `devices/NAME.toml` or `NAME.toml`, a plant is `plants/NAME.toml`.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Search {
+    folders: Vec<PathBuf>,
+}
+
+impl Search {
+    /// The user's folder (`$XDG_CONFIG_HOME/sightglass`, else `~/.config/sightglass`), then `/etc/sightglass`.
+    pub fn usual() -> Search {
+        let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+        // The XDG rules say that a relative path is to be ignored.
+        let config = set("XDG_CONFIG_HOME").filter(|path| path.is_absolute());
+        let user = config.or_else(|| set("HOME").map(|home| home.join(".config")));
+        let user = user.map(|config| config.join("sightglass"));
+        Search { folders: user.into_iter().chain([PathBuf::from("/etc/sightglass")]).collect() }
+    }
+    /// Only what comes with the program and lies beside the plant file.
+    pub fn shipped() -> Search {
+        Search::default()
+    }
+    /// These folders, the first one first.
+    pub fn folders(folders: Vec<PathBuf>) -> Search {
+        Search { folders }
+    }
+    /// The same, with the plant file's own folder in front.
+    pub(super) fn beside(&self, plant: &Found) -> Search {
+        let own = plant.path.as_deref().and_then(Path::parent);
+        // A folder `plants` has its devices in the folder `devices` next to it.
+        let sibling = own.filter(|own| own.ends_with("plants")).and_then(Path::parent);
+        let front = own.into_iter().chain(sibling).map(Path::to_path_buf);
+        Search { folders: front.chain(self.folders.iter().cloned()).collect() }
+    }
+}
+
+/// A plant file that was found.
+pub(super) struct Found {
+    /// The stem of the file.
+    pub name: String,
+    /// Its text.
+    pub text: Text,
+    /// Where it lies; `None` for a shipped one.
+    path: Option<PathBuf>,
+}
+
+/// Reads the plant file that an argument means: a path, or the name of a plant.
+pub(super) fn plant(argument: &Path, search: &Search) -> Result<Found, Errors> {
+    let name = argument.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let by_name = argument.to_str().filter(|name| plain(name)).map(|name| format!("{name}.toml"));
+    let in_folders = by_name.iter().flat_map(|file| search.folders.iter().map(move |f| f.join("plants").join(file)));
+    let path = std::iter::once(argument.to_path_buf()).chain(in_folders).find(|path| path.is_file());
+    if let Some(path) = path {
+        let file = path.display().to_string();
+        let bytes =
+            read(&path).map_err(|why| Errors::unreadable(format!("{file} cannot be read: {why}"), String::new()))?;
+        return Ok(Found { name, text: Text { file, bytes }, path: Some(path) });
+    }
+    let inside = match &by_name {
+        Some(file) => SHIPPED.get_file(format!("plants/{file}")),
+        None => argument.strip_prefix("profiles").ok().and_then(|inside| SHIPPED.get_file(inside)),
+    };
+    match inside {
+        Some(file) => Ok(Found { name, text: shipped_text(file), path: None }),
+        None => Err(missing(argument, &name, search)),
+    }
+}
+
+fn missing(argument: &Path, name: &str, search: &Search) -> Errors {
+    let what = if argument.exists() { "is not a file" } else { "does not exist" };
+    let plants: Vec<String> = list(search).into_iter().filter(|l| l.kind == Kind::Plant).map(|l| l.name).collect();
+    let near = plants.iter().find(|plant| strsim::damerau_levenshtein(plant, name) <= 1);
+    let help = match near {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("give the path of a plant file, or one of the known plants: {}", plants.join(", ")),
+    };
+    Errors::unreadable(format!("the plant file {} {what}", argument.display()), help)
+}
+
+/// Reads the device profile of a name: the first folder that has it wins, the shipped one comes last.
+pub(super) fn device(name: &str, search: &Search) -> Result<Option<Text>, String> {
+    if !plain(name) {
+        return Ok(None);
+    }
+    match path_of("devices", name, search) {
+        Some(path) => {
+            let bytes = read(&path).map_err(|why| format!("{}: {why}", path.display()))?;
+            Ok(Some(Text { file: path.display().to_string(), bytes }))
+        }
+        None => Ok(SHIPPED.get_file(format!("devices/{name}.toml")).map(shipped_text)),
+    }
+}
+
+/// The names of all plants and device profiles, with where each comes from.
+pub(super) fn list(search: &Search) -> Vec<Listed> {
+    let mut all = Vec::new();
+    for (kind, folder) in [(Kind::Plant, "plants"), (Kind::Device, "devices")] {
+        let shipped = SHIPPED.get_dir(folder).into_iter().flat_map(Dir::files).filter_map(|file| stem(file.path()));
+        let entries = search.folders.iter().filter_map(|path| path.join(folder).read_dir().ok()).flatten().flatten();
+        let mut names: Vec<String> = entries.filter_map(|entry| stem(&entry.path())).chain(shipped).collect();
+        names.sort();
+        names.dedup();
+        all.extend(names.into_iter().map(|name| Listed { kind, from: path_of(folder, &name, search), name }));
+    }
+    all
+}
+
+/// The text of a plant or profile by its name.
+pub(super) fn text_of(name: &str, search: &Search) -> Option<String> {
+    let plant = || plant(Path::new(name), search).ok().map(|found| found.text);
+    let text = device(name, search).ok().flatten().or_else(|| plain(name).then(plant).flatten())?;
+    Some(String::from_utf8_lossy(&text.bytes).into_owned())
+}
+
+/// Where the file of a name lies on disk; a device profile may also lie in the folder itself.
+fn path_of(folder: &str, name: &str, search: &Search) -> Option<PathBuf> {
+    let file = format!("{name}.toml");
+    let places =
+        |base: &PathBuf| [Some(base.join(folder).join(&file)), (folder == "devices").then(|| base.join(&file))];
+    search.folders.iter().flat_map(places).flatten().find(|path| path.is_file())
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(|error| error.to_string())?;
+    file.take(BYTES_MAX + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+    if bytes.len() as u64 > BYTES_MAX { Err("larger than 4 MiB".to_owned()) } else { Ok(bytes) }
+}
+
+fn shipped_text(file: &include_dir::File) -> Text {
+    Text { file: format!("profiles/{}", file.path().display()), bytes: file.contents().to_vec() }
+}
+
+fn stem(path: &Path) -> Option<String> {
+    let toml = path.extension().is_some_and(|extension| extension == "toml");
+    path.file_stem().filter(|_| toml).map(|stem| stem.to_string_lossy().into_owned())
+}
+
+/// A name, not a path: nothing that could lead out of the folders.
+fn plain(name: &str) -> bool {
+    !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-')
+}

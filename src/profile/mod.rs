@@ -1,0 +1,85 @@
+//! Profiles: TOML becomes a checked `PlantDef`, or every error at once with file, line and a suggestion.
+//!
+//! ```text
+//!  plant file ─┐                      ┌─ tag ─── address, units
+//!              ├─ reader ── schema ── plant ─ line, device
+//!  profiles  ──┘  (layers,  (words)   ├─ alarm
+//!                 spans)              ├─ picture, report
+//!                                     └─ Arc<PlantDef>   or   diagnostic::Errors
+//! ```
+//!
+//! Only `io` touches files; everything else works on texts.
+
+mod address;
+mod alarm;
+mod device;
+mod diagnostic;
+mod io;
+mod line;
+mod names;
+mod picture;
+mod plant;
+mod reader;
+mod report;
+mod schema;
+mod tag;
+mod units;
+
+#[cfg(test)]
+mod shipped;
+#[cfg(test)]
+mod tests;
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+pub use self::{
+    diagnostic::{Errors, render},
+    io::Search,
+};
+use crate::plant::def::PlantDef;
+
+/// Loads a plant, or tells everything that is wrong with it.
+///
+/// `plant` is the path of a plant file, or the name of a plant (`tank`) in a configuration folder or in the program.
+/// A path such as `profiles/plants/tank.toml` that does not exist on disk but is shipped is taken from the program.
+/// Device profiles are looked for beside the plant file, in the folders of `search`, then in the program.
+pub fn load(plant: &Path, search: &Search) -> Result<Arc<PlantDef>, Errors> {
+    let found = io::plant(plant, search)?;
+    let search = search.beside(&found);
+    let names = io::list(&search).into_iter().filter(|listed| listed.kind == Kind::Device).map(|listed| listed.name);
+    let library = plant::Library { find: &|name| io::device(name, &search), names: names.collect() };
+    plant::build(&found.name, &found.text, &library).map(Arc::new)
+}
+
+/// A plant or device profile that could be loaded by its name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Listed {
+    /// Plant or device.
+    pub kind: Kind,
+    /// `fuji_pxr`.
+    pub name: String,
+    /// The file it comes from; `None` if it is shipped in the program.
+    pub from: Option<PathBuf>,
+}
+
+/// The two kinds of profile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A whole plant.
+    Plant,
+    /// A device.
+    Device,
+}
+
+/// All plants, then all devices, each by name: what `sightglass profiles` shows.
+pub fn list(search: &Search) -> Vec<Listed> {
+    io::list(search)
+}
+
+/// The text of a device profile or plant, to read or to copy and change.
+pub fn text_of(name: &str, search: &Search) -> Option<String> {
+    io::text_of(name, search)
+}

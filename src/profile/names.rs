@@ -1,0 +1,132 @@
+//! Which names a plant has, and what a reference by name leads to.
+
+use std::collections::BTreeMap;
+
+use super::{
+    diagnostic::{Problems, Span},
+    reader::{At, Choice},
+};
+use crate::plant::{
+    def::{DeviceDef, DeviceId, TagId},
+    tag::TagDef,
+};
+
+/// The full names of all tags, known before the tags themselves are, since tags refer to each other.
+#[derive(Debug, Default)]
+pub(super) struct Names {
+    tags: BTreeMap<String, TagId>,
+    /// Devices whose profile could not be read. Their tags are not missing, only unknown: one mistake, one message.
+    unread: Vec<String>,
+}
+
+impl Names {
+    /// Adds a tag.
+    pub fn insert(&mut self, full: String, id: TagId) {
+        self.tags.insert(full, id);
+    }
+    /// Remembers a device whose tags cannot be known.
+    pub fn unread(&mut self, device: &str) {
+        self.unread.push(device.to_owned());
+    }
+    /// A tag that is named beside a tag of `device`: `SV-L`, or in full `TIC-1.SV-L`.
+    pub fn near(&self, name: &At<String>, device: &str, problems: &mut Problems) -> Option<TagId> {
+        let inside = format!("{device}.{}", name.value);
+        if let Some(id) = self.tags.get(&inside).or_else(|| self.tags.get(&name.value)) {
+            return Some(*id);
+        }
+        let prefix = format!("{device}.");
+        let known = self.tags.keys().filter_map(|full| full.strip_prefix(&prefix));
+        let problem = problems.add(name.at, format!("unknown tag `{}` in {device}", name.value));
+        problem.label("no tag of this device").suggest(&name.value, known);
+        None
+    }
+    /// A tag by its full name.
+    pub fn full(&self, name: &At<String>, problems: &mut Problems) -> Option<TagId> {
+        let found = self.tags.get(&name.value).copied();
+        let unread = name.value.split_once('.').is_some_and(|(device, _)| self.unread.iter().any(|d| d == device));
+        if found.is_none() && !unread {
+            let problem = problems.add(name.at, format!("unknown tag `{}`", name.value));
+            problem.label("expected DEVICE.TAG").suggest(&name.value, self.tags.keys().map(String::as_str));
+        }
+        found
+    }
+}
+
+/// Devices and tags, finished: what alarms, the picture, trends and reports refer to.
+pub(super) struct Defs<'a> {
+    pub names: &'a Names,
+    pub devices: &'a [DeviceDef],
+    pub tags: &'a [TagDef],
+}
+
+impl Defs<'_> {
+    /// A tag by its full name.
+    pub fn tag(&self, name: &At<String>, problems: &mut Problems) -> Option<&TagDef> {
+        self.names.full(name, problems).map(|id| &self.tags[id.index()])
+    }
+    /// The id of a tag that may be left out.
+    pub fn tag_id(&self, name: &Option<At<String>>, problems: &mut Problems) -> Option<TagId> {
+        name.as_ref().and_then(|name| self.names.full(name, problems))
+    }
+    /// A device by its name.
+    pub fn device(&self, name: &At<String>, problems: &mut Problems) -> Option<DeviceId> {
+        let found = self.devices.iter().find(|device| device.name == name.value).map(|device| device.id);
+        if found.is_none() && !self.names.unread.contains(&name.value) {
+            let problem = problems.add(name.at, format!("unknown device `{}`", name.value));
+            problem.label("no such device").suggest(&name.value, self.devices.iter().map(|d| d.name.as_str()));
+        }
+        found
+    }
+}
+
+/// Checks that a name can be typed, shown and used in `DEVICE.TAG`.
+pub(super) fn check_name(name: &At<String>, what: &str, problems: &mut Problems) {
+    let plain = |c: char| c.is_alphanumeric() || "-_/#+.".contains(c);
+    let dot = what != "tag" && name.value.contains('.');
+    if name.value.is_empty() || dot || !name.value.chars().all(plain) {
+        let problem = problems.add(name.at, format!("`{}` is not a name for a {what}", name.value));
+        problem.label("expected letters, digits, - _ / # +, without spaces");
+    }
+}
+
+/// Finds names that are used twice, and says where the first one stands.
+#[derive(Debug, Default)]
+pub(super) struct Unique(BTreeMap<String, Span>);
+
+impl Unique {
+    /// `true` if the name is new; else the problem with this message was added.
+    pub fn insert(&mut self, name: &str, at: Span, message: impl Into<String>, problems: &mut Problems) -> bool {
+        match self.0.get(name) {
+            Some(first) => {
+                problems.add(at, message).label("again").also(*first, "first here");
+                false
+            }
+            None => {
+                self.0.insert(name.to_owned(), at);
+                true
+            }
+        }
+    }
+}
+
+/// The number that a choice means for a tag: a label of its enumeration, or a number that the tag can hold.
+pub(super) fn number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Problems) -> Option<f64> {
+    let labels = || tag.labels.iter().map(|(_, text)| text.as_str());
+    let known = match &choice.value {
+        Choice::Word(word) => tag.labels.iter().find(|(_, text)| text == word).map(|(number, _)| *number as f64),
+        Choice::Number(number) => Some(*number).filter(|n| tag.labels.is_empty() || tag.label_of(*n).is_some()),
+    };
+    if known.is_none() {
+        let written = match &choice.value {
+            Choice::Word(word) => word.clone(),
+            Choice::Number(number) => number.to_string(),
+        };
+        let problem = problems.add(choice.at, format!("`{written}` is not a state of {}", tag.name));
+        if tag.labels.is_empty() {
+            problem.label("expected a number: the tag has no `enum`");
+        } else {
+            problem.label("not in its `enum`").suggest(&written, labels());
+        }
+    }
+    known
+}

@@ -1,0 +1,282 @@
+//! A plant file and the profiles it names become one `PlantDef`. Pure: the texts come from outside.
+
+use std::{collections::BTreeMap, rc::Rc, time::Duration};
+
+use jiff::tz::TimeZone;
+
+use super::{
+    alarm, device,
+    diagnostic::{Errors, Problems},
+    line,
+    names::{Defs, Names, Unique, check_name},
+    picture, reader,
+    reader::{At, text},
+    report,
+    schema::{DeviceTable, PlantFile, ProfileFile},
+    tag::{self, Surroundings},
+};
+use crate::plant::{
+    def::{DeviceDef, DeviceId, LineDef, LineId, MimicDef, PlantDef, TagId, Transport},
+    tag::TagDef,
+};
+
+/// A text and the name the user knows it by.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Text {
+    pub file: String,
+    pub bytes: Vec<u8>,
+}
+
+/// Where device profiles come from.
+pub(super) struct Library<'a> {
+    /// The profile of a name: `Ok(None)` if there is none, `Err` with the reason if it cannot be read.
+    pub find: &'a dyn Fn(&str) -> Result<Option<Text>, String>,
+    /// The names of all profiles, for suggestions.
+    pub names: Vec<String>,
+}
+
+/// Builds the plant called `name`, or tells everything that is wrong with its texts.
+pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<PlantDef, Errors> {
+    let mut problems = Problems::default();
+    let built = reader::parse(&plant.file, &plant.bytes, &mut problems).map(|raw| {
+        let file = PlantFile::of(&[raw], &mut problems);
+        assemble(name, &file, library, &mut problems)
+    });
+    match problems.finish(built)? {
+        Some(plant) => Ok(plant),
+        // A text that gave no plant always gave a problem; this keeps the promise without a panic.
+        None => Err(Errors::unreadable(format!("{} is not a plant file", plant.file), String::new())),
+    }
+}
+
+fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Problems) -> PlantDef {
+    let lines = line::lines(&file.lines, problems);
+    let (devices, tags, names) = devices(file, &lines, library, problems);
+    let defs = Defs { names: &names, devices: &devices, tags: &tags };
+    let alarms = alarm::alarms(&file.alarms, &defs, problems);
+    let mimic =
+        file.mimic.as_ref().map_or_else(MimicDef::default, |mimic| picture::mimic(&mimic.value, &defs, problems));
+    let trends = picture::trends(&file.trends, &defs, problems);
+    let shifts = report::shifts(&file.shifts, problems);
+    let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, problems);
+    PlantDef {
+        name: name.to_owned(),
+        title: text(&file.title),
+        time_zone: time_zone(&file.time_zone, problems),
+        lines,
+        alarms,
+        mimic,
+        trends,
+        shifts,
+        report,
+        simulation: file.simulation.as_ref().map(|simulation| simulation.value.clone()),
+        devices,
+        tags,
+    }
+}
+
+fn time_zone(name: &Option<At<String>>, problems: &mut Problems) -> TimeZone {
+    let Some(name) = name else { return TimeZone::UTC };
+    TimeZone::get(&name.value).unwrap_or_else(|_| {
+        let known: Vec<String> = jiff::tz::db().available().map(|zone| zone.to_string()).collect();
+        let problem = problems.add(name.at, format!("unknown time zone `{}`", name.value));
+        problem
+            .label("expected an IANA name such as Asia/Bangkok")
+            .suggest(&name.value, known.iter().map(String::as_str));
+        TimeZone::UTC
+    })
+}
+
+/// A device whose name and profile are known.
+struct Known<'a> {
+    name: &'a str,
+    table: &'a DeviceTable,
+    profile: Rc<ProfileFile>,
+}
+
+fn devices(
+    file: &PlantFile,
+    lines: &[LineDef],
+    library: &Library,
+    problems: &mut Problems,
+) -> (Vec<DeviceDef>, Vec<TagDef>, Names) {
+    check_devices(file, lines, problems);
+    let mut names = Names::default();
+    let known = known_devices(file, library, &mut names, problems);
+    // All names come first, because tags refer to tags.
+    let mut count = 0;
+    let mut rows = Vec::new();
+    for device in &known {
+        let of_device = device::rows(device.table, &device.profile, problems);
+        for row in &of_device {
+            // A row without a name is reported when it is read.
+            if !row.short.is_empty() {
+                names.insert(format!("{}.{}", device.name, row.short), TagId(count as u16));
+            }
+            count += 1;
+        }
+        rows.push(of_device);
+    }
+    if count > TAGS_MAX {
+        problems.add(file.at, format!("{count} tags are too many")).label(format!("at most {TAGS_MAX}"));
+        return (Vec::new(), Vec::new(), names);
+    }
+    let (mut devices, mut defined) = (Vec::new(), Vec::new());
+    for (device, rows) in known.iter().zip(rows) {
+        let (def, around) = define_device(DeviceId(devices.len() as u16), device, lines, &names, problems);
+        let first = defined.len();
+        for row in rows {
+            defined.push(tag::define(TagId(defined.len() as u16), row.layers, &around, problems));
+        }
+        device::check_overlaps(&defined[first..], problems);
+        devices.push(def);
+    }
+    let tags = device::link(defined, problems);
+    for (def, device) in devices.iter_mut().zip(&known) {
+        let face = device.profile.faceplate.as_ref().map(|face| &face.value);
+        def.faceplate = face.and_then(|face| device::faceplate(face, device.name, &names, &tags, problems));
+        def.actions = device::actions(&device.profile.actions, device.name, &names, &tags, problems);
+    }
+    (devices, tags, names)
+}
+
+fn known_devices<'a>(
+    file: &'a PlantFile,
+    library: &Library,
+    names: &mut Names,
+    problems: &mut Problems,
+) -> Vec<Known<'a>> {
+    let mut profiles = Profiles::new();
+    let mut known = Vec::new();
+    if file.devices.is_empty() {
+        problems.add(file.at, "the plant has no device").label("expected a [[device]]");
+    }
+    for table in file.devices.iter().map(|table| &table.value) {
+        let profile = profile(&table.profile, library, &mut profiles, problems);
+        match (&table.name, profile) {
+            (Some(name), Some(profile)) => known.push(Known { name: &name.value, table, profile }),
+            (Some(name), None) => names.unread(&name.value),
+            (None, _) => {}
+        }
+    }
+    known
+}
+
+/// The device without its faceplate and actions, which need the tags; and what its tags must know of it.
+fn define_device<'a>(
+    id: DeviceId,
+    known: &'a Known,
+    lines: &[LineDef],
+    names: &'a Names,
+    problems: &mut Problems,
+) -> (DeviceDef, Surroundings<'a>) {
+    let Known { name, table, profile } = known;
+    let (limits, gap, write_gap) = device::limits(table, profile, problems);
+    let def = DeviceDef {
+        id,
+        name: (*name).to_owned(),
+        title: text(&table.title),
+        line: line_of(table, lines).unwrap_or(LineId(0)),
+        unit: table.unit.map_or(1, |unit| unit.value),
+        profile: text(&table.profile),
+        model: format!("{} {}", text(&profile.vendor), text(&profile.model)),
+        limits,
+        gap,
+        write_gap,
+        faceplate: None,
+        actions: Vec::new(),
+    };
+    let around = Surroundings {
+        device: id,
+        device_name: name,
+        scheme: profile.scheme.map(|scheme| scheme.value).unwrap_or_default(),
+        limits,
+        fast: period(table.fast, 1, problems),
+        slow: period(table.slow, 10, problems),
+        names,
+    };
+    (def, around)
+}
+
+/// Most tags of a plant; an id has 16 bits, and a terminal plant is far from it.
+const TAGS_MAX: usize = 20_000;
+
+/// A poll period that a line can keep and an operator can wait for.
+fn period(written: Option<At<Duration>>, default_s: u64, problems: &mut Problems) -> Duration {
+    let Some(period) = written else { return Duration::from_secs(default_s) };
+    if period.value < Duration::from_millis(50) || period.value > Duration::from_secs(86_400) {
+        problems.add(period.at, "this is not a poll period").label("expected 50ms to 1 day");
+    }
+    period.value
+}
+
+fn line_of(table: &DeviceTable, lines: &[LineDef]) -> Option<LineId> {
+    let name = table.line.as_ref()?;
+    lines.iter().find(|line| line.name == name.value).map(|line| line.id)
+}
+
+/// Names, lines and units of all devices against each other.
+fn check_devices(file: &PlantFile, lines: &[LineDef], problems: &mut Problems) {
+    let mut seen = Unique::default();
+    let mut units = Unique::default();
+    let known_lines: Vec<String> = file.lines.iter().filter_map(|line| line::name_of(&line.value)).collect();
+    for device in file.devices.iter().map(|device| &device.value) {
+        if let Some(name) = &device.name {
+            check_name(name, "device", problems);
+            seen.insert(&name.value, name.at, format!("duplicate device `{}`", name.value), problems);
+        }
+        let Some(line) = &device.line else { continue };
+        if !known_lines.contains(&line.value) {
+            let problem = problems.add(line.at, format!("unknown line `{}`", line.value));
+            problem.label("no such line").suggest(&line.value, known_lines.iter().map(String::as_str));
+        }
+        let (Some(unit), Some(id)) = (device.unit, line_of(device, lines)) else { continue };
+        let Some(def) = lines.iter().find(|line| line.id == id) else { continue };
+        if matches!(def.transport, Transport::Rtu { .. }) && !(1..=247).contains(&unit.value) {
+            let problem = problems.add(unit.at, format!("unit {} cannot be used on a serial line", unit.value));
+            problem.label("expected 1 to 247");
+            if unit.value == 0 {
+                problem.help("0 is the broadcast address: every device obeys and none answers");
+            }
+        }
+        let place = format!("unit {} is used twice on line {}", unit.value, line.value);
+        units.insert(&place, unit.at, place.as_str(), problems);
+    }
+}
+
+/// The profiles of a plant by name, each read once; `None` if it could not be read.
+type Profiles = BTreeMap<String, Option<Rc<ProfileFile>>>;
+
+/// Finds and reads a profile, once.
+fn profile(
+    name: &Option<At<String>>,
+    library: &Library,
+    profiles: &mut Profiles,
+    problems: &mut Problems,
+) -> Option<Rc<ProfileFile>> {
+    let name = name.as_ref()?;
+    if let Some(known) = profiles.get(&name.value) {
+        return known.clone();
+    }
+    let read = match (library.find)(&name.value) {
+        Ok(Some(text)) => reader::parse(&text.file, &text.bytes, problems).map(|raw| {
+            let file = ProfileFile::of(&[raw], problems);
+            if let Some(base) = file.address_base.filter(|base| base.value != 0) {
+                let problem = problems.add(base.at, "addresses are written as they are sent, from 0");
+                problem.label("expected 0").help("`modicon` may be added to a tag and is checked against its address");
+            }
+            Rc::new(file)
+        }),
+        Ok(None) => {
+            let problem = problems.add(name.at, format!("unknown profile `{}`", name.value));
+            problem.label("no such profile").suggest(&name.value, library.names.iter().map(String::as_str));
+            None
+        }
+        Err(why) => {
+            problems.add(name.at, format!("profile `{}` cannot be read: {why}", name.value)).label("named here");
+            None
+        }
+    };
+    profiles.insert(name.value.clone(), read.clone());
+    read
+}

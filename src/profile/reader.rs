@@ -1,0 +1,417 @@
+//! Reads TOML into typed tables and goes on after an error, so that a file tells all of its problems at once.
+//!
+//! serde stops at the first error and forgets where values stood. Here each value keeps its [`Span`], and a table may
+//! have several [`Raw`] layers: a plant file's row lies on the row of the device profile, which lies on its defaults.
+
+use std::{collections::BTreeMap, time::Duration};
+
+use jiff::{SignedDuration, civil::Time};
+use toml::{
+    Spanned,
+    de::{DeTable, DeValue},
+};
+
+use super::diagnostic::{Problems, Span};
+
+/// A value and where it stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct At<T> {
+    pub value: T,
+    pub at: Span,
+}
+
+/// A TOML value with the places of all that is in it.
+#[derive(Debug, Clone)]
+pub(super) enum Node {
+    Text(String),
+    /// As written: what range is right depends on the key.
+    Whole(i128),
+    Number(f64),
+    Flag(bool),
+    Time(String),
+    Array(Vec<At<Node>>),
+    Table(Table),
+}
+
+/// The keys of a table, each with the place of the key and its value.
+pub(super) type Table = BTreeMap<String, (Span, At<Node>)>;
+
+/// A table as it was written.
+#[derive(Debug, Clone)]
+pub(super) struct Raw {
+    pub at: Span,
+    pub table: Table,
+}
+
+/// A type that a TOML value can become. `None` after the problem was added.
+pub(super) trait Value: Sized {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self>;
+}
+
+/// Parses a file. `None` if it is not UTF-8, not TOML or says nothing; the problems say which.
+pub(super) fn parse(file: &str, bytes: &[u8], problems: &mut Problems) -> Option<Raw> {
+    let source = problems.source(file, String::from_utf8_lossy(bytes).into_owned());
+    if let Err(error) = std::str::from_utf8(bytes) {
+        // Up to here the lossy text equals the file; the replacement character that follows has three bytes.
+        let start = error.valid_up_to();
+        let byte = bytes[start];
+        problems
+            .add(Span { source, start, end: start + '\u{FFFD}'.len_utf8() }, format!("{file} is not UTF-8"))
+            .label(format!("byte 0x{byte:02X}"))
+            .help("save the file as UTF-8");
+        return None;
+    }
+    let text = problems.text(source).to_owned();
+    let (document, errors) = DeTable::parse_recoverable(&text);
+    let table = table_of(document.get_ref(), source);
+    for error in &errors {
+        let span = error.span().unwrap_or(0..0);
+        problems
+            .add(Span { source, start: span.start, end: span.end.max(span.start) }, error.message())
+            .label("here the TOML breaks");
+    }
+    if errors.is_empty() && table.is_empty() {
+        problems
+            .add(Span { source, start: 0, end: 0 }, format!("{file} is empty"))
+            .help("see `sightglass profiles tank`");
+    }
+    let at = Span { source, start: 0, end: 0 };
+    (errors.is_empty() && !table.is_empty()).then_some(Raw { at, table })
+}
+
+fn table_of(table: &DeTable<'_>, source: usize) -> Table {
+    let entry = |(key, value): (&Spanned<_>, &Spanned<_>)| {
+        let word: &std::borrow::Cow<'_, str> = key.get_ref();
+        (word.as_ref().to_owned(), (place(key, source), node_of(value, source)))
+    };
+    table.iter().map(entry).collect()
+}
+
+fn node_of(value: &Spanned<DeValue<'_>>, source: usize) -> At<Node> {
+    let node = match value.get_ref() {
+        DeValue::String(text) => Node::Text(text.as_ref().to_owned()),
+        // TOML itself promises 64 bits; a longer number is as wrong as a number that is not finite.
+        DeValue::Integer(number) => {
+            i128::from_str_radix(number.as_str(), number.radix()).map_or(Node::Number(f64::NAN), Node::Whole)
+        }
+        DeValue::Float(number) => Node::Number(number.as_str().parse().unwrap_or(f64::NAN)),
+        DeValue::Boolean(flag) => Node::Flag(*flag),
+        DeValue::Datetime(time) => Node::Time(time.to_string()),
+        DeValue::Array(array) => Node::Array(array.iter().map(|item| node_of(item, source)).collect()),
+        DeValue::Table(table) => Node::Table(table_of(table, source)),
+    };
+    At { value: node, at: place(value, source) }
+}
+
+fn place<T>(spanned: &Spanned<T>, source: usize) -> Span {
+    Span { source, start: spanned.span().start, end: spanned.span().end }
+}
+
+/// The fields of a table that is being read, topmost layer first.
+pub(super) struct Fields<'a> {
+    layers: &'a [Raw],
+    what: &'static str,
+}
+
+impl<'a> Fields<'a> {
+    /// Starts reading; reports every key that is not known.
+    pub fn new(layers: &'a [Raw], what: &'static str, known: &[&'static str], problems: &mut Problems) -> Self {
+        for layer in layers {
+            for (word, (at, _)) in layer.table.iter().filter(|(word, _)| !known.contains(&word.as_str())) {
+                problems
+                    .add(*at, format!("unknown key `{word}` in {what}"))
+                    .label("not known here")
+                    .suggest(word, known.iter().copied());
+            }
+        }
+        Fields { layers, what }
+    }
+    /// Where the topmost layer stands.
+    pub fn at(&self) -> Span {
+        self.layers[0].at
+    }
+    /// A value that must be there.
+    pub fn need<T: Value>(&self, key: &str, problems: &mut Problems) -> Option<At<T>> {
+        if self.find(key).is_none() {
+            let what = self.what;
+            problems.add(self.at(), format!("{what} needs `{key}`")).label("missing here");
+        }
+        self.opt(key, problems)
+    }
+    /// A value that may be there.
+    pub fn opt<T: Value>(&self, key: &str, problems: &mut Problems) -> Option<At<T>> {
+        let (value, at) = self.find(key)?;
+        T::read(value, at, problems).map(|value| At { value, at })
+    }
+    /// An array, empty if it is not there.
+    pub fn list<T: Value>(&self, key: &str, problems: &mut Problems) -> Vec<At<T>> {
+        let Some((value, at)) = self.find(key) else { return Vec::new() };
+        let Node::Array(array) = value else {
+            wrong_type::<T>(value, at, "an array", problems);
+            return Vec::new();
+        };
+        array
+            .iter()
+            .filter_map(|At { value, at }| T::read(value, *at, problems).map(|value| At { value, at: *at }))
+            .collect()
+    }
+    fn find(&self, key: &str) -> Option<(&'a Node, Span)> {
+        self.layers.iter().find_map(|layer| layer.table.get(key).map(|(_, node)| (&node.value, node.at)))
+    }
+}
+
+/// Keeps of two keys that exclude each other (`min` and `min_from`) the one in the upper layer.
+/// Two in the same layer are a contradiction.
+pub(super) fn either(layers: &mut [Raw], first: &str, second: &str, problems: &mut Problems) {
+    let Some(top) = layers.iter().position(|l| l.table.contains_key(first) || l.table.contains_key(second)) else {
+        return;
+    };
+    let layer = &layers[top];
+    if let (Some((a, _)), Some((b, _))) = (layer.table.get(first), layer.table.get(second)) {
+        problems
+            .add(*a, format!("`{first}` and `{second}` exclude each other"))
+            .label("keep one of them")
+            .also(*b, "the other");
+    }
+    for below in &mut layers[top + 1..] {
+        below.table.remove(first);
+        below.table.remove(second);
+    }
+}
+
+/// Declares a table of the format: its keys, their types, and which are needed (`need`), optional (`opt`) or arrays (`list`).
+macro_rules! table {
+    (@type need $type:ty) => { Option<$crate::profile::reader::At<$type>> };
+    (@type opt $type:ty) => { Option<$crate::profile::reader::At<$type>> };
+    (@type list $type:ty) => { Vec<$crate::profile::reader::At<$type>> };
+    ($(#[$doc:meta])* $name:ident, $what:literal { $($(#[$note:meta])* $mode:ident $key:literal $field:ident: $type:ty,)* }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone)]
+        #[allow(dead_code, reason = "some keys are only checked, and not every table is reported as a whole")]
+        pub(super) struct $name {
+            /// Where the table stands.
+            pub at: $crate::profile::diagnostic::Span,
+            /// Nothing in it was wrong by itself. If something was, what seems missing is better not asked for.
+            pub sound: bool,
+            $($(#[$note])* pub $field: $crate::profile::reader::table!(@type $mode $type),)*
+        }
+        impl $name {
+            pub fn of(layers: &[$crate::profile::reader::Raw], problems: &mut $crate::profile::diagnostic::Problems) -> Self {
+                let before = problems.count();
+                let fields = $crate::profile::reader::Fields::new(layers, $what, &[$($key),*], problems);
+                $(let $field = fields.$mode::<$type>($key, problems);)*
+                $name { at: fields.at(), sound: problems.count() == before, $($field,)* }
+            }
+        }
+        impl $crate::profile::reader::Value for $name {
+            fn read(
+                value: &$crate::profile::reader::Node,
+                at: $crate::profile::diagnostic::Span,
+                problems: &mut $crate::profile::diagnostic::Problems,
+            ) -> Option<Self> {
+                let raw = <$crate::profile::reader::Raw as $crate::profile::reader::Value>::read(value, at, problems)?;
+                Some($name::of(&[raw], problems))
+            }
+        }
+    };
+}
+pub(super) use table;
+
+/// Lets a type of the vocabulary be written as one of a few words.
+macro_rules! words {
+    ($type:ty, $what:literal { $($word:literal => $value:expr,)* }) => {
+        impl $crate::profile::reader::Value for $type {
+            fn read(
+                value: &$crate::profile::reader::Node,
+                at: $crate::profile::diagnostic::Span,
+                problems: &mut $crate::profile::diagnostic::Problems,
+            ) -> Option<Self> {
+                let word = <String as $crate::profile::reader::Value>::read(value, at, problems)?;
+                match word.as_str() {
+                    $($word => Some($value),)*
+                    _ => {
+                        let known = [$($word),*];
+                        problems.add(at, format!(concat!("unknown ", $what, " `{}`"), word))
+                            .label(concat!("not a ", $what)).suggest(&word, known);
+                        None
+                    }
+                }
+            }
+        }
+    };
+}
+pub(super) use words;
+
+impl Value for Raw {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        match value {
+            Node::Table(table) => Some(Raw { at, table: table.clone() }),
+            _ => wrong_type(value, at, "a table", problems),
+        }
+    }
+}
+
+impl Value for String {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        match value {
+            Node::Text(text) => Some(text.clone()),
+            _ => wrong_type(value, at, "a string", problems),
+        }
+    }
+}
+
+impl Value for bool {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        match value {
+            Node::Flag(flag) => Some(*flag),
+            _ => wrong_type(value, at, "true or false", problems),
+        }
+    }
+}
+
+impl Value for f64 {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let number = match value {
+            Node::Whole(number) => *number as f64,
+            Node::Number(number) => *number,
+            _ => return wrong_type(value, at, "a number", problems),
+        };
+        if !number.is_finite() {
+            problems.add(at, "not a number that can be used").label("expected a finite number");
+        }
+        Some(number).filter(|number| number.is_finite())
+    }
+}
+
+/// Whole numbers, with their range in the message.
+macro_rules! whole {
+    ($($type:ty),*) => { $(
+        impl Value for $type {
+            fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+                let expected = format!("a whole number from {} to {}", <$type>::MIN, <$type>::MAX);
+                let Node::Whole(number) = value else { return wrong_type(value, at, &expected, problems) };
+                let parsed = <$type>::try_from(*number).ok();
+                if parsed.is_none() {
+                    problems.add(at, format!("{number} is out of range")).label(format!("expected {expected}"));
+                }
+                parsed
+            }
+        }
+    )* };
+}
+whole!(u8, u16, u32, u64, i64);
+
+impl Value for Duration {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        const FORM: &str = "a duration such as \"500ms\", \"10s\", \"5 min\" or \"1h 30m\"";
+        let Node::Text(text) = value else { return wrong_type(value, at, FORM, problems) };
+        let duration = text.parse::<SignedDuration>().ok().and_then(|signed| Duration::try_from(signed).ok());
+        // A hundred days is beyond every use, and keeps sums of times far from overflow.
+        let usable = duration.filter(|duration| *duration <= Duration::from_secs(100 * 86_400));
+        if usable.is_none() {
+            problems
+                .add(at, format!("`{text}` is not a duration"))
+                .label("not understood")
+                .help(format!("write {FORM}"));
+        }
+        usable
+    }
+}
+
+impl Value for Time {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let text = match value {
+            Node::Text(text) | Node::Time(text) => text,
+            _ => return wrong_type(value, at, "a time of day such as \"06:00\"", problems),
+        };
+        let time = text.parse().ok();
+        if time.is_none() {
+            problems.add(at, format!("`{text}` is not a time of day")).label("expected \"06:00\"");
+        }
+        time
+    }
+}
+
+/// An array of exactly two.
+impl<T: Value + Copy> Value for [T; 2] {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let pair = match value {
+            Node::Array(array) if array.len() == 2 => array,
+            _ => return wrong_type(value, at, "an array of two", problems),
+        };
+        let mut both = pair.iter().map(|item| T::read(&item.value, item.at, problems));
+        let (first, second) = (both.next()?, both.next()?);
+        Some([first?, second?])
+    }
+}
+
+/// A table with numbers for keys: `{ 0 = "STOP", 1 = "RUN" }`.
+#[derive(Debug, Clone)]
+pub(super) struct Numbered(pub Vec<(At<i64>, String)>);
+
+impl Value for Numbered {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let raw = Raw::read(value, at, problems)?;
+        let mut rows = Vec::new();
+        for (word, (at, text)) in &raw.table {
+            let hex = word.strip_prefix("0x").and_then(|digits| i64::from_str_radix(digits, 16).ok());
+            match hex.or_else(|| word.parse().ok()) {
+                Some(value) => {
+                    let text = String::read(&text.value, text.at, problems);
+                    rows.extend(text.map(|text| (At { value, at: *at }, text)));
+                }
+                None => {
+                    problems.add(*at, format!("`{word}` is not a whole number")).label("expected 0 = \"…\", 1 = \"…\"");
+                }
+            }
+        }
+        rows.sort_by_key(|(number, _)| number.value);
+        Some(Numbered(rows))
+    }
+}
+
+/// A number, or a word that stands for one: `value = "RUN"`.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Choice {
+    Number(f64),
+    Word(String),
+}
+
+impl Value for Choice {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        match value {
+            Node::Text(word) => Some(Choice::Word(word.clone())),
+            Node::Flag(flag) => Some(Choice::Number(f64::from(u8::from(*flag)))),
+            Node::Whole(_) | Node::Number(_) => f64::read(value, at, problems).map(Choice::Number),
+            _ => wrong_type(value, at, "a number or a word", problems),
+        }
+    }
+}
+
+/// The words of an optional string; empty if it is not there.
+pub(super) fn text(value: &Option<At<String>>) -> String {
+    value.as_ref().map(|text| text.value.clone()).unwrap_or_default()
+}
+
+/// If a layer has `key`, takes `stale` out of the layers below: it belonged to their `key`.
+pub(super) fn supersede(layers: &mut [Raw], key: &str, stale: &str) {
+    if let Some(top) = layers.iter().position(|layer| layer.table.contains_key(key)) {
+        for below in &mut layers[top + 1..] {
+            below.table.remove(stale);
+        }
+    }
+}
+
+fn wrong_type<T>(value: &Node, at: Span, expected: &str, problems: &mut Problems) -> Option<T> {
+    let found = match value {
+        Node::Text(_) => "a string",
+        Node::Whole(_) => "a whole number",
+        Node::Number(_) => "a number with a point",
+        Node::Flag(_) => "true or false",
+        Node::Time(_) => "a date or time",
+        Node::Array(_) => "an array",
+        Node::Table(_) => "a table",
+    };
+    problems.add(at, format!("found {found}, expected {expected}")).label(format!("expected {expected}"));
+    None
+}

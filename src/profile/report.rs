@@ -1,0 +1,77 @@
+//! Shifts, and what reports contain.
+
+use std::{path::PathBuf, time::Duration};
+
+use super::{
+    diagnostic::Problems,
+    names::{Defs, Unique},
+    reader::At,
+    schema::{CsvTable, ReportTable, ShiftTable},
+};
+use crate::plant::def::{CsvDialect, ReportDef, ShiftDef};
+
+/// The shifts in order of their start.
+pub(super) fn shifts(tables: &[At<ShiftTable>], problems: &mut Problems) -> Vec<ShiftDef> {
+    let (mut names, mut starts) = (Unique::default(), Unique::default());
+    let mut shifts = Vec::new();
+    for table in tables.iter().map(|table| &table.value) {
+        let (Some(name), Some(start)) = (&table.name, table.start) else { continue };
+        names.insert(&name.value, name.at, format!("duplicate shift `{}`", name.value), problems);
+        starts.insert(&start.value.to_string(), start.at, "two shifts start at the same time", problems);
+        shifts.push(ShiftDef { name: name.value.clone(), start: start.value });
+    }
+    shifts.sort_by_key(|shift| shift.start);
+    shifts
+}
+
+/// What reports contain and where they go.
+pub(super) fn report(table: Option<&ReportTable>, defs: &Defs, problems: &mut Problems) -> ReportDef {
+    let mut report =
+        ReportDef { folder: PathBuf::from("reports"), tags: Vec::new(), record: None, csv: CsvDialect::default() };
+    let Some(table) = table else { return report };
+    if let Some(folder) = &table.folder {
+        report.folder = PathBuf::from(&folder.value);
+    }
+    report.tags = table.tags.iter().filter_map(|tag| defs.names.full(tag, problems)).collect();
+    if let Some(record) = table.record.as_ref().map(|record| &record.value)
+        && let (Some(device), Some(every)) = (&record.device, record.every)
+    {
+        if every.value < Duration::from_secs(1) {
+            problems.add(every.at, "the record has at most one row a second").label("expected 1s or more");
+        }
+        let id = defs.device(device, problems);
+        if id.is_some_and(|id| defs.devices[id.index()].faceplate.is_none()) {
+            problems
+                .add(device.at, format!("{} is no controller", device.value))
+                .label("it has no faceplate with PV and SV");
+        }
+        report.record = id.map(|id| (id, every.value));
+    }
+    if let Some(csv) = &table.csv {
+        report.csv = dialect(&csv.value, problems);
+    }
+    report
+}
+
+fn dialect(table: &CsvTable, problems: &mut Problems) -> CsvDialect {
+    let usual = CsvDialect::default();
+    let separator = one_of(&table.separator, &[',', ';', '\t'], usual.separator, problems);
+    let decimal = one_of(&table.decimal, &['.', ','], usual.decimal, problems);
+    if let Some(at) = table.decimal.as_ref().or(table.separator.as_ref()).map(|word| word.at)
+        && separator == decimal
+    {
+        problems.add(at, "separator and decimal are the same").label("columns could not be told apart");
+    }
+    CsvDialect { separator, decimal, bom: table.bom.map_or(usual.bom, |bom| bom.value) }
+}
+
+fn one_of(word: &Option<At<String>>, known: &[char], usual: char, problems: &mut Problems) -> char {
+    let Some(word) = word else { return usual };
+    let found = known.iter().find(|c| word.value == c.to_string());
+    if found.is_none() {
+        problems
+            .add(word.at, format!("{:?} cannot be used here", word.value))
+            .label(format!("expected one of {known:?}"));
+    }
+    found.copied().unwrap_or(usual)
+}

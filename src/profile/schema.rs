@@ -1,0 +1,370 @@
+//! The words of the format: every table of a plant file and of a device profile, and every key in it.
+
+use std::time::Duration;
+
+use jiff::civil::Time;
+
+use super::{
+    address::{Location, Modicon},
+    reader::{Choice, Numbered, Raw, table, words},
+};
+use crate::plant::{
+    def::{Parity, Priority},
+    tag::{Access, Confidence, Kind, Order, Table},
+};
+
+table!(
+    /// A plant file.
+    PlantFile, "the plant file" {
+        need "title" title: String,
+        need "time_zone" time_zone: String,
+        opt "simulation" simulation: String,
+        list "line" lines: Raw,
+        list "device" devices: DeviceTable,
+        list "alarm" alarms: AlarmTable,
+        opt "mimic" mimic: MimicTable,
+        list "trend" trends: TrendTable,
+        list "shift" shifts: ShiftTable,
+        opt "report" report: ReportTable,
+    }
+);
+
+table!(
+    /// A `[[line]]` on a serial port.
+    RtuTable, "a line with mode = \"rtu\"" {
+        need "name" name: String,
+        need "mode" mode: String,
+        need "port" port: String,
+        need "baud" baud: u32,
+        opt "data_bits" data_bits: u8,
+        need "parity" parity: Parity,
+        opt "stop_bits" stop_bits: u8,
+        opt "timeout_ms" timeout_ms: u16,
+        opt "gap_ms" gap_ms: u16,
+    }
+);
+
+table!(
+    /// A `[[line]]` over TCP.
+    TcpTable, "a line with mode = \"tcp\"" {
+        need "name" name: String,
+        need "mode" mode: String,
+        need "host" host: String,
+        opt "tcp_port" tcp_port: u16,
+        opt "timeout_ms" timeout_ms: u16,
+        opt "gap_ms" gap_ms: u16,
+    }
+);
+
+table!(
+    /// A `[[device]]` of a plant file.
+    DeviceTable, "a device" {
+        need "name" name: String,
+        opt "title" title: String,
+        need "profile" profile: String,
+        need "line" line: String,
+        need "unit" unit: u8,
+        /// Period of tags with `poll = "fast"`.
+        opt "fast" fast: Duration,
+        /// Period of tags with `poll = "slow"`.
+        opt "slow" slow: Duration,
+        opt "limits" limits: Raw,
+        /// More tags, or other keys for the tags of the profile.
+        list "tag" tags: Raw,
+    }
+);
+
+table!(
+    /// A device profile.
+    ProfileFile, "the device profile" {
+        need "vendor" vendor: String,
+        need "model" model: String,
+        opt "revision" revision: String,
+        /// How well the map is known: `verified`, `manual` or `partial`.
+        need "status" status: Status,
+        need "source" source: String,
+        opt "notes" notes: String,
+        /// Always 0; written down so that nobody has to ask.
+        opt "address_base" address_base: u8,
+        opt "scheme" scheme: Scheme,
+        opt "limits" limits: Raw,
+        /// Keys that every tag has unless it says otherwise.
+        opt "default" default: Raw,
+        list "tag" tags: Raw,
+        list "action" actions: ActionTable,
+        opt "faceplate" faceplate: FaceplateTable,
+    }
+);
+
+table!(
+    /// What one request may hold.
+    LimitsTable, "limits" {
+        opt "read_words_max" read_words_max: u16,
+        opt "read_bits_max" read_bits_max: u16,
+        opt "write_words_max" write_words_max: u16,
+        opt "gap_words_max" gap_words_max: u16,
+        opt "alignment" alignment: u16,
+        opt "gap_ms" gap_ms: u16,
+        opt "write_gap_ms" write_gap_ms: u16,
+    }
+);
+
+table!(
+    /// A `[[tag]]` of a profile, or a `[[device.tag]]` of a plant file.
+    TagTable, "a tag" {
+        need "name" name: String,
+        opt "label" label: String,
+        opt "meaning" meaning: String,
+        opt "table" table: Table,
+        need "address" address: Location,
+        opt "modicon" modicon: Modicon,
+        opt "type" kind: TypeName,
+        opt "order" order: Order,
+        opt "field" field: Choice,
+        opt "scale" scale: f64,
+        opt "offset" offset: f64,
+        opt "decimals" decimals: u8,
+        opt "decimals_from" decimals_from: String,
+        opt "unit" unit: String,
+        opt "unit_from" unit_from: String,
+        opt "min" min: f64,
+        opt "max" max: f64,
+        opt "min_from" min_from: String,
+        opt "max_from" max_from: String,
+        opt "access" access: Access,
+        opt "verify" verify: bool,
+        opt "confirm" confirm: String,
+        opt "enum" labels: Numbered,
+        opt "bits" bits: Numbered,
+        list "bad_if" bad_if: i64,
+        opt "quality_from" quality_from: String,
+        opt "quality_mask" quality_mask: u64,
+        opt "write_fc" write_fc: u8,
+        opt "write_unlock" write_unlock: UnlockTable,
+        opt "group" group: String,
+        opt "poll" poll: PollWord,
+        opt "deadband" deadband: f64,
+        opt "store" store: bool,
+        opt "confidence" confidence: Confidence,
+        opt "source" source: String,
+    }
+);
+
+table!(
+    /// What must be written before a tag takes a write.
+    UnlockTable, "write_unlock" {
+        need "tag" tag: String,
+        need "value" value: Choice,
+    }
+);
+
+table!(
+    /// An `[[action]]` of a profile.
+    ActionTable, "an action" {
+        need "name" name: String,
+        need "tag" tag: String,
+        need "value" value: Choice,
+        opt "settle_ms" settle_ms: u32,
+        need "confirm" confirm: String,
+    }
+);
+
+table!(
+    /// Which tags a controller is operated by.
+    FaceplateTable, "the faceplate" {
+        need "pv" pv: String,
+        need "sv" sv: String,
+        opt "mv" mv: String,
+        opt "run" run: String,
+        opt "mode" mode: String,
+        opt "tune" tune: String,
+    }
+);
+
+table!(
+    /// An `[[alarm]]`.
+    AlarmTable, "an alarm" {
+        opt "tag" tag: String,
+        opt "device" device: String,
+        opt "high_high" high_high: f64,
+        opt "high" high: f64,
+        opt "low" low: f64,
+        opt "low_low" low_low: f64,
+        opt "deviation" deviation: f64,
+        opt "from" from: String,
+        opt "is" is: Choice,
+        opt "deadband" deadband: f64,
+        opt "on_delay" on_delay: Duration,
+        opt "off_delay" off_delay: Duration,
+        need "priority" priority: Priority,
+        need "text" text: String,
+        opt "cause" cause: String,
+        opt "effect" effect: String,
+        opt "action" action: String,
+        opt "respond" respond: Duration,
+    }
+);
+
+table!(
+    /// The picture of the process.
+    MimicTable, "the mimic" {
+        opt "size" size: [u16; 2],
+        list "item" items: Raw,
+        list "command" commands: CommandTable,
+    }
+);
+
+table!(
+    /// A command on the mimic.
+    CommandTable, "a mimic command" {
+        need "key" key: String,
+        need "label" label: String,
+        need "tag" tag: String,
+        opt "value" value: Choice,
+    }
+);
+
+table!(
+    /// A `[[trend]]` group.
+    TrendTable, "a trend" {
+        need "name" name: String,
+        list "pens" pens: PenTable,
+    }
+);
+
+table!(
+    /// A pen of a trend.
+    PenTable, "a pen" {
+        need "tag" tag: String,
+        opt "scale" scale: [f64; 2],
+    }
+);
+
+table!(
+    /// A `[[shift]]`.
+    ShiftTable, "a shift" {
+        need "name" name: String,
+        need "start" start: Time,
+    }
+);
+
+table!(
+    /// What reports contain.
+    ReportTable, "the report" {
+        opt "folder" folder: String,
+        list "tags" tags: String,
+        opt "record" record: RecordTable,
+        opt "csv" csv: CsvTable,
+    }
+);
+
+table!(
+    /// The raw record of a controller.
+    RecordTable, "the report's record" {
+        need "device" device: String,
+        need "every" every: Duration,
+    }
+);
+
+table!(
+    /// How CSV is written.
+    CsvTable, "the report's csv" {
+        opt "separator" separator: String,
+        opt "decimal" decimal: String,
+        opt "bom" bom: bool,
+    }
+);
+
+words!(Parity, "parity" { "N" => Parity::None, "E" => Parity::Even, "O" => Parity::Odd, });
+
+words!(Table, "table" {
+    "coil" => Table::Coil, "discrete" => Table::Discrete, "input" => Table::Input, "holding" => Table::Holding,
+});
+
+words!(Order, "order" {
+    "ABCD" => Order::Abcd, "CDAB" => Order::Cdab, "BADC" => Order::Badc, "DCBA" => Order::Dcba,
+});
+
+words!(Access, "access" { "r" => Access::Read, "rw" => Access::ReadWrite, "w" => Access::Write, });
+
+words!(Confidence, "confidence" {
+    "proven" => Confidence::Proven, "high" => Confidence::High, "medium" => Confidence::Medium, "low" => Confidence::Low,
+});
+
+words!(Priority, "priority" {
+    "critical" => Priority::Critical, "high" => Priority::High, "medium" => Priority::Medium, "low" => Priority::Low,
+});
+
+/// How addresses are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Scheme {
+    /// 0-based numbers, as sent.
+    #[default]
+    Modbus,
+    /// Octal `V40500`, `Y17`, `X23`, `C54` of KOYO and AutomationDirect.
+    DirectLogic,
+}
+words!(Scheme, "scheme" { "modbus" => Scheme::Modbus, "directlogic" => Scheme::DirectLogic, });
+
+/// How well a register map is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Status {
+    /// Tried on the device.
+    Verified,
+    /// Taken from the maker's manual.
+    Manual,
+    /// Parts are known.
+    Partial,
+}
+words!(Status, "status" { "verified" => Status::Verified, "manual" => Status::Manual, "partial" => Status::Partial, });
+
+/// How often a tag is read; the device says what fast and slow are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PollWord {
+    Fast,
+    Slow,
+    Once,
+    Never,
+}
+words!(PollWord, "poll" {
+    "fast" => PollWord::Fast, "slow" => PollWord::Slow, "once" => PollWord::Once, "never" => PollWord::Never,
+});
+
+/// The type of a raw value. Strings are known to be wanted, and refused with a clear word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct TypeName(pub Kind);
+
+impl super::reader::Value for TypeName {
+    fn read(
+        value: &super::reader::Node,
+        at: super::diagnostic::Span,
+        problems: &mut super::diagnostic::Problems,
+    ) -> Option<Self> {
+        let word = <String as super::reader::Value>::read(value, at, problems)?;
+        if word.starts_with("string") {
+            problems.add(at, "text in registers is not supported yet").label("a string type");
+            return None;
+        }
+        let found = TYPES.iter().find(|(name, _)| *name == word);
+        if found.is_none() {
+            let names = TYPES.iter().map(|(name, _)| *name);
+            problems.add(at, format!("unknown type `{word}`")).label("not a type").suggest(&word, names);
+        }
+        found.map(|(_, kind)| TypeName(*kind))
+    }
+}
+
+/// The names of the types, as Telegraf and its kin write them.
+const TYPES: &[(&str, Kind)] = &[
+    ("int16", Kind::I16),
+    ("uint16", Kind::U16),
+    ("int32", Kind::I32),
+    ("uint32", Kind::U32),
+    ("int64", Kind::I64),
+    ("uint64", Kind::U64),
+    ("float32", Kind::F32),
+    ("float64", Kind::F64),
+    ("bcd16", Kind::Bcd16),
+    ("bcd32", Kind::Bcd32),
+    ("bool", Kind::Bool),
+];

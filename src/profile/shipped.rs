@@ -1,0 +1,144 @@
+//! Tests of what is shipped: every profile loads, and its addresses are those of the manuals.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use super::*;
+use crate::plant::{
+    def::{Condition, Subject},
+    tag::{Access, Bound, Decimals, Kind as Raw, Poll, Table},
+};
+
+fn tank() -> Arc<PlantDef> {
+    load(Path::new("tank"), &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}"))
+}
+
+#[test]
+fn every_shipped_plant_loads_without_a_problem() {
+    for plant in list(&Search::shipped()).iter().filter(|listed| listed.kind == Kind::Plant) {
+        if let Err(errors) = load(Path::new(&plant.name), &Search::shipped()) {
+            panic!("{}:\n{errors}", plant.name);
+        }
+    }
+}
+
+#[test]
+fn every_shipped_device_loads_without_a_problem() {
+    let folder = tempfile::tempdir().unwrap();
+    for device in list(&Search::shipped()).iter().filter(|listed| listed.kind == Kind::Device) {
+        let path = folder.path().join("p.toml");
+        let text = format!(
+            "title = 'a'\ntime_zone = 'UTC'\n[[line]]\nname = 'L'\nmode = 'rtu'\nport = 'p'\nbaud = 9600\nparity = 'N'\n\
+             [[device]]\nname = 'D'\nprofile = '{}'\nline = 'L'\nunit = 1\n",
+            device.name
+        );
+        std::fs::write(&path, text).unwrap();
+        let plant = load(&path, &Search::shipped()).unwrap_or_else(|errors| panic!("{}:\n{errors}", device.name));
+        assert!(plant.tags.iter().all(|tag| !tag.source.is_empty()), "{}: a row without a source", device.name);
+    }
+}
+
+#[test]
+fn the_addresses_are_those_of_the_recorded_frames_and_manuals() {
+    let plant = tank();
+    let check = |name: &str, table: Table, address: u16, kind: Raw| {
+        let point = plant.tag(plant.tag_named(name).unwrap()).point;
+        assert_eq!((point.table, point.address, point.kind), (table, address, kind), "{name}");
+    };
+    check("TIC-1.SV", Table::Holding, 0x03EA, Raw::I16);
+    check("TIC-1.PV", Table::Input, 0x03E8, Raw::I16);
+    check("TIC-1.MV", Table::Input, 0x03EB, Raw::I16);
+    check("TIC-1.FAULT", Table::Input, 0x03EF, Raw::U16);
+    check("TIC-1.FIX", Table::Holding, 0x03E8, Raw::U16);
+    check("TIC-1.STBY", Table::Holding, 0x03EB, Raw::U16);
+    check("TIC-1.P-DP", Table::Holding, 0x03FB, Raw::U16);
+    check("TIC-1.SV-H", Table::Holding, 0x0407, Raw::I16);
+    check("TIC-1.SV-8", Table::Holding, 0x0427, Raw::I16);
+    check("TIC-1.TM8S", Table::Holding, 0x0437, Raw::U16);
+    check("TIC-1.PTN", Table::Holding, 0x043A, Raw::U16);
+    check("PLC-1.Y0", Table::Coil, 2048, Raw::Bool);
+    check("PLC-1.Y17", Table::Coil, 2063, Raw::Bool);
+    check("PLC-1.X23", Table::Discrete, 2067, Raw::Bool);
+    check("PLC-1.VY0", Table::Holding, 0x4140, Raw::U16);
+    check("PLC-1.VX0", Table::Holding, 0x4100, Raw::U16);
+    check("PLC-1.P-1", Table::Coil, 2048, Raw::Bool);
+    check("PLC-1.AT-SV", Table::Discrete, 2052, Raw::Bool);
+    check("PLC-1.RUN", Table::Coil, 3072, Raw::Bool);
+    check("PLC-1.SEQ.FAULT", Table::Coil, 3079, Raw::Bool);
+    check("PLC-1.STEP", Table::Holding, 1024, Raw::Bcd16);
+    check("PLC-1.LT-1", Table::Input, 1032, Raw::U16);
+    check("PLC-1.HEATER", Table::Input, 1038, Raw::U16);
+}
+
+#[test]
+fn a_temperature_is_not_shown_without_its_decimals_unit_and_sensor_state() {
+    let plant = tank();
+    let id = |name: &str| plant.tag_named(name).unwrap();
+    let pv = plant.tag(id("TIC-1.PV"));
+    assert_eq!(pv.decimals, Decimals::From(id("TIC-1.P-DP")));
+    assert_eq!(pv.quality_from, Some((id("TIC-1.FAULT"), u64::MAX)));
+    assert_eq!(pv.unit_from, Some((id("TIC-1.P-F"), vec![(0, "°C".to_owned()), (1, "°F".to_owned())])));
+    assert_eq!(pv.unit, "°C");
+    assert_eq!((pv.min, pv.max), (Some(Bound::Fixed(0.0)), Some(Bound::Fixed(100.0))), "the plant file's bounds win");
+    let sv = plant.tag(id("TIC-1.SV"));
+    assert_eq!((sv.min, sv.max), (Some(Bound::From(id("TIC-1.SV-L"))), Some(Bound::From(id("TIC-1.SV-H")))));
+}
+
+#[test]
+fn outputs_and_sensors_cannot_be_written_and_only_what_the_plant_needs_is_polled() {
+    let plant = tank();
+    let plc = plant.devices[1].id;
+    let writable: Vec<&str> = plant.tags_of(plc).filter(|tag| tag.writable()).map(|tag| tag.short.as_str()).collect();
+    assert_eq!(writable, ["RUN", "AUTO", "MAN.P-1", "MAN.M-1", "MAN.SV-1", "MAN.SV-2", "MAN.HEATER"]);
+    assert_eq!(plant.tags_of(plc).filter(|tag| tag.poll != Poll::Never).count(), 23);
+    let fix = plant.tag(plant.tag_named("TIC-1.FIX").unwrap());
+    assert_eq!((fix.access, fix.poll), (Access::Write, Poll::Never));
+}
+
+#[test]
+fn a_silent_device_always_raises_an_alarm() {
+    let plant = tank();
+    for device in &plant.devices {
+        let silent = |alarm: &&crate::plant::def::AlarmDef| {
+            alarm.subject == Subject::Device(device.id) && alarm.condition == Condition::NotAnswering
+        };
+        assert_eq!(plant.alarms.iter().filter(silent).count(), 1, "{}", device.name);
+    }
+    assert!(plant.alarms.iter().all(|alarm| !alarm.guidance.action.is_empty()), "every alarm says what to do");
+}
+
+#[test]
+fn a_plant_is_found_by_name_and_by_its_path_in_the_program() {
+    let check = |argument: &str, expect: bool| {
+        assert_eq!(load(Path::new(argument), &Search::shipped()).is_ok(), expect, "{argument}");
+    };
+    check("tank", true);
+    check("profiles/plants/tank.toml", true);
+    check("plants/nowhere.toml", false);
+    check("../profiles/plants/tank.toml", false);
+}
+
+#[test]
+fn the_file_beside_the_plant_wins_then_the_users_then_the_shipped_one() {
+    let root = tempfile::tempdir().unwrap();
+    let (here, user) = (root.path().join("here"), root.path().join("user"));
+    std::fs::create_dir_all(&here).unwrap();
+    std::fs::create_dir_all(user.join("devices")).unwrap();
+    std::fs::create_dir_all(user.join("plants")).unwrap();
+    let tank = text_of("tank", &Search::shipped()).unwrap();
+    std::fs::write(here.join("mine.toml"), &tank).unwrap();
+    let search = Search::folders(vec![user.clone()]);
+    let model = || load(&here.join("mine.toml"), &search).map(|plant| plant.devices[1].model.clone()).unwrap();
+    let koyo =
+        |model: &str| text_of("koyo_dl06", &Search::shipped()).unwrap().replace("\"DL06\"", &format!("\"{model}\""));
+    assert_eq!(model(), "KOYO DL06");
+    std::fs::write(user.join("devices/koyo_dl06.toml"), koyo("USER")).unwrap();
+    assert_eq!(model(), "KOYO USER");
+    std::fs::write(here.join("koyo_dl06.toml"), koyo("HERE")).unwrap();
+    assert_eq!(model(), "KOYO HERE");
+    let listed = list(&search).into_iter().find(|listed| listed.name == "koyo_dl06").unwrap();
+    assert_eq!(listed.from, Some(user.join("devices/koyo_dl06.toml")), "sightglass profiles says where it comes from");
+    assert!(text_of("koyo_dl06", &search).unwrap().contains("USER"));
+    std::fs::write(user.join("plants/copy.toml"), &tank).unwrap();
+    assert_eq!(load(Path::new("copy"), &search).unwrap().name, "copy");
+}

@@ -1,0 +1,372 @@
+//! One row of a register map becomes the definition of a tag, and is checked against itself and its device.
+
+use std::time::Duration;
+
+use super::{
+    address::{check_modicon, locate},
+    diagnostic::{Problems, Span},
+    names::{Names, check_name},
+    reader::{At, Choice, Numbered, Raw, either, supersede, text},
+    schema::{PollWord, Scheme, TagTable},
+    units,
+};
+use crate::plant::{
+    def::{DeviceId, Limits, TagId},
+    tag::{Access, Bound, Confidence, Decimals, Kind, Point, Poll, Table, TagDef},
+};
+
+/// What a tag must know of its device.
+pub(super) struct Surroundings<'a> {
+    pub device: DeviceId,
+    pub device_name: &'a str,
+    pub scheme: Scheme,
+    pub limits: Limits,
+    pub fast: Duration,
+    pub slow: Duration,
+    pub names: &'a Names,
+}
+
+/// A defined tag and what must still be checked when all tags are there.
+pub(super) struct Defined {
+    pub tag: TagDef,
+    /// Where its address stands; `None` if it has no valid point.
+    pub address_at: Option<Span>,
+    /// Tags that this one needs to be shown right.
+    pub needs: Vec<(At<TagId>, &'static str)>,
+    /// Where the unlock value stands, which is resolved when the other tag is known.
+    pub unlock: Option<(TagId, At<Choice>)>,
+}
+
+/// Builds a tag from its layers. Where something is wrong a placeholder stands, and the problems keep it from getting out.
+pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, problems: &mut Problems) -> Defined {
+    for (first, second) in [("min", "min_from"), ("max", "max_from"), ("decimals", "decimals_from")] {
+        either(&mut layers, first, second, problems);
+    }
+    // A plant file that moves a tag need not repeat the number of the manual.
+    supersede(&mut layers, "address", "modicon");
+    let row = TagTable::of(&layers, problems);
+    let point = point(&row, around, problems);
+    let kind = point.map(|point| (point.kind, point.field.map(|(_, bits)| bits)));
+    let links = links(&row, around, problems);
+    let decimals = match links.decimals {
+        Some(tag) => Decimals::From(tag),
+        None => Decimals::Fixed(decimals(&row, kind, problems)),
+    };
+    check_scaling(&row, kind, decimals, problems);
+    let access = access(&row, point, problems);
+    let poll = match row.poll.map_or(PollWord::Slow, |poll| poll.value) {
+        PollWord::Fast => Poll::Every(around.fast),
+        PollWord::Slow => Poll::Every(around.slow),
+        PollWord::Once => Poll::Once,
+        PollWord::Never => Poll::Never,
+    };
+    if let Some(name) = &row.name {
+        check_name(name, "tag", problems);
+    }
+    let short = text(&row.name);
+    let tag = TagDef {
+        id,
+        device: around.device,
+        name: format!("{}.{short}", around.device_name),
+        label: row.label.as_ref().map_or_else(|| short.clone(), |label| label.value.clone()),
+        short,
+        meaning: text(&row.meaning),
+        point: point.unwrap_or(NOWHERE),
+        scale: row.scale.map_or(1.0, |scale| scale.value),
+        offset: row.offset.map_or(0.0, |offset| offset.value),
+        decimals,
+        unit: row.unit.as_ref().map(|unit| units::check(unit, problems)).unwrap_or_default(),
+        unit_from: links.unit.map(|tag| (tag, Vec::new())),
+        min: links.min.map(Bound::From).or(fixed(&row.min)),
+        max: links.max.map(Bound::From).or(fixed(&row.max)),
+        access,
+        confirm: row.confirm.as_ref().map(|confirm| confirm.value.clone()),
+        labels: labels(&row, kind, problems),
+        bit_labels: bit_labels(&row.bits, kind, problems),
+        bad_if: row.bad_if.iter().map(|raw| raw.value).collect(),
+        quality_from: links.quality.map(|tag| (tag, row.quality_mask.map_or(u64::MAX, |mask| mask.value))),
+        write_fc: row.write_fc.map(|fc| fc.value),
+        write_unlock: None,
+        group: text(&row.group),
+        poll,
+        deadband: row.deadband.map_or(0.0, |deadband| deadband.value),
+        store: row.store.map_or(access != Access::Write && matches!(poll, Poll::Every(_)), |store| store.value),
+        confidence: row.confidence.map_or(Confidence::Medium, |confidence| confidence.value),
+        source: text(&row.source),
+    };
+    let address_at = point.and(row.address.map(|address| address.at));
+    Defined { tag, address_at, needs: links.needs, unlock: links.unlock }
+}
+
+/// Stands in for an address that is wrong; it never leaves the loader.
+const NOWHERE: Point =
+    Point { table: Table::Holding, address: 0, kind: Kind::U16, order: crate::plant::tag::Order::Abcd, field: None };
+
+/// The other tags that a row names.
+struct Links {
+    decimals: Option<TagId>,
+    unit: Option<TagId>,
+    min: Option<TagId>,
+    max: Option<TagId>,
+    quality: Option<TagId>,
+    needs: Vec<(At<TagId>, &'static str)>,
+    unlock: Option<(TagId, At<Choice>)>,
+}
+
+fn links(row: &TagTable, around: &Surroundings, problems: &mut Problems) -> Links {
+    let mut needs = Vec::new();
+    let mut refer = |name: &Option<At<String>>, what, problems: &mut Problems| {
+        let name = name.as_ref()?;
+        let value = around.names.near(name, around.device_name, problems)?;
+        needs.push((At { value, at: name.at }, what));
+        Some(value)
+    };
+    let unlock = row.write_unlock.as_ref().and_then(|unlock| {
+        let tag = around.names.near(unlock.value.tag.as_ref()?, around.device_name, problems)?;
+        Some((tag, unlock.value.value.clone()?))
+    });
+    Links {
+        decimals: refer(&row.decimals_from, "decimals_from", problems),
+        unit: refer(&row.unit_from, "unit_from", problems),
+        min: refer(&row.min_from, "min_from", problems),
+        max: refer(&row.max_from, "max_from", problems),
+        quality: refer(&row.quality_from, "quality_from", problems),
+        needs,
+        unlock,
+    }
+}
+
+/// Raw type and, for a field, its number of bits.
+type Raws = (Kind, Option<u8>);
+
+fn point(row: &TagTable, around: &Surroundings, problems: &mut Problems) -> Option<Point> {
+    let location = row.address.as_ref().filter(|_| row.sound)?;
+    let (named, address) = locate(location, around.scheme, problems)?;
+    let table = table(row, named, problems)?;
+    if let Some(modicon) = &row.modicon {
+        check_modicon(modicon, table, address, problems);
+    }
+    let kind = match (row.kind, table.is_bits()) {
+        (Some(kind), true) if kind.value.0 != Kind::Bool => {
+            problems.add(kind.at, format!("a {} is one bit", table.word())).label("expected type = \"bool\"");
+            return None;
+        }
+        (None, true) => Kind::Bool,
+        (Some(kind), _) => kind.value.0,
+        (None, false) => {
+            problems
+                .add(row.at, "a tag in a register needs `type`")
+                .label("missing here")
+                .help("for example type = \"int16\"");
+            return None;
+        }
+    };
+    let field = match &row.field {
+        Some(field) => Some(bit_field(field, kind, table, problems)?),
+        None => None,
+    };
+    let point = Point { table, address, kind, order: row.order.map(|order| order.value).unwrap_or_default(), field };
+    check_place(point, location.at, around.limits, problems).then_some(point)
+}
+
+fn table(row: &TagTable, named: Option<Table>, problems: &mut Problems) -> Option<Table> {
+    match (row.table, named) {
+        // V memory answers to both register functions, so the table may be named for it.
+        (Some(written), Some(Table::Holding)) if !written.value.is_bits() => Some(written.value),
+        (Some(written), Some(named)) if written.value != named => {
+            let problem =
+                problems.add(written.at, format!("this address is a {}, not a {}", named.word(), written.value.word()));
+            problem.label("leave it out: the address says it");
+            None
+        }
+        (Some(written), _) => Some(written.value),
+        (None, Some(named)) => Some(named),
+        (None, None) => {
+            problems.add(row.at, "a tag needs `table`").label("missing here").help("coil, discrete, input or holding");
+            None
+        }
+    }
+}
+
+/// Checks that the registers exist, fit into one request and lie where the device wants them.
+fn check_place(point: Point, at: Span, limits: Limits, problems: &mut Problems) -> bool {
+    let words = point.len();
+    if u32::from(point.address) + u32::from(words) > 0x1_0000 {
+        problems.add(at, "the value reaches past the last address").label("the last is 65535");
+        return false;
+    }
+    if words > 1 && !point.address.is_multiple_of(limits.alignment.max(1)) {
+        let alignment = limits.alignment;
+        let problem = problems.add(
+            at,
+            format!("a value of {words} registers at address {} breaks alignment = {alignment}", point.address),
+        );
+        problem.label(format!("expected a multiple of {alignment}"));
+    }
+    if !point.table.is_bits() && words > limits.read_words_max {
+        let max = limits.read_words_max;
+        problems
+            .add(at, format!("the value takes {words} registers, the device reads at most {max}"))
+            .label("too long");
+    }
+    true
+}
+
+/// `"5-4"` or `3`: lowest bit and number of bits.
+fn bit_field(field: &At<Choice>, kind: Kind, table: Table, problems: &mut Problems) -> Option<(u8, u8)> {
+    let bounds = match &field.value {
+        Choice::Number(bit) if bit.fract() == 0.0 && (0.0..64.0).contains(bit) => Some((*bit as u8, *bit as u8)),
+        Choice::Number(_) => None,
+        Choice::Word(word) => match word.split_once('-') {
+            Some((high, low)) => high.trim().parse().ok().zip(low.trim().parse().ok()),
+            None => word.trim().parse().ok().map(|bit: u8| (bit, bit)),
+        },
+    };
+    let size = kind.words() * 16;
+    let whole = !table.is_bits() && !matches!(kind, Kind::F32 | Kind::F64 | Kind::Bcd16 | Kind::Bcd32);
+    let valid = bounds.filter(|(high, low)| low <= high && u16::from(*high) < size && whole);
+    if valid.is_none() {
+        let problem = problems.add(field.at, "this is not a field of bits");
+        problem.label(format!("expected \"HIGH-LOW\" or one bit, 0 to {} of a whole number", size - 1));
+    }
+    valid.map(|(high, low)| (low, high - low + 1))
+}
+
+/// Decimals to show if the row does not say: as many as the scale has, two for floats.
+fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {
+    if let Some(decimals) = row.decimals {
+        if decimals.value > 6 {
+            problems.add(decimals.at, format!("{} decimals are too many", decimals.value)).label("expected 0 to 6");
+        }
+        return decimals.value;
+    }
+    if matches!(kind, Some((Kind::F32 | Kind::F64, _))) {
+        return 2;
+    }
+    let scale = row.scale.map_or(1.0, |scale| scale.value);
+    let whole = |digits: &u8| {
+        ((scale * 10f64.powi(i32::from(*digits))).round() / 10f64.powi(i32::from(*digits)) - scale).abs() < 1e-9
+    };
+    (0..=6).find(whole).unwrap_or(6)
+}
+
+/// Checks scale and bounds against each other and against what the raw type can hold.
+fn check_scaling(row: &TagTable, kind: Option<Raws>, decimals: Decimals, problems: &mut Problems) {
+    if let Some(scale) = row.scale.filter(|scale| scale.value == 0.0) {
+        problems.add(scale.at, "a scale of 0 makes every value 0").label("expected a number other than 0");
+        return;
+    }
+    if let Some(deadband) = row.deadband.filter(|deadband| deadband.value < 0.0) {
+        problems.add(deadband.at, "a deadband cannot be negative").label("expected 0 or more");
+    }
+    if let (Some(min), Some(max)) = (row.min, row.max)
+        && min.value >= max.value
+    {
+        problems
+            .add(max.at, format!("max {} is not above min {}", max.value, min.value))
+            .label("too low")
+            .also(min.at, "min");
+    }
+    let (Some(kind), Decimals::Fixed(_)) = (kind, decimals) else { return };
+    let scale = row.scale.map_or(1.0, |scale| scale.value);
+    let offset = row.offset.map_or(0.0, |offset| offset.value);
+    let Some((low, high)) = value_range(kind, scale, offset) else { return };
+    for (bound, word) in [(row.min, "min"), (row.max, "max")] {
+        let Some(bound) = bound.filter(|bound| bound.value < low || bound.value > high) else { continue };
+        let problem = problems.add(bound.at, format!("{word} {} is outside what the register can hold", bound.value));
+        problem.label(format!("it holds {low} to {high}"));
+    }
+}
+
+/// What a tag can hold at all, in its unit; `None` if its decimals come from the device or it is a float.
+pub(super) fn range_of(tag: &TagDef) -> Option<(f64, f64)> {
+    let kind = (tag.point.kind, tag.point.field.map(|(_, bits)| bits));
+    match tag.decimals {
+        Decimals::Fixed(_) => value_range(kind, tag.scale, tag.offset),
+        Decimals::From(_) => None,
+    }
+}
+
+fn value_range(kind: Raws, scale: f64, offset: f64) -> Option<(f64, f64)> {
+    let (low, high) = raw_range(kind)?;
+    let round = |value: f64| (value * 1e6).round() / 1e6;
+    let (a, b) = (round(low * scale + offset), round(high * scale + offset));
+    Some((a.min(b), a.max(b)))
+}
+
+fn raw_range((kind, field): Raws) -> Option<(f64, f64)> {
+    if let Some(bits) = field {
+        return Some((0.0, 2f64.powi(i32::from(bits)) - 1.0));
+    }
+    match kind {
+        Kind::Bool => Some((0.0, 1.0)),
+        Kind::I16 => Some((f64::from(i16::MIN), f64::from(i16::MAX))),
+        Kind::U16 => Some((0.0, f64::from(u16::MAX))),
+        Kind::I32 => Some((f64::from(i32::MIN), f64::from(i32::MAX))),
+        Kind::U32 => Some((0.0, f64::from(u32::MAX))),
+        Kind::I64 => Some((i64::MIN as f64, i64::MAX as f64)),
+        Kind::U64 => Some((0.0, u64::MAX as f64)),
+        Kind::Bcd16 => Some((0.0, 9_999.0)),
+        Kind::Bcd32 => Some((0.0, 99_999_999.0)),
+        Kind::F32 | Kind::F64 => None,
+    }
+}
+
+fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Access {
+    let access = row.access.map_or(Access::Read, |access| access.value);
+    let Some(point) = point.filter(|_| access != Access::Read) else { return access };
+    let at = row.access.map_or(row.at, |access| access.at);
+    if matches!(point.table, Table::Discrete | Table::Input) {
+        problems.add(at, format!("a {} can only be read", point.table.word())).label("expected access = \"r\"");
+    }
+    if let Some(verify) = row.verify.filter(|verify| !verify.value) {
+        let problem = problems.add(verify.at, "a write is always verified").label("leave this out");
+        problem.help("a tag that cannot be read back has access = \"w\"");
+    }
+    if let Some(fc) = row.write_fc {
+        let allowed: &[u8] = match (point.table.is_bits(), point.len()) {
+            (true, _) => &[5, 15],
+            (false, 1) => &[6, 16],
+            (false, _) => &[16],
+        };
+        if !allowed.contains(&fc.value) {
+            let problem = problems.add(fc.at, format!("function {} cannot write this tag", fc.value));
+            problem.label(format!("expected {allowed:?}"));
+        }
+    }
+    access
+}
+
+fn labels(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> Vec<(i64, String)> {
+    let Some(Numbered(rows)) = row.labels.as_ref().map(|labels| &labels.value) else { return Vec::new() };
+    let range = kind.and_then(raw_range);
+    for (number, text) in rows {
+        let outside = range.filter(|(low, high)| (number.value as f64) < *low || (number.value as f64) > *high);
+        if let Some((low, high)) = outside {
+            let problem =
+                problems.add(number.at, format!("enum value {} ({text}) does not fit the type", number.value));
+            problem.label(format!("the type holds {low} to {high}"));
+        }
+    }
+    rows.iter().map(|(number, text)| (number.value, text.clone())).collect()
+}
+
+fn bit_labels(bits: &Option<At<Numbered>>, kind: Option<Raws>, problems: &mut Problems) -> Vec<(u8, String)> {
+    let Some(Numbered(rows)) = bits.as_ref().map(|bits| &bits.value) else { return Vec::new() };
+    let size = kind.map_or(64, |(kind, field)| field.map_or(i64::from(kind.words()) * 16, i64::from));
+    let mut labels = Vec::new();
+    for (bit, text) in rows {
+        match u8::try_from(bit.value).ok().filter(|_| bit.value < size) {
+            Some(number) => labels.push((number, text.clone())),
+            None => {
+                let problem = problems.add(bit.at, format!("there is no bit {}", bit.value));
+                problem.label(format!("expected 0 to {}", size - 1));
+            }
+        }
+    }
+    labels
+}
+
+fn fixed(bound: &Option<At<f64>>) -> Option<Bound> {
+    bound.map(|bound| Bound::Fixed(bound.value))
+}

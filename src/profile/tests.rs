@@ -1,0 +1,438 @@
+//! Tests of the messages: for each mistake the file, the line, what is wrong, and what was probably meant.
+#![allow(clippy::unwrap_used)]
+
+use proptest::prelude::*;
+
+use super::{
+    diagnostic::{Errors, render},
+    plant::{Library, Text, build},
+};
+use crate::plant::{
+    def::{Condition, PlantDef},
+    tag::Bound,
+};
+
+/// A small plant that is right. Each case changes some words of it.
+const PLANT: &str = r#"title = "Small"
+time_zone = "Asia/Bangkok"
+
+[[line]]
+name = "L1"
+mode = "rtu"
+port = "/dev/ttyS0"
+baud = 9600
+parity = "N"
+
+[[device]]
+name = "D1"
+profile = "meter"
+line = "L1"
+unit = 1
+fast = "1s"
+
+[[device]]
+name = "PLC"
+profile = "plc"
+line = "L1"
+unit = 2
+
+[[alarm]]
+tag = "D1.T"
+high = 80.0
+deadband = 1.0
+priority = "high"
+text = "hot"
+
+[mimic]
+item = [
+    { kind = "value", x = 1, y = 1, tag = "D1.T" },
+]
+"#;
+
+const METER: &str = r#"vendor = "ACME"
+model = "M1"
+status = "manual"
+source = "manual"
+
+[limits]
+read_words_max = 60
+alignment = 1
+
+[[tag]]
+name = "T"
+table = "holding"
+address = 1002
+modicon = 41003
+type = "int16"
+unit = "°C"
+decimals_from = "DP"
+min = 0
+max = 100
+
+[[tag]]
+name = "DP"
+table = "holding"
+address = 1004
+type = "uint16"
+
+[[tag]]
+name = "MODE"
+table = "holding"
+address = 1005
+type = "uint16"
+access = "rw"
+enum = { 0 = "off", 1 = "on" }
+
+[[action]]
+name = "START"
+tag = "MODE"
+value = "on"
+confirm = "Start?"
+"#;
+
+const PLC: &str = r#"vendor = "KOYO"
+model = "DL06"
+status = "manual"
+source = "manual"
+scheme = "directlogic"
+
+[[tag]]
+name = "STEP"
+address = "V2000"
+type = "bcd16"
+
+[[tag]]
+name = "OUT"
+address = "Y17"
+"#;
+
+fn load(plant: &[u8], meter: &str, plc: &str) -> Result<PlantDef, Errors> {
+    let find = |name: &str| {
+        let text = match name {
+            "meter" => meter,
+            "plc" => plc,
+            _ => return Ok(None),
+        };
+        Ok(Some(Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() }))
+    };
+    let library = Library { find: &find, names: vec!["meter".to_owned(), "plc".to_owned()] };
+    build("small", &Text { file: "small.toml".to_owned(), bytes: plant.to_vec() }, &library)
+}
+
+/// Replaces `from` by `to` in whichever of the three texts has it; the rendering must then contain all of `expect`,
+/// and hold exactly one problem.
+fn check(from: &str, to: &str, expect: &[&str]) {
+    let errors = changed(&[(from, to)]);
+    let text = errors.to_string();
+    for piece in expect {
+        assert!(text.contains(piece), "`{from}` -> `{to}`: no `{piece}` in\n{text}");
+    }
+    assert_eq!(errors.count(), 1, "`{from}` -> `{to}`: one mistake, one message\n{text}");
+}
+
+fn changed(changes: &[(&str, &str)]) -> Errors {
+    let mut texts = [PLANT.to_owned(), METER.to_owned(), PLC.to_owned()];
+    for (from, to) in changes {
+        let text = texts.iter_mut().find(|text| text.contains(from)).unwrap_or_else(|| panic!("no text has `{from}`"));
+        *text = text.replacen(from, to, 1);
+    }
+    load(texts[0].as_bytes(), &texts[1], &texts[2]).expect_err("the change must be a mistake")
+}
+
+#[test]
+fn the_small_plant_is_right() {
+    let plant = load(PLANT.as_bytes(), METER, PLC).unwrap_or_else(|errors| panic!("{errors}"));
+    assert_eq!(plant.name, "small");
+    assert_eq!(plant.alarms.len(), 3, "one written, and not answering for two devices");
+    assert!(matches!(plant.alarms[1].condition, Condition::NotAnswering));
+    assert_eq!(plant.trends.len(), 1, "a group of pens is made up");
+}
+
+#[test]
+fn an_address_that_cannot_be_is_shown_to_the_digit() {
+    check(
+        "V2000",
+        "V40508",
+        &[
+            "[plc.toml:9:17]",
+            "`V40508` does not exist: DirectLOGIC counts in octal",
+            "`8` is not an octal digit",
+            "after V7 comes V10",
+        ],
+    );
+    check("Y17", "Y18", &["[plc.toml:14:14]", "`Y18` does not exist", "after Y7 comes Y10"]);
+    check("Y17", "Q1", &["`Q1` is not a DirectLOGIC address"]);
+    check("1004", "\"V2000\"", &["[meter.toml:24:11]", "`V2000` is not an address", "scheme = \"directlogic\""]);
+    check("1004", "70000", &["70000 is out of range", "a whole number from 0 to 65535"]);
+    check(
+        "1004",
+        "\"0x3EC\"\nmodicon = 41006",
+        &[
+            "modicon 41006 does not fit address 1004",
+            "holding 1004 (0x03EC) is 41005",
+            "41006 is holding 1005 (0x03ED)",
+        ],
+    );
+    check(
+        "address = 1004\ntype = \"uint16\"",
+        "address = 65535\ntype = \"float32\"",
+        &["reaches past the last address"],
+    );
+}
+
+#[test]
+fn two_tags_cannot_see_one_register_with_different_eyes() {
+    check(
+        "address = 1004\ntype = \"uint16\"",
+        "address = 1004\ntype = \"float32\"",
+        &["[meter.toml:30:11]", "D1.DP and D1.MODE overlap with different types", "D1.DP begins at 1004"],
+    );
+    check(
+        "alignment = 1",
+        "alignment = 2\n[[tag]]\nname = 'E'\ntable = 'input'\naddress = 7\ntype = 'float32'",
+        &["a value of 2 registers at address 7 breaks alignment = 2", "expected a multiple of 2"],
+    );
+    check(
+        "read_words_max = 60",
+        "read_words_max = 200",
+        &["[meter.toml:7:18]", "read_words_max = 200 is not possible", "the Modbus standard allows 1 to 125"],
+    );
+}
+
+#[test]
+fn a_mistyped_word_brings_the_right_one() {
+    check("°C", "degC", &["unknown unit `degC`", "did you mean `°C`?"]);
+    check(
+        "deadband = 1.0",
+        "deadbnd = 1.0\ndeadband = 1.0",
+        &["[small.toml:27:1]", "unknown key `deadbnd` in an alarm", "did you mean `deadband`?"],
+    );
+    check("type = \"bcd16\"", "type = \"bdc16\"", &["unknown type `bdc16`", "did you mean `bcd16`?"]);
+    check(
+        "profile = \"meter\"",
+        "profile = \"metr\"",
+        &["[small.toml:13:11]", "unknown profile `metr`", "did you mean `meter`?"],
+    );
+    check(
+        "tag = \"D1.T\"\nhigh",
+        "tag = \"D1.DPP\"\nhigh",
+        &["[small.toml:25:7]", "unknown tag `D1.DPP`", "did you mean `D1.DP`?"],
+    );
+    check(
+        "tag = \"D1.T\" }",
+        "tag = \"D1.MOD\" }",
+        &["[small.toml:33:43]", "unknown tag `D1.MOD`", "did you mean `D1.MODE`?"],
+    );
+    check("decimals_from = \"DP\"", "decimals_from = \"PD\"", &["unknown tag `PD` in D1", "did you mean `DP`?"]);
+    check(
+        "line = \"L1\"\nunit = 2",
+        "line = \"L2\"\nunit = 2",
+        &["[small.toml:21:8]", "unknown line `L2`", "did you mean `L1`?"],
+    );
+    check(
+        "Asia/Bangkok",
+        "Asia/Bankok",
+        &["[small.toml:2:13]", "unknown time zone `Asia/Bankok`", "did you mean `Asia/Bangkok`?"],
+    );
+    check("value = \"on\"", "value = \"onn\"", &["`onn` is not a state of D1.MODE", "did you mean `on`?"]);
+    check("kind = \"value\"", "kind = \"valve_\"", &["unknown kind `valve_`", "did you mean `valve`?"]);
+    check("mode = \"rtu\"", "mode = \"ascii\"", &["unknown mode `ascii`", "known: rtu, tcp"]);
+    check(
+        "priority = \"high\"",
+        "priority = \"urgent\"",
+        &["unknown priority `urgent`", "known: critical, high, medium, low"],
+    );
+}
+
+#[test]
+fn a_name_is_used_once() {
+    check(
+        "name = \"DP\"",
+        "name = \"DP\"\ntable = \"input\"\naddress = 1\ntype = \"int16\"\n[[tag]]\nname = \"DP\"",
+        &["duplicate tag `DP`", "first here"],
+    );
+    check("name = \"PLC\"", "name = \"D1\"", &["[small.toml:19:8]", "duplicate device `D1`", "first here"]);
+    check("[[device]]", "[[line]]\nname = \"L1\"\nmode = \"tcp\"\nhost = \"a\"\n[[device]]", &["duplicate line `L1`"]);
+    check("unit = 2", "unit = 1", &["[small.toml:22:8]", "unit 1 is used twice on line L1", "first here"]);
+    check("unit = 2", "unit = 0", &["unit 0 cannot be used on a serial line", "broadcast"]);
+}
+
+#[test]
+fn a_value_of_the_wrong_kind_is_named() {
+    check(
+        "baud = 9600",
+        "baud = \"9600\"",
+        &["[small.toml:8:8]", "found a string, expected a whole number from 0 to 4294967295"],
+    );
+    check("high = 80.0", "high = \"80\"", &["found a string, expected a number"]);
+    check("fast = \"1s\"", "fast = \"1 sek\"", &["[small.toml:16:8]", "`1 sek` is not a duration", "\"500ms\""]);
+    check("fast = \"1s\"", "fast = 1", &["found a whole number, expected a duration"]);
+    check("fast = \"1s\"", "fast = \"0s\"", &["not a poll period"]);
+    check(
+        "type = \"uint16\"\n\n[[tag]]\nname = \"MODE\"",
+        "type = \"string(8)\"\n\n[[tag]]\nname = \"MODE\"",
+        &["text in registers is not supported yet"],
+    );
+    check(
+        "1 = \"on\"",
+        "1 = \"on\", 70000 = \"far\"",
+        &["enum value 70000 (far) does not fit the type", "the type holds 0 to 65535"],
+    );
+    check("name = \"OUT\"", "", &["a tag needs `name`"]);
+    check("line = \"L1\"\nunit = 2", "unit = 2", &["a device needs `line`"]);
+}
+
+#[test]
+fn an_alarm_that_could_never_come_or_never_go_is_refused() {
+    check(
+        "high = 80.0",
+        "high = 120.0",
+        &["[small.toml:26:8]", "the limit 120 is outside the range of D1.T", "it goes from 0 to 100"],
+    );
+    check("deadband = 1.0", "", &["a limit needs a `deadband`", "temperature 1 %"]);
+    check("high = 80.0", "high = 80.0\nlow = 3.0", &["an alarm has one condition"]);
+    check("high = 80.0\n", "", &["an alarm needs a condition"]);
+    check("decimals_from", "poll = \"fast\"\nquality_from = \"Q\"\ndecimals_from", &["unknown tag `Q`"]);
+    check("address = 1004", "address = 1004\npoll = \"never\"", &["D1.DP is never read, so D1.T can never be shown"]);
+}
+
+#[test]
+fn limits_of_one_tag_stand_in_order() {
+    let second = "[[alarm]]\ntag = \"D1.T\"\nhigh_high = 70.0\ndeadband = 1.0\npriority = \"critical\"\ntext = \"very hot\"\n[mimic]";
+    check("[mimic]", second, &["[small.toml:26:8]", "high 80 is not below high_high 70 of D1.T"]);
+}
+
+#[test]
+fn a_plant_file_changes_a_tag_and_says_so_only_where_it_contradicts_itself() {
+    let moved = "fast = \"1s\"\n[[device.tag]]\nname = \"T\"\naddress = 1010\nmax = 90";
+    let plant =
+        load(PLANT.replacen("fast = \"1s\"", moved, 1).as_bytes(), METER, PLC).unwrap_or_else(|e| panic!("{e}"));
+    let tag = plant.tag(plant.tag_named("D1.T").unwrap());
+    assert_eq!((tag.point.address, tag.max, tag.min), (1010, Some(Bound::Fixed(90.0)), Some(Bound::Fixed(0.0))));
+    assert_eq!(tag.unit, "°C", "what the plant file does not say stays as the profile has it");
+    let both = "fast = \"1s\"\n[[device.tag]]\nname = \"T\"\nmax = 90\nmax_from = \"DP\"";
+    check("fast = \"1s\"", both, &["`max` and `max_from` exclude each other"]);
+    check("unit = \"°C\"", "unit_from = \"MODE\"", &["D1.MODE does not tell a unit: `off` is no unit"]);
+}
+
+#[test]
+fn files_of_other_systems_are_read() {
+    let windows = format!("\u{feff}{}", PLANT.replace('\n', "\r\n"));
+    assert!(load(windows.as_bytes(), METER, PLC).is_ok(), "byte order mark and CR LF");
+}
+
+#[test]
+fn an_action_asks_before_it_acts() {
+    check("confirm = \"Start?\"\n", "", &["an action needs `confirm`"]);
+    check("access = \"rw\"\n", "", &["D1.MODE cannot be written"]);
+}
+
+#[test]
+fn a_file_that_is_no_toml_is_told_from_one_that_is_wrong() {
+    let check = |bytes: &[u8], expect: &[&str]| {
+        let text = load(bytes, METER, PLC).expect_err("it is no plant").to_string();
+        for piece in expect {
+            assert!(text.contains(piece), "no `{piece}` in\n{text}");
+        }
+    };
+    check(b"", &["small.toml is empty"]);
+    check(b"# nothing\n\n", &["small.toml is empty"]);
+    check(b"title = \"K\xE4se\"\n", &["small.toml is not UTF-8", "[small.toml:1:11]", "byte 0xE4"]);
+    check(b"title = \"a\"\nline = [\n", &["small.toml:2:", "here the TOML breaks"]);
+    check(b"title = \"a\"\ntitle = \"b\"\n", &["small.toml:2:1", "duplicate key"]);
+}
+
+#[test]
+fn a_missing_file_names_the_plants_there_are() {
+    let check = |argument: &str, expect: &str| {
+        let errors = super::load(std::path::Path::new(argument), &super::Search::shipped()).expect_err("no such plant");
+        assert!(errors.to_string().contains(expect), "{errors}");
+    };
+    check("nowhere.toml", "the plant file nowhere.toml does not exist");
+    check("nowhere.toml", "known plants: tank");
+    check("tnk", "did you mean `tank`?");
+    check("/", "the plant file / is not a file");
+}
+
+#[test]
+fn all_problems_come_at_once_and_in_file_order() {
+    let errors = changed(&[
+        ("deadband = 1.0", "deadbnd = 1.0"),
+        ("Asia/Bangkok", "Mars/Base"),
+        ("unit = 2", "unit = 0"),
+        ("V2000", "V2008"),
+        ("°C", "C"),
+        ("baud = 9600", "baud = 9601"),
+    ]);
+    let lines: Vec<String> = errors.lines().collect();
+    insta::assert_snapshot!(lines.join("\n"), @"
+    small.toml:2:13: unknown time zone `Mars/Base`
+    small.toml:8:8: 9601 is not a usual baud rate
+    small.toml:22:8: unit 0 cannot be used on a serial line
+    small.toml:27:1: unknown key `deadbnd` in an alarm
+    meter.toml:16:8: unknown unit `C`
+    plc.toml:9:16: `V2008` does not exist: DirectLOGIC counts in octal
+    ");
+}
+
+#[test]
+fn a_message_shows_the_line_and_a_caret() {
+    insta::assert_snapshot!(changed(&[("profile = \"meter\"", "profile = \"metr\"")]).to_string(), @r#"
+      × unknown profile `metr`
+        ╭─[small.toml:13:11]
+     12 │ name = "D1"
+     13 │ profile = "metr"
+        ·           ───┬──
+        ·              ╰── no such profile
+     14 │ line = "L1"
+        ╰────
+      help: did you mean `meter`?
+
+    1 problem
+    "#);
+}
+
+#[test]
+fn colours_are_for_terminals_only() {
+    let errors = changed(&[("unit = 2", "unit = 1")]);
+    assert!(render(&errors, true).contains('\u{1b}'));
+    assert!(!render(&errors, false).contains('\u{1b}'));
+}
+
+#[test]
+fn a_thousand_mistakes_do_not_flood_the_terminal() {
+    let errors = changed(&[("title = \"Small\"", &(0..1000).map(|n| format!("wrong{n} = 1\n")).collect::<String>())]);
+    let text = errors.to_string();
+    assert!(text.contains("more problems") && text.lines().count() < 600, "{} lines", text.lines().count());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    /// However a plant file is torn, the loader answers with a plant or with problems, never with a panic.
+    #[test]
+    fn a_torn_file_is_reported_and_never_panics(start in 0usize..PLANT.len(), length in 0usize..200, junk in "[a-z0-9=\\[\\]{}\"., \\n°-]{0,12}") {
+        let end = (start + length).min(PLANT.len());
+        let mut bytes = PLANT.as_bytes()[..start].to_vec();
+        bytes.extend_from_slice(junk.as_bytes());
+        bytes.extend_from_slice(&PLANT.as_bytes()[end..]);
+        if let Err(errors) = load(&bytes, METER, PLC) {
+            prop_assert!(errors.count() > 0 && errors.lines().count() == errors.count());
+            prop_assert!(!errors.to_string().is_empty());
+        }
+    }
+
+    /// The same for a device profile.
+    #[test]
+    fn a_torn_profile_is_reported_and_never_panics(start in 0usize..METER.len(), length in 0usize..200, junk in "[a-z0-9=\\[\\]{}\"., \\n-]{0,12}") {
+        // METER holds a degree sign, so the cut is made on bytes and mended like a file that is not UTF-8.
+        let end = (start + length).min(METER.len());
+        let mut bytes = METER.as_bytes()[..start].to_vec();
+        bytes.extend_from_slice(junk.as_bytes());
+        bytes.extend_from_slice(&METER.as_bytes()[end..]);
+        let meter = String::from_utf8_lossy(&bytes);
+        if let Err(errors) = load(PLANT.as_bytes(), &meter, PLC) {
+            prop_assert!(errors.count() > 0 && !errors.to_string().is_empty());
+        }
+    }
+}
