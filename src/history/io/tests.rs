@@ -344,6 +344,9 @@ fn a_log_torn_at_any_length_never_keeps_the_station_down() {
         fs::write(beside(&db, ".wal"), &torn).unwrap();
         let opens = open_until_it_lives(&db);
         assert!(opens <= 3, "{opens} opens");
+        // What a checkpoint had brought into the file is still there, whatever happened to the log.
+        let store = Store::open(&db, &def(), sec(20)).unwrap().store;
+        assert!((0..5).all(|second| means(&store, PV, second, second + 1, 1) == [Some(27.0)]));
     }
 }
 
@@ -353,10 +356,20 @@ fn files_whose_opening_never_ended_twice_are_set_aside_before_the_third() {
     open(&db, 0).append(&[good(PV, 0, 27.0)]).unwrap();
     fs::write(beside(&db, ".opening"), "1").unwrap();
     assert_eq!(means(&open(&db, 0), PV, 0, 1, 1), [Some(27.0)]);
+    // First the log, because it is what is replayed; the file keeps what it has.
+    let log = beside(&db, ".wal");
+    fs::write(&log, "poison").unwrap();
     fs::write(beside(&db, ".opening"), "2").unwrap();
     let opened = Store::open(&db, &def(), sec(0)).unwrap();
-    assert!(opened.trouble.unwrap().contains("opening it never ended"));
-    assert!(beside(&db, ".damaged-19700101T000000Z").exists());
+    assert!(opened.trouble.unwrap().contains("the last minutes of the history are damaged (opening it never ended)"));
+    assert_eq!(means(&opened.store, PV, 0, 1, 1), [Some(27.0)]);
+    assert_eq!(fs::read(beside(&db, ".damaged-19700101T000000Z.wal")).unwrap(), b"poison");
+    drop(opened.store);
+    // If that did not help, the file.
+    fs::write(beside(&db, ".opening"), "3").unwrap();
+    let opened = Store::open(&db, &def(), sec(0)).unwrap();
+    assert!(opened.trouble.unwrap().contains("the history is damaged (opening it never ended)"));
+    assert!(beside(&db, ".damaged-19700101T000000Z-2").exists());
     assert!(!beside(&db, ".opening").exists());
 }
 
@@ -493,6 +506,9 @@ fn job_of_a_child_process() {
     match job.as_str() {
         "write and die" => {
             for second in 0..10 {
+                if second == 5 {
+                    store.checkpoint().unwrap();
+                }
                 store
                     .append(&[good(PV, second, 27.0), Record::Alarm(step(second, "high", AlarmStep::Raised))])
                     .unwrap();
