@@ -160,6 +160,10 @@ impl Store {
             return Err(Failure::Obstacle(HistoryError::Engine(words)));
         }
         store.register_tags().map_err(failed)?;
+        if store.ids.contains(&None) {
+            let words = "the file has known 65536 tags, more cannot be numbered: begin a new one";
+            return Err(Failure::Obstacle(HistoryError::Engine(words.into())));
+        }
         // Read what every start reads, so that damage shows while the files can still be set aside.
         store.extent().map_err(|error| files::diagnose(path, &error.to_string()))?;
         Ok(store)

@@ -426,6 +426,16 @@ fn records_wait_while_the_store_fails_and_nothing_is_lost_when_it_recovers() {
 }
 
 #[test]
+fn a_clock_that_went_back_is_reported_and_the_old_curve_still_ends() {
+    let (_folder, db) = folder();
+    open(&db, 0).append(&[good(PV, 1000, 27.0)]).unwrap();
+    let writer = Writer::open(db, def(), sec(500)).unwrap();
+    let trouble = writer.status().trouble.clone().unwrap();
+    assert_eq!(trouble, "the clock is behind the last record, 1970-01-01T00:16:41Z: is it right?");
+    assert_eq!(means(writer.store().unwrap(), PV, 1000, 1002, 2), [Some(27.0), None]);
+}
+
+#[test]
 fn a_stopped_station_leaves_every_curve_ended_and_a_running_one_answers() {
     let (_folder, db) = folder();
     let clock = Clock::starting_at(sec(10), 1.0);
