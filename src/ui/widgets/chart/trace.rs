@@ -8,8 +8,6 @@ use crate::history::{Bucket, Series};
 
 /// Live values kept while no newer answer comes; the oldest go first, and the history has them.
 const LIVE_MAX: usize = 4096;
-/// How far an answer may lag behind: the store commits once a second, and a commit may take most of another.
-const COMMIT_LAG: SignedDuration = SignedDuration::from_secs(3);
 
 /// What is known of one tag over time. A value holds until the next one.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -30,11 +28,10 @@ pub struct Span {
 }
 
 impl Trace {
-    /// Takes an answer of the history to a question asked at `asked`. Live values that the store must have by then are
-    /// given up, except the one that still held.
-    pub fn set_past(&mut self, series: Series, asked: Timestamp) {
+    /// Takes an answer of the history that surely holds all that happened before `sure`: older live values are given
+    /// up, except the one that still held then.
+    pub fn set_past(&mut self, series: Series, sure: Timestamp) {
         self.past = Some(series);
-        let Ok(sure) = asked.checked_sub(COMMIT_LAG) else { return };
         while self.live.get(1).is_some_and(|(at, _)| *at <= sure) {
             self.live.pop_front();
         }
@@ -43,15 +40,19 @@ impl Trace {
         }
     }
 
-    /// Adds a live value; `None` is "no good value". Values that are not newer than the last are left out.
+    /// Adds a live value if it is news; `None` is "no good value". A value that is not newer than the last one counts
+    /// from just after it.
     pub fn push(&mut self, at: Timestamp, value: Option<f64>) {
-        if self.live.back().is_some_and(|(last, _)| *last >= at) {
-            return;
-        }
+        let value = value.filter(|value| value.is_finite());
+        let at = match self.live.back() {
+            Some((_, held)) if *held == value => return,
+            Some((last, _)) if *last >= at => last.checked_add(SignedDuration::from_micros(1)).unwrap_or(at),
+            _ => at,
+        };
         if self.live.len() == LIVE_MAX {
             self.live.pop_front();
         }
-        self.live.push_back((at, value.filter(|value| value.is_finite())));
+        self.live.push_back((at, value));
     }
 
     /// The answer of the history, if there is one.
@@ -202,7 +203,7 @@ mod tests {
     #[test]
     fn an_answer_takes_over_from_the_live_values_that_it_covers() {
         let mut trace = trace(&[], &[(0, 1.), (10, 2.), (20, 3.), (30, 4.)]);
-        trace.set_past(past(&[1., 2., 3.]), at(31));
+        trace.set_past(past(&[1., 2., 3.]), at(28));
         assert_eq!(trace.live, [(at(28), Some(3.)), (at(30), Some(4.))]);
         check(&trace, 40, 40, 4, "1 2 3 4");
     }
@@ -220,9 +221,11 @@ mod tests {
     #[test]
     fn live_values_are_bounded_and_in_order() {
         let mut trace = Trace::default();
-        (0..5000).for_each(|second| trace.push(at(second), Some(1.)));
-        trace.push(at(10), Some(2.));
-        assert_eq!((trace.live.len(), trace.live.back()), (LIVE_MAX, Some(&(at(4999), Some(1.)))));
+        (0..5000).for_each(|second| trace.push(at(second), Some(second as f64)));
+        trace.push(at(5000), Some(4999.));
+        assert_eq!((trace.live.len(), trace.live.back()), (LIVE_MAX, Some(&(at(4999), Some(4999.)))));
+        trace.push(at(10), None);
+        assert!(trace.live.back().is_some_and(|(last, value)| *last > at(4999) && value.is_none()));
     }
 
     proptest! {
