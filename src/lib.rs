@@ -4,3 +4,5 @@ pub mod plant;
 pub mod bus;
 pub mod report;
 pub mod history;
+pub mod station;
+pub mod ui;

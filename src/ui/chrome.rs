@@ -1,0 +1,280 @@
+//! What every tab shares: header, tab bar, alarm banner, the last order's outcome, and the keys of the moment.
+
+use ratatui::{Frame, layout::Rect, style::Style};
+
+use super::{
+    Cx, Model, SILENCE, Watch,
+    keys::{self, Hint},
+    modal::{confirm::subject, faceplate::device_words},
+    tabs::Tab,
+    widgets::text::{Canvas, between, clock, fit, running, width},
+};
+use crate::plant::{
+    alarm::AlarmState,
+    command::{Command, Outcome},
+    def::{LineDef, Priority},
+    event::LineState,
+    snapshot::ActiveAlarm,
+};
+
+/// Least size in which the tabs make sense; 80x24 shows everything.
+const SIZE_MIN: (u16, u16) = (60, 16);
+
+/// Where the parts of the screen are. On a screen that is too small only the banner has a place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Plant, lines, clock.
+    pub header: Rect,
+    /// Names of the tabs.
+    pub tabs: Rect,
+    /// The most urgent alarm.
+    pub banner: Rect,
+    /// The line between banner and body.
+    pub rule: Rect,
+    /// The tab.
+    pub body: Rect,
+    /// Outcome of the last order.
+    pub status: Rect,
+    /// Keys.
+    pub footer: Rect,
+    /// Too small for more than the banner.
+    pub small: bool,
+}
+
+/// Cuts the screen into its parts.
+pub fn layout(screen: Rect) -> Layout {
+    let row = |y: u16| Rect { y: screen.y.saturating_add(y), height: 1, ..screen }.intersection(screen);
+    let small = screen.width < SIZE_MIN.0 || screen.height < SIZE_MIN.1;
+    if small {
+        let none = Rect { width: 0, height: 0, ..screen };
+        return Layout { header: none, tabs: none, banner: row(0), rule: none, body: none, status: none, footer: none, small };
+    }
+    Layout {
+        header: row(0),
+        tabs: row(1),
+        banner: row(2),
+        rule: row(3),
+        body: Rect { y: screen.y + 4, height: screen.height - 6, ..screen },
+        status: row(screen.height - 2),
+        footer: row(screen.height - 1),
+        small,
+    }
+}
+
+/// Draws the whole screen.
+pub fn view(model: &Model, cx: &Cx, frame: &mut Frame) {
+    let parts = layout(frame.area());
+    banner(cx, &mut Canvas::new(frame.buffer_mut(), parts.banner));
+    if parts.small {
+        return too_small(cx, frame);
+    }
+    header(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.header));
+    tab_bar(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.tabs));
+    Canvas::new(frame.buffer_mut(), parts.rule).run(0, 0, parts.rule.width, '─', cx.theme.dim());
+    model.tabs.view(cx, frame, parts.body);
+    status(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.status));
+    let hints = match &model.modal {
+        Some(modal) => modal.hints(cx),
+        None => model.tabs.hints(cx),
+    };
+    footer(cx, &mut Canvas::new(frame.buffer_mut(), parts.footer), &hints, model.modal.is_none());
+    if let Some(modal) = &model.modal {
+        modal.view(cx, &model.tabs, frame, parts.body);
+    }
+}
+
+fn too_small(cx: &Cx, frame: &mut Frame) {
+    let area = frame.area();
+    let mut canvas = Canvas::new(frame.buffer_mut(), area);
+    let (width, height) = SIZE_MIN;
+    canvas.text(0, 1, &fit(&format!("screen too small: {}x{}, needs {width}x{height}", area.width, area.height), area.width), cx.theme.normal());
+    canvas.text(0, 2, "q quit", cx.theme.dim());
+}
+
+fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let x = canvas.text(1, 0, "sightglass", theme.dim());
+    canvas.text(x + 2, 0, &cx.def().title, theme.strong());
+    let mut end = canvas.width().saturating_sub(1);
+    let mut put = |text: &str, style: Style| {
+        canvas.text_right(end, 0, text, style);
+        end = end.saturating_sub(width(text) + 2);
+    };
+    if model.clock.silent >= SILENCE {
+        // The clock stands still on purpose: nobody knows what the plant does.
+        put(&format!("STATION SILENT {}", running(model.clock.silent)), theme.trouble());
+    } else {
+        put(&clock(cx.now, &cx.def().time_zone), theme.normal());
+    }
+    put(&fit(&model.operator, 12), theme.dim());
+    if cx.snapshot.speed != 1.0 {
+        put(&format!("speed ×{}", cx.snapshot.speed), theme.strong());
+    }
+    let history = &cx.snapshot.history;
+    if history.lost > 0 {
+        put(&format!("{} records lost", history.lost), theme.trouble());
+    }
+    if let Some(trouble) = &history.trouble {
+        put(&fit(&format!("history: {trouble}"), 28), theme.trouble());
+    }
+    for line in cx.def().lines.iter().rev() {
+        let (text, style) = line_words(cx, line);
+        put(&text, style);
+    }
+}
+
+/// A line in the header: `L1 ▪ tx rx 62 %`, or why it is not connected and when it is tried again.
+fn line_words(cx: &Cx, line: &LineDef) -> (String, Style) {
+    let status = cx.snapshot.line(line.id);
+    let counters = &status.counters;
+    let recent = |at: Option<jiff::Timestamp>| at.is_some_and(|at| between(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0));
+    match &status.state {
+        LineState::Connected => {
+            let tx = if recent(counters.last_tx) { "tx" } else { "--" };
+            let rx = if recent(counters.last_rx) { "rx" } else { "--" };
+            let busy = counters.utilisation * 100.0;
+            let style = if rx == "rx" { cx.theme.normal() } else { cx.theme.trouble() };
+            (format!("{} {} {tx} {rx} {busy:.0} %", line.name, cx.theme.pick("▪", "*")), style)
+        }
+        LineState::Connecting => (format!("{} connecting", line.name), cx.theme.trouble()),
+        LineState::Waiting { retry_at, .. } => {
+            let left = between(cx.now, *retry_at).as_secs();
+            (format!("{} DOWN retry {left}s", line.name), cx.theme.trouble())
+        }
+        LineState::Disconnected => (format!("{} DISCONNECTED", line.name), cx.theme.trouble()),
+    }
+}
+
+fn tab_bar(model: &Model, cx: &Cx, canvas: &mut Canvas) {
+    let mut x = 0;
+    for (n, tab) in Tab::ALL.into_iter().enumerate() {
+        if n > 0 {
+            x = canvas.text(x, 0, "│", cx.theme.dim());
+        }
+        let count = if tab == Tab::Alarms { cx.snapshot.alarms.len() } else { 0 };
+        let count = if count > 0 { format!(" {count}") } else { String::new() };
+        let shown = tab == model.tabs.shown;
+        x = canvas.text(x, 0, &format!(" {} {}{count} ", n + 1, tab.title()), cx.theme.tab(shown));
+    }
+}
+
+/// The most urgent alarm that waits for an acknowledgement, else the most urgent one, and the counts by priority.
+fn banner(cx: &Cx, canvas: &mut Canvas) {
+    let alarms = &cx.snapshot.alarms;
+    let Some(alarm) = alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()).or(alarms.first()) else {
+        canvas.text(1, 0, "no alarms", cx.theme.dim());
+        return;
+    };
+    let def = cx.def().alarm(alarm.id);
+    let waiting = alarm.state.needs_acknowledgement();
+    let counts = counts(cx);
+    let tail = if waiting { format!("{counts}    a ack ") } else { format!("{counts} ") };
+    let room = canvas.width().saturating_sub(width(&tail) + 1);
+    let mark = cx.theme.alarm(def.priority, alarm.state, cx.flash());
+    let x = canvas.text(1, 0, cx.theme.priority_mark(def.priority), mark);
+    let text = alarm_words(cx, alarm);
+    let style = cx.theme.alarm(def.priority, alarm.state, false);
+    let end = canvas.text(x + 1, 0, &fit(&text, room.saturating_sub(x + 1)), style);
+    if end + width(&tail) < canvas.width() {
+        let end = canvas.width();
+        canvas.text_right(end, 0, &tail, cx.theme.normal());
+    }
+}
+
+/// `TIC-1.PV temperature high  72.4 °C  UNACK 00:41`.
+fn alarm_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
+    use crate::plant::def::Subject;
+    let def = cx.def().alarm(alarm.id);
+    let now = match def.subject {
+        Subject::Tag(tag) => super::widgets::value::show(cx, tag).with_unit(),
+        Subject::Device(device) => device_words(cx, device),
+    };
+    let since = match alarm.state {
+        AlarmState::Returned => alarm.returned_at.unwrap_or(alarm.raised_at),
+        AlarmState::Normal | AlarmState::Unacknowledged | AlarmState::Acknowledged => alarm.raised_at,
+    };
+    format!("{} {}  {now}  {} {}", subject(cx, alarm.id), def.text, alarm.state.word(), running(between(since, cx.now)))
+}
+
+/// How many of each priority: `[1]!1 (3)2`.
+fn counts(cx: &Cx) -> String {
+    let all = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low].into_iter().filter_map(|priority| {
+        let count = cx.snapshot.alarms.iter().filter(|alarm| cx.def().alarm(alarm.id).priority == priority).count();
+        (count > 0).then(|| format!("{}×{count}", cx.theme.priority_mark(priority).trim()))
+    });
+    all.collect::<Vec<_>>().join(" ")
+}
+
+fn status(model: &Model, cx: &Cx, canvas: &mut Canvas) {
+    let length = canvas.width();
+    canvas.run(0, 0, length, '─', cx.theme.dim());
+    if let Some(watch) = &model.watch {
+        let (text, style) = watch_words(cx, watch);
+        canvas.text(1, 0, &fit(&format!(" {text} "), length.saturating_sub(2)), style);
+    }
+}
+
+/// An order and how it stands: `TIC-1.SV 60.0 → 70.0 °C verified 13:40:02`.
+pub fn watch_words(cx: &Cx, watch: &Watch) -> (String, Style) {
+    let theme = cx.theme;
+    let what = order_words(cx, &watch.command, watch.status.as_ref().and_then(|status| status.old));
+    let Some(status) = &watch.status else {
+        return match watch.undelivered {
+            Some(why) => (format!("{what}  NOT SENT: {why}"), theme.trouble()),
+            None => (format!("{what}  sent …"), theme.normal()),
+        };
+    };
+    let (words, trouble) = outcome_words(&status.outcome);
+    let at = clock(status.at, &cx.def().time_zone);
+    (format!("{what}  {words} {at}"), if trouble { theme.trouble() } else { theme.done() })
+}
+
+/// An outcome in words, and whether the operator should worry.
+pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
+    match outcome {
+        Outcome::Pending => ("pending …".to_owned(), false),
+        Outcome::Verified => ("verified".to_owned(), false),
+        Outcome::Unchanged => ("unchanged, nothing written".to_owned(), false),
+        Outcome::Refused(why) => (format!("REFUSED: {why}"), true),
+        Outcome::NotConfirmed(why) => (format!("NOT CONFIRMED: {why}"), true),
+        Outcome::Failed(fault) => (format!("FAILED, may or may not have taken effect: {fault}"), true),
+    }
+}
+
+/// What was wished, in words: `TIC-1.SV 60.0 → 70.0 °C`.
+pub fn order_words(cx: &Cx, command: &Command, old: Option<f64>) -> String {
+    match command {
+        Command::Write { tag, value } => {
+            let old = old.map_or("?".to_owned(), |old| cx.snapshot.format(*tag, old));
+            let text = format!("{} {old} → {} {}", cx.def().tag(*tag).name, cx.snapshot.format(*tag, *value), cx.snapshot.unit(*tag));
+            text.trim_end().to_owned()
+        }
+        Command::Acknowledge(alarm) => format!("acknowledge {} {}", subject(cx, *alarm), cx.def().alarm(*alarm).text),
+        Command::AcknowledgeAll => "acknowledge all".to_owned(),
+        Command::Refresh(device) => format!("refresh {}", cx.def().device(*device).name),
+        Command::Connect(line, true) => format!("connect {}", cx.def().line(*line).name),
+        Command::Connect(line, false) => format!("disconnect {}", cx.def().line(*line).name),
+    }
+}
+
+/// As many keys as fit; those of every tab stand at the right end.
+fn footer(cx: &Cx, canvas: &mut Canvas, hints: &[Hint], global: bool) {
+    let tail: Vec<Hint> = if global { keys::hints(keys::GLOBAL).into_iter().filter(|hint| !hint.label.is_empty()).collect() } else { Vec::new() };
+    let room = |hint: &Hint| width(&hint.key) + 1 + width(&hint.label) + 2;
+    let mut end = canvas.width().saturating_sub(1 + tail.iter().map(room).sum::<u16>());
+    let mut x = 1;
+    for hint in hints.iter().filter(|hint| !hint.label.is_empty()) {
+        if x + room(hint) > end {
+            break;
+        }
+        x = key(cx, canvas, x, hint);
+    }
+    for hint in &tail {
+        end = key(cx, canvas, end, hint);
+    }
+}
+
+fn key(cx: &Cx, canvas: &mut Canvas, x: u16, hint: &Hint) -> u16 {
+    let x = canvas.text(x, 0, &hint.key, cx.theme.strong());
+    canvas.text(x + 1, 0, &hint.label, cx.theme.dim()) + 2
+}

@@ -1,0 +1,102 @@
+//! The last step before the terminal: every cell becomes something that the terminal draws in the width we think.
+
+use std::borrow::Cow;
+
+use ratatui::buffer::Buffer;
+
+use super::theme::{Glyphs, Theme};
+
+/// Rewrites SARA AM (U+0E33) as NIKHAHIT + SARA AA: it looks the same, and every cluster becomes one cell wide.
+/// Terminals put SARA AM in a cell of its own, and the diff of two frames then leaves it behind on the screen.
+pub fn thai_cells(text: &str) -> Cow<'_, str> {
+    if !text.contains('\u{e33}') {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 8);
+    for c in text.chars() {
+        if c == '\u{e33}' {
+            let tone = out.chars().last().filter(|tone| ('\u{e48}'..='\u{e4b}').contains(tone));
+            if tone.is_some() {
+                out.pop();
+            }
+            out.push('\u{e4d}');
+            out.extend(tone);
+            out.push('\u{e32}');
+        } else {
+            out.push(c);
+        }
+    }
+    Cow::Owned(out)
+}
+
+/// Makes a drawn frame safe for the terminal: no SARA AM, and only seven bits for the ASCII glyph set.
+pub fn finish(buffer: &mut Buffer, theme: &Theme) {
+    for cell in &mut buffer.content {
+        if cell.symbol().is_ascii() {
+            continue;
+        }
+        if cell.symbol().contains('\u{e33}') {
+            let symbol = thai_cells(cell.symbol()).into_owned();
+            cell.set_symbol(&symbol);
+        }
+        if theme.glyphs == Glyphs::Ascii {
+            let plain = cell.symbol().chars().next().map_or(' ', ascii);
+            cell.set_char(plain);
+        }
+    }
+}
+
+/// The nearest character of seven bits, one cell wide.
+fn ascii(c: char) -> char {
+    match c {
+        '─' | '┄' | '╌' | '━' | '═' | '╶' | '╴' | '–' | '−' => '-',
+        '│' | '┃' | '║' | '╵' | '╷' | '┆' | '▏' => '|',
+        '┌' | '┐' | '└' | '┘' | '├' | '┤' | '┬' | '┴' | '┼' | '╔' | '╗' | '╚' | '╝' | '╫' | '╪' | '╢' | '╟' => '+',
+        '▶' | '▸' | '►' | '→' => '>',
+        '◀' | '◂' | '◄' | '←' => '<',
+        '▲' | '▴' | '↑' => '^',
+        '▼' | '▾' | '↓' => 'v',
+        '⏎' => '/',
+        '°' => '*',
+        '·' | '…' => '.',
+        '●' | '■' | '◆' => '@',
+        '○' | '□' | '◇' | '△' => 'o',
+        '▁' | '▂' => '_',
+        '▃' | '▄' | '≋' | '≈' => '~',
+        '▅' | '▆' | '▇' | '█' | '▓' | '▒' => '#',
+        '░' => ':',
+        '×' => 'x',
+        '✓' => 'v',
+        '✗' => 'x',
+        'µ' => 'u',
+        '²' => '2',
+        '³' => '3',
+        c if c.is_ascii() => c,
+        _ => '?',
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ratatui::{layout::Rect, style::Style};
+
+    #[test]
+    fn sara_am_never_reaches_the_terminal() {
+        assert_eq!(thai_cells("อุณหภูมิน้ำ"), "อุณหภูมิน\u{e4d}\u{e49}\u{e32}");
+        assert_eq!(thai_cells("ทำ"), "ท\u{e4d}\u{e32}");
+        let mut buffer = Buffer::empty(Rect::new(0, 0, 20, 1));
+        buffer.set_string(0, 0, "น้ำในถัง", Style::new());
+        finish(&mut buffer, &Theme::FULL);
+        assert!(buffer.content.iter().all(|cell| !cell.symbol().contains('\u{e33}')));
+    }
+
+    #[test]
+    fn an_ascii_terminal_gets_seven_bits() {
+        let mut buffer = Buffer::empty(Rect::new(0, 0, 12, 1));
+        buffer.set_string(0, 0, "72.4 °C ▲─█⡇", Style::new());
+        finish(&mut buffer, &Theme::PLAIN);
+        let text: String = buffer.content.iter().map(|cell| cell.symbol()).collect();
+        assert_eq!(text, "72.4 *C ^-#?");
+    }
+}

@@ -1,0 +1,358 @@
+//! What an operator looks at: `update` turns messages into state and effects, `view` draws state; both are pure.
+
+pub mod chrome;
+pub mod edge;
+pub mod io;
+pub mod keys;
+pub mod modal;
+pub mod tabs;
+pub mod theme;
+pub mod widgets;
+
+#[cfg(test)]
+pub mod fixture;
+#[cfg(test)]
+mod tests;
+
+use std::{path::PathBuf, sync::Arc, time::Duration};
+
+use crossterm::event::{KeyEvent, KeyEventKind};
+use jiff::Timestamp;
+use ratatui::{Frame, layout::Rect};
+
+use crate::{
+    history::{Answer, HistoryError, Question},
+    plant::{
+        command::{Command, OrderId, OrderStatus},
+        def::{AlarmId, PlantDef},
+        sample::Cause,
+        snapshot::Snapshot,
+    },
+};
+use keys::Global;
+use modal::{Confirm, Intent, Modal};
+use tabs::{Tab, Tabs};
+use theme::Theme;
+
+/// A station that has said nothing for so long (real time) is silent: its values are doubted.
+pub const SILENCE: Duration = Duration::from_secs(5);
+
+/// All that a terminal knows.
+#[derive(Debug)]
+pub struct Model {
+    /// The plant as last heard; values doubted while the station is silent.
+    pub snapshot: Arc<Snapshot>,
+    /// The tabs and which one is shown.
+    pub tabs: Tabs,
+    /// The window on top, which gets every key.
+    pub modal: Option<Modal>,
+    /// How things look.
+    pub theme: Theme,
+    /// The whole screen.
+    pub screen: Rect,
+    /// What time it is and how the animation stands.
+    pub clock: Clock,
+    /// The last order of this terminal and its outcome.
+    pub watch: Option<Watch>,
+    /// Number of this terminal.
+    pub terminal: u32,
+    /// Who sits here.
+    pub operator: Arc<str>,
+    /// Orders given so far.
+    pub ordered: u32,
+}
+
+/// The terminal's sense of time, fed by ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Clock {
+    /// Real time since the last snapshot came.
+    pub silent: Duration,
+    /// Counts ticks, two a second: drives flashing and motion.
+    pub phase: u32,
+}
+
+/// An order of this terminal on its way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Watch {
+    /// Which.
+    pub id: OrderId,
+    /// What was wished.
+    pub command: Command,
+    /// As last seen in a snapshot.
+    pub status: Option<OrderStatus>,
+    /// Why it never left the terminal.
+    pub undelivered: Option<&'static str>,
+}
+
+/// What happens to a terminal.
+#[derive(Debug)]
+pub enum Msg {
+    /// A key.
+    Key(KeyEvent),
+    /// Pasted text: never acts as keys.
+    Paste(String),
+    /// The screen has a new size.
+    Resize(u16, u16),
+    /// News of the plant.
+    Snapshot(Arc<Snapshot>),
+    /// The history answered.
+    Answer(AskId, Result<Answer, HistoryError>),
+    /// A report was written, or why not.
+    Saved(Result<PathBuf, String>),
+    /// The station did not take this order: its queue is full, or it has gone.
+    Undelivered(OrderId, &'static str),
+    /// Half a second passed; so long ago (real time) came the last snapshot.
+    Tick {
+        /// Real time since the last snapshot.
+        silent: Duration,
+    },
+}
+
+/// What a terminal wants done.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Effect {
+    /// Give the station an order.
+    Order(OrderId, Command),
+    /// Ask the history.
+    Ask(AskId, Question),
+    /// Write a report; answered by [`Msg::Saved`].
+    SaveReport {
+        /// Where, relative to the working folder.
+        path: PathBuf,
+        /// What.
+        bytes: Vec<u8>,
+    },
+    /// Forget what the terminal shows and draw everything.
+    Redraw,
+    /// Leave.
+    Quit,
+}
+
+/// Identifies a question: who asked, and its running count. An answer to an older question is ignored by the tab.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct AskId {
+    /// The tab that asked.
+    pub tab: Tab,
+    /// Chosen by the tab.
+    pub number: u32,
+}
+
+/// What a tab or window asks of the terminal.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Act {
+    /// Put a window on top.
+    Open(Modal),
+    /// Show a tab.
+    Show(Tab),
+    /// Give an order and watch its outcome.
+    Order(Command),
+    /// Pass on an effect as it is.
+    Do(Effect),
+}
+
+impl Act {
+    /// Asks the history on behalf of a tab.
+    pub fn ask(tab: Tab, number: u32, question: Question) -> Act {
+        Act::Do(Effect::Ask(AskId { tab, number }, question))
+    }
+}
+
+/// What every tab, window and widget may read.
+#[derive(Debug, Clone, Copy)]
+pub struct Cx<'a> {
+    /// The plant.
+    pub snapshot: &'a Snapshot,
+    /// The looks.
+    pub theme: &'a Theme,
+    /// Plant time now: the snapshot's, carried on while none comes.
+    pub now: Timestamp,
+    /// Counts half seconds.
+    pub phase: u32,
+    /// Where the shown tab draws, for questions that depend on its width.
+    pub area: Rect,
+}
+
+impl<'a> Cx<'a> {
+    /// The plant's definition.
+    pub fn def(&self) -> &'a PlantDef {
+        &self.snapshot.def
+    }
+    /// The phase in which unacknowledged alarms are reversed: half of every two seconds.
+    pub fn flash(&self) -> bool {
+        self.phase % 4 < 2
+    }
+    /// Age of a tag's sample now.
+    pub fn age(&self, tag: crate::plant::def::TagId) -> Duration {
+        Duration::try_from(self.now.duration_since(self.snapshot.sample(tag).at)).unwrap_or_default()
+    }
+}
+
+impl Model {
+    /// A terminal that has just attached.
+    pub fn new(snapshot: Arc<Snapshot>, theme: Theme, terminal: u32, operator: Arc<str>) -> Model {
+        let tabs = Tabs::new(&snapshot);
+        Model {
+            snapshot,
+            tabs,
+            modal: None,
+            theme,
+            screen: Rect::default(),
+            clock: Clock::default(),
+            watch: None,
+            terminal,
+            operator,
+            ordered: 0,
+        }
+    }
+
+    /// What the parts of the terminal may read.
+    pub fn cx(&self) -> Cx<'_> {
+        context(&self.snapshot, &self.theme, self.clock, self.screen)
+    }
+
+    /// The alarm that `a` is for: the one selected on the alarms tab, else the most urgent unacknowledged.
+    fn alarm_to_acknowledge(&self) -> Option<AlarmId> {
+        let selected = (self.tabs.shown == Tab::Alarms).then(|| self.tabs.alarms.selected(&self.cx())).flatten();
+        let alarm = selected.or_else(|| self.snapshot.alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()))?;
+        alarm.state.needs_acknowledgement().then_some(alarm.id)
+    }
+}
+
+/// Takes in one message. The only place where a terminal's state changes.
+pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
+    let acts = match msg {
+        Msg::Key(event) if event.kind == KeyEventKind::Release => Vec::new(),
+        Msg::Key(event) => on_key(model, event),
+        Msg::Paste(text) => {
+            if let Some(modal) = &mut model.modal {
+                modal.on_paste(&text);
+            }
+            Vec::new()
+        }
+        Msg::Resize(width, height) => {
+            model.screen = Rect::new(0, 0, width, height);
+            with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
+        }
+        Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
+        Msg::Answer(id, answer) => with_tabs(model, |tabs, cx| tabs.on_answer(cx, id, answer)),
+        Msg::Saved(result) => with_tabs(model, |tabs, cx| tabs.reports.on_saved(cx, result)),
+        Msg::Undelivered(id, why) => {
+            if let Some(watch) = model.watch.as_mut().filter(|watch| watch.id == id) {
+                watch.undelivered = Some(why);
+            }
+            Vec::new()
+        }
+        Msg::Tick { silent } => on_tick(model, silent),
+    };
+    perform(model, acts)
+}
+
+/// Draws the terminal as it stands.
+pub fn view(model: &Model, frame: &mut Frame) {
+    let cx = context(&model.snapshot, &model.theme, model.clock, frame.area());
+    chrome::view(model, &cx, frame);
+    edge::finish(frame.buffer_mut(), &model.theme);
+}
+
+fn context<'a>(snapshot: &'a Snapshot, theme: &'a Theme, clock: Clock, screen: Rect) -> Cx<'a> {
+    let ahead = jiff::SignedDuration::from_secs_f64(clock.silent.as_secs_f64() * snapshot.speed.clamp(0.0, 1e6));
+    let now = snapshot.at.checked_add(ahead).unwrap_or(snapshot.at);
+    Cx { snapshot, theme, now, phase: clock.phase, area: chrome::layout(screen).body }
+}
+
+/// Lets the tabs change while they read the rest of the model.
+fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &Cx) -> Vec<Act>) -> Vec<Act> {
+    let cx = context(&model.snapshot, &model.theme, model.clock, model.screen);
+    change(&mut model.tabs, &cx)
+}
+
+fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
+    if let Some(modal) = model.modal.take() {
+        let cx = context(&model.snapshot, &model.theme, model.clock, model.screen);
+        let (rest, acts) = modal.on_key(&cx, &mut model.tabs, event);
+        model.modal = rest;
+        return acts;
+    }
+    match keys::find(keys::GLOBAL, event) {
+        Some(global) => on_global(model, global),
+        None => with_tabs(model, |tabs, cx| tabs.on_key(cx, event)),
+    }
+}
+
+fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
+    match global {
+        Global::Show(n) => Tab::ALL.get(n).map(|tab| Act::Show(*tab)).into_iter().collect(),
+        Global::Next => vec![Act::Show(model.tabs.shown.step(1))],
+        Global::Previous => vec![Act::Show(model.tabs.shown.step(-1))],
+        Global::Help => vec![Act::Open(Modal::Help(0))],
+        Global::Quit => vec![Act::Open(Modal::Confirm(Confirm::quit()))],
+        Global::Acknowledge => match model.alarm_to_acknowledge() {
+            Some(id) => vec![Act::Order(Command::Acknowledge(id))],
+            None => Vec::new(),
+        },
+        Global::AcknowledgeAll => Confirm::acknowledge_all(&model.cx()).map(|confirm| Act::Open(Modal::Confirm(confirm))).into_iter().collect(),
+        Global::Redraw => vec![Act::Do(Effect::Redraw)],
+        Global::Dismiss => {
+            model.watch = None;
+            Vec::new()
+        }
+    }
+}
+
+fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<Act> {
+    model.snapshot = snapshot;
+    model.clock.silent = Duration::ZERO;
+    if let Some(watch) = &mut model.watch
+        && let Some(status) = model.snapshot.orders.iter().find(|status| status.id == watch.id)
+    {
+        watch.status = Some(status.clone());
+    }
+    with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
+}
+
+fn on_tick(model: &mut Model, silent: Duration) -> Vec<Act> {
+    model.clock.phase = model.clock.phase.wrapping_add(1);
+    model.clock.silent = silent;
+    if silent >= SILENCE && model.snapshot.samples.iter().any(|sample| sample.quality.is_good()) {
+        let doubted = Arc::make_mut(&mut model.snapshot);
+        for sample in doubted.samples.iter_mut().filter(|sample| sample.quality.is_good()) {
+            *sample = sample.doubted(Cause::Stale);
+        }
+    }
+    with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
+}
+
+fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
+    let mut effects = Vec::new();
+    for act in acts {
+        match act {
+            Act::Open(modal) => model.modal = Some(modal),
+            Act::Show(tab) => {
+                model.tabs.shown = tab;
+                let asked = with_tabs(model, |tabs, cx| tabs.on_snapshot(cx));
+                effects.extend(asked.into_iter().filter_map(|act| match act {
+                    Act::Do(effect) => Some(effect),
+                    Act::Open(_) | Act::Show(_) | Act::Order(_) => None,
+                }));
+            }
+            Act::Order(command) => {
+                model.ordered = model.ordered.wrapping_add(1);
+                let id = OrderId { terminal: model.terminal, number: model.ordered };
+                model.watch = Some(Watch { id, command: command.clone(), status: None, undelivered: None });
+                effects.push(Effect::Order(id, command));
+            }
+            Act::Do(effect) => effects.push(effect),
+        }
+    }
+    effects
+}
+
+impl Intent {
+    /// What a confirmed intent does.
+    pub fn act(self) -> Act {
+        match self {
+            Intent::Quit => Act::Do(Effect::Quit),
+            Intent::Order(command) => Act::Order(command),
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! One of a few: the values of an enumeration, or the actions of a device.
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect};
+
+use super::{Confirm, Modal, Next, confirm::wire_words, window};
+use crate::{
+    plant::def::{DeviceId, TagId},
+    ui::{
+        Cx, keys,
+        widgets::{text::width, value},
+    },
+};
+
+/// A list to pick from; picking leads to a confirm window.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    title: String,
+    rows: Vec<Row>,
+    selected: usize,
+}
+
+/// A row: its text and the window that it leads to.
+#[derive(Debug, Clone, PartialEq)]
+struct Row {
+    text: String,
+    tag: TagId,
+    next: Confirm,
+}
+
+impl Choice {
+    /// The values of an enumeration, the present one selected.
+    pub fn values(cx: &Cx, tag: TagId) -> Choice {
+        let def = cx.def().tag(tag);
+        let rows = def.labels.iter().map(|(number, label)| {
+            let next = Confirm::write(cx, tag, *number as f64);
+            Row { text: format!("{number}  {label}"), tag, next }
+        });
+        let now = cx.snapshot.sample(tag).value;
+        let selected = def.labels.iter().position(|(number, _)| Some(*number as f64) == now).unwrap_or(0);
+        Choice { title: format!("write {} {}", def.name, def.label), rows: rows.collect(), selected }
+    }
+
+    /// The actions of a device; `None` if it has none.
+    pub fn actions(cx: &Cx, device: DeviceId) -> Option<Choice> {
+        let def = cx.def().device(device);
+        let rows = def.actions.iter().map(|action| {
+            let next = Confirm::action(cx, action.tag, action.value, &action.name, &action.confirm);
+            Row { text: format!("{}  {}", action.name, cx.def().tag(action.tag).label), tag: action.tag, next }
+        });
+        let rows: Vec<Row> = rows.collect();
+        (!rows.is_empty()).then(|| Choice { title: format!("actions of {}", def.name), rows, selected: 0 })
+    }
+
+    pub(super) fn on_key(mut self, _cx: &Cx, event: KeyEvent) -> Next {
+        let last = self.rows.len().saturating_sub(1);
+        match event.code {
+            KeyCode::Up => self.selected = self.selected.saturating_sub(1),
+            KeyCode::Down => self.selected = (self.selected + 1).min(last),
+            KeyCode::Home => self.selected = 0,
+            KeyCode::End => self.selected = last,
+            KeyCode::Enter if keys::code(KeyCode::Enter).is(event) && !self.rows.is_empty() => {
+                return Next::Stay(Modal::Confirm(self.rows.swap_remove(self.selected).next));
+            }
+            _ => {}
+        }
+        Next::Stay(Modal::Choice(self))
+    }
+
+    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+        let shown = usize::from(body.height.saturating_sub(6)).clamp(1, self.rows.len().max(1));
+        let first = self.selected.saturating_sub(shown - 1);
+        let inner = self.rows.iter().map(|row| width(&row.text)).max().unwrap_or(0).max(46);
+        let mut canvas = window(cx, frame, body, &self.title, (inner, shown as u16 + 4));
+        if let Some(row) = self.rows.get(self.selected) {
+            canvas.text(0, 0, &format!("now {}", value::show(cx, row.tag).whole()), cx.theme.normal());
+            canvas.text(0, 1, &wire_words(cx.def().tag(row.tag)), cx.theme.dim());
+        }
+        for (y, (n, row)) in self.rows.iter().enumerate().skip(first).take(shown).enumerate() {
+            let style = if n == self.selected { cx.theme.focus() } else { cx.theme.normal() };
+            canvas.text(0, y as u16 + 2, if n == self.selected { "▸ " } else { "  " }, cx.theme.strong());
+            canvas.text(2, y as u16 + 2, &row.text, style);
+        }
+        let last = canvas.height().saturating_sub(1);
+        canvas.text(0, last, "↑↓ select   ⏎ next   Esc leave unchanged", cx.theme.strong());
+    }
+}

@@ -1,0 +1,163 @@
+//! "Do it or not": the window that carries a finished intent.
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect, style::Style};
+
+use super::{Modal, Next, window};
+use crate::{
+    plant::{
+        command::Command,
+        def::TagId,
+        tag::{Confidence, Table, TagDef},
+    },
+    ui::{
+        Cx, keys,
+        widgets::{
+            text::{width, wrap},
+            value,
+        },
+    },
+};
+
+/// A finished intent and what the operator is asked about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Confirm {
+    intent: Intent,
+    title: String,
+    notes: Vec<String>,
+}
+
+/// What a confirmed window does.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Intent {
+    /// Leave the terminal.
+    Quit,
+    /// Give an order.
+    Order(Command),
+}
+
+impl Confirm {
+    /// Leave?
+    pub fn quit() -> Confirm {
+        let notes = vec!["Leave this terminal?".to_owned()];
+        Confirm { intent: Intent::Quit, title: "leave".to_owned(), notes }
+    }
+
+    /// Acknowledge all? `None` when there is nothing to acknowledge.
+    pub fn acknowledge_all(cx: &Cx) -> Option<Confirm> {
+        let waiting: Vec<_> = cx.snapshot.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement()).collect();
+        if waiting.is_empty() {
+            return None;
+        }
+        let mut notes = vec![match waiting.len() {
+            1 => "Acknowledge 1 alarm?".to_owned(),
+            n => format!("Acknowledge {n} alarms?"),
+        }];
+        notes.extend(waiting.iter().take(6).map(|alarm| {
+            let def = cx.def().alarm(alarm.id);
+            format!("{} {} {}", cx.theme.priority_mark(def.priority), subject(cx, alarm.id), def.text)
+        }));
+        if waiting.len() > 6 {
+            notes.push(format!("… and {} more", waiting.len() - 6));
+        }
+        let intent = Intent::Order(Command::AcknowledgeAll);
+        Some(Confirm { intent, title: "acknowledge all".to_owned(), notes })
+    }
+
+    /// Write this value? Old and new value are drawn from the intent, so they cannot differ from what is sent.
+    pub fn write(cx: &Cx, tag: TagId, value: f64) -> Confirm {
+        let def = cx.def().tag(tag);
+        let intent = Intent::Order(Command::Write { tag, value });
+        Confirm { intent, title: format!("write {}", def.name), notes: write_notes(def) }
+    }
+
+    /// A write with words of its own (an action of a device).
+    pub fn action(cx: &Cx, tag: TagId, value: f64, name: &str, words: &str) -> Confirm {
+        let confirm = Confirm::write(cx, tag, value);
+        let notes = [words.to_owned()].into_iter().chain(confirm.notes).collect();
+        Confirm { title: format!("{name} {}", cx.def().device(cx.def().tag(tag).device).name), notes, ..confirm }
+    }
+
+    /// Open or close a line, or any other order, with words of its own.
+    pub fn order(title: impl Into<String>, words: impl Into<String>, command: Command) -> Confirm {
+        Confirm { intent: Intent::Order(command), title: title.into(), notes: vec![words.into()] }
+    }
+
+    /// What Enter does.
+    pub fn verb(&self) -> &'static str {
+        match &self.intent {
+            Intent::Quit => "leave",
+            Intent::Order(Command::Write { .. }) => "write and verify",
+            Intent::Order(Command::Acknowledge(_) | Command::AcknowledgeAll) => "acknowledge",
+            Intent::Order(Command::Refresh(_)) => "refresh",
+            Intent::Order(Command::Connect(_, true)) => "connect",
+            Intent::Order(Command::Connect(_, false)) => "disconnect",
+        }
+    }
+
+    pub(super) fn on_key(self, event: KeyEvent) -> Next {
+        if keys::code(KeyCode::Enter).is(event) || keys::char('y').is(event) {
+            Next::Do(vec![self.intent.act()])
+        } else if keys::char('n').is(event) || keys::char('q').is(event) {
+            Next::Close
+        } else {
+            Next::Stay(Modal::Confirm(self))
+        }
+    }
+
+    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+        let room = body.width.saturating_sub(8).min(68);
+        let mut rows: Vec<(String, Style)> = Vec::new();
+        if let Intent::Order(Command::Write { tag, value }) = &self.intent {
+            rows.push((old_and_new(cx, *tag, *value), cx.theme.strong()));
+            rows.push((wire_words(cx.def().tag(*tag)), cx.theme.dim()));
+        }
+        rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));
+        let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(34);
+        let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + 2));
+        for (y, (text, style)) in rows.iter().enumerate() {
+            canvas.text(0, y as u16, text, *style);
+        }
+        let last = canvas.height().saturating_sub(1);
+        canvas.text(0, last, &format!("⏎ {}   Esc leave it as it is", self.verb()), cx.theme.strong());
+    }
+}
+
+/// `old 60.0 °C → new 70.0 °C`; an unknown old value is said to be unknown.
+pub(super) fn old_and_new(cx: &Cx, tag: TagId, new: f64) -> String {
+    let old = value::show(cx, tag).whole();
+    let unit = cx.snapshot.unit(tag);
+    let new = cx.snapshot.format(tag, new);
+    format!("old {old}  →  new {new}{}{unit}", if unit.is_empty() { "" } else { " " })
+}
+
+/// Where a write goes, in both forms that manuals use: `41007 / 0x03EE, FC 06 / 0x06`.
+pub fn wire_words(def: &TagDef) -> String {
+    let fc = def.write_fc.unwrap_or(match (def.point.table, def.point.len()) {
+        (Table::Coil | Table::Discrete, _) => 5,
+        (Table::Input | Table::Holding, 1) => 6,
+        (Table::Input | Table::Holding, _) => 16,
+    });
+    let address = def.point.address;
+    format!("{} / 0x{address:04X}, FC {fc:02} / 0x{fc:02X}", def.point.table.modicon(address))
+}
+
+/// What the profile wants said before a write.
+pub(super) fn write_notes(def: &TagDef) -> Vec<String> {
+    let mut notes: Vec<String> = def.confirm.iter().cloned().collect();
+    match def.confidence {
+        Confidence::Proven | Confidence::High => {}
+        Confidence::Medium => notes.push("! not verified: this row of the register map has one source".to_owned()),
+        Confidence::Low => notes.push("! not verified: this row of the register map is inferred".to_owned()),
+    }
+    notes
+}
+
+/// The name of what an alarm watches.
+pub fn subject(cx: &Cx, alarm: crate::plant::def::AlarmId) -> String {
+    use crate::plant::def::Subject;
+    match cx.def().alarm(alarm).subject {
+        Subject::Tag(tag) => cx.def().tag(tag).name.clone(),
+        Subject::Device(device) => cx.def().device(device).name.clone(),
+    }
+}

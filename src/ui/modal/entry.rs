@@ -1,0 +1,129 @@
+//! A number for a tag: old value, new value, range, address, and what the profile wants said.
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect, style::Style};
+
+use super::{
+    Confirm, Modal, Next,
+    confirm::{wire_words, write_notes},
+    line::Line,
+    window,
+};
+use crate::{
+    plant::{command::Command, def::TagId},
+    ui::{
+        Act, Cx, keys,
+        widgets::{
+            text::{width, wrap},
+            value,
+        },
+    },
+};
+
+/// A number on its way into a tag.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Which tag.
+    pub tag: TagId,
+    /// What has been typed.
+    pub line: Line,
+    /// Why the last Enter was not taken.
+    pub problem: Option<String>,
+}
+
+impl Entry {
+    /// An empty entry.
+    pub fn new(tag: TagId) -> Entry {
+        Entry { tag, line: Line::only("0123456789.-"), problem: None }
+    }
+
+    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+        if keys::code(KeyCode::Enter).is(event) {
+            match check(cx, self.tag, &self.line.text()) {
+                Ok(value) if cx.def().tag(self.tag).confirm.is_some() => {
+                    return Next::Stay(Modal::Confirm(Confirm::write(cx, self.tag, value)));
+                }
+                Ok(value) => return Next::Do(vec![Act::Order(Command::Write { tag: self.tag, value })]),
+                Err(problem) => self.problem = Some(problem),
+            }
+        } else if self.line.on_key(event) {
+            self.problem = None;
+        }
+        Next::Stay(Modal::Entry(self))
+    }
+
+    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+        let theme = cx.theme;
+        let def = cx.def().tag(self.tag);
+        let room = body.width.saturating_sub(8).min(64);
+        let mut rows: Vec<(String, Style)> = vec![(range_words(cx, self.tag), theme.normal()), (wire_words(def), theme.dim())];
+        let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
+        rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
+        let problem = self.problem.clone().unwrap_or_default();
+        let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&problem)).max(46);
+        let title = format!("write {} {}", def.name, def.label);
+        let mut canvas = window(cx, frame, body, &title, (inner, rows.len() as u16 + 4));
+        let old = value::show(cx, self.tag);
+        let x = canvas.text(0, 0, "old ", theme.dim());
+        let x = canvas.text(x, 0, &old.whole(), old.style);
+        let x = canvas.text(x, 0, "  →  new ", theme.dim());
+        let x = self.line.view(theme, &mut canvas, x, 0);
+        canvas.text(x + 1, 0, cx.snapshot.unit(self.tag), theme.normal());
+        for (y, (text, style)) in rows.iter().enumerate() {
+            canvas.text(0, y as u16 + 1, text, *style);
+        }
+        let last = canvas.height().saturating_sub(1);
+        canvas.text(0, last.saturating_sub(1), &problem, theme.trouble());
+        canvas.text(0, last, "⏎ write and verify   Esc leave unchanged", theme.strong());
+    }
+}
+
+/// The permitted range in words.
+pub fn range_words(cx: &Cx, tag: TagId) -> String {
+    match cx.snapshot.range(tag) {
+        Some((min, max)) => {
+            let unit = cx.snapshot.unit(tag);
+            format!("range {} … {} {unit}", cx.snapshot.format(tag, min), cx.snapshot.format(tag, max)).trim_end().to_owned()
+        }
+        None => "range not known".to_owned(),
+    }
+}
+
+/// The number if it can be written; else what is wrong with it. Courtesy: the station checks again.
+fn check(cx: &Cx, tag: TagId, text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| if text.is_empty() { "type a number".to_owned() } else { format!("{text} is not a number") })?;
+    let decimals = usize::from(cx.snapshot.decimals[tag.index()]);
+    let typed = text.split_once('.').map_or(0, |(_, fraction)| fraction.trim_end_matches('0').len());
+    if typed > decimals {
+        return Err(match decimals {
+            0 => "whole numbers only".to_owned(),
+            n => format!("at most {n} decimals"),
+        });
+    }
+    match cx.snapshot.range(tag) {
+        Some((min, max)) if !(min..=max).contains(&value) => Err(format!("outside {}", range_words(cx, tag))),
+        Some(_) | None => Ok(value),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ui::fixture::{Fixture, with_cx};
+
+    #[test]
+    fn a_wrong_number_is_told_before_it_is_sent() {
+        let fixture = Fixture::normal();
+        let sv = fixture.tag("TIC-1.SV");
+        with_cx(&fixture.snapshot(), |cx| {
+            let check = |text: &str, expect: Result<f64, &str>| assert_eq!(check(cx, sv, text), expect.map_err(str::to_owned), "{text}");
+            check("70", Ok(70.0));
+            check("70.5", Ok(70.5));
+            check("70.50", Ok(70.5));
+            check("", Err("type a number"));
+            check("7-0", Err("7-0 is not a number"));
+            check("70.55", Err("at most 1 decimals"));
+            check("1000", Err("outside range 0.0 … 120.0 °C"));
+        });
+    }
+}

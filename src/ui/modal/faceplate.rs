@@ -1,0 +1,141 @@
+//! What there is to know about an item of the mimic: its tags with value, quality, age, range, alarms and device.
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect, style::Style};
+
+use super::{Modal, Next, confirm::wire_words, entry::range_words, window};
+use crate::{
+    plant::{
+        def::TagId,
+        sample::Quality,
+        snapshot::DeviceState,
+        tag::{Access, Poll},
+    },
+    ui::{
+        Cx, keys,
+        keys::Hint,
+        widgets::{
+            text::{age, clock, fit, pad, width, wrap},
+            value,
+        },
+    },
+};
+
+/// The tags of an item, one of them looked at closely.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Faceplate {
+    title: String,
+    tags: Vec<TagId>,
+    selected: usize,
+}
+
+impl Faceplate {
+    /// A faceplate; `None` for an item without tags.
+    pub fn new(title: impl Into<String>, tags: Vec<TagId>) -> Option<Faceplate> {
+        (!tags.is_empty()).then(|| Faceplate { title: title.into(), tags, selected: 0 })
+    }
+
+    pub(super) fn hints(&self, cx: &Cx) -> Vec<Hint> {
+        let hint = |key: &str, label: &str| Hint::new(key, label, "");
+        let mut hints = Vec::new();
+        if self.tags.len() > 1 {
+            hints.push(hint("↑↓", "select"));
+        }
+        if cx.def().tag(self.tag()).writable() {
+            hints.push(hint("⏎", "write"));
+        }
+        hints.push(hint("Esc", "close"));
+        hints
+    }
+
+    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+        match event.code {
+            KeyCode::Up => self.selected = self.selected.saturating_sub(1),
+            KeyCode::Down => self.selected = (self.selected + 1).min(self.tags.len() - 1),
+            KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => {
+                return Next::Stay(Modal::write(cx, self.tag()).unwrap_or(Modal::Faceplate(self)));
+            }
+            KeyCode::Char('q') => return Next::Close,
+            _ => {}
+        }
+        Next::Stay(Modal::Faceplate(self))
+    }
+
+    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+        let names = self.tags.iter().map(|tag| width(&cx.def().tag(*tag).name)).max().unwrap_or(0);
+        let room = body.width.saturating_sub(8).min(64);
+        let details = details(cx, self.tag(), room);
+        let list = self.tags.len() as u16;
+        let mut canvas = window(cx, frame, body, &self.title, (room, list + 1 + details.len() as u16));
+        for (y, tag) in self.tags.iter().enumerate() {
+            let y = y as u16;
+            let def = cx.def().tag(*tag);
+            let shown = value::show(cx, *tag);
+            let name = if usize::from(y) == self.selected { cx.theme.focus() } else { cx.theme.normal() };
+            let x = canvas.text(0, y, &pad(&def.name, names), name);
+            let x = canvas.text(x + 2, y, &shown.whole(), shown.style);
+            let left = canvas.width().saturating_sub(x + 2);
+            canvas.text(x + 2, y, &fit(&def.label, left), cx.theme.dim());
+        }
+        for (y, (label, text, style)) in details.iter().enumerate() {
+            let y = list + 1 + y as u16;
+            canvas.text(0, y, label, cx.theme.dim());
+            canvas.text(9, y, text, *style);
+        }
+    }
+
+    fn tag(&self) -> TagId {
+        self.tags[self.selected.min(self.tags.len() - 1)]
+    }
+}
+
+/// What is known about one tag: (label, words, style).
+fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)> {
+    let (theme, def, sample) = (cx.theme, cx.def().tag(tag), cx.snapshot.sample(tag));
+    let quality = match sample.quality {
+        Quality::Good => "good".to_owned(),
+        Quality::Uncertain(cause) => format!("uncertain: {}", cause.words()),
+        Quality::Bad(cause) => format!("bad: {}", cause.words()),
+    };
+    let read = format!("{} ago, {}", age(cx.age(tag)), clock(sample.at, &cx.def().time_zone));
+    let poll = match def.poll {
+        Poll::Every(period) => format!("every {} s", period.as_secs_f64()),
+        Poll::Once => "once, and on refresh".to_owned(),
+        Poll::Never => "never by itself".to_owned(),
+    };
+    let access = match def.access {
+        Access::Read => "read only",
+        Access::ReadWrite => "read and write",
+        Access::Write => "write only",
+    };
+    let device = cx.def().device(def.device);
+    let mut rows = vec![
+        ("quality", quality, theme.quality(sample.quality)),
+        ("read", format!("{read} ({poll})"), theme.normal()),
+        ("range", range_words(cx, tag).trim_start_matches("range ").to_owned(), theme.normal()),
+        ("access", format!("{access}  {}  {}", wire_words(def), def.confidence.word()), theme.normal()),
+        ("device", format!("{} {} unit {} on {}  {}", device.name, device.model, device.unit, cx.def().line(device.line).name, device_words(cx, def.device)), theme.normal()),
+    ];
+    for alarm in cx.snapshot.alarms_of(tag) {
+        let def = cx.def().alarm(alarm.id);
+        let text = format!("{} {} {}", theme.priority_mark(def.priority), def.text, alarm.state.word());
+        rows.push(("alarm", text, theme.alarm(def.priority, alarm.state, cx.flash())));
+    }
+    let meaning = wrap(&def.meaning, room.saturating_sub(9));
+    rows.extend(meaning.into_iter().enumerate().map(|(n, line)| (if n == 0 { "meaning" } else { "" }, line, theme.normal())));
+    rows
+}
+
+/// How a device stands, in words.
+pub fn device_words(cx: &Cx, device: crate::plant::def::DeviceId) -> String {
+    let status = cx.snapshot.device(device);
+    match status.state {
+        DeviceState::Unknown => "not asked yet".to_owned(),
+        DeviceState::Answering => match status.reply {
+            Some(reply) => format!("answering in {} ms", reply.as_millis()),
+            None => "answering".to_owned(),
+        },
+        DeviceState::Failing(n) => format!("failing, {n} in a row"),
+        DeviceState::Down { since } => format!("DOWN since {}", clock(since, &cx.def().time_zone)),
+    }
+}

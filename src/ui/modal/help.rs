@@ -1,0 +1,44 @@
+//! All keys of the shown tab and of every tab, from their tables.
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect};
+
+use super::{Modal, Next, window};
+use crate::ui::{
+    Cx, keys,
+    keys::Hint,
+    tabs::Tabs,
+    widgets::text::{pad, width},
+};
+
+pub(super) fn on_key(row: u16, event: KeyEvent) -> Next {
+    match event.code {
+        KeyCode::Up => Next::Stay(Modal::Help(row.saturating_sub(1))),
+        KeyCode::Down => Next::Stay(Modal::Help((row + 1).min(99))),
+        KeyCode::PageUp => Next::Stay(Modal::Help(row.saturating_sub(10))),
+        KeyCode::PageDown => Next::Stay(Modal::Help((row + 10).min(99))),
+        KeyCode::Char('q' | '?') | KeyCode::Enter => Next::Close,
+        _ => Next::Stay(Modal::Help(row)),
+    }
+}
+
+pub(super) fn view(row: u16, cx: &Cx, tabs: &Tabs, frame: &mut Frame, body: Rect) {
+    let own = tabs.hints(cx);
+    let global = keys::hints(keys::GLOBAL);
+    let heading = |text: &str| Hint::new("", text, "");
+    let rows: Vec<Hint> = [heading(tabs.shown.title())].into_iter().chain(own).chain([heading(""), heading("every tab")]).chain(global).collect();
+    let keys = rows.iter().map(|hint| width(&hint.key)).max().unwrap_or(0);
+    let inner = rows.iter().map(|hint| keys + 2 + width(&hint.help)).max().unwrap_or(0).max(40);
+    let shown = body.height.saturating_sub(2);
+    let first = row.min((rows.len() as u16).saturating_sub(shown));
+    let mut canvas = window(cx, frame, body, "keys", (inner, rows.len() as u16));
+    for (y, hint) in rows.iter().skip(usize::from(first)).enumerate() {
+        let y = y as u16;
+        if hint.key.is_empty() {
+            canvas.text(0, y, &hint.label, cx.theme.dim());
+        } else {
+            let x = canvas.text(0, y, &pad(&hint.key, keys + 2), cx.theme.strong());
+            canvas.text(x, y, &hint.help, cx.theme.normal());
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Windows on top of a tab: they get every key until they close, and carry the finished intent.
+
+pub mod choice;
+pub mod confirm;
+pub mod entry;
+pub mod faceplate;
+pub mod help;
+pub mod line;
+pub mod prompt;
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect};
+
+pub use choice::Choice;
+pub use confirm::{Confirm, Intent};
+pub use entry::Entry;
+pub use faceplate::Faceplate;
+pub use prompt::Prompt;
+
+use super::{
+    Act, Cx,
+    keys::{self, Hint},
+    tabs::Tabs,
+    widgets::text::{Canvas, fit, width},
+};
+use crate::plant::def::TagId;
+
+/// A window.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Modal {
+    /// All keys; the number is the first row shown.
+    Help(u16),
+    /// Do it or not.
+    Confirm(Confirm),
+    /// A number for a tag.
+    Entry(Entry),
+    /// One of a few.
+    Choice(Choice),
+    /// A text for the tab below.
+    Prompt(Prompt),
+    /// What there is to know about an item of the mimic.
+    Faceplate(Faceplate),
+}
+
+/// What a key did to a window.
+#[derive(Debug)]
+pub enum Next {
+    /// It stays.
+    Stay(Modal),
+    /// It is gone.
+    Close,
+    /// It is gone, and this is to be done.
+    Do(Vec<Act>),
+}
+
+impl Modal {
+    /// The window in which an operator writes this tag: a list for an enumeration, else a number; `None` if it is read-only.
+    pub fn write(cx: &Cx, tag: TagId) -> Option<Modal> {
+        let def = cx.def().tag(tag);
+        match (def.writable(), def.labels.is_empty()) {
+            (false, _) => None,
+            (true, true) => Some(Modal::Entry(Entry::new(tag))),
+            (true, false) => Some(Modal::Choice(Choice::values(cx, tag))),
+        }
+    }
+
+    /// A key: what is left of the window, and what is to be done.
+    pub fn on_key(self, cx: &Cx, tabs: &mut Tabs, event: KeyEvent) -> (Option<Modal>, Vec<Act>) {
+        if keys::code(KeyCode::Esc).is(event) {
+            return (None, Vec::new());
+        }
+        if keys::ctrl('c').is(event) {
+            return (Some(Modal::Confirm(Confirm::quit())), Vec::new());
+        }
+        let next = match self {
+            Modal::Help(row) => help::on_key(row, event),
+            Modal::Confirm(confirm) => confirm.on_key(event),
+            Modal::Entry(entry) => entry.on_key(cx, event),
+            Modal::Choice(choice) => choice.on_key(cx, event),
+            Modal::Prompt(prompt) => prompt.on_key(cx, tabs, event),
+            Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
+        };
+        match next {
+            Next::Stay(modal) => (Some(modal), Vec::new()),
+            Next::Close => (None, Vec::new()),
+            Next::Do(acts) => (None, acts),
+        }
+    }
+
+    /// Pasted text goes into a text line, or nowhere.
+    pub fn on_paste(&mut self, text: &str) {
+        match self {
+            Modal::Entry(entry) => entry.line.paste(text),
+            Modal::Prompt(prompt) => prompt.line.paste(text),
+            Modal::Help(_) | Modal::Confirm(_) | Modal::Choice(_) | Modal::Faceplate(_) => {}
+        }
+    }
+
+    /// The keys of the moment.
+    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+        let hint = |key: &str, label: &str| Hint::new(key, label, "");
+        match self {
+            Modal::Help(_) => vec![hint("↑↓", "scroll"), hint("Esc", "close")],
+            Modal::Confirm(confirm) => vec![hint("⏎", confirm.verb()), hint("Esc", "leave it as it is")],
+            Modal::Entry(_) => vec![hint("⏎", "write and verify"), hint("Esc", "leave unchanged")],
+            Modal::Choice(_) => vec![hint("↑↓", "select"), hint("⏎", "next"), hint("Esc", "leave unchanged")],
+            Modal::Prompt(_) => vec![hint("⏎", "take it"), hint("Esc", "leave")],
+            Modal::Faceplate(faceplate) => faceplate.hints(cx),
+        }
+    }
+
+    /// Draws it in the middle of the body.
+    pub fn view(&self, cx: &Cx, tabs: &Tabs, frame: &mut Frame, body: Rect) {
+        match self {
+            Modal::Help(row) => help::view(*row, cx, tabs, frame, body),
+            Modal::Confirm(confirm) => confirm.view(cx, frame, body),
+            Modal::Entry(entry) => entry.view(cx, frame, body),
+            Modal::Choice(choice) => choice.view(cx, frame, body),
+            Modal::Prompt(prompt) => prompt.view(cx, frame, body),
+            Modal::Faceplate(faceplate) => faceplate.view(cx, frame, body),
+        }
+    }
+}
+
+/// A cleared, framed window of this inner size in the middle of the body; drawn smaller where there is no room.
+pub(super) fn window<'a>(cx: &Cx, frame: &'a mut Frame, body: Rect, title: &str, inner: (u16, u16)) -> Canvas<'a> {
+    let width = inner.0.max(width(title) + 4).saturating_add(4).min(body.width);
+    let height = inner.1.saturating_add(2).min(body.height);
+    let area = Rect::new(body.x + (body.width - width) / 2, body.y + (body.height - height) / 2, width, height);
+    let mut canvas = Canvas::new(frame.buffer_mut(), area);
+    canvas.clear();
+    canvas.frame(&fit(title, width.saturating_sub(6)), cx.theme.strong());
+    let area = Rect::new(area.x + 2.min(width), area.y + 1.min(height), width.saturating_sub(4), height.saturating_sub(2));
+    Canvas::new(frame.buffer_mut(), area)
+}

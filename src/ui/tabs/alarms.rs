@@ -1,0 +1,49 @@
+//! The alarms tab.
+
+use ratatui::{Frame, layout::Rect};
+
+use crate::{
+    history::{Answer, HistoryError},
+    plant::snapshot::Snapshot,
+    ui::{Act, Cx, keys::Key},
+};
+
+/// What a key means here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {}
+
+/// Keys of this tab.
+pub const KEYS: &[Key<Action>] = &[];
+
+/// State of this tab.
+#[derive(Debug)]
+pub struct Alarms {}
+
+impl Alarms {
+    /// As it is at the start.
+    pub fn new(_snapshot: &Snapshot) -> Alarms {
+        Alarms {}
+    }
+    /// A key of [`KEYS`].
+    pub fn on_key(&mut self, _cx: &Cx, action: Action) -> Vec<Act> {
+        match action {}
+    }
+    /// News, or time has passed.
+    pub fn on_snapshot(&mut self, _cx: &Cx) -> Vec<Act> {
+        Vec::new()
+    }
+    /// The history answered question `number`.
+    pub fn on_answer(&mut self, _cx: &Cx, _number: u32, _answer: Result<Answer, HistoryError>) -> Vec<Act> {
+        Vec::new()
+    }
+    /// The selected alarm.
+    pub fn selected<'a>(&self, cx: &Cx<'a>) -> Option<&'a crate::plant::snapshot::ActiveAlarm> {
+        cx.snapshot.alarms.first()
+    }
+    /// The text of an entry window.
+    pub fn on_text(&mut self, _cx: &Cx, _text: &str) -> Result<Vec<Act>, String> {
+        Ok(Vec::new())
+    }
+    /// Draws it.
+    pub fn view(&self, _cx: &Cx, _frame: &mut Frame, _area: Rect) {}
+}

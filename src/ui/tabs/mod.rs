@@ -1,0 +1,159 @@
+//! The tabs: which there are, which one is shown, and the calls that each of them answers.
+//!
+//! The contract of a tab is a struct with `KEYS`, `on_key`, `on_snapshot` (called on every snapshot, tick and resize, and
+//! when it is shown, only while it is shown: ask here what is due), `on_answer`, `view`, and where it opens a text entry, `on_text`.
+
+pub mod alarms;
+pub mod controllers;
+pub mod mimic;
+pub mod reports;
+pub mod trends;
+
+use crossterm::event::KeyEvent;
+use ratatui::{Frame, layout::Rect};
+
+use super::{
+    Act, AskId, Cx,
+    keys::{self, Hint},
+};
+use crate::{
+    history::{Answer, HistoryError},
+    plant::snapshot::Snapshot,
+};
+
+/// A tab.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Tab {
+    /// The picture of the process.
+    Mimic,
+    /// Curves.
+    Trends,
+    /// Alarms and journal.
+    Alarms,
+    /// Parameters of the devices.
+    Controllers,
+    /// Shift reports.
+    Reports,
+}
+
+impl Tab {
+    /// Every tab, in the order of its number key.
+    pub const ALL: [Tab; 5] = [Tab::Mimic, Tab::Trends, Tab::Alarms, Tab::Controllers, Tab::Reports];
+
+    /// Its heading.
+    pub fn title(self) -> &'static str {
+        match self {
+            Tab::Mimic => "Mimic",
+            Tab::Trends => "Trends",
+            Tab::Alarms => "Alarms",
+            Tab::Controllers => "Controllers",
+            Tab::Reports => "Reports",
+        }
+    }
+    /// The tab so many further on, around the end.
+    pub fn step(self, by: isize) -> Tab {
+        let place = Tab::ALL.iter().position(|tab| *tab == self).unwrap_or(0) as isize;
+        Tab::ALL[(place + by).rem_euclid(Tab::ALL.len() as isize) as usize]
+    }
+}
+
+/// The state of all tabs.
+#[derive(Debug)]
+pub struct Tabs {
+    /// Which one is shown.
+    pub shown: Tab,
+    /// Tab 1.
+    pub mimic: mimic::Mimic,
+    /// Tab 2.
+    pub trends: trends::Trends,
+    /// Tab 3.
+    pub alarms: alarms::Alarms,
+    /// Tab 4.
+    pub controllers: controllers::Controllers,
+    /// Tab 5.
+    pub reports: reports::Reports,
+}
+
+impl Tabs {
+    /// All tabs as they are at the start.
+    pub fn new(snapshot: &Snapshot) -> Tabs {
+        Tabs {
+            shown: Tab::Mimic,
+            mimic: mimic::Mimic::new(snapshot),
+            trends: trends::Trends::new(snapshot),
+            alarms: alarms::Alarms::new(snapshot),
+            controllers: controllers::Controllers::new(snapshot),
+            reports: reports::Reports::new(snapshot),
+        }
+    }
+
+    /// A key for the shown tab; one that is in no table does nothing.
+    pub fn on_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+        fn act<A: Copy>(table: &[keys::Key<A>], event: KeyEvent, on_key: impl FnOnce(A) -> Vec<Act>) -> Vec<Act> {
+            keys::find(table, event).map(on_key).unwrap_or_default()
+        }
+        match self.shown {
+            Tab::Mimic => match keys::find(mimic::KEYS, event) {
+                Some(action) => self.mimic.on_key(cx, action),
+                None => self.mimic.on_command_key(cx, event),
+            },
+            Tab::Trends => act(trends::KEYS, event, |action| self.trends.on_key(cx, action)),
+            Tab::Alarms => act(alarms::KEYS, event, |action| self.alarms.on_key(cx, action)),
+            Tab::Controllers => act(controllers::KEYS, event, |action| self.controllers.on_key(cx, action)),
+            Tab::Reports => act(reports::KEYS, event, |action| self.reports.on_key(cx, action)),
+        }
+    }
+
+    /// The keys of the shown tab.
+    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+        match self.shown {
+            Tab::Mimic => self.mimic.hints(cx),
+            Tab::Trends => keys::hints(trends::KEYS),
+            Tab::Alarms => keys::hints(alarms::KEYS),
+            Tab::Controllers => keys::hints(controllers::KEYS),
+            Tab::Reports => keys::hints(reports::KEYS),
+        }
+    }
+
+    /// News, or time has passed, or the tab was just shown.
+    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+        match self.shown {
+            Tab::Mimic => self.mimic.on_snapshot(cx),
+            Tab::Trends => self.trends.on_snapshot(cx),
+            Tab::Alarms => self.alarms.on_snapshot(cx),
+            Tab::Controllers => self.controllers.on_snapshot(cx),
+            Tab::Reports => self.reports.on_snapshot(cx),
+        }
+    }
+
+    /// An answer goes to the tab that asked, shown or not.
+    pub fn on_answer(&mut self, cx: &Cx, id: AskId, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+        match id.tab {
+            Tab::Mimic => self.mimic.on_answer(cx, id.number, answer),
+            Tab::Trends => self.trends.on_answer(cx, id.number, answer),
+            Tab::Alarms => self.alarms.on_answer(cx, id.number, answer),
+            Tab::Controllers => Vec::new(),
+            Tab::Reports => self.reports.on_answer(cx, id.number, answer),
+        }
+    }
+
+    /// The text that was entered in a window which the shown tab had opened; `Err` keeps the window open and says why.
+    pub fn on_text(&mut self, cx: &Cx, text: &str) -> Result<Vec<Act>, String> {
+        match self.shown {
+            Tab::Trends => self.trends.on_text(cx, text),
+            Tab::Reports => self.reports.on_text(cx, text),
+            Tab::Mimic | Tab::Alarms | Tab::Controllers => Ok(Vec::new()),
+        }
+    }
+
+    /// Draws the shown tab.
+    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+        match self.shown {
+            Tab::Mimic => self.mimic.view(cx, frame, area),
+            Tab::Trends => self.trends.view(cx, frame, area),
+            Tab::Alarms => self.alarms.view(cx, frame, area),
+            Tab::Controllers => self.controllers.view(cx, frame, area),
+            Tab::Reports => self.reports.view(cx, frame, area),
+        }
+    }
+}

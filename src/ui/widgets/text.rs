@@ -1,0 +1,255 @@
+//! Text on a clipped canvas: no widget can write outside its area, whatever the size of the screen.
+
+use std::time::Duration;
+
+use jiff::{Timestamp, tz::TimeZone};
+use ratatui::{buffer::Buffer, layout::Rect, style::Style};
+use unicode_width::UnicodeWidthStr;
+
+use crate::ui::edge::thai_cells;
+
+/// A rectangle of the screen with coordinates of its own; what falls outside is not drawn.
+#[derive(Debug)]
+pub struct Canvas<'a> {
+    buffer: &'a mut Buffer,
+    area: Rect,
+}
+
+impl<'a> Canvas<'a> {
+    /// A canvas over a part of the buffer.
+    pub fn new(buffer: &'a mut Buffer, area: Rect) -> Canvas<'a> {
+        let area = area.intersection(buffer.area);
+        Canvas { buffer, area }
+    }
+    /// Columns.
+    pub fn width(&self) -> u16 {
+        self.area.width
+    }
+    /// Rows.
+    pub fn height(&self) -> u16 {
+        self.area.height
+    }
+    /// A part of this canvas as a canvas of its own.
+    pub fn part(&mut self, x: u16, y: u16, width: u16, height: u16) -> Canvas<'_> {
+        let wanted = Rect::new(self.area.x.saturating_add(x), self.area.y.saturating_add(y), width, height);
+        Canvas { area: wanted.intersection(self.area), buffer: self.buffer }
+    }
+    /// Writes text; returns the column after it.
+    pub fn text(&mut self, x: u16, y: u16, text: &str, style: Style) -> u16 {
+        let text = thai_cells(text);
+        if y < self.area.height && x < self.area.width {
+            let room = usize::from(self.area.width - x);
+            self.buffer.set_stringn(self.area.x + x, self.area.y + y, &text, room, style);
+        }
+        x.saturating_add(width(&text))
+    }
+    /// Writes text that ends before column `end`.
+    pub fn text_right(&mut self, end: u16, y: u16, text: &str, style: Style) {
+        self.text(end.saturating_sub(width(&thai_cells(text))), y, text, style);
+    }
+    /// Writes text in the middle of a row.
+    pub fn text_centred(&mut self, y: u16, text: &str, style: Style) {
+        self.text(self.width().saturating_sub(width(text)) / 2, y, text, style);
+    }
+    /// One character.
+    pub fn glyph(&mut self, x: u16, y: u16, glyph: char, style: Style) {
+        if let Some(cell) = self.cell(x, y) {
+            cell.set_char(glyph).set_style(style);
+        }
+    }
+    /// A horizontal run of one character.
+    pub fn run(&mut self, x: u16, y: u16, length: u16, glyph: char, style: Style) {
+        for column in x..x.saturating_add(length).min(self.area.width) {
+            self.glyph(column, y, glyph, style);
+        }
+    }
+    /// Adds a style to a rectangle without changing its characters.
+    pub fn paint(&mut self, x: u16, y: u16, width: u16, height: u16, style: Style) {
+        let area = self.part(x, y, width, height).area;
+        self.buffer.set_style(area, style);
+    }
+    /// Blanks everything.
+    pub fn clear(&mut self) {
+        for y in 0..self.height() {
+            for x in 0..self.width() {
+                if let Some(cell) = self.cell(x, y) {
+                    cell.reset();
+                }
+            }
+        }
+    }
+    /// A frame along the edge, with a title.
+    pub fn frame(&mut self, title: &str, style: Style) {
+        let (right, bottom) = (self.width().saturating_sub(1), self.height().saturating_sub(1));
+        self.run(0, 0, self.width(), '─', style);
+        self.run(0, bottom, self.width(), '─', style);
+        for y in 0..self.height() {
+            self.glyph(0, y, '│', style);
+            self.glyph(right, y, '│', style);
+        }
+        for (x, y, corner) in [(0, 0, '┌'), (right, 0, '┐'), (0, bottom, '└'), (right, bottom, '┘')] {
+            self.glyph(x, y, corner, style);
+        }
+        if !title.is_empty() {
+            let text = fit(&format!(" {title} "), self.width().saturating_sub(4));
+            self.text(2, 0, &text, style);
+        }
+    }
+    /// The character that stands at a place.
+    pub fn symbol(&self, x: u16, y: u16) -> Option<&str> {
+        self.buffer.cell((self.area.x + x, self.area.y + y)).map(|cell| cell.symbol())
+    }
+    /// The part of the screen under this canvas.
+    pub fn area(&self) -> Rect {
+        self.area
+    }
+    /// The buffer, for widgets of the library.
+    pub fn buffer(&mut self) -> &mut Buffer {
+        self.buffer
+    }
+
+    fn cell(&mut self, x: u16, y: u16) -> Option<&mut ratatui::buffer::Cell> {
+        let inside = x < self.area.width && y < self.area.height;
+        inside.then(|| self.buffer.cell_mut((self.area.x + x, self.area.y + y))).flatten()
+    }
+}
+
+/// Columns that a text takes.
+pub fn width(text: &str) -> u16 {
+    text.width().try_into().unwrap_or(u16::MAX)
+}
+
+/// The text, cut with `…` where it is too wide.
+pub fn fit(text: &str, room: u16) -> String {
+    if width(text) <= room {
+        return text.to_owned();
+    }
+    let mut out = String::new();
+    for c in text.chars() {
+        if width(&out) + width(c.encode_utf8(&mut [0; 4])) + 1 > room {
+            break;
+        }
+        out.push(c);
+    }
+    if room > 0 {
+        out.push('…');
+    }
+    out
+}
+
+/// The text, cut or filled with blanks to exactly this width.
+pub fn pad(text: &str, room: u16) -> String {
+    let text = fit(text, room);
+    let blanks = room.saturating_sub(width(&text));
+    format!("{text}{}", " ".repeat(usize::from(blanks)))
+}
+
+/// The text, cut or filled from the left to exactly this width.
+pub fn pad_left(text: &str, room: u16) -> String {
+    let text = fit(text, room);
+    let blanks = room.saturating_sub(width(&text));
+    format!("{}{text}", " ".repeat(usize::from(blanks)))
+}
+
+/// The text in lines of at most this width, broken between words where possible.
+pub fn wrap(text: &str, room: u16) -> Vec<String> {
+    let mut lines = Vec::new();
+    let mut line = String::new();
+    for word in text.split_whitespace() {
+        if !line.is_empty() && width(&line) + 1 + width(word) > room {
+            lines.push(std::mem::take(&mut line));
+        }
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line.push_str(word);
+    }
+    if !line.is_empty() {
+        lines.push(line);
+    }
+    lines.into_iter().map(|line| fit(&line, room)).collect()
+}
+
+/// How long ago, short: `0.4s`, `12s`, `4m12s`, `3h05m`, `2d`.
+pub fn age(span: Duration) -> String {
+    let seconds = span.as_secs();
+    match seconds {
+        0..=99 => format!("{seconds}s"),
+        100..=5_999 => format!("{}m{:02}s", seconds / 60, seconds % 60),
+        6_000..=172_799 => format!("{}h{:02}m", seconds / 3_600, seconds / 60 % 60),
+        _ => format!("{}d", seconds / 86_400),
+    }
+}
+
+/// A running time: `00:41`, `1:02:03`, `2d 03:04`.
+pub fn running(span: Duration) -> String {
+    let (seconds, minutes, hours) = (span.as_secs() % 60, span.as_secs() / 60 % 60, span.as_secs() / 3_600);
+    match hours {
+        0 => format!("{minutes:02}:{seconds:02}"),
+        1..=23 => format!("{hours}:{minutes:02}:{seconds:02}"),
+        _ => format!("{}d {:02}:{minutes:02}", hours / 24, hours % 24),
+    }
+}
+
+/// Time between two instants, zero if the second is not later.
+pub fn between(from: Timestamp, to: Timestamp) -> Duration {
+    Duration::try_from(to.duration_since(from)).unwrap_or_default()
+}
+
+/// Local time of day: `14:02:31`.
+pub fn clock(at: Timestamp, zone: &TimeZone) -> String {
+    at.to_zoned(zone.clone()).strftime("%H:%M:%S").to_string()
+}
+
+/// Local date and time, without the date when it is the same day as `now`.
+pub fn moment(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
+    let (at, now) = (at.to_zoned(zone.clone()), now.to_zoned(zone.clone()));
+    let form = if at.date() == now.date() { "%H:%M:%S" } else { "%m-%d %H:%M" };
+    at.strftime(form).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cut_text_says_that_it_is_cut() {
+        assert_eq!(fit("temperature", 11), "temperature");
+        assert_eq!(fit("temperature", 6), "tempe…");
+        assert_eq!(fit("temperature", 1), "…");
+        assert_eq!(fit("temperature", 0), "");
+        assert_eq!(pad("PV", 4), "PV  ");
+        assert_eq!(pad_left("7", 3), "  7");
+    }
+
+    #[test]
+    fn spans_read_as_a_technician_says_them() {
+        let check = |seconds, short: &str, long: &str| {
+            let span = Duration::from_secs(seconds);
+            assert_eq!((age(span).as_str(), running(span).as_str()), (short, long));
+        };
+        check(0, "0s", "00:00");
+        check(41, "41s", "00:41");
+        check(252, "4m12s", "04:12");
+        check(11_100, "3h05m", "3:05:00");
+        check(200_000, "2d", "2d 07:33");
+    }
+
+    #[test]
+    fn lines_break_between_words() {
+        assert_eq!(wrap("lower SV or stop; check SSR lamp", 12), ["lower SV or", "stop; check", "SSR lamp"]);
+        assert_eq!(wrap("", 12), Vec::<String>::new());
+    }
+
+    #[test]
+    fn nothing_is_drawn_outside_a_canvas() {
+        let mut buffer = Buffer::empty(Rect::new(0, 0, 6, 3));
+        let mut canvas = Canvas::new(&mut buffer, Rect::new(2, 1, 2, 1));
+        canvas.text(0, 0, "abcdef", Style::new());
+        canvas.text(0, 1, "below", Style::new());
+        canvas.glyph(9, 9, 'x', Style::new());
+        canvas.part(1, 0, 9, 9).run(0, 0, 9, '-', Style::new());
+        let text: String = buffer.content.iter().map(|cell| cell.symbol()).collect();
+        assert_eq!(text, "        a-        ");
+    }
+}

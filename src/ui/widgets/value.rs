@@ -1,0 +1,60 @@
+//! A value as an operator sees it: number, unit and how far to trust it, with one look everywhere.
+
+use ratatui::style::Style;
+
+use super::text;
+use crate::{
+    plant::{
+        def::TagId,
+        sample::{Cause, Quality},
+    },
+    ui::Cx,
+};
+
+/// The parts of a shown value, to be arranged as there is room.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shown {
+    /// `72.4`, `72.4?` or `----`.
+    pub text: String,
+    /// `°C`; empty without a value.
+    pub unit: String,
+    /// Why not to trust it: the age of an uncertain value, the cause of a bad one; empty if good.
+    pub note: String,
+    /// Look of the text.
+    pub style: Style,
+}
+
+/// A tag as it stands.
+pub fn show(cx: &Cx, tag: TagId) -> Shown {
+    let sample = cx.snapshot.sample(tag);
+    let style = cx.theme.quality(sample.quality);
+    let unit = cx.snapshot.unit(tag).to_owned();
+    match (sample.quality, cx.snapshot.text(tag)) {
+        (Quality::Good, Some(text)) => Shown { text, unit, note: String::new(), style },
+        (Quality::Uncertain(_), Some(text)) => Shown { text: format!("{text}?"), unit, note: text::age(cx.age(tag)), style },
+        (quality, _) => {
+            let note = quality.cause().unwrap_or(Cause::NotRead).words().to_owned();
+            Shown { text: "----".to_owned(), unit: String::new(), note, style }
+        }
+    }
+}
+
+impl Shown {
+    /// Value and unit: `72.4 °C`.
+    pub fn with_unit(&self) -> String {
+        if self.unit.is_empty() { self.text.clone() } else { format!("{} {}", self.text, self.unit) }
+    }
+    /// All of it: `72.4? °C 12s`, `---- device not answering`.
+    pub fn whole(&self) -> String {
+        if self.note.is_empty() { self.with_unit() } else { format!("{} {}", self.with_unit(), self.note) }
+    }
+    /// As much as fits: the note goes first, then the unit; the doubt itself is part of the text and stays.
+    pub fn within(&self, room: u16) -> String {
+        [self.whole(), self.with_unit()].into_iter().find(|text| text::width(text) <= room).unwrap_or_else(|| text::fit(&self.text, room))
+    }
+}
+
+/// `on` for a good value that is not zero; `None` when nobody can say.
+pub fn is_on(cx: &Cx, tag: TagId) -> Option<bool> {
+    cx.snapshot.sample(tag).trusted().map(|value| value != 0.0)
+}
