@@ -140,7 +140,7 @@ impl Chart<'_> {
             let spans = same().flat_map(|(_, columns)| columns.iter().flatten()).map(|span| (span.min, span.max));
             let fixed = same().filter_map(|(curve, _)| curve.fixed);
             let resolution = same().map(|(curve, _)| curve.resolution).fold(f64::INFINITY, f64::min);
-            Scale::fit(spans.reduce(widen), fixed.reduce(widen), resolution, rows.div_ceil(3).min(6))
+            Scale::fit(spans.reduce(widen), fixed.reduce(widen), resolution, rows.div_ceil(2).min(6))
         };
         self.axes().into_iter().zip(self.curves.iter().map(scale)).collect()
     }
@@ -271,10 +271,11 @@ impl Chart<'_> {
         while x < past && !plan.columns.is_empty() {
             let end = (x..past).find(known).unwrap_or(past);
             let (first, last) = (x.div_ceil(across) as u16, (end / across) as u16);
-            let text = format!("no data {}", span_words(span.mul_f64((end - x) as f64 / count as f64)));
-            let width = text.width() as u16;
-            if last >= first + width + 2 {
-                let start = plot.x + first + (last - first - width) / 2;
+            let length = span_words(span.mul_f64((end - x) as f64 / count as f64));
+            let texts = [format!("no data {length}"), format!("gap {length}"), length];
+            let fits = |text: &String| first + text.width() as u16 + 2 <= last;
+            if let Some(text) = texts.into_iter().find(fits) {
+                let start = plot.x + first + (last - first - text.width() as u16) / 2;
                 buf.set_string(start, plot.y + plot.height / 2, text, self.theme.dim());
             }
             x = end + 1;
@@ -363,7 +364,8 @@ impl Chart<'_> {
         if plot.y > area.y {
             buf[(x, plot.bottom())].set_symbol(self.theme.pick("┷", "^")).set_style(self.theme.normal());
             let width = (words.width() as u16).min(plot.width);
-            let start = x.saturating_sub(width / 2).clamp(plot.x, plot.right() - width);
+            let end = plot.right().saturating_sub(2).max(plot.x + width);
+            let start = x.saturating_sub(width / 2).clamp(plot.x, end - width);
             buf.set_line(start, area.y, words, width);
         }
     }

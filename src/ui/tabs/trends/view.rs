@@ -4,7 +4,6 @@ use jiff::Timestamp;
 use ratatui::{
     Frame,
     layout::Rect,
-    style::Style,
     text::{Line, Span},
     widgets::Widget,
 };
@@ -19,9 +18,9 @@ use crate::{
     ui::{
         Cx,
         widgets::{
-            chart::{Axis, Chart, Curve, Plan, mark, span_words},
+            chart::{Axis, Chart, Curve, Plan, mark},
             spark::spark,
-            text::{Canvas, clock, fit, moment, pad, width},
+            text::{Canvas, clock, fit, moment, pad},
             value,
         },
     },
@@ -70,14 +69,16 @@ fn draw_title(trends: &Trends, cx: &Cx, canvas: &mut Canvas) {
         (None, None) => String::new(),
     };
     let mut x = canvas.text(1, 0, &name, theme.strong());
-    if def.trends.len() > 1 {
-        x = canvas.text(x + 1, 0, &format!("{}/{}", trends.group + 1, def.trends.len()), theme.dim());
+    let groups = def.trends.len() + usize::from(trends.picked.is_some());
+    if groups > 1 {
+        x = canvas.text(x + 1, 0, &format!("group {}/{}", trends.group + 1, groups), theme.dim());
     }
     x = match (trends.accumulate, trends.since) {
         (true, since) => {
             let from = since.filter(|since| *since > midnight(cx.now, zone));
-            let from = from.map_or("since midnight".to_owned(), |since| format!("since the first value at {}", clock(since, zone)));
-            canvas.text(x + 3, 0, &format!("all {from}"), theme.normal())
+            let local = |since: Timestamp| since.to_zoned(zone.clone()).strftime("%H:%M, the first value today").to_string();
+            let from = from.map_or("midnight".to_owned(), local);
+            canvas.text(x + 3, 0, &format!("all since {from}"), theme.normal())
         }
         (false, _) => canvas.text(x + 3, 0, &format!("window {}", window_words(WINDOWS[trends.window])), theme.normal()),
     };
@@ -262,12 +263,12 @@ fn draw_values(trends: &Trends, cx: &Cx, canvas: &mut Canvas, first: usize, sele
     let last = (first + rows).min(all.len());
     let x = canvas.text(1, 0, "All values", theme.strong());
     canvas.text(x + 3, 0, &format!("{}–{} of {}", (first + 1).min(last), last, all.len()), theme.dim());
-    let name = 15 + canvas.width().saturating_sub(80) / 5;
-    let label = name + canvas.width().saturating_sub(60) / 2;
-    let (value, low, high) = (label + 18, label + 28, label + 38);
+    let wide = canvas.width().saturating_sub(80);
+    let name = 15 + wide / 5;
+    let label = name + 18 + wide / 4;
+    let (value, low, high) = (label + 15, label + 23, label + 31);
     canvas.text(2, 1, "tag", theme.dim());
-    canvas.text(2 + name, 1, "", theme.dim());
-    for (end, text) in [(value, "now"), (low, "min"), (high, "max")] {
+    for (end, text) in [(value, "now"), (low, "1 h min"), (high, "1 h max")] {
         canvas.text_right(end, 1, text, theme.dim());
     }
     canvas.text(high + 2, 1, "last hour", theme.dim());
@@ -279,8 +280,8 @@ fn draw_values(trends: &Trends, cx: &Cx, canvas: &mut Canvas, first: usize, sele
             canvas.text(0, y, theme.pick("▸", ">"), theme.strong());
         }
         canvas.text(2, y, &pad(&def.name, name.saturating_sub(1)), style);
-        canvas.text(2 + name, y, &fit(&def.label, label.saturating_sub(name + 3)), theme.dim());
-        canvas.text_right(value, y, &shown.within(value.saturating_sub(label)), shown.style);
+        canvas.text(2 + name, y, &fit(&def.label, label - name - 2), theme.dim());
+        canvas.text_right(value, y, &shown.within(value - label), shown.style);
         let Some(series) = trends.data.hours.get(tag) else { continue };
         if let Some((min, _, max)) = series.summary.filter(|_| def.labels.is_empty()) {
             canvas.text_right(low, y, &cx.snapshot.format(*tag, min), theme.dim());

@@ -89,16 +89,18 @@ impl Trace {
         (0..count).map(column).collect()
     }
 
-    /// The history between `a` and `b`: the columns whose middle lies there, or else the one that covers the middle.
+    /// The history between `a` and `b`: the columns whose middle lies there; of columns wider than that, the one that
+    /// covers the middle. What the live values already tell is left to them.
     fn past_span(&self, a: i64, b: i64, live_from: i64) -> Option<Span> {
         let past = self.past.as_ref()?;
         let (from, step) = (past.from.as_microsecond(), micros(past.step).max(1));
         let index = |at: i64| (at - from).div_euclid(step);
-        let (mut first, mut last) = (index(a + step - step / 2 - 1), index(b + step - step / 2 - 1) - 1);
-        if last < first {
-            first = index(a + (b - a) / 2);
-            last = if a < live_from { first } else { first - 1 };
-        }
+        let (first, last) = if step > b - a {
+            let middle = index(a + (b - a) / 2);
+            (middle, if a < live_from { middle } else { middle - 1 })
+        } else {
+            (index(a + step - step / 2 - 1), index(b + step - step / 2 - 1) - 1)
+        };
         let wanted = first.max(0)..=last.min(past.buckets.len() as i64 - 1);
         let known = wanted.filter(|n| from + n * step < live_from);
         known.filter_map(|n| past.buckets[n as usize].and_then(span)).fold(None, |sum, next| join(sum, Some(next)))
@@ -194,6 +196,7 @@ mod tests {
     fn live_values_continue_the_past_and_hold_until_the_next() {
         check(&trace(&[1., 2.], &[(20, 7.), (35, 8.)]), 40, 40, 4, "1 2 7 7…8");
         check(&trace(&[1., 2., 3., 4.], &[(15, 7.)]), 40, 40, 4, "1 2…7 7 7");
+        check(&trace(&[1., 2.], &[(12, 7.)]), 20, 20, 8, "1 1 1 1 2…7 7 7 7");
         let mut gap = trace(&[1.], &[(10, 5.)]);
         gap.push(at(20), None);
         gap.push(at(30), Some(6.));
