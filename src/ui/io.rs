@@ -1,1 +1,228 @@
-//! The terminal's loop.
+//! The terminal's loop: keys, snapshots, answers and ticks become messages; effects become orders, questions and frames.
+
+mod screen;
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
+
+use crossterm::event::{Event, EventStream};
+use futures_util::StreamExt;
+use tokio::{
+    signal::unix::{SignalKind, signal},
+    sync::{mpsc, oneshot},
+    time::{Instant, MissedTickBehavior, interval, sleep_until},
+};
+
+use super::{AskId, Effect, Model, Msg, theme::Theme, update, view};
+use crate::{
+    history::{HistoryError, Query, Question},
+    plant::command::Order,
+    station::session::Session,
+};
+use screen::{Screen, own};
+
+/// Time between two ticks: flashing, motion, clock.
+const TICK: Duration = Duration::from_millis(500);
+/// Least time between two frames without a key.
+const FRAME: Duration = Duration::from_millis(250);
+/// Least time between two frames while keys come in.
+const ECHO: Duration = Duration::from_millis(30);
+/// Answers that may wait to be taken in; the history's own queue bounds the questions.
+const INBOX: usize = 32;
+
+/// What can be chosen about a terminal.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// How things look.
+    pub theme: Theme,
+}
+
+impl Default for Options {
+    /// Looks chosen by the environment.
+    fn default() -> Options {
+        Options { theme: Theme::detect(|name| std::env::var(name).ok()) }
+    }
+}
+
+/// Why a terminal ended, other than by its operator or a signal.
+#[derive(Debug, thiserror::Error)]
+pub enum UiError {
+    /// Standard input or output is no terminal, or a dumb one.
+    #[error("no terminal here: run in a terminal, or use --headless to run without screens")]
+    NotATerminal,
+    /// The terminal has gone or does not take what it is sent.
+    #[error("the terminal has gone: {0}")]
+    Lost(#[from] io::Error),
+    /// No snapshot will come any more.
+    #[error("the station has ended")]
+    StationGone,
+}
+
+/// Runs a terminal until its operator leaves it, a signal ends it, or the terminal or the station goes.
+/// The terminal is restored before this returns.
+pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
+    if !Screen::exists() {
+        return Err(UiError::NotATerminal);
+    }
+    let (outbox, inbox) = mpsc::channel(INBOX);
+    let mut session = session;
+    let snapshot = session.snapshots.borrow_and_update().clone();
+    let model = Model::new(snapshot, options.theme, session.terminal, Arc::clone(&session.operator));
+    let screen = Screen::raise()?;
+    Loop { session, model, screen, outbox, redraw_at: None, drawn_at: None, heard_at: Instant::now() }.run(inbox).await
+}
+
+struct Loop {
+    session: Session,
+    model: Model,
+    screen: Screen,
+    /// For answers and saved reports, which come from other tasks.
+    outbox: mpsc::Sender<Msg>,
+    /// When the next frame is due; `None` while the screen is up to date.
+    redraw_at: Option<Instant>,
+    drawn_at: Option<Instant>,
+    /// When the last snapshot came.
+    heard_at: Instant,
+}
+
+impl Loop {
+    async fn run(mut self, mut inbox: mpsc::Receiver<Msg>) -> Result<(), UiError> {
+        let mut events = EventStream::new();
+        let mut hangup = signal(SignalKind::hangup())?;
+        let mut terminate = signal(SignalKind::terminate())?;
+        let mut interrupt = signal(SignalKind::interrupt())?;
+        let mut ticks = interval(TICK);
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        let (width, height) = self.screen.size();
+        self.take(Msg::Resize(width, height), Duration::ZERO)?;
+        loop {
+            let due = self.redraw_at.unwrap_or_else(|| Instant::now() + FRAME);
+            let leave = tokio::select! {
+                // In this order: leaving before anything, keys before news.
+                biased;
+                _ = hangup.recv() => true,
+                _ = terminate.recv() => true,
+                _ = interrupt.recv() => true,
+                event = events.next() => match event {
+                    Some(event) => self.on_event(event?)?,
+                    None => return Err(UiError::Lost(io::ErrorKind::UnexpectedEof.into())),
+                },
+                () = sleep_until(due), if self.redraw_at.is_some() => {
+                    self.draw()?;
+                    false
+                }
+                changed = self.session.snapshots.changed() => {
+                    changed.map_err(|_| UiError::StationGone)?;
+                    self.heard_at = Instant::now();
+                    let snapshot = self.session.snapshots.borrow_and_update().clone();
+                    self.take(Msg::Snapshot(snapshot), FRAME)?
+                }
+                Some(msg) = inbox.recv() => self.take(msg, FRAME)?,
+                _ = ticks.tick() => {
+                    let silent = self.heard_at.elapsed();
+                    self.take(Msg::Tick { silent }, FRAME)?
+                }
+            };
+            if leave {
+                return Ok(());
+            }
+        }
+    }
+
+    fn on_event(&mut self, event: Event) -> Result<bool, UiError> {
+        match event {
+            Event::Key(key) => self.take(Msg::Key(key), ECHO),
+            Event::Paste(text) => self.take(Msg::Paste(text), ECHO),
+            Event::Resize(_, _) => {
+                self.screen.renew()?;
+                let (width, height) = self.screen.size();
+                self.take(Msg::Resize(width, height), ECHO)
+            }
+            Event::Mouse(_) | Event::FocusGained | Event::FocusLost => Ok(false),
+        }
+    }
+
+    /// Takes in a message; a frame follows no sooner than `pause` after the last one. `true`: leave.
+    fn take(&mut self, msg: Msg, pause: Duration) -> Result<bool, UiError> {
+        let effects = own(|| update(&mut self.model, msg));
+        let due = self.drawn_at.map_or_else(Instant::now, |at| at + pause);
+        self.redraw_at = Some(self.redraw_at.map_or(due, |planned| planned.min(due)));
+        for effect in effects {
+            match effect {
+                Effect::Order(id, command) => {
+                    let order = Order { id, by: Arc::clone(&self.session.operator), command };
+                    let why = match self.session.orders.try_send(order) {
+                        Ok(()) => continue,
+                        Err(mpsc::error::TrySendError::Full(_)) => "station too busy",
+                        Err(mpsc::error::TrySendError::Closed(_)) => "station has ended",
+                    };
+                    own(|| update(&mut self.model, Msg::Undelivered(id, why)));
+                }
+                Effect::Ask(id, question) => self.ask(id, question),
+                Effect::SaveReport { path, bytes } => self.save(path, bytes),
+                Effect::Redraw => self.screen.renew()?,
+                Effect::Quit => return Ok(true),
+            }
+        }
+        Ok(false)
+    }
+
+    fn ask(&self, id: AskId, question: Question) {
+        let (reply, answer) = oneshot::channel();
+        let sent = self.session.queries.try_send(Query { question, reply });
+        let outbox = self.outbox.clone();
+        tokio::spawn(async move {
+            let answer = match sent {
+                Ok(()) => answer.await.unwrap_or_else(|_| Err(HistoryError::Engine("the store has gone".to_owned()))),
+                Err(_) => Err(HistoryError::Engine("too busy, asked again later".to_owned())),
+            };
+            // A terminal that has left needs no answer.
+            let _ = outbox.send(Msg::Answer(id, answer)).await;
+        });
+    }
+
+    fn save(&self, path: PathBuf, bytes: Vec<u8>) {
+        let outbox = self.outbox.clone();
+        tokio::task::spawn_blocking(move || {
+            let saved = save(&path, &bytes).map_err(|error| format!("{}: {error}", path.display()));
+            let _ = outbox.blocking_send(Msg::Saved(saved));
+        });
+    }
+
+    fn draw(&mut self) -> Result<(), UiError> {
+        self.redraw_at = None;
+        self.screen.draw(|frame| view(&self.model, frame))?;
+        self.drawn_at = Some(Instant::now());
+        Ok(())
+    }
+}
+
+/// Writes beside and renames, so that a half-written report never has the name of a whole one.
+fn save(path: &Path, bytes: &[u8]) -> io::Result<PathBuf> {
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder)?;
+    }
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    std::fs::write(&part, bytes)?;
+    std::fs::rename(&part, path)?;
+    std::path::absolute(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_saved_report_is_whole_and_named() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("reports/morning.csv");
+        assert_eq!(save(&path, b"a,b\n").expect("a writable folder"), path);
+        assert_eq!(std::fs::read(&path).expect("the report"), b"a,b\n");
+        assert_eq!(std::fs::read_dir(folder.path().join("reports")).expect("the folder").count(), 1);
+    }
+}

@@ -24,7 +24,7 @@ use crate::{
     history::{Answer, HistoryError, Question},
     plant::{
         command::{Command, OrderId, OrderStatus},
-        def::{AlarmId, PlantDef},
+        def::{AlarmId, DeviceId, PlantDef},
         sample::Cause,
         snapshot::Snapshot,
     },
@@ -144,6 +144,8 @@ pub enum Act {
     Open(Modal),
     /// Show a tab.
     Show(Tab),
+    /// Show a device on the controllers tab.
+    ShowDevice(DeviceId),
     /// Give an order and watch its outcome.
     Order(Command),
     /// Pass on an effect as it is.
@@ -327,13 +329,10 @@ fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
     for act in acts {
         match act {
             Act::Open(modal) => model.modal = Some(modal),
-            Act::Show(tab) => {
-                model.tabs.shown = tab;
-                let asked = with_tabs(model, |tabs, cx| tabs.on_snapshot(cx));
-                effects.extend(asked.into_iter().filter_map(|act| match act {
-                    Act::Do(effect) => Some(effect),
-                    Act::Open(_) | Act::Show(_) | Act::Order(_) => None,
-                }));
+            Act::Show(tab) => effects.extend(show(model, tab)),
+            Act::ShowDevice(device) => {
+                model.tabs.controllers.show(device);
+                effects.extend(show(model, Tab::Controllers));
             }
             Act::Order(command) => {
                 model.ordered = model.ordered.wrapping_add(1);
@@ -345,6 +344,17 @@ fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
         }
     }
     effects
+}
+
+/// Shows a tab; it asks at once for what it needs.
+fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
+    model.tabs.shown = tab;
+    let asked = with_tabs(model, |tabs, cx| tabs.on_snapshot(cx));
+    let effects = asked.into_iter().filter_map(|act| match act {
+        Act::Do(effect) => Some(effect),
+        Act::Open(_) | Act::Show(_) | Act::ShowDevice(_) | Act::Order(_) => None,
+    });
+    effects.collect()
 }
 
 impl Intent {

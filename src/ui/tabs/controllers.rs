@@ -1,45 +1,277 @@
-//! The controllers tab.
+//! The controllers tab: every parameter of a device with unit, range and meaning, and the way to change it.
 
+use crossterm::event::KeyCode;
 use ratatui::{Frame, layout::Rect};
 
 use crate::{
-    history::{Answer, HistoryError},
-    plant::snapshot::Snapshot,
-    ui::{Act, Cx, keys::Key},
+    plant::{
+        command::Command,
+        def::{DeviceDef, DeviceId, TagId},
+        snapshot::{DeviceState, Snapshot},
+        tag::{Poll, TagDef},
+    },
+    ui::{
+        Act, Cx,
+        chrome::{order_words, outcome_words},
+        keys::{Key, char, code},
+        modal::{Choice, Faceplate, Modal, entry::range_words, faceplate::device_words},
+        widgets::{
+            text::{Canvas, age, clock, fit, pad, pad_left},
+            value,
+        },
+    },
 };
 
 /// What a key means here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {}
+pub enum Action {
+    /// Show the device so many further on.
+    Device(isize),
+    /// Select so many rows further on.
+    Move(isize),
+    /// Edit the selected parameter, or look at it if it is read-only.
+    Edit,
+    /// Read everything now.
+    Refresh,
+    /// Pick one of the device's actions.
+    Actions,
+    /// Start or stop auto-tuning.
+    Tune,
+    /// Run or standby.
+    Run,
+}
 
 /// Keys of this tab.
-pub const KEYS: &[Key<Action>] = &[];
+pub const KEYS: &[Key<Action>] = &[
+    Key { chord: code(KeyCode::Left), label: "", help: "previous device", action: Action::Device(-1) },
+    Key { chord: code(KeyCode::Right), label: "device", help: "next device", action: Action::Device(1) },
+    Key { chord: code(KeyCode::Up), label: "", help: "select the parameter above", action: Action::Move(-1) },
+    Key { chord: code(KeyCode::Down), label: "select", help: "select the parameter below", action: Action::Move(1) },
+    Key { chord: code(KeyCode::PageUp), label: "", help: "ten parameters up", action: Action::Move(-10) },
+    Key { chord: code(KeyCode::PageDown), label: "", help: "ten parameters down", action: Action::Move(10) },
+    Key { chord: code(KeyCode::Home), label: "", help: "first parameter", action: Action::Move(-9_999) },
+    Key { chord: code(KeyCode::End), label: "", help: "last parameter", action: Action::Move(9_999) },
+    Key { chord: code(KeyCode::Enter), label: "edit", help: "change the parameter, or look at a read-only one", action: Action::Edit },
+    Key { chord: char('u'), label: "refresh", help: "read all parameters of the device now", action: Action::Refresh },
+    Key { chord: char('f'), label: "actions", help: "actions of the device (save to memory)", action: Action::Actions },
+    Key { chord: char('T'), label: "tune", help: "auto-tuning, if the device has it", action: Action::Tune },
+    Key { chord: char('S'), label: "standby", help: "run or standby, if the device has it", action: Action::Run },
+];
 
 /// State of this tab.
 #[derive(Debug)]
-pub struct Controllers {}
+pub struct Controllers {
+    /// The device that is shown.
+    device: DeviceId,
+    /// The selected parameter, by its place among the device's tags.
+    selected: usize,
+}
 
 impl Controllers {
-    /// As it is at the start.
-    pub fn new(_snapshot: &Snapshot) -> Controllers {
-        Controllers {}
+    /// Starts with the first device that has a faceplate.
+    pub fn new(snapshot: &Snapshot) -> Controllers {
+        let devices = &snapshot.def.devices;
+        let first = devices.iter().find(|device| device.faceplate.is_some()).or(devices.first());
+        Controllers { device: first.map_or(DeviceId(0), |device| device.id), selected: 0 }
     }
+
+    /// Shows a device.
+    pub fn show(&mut self, device: DeviceId) {
+        *self = Controllers { device, selected: 0 };
+    }
+
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, _cx: &Cx, action: Action) -> Vec<Act> {
-        match action {}
+    pub fn on_key(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+        let Some(device) = self.device(cx) else { return Vec::new() };
+        let write = |tag: Option<TagId>| tag.and_then(|tag| Modal::write(cx, tag)).map(Act::Open).into_iter().collect();
+        match action {
+            Action::Device(by) => {
+                let count = cx.def().devices.len() as isize;
+                let next = (self.device.0 as isize + by).rem_euclid(count);
+                self.show(DeviceId(next as u16));
+                Vec::new()
+            }
+            Action::Move(by) => {
+                let last = cx.def().tags_of(self.device).count().saturating_sub(1);
+                self.selected = self.selected.saturating_add_signed(by).min(last);
+                Vec::new()
+            }
+            Action::Edit => match self.selected(cx) {
+                Some(tag) if tag.writable() => write(Some(tag.id)),
+                Some(tag) => Faceplate::new(tag.label.clone(), vec![tag.id]).map(|plate| Act::Open(Modal::Faceplate(plate))).into_iter().collect(),
+                None => Vec::new(),
+            },
+            Action::Refresh => vec![Act::Order(Command::Refresh(self.device))],
+            Action::Actions => Choice::actions(cx, self.device).map(|choice| Act::Open(Modal::Choice(choice))).into_iter().collect(),
+            Action::Tune => write(device.faceplate.as_ref().and_then(|plate| plate.tune)),
+            Action::Run => write(device.faceplate.as_ref().and_then(|plate| plate.run)),
+        }
     }
-    /// News, or time has passed.
+
+    /// Nothing is due here: all that is shown comes with the snapshot.
     pub fn on_snapshot(&mut self, _cx: &Cx) -> Vec<Act> {
         Vec::new()
     }
-    /// The history answered question `number`.
-    pub fn on_answer(&mut self, _cx: &Cx, _number: u32, _answer: Result<Answer, HistoryError>) -> Vec<Act> {
-        Vec::new()
-    }
-    /// The text of an entry window.
-    pub fn on_text(&mut self, _cx: &Cx, _text: &str) -> Result<Vec<Act>, String> {
-        Ok(Vec::new())
-    }
+
     /// Draws it.
-    pub fn view(&self, _cx: &Cx, _frame: &mut Frame, _area: Rect) {}
+    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+        let mut canvas = Canvas::new(frame.buffer_mut(), area);
+        let Some(device) = self.device(cx) else {
+            canvas.text(1, 1, "this plant has no devices", cx.theme.normal());
+            return;
+        };
+        self.heading(cx, device, &mut canvas);
+        faceplate_row(cx, device, &mut canvas);
+        let (width, height) = (canvas.width(), canvas.height());
+        self.table(cx, &mut canvas.part(0, 2, width, height.saturating_sub(3)));
+        if let Some(text) = last_write(cx, self.device) {
+            canvas.text(1, height.saturating_sub(1), &fit(&text.0, width.saturating_sub(2)), if text.1 { cx.theme.trouble() } else { cx.theme.dim() });
+        }
+    }
+
+    fn device<'a>(&self, cx: &Cx<'a>) -> Option<&'a DeviceDef> {
+        cx.def().devices.get(self.device.index())
+    }
+
+    fn selected<'a>(&self, cx: &Cx<'a>) -> Option<&'a TagDef> {
+        in_groups(cx, self.device).into_iter().nth(self.selected)
+    }
+
+    fn heading(&self, cx: &Cx, device: &DeviceDef, canvas: &mut Canvas) {
+        let theme = cx.theme;
+        let count = cx.def().devices.len();
+        let x = canvas.text(1, 0, &format!("‹ {} ›", device.name), theme.focus());
+        let line = &cx.def().line(device.line).name;
+        let x = canvas.text(x + 2, 0, &format!("{}  {}  unit {}  {line}", device.model, device.title, device.unit), theme.normal());
+        let (mark, style) = match cx.snapshot.device(device.id).state {
+            DeviceState::Answering => ("✓", theme.normal()),
+            DeviceState::Unknown => ("?", theme.dim()),
+            DeviceState::Failing(_) | DeviceState::Down { .. } => ("✗", theme.trouble()),
+        };
+        canvas.text(x + 2, 0, &format!("{mark} {}", device_words(cx, device.id)), style);
+        let end = canvas.width().saturating_sub(1);
+        canvas.text_right(end, 0, &format!("{}/{count}", self.device.0 + 1), theme.dim());
+    }
+
+    /// Parameters under the names of their groups, the selected one in sight.
+    fn table(&self, cx: &Cx, canvas: &mut Canvas) {
+        let theme = cx.theme;
+        let columns = Columns::of(cx, self.device, canvas.width());
+        canvas.text(1, 0, &columns.row(["", "parameter", "value", "", "range", "age", "meaning"]), theme.dim());
+        let mut rows: Vec<Option<(usize, &TagDef)>> = Vec::new();
+        let mut groups: Vec<(usize, &str)> = Vec::new();
+        for (n, tag) in in_groups(cx, self.device).into_iter().enumerate() {
+            if groups.last().is_none_or(|(_, group)| *group != tag.group) {
+                groups.push((rows.len(), &tag.group));
+                rows.push(None);
+            }
+            rows.push(Some((n, tag)));
+        }
+        let place = rows.iter().position(|row| row.is_some_and(|(n, _)| n == self.selected)).unwrap_or(0);
+        let room = usize::from(canvas.height().saturating_sub(1)).max(1);
+        let first = place.saturating_sub(room / 2).min(rows.len().saturating_sub(room));
+        for (y, (n, row)) in rows.iter().enumerate().skip(first).take(room).enumerate() {
+            let y = y as u16 + 1;
+            match row {
+                Some((place, tag)) => parameter(cx, canvas, y, &columns, tag, *place == self.selected),
+                None => {
+                    let group = groups.iter().find(|(row, _)| *row == n).map_or("", |(_, group)| group);
+                    canvas.text(1, y, group, theme.strong());
+                }
+            }
+        }
+        if rows.len() > first + room {
+            let end = canvas.width().saturating_sub(1);
+            canvas.text_right(end, 0, &format!("{} more {}", rows.len() - first - room, theme.pick("▼", "below")), theme.normal());
+        }
+    }
+}
+
+/// The tags of a device, those of one group together, in the order of the profile.
+fn in_groups<'a>(cx: &Cx<'a>, device: DeviceId) -> Vec<&'a TagDef> {
+    let tags: Vec<&TagDef> = cx.def().tags_of(device).collect();
+    let mut sorted = tags.clone();
+    sorted.sort_by_key(|tag| tags.iter().position(|first| first.group == tag.group));
+    sorted
+}
+
+fn parameter(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagDef, selected: bool) {
+    let theme = cx.theme;
+    let shown = value::show(cx, tag.id);
+    let old = matches!(tag.poll, Poll::Every(_)) && cx.age(tag.id).as_secs() < 60 && cx.snapshot.sample(tag.id).quality.is_good();
+    let read = if old { String::new() } else { age(cx.age(tag.id)) };
+    let range = if tag.labels.is_empty() { range_words(cx, tag.id) } else { format!("one of {}", tag.labels.len()) };
+    let range = range.trim_start_matches("range ").trim_end_matches(&shown.unit).trim_end().to_owned();
+    let pen = if tag.writable() { theme.pick("✎", "w") } else { " " };
+    let meaning = if shown.note.is_empty() || cx.snapshot.sample(tag.id).value.is_some() { &tag.meaning } else { &shown.note };
+    let name = format!("{} {}", pad(&tag.short, columns.short), tag.label);
+    let row = columns.row([pen, &name, &shown.text, &shown.unit, &range, &read, meaning]);
+    canvas.text(1, y, &row, if selected { theme.focus() } else { theme.normal() });
+    if !selected && !cx.snapshot.sample(tag.id).quality.is_good() {
+        canvas.text(1 + columns.value_at(), y, &pad_left(&shown.text, Columns::VALUE), shown.style);
+    }
+}
+
+/// `PV 72.4 °C │ SV 70.0 °C │ MV 12.0 % │ PID │ AT off │ RUN`, for devices that have these.
+fn faceplate_row(cx: &Cx, device: &DeviceDef, canvas: &mut Canvas) {
+    let Some(plate) = &device.faceplate else { return };
+    let parts = [("PV", Some(plate.pv)), ("SV", Some(plate.sv)), ("MV", plate.mv), ("", plate.mode), ("AT", plate.tune), ("", plate.run)];
+    let mut x = 1;
+    for (name, tag) in parts.into_iter().filter_map(|(name, tag)| Some((name, tag?))) {
+        if x > 1 {
+            x = canvas.text(x, 1, " │ ", cx.theme.dim());
+        }
+        if !name.is_empty() {
+            x = canvas.text(x, 1, name, cx.theme.dim()) + 1;
+        }
+        let shown = value::show(cx, tag);
+        x = canvas.text(x, 1, &shown.with_unit(), shown.style);
+    }
+}
+
+/// The latest write to this device and its outcome, and whether that is a worry.
+fn last_write(cx: &Cx, device: DeviceId) -> Option<(String, bool)> {
+    let order = cx.snapshot.orders.iter().find(|order| match order.command {
+        Command::Write { tag, .. } => cx.def().tag(tag).device == device,
+        Command::Acknowledge(_) | Command::AcknowledgeAll | Command::Refresh(_) | Command::Connect(..) => false,
+    })?;
+    let (words, trouble) = outcome_words(&order.outcome);
+    let what = order_words(cx, &order.command, order.old);
+    Some((format!("last: {what}  {words} {} by {}", clock(order.at, &cx.def().time_zone), order.by), trouble))
+}
+
+/// Widths of the columns that depend on device and screen.
+struct Columns {
+    short: u16,
+    name: u16,
+    meaning: u16,
+}
+
+impl Columns {
+    const VALUE: u16 = 10;
+    const UNIT: u16 = 6;
+    const RANGE: u16 = 16;
+    const AGE: u16 = 6;
+
+    fn of(cx: &Cx, device: DeviceId, width: u16) -> Columns {
+        let short = cx.def().tags_of(device).map(|tag| tag.short.chars().count()).max().unwrap_or(0).min(10) as u16;
+        let label = cx.def().tags_of(device).map(|tag| tag.label.chars().count()).max().unwrap_or(0) as u16;
+        let free = width.saturating_sub(3 + Columns::VALUE + Columns::UNIT + Columns::RANGE + Columns::AGE + 5);
+        let name = (short + 1 + label).min(free * 3 / 4);
+        Columns { short, name, meaning: free.saturating_sub(name) }
+    }
+    fn value_at(&self) -> u16 {
+        2 + self.name + 1
+    }
+    fn row(&self, [pen, name, value, unit, range, age, meaning]: [&str; 7]) -> String {
+        format!(
+            "{pen:1} {} {} {} {} {} {}",
+            pad(name, self.name),
+            pad_left(value, Columns::VALUE),
+            pad(unit, Columns::UNIT),
+            pad(range, Columns::RANGE),
+            pad_left(age, Columns::AGE),
+            pad(meaning, self.meaning)
+        )
+    }
 }

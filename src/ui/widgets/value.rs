@@ -29,7 +29,7 @@ pub fn show(cx: &Cx, tag: TagId) -> Shown {
     let sample = cx.snapshot.sample(tag);
     let style = cx.theme.quality(sample.quality);
     let unit = cx.snapshot.unit(tag).to_owned();
-    match (sample.quality, cx.snapshot.text(tag)) {
+    match (sample.quality, words(cx, tag)) {
         (Quality::Good, Some(text)) => Shown { text, unit, note: String::new(), style },
         (Quality::Uncertain(_), Some(text)) => Shown { text: format!("{text}?"), unit, note: text::age(cx.age(tag)), style },
         (quality, _) => {
@@ -37,6 +37,17 @@ pub fn show(cx: &Cx, tag: TagId) -> Shown {
             Shown { text: "----".to_owned(), unit: String::new(), note, style }
         }
     }
+}
+
+/// The value in words; a status word as the names of its set bits.
+fn words(cx: &Cx, tag: TagId) -> Option<String> {
+    let def = cx.def().tag(tag);
+    let value = cx.snapshot.sample(tag).value?;
+    if def.bit_labels.is_empty() {
+        return Some(cx.snapshot.format(tag, value));
+    }
+    let set: Vec<&str> = def.bit_labels.iter().filter(|(bit, _)| value as u64 >> (*bit).min(63) & 1 == 1).map(|(_, name)| name.as_str()).collect();
+    Some(if set.is_empty() { "none".to_owned() } else { set.join(", ") })
 }
 
 impl Shown {
