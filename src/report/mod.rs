@@ -1,10 +1,22 @@
 //! Reports: the shift calendar, the figures of a shift, and their CSV; pure, rows in and bytes out.
 
+pub mod shift;
+pub mod ask;
+pub mod hold;
+pub mod figures;
+pub mod csv;
+pub mod text;
+#[cfg(test)]
+pub(crate) mod testing;
+
 use std::time::Duration;
 
 use jiff::Timestamp;
 
 use crate::plant::record::{ActionRecord, AlarmRecord};
+
+/// Decimals to print where the device has not said how many there are.
+pub const DECIMALS_UNKNOWN: u8 = 2;
 
 /// A span of time with a name: a shift, or a free period.
 #[derive(Debug, Clone, PartialEq, Eq)]

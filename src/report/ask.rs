@@ -1,0 +1,210 @@
+//! What a person types to name a period: `last`, `night@2026-11-20`, `2026-11-21 06:00`.
+
+use jiff::{Timestamp, civil, tz::AmbiguousOffset};
+
+use super::{
+    Period,
+    shift::{instant, previous, recent, shift_at, shift_on},
+};
+use crate::plant::def::PlantDef;
+
+/// What is wrong with a period as it was typed: what was found, and what was expected.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PeriodError {
+    /// A shift was asked of a plant without shifts.
+    #[error("this plant has no shifts: give the period with --from and --to")]
+    NoShifts,
+    /// No shift has this name.
+    #[error("no shift `{found}`: expected last, current, {expected}, or one of these with @YYYY-MM-DD")]
+    NoSuchShift {
+        /// As typed.
+        found: String,
+        /// The names there are.
+        expected: String,
+    },
+    /// What stands behind the @ is not a date.
+    #[error("`{0}` is not a date: expected YYYY-MM-DD, as in 2026-11-21")]
+    NotADate(String),
+    /// The clocks skipped the shift on this date.
+    #[error("there was no shift `{name}` on {date}: the clocks skipped it")]
+    Skipped {
+        /// Its name.
+        name: String,
+        /// Its date.
+        date: civil::Date,
+    },
+    /// Not a time.
+    #[error("`{0}` is not a time: expected local 2026-11-21T06:00, or with offset 2026-11-21T06:00+07:00")]
+    NotATime(String),
+    /// The period lies in the future.
+    #[error("{0} has not begun yet")]
+    NotBegun(String),
+    /// It ends before it begins, or at once.
+    #[error("the period is empty: from {from} to {to}")]
+    Empty {
+        /// From.
+        from: Timestamp,
+        /// To.
+        to: Timestamp,
+    },
+    /// An end without a beginning.
+    #[error("--to needs --from")]
+    NoFrom,
+    /// Both a shift and a free period.
+    #[error("give either --shift or --from and --to, not both")]
+    Both,
+}
+
+/// The period that was asked for; without any wish the last shift that is over.
+///
+/// `shift` is `last`, `current`, `NAME` (the latest of that name that has begun) or `NAME@YYYY-MM-DD` (the local date of
+/// its start). `from` and `to` are local times of the plant or RFC 3339; without `to` the period ends now. A local time
+/// that happens twice is read so that the period is the longer one.
+pub fn period(
+    def: &PlantDef,
+    shift: Option<&str>,
+    from: Option<&str>,
+    to: Option<&str>,
+    now: Timestamp,
+) -> Result<Period, PeriodError> {
+    match (shift, from, to) {
+        (Some(_), Some(_), _) | (Some(_), _, Some(_)) => Err(PeriodError::Both),
+        (None, None, Some(_)) => Err(PeriodError::NoFrom),
+        (shift, None, None) => shift_named(def, shift.unwrap_or("last"), now),
+        (None, Some(from), to) => {
+            let from = moment(def, from, Fold::First)?;
+            let to = to.map_or(Ok(now), |to| moment(def, to, Fold::Second))?;
+            if from >= to {
+                return Err(PeriodError::Empty { from, to });
+            }
+            begun(Period { name: "period".into(), from, to }, now)
+        }
+    }
+}
+
+fn shift_named(def: &PlantDef, text: &str, now: Timestamp) -> Result<Period, PeriodError> {
+    let current = shift_at(def, now).ok_or(PeriodError::NoShifts)?;
+    match text {
+        "current" => return Ok(current),
+        "last" => return previous(def, &current).ok_or(PeriodError::NoShifts),
+        _ => {}
+    }
+    let (name, date) = match text.split_once('@') {
+        Some((name, date)) => (name, Some(date.parse().map_err(|_| PeriodError::NotADate(date.into()))?)),
+        None => (text, None),
+    };
+    if !def.shifts.iter().any(|shift| shift.name == name) {
+        let names: Vec<_> = def.shifts.iter().map(|shift| shift.name.as_str()).collect();
+        return Err(PeriodError::NoSuchShift { found: name.into(), expected: names.join(", ") });
+    }
+    match date {
+        Some(date) => {
+            let period = shift_on(def, name, date).ok_or(PeriodError::Skipped { name: name.into(), date })?;
+            begun(period, now)
+        }
+        // Two days of shifts hold every name, even if a clock change skipped one of them.
+        None => recent(def, now, 2 * def.shifts.len() + 1)
+            .into_iter()
+            .find(|period| period.name.rsplit_once(' ').is_some_and(|(start, _)| start == name))
+            .ok_or(PeriodError::NoShifts),
+    }
+}
+
+fn begun(period: Period, now: Timestamp) -> Result<Period, PeriodError> {
+    if period.from < now { Ok(period) } else { Err(PeriodError::NotBegun(period.name)) }
+}
+
+/// Which of two equal local times is meant.
+enum Fold {
+    First,
+    Second,
+}
+
+/// An instant with offset, or a local time of the plant (a date alone is its midnight).
+fn moment(def: &PlantDef, text: &str, fold: Fold) -> Result<Timestamp, PeriodError> {
+    let wrong = || PeriodError::NotATime(text.into());
+    // First, because a local time may be followed by an offset that reading it as local would pass over.
+    if let Ok(at) = text.parse::<Timestamp>() {
+        return Ok(at);
+    }
+    let offset = |c: char| c == '+' || c == 'Z' || c == 'z' || c == '[';
+    let local: civil::DateTime = match text.contains(offset) {
+        true => return Err(wrong()),
+        false => text.parse().map_err(|_| wrong())?,
+    };
+    match (def.time_zone.to_ambiguous_timestamp(local).offset(), fold) {
+        (AmbiguousOffset::Fold { after, .. }, Fold::Second) => after.to_timestamp(local).ok(),
+        (_, Fold::First | Fold::Second) => instant(&def.time_zone, local),
+    }
+    .ok_or_else(wrong)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::testing::{THREE, at, plant};
+
+    const NOW: &str = "2026-11-21T09:00+07";
+
+    fn ask(typed: (Option<&str>, Option<&str>, Option<&str>)) -> Result<Period, PeriodError> {
+        period(&plant("Asia/Bangkok", &THREE), typed.0, typed.1, typed.2, at(NOW))
+    }
+
+    fn check(typed: (Option<&str>, Option<&str>, Option<&str>), name: &str, from: &str, to: &str) {
+        assert_eq!(ask(typed), Ok(Period { name: name.into(), from: at(from), to: at(to) }), "{typed:?}");
+    }
+
+    #[test]
+    fn a_shift_is_found_by_its_name_and_date() {
+        let night = ("night 2026-11-20", "2026-11-20T22:00+07", "2026-11-21T06:00+07");
+        for typed in [None, Some("last"), Some("night"), Some("night@2026-11-20")] {
+            check((typed, None, None), night.0, night.1, night.2);
+        }
+        for typed in [Some("current"), Some("morning"), Some("morning@2026-11-21")] {
+            check((typed, None, None), "morning 2026-11-21", "2026-11-21T06:00+07", "2026-11-21T14:00+07");
+        }
+        let afternoon = ("afternoon 2026-11-20", "2026-11-20T14:00+07", "2026-11-20T22:00+07");
+        check((Some("afternoon"), None, None), afternoon.0, afternoon.1, afternoon.2);
+    }
+
+    #[test]
+    fn a_free_period_is_local_unless_it_says_its_offset() {
+        let expect = ("period", "2026-11-20T06:00+07", "2026-11-20T18:30+07");
+        for (from, to) in [
+            ("2026-11-20T06:00", "2026-11-20T18:30"),
+            ("2026-11-20 06:00:00", "2026-11-20T18:30:00+07:00"),
+            ("2026-11-19T23:00Z", "2026-11-20T12:30+01:00"),
+        ] {
+            check((None, Some(from), Some(to)), expect.0, expect.1, expect.2);
+        }
+        check((None, Some("2026-11-20"), None), "period", "2026-11-20T00:00+07", NOW);
+    }
+
+    #[test]
+    fn a_repeated_hour_is_read_so_that_nothing_is_left_out() {
+        let def = plant("Europe/Berlin", &THREE);
+        let got = period(&def, None, Some("2026-10-25T02:30"), Some("2026-10-25T02:30"), at(NOW));
+        let expect = Period { name: "period".into(), from: at("2026-10-25T02:30+02"), to: at("2026-10-25T02:30+01") };
+        assert_eq!(got, Ok(expect));
+    }
+
+    #[test]
+    fn a_wrong_wish_is_answered_with_what_was_found_and_expected() {
+        for (typed, words) in [
+            ((Some("nite"), None, None), "no shift `nite`: expected last, current, morning, afternoon, night"),
+            ((Some("night@20.11."), None, None), "`20.11.` is not a date: expected YYYY-MM-DD"),
+            ((Some("night@2026-11-21"), None, None), "night 2026-11-21 has not begun yet"),
+            ((None, Some("six"), None), "`six` is not a time: expected local 2026-11-21T06:00"),
+            ((None, Some("2026-11-20T06:00+banana"), None), "is not a time"),
+            ((None, Some("2026-11-21T08:00"), Some("2026-11-21T07:00")), "the period is empty"),
+            ((None, Some("2026-11-22"), Some("2026-11-23")), "period has not begun yet"),
+            ((None, None, Some("2026-11-22")), "--to needs --from"),
+            ((Some("last"), Some("2026-11-22"), None), "either --shift or --from"),
+        ] {
+            let error = ask(typed).expect_err("a wrong wish").to_string();
+            assert!(error.contains(words), "{error}");
+        }
+        let none = period(&plant("Asia/Bangkok", &[]), None, None, None, at(NOW));
+        assert_eq!(none, Err(PeriodError::NoShifts));
+    }
+}

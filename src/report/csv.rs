@@ -1,0 +1,365 @@
+//! A report as CSV: RFC 4180, one file, sections of equal width.
+
+use jiff::{Timestamp, tz::TimeZone};
+
+use super::{RecordRow, ShiftReport, TagFigures};
+use crate::plant::{
+    def::{CsvDialect, PlantDef, Priority},
+    record::{ActionRecord, AlarmRecord, AlarmStep},
+    tag::Decimals,
+};
+
+/// The whole report: facts, tags, alarm counts, alarm list, operator actions, raw record. Every section has a title row,
+/// a header row and its rows; every row has as many columns as the widest. The same report gives the same bytes.
+pub fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u8> {
+    let zone = &def.time_zone;
+    let mut table = Table::default();
+    table.section("shift report", &["plant", "shift", "from", "to", "until", "program"]);
+    table.row(vec![
+        text(&def.title),
+        text(&report.period.name),
+        plain(iso(zone, report.period.from)),
+        plain(iso(zone, report.period.to)),
+        plain(iso(zone, report.until)),
+        plain(concat!("sightglass ", env!("CARGO_PKG_VERSION"))),
+    ]);
+    table.section("tags", &["tag", "unit", "min", "mean", "max", "last", "minutes in alarm", "good %"]);
+    report.tags.iter().for_each(|tag| table.row(tag_row(tag, dialect)));
+    table.section("alarm counts", &["priority", "raised"]);
+    for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
+        table.row(vec![plain(priority.word()), plain(raised(&report.alarms, priority).to_string())]);
+    }
+    table.section("alarms", &["time", "priority", "subject", "alarm", "step", "value", "limit", "by"]);
+    report.alarms.iter().for_each(|alarm| table.row(alarm_row(alarm, zone, dialect)));
+    table.section("operator actions", &["time", "by", "action", "target", "old", "new", "outcome"]);
+    report.actions.iter().for_each(|action| table.row(action_row(action, zone)));
+    if let Some((name, unit)) = &report.record_of {
+        let decimals = record_decimals(report, def);
+        let title = if unit.is_empty() { format!("record {name}") } else { format!("record {name} in {unit}") };
+        table.section(&title, &RECORD_HEADER);
+        report.record.iter().for_each(|row| table.row(record_row(row, zone, decimals, dialect)));
+    }
+    table.write(dialect)
+}
+
+/// The thesis's record alone: date, time with offset, SV, PV, ER = SV − PV; one header row.
+pub fn record_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u8> {
+    let decimals = record_decimals(report, def);
+    let mut table = Table::default();
+    table.row(RECORD_HEADER.iter().map(|word| plain(*word)).collect());
+    report.record.iter().for_each(|row| table.row(record_row(row, &def.time_zone, decimals, dialect)));
+    table.write(dialect)
+}
+
+/// Alarms of a priority that were raised.
+pub fn raised(alarms: &[AlarmRecord], priority: Priority) -> usize {
+    alarms.iter().filter(|alarm| alarm.step == AlarmStep::Raised && alarm.priority == priority).count()
+}
+
+const RECORD_HEADER: [&str; 5] = ["date", "time", "SV", "PV", "ER"];
+
+fn tag_row(tag: &TagFigures, dialect: CsvDialect) -> Vec<String> {
+    let value = |value: Option<f64>| number(value, tag.decimals, dialect);
+    vec![
+        text(&tag.tag),
+        text(&tag.unit),
+        value(tag.min),
+        // One more decimal than the device has: a mean is finer than its samples.
+        number(tag.mean, tag.decimals.saturating_add(1), dialect),
+        value(tag.max),
+        value(tag.last),
+        number(Some(tag.in_alarm.as_secs_f64() / 60.0), 1, dialect),
+        number(Some(floor_percent(tag.good)), 1, dialect),
+    ]
+}
+
+fn alarm_row(alarm: &AlarmRecord, zone: &TimeZone, dialect: CsvDialect) -> Vec<String> {
+    vec![
+        plain(iso_millis(zone, alarm.at)),
+        plain(alarm.priority.word()),
+        text(&alarm.subject),
+        text(&alarm.text),
+        plain(alarm.step.word()),
+        shortest(alarm.value, dialect),
+        shortest(alarm.limit, dialect),
+        text(alarm.by.as_deref().unwrap_or("")),
+    ]
+}
+
+fn action_row(action: &ActionRecord, zone: &TimeZone) -> Vec<String> {
+    vec![
+        plain(iso_millis(zone, action.at)),
+        text(&action.by),
+        text(&action.action),
+        text(&action.target),
+        text(action.old.as_deref().unwrap_or("")),
+        text(action.new.as_deref().unwrap_or("")),
+        text(&action.outcome),
+    ]
+}
+
+fn record_row(row: &RecordRow, zone: &TimeZone, decimals: u8, dialect: CsvDialect) -> Vec<String> {
+    let local = row.at.to_zoned(zone.clone());
+    vec![
+        plain(local.strftime("%Y-%m-%d").to_string()),
+        plain(local.strftime("%H:%M:%S%.f%:z").to_string()),
+        number(row.sv, decimals, dialect),
+        number(row.pv, decimals, dialect),
+        number(row.er, decimals, dialect),
+    ]
+}
+
+/// Decimals of the recorded controller: those of its PV, as the report has them.
+fn record_decimals(report: &ShiftReport, def: &PlantDef) -> u8 {
+    let pv =
+        def.report.record.and_then(|(device, _)| def.device(device).faceplate.as_ref()).map(|face| def.tag(face.pv));
+    let Some(pv) = pv else { return super::DECIMALS_UNKNOWN };
+    match (report.tags.iter().find(|tag| tag.tag == pv.name), pv.decimals) {
+        (Some(tag), _) => tag.decimals,
+        (None, Decimals::Fixed(decimals)) => decimals,
+        (None, Decimals::From(_)) => super::DECIMALS_UNKNOWN,
+    }
+}
+
+/// Rows of cells, made equally wide when written.
+#[derive(Default)]
+struct Table(Vec<Vec<String>>);
+
+impl Table {
+    fn section(&mut self, title: &str, header: &[&str]) {
+        if !self.0.is_empty() {
+            self.0.push(Vec::new());
+        }
+        self.0.push(vec![text(title)]);
+        self.0.push(header.iter().map(|word| plain(*word)).collect());
+    }
+
+    fn row(&mut self, cells: Vec<String>) {
+        self.0.push(cells);
+    }
+
+    fn write(mut self, dialect: CsvDialect) -> Vec<u8> {
+        let width = self.0.iter().map(Vec::len).max().unwrap_or(0);
+        let mut bytes = if dialect.bom { "\u{feff}".as_bytes().to_vec() } else { Vec::new() };
+        let mut writer = csv::WriterBuilder::new()
+            .delimiter(u8::try_from(dialect.separator).unwrap_or(b','))
+            .terminator(csv::Terminator::CRLF)
+            .from_writer(&mut bytes);
+        for row in &mut self.0 {
+            row.resize(width, String::new());
+            writer.write_record(row).expect("rows are equally wide and memory does not fail to write");
+        }
+        writer.flush().expect("memory does not fail to write");
+        drop(writer);
+        bytes
+    }
+}
+
+/// A cell of text from outside. A spreadsheet runs a cell that begins with one of these as a formula: an apostrophe
+/// before it keeps it text.
+fn text(cell: &str) -> String {
+    match cell.chars().next() {
+        Some('=' | '+' | '-' | '@' | '\t' | '\r') => format!("'{cell}"),
+        _ => cell.to_owned(),
+    }
+}
+
+/// A cell of our own making: a number, a time, a word.
+fn plain(cell: impl Into<String>) -> String {
+    cell.into()
+}
+
+/// A number with fixed decimals; empty if there is none.
+fn number(value: Option<f64>, decimals: u8, dialect: CsvDialect) -> String {
+    let Some(value) = value.filter(|value| value.is_finite()) else { return String::new() };
+    let digits = format!("{value:.*}", usize::from(decimals));
+    // A value that rounds to nothing has no sign.
+    let digits = match digits.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+        _ => digits,
+    };
+    localised(digits, dialect)
+}
+
+/// A number with as many digits as it has; empty if there is none.
+fn shortest(value: Option<f64>, dialect: CsvDialect) -> String {
+    value.filter(|value| value.is_finite()).map_or_else(String::new, |value| localised(value.to_string(), dialect))
+}
+
+fn localised(digits: String, dialect: CsvDialect) -> String {
+    if dialect.decimal == '.' { digits } else { digits.replace('.', &dialect.decimal.to_string()) }
+}
+
+/// Percent of a share, cut and not rounded to one decimal: 100.0 is written only if nothing was missing.
+pub(super) fn floor_percent(share: f64) -> f64 {
+    (share * 1000.0 + 1e-9).floor() / 10.0
+}
+
+pub(super) fn iso(zone: &TimeZone, at: Timestamp) -> String {
+    at.to_zoned(zone.clone()).strftime("%Y-%m-%dT%H:%M:%S%:z").to_string()
+}
+
+fn iso_millis(zone: &TimeZone, at: Timestamp) -> String {
+    at.to_zoned(zone.clone()).strftime("%Y-%m-%dT%H:%M:%S%.3f%:z").to_string()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::report::{
+        Period,
+        testing::{THREE, at, plant},
+    };
+
+    fn report() -> ShiftReport {
+        let from = at("2026-11-21T06:00+07");
+        ShiftReport {
+            period: Period { name: "morning 2026-11-21".into(), from, to: at("2026-11-21T14:00+07") },
+            until: at("2026-11-21T13:59:30+07"),
+            tags: vec![
+                TagFigures {
+                    tag: "TIC-1.PV".into(),
+                    unit: "°C".into(),
+                    decimals: 1,
+                    min: Some(-0.04),
+                    mean: Some(54.3219),
+                    max: Some(71.2),
+                    last: Some(70.0),
+                    in_alarm: Duration::from_secs(90),
+                    good: 0.99999,
+                },
+                TagFigures {
+                    tag: "TIC-1.MV".into(),
+                    unit: "%".into(),
+                    decimals: 0,
+                    min: None,
+                    mean: None,
+                    max: None,
+                    last: None,
+                    in_alarm: Duration::ZERO,
+                    good: 0.0,
+                },
+            ],
+            alarms: vec![AlarmRecord {
+                at: at("2026-11-21T06:12:45.5+07"),
+                subject: "TIC-1.PV".into(),
+                text: "temperature high; \"check\" heater".into(),
+                priority: Priority::High,
+                step: AlarmStep::Raised,
+                value: Some(-85.25),
+                limit: Some(85.0),
+                by: None,
+            }],
+            actions: vec![ActionRecord {
+                at: at("2026-11-21T06:13+07"),
+                by: "=cmd|' /C calc'!A0".into(),
+                action: "write".into(),
+                target: "TIC-1.SV".into(),
+                old: Some("-70.0 °C".into()),
+                new: Some("60.0 °C".into()),
+                outcome: "verified".into(),
+            }],
+            record: vec![
+                RecordRow { at: from, sv: Some(70.0), pv: Some(72.5), er: Some(-2.5) },
+                RecordRow { at: from + Duration::from_secs(10), sv: Some(70.0), pv: None, er: None },
+            ],
+            record_of: Some(("TIC-1".into(), "°C".into())),
+        }
+    }
+
+    fn dialect(separator: char, decimal: char, bom: bool) -> CsvDialect {
+        CsvDialect { separator, decimal, bom }
+    }
+
+    #[test]
+    fn the_report_reads_as_a_technician_expects() {
+        let def = plant("Asia/Bangkok", &THREE);
+        let csv = String::from_utf8(shift_csv(&report(), &def, CsvDialect::default())).unwrap();
+        let expect = "\
+shift report,,,,,,,
+plant,shift,from,to,until,program,,
+Water tank,morning 2026-11-21,2026-11-21T06:00:00+07:00,2026-11-21T14:00:00+07:00,2026-11-21T13:59:30+07:00,sightglass VERSION,,
+,,,,,,,
+tags,,,,,,,
+tag,unit,min,mean,max,last,minutes in alarm,good %
+TIC-1.PV,°C,0.0,54.32,71.2,70.0,1.5,99.9
+TIC-1.MV,%,,,,,0.0,0.0
+,,,,,,,
+alarm counts,,,,,,,
+priority,raised,,,,,,
+critical,0,,,,,,
+high,1,,,,,,
+medium,0,,,,,,
+low,0,,,,,,
+,,,,,,,
+alarms,,,,,,,
+time,priority,subject,alarm,step,value,limit,by
+2026-11-21T06:12:45.500+07:00,high,TIC-1.PV,\"temperature high; \"\"check\"\" heater\",raised,-85.25,85,
+,,,,,,,
+operator actions,,,,,,,
+time,by,action,target,old,new,outcome,
+2026-11-21T06:13:00.000+07:00,'=cmd|' /C calc'!A0,write,TIC-1.SV,'-70.0 °C,60.0 °C,verified,
+,,,,,,,
+record TIC-1 in °C,,,,,,,
+date,time,SV,PV,ER,,,
+2026-11-21,06:00:00+07:00,70.0,72.5,-2.5,,,
+2026-11-21,06:00:10+07:00,70.0,,,,,
+";
+        assert_eq!(csv, expect.replace("VERSION", env!("CARGO_PKG_VERSION")).replace('\n', "\r\n"));
+    }
+
+    #[test]
+    fn every_dialect_is_read_back_by_a_strict_reader_with_the_same_cells() {
+        let def = plant("Asia/Bangkok", &THREE);
+        let rows = |dialect: CsvDialect| -> Vec<Vec<String>> {
+            let bytes = shift_csv(&report(), &def, dialect);
+            let body = bytes.strip_prefix("\u{feff}".as_bytes());
+            assert_eq!(body.is_some(), dialect.bom);
+            csv::ReaderBuilder::new()
+                .has_headers(false)
+                .delimiter(dialect.separator as u8)
+                .from_reader(body.unwrap_or(&bytes))
+                .records()
+                .map(|row| row.unwrap().iter().map(str::to_owned).collect())
+                .collect()
+        };
+        let english = rows(dialect(',', '.', false));
+        let german = rows(dialect(';', ',', true));
+        assert!(german.iter().any(|row| row.contains(&"54,32".to_owned())));
+        assert_eq!(english.len(), german.len());
+        let tags = |rows: &[Vec<String>]| rows[6].join("|");
+        assert_eq!(tags(&german).replace(',', "."), tags(&english));
+    }
+
+    #[test]
+    fn the_record_alone_is_a_plain_table() {
+        let def = plant("Asia/Bangkok", &THREE);
+        let csv = String::from_utf8(record_csv(&report(), &def, dialect(';', ',', false))).unwrap();
+        let expect =
+            "date;time;SV;PV;ER\r\n2026-11-21;06:00:00+07:00;70,0;72,5;-2,5\r\n2026-11-21;06:00:10+07:00;70,0;;\r\n";
+        assert_eq!(csv, expect);
+    }
+
+    #[test]
+    fn text_that_a_spreadsheet_would_run_is_kept_text_and_numbers_are_left_alone() {
+        for (cell, expect) in [
+            ("=1+1", "'=1+1"),
+            ("+66 2", "'+66 2"),
+            ("-", "'-"),
+            ("@SUM", "'@SUM"),
+            ("\tx", "'\tx"),
+            ("\rx", "'\rx"),
+            ("", ""),
+            ("TIC-1", "TIC-1"),
+            (" =1", " =1"),
+        ] {
+            assert_eq!(text(cell), expect);
+        }
+        assert_eq!(number(Some(-1.25), 1, CsvDialect::default()), "-1.2");
+        assert_eq!(number(Some(f64::NAN), 1, CsvDialect::default()), "");
+        assert_eq!(floor_percent(1.0), 100.0);
+    }
+}

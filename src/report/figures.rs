@@ -1,0 +1,280 @@
+//! The figures of a period: from stored samples and alarm steps to the rows of a report.
+
+use std::{collections::HashSet, time::Duration};
+
+use jiff::{Timestamp, ToSpan, tz::TimeZone};
+
+use super::{
+    RecordRow, TagFigures,
+    hold::{AsOf, Tally, held},
+};
+use crate::plant::{
+    record::{AlarmRecord, AlarmStep},
+    sample::Sample,
+};
+
+/// What a tag is called in a report.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Label {
+    /// `TIC-1.PV`.
+    pub tag: String,
+    /// `°C`.
+    pub unit: String,
+    /// Decimals to print.
+    pub decimals: u8,
+}
+
+/// The figures of one tag over `from..until`. The samples are in order of time and begin
+/// [`HOLD_MAX`](super::hold::HOLD_MAX) before `from`.
+pub fn figures(
+    label: Label,
+    samples: impl Iterator<Item = Sample>,
+    from: Timestamp,
+    until: Timestamp,
+    in_alarm: Duration,
+) -> TagFigures {
+    let mut tally = None;
+    held(samples, from, until).for_each(|span| Tally::add(&mut tally, span));
+    let seconds = until.duration_since(from).as_secs_f64();
+    TagFigures {
+        tag: label.tag,
+        unit: label.unit,
+        decimals: label.decimals,
+        min: tally.map(|tally| tally.min),
+        mean: tally.map(|tally| tally.mean),
+        max: tally.map(|tally| tally.max),
+        last: tally.map(|tally| tally.last),
+        in_alarm,
+        good: tally.map_or(0.0, |tally| (tally.seconds / seconds).clamp(0.0, 1.0)),
+    }
+}
+
+/// Time within `from..until` in which at least one alarm of a subject was active. The steps are in order and begin with
+/// those of the alarms that were active at `from`; an alarm still active at the end counts to the end.
+pub fn time_in_alarm<'a>(
+    steps: impl Iterator<Item = &'a AlarmRecord>,
+    subject: &str,
+    from: Timestamp,
+    until: Timestamp,
+) -> Duration {
+    let mut active: HashSet<&str> = HashSet::new();
+    let mut since = from;
+    let mut total = Duration::ZERO;
+    for step in steps.filter(|step| &*step.subject == subject && step.at < until) {
+        let at = step.at.max(since);
+        if !active.is_empty() {
+            total += Duration::try_from(at.duration_since(since)).unwrap_or_default();
+        }
+        since = at;
+        match step.step {
+            AlarmStep::Raised => {
+                active.insert(&step.text);
+            }
+            AlarmStep::Returned => {
+                active.remove(&*step.text);
+            }
+            AlarmStep::Acknowledged => {}
+        }
+    }
+    if !active.is_empty() {
+        total += Duration::try_from(until.duration_since(since)).unwrap_or_default();
+    }
+    total
+}
+
+/// The thesis's record over `from..until`: one row at every instant whose local time of day is a multiple of `interval`.
+/// The samples are in order of time and begin [`HOLD_MAX`](super::hold::HOLD_MAX) before `from`.
+pub fn record(
+    sv: impl Iterator<Item = Sample>,
+    pv: impl Iterator<Item = Sample>,
+    interval: Duration,
+    zone: &TimeZone,
+    from: Timestamp,
+    until: Timestamp,
+) -> Vec<RecordRow> {
+    let (mut sv, mut pv) = (AsOf::new(sv), AsOf::new(pv));
+    let mut rows = Vec::new();
+    let mut next = on_grid(zone, interval, from);
+    while let Some(at) = next.filter(|at| *at < until) {
+        let (sv, pv) = (sv.at(at), pv.at(at));
+        rows.push(RecordRow { at, sv, pv, er: sv.zip(pv).map(|(sv, pv)| sv - pv) });
+        next = at.checked_add(1.microsecond()).ok().and_then(|after| on_grid(zone, interval, after));
+    }
+    rows
+}
+
+/// The first instant not before `at` whose local time of day is a multiple of `interval`. The grid starts anew at every
+/// local midnight and follows the clocks over a change: an hour that happens twice has its rows twice.
+fn on_grid(zone: &TimeZone, interval: Duration, at: Timestamp) -> Option<Timestamp> {
+    const DAY: i64 = 86_400_000_000;
+    let interval = i64::try_from(interval.as_micros()).ok().filter(|interval| *interval > 0)?;
+    let mut at = at;
+    loop {
+        let local = at.as_microsecond() + i64::from(zone.to_offset(at).seconds()) * 1_000_000;
+        let of_day = local.rem_euclid(DAY);
+        let past = of_day % interval;
+        if past == 0 {
+            return Some(at);
+        }
+        let candidate = at.checked_add((interval - past).min(DAY - of_day).microseconds()).ok()?;
+        // A clock change on the way moves the grid: go on from there. Both branches move forward, so this ends.
+        let change = zone.following(at).next().map(|change| change.timestamp());
+        at = change.map_or(candidate, |change| change.min(candidate));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::{
+        plant::{def::Priority, sample::Cause},
+        report::testing::{at, sec, zone},
+    };
+
+    fn label() -> Label {
+        Label { tag: "TIC-1.PV".into(), unit: "°C".into(), decimals: 1 }
+    }
+
+    /// Figures over 0..100 s of samples (second, value or none) as (min, mean, max, last, good).
+    fn check(samples: &[(i64, Option<f64>)], expect: (Option<[f64; 4]>, f64)) {
+        let samples = samples.iter().map(|&(at, value)| {
+            value.map_or(Sample::bad(Cause::Timeout, sec(at)), |value| Sample::good(value, sec(at)))
+        });
+        let got = figures(label(), samples, sec(0), sec(100), Duration::ZERO);
+        let [min, mean, max, last] = expect.0.map_or([None; 4], |values| values.map(Some));
+        assert_eq!((got.min, got.mean, got.max, got.last), (min, mean, max, last));
+        assert!((got.good - expect.1).abs() < 1e-9, "{}", got.good);
+    }
+
+    #[test]
+    fn the_figures_count_good_time_only() {
+        check(&[], (None, 0.0));
+        check(&[(0, Some(20.0))], (Some([20.0; 4]), 1.0));
+        check(&[(-30, Some(20.0))], (Some([20.0; 4]), 1.0));
+        check(&[(0, Some(10.0)), (75, Some(30.0))], (Some([10.0, 15.0, 30.0, 30.0]), 1.0));
+        check(&[(0, Some(10.0)), (50, None)], (Some([10.0; 4]), 0.5));
+        check(&[(0, None), (90, Some(7.0))], (Some([7.0; 4]), 0.1));
+        check(&[(0, Some(10.0)), (120, Some(99.0))], (Some([10.0; 4]), 1.0));
+    }
+
+    fn step(at: i64, text: &str, step: AlarmStep) -> AlarmRecord {
+        let subject = Arc::from("TIC-1.PV");
+        let priority = Priority::High;
+        AlarmRecord { at: sec(at), subject, text: text.into(), priority, step, value: None, limit: None, by: None }
+    }
+
+    #[test]
+    fn minutes_in_alarm_are_counted_once_however_many_alarms_overlap() {
+        use AlarmStep::{Acknowledged, Raised, Returned};
+        for (steps, expect) in [
+            (vec![], 0),
+            (vec![step(10, "high", Raised), step(30, "high", Returned)], 20),
+            (vec![step(10, "high", Raised), step(12, "high", Acknowledged), step(30, "high", Returned)], 20),
+            // Two that overlap, two that do not.
+            (
+                vec![
+                    step(10, "high", Raised),
+                    step(20, "high-high", Raised),
+                    step(30, "high-high", Returned),
+                    step(40, "high", Returned),
+                ],
+                30,
+            ),
+            (
+                vec![
+                    step(10, "high", Raised),
+                    step(20, "high", Returned),
+                    step(50, "low", Raised),
+                    step(55, "low", Returned),
+                ],
+                15,
+            ),
+            // Active before the period, still active at its end.
+            (vec![step(-50, "high", Raised), step(30, "high", Returned)], 30),
+            (vec![step(90, "high", Raised)], 10),
+            (vec![step(-50, "high", Raised)], 100),
+            // Raised again without having returned (a restart): one stretch.
+            (vec![step(10, "high", Raised), step(20, "high", Raised), step(30, "high", Returned)], 20),
+            // After the end nothing counts.
+            (vec![step(90, "high", Raised), step(150, "high", Returned)], 10),
+            (vec![step(110, "high", Raised)], 0),
+        ] {
+            let got = time_in_alarm(steps.iter(), "TIC-1.PV", sec(0), sec(100));
+            assert_eq!(got, Duration::from_secs(expect), "{steps:?}");
+            assert_eq!(time_in_alarm(steps.iter(), "TIC-2.PV", sec(0), sec(100)), Duration::ZERO);
+        }
+    }
+
+    #[test]
+    fn the_record_stands_on_the_local_grid_and_leaves_out_what_was_not_good() {
+        let sv = [Sample::good(70.0, sec(-5))];
+        let pv = [Sample::good(27.0, sec(3)), Sample::bad(Cause::Timeout, sec(15)), Sample::good(28.5, sec(30))];
+        let rows = record(sv.into_iter(), pv.into_iter(), Duration::from_secs(10), &TimeZone::UTC, sec(0), sec(40));
+        let row = |at, pv: Option<f64>| RecordRow { at: sec(at), sv: Some(70.0), pv, er: pv.map(|pv| 70.0 - pv) };
+        assert_eq!(rows, [row(0, None), row(10, Some(27.0)), row(20, None), row(30, Some(28.5))]);
+    }
+
+    fn grid(zone_name: &str, interval: u64, from: &str, until: &str) -> Vec<String> {
+        let none = std::iter::empty::<Sample>;
+        let zone = zone(zone_name);
+        let rows = record(none(), none(), Duration::from_secs(interval), &zone, at(from), at(until));
+        rows.iter().map(|row| row.at.to_zoned(zone.clone()).strftime("%H:%M%:z").to_string()).collect()
+    }
+
+    #[test]
+    fn the_grid_follows_the_local_clock_over_its_changes() {
+        // A half-hour zone: the grid is local, not UTC.
+        assert_eq!(
+            grid("Asia/Kolkata", 3600, "2026-01-01T00:10+05:30", "2026-01-01T02:10+05:30"),
+            ["01:00+05:30", "02:00+05:30"]
+        );
+        // Spring: 02:00 does not exist. Autumn: 02:00 and 02:30 happen twice.
+        assert_eq!(
+            grid("Europe/Berlin", 1800, "2026-03-29T01:30+01", "2026-03-29T03:30+02"),
+            ["01:30+01:00", "03:00+02:00"]
+        );
+        let autumn = grid("Europe/Berlin", 1800, "2026-10-25T02:00+02", "2026-10-25T03:30+01");
+        assert_eq!(autumn, ["02:00+02:00", "02:30+02:00", "02:00+01:00", "02:30+01:00", "03:00+01:00"]);
+        // An interval that does not divide the day starts anew at midnight.
+        assert_eq!(
+            grid("Asia/Bangkok", 7 * 3600, "2026-01-01T20:00+07", "2026-01-02T08:00+07"),
+            ["21:00+07:00", "00:00+07:00", "07:00+07:00"]
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn the_mean_equals_a_second_by_second_integration(
+            steps in proptest::collection::vec((1i64..200, proptest::option::weighted(0.8, -1e3f64..1e3)), 0..40),
+            from in 0i64..500,
+            length in 1i64..2000,
+        ) {
+            let mut at = 0;
+            let samples: Vec<Sample> = steps.iter().map(|&(wait, value)| {
+                at += wait;
+                value.map_or(Sample::bad(Cause::Timeout, sec(at)), |value| Sample::good(value, sec(at)))
+            }).collect();
+            let until = from + length;
+            let got = figures(label(), samples.iter().copied(), sec(from), sec(until), Duration::ZERO);
+            // Naive: what stood in each second, by searching the whole list.
+            let stood = |second: i64| samples.iter().rev().find(|sample| sample.at <= sec(second))
+                .filter(|sample| sec(second).duration_since(sample.at).as_secs() < 150)
+                .and_then(|sample| sample.trusted());
+            let values: Vec<f64> = (from..until).filter_map(stood).collect();
+            let good = values.len() as f64 / length as f64;
+            prop_assert!((got.good - good).abs() < 1e-9);
+            prop_assert_eq!(got.last, values.last().copied());
+            prop_assert_eq!(got.min, values.iter().copied().reduce(f64::min));
+            prop_assert_eq!(got.max, values.iter().copied().reduce(f64::max));
+            let mean = (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
+            prop_assert_eq!(got.mean.is_some(), mean.is_some());
+            if let (Some(got), Some(mean)) = (got.mean, mean) {
+                prop_assert!((got - mean).abs() < 1e-6, "{} {}", got, mean);
+            }
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! How long a stored sample stands: until the next one, and never longer than [`HOLD_MAX`].
+//!
+//! ```text
+//!   stored      27.1      27.4   bad          27.6                  (nothing more)
+//!   held        ├─ 27.1 ──┤─27.4─┤            ├──── 27.6 ────┤
+//!                                  no value        HOLD_MAX     no value
+//! ```
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+
+use crate::plant::sample::Sample;
+
+/// The plant stores every change of value or quality at once, and an unchanged value at least every 60 s. A value
+/// without a successor for longer than this was therefore not stored any more: from here on it is not known.
+pub const HOLD_MAX: Duration = Duration::from_secs(150);
+
+/// A span in which one good value stood; never empty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held {
+    /// From, inclusive.
+    pub from: Timestamp,
+    /// To, exclusive.
+    pub to: Timestamp,
+    /// The value.
+    pub value: f64,
+}
+
+impl Held {
+    /// How long, in seconds.
+    pub fn seconds(self) -> f64 {
+        self.to.duration_since(self.from).as_secs_f64()
+    }
+}
+
+/// The spans of good values within `from..until`, in order. The samples are in order of time and should begin
+/// [`HOLD_MAX`] before `from`, so that the value standing there is known. Nothing is held beyond `until`.
+pub fn held(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> impl Iterator<Item = Held> {
+    let mut samples = samples.peekable();
+    std::iter::from_fn(move || {
+        loop {
+            let sample = samples.next()?;
+            let Some(value) = good_value(sample) else { continue };
+            let successor = samples.peek().map_or(until, |next| next.at);
+            let to = successor.min(expiry(sample)).min(until);
+            let from = sample.at.max(from);
+            if from < to {
+                return Some(Held { from, to, value });
+            }
+        }
+    })
+}
+
+/// The good value in force at rising instants.
+pub struct AsOf<I: Iterator<Item = Sample>> {
+    samples: std::iter::Peekable<I>,
+    current: Option<Sample>,
+}
+
+impl<I: Iterator<Item = Sample>> AsOf<I> {
+    /// Over samples in order of time.
+    pub fn new(samples: I) -> AsOf<I> {
+        AsOf { samples: samples.peekable(), current: None }
+    }
+
+    /// The good value at an instant, which must not be before the one asked last.
+    pub fn at(&mut self, at: Timestamp) -> Option<f64> {
+        while let Some(sample) = self.samples.next_if(|next| next.at <= at) {
+            self.current = Some(sample);
+        }
+        self.current.filter(|sample| at < expiry(*sample)).and_then(good_value)
+    }
+}
+
+/// Extremes, time-weighted mean and last value of spans.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tally {
+    /// Least.
+    pub min: f64,
+    /// Greatest.
+    pub max: f64,
+    /// Time-weighted mean.
+    pub mean: f64,
+    /// Latest.
+    pub last: f64,
+    /// Time with a good value, in seconds.
+    pub seconds: f64,
+}
+
+impl Tally {
+    /// Adds a span to what there is.
+    pub fn add(tally: &mut Option<Tally>, span: Held) {
+        let Held { value, .. } = span;
+        let seconds = span.seconds();
+        let Some(old) = tally else {
+            *tally = Some(Tally { min: value, max: value, mean: value, last: value, seconds });
+            return;
+        };
+        old.seconds += seconds;
+        old.min = old.min.min(value);
+        old.max = old.max.max(value);
+        // Kept as a running mean, so that a constant stays exactly what it is; rounding never leaves the extremes.
+        old.mean = (old.mean + (value - old.mean) * (seconds / old.seconds)).clamp(old.min, old.max);
+        old.last = value;
+    }
+}
+
+/// A good value that is a number. A stored NaN or infinity is no value, whatever its quality says.
+fn good_value(sample: Sample) -> Option<f64> {
+    sample.trusted().filter(|value| value.is_finite())
+}
+
+fn expiry(sample: Sample) -> Timestamp {
+    sample.at.checked_add(HOLD_MAX).unwrap_or(Timestamp::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{plant::sample::Cause, report::testing::sec};
+
+    fn check(samples: &[(i64, Option<f64>)], window: (i64, i64), expect: &[(i64, i64, f64)]) {
+        let samples = samples.iter().map(|&(at, value)| match value {
+            Some(value) => Sample::good(value, sec(at)),
+            None => Sample::bad(Cause::Timeout, sec(at)),
+        });
+        let got: Vec<_> = held(samples, sec(window.0), sec(window.1))
+            .map(|span| (span.from.as_second(), span.to.as_second(), span.value))
+            .collect();
+        assert_eq!(got, expect);
+    }
+
+    #[test]
+    fn a_value_stands_until_the_next_row_and_never_over_a_gap() {
+        check(&[], (0, 100), &[]);
+        check(&[(0, Some(1.0)), (10, Some(2.0))], (0, 20), &[(0, 10, 1.0), (10, 20, 2.0)]);
+        check(&[(0, Some(1.0)), (10, None), (30, Some(2.0))], (0, 40), &[(0, 10, 1.0), (30, 40, 2.0)]);
+        // Before the window: only the part inside counts.
+        check(&[(-20, Some(1.0)), (5, Some(2.0))], (0, 10), &[(0, 5, 1.0), (5, 10, 2.0)]);
+        check(&[(-20, Some(1.0)), (-5, None)], (0, 10), &[]);
+        // Nothing stored for long: the value ends after the longest hold.
+        check(&[(0, Some(1.0)), (400, Some(2.0))], (0, 900), &[(0, 150, 1.0), (400, 550, 2.0)]);
+        // Two rows at one instant: the later row counts.
+        check(&[(0, Some(1.0)), (0, Some(2.0))], (0, 10), &[(0, 10, 2.0)]);
+        // Not a number is not a value.
+        check(&[(0, Some(f64::NAN)), (5, Some(2.0))], (0, 10), &[(5, 10, 2.0)]);
+        // Nothing after `until`.
+        check(&[(0, Some(1.0)), (20, Some(9.0))], (0, 10), &[(0, 10, 1.0)]);
+    }
+
+    #[test]
+    fn an_uncertain_value_is_not_counted_as_good() {
+        let samples = [Sample::good(5.0, sec(0)), Sample::good(5.0, sec(4)).doubted(Cause::Stale)];
+        let spans: Vec<_> = held(samples.into_iter(), sec(0), sec(10)).collect();
+        assert_eq!(spans, [Held { from: sec(0), to: sec(4), value: 5.0 }]);
+    }
+
+    #[test]
+    fn the_value_at_an_instant_is_the_one_that_stood_then() {
+        let samples = [Sample::good(1.0, sec(0)), Sample::bad(Cause::Timeout, sec(10)), Sample::good(3.0, sec(20))];
+        let mut as_of = AsOf::new(samples.into_iter());
+        let got: Vec<_> = [-1, 0, 9, 10, 19, 20, 169, 170].map(|at| as_of.at(sec(at))).to_vec();
+        assert_eq!(got, [None, Some(1.0), Some(1.0), None, None, Some(3.0), Some(3.0), None]);
+    }
+}

@@ -1,0 +1,115 @@
+//! A small plant for the tests of reports and history: one controller, three tags, three shifts.
+
+use std::time::Duration;
+
+use jiff::{Timestamp, civil::time, tz::TimeZone};
+
+use crate::plant::{
+    def::{CsvDialect, DeviceDef, DeviceId, Faceplate, Limits, LineId, MimicDef, PlantDef, ReportDef, ShiftDef, TagId},
+    tag::{Access, Confidence, Decimals, Kind, Order, Point, Poll, Table, TagDef},
+};
+
+/// Seconds after the epoch as an instant.
+pub fn sec(at: i64) -> Timestamp {
+    Timestamp::from_second(at).expect("tests stay within the calendar")
+}
+
+/// An instant from its text.
+pub fn at(text: &str) -> Timestamp {
+    text.parse().expect("tests write valid times")
+}
+
+/// A time zone by name.
+pub fn zone(name: &str) -> TimeZone {
+    TimeZone::get(name).expect("tests run where time zones are installed")
+}
+
+/// The plant: TIC-1 with PV, SV and MV, in a zone, with shifts (name, hour, minute).
+pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
+    let device = DeviceId(0);
+    PlantDef {
+        name: "tank".into(),
+        title: "Water tank".into(),
+        time_zone: zone(zone_name),
+        lines: Vec::new(),
+        devices: vec![DeviceDef {
+            id: device,
+            name: "TIC-1".into(),
+            title: "tank temperature".into(),
+            line: LineId(0),
+            unit: 1,
+            profile: "fuji_pxr".into(),
+            model: "FUJI PXR4".into(),
+            limits: Limits {
+                read_words_max: 60,
+                read_bits_max: 60,
+                write_words_max: 60,
+                gap_words_max: 4,
+                alignment: 1,
+            },
+            gap: Duration::ZERO,
+            write_gap: Duration::ZERO,
+            faceplate: Some(Faceplate {
+                pv: TagId(0),
+                sv: TagId(1),
+                mv: Some(TagId(2)),
+                run: None,
+                mode: None,
+                tune: None,
+            }),
+            actions: Vec::new(),
+        }],
+        tags: ["PV", "SV", "MV"].iter().enumerate().map(|(i, short)| tag(i as u16, short)).collect(),
+        alarms: Vec::new(),
+        mimic: MimicDef::default(),
+        trends: Vec::new(),
+        shifts: shifts
+            .iter()
+            .map(|&(name, hour, minute)| ShiftDef { name: name.into(), start: time(hour, minute, 0, 0) })
+            .collect(),
+        report: ReportDef {
+            folder: "reports".into(),
+            tags: Vec::new(),
+            record: Some((device, Duration::from_secs(10))),
+            csv: CsvDialect::default(),
+        },
+        simulation: None,
+    }
+}
+
+/// Shifts at 06:00, 14:00 and 22:00.
+pub const THREE: [(&str, i8, i8); 3] = [("morning", 6, 0), ("afternoon", 14, 0), ("night", 22, 0)];
+
+/// A stored tag of TIC-1 with one decimal; MV in percent, the others in degrees.
+pub fn tag(id: u16, short: &str) -> TagDef {
+    TagDef {
+        id: TagId(id),
+        device: DeviceId(0),
+        name: format!("TIC-1.{short}"),
+        short: short.into(),
+        label: String::new(),
+        meaning: String::new(),
+        point: Point { table: Table::Input, address: id, kind: Kind::I16, order: Order::Abcd, field: None },
+        scale: 0.1,
+        offset: 0.0,
+        decimals: Decimals::Fixed(1),
+        unit: if short == "MV" { "%".into() } else { "°C".into() },
+        unit_from: None,
+        min: None,
+        max: None,
+        access: Access::Read,
+        confirm: None,
+        labels: Vec::new(),
+        bit_labels: Vec::new(),
+        bad_if: Vec::new(),
+        quality_from: None,
+        write_fc: None,
+        write_unlock: None,
+        group: String::new(),
+        poll: Poll::Every(Duration::from_secs(1)),
+        deadband: 0.0,
+        store: true,
+        confidence: Confidence::Proven,
+        source: String::new(),
+    }
+}

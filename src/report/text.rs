@@ -1,0 +1,102 @@
+//! A report as plain lines for the terminal: facts, tags, counts.
+
+use super::{
+    ShiftReport, TagFigures,
+    csv::{floor_percent, iso, raised},
+};
+use crate::plant::def::{PlantDef, Priority};
+
+/// The report as lines, without alarm list, actions and record; a missing figure is `—`.
+pub fn shift_text(report: &ShiftReport, def: &PlantDef) -> String {
+    let zone = &def.time_zone;
+    let mut lines = vec![
+        format!("{}, {}", def.title, report.period.name),
+        format!("{} to {}", iso(zone, report.period.from), iso(zone, report.period.to)),
+    ];
+    if report.until < report.period.to {
+        lines.push(format!("still running: figures until {}", iso(zone, report.until)));
+    }
+    let width = report.tags.iter().map(|tag| tag.tag.chars().count()).max().unwrap_or(0).max(3);
+    lines.push(String::new());
+    lines.push(format!(
+        "{:width$} {:>10} {:>10} {:>10} {:>10} {:>8} {:>7}  unit",
+        "tag", "min", "mean", "max", "last", "alarm/m", "good %"
+    ));
+    lines.extend(report.tags.iter().map(|tag| tag_line(tag, width)));
+    lines.push(String::new());
+    let counts: Vec<_> = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low]
+        .map(|priority| format!("{} {}", raised(&report.alarms, priority), priority.word()))
+        .to_vec();
+    lines.push(format!("alarms raised: {}", counts.join(", ")));
+    lines.push(format!("operator actions: {}", report.actions.len()));
+    lines.join("\n") + "\n"
+}
+
+fn tag_line(tag: &TagFigures, width: usize) -> String {
+    let value = |value: Option<f64>, decimals: u8| match value {
+        Some(value) => format!("{value:.*}", usize::from(decimals)),
+        None => "—".into(),
+    };
+    format!(
+        "{:width$} {:>10} {:>10} {:>10} {:>10} {:>8.1} {:>7.1}  {}",
+        tag.tag,
+        value(tag.min, tag.decimals),
+        value(tag.mean, tag.decimals.saturating_add(1)),
+        value(tag.max, tag.decimals),
+        value(tag.last, tag.decimals),
+        tag.in_alarm.as_secs_f64() / 60.0,
+        floor_percent(tag.good),
+        tag.unit,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::report::{
+        Period,
+        testing::{THREE, at, plant},
+    };
+
+    #[test]
+    fn a_missing_figure_is_a_dash_and_a_running_shift_says_so() {
+        let report = ShiftReport {
+            period: Period {
+                name: "morning 2026-11-21".into(),
+                from: at("2026-11-21T06:00+07"),
+                to: at("2026-11-21T14:00+07"),
+            },
+            until: at("2026-11-21T09:00+07"),
+            tags: vec![TagFigures {
+                tag: "TIC-1.PV".into(),
+                unit: "°C".into(),
+                decimals: 1,
+                min: Some(27.0),
+                mean: Some(54.321),
+                max: Some(71.2),
+                last: None,
+                in_alarm: Duration::from_secs(90),
+                good: 0.5,
+            }],
+            alarms: Vec::new(),
+            actions: Vec::new(),
+            record: Vec::new(),
+            record_of: None,
+        };
+        let text = shift_text(&report, &plant("Asia/Bangkok", &THREE));
+        let expect = "\
+Water tank, morning 2026-11-21
+2026-11-21T06:00:00+07:00 to 2026-11-21T14:00:00+07:00
+still running: figures until 2026-11-21T09:00:00+07:00
+
+tag             min       mean        max       last  alarm/m  good %  unit
+TIC-1.PV       27.0      54.32       71.2          —      1.5    50.0  °C
+
+alarms raised: 0 critical, 0 high, 0 medium, 0 low
+operator actions: 0
+";
+        assert_eq!(text, expect);
+    }
+}
