@@ -1,7 +1,6 @@
 //! Tab 2: curves of the plant's groups over a moving window or since the start of the day, past and live as one curve;
 //! and a page with every stored value and its last hour.
 
-mod errand;
 mod span;
 mod view;
 
@@ -14,11 +13,8 @@ use crossterm::event::KeyCode;
 use jiff::{SignedDuration, Timestamp};
 use ratatui::{Frame, layout::Rect};
 
-use self::{
-    errand::Errand,
-    span::{RATES, View, WINDOWS, midnight, nearest, pan},
-};
-use super::Tab;
+use self::span::{RATES, View, WINDOWS, midnight, nearest, pan};
+use super::{Tab, errand::Errand};
 use crate::{
     history::{Answer, HistoryError, Question, Series},
     plant::{
