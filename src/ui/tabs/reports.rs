@@ -53,8 +53,8 @@ pub enum Action {
 
 /// Keys of this tab.
 pub const KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Left), label: "shift before", help: "the shift before", action: Action::Before },
-    Key { chord: code(KeyCode::Right), label: "after", help: "the shift after", action: Action::After },
+    Key { chord: code(KeyCode::Left), label: "earlier", help: "the shift before", action: Action::Before },
+    Key { chord: code(KeyCode::Right), label: "later", help: "the shift after", action: Action::After },
     Key { chord: char('l'), label: "running", help: "the shift that is running", action: Action::Running },
     Key { chord: char('/'), label: "period", help: "any period: from-to, a day, a shift", action: Action::Free },
     Key { chord: char('e'), label: "export", help: "write the report as CSV", action: Action::Export },
@@ -122,7 +122,7 @@ impl Reports {
     pub fn on_key(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
         let page = usize::from(cx.area.height.saturating_sub(3)).max(1);
         match action {
-            Action::Before => self.step(cx, |def, shown| period::before(def, shown)),
+            Action::Before => self.step(cx, period::before),
             Action::After => self.step(cx, |def, shown| period::after(def, shown, cx.now)),
             Action::Running => {
                 self.show(period::at(cx.def(), cx.now));

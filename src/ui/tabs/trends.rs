@@ -194,13 +194,13 @@ impl Trends {
             (None, Action::Group) => self.next_group(cx),
             (None, Action::Mode) => {
                 (self.accumulate, self.since, self.end) = (!self.accumulate, None, None);
-                self.errands.view_changed();
+                self.moved();
             }
             (None, Action::Rate) => self.rate = (self.rate + 1) % RATES.len(),
             (None, Action::Cursor) => self.cursor = if self.cursor.is_some() { None } else { Some(cx.now) },
             (None, Action::Live) => {
                 (self.end, self.cursor) = (None, None);
-                self.errands.view_changed();
+                self.moved();
             }
         }
         self.ask(cx)
@@ -211,7 +211,7 @@ impl Trends {
         let unseen = self.data.seen.is_none_or(|seen| cx.now.duration_since(seen) > real(cx, UNSEEN_S) || cx.now < seen);
         if unseen {
             self.data.traces.clear();
-            self.errands.view_changed();
+            self.moved();
             self.errands.hours.want();
         }
         self.data.seen = Some(cx.now);
@@ -318,7 +318,7 @@ impl Trends {
         }
         let by = SignedDuration::from_secs(WINDOWS[self.window]) / 4 * quarters;
         self.end = pan(end, by, cx.now);
-        self.errands.view_changed();
+        self.moved();
     }
 
     fn zoom(&mut self, cx: &Cx, by: isize) {
@@ -328,7 +328,7 @@ impl Trends {
         } else {
             self.window = self.window.saturating_add_signed(by).min(WINDOWS.len() - 1);
         }
-        self.errands.view_changed();
+        self.moved();
     }
 
     fn toggle(&mut self, cx: &Cx) {
@@ -337,7 +337,7 @@ impl Trends {
             Some(place) => drop(self.off.remove(place)),
             None => self.off.push(pen.tag),
         }
-        self.errands.view_changed();
+        self.errands.curves.want();
     }
 
     fn next_group(&mut self, cx: &Cx) {
@@ -349,9 +349,17 @@ impl Trends {
         (self.group, self.selected, self.since) = (group, selected, None);
         let tags: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         self.data.traces.retain(|tag, _| tags.contains(tag));
-        self.errands.view_changed();
+        self.moved();
         self.errands.hours.want();
         self.push_live(cx);
+    }
+
+    /// The chart shows another stretch of time or other pens; figures of the old one must not stand beside it.
+    fn moved(&mut self) {
+        self.data.figures.clear();
+        self.errands.curves.want();
+        self.errands.figures.want();
+        self.errands.raised.want();
     }
 
     /// Rows that the list of values has room for.
@@ -406,7 +414,7 @@ impl Trends {
             let (first, view) = (series.iter().filter_map(begin).min(), self.span(cx));
             if let Some(first) = first.filter(|first| *first > view.from) {
                 if first.duration_since(view.from) > view.width() / 20 {
-                    self.errands.view_changed();
+                    self.moved();
                 }
                 self.since = Some(first);
             }
@@ -451,15 +459,6 @@ impl Trends {
             due(hours, real(cx, 20.0), series(&tags, hour.from, hour.to, HOUR_COLUMNS));
         }
         acts
-    }
-}
-
-impl Errands {
-    /// The chart shows another stretch of time or other pens.
-    fn view_changed(&mut self) {
-        self.curves.want();
-        self.figures.want();
-        self.raised.want();
     }
 }
 

@@ -7,7 +7,7 @@ pub mod trace;
 
 use std::time::Duration;
 
-use jiff::{Timestamp, tz::TimeZone};
+use jiff::{SignedDuration, Timestamp, tz::TimeZone};
 use ratatui::{buffer::Buffer, layout::Rect, style::Style, text::Line, widgets::Widget};
 use unicode_width::UnicodeWidthStr;
 
@@ -81,11 +81,15 @@ pub struct Plan {
     columns: Vec<Vec<Option<Span>>>,
 }
 
-/// The mark of a pen, in the legend and on its curve.
+/// The mark of a pen, in the legend and on its curve: a shape, or a letter where the font may lack the shapes.
 pub fn mark(theme: &Theme, pen: usize) -> &'static str {
-    const MARKS: [&str; 8] = ["●", "○", "▲", "△", "■", "□", "◆", "◇"];
+    const SHAPES: [&str; 8] = ["●", "○", "▲", "△", "■", "□", "◆", "◇"];
     const LETTERS: [&str; 8] = ["A", "B", "C", "D", "E", "F", "G", "H"];
-    theme.pick(MARKS, LETTERS)[pen % MARKS.len()]
+    let marks = match theme.glyphs {
+        Glyphs::Braille => SHAPES,
+        Glyphs::Block | Glyphs::Ascii => LETTERS,
+    };
+    marks[pen % marks.len()]
 }
 
 /// Dots across a chart of so many columns whose labels are of usual width: the columns to ask the history for.
@@ -260,13 +264,18 @@ impl Chart<'_> {
         }
     }
 
-    /// Says how long nothing is known of any pen, where there is room to say it.
+    /// Says how long there is no value of any pen, where there is room to say it. Time that was not read yet is left
+    /// blank: nothing is known of it.
     fn draw_gaps(&self, plan: &Plan, buf: &mut Buffer) {
         let (plot, across) = (plan.plot, raster(self.theme).dots().0);
         let count = usize::from(plot.width) * across;
         let past = self.cell(self.now, plot.width).map_or(count, |x| usize::from(x) * across);
         let known = |x: &usize| plan.columns.iter().any(|columns| columns[*x].is_some());
         let span = Duration::try_from(self.to.duration_since(self.from)).unwrap_or_default();
+        let was_read = |x: usize| {
+            let at = self.from.checked_add(SignedDuration::try_from(span.mul_f64(x as f64 / count as f64)).unwrap_or_default());
+            at.is_ok_and(|at| self.curves.iter().any(|curve| curve.trace.covers(at)))
+        };
         let mut x = 0;
         while x < past && !plan.columns.is_empty() {
             let end = (x..past).find(known).unwrap_or(past);
@@ -274,7 +283,7 @@ impl Chart<'_> {
             let length = span_words(span.mul_f64((end - x) as f64 / count as f64));
             let texts = [format!("no data {length}"), format!("gap {length}"), length];
             let fits = |text: &String| first + text.width() as u16 + 2 <= last;
-            if let Some(text) = texts.into_iter().find(fits) {
+            if let Some(text) = texts.into_iter().find(fits).filter(|_| was_read(x + (end - x) / 2)) {
                 let start = plot.x + first + (last - first - text.width() as u16) / 2;
                 buf.set_string(start, plot.y + plot.height / 2, text, self.theme.dim());
             }
@@ -353,16 +362,21 @@ impl Chart<'_> {
         let plot = plan.plot;
         let Some((at, words)) = &self.cursor else { return };
         let Some(x) = self.cell(*at, plot.width).map(|x| plot.x + x) else { return };
+        let (line, foot) = match self.theme.glyphs {
+            Glyphs::Braille => ("┊", "┷"),
+            Glyphs::Block => ("│", "┴"),
+            Glyphs::Ascii => (":", "^"),
+        };
         for y in plot.y..plot.bottom() {
             let cell = &mut buf[(x, y)];
             if matches!(cell.symbol(), " " | "·") {
-                cell.set_symbol(self.theme.pick("┊", ":")).set_style(self.theme.normal());
+                cell.set_symbol(line).set_style(self.theme.normal());
             } else {
                 cell.set_style(self.theme.focus());
             }
         }
         if plot.y > area.y {
-            buf[(x, plot.bottom())].set_symbol(self.theme.pick("┷", "^")).set_style(self.theme.normal());
+            buf[(x, plot.bottom())].set_symbol(foot).set_style(self.theme.normal());
             let width = (words.width() as u16).min(plot.width);
             let end = plot.right().saturating_sub(2).max(plot.x + width);
             let start = x.saturating_sub(width / 2).clamp(plot.x, end - width);

@@ -1,15 +1,19 @@
 //! A curve in one row of cells: the shape of the last hour beside a value.
 
-use crate::history::Series;
+use crate::{history::Series, ui::theme::Glyphs};
 
 const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 const ASCII: [char; 5] = ['_', '.', '-', '=', '^'];
 
 /// The curve in `cells` glyphs, from its least value at the bottom to its greatest at the top. A cell without a good
 /// value is blank, and a constant is drawn in the middle: it is neither low nor high. `resolution` is the last digit
-/// of the tag: what moves by no more counts as constant.
-pub fn spark(series: &Series, cells: usize, resolution: f64, ascii: bool) -> String {
-    let glyphs: &[char] = if ascii { &ASCII } else { &BLOCKS };
+/// of the tag: what moves by no more counts as constant. Console fonts lack most eighth blocks, so only the full glyph
+/// set has them.
+pub fn spark(series: &Series, cells: usize, resolution: f64, glyphs: Glyphs) -> String {
+    let glyphs: &[char] = match glyphs {
+        Glyphs::Braille => &BLOCKS,
+        Glyphs::Block | Glyphs::Ascii => &ASCII,
+    };
     let count = series.buckets.len();
     let mean = |n: usize| {
         // Every cell stands for at least one column, and every column stands in a cell.
@@ -50,8 +54,8 @@ mod tests {
             summary: None,
             good: 1.0,
         };
-        assert_eq!(spark(&series, cells, 0.1, false), expect, "{values:?}");
-        assert_eq!(spark(&series, cells, 0.1, true), expect_ascii, "{values:?}");
+        assert_eq!(spark(&series, cells, 0.1, Glyphs::Braille), expect, "{values:?}");
+        assert_eq!(spark(&series, cells, 0.1, Glyphs::Ascii), expect_ascii, "{values:?}");
     }
 
     #[test]

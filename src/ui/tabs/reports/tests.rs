@@ -123,7 +123,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
         alarms: if full { alarms } else { Vec::new() },
         actions: if full { vec![action] } else { Vec::new() },
         record: Vec::new(),
-        record_of: None,
+        record_of: full.then(|| ("TIC-1".to_owned(), "°C".to_owned())),
     }
 }
 
@@ -205,7 +205,7 @@ fn a_typed_period_is_reported_or_explained() {
     stand.send(Msg::Key(KeyEvent::new(KeyCode::Backspace, KeyModifiers::NONE)));
     stand.press("07:30⏎");
     stand.answer(true);
-    assert!(stand.screen().contains("06:00 – 07:30 +07   closed"), "{}", stand.screen());
+    assert!(stand.screen().contains("period   2026-11-21 06:00 – 07:30 +07   closed"), "{}", stand.screen());
     stand.press("l");
     assert!(stand.screen().contains("afternoon 2026-11-21"));
 }

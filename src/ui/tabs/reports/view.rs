@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
-use jiff::{Timestamp, tz::TimeZone};
+use jiff::{SignedDuration, Timestamp, tz::TimeZone};
 use ratatui::{
     Frame,
     layout::Rect,
@@ -19,7 +19,7 @@ use crate::{
     report::{Period, ShiftReport, TagFigures, csv::raised},
     ui::{
         Cx,
-        widgets::text::{Canvas, fit, pad, pad_left},
+        widgets::text::{Canvas, fit, pad, pad_left, width},
     },
 };
 
@@ -29,7 +29,7 @@ const LIST_MAX: usize = 500;
 /// Draws the tab.
 pub fn draw(reports: &Reports, cx: &Cx, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
-    let (width, height) = (canvas.width(), canvas.height());
+    let (columns, height) = (canvas.width(), canvas.height());
     let Some(period) = &reports.period else { return };
     draw_title(reports, cx, period, &mut canvas);
     let rows = height.saturating_sub(3);
@@ -37,19 +37,19 @@ pub fn draw(reports: &Reports, cx: &Cx, frame: &mut Frame, area: Rect) {
         Some(report) => {
             let lines = lines(cx, report);
             let first = reports.first.min(lines.len().saturating_sub(usize::from(rows)));
-            let mut part = canvas.part(0, 2, width, rows);
+            let mut part = canvas.part(0, 2, columns, rows);
             let area = part.area();
-            let (head, body) = (heading(cx, width), lines.iter().skip(first).take(rows.into()));
+            let (head, body) = (heading(cx, columns), lines.iter().skip(first).take(rows.into()));
             for (y, line) in body.enumerate() {
                 part.buffer().set_line(area.x, area.y + y as u16, line, area.width);
             }
             let hidden = lines.len().saturating_sub(first + usize::from(rows));
-            let mut row = canvas.part(0, 1, width, 1);
+            let mut row = canvas.part(0, 1, columns, 1);
             let area = row.area();
             if !area.is_empty() {
                 row.buffer().set_line(area.x, area.y, &head, area.width);
             }
-            draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), width, 1));
+            draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
         }
         None => {
             let words = reports.trouble.as_deref().unwrap_or("reading the history");
@@ -68,7 +68,7 @@ fn draw_title(reports: &Reports, cx: &Cx, period: &Period, canvas: &mut Canvas) 
     let running = reports.is_running(cx.now);
     let until = reports.report.as_ref().map_or(cx.now, |report| report.until);
     let state = match (running, &reports.report) {
-        (true, _) => format!("RUNNING: figures until now, {}", local(until, zone, "%H:%M:%S")),
+        (true, _) => format!("RUNNING, until now {}", local(until, zone, "%H:%M:%S")),
         (false, Some(report)) if report.until < report.period.to => {
             format!("figures until {} only", local(until, zone, "%H:%M:%S"))
         }
@@ -89,9 +89,9 @@ fn draw_title(reports: &Reports, cx: &Cx, period: &Period, canvas: &mut Canvas) 
 /// What the CSV is like, and where it went.
 fn draw_export(reports: &Reports, cx: &Cx, report: &ShiftReport, hidden: usize, row: &mut Canvas) {
     let (theme, dialect) = (cx.theme, reports.dialect);
-    let mark = if dialect.bom { ", with byte order mark" } else { "" };
-    let kind = format!("CSV a{}b, 1{}5{mark}", dialect.separator, dialect.decimal);
-    let x = row.text(1, 0, &kind, theme.dim()) + 3;
+    let separator = if dialect.separator == ';' { "semicolons" } else { "commas" };
+    let decimal = if dialect.decimal == ',' { "decimal comma" } else { "decimal point" };
+    let bom = if dialect.bom { ", BOM" } else { "" };
     let path = reports.path(cx, report);
     let (text, style) = match &reports.export {
         Export::Not => (format!("e writes {}", path.display()), theme.dim()),
@@ -99,10 +99,18 @@ fn draw_export(reports: &Reports, cx: &Cx, report: &ShiftReport, hidden: usize, 
         Export::Done(path) => (format!("{} written {}", theme.pick("✓", "ok"), path.display()), theme.done()),
         Export::Failed(why) => (format!("not written: {why}"), theme.trouble()),
     };
-    let more = if hidden > 0 { format!("{} {hidden} more", theme.pick("↓", "down")) } else { String::new() };
-    let room = row.width().saturating_sub(x + 2 + more.len() as u16);
-    row.text(x, 0, &fit(&text, room), style);
-    row.text_right(row.width().saturating_sub(1), 0, &more, theme.dim());
+    let more = if hidden > 0 { format!("   {} {hidden} more", theme.pick("↓", "down")) } else { String::new() };
+    // The path matters most: the format is told in full where there is room.
+    let kinds = [
+        format!("CSV: {separator}, {decimal}{bom}{more}"),
+        format!("CSV {} {}{bom}{more}", dialect.separator, dialect.decimal),
+        more.trim().to_owned(),
+    ];
+    let end = row.width().saturating_sub(1);
+    let fits = |kind: &String| width(&text) + width(kind) + 4 <= end;
+    let kind = kinds.iter().find(|kind| fits(kind)).unwrap_or(&kinds[2]);
+    row.text(1, 0, &fit(&text, end.saturating_sub(width(kind) + 2)), style);
+    row.text_right(end, 0, kind, theme.dim());
 }
 
 /// Widths of the table: tag, unit, then right-aligned figures.
@@ -114,7 +122,7 @@ fn widths(width: u16) -> (u16, u16) {
 fn heading(cx: &Cx, width: u16) -> Line<'static> {
     let (tag, figure) = widths(width);
     let mut text = format!("  {}{}", pad("tag", tag), pad("unit", 7));
-    for (name, more) in [("min", 0), ("mean", 0), ("max", 0), ("last", 0), ("in alarm", 2), ("good", 0)] {
+    for (name, more) in [("min", 0), ("mean", 0), ("max", 0), ("last", 0), ("in alarm", 1), ("good", 0)] {
         text.push_str(&pad_left(name, figure + more));
     }
     Line::from(Span::styled(text, cx.theme.dim()))
@@ -131,12 +139,14 @@ pub fn lines(cx: &Cx, report: &ShiftReport) -> Vec<Line<'static>> {
     lines.extend(report.tags.iter().map(|tag| figures(cx, tag)));
     lines.push(Line::default());
     lines.push(counts(cx, report));
-    let one_day = {
-        let day = |at: Timestamp| at.to_zoned(cx.def().time_zone.clone()).date();
-        day(report.period.from) == day(report.until)
-    };
-    let form = if one_day { "%H:%M:%S" } else { "%m-%d %H:%M:%S" };
-    let time = |at: Timestamp| Span::styled(format!("  {}  ", local(at, &cx.def().time_zone, form)), theme.dim());
+    if let Some((of, _)) = &report.record_of {
+        let words = format!("  record of {of}: {} rows in the CSV", report.record.len());
+        lines.push(Line::from(Span::styled(words, theme.normal())));
+    }
+    // The name of a shift tells its day; only a longer period needs the date in every line.
+    let short = report.until.duration_since(report.period.from) <= SignedDuration::from_hours(24);
+    let form = if short { "%H:%M:%S" } else { "%m-%d %H:%M:%S" };
+    let time = |at: Timestamp| format!("  {}  ", local(at, &cx.def().time_zone, form));
     let more = |n: usize| Line::from(Span::styled(format!("  and {n} more in the CSV"), theme.dim()));
     if !report.alarms.is_empty() {
         lines.push(section(cx, "alarms"));
@@ -164,7 +174,7 @@ fn figures(cx: &Cx, tag: &TagFigures) -> Line<'static> {
         Span::styled(format!("  {}", pad(&tag.tag, name - 1)), theme.normal()),
         Span::styled(format!(" {}", pad(&tag.unit, 7)), theme.dim()),
         Span::styled([value(tag.min, 0), value(tag.mean, 1), value(tag.max, 0), value(tag.last, 0)].concat(), theme.normal()),
-        Span::styled(pad_left(&alarm, figure + 2), if tag.in_alarm.is_zero() { theme.dim() } else { theme.strong() }),
+        Span::styled(pad_left(&alarm, figure + 1), if tag.in_alarm.is_zero() { theme.dim() } else { theme.strong() }),
         Span::styled(pad_left(&good, figure), if tag.good < 0.9995 { theme.strong() } else { theme.dim() }),
     ])
 }
@@ -196,7 +206,8 @@ fn section(cx: &Cx, title: &str) -> Line<'static> {
     Line::from(Span::styled(format!(" {rule} {title} {}", rule.repeat(rest)), cx.theme.dim()))
 }
 
-fn alarm_line(cx: &Cx, alarm: &AlarmRecord, time: Span<'static>) -> Line<'static> {
+/// One step of an alarm. An acknowledgement tells who, the other steps tell the value.
+fn alarm_line(cx: &Cx, alarm: &AlarmRecord, time: String) -> Line<'static> {
     let theme = cx.theme;
     let value = |value: f64| match cx.def().tag_named(&alarm.subject) {
         Some(tag) => format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)),
@@ -204,17 +215,22 @@ fn alarm_line(cx: &Cx, alarm: &AlarmRecord, time: Span<'static>) -> Line<'static
     };
     let active = alarm.step == AlarmStep::Raised;
     let style: Style = if active { theme.normal() } else { theme.dim() };
-    let by = alarm.by.as_ref().map(|by| format!("by {by}")).unwrap_or_default();
-    let value = alarm.value.map(value).unwrap_or_default();
+    let detail = match (&alarm.by, alarm.value) {
+        (Some(by), _) => format!("by {by}"),
+        (None, Some(number)) => pad_left(value(number).trim(), 10),
+        (None, None) => String::new(),
+    };
+    let text = 21 + (cx.area.width.saturating_sub(68 + width(&time)) / 2).min(20);
     Line::from(vec![
-        time,
+        Span::styled(time, theme.dim()),
         Span::styled(theme.priority_mark(alarm.priority), if active { theme.severity(alarm.priority) } else { theme.dim() }),
-        Span::styled(format!(" {} {} ", pad(&alarm.subject, 11), pad(&alarm.text, 22)), style),
-        Span::styled(format!("{} {} {by}", pad(alarm.step.word(), 12), pad_left(value.trim(), 10)), style),
+        Span::styled(format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.text, text)), style),
+        Span::styled(format!("{} {detail}", pad(alarm.step.word(), 13)), style),
     ])
 }
 
-fn action_line(cx: &Cx, action: &ActionRecord, time: Span<'static>) -> Line<'static> {
+/// One deed of an operator; where it is too long, its outcome is kept.
+fn action_line(cx: &Cx, action: &ActionRecord, time: String) -> Line<'static> {
     let arrow = cx.theme.pick("→", "->");
     let change = match (&action.old, &action.new) {
         (Some(old), Some(new)) => format!("{old} {arrow} {new}"),
@@ -222,15 +238,22 @@ fn action_line(cx: &Cx, action: &ActionRecord, time: Span<'static>) -> Line<'sta
         (Some(old), None) => old.to_string(),
         (None, None) => String::new(),
     };
-    let text = format!("{} {} {} {}  ", pad(&action.by, 8), action.action, action.target, change);
-    let outcome = Span::styled(action.outcome.to_string(), cx.theme.strong());
-    Line::from(vec![time, Span::styled(text, cx.theme.normal()), outcome])
+    let room = cx.area.width.saturating_sub(width(&time) + 1);
+    let outcome = fit(&action.outcome, room / 2);
+    let text = fit(&format!("{} {} {} {change}", pad(&action.by, 8), action.action, action.target), room.saturating_sub(width(&outcome) + 2));
+    Line::from(vec![
+        Span::styled(time, cx.theme.dim()),
+        Span::styled(text, cx.theme.normal()),
+        Span::styled(format!("  {outcome}"), cx.theme.strong()),
+    ])
 }
 
-/// `11-20 22:00 – 11-21 06:00 +07`; dates only where the period leaves the day of its name.
+/// `22:00 – 11-21 06:00 +07`; dates only where the name of the period does not tell them.
 fn span(period: &Period, zone: &TimeZone) -> String {
     let (from, to) = (period.from.to_zoned(zone.clone()), period.to.to_zoned(zone.clone()));
     let form = if from.date() == to.date() { "%H:%M" } else { "%m-%d %H:%M" };
+    let named = period.name.contains(&from.date().to_string());
+    let start = from.strftime(if named { "%H:%M" } else { "%Y-%m-%d %H:%M" });
     let offset = |at: &jiff::Zoned| {
         let (seconds, sign) = (at.offset().seconds(), if at.offset().is_negative() { '-' } else { '+' });
         let minutes = seconds.abs() / 60 % 60;
@@ -239,7 +262,7 @@ fn span(period: &Period, zone: &TimeZone) -> String {
     };
     // Where the clocks change in between, both ends tell their offset.
     let first = if from.offset() == to.offset() { String::new() } else { format!(" {}", offset(&from)) };
-    format!("{}{first} – {} {}", from.strftime(form), to.strftime(form), offset(&to))
+    format!("{start}{first} – {} {}", to.strftime(form), offset(&to))
 }
 
 fn local(at: Timestamp, zone: &TimeZone, form: &str) -> String {

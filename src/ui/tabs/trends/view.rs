@@ -17,6 +17,7 @@ use crate::{
     plant::def::{Pen, TagId},
     ui::{
         Cx,
+        theme::Glyphs,
         widgets::{
             chart::{Axis, Chart, Curve, Plan, mark},
             spark::spark,
@@ -83,7 +84,7 @@ fn draw_title(trends: &Trends, cx: &Cx, canvas: &mut Canvas) {
         (false, _) => canvas.text(x + 3, 0, &format!("window {}", window_words(WINDOWS[trends.window])), theme.normal()),
     };
     x = match trends.end {
-        None => canvas.text(x + 3, 0, theme.pick("live ●", "live *"), theme.normal()),
+        None => canvas.text(x + 3, 0, if theme.glyphs == Glyphs::Braille { "live ●" } else { "live *" }, theme.normal()),
         Some(_) => {
             let (from, to) = (moment(view.from, cx.now, zone), moment(view.to, cx.now, zone));
             canvas.text(x + 3, 0, &format!(" past {from} – {to} "), theme.focus())
@@ -238,8 +239,7 @@ fn draw_pen(
     }
     if let Some(series) = trends.data.hours.get(&pen.tag) {
         let cells = usize::from(row.width().saturating_sub(x + 1)).min(series.buckets.len());
-        let ascii = theme.pick(false, true);
-        row.text(x, 0, &spark(series, cells, resolution(cx, pen.tag), ascii), pen_style);
+        row.text(x, 0, &spark(series, cells, resolution(cx, pen.tag), theme.glyphs), pen_style);
     }
 }
 
@@ -288,7 +288,7 @@ fn draw_values(trends: &Trends, cx: &Cx, canvas: &mut Canvas, first: usize, sele
             canvas.text_right(high, y, &cx.snapshot.format(*tag, max), theme.dim());
         }
         let cells = usize::from(canvas.width().saturating_sub(high + 3)).min(series.buckets.len());
-        canvas.text(high + 2, y, &spark(series, cells, resolution(cx, *tag), theme.pick(false, true)), style);
+        canvas.text(high + 2, y, &spark(series, cells, resolution(cx, *tag), theme.glyphs), style);
     }
 }
 

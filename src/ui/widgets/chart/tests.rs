@@ -120,3 +120,18 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_console_without_braille_gets_blocks_and_letters() {
+    let theme = Theme { glyphs: Glyphs::Block, ..Theme::FULL };
+    let (pv, sv) = (trace((0..120).map(wave)), trace((0..120).map(|_| 70.0)));
+    let sv = Curve { dashed: true, ..curve(&sv, 1, "°C") };
+    insta::assert_snapshot!(picture(&chart(&theme, vec![curve(&pv, 0, "°C"), sv]), 70, 14));
+}
+
+#[test]
+fn time_that_was_not_read_yet_is_blank_and_not_called_a_gap() {
+    let unread = Trace::default();
+    let picture = picture(&chart(&Theme::FULL, vec![curve(&unread, 0, "°C")]), 60, 8);
+    assert!(!picture.contains("no data"), "{picture}");
+}

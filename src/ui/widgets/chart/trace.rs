@@ -60,6 +60,16 @@ impl Trace {
         self.past.as_ref()
     }
 
+    /// Was this instant read, with or without a value in it?
+    pub fn covers(&self, at: Timestamp) -> bool {
+        let live = self.live.front().is_some_and(|(first, _)| *first <= at);
+        let past = self.past.as_ref().is_some_and(|past| {
+            let width = past.step.checked_mul(past.buckets.len() as u32).unwrap_or(Duration::MAX);
+            past.from <= at && at.duration_since(past.from) < SignedDuration::try_from(width).unwrap_or(SignedDuration::MAX)
+        });
+        live || past
+    }
+
     /// The value at an instant: the live value that held, or the last one of its column in the history.
     pub fn value_at(&self, at: Timestamp) -> Option<f64> {
         if self.live.front().is_some_and(|(first, _)| *first <= at) {
@@ -219,6 +229,15 @@ mod tests {
         {
             assert_eq!(trace.value_at(at(second)), expect, "at {second} s");
         }
+    }
+
+    #[test]
+    fn no_data_and_not_read_yet_are_two_things() {
+        let trace = trace(&[1., f64::NAN], &[(30, 7.)]);
+        for (second, expect) in [(-1, false), (0, true), (15, true), (20, false), (29, false), (30, true), (99, true)] {
+            assert_eq!(trace.covers(at(second)), expect, "at {second} s");
+        }
+        assert!(!Trace::default().covers(at(0)));
     }
 
     #[test]
