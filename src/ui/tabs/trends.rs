@@ -1,6 +1,7 @@
 //! Tab 2: curves of the plant's groups over a moving window or since the start of the day, past and live as one curve;
 //! and a page with every stored value and its last hour.
 
+mod keys;
 mod span;
 mod view;
 
@@ -9,10 +10,10 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crossterm::event::KeyCode;
 use jiff::{SignedDuration, Timestamp};
 use ratatui::{Frame, layout::Rect};
 
+pub use self::keys::{Action, KEYS};
 use self::span::{RATES, View, WINDOWS, midnight, nearest, pan};
 use super::{Tab, errand::Errand};
 use crate::{
@@ -24,68 +25,9 @@ use crate::{
     },
     ui::{
         Act, Cx,
-        keys::{Key, char, code},
         widgets::chart::{self, trace::Trace},
     },
 };
-
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Earlier, or the cursor to the left.
-    Left,
-    /// Later, or the cursor to the right.
-    Right,
-    /// A whole window earlier; a page up in the list of values.
-    PageBack,
-    /// A whole window later; a page down in the list of values.
-    PageOn,
-    /// The pen or value above.
-    Up,
-    /// The pen or value below.
-    Down,
-    /// Switch the selected pen on or off.
-    Toggle,
-    /// Show the curve of the selected value.
-    Open,
-    /// Shorter window.
-    ZoomIn,
-    /// Longer window.
-    ZoomOut,
-    /// Next group of pens.
-    Group,
-    /// Moving window, or everything since the start of the day.
-    Mode,
-    /// Next update rate.
-    Rate,
-    /// Cursor on or off.
-    Cursor,
-    /// Back to the present.
-    Live,
-    /// Curves, or the list of all values.
-    Values,
-}
-
-/// Keys of this tab.
-pub const KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Left), label: "", help: "earlier (with the cursor on: cursor to the left)", action: Action::Left },
-    Key { chord: code(KeyCode::Right), label: "", help: "later (with the cursor on: cursor to the right)", action: Action::Right },
-    Key { chord: code(KeyCode::PageUp), label: "", help: "a whole window earlier; a page up", action: Action::PageBack },
-    Key { chord: code(KeyCode::PageDown), label: "", help: "a whole window later; a page down", action: Action::PageOn },
-    Key { chord: code(KeyCode::Up), label: "", help: "select the pen above", action: Action::Up },
-    Key { chord: code(KeyCode::Down), label: "", help: "select the pen below", action: Action::Down },
-    Key { chord: char('l'), label: "live", help: "back to the present", action: Action::Live },
-    Key { chord: char('+'), label: "zoom", help: "shorter window", action: Action::ZoomIn },
-    Key { chord: char('='), label: "", help: "shorter window", action: Action::ZoomIn },
-    Key { chord: char('-'), label: "", help: "longer window", action: Action::ZoomOut },
-    Key { chord: char('c'), label: "cursor", help: "cursor on or off: reads every pen at one time", action: Action::Cursor },
-    Key { chord: char('g'), label: "group", help: "next group of pens", action: Action::Group },
-    Key { chord: char(' '), label: "pen", help: "switch the selected pen on or off", action: Action::Toggle },
-    Key { chord: char('v'), label: "values", help: "all values with their last hour, or the curves", action: Action::Values },
-    Key { chord: char('m'), label: "mode", help: "moving window, or everything since the start of the day", action: Action::Mode },
-    Key { chord: char('u'), label: "rate", help: "how often the curves are read anew: 0.5, 1, 2, 5, 10 s", action: Action::Rate },
-    Key { chord: code(KeyCode::Enter), label: "", help: "in the list of values: show its curve", action: Action::Open },
-];
 
 /// An answer that takes longer (real time) is taken for lost.
 const PATIENCE_S: f64 = 15.0;
@@ -208,7 +150,8 @@ impl Trends {
 
     /// News, or time has passed: takes in live values and asks what is due.
     pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
-        let unseen = self.data.seen.is_none_or(|seen| cx.now.duration_since(seen) > real(cx, UNSEEN_S) || cx.now < seen);
+        let unseen =
+            self.data.seen.is_none_or(|seen| cx.now.duration_since(seen) > real(cx, UNSEEN_S) || cx.now < seen);
         if unseen {
             self.data.traces.clear();
             self.moved();

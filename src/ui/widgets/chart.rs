@@ -166,6 +166,12 @@ impl Chart<'_> {
         self.curves.iter().map(axis).collect()
     }
 
+    /// The cell row of a value, counted from the top of the plot: the very cell that its dots are in.
+    fn row(&self, scale: Scale, value: f64, height: u16) -> u16 {
+        let down = raster(self.theme).dots().1;
+        (dot_of(scale, value, usize::from(height) * down) / down) as u16
+    }
+
     /// The cell column of an instant, counted from the left of the plot.
     fn cell(&self, at: Timestamp, width: u16) -> Option<u16> {
         let (from, to) = (self.from.as_microsecond(), self.to.as_microsecond());
@@ -201,7 +207,7 @@ impl Chart<'_> {
         for (at, _) in self.time_labels(plan) {
             let Some(x) = self.cell(at, plan.plot.width) else { continue };
             for tick in scale.ticks() {
-                let y = row_of(*scale, tick, plan.plot.height);
+                let y = self.row(*scale, tick, plan.plot.height);
                 buf[(plan.plot.x + x, plan.plot.y + y)].set_symbol("·").set_style(self.theme.dim());
             }
         }
@@ -213,7 +219,7 @@ impl Chart<'_> {
         let (_, height) = canvas.size();
         for (n, curve) in self.curves.iter().enumerate().rev() {
             let scale = plan.scales[n].1;
-            let row = |value: f64| ((1.0 - scale.share(value)) * height.saturating_sub(1) as f64).round() as usize;
+            let row = |value: f64| dot_of(scale, value, height);
             let mut before: Option<Span> = None;
             for (x, span) in plan.columns[n].iter().enumerate() {
                 if let Some(span) = span {
@@ -243,7 +249,7 @@ impl Chart<'_> {
             let place = |x: u16| {
                 let cell = &plan.columns[n][usize::from(x) * dots..(usize::from(x) + 1) * dots];
                 let last = cell.iter().rev().flatten().next()?.last;
-                Some((x, row_of(plan.scales[n].1, last, plot.height)))
+                Some((x, self.row(plan.scales[n].1, last, plot.height)))
             };
             let mut put = |(x, y): (u16, u16)| {
                 let free = !taken.contains(&(x, y));
@@ -273,7 +279,9 @@ impl Chart<'_> {
         let known = |x: &usize| plan.columns.iter().any(|columns| columns[*x].is_some());
         let span = Duration::try_from(self.to.duration_since(self.from)).unwrap_or_default();
         let was_read = |x: usize| {
-            let at = self.from.checked_add(SignedDuration::try_from(span.mul_f64(x as f64 / count as f64)).unwrap_or_default());
+            let at = self
+                .from
+                .checked_add(SignedDuration::try_from(span.mul_f64(x as f64 / count as f64)).unwrap_or_default());
             at.is_ok_and(|at| self.curves.iter().any(|curve| curve.trace.covers(at)))
         };
         let mut x = 0;
@@ -309,7 +317,7 @@ impl Chart<'_> {
             let width = usize::from(plot.x - area.x - 1);
             buf.set_stringn(area.x, area.y, format!("{:>width$}", curve.unit), plot.width.into(), style);
             for tick in scale.ticks() {
-                let y = plot.y + row_of(*scale, tick, plot.height);
+                let y = plot.y + self.row(*scale, tick, plot.height);
                 buf.set_string(area.x, y, format!("{:>width$}{}", scale.label(tick), line("┤", "+")), style);
             }
         }
@@ -320,7 +328,7 @@ impl Chart<'_> {
             buf.set_stringn(right + 1, area.y, curve.unit, usize::from(area.right() - right - 1), style);
             buf[(right, below)].set_symbol(line("┘", "+")).set_style(style);
             for tick in scale.ticks() {
-                let y = plot.y + row_of(*scale, tick, plot.height);
+                let y = plot.y + self.row(*scale, tick, plot.height);
                 buf.set_string(right, y, format!("{}{}", line("├", "+"), scale.label(tick)), style);
             }
         }
@@ -385,9 +393,9 @@ impl Chart<'_> {
     }
 }
 
-/// The row of a value in a plot of so many rows, from the top.
-fn row_of(scale: Scale, value: f64, rows: u16) -> u16 {
-    ((1.0 - scale.share(value)) * f64::from(rows.saturating_sub(1))).round() as u16
+/// The row of dots of a value in a plot of so many rows of dots, from the top.
+fn dot_of(scale: Scale, value: f64, rows: usize) -> usize {
+    ((1.0 - scale.share(value)) * rows.saturating_sub(1) as f64).round() as usize
 }
 
 fn widen(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {

@@ -164,7 +164,9 @@ mod tests {
         check("6 o'clock", "`6 o'clock` is not a time: expected 06:00, 2026-11-21 or 2026-11-21 06:00");
         check("2026-01-01 - 2026-11-01", "a report covers 92 days at most");
         check("", &format!("expected {FORMS}"));
-        for nonsense in ["2027-01-01", "-", "–", "::", "2026-11-20 2026-11-21", "lunch", "..", "2026-11-21 - 2026-11-20"] {
+        for nonsense in
+            ["2027-01-01", "-", "–", "::", "2026-11-20 2026-11-21", "lunch", "..", "2026-11-21 - 2026-11-20"]
+        {
             assert!(typed(&def, nonsense, now()).is_err(), "{nonsense}");
         }
     }

@@ -10,7 +10,12 @@ use crate::{
         record::{ActionRecord, AlarmRecord, AlarmStep},
     },
     report::TagFigures,
-    ui::{AskId, Model, Msg, fixture::{Fixture, now}, theme::Theme, update, view},
+    ui::{
+        AskId, Model, Msg,
+        fixture::{Fixture, now},
+        theme::Theme,
+        update, view,
+    },
 };
 
 struct Stand {
@@ -61,7 +66,8 @@ impl Stand {
 
     fn terminal(&self) -> Terminal<TestBackend> {
         let screen = self.model.screen;
-        let mut terminal = Terminal::new(TestBackend::new(screen.width, screen.height)).expect("a test backend never fails");
+        let mut terminal =
+            Terminal::new(TestBackend::new(screen.width, screen.height)).expect("a test backend never fails");
         terminal.draw(|frame| view(&self.model, frame)).expect("a test backend never fails");
         terminal
     }
@@ -191,7 +197,10 @@ fn figures_never_stand_under_the_name_of_another_shift() {
     stand.press("←");
     let Some((id, Question::Report { period })) = asked.into_iter().next() else { panic!("a report is asked for") };
     stand.send(Msg::Answer(id, Ok(Answer::Report(Box::new(report(period, true))))));
-    assert!(stand.screen().contains("night 2026-11-20") && !stand.screen().contains("58.31"), "an answer for the morning");
+    assert!(
+        stand.screen().contains("night 2026-11-20") && !stand.screen().contains("58.31"),
+        "an answer for the morning"
+    );
     stand.answer(true);
     assert!(stand.screen().contains("58.31"));
 }
@@ -222,7 +231,9 @@ fn the_next_shift_is_shown_when_it_begins() {
 
 #[test]
 fn no_size_is_too_small_to_survive() {
-    for (width, height) in (0..40).flat_map(|width| (0..20).map(move |height| (width, height))).chain([(200, 60), (80, 12)]) {
+    for (width, height) in
+        (0..40).flat_map(|width| (0..20).map(move |height| (width, height))).chain([(200, 60), (80, 12)])
+    {
         let mut stand = Stand::new(Theme::FULL, width, height);
         stand.terminal();
         stand.answer(true);

@@ -169,11 +169,15 @@ fn figures(cx: &Cx, tag: &TagFigures) -> Line<'static> {
         None => pad_left("–", figure),
     };
     let alarm = if tag.in_alarm.is_zero() { "–".to_owned() } else { long(tag.in_alarm) };
-    let good = if tag.good >= 1.0 { "100 %".to_owned() } else { format!("{:.1} %", (tag.good * 1_000.0).floor() / 10.0) };
+    let good =
+        if tag.good >= 1.0 { "100 %".to_owned() } else { format!("{:.1} %", (tag.good * 1_000.0).floor() / 10.0) };
     Line::from(vec![
         Span::styled(format!("  {}", pad(&tag.tag, name - 1)), theme.normal()),
         Span::styled(format!(" {}", pad(&tag.unit, 7)), theme.dim()),
-        Span::styled([value(tag.min, 0), value(tag.mean, 1), value(tag.max, 0), value(tag.last, 0)].concat(), theme.normal()),
+        Span::styled(
+            [value(tag.min, 0), value(tag.mean, 1), value(tag.max, 0), value(tag.last, 0)].concat(),
+            theme.normal(),
+        ),
         Span::styled(pad_left(&alarm, figure + 1), if tag.in_alarm.is_zero() { theme.dim() } else { theme.strong() }),
         Span::styled(pad_left(&good, figure), if tag.good < 0.9995 { theme.strong() } else { theme.dim() }),
     ])
@@ -223,7 +227,10 @@ fn alarm_line(cx: &Cx, alarm: &AlarmRecord, time: String) -> Line<'static> {
     let text = 21 + (cx.area.width.saturating_sub(68 + width(&time)) / 2).min(20);
     Line::from(vec![
         Span::styled(time, theme.dim()),
-        Span::styled(theme.priority_mark(alarm.priority), if active { theme.severity(alarm.priority) } else { theme.dim() }),
+        Span::styled(
+            theme.priority_mark(alarm.priority),
+            if active { theme.severity(alarm.priority) } else { theme.dim() },
+        ),
         Span::styled(format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.text, text)), style),
         Span::styled(format!("{} {detail}", pad(alarm.step.word(), 13)), style),
     ])
@@ -240,7 +247,10 @@ fn action_line(cx: &Cx, action: &ActionRecord, time: String) -> Line<'static> {
     };
     let room = cx.area.width.saturating_sub(width(&time) + 1);
     let outcome = fit(&action.outcome, room / 2);
-    let text = fit(&format!("{} {} {} {change}", pad(&action.by, 8), action.action, action.target), room.saturating_sub(width(&outcome) + 2));
+    let text = fit(
+        &format!("{} {} {} {change}", pad(&action.by, 8), action.action, action.target),
+        room.saturating_sub(width(&outcome) + 2),
+    );
     Line::from(vec![
         Span::styled(time, cx.theme.dim()),
         Span::styled(text, cx.theme.normal()),

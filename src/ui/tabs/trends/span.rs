@@ -114,7 +114,9 @@ mod tests {
 
     #[test]
     fn everything_since_the_start_is_on_the_screen() {
-        for (from, end) in [("06:12:00", "07:00:00"), ("06:59:59", "07:00:00"), ("00:00:00", "23:59:59"), ("06:58:00", "07:00:00")] {
+        for (from, end) in
+            [("06:12:00", "07:00:00"), ("06:59:59", "07:00:00"), ("00:00:00", "23:59:59"), ("06:58:00", "07:00:00")]
+        {
             for columns in [1, 10, 119, 120, 121, 400] {
                 let view = View::since(at(from), at(end), columns);
                 assert!(view.from <= at(from) && view.holds(at(end)), "{from} {end} {columns}: {view:?}");

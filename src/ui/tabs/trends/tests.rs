@@ -10,7 +10,12 @@ use super::*;
 use crate::{
     history::Bucket,
     plant::{def::Priority, sample::Sample},
-    ui::{AskId, Effect, Model, Msg, fixture::{Fixture, now}, theme::Theme, update, view},
+    ui::{
+        AskId, Effect, Model, Msg,
+        fixture::{Fixture, now},
+        theme::Theme,
+        update, view,
+    },
 };
 
 /// A terminal on the trends tab, and the history that answers it.
@@ -32,7 +37,13 @@ fn past(tag: TagId, at: Timestamp) -> f64 {
     let seconds = at.duration_since(now()).as_secs_f64();
     match tag.0 {
         0 => 64.0 + 6.0 * (seconds / 90.0).sin() * (1.0 + seconds / 9_000.0),
-        1 => if seconds < -300.0 { 60.0 } else { 70.0 },
+        1 => {
+            if seconds < -300.0 {
+                60.0
+            } else {
+                70.0
+            }
+        }
         n => 42.0 + f64::from(n) + seconds / 40.0 % 30.0,
     }
 }
@@ -122,7 +133,8 @@ impl Stand {
             for (n, sample) in snapshot.samples.iter_mut().enumerate() {
                 sample.at = at;
                 if n == 0 {
-                    *sample = value(second).map_or(Sample::bad(crate::plant::sample::Cause::Timeout, at), |v| Sample::good(v, at));
+                    *sample = value(second)
+                        .map_or(Sample::bad(crate::plant::sample::Cause::Timeout, at), |v| Sample::good(v, at));
                 }
             }
             self.send(Msg::Snapshot(Arc::new(snapshot)));
@@ -131,7 +143,8 @@ impl Stand {
 
     fn terminal(&self) -> Terminal<TestBackend> {
         let screen = self.model.screen;
-        let mut terminal = Terminal::new(TestBackend::new(screen.width, screen.height)).expect("a test backend never fails");
+        let mut terminal =
+            Terminal::new(TestBackend::new(screen.width, screen.height)).expect("a test backend never fails");
         terminal.draw(|frame| view(&self.model, frame)).expect("a test backend never fails");
         terminal
     }
@@ -323,7 +336,9 @@ fn a_pen_is_switched_off_and_on() {
 
 #[test]
 fn no_size_is_too_small_to_survive() {
-    for (width, height) in (0..40).flat_map(|width| (0..20).map(move |height| (width, height))).chain([(200, 60), (80, 12), (300, 8)]) {
+    for (width, height) in
+        (0..40).flat_map(|width| (0..20).map(move |height| (width, height))).chain([(200, 60), (80, 12), (300, 8)])
+    {
         for keys in ["", "c", "v", "m"] {
             let mut stand = Stand::new(Theme::FULL, width, height);
             stand.press(keys);

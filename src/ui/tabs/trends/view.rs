@@ -77,14 +77,19 @@ fn draw_title(trends: &Trends, cx: &Cx, canvas: &mut Canvas) {
     x = match (trends.accumulate, trends.since) {
         (true, since) => {
             let from = since.filter(|since| *since > midnight(cx.now, zone));
-            let local = |since: Timestamp| since.to_zoned(zone.clone()).strftime("%H:%M, the first value today").to_string();
+            let local =
+                |since: Timestamp| since.to_zoned(zone.clone()).strftime("%H:%M, the first value today").to_string();
             let from = from.map_or("midnight".to_owned(), local);
             canvas.text(x + 3, 0, &format!("all since {from}"), theme.normal())
         }
-        (false, _) => canvas.text(x + 3, 0, &format!("window {}", window_words(WINDOWS[trends.window])), theme.normal()),
+        (false, _) => {
+            canvas.text(x + 3, 0, &format!("window {}", window_words(WINDOWS[trends.window])), theme.normal())
+        }
     };
     x = match trends.end {
-        None => canvas.text(x + 3, 0, if theme.glyphs == Glyphs::Braille { "live ●" } else { "live *" }, theme.normal()),
+        None => {
+            canvas.text(x + 3, 0, if theme.glyphs == Glyphs::Braille { "live ●" } else { "live *" }, theme.normal())
+        }
         Some(_) => {
             let (from, to) = (moment(view.from, cx.now, zone), moment(view.to, cx.now, zone));
             canvas.text(x + 3, 0, &format!(" past {from} – {to} "), theme.focus())
@@ -175,9 +180,13 @@ fn draw_legend(trends: &Trends, cx: &Cx, canvas: &mut Canvas, plan: Option<&Plan
     let cursor = trends.cursor(cx);
     let now = cursor.map_or("now".to_owned(), |at| format!("at {}", clock(at, &cx.def().time_zone)));
     canvas.text(4, 0, "pen", dim);
-    for (end, text) in
-        [(columns.value, now.as_str()), (columns.min, "min"), (columns.mean, "mean"), (columns.max, "max"), (columns.good, "good")]
-    {
+    for (end, text) in [
+        (columns.value, now.as_str()),
+        (columns.min, "min"),
+        (columns.mean, "mean"),
+        (columns.max, "max"),
+        (columns.good, "good"),
+    ] {
         canvas.text_right(end, 0, text, dim);
     }
     canvas.text(columns.hour, 0, "last hour", dim);
@@ -249,7 +258,10 @@ fn draw_figures(trends: &Trends, cx: &Cx, row: &mut Canvas, tag: TagId) {
     let (columns, style) = (Columns::of(row.width()), cx.theme.normal());
     let Some((summary, good)) = trends.data.figures.get(&tag) else { return };
     if cx.def().tag(tag).labels.is_empty() {
-        for (end, value) in [columns.min, columns.mean, columns.max].into_iter().zip(summary.map_or([None; 3], |s| [Some(s.0), Some(s.1), Some(s.2)])) {
+        for (end, value) in [columns.min, columns.mean, columns.max]
+            .into_iter()
+            .zip(summary.map_or([None; 3], |s| [Some(s.0), Some(s.1), Some(s.2)]))
+        {
             row.text_right(end, 0, &value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value)), style);
         }
     }
@@ -272,7 +284,12 @@ fn draw_values(trends: &Trends, cx: &Cx, canvas: &mut Canvas, first: usize, sele
         canvas.text_right(end, 1, text, theme.dim());
     }
     canvas.text(high + 2, 1, "last hour", theme.dim());
-    canvas.text_right(canvas.width().saturating_sub(1), 0, &format!("{} curve   v back", theme.pick("⏎", "Enter")), theme.dim());
+    canvas.text_right(
+        canvas.width().saturating_sub(1),
+        0,
+        &format!("{} curve   v back", theme.pick("⏎", "Enter")),
+        theme.dim(),
+    );
     for (y, (n, tag)) in all.iter().enumerate().skip(first).take(rows).enumerate() {
         let (y, def, shown) = (y as u16 + 2, cx.def().tag(*tag), value::show(cx, *tag));
         let style = if n == selected { theme.strong() } else { theme.normal() };
@@ -301,7 +318,8 @@ fn resolution(cx: &Cx, tag: TagId) -> f64 {
 fn is_set_value(cx: &Cx, tag: TagId) -> bool {
     let faceplates = cx.def().devices.iter().filter_map(|device| device.faceplate.as_ref());
     let def = cx.def().tag(tag);
-    faceplates.clone().any(|face| face.sv == tag) || def.writable() && !faceplates.clone().any(|face| face.mv == Some(tag))
+    faceplates.clone().any(|face| face.sv == tag)
+        || def.writable() && !faceplates.clone().any(|face| face.mv == Some(tag))
 }
 
 /// `98.9 %`; whole only when it is whole.

@@ -106,7 +106,13 @@ pub fn time_ticks(
     while let Some(at) = next.filter(|at| *at <= to && ticks.len() as i64 <= room + 2) {
         let local = at.to_zoned(zone.clone());
         let midnight = local.hour() == 0 && local.minute() == 0 && local.second() == 0;
-        let form = if midnight && span >= 3_600 { "%m-%d" } else if step < 60 { "%H:%M:%S" } else { "%H:%M" };
+        let form = if midnight && span >= 3_600 {
+            "%m-%d"
+        } else if step < 60 {
+            "%H:%M:%S"
+        } else {
+            "%H:%M"
+        };
         ticks.push((at, local.strftime(form).to_string()));
         next = Timestamp::from_second(at.as_second() + 1).ok().and_then(|after| round_up(after, step, zone));
     }
@@ -166,7 +172,13 @@ mod tests {
             assert_eq!(labels.join(" "), expect, "{from} {minutes} min");
         };
         check("2026-11-21T06:05:20Z", 60, "Asia/Bangkok", 66, "13:10 13:20 13:30 13:40 13:50 14:00");
-        check("2026-11-21T06:05:20Z", 1, "Asia/Bangkok", 66, "13:05:20 13:05:30 13:05:40 13:05:50 13:06:00 13:06:10 13:06:20");
+        check(
+            "2026-11-21T06:05:20Z",
+            1,
+            "Asia/Bangkok",
+            66,
+            "13:05:20 13:05:30 13:05:40 13:05:50 13:06:00 13:06:10 13:06:20",
+        );
         check("2026-11-21T06:05:20Z", 1440, "Asia/Bangkok", 66, "15:00 18:00 21:00 11-22 03:00 06:00 09:00 12:00");
         // Half-hour zones are round too.
         check("2026-11-21T06:05:20Z", 240, "Asia/Kolkata", 40, "12:00 13:00 14:00 15:00");

@@ -65,7 +65,8 @@ impl Trace {
         let live = self.live.front().is_some_and(|(first, _)| *first <= at);
         let past = self.past.as_ref().is_some_and(|past| {
             let width = past.step.checked_mul(past.buckets.len() as u32).unwrap_or(Duration::MAX);
-            past.from <= at && at.duration_since(past.from) < SignedDuration::try_from(width).unwrap_or(SignedDuration::MAX)
+            past.from <= at
+                && at.duration_since(past.from) < SignedDuration::try_from(width).unwrap_or(SignedDuration::MAX)
         });
         live || past
     }
