@@ -100,6 +100,13 @@ impl Theme {
     pub fn liquid(&self) -> Style {
         self.fg((96, 128, 152), 67, Color::Blue)
     }
+    /// Under words that stand in liquid: its colour becomes the background.
+    pub fn under_liquid(&self) -> Style {
+        match self.liquid().fg {
+            Some(colour) => Style::new().bg(colour),
+            None => Style::new(),
+        }
+    }
     /// Equipment that runs: brighter than one that rests, no colour of its own.
     pub fn running(&self) -> Style {
         self.strong()

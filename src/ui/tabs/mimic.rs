@@ -1,53 +1,247 @@
-//! The mimic tab.
+//! The mimic tab: the process at a glance, and the few commands that it is driven by.
 
+use crossterm::event::{KeyCode, KeyEvent};
+use jiff::SignedDuration;
 use ratatui::{Frame, layout::Rect};
 
+use super::Tab;
 use crate::{
-    history::{Answer, HistoryError},
-    plant::snapshot::Snapshot,
-    ui::{Act, Cx, keys::Key},
+    history::{Answer, HistoryError, Question, Series},
+    plant::{
+        def::{MimicCommand, MimicItem, Place},
+        snapshot::Snapshot,
+        tag::Kind,
+    },
+    ui::{
+        Act, Cx,
+        keys::{self, Hint, Key, char, code},
+        modal::{Choice, Confirm, Faceplate, Modal},
+        widgets::{
+            mimic::{Stretch, panel, pipe, place, tags, tank::Tank, title, trend, unit},
+            text::{Canvas, fit},
+        },
+    },
 };
 
 /// What a key means here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {}
+pub enum Action {
+    /// Select the next item in a direction (columns, rows).
+    Move(i32, i32),
+    /// Open the faceplate of the selected item.
+    Open,
+    /// Stop or start the motion of agitators and arrows.
+    Motion,
+}
 
-/// Keys of this tab.
-pub const KEYS: &[Key<Action>] = &[];
+/// Keys of this tab; the plant file adds its own.
+pub const KEYS: &[Key<Action>] = &[
+    Key { chord: code(KeyCode::Left), label: "", help: "select the item to the left", action: Action::Move(-1, 0) },
+    Key { chord: code(KeyCode::Right), label: "", help: "select the item to the right", action: Action::Move(1, 0) },
+    Key { chord: code(KeyCode::Up), label: "", help: "select the item above", action: Action::Move(0, -1) },
+    Key { chord: code(KeyCode::Down), label: "", help: "select the item below", action: Action::Move(0, 1) },
+    Key { chord: code(KeyCode::Enter), label: "open", help: "faceplate of the selected item", action: Action::Open },
+    Key { chord: char('M'), label: "", help: "motion of agitators and arrows off and on", action: Action::Motion },
+];
+
+/// The small trends are asked again after so many ticks (half seconds).
+const TREND_TICKS: u32 = 20;
 
 /// State of this tab.
 #[derive(Debug)]
-pub struct Mimic {}
+pub struct Mimic {
+    /// The selected item, by its place in the picture.
+    selected: Option<usize>,
+    motion: bool,
+    /// Curves of the small trends, by the item's place.
+    trends: Vec<(usize, Option<Series>)>,
+    /// Tick of the last questions; their number is a multiple of the number of trends, plus which trend.
+    asked_at: Option<u32>,
+    asked: u32,
+}
 
 impl Mimic {
     /// As it is at the start.
-    pub fn new(_snapshot: &Snapshot) -> Mimic {
-        Mimic {}
+    pub fn new(snapshot: &Snapshot) -> Mimic {
+        let items = snapshot.def.mimic.items.iter().enumerate();
+        let trends = items.filter(|(_, item)| matches!(item, MimicItem::Trend { .. })).map(|(n, _)| (n, None));
+        Mimic { selected: None, motion: true, trends: trends.collect(), asked_at: None, asked: 0 }
     }
+
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, _cx: &Cx, action: Action) -> Vec<Act> {
-        match action {}
-    }
-    /// News, or time has passed.
-    pub fn on_snapshot(&mut self, _cx: &Cx) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+        let items = &cx.def().mimic.items;
+        match action {
+            Action::Move(dx, dy) => self.selected = neighbour(items, self.selected, (dx, dy)),
+            Action::Motion => self.motion = !self.motion,
+            Action::Open => {
+                let item = self.selected.and_then(|n| items.get(n));
+                let plate = item.and_then(|item| Faceplate::new(title(cx, item), tags(cx, item)));
+                return plate.map(|plate| Act::Open(Modal::Faceplate(plate))).into_iter().collect();
+            }
+        }
         Vec::new()
     }
+
+    /// A key that the plant file defines: a window with the finished intent.
+    pub fn on_command_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+        let command = cx.def().mimic.commands.iter().find(|command| char(command.key).is(event));
+        command.and_then(|command| intent(cx, command)).map(Act::Open).into_iter().collect()
+    }
+
+    /// The plant's keys first: they are what the tab is for.
+    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+        let commands = cx.def().mimic.commands.iter();
+        let commands = commands.map(|command| Hint::new(command.key, &command.label, format!("{} (asks first)", command.label)));
+        commands.chain([Hint::new("←↑↓→", "select", "select an item")]).chain(keys::hints(KEYS)).collect()
+    }
+
+    /// News, or time has passed: the small trends are asked again now and then.
+    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+        if self.trends.is_empty() || self.asked_at.is_some_and(|at| cx.phase.wrapping_sub(at) < TREND_TICKS) {
+            return Vec::new();
+        }
+        self.asked_at = Some(cx.phase);
+        self.asked = self.asked.wrapping_add(1);
+        let count = self.trends.len() as u32;
+        let asks = self.trends.iter().enumerate().filter_map(|(n, (item, _))| match &cx.def().mimic.items[*item] {
+            MimicItem::Trend { tag, window, place } => {
+                let from = cx.now - SignedDuration::try_from(*window).ok()?;
+                let width = stretch(cx, cx.area).place(*place).width;
+                let question = Question::Series { tags: vec![*tag], from, to: cx.now, buckets: usize::from(width.max(1)) * 2 };
+                Some(Act::ask(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(n as u32), question))
+            }
+            MimicItem::Tank { .. }
+            | MimicItem::Valve { .. }
+            | MimicItem::Pump { .. }
+            | MimicItem::Pipe { .. }
+            | MimicItem::Value { .. }
+            | MimicItem::Controller { .. }
+            | MimicItem::Sequence { .. }
+            | MimicItem::Text { .. } => None,
+        });
+        asks.collect()
+    }
+
     /// The history answered question `number`.
-    pub fn on_answer(&mut self, _cx: &Cx, _number: u32, _answer: Result<Answer, HistoryError>) -> Vec<Act> {
+    pub fn on_answer(&mut self, _cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+        let first = self.asked.wrapping_mul(self.trends.len() as u32);
+        let place = number.wrapping_sub(first) as usize;
+        if let Some((_, series)) = self.trends.get_mut(place) {
+            *series = match answer {
+                Ok(Answer::Series(all)) => all.into_iter().next(),
+                Ok(Answer::Journal(_) | Answer::Actions(_) | Answer::Report(_)) | Err(_) => None,
+            };
+        }
         Vec::new()
     }
-    /// A key that the plant file defines.
-    pub fn on_command_key(&mut self, _cx: &Cx, _event: crossterm::event::KeyEvent) -> Vec<Act> {
-        Vec::new()
-    }
-    /// Keys for footer and help.
-    pub fn hints(&self, _cx: &Cx) -> Vec<crate::ui::keys::Hint> {
-        crate::ui::keys::hints(KEYS)
-    }
-    /// The text of an entry window.
-    pub fn on_text(&mut self, _cx: &Cx, _text: &str) -> Result<Vec<Act>, String> {
-        Ok(Vec::new())
-    }
+
     /// Draws it.
-    pub fn view(&self, _cx: &Cx, _frame: &mut Frame, _area: Rect) {}
+    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+        let mut canvas = Canvas::new(frame.buffer_mut(), area);
+        let items = &cx.def().mimic.items;
+        let stretch = stretch(cx, area);
+        for (n, item) in items.iter().enumerate() {
+            self.item(cx, &mut canvas, item, n, stretch);
+        }
+        if items.is_empty() {
+            canvas.text(1, 1, "the plant file draws no picture", cx.theme.dim());
+        }
+    }
+
+    fn item(&self, cx: &Cx, canvas: &mut Canvas, item: &MimicItem, n: usize, stretch: Stretch) {
+        let selected = self.selected == Some(n);
+        let motion = self.motion && cx.theme.motion;
+        match item {
+            MimicItem::Tank { place, label, level, temperature, heater, agitator } => {
+                let tank = Tank { label, level: *level, temperature: *temperature, heater: *heater, agitator: *agitator };
+                tank.view(cx, canvas, stretch.place(*place), selected, motion);
+            }
+            MimicItem::Valve { place, label, tag, vertical } => unit::valve(cx, canvas, stretch.spot(*place), label, *tag, *vertical, selected),
+            MimicItem::Pump { place, label, tag } => unit::pump(cx, canvas, stretch.place(*place), label, *tag, selected),
+            MimicItem::Pipe { points, flow } => pipe::view(cx, canvas, points, flow, stretch, motion),
+            MimicItem::Value { place, label, tag } => unit::labelled(cx, canvas, stretch.place(*place), label, *tag, selected),
+            MimicItem::Controller { place, device } => panel::controller(cx, canvas, stretch.place(*place), cx.def().device(*device), selected),
+            MimicItem::Sequence { place, label, step, remaining, states } => {
+                let sequence = panel::Sequence { label, step: *step, remaining: *remaining, states };
+                sequence.view(cx, canvas, stretch.place(*place), selected);
+            }
+            MimicItem::Trend { place, tag, window } => {
+                let series = self.trends.iter().find(|(item, _)| *item == n).and_then(|(_, series)| series.as_ref());
+                trend::view(cx, canvas, stretch.place(*place), *tag, *window, series, selected);
+            }
+            MimicItem::Text { place, text } => {
+                let at = stretch.place(*place);
+                canvas.text(at.x, at.y, &fit(text, at.width.max(1)), cx.theme.dim());
+            }
+        }
+    }
+}
+
+fn stretch(cx: &Cx, area: Rect) -> Stretch {
+    Stretch::new(cx.def().mimic.size, (area.width, area.height))
+}
+
+/// The window of a plant command: a fixed value or the other of two states is asked at once; a toggle of a state that
+/// nobody knows becomes a list, and anything else is entered.
+fn intent(cx: &Cx, command: &MimicCommand) -> Option<Modal> {
+    let tag = command.tag;
+    let def = cx.def().tag(tag);
+    if let Some(value) = command.value {
+        return Some(Modal::Confirm(Confirm::write(cx, tag, value)));
+    }
+    let states: Vec<f64> = match (def.labels.as_slice(), def.point.kind) {
+        ([one, other], _) => vec![one.0 as f64, other.0 as f64],
+        ([], Kind::Bool) => vec![0.0, 1.0],
+        _ => Vec::new(),
+    };
+    let now = cx.snapshot.sample(tag).trusted();
+    match (states.as_slice(), now) {
+        ([one, other], Some(now)) if now == *one || now == *other => {
+            let new = if now == *one { *other } else { *one };
+            Some(Modal::Confirm(Confirm::write(cx, tag, new)))
+        }
+        ([_, _], _) if !def.labels.is_empty() => Some(Modal::Choice(Choice::values(cx, tag))),
+        _ => Modal::write(cx, tag),
+    }
+}
+
+/// The nearest item in a direction; the first one when none is selected; the same when there is none further on.
+fn neighbour(items: &[MimicItem], selected: Option<usize>, (dx, dy): (i32, i32)) -> Option<usize> {
+    let centre = |place: Place| {
+        let middle = |from: u16, length: u16| i32::from(from) * 2 + i32::from(length);
+        // A row is about as high as two columns are wide.
+        (middle(place.x, place.width), middle(place.y, place.height) * 2)
+    };
+    let places = || items.iter().enumerate().filter_map(|(n, item)| Some((n, centre(place(item)?))));
+    let Some((_, (x, y))) = selected.and_then(|selected| places().find(|(n, _)| *n == selected)) else {
+        return places().next().map(|(n, _)| n);
+    };
+    let ahead = places().filter_map(|(n, (to_x, to_y))| {
+        let along = (to_x - x) * dx + (to_y - y) * dy;
+        let aside = ((to_x - x) * dy).abs() + ((to_y - y) * dx).abs();
+        (along > 0 && aside <= along * 3).then_some((along + 2 * aside, n))
+    });
+    ahead.min().map(|(_, n)| n).or(selected)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ui::fixture::Fixture;
+
+    #[test]
+    fn arrow_keys_reach_every_item() {
+        let items = Fixture::normal().def.mimic.items;
+        let mut reached = vec![false; items.len()];
+        let mut open: Vec<usize> = neighbour(&items, None, (1, 0)).into_iter().collect();
+        while let Some(n) = open.pop() {
+            if !std::mem::replace(&mut reached[n], true) {
+                open.extend([(1, 0), (-1, 0), (0, 1), (0, -1)].into_iter().filter_map(|way| neighbour(&items, Some(n), way)));
+            }
+        }
+        for (n, item) in items.iter().enumerate() {
+            assert_eq!(reached[n], place(item).is_some(), "{item:?}");
+        }
+    }
 }

@@ -1,1 +1,156 @@
-//! The parts of the process picture.
+//! The parts of the process picture, on a canvas of nominal cells that is stretched to the screen.
+
+pub mod panel;
+pub mod pipe;
+pub mod tank;
+pub mod trend;
+pub mod unit;
+
+use ratatui::style::Style;
+
+use super::text::Canvas;
+use crate::{
+    plant::def::{MimicItem, Place, TagId},
+    ui::Cx,
+};
+
+/// Maps nominal cells to cells of the screen. Never shrinks: what does not fit is cut off at the right and bottom.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stretch {
+    x: f64,
+    y: f64,
+}
+
+/// A rectangle of the screen, relative to the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Box {
+    /// Left column.
+    pub x: u16,
+    /// Top row.
+    pub y: u16,
+    /// Columns.
+    pub width: u16,
+    /// Rows.
+    pub height: u16,
+}
+
+impl Stretch {
+    /// From the nominal size of the picture to the room there is.
+    pub fn new(nominal: (u16, u16), room: (u16, u16)) -> Stretch {
+        let scale = |nominal: u16, room: u16| (f64::from(room) / f64::from(nominal.max(1))).max(1.0);
+        Stretch { x: scale(nominal.0, room.0), y: scale(nominal.1, room.1) }
+    }
+    /// The left edge of a nominal column.
+    pub fn column(self, x: u16) -> u16 {
+        (f64::from(x) * self.x).round() as u16
+    }
+    /// The top edge of a nominal row.
+    pub fn row(self, y: u16) -> u16 {
+        (f64::from(y) * self.y).round() as u16
+    }
+    /// The column in the middle of a nominal one.
+    pub fn middle_column(self, x: u16) -> u16 {
+        ((f64::from(x) + 0.5) * self.x) as u16
+    }
+    /// The row in the middle of a nominal one.
+    pub fn middle_row(self, y: u16) -> u16 {
+        ((f64::from(y) + 0.5) * self.y) as u16
+    }
+    /// A nominal rectangle.
+    pub fn place(self, place: Place) -> Box {
+        let (x, y) = (self.column(place.x), self.row(place.y));
+        let right = self.column(place.x.saturating_add(place.width.max(1)));
+        let bottom = self.row(place.y.saturating_add(place.height.max(1)));
+        Box { x, y, width: right.saturating_sub(x).max(1), height: bottom.saturating_sub(y).max(1) }
+    }
+    /// Where a single symbol stands.
+    pub fn spot(self, place: Place) -> (u16, u16) {
+        (self.middle_column(place.x), self.middle_row(place.y))
+    }
+}
+
+/// The tags of an item, the most telling first; none for pipes and words.
+pub fn tags(cx: &Cx, item: &MimicItem) -> Vec<TagId> {
+    match item {
+        MimicItem::Tank { level, temperature, heater, agitator, .. } => [*temperature, *level, *heater, *agitator].into_iter().flatten().collect(),
+        MimicItem::Valve { tag, .. } | MimicItem::Pump { tag, .. } | MimicItem::Value { tag, .. } | MimicItem::Trend { tag, .. } => vec![*tag],
+        MimicItem::Controller { device, .. } => match &cx.def().device(*device).faceplate {
+            Some(plate) => [Some(plate.sv), Some(plate.pv), plate.mv, plate.run, plate.mode, plate.tune].into_iter().flatten().collect(),
+            None => Vec::new(),
+        },
+        MimicItem::Sequence { step, remaining, states, .. } => [*step].into_iter().chain(*remaining).chain(states.iter().copied()).collect(),
+        MimicItem::Pipe { .. } | MimicItem::Text { .. } => Vec::new(),
+    }
+}
+
+/// What the item is called.
+pub fn title(cx: &Cx, item: &MimicItem) -> String {
+    match item {
+        MimicItem::Tank { label, .. } | MimicItem::Valve { label, .. } | MimicItem::Pump { label, .. } | MimicItem::Sequence { label, .. } => label.clone(),
+        MimicItem::Value { tag, .. } | MimicItem::Trend { tag, .. } => cx.def().tag(*tag).label.clone(),
+        MimicItem::Controller { device, .. } => format!("{} {}", cx.def().device(*device).name, cx.def().device(*device).title),
+        MimicItem::Pipe { .. } => String::new(),
+        MimicItem::Text { text, .. } => text.clone(),
+    }
+}
+
+/// The place of an item that can be selected.
+pub fn place(item: &MimicItem) -> Option<Place> {
+    match item {
+        MimicItem::Tank { place, .. }
+        | MimicItem::Valve { place, .. }
+        | MimicItem::Pump { place, .. }
+        | MimicItem::Value { place, .. }
+        | MimicItem::Controller { place, .. }
+        | MimicItem::Sequence { place, .. }
+        | MimicItem::Trend { place, .. } => Some(*place),
+        MimicItem::Pipe { .. } | MimicItem::Text { .. } => None,
+    }
+}
+
+/// The mark of the most urgent alarm of a tag.
+pub(super) fn alarm_mark(cx: &Cx, tag: TagId) -> Option<(&'static str, Style)> {
+    let alarm = cx.snapshot.alarms_of(tag).next()?;
+    let priority = cx.def().alarm(alarm.id).priority;
+    Some((cx.theme.priority_mark(priority).trim(), cx.theme.alarm(priority, alarm.state, cx.flash())))
+}
+
+/// Writes a value with unit, doubt and alarm mark; returns the column after it. `within` is cut to the room.
+pub(super) fn put_value(cx: &Cx, canvas: &mut Canvas, x: u16, y: u16, tag: TagId, room: u16) -> u16 {
+    let mark = alarm_mark(cx, tag);
+    let taken = mark.map_or(0, |(mark, _)| super::text::width(mark) + 1);
+    let shown = super::value::show(cx, tag);
+    let x = canvas.text(x, y, &shown.within(room.saturating_sub(taken)), shown.style);
+    match mark {
+        Some((mark, style)) => canvas.text(x + 1, y, mark, style),
+        None => x,
+    }
+}
+
+/// The label of an item: reversed while it is selected.
+pub(super) fn label_style(cx: &Cx, selected: bool) -> Style {
+    if selected { cx.theme.focus() } else { cx.theme.normal() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_stay_neighbours_at_every_size() {
+        for room in [(80, 18), (97, 18), (120, 34), (200, 54)] {
+            let stretch = Stretch::new((80, 18), room);
+            let tank = stretch.place(Place { x: 14, y: 6, width: 16, height: 6 });
+            let below = stretch.place(Place { x: 14, y: 12, width: 16, height: 1 });
+            assert_eq!(tank.y + tank.height, below.y, "{room:?}");
+            assert_eq!(tank.x + tank.width, stretch.column(30), "{room:?}");
+            assert!(stretch.middle_column(14) >= tank.x && stretch.middle_column(29) < tank.x + tank.width);
+        }
+    }
+
+    #[test]
+    fn a_small_screen_cuts_and_never_squeezes() {
+        let stretch = Stretch::new((80, 18), (60, 10));
+        assert_eq!(stretch.place(Place { x: 54, y: 6, width: 26, height: 6 }), Box { x: 54, y: 6, width: 26, height: 6 });
+    }
+}

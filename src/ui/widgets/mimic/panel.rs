@@ -1,0 +1,136 @@
+//! Panels beside the picture: a controller with its bar, and a sequence with its steps.
+
+use super::{Box, alarm_mark, label_style, put_value, unit::states};
+use crate::{
+    plant::def::{Condition, DeviceDef, Faceplate, Level, Subject, TagId},
+    ui::{
+        Cx,
+        widgets::{
+            text::{Canvas, fit, running, width},
+            value,
+        },
+    },
+};
+
+/// A controller: PV, SV, MV, a bar of the range with SV and limits, and its states.
+pub fn controller(cx: &Cx, canvas: &mut Canvas, at: Box, device: &DeviceDef, selected: bool) {
+    let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
+    let theme = cx.theme;
+    let x = canvas.text(0, 0, &device.name, label_style(cx, selected));
+    canvas.text(x + 2, 0, &device.model, theme.dim());
+    let Some(plate) = &device.faceplate else { return };
+    let mut y = 1;
+    for (name, tag) in [("PV", Some(plate.pv)), ("SV", Some(plate.sv)), ("MV", plate.mv)] {
+        let Some(tag) = tag else { continue };
+        canvas.text(0, y, name, theme.dim());
+        put_value(cx, &mut canvas, 4, y, tag, at.width.saturating_sub(4));
+        y += 1;
+    }
+    if at.height > 7 {
+        y += 1;
+        scale(cx, &mut canvas, y, plate.pv);
+        y += 1;
+    }
+    bar(cx, &mut canvas, y, plate);
+    let tags: Vec<TagId> = [plate.mode, plate.tune, plate.run].into_iter().flatten().collect();
+    let mut x = 0;
+    for tag in tags {
+        let shown = value::show(cx, tag);
+        if Some(tag) == plate.tune {
+            x = canvas.text(x, y + 1, "AT", theme.dim()) + 1;
+        }
+        x = canvas.text(x, y + 1, &shown.text, shown.style) + 2;
+    }
+}
+
+/// The ends of the range above the bar.
+fn scale(cx: &Cx, canvas: &mut Canvas, y: u16, pv: TagId) {
+    let Some((min, max)) = cx.snapshot.range(pv) else { return };
+    let end = canvas.width();
+    canvas.text(0, y, &cx.snapshot.format(pv, min), cx.theme.dim());
+    canvas.text_right(end, y, &format!("{} {}", cx.snapshot.format(pv, max), cx.snapshot.unit(pv)), cx.theme.dim());
+}
+
+/// `├───┃────▼──█──┃────┤`: PV filled, SV as a triangle, alarm limits as bars. Without a good PV the bar has no PV.
+fn bar(cx: &Cx, canvas: &mut Canvas, y: u16, plate: &Faceplate) {
+    let theme = cx.theme;
+    let inner = canvas.width().saturating_sub(2);
+    canvas.run(0, y, inner + 2, '─', theme.dim());
+    canvas.glyph(0, y, '├', theme.dim());
+    canvas.glyph(inner + 1, y, '┤', theme.dim());
+    let Some((min, max)) = cx.snapshot.range(plate.pv) else { return };
+    let column = |value: f64| {
+        let share = (value - min) / (max - min);
+        share.is_finite().then(|| 1 + (share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round() as u16)
+    };
+    for limit in limits(cx, plate.pv) {
+        if let Some(x) = column(limit) {
+            canvas.glyph(x, y, '┃', theme.normal());
+        }
+    }
+    if let Some(x) = cx.snapshot.sample(plate.sv).trusted().and_then(column) {
+        canvas.glyph(x, y, '▼', theme.set_value());
+    }
+    if let Some(x) = cx.snapshot.sample(plate.pv).trusted().and_then(column) {
+        let style = alarm_mark(cx, plate.pv).map_or(theme.strong(), |(_, style)| style);
+        canvas.glyph(x, y, '█', style);
+    }
+}
+
+/// The limits of a tag's alarms.
+fn limits(cx: &Cx, tag: TagId) -> impl Iterator<Item = f64> {
+    cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag)).filter_map(|alarm| match alarm.condition {
+        Condition::Limit { level: Level::HighHigh | Level::High | Level::Low | Level::LowLow, limit, .. } => Some(limit),
+        Condition::Deviation { .. } | Condition::State { .. } | Condition::NotAnswering => None,
+    })
+}
+
+/// What a sequence panel shows.
+#[derive(Debug, Clone, Copy)]
+pub struct Sequence<'a> {
+    /// Heading.
+    pub label: &'a str,
+    /// The step; its labels are the steps.
+    pub step: TagId,
+    /// Seconds left.
+    pub remaining: Option<TagId>,
+    /// Shown below.
+    pub states: &'a [TagId],
+}
+
+impl Sequence<'_> {
+    /// Draws heading, steps with the present one marked, and states.
+    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, at: Box, selected: bool) {
+        let theme = cx.theme;
+        let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
+        let x = canvas.text(0, 0, self.label, label_style(cx, selected));
+        let shown = value::show(cx, self.step);
+        let x = canvas.text(x + 2, 0, &shown.text, if shown.note.is_empty() { theme.strong() } else { shown.style });
+        if let Some(left) = self.remaining {
+            let text = match cx.snapshot.sample(left).trusted() {
+                Some(seconds) if seconds >= 0.0 => format!("{} left", running(std::time::Duration::from_secs_f64(seconds.min(1e7)))),
+                Some(_) | None => format!("{} left", value::show(cx, left).text),
+            };
+            let end = at.width;
+            canvas.text_right(end.max(x + 1 + width(&text)), 0, &text, theme.normal());
+        }
+        let last = at.height.saturating_sub(1).max(1);
+        self.steps(cx, &mut canvas.part(0, 1, at.width, last.saturating_sub(1)));
+        states(cx, &mut canvas, 0, last, self.states);
+    }
+
+    fn steps(&self, cx: &Cx, canvas: &mut Canvas) {
+        let theme = cx.theme;
+        let now = cx.snapshot.sample(self.step).trusted();
+        let (mut x, mut y) = (0, 0);
+        for (number, name) in &cx.def().tag(self.step).labels {
+            let present = now == Some(*number as f64);
+            let text = if present { format!("{}{name}", theme.pick("▸", ">")) } else { format!(" {}", name.to_lowercase()) };
+            let text = fit(&text, canvas.width());
+            if x + width(&text) > canvas.width() {
+                (x, y) = (0, y + 1);
+            }
+            x = canvas.text(x, y, &text, if present { theme.strong() } else { theme.dim() }) + 1;
+        }
+    }
+}

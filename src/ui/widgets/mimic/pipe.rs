@@ -1,0 +1,187 @@
+//! A pipe: arrows travel along it only while every flow tag is on and good.
+
+use super::Stretch;
+use crate::{
+    plant::def::TagId,
+    ui::{
+        Cx,
+        widgets::{text::Canvas, value},
+    },
+};
+
+/// One arrow in so many cells.
+const ARROW_CELLS: usize = 5;
+
+/// One cell of a pipe: column, row, and the directions in and out of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Step {
+    x: u16,
+    y: u16,
+    from: Way,
+    to: Way,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    Right,
+    Left,
+    Down,
+    Up,
+}
+
+/// Draws a pipe along its nominal points.
+pub fn view(cx: &Cx, canvas: &mut Canvas, points: &[(u16, u16)], flow: &[TagId], stretch: Stretch, motion: bool) {
+    let flowing = flow.iter().try_fold(!flow.is_empty(), |all, tag| value::is_on(cx, *tag).map(|on| all && on));
+    let style = match flowing {
+        Some(true) => cx.theme.running(),
+        Some(false) | None => cx.theme.dim(),
+    };
+    let steps = steps(points, stretch);
+    let shift = if motion { cx.phase as usize / 2 } else { 0 };
+    for (n, step) in steps.iter().enumerate() {
+        let arrow = (n + ARROW_CELLS - shift % ARROW_CELLS) % ARROW_CELLS == ARROW_CELLS / 2 && step.from == step.to;
+        let glyph = match flowing {
+            Some(true) if arrow => arrow_head(step.to),
+            Some(true) => bend(step.from, step.to, true),
+            Some(false) => bend(step.from, step.to, false),
+            None => unknown(step.from, step.to),
+        };
+        canvas.glyph(step.x, step.y, glyph, style);
+    }
+}
+
+/// The cells of a pipe in the order of its flow. The ends reach to the edge of their nominal cells, so that they touch
+/// what stands beside them at every size.
+fn steps(points: &[(u16, u16)], stretch: Stretch) -> Vec<Step> {
+    let corners: Vec<(u16, u16)> = points.iter().enumerate().map(|(n, point)| corner(points, n, *point, stretch)).collect();
+    let mut steps: Vec<Step> = Vec::new();
+    for pair in corners.windows(2) {
+        let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
+        let Some(way) = way(pair[0], pair[1]) else { continue };
+        let length = x0.abs_diff(x1).max(y0.abs_diff(y1));
+        if let Some(last) = steps.last_mut() {
+            last.to = way;
+        }
+        for n in u16::from(!steps.is_empty())..=length {
+            let (x, y) = match way {
+                Way::Right => (x0 + n, y0),
+                Way::Left => (x0 - n, y0),
+                Way::Down => (x0, y0 + n),
+                Way::Up => (x0, y0 - n),
+            };
+            steps.push(Step { x, y, from: way, to: way });
+        }
+    }
+    if let ([only], Some(way)) = (corners.as_slice(), Some(Way::Right)) {
+        steps.push(Step { x: only.0, y: only.1, from: way, to: way });
+    }
+    steps
+}
+
+/// A point of the pipe on the screen: the middle of its nominal cell, but at the ends the far edge along the pipe.
+fn corner(points: &[(u16, u16)], n: usize, (x, y): (u16, u16), stretch: Stretch) -> (u16, u16) {
+    let (near_x, far_x) = (stretch.column(x), stretch.column(x + 1).saturating_sub(1));
+    let (near_y, far_y) = (stretch.row(y), stretch.row(y + 1).saturating_sub(1));
+    let (middle_x, middle_y) = (stretch.middle_column(x), stretch.middle_row(y));
+    let starts = points.get(1).filter(|_| n == 0).and_then(|next| way((x, y), *next));
+    let ends = (n > 0 && n + 1 == points.len()).then(|| way(points[n - 1], (x, y))).flatten();
+    match (starts, ends) {
+        (Some(Way::Right), _) | (_, Some(Way::Left)) => (near_x, middle_y),
+        (Some(Way::Left), _) | (_, Some(Way::Right)) => (far_x, middle_y),
+        (Some(Way::Down), _) | (_, Some(Way::Up)) => (middle_x, near_y),
+        (Some(Way::Up), _) | (_, Some(Way::Down)) => (middle_x, far_y),
+        (None, None) => (middle_x, middle_y),
+    }
+}
+
+/// The direction from one point to another; along the longer side if they are not in line, none if they are the same.
+fn way((x0, y0): (u16, u16), (x1, y1): (u16, u16)) -> Option<Way> {
+    match (x1.cmp(&x0), y1.cmp(&y0)) {
+        (std::cmp::Ordering::Equal, std::cmp::Ordering::Equal) => None,
+        (std::cmp::Ordering::Equal, std::cmp::Ordering::Greater) => Some(Way::Down),
+        (std::cmp::Ordering::Equal, std::cmp::Ordering::Less) => Some(Way::Up),
+        (std::cmp::Ordering::Greater, _) => Some(Way::Right),
+        (std::cmp::Ordering::Less, _) => Some(Way::Left),
+    }
+}
+
+fn arrow_head(way: Way) -> char {
+    match way {
+        Way::Right => '►',
+        Way::Left => '◄',
+        Way::Down => '▼',
+        Way::Up => '▲',
+    }
+}
+
+/// A straight or bent piece: heavy while it flows, light while it does not.
+fn bend(from: Way, to: Way, heavy: bool) -> char {
+    let (light, strong) = match (from, to) {
+        (Way::Right, Way::Right) | (Way::Left, Way::Left) | (Way::Right, Way::Left) | (Way::Left, Way::Right) => ('─', '━'),
+        (Way::Down, Way::Down) | (Way::Up, Way::Up) | (Way::Down, Way::Up) | (Way::Up, Way::Down) => ('│', '┃'),
+        (Way::Right, Way::Down) | (Way::Up, Way::Left) => ('┐', '┓'),
+        (Way::Right, Way::Up) | (Way::Down, Way::Left) => ('┘', '┛'),
+        (Way::Left, Way::Down) | (Way::Up, Way::Right) => ('┌', '┏'),
+        (Way::Left, Way::Up) | (Way::Down, Way::Right) => ('└', '┗'),
+    };
+    if heavy { strong } else { light }
+}
+
+/// Nobody knows whether it flows.
+fn unknown(from: Way, to: Way) -> char {
+    match bend(from, to, false) {
+        '─' => '╌',
+        '│' => '┆',
+        corner => corner,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ui::{
+        fixture::{Fixture, with_cx},
+        theme::Theme,
+    };
+    use ratatui::{buffer::Buffer, layout::Rect};
+
+    const POINTS: [(u16, u16); 3] = [(0, 0), (9, 0), (9, 2)];
+
+    fn drawn(fixture: &Fixture, phase: u32) -> Vec<String> {
+        let mut buffer = Buffer::empty(Rect::new(0, 0, 10, 3));
+        let area = buffer.area;
+        with_cx(&fixture.snapshot(), |cx| {
+            let cx = Cx { phase, theme: &Theme::FULL, ..*cx };
+            let mut canvas = Canvas::new(&mut buffer, area);
+            view(&cx, &mut canvas, &POINTS, &[fixture.tag("PLC-1.SV-1")], Stretch::new((10, 3), (10, 3)), true);
+        });
+        buffer.content.chunks(10).map(|row| row.iter().map(|cell| cell.symbol()).collect()).collect()
+    }
+
+    #[test]
+    fn arrows_travel_while_it_flows() {
+        let fixture = Fixture::normal();
+        assert_eq!(drawn(&fixture, 0), ["━━►━━━━►━┓", "         ┃", "         ┃"]);
+        assert_eq!(drawn(&fixture, 2), ["━━━►━━━━►┓", "         ┃", "         ┃"]);
+    }
+
+    #[test]
+    fn nothing_moves_without_flow_or_without_knowing() {
+        let mut fixture = Fixture::normal();
+        fixture.set("PLC-1.SV-1", 0.0);
+        let shut = ["─────────┐", "         │", "         │"];
+        assert_eq!(drawn(&fixture, 0), shut);
+        assert_eq!(drawn(&fixture, 7), shut);
+        let unknown = ["╌╌╌╌╌╌╌╌╌┐", "         ┆", "         ┆"];
+        assert_eq!(drawn(&Fixture::line_down(), 0), unknown);
+        assert_eq!(drawn(&Fixture::line_down(), 7), unknown);
+    }
+
+    #[test]
+    fn a_stretched_pipe_still_touches_its_ends() {
+        let steps = steps(&[(2, 1), (4, 1), (4, 3)], Stretch::new((10, 5), (25, 15)));
+        let (first, last) = (steps[0], steps[steps.len() - 1]);
+        assert_eq!((first.x, last.y), (5, 11), "the left edge of column 2 and the lower edge of row 3");
+        assert!(steps.windows(2).all(|pair| pair[0].x.abs_diff(pair[1].x) + pair[0].y.abs_diff(pair[1].y) == 1));
+    }
+}

@@ -1,0 +1,136 @@
+//! A vessel: its liquid follows the level, its agitator turns, its heater glows, and none of them without a good value.
+
+use super::{Box, alarm_mark, label_style, put_value};
+use crate::{
+    plant::def::TagId,
+    ui::{
+        Cx,
+        theme::Colours,
+        widgets::{
+            text::{Canvas, fit, width},
+            value,
+        },
+    },
+};
+
+/// What a vessel shows.
+#[derive(Debug, Clone, Copy)]
+pub struct Tank<'a> {
+    /// Written into the upper edge.
+    pub label: &'a str,
+    /// Level; its range is the height of the vessel.
+    pub level: Option<TagId>,
+    /// Temperature of the contents.
+    pub temperature: Option<TagId>,
+    /// Heating power.
+    pub heater: Option<TagId>,
+    /// Agitator run signal.
+    pub agitator: Option<TagId>,
+}
+
+impl Tank<'_> {
+    /// Draws the vessel into its box.
+    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, at: Box, selected: bool, motion: bool) {
+        let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
+        canvas.frame("", cx.theme.dim());
+        let label = fit(&format!(" {} ", self.label), at.width.saturating_sub(2));
+        canvas.text(1, 0, &label, label_style(cx, selected));
+        let (columns, rows) = (at.width.saturating_sub(2), at.height.saturating_sub(2));
+        let eighths = self.level.and_then(|level| eighths(cx, level, rows));
+        self.marks(cx, &mut canvas, rows);
+        let mut inside = canvas.part(1, 1, columns, rows);
+        if let Some(eighths) = eighths {
+            liquid(cx, &mut inside, eighths);
+        }
+        self.fittings(cx, &mut inside, motion);
+        self.values(cx, &mut inside);
+        // Text over liquid stands on the liquid, not in a hole.
+        if let Some(eighths) = eighths.filter(|_| cx.theme.colours != Colours::None) {
+            let full = (eighths / 8) as u16;
+            let top = inside.height().saturating_sub(full);
+            let width = inside.width();
+            inside.paint(0, top, width, full, cx.theme.under_liquid());
+        }
+    }
+
+    /// Level and temperature, from the top; the temperature is what the eye looks for first.
+    fn values(&self, cx: &Cx, canvas: &mut Canvas) {
+        let room = canvas.width();
+        let rows = [self.temperature, self.level];
+        for (y, tag) in rows.into_iter().flatten().enumerate() {
+            let shown = value::show(cx, tag);
+            let mark = alarm_mark(cx, tag).map_or(0, |(mark, _)| width(mark) + 1);
+            let length = width(&shown.within(room.saturating_sub(mark))) + mark;
+            put_value(cx, canvas, room.saturating_sub(length) / 2, y as u16, tag, room);
+        }
+    }
+
+    /// Agitator and heater, from the bottom.
+    fn fittings(&self, cx: &Cx, canvas: &mut Canvas, motion: bool) {
+        let theme = cx.theme;
+        let centre = canvas.width() / 2;
+        let mut y = canvas.height();
+        if let Some(heater) = self.heater {
+            y = y.saturating_sub(1);
+            match value::is_on(cx, heater) {
+                Some(true) => {
+                    let x = canvas.text(1, y, theme.pick("≋≋≋ ", "### "), theme.running());
+                    put_value(cx, canvas, x, y, heater, 11);
+                }
+                Some(false) => {
+                    canvas.text(1, y, theme.pick("─── heater off", "--- heater off"), theme.dim());
+                }
+                None => {
+                    canvas.text(1, y, "heater ?", theme.trouble());
+                }
+            }
+        }
+        if let Some(agitator) = self.agitator {
+            y = y.saturating_sub(1);
+            let shown = value::show(cx, agitator);
+            let on = value::is_on(cx, agitator);
+            let turn = motion && cx.phase % 4 >= 2;
+            let (picture, style) = match (on, turn) {
+                (Some(true), false) => (theme.pick("╶─╂─╴", "-+-"), theme.running()),
+                (Some(true), true) => (theme.pick(" ╶╂╴ ", " + "), theme.running()),
+                (Some(false), _) => (theme.pick("╶─┼─╴", "-|-"), theme.dim()),
+                (None, _) => (" ? ", theme.trouble()),
+            };
+            let x = canvas.text(centre.saturating_sub(5), y, picture, style);
+            canvas.text(x + 1, y, &shown.text, if on == Some(true) { theme.running() } else { shown.style });
+        }
+    }
+
+    /// Quarters of the range on the right wall.
+    fn marks(&self, cx: &Cx, canvas: &mut Canvas, rows: u16) {
+        if self.level.is_none() || rows < 4 {
+            return;
+        }
+        let right = canvas.width().saturating_sub(1);
+        for quarter in 1..4 {
+            canvas.glyph(right, 1 + rows - rows * quarter / 4, '┤', cx.theme.dim());
+        }
+    }
+}
+
+/// The level in eighths of a row; `None` unless the value is good and its range known.
+fn eighths(cx: &Cx, level: TagId, rows: u16) -> Option<u32> {
+    let value = cx.snapshot.sample(level).trusted()?;
+    let (min, max) = cx.snapshot.range(level)?;
+    let share = ((value - min) / (max - min)).clamp(0.0, 1.0);
+    share.is_finite().then(|| (share * f64::from(rows) * 8.0).round() as u32)
+}
+
+fn liquid(cx: &Cx, canvas: &mut Canvas, eighths: u32) {
+    const SURFACE: [char; 7] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇'];
+    let body = if cx.theme.colours == Colours::None { '▒' } else { '█' };
+    let (width, height) = (canvas.width(), canvas.height());
+    let full = (eighths / 8) as u16;
+    for y in height.saturating_sub(full)..height {
+        canvas.run(0, y, width, body, cx.theme.liquid());
+    }
+    let rest = (eighths % 8) as usize;
+    if rest > 0 && full < height {
+        canvas.run(0, height - full - 1, width, SURFACE[rest - 1], cx.theme.liquid());
+    }
+}

@@ -1,0 +1,97 @@
+//! A small trend of the last minutes: its curve, its name and its scale.
+
+use std::time::Duration;
+
+use ratatui::style::Style;
+
+use super::{Box, label_style};
+use crate::{
+    history::Series,
+    plant::def::TagId,
+    ui::{
+        Cx,
+        theme::Glyphs,
+        widgets::text::{Canvas, fit},
+    },
+};
+
+/// Draws the curve of a tag, a gap where nothing good is known.
+pub fn view(cx: &Cx, canvas: &mut Canvas, at: Box, tag: TagId, window: Duration, series: Option<&Series>, selected: bool) {
+    let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
+    let theme = cx.theme;
+    let minutes = window.as_secs() / 60;
+    let span = if minutes.is_multiple_of(60) && minutes > 0 { format!("{} h", minutes / 60) } else { format!("{minutes} min") };
+    let x = canvas.text(0, 0, &fit(&cx.def().tag(tag).name, at.width), label_style(cx, selected));
+    canvas.text(x + 1, 0, &format!("last {span}"), theme.dim());
+    let Some((series, (low, _, high))) = series.and_then(|series| Some((series, series.summary?))) else {
+        canvas.text(0, 1, if series.is_some() { "no good value" } else { "reading …" }, theme.dim());
+        return;
+    };
+    let label = |value| format!("{}", cx.snapshot.format(tag, value));
+    let (top, bottom) = (label(high), label(low));
+    let room = top.len().max(bottom.len()) as u16 + 1;
+    let (rows, columns) = (at.height.saturating_sub(1), at.width.saturating_sub(room));
+    canvas.text_right(at.width, 1, &top, theme.dim());
+    if rows > 1 {
+        canvas.text_right(at.width, rows, &bottom, theme.dim());
+    }
+    let style = theme.pen(0);
+    curve(&mut canvas.part(0, 1, columns, rows), series, (low, high), theme.glyphs, style);
+}
+
+/// Two dots a cell across and four down in braille; else one bar a cell in eighths.
+fn curve(canvas: &mut Canvas, series: &Series, (low, high): (f64, f64), glyphs: Glyphs, style: Style) {
+    let (across, down) = match glyphs {
+        Glyphs::Braille => (2, 4),
+        Glyphs::Block | Glyphs::Ascii => (1, 8),
+    };
+    let (width, height) = (usize::from(canvas.width()), usize::from(canvas.height()));
+    if width == 0 || height == 0 {
+        return;
+    }
+    let dots = height * down;
+    let level = |value: f64| {
+        let share = if high > low { (value - low) / (high - low) } else { 0.5 };
+        ((1.0 - share.clamp(0.0, 1.0)) * (dots - 1) as f64).round() as usize
+    };
+    let columns = width * across;
+    for y in 0..height {
+        for x in 0..width {
+            let mut bits = 0u32;
+            let mut filled = 0;
+            for dx in 0..across {
+                let Some((top, bottom)) = span(series, x * across + dx, columns) else { continue };
+                let (top, bottom) = (level(top), level(bottom));
+                for dy in 0..down {
+                    let row = y * down + dy;
+                    let lit = if across == 2 { (top..=bottom).contains(&row) } else { row >= top };
+                    if lit {
+                        bits |= braille(dx, dy);
+                        filled += 1;
+                    }
+                }
+            }
+            let glyph = match (glyphs, filled) {
+                (_, 0) => continue,
+                (Glyphs::Braille, _) => char::from_u32(0x2800 + bits).unwrap_or(' '),
+                (Glyphs::Block | Glyphs::Ascii, n) => ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'][n - 1],
+            };
+            canvas.glyph(x as u16, y as u16, glyph, style);
+        }
+    }
+}
+
+/// Highest and lowest value in one column of dots.
+fn span(series: &Series, column: usize, columns: usize) -> Option<(f64, f64)> {
+    let count = series.buckets.len();
+    let from = column * count / columns;
+    let to = ((column + 1) * count / columns).clamp(from + 1, count.max(from + 1));
+    let good = series.buckets.get(from..to.min(count))?.iter().flatten();
+    good.map(|bucket| (bucket.max, bucket.min)).reduce(|(top, low), (max, min)| (top.max(max), low.min(min)))
+}
+
+/// The bit of a dot in the braille block of Unicode.
+fn braille(dx: usize, dy: usize) -> u32 {
+    const BITS: [[u32; 8]; 2] = [[0x01, 0x02, 0x04, 0x40, 0, 0, 0, 0], [0x08, 0x10, 0x20, 0x80, 0, 0, 0, 0]];
+    BITS[dx][dy]
+}

@@ -1,0 +1,81 @@
+//! Valves, pumps and single values: a shape that is filled while it works, a name and a word.
+
+use super::{Box, label_style, put_value};
+use crate::{
+    plant::def::TagId,
+    ui::{
+        Cx,
+        widgets::{
+            text::{Canvas, fit, pad, width},
+            value,
+        },
+    },
+};
+
+/// A valve at a spot: bow tie, name above (beside, in a vertical pipe) and its state in a word.
+pub fn valve(cx: &Cx, canvas: &mut Canvas, (x, y): (u16, u16), label: &str, tag: TagId, vertical: bool, selected: bool) {
+    let theme = cx.theme;
+    let on = value::is_on(cx, tag);
+    let word = word(cx, tag, ("OPEN", "SHUT"));
+    let (shape, style) = match on {
+        Some(true) => (theme.pick("▶◀", "><"), theme.running()),
+        Some(false) => (theme.pick("▷◁", "||"), theme.normal()),
+        None => ("??", theme.trouble()),
+    };
+    let words = if on.is_some() { style } else { theme.quality(cx.snapshot.sample(tag).quality) };
+    if vertical {
+        canvas.text(x, y, shape, style);
+        let x = canvas.text(x + 3, y, label, label_style(cx, selected));
+        canvas.text(x + 1, y, &word, words);
+    } else {
+        canvas.text(x, y, shape, style);
+        let above = x.saturating_sub(width(label) / 2);
+        let name = canvas.text(above, y.saturating_sub(1), label, label_style(cx, selected));
+        canvas.text(name + 1, y.saturating_sub(1), &word, words);
+    }
+}
+
+/// A pump in a pipe: a filled disc while it runs, a ring while it rests.
+pub fn pump(cx: &Cx, canvas: &mut Canvas, at: Box, label: &str, tag: TagId, selected: bool) {
+    let theme = cx.theme;
+    let (shape, style) = match value::is_on(cx, tag) {
+        Some(true) => (theme.pick("●", "@"), theme.running()),
+        Some(false) => (theme.pick("○", "o"), theme.normal()),
+        None => ("?", theme.trouble()),
+    };
+    let x = canvas.text(at.x, at.y + at.height / 2, &format!("({shape} "), style);
+    let x = canvas.text(x, at.y + at.height / 2, label, label_style(cx, selected));
+    let word = word(cx, tag, ("RUN", "STOP"));
+    canvas.text(x, at.y + at.height / 2, &format!(" {word})"), style);
+}
+
+/// A label and its value.
+pub fn labelled(cx: &Cx, canvas: &mut Canvas, at: Box, label: &str, tag: TagId, selected: bool) {
+    let style = if selected { cx.theme.focus() } else { cx.theme.dim() };
+    let x = if label.is_empty() { at.x } else { canvas.text(at.x, at.y, &fit(label, at.width / 2), style) + 1 };
+    let room = at.width.saturating_sub(x.saturating_sub(at.x));
+    let end = put_value(cx, canvas, x, at.y, tag, room);
+    if label.is_empty() && selected {
+        canvas.paint(at.x, at.y, end.saturating_sub(at.x), 1, cx.theme.focus());
+    }
+}
+
+/// Tags of two states: name and word side by side.
+pub fn states(cx: &Cx, canvas: &mut Canvas, x: u16, y: u16, tags: &[TagId]) {
+    let mut x = x;
+    for tag in tags {
+        let shown = value::show(cx, *tag);
+        x = canvas.text(x, y, &cx.def().tag(*tag).label, cx.theme.dim()) + 1;
+        x = canvas.text(x, y, &pad(&shown.text, width(&shown.text) + 2), shown.style);
+    }
+}
+
+/// The state in a word: the profile's, else ours; why not, when it is not known.
+fn word(cx: &Cx, tag: TagId, (on, off): (&str, &str)) -> String {
+    let shown = value::show(cx, tag);
+    match (value::is_on(cx, tag), cx.def().tag(tag).labels.is_empty()) {
+        (Some(true), true) => on.to_owned(),
+        (Some(false), true) => off.to_owned(),
+        (Some(_), false) | (None, _) => shown.text,
+    }
+}
