@@ -1,5 +1,8 @@
 //! What the plant remembers: DuckDB behind one thread. Everyone else asks it.
 
+pub mod series;
+pub mod io;
+
 use std::time::Duration;
 
 use jiff::Timestamp;
@@ -119,6 +122,20 @@ pub enum HistoryError {
     /// The engine failed.
     #[error("history: {0}")]
     Engine(String),
+    /// There is nothing to read: no station has written here.
+    #[error("no history at {path}: has the station of this plant ever run here?")]
+    Missing {
+        /// The file.
+        path: String,
+    },
+    /// The answer would be longer than is safe to hold; a shorter period is answered.
+    #[error("too much for one answer: {rows} rows, at most {max}; choose a shorter period")]
+    TooManyRows {
+        /// Rows that the question means.
+        rows: u64,
+        /// Rows that are permitted.
+        max: u64,
+    },
     /// The question makes no sense: empty or negative span.
     #[error("empty period")]
     EmptyPeriod,

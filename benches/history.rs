@@ -1,0 +1,130 @@
+//! What the history costs: one commit, rows a second, bytes a sample, and reading a curve of a week.
+#![allow(clippy::print_stdout, missing_docs)]
+
+use std::{hint::black_box, path::Path, sync::Arc, time::Duration, time::Instant};
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use jiff::{Timestamp, tz::TimeZone};
+use sightglass::{
+    history::{Question, io::store::Store},
+    plant::{
+        def::{CsvDialect, DeviceId, MimicDef, PlantDef, ReportDef, TagId},
+        record::Record,
+        sample::Sample,
+        tag::{Access, Confidence, Decimals, Kind, Order, Point, Poll, Table, TagDef},
+    },
+};
+
+/// Tags of the tank: temperatures and outputs that change, set values and switches that rarely do.
+const CHANGING: u16 = 8;
+const TAGS: u16 = 24;
+const WEEK: i64 = 7 * 86_400;
+
+fn tag(id: u16) -> TagDef {
+    TagDef {
+        id: TagId(id),
+        device: DeviceId(0),
+        name: format!("TIC-1.T{id}"),
+        short: format!("T{id}"),
+        label: String::new(),
+        meaning: String::new(),
+        point: Point { table: Table::Input, address: id, kind: Kind::I16, order: Order::Abcd, field: None },
+        scale: 0.1,
+        offset: 0.0,
+        decimals: Decimals::Fixed(1),
+        unit: "°C".into(),
+        unit_from: None,
+        min: None,
+        max: None,
+        access: Access::Read,
+        confirm: None,
+        labels: Vec::new(),
+        bit_labels: Vec::new(),
+        bad_if: Vec::new(),
+        quality_from: None,
+        write_fc: None,
+        write_unlock: None,
+        group: String::new(),
+        poll: Poll::Every(Duration::from_secs(1)),
+        deadband: 0.0,
+        store: true,
+        confidence: Confidence::Proven,
+        source: String::new(),
+    }
+}
+
+fn tank() -> Arc<PlantDef> {
+    Arc::new(PlantDef {
+        name: "tank".into(),
+        title: "Water tank".into(),
+        time_zone: TimeZone::UTC,
+        lines: Vec::new(),
+        devices: Vec::new(),
+        tags: (0..TAGS).map(tag).collect(),
+        alarms: Vec::new(),
+        mimic: MimicDef::default(),
+        trends: Vec::new(),
+        shifts: Vec::new(),
+        report: ReportDef { folder: "reports".into(), tags: Vec::new(), record: None, csv: CsvDialect::default() },
+        simulation: None,
+    })
+}
+
+/// The records of one second: the changing tags wander by a tenth, the others are stored once a minute.
+fn second(at: i64) -> Vec<Record> {
+    let stamp = |id: u16| {
+        Timestamp::from_microsecond(at * 1_000_000 + i64::from(id) * 37_113 + at % 97 * 211).expect("in range")
+    };
+    let wander = |id: u16| {
+        let phase = at as f64 / (300.0 + f64::from(id) * 41.0);
+        let noise = (at.wrapping_mul(2_654_435_761) >> 7).rem_euclid(5) as f64 - 2.0;
+        ((60.0 + 10.0 * phase.sin()) * 10.0 + noise).round() / 10.0
+    };
+    let changing = (0..CHANGING).map(|id| Record::Sample(TagId(id), Sample::good(wander(id), stamp(id))));
+    let steady = (CHANGING..TAGS)
+        .filter(|id| at % 60 == i64::from(*id))
+        .map(|id| Record::Sample(TagId(id), Sample::good(f64::from(id) * 10.0, stamp(id))));
+    changing.chain(steady).collect()
+}
+
+fn fill(path: &Path, def: &Arc<PlantDef>, seconds: i64) -> Store {
+    let store = Store::open(path, def, Timestamp::UNIX_EPOCH).expect("a new file").store;
+    let (start, mut rows) = (Instant::now(), 0);
+    let all: Vec<i64> = (0..seconds).collect();
+    for minutes in all.chunks(600) {
+        let records: Vec<Record> = minutes.iter().flat_map(|at| second(*at)).collect();
+        rows += records.len();
+        store.append(&records).expect("appended");
+    }
+    store.checkpoint().expect("checkpoint");
+    let (spent, bytes) = (start.elapsed().as_secs_f64(), store.file_bytes());
+    println!("{rows} rows in {spent:.2} s: {:.0} rows/s in commits of ten minutes", rows as f64 / spent);
+    println!("{bytes} bytes on disk: {:.2} bytes a sample", bytes as f64 / rows as f64);
+    store
+}
+
+fn history(c: &mut Criterion) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let def = tank();
+    let store = fill(&folder.path().join("week.duckdb"), &def, WEEK);
+    let end = Timestamp::from_second(WEEK).expect("in range");
+    for (name, from) in [("hour", WEEK - 3600), ("day", WEEK - 86_400), ("week", 0)] {
+        let from = Timestamp::from_second(from).expect("in range");
+        let question = Question::Series { tags: vec![TagId(0)], from, to: end, buckets: 160 };
+        c.bench_function(&format!("curve of a {name}"), |b| b.iter(|| black_box(store.answer(&question, end))));
+    }
+    let mut at = WEEK;
+    c.bench_function("commit of one second", |b| {
+        b.iter(|| {
+            at += 1;
+            store.append(&second(at)).expect("appended");
+        });
+    });
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(10).measurement_time(Duration::from_secs(3)).warm_up_time(Duration::from_millis(300));
+    targets = history
+}
+criterion_main!(benches);

@@ -1,0 +1,224 @@
+//! The files of a store: the guard around opening, setting damaged files aside, who holds a lock.
+//!
+//! The database file itself is never opened here: closing it would drop the locks that DuckDB holds on it.
+
+use std::{
+    ffi::OsString,
+    fs::{self, File, TryLockError},
+    io::{Read, Seek, Write},
+    path::{Path, PathBuf},
+};
+
+use jiff::{Timestamp, tz::TimeZone};
+
+use crate::history::HistoryError;
+
+/// Opens that never ended before the files are set aside.
+pub const FAILED_OPENS_MAX: u32 = 2;
+
+/// A file beside the database that exists only while it is being opened. Replaying a damaged log can abort the whole
+/// process: then the file stays behind and counts.
+pub struct Opening {
+    path: PathBuf,
+    file: File,
+    /// Earlier opens that never ended.
+    pub failed: u32,
+}
+
+impl Opening {
+    /// Marks that the store is being opened. [`HistoryError::Locked`] if another process is just opening it.
+    pub fn begin(db: &Path) -> Result<Opening, HistoryError> {
+        let path = beside(db, ".opening");
+        let wrong = |error: std::io::Error| HistoryError::Engine(format!("{}: {error}", path.display()));
+        if let Some(folder) = db.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            fs::create_dir_all(folder).map_err(wrong)?;
+        }
+        let mut file =
+            File::options().read(true).write(true).create(true).truncate(false).open(&path).map_err(wrong)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(locked(db, "another process, which is just starting".into())),
+            Err(TryLockError::Error(error)) => return Err(wrong(error)),
+        }
+        let mut text = String::new();
+        // What cannot be read counts as nothing: the guard must not keep a good store closed.
+        let _ = file.read_to_string(&mut text);
+        let failed = text.trim().parse().unwrap_or(0);
+        let mut opening = Opening { path, file, failed };
+        opening.count(failed + 1);
+        Ok(opening)
+    }
+
+    /// Starts counting anew, after the files were set aside.
+    pub fn forget(&mut self) {
+        self.count(1);
+    }
+
+    /// A full disk must not keep the store closed either: a count that cannot be written is not kept.
+    fn count(&mut self, count: u32) {
+        let written =
+            self.file.rewind().and_then(|()| self.file.set_len(0)).and_then(|()| write!(self.file, "{count}"));
+        let _ = written.and_then(|()| self.file.sync_all());
+    }
+}
+
+impl Drop for Opening {
+    /// The open came to an orderly end, good or not.
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Moves a database and its log aside under the time of day; returns the new path. Nothing is ever deleted.
+pub fn set_aside(db: &Path, now: Timestamp) -> Result<PathBuf, HistoryError> {
+    let stamp = now.to_zoned(TimeZone::UTC).strftime("%Y%m%dT%H%M%SZ").to_string();
+    let free = |path: &PathBuf| !path.exists() && !beside(path, ".wal").exists();
+    let target = (1..)
+        .map(|n| match n {
+            1 => beside(db, &format!(".damaged-{stamp}")),
+            n => beside(db, &format!(".damaged-{stamp}-{n}")),
+        })
+        .find(free)
+        .expect("some number is free");
+    // The log first: a database without its log is merely older, a log that meets a new database would be replayed.
+    for suffix in [".wal", ""] {
+        let (from, to) = (beside(db, suffix), beside(&target, suffix));
+        if from.exists() {
+            fs::rename(&from, &to).map_err(|error| HistoryError::Engine(format!("{}: {error}", from.display())))?;
+        }
+    }
+    Ok(target)
+}
+
+/// Bytes of the database and its log.
+pub fn size(db: &Path) -> u64 {
+    [db.to_owned(), beside(db, ".wal")].iter().filter_map(|path| fs::metadata(path).ok()).map(|meta| meta.len()).sum()
+}
+
+/// The path with something appended: DuckDB itself names its log so.
+pub fn beside(db: &Path, suffix: &str) -> PathBuf {
+    let mut name = OsString::from(db.as_os_str());
+    name.push(suffix);
+    name.into()
+}
+
+/// What a failure to open means.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// The file is as it should be, but something stands in the way.
+    Obstacle(HistoryError),
+    /// The file or its log cannot be read.
+    Damaged(String),
+}
+
+/// Reads DuckDB's message. What is not known to be an obstacle is taken as damage: nothing is lost by setting files
+/// aside, and recording goes on.
+pub fn diagnose(db: &Path, message: &str) -> Failure {
+    const OBSTACLES: [&str; 11] = [
+        "Permission denied",
+        "No such file",
+        "Is a directory",
+        "No space left",
+        "Read-only file system",
+        "Too many open files",
+        "Input/output error",
+        "Out of Memory",
+        "newer version",
+        "newer DuckDB",
+        "in read-only mode",
+    ];
+    if message.contains("Could not set lock") {
+        return Failure::Obstacle(locked(db, holder(message)));
+    }
+    match OBSTACLES.iter().any(|words| message.contains(words)) {
+        true => Failure::Obstacle(HistoryError::Engine(message.to_owned())),
+        false => Failure::Damaged(first_line(message)),
+    }
+}
+
+/// DuckDB appends advice and stack traces; the first line says what happened.
+pub fn first_line(message: &str) -> String {
+    message.lines().next().unwrap_or("").trim().to_owned()
+}
+
+fn locked(db: &Path, by: String) -> HistoryError {
+    HistoryError::Locked { path: db.display().to_string(), by }
+}
+
+/// `process 1234 (sightglass)`, from `Conflicting lock is held in /usr/bin/sightglass (PID 1234)`.
+fn holder(message: &str) -> String {
+    let digits = |text: &str| text.chars().take_while(char::is_ascii_digit).collect::<String>();
+    let pid = message.split_once("PID ").map(|(_, rest)| digits(rest)).filter(|pid| !pid.is_empty());
+    match pid {
+        Some(pid) => match fs::read_to_string(format!("/proc/{pid}/comm")) {
+            Ok(name) => format!("process {pid} ({})", name.trim()),
+            Err(_) => format!("process {pid}"),
+        },
+        None => "another process".into(),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::report::testing::at;
+
+    #[test]
+    fn the_holder_of_a_lock_is_named() {
+        let own = std::process::id();
+        let comm = fs::read_to_string("/proc/self/comm").unwrap();
+        let message =
+            format!("IO Error: Could not set lock on file \"x\": Conflicting lock is held in /bin/x (PID {own}).");
+        let expect = HistoryError::Locked { path: "x".into(), by: format!("process {own} ({})", comm.trim()) };
+        assert_eq!(diagnose(Path::new("x"), &message), Failure::Obstacle(expect));
+        let unknown = HistoryError::Locked { path: "x".into(), by: "another process".into() };
+        assert_eq!(diagnose(Path::new("x"), "IO Error: Could not set lock on file"), Failure::Obstacle(unknown));
+    }
+
+    #[test]
+    fn a_full_or_forbidden_disk_is_not_taken_for_damage() {
+        for message in ["IO Error: Cannot open file \"x\": Permission denied", "IO Error: No space left on device"] {
+            let expect = Failure::Obstacle(HistoryError::Engine(message.into()));
+            assert_eq!(diagnose(Path::new("x"), message), expect);
+        }
+        let message = "IO Error: The file \"x\" exists, but it is not a valid DuckDB database file!\nmore";
+        assert!(matches!(diagnose(Path::new("x"), message), Failure::Damaged(why) if why.ends_with("file!")));
+    }
+
+    #[test]
+    fn files_set_aside_within_one_second_do_not_overwrite_each_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let db = folder.path().join("x.duckdb");
+        let mut targets = Vec::new();
+        for text in ["one", "two"] {
+            fs::write(&db, text).unwrap();
+            fs::write(beside(&db, ".wal"), text).unwrap();
+            targets.push(set_aside(&db, at("2026-11-21T06:00:00Z")).unwrap());
+        }
+        assert!(targets[0].ends_with("x.duckdb.damaged-20261121T060000Z"));
+        for (target, text) in targets.iter().zip(["one", "two"]) {
+            assert_eq!(fs::read_to_string(target).unwrap(), text);
+            assert_eq!(fs::read_to_string(beside(target, ".wal")).unwrap(), text);
+        }
+        assert!(!db.exists());
+    }
+
+    #[test]
+    fn only_opens_that_never_ended_are_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let db = folder.path().join("x.duckdb");
+        assert_eq!(Opening::begin(&db).unwrap().failed, 0);
+        // The first one ended in order.
+        let first = Opening::begin(&db).unwrap();
+        assert_eq!(first.failed, 0);
+        assert!(matches!(Opening::begin(&db), Err(HistoryError::Locked { .. })));
+        drop(first);
+        // A process that died leaves the count behind.
+        fs::write(beside(&db, ".opening"), "2").unwrap();
+        assert_eq!(Opening::begin(&db).unwrap().failed, 2);
+        assert!(!beside(&db, ".opening").exists());
+    }
+}

@@ -1,0 +1,94 @@
+//! The schema as numbered migrations, and the questions in SQL. Times are UTC; local time is Rust's business.
+
+/// The migrations; the schema's version is their number. Each runs in one transaction, followed by a checkpoint before
+/// any data, because data definitions among data in the log are what DuckDB's known recovery bugs need.
+///
+/// No keys and no indexes: they cost eight times the file. `utc` is a TIMESTAMP, not a BIGINT: both are 64 bits of
+/// microseconds and take the same space on disk (measured), but a TIMESTAMP can be read by a person and by `time_bucket`.
+/// `value` is a DOUBLE because a FLOAT would turn 123456.7 into 123456.703. `quality` is `Quality::code`.
+pub const MIGRATIONS: [&str; 1] = ["
+CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
+CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
+CREATE TABLE alarm_journal (
+    utc TIMESTAMP NOT NULL, subject VARCHAR NOT NULL, text VARCHAR NOT NULL, priority UTINYINT NOT NULL,
+    step VARCHAR NOT NULL, value DOUBLE, limit_value DOUBLE, by_whom VARCHAR);
+CREATE TABLE operator_action (
+    utc TIMESTAMP NOT NULL, by_whom VARCHAR NOT NULL, action VARCHAR NOT NULL, target VARCHAR NOT NULL,
+    old_value VARCHAR, new_value VARCHAR, outcome VARCHAR NOT NULL);
+"];
+
+/// Holds the number of migrations done.
+pub const CREATE_VERSION: &str = "CREATE TABLE IF NOT EXISTS schema_version (version UINTEGER NOT NULL)";
+/// 0 rows before the first migration.
+pub const VERSION: &str = "SELECT coalesce(max(version), 0) FROM schema_version";
+/// Notes a migration as done.
+pub const SET_VERSION: &str = "INSERT INTO schema_version VALUES (?)";
+
+/// The dictionary of tags.
+pub const TAGS: &str = "SELECT id, name, unit FROM tag";
+/// Adds a tag.
+pub const ADD_TAG: &str = "INSERT INTO tag VALUES (?, ?, ?)";
+
+/// The first and the last instant stored.
+pub const EXTENT: &str = "SELECT min(a), max(z) FROM (
+    SELECT min(utc) AS a, max(utc) AS z FROM sample UNION ALL SELECT min(utc), max(utc) FROM alarm_journal)";
+
+/// Ends every curve: a row (time, no value, quality) for each tag whose last row since an instant has a value.
+pub const END_CURVES: &str = "INSERT INTO sample
+    SELECT ?, tag, NULL, ? FROM (SELECT tag, arg_max(quality, rowid) AS last FROM sample WHERE utc >= ? GROUP BY tag)
+    WHERE last < 128";
+
+/// Samples of a tag in a span. Rows of one instant keep the order in which they were written.
+pub const SAMPLES: &str =
+    "SELECT utc, value, quality FROM sample WHERE tag = ? AND utc >= ? AND utc < ? ORDER BY utc, rowid";
+/// How many there are.
+pub const COUNT_SAMPLES: &str = "SELECT count(*) FROM sample WHERE tag = ? AND utc >= ? AND utc < ?";
+/// The latest good value of a tag in a span.
+pub const LATEST_GOOD: &str =
+    "SELECT arg_max(value, utc) FROM sample WHERE tag = ? AND utc >= ? AND utc < ? AND quality = 0";
+
+/// Columns of an alarm step, in the order that `read` expects.
+const STEP: &str = "utc, subject, text, priority, step, value, limit_value, by_whom";
+
+/// Steps of alarms in a span, newest first.
+pub fn journal_newest() -> String {
+    format!("SELECT {STEP} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc DESC, rowid DESC LIMIT ?")
+}
+
+/// Steps of alarms in a span, oldest first.
+pub fn journal_oldest() -> String {
+    format!("SELECT {STEP} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc, rowid LIMIT ?")
+}
+
+/// The raising steps of the alarms that were active at an instant.
+pub fn active_at() -> String {
+    format!(
+        "SELECT {STEP} FROM (
+            SELECT *, rowid AS place FROM alarm_journal WHERE utc < ? AND step IN ('raised', 'returned')
+            QUALIFY row_number() OVER (PARTITION BY subject, text ORDER BY utc DESC, rowid DESC) = 1)
+         WHERE step = 'raised' ORDER BY utc, place LIMIT ?"
+    )
+}
+
+/// Of each alarm the steps since it was last raised, in the order in which they were written.
+pub fn restore() -> String {
+    format!(
+        "SELECT {STEP} FROM (
+            SELECT *, rowid AS place, max(rowid) FILTER (step = 'raised') OVER (PARTITION BY subject, text) AS raised
+            FROM alarm_journal)
+         WHERE place >= raised ORDER BY place LIMIT ?"
+    )
+}
+
+/// Deeds in a span.
+const DEED: &str = "utc, by_whom, action, target, old_value, new_value, outcome";
+
+/// Deeds of operators in a span, newest first.
+pub fn actions_newest() -> String {
+    format!("SELECT {DEED} FROM operator_action WHERE utc >= ? AND utc < ? ORDER BY utc DESC, rowid DESC LIMIT ?")
+}
+
+/// Deeds of operators in a span, oldest first.
+pub fn actions_oldest() -> String {
+    format!("SELECT {DEED} FROM operator_action WHERE utc >= ? AND utc < ? ORDER BY utc, rowid LIMIT ?")
+}

@@ -1,0 +1,511 @@
+//! The store against the accidents of a plant: restart, death, damage, a second process, a full disk.
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    fs,
+    io::{BufRead, BufReader, Write},
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    sync::Arc,
+};
+
+use jiff::Timestamp;
+
+use super::{files::beside, sql, store::Store, thread, writer::Writer};
+use crate::{
+    bus::io::clock::Clock,
+    history::{Answer, HistoryError, Query, Question, Series},
+    plant::{
+        def::{PlantDef, Priority, TagId},
+        record::{ActionRecord, AlarmRecord, AlarmStep, Record},
+        sample::{Cause, Sample},
+    },
+    report::{
+        Period,
+        testing::{THREE, plant, sec, tag},
+    },
+};
+
+const PV: TagId = TagId(0);
+const SV: TagId = TagId(1);
+
+fn def() -> Arc<PlantDef> {
+    Arc::new(plant("Asia/Bangkok", &THREE))
+}
+
+fn folder() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let db = folder.path().join("tank.duckdb");
+    (folder, db)
+}
+
+fn open(db: &Path, now: i64) -> Store {
+    let opened = Store::open(db, &def(), sec(now)).unwrap();
+    assert_eq!(opened.trouble, None);
+    opened.store.end_curves_left_behind(sec(now)).unwrap();
+    opened.store
+}
+
+fn good(tag: TagId, at: i64, value: f64) -> Record {
+    Record::Sample(tag, Sample::good(value, sec(at)))
+}
+
+fn step(at: i64, text: &str, step: AlarmStep) -> AlarmRecord {
+    AlarmRecord {
+        at: sec(at),
+        subject: "TIC-1.PV".into(),
+        text: text.into(),
+        priority: Priority::High,
+        step,
+        value: Some(85.5),
+        limit: Some(85.0),
+        by: (step == AlarmStep::Acknowledged).then(|| "somchai".into()),
+    }
+}
+
+fn deed(at: i64) -> ActionRecord {
+    ActionRecord {
+        at: sec(at),
+        by: "somchai".into(),
+        action: "write".into(),
+        target: "TIC-1.SV".into(),
+        old: Some("70.0 °C".into()),
+        new: None,
+        outcome: "verified".into(),
+    }
+}
+
+fn series(store: &Store, tag: TagId, from: i64, to: i64, buckets: usize) -> Series {
+    let question = Question::Series { tags: vec![tag], from: sec(from), to: sec(to), buckets };
+    match store.answer(&question, sec(to)).unwrap() {
+        Answer::Series(mut series) => series.remove(0),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn means(store: &Store, tag: TagId, from: i64, to: i64, buckets: usize) -> Vec<Option<f64>> {
+    series(store, tag, from, to, buckets).buckets.iter().map(|bucket| bucket.map(|bucket| bucket.mean)).collect()
+}
+
+fn setting(store: &Store, name: &str) -> String {
+    store.db.query_row(&format!("SELECT current_setting('{name}')::VARCHAR"), [], |row| row.get(0)).unwrap()
+}
+
+#[test]
+fn the_engine_is_the_one_that_was_vetted_and_set_as_decided() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    assert_eq!(store.db.version().unwrap(), "v1.5.6");
+    for (name, expect) in [
+        ("threads", "1"),
+        ("max_memory", "122.0 MiB"),
+        ("autoinstall_known_extensions", "false"),
+        ("autoload_known_extensions", "false"),
+        ("disabled_compression_methods", "bitpacking"),
+        ("max_temp_directory_size", "488.2 MiB"),
+        ("checkpoint_threshold", "3.8 MiB"),
+    ] {
+        assert_eq!(setting(&store, name).to_lowercase(), expect.to_lowercase(), "{name}");
+    }
+    // And it does what it says: nothing on disk is bit-packed.
+    store.append(&(0..20_000).map(|i| good(PV, i, i as f64 / 10.0)).collect::<Vec<_>>()).unwrap();
+    store.checkpoint().unwrap();
+    let sql = "SELECT count(*), count(*) FILTER (lower(compression) = 'bitpacking') FROM pragma_storage_info('sample')";
+    let (segments, packed): (u32, u32) = store.db.query_row(sql, [], |row| Ok((row.get(0)?, row.get(1)?))).unwrap();
+    assert!(segments > 0);
+    assert_eq!(packed, 0);
+}
+
+#[cfg(not(feature = "bundled"))]
+#[test]
+fn the_linked_library_has_its_extensions_built_in() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    let sql = "SELECT count(*) FROM duckdb_extensions() WHERE loaded AND extension_name IN ('icu', 'json', 'parquet')";
+    assert_eq!(store.db.query_row(sql, [], |row| row.get::<_, u32>(0)).unwrap(), 3);
+}
+
+#[test]
+fn a_restart_continues_and_the_time_in_between_is_a_gap() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.append(&[good(PV, 0, 27.0), good(SV, 0, 70.0), good(PV, 30, 28.0)]).unwrap();
+    drop(store);
+    // Nobody ended the curves: the station died. It is known to have lived until 30 s.
+    let store = open(&db, 100);
+    store.append(&[good(PV, 100, 40.0)]).unwrap();
+    let expect = [Some(27.0), Some(28.0), None, None, Some(40.0)];
+    assert_eq!(means(&store, PV, 0, 125, 5)[0], expect[0]);
+    let by_10_s = means(&store, PV, 0, 110, 11);
+    assert_eq!(by_10_s[..3], [Some(27.0); 3]);
+    assert_eq!(by_10_s[3], Some(28.0));
+    assert_eq!(by_10_s[4..10], [None; 6]);
+    assert_eq!(by_10_s[10], Some(40.0));
+    // 31 s of the set value, then nothing.
+    assert!((series(&store, SV, 0, 100, 1).good - 0.31).abs() < 1e-9);
+    // Opening once more adds nothing: the curve of SV has ended already.
+    drop(store);
+    let store = open(&db, 100);
+    let rows: u32 = store.db.query_row("SELECT count(*) FROM sample WHERE tag = 1", [], |row| row.get(0)).unwrap();
+    assert_eq!(rows, 2);
+}
+
+#[test]
+fn a_value_is_stored_to_its_last_digit_and_every_quality_comes_back() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.append(&[good(PV, 0, 123_456.7), Record::Sample(PV, Sample::bad(Cause::SensorFault, sec(10)))]).unwrap();
+    let last = Sample::good(1.0, sec(20)).doubted(Cause::Timeout);
+    store.append(&[Record::Sample(PV, Sample { at: sec(20), ..last })]).unwrap();
+    assert_eq!(means(&store, PV, 0, 30, 3), [Some(123_456.7), None, None]);
+    let codes: Vec<u8> = {
+        let mut statement = store.db.prepare("SELECT quality FROM sample ORDER BY utc").unwrap();
+        statement.query_map([], |row| row.get(0)).unwrap().map(Result::unwrap).collect()
+    };
+    assert_eq!(codes, [0, 136, 66]);
+}
+
+#[test]
+fn a_tag_keeps_its_curve_when_the_plant_file_is_reordered_and_loses_it_with_its_unit() {
+    let (_folder, db) = folder();
+    open(&db, 0).append(&[good(PV, 0, 27.0), good(SV, 0, 70.0)]).unwrap();
+    let mut other = plant("Asia/Bangkok", &THREE);
+    other.tags = vec![tag(0, "NEW"), tag(1, "SV"), tag(2, "PV")];
+    let store = Store::open(&db, &Arc::new(other.clone()), sec(5)).unwrap().store;
+    let at_start = |store: &Store, tag| means(store, TagId(tag), 0, 1, 1)[0];
+    assert_eq!([0, 1, 2].map(|tag| at_start(&store, tag)), [None, Some(70.0), Some(27.0)]);
+    drop(store);
+    other.tags[2].unit = "°F".into();
+    let store = Store::open(&db, &Arc::new(other), sec(5)).unwrap().store;
+    assert_eq!([1, 2].map(|tag| at_start(&store, tag)), [Some(70.0), None]);
+}
+
+#[test]
+fn a_commit_that_fails_leaves_nothing_behind() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.db.execute_batch("DROP TABLE operator_action").unwrap();
+    let records = [good(PV, 0, 27.0), Record::Alarm(step(0, "high", AlarmStep::Raised)), Record::Action(deed(0))];
+    assert!(matches!(store.append(&records), Err(HistoryError::Engine(_))));
+    for table in ["sample", "alarm_journal"] {
+        let sql = format!("SELECT count(*) FROM {table}");
+        assert_eq!(store.db.query_row(&sql, [], |row| row.get::<_, u32>(0)).unwrap(), 0, "{table}");
+    }
+    // And the store goes on.
+    store.append(&records[..2]).unwrap();
+}
+
+#[test]
+fn lists_come_newest_first_within_their_span_and_limit() {
+    use AlarmStep::{Acknowledged, Raised, Returned};
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    // Two steps at one instant keep their order.
+    let steps =
+        [step(1, "high", Raised), step(2, "high", Acknowledged), step(2, "high", Returned), step(9, "low", Raised)];
+    let mut records: Vec<_> = steps.iter().cloned().map(Record::Alarm).collect();
+    records.extend([deed(3), deed(4)].map(Record::Action));
+    store.append(&records).unwrap();
+    let journal = |from, to, limit| Question::Journal { from: sec(from), to: sec(to), limit };
+    let [raised, acked, returned, low] = &steps;
+    for (question, expect) in [
+        (journal(0, 10, 100), vec![low, returned, acked, raised]),
+        (journal(0, 9, 2), vec![returned, acked]),
+        (journal(2, 9, 100), vec![returned, acked]),
+    ] {
+        let expect = Answer::Journal(expect.into_iter().cloned().collect());
+        assert_eq!(store.answer(&question, sec(10)).unwrap(), expect);
+    }
+    let question = Question::Actions { from: sec(0), to: sec(10), limit: 1 };
+    assert_eq!(store.answer(&question, sec(10)).unwrap(), Answer::Actions(vec![deed(4)]));
+    assert_eq!(store.answer(&journal(5, 5, 1), sec(10)), Err(HistoryError::EmptyPeriod));
+}
+
+#[test]
+fn the_alarms_of_before_the_restart_are_restored_with_their_acknowledgements() {
+    use AlarmStep::{Acknowledged, Raised, Returned};
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    let old = [step(1, "high", Raised), step(2, "high", Returned), step(3, "high", Acknowledged)];
+    let new =
+        [step(4, "high", Raised), step(5, "low", Raised), step(6, "high", Acknowledged), step(7, "low", Returned)];
+    store.append(&old.into_iter().chain(new.clone()).map(Record::Alarm).collect::<Vec<_>>()).unwrap();
+    assert_eq!(store.restore().unwrap(), new);
+}
+
+#[test]
+fn the_report_of_a_shift_has_its_figures_alarms_deeds_and_record() {
+    use AlarmStep::{Raised, Returned};
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    let samples = (0..12).map(|i| good(PV, i * 10, 20.0 + i as f64)).chain([good(SV, 0, 70.0)]);
+    let alarms = [step(5, "high", Raised), step(30, "high", Returned), step(50, "low", Raised)].map(Record::Alarm);
+    store.append(&samples.chain(alarms).chain([Record::Action(deed(25))]).collect::<Vec<_>>()).unwrap();
+    let period = Period { name: "period".into(), from: sec(20), to: sec(200) };
+    let question = Question::Report { period: period.clone() };
+    let Answer::Report(report) = store.answer(&question, sec(100)).unwrap() else { panic!("not a report") };
+    assert_eq!((report.period, report.until), (period, sec(100)));
+    let [pv, sv, mv] = report.tags.as_slice() else { panic!("three tags") };
+    assert_eq!((pv.tag.as_str(), pv.unit.as_str(), pv.decimals), ("TIC-1.PV", "°C", 1));
+    assert_eq!((pv.min, pv.mean, pv.max, pv.last, pv.good), (Some(22.0), Some(25.5), Some(29.0), Some(29.0), 1.0));
+    // 20–30 s from before the period, and 50 s to the end.
+    assert_eq!(pv.in_alarm.as_secs(), 60);
+    assert_eq!((sv.mean, sv.good), (Some(70.0), 1.0));
+    assert_eq!((mv.mean, mv.good), (None, 0.0));
+    assert_eq!(report.alarms, [step(30, "high", Returned), step(50, "low", Raised)]);
+    assert_eq!(report.actions, [deed(25)]);
+    assert_eq!(report.record_of, Some(("TIC-1".into(), "°C".into())));
+    assert_eq!(report.record.len(), 8);
+    assert_eq!((report.record[0].at, report.record[0].er), (sec(20), Some(48.0)));
+    let future = Question::Report { period: Period { name: "period".into(), from: sec(300), to: sec(400) } };
+    assert_eq!(store.answer(&future, sec(100)), Err(HistoryError::EmptyPeriod));
+}
+
+#[test]
+fn a_period_of_a_century_is_answered_at_once_and_a_record_of_millions_of_rows_refused() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.append(&[good(PV, 0, 27.0), good(PV, 100_000, 28.0)]).unwrap();
+    let century = 3_000_000_000;
+    assert_eq!(series(&store, PV, -century, century, 3).buckets.len(), 3);
+    let period = Period { name: "period".into(), from: sec(0), to: sec(century) };
+    let answer = store.answer(&Question::Report { period }, sec(century));
+    assert!(matches!(answer, Err(HistoryError::TooManyRows { .. })));
+}
+
+#[test]
+fn a_report_without_the_station_reads_but_never_creates() {
+    let (_folder, db) = folder();
+    let missing = Store::open_read_only(&db, &def()).err();
+    assert_eq!(missing, Some(HistoryError::Missing { path: db.display().to_string() }));
+    assert!(!db.exists());
+    // A station that died with a log: the log is read, the file is not changed, the curve ends.
+    die_after_writing(&db);
+    let (before, log) = (fs::read(&db).unwrap(), fs::read(beside(&db, ".wal")).unwrap());
+    let store = Store::open_read_only(&db, &def()).unwrap();
+    assert_eq!(means(&store, PV, 0, 60, 3), [Some(27.0), None, None]);
+    assert!((series(&store, PV, 0, 10, 1).good - 1.0).abs() < 1e-9);
+    drop(store);
+    assert_eq!((fs::read(&db).unwrap(), fs::read(beside(&db, ".wal")).unwrap()), (before, log));
+}
+
+#[test]
+fn a_file_that_is_not_a_database_is_set_aside_and_recording_begins_anew() {
+    for damage in [b"not a database".to_vec(), vec![0; 20_000], vec![0xA5; 20_000]] {
+        let (_folder, db) = folder();
+        fs::write(&db, &damage).unwrap();
+        let opened = Store::open(&db, &def(), sec(0)).unwrap();
+        let aside = beside(&db, ".damaged-19700101T000000Z");
+        assert_eq!(fs::read(&aside).unwrap(), damage);
+        assert!(opened.trouble.unwrap().contains("set aside as"));
+        opened.store.append(&[good(PV, 0, 27.0)]).unwrap();
+    }
+}
+
+#[test]
+fn a_file_cut_or_scribbled_over_is_set_aside() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.append(&(0..20_000).map(|i| good(PV, i, f64::from(i as u32).sqrt())).collect::<Vec<_>>()).unwrap();
+    drop(store);
+    let whole = fs::read(&db).unwrap();
+    let mut scribbled = whole.clone();
+    scribbled[4096..12_288].fill(0x5A);
+    for damaged in [whole[..whole.len() / 2].to_vec(), whole[..4096].to_vec(), scribbled] {
+        fs::write(&db, &damaged).unwrap();
+        // In a process of its own, because DuckDB may end the process.
+        let opens = open_until_it_lives(&db);
+        assert!(opens <= 3, "{opens} opens");
+        let aside = fs::read_dir(db.parent().unwrap())
+            .unwrap()
+            .filter(|entry| entry.as_ref().unwrap().file_name().to_string_lossy().contains(".damaged-"));
+        assert_eq!(aside.count(), 1);
+        for entry in fs::read_dir(db.parent().unwrap()).unwrap() {
+            fs::remove_file(entry.unwrap().path()).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_log_torn_at_any_length_never_keeps_the_station_down() {
+    let (_folder, db) = folder();
+    die_after_writing(&db);
+    let (file, log) = (fs::read(&db).unwrap(), fs::read(beside(&db, ".wal")).unwrap());
+    assert!(log.len() > 100, "the child left a log");
+    let cuts = [0, 1, 7, 20, log.len() / 3, log.len() / 2, log.len() - 9, log.len() - 1];
+    let torn = cuts.map(|cut| log[..cut].to_vec());
+    let flipped = [30, log.len() / 2, log.len() - 20].map(|at| {
+        let mut log = log.clone();
+        log[at] ^= 0xFF;
+        log
+    });
+    for torn in torn.into_iter().chain(flipped) {
+        fs::write(&db, &file).unwrap();
+        fs::write(beside(&db, ".wal"), &torn).unwrap();
+        let opens = open_until_it_lives(&db);
+        assert!(opens <= 3, "{opens} opens");
+    }
+}
+
+#[test]
+fn files_whose_opening_never_ended_twice_are_set_aside_before_the_third() {
+    let (_folder, db) = folder();
+    open(&db, 0).append(&[good(PV, 0, 27.0)]).unwrap();
+    fs::write(beside(&db, ".opening"), "1").unwrap();
+    assert_eq!(means(&open(&db, 0), PV, 0, 1, 1), [Some(27.0)]);
+    fs::write(beside(&db, ".opening"), "2").unwrap();
+    let opened = Store::open(&db, &def(), sec(0)).unwrap();
+    assert!(opened.trouble.unwrap().contains("opening it never ended"));
+    assert!(beside(&db, ".damaged-19700101T000000Z").exists());
+    assert!(!beside(&db, ".opening").exists());
+}
+
+#[test]
+fn a_second_process_is_told_who_has_the_file() {
+    let (_folder, db) = folder();
+    let mut holder = child("hold", &db);
+    let mut ready = String::new();
+    let mut lines = BufReader::new(holder.stdout.take().unwrap());
+    while !ready.contains("ready") {
+        ready.clear();
+        assert_ne!(lines.read_line(&mut ready).unwrap(), 0, "the child ended");
+    }
+    let expect = format!("process {} (", holder.id());
+    let refused = [Store::open(&db, &def(), sec(0)).err(), Store::open_read_only(&db, &def()).err()];
+    drop(holder.stdin.take());
+    holder.wait().unwrap();
+    for error in refused {
+        match error {
+            Some(HistoryError::Locked { path, by }) => {
+                assert_eq!(path, db.display().to_string());
+                assert!(by.starts_with(&expect), "{by}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(!beside(&db, ".opening").exists());
+    open(&db, 0);
+}
+
+#[test]
+fn records_wait_while_the_store_fails_and_nothing_is_lost_when_it_recovers() {
+    let (_folder, db) = folder();
+    let mut writer = Writer::open(db, def(), sec(0)).unwrap();
+    let sql = |writer: &Writer, sql: &str| writer.store().unwrap().db.execute_batch(sql).unwrap();
+    sql(&writer, "ALTER TABLE sample RENAME TO hidden");
+    writer.accept(vec![good(PV, 0, 27.0)]);
+    writer.commit(sec(1));
+    writer.accept(vec![good(PV, 1, 28.0)]);
+    writer.commit(sec(2));
+    let trouble = writer.status().trouble.clone().unwrap();
+    assert!(trouble.contains("2 records waiting"), "{trouble}");
+    assert_eq!((writer.status().rows, writer.status().lost, writer.status().committed_at), (0, 0, None));
+    sql(&writer, "ALTER TABLE hidden RENAME TO sample");
+    writer.commit(sec(3));
+    assert_eq!((writer.status().rows, writer.status().lost), (2, 0));
+    assert_eq!((&writer.status().trouble, writer.status().committed_at), (&None, Some(sec(3))));
+    assert_eq!(means(writer.store().unwrap(), PV, 0, 2, 2), [Some(27.0), Some(28.0)]);
+    // What still cannot be stored at the very end is counted as lost.
+    sql(&writer, "ALTER TABLE sample RENAME TO hidden");
+    writer.accept(vec![good(PV, 4, 27.0)]);
+    writer.finish(sec(5));
+    assert_eq!(writer.status().lost, 1);
+}
+
+#[test]
+fn a_stopped_station_leaves_every_curve_ended_and_a_running_one_answers() {
+    let (_folder, db) = folder();
+    let clock = Clock::starting_at(sec(10), 1.0);
+    let handle = thread::start(&db, def(), clock).unwrap();
+    assert_eq!(handle.restored, []);
+    handle.records.blocking_send(vec![good(PV, 5, 27.0), Record::Alarm(step(6, "high", AlarmStep::Raised))]).unwrap();
+    let (reply, answer) = tokio::sync::oneshot::channel();
+    let period = Period { name: "period".into(), from: sec(0), to: sec(10) };
+    handle.queries.blocking_send(Query { question: Question::Report { period }, reply }).unwrap();
+    let Ok(Ok(Answer::Report(report))) = answer.blocking_recv() else { panic!("no report") };
+    assert_eq!(report.tags[0].last, Some(27.0));
+    assert_eq!(handle.status.borrow().lost, 0);
+    handle.stop();
+    let store = open(&db, 100);
+    assert_eq!(store.restore().unwrap(), [step(6, "high", AlarmStep::Raised)]);
+    let (last, quality): (i64, u8) = store
+        .db
+        .query_row("SELECT utc, quality FROM sample ORDER BY rowid DESC LIMIT 1", [], |row| {
+            Ok((row.get(0)?, row.get(1)?))
+        })
+        .unwrap();
+    assert_eq!(quality, 139);
+    assert!(Timestamp::from_microsecond(last).unwrap() < sec(100));
+    assert!(!beside(&db, ".wal").exists(), "the log was written into the file");
+}
+
+#[test]
+fn migrations_are_numbered_and_run_once() {
+    let (_folder, db) = folder();
+    for _ in 0..2 {
+        let store = open(&db, 0);
+        let versions: u32 = store.db.query_row("SELECT count(*) FROM schema_version", [], |row| row.get(0)).unwrap();
+        assert_eq!(versions as usize, sql::MIGRATIONS.len());
+    }
+    open(&db, 0).db.execute_batch("INSERT INTO schema_version VALUES (999)").unwrap();
+    assert!(
+        matches!(Store::open(&db, &def(), sec(0)).err(), Some(HistoryError::Engine(words)) if words.contains("newer"))
+    );
+    assert!(db.exists());
+}
+
+// What follows runs in child processes: this test program again, with one helper test and a job in the environment.
+
+const JOB: &str = "SIGHTGLASS_TEST_JOB";
+const FILE: &str = "SIGHTGLASS_TEST_FILE";
+
+fn child(job: &str, db: &Path) -> Child {
+    Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "history::io::tests::job_of_a_child_process", "--nocapture"])
+        .env(JOB, job)
+        .env(FILE, db)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+/// A child commits a few seconds of records and dies without closing anything.
+fn die_after_writing(db: &Path) {
+    assert!(!child("write and die", db).wait().unwrap().success());
+}
+
+/// Starts processes until one opens the store and stores something; returns how many it took.
+fn open_until_it_lives(db: &Path) -> usize {
+    (1..=5).find(|_| child("open", db).wait().unwrap().success()).expect("one of five opens is good")
+}
+
+/// Does a job if the environment names one; in an ordinary run it checks that none is named.
+#[test]
+fn job_of_a_child_process() {
+    let Ok(job) = std::env::var(JOB) else {
+        assert_eq!(std::env::var(FILE).ok(), None);
+        return;
+    };
+    let db = PathBuf::from(std::env::var(FILE).unwrap());
+    let store = Store::open(&db, &def(), sec(20)).unwrap().store;
+    match job.as_str() {
+        "write and die" => {
+            for second in 0..10 {
+                store
+                    .append(&[good(PV, second, 27.0), Record::Alarm(step(second, "high", AlarmStep::Raised))])
+                    .unwrap();
+            }
+            std::process::abort();
+        }
+        "open" => store.append(&[good(PV, 20, 28.0)]).unwrap(),
+        "hold" => {
+            let mut out = std::io::stdout();
+            writeln!(out, "\nready").and_then(|()| out.flush()).unwrap();
+            let mut rest = String::new();
+            std::io::stdin().read_line(&mut rest).unwrap();
+        }
+        other => panic!("no such job: {other}"),
+    }
+}

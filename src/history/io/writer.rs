@@ -1,0 +1,239 @@
+//! What the history thread does, without the thread: gathers records, commits, retries, answers, keeps the status.
+
+use std::{path::PathBuf, sync::Arc};
+
+use jiff::Timestamp;
+
+use super::{
+    files,
+    store::{Opened, Store},
+};
+use crate::{
+    history::{Answer, HistoryError, Question},
+    plant::{def::PlantDef, record::AlarmRecord, record::Record, snapshot::HistoryStatus},
+};
+
+/// Records kept while the store cannot take them: more than half an hour of a hundred a second.
+pub const PENDING_MAX: usize = 200_000;
+/// Commits between two checkpoints: five minutes of one a second.
+const CHECKPOINT_EVERY: u32 = 300;
+/// Failed commits between two attempts to open the store anew.
+const REOPEN_EVERY: u32 = 10;
+
+/// The writing side of a store.
+pub struct Writer {
+    /// Gone while it could not be opened again after a fatal error.
+    store: Option<Store>,
+    path: PathBuf,
+    def: Arc<PlantDef>,
+    pending: Vec<Record>,
+    status: HistoryStatus,
+    /// What was wrong at the last open; stays until the station ends.
+    opened_with: Option<String>,
+    /// What is wrong now; goes when it works again.
+    failing: Option<String>,
+    /// What was wrong with the last checkpoint; goes with the next good one.
+    unchecked: Option<String>,
+    failures: u32,
+    commits: u32,
+}
+
+impl Writer {
+    /// Opens the store. Errors as [`Store::open`].
+    pub fn open(path: PathBuf, def: Arc<PlantDef>, now: Timestamp) -> Result<Writer, HistoryError> {
+        let Opened { store, trouble } = Store::open(&path, &def, now)?;
+        store.end_curves_left_behind(now)?;
+        let mut writer = Writer {
+            store: Some(store),
+            path,
+            def,
+            pending: Vec::new(),
+            status: HistoryStatus::default(),
+            opened_with: trouble,
+            failing: None,
+            unchecked: None,
+            failures: 0,
+            commits: 0,
+        };
+        writer.describe();
+        Ok(writer)
+    }
+
+    /// How the store stands.
+    pub fn status(&self) -> &HistoryStatus {
+        &self.status
+    }
+
+    /// The alarm steps to restore, see [`Store::restore`].
+    pub fn restore(&self) -> Result<Vec<AlarmRecord>, HistoryError> {
+        self.store()?.restore()
+    }
+
+    /// Takes records to be stored with the next commit.
+    pub fn accept(&mut self, records: Vec<Record>) {
+        self.pending.extend(records);
+        let lost = shed(&mut self.pending, PENDING_MAX);
+        if lost > 0 {
+            self.status.lost += lost;
+            self.describe();
+        }
+    }
+
+    /// Stores what is pending, all or nothing; what could not be stored stays pending. Called once a second.
+    pub fn commit(&mut self, now: Timestamp) {
+        self.commits += 1;
+        let result = match self.pending.is_empty() {
+            true if self.failing.is_none() => Ok(()),
+            _ => self.store().and_then(|store| store.append(&self.pending)),
+        };
+        match result {
+            Ok(()) => {
+                if !self.pending.is_empty() {
+                    self.status.rows += self.pending.len() as u64;
+                    self.status.committed_at = Some(now);
+                    self.pending.clear();
+                }
+                self.failures = 0;
+                self.failing = None;
+                if self.commits.is_multiple_of(CHECKPOINT_EVERY) {
+                    self.checkpoint();
+                }
+            }
+            Err(error) => {
+                self.failures += 1;
+                if is_fatal(&error) || self.store.is_none() {
+                    self.reopen(now);
+                }
+                self.failing = Some(error.to_string());
+            }
+        }
+        self.describe();
+    }
+
+    /// Answers a question. A report first commits what is pending, so that it lacks nothing.
+    pub fn answer(&mut self, question: &Question, now: Timestamp) -> Result<Answer, HistoryError> {
+        match question {
+            Question::Report { .. } => self.commit(now),
+            Question::Series { .. } | Question::Journal { .. } | Question::Actions { .. } => {}
+        }
+        self.store()?.answer(question, now)
+    }
+
+    /// The orderly end: everything stored, every curve ended, the log written into the file.
+    pub fn finish(&mut self, now: Timestamp) {
+        // Some tries, because this is the last chance; what still fails is lost, and said so.
+        for _ in 0..3 {
+            self.commit(now);
+            if self.pending.is_empty() {
+                break;
+            }
+        }
+        self.status.lost += self.pending.len() as u64;
+        self.pending.clear();
+        if let Err(error) = self.store().and_then(|store| store.end_curves(now)) {
+            self.failing = Some(error.to_string());
+        }
+        self.checkpoint();
+        self.describe();
+    }
+
+    pub(super) fn store(&self) -> Result<&Store, HistoryError> {
+        self.store.as_ref().ok_or_else(|| HistoryError::Engine("not open".into()))
+    }
+
+    fn checkpoint(&mut self) {
+        let result = self.store().and_then(Store::checkpoint);
+        self.unchecked = result.err().map(|error| format!("checkpoint: {error}"));
+    }
+
+    /// After a fatal error DuckDB answers nothing more until the file is opened anew.
+    fn reopen(&mut self, now: Timestamp) {
+        if self.failures % REOPEN_EVERY != 1 {
+            return;
+        }
+        // Closed first: two stores of one process on one file would not see each other's locks.
+        self.store = None;
+        if let Ok(Opened { store, trouble }) = Store::open(&self.path, &self.def, now) {
+            self.store = Some(store);
+            self.opened_with = trouble.or(self.opened_with.take());
+        }
+    }
+
+    fn describe(&mut self) {
+        let lost = (self.status.lost > 0).then(|| format!("{} records lost", self.status.lost));
+        let waiting = self.failing.as_ref().map(|why| format!("{why}; {} records waiting", self.pending.len()));
+        let parts: Vec<String> =
+            [waiting, self.unchecked.clone(), lost, self.opened_with.clone()].into_iter().flatten().collect();
+        self.status.trouble = (!parts.is_empty()).then(|| parts.join("; "));
+        self.status.file_bytes = files::size(&self.path);
+    }
+}
+
+/// Brings a list down to three quarters of `max` if it is longer: the oldest samples go first, then the oldest of all.
+/// Steps of alarms and deeds of operators are worth more than any sample. Returns how many went.
+fn shed(pending: &mut Vec<Record>, max: usize) -> u64 {
+    if pending.len() <= max {
+        return 0;
+    }
+    let mut excess = pending.len() - max * 3 / 4;
+    let lost = excess as u64;
+    pending.retain(|record| {
+        let goes = excess > 0 && matches!(record, Record::Sample(..));
+        excess -= usize::from(goes);
+        !goes
+    });
+    pending.drain(..excess);
+    lost
+}
+
+fn is_fatal(error: &HistoryError) -> bool {
+    match error {
+        HistoryError::Engine(words) => words.contains("FATAL") || words.contains("invalidated"),
+        HistoryError::Locked { .. }
+        | HistoryError::Missing { .. }
+        | HistoryError::TooManyRows { .. }
+        | HistoryError::EmptyPeriod => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        plant::{def::Priority, def::TagId, record::AlarmStep, sample::Sample},
+        report::testing::sec,
+    };
+
+    fn sample(at: i64) -> Record {
+        Record::Sample(TagId(0), Sample::good(1.0, sec(at)))
+    }
+
+    fn alarm(at: i64) -> Record {
+        Record::Alarm(AlarmRecord {
+            at: sec(at),
+            subject: "TIC-1.PV".into(),
+            text: "high".into(),
+            priority: Priority::High,
+            step: AlarmStep::Raised,
+            value: None,
+            limit: None,
+            by: None,
+        })
+    }
+
+    fn check(mut pending: Vec<Record>, expect: Vec<Record>) {
+        let all = pending.len();
+        let lost = shed(&mut pending, 4);
+        assert_eq!(pending, expect);
+        assert_eq!(lost as usize, all - pending.len());
+    }
+
+    #[test]
+    fn when_too_much_waits_the_oldest_samples_go_and_the_alarms_stay() {
+        check(vec![], vec![]);
+        check((0..4).map(sample).collect(), (0..4).map(sample).collect());
+        check((0..5).map(sample).collect(), (2..5).map(sample).collect());
+        check(vec![alarm(0), sample(1), sample(2), sample(3), alarm(4)], vec![alarm(0), sample(3), alarm(4)]);
+        check(vec![alarm(0), alarm(1), sample(2), alarm(3), alarm(4)], vec![alarm(1), alarm(3), alarm(4)]);
+    }
+}

@@ -1,0 +1,166 @@
+//! Stored samples reduced to the columns of a curve.
+
+use std::time::Duration;
+
+use jiff::{SignedDuration, Timestamp};
+
+use super::{Bucket, Series};
+use crate::{
+    plant::{def::TagId, sample::Sample},
+    report::hold::{Held, Tally, held},
+};
+
+/// The span of a curve; `from < to`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Span {
+    /// Start of the first column.
+    pub from: Timestamp,
+    /// End of the last column.
+    pub to: Timestamp,
+    /// Nothing is known from here on: now, where the span reaches into the future.
+    pub until: Timestamp,
+}
+
+/// A curve of at most `buckets` columns. The samples are in order of time and begin
+/// [`HOLD_MAX`](crate::report::hold::HOLD_MAX) before the span, so that the value standing at its start is known.
+pub fn series(tag: TagId, samples: impl Iterator<Item = Sample>, span: Span, buckets: usize) -> Series {
+    let columns = Columns::new(span, buckets);
+    let mut tallies: Vec<Option<Tally>> = vec![None; columns.count];
+    let mut whole = None;
+    for piece in held(samples, span.from, span.until.min(span.to)) {
+        Tally::add(&mut whole, piece);
+        columns.cut(piece, |column, part| Tally::add(&mut tallies[column], part));
+    }
+    let bucket = |tally: Tally| Bucket { min: tally.min, max: tally.max, mean: tally.mean, last: tally.last };
+    Series {
+        tag,
+        from: span.from,
+        step: columns.step(),
+        buckets: tallies.into_iter().map(|tally| tally.map(bucket)).collect(),
+        summary: whole.map(|tally| (tally.min, tally.mean, tally.max)),
+        good: whole.map_or(0.0, |tally| (tally.seconds * 1e9 / columns.nanos as f64).clamp(0.0, 1.0)),
+    }
+}
+
+/// Columns of equal width over a span. Their edges are computed each from the start, so that no rounding adds up.
+struct Columns {
+    from: Timestamp,
+    nanos: i128,
+    count: usize,
+}
+
+impl Columns {
+    fn new(span: Span, buckets: usize) -> Columns {
+        let nanos = span.to.duration_since(span.from).as_nanos().max(1);
+        // Never narrower than the microsecond that is stored.
+        let count = buckets.clamp(1, usize::try_from(nanos / 1_000).unwrap_or(usize::MAX).max(1));
+        Columns { from: span.from, nanos, count }
+    }
+
+    fn step(&self) -> Duration {
+        let nanos = self.nanos / self.count as i128;
+        Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
+    }
+
+    fn edge(&self, column: usize) -> Timestamp {
+        let nanos = self.nanos * column as i128 / self.count as i128;
+        self.from.checked_add(SignedDuration::from_nanos_i128(nanos)).unwrap_or(Timestamp::MAX)
+    }
+
+    fn column_of(&self, at: Timestamp) -> usize {
+        let nanos = at.duration_since(self.from).as_nanos();
+        usize::try_from(nanos * self.count as i128 / self.nanos).unwrap_or(0).min(self.count - 1)
+    }
+
+    /// Cuts a piece at the edges of the columns that it lies in.
+    fn cut(&self, piece: Held, mut each: impl FnMut(usize, Held)) {
+        let mut from = piece.from;
+        let mut column = self.column_of(from);
+        while from < piece.to && column < self.count {
+            let to = self.edge(column + 1).min(piece.to);
+            if from < to {
+                each(column, Held { from, to, ..piece });
+                from = to;
+            }
+            column += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::{plant::sample::Cause, report::testing::sec};
+
+    fn samples(rows: &[(i64, Option<f64>)]) -> Vec<Sample> {
+        let row = |&(at, value): &(i64, Option<f64>)| {
+            value.map_or(Sample::bad(Cause::DeviceDown, sec(at)), |value| Sample::good(value, sec(at)))
+        };
+        rows.iter().map(row).collect()
+    }
+
+    fn span(from: i64, to: i64) -> Span {
+        Span { from: sec(from), to: sec(to), until: sec(to) }
+    }
+
+    /// Buckets as (min, mean, max, last) of 0..40 s in four columns.
+    fn check(rows: &[(i64, Option<f64>)], expect: [Option<(f64, f64, f64, f64)>; 4], good: f64) {
+        let got = series(TagId(0), samples(rows).into_iter(), span(0, 40), 4);
+        let buckets: Vec<_> = got.buckets.iter().map(|b| b.map(|b| (b.min, b.mean, b.max, b.last))).collect();
+        assert_eq!(buckets, expect);
+        assert!((got.good - good).abs() < 1e-9, "{}", got.good);
+        assert_eq!(got.step, Duration::from_secs(10));
+    }
+
+    #[test]
+    fn a_column_shows_what_stood_in_it_and_a_gap_stays_a_gap() {
+        let flat = |value| Some((value, value, value, value));
+        check(&[], [None; 4], 0.0);
+        check(&[(0, Some(5.0))], [flat(5.0); 4], 1.0);
+        check(&[(-60, Some(5.0))], [flat(5.0); 4], 1.0);
+        check(
+            &[(0, Some(0.0)), (5, Some(10.0))],
+            [Some((0.0, 5.0, 10.0, 10.0)), flat(10.0), flat(10.0), flat(10.0)],
+            1.0,
+        );
+        check(&[(0, Some(5.0)), (12, None), (30, Some(7.0))], [flat(5.0), flat(5.0), None, flat(7.0)], 22.0 / 40.0);
+        // The last good value of a column is shown even if the column ends without one.
+        check(&[(0, Some(1.0)), (4, Some(4.0)), (8, None)], [Some((1.0, 2.5, 4.0, 4.0)), None, None, None], 0.2);
+        // Not stored any more: the curve ends, it does not run on.
+        check(&[(-145, Some(5.0))], [flat(5.0), None, None, None], 5.0 / 40.0);
+    }
+
+    #[test]
+    fn nothing_is_drawn_into_the_future() {
+        let window = Span { until: sec(20), ..span(0, 40) };
+        let got = series(TagId(0), samples(&[(0, Some(5.0))]).into_iter(), window, 4);
+        assert_eq!(got.buckets.iter().map(Option::is_some).collect::<Vec<_>>(), [true, true, false, false]);
+        assert_eq!(got.good, 0.5);
+    }
+
+    proptest! {
+        #[test]
+        fn no_peak_is_lost_and_columns_agree_with_the_whole(
+            rows in proptest::collection::vec((1i64..40, proptest::option::weighted(0.8, -1e3f64..1e3)), 0..60),
+            length in 1i64..700,
+            buckets in 1usize..200,
+        ) {
+            let mut at = -20;
+            let rows: Vec<_> = rows.into_iter().map(|(wait, value)| { at += wait; (at, value) }).collect();
+            let got = series(TagId(0), samples(&rows).into_iter(), span(0, length), buckets);
+            prop_assert_eq!(got.buckets.len(), buckets);
+            let columns: Vec<Bucket> = got.buckets.iter().flatten().copied().collect();
+            let (min, max) = (columns.iter().map(|b| b.min).reduce(f64::min), columns.iter().map(|b| b.max).reduce(f64::max));
+            prop_assert_eq!(got.summary.map(|s| (s.0, s.2)), min.zip(max));
+            for b in &columns {
+                prop_assert!(b.min <= b.mean && b.mean <= b.max && b.min <= b.last && b.last <= b.max);
+            }
+            prop_assert!(!columns.is_empty() || got.good == 0.0);
+            // One column over everything has the mean of the summary.
+            let one = series(TagId(0), samples(&rows).into_iter(), span(0, length), 1);
+            prop_assert_eq!(one.buckets[0].map(|b| b.mean), got.summary.map(|s| s.1));
+        }
+    }
+}
