@@ -37,6 +37,11 @@ impl Errand {
         Some(at)
     }
 
+    /// Has what is shown changed since the last question went out?
+    pub fn is_wanted(&self) -> bool {
+        self.wanted
+    }
+
     /// How long the question on its way has been waiting.
     pub fn waiting(&self, now: Timestamp) -> Option<SignedDuration> {
         self.on_way.map(|(_, at)| now.duration_since(at))

@@ -84,7 +84,6 @@ type Figures = (Option<(f64, f64, f64)>, f64);
 #[derive(Debug, Default)]
 struct Errands {
     curves: Errand,
-    figures: Errand,
     hours: Errand,
     raised: Errand,
     number: u32,
@@ -166,12 +165,11 @@ impl Trends {
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
         let errands = &mut self.errands;
         let curves = errands.curves.answered(number);
-        let figures = errands.figures.answered(number);
         let (hours, raised) = (errands.hours.answered(number), errands.raised.answered(number));
         let answer = match answer {
             Ok(answer) => answer,
             Err(error) => {
-                if curves.or(figures).or(hours).or(raised).is_some() {
+                if curves.or(hours).or(raised).is_some() {
                     self.data.trouble = Some(error.to_string());
                 }
                 return Vec::new();
@@ -182,8 +180,6 @@ impl Trends {
                 if let Some(asked) = curves {
                     self.data.trouble = None;
                     self.take_curves(cx, series, asked);
-                } else if figures.is_some() {
-                    self.data.figures = series.into_iter().map(|s| (s.tag, (s.summary, s.good))).collect();
                 } else if hours.is_some() {
                     self.data.hours = series.into_iter().map(|series| (series.tag, series)).collect();
                 }
@@ -301,7 +297,6 @@ impl Trends {
     fn moved(&mut self) {
         self.data.figures.clear();
         self.errands.curves.want();
-        self.errands.figures.want();
         self.errands.raised.want();
     }
 
@@ -345,25 +340,29 @@ impl Trends {
         }
     }
 
-    /// Takes curves of the history in. In the view of the whole day they also tell when the day's data begin.
+    /// Takes curves of the history in. Figures, and where the day's data begin, are taken only from an answer for what
+    /// is shown now; a curve carries its own times and is right in any view.
     fn take_curves(&mut self, cx: &Cx, series: Vec<Series>, asked: Timestamp) {
-        let sure = asked.checked_sub(real(cx, COMMIT_LAG_S)).unwrap_or(asked);
-        let tags: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
-        if self.accumulate && self.end.is_none() {
-            let begin = |series: &Series| {
-                let first = series.buckets.iter().position(Option::is_some)?;
-                series.from.checked_add(series.step * u32::try_from(first).ok()?).ok()
-            };
-            let (first, view) = (series.iter().filter_map(begin).min(), self.span(cx));
-            if let Some(first) = first.filter(|first| *first > view.from) {
-                if first.duration_since(view.from) > view.width() / 20 {
-                    self.moved();
-                }
-                self.since = Some(first);
+        if !self.errands.curves.is_wanted() {
+            self.data.figures = series.iter().map(|series| (series.tag, figures(series, asked))).collect();
+            if self.accumulate && self.end.is_none() {
+                self.begin_with(self.span(cx), series.iter().filter_map(first_value).min());
             }
         }
+        let sure = asked.checked_sub(real(cx, COMMIT_LAG_S)).unwrap_or(asked);
+        let tags: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         for series in series.into_iter().filter(|series| tags.contains(&series.tag)) {
             self.data.traces.entry(series.tag).or_default().set_past(series, sure);
+        }
+    }
+
+    /// Lets the view of the day begin with its first value, and asks again where that makes the columns much finer.
+    fn begin_with(&mut self, view: View, first: Option<Timestamp>) {
+        if let Some(first) = first.filter(|first| *first > view.from) {
+            self.since = Some(first);
+            if first.duration_since(view.from) > view.width() / 20 {
+                self.moved();
+            }
         }
     }
 
@@ -373,14 +372,14 @@ impl Trends {
         let group: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         let rate = real(cx, RATES[self.rate] as f64 / 1_000.0);
         // A curve of wide columns does not change its shape at every update; its newest values come live.
-        let (often, slow) = match view.holds(now) {
-            true => (rate.max((view.step() / 2).min(real(cx, 30.0))), rate.max(real(cx, 5.0))),
-            false => (real(cx, 60.0), real(cx, 60.0)),
+        let often = match view.holds(now) {
+            true => rate.max((view.step() / 2).min(real(cx, 30.0))),
+            false => real(cx, 60.0),
         };
         let to = view.to.min(now);
         let series = |tags: &[TagId], from, to, buckets| Question::Series { tags: tags.to_vec(), from, to, buckets };
         let mut acts = Vec::new();
-        let Errands { curves, figures, hours, raised, number } = &mut self.errands;
+        let Errands { curves, hours, raised, number } = &mut self.errands;
         let mut due = |errand: &mut Errand, every, question: Question| {
             if errand.due(now, every, patience) {
                 *number = number.wrapping_add(1);
@@ -390,8 +389,7 @@ impl Trends {
         };
         if self.values.is_none() && !group.is_empty() {
             due(curves, often, series(&group, view.from, view.to, view.columns));
-            due(figures, slow, series(&group, view.from, to, 1));
-            due(raised, slow.max(real(cx, 10.0)), Question::Journal { from: view.from, to, limit: MARKS_MAX });
+            due(raised, often.max(real(cx, 10.0)), Question::Journal { from: view.from, to, limit: MARKS_MAX });
         }
         let tags = match self.values {
             Some((first, _)) => stored(cx).into_iter().skip(first).take(usize::from(cx.area.height)).collect(),
@@ -403,6 +401,20 @@ impl Trends {
         }
         acts
     }
+}
+
+/// Start of the first column that has a value.
+fn first_value(series: &Series) -> Option<Timestamp> {
+    let first = series.buckets.iter().position(Option::is_some)?;
+    series.from.checked_add(series.step * u32::try_from(first).ok()?).ok()
+}
+
+/// The figures of a curve up to when it was asked for: what lies after that is neither good nor bad.
+fn figures(series: &Series, asked: Timestamp) -> Figures {
+    let width = series.step.as_secs_f64() * series.buckets.len() as f64;
+    let past = asked.duration_since(series.from).as_secs_f64().clamp(0.0, width);
+    let good = if past > 0.0 { (series.good * width / past).min(1.0) } else { series.good };
+    (series.summary, good)
 }
 
 /// All stored tags, in the order of the plant.

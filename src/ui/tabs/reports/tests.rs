@@ -36,9 +36,9 @@ impl Stand {
     fn send(&mut self, msg: Msg) {
         for effect in update(&mut self.model, msg) {
             match effect {
-                Effect::Ask(id, question) => self.asked.push((id, question)),
+                Effect::Ask(id, question) if id.tab == Tab::Reports => self.asked.push((id, question)),
                 Effect::SaveReport { path, bytes } => self.saved.push((path, bytes)),
-                Effect::Order(..) | Effect::Redraw | Effect::Quit => {}
+                Effect::Ask(..) | Effect::Order(..) | Effect::Redraw | Effect::Quit => {}
             }
         }
     }

@@ -61,7 +61,7 @@ impl Stand {
     fn send(&mut self, msg: Msg) {
         let effects = update(&mut self.model, msg);
         self.asked.extend(effects.into_iter().filter_map(|effect| match effect {
-            Effect::Ask(id, question) => Some((id, question)),
+            Effect::Ask(id, question) if id.tab == Tab::Trends => Some((id, question)),
             _ => None,
         }));
     }
@@ -118,7 +118,10 @@ impl Stand {
             let bucket = Bucket { min: first.min(last), max: first.max(last), mean: (first + last) / 2.0, last };
             known(at).then_some(bucket)
         };
-        let good = if self.gap.0 < self.gap.1 { 0.834 } else { 1.0 };
+        // Good is the share of the whole span, also of the part that lies ahead.
+        let ahead = to.duration_since(now()).max(SignedDuration::ZERO).as_secs_f64();
+        let good = 1.0 - ahead / to.duration_since(from).as_secs_f64();
+        let good = if self.gap.0 < self.gap.1 { good - 0.166 } else { good };
         let summary = (self.begin < now()).then_some((58.25, 64.0, 70.0));
         let good = if summary.is_some() { good } else { 0.0 };
         Series { tag, from, step, buckets: (0..count).map(bucket).collect(), summary, good }
@@ -225,7 +228,6 @@ fn everything_since_the_first_value_of_the_day() {
 /// Which questions are on their way, by what they ask about.
 fn kinds(asked: &[(AskId, Question)]) -> String {
     let kind = |question: &Question| match question {
-        Question::Series { buckets: 1, .. } => "figures",
         Question::Series { buckets: HOUR_COLUMNS, .. } => "hour",
         Question::Series { .. } => "curves",
         Question::Journal { .. } => "alarms",
@@ -237,13 +239,13 @@ fn kinds(asked: &[(AskId, Question)]) -> String {
 #[test]
 fn nothing_is_asked_while_the_tab_is_not_shown() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
-    assert_eq!(kinds(&stand.asked), "curves figures alarms hour");
+    assert_eq!(kinds(&stand.asked), "curves alarms hour");
     stand.answer();
     stand.press("1");
     stand.live(120, |_| Some(60.0));
     assert_eq!(kinds(&stand.asked), "");
     stand.press("2");
-    assert_eq!(kinds(&stand.asked), "curves figures alarms hour");
+    assert_eq!(kinds(&stand.asked), "curves alarms hour");
 }
 
 #[test]
@@ -251,7 +253,7 @@ fn an_answer_to_an_older_question_is_ignored() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     let old = std::mem::take(&mut stand.asked);
     stand.live(20, |_| Some(60.0));
-    assert_eq!(kinds(&stand.asked), "curves figures alarms hour", "the answer is overdue");
+    assert_eq!(kinds(&stand.asked), "curves alarms hour", "the answer is overdue");
     let before = stand.screen();
     for (id, question) in old {
         let answer = stand.history(&question);
@@ -267,7 +269,7 @@ fn fast_keys_do_not_pile_up_questions() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     stand.answer();
     stand.press("--++--←←←←");
-    assert_eq!(kinds(&stand.asked), "curves figures alarms");
+    assert_eq!(kinds(&stand.asked), "curves alarms");
     stand.answer();
     let view = stand.model.tabs.trends.span(&stand.model.cx());
     let shown = stand.model.tabs.trends.data.traces[&TagId(0)].past().map(|series| series.from);
@@ -346,4 +348,22 @@ fn no_size_is_too_small_to_survive() {
             stand.terminal();
         }
     }
+}
+
+#[test]
+fn figures_of_another_view_do_not_stand_beside_this_one() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    assert!(stand.screen().contains("58.2"));
+    stand.press("-");
+    assert!(!stand.screen().contains("58.2"), "until the history has answered");
+    let old = std::mem::take(&mut stand.asked);
+    stand.press("-");
+    for (id, question) in old {
+        let answer = stand.history(&question);
+        stand.send(Msg::Answer(id, Ok(answer)));
+    }
+    assert!(!stand.screen().contains("58.2"), "the answer was for the window before");
+    stand.answer();
+    assert!(stand.screen().contains("58.2") && stand.screen().contains("100 %"));
 }
