@@ -149,8 +149,9 @@ impl Trends {
 
     /// News, or time has passed: takes in live values and asks what is due.
     pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
-        let unseen =
-            self.data.seen.is_none_or(|seen| cx.now.duration_since(seen) > real(cx, UNSEEN_S) || cx.now < seen);
+        // Either way: the time of a snapshot may lie a little before what was guessed until it came.
+        let away = |seen: Timestamp| cx.now.duration_since(seen).abs() > real(cx, UNSEEN_S);
+        let unseen = self.data.seen.is_none_or(away);
         if unseen {
             self.data.traces.clear();
             self.moved();
@@ -413,7 +414,8 @@ fn first_value(series: &Series) -> Option<Timestamp> {
 fn figures(series: &Series, asked: Timestamp) -> Figures {
     let width = series.step.as_secs_f64() * series.buckets.len() as f64;
     let past = asked.duration_since(series.from).as_secs_f64().clamp(0.0, width);
-    let good = if past > 0.0 { (series.good * width / past).min(1.0) } else { series.good };
+    // The millionth makes up for the rounding of the column's width, lest a whole record reads 99.9 %.
+    let good = if past > 0.0 { (series.good * width / past + 1e-6).min(1.0) } else { series.good };
     (series.summary, good)
 }
 

@@ -10,7 +10,7 @@ use crate::{
 /// The longest free period: a quarter of a year.
 const LONGEST: SignedDuration = SignedDuration::from_hours(24 * 92);
 /// What may be typed, for the entry window.
-pub const FORMS: &str = "06:00-14:00   2026-11-20   2026-11-20 22:00-2026-11-21 06:00   night@2026-11-20";
+pub const FORMS: &str = "06:00-14:00  2026-11-20  2026-11-20 22:00-06:00  night@2026-11-20";
 
 /// The shift of an instant, or the local day where the plant has no shifts.
 pub fn at(def: &PlantDef, at: Timestamp) -> Option<Period> {

@@ -367,3 +367,15 @@ fn figures_of_another_view_do_not_stand_beside_this_one() {
     stand.answer();
     assert!(stand.screen().contains("58.2") && stand.screen().contains("100 %"));
 }
+
+#[test]
+fn a_snapshot_a_little_older_than_the_guessed_time_changes_nothing() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    stand.press("+++");
+    stand.send(Msg::Tick { silent: std::time::Duration::from_millis(900) });
+    assert_eq!(kinds(&std::mem::take(&mut stand.asked)), "curves alarms");
+    stand.send(Msg::Snapshot(stand.model.snapshot.clone()));
+    assert_eq!(kinds(&stand.asked), "");
+    assert!(!stand.model.tabs.trends.data.traces[&TagId(0)].past().is_none_or(|past| past.buckets.is_empty()));
+}
