@@ -5,6 +5,7 @@
 
 pub mod alarms;
 pub mod controllers;
+mod errand;
 pub mod mimic;
 pub mod reports;
 pub mod trends;

@@ -1,49 +1,263 @@
-//! The reports tab.
+//! Tab 5: the report of a shift or of any period, as the CSV will have it; and the CSV.
 
+mod period;
+mod view;
+
+#[cfg(test)]
+mod tests;
+
+use std::path::PathBuf;
+
+use crossterm::event::KeyCode;
+use jiff::{SignedDuration, Timestamp};
 use ratatui::{Frame, layout::Rect};
 
+use super::{Tab, errand::Errand};
 use crate::{
-    history::{Answer, HistoryError},
-    plant::snapshot::Snapshot,
-    ui::{Act, Cx, keys::Key},
+    history::{Answer, HistoryError, Question},
+    plant::{def::CsvDialect, snapshot::Snapshot},
+    report::{Period, ShiftReport, csv::shift_csv},
+    ui::{
+        Act, Cx, Effect,
+        keys::{Key, char, code},
+        modal::{Modal, Prompt},
+    },
 };
 
 /// What a key means here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {}
+pub enum Action {
+    /// The shift before.
+    Before,
+    /// The shift after.
+    After,
+    /// The running shift.
+    Running,
+    /// Any period.
+    Free,
+    /// A line up.
+    Up,
+    /// A line down.
+    Down,
+    /// A page up.
+    PageUp,
+    /// A page down.
+    PageDown,
+    /// Write the CSV.
+    Export,
+    /// The other way to write CSV.
+    Dialect,
+    /// Ask the history again.
+    Refresh,
+}
 
 /// Keys of this tab.
-pub const KEYS: &[Key<Action>] = &[];
+pub const KEYS: &[Key<Action>] = &[
+    Key { chord: code(KeyCode::Left), label: "earlier", help: "the shift before", action: Action::Before },
+    Key { chord: code(KeyCode::Right), label: "later", help: "the shift after", action: Action::After },
+    Key { chord: char('l'), label: "running", help: "the shift that is running", action: Action::Running },
+    Key { chord: char('/'), label: "period", help: "any period: from-to, a day, a shift", action: Action::Free },
+    Key { chord: char('e'), label: "export", help: "write the report as CSV", action: Action::Export },
+    Key { chord: char(';'), label: "format", help: "CSV with , and . or with ; and ,", action: Action::Dialect },
+    Key { chord: code(KeyCode::Up), label: "", help: "scroll up", action: Action::Up },
+    Key { chord: code(KeyCode::Down), label: "", help: "scroll down", action: Action::Down },
+    Key { chord: code(KeyCode::PageUp), label: "", help: "a page up", action: Action::PageUp },
+    Key { chord: code(KeyCode::PageDown), label: "", help: "a page down", action: Action::PageDown },
+    Key { chord: char('u'), label: "", help: "read the figures anew", action: Action::Refresh },
+];
+
+/// How often the figures of a running shift are read anew, and when an answer counts as lost (real time).
+const EVERY_S: f64 = 30.0;
+/// A report over weeks may take its time.
+const PATIENCE_S: f64 = 60.0;
 
 /// State of this tab.
 #[derive(Debug)]
-pub struct Reports {}
+pub struct Reports {
+    /// The period shown; `None` only at the very ends of the calendar.
+    period: Option<Period>,
+    /// Nobody has chosen a period: the running shift is shown, whichever that is.
+    follow: bool,
+    /// The report of that very period.
+    report: Option<Box<ShiftReport>>,
+    trouble: Option<String>,
+    dialect: CsvDialect,
+    export: Export,
+    /// First line shown.
+    first: usize,
+    errand: Errand,
+    number: u32,
+}
+
+/// How the CSV stands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Export {
+    /// Nothing written of this period.
+    Not,
+    /// On its way to the disk.
+    Writing,
+    /// Written here.
+    Done(PathBuf),
+    /// Why not.
+    Failed(String),
+}
 
 impl Reports {
-    /// As it is at the start.
-    pub fn new(_snapshot: &Snapshot) -> Reports {
-        Reports {}
+    /// As it is at the start: the running shift.
+    pub fn new(snapshot: &Snapshot) -> Reports {
+        Reports {
+            period: period::at(&snapshot.def, snapshot.at),
+            follow: true,
+            report: None,
+            trouble: None,
+            dialect: snapshot.def.report.csv,
+            export: Export::Not,
+            first: 0,
+            errand: Errand::default(),
+            number: 0,
+        }
     }
+
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, _cx: &Cx, action: Action) -> Vec<Act> {
-        match action {}
+    pub fn on_key(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+        let page = usize::from(cx.area.height.saturating_sub(3)).max(1);
+        match action {
+            Action::Before => self.step(cx, period::before),
+            Action::After => self.step(cx, |def, shown| period::after(def, shown, cx.now)),
+            Action::Running => {
+                self.show(period::at(cx.def(), cx.now));
+                self.follow = true;
+            }
+            Action::Free => {
+                let prompt = Prompt::new("report of a period", period::FORMS, "");
+                return vec![Act::Open(Modal::Prompt(prompt))];
+            }
+            Action::Up => self.first = self.first.saturating_sub(1),
+            Action::Down => self.scroll(cx, 1),
+            Action::PageUp => self.first = self.first.saturating_sub(page),
+            Action::PageDown => self.scroll(cx, page),
+            Action::Export => return self.export(cx),
+            Action::Dialect => {
+                self.dialect = other(self.dialect, cx.def().report.csv);
+                self.export = Export::Not;
+            }
+            Action::Refresh => self.errand.want(),
+        }
+        self.ask(cx)
     }
+
     /// News, or time has passed.
-    pub fn on_snapshot(&mut self, _cx: &Cx) -> Vec<Act> {
-        Vec::new()
+    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+        if self.follow {
+            let running = period::at(cx.def(), cx.now);
+            if running != self.period {
+                self.show(running);
+            }
+        }
+        self.ask(cx)
     }
-    /// The history answered question `number`.
-    pub fn on_answer(&mut self, _cx: &Cx, _number: u32, _answer: Result<Answer, HistoryError>) -> Vec<Act> {
-        Vec::new()
+
+    /// The history answered question `number`; an answer for another period than the one shown is ignored.
+    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+        if self.errand.answered(number).is_none() {
+            return Vec::new();
+        }
+        match answer {
+            Ok(Answer::Report(report)) if Some(&report.period) == self.period.as_ref() => {
+                (self.report, self.trouble) = (Some(report), None);
+            }
+            Ok(_) => {}
+            Err(error) => {
+                self.trouble = Some(error.to_string());
+                return Vec::new();
+            }
+        }
+        self.ask(cx)
     }
-    /// The text of an entry window.
-    pub fn on_text(&mut self, _cx: &Cx, _text: &str) -> Result<Vec<Act>, String> {
-        Ok(Vec::new())
+
+    /// The period that was typed.
+    pub fn on_text(&mut self, cx: &Cx, text: &str) -> Result<Vec<Act>, String> {
+        let typed = period::typed(cx.def(), text, cx.now)?;
+        self.show(Some(typed));
+        Ok(self.ask(cx))
     }
+
     /// A report was written, or why not.
-    pub fn on_saved(&mut self, _cx: &Cx, _result: Result<std::path::PathBuf, String>) -> Vec<Act> {
+    pub fn on_saved(&mut self, _cx: &Cx, result: Result<PathBuf, String>) -> Vec<Act> {
+        self.export = match result {
+            Ok(path) => Export::Done(path),
+            Err(why) => Export::Failed(why),
+        };
         Vec::new()
     }
+
     /// Draws it.
-    pub fn view(&self, _cx: &Cx, _frame: &mut Frame, _area: Rect) {}
+    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+        view::draw(self, cx, frame, area);
+    }
+}
+
+impl Reports {
+    /// Shows another period; figures of the old one must not stand under its name.
+    fn show(&mut self, period: Option<Period>) {
+        (self.period, self.follow, self.report, self.first) = (period, false, None, 0);
+        (self.export, self.trouble) = (Export::Not, None);
+        self.errand.want();
+    }
+
+    fn step(&mut self, cx: &Cx, to: impl Fn(&crate::plant::def::PlantDef, &Period) -> Option<Period>) {
+        if let Some(next) = self.period.as_ref().and_then(|shown| to(cx.def(), shown)) {
+            self.show(Some(next));
+        }
+    }
+
+    fn scroll(&mut self, cx: &Cx, by: usize) {
+        let rows = usize::from(cx.area.height.saturating_sub(3)).max(1);
+        let lines = self.report.as_ref().map_or(0, |report| view::lines(cx, report).len());
+        self.first = (self.first + by).min(lines.saturating_sub(rows));
+    }
+
+    fn is_running(&self, now: Timestamp) -> bool {
+        self.period.as_ref().is_some_and(|period| now < period.to)
+    }
+
+    fn ask(&mut self, cx: &Cx) -> Vec<Act> {
+        let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
+        // The past stays as it is; but a report that was read while its shift still ran is not the last word.
+        let settled = self.report.as_ref().is_some_and(|report| report.until >= report.period.to);
+        let every = if settled && !self.is_running(cx.now) { SignedDuration::MAX } else { real(EVERY_S) };
+        match &self.period {
+            Some(period) if self.errand.due(cx.now, every, real(PATIENCE_S)) => {
+                self.number = self.number.wrapping_add(1);
+                self.errand.asked(self.number, cx.now);
+                vec![Act::ask(Tab::Reports, self.number, Question::Report { period: period.clone() })]
+            }
+            Some(_) | None => Vec::new(),
+        }
+    }
+
+    /// Writes exactly the figures that are shown.
+    fn export(&mut self, cx: &Cx) -> Vec<Act> {
+        let Some(report) = &self.report else {
+            self.export = Export::Failed("nothing to write yet".to_owned());
+            return Vec::new();
+        };
+        self.export = Export::Writing;
+        let bytes = shift_csv(report, cx.def(), self.dialect);
+        vec![Act::Do(Effect::SaveReport { path: self.path(cx, report), bytes })]
+    }
+
+    fn path(&self, cx: &Cx, report: &ShiftReport) -> PathBuf {
+        cx.def().report.folder.join(period::file_name(cx.def(), &report.period, report.until))
+    }
+}
+
+/// The other of the two common ways to write CSV. The one with `;` is for spreadsheets, which want the byte order mark
+/// to read `°C`.
+fn other(dialect: CsvDialect, plants: CsvDialect) -> CsvDialect {
+    let choices = match plants.separator {
+        ';' => [plants, CsvDialect::default()],
+        _ => [plants, CsvDialect { separator: ';', decimal: ',', bom: true }],
+    };
+    if dialect == choices[0] { choices[1] } else { choices[0] }
 }

@@ -1,45 +1,430 @@
-//! The trends tab.
+//! Tab 2: curves of the plant's groups over a moving window or since the start of the day, past and live as one curve;
+//! and a page with every stored value and its last hour.
 
+mod keys;
+mod span;
+mod view;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use jiff::{SignedDuration, Timestamp};
 use ratatui::{Frame, layout::Rect};
 
+pub use self::keys::{Action, KEYS};
+use self::span::{RATES, View, WINDOWS, midnight, nearest, pan};
+use super::{Tab, errand::Errand};
 use crate::{
-    history::{Answer, HistoryError},
-    plant::snapshot::Snapshot,
-    ui::{Act, Cx, keys::Key},
+    history::{Answer, HistoryError, Question, Series},
+    plant::{
+        def::{Pen, TagId, TrendGroup},
+        record::{AlarmRecord, AlarmStep},
+        snapshot::Snapshot,
+    },
+    ui::{
+        Act, Cx,
+        widgets::chart::{self, trace::Trace},
+    },
 };
 
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {}
-
-/// Keys of this tab.
-pub const KEYS: &[Key<Action>] = &[];
+/// An answer that takes longer (real time) is taken for lost.
+const PATIENCE_S: f64 = 15.0;
+/// The tab was out of sight if it heard nothing for so long (real time): what happened meanwhile only the history knows.
+const UNSEEN_S: f64 = 3.0;
+/// The history may lag behind the present: it commits once a second (real time), and a commit takes up to another.
+const COMMIT_LAG_S: f64 = 3.0;
+/// Columns of the last hour, a minute each.
+const HOUR_COLUMNS: usize = 60;
+/// Alarms marked on the time axis at most.
+const MARKS_MAX: usize = 200;
 
 /// State of this tab.
 #[derive(Debug)]
-pub struct Trends {}
+pub struct Trends {
+    /// Groups of the plant, and behind them the tag that was picked in the list of values.
+    group: usize,
+    picked: Option<TagId>,
+    off: Vec<TagId>,
+    selected: usize,
+    /// Place in [`WINDOWS`].
+    window: usize,
+    /// Place in [`RATES`].
+    rate: usize,
+    /// Everything since the start of the day instead of a window.
+    accumulate: bool,
+    /// The column in which the first value of the day was found.
+    since: Option<Timestamp>,
+    /// Right edge of a view of the past; `None` is the present.
+    end: Option<Timestamp>,
+    cursor: Option<Timestamp>,
+    /// The list of values instead of the curves: first row shown, row selected.
+    values: Option<(usize, usize)>,
+    data: Data,
+    errands: Errands,
+}
+
+/// What the history and the snapshots have told.
+#[derive(Debug, Default)]
+struct Data {
+    traces: BTreeMap<TagId, Trace>,
+    /// Figures of the view up to now, by tag: (min, mean, max) and the share of good time.
+    figures: BTreeMap<TagId, Figures>,
+    hours: BTreeMap<TagId, Series>,
+    raised: Vec<AlarmRecord>,
+    trouble: Option<String>,
+    /// When the tab last heard of the plant.
+    seen: Option<Timestamp>,
+}
+
+type Figures = (Option<(f64, f64, f64)>, f64);
+
+/// The questions of this tab.
+#[derive(Debug, Default)]
+struct Errands {
+    curves: Errand,
+    hours: Errand,
+    raised: Errand,
+    number: u32,
+}
 
 impl Trends {
-    /// As it is at the start.
+    /// As it is at the start: the first group, ten minutes, live.
     pub fn new(_snapshot: &Snapshot) -> Trends {
-        Trends {}
+        Trends {
+            group: 0,
+            picked: None,
+            off: Vec::new(),
+            selected: 0,
+            window: WINDOWS.iter().position(|window| *window == 600).unwrap_or(0),
+            rate: 1,
+            accumulate: false,
+            since: None,
+            end: None,
+            cursor: None,
+            values: None,
+            data: Data::default(),
+            errands: Errands::default(),
+        }
     }
+
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, _cx: &Cx, action: Action) -> Vec<Act> {
-        match action {}
+    pub fn on_key(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+        match (self.values, action) {
+            (Some(_), Action::Up) => self.select_value(cx, -1),
+            (Some(_), Action::Down) => self.select_value(cx, 1),
+            (Some(_), Action::PageBack) => self.select_value(cx, -(self.rows(cx) as isize)),
+            (Some(_), Action::PageOn) => self.select_value(cx, self.rows(cx) as isize),
+            (Some((_, row)), Action::Open) => self.open(cx, row),
+            (_, Action::Values) => {
+                self.values = if self.values.is_some() { None } else { Some((0, 0)) };
+                self.errands.hours.want();
+            }
+            (Some(_), _) => {}
+            (None, Action::Left) => self.step(cx, -1),
+            (None, Action::Right) => self.step(cx, 1),
+            (None, Action::PageBack) => self.pan(cx, -4),
+            (None, Action::PageOn) => self.pan(cx, 4),
+            (None, Action::Up) => self.selected = self.selected.saturating_sub(1),
+            (None, Action::Down) => self.selected = (self.selected + 1).min(self.pens(cx).len().saturating_sub(1)),
+            (None, Action::Toggle) => self.toggle(cx),
+            (None, Action::Open) => {}
+            (None, Action::ZoomIn) => self.zoom(cx, -1),
+            (None, Action::ZoomOut) => self.zoom(cx, 1),
+            (None, Action::Group) => self.next_group(cx),
+            (None, Action::Mode) => {
+                (self.accumulate, self.since, self.end) = (!self.accumulate, None, None);
+                self.moved();
+            }
+            (None, Action::Rate) => self.rate = (self.rate + 1) % RATES.len(),
+            (None, Action::Cursor) => self.cursor = if self.cursor.is_some() { None } else { Some(cx.now) },
+            (None, Action::Live) => {
+                (self.end, self.cursor) = (None, None);
+                self.moved();
+            }
+        }
+        self.ask(cx)
     }
-    /// News, or time has passed.
-    pub fn on_snapshot(&mut self, _cx: &Cx) -> Vec<Act> {
-        Vec::new()
+
+    /// News, or time has passed: takes in live values and asks what is due.
+    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+        // Either way: the time of a snapshot may lie a little before what was guessed until it came.
+        let away = |seen: Timestamp| cx.now.duration_since(seen).abs() > real(cx, UNSEEN_S);
+        let unseen = self.data.seen.is_none_or(away);
+        if unseen {
+            self.data.traces.clear();
+            self.moved();
+            self.errands.hours.want();
+        }
+        self.data.seen = Some(cx.now);
+        self.push_live(cx);
+        self.ask(cx)
     }
-    /// The history answered question `number`.
-    pub fn on_answer(&mut self, _cx: &Cx, _number: u32, _answer: Result<Answer, HistoryError>) -> Vec<Act> {
-        Vec::new()
+
+    /// The history answered question `number`; an answer to an older question is ignored.
+    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+        let errands = &mut self.errands;
+        let curves = errands.curves.answered(number);
+        let (hours, raised) = (errands.hours.answered(number), errands.raised.answered(number));
+        let answer = match answer {
+            Ok(answer) => answer,
+            Err(error) => {
+                if curves.or(hours).or(raised).is_some() {
+                    self.data.trouble = Some(error.to_string());
+                }
+                return Vec::new();
+            }
+        };
+        match answer {
+            Answer::Series(series) => {
+                if let Some(asked) = curves {
+                    self.data.trouble = None;
+                    self.take_curves(cx, series, asked);
+                } else if hours.is_some() {
+                    self.data.hours = series.into_iter().map(|series| (series.tag, series)).collect();
+                }
+            }
+            Answer::Journal(records) if raised.is_some() => {
+                self.data.raised = records.into_iter().filter(|record| record.step == AlarmStep::Raised).collect();
+            }
+            Answer::Journal(_) | Answer::Actions(_) | Answer::Report(_) => {}
+        }
+        self.ask(cx)
     }
-    /// The text of an entry window.
+
+    /// No entry window is opened here.
     pub fn on_text(&mut self, _cx: &Cx, _text: &str) -> Result<Vec<Act>, String> {
         Ok(Vec::new())
     }
+
     /// Draws it.
-    pub fn view(&self, _cx: &Cx, _frame: &mut Frame, _area: Rect) {}
+    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+        view::draw(self, cx, frame, area);
+    }
+}
+
+impl Trends {
+    /// The pens of the shown group, at most eight; behind the plant's groups comes the tag picked from the list.
+    fn pens(&self, cx: &Cx) -> Vec<Pen> {
+        let picked = || self.picked.map(|tag| Pen { tag, scale: None }).into_iter().collect();
+        cx.def().trends.get(self.group).map_or_else(picked, |group| group.pens.iter().take(8).copied().collect())
+    }
+
+    /// The pens that are switched on, with their place in the group.
+    fn drawn(&self, cx: &Cx) -> Vec<(usize, Pen)> {
+        self.pens(cx).into_iter().enumerate().filter(|(_, pen)| !self.off.contains(&pen.tag)).collect()
+    }
+
+    /// What the chart shows now.
+    fn span(&self, cx: &Cx) -> View {
+        let units = self.drawn(cx).iter().map(|(_, pen)| cx.snapshot.unit(pen.tag)).collect::<BTreeSet<_>>();
+        let columns = chart::dots(cx.theme, cx.area.width, units.len());
+        match (self.accumulate, self.end) {
+            (true, None) => {
+                let day = midnight(cx.now, &cx.def().time_zone);
+                View::since(self.since.map_or(day, |since| since.max(day)), cx.now, columns)
+            }
+            (_, end) => View::ending(end.unwrap_or(cx.now), WINDOWS[self.window], columns),
+        }
+    }
+
+    /// The cursor, kept on the screen.
+    fn cursor(&self, cx: &Cx) -> Option<Timestamp> {
+        let view = self.span(cx);
+        let last = view.to.min(cx.now).checked_sub(SignedDuration::from_micros(1)).unwrap_or(view.to);
+        self.cursor.map(|at| at.min(last).max(view.from))
+    }
+
+    /// A step to the side: of the cursor by one cell, or of the view by a quarter.
+    fn step(&mut self, cx: &Cx, by: i32) {
+        let Some(at) = self.cursor(cx) else { return self.pan(cx, by) };
+        let view = self.span(cx);
+        let cell = view.width() / i32::from(cx.area.width.saturating_sub(12).max(10));
+        let to = at.checked_add(cell * by).unwrap_or(at);
+        if to < view.from || (to >= view.to && self.end.is_some()) {
+            self.pan(cx, by);
+        }
+        self.cursor = Some(to);
+        self.cursor = self.cursor(cx);
+    }
+
+    /// Moves the view by quarters; a view of the whole day becomes a window.
+    fn pan(&mut self, cx: &Cx, quarters: i32) {
+        let end = self.end.unwrap_or(cx.now);
+        if self.accumulate {
+            self.window = nearest(self.span(cx).width());
+            self.accumulate = false;
+        }
+        let by = SignedDuration::from_secs(WINDOWS[self.window]) / 4 * quarters;
+        self.end = pan(end, by, cx.now);
+        self.moved();
+    }
+
+    fn zoom(&mut self, cx: &Cx, by: isize) {
+        if self.accumulate {
+            self.window = nearest(self.span(cx).width());
+            self.accumulate = false;
+        } else {
+            self.window = self.window.saturating_add_signed(by).min(WINDOWS.len() - 1);
+        }
+        self.moved();
+    }
+
+    fn toggle(&mut self, cx: &Cx) {
+        let Some(pen) = self.pens(cx).get(self.selected).copied() else { return };
+        match self.off.iter().position(|off| *off == pen.tag) {
+            Some(place) => drop(self.off.remove(place)),
+            None => self.off.push(pen.tag),
+        }
+        self.errands.curves.want();
+    }
+
+    fn next_group(&mut self, cx: &Cx) {
+        let count = cx.def().trends.len() + usize::from(self.picked.is_some());
+        self.show_group(cx, (self.group + 1) % count.max(1), 0);
+    }
+
+    fn show_group(&mut self, cx: &Cx, group: usize, selected: usize) {
+        (self.group, self.selected, self.since) = (group, selected, None);
+        let tags: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
+        self.data.traces.retain(|tag, _| tags.contains(tag));
+        self.moved();
+        self.errands.hours.want();
+        self.push_live(cx);
+    }
+
+    /// The chart shows another stretch of time or other pens; figures of the old one must not stand beside it.
+    fn moved(&mut self) {
+        self.data.figures.clear();
+        self.errands.curves.want();
+        self.errands.raised.want();
+    }
+
+    /// Rows that the list of values has room for.
+    fn rows(&self, cx: &Cx) -> usize {
+        usize::from(cx.area.height.saturating_sub(2)).max(1)
+    }
+
+    fn select_value(&mut self, cx: &Cx, by: isize) {
+        let Some((first, row)) = self.values else { return };
+        let row = row.saturating_add_signed(by).min(stored(cx).len().saturating_sub(1));
+        let first_now = first.clamp((row + 1).saturating_sub(self.rows(cx)), row);
+        if first_now != first {
+            self.errands.hours.want();
+        }
+        self.values = Some((first_now, row));
+    }
+
+    /// Shows the curve of a value: in the group of the plant that has it, or alone.
+    fn open(&mut self, cx: &Cx, row: usize) {
+        let Some(tag) = stored(cx).get(row).copied() else { return };
+        let groups = &cx.def().trends;
+        let place = |group: &TrendGroup| group.pens.iter().take(8).position(|pen| pen.tag == tag);
+        let found = groups.iter().enumerate().find_map(|(n, group)| Some((n, place(group)?)));
+        if found.is_none() {
+            self.picked = Some(tag);
+        }
+        self.values = None;
+        self.off.retain(|off| *off != tag);
+        let (group, selected) = found.unwrap_or((groups.len(), 0));
+        self.show_group(cx, group, selected);
+    }
+
+    /// Appends what the snapshot knows to the curves of the shown group.
+    fn push_live(&mut self, cx: &Cx) {
+        for pen in self.pens(cx) {
+            let sample = cx.snapshot.sample(pen.tag);
+            let value = sample.trusted();
+            let at = if value.is_some() { sample.at } else { cx.now };
+            self.data.traces.entry(pen.tag).or_default().push(at, value);
+        }
+    }
+
+    /// Takes curves of the history in. Figures, and where the day's data begin, are taken only from an answer for what
+    /// is shown now; a curve carries its own times and is right in any view.
+    fn take_curves(&mut self, cx: &Cx, series: Vec<Series>, asked: Timestamp) {
+        if !self.errands.curves.is_wanted() {
+            self.data.figures = series.iter().map(|series| (series.tag, figures(series, asked))).collect();
+            if self.accumulate && self.end.is_none() {
+                self.begin_with(self.span(cx), series.iter().filter_map(first_value).min());
+            }
+        }
+        let sure = asked.checked_sub(real(cx, COMMIT_LAG_S)).unwrap_or(asked);
+        let tags: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
+        for series in series.into_iter().filter(|series| tags.contains(&series.tag)) {
+            self.data.traces.entry(series.tag).or_default().set_past(series, sure);
+        }
+    }
+
+    /// Lets the view of the day begin with its first value, and asks again where that makes the columns much finer.
+    fn begin_with(&mut self, view: View, first: Option<Timestamp>) {
+        if let Some(first) = first.filter(|first| *first > view.from) {
+            self.since = Some(first);
+            if first.duration_since(view.from) > view.width() / 20 {
+                self.moved();
+            }
+        }
+    }
+
+    /// Asks what is due.
+    fn ask(&mut self, cx: &Cx) -> Vec<Act> {
+        let (now, patience, view) = (cx.now, real(cx, PATIENCE_S), self.span(cx));
+        let group: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
+        let rate = real(cx, RATES[self.rate] as f64 / 1_000.0);
+        // A curve of wide columns does not change its shape at every update; its newest values come live.
+        let often = match view.holds(now) {
+            true => rate.max((view.step() / 2).min(real(cx, 30.0))),
+            false => real(cx, 60.0),
+        };
+        let to = view.to.min(now);
+        let series = |tags: &[TagId], from, to, buckets| Question::Series { tags: tags.to_vec(), from, to, buckets };
+        let mut acts = Vec::new();
+        let Errands { curves, hours, raised, number } = &mut self.errands;
+        let mut due = |errand: &mut Errand, every, question: Question| {
+            if errand.due(now, every, patience) {
+                *number = number.wrapping_add(1);
+                errand.asked(*number, now);
+                acts.push(Act::ask(Tab::Trends, *number, question));
+            }
+        };
+        if self.values.is_none() && !group.is_empty() {
+            due(curves, often, series(&group, view.from, view.to, view.columns));
+            due(raised, often.max(real(cx, 10.0)), Question::Journal { from: view.from, to, limit: MARKS_MAX });
+        }
+        let tags = match self.values {
+            Some((first, _)) => stored(cx).into_iter().skip(first).take(usize::from(cx.area.height)).collect(),
+            None => group,
+        };
+        let hour = View::ending(now, 3_600, HOUR_COLUMNS);
+        if !tags.is_empty() {
+            due(hours, real(cx, 20.0), series(&tags, hour.from, hour.to, HOUR_COLUMNS));
+        }
+        acts
+    }
+}
+
+/// Start of the first column that has a value.
+fn first_value(series: &Series) -> Option<Timestamp> {
+    let first = series.buckets.iter().position(Option::is_some)?;
+    series.from.checked_add(series.step * u32::try_from(first).ok()?).ok()
+}
+
+/// The figures of a curve up to when it was asked for: what lies after that is neither good nor bad.
+fn figures(series: &Series, asked: Timestamp) -> Figures {
+    let width = series.step.as_secs_f64() * series.buckets.len() as f64;
+    let past = asked.duration_since(series.from).as_secs_f64().clamp(0.0, width);
+    // The millionth makes up for the rounding of the column's width, lest a whole record reads 99.9 %.
+    let good = if past > 0.0 { (series.good * width / past + 1e-6).min(1.0) } else { series.good };
+    (series.summary, good)
+}
+
+/// All stored tags, in the order of the plant.
+fn stored(cx: &Cx) -> Vec<TagId> {
+    cx.def().tags.iter().filter(|tag| tag.store).map(|tag| tag.id).collect()
+}
+
+/// Seconds of the operator's time as plant time, which runs faster in demonstrations.
+fn real(cx: &Cx, seconds: f64) -> SignedDuration {
+    SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6))
 }

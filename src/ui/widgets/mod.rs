@@ -1,5 +1,7 @@
 //! Small drawings that tabs are made of.
 
+pub mod chart;
 pub mod mimic;
+pub mod spark;
 pub mod text;
 pub mod value;

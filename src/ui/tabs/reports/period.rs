@@ -1,0 +1,208 @@
+//! Which period a report is of: the shifts of the plant, days where it has none, or what somebody typed; pure.
+
+use jiff::{SignedDuration, Timestamp, ToSpan, civil};
+
+use crate::{
+    plant::def::PlantDef,
+    report::{Period, ask, shift},
+};
+
+/// The longest free period: a quarter of a year.
+const LONGEST: SignedDuration = SignedDuration::from_hours(24 * 92);
+/// What may be typed, for the entry window.
+pub const FORMS: &str = "06:00-14:00  2026-11-20  2026-11-20 22:00-06:00  night@2026-11-20";
+
+/// The shift of an instant, or the local day where the plant has no shifts.
+pub fn at(def: &PlantDef, at: Timestamp) -> Option<Period> {
+    if !def.shifts.is_empty() {
+        return shift::shift_at(def, at);
+    }
+    let date = at.to_zoned(def.time_zone.clone()).date();
+    Some(Period { name: format!("day {date}"), from: midnight(def, date)?, to: midnight(def, date.tomorrow().ok()?)? })
+}
+
+/// The shift or day before a period.
+pub fn before(def: &PlantDef, period: &Period) -> Option<Period> {
+    at(def, period.from.checked_sub(SignedDuration::from_nanos(1)).ok()?)
+}
+
+/// The shift or day after a period, if it has begun.
+pub fn after(def: &PlantDef, period: &Period, now: Timestamp) -> Option<Period> {
+    at(def, period.to).filter(|next| next.from <= now)
+}
+
+/// The period that was typed: `from-to`, each a time, a date or both; a date alone is that day, a time alone lasts until
+/// now, a shift may be named. Times without a date are of today, or of last night where the first is the later one.
+pub fn typed(def: &PlantDef, text: &str, now: Timestamp) -> Result<Period, String> {
+    let text = text.trim();
+    let said = |error: ask::PeriodError| error.to_string();
+    let period = match split(text) {
+        _ if text.is_empty() => return Err(format!("expected {FORMS}")),
+        (from, None) if from.starts_with(|c: char| c.is_alphabetic()) => {
+            return ask::period(def, Some(from), None, None, now).map_err(said);
+        }
+        (from, to) => {
+            let (from, to) = whole(def, from, to, now)?;
+            ask::period(def, None, Some(&from), to.as_deref(), now).map_err(said)?
+        }
+    };
+    if period.to.duration_since(period.from) > LONGEST {
+        return Err("a report covers 92 days at most".to_owned());
+    }
+    Ok(period)
+}
+
+/// Where the file of a report goes: `2026-11-21-morning.csv`. One of a running shift says until when, so that it is
+/// never taken for the whole.
+pub fn file_name(def: &PlantDef, period: &Period, until: Timestamp) -> String {
+    let local = |at: Timestamp| at.to_zoned(def.time_zone.clone());
+    let (from, to) = (local(period.from), local(period.to));
+    let word = period.name.split_whitespace().next().unwrap_or("period");
+    let running = until < period.to;
+    let end = if running { local(until).strftime("-until-%H%M").to_string() } else { String::new() };
+    if word == "period" {
+        let to = if running { local(until) } else { to };
+        return format!("{}-to-{}.csv", from.strftime("%Y-%m-%dT%H%M"), to.strftime("%Y-%m-%dT%H%M"));
+    }
+    let plain = |c: char| if c.is_alphanumeric() { c } else { '-' };
+    format!("{}-{}{end}.csv", from.date(), word.chars().map(plain).collect::<String>())
+}
+
+/// Cuts `from-to` in two; the dashes of a date are no cut.
+fn split(text: &str) -> (&str, Option<&str>) {
+    for cut in ["–", "..", " - ", " to "] {
+        if let Some((from, to)) = text.split_once(cut) {
+            return (from.trim(), Some(to.trim()));
+        }
+    }
+    let after_time = text.find(':').and_then(|colon| Some(colon + text[colon..].find('-')?));
+    match after_time.filter(|_| !text.starts_with(char::is_alphabetic)) {
+        Some(dash) => (text[..dash].trim(), Some(text[dash + 1..].trim())),
+        None => (text, None),
+    }
+}
+
+/// Adds what was left out: dates, and the times of whole days.
+fn whole(def: &PlantDef, from: &str, to: Option<&str>, now: Timestamp) -> Result<(String, Option<String>), String> {
+    let today = now.to_zoned(def.time_zone.clone()).date();
+    let (from_date, from_time) = parts(from)?;
+    let to = to.filter(|to| !to.is_empty() && *to != "now").map(parts).transpose()?;
+    let mut first = from_date.unwrap_or(today);
+    let end = match to {
+        None if from_time.is_some() => None,
+        None => Some((day_after(first)?, civil::Time::midnight())),
+        Some((Some(date), None)) => Some((day_after(date)?, civil::Time::midnight())),
+        Some((date, time)) => {
+            let time = time.unwrap_or(civil::Time::midnight());
+            let backwards = date.is_none() && from_time.is_some_and(|from| from >= time);
+            if backwards && from_date.is_none() {
+                first = first.yesterday().map_err(|error| error.to_string())?;
+            }
+            let last = if backwards { day_after(first)? } else { date.unwrap_or(first) };
+            Some((last, time))
+        }
+    };
+    let text = |(date, time): (civil::Date, civil::Time)| format!("{date}T{}", time.strftime("%H:%M:%S"));
+    Ok((text((first, from_time.unwrap_or(civil::Time::midnight()))), end.map(text)))
+}
+
+/// Date and time of one end; at least one of them is there.
+fn parts(text: &str) -> Result<(Option<civil::Date>, Option<civil::Time>), String> {
+    let wrong = || format!("`{text}` is not a time: expected 06:00, 2026-11-21 or 2026-11-21 06:00");
+    let mut words = text.split([' ', 'T']).filter(|word| !word.is_empty());
+    let (first, second) = (words.next().ok_or_else(wrong)?, words.next());
+    let time = |word: &str| word.contains(':').then(|| word.parse::<civil::Time>().ok()).flatten();
+    let date = |word: &str| word.parse::<civil::Date>().ok().filter(|_| !word.contains(':'));
+    match (date(first), second, words.next()) {
+        (Some(date), None, None) => Ok((Some(date), None)),
+        (Some(date), Some(second), None) => Ok((Some(date), Some(time(second).ok_or_else(wrong)?))),
+        (None, None, None) => Ok((None, Some(time(first).ok_or_else(wrong)?))),
+        _ => Err(wrong()),
+    }
+}
+
+fn day_after(date: civil::Date) -> Result<civil::Date, String> {
+    date.checked_add(1.day()).map_err(|error| error.to_string())
+}
+
+fn midnight(def: &PlantDef, date: civil::Date) -> Option<Timestamp> {
+    shift::instant(&def.time_zone, date.to_datetime(civil::Time::midnight()))
+}
+
+#[cfg(test)]
+mod tests {
+    use jiff::tz::TimeZone;
+
+    use super::*;
+    use crate::ui::fixture::{Fixture, now};
+
+    fn words(def: &PlantDef, period: &Period) -> String {
+        let local = |at: Timestamp| at.to_zoned(def.time_zone.clone()).strftime("%m-%d %H:%M").to_string();
+        format!("{}: {} to {}", period.name, local(period.from), local(period.to))
+    }
+
+    #[test]
+    fn a_period_is_understood_as_it_is_typed() {
+        let def = Fixture::normal().def;
+        let check = |text: &str, expect: &str| {
+            let got = typed(&def, text, now()).map_or_else(|error| error, |period| words(&def, &period));
+            assert_eq!(got, expect, "{text}");
+        };
+        check("06:00-14:00", "period: 11-21 06:00 to 11-21 14:00");
+        check(" 06:00 - 14:00 ", "period: 11-21 06:00 to 11-21 14:00");
+        check("06:00–now", "period: 11-21 06:00 to 11-21 14:02");
+        check("06:00", "period: 11-21 06:00 to 11-21 14:02");
+        check("22:00-06:00", "period: 11-20 22:00 to 11-21 06:00");
+        check("2026-11-20", "period: 11-20 00:00 to 11-21 00:00");
+        check("2026-11-18..2026-11-20", "period: 11-18 00:00 to 11-21 00:00");
+        check("2026-11-20 22:00-06:00", "period: 11-20 22:00 to 11-21 06:00");
+        check("2026-11-19 22:00-2026-11-21 06:00", "period: 11-19 22:00 to 11-21 06:00");
+        check("2026-11-19T22:00 to 2026-11-21T06:00", "period: 11-19 22:00 to 11-21 06:00");
+        check("night@2026-11-19", "night 2026-11-19: 11-19 22:00 to 11-20 06:00");
+        check("last", "morning 2026-11-21: 11-21 06:00 to 11-21 14:00");
+        check("25:00-26:00", "`25:00` is not a time: expected 06:00, 2026-11-21 or 2026-11-21 06:00");
+        check("6 o'clock", "`6 o'clock` is not a time: expected 06:00, 2026-11-21 or 2026-11-21 06:00");
+        check("2026-01-01 - 2026-11-01", "a report covers 92 days at most");
+        check("", &format!("expected {FORMS}"));
+        for nonsense in
+            ["2027-01-01", "-", "–", "::", "2026-11-20 2026-11-21", "lunch", "..", "2026-11-21 - 2026-11-20"]
+        {
+            assert!(typed(&def, nonsense, now()).is_err(), "{nonsense}");
+        }
+    }
+
+    #[test]
+    fn shifts_follow_each_other_up_to_the_running_one() {
+        let def = Fixture::normal().def;
+        let running = at(&def, now()).expect("a shift runs");
+        assert_eq!(words(&def, &running), "afternoon 2026-11-21: 11-21 14:00 to 11-21 22:00");
+        assert_eq!(after(&def, &running, now()), None);
+        let last = before(&def, &running).expect("a shift before");
+        assert_eq!(words(&def, &last), "morning 2026-11-21: 11-21 06:00 to 11-21 14:00");
+        assert_eq!(after(&def, &last, now()), Some(running));
+    }
+
+    #[test]
+    fn a_plant_without_shifts_has_days() {
+        let mut def = Fixture::normal().def;
+        def.shifts.clear();
+        def.time_zone = TimeZone::get("Europe/Berlin").expect("a zone");
+        let summer_ends = at(&def, "2026-10-25T12:00:00Z".parse().expect("a time")).expect("a day");
+        assert_eq!(summer_ends.to.duration_since(summer_ends.from), SignedDuration::from_hours(25));
+        assert_eq!(before(&def, &summer_ends).map(|day| day.name).as_deref(), Some("day 2026-10-24"));
+    }
+
+    #[test]
+    fn files_are_named_so_that_a_part_is_no_whole() {
+        let def = Fixture::normal().def;
+        let check = |text: &str, hours_left: i64, expect: &str| {
+            let period = typed(&def, text, now()).expect("a period of the table");
+            let until = period.to - SignedDuration::from_hours(hours_left);
+            assert_eq!(file_name(&def, &period, until), expect);
+        };
+        check("morning@2026-11-21", 0, "2026-11-21-morning.csv");
+        check("morning@2026-11-21", 2, "2026-11-21-morning-until-1200.csv");
+        check("2026-11-20 22:00-06:00", 0, "2026-11-20T2200-to-2026-11-21T0600.csv");
+        check("2026-11-20 22:00-06:00", 1, "2026-11-20T2200-to-2026-11-21T0500.csv");
+    }
+}

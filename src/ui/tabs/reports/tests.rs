@@ -1,0 +1,243 @@
+//! The reports tab in the whole terminal, with a made-up report behind it.
+
+use crossterm::event::{KeyEvent, KeyModifiers};
+use ratatui::{Terminal, backend::TestBackend};
+
+use super::*;
+use crate::{
+    plant::{
+        def::Priority,
+        record::{ActionRecord, AlarmRecord, AlarmStep},
+    },
+    report::TagFigures,
+    ui::{
+        AskId, Model, Msg,
+        fixture::{Fixture, now},
+        theme::Theme,
+        update, view,
+    },
+};
+
+struct Stand {
+    model: Model,
+    asked: Vec<(AskId, Question)>,
+    saved: Vec<(PathBuf, Vec<u8>)>,
+}
+
+impl Stand {
+    fn new(theme: Theme, width: u16, height: u16) -> Stand {
+        let model = Model::new(Fixture::normal().snapshot(), theme, 1, "tech1".into());
+        let mut stand = Stand { model, asked: Vec::new(), saved: Vec::new() };
+        stand.send(Msg::Resize(width, height));
+        stand.press("5");
+        stand
+    }
+
+    fn send(&mut self, msg: Msg) {
+        for effect in update(&mut self.model, msg) {
+            match effect {
+                Effect::Ask(id, question) if id.tab == Tab::Reports => self.asked.push((id, question)),
+                Effect::SaveReport { path, bytes } => self.saved.push((path, bytes)),
+                Effect::Ask(..) | Effect::Order(..) | Effect::Redraw | Effect::Quit => {}
+            }
+        }
+    }
+
+    fn press(&mut self, keys: &str) {
+        for key in keys.chars() {
+            let code = match key {
+                '←' => KeyCode::Left,
+                '→' => KeyCode::Right,
+                '↓' => KeyCode::Down,
+                '⏎' => KeyCode::Enter,
+                key => KeyCode::Char(key),
+            };
+            self.send(Msg::Key(KeyEvent::new(code, KeyModifiers::NONE)));
+        }
+    }
+
+    /// Answers what was asked; `full` with figures, else with an empty report.
+    fn answer(&mut self, full: bool) {
+        for (id, question) in std::mem::take(&mut self.asked) {
+            let Question::Report { period } = question else { panic!("reports ask for reports: {question:?}") };
+            self.send(Msg::Answer(id, Ok(Answer::Report(Box::new(report(period, full))))));
+        }
+    }
+
+    fn terminal(&self) -> Terminal<TestBackend> {
+        let screen = self.model.screen;
+        let mut terminal =
+            Terminal::new(TestBackend::new(screen.width, screen.height)).expect("a test backend never fails");
+        terminal.draw(|frame| view(&self.model, frame)).expect("a test backend never fails");
+        terminal
+    }
+
+    fn screen(&self) -> String {
+        self.terminal().backend().to_string()
+    }
+}
+
+fn report(period: Period, full: bool) -> ShiftReport {
+    let until = period.to.min(now());
+    let tag = |tag: &str, unit: &str, decimals, min: f64, mean, max, last: Option<f64>, in_alarm, good| TagFigures {
+        tag: tag.to_owned(),
+        unit: unit.to_owned(),
+        decimals,
+        min: full.then_some(min),
+        mean: full.then_some(mean),
+        max: full.then_some(max),
+        last: last.filter(|_| full),
+        in_alarm: std::time::Duration::from_secs(in_alarm),
+        good: if full { good } else { 0.0 },
+    };
+    let at = |seconds: i64| period.from + SignedDuration::from_secs(seconds);
+    let alarm = |seconds, priority, subject: &str, text: &str, step, by: Option<&str>| AlarmRecord {
+        at: at(seconds),
+        subject: subject.into(),
+        text: text.into(),
+        priority,
+        step,
+        value: (subject == "TIC-1.PV").then_some(72.44),
+        limit: None,
+        by: by.map(Into::into),
+    };
+    let (high, low) = (Priority::High, Priority::Low);
+    let alarms = vec![
+        alarm(12, high, "TIC-1.PV", "temperature high", AlarmStep::Raised, None),
+        alarm(31, high, "TIC-1.PV", "temperature high", AlarmStep::Acknowledged, Some("tech1")),
+        alarm(53, high, "TIC-1.PV", "temperature high", AlarmStep::Returned, None),
+        alarm(80, low, "PLC-1", "not answering", AlarmStep::Raised, None),
+        alarm(95, high, "TIC-1.PV", "temperature high", AlarmStep::Raised, None),
+    ];
+    let action = ActionRecord {
+        at: at(20),
+        by: "tech1".into(),
+        action: "write".into(),
+        target: "TIC-1.SV".into(),
+        old: Some("60.0 °C".into()),
+        new: Some("70.0 °C".into()),
+        outcome: "verified".into(),
+    };
+    ShiftReport {
+        period,
+        until,
+        tags: vec![
+            tag("TIC-1.PV", "°C", 1, 26.8, 58.31, 72.6, Some(72.4), 41, 0.989_99),
+            tag("TIC-1.MV", "%", 1, 0.0, 41.3, 100.0, Some(12.0), 0, 1.0),
+            tag("PLC-1.FLOW", "l/min", 2, 0.0, 0.412, 1.25, None, 0, 0.742),
+        ],
+        alarms: if full { alarms } else { Vec::new() },
+        actions: if full { vec![action] } else { Vec::new() },
+        record: Vec::new(),
+        record_of: full.then(|| ("TIC-1".to_owned(), "°C".to_owned())),
+    }
+}
+
+#[test]
+fn a_running_shift_at_80x24() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer(true);
+    insta::assert_snapshot!(stand.screen());
+}
+
+#[test]
+fn a_closed_shift_at_120x40() {
+    let mut stand = Stand::new(Theme::FULL, 120, 40);
+    stand.press("←");
+    stand.answer(true);
+    stand.answer(true);
+    insta::assert_snapshot!(stand.screen());
+}
+
+#[test]
+fn a_shift_without_data() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer(false);
+    insta::assert_snapshot!(stand.screen());
+}
+
+#[test]
+fn a_night_without_unicode_and_colour() {
+    let mut stand = Stand::new(Theme::PLAIN, 80, 24);
+    stand.answer(true);
+    stand.press("←←");
+    stand.answer(true);
+    stand.answer(true);
+    insta::assert_snapshot!(stand.screen());
+}
+
+#[test]
+fn the_csv_that_is_written_is_the_report_that_is_shown() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.press("e");
+    assert!(stand.screen().contains("reading the history") && stand.saved.is_empty());
+    stand.answer(true);
+    stand.press("e");
+    let (path, bytes) = stand.saved.pop().expect("the key writes");
+    assert_eq!(path, PathBuf::from("reports/2026-11-21-afternoon-until-1402.csv"));
+    let Stand { model, .. } = &stand;
+    let shown = model.tabs.reports.report.as_ref().expect("a report is shown");
+    assert_eq!(bytes, shift_csv(shown, &model.snapshot.def, CsvDialect::default()));
+    stand.send(Msg::Saved(Ok(path)));
+    assert!(stand.screen().contains("✓ written reports/2026-11-21-afternoon-until-1402.csv"));
+    stand.press(";e");
+    let (_, bytes) = stand.saved.pop().expect("the key writes");
+    assert!(bytes.starts_with(b"\xef\xbb\xbf"), "the other dialect is for spreadsheets");
+    stand.send(Msg::Saved(Err("disk full".to_owned())));
+    assert!(stand.screen().contains("not written: disk full"));
+}
+
+#[test]
+fn figures_never_stand_under_the_name_of_another_shift() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer(true);
+    stand.press("←");
+    assert!(stand.screen().contains("morning 2026-11-21") && !stand.screen().contains("58.31"));
+    let asked = std::mem::take(&mut stand.asked);
+    stand.press("←");
+    let Some((id, Question::Report { period })) = asked.into_iter().next() else { panic!("a report is asked for") };
+    stand.send(Msg::Answer(id, Ok(Answer::Report(Box::new(report(period, true))))));
+    assert!(
+        stand.screen().contains("night 2026-11-20") && !stand.screen().contains("58.31"),
+        "an answer for the morning"
+    );
+    stand.answer(true);
+    assert!(stand.screen().contains("58.31"));
+}
+
+#[test]
+fn a_typed_period_is_reported_or_explained() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer(true);
+    stand.press("/06:00-x⏎");
+    insta::assert_snapshot!(stand.screen());
+    stand.send(Msg::Key(KeyEvent::new(KeyCode::Backspace, KeyModifiers::NONE)));
+    stand.press("07:30⏎");
+    stand.answer(true);
+    assert!(stand.screen().contains("period   2026-11-21 06:00 – 07:30 +07   closed"), "{}", stand.screen());
+    stand.press("l");
+    assert!(stand.screen().contains("afternoon 2026-11-21"));
+}
+
+#[test]
+fn the_next_shift_is_shown_when_it_begins() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer(true);
+    let mut later = (*stand.model.snapshot).clone();
+    later.at += SignedDuration::from_hours(8);
+    stand.send(Msg::Snapshot(std::sync::Arc::new(later)));
+    assert!(stand.screen().contains("night 2026-11-21"));
+}
+
+#[test]
+fn no_size_is_too_small_to_survive() {
+    for (width, height) in
+        (0..40).flat_map(|width| (0..20).map(move |height| (width, height))).chain([(200, 60), (80, 12)])
+    {
+        let mut stand = Stand::new(Theme::FULL, width, height);
+        stand.terminal();
+        stand.answer(true);
+        stand.press("↓↓↓↓↓e");
+        stand.terminal();
+    }
+}

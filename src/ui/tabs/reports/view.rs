@@ -1,0 +1,286 @@
+//! The picture of the reports tab: which period, its figures, alarms and actions, and what the CSV will be.
+
+use std::{collections::BTreeMap, time::Duration};
+
+use jiff::{SignedDuration, Timestamp, tz::TimeZone};
+use ratatui::{
+    Frame,
+    layout::Rect,
+    style::Style,
+    text::{Line, Span},
+};
+
+use super::{Export, Reports};
+use crate::{
+    plant::{
+        def::Priority,
+        record::{ActionRecord, AlarmRecord, AlarmStep},
+    },
+    report::{Period, ShiftReport, TagFigures, csv::raised},
+    ui::{
+        Cx,
+        widgets::text::{Canvas, fit, pad, pad_left, width},
+    },
+};
+
+/// Alarm steps and actions listed at most; the CSV has all of them.
+const LIST_MAX: usize = 500;
+
+/// Draws the tab.
+pub fn draw(reports: &Reports, cx: &Cx, frame: &mut Frame, area: Rect) {
+    let mut canvas = Canvas::new(frame.buffer_mut(), area);
+    let (columns, height) = (canvas.width(), canvas.height());
+    let Some(period) = &reports.period else { return };
+    draw_title(reports, cx, period, &mut canvas);
+    let rows = height.saturating_sub(3);
+    match &reports.report {
+        Some(report) => {
+            let lines = lines(cx, report);
+            let first = reports.first.min(lines.len().saturating_sub(usize::from(rows)));
+            let mut part = canvas.part(0, 2, columns, rows);
+            let area = part.area();
+            let (head, body) = (heading(cx, columns), lines.iter().skip(first).take(rows.into()));
+            for (y, line) in body.enumerate() {
+                part.buffer().set_line(area.x, area.y + y as u16, line, area.width);
+            }
+            let hidden = lines.len().saturating_sub(first + usize::from(rows));
+            let mut row = canvas.part(0, 1, columns, 1);
+            let area = row.area();
+            if !area.is_empty() {
+                row.buffer().set_line(area.x, area.y, &head, area.width);
+            }
+            draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
+        }
+        None => {
+            let words = reports.trouble.as_deref().unwrap_or("reading the history");
+            let style = if reports.trouble.is_some() { cx.theme.trouble() } else { cx.theme.dim() };
+            canvas.text_centred(height / 2, words, style);
+        }
+    }
+}
+
+/// `▸ morning 2026-11-21   06:00 – 14:00 +07   closed`.
+fn draw_title(reports: &Reports, cx: &Cx, period: &Period, canvas: &mut Canvas) {
+    let (theme, zone) = (cx.theme, &cx.def().time_zone);
+    let x = canvas.text(1, 0, theme.pick("▸ ", "> "), theme.dim());
+    let x = canvas.text(x, 0, &period.name, theme.strong());
+    let x = canvas.text(x + 3, 0, &span(period, zone), theme.normal());
+    let running = reports.is_running(cx.now);
+    let until = reports.report.as_ref().map_or(cx.now, |report| report.until);
+    let state = match (running, &reports.report) {
+        (true, _) => format!("RUNNING, until now {}", local(until, zone, "%H:%M:%S")),
+        (false, Some(report)) if report.until < report.period.to => {
+            format!("figures until {} only", local(until, zone, "%H:%M:%S"))
+        }
+        (false, _) => "closed".to_owned(),
+    };
+    let x = canvas.text(x + 3, 0, &state, if running { theme.strong() } else { theme.normal() });
+    let slow = reports.errand.waiting(cx.now).is_some_and(|waiting| waiting.as_secs_f64() > 2.0 * cx.snapshot.speed);
+    if reports.report.is_some() {
+        let right = canvas.width().saturating_sub(1);
+        match &reports.trouble {
+            Some(trouble) => canvas.text_right(right, 0, &fit(trouble, right.saturating_sub(x + 2)), theme.trouble()),
+            None if slow => canvas.text_right(right, 0, &fit("reading", right.saturating_sub(x + 2)), theme.dim()),
+            None => {}
+        }
+    }
+}
+
+/// What the CSV is like, and where it went.
+fn draw_export(reports: &Reports, cx: &Cx, report: &ShiftReport, hidden: usize, row: &mut Canvas) {
+    let (theme, dialect) = (cx.theme, reports.dialect);
+    let separator = if dialect.separator == ';' { "semicolons" } else { "commas" };
+    let decimal = if dialect.decimal == ',' { "decimal comma" } else { "decimal point" };
+    let bom = if dialect.bom { ", BOM" } else { "" };
+    let path = reports.path(cx, report);
+    let (text, style) = match &reports.export {
+        Export::Not => (format!("e writes {}", path.display()), theme.dim()),
+        Export::Writing => (format!("writing {}", path.display()), theme.normal()),
+        Export::Done(path) => (format!("{} written {}", theme.pick("✓", "ok"), path.display()), theme.done()),
+        Export::Failed(why) => (format!("not written: {why}"), theme.trouble()),
+    };
+    let more = if hidden > 0 { format!("   {} {hidden} more", theme.pick("↓", "down")) } else { String::new() };
+    // The path matters most: the format is told in full where there is room.
+    let kinds = [
+        format!("CSV: {separator}, {decimal}{bom}{more}"),
+        format!("CSV {} {}{bom}{more}", dialect.separator, dialect.decimal),
+        more.trim().to_owned(),
+    ];
+    let end = row.width().saturating_sub(1);
+    let fits = |kind: &String| width(&text) + width(kind) + 4 <= end;
+    let kind = kinds.iter().find(|kind| fits(kind)).unwrap_or(&kinds[2]);
+    row.text(1, 0, &fit(&text, end.saturating_sub(width(kind) + 2)), style);
+    row.text_right(end, 0, kind, theme.dim());
+}
+
+/// Widths of the table: tag, unit, then right-aligned figures.
+fn widths(width: u16) -> (u16, u16) {
+    let wide = width.saturating_sub(80);
+    (15 + wide / 4, 9 + wide / 10)
+}
+
+fn heading(cx: &Cx, width: u16) -> Line<'static> {
+    let (tag, figure) = widths(width);
+    let mut text = format!("  {}{}", pad("tag", tag), pad("unit", 7));
+    for (name, more) in [("min", 0), ("mean", 0), ("max", 0), ("last", 0), ("in alarm", 1), ("good", 0)] {
+        text.push_str(&pad_left(name, figure + more));
+    }
+    Line::from(Span::styled(text, cx.theme.dim()))
+}
+
+/// Everything below the heading: figures, counts, alarms, actions.
+pub fn lines(cx: &Cx, report: &ShiftReport) -> Vec<Line<'static>> {
+    let theme = cx.theme;
+    let mut lines = Vec::new();
+    if report.tags.iter().all(|tag| tag.good == 0.0) {
+        let words = "  no data: no good value was recorded in this period";
+        lines.push(Line::from(Span::styled(words, theme.trouble())));
+    }
+    lines.extend(report.tags.iter().map(|tag| figures(cx, tag)));
+    lines.push(Line::default());
+    lines.push(counts(cx, report));
+    if let Some((of, _)) = &report.record_of {
+        let words = format!("  record of {of}: {} rows in the CSV", report.record.len());
+        lines.push(Line::from(Span::styled(words, theme.normal())));
+    }
+    // The name of a shift tells its day; only a longer period needs the date in every line.
+    let short = report.until.duration_since(report.period.from) <= SignedDuration::from_hours(24);
+    let form = if short { "%H:%M:%S" } else { "%m-%d %H:%M:%S" };
+    let time = |at: Timestamp| format!("  {}  ", local(at, &cx.def().time_zone, form));
+    let more = |n: usize| Line::from(Span::styled(format!("  and {n} more in the CSV"), theme.dim()));
+    if !report.alarms.is_empty() {
+        lines.push(section(cx, "alarms"));
+        lines.extend(report.alarms.iter().take(LIST_MAX).map(|alarm| alarm_line(cx, alarm, time(alarm.at))));
+        lines.extend(report.alarms.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
+    }
+    if !report.actions.is_empty() {
+        lines.push(section(cx, "operator actions"));
+        lines.extend(report.actions.iter().take(LIST_MAX).map(|action| action_line(cx, action, time(action.at))));
+        lines.extend(report.actions.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
+    }
+    lines
+}
+
+fn figures(cx: &Cx, tag: &TagFigures) -> Line<'static> {
+    let (theme, (name, figure)) = (cx.theme, widths(cx.area.width));
+    // A mean carries one digit more than the values that it is of.
+    let value = |value: Option<f64>, more: usize| match value {
+        Some(value) => pad_left(&format!("{value:.*}", usize::from(tag.decimals) + more), figure),
+        None => pad_left("–", figure),
+    };
+    let alarm = if tag.in_alarm.is_zero() { "–".to_owned() } else { long(tag.in_alarm) };
+    let good =
+        if tag.good >= 1.0 { "100 %".to_owned() } else { format!("{:.1} %", (tag.good * 1_000.0).floor() / 10.0) };
+    Line::from(vec![
+        Span::styled(format!("  {}", pad(&tag.tag, name - 1)), theme.normal()),
+        Span::styled(format!(" {}", pad(&tag.unit, 7)), theme.dim()),
+        Span::styled(
+            [value(tag.min, 0), value(tag.mean, 1), value(tag.max, 0), value(tag.last, 0)].concat(),
+            theme.normal(),
+        ),
+        Span::styled(pad_left(&alarm, figure + 1), if tag.in_alarm.is_zero() { theme.dim() } else { theme.strong() }),
+        Span::styled(pad_left(&good, figure), if tag.good < 0.9995 { theme.strong() } else { theme.dim() }),
+    ])
+}
+
+/// `alarms 3 (high 1, medium 2)   most TIC-1.PV ×2   operator actions 4`.
+fn counts(cx: &Cx, report: &ShiftReport) -> Line<'static> {
+    let priorities = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low];
+    let by = priorities.map(|priority| (raised(&report.alarms, priority), priority.word()));
+    let total: usize = by.iter().map(|(n, _)| n).sum();
+    let parts: Vec<String> = by.iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{word} {n}")).collect();
+    let mut text = format!("  alarms {total}");
+    if total > 0 {
+        text.push_str(&format!(" ({})", parts.join(", ")));
+    }
+    let mut subjects: BTreeMap<&str, usize> = BTreeMap::new();
+    for alarm in report.alarms.iter().filter(|alarm| alarm.step == AlarmStep::Raised) {
+        *subjects.entry(&alarm.subject).or_default() += 1;
+    }
+    if let Some((subject, n)) = subjects.into_iter().max_by_key(|(_, n)| *n).filter(|(_, n)| *n > 1) {
+        text.push_str(&format!("   most {subject} {}{n}", cx.theme.pick("×", "x")));
+    }
+    text.push_str(&format!("   operator actions {}", report.actions.len()));
+    Line::from(Span::styled(text, cx.theme.normal()))
+}
+
+fn section(cx: &Cx, title: &str) -> Line<'static> {
+    let rule = cx.theme.pick("─", "-");
+    let rest = usize::from(cx.area.width).saturating_sub(title.len() + 5);
+    Line::from(Span::styled(format!(" {rule} {title} {}", rule.repeat(rest)), cx.theme.dim()))
+}
+
+/// One step of an alarm. An acknowledgement tells who, the other steps tell the value.
+fn alarm_line(cx: &Cx, alarm: &AlarmRecord, time: String) -> Line<'static> {
+    let theme = cx.theme;
+    let value = |value: f64| match cx.def().tag_named(&alarm.subject) {
+        Some(tag) => format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)),
+        None => format!("{value}"),
+    };
+    let active = alarm.step == AlarmStep::Raised;
+    let style: Style = if active { theme.normal() } else { theme.dim() };
+    let detail = match (&alarm.by, alarm.value) {
+        (Some(by), _) => format!("by {by}"),
+        (None, Some(number)) => pad_left(value(number).trim(), 10),
+        (None, None) => String::new(),
+    };
+    let text = 21 + (cx.area.width.saturating_sub(68 + width(&time)) / 2).min(20);
+    Line::from(vec![
+        Span::styled(time, theme.dim()),
+        Span::styled(
+            theme.priority_mark(alarm.priority),
+            if active { theme.severity(alarm.priority) } else { theme.dim() },
+        ),
+        Span::styled(format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.text, text)), style),
+        Span::styled(format!("{} {detail}", pad(alarm.step.word(), 13)), style),
+    ])
+}
+
+/// One deed of an operator; where it is too long, its outcome is kept.
+fn action_line(cx: &Cx, action: &ActionRecord, time: String) -> Line<'static> {
+    let arrow = cx.theme.pick("→", "->");
+    let change = match (&action.old, &action.new) {
+        (Some(old), Some(new)) => format!("{old} {arrow} {new}"),
+        (None, Some(new)) => format!("{arrow} {new}"),
+        (Some(old), None) => old.to_string(),
+        (None, None) => String::new(),
+    };
+    let room = cx.area.width.saturating_sub(width(&time) + 1);
+    let outcome = fit(&action.outcome, room / 2);
+    let text = fit(
+        &format!("{} {} {} {change}", pad(&action.by, 8), action.action, action.target),
+        room.saturating_sub(width(&outcome) + 2),
+    );
+    Line::from(vec![
+        Span::styled(time, cx.theme.dim()),
+        Span::styled(text, cx.theme.normal()),
+        Span::styled(format!("  {outcome}"), cx.theme.strong()),
+    ])
+}
+
+/// `22:00 – 11-21 06:00 +07`; dates only where the name of the period does not tell them.
+fn span(period: &Period, zone: &TimeZone) -> String {
+    let (from, to) = (period.from.to_zoned(zone.clone()), period.to.to_zoned(zone.clone()));
+    let form = if from.date() == to.date() { "%H:%M" } else { "%m-%d %H:%M" };
+    let named = period.name.contains(&from.date().to_string());
+    let start = from.strftime(if named { "%H:%M" } else { "%Y-%m-%d %H:%M" });
+    let offset = |at: &jiff::Zoned| {
+        let (seconds, sign) = (at.offset().seconds(), if at.offset().is_negative() { '-' } else { '+' });
+        let minutes = seconds.abs() / 60 % 60;
+        let hours = format!("{sign}{:02}", seconds.abs() / 3_600);
+        if minutes == 0 { hours } else { format!("{hours}:{minutes:02}") }
+    };
+    // Where the clocks change in between, both ends tell their offset.
+    let first = if from.offset() == to.offset() { String::new() } else { format!(" {}", offset(&from)) };
+    format!("{start}{first} – {} {}", to.strftime(form), offset(&to))
+}
+
+fn local(at: Timestamp, zone: &TimeZone, form: &str) -> String {
+    at.to_zoned(zone.clone()).strftime(form).to_string()
+}
+
+/// Hours, minutes, seconds: `00:00:41`.
+fn long(span: Duration) -> String {
+    let seconds = span.as_secs();
+    format!("{:02}:{:02}:{:02}", seconds / 3_600, seconds / 60 % 60, seconds % 60)
+}

@@ -1,0 +1,67 @@
+//! What the keys of the trends tab are and mean.
+
+use crossterm::event::KeyCode;
+
+use crate::ui::keys::{Chord, Key, char, code};
+
+/// What a key means here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Earlier, or the cursor to the left.
+    Left,
+    /// Later, or the cursor to the right.
+    Right,
+    /// A whole window earlier; a page up in the list of values.
+    PageBack,
+    /// A whole window later; a page down in the list of values.
+    PageOn,
+    /// The pen or value above.
+    Up,
+    /// The pen or value below.
+    Down,
+    /// Switch the selected pen on or off.
+    Toggle,
+    /// Show the curve of the selected value.
+    Open,
+    /// Shorter window.
+    ZoomIn,
+    /// Longer window.
+    ZoomOut,
+    /// Next group of pens.
+    Group,
+    /// Moving window, or everything since the start of the day.
+    Mode,
+    /// Next update rate.
+    Rate,
+    /// Cursor on or off.
+    Cursor,
+    /// Back to the present.
+    Live,
+    /// Curves, or the list of all values.
+    Values,
+}
+
+/// Keys of this tab.
+pub const KEYS: &[Key<Action>] = &[
+    key(code(KeyCode::Left), "", "earlier (with the cursor on: cursor to the left)", Action::Left),
+    key(code(KeyCode::Right), "", "later (with the cursor on: cursor to the right)", Action::Right),
+    key(code(KeyCode::PageUp), "", "a whole window earlier; a page up", Action::PageBack),
+    key(code(KeyCode::PageDown), "", "a whole window later; a page down", Action::PageOn),
+    key(code(KeyCode::Up), "", "select the pen above", Action::Up),
+    key(code(KeyCode::Down), "", "select the pen below", Action::Down),
+    key(char('l'), "live", "back to the present", Action::Live),
+    key(char('+'), "zoom", "shorter window", Action::ZoomIn),
+    key(char('='), "", "shorter window", Action::ZoomIn),
+    key(char('-'), "", "longer window", Action::ZoomOut),
+    key(char('c'), "cursor", "cursor on or off: reads every pen at one time", Action::Cursor),
+    key(char('g'), "group", "next group of pens", Action::Group),
+    key(char(' '), "pen", "switch the selected pen on or off", Action::Toggle),
+    key(char('v'), "values", "all values with their last hour, or the curves", Action::Values),
+    key(char('m'), "mode", "moving window, or everything since the start of the day", Action::Mode),
+    key(char('u'), "rate", "how often the curves are read anew: 0.5, 1, 2, 5, 10 s", Action::Rate),
+    key(code(KeyCode::Enter), "", "in the list of values: show its curve", Action::Open),
+];
+
+const fn key(chord: Chord, label: &'static str, help: &'static str, action: Action) -> Key<Action> {
+    Key { chord, label, help, action }
+}

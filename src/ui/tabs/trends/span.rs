@@ -1,0 +1,168 @@
+//! Which stretch of time the trends show: windows, zoom, pan and the grid of columns; pure arithmetic.
+
+use std::time::Duration;
+
+use jiff::{SignedDuration, Timestamp, tz::TimeZone};
+
+/// The windows that zooming steps through, seconds: 1 min to 24 h.
+pub const WINDOWS: [i64; 12] = [60, 120, 300, 600, 900, 1_800, 3_600, 7_200, 14_400, 28_800, 43_200, 86_400];
+/// How often the history may be asked anew, milliseconds.
+pub const RATES: [u64; 5] = [500, 1_000, 2_000, 5_000, 10_000];
+
+/// A stretch of time cut into columns of equal width, on a grid that does not move with the clock: so a curve travels
+/// by whole columns and does not shimmer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct View {
+    /// Left edge.
+    pub from: Timestamp,
+    /// Right edge; for a living view up to one column after now.
+    pub to: Timestamp,
+    /// Number of columns.
+    pub columns: usize,
+}
+
+impl View {
+    /// The view of `seconds` that ends with the column in which `end` lies.
+    pub fn ending(end: Timestamp, seconds: i64, columns: usize) -> View {
+        let columns = columns.max(1);
+        let step = (seconds.max(1) * 1_000_000 + columns as i64 - 1) / columns as i64;
+        let to = (end.as_microsecond().div_euclid(step) + 1) * step;
+        View { from: instant(to - step * columns as i64), to: instant(to), columns }
+    }
+
+    /// The view from `from` to `end`, at least a minute wide. Columns are half seconds or multiples, so that it grows by
+    /// steps, and one column is to spare, so that its left edge can stand on the grid.
+    pub fn since(from: Timestamp, end: Timestamp, columns: usize) -> View {
+        let columns = columns.max(2);
+        let count = columns as i64;
+        let width = (end.as_microsecond() - from.as_microsecond()).max(60_000_000);
+        let step = (width / (count - 1) / 500_000 + 1) * 500_000;
+        let from = from.as_microsecond().div_euclid(step) * step;
+        View { from: instant(from), to: instant(from + step * count), columns }
+    }
+
+    /// Width of a column.
+    pub fn step(self) -> SignedDuration {
+        self.to.duration_since(self.from) / i32::try_from(self.columns.max(1)).unwrap_or(i32::MAX)
+    }
+
+    /// Width of the view.
+    pub fn width(self) -> SignedDuration {
+        self.to.duration_since(self.from)
+    }
+
+    /// Is an instant on it?
+    pub fn holds(self, at: Timestamp) -> bool {
+        self.from <= at && at < self.to
+    }
+}
+
+/// The end of a view after a step of `by` to the right (left if negative); `None` when that reaches the present, and
+/// the view is alive again.
+pub fn pan(end: Timestamp, by: SignedDuration, now: Timestamp) -> Option<Timestamp> {
+    end.checked_add(by).ok().filter(|end| *end < now)
+}
+
+/// The window nearest to a stretch of time, as a place in [`WINDOWS`].
+pub fn nearest(span: SignedDuration) -> usize {
+    let seconds = span.as_secs();
+    WINDOWS.iter().position(|window| *window >= seconds).unwrap_or(WINDOWS.len() - 1)
+}
+
+/// The last local midnight; a day that begins later (clocks change at midnight) begins then.
+pub fn midnight(now: Timestamp, zone: &TimeZone) -> Timestamp {
+    now.to_zoned(zone.clone()).start_of_day().map_or(now, |start| start.timestamp())
+}
+
+/// A window as it is written: `10 min`, `1 h`.
+pub fn window_words(seconds: i64) -> String {
+    if seconds < 3_600 { format!("{} min", seconds / 60) } else { format!("{} h", seconds / 3_600) }
+}
+
+/// A rate as it is written: `0.5 s`, `10 s`.
+pub fn rate_words(millis: u64) -> String {
+    format!("{} s", Duration::from_millis(millis).as_secs_f64())
+}
+
+/// An instant of plain microseconds; the times of a plant lie far inside the calendar.
+fn instant(micros: i64) -> Timestamp {
+    Timestamp::from_microsecond(micros).unwrap_or(Timestamp::UNIX_EPOCH)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn at(text: &str) -> Timestamp {
+        format!("2026-11-21T{text}Z").parse().expect("a time in the table")
+    }
+
+    #[test]
+    fn a_view_stands_still_until_a_column_is_full() {
+        let check = |now: &str, seconds, columns, from: &str, to: &str| {
+            let view = View::ending(at(now), seconds, columns);
+            assert_eq!((view.from, view.to), (at(from), at(to)), "{now} {seconds} s in {columns}");
+        };
+        check("06:00:00", 600, 120, "05:50:05", "06:00:05");
+        check("06:00:04.9", 600, 120, "05:50:05", "06:00:05");
+        check("06:00:05", 600, 120, "05:50:10", "06:00:10");
+        check("06:00:00.2", 60, 120, "05:59:00.5", "06:00:00.5");
+        check("06:00:00", 3_600, 1, "06:00:00", "07:00:00");
+    }
+
+    #[test]
+    fn everything_since_the_start_is_on_the_screen() {
+        for (from, end) in
+            [("06:12:00", "07:00:00"), ("06:59:59", "07:00:00"), ("00:00:00", "23:59:59"), ("06:58:00", "07:00:00")]
+        {
+            for columns in [1, 10, 119, 120, 121, 400] {
+                let view = View::since(at(from), at(end), columns);
+                assert!(view.from <= at(from) && view.holds(at(end)), "{from} {end} {columns}: {view:?}");
+                assert!(view.width() >= SignedDuration::from_secs(60));
+            }
+        }
+    }
+
+    #[test]
+    fn panning_right_ends_in_the_present() {
+        let now = at("07:00:00");
+        let minutes = SignedDuration::from_mins;
+        for (end, by, expect) in [
+            ("07:00:00", minutes(-15), Some("06:45:00")),
+            ("06:30:00", minutes(15), Some("06:45:00")),
+            ("06:45:00", minutes(15), None),
+            ("06:50:00", minutes(60), None),
+        ] {
+            assert_eq!(pan(at(end), by, now), expect.map(at), "{end}");
+        }
+    }
+
+    #[test]
+    fn windows_and_rates_read_well() {
+        let words: Vec<String> = WINDOWS.into_iter().map(window_words).collect();
+        assert_eq!(words.join(", "), "1 min, 2 min, 5 min, 10 min, 15 min, 30 min, 1 h, 2 h, 4 h, 8 h, 12 h, 24 h");
+        let words: Vec<String> = RATES.into_iter().map(rate_words).collect();
+        assert_eq!(words.join(", "), "0.5 s, 1 s, 2 s, 5 s, 10 s");
+        for (seconds, expect) in [(10, 60), (60, 60), (61, 120), (90_000, 86_400)] {
+            assert_eq!(WINDOWS[nearest(SignedDuration::from_secs(seconds))], expect);
+        }
+    }
+
+    #[test]
+    fn the_day_begins_at_the_plants_midnight() {
+        let bangkok = TimeZone::get("Asia/Bangkok").expect("a zone");
+        assert_eq!(midnight(at("06:00:00"), &bangkok), "2026-11-20T17:00:00Z".parse().expect("a time"));
+    }
+
+    proptest! {
+        #[test]
+        fn the_present_is_always_in_the_last_column(second in 0i64..4_000_000_000, window in 0usize..12, columns in 1usize..500) {
+            let now = instant(second * 1_000_003);
+            let view = View::ending(now, WINDOWS[window], columns);
+            prop_assert!(view.holds(now) && view.to.duration_since(now) <= view.step() + SignedDuration::from_micros(columns as i64));
+            prop_assert_eq!((view.to.as_microsecond() - view.from.as_microsecond()) % columns as i64, 0);
+        }
+    }
+}

@@ -1,0 +1,381 @@
+//! The trends tab in the whole terminal, with a made-up history behind it.
+
+use std::sync::Arc;
+
+use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use jiff::SignedDuration;
+use ratatui::{Terminal, backend::TestBackend};
+
+use super::*;
+use crate::{
+    history::Bucket,
+    plant::{def::Priority, sample::Sample},
+    ui::{
+        AskId, Effect, Model, Msg,
+        fixture::{Fixture, now},
+        theme::Theme,
+        update, view,
+    },
+};
+
+/// A terminal on the trends tab, and the history that answers it.
+struct Stand {
+    model: Model,
+    asked: Vec<(AskId, Question)>,
+    /// When the store began.
+    begin: Timestamp,
+    /// Nothing was recorded here.
+    gap: (Timestamp, Timestamp),
+}
+
+fn ago(seconds: i64) -> Timestamp {
+    now() - SignedDuration::from_secs(seconds)
+}
+
+/// The made-up past of a tag: PV swings, SV steps ten minutes ago, the rest climbs.
+fn past(tag: TagId, at: Timestamp) -> f64 {
+    let seconds = at.duration_since(now()).as_secs_f64();
+    match tag.0 {
+        0 => 64.0 + 6.0 * (seconds / 90.0).sin() * (1.0 + seconds / 9_000.0),
+        1 => {
+            if seconds < -300.0 {
+                60.0
+            } else {
+                70.0
+            }
+        }
+        n => 42.0 + f64::from(n) + seconds / 40.0 % 30.0,
+    }
+}
+
+impl Stand {
+    fn new(theme: Theme, width: u16, height: u16) -> Stand {
+        let mut model = Model::new(Fixture::normal().snapshot(), theme, 1, "tech1".into());
+        let begin = ago(86_400);
+        update(&mut model, Msg::Resize(width, height));
+        let mut stand = Stand { model, asked: Vec::new(), begin, gap: (begin, begin) };
+        stand.press("2");
+        stand
+    }
+
+    fn send(&mut self, msg: Msg) {
+        let effects = update(&mut self.model, msg);
+        self.asked.extend(effects.into_iter().filter_map(|effect| match effect {
+            Effect::Ask(id, question) if id.tab == Tab::Trends => Some((id, question)),
+            _ => None,
+        }));
+    }
+
+    fn press(&mut self, keys: &str) {
+        for key in keys.chars() {
+            let code = match key {
+                '←' => KeyCode::Left,
+                '→' => KeyCode::Right,
+                '↓' => KeyCode::Down,
+                '⏎' => KeyCode::Enter,
+                key => KeyCode::Char(key),
+            };
+            self.send(Msg::Key(KeyEvent::new(code, KeyModifiers::NONE)));
+        }
+    }
+
+    /// Answers everything that was asked, until nothing more is asked.
+    fn answer(&mut self) {
+        for _ in 0..10 {
+            for (id, question) in std::mem::take(&mut self.asked) {
+                let answer = self.history(&question);
+                self.send(Msg::Answer(id, Ok(answer)));
+            }
+        }
+        assert_eq!(self.asked, [], "the tab never comes to rest");
+    }
+
+    fn history(&self, question: &Question) -> Answer {
+        match question {
+            Question::Series { tags, from, to, buckets } => {
+                Answer::Series(tags.iter().map(|tag| self.series(*tag, *from, *to, *buckets)).collect())
+            }
+            Question::Journal { .. } => Answer::Journal(vec![AlarmRecord {
+                at: ago(240),
+                subject: "TIC-1.PV".into(),
+                text: "temperature high".into(),
+                priority: Priority::High,
+                step: AlarmStep::Raised,
+                value: Some(72.1),
+                limit: Some(72.0),
+                by: None,
+            }]),
+            other => panic!("the trends never ask {other:?}"),
+        }
+    }
+
+    fn series(&self, tag: TagId, from: Timestamp, to: Timestamp, count: usize) -> Series {
+        let step = std::time::Duration::try_from(to.duration_since(from)).expect("forward") / count as u32;
+        let known = |at: Timestamp| at + step > self.begin && at <= now() && !(self.gap.0..self.gap.1).contains(&at);
+        let bucket = |n: usize| {
+            let at = from + step * n as u32;
+            let (first, last) = (past(tag, at), past(tag, at + step));
+            let bucket = Bucket { min: first.min(last), max: first.max(last), mean: (first + last) / 2.0, last };
+            known(at).then_some(bucket)
+        };
+        // Good is the share of the whole span, also of the part that lies ahead.
+        let ahead = to.duration_since(now()).max(SignedDuration::ZERO).as_secs_f64();
+        let good = 1.0 - ahead / to.duration_since(from).as_secs_f64();
+        let good = if self.gap.0 < self.gap.1 { good - 0.166 } else { good };
+        let summary = (self.begin < now()).then_some((58.25, 64.0, 70.0));
+        let good = if summary.is_some() { good } else { 0.0 };
+        Series { tag, from, step, buckets: (0..count).map(bucket).collect(), summary, good }
+    }
+
+    /// So many seconds pass, with a snapshot each; `value` is the PV.
+    fn live(&mut self, seconds: i64, value: impl Fn(i64) -> Option<f64>) {
+        for second in 1..=seconds {
+            let mut snapshot = (*self.model.snapshot).clone();
+            snapshot.at += SignedDuration::from_secs(1);
+            let at = snapshot.at;
+            for (n, sample) in snapshot.samples.iter_mut().enumerate() {
+                sample.at = at;
+                if n == 0 {
+                    *sample = value(second)
+                        .map_or(Sample::bad(crate::plant::sample::Cause::Timeout, at), |v| Sample::good(v, at));
+                }
+            }
+            self.send(Msg::Snapshot(Arc::new(snapshot)));
+        }
+    }
+
+    fn terminal(&self) -> Terminal<TestBackend> {
+        let screen = self.model.screen;
+        let mut terminal =
+            Terminal::new(TestBackend::new(screen.width, screen.height)).expect("a test backend never fails");
+        terminal.draw(|frame| view(&self.model, frame)).expect("a test backend never fails");
+        terminal
+    }
+
+    fn screen(&self) -> String {
+        self.terminal().backend().to_string()
+    }
+}
+
+#[test]
+fn a_living_trend_at_80x24() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    insta::assert_snapshot!(stand.screen());
+}
+
+#[test]
+fn a_living_trend_at_120x40() {
+    let mut stand = Stand::new(Theme::FULL, 120, 40);
+    stand.answer();
+    insta::assert_snapshot!(stand.screen());
+}
+
+#[test]
+fn a_gap_and_the_cursor() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.gap = (ago(300), ago(180));
+    stand.answer();
+    stand.press("c←←←←←←←←←←");
+    stand.answer();
+    insta::assert_snapshot!(stand.screen());
+}
+
+#[test]
+fn an_empty_history() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.begin = now();
+    stand.answer();
+    insta::assert_snapshot!(stand.screen());
+}
+
+#[test]
+fn without_unicode_and_colour() {
+    let mut stand = Stand::new(Theme::PLAIN, 80, 24);
+    stand.answer();
+    insta::assert_snapshot!(stand.screen());
+}
+
+#[test]
+fn the_list_of_all_values() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.press("v↓↓");
+    stand.answer();
+    insta::assert_snapshot!(stand.screen());
+}
+
+#[test]
+fn the_past_is_told_from_the_present() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    stand.press("←←←←←");
+    stand.answer();
+    insta::assert_snapshot!(stand.screen());
+    stand.press("l");
+    assert!(stand.screen().contains("live ●"));
+}
+
+#[test]
+fn everything_since_the_first_value_of_the_day() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.begin = ago(3_000);
+    stand.answer();
+    stand.press("m");
+    stand.answer();
+    insta::assert_snapshot!(stand.screen());
+}
+
+/// Which questions are on their way, by what they ask about.
+fn kinds(asked: &[(AskId, Question)]) -> String {
+    let kind = |question: &Question| match question {
+        Question::Series { buckets: HOUR_COLUMNS, .. } => "hour",
+        Question::Series { .. } => "curves",
+        Question::Journal { .. } => "alarms",
+        Question::Actions { .. } | Question::Report { .. } => "other",
+    };
+    asked.iter().map(|(_, question)| kind(question)).collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn nothing_is_asked_while_the_tab_is_not_shown() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    assert_eq!(kinds(&stand.asked), "curves alarms hour");
+    stand.answer();
+    stand.press("1");
+    stand.live(120, |_| Some(60.0));
+    assert_eq!(kinds(&stand.asked), "");
+    stand.press("2");
+    assert_eq!(kinds(&stand.asked), "curves alarms hour");
+}
+
+#[test]
+fn an_answer_to_an_older_question_is_ignored() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    let old = std::mem::take(&mut stand.asked);
+    stand.live(20, |_| Some(60.0));
+    assert_eq!(kinds(&stand.asked), "curves alarms hour", "the answer is overdue");
+    let before = stand.screen();
+    for (id, question) in old {
+        let answer = stand.history(&question);
+        stand.send(Msg::Answer(id, Ok(answer)));
+    }
+    assert_eq!(stand.screen(), before);
+    stand.answer();
+    assert_ne!(stand.screen(), before);
+}
+
+#[test]
+fn fast_keys_do_not_pile_up_questions() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    stand.press("--++--←←←←");
+    assert_eq!(kinds(&stand.asked), "curves alarms");
+    stand.answer();
+    let view = stand.model.tabs.trends.span(&stand.model.cx());
+    let shown = stand.model.tabs.trends.data.traces[&TagId(0)].past().map(|series| series.from);
+    assert_eq!(shown, Some(view.from), "the last view is asked for in the end");
+}
+
+#[test]
+fn live_values_are_on_the_screen_before_the_history_has_them() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    stand.press("+++");
+    stand.live(20, |second| if (8..12).contains(&second) { None } else { Some(90.0) });
+    let cx = stand.model.cx();
+    let trace = &stand.model.tabs.trends.data.traces[&TagId(0)];
+    assert_eq!(trace.value_at(cx.now), Some(90.0));
+    assert_eq!(trace.value_at(ago(-9)), None, "no answer is a gap");
+    insta::assert_snapshot!(stand.screen());
+}
+
+#[test]
+fn trouble_of_the_history_is_told() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    let (id, _) = stand.asked[0].clone();
+    stand.send(Msg::Answer(id, Err(HistoryError::Engine("disk full".to_owned()))));
+    assert!(stand.screen().contains("history: disk full"));
+    stand.live(5, |_| Some(60.0));
+    stand.answer();
+    assert!(!stand.screen().contains("disk full"));
+}
+
+#[test]
+fn keys_move_through_time() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    let mut check = |keys: &str, expect: &str| {
+        stand.press(keys);
+        stand.answer();
+        let title = stand.screen().lines().nth(4).map(str::to_owned).unwrap_or_default();
+        assert!(title.contains(expect), "{keys}: {title}");
+    };
+    check("", "window 10 min   live ●");
+    check("-", "window 15 min   live ●");
+    check("+++++++++", "window 1 min   live ●");
+    check("----------------", "window 24 h   live ●");
+    check("+", "window 12 h   live ●");
+    check("←", "past 11-20 23:");
+    check("→", "live ●");
+    check("u", "update 2 s");
+    check("m", "all since midnight");
+    check("m", "window 12 h");
+    check("g", "Levels group 2/2");
+    check("v↓↓↓↓⏎", "TIC-1.I group 3/3");
+    check("v⏎", "TIC-1 group 1/3");
+}
+
+#[test]
+fn a_pen_is_switched_off_and_on() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    stand.press("↓ ");
+    stand.answer();
+    assert!(stand.screen().contains("- TIC-1.SV"));
+    assert_eq!(stand.model.tabs.trends.drawn(&stand.model.cx()).len(), 2);
+    stand.press(" ");
+    assert_eq!(stand.model.tabs.trends.drawn(&stand.model.cx()).len(), 3);
+}
+
+#[test]
+fn no_size_is_too_small_to_survive() {
+    for (width, height) in
+        (0..40).flat_map(|width| (0..20).map(move |height| (width, height))).chain([(200, 60), (80, 12), (300, 8)])
+    {
+        for keys in ["", "c", "v", "m"] {
+            let mut stand = Stand::new(Theme::FULL, width, height);
+            stand.press(keys);
+            stand.answer();
+            stand.terminal();
+        }
+    }
+}
+
+#[test]
+fn figures_of_another_view_do_not_stand_beside_this_one() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    assert!(stand.screen().contains("58.2"));
+    stand.press("-");
+    assert!(!stand.screen().contains("58.2"), "until the history has answered");
+    let old = std::mem::take(&mut stand.asked);
+    stand.press("-");
+    for (id, question) in old {
+        let answer = stand.history(&question);
+        stand.send(Msg::Answer(id, Ok(answer)));
+    }
+    assert!(!stand.screen().contains("58.2"), "the answer was for the window before");
+    stand.answer();
+    assert!(stand.screen().contains("58.2") && stand.screen().contains("100 %"));
+}
+
+#[test]
+fn a_snapshot_a_little_older_than_the_guessed_time_changes_nothing() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    stand.press("+++");
+    stand.send(Msg::Tick { silent: std::time::Duration::from_millis(900) });
+    assert_eq!(kinds(&std::mem::take(&mut stand.asked)), "curves alarms");
+    stand.send(Msg::Snapshot(stand.model.snapshot.clone()));
+    assert_eq!(kinds(&stand.asked), "");
+    assert!(!stand.model.tabs.trends.data.traces[&TagId(0)].past().is_none_or(|past| past.buckets.is_empty()));
+}

@@ -1,0 +1,339 @@
+//! The picture of the trends tab: title, chart, legend with figures; or the list of values.
+
+use jiff::Timestamp;
+use ratatui::{
+    Frame,
+    layout::Rect,
+    text::{Line, Span},
+    widgets::Widget,
+};
+
+use super::{
+    Trends,
+    span::{RATES, WINDOWS, midnight, rate_words, window_words},
+    stored,
+};
+use crate::{
+    plant::def::{Pen, TagId},
+    ui::{
+        Cx,
+        theme::Glyphs,
+        widgets::{
+            chart::{Axis, Chart, Curve, Plan, mark},
+            spark::spark,
+            text::{Canvas, clock, fit, moment, pad},
+            value,
+        },
+    },
+};
+
+/// Rows that the chart keeps, whatever the legend wants.
+const CHART_ROWS_MIN: u16 = 7;
+
+/// Draws the tab.
+pub fn draw(trends: &Trends, cx: &Cx, frame: &mut Frame, area: Rect) {
+    let mut canvas = Canvas::new(frame.buffer_mut(), area);
+    match trends.values {
+        Some((first, row)) => draw_values(trends, cx, &mut canvas, first, row),
+        None => draw_curves(trends, cx, &mut canvas),
+    }
+}
+
+fn draw_curves(trends: &Trends, cx: &Cx, canvas: &mut Canvas) {
+    let (width, height) = (canvas.width(), canvas.height());
+    let pens = trends.pens(cx);
+    let legend = (pens.len() as u16 + 1).min(height.saturating_sub(1 + CHART_ROWS_MIN));
+    draw_title(trends, cx, canvas);
+    let mut chart = chart(trends, cx);
+    let area = canvas.part(0, 1, width, height.saturating_sub(1 + legend)).area();
+    let plan = (!area.is_empty()).then(|| chart.plan(area));
+    if let Some(plan) = &plan {
+        let cursor = trends.cursor(cx);
+        chart.cursor = cursor.map(|at| (at, readout(trends, cx, at, plan.plot.width)));
+        chart.render(area, canvas.buffer());
+        if trends.drawn(cx).is_empty() {
+            let words = "no pen is switched on: select one below, space switches it on";
+            canvas.text_centred(1 + area.height / 2, words, cx.theme.dim());
+        }
+    }
+    let mut part = canvas.part(0, height - legend.min(height), width, legend);
+    draw_legend(trends, cx, &mut part, plan.as_ref());
+}
+
+/// Group, window, live or past, rate; on the right what is wrong with the history.
+fn draw_title(trends: &Trends, cx: &Cx, canvas: &mut Canvas) {
+    let (def, theme, view) = (cx.def(), cx.theme, trends.span(cx));
+    let zone = &def.time_zone;
+    let name = match (def.trends.get(trends.group), trends.picked) {
+        (Some(group), _) => group.name.clone(),
+        (None, Some(tag)) => def.tag(tag).name.clone(),
+        (None, None) => String::new(),
+    };
+    let mut x = canvas.text(1, 0, &name, theme.strong());
+    let groups = def.trends.len() + usize::from(trends.picked.is_some());
+    if groups > 1 {
+        x = canvas.text(x + 1, 0, &format!("group {}/{}", trends.group + 1, groups), theme.dim());
+    }
+    x = match (trends.accumulate, trends.since) {
+        (true, since) => {
+            let from = since.filter(|since| *since > midnight(cx.now, zone));
+            let local =
+                |since: Timestamp| since.to_zoned(zone.clone()).strftime("%H:%M, the first value today").to_string();
+            let from = from.map_or("midnight".to_owned(), local);
+            canvas.text(x + 3, 0, &format!("all since {from}"), theme.normal())
+        }
+        (false, _) => {
+            canvas.text(x + 3, 0, &format!("window {}", window_words(WINDOWS[trends.window])), theme.normal())
+        }
+    };
+    x = match trends.end {
+        None => {
+            canvas.text(x + 3, 0, if theme.glyphs == Glyphs::Braille { "live ●" } else { "live *" }, theme.normal())
+        }
+        Some(_) => {
+            let (from, to) = (moment(view.from, cx.now, zone), moment(view.to, cx.now, zone));
+            canvas.text(x + 3, 0, &format!(" past {from} – {to} "), theme.focus())
+        }
+    };
+    if trends.end.is_none() {
+        x = canvas.text(x + 3, 0, &format!("update {}", rate_words(RATES[trends.rate])), theme.normal());
+    }
+    let slow = trends.errands.curves.waiting(cx.now).filter(|waiting| *waiting >= super::real(cx, 2.0));
+    let trouble = match (&trends.data.trouble, slow) {
+        (Some(trouble), _) => Some(trouble.clone()),
+        (None, Some(_)) => Some("waiting for the history".to_owned()),
+        (None, None) => None,
+    };
+    if let Some(trouble) = trouble {
+        let room = canvas.width().saturating_sub(x + 3);
+        canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&trouble, room.saturating_sub(1)), theme.trouble());
+    }
+}
+
+fn chart<'a>(trends: &'a Trends, cx: &Cx<'a>) -> Chart<'a> {
+    let view = trends.span(cx);
+    let curve = |(n, pen): (usize, Pen)| {
+        Some(Curve {
+            trace: trends.data.traces.get(&pen.tag)?,
+            pen: n,
+            unit: cx.snapshot.unit(pen.tag),
+            fixed: pen.scale,
+            resolution: resolution(cx, pen.tag),
+            dashed: is_set_value(cx, pen.tag),
+        })
+    };
+    let names: Vec<&str> = trends.drawn(cx).iter().map(|(_, pen)| cx.def().tag(pen.tag).name.as_str()).collect();
+    let marks = trends.data.raised.iter().filter(|record| names.contains(&&*record.subject));
+    Chart {
+        theme: cx.theme,
+        zone: &cx.def().time_zone,
+        from: view.from,
+        to: view.to,
+        now: cx.now,
+        curves: trends.drawn(cx).into_iter().filter_map(curve).collect(),
+        cursor: None,
+        marks: marks.map(|record| (record.at, cx.theme.severity(record.priority))).collect(),
+    }
+}
+
+/// The time at the cursor with the value of every pen; only the time where that is too wide, the legend has the values.
+fn readout<'a>(trends: &Trends, cx: &Cx, at: Timestamp, room: u16) -> Line<'a> {
+    let zone = &cx.def().time_zone;
+    let mut line = Line::from(Span::styled(moment_exact(at, cx.now, zone), cx.theme.strong()));
+    let time = line.clone();
+    for (n, pen) in trends.drawn(cx) {
+        let text = at_cursor(trends, cx, pen.tag, at).unwrap_or_else(|| "----".to_owned());
+        line.push_span(Span::styled(format!("  {} {text}", mark(cx.theme, n)), cx.theme.pen(n)));
+    }
+    if line.width() <= usize::from(room) { line } else { time }
+}
+
+fn at_cursor(trends: &Trends, cx: &Cx, tag: TagId, at: Timestamp) -> Option<String> {
+    let value = trends.data.traces.get(&tag)?.value_at(at)?;
+    Some(cx.snapshot.format(tag, value))
+}
+
+/// Columns of the legend: right ends of the numbers, and where the last column begins.
+struct Columns {
+    name: u16,
+    value: u16,
+    min: u16,
+    mean: u16,
+    max: u16,
+    good: u16,
+    hour: u16,
+}
+
+impl Columns {
+    fn of(width: u16) -> Columns {
+        let name = 13 + width.saturating_sub(80).min(30) / 2;
+        let value = 4 + name + 13 + width.saturating_sub(80).min(40) / 4;
+        Columns { name, value, min: value + 8, mean: value + 16, max: value + 24, good: value + 33, hour: value + 36 }
+    }
+}
+
+fn draw_legend(trends: &Trends, cx: &Cx, canvas: &mut Canvas, plan: Option<&Plan>) {
+    let (columns, dim) = (Columns::of(canvas.width()), cx.theme.dim());
+    if canvas.height() == 0 {
+        return;
+    }
+    let cursor = trends.cursor(cx);
+    let now = cursor.map_or("now".to_owned(), |at| format!("at {}", clock(at, &cx.def().time_zone)));
+    canvas.text(4, 0, "pen", dim);
+    for (end, text) in [
+        (columns.value, now.as_str()),
+        (columns.min, "min"),
+        (columns.mean, "mean"),
+        (columns.max, "max"),
+        (columns.good, "good"),
+    ] {
+        canvas.text_right(end, 0, text, dim);
+    }
+    canvas.text(columns.hour, 0, "last hour", dim);
+    let pens = trends.pens(cx);
+    let rows = usize::from(canvas.height() - 1);
+    let first = (trends.selected + 1).saturating_sub(rows).min(pens.len().saturating_sub(rows));
+    let mut drawn = 0;
+    for (n, pen) in pens.iter().enumerate() {
+        let off = trends.off.contains(&pen.tag);
+        let scale = plan.and_then(|plan| if off { None } else { plan.scales.get(drawn) });
+        drawn += usize::from(!off);
+        if (first..first + rows).contains(&n) {
+            let y = (n - first) as u16 + 1;
+            let own = scale.filter(|(axis, _)| *axis == Axis::Own).map(|(_, scale)| (scale.low, scale.high));
+            let mut row = canvas.part(0, y, canvas.width(), 1);
+            draw_pen(trends, cx, &mut row, (n, *pen), cursor, own);
+        }
+    }
+}
+
+/// One row of the legend. A pen with a scale of its own tells it, because no axis does.
+fn draw_pen(
+    trends: &Trends,
+    cx: &Cx,
+    row: &mut Canvas,
+    (n, pen): (usize, Pen),
+    cursor: Option<Timestamp>,
+    own: Option<(f64, f64)>,
+) {
+    let (theme, columns, def) = (cx.theme, Columns::of(row.width()), cx.def().tag(pen.tag));
+    let (selected, off) = (trends.selected == n, trends.off.contains(&pen.tag));
+    if selected {
+        row.text(0, 0, theme.pick("▸", ">"), theme.strong());
+    }
+    let pen_style = if off { theme.dim() } else { theme.pen(n) };
+    row.text(2, 0, if off { "-" } else { mark(theme, n) }, pen_style);
+    let name = if row.width() >= 100 { format!("{}  {}", def.name, def.label) } else { def.name.clone() };
+    row.text(4, 0, &fit(&name, columns.name), if selected { theme.strong() } else { pen_style });
+    let (text, style) = match cursor {
+        None => {
+            let shown = value::show(cx, pen.tag);
+            (shown.within(columns.value - columns.name - 5), shown.style)
+        }
+        Some(at) => match at_cursor(trends, cx, pen.tag, at) {
+            Some(text) => (format!("{text} {}", cx.snapshot.unit(pen.tag)), theme.normal()),
+            None => ("---- no data".to_owned(), theme.dim()),
+        },
+    };
+    row.text_right(columns.value, 0, text.trim_end(), style);
+    if off {
+        row.text_right(columns.min, 0, "off", theme.dim());
+        return;
+    }
+    draw_figures(trends, cx, row, pen.tag);
+    let mut x = columns.hour;
+    if let Some((low, high)) = own {
+        let text = format!("scale {} … {}  ", number(low), number(high));
+        x = row.text(x, 0, &text, theme.dim());
+    }
+    if let Some(series) = trends.data.hours.get(&pen.tag) {
+        let cells = usize::from(row.width().saturating_sub(x + 1)).min(series.buckets.len());
+        row.text(x, 0, &spark(series, cells, resolution(cx, pen.tag), theme.glyphs), pen_style);
+    }
+}
+
+/// Least, mean and greatest of the window and its share of good time; nothing where there was no good value, and no
+/// arithmetic with the numbers of an enumeration.
+fn draw_figures(trends: &Trends, cx: &Cx, row: &mut Canvas, tag: TagId) {
+    let (columns, style) = (Columns::of(row.width()), cx.theme.normal());
+    let Some((summary, good)) = trends.data.figures.get(&tag) else { return };
+    if cx.def().tag(tag).labels.is_empty() {
+        for (end, value) in [columns.min, columns.mean, columns.max]
+            .into_iter()
+            .zip(summary.map_or([None; 3], |s| [Some(s.0), Some(s.1), Some(s.2)]))
+        {
+            row.text_right(end, 0, &value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value)), style);
+        }
+    }
+    row.text_right(columns.good, 0, &share(*good), if *good < 0.9995 { cx.theme.strong() } else { cx.theme.dim() });
+}
+
+/// Every stored value with its last hour.
+fn draw_values(trends: &Trends, cx: &Cx, canvas: &mut Canvas, first: usize, selected: usize) {
+    let (theme, all) = (cx.theme, stored(cx));
+    let rows = usize::from(canvas.height().saturating_sub(2)).max(1);
+    let last = (first + rows).min(all.len());
+    let x = canvas.text(1, 0, "All values", theme.strong());
+    canvas.text(x + 3, 0, &format!("{}–{} of {}", (first + 1).min(last), last, all.len()), theme.dim());
+    let wide = canvas.width().saturating_sub(80);
+    let name = 15 + wide / 5;
+    let label = name + 18 + wide / 4;
+    let (value, low, high) = (label + 15, label + 23, label + 31);
+    canvas.text(2, 1, "tag", theme.dim());
+    for (end, text) in [(value, "now"), (low, "1 h min"), (high, "1 h max")] {
+        canvas.text_right(end, 1, text, theme.dim());
+    }
+    canvas.text(high + 2, 1, "last hour", theme.dim());
+    canvas.text_right(
+        canvas.width().saturating_sub(1),
+        0,
+        &format!("{} curve   v back", theme.pick("⏎", "Enter")),
+        theme.dim(),
+    );
+    for (y, (n, tag)) in all.iter().enumerate().skip(first).take(rows).enumerate() {
+        let (y, def, shown) = (y as u16 + 2, cx.def().tag(*tag), value::show(cx, *tag));
+        let style = if n == selected { theme.strong() } else { theme.normal() };
+        if n == selected {
+            canvas.text(0, y, theme.pick("▸", ">"), theme.strong());
+        }
+        canvas.text(2, y, &pad(&def.name, name.saturating_sub(1)), style);
+        canvas.text(2 + name, y, &fit(&def.label, label - name - 2), theme.dim());
+        canvas.text_right(value, y, &shown.within(value - label), shown.style);
+        let Some(series) = trends.data.hours.get(tag) else { continue };
+        if let Some((min, _, max)) = series.summary.filter(|_| def.labels.is_empty()) {
+            canvas.text_right(low, y, &cx.snapshot.format(*tag, min), theme.dim());
+            canvas.text_right(high, y, &cx.snapshot.format(*tag, max), theme.dim());
+        }
+        let cells = usize::from(canvas.width().saturating_sub(high + 3)).min(series.buckets.len());
+        canvas.text(high + 2, y, &spark(series, cells, resolution(cx, *tag), theme.glyphs), style);
+    }
+}
+
+/// The last digit of a tag: 0.1 for one decimal.
+fn resolution(cx: &Cx, tag: TagId) -> f64 {
+    10f64.powi(-i32::from(cx.snapshot.decimals[tag.index()]))
+}
+
+/// Is it set by somebody rather than measured? Such pens are drawn as broken lines.
+fn is_set_value(cx: &Cx, tag: TagId) -> bool {
+    let faceplates = cx.def().devices.iter().filter_map(|device| device.faceplate.as_ref());
+    let def = cx.def().tag(tag);
+    faceplates.clone().any(|face| face.sv == tag)
+        || def.writable() && !faceplates.clone().any(|face| face.mv == Some(tag))
+}
+
+/// `98.9 %`; whole only when it is whole.
+fn share(good: f64) -> String {
+    if good >= 1.0 { "100 %".to_owned() } else { format!("{:.1} %", (good * 1_000.0).floor() / 10.0) }
+}
+
+fn number(value: f64) -> String {
+    format!("{}", (value * 1e6).round() / 1e6)
+}
+
+/// `14:02:31`, with the date before it when it is not today.
+fn moment_exact(at: Timestamp, now: Timestamp, zone: &jiff::tz::TimeZone) -> String {
+    let (local, now) = (at.to_zoned(zone.clone()), now.to_zoned(zone.clone()));
+    let form = if local.date() == now.date() { "%H:%M:%S" } else { "%m-%d %H:%M:%S" };
+    local.strftime(form).to_string()
+}
