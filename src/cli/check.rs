@@ -1,30 +1,28 @@
 //! `sightglass check`: every error of a file at once, or the read plan of each line.
 
-use std::io::IsTerminal;
+use std::path::PathBuf;
 
-use crate::{bus::plan, profile};
+use crate::{
+    bus::plan,
+    profile::{self, Search},
+};
 
-use super::{CliError, say};
+use super::{CliError, render, say};
 
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A plant or device file, or the name of a shipped one
-    file: String,
+    /// A plant file, or the name of a shipped plant
+    plant: PathBuf,
 }
 
 /// Checks; on success prints what would be read, and how busy each line would be.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let color = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    let checked = profile::check(&args.file).map_err(|errors| CliError::Profile(errors.render(color)))?;
-    match checked {
-        profile::Checked::Plant(def) => {
-            say(&format!("{}: {} is good", args.file, def.title));
-            for line in plan::describe(&def) {
-                say(&line);
-            }
-        }
-        profile::Checked::Device { title, tags } => say(&format!("{}: {title} is good, {tags} tags", args.file)),
+    let def = profile::load(&args.plant, &Search::usual()).map_err(|errors| CliError::Profile(render(&errors)))?;
+    let (tags, alarms) = (def.tags.len(), def.alarms.len());
+    say(&format!("{}: {} is good: {tags} tags, {alarms} alarms", args.plant.display(), def.title));
+    for line in plan::describe(&def) {
+        say(&line);
     }
     Ok(())
 }

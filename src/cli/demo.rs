@@ -7,7 +7,7 @@ use tokio::sync::oneshot;
 
 use crate::{
     bus::io::{clock::Clock, transport::Connector},
-    history::{Answer, HistoryError, Question, Query},
+    history::{Answer, HistoryError, Question, io::Query},
     plant::{PlantDef, Snapshot, def::Transport},
     report::{Period, ShiftReport, csv},
     sim,
@@ -51,21 +51,23 @@ pub fn main(args: Args) -> Result<(), CliError> {
     runtime()?.block_on(async {
         let clock = Clock::starting_at(Timestamp::now(), args.speed);
         let simulated = sim::io::start_pty(&def, clock).map_err(|error| simulation_error(&args.plant, error))?;
-        plug_into(&mut def, &simulated.path);
+        plug_into(&mut def, simulated.path());
         let def = Arc::new(def);
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
         let history = scratch.history.clone();
         let mut station = station::start(station::Options { def: def.clone(), clock, history, connectors })?;
         let result = if args.headless {
-            say(&format!("{}: simulated on {}", def.title, simulated.path.display()));
+            say(&format!("{}: simulated on {}", def.title, simulated.path().display()));
             headless(station.session("demo"), clock, &args).await
         } else {
             let session = station.session(&paths::operator());
-            let options = ui::io::Options { duration: args.duration.map(|span| clock.real_span(span)), ..Default::default() };
-            ui::io::run(session, options).await.map_err(CliError::from)
+            tokio::select! {
+                result = ui::io::run(session, ui::io::Options::default()) => result.map_err(CliError::from),
+                () = run::over(clock, args.duration) => Ok(()),
+            }
         };
         station.stop().await;
-        simulated.stop().await;
+        drop(simulated);
         result
     })
 }

@@ -9,7 +9,11 @@ mod report;
 mod run;
 mod sim;
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{
+    io::IsTerminal,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use clap::{Parser, Subcommand};
 
@@ -135,7 +139,8 @@ fn runtime() -> Result<tokio::runtime::Runtime, CliError> {
 
 /// A span as people write it: `10m`, `1h 30m`, `500ms`.
 fn span(text: &str) -> Result<std::time::Duration, String> {
-    let span: jiff::SignedDuration = text.parse().map_err(|_| format!("found `{text}`, expected a time like 10m or 8h"))?;
+    let span: jiff::SignedDuration =
+        text.parse().map_err(|_| format!("found `{text}`, expected a time like 10m or 8h"))?;
     std::time::Duration::try_from(span).map_err(|_| format!("found `{text}`, expected a time above zero"))
 }
 
@@ -148,12 +153,19 @@ fn speed(text: &str) -> Result<f64, String> {
 }
 
 fn load(plant: &str, station: &StationArgs) -> Result<crate::plant::PlantDef, CliError> {
-    let def = profile::load(plant).map_err(|errors| CliError::Profile(errors.to_string()))?;
+    let errors = |errors: profile::Errors| CliError::Profile(render(&errors));
+    let def = profile::load(Path::new(plant), &profile::Search::usual()).map_err(errors)?;
     let mut def = std::sync::Arc::unwrap_or_clone(def);
     for port in &station.ports {
         paths::replace_port(&mut def, port).map_err(CliError::Usage)?;
     }
     Ok(def)
+}
+
+/// Errors of a profile, in colour where somebody looks and has not refused it.
+fn render(errors: &profile::Errors) -> String {
+    let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    profile::render(errors, std::io::stderr().is_terminal() && !plain)
 }
 
 #[cfg(test)]

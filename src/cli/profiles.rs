@@ -1,6 +1,6 @@
 //! `sightglass profiles`: lists the known profiles, or prints one.
 
-use crate::profile;
+use crate::profile::{self, Kind, Search};
 
 use super::{CliError, say};
 
@@ -13,12 +13,23 @@ pub struct Args {
 
 /// Lists or prints.
 pub fn main(args: Args) -> Result<(), CliError> {
-    match args.name {
-        Some(name) => say(profile::text_of(&name).map_err(|error| CliError::Profile(error.to_string()))?.trim_end()),
+    let search = Search::usual();
+    let Some(name) = args.name else {
+        for listed in profile::list(&search) {
+            let kind = match listed.kind {
+                Kind::Plant => "plant",
+                Kind::Device => "device",
+            };
+            let from = listed.from.map_or_else(|| "shipped".into(), |path| path.display().to_string());
+            say(&format!("{kind:6}  {:24}  {from}", listed.name));
+        }
+        return Ok(());
+    };
+    match profile::text_of(&name, &search) {
+        Some(text) => say(text.trim_end()),
         None => {
-            for profile in profile::list() {
-                say(&format!("{:8} {:18} {:34} {}", profile.kind, profile.name, profile.title, profile.origin));
-            }
+            let names: Vec<String> = profile::list(&search).into_iter().map(|listed| listed.name).collect();
+            return Err(CliError::Usage(format!("no profile `{name}`, there are {}", names.join(", "))));
         }
     }
     Ok(())

@@ -1,11 +1,11 @@
 //! `sightglass report`: the report of a shift or period from the history as CSV.
 
-use std::{io::Write, path::PathBuf};
+use std::{io::Write, path::PathBuf, sync::Arc};
 
 use crate::{
     history::io::store::Store,
     plant::def::CsvDialect,
-    report::{csv, shift},
+    report::{ask, csv},
 };
 
 use super::{CliError, StationArgs, load, paths, say};
@@ -15,14 +15,14 @@ use super::{CliError, StationArgs, load, paths, say};
 pub struct Args {
     /// A plant file, or the name of a shipped plant
     plant: String,
-    /// Which shift: last, current, NAME or NAME@YYYY-MM-DD
-    #[arg(long, value_name = "SHIFT", conflicts_with_all = ["from", "to"], required_unless_present = "from")]
+    /// Which shift: last, current, NAME or NAME@YYYY-MM-DD [default: last]
+    #[arg(long, value_name = "SHIFT")]
     shift: Option<String>,
     /// From this local time (2026-11-21T06:00) or instant with offset
-    #[arg(long, value_name = "TIME", requires = "to")]
+    #[arg(long, value_name = "TIME")]
     from: Option<String>,
-    /// To this local time or instant
-    #[arg(long, value_name = "TIME", requires = "from")]
+    /// To this local time or instant [default: now]
+    #[arg(long, value_name = "TIME")]
     to: Option<String>,
     /// File to write, `-` for standard output [default: the plant's report folder]
     #[arg(long, value_name = "FILE")]
@@ -42,22 +42,18 @@ pub struct Args {
 
 /// Reads the store and writes the report.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let def = load(&args.plant, &args.station)?;
+    let def = Arc::new(load(&args.plant, &args.station)?);
     let now = jiff::Timestamp::now();
-    let period = match (&args.shift, &args.from, &args.to) {
-        (Some(shift), _, _) => shift::find(&def, shift, now),
-        (None, Some(from), Some(to)) => shift::period(&def, from, to),
-        (None, _, _) => return Err(CliError::Usage("expected --shift, or --from and --to".into())),
-    }
-    .map_err(|error| CliError::Usage(error.to_string()))?;
+    let period = ask::period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref(), now)
+        .map_err(|error| CliError::Usage(error.to_string()))?;
     let history = args.station.history.clone().unwrap_or_else(|| paths::history_of(&def.name));
-    let report = Store::open_read_only(&history)?.report(&def, &period, now)?;
+    let report = Store::open_read_only(&history, &def)?.report(&period, now)?;
     let dialect = dialect(def.report.csv, args.separator.as_deref(), args.bom);
     let bytes = match args.record {
         true => csv::record_csv(&report, &def, dialect),
         false => csv::shift_csv(&report, &def, dialect),
     };
-    let path = args.out.unwrap_or_else(|| def.report.folder.join(csv::file_name(&report.period)));
+    let path = args.out.unwrap_or_else(|| def.report.folder.join(csv::file_name(&def, &report.period, report.until)));
     let failed = |error| CliError::Io { what: format!("cannot write {}", path.display()), error };
     if path.as_os_str() == "-" {
         return std::io::stdout().write_all(&bytes).map_err(failed);

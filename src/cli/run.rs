@@ -65,7 +65,8 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
 fn values(snapshot: &Snapshot) -> Vec<String> {
     let row = |tag: &crate::plant::tag::TagDef| {
         let sample = snapshot.sample(tag.id);
-        let value = snapshot.text(tag.id).map_or_else(|| "----".into(), |text| format!("{text} {}", snapshot.unit(tag.id)));
+        let value =
+            snapshot.text(tag.id).map_or_else(|| "----".into(), |text| format!("{text} {}", snapshot.unit(tag.id)));
         let quality = match sample.quality {
             Quality::Good => "good".to_owned(),
             Quality::Uncertain(cause) => format!("uncertain: {}", cause.words()),
@@ -94,12 +95,7 @@ fn start(def: &Arc<PlantDef>, clock: Clock, history: PathBuf) -> Result<station:
 /// Tells what changes until the time is over, a signal comes, or the station ends; gives the last snapshot.
 pub async fn follow(mut session: Session, clock: Clock, duration: Option<Duration>) -> Arc<Snapshot> {
     let mut before = session.snapshots.borrow_and_update().clone();
-    let end = async {
-        match duration {
-            Some(duration) => clock.sleep(duration).await,
-            None => std::future::pending().await,
-        }
-    };
+    let end = over(clock, duration);
     tokio::pin!(end);
     let told_to_stop = signalled();
     tokio::pin!(told_to_stop);
@@ -121,6 +117,14 @@ pub async fn follow(mut session: Session, clock: Clock, duration: Option<Duratio
         }
     }
     session.snapshots.borrow().clone()
+}
+
+/// Returns when a span of plant time is over; never without one.
+pub async fn over(clock: Clock, duration: Option<Duration>) {
+    match duration {
+        Some(duration) => clock.sleep(duration).await,
+        None => std::future::pending().await,
+    }
 }
 
 /// Returns when the process is asked to end.

@@ -35,17 +35,15 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let failed = |error| simulation_error(&args.plant, error);
         if let Some(address) = args.tcp {
             let serving = sim::io::start_tcp(&def, clock, address).await.map_err(failed)?;
-            say(&format!("{} serves Modbus TCP on {}", def.title, serving.address));
+            say(&format!("{} serves Modbus TCP on {}", def.title, serving.address()));
             run::signalled().await;
-            serving.stop().await;
             return Ok(());
         }
         let serving = sim::io::start_pty(&def, clock).map_err(failed)?;
-        let link = args.link.map(|link| Link::make(link, &serving.path)).transpose()?;
-        let path = link.as_ref().map_or(&serving.path, |link| &link.0);
+        let link = args.link.map(|link| Link::make(link, serving.path())).transpose()?;
+        let path = link.as_ref().map_or(serving.path(), |link| link.0.as_path());
         say(&format!("{} serves Modbus RTU on {}", def.title, path.display()));
         run::signalled().await;
-        serving.stop().await;
         Ok(())
     })
 }

@@ -6,7 +6,6 @@ pub mod io;
 use std::time::Duration;
 
 use jiff::Timestamp;
-use tokio::sync::oneshot;
 
 use crate::{
     plant::{
@@ -15,16 +14,6 @@ use crate::{
     },
     report::{Period, ShiftReport},
 };
-
-/// A question on its way to the history thread, with the place for its answer.
-/// A dropped answer means: the store has gone.
-#[derive(Debug)]
-pub struct Query {
-    /// What is asked.
-    pub question: Question,
-    /// Where the answer goes.
-    pub reply: oneshot::Sender<Result<Answer, HistoryError>>,
-}
 
 /// What can be asked. Spans include `from` and exclude `to`.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 
 use jiff::{Timestamp, tz::TimeZone};
 
-use super::{RecordRow, ShiftReport, TagFigures};
+use super::{Period, RecordRow, ShiftReport, TagFigures};
 use crate::plant::{
     def::{CsvDialect, PlantDef, Priority},
     record::{ActionRecord, AlarmRecord, AlarmStep},
@@ -49,6 +49,22 @@ pub fn record_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> 
     table.row(RECORD_HEADER.iter().map(|word| plain(*word)).collect());
     report.record.iter().for_each(|row| table.row(record_row(row, &def.time_zone, decimals, dialect)));
     table.write(dialect)
+}
+
+/// Where the file of a report goes: `2026-11-21-morning.csv`. One of a running shift says until when, so that it is
+/// never taken for the whole.
+pub fn file_name(def: &PlantDef, period: &Period, until: Timestamp) -> String {
+    let local = |at: Timestamp| at.to_zoned(def.time_zone.clone());
+    let (from, to) = (local(period.from), local(period.to));
+    let word = period.name.split_whitespace().next().unwrap_or("period");
+    let running = until < period.to;
+    let end = if running { local(until).strftime("-until-%H%M").to_string() } else { String::new() };
+    if word == "period" {
+        let to = if running { local(until) } else { to };
+        return format!("{}-to-{}.csv", from.strftime("%Y-%m-%dT%H%M"), to.strftime("%Y-%m-%dT%H%M"));
+    }
+    let plain = |c: char| if c.is_alphanumeric() { c } else { '-' };
+    format!("{}-{}{end}.csv", from.date(), word.chars().map(plain).collect::<String>())
 }
 
 /// Alarms of a priority that were raised.

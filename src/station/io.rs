@@ -112,7 +112,10 @@ impl Station {
                 tracing::error!(%error, "a task of the station ended badly");
             }
         }
-        history.finish().await;
+        // The last records are on their way; the thread ends when it has stored them.
+        if let Err(error) = tokio::task::spawn_blocking(move || history.stop()).await {
+            tracing::error!(%error, "the history did not end well");
+        }
     }
 }
 

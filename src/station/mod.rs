@@ -1,4 +1,3 @@
-<<<<<<< HEAD
 //! The station: links, plant, history, wired together. Polls whether or not anybody looks.
 //!
 //! There is exactly one awaited send (link → plant). Everything else is `try_send` or `watch`, so the plant task never
@@ -10,8 +9,3 @@ pub mod teller;
 pub mod io;
 
 pub use session::Session;
-=======
-//! Assembles the tasks: channels, start and shutdown order; nothing but wiring.
-
-pub mod session;
->>>>>>> ui

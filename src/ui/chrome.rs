@@ -47,7 +47,16 @@ pub fn layout(screen: Rect) -> Layout {
     let small = screen.width < SIZE_MIN.0 || screen.height < SIZE_MIN.1;
     if small {
         let none = Rect { width: 0, height: 0, ..screen };
-        return Layout { header: none, tabs: none, banner: row(0), rule: none, body: none, status: none, footer: none, small };
+        return Layout {
+            header: none,
+            tabs: none,
+            banner: row(0),
+            rule: none,
+            body: none,
+            status: none,
+            footer: none,
+            small,
+        };
     }
     Layout {
         header: row(0),
@@ -87,7 +96,12 @@ fn too_small(cx: &Cx, frame: &mut Frame) {
     let area = frame.area();
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (width, height) = SIZE_MIN;
-    canvas.text(0, 1, &fit(&format!("screen too small: {}x{}, needs {width}x{height}", area.width, area.height), area.width), cx.theme.normal());
+    canvas.text(
+        0,
+        1,
+        &fit(&format!("screen too small: {}x{}, needs {width}x{height}", area.width, area.height), area.width),
+        cx.theme.normal(),
+    );
     canvas.text(0, 2, "q quit", cx.theme.dim());
 }
 
@@ -127,7 +141,9 @@ fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {
 fn line_words(cx: &Cx, line: &LineDef) -> (String, Style) {
     let status = cx.snapshot.line(line.id);
     let counters = &status.counters;
-    let recent = |at: Option<jiff::Timestamp>| at.is_some_and(|at| between(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0));
+    let recent = |at: Option<jiff::Timestamp>| {
+        at.is_some_and(|at| between(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0))
+    };
     match &status.state {
         LineState::Connected => {
             let tx = if recent(counters.last_tx) { "tx" } else { "--" };
@@ -196,10 +212,11 @@ fn alarm_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
 
 /// How many of each priority: `[1]!1 (3)2`.
 fn counts(cx: &Cx) -> String {
-    let all = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low].into_iter().filter_map(|priority| {
-        let count = cx.snapshot.alarms.iter().filter(|alarm| cx.def().alarm(alarm.id).priority == priority).count();
-        (count > 0).then(|| format!("{}×{count}", cx.theme.priority_tag(priority)))
-    });
+    let all =
+        [Priority::Critical, Priority::High, Priority::Medium, Priority::Low].into_iter().filter_map(|priority| {
+            let count = cx.snapshot.alarms.iter().filter(|alarm| cx.def().alarm(alarm.id).priority == priority).count();
+            (count > 0).then(|| format!("{}×{count}", cx.theme.priority_tag(priority)))
+        });
     all.collect::<Vec<_>>().join(" ")
 }
 
@@ -244,7 +261,12 @@ pub fn order_words(cx: &Cx, command: &Command, old: Option<f64>) -> String {
     match command {
         Command::Write { tag, value } => {
             let old = old.map_or("?".to_owned(), |old| cx.snapshot.format(*tag, old));
-            let text = format!("{} {old} → {} {}", cx.def().tag(*tag).name, cx.snapshot.format(*tag, *value), cx.snapshot.unit(*tag));
+            let text = format!(
+                "{} {old} → {} {}",
+                cx.def().tag(*tag).name,
+                cx.snapshot.format(*tag, *value),
+                cx.snapshot.unit(*tag)
+            );
             text.trim_end().to_owned()
         }
         Command::Acknowledge(alarm) => format!("acknowledge {} {}", subject(cx, *alarm), cx.def().alarm(*alarm).text),
@@ -257,7 +279,11 @@ pub fn order_words(cx: &Cx, command: &Command, old: Option<f64>) -> String {
 
 /// As many keys as fit; those of every tab stand at the right end.
 fn footer(cx: &Cx, canvas: &mut Canvas, hints: &[Hint], global: bool) {
-    let tail: Vec<Hint> = if global { keys::hints(keys::GLOBAL).into_iter().filter(|hint| !hint.label.is_empty()).collect() } else { Vec::new() };
+    let tail: Vec<Hint> = if global {
+        keys::hints(keys::GLOBAL).into_iter().filter(|hint| !hint.label.is_empty()).collect()
+    } else {
+        Vec::new()
+    };
     let room = |hint: &Hint| width(&hint.key) + 1 + width(&hint.label) + 2;
     let mut end = canvas.width().saturating_sub(1 + tail.iter().map(room).sum::<u16>());
     let mut x = 1;

@@ -40,10 +40,28 @@ impl Fixture {
         let def = plant();
         let at = now() - SignedDuration::from_millis(400);
         let samples = def.tags.iter().map(|tag| Sample::good(start(&tag.name), at)).collect();
-        let counters = LineCounters { requests: 812, ok: 812, utilisation: 0.62, last_tx: Some(at), last_rx: Some(at), ..LineCounters::default() };
-        let answering = DeviceStatus { state: DeviceState::Answering, reply: Some(Duration::from_millis(12)), ok: 406, ..DeviceStatus::default() };
+        let counters = LineCounters {
+            requests: 812,
+            ok: 812,
+            utilisation: 0.62,
+            last_tx: Some(at),
+            last_rx: Some(at),
+            ..LineCounters::default()
+        };
+        let answering = DeviceStatus {
+            state: DeviceState::Answering,
+            reply: Some(Duration::from_millis(12)),
+            ok: 406,
+            ..DeviceStatus::default()
+        };
         let devices = vec![answering; def.devices.len()];
-        Fixture { def, samples, alarms: Vec::new(), line: LineStatus { state: LineState::Connected, counters }, devices }
+        Fixture {
+            def,
+            samples,
+            alarms: Vec::new(),
+            line: LineStatus { state: LineState::Connected, counters },
+            devices,
+        }
     }
 
     /// PV above its limit and unacknowledged, a late PLC acknowledged, a low level returned.
@@ -52,9 +70,27 @@ impl Fixture {
         plant.set("TIC-1.PV", 72.4);
         let ago = |seconds| now() - SignedDuration::from_secs(seconds);
         plant.alarms = vec![
-            ActiveAlarm { id: AlarmId(0), state: AlarmState::Unacknowledged, raised_at: ago(41), returned_at: None, value: Some(72.1) },
-            ActiveAlarm { id: AlarmId(3), state: AlarmState::Acknowledged, raised_at: ago(269), returned_at: None, value: None },
-            ActiveAlarm { id: AlarmId(2), state: AlarmState::Returned, raised_at: ago(2_540), returned_at: Some(ago(2_400)), value: Some(3.9) },
+            ActiveAlarm {
+                id: AlarmId(0),
+                state: AlarmState::Unacknowledged,
+                raised_at: ago(41),
+                returned_at: None,
+                value: Some(72.1),
+            },
+            ActiveAlarm {
+                id: AlarmId(3),
+                state: AlarmState::Acknowledged,
+                raised_at: ago(269),
+                returned_at: None,
+                value: None,
+            },
+            ActiveAlarm {
+                id: AlarmId(2),
+                state: AlarmState::Returned,
+                raised_at: ago(2_540),
+                returned_at: Some(ago(2_400)),
+                value: Some(3.9),
+            },
         ];
         plant
     }
@@ -67,13 +103,23 @@ impl Fixture {
         let at = now() - SignedDuration::from_secs(12);
         for (tag, sample) in plant.def.tags.iter().zip(&mut plant.samples) {
             sample.at = at;
-            *sample = if tag.device == DeviceId(0) { sample.doubted(Cause::NotConnected) } else { Sample::bad(Cause::NotConnected, at) };
+            *sample = if tag.device == DeviceId(0) {
+                sample.doubted(Cause::NotConnected)
+            } else {
+                Sample::bad(Cause::NotConnected, at)
+            };
         }
         for device in &mut plant.devices {
             device.state = DeviceState::Down { since: at };
             device.last_fault = Some((at, Fault::NotConnected));
         }
-        plant.alarms = vec![ActiveAlarm { id: AlarmId(3), state: AlarmState::Unacknowledged, raised_at: at, returned_at: None, value: None }];
+        plant.alarms = vec![ActiveAlarm {
+            id: AlarmId(3),
+            state: AlarmState::Unacknowledged,
+            raised_at: at,
+            returned_at: None,
+            value: None,
+        }];
         plant
     }
 
@@ -133,7 +179,16 @@ fn start(tag: &str) -> f64 {
     }
 }
 
-struct Row(&'static str, &'static str, &'static str, (f64, f64), u8, Access, &'static [(i64, &'static str)], &'static str);
+struct Row(
+    &'static str,
+    &'static str,
+    &'static str,
+    (f64, f64),
+    u8,
+    Access,
+    &'static [(i64, &'static str)],
+    &'static str,
+);
 
 fn plant() -> PlantDef {
     use Access::{Read, ReadWrite};
@@ -145,7 +200,16 @@ fn plant() -> PlantDef {
         Row("SV", "set value", "°C", (0.0, 120.0), 1, ReadWrite, NONE, "Operation"),
         Row("MV", "output", "%", (0.0, 100.0), 1, Read, NONE, "Operation"),
         Row("RUN", "run / standby", "", (0.0, 1.0), 0, ReadWrite, &[(0, "RUN"), (1, "STANDBY")], "Operation"),
-        Row("AT", "auto-tuning", "", (0.0, 2.0), 0, ReadWrite, &[(0, "off"), (1, "normal"), (2, "low PV")], "Operation"),
+        Row(
+            "AT",
+            "auto-tuning",
+            "",
+            (0.0, 2.0),
+            0,
+            ReadWrite,
+            &[(0, "off"), (1, "normal"), (2, "low PV")],
+            "Operation",
+        ),
         Row("P", "proportional", "%", (0.0, 999.9), 1, ReadWrite, NONE, "PID"),
         Row("I", "integral", "s", (0.0, 3200.0), 0, ReadWrite, NONE, "PID"),
         Row("D", "derivative", "s", (0.0, 999.9), 1, ReadWrite, NONE, "PID"),
@@ -162,12 +226,24 @@ fn plant() -> PlantDef {
         Row("M-1", "agitator", "", (0.0, 1.0), 0, Read, RUN, "Outputs"),
         Row("SV-1", "valve TK-1 to TK-3", "", (0.0, 1.0), 0, Read, OPEN, "Outputs"),
         Row("SV-2", "valve TK-2 to TK-1", "", (0.0, 1.0), 0, Read, OPEN, "Outputs"),
-        Row("STEP", "sequence step", "", (0.0, 6.0), 0, Read, &[(0, "IDLE"), (1, "FILL"), (2, "HEAT"), (3, "HOLD"), (4, "DRAIN"), (5, "COOL"), (6, "RETURN")], "Sequence"),
+        Row(
+            "STEP",
+            "sequence step",
+            "",
+            (0.0, 6.0),
+            0,
+            Read,
+            &[(0, "IDLE"), (1, "FILL"), (2, "HEAT"), (3, "HOLD"), (4, "DRAIN"), (5, "COOL"), (6, "RETURN")],
+            "Sequence",
+        ),
         Row("LEFT", "seconds left in step", "s", (0.0, 9999.0), 0, Read, NONE, "Sequence"),
         Row("RUN", "sequence", "", (0.0, 1.0), 0, ReadWrite, RUN, "Sequence"),
         Row("AUTO", "mode", "", (0.0, 1.0), 0, ReadWrite, &[(0, "MANUAL"), (1, "AUTO")], "Sequence"),
     ];
-    let rows = tic.into_iter().map(|row| (DeviceId(0), "TIC-1", row)).chain(plc.into_iter().map(|row| (DeviceId(1), "PLC-1", row)));
+    let rows = tic
+        .into_iter()
+        .map(|row| (DeviceId(0), "TIC-1", row))
+        .chain(plc.into_iter().map(|row| (DeviceId(1), "PLC-1", row)));
     let tags: Vec<TagDef> = rows.enumerate().map(|(n, (device, name, row))| tag(n as u16, device, name, row)).collect();
     let id = |name: &str| tags.iter().find(|tag| tag.name == name).map(|tag| tag.id).expect("a tag of the fixture");
     let faceplate = Faceplate {
@@ -187,7 +263,13 @@ fn plant() -> PlantDef {
     };
     let alarms = vec![
         alarm(0, Subject::Tag(id("TIC-1.PV")), limit(Level::High, 72.0), Priority::High, "temperature high"),
-        alarm(1, Subject::Tag(id("TIC-1.PV")), limit(Level::HighHigh, 90.0), Priority::Critical, "temperature very high"),
+        alarm(
+            1,
+            Subject::Tag(id("TIC-1.PV")),
+            limit(Level::HighHigh, 90.0),
+            Priority::Critical,
+            "temperature very high",
+        ),
         alarm(2, Subject::Tag(id("PLC-1.LT-1")), limit(Level::Low, 4.0), Priority::Low, "level low"),
         alarm(3, Subject::Device(DeviceId(1)), Condition::NotAnswering, Priority::Medium, "not answering"),
     ];
@@ -243,7 +325,12 @@ fn plant() -> PlantDef {
     }
 }
 
-fn tag(n: u16, device: DeviceId, of: &str, Row(short, label, unit, (min, max), decimals, access, labels, group): Row) -> TagDef {
+fn tag(
+    n: u16,
+    device: DeviceId,
+    of: &str,
+    Row(short, label, unit, (min, max), decimals, access, labels, group): Row,
+) -> TagDef {
     TagDef {
         id: TagId(n),
         device,
@@ -276,7 +363,14 @@ fn tag(n: u16, device: DeviceId, of: &str, Row(short, label, unit, (min, max), d
     }
 }
 
-fn device(n: u16, name: &str, title: &str, model: &str, faceplate: Option<Faceplate>, actions: Vec<ActionDef>) -> DeviceDef {
+fn device(
+    n: u16,
+    name: &str,
+    title: &str,
+    model: &str,
+    faceplate: Option<Faceplate>,
+    actions: Vec<ActionDef>,
+) -> DeviceDef {
     DeviceDef {
         id: DeviceId(n),
         name: name.to_owned(),
@@ -285,7 +379,13 @@ fn device(n: u16, name: &str, title: &str, model: &str, faceplate: Option<Facepl
         unit: n as u8 + 1,
         profile: "fixture".to_owned(),
         model: model.to_owned(),
-        limits: Limits { read_words_max: 60, read_bits_max: 2_000, write_words_max: 60, gap_words_max: 8, alignment: 1 },
+        limits: Limits {
+            read_words_max: 60,
+            read_bits_max: 2_000,
+            write_words_max: 60,
+            gap_words_max: 8,
+            alignment: 1,
+        },
         gap: Duration::ZERO,
         write_gap: Duration::ZERO,
         faceplate,
@@ -339,9 +439,19 @@ fn mimic(id: &impl Fn(&str) -> TagId) -> MimicDef {
             },
             tank(place(34, 13, 12, 5), "TK-3 hot", id("PLC-1.TK-3")),
             MimicItem::Pipe { points: vec![(14, 4), (20, 4), (20, 5)], flow: vec![id("PLC-1.SV-2")] },
-            MimicItem::Valve { place: place(16, 4, 1, 1), label: "SV-2".to_owned(), tag: id("PLC-1.SV-2"), vertical: false },
+            MimicItem::Valve {
+                place: place(16, 4, 1, 1),
+                label: "SV-2".to_owned(),
+                tag: id("PLC-1.SV-2"),
+                vertical: false,
+            },
             MimicItem::Pipe { points: vec![(32, 12), (40, 12), (40, 12)], flow: vec![id("PLC-1.SV-1")] },
-            MimicItem::Valve { place: place(35, 12, 1, 1), label: "SV-1".to_owned(), tag: id("PLC-1.SV-1"), vertical: false },
+            MimicItem::Valve {
+                place: place(35, 12, 1, 1),
+                label: "SV-1".to_owned(),
+                tag: id("PLC-1.SV-1"),
+                vertical: false,
+            },
             MimicItem::Pipe { points: vec![(33, 16), (4, 16), (4, 6)], flow: vec![id("PLC-1.P-1")] },
             MimicItem::Pump { place: place(18, 16, 5, 1), label: "P-1".to_owned(), tag: id("PLC-1.P-1") },
             MimicItem::Value { place: place(34, 8, 16, 1), label: "flow".to_owned(), tag: id("PLC-1.FLOW") },

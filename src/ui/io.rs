@@ -19,7 +19,7 @@ use tokio::{
 
 use super::{AskId, Effect, Model, Msg, theme::Theme, update, view};
 use crate::{
-    history::{HistoryError, Query, Question},
+    history::{HistoryError, Question, io::Query},
     plant::command::Order,
     station::session::Session,
 };
@@ -62,12 +62,15 @@ pub enum UiError {
     StationGone,
 }
 
+/// An error unless there is a terminal to draw on: to be asked before anything is started.
+pub fn require_terminal() -> Result<(), UiError> {
+    if Screen::exists() { Ok(()) } else { Err(UiError::NotATerminal) }
+}
+
 /// Runs a terminal until its operator leaves it, a signal ends it, or the terminal or the station goes.
 /// The terminal is restored before this returns.
 pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
-    if !Screen::exists() {
-        return Err(UiError::NotATerminal);
-    }
+    require_terminal()?;
     let (outbox, inbox) = mpsc::channel(INBOX);
     let mut session = session;
     let snapshot = session.snapshots.borrow_and_update().clone();

@@ -151,7 +151,12 @@ fn without_colour_every_state_and_quality_looks_different() {
             let mut model = model(&fixture, theme);
             model.tabs.shown = Tab::Alarms;
             let buffer = draw(&mut model, 80, 24);
-            assert!(buffer.content.iter().all(|cell| cell.fg == ratatui::style::Color::Reset && cell.bg == ratatui::style::Color::Reset));
+            assert!(
+                buffer
+                    .content
+                    .iter()
+                    .all(|cell| cell.fg == ratatui::style::Color::Reset && cell.bg == ratatui::style::Color::Reset)
+            );
             looks.insert(text(&buffer));
             states += 1;
         }
@@ -289,7 +294,8 @@ fn the_outcome_of_an_order_is_told_until_it_is_dismissed() {
         let effects = type_keys(&mut model, "s60⏎");
         let Some(Effect::Order(id, command)) = effects.first().cloned() else { panic!("{effects:?}") };
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
-        snapshot.orders = vec![OrderStatus { id, by: Arc::from("tech1"), command, at: snapshot.at, old: Some(70.0), outcome }];
+        snapshot.orders =
+            vec![OrderStatus { id, by: Arc::from("tech1"), command, at: snapshot.at, old: Some(70.0), outcome }];
         update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
         // The station forgets old orders; the terminal still knows its own.
         update(&mut model, Msg::Snapshot(fixture.snapshot()));
@@ -323,7 +329,10 @@ fn a_silent_station_is_believed_no_more() {
     assert!(screen(&mut model, 80, 24).contains("64.2 °C"));
     update(&mut model, Msg::Tick { silent: Duration::from_secs(7) });
     let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("STATION SILENT 00:07") && shown.contains("64.2? °C 7s") && !shown.contains("64.2 °C"), "{shown}");
+    assert!(
+        shown.contains("STATION SILENT 00:07") && shown.contains("64.2? °C 7s") && !shown.contains("64.2 °C"),
+        "{shown}"
+    );
     assert!(!shown.contains('█'), "no picture without a good value:\n{shown}");
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     assert!(screen(&mut model, 80, 24).contains("64.2 °C"));
@@ -345,7 +354,9 @@ fn trouble_of_the_store_is_in_the_header() {
 
 #[test]
 fn only_unacknowledged_alarms_flash() {
-    for (state, flashes) in [(AlarmState::Unacknowledged, true), (AlarmState::Acknowledged, false), (AlarmState::Returned, false)] {
+    for (state, flashes) in
+        [(AlarmState::Unacknowledged, true), (AlarmState::Acknowledged, false), (AlarmState::Returned, false)]
+    {
         let mut fixture = Fixture::alarm();
         fixture.alarms.truncate(1);
         fixture.alarms[0].state = state;
@@ -361,7 +372,9 @@ fn only_unacknowledged_alarms_flash() {
 #[test]
 fn the_journal_is_asked_only_while_it_is_shown() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
-    let asks = |effects: Vec<Effect>| effects.iter().filter(|effect| matches!(effect, Effect::Ask(id, _) if id.tab == Tab::Alarms)).count();
+    let asks = |effects: Vec<Effect>| {
+        effects.iter().filter(|effect| matches!(effect, Effect::Ask(id, _) if id.tab == Tab::Alarms)).count()
+    };
     let tick = || Msg::Tick { silent: Duration::ZERO };
     assert_eq!(asks(type_keys(&mut model, "3")), 0);
     assert_eq!(asks(type_keys(&mut model, "j")), 2, "alarms and actions");
@@ -412,7 +425,9 @@ fn the_next_frame_leaves_nothing_of_the_last_one() {
         send(&mut living, &last, &next);
         let mut fresh = vt100::Parser::new(3, 24, 0);
         send(&mut fresh, &empty, &next);
-        let rows = |parser: &vt100::Parser| parser.screen().rows(0, 24).map(|row| row.trim_end().to_owned()).collect::<Vec<_>>();
+        let rows = |parser: &vt100::Parser| {
+            parser.screen().rows(0, 24).map(|row| row.trim_end().to_owned()).collect::<Vec<_>>()
+        };
         assert_eq!(rows(&living), rows(&fresh), "frame {seed}");
         last = next;
     }

@@ -1,5 +1,19 @@
 //! The edge of the history: DuckDB, its files and its thread.
 
+use tokio::sync::oneshot;
+
+use super::{Answer, HistoryError, Question};
+
+/// A question on its way to the history thread, with the place for its answer.
+/// A dropped answer means: the store has gone.
+#[derive(Debug)]
+pub struct Query {
+    /// What is asked.
+    pub question: Question,
+    /// Where the answer goes.
+    pub reply: oneshot::Sender<Result<Answer, HistoryError>>,
+}
+
 pub mod sql;
 pub mod files;
 pub mod store;

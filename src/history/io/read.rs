@@ -73,7 +73,8 @@ impl Store {
         tags.iter().map(curve).collect()
     }
 
-    fn report(&self, period: &Period, now: Timestamp) -> Result<ShiftReport, HistoryError> {
+    /// The report of a period, up to `now`.
+    pub fn report(&self, period: &Period, now: Timestamp) -> Result<ShiftReport, HistoryError> {
         let (from, until) = (period.from, period.to.min(now));
         check_span(from, until)?;
         let active = self.whole_list(&sql::active_at(), params![utc(from), ROWS_MAX + 1], alarm)?;

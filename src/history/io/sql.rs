@@ -33,6 +33,10 @@ pub const ADD_TAG: &str = "INSERT INTO tag VALUES (?, ?, ?)";
 pub const EXTENT: &str = "SELECT min(a), max(z) FROM (
     SELECT min(utc) AS a, max(utc) AS z FROM sample UNION ALL SELECT min(utc), max(utc) FROM alarm_journal)";
 
+/// Rows of all tables.
+pub const COUNT_ROWS: &str = "SELECT (SELECT count(*) FROM sample) + (SELECT count(*) FROM alarm_journal)
+    + (SELECT count(*) FROM operator_action)";
+
 /// Ends every curve: a row (time, no value, quality) for each tag whose last row since an instant has a value.
 pub const END_CURVES: &str = "INSERT INTO sample
     SELECT ?, tag, NULL, ? FROM (SELECT tag, arg_max(quality, rowid) AS last FROM sample WHERE utc >= ? GROUP BY tag)

@@ -141,6 +141,11 @@ impl Store {
         files::size(&self.path)
     }
 
+    /// Rows of all tables: samples, steps of alarms, deeds of operators.
+    pub fn count_rows(&self) -> Result<u64, HistoryError> {
+        self.db.query_row(sql::COUNT_ROWS, [], |row| row.get(0)).map_err(engine)
+    }
+
     /// The first and last instant stored.
     pub fn extent(&self) -> Result<Option<(Timestamp, Timestamp)>, HistoryError> {
         let row = |row: &duckdb::Row| Ok((row.get::<_, Option<i64>>(0)?, row.get::<_, Option<i64>>(1)?));

@@ -7,10 +7,11 @@ use tokio::{
     time::MissedTickBehavior,
 };
 
+use super::Query;
 use super::writer::Writer;
 use crate::{
     bus::io::clock::Clock,
-    history::{HistoryError, Query},
+    history::HistoryError,
     plant::{
         def::PlantDef,
         record::{AlarmRecord, Record},

@@ -96,6 +96,7 @@ impl Writer {
                 if !self.pending.is_empty() {
                     self.status.rows += self.pending.len() as u64;
                     self.status.committed_at = Some(now);
+                    tracing::debug!(rows = self.pending.len(), total = self.status.rows, "committed");
                     self.pending.clear();
                 }
                 self.failures = 0;

@@ -3,9 +3,11 @@
 mod owner;
 mod pty;
 mod rtu;
+mod serving;
 mod tcp;
 
 pub use owner::RigHandle;
 pub use pty::{Pty, open_pty};
 pub use rtu::serve_rtu;
+pub use serving::{Serving, SimError, start_pty, start_tcp};
 pub use tcp::serve_tcp;

@@ -253,7 +253,7 @@ mod tests {
         master.write_all(&request[3..]).await.expect("the line takes bytes");
         assert_eq!(gather(&mut master).await.0.len(), 7);
         master.write_all(&[0xFF, 0x00, 0x55]).await.expect("the line takes bytes");
-        assert_eq!(gather(&mut master).await.0, []);
+        assert_eq!(gather(&mut master).await.0, Vec::<u8>::new());
         assert_eq!(ask(&mut master, READ_STEP).await.0.len(), 7);
         assert_eq!(ask(&mut master, &[1, 0x2B, 14, 1, 0]).await.0, with_crc(&[1, 0xAB, 1]));
     }
@@ -262,7 +262,7 @@ mod tests {
     async fn faults_look_as_they_do_on_a_line() {
         let (mut master, rig) = line(9600, Parity::None, 1.0);
         rig.set_fault(1, Fault::Silent).await;
-        assert_eq!(ask(&mut master, READ_TEN).await.0, []);
+        assert_eq!(ask(&mut master, READ_TEN).await.0, Vec::<u8>::new());
         assert_eq!(ask(&mut master, READ_STEP).await.0.len(), 7);
         rig.set_fault(1, Fault::Truncated).await;
         assert_eq!(ask(&mut master, READ_TEN).await.0.len(), 12);
@@ -284,7 +284,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_broadcast_and_a_stranger_are_not_answered() {
         let (mut master, _rig) = line(9600, Parity::None, 1.0);
-        assert_eq!(ask(&mut master, &[0, 6, 0x03, 0xEA, 0, 1]).await.0, []);
-        assert_eq!(ask(&mut master, &[9, 3, 0, 0, 0, 1]).await.0, []);
+        assert_eq!(ask(&mut master, &[0, 6, 0x03, 0xEA, 0, 1]).await.0, Vec::<u8>::new());
+        assert_eq!(ask(&mut master, &[9, 3, 0, 0, 0, 1]).await.0, Vec::<u8>::new());
     }
 }

@@ -51,7 +51,12 @@ pub const KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::PageDown), label: "", help: "ten parameters down", action: Action::Move(10) },
     Key { chord: code(KeyCode::Home), label: "", help: "first parameter", action: Action::Move(-9_999) },
     Key { chord: code(KeyCode::End), label: "", help: "last parameter", action: Action::Move(9_999) },
-    Key { chord: code(KeyCode::Enter), label: "edit", help: "change the parameter, or look at a read-only one", action: Action::Edit },
+    Key {
+        chord: code(KeyCode::Enter),
+        label: "edit",
+        help: "change the parameter, or look at a read-only one",
+        action: Action::Edit,
+    },
     Key { chord: char('u'), label: "refresh", help: "read all parameters of the device now", action: Action::Refresh },
     Key { chord: char('f'), label: "actions", help: "actions of the device (save to memory)", action: Action::Actions },
     Key { chord: char('T'), label: "tune", help: "auto-tuning, if the device has it", action: Action::Tune },
@@ -98,11 +103,16 @@ impl Controllers {
             }
             Action::Edit => match self.selected(cx) {
                 Some(tag) if tag.writable() => write(Some(tag.id)),
-                Some(tag) => Faceplate::new(tag.label.clone(), vec![tag.id]).map(|plate| Act::Open(Modal::Faceplate(plate))).into_iter().collect(),
+                Some(tag) => Faceplate::new(tag.label.clone(), vec![tag.id])
+                    .map(|plate| Act::Open(Modal::Faceplate(plate)))
+                    .into_iter()
+                    .collect(),
                 None => Vec::new(),
             },
             Action::Refresh => vec![Act::Order(Command::Refresh(self.device))],
-            Action::Actions => Choice::actions(cx, self.device).map(|choice| Act::Open(Modal::Choice(choice))).into_iter().collect(),
+            Action::Actions => {
+                Choice::actions(cx, self.device).map(|choice| Act::Open(Modal::Choice(choice))).into_iter().collect()
+            }
             Action::Tune => write(device.faceplate.as_ref().and_then(|plate| plate.tune)),
             Action::Run => write(device.faceplate.as_ref().and_then(|plate| plate.run)),
         }
@@ -125,7 +135,12 @@ impl Controllers {
         let (width, height) = (canvas.width(), canvas.height());
         self.table(cx, &mut canvas.part(0, 2, width, height.saturating_sub(3)));
         if let Some(text) = last_write(cx, self.device) {
-            canvas.text(1, height.saturating_sub(1), &fit(&text.0, width.saturating_sub(2)), if text.1 { cx.theme.trouble() } else { cx.theme.dim() });
+            canvas.text(
+                1,
+                height.saturating_sub(1),
+                &fit(&text.0, width.saturating_sub(2)),
+                if text.1 { cx.theme.trouble() } else { cx.theme.dim() },
+            );
         }
     }
 
@@ -142,7 +157,12 @@ impl Controllers {
         let count = cx.def().devices.len();
         let x = canvas.text(1, 0, &format!("‹ {} ›", device.name), theme.focus());
         let line = &cx.def().line(device.line).name;
-        let x = canvas.text(x + 2, 0, &format!("{}  {}  unit {}  {line}", device.model, device.title, device.unit), theme.normal());
+        let x = canvas.text(
+            x + 2,
+            0,
+            &format!("{}  {}  unit {}  {line}", device.model, device.title, device.unit),
+            theme.normal(),
+        );
         let (mark, style) = match cx.snapshot.device(device.id).state {
             DeviceState::Answering => ("✓", theme.normal()),
             DeviceState::Unknown => ("?", theme.dim()),
@@ -182,7 +202,12 @@ impl Controllers {
         }
         if rows.len() > first + room {
             let end = canvas.width().saturating_sub(1);
-            canvas.text_right(end, 0, &format!("{} more {}", rows.len() - first - room, theme.pick("▼", "below")), theme.normal());
+            canvas.text_right(
+                end,
+                0,
+                &format!("{} more {}", rows.len() - first - room, theme.pick("▼", "below")),
+                theme.normal(),
+            );
         }
     }
 }
@@ -201,12 +226,15 @@ fn parameter(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagD
     if tag.access == Access::Write {
         shown.text = "–".to_owned();
     }
-    let old = matches!(tag.poll, Poll::Every(_)) && cx.age(tag.id).as_secs() < 60 && cx.snapshot.sample(tag.id).quality.is_good();
+    let old = matches!(tag.poll, Poll::Every(_))
+        && cx.age(tag.id).as_secs() < 60
+        && cx.snapshot.sample(tag.id).quality.is_good();
     let read = if old { String::new() } else { age(cx.age(tag.id)) };
     let range = range_words(cx, tag.id);
     let range = range.trim_start_matches("range ").trim_end_matches(&shown.unit).trim_end().to_owned();
     let pen = if tag.writable() { theme.pick("✎", "w") } else { " " };
-    let meaning = if shown.note.is_empty() || cx.snapshot.sample(tag.id).value.is_some() { &tag.meaning } else { &shown.note };
+    let meaning =
+        if shown.note.is_empty() || cx.snapshot.sample(tag.id).value.is_some() { &tag.meaning } else { &shown.note };
     let name = format!("{} {}", pad(&tag.short, columns.short), tag.label);
     let row = columns.row([pen, &name, &shown.text, &shown.unit, &range, &read, meaning]);
     canvas.text(1, y, &row, if selected { theme.focus() } else { theme.normal() });
@@ -218,7 +246,14 @@ fn parameter(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagD
 /// `PV 72.4 °C │ SV 70.0 °C │ MV 12.0 % │ PID │ AT off │ RUN`, for devices that have these.
 fn faceplate_row(cx: &Cx, device: &DeviceDef, canvas: &mut Canvas) {
     let Some(plate) = &device.faceplate else { return };
-    let parts = [("PV", Some(plate.pv)), ("SV", Some(plate.sv)), ("MV", plate.mv), ("", plate.mode), ("AT", plate.tune), ("", plate.run)];
+    let parts = [
+        ("PV", Some(plate.pv)),
+        ("SV", Some(plate.sv)),
+        ("MV", plate.mv),
+        ("", plate.mode),
+        ("AT", plate.tune),
+        ("", plate.run),
+    ];
     let mut x = 1;
     for (name, tag) in parts.into_iter().filter_map(|(name, tag)| Some((name, tag?))) {
         if x > 1 {

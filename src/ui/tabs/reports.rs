@@ -16,7 +16,10 @@ use super::{Tab, errand::Errand};
 use crate::{
     history::{Answer, HistoryError, Question},
     plant::{def::CsvDialect, snapshot::Snapshot},
-    report::{Period, ShiftReport, csv::shift_csv},
+    report::{
+        Period, ShiftReport,
+        csv::{file_name, shift_csv},
+    },
     ui::{
         Act, Cx, Effect,
         keys::{Key, char, code},
@@ -248,7 +251,7 @@ impl Reports {
     }
 
     fn path(&self, cx: &Cx, report: &ShiftReport) -> PathBuf {
-        cx.def().report.folder.join(period::file_name(cx.def(), &report.period, report.until))
+        cx.def().report.folder.join(file_name(cx.def(), &report.period, report.until))
     }
 }
 

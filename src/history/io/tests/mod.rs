@@ -13,7 +13,7 @@ use jiff::Timestamp;
 use super::{files::beside, sql, store::Store, thread, writer::Writer};
 use crate::{
     bus::io::clock::Clock,
-    history::{Answer, HistoryError, Query, Question, Series},
+    history::{Answer, HistoryError, Question, Series, io::Query},
     plant::{
         def::{PlantDef, Priority, TagId},
         record::{ActionRecord, AlarmRecord, AlarmStep, Record},

@@ -52,22 +52,6 @@ pub fn typed(def: &PlantDef, text: &str, now: Timestamp) -> Result<Period, Strin
     Ok(period)
 }
 
-/// Where the file of a report goes: `2026-11-21-morning.csv`. One of a running shift says until when, so that it is
-/// never taken for the whole.
-pub fn file_name(def: &PlantDef, period: &Period, until: Timestamp) -> String {
-    let local = |at: Timestamp| at.to_zoned(def.time_zone.clone());
-    let (from, to) = (local(period.from), local(period.to));
-    let word = period.name.split_whitespace().next().unwrap_or("period");
-    let running = until < period.to;
-    let end = if running { local(until).strftime("-until-%H%M").to_string() } else { String::new() };
-    if word == "period" {
-        let to = if running { local(until) } else { to };
-        return format!("{}-to-{}.csv", from.strftime("%Y-%m-%dT%H%M"), to.strftime("%Y-%m-%dT%H%M"));
-    }
-    let plain = |c: char| if c.is_alphanumeric() { c } else { '-' };
-    format!("{}-{}{end}.csv", from.date(), word.chars().map(plain).collect::<String>())
-}
-
 /// Cuts `from-to` in two; the dashes of a date are no cut.
 fn split(text: &str) -> (&str, Option<&str>) {
     for cut in ["–", "..", " - ", " to "] {
@@ -131,6 +115,7 @@ fn midnight(def: &PlantDef, date: civil::Date) -> Option<Timestamp> {
 
 #[cfg(test)]
 mod tests {
+    use crate::report::csv::file_name;
     use jiff::tz::TimeZone;
 
     use super::*;

@@ -79,9 +79,13 @@ fn bar(cx: &Cx, canvas: &mut Canvas, y: u16, plate: &Faceplate) {
 
 /// The limits of a tag's alarms.
 fn limits(cx: &Cx, tag: TagId) -> impl Iterator<Item = f64> {
-    cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag)).filter_map(|alarm| match alarm.condition {
-        Condition::Limit { level: Level::HighHigh | Level::High | Level::Low | Level::LowLow, limit, .. } => Some(limit),
-        Condition::Deviation { .. } | Condition::State { .. } | Condition::NotAnswering => None,
+    cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag)).filter_map(|alarm| {
+        match alarm.condition {
+            Condition::Limit { level: Level::HighHigh | Level::High | Level::Low | Level::LowLow, limit, .. } => {
+                Some(limit)
+            }
+            Condition::Deviation { .. } | Condition::State { .. } | Condition::NotAnswering => None,
+        }
     })
 }
 
@@ -108,7 +112,9 @@ impl Sequence<'_> {
         let x = canvas.text(x + 2, 0, &shown.text, if shown.note.is_empty() { theme.strong() } else { shown.style });
         if let Some(left) = self.remaining {
             let text = match cx.snapshot.sample(left).trusted() {
-                Some(seconds) if seconds >= 0.0 => format!("{} left", running(std::time::Duration::from_secs_f64(seconds.min(1e7)))),
+                Some(seconds) if seconds >= 0.0 => {
+                    format!("{} left", running(std::time::Duration::from_secs_f64(seconds.min(1e7))))
+                }
                 Some(_) | None => format!("{} left", value::show(cx, left).text),
             };
             let end = at.width;
@@ -125,7 +131,8 @@ impl Sequence<'_> {
         let (mut x, mut y) = (0, 0);
         for (number, name) in &cx.def().tag(self.step).labels {
             let present = now == Some(*number as f64);
-            let text = if present { format!("{}{name}", theme.pick("▸", ">")) } else { format!(" {}", name.to_lowercase()) };
+            let text =
+                if present { format!("{}{name}", theme.pick("▸", ">")) } else { format!(" {}", name.to_lowercase()) };
             let text = fit(&text, canvas.width());
             if x + width(&text) > canvas.width() {
                 (x, y) = (0, y + 1);

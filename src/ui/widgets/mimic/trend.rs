@@ -16,11 +16,23 @@ use crate::{
 };
 
 /// Draws the curve of a tag, a gap where nothing good is known.
-pub fn view(cx: &Cx, canvas: &mut Canvas, at: Box, tag: TagId, window: Duration, series: Option<&Series>, selected: bool) {
+pub fn view(
+    cx: &Cx,
+    canvas: &mut Canvas,
+    at: Box,
+    tag: TagId,
+    window: Duration,
+    series: Option<&Series>,
+    selected: bool,
+) {
     let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
     let theme = cx.theme;
     let minutes = window.as_secs() / 60;
-    let span = if minutes.is_multiple_of(60) && minutes > 0 { format!("{} h", minutes / 60) } else { format!("{minutes} min") };
+    let span = if minutes.is_multiple_of(60) && minutes > 0 {
+        format!("{} h", minutes / 60)
+    } else {
+        format!("{minutes} min")
+    };
     let x = canvas.text(0, 0, &fit(&cx.def().tag(tag).name, at.width), label_style(cx, selected));
     canvas.text(x + 1, 0, &format!("last {span}"), theme.dim());
     let Some((series, (low, _, high))) = series.and_then(|series| Some((series, series.summary?))) else {

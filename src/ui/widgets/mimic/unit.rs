@@ -13,7 +13,15 @@ use crate::{
 };
 
 /// A valve at a spot: bow tie, name above (beside, in a vertical pipe) and its state in a word.
-pub fn valve(cx: &Cx, canvas: &mut Canvas, (x, y): (u16, u16), label: &str, tag: TagId, vertical: bool, selected: bool) {
+pub fn valve(
+    cx: &Cx,
+    canvas: &mut Canvas,
+    (x, y): (u16, u16),
+    label: &str,
+    tag: TagId,
+    vertical: bool,
+    selected: bool,
+) {
     let theme = cx.theme;
     let on = value::is_on(cx, tag);
     let word = word(cx, tag, ("OPEN", "SHUT"));
