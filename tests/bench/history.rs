@@ -13,6 +13,7 @@ use sightglass::{
         sample::Sample,
         tag::{Access, Confidence, Decimals, Kind, Order, Point, Poll, Table, TagDef},
     },
+    report::Period,
 };
 
 /// Tags of the tank: temperatures and outputs that change, set values and switches that rarely do.
@@ -113,6 +114,9 @@ fn history(c: &mut Criterion) {
         let question = Question::Series { tags: vec![TagId(0)], from, to: end, buckets: 160 };
         c.bench_function(&format!("curve of a {name}"), |b| b.iter(|| black_box(store.answer(&question, end))));
     }
+    let from = Timestamp::from_second(WEEK - 8 * 3600).expect("in range");
+    let question = Question::Report { period: Period { name: "period".into(), from, to: end } };
+    c.bench_function("report of eight hours", |b| b.iter(|| black_box(store.answer(&question, end))));
     let mut at = WEEK;
     c.bench_function("commit of one second", |b| {
         b.iter(|| {

@@ -1,6 +1,6 @@
 //! The store: one DuckDB file, opened, guarded, appended to. Plain and synchronous; one thread owns it.
 
-use std::{collections::HashMap, path::Path, path::PathBuf, sync::Arc, time::Duration};
+use std::{cell::Cell, collections::HashMap, path::Path, path::PathBuf, sync::Arc, time::Duration};
 
 use duckdb::{
     AccessMode, Config, Connection, params,
@@ -27,6 +27,8 @@ pub struct Store {
     pub(super) db: Connection,
     pub(super) def: Arc<PlantDef>,
     path: PathBuf,
+    /// The first and last instant stored, kept because reading them scans the whole file.
+    extent: Cell<Option<(Timestamp, Timestamp)>>,
     /// The stored number of each tag, by `TagId`; `None` for a tag that the file does not know (only when read-only).
     pub(super) ids: Vec<Option<u16>>,
     /// Where the records end, if nobody is writing any more.
@@ -91,7 +93,7 @@ impl Store {
             Failure::Damaged(why) => HistoryError::Engine(why),
         };
         let db = connect(path, AccessMode::ReadOnly).map_err(|error| failed(error.to_string()))?;
-        let mut store = Store { db, def: Arc::clone(def), path: path.to_owned(), ids: Vec::new(), ended: None };
+        let mut store = Store::around(db, path, def);
         let version = store.version().map_err(|_| HistoryError::Engine("the file is not a history".into()))?;
         if version as usize != sql::MIGRATIONS.len() {
             let words = format!("schema version {version}, this program reads {}", sql::MIGRATIONS.len());
@@ -100,7 +102,8 @@ impl Store {
         let known = store.dictionary().map_err(engine)?;
         let id = |name: &str, unit: &str| known.get(&(name.to_owned(), unit.to_owned())).copied();
         store.ids = def.tags.iter().map(|tag| id(&tag.name, &tag.unit)).collect();
-        store.ended = store.extent()?.and_then(|(_, last)| after(last));
+        store.read_extent().map_err(engine)?;
+        store.ended = store.extent().and_then(|(_, last)| after(last));
         Ok(store)
     }
 
@@ -110,22 +113,30 @@ impl Store {
             self.append_samples(records)?;
             self.append_alarms(records)?;
             self.append_actions(records)
-        })
+        })?;
+        records.iter().for_each(|record| match record {
+            Record::Sample(_, sample) => self.extend(sample.at),
+            Record::Alarm(alarm) => self.extend(alarm.at),
+            Record::Action(_) => {}
+        });
+        Ok(())
     }
 
     /// Ends every curve at an instant: from here on the station is off.
     pub fn end_curves(&self, at: Timestamp) -> Result<(), HistoryError> {
-        let Some((_, last)) = self.extent()? else { return Ok(()) };
+        let Some((_, last)) = self.extent() else { return Ok(()) };
         // A tag without a row for so long has no value any more anyway.
         let since = last.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN);
         let off = Quality::Bad(Cause::StationOff).code();
-        self.db.execute(sql::END_CURVES, params![utc(at), off, utc(since)]).map(drop).map_err(engine)
+        self.db.execute(sql::END_CURVES, params![utc(at), off, utc(since)]).map_err(engine)?;
+        self.extend(at);
+        Ok(())
     }
 
     /// Ends the curves that a station left behind when it died, one second after the last row of all. To be called
     /// before the first append of a new station, so that no curve or mean runs through the time in between.
     pub fn end_curves_left_behind(&self, now: Timestamp) -> Result<(), HistoryError> {
-        let Some((_, last)) = self.extent()? else { return Ok(()) };
+        let Some((_, last)) = self.extent() else { return Ok(()) };
         let Some(end) = after(last) else { return Ok(()) };
         // Not after the first rows to come; if the clock went back, those rows lie elsewhere anyway.
         self.end_curves(if now > last { end.min(now) } else { end })
@@ -147,16 +158,31 @@ impl Store {
     }
 
     /// The first and last instant stored.
-    pub fn extent(&self) -> Result<Option<(Timestamp, Timestamp)>, HistoryError> {
+    pub fn extent(&self) -> Option<(Timestamp, Timestamp)> {
+        self.extent.get()
+    }
+
+    fn around(db: Connection, path: &Path, def: &Arc<PlantDef>) -> Store {
+        let (def, path) = (Arc::clone(def), path.to_owned());
+        Store { db, def, path, extent: Cell::new(None), ids: Vec::new(), ended: None }
+    }
+
+    fn read_extent(&self) -> duckdb::Result<()> {
         let row = |row: &duckdb::Row| Ok((row.get::<_, Option<i64>>(0)?, row.get::<_, Option<i64>>(1)?));
-        let (first, last) = self.db.query_row(sql::EXTENT, [], row).map_err(engine)?;
-        Ok(first.zip(last).and_then(|(first, last)| Some((instant(first)?, instant(last)?))))
+        let (first, last) = self.db.query_row(sql::EXTENT, [], row)?;
+        self.extent.set(first.zip(last).and_then(|(first, last)| Some((instant(first)?, instant(last)?))));
+        Ok(())
+    }
+
+    fn extend(&self, at: Timestamp) {
+        let (first, last) = self.extent.get().unwrap_or((at, at));
+        self.extent.set(Some((first.min(at), last.max(at))));
     }
 
     fn open_file(path: &Path, def: &Arc<PlantDef>) -> Result<Store, Failure> {
         let failed = |error: duckdb::Error| files::diagnose(path, &error.to_string());
         let db = connect(path, AccessMode::ReadWrite).map_err(failed)?;
-        let mut store = Store { db, def: Arc::clone(def), path: path.to_owned(), ids: Vec::new(), ended: None };
+        let mut store = Store::around(db, path, def);
         store.migrate().map_err(failed)?;
         let newest = sql::MIGRATIONS.len() as u32;
         let version = store.version().map_err(failed)?;
@@ -170,7 +196,7 @@ impl Store {
             return Err(Failure::Obstacle(HistoryError::Engine(words.into())));
         }
         // Read what every start reads, so that damage shows while the files can still be set aside.
-        store.extent().map_err(|error| files::diagnose(path, &error.to_string()))?;
+        store.read_extent().map_err(failed)?;
         Ok(store)
     }
 
