@@ -167,18 +167,16 @@ fn banner(cx: &Cx, canvas: &mut Canvas) {
     };
     let def = cx.def().alarm(alarm.id);
     let waiting = alarm.state.needs_acknowledgement();
-    let counts = counts(cx);
-    let tail = if waiting { format!("{counts}    a ack ") } else { format!("{counts} ") };
-    let room = canvas.width().saturating_sub(width(&tail) + 1);
     let mark = cx.theme.alarm(def.priority, alarm.state, cx.flash());
-    let x = canvas.text(1, 0, cx.theme.priority_mark(def.priority), mark);
-    let text = alarm_words(cx, alarm);
-    let style = cx.theme.alarm(def.priority, alarm.state, false);
-    let end = canvas.text(x + 1, 0, &fit(&text, room.saturating_sub(x + 1)), style);
-    if end + width(&tail) < canvas.width() {
-        let end = canvas.width();
-        canvas.text_right(end, 0, &tail, cx.theme.normal());
-    }
+    let x = canvas.text(1, 0, cx.theme.priority_mark(def.priority), mark) + 1;
+    let (text, room) = (alarm_words(cx, alarm), canvas.width());
+    let ack = if waiting { "a ack " } else { "" };
+    // The alarm itself comes first; the counts and the key only where there is room left.
+    let tails = [format!("{}   {ack}", counts(cx)), ack.to_owned(), String::new()];
+    let fits = |tail: &&String| x + width(&text) + 2 + width(tail) <= room;
+    let tail = tails.iter().find(fits).map_or("", String::as_str);
+    canvas.text(x, 0, &fit(&text, room.saturating_sub(x)), cx.theme.alarm(def.priority, alarm.state, false));
+    canvas.text_right(room, 0, tail, cx.theme.normal());
 }
 
 /// `TIC-1.PV temperature high  72.4 °C  UNACK 00:41`.
@@ -200,7 +198,7 @@ fn alarm_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
 fn counts(cx: &Cx) -> String {
     let all = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low].into_iter().filter_map(|priority| {
         let count = cx.snapshot.alarms.iter().filter(|alarm| cx.def().alarm(alarm.id).priority == priority).count();
-        (count > 0).then(|| format!("{}×{count}", cx.theme.priority_mark(priority).trim()))
+        (count > 0).then(|| format!("{}×{count}", cx.theme.priority_tag(priority)))
     });
     all.collect::<Vec<_>>().join(" ")
 }
@@ -263,15 +261,23 @@ fn footer(cx: &Cx, canvas: &mut Canvas, hints: &[Hint], global: bool) {
     let room = |hint: &Hint| width(&hint.key) + 1 + width(&hint.label) + 2;
     let mut end = canvas.width().saturating_sub(1 + tail.iter().map(room).sum::<u16>());
     let mut x = 1;
-    for hint in hints.iter().filter(|hint| !hint.label.is_empty()) {
-        if x + room(hint) > end {
+    for (n, hint) in hints.iter().enumerate().filter(|(_, hint)| !hint.label.is_empty()) {
+        let hint = n.checked_sub(1).and_then(|before| pair(&hints[before], hint)).unwrap_or_else(|| hint.clone());
+        if x + room(&hint) > end {
             break;
         }
-        x = key(cx, canvas, x, hint);
+        x = key(cx, canvas, x, &hint);
     }
     for hint in &tail {
         end = key(cx, canvas, end, hint);
     }
+}
+
+/// Two arrow keys that belong together as one: `↑↓ select`.
+fn pair(before: &Hint, hint: &Hint) -> Option<Hint> {
+    let arrow = |hint: &Hint| matches!(hint.key.as_str(), "←" | "→" | "↑" | "↓");
+    let together = before.label.is_empty() && arrow(before) && arrow(hint);
+    together.then(|| Hint { key: format!("{}{}", before.key, hint.key), ..hint.clone() })
 }
 
 fn key(cx: &Cx, canvas: &mut Canvas, x: u16, hint: &Hint) -> u16 {

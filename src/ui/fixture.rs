@@ -353,8 +353,8 @@ fn mimic(id: &impl Fn(&str) -> TagId) -> MimicDef {
                 states: vec![id("PLC-1.AUTO"), id("PLC-1.RUN")],
             },
             MimicItem::Controller { place: place(53, 6, 26, 6), device: DeviceId(0) },
-            MimicItem::Text { place: place(53, 13, 26, 1), text: "last hour".to_owned() },
-            MimicItem::Trend { place: place(53, 14, 26, 3), tag: id("TIC-1.PV"), window: Duration::from_secs(3_600) },
+            MimicItem::Text { place: place(34, 6, 16, 1), text: "to the drain".to_owned() },
+            MimicItem::Trend { place: place(53, 13, 26, 4), tag: id("TIC-1.PV"), window: Duration::from_secs(3_600) },
         ],
         commands: vec![
             MimicCommand { key: 's', label: "set SV".to_owned(), tag: id("TIC-1.SV"), value: None },

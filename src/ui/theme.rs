@@ -178,6 +178,13 @@ impl Theme {
             (Priority::Low, _) => " 4  ",
         }
     }
+    /// The mark of a priority beside a value, where a bare number could be read as one.
+    pub fn priority_tag(&self, priority: Priority) -> &'static str {
+        match priority {
+            Priority::Low => self.pick("·4·", ".4."),
+            Priority::Critical | Priority::High | Priority::Medium => self.priority_mark(priority).trim_end(),
+        }
+    }
     /// Picks the text for terminals with Unicode or without.
     pub fn pick<T>(&self, unicode: T, ascii: T) -> T {
         if self.glyphs == Glyphs::Ascii { ascii } else { unicode }

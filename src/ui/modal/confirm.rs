@@ -8,7 +8,7 @@ use crate::{
     plant::{
         command::Command,
         def::TagId,
-        tag::{Confidence, Table, TagDef},
+        tag::{Access, Confidence, Table, TagDef},
     },
     ui::{
         Cx, keys,
@@ -113,33 +113,39 @@ impl Confirm {
             rows.push((wire_words(cx.def().tag(*tag)), cx.theme.dim()));
         }
         rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));
-        let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(34);
+        let keys = format!("⏎ {}   Esc leave it as it is", self.verb());
+        let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&keys));
         let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + 2));
         for (y, (text, style)) in rows.iter().enumerate() {
             canvas.text(0, y as u16, text, *style);
         }
         let last = canvas.height().saturating_sub(1);
-        canvas.text(0, last, &format!("⏎ {}   Esc leave it as it is", self.verb()), cx.theme.strong());
+        canvas.text(0, last, &keys, cx.theme.strong());
     }
 }
 
 /// `old 60.0 °C → new 70.0 °C`; an unknown old value is said to be unknown.
 pub(super) fn old_and_new(cx: &Cx, tag: TagId, new: f64) -> String {
-    let old = value::show(cx, tag).whole();
-    let unit = cx.snapshot.unit(tag);
-    let new = cx.snapshot.format(tag, new);
-    format!("old {old}  →  new {new}{}{unit}", if unit.is_empty() { "" } else { " " })
+    let new = format!("{} {}", cx.snapshot.format(tag, new), cx.snapshot.unit(tag));
+    match cx.def().tag(tag).access {
+        Access::Write => format!("writes {}", new.trim_end()),
+        Access::Read | Access::ReadWrite => format!("old {}  →  new {}", value::show(cx, tag).whole(), new.trim_end()),
+    }
 }
 
-/// Where a write goes, in both forms that manuals use: `41007 / 0x03EE, FC 06 / 0x06`.
+/// Where a write goes (a read, for a tag that is read-only), in both forms that manuals use: `41007 / 0x03EE, FC 06 / 0x06`.
 pub fn wire_words(def: &TagDef) -> String {
-    let fc = def.write_fc.unwrap_or(match (def.point.table, def.point.len()) {
+    let fc = if !def.writable() { def.point.table.read_fc() } else { write_fc(def) };
+    let address = def.point.address;
+    format!("{} / 0x{address:04X}, FC {fc:02} / 0x{fc:02X}", def.point.table.modicon(address))
+}
+
+fn write_fc(def: &TagDef) -> u8 {
+    def.write_fc.unwrap_or(match (def.point.table, def.point.len()) {
         (Table::Coil | Table::Discrete, _) => 5,
         (Table::Input | Table::Holding, 1) => 6,
         (Table::Input | Table::Holding, _) => 16,
-    });
-    let address = def.point.address;
-    format!("{} / 0x{address:04X}, FC {fc:02} / 0x{fc:02X}", def.point.table.modicon(address))
+    })
 }
 
 /// What the profile wants said before a write.

@@ -80,6 +80,10 @@ impl Entry {
 
 /// The permitted range in words.
 pub fn range_words(cx: &Cx, tag: TagId) -> String {
+    let labels = &cx.def().tag(tag).labels;
+    if !labels.is_empty() {
+        return format!("range one of {}", labels.len());
+    }
     match cx.snapshot.range(tag) {
         Some((min, max)) => {
             let unit = cx.snapshot.unit(tag);

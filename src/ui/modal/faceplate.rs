@@ -113,7 +113,7 @@ fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)>
         ("quality", quality, theme.quality(sample.quality)),
         ("read", format!("{read} ({poll})"), theme.normal()),
         ("range", range_words(cx, tag).trim_start_matches("range ").to_owned(), theme.normal()),
-        ("access", format!("{access}  {}  {}", wire_words(def), def.confidence.word()), theme.normal()),
+        ("access", format!("{access}  {}  map row {}", wire_words(def), def.confidence.word()), theme.normal()),
         ("device", format!("{} {} unit {} on {}  {}", device.name, device.model, device.unit, cx.def().line(device.line).name, device_words(cx, def.device)), theme.normal()),
     ];
     for alarm in cx.snapshot.alarms_of(tag) {

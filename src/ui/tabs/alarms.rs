@@ -18,7 +18,7 @@ use crate::{
         keys::{Key, char, code},
         modal::{Faceplate, Modal, confirm::subject, faceplate::device_words},
         widgets::{
-            text::{Canvas, between, fit, moment, pad, pad_left, running, wrap},
+            text::{self, Canvas, between, fit, moment, pad, pad_left, running, wrap},
             value,
         },
     },
@@ -190,13 +190,13 @@ impl Alarms {
         );
         let x = canvas.text(1, 0, "Alarms  ", theme.strong());
         canvas.text(x, 0, &summary, theme.normal());
-        let columns = Columns::of(canvas.width());
+        let columns = Columns::of(cx, canvas.width());
         canvas.text(1, 1, &columns.row(["", "time", "tag", "what", "value", "state", "for"]), theme.dim());
         if alarms.is_empty() {
             canvas.text(6, 3, "Nothing is wrong. j shows what was.", theme.normal());
             return;
         }
-        let guide = canvas.height().saturating_sub(4).min(7);
+        let guide = canvas.height().saturating_sub(4).min(6);
         let room = usize::from(canvas.height().saturating_sub(2 + guide)).max(1);
         let place = self.place(cx);
         let first = place.saturating_sub(room - 1);
@@ -224,12 +224,12 @@ impl Alarms {
         let length = canvas.width();
         canvas.run(0, 0, length, '─', theme.dim());
         let condition = condition_words(cx, alarm.id);
-        let title = format!(" {} {} {} {condition} ", theme.priority_mark(def.priority).trim(), subject(cx, alarm.id), def.text);
+        let title = format!(" {} {} {} {condition} ", theme.priority_tag(def.priority), subject(cx, alarm.id), def.text);
         canvas.text(1, 0, &fit(&title, length.saturating_sub(2)), theme.strong());
         let guidance = &def.guidance;
-        let respond = guidance.respond.map(|span| format!("   respond within {} min", span.as_secs().div_ceil(60))).unwrap_or_default();
+        let respond = guidance.respond.map(|span| format!(" (respond within {} min)", span.as_secs().div_ceil(60))).unwrap_or_default();
         let now = match def.subject {
-            Subject::Tag(tag) => format!("{}   raised at {}", value::show(cx, tag).whole(), raised_value(cx, alarm)),
+            Subject::Tag(tag) => format!("{}, raised at {}", value::show(cx, tag).whole(), raised_value(cx, alarm)),
             Subject::Device(device) => device_words(cx, device),
         };
         let rows: [(&str, &str); 4] =
@@ -264,7 +264,7 @@ impl Journal {
         let width = canvas.width();
         for (y, (at, text, style)) in rows.iter().skip(self.first).enumerate() {
             let y = y as u16 + 1;
-            let x = canvas.text(1, y, &pad(&moment(*at, cx.now, &cx.def().time_zone), 13), theme.dim());
+            let x = canvas.text(1, y, &pad(&moment(*at, cx.now, &cx.def().time_zone), 10), theme.dim());
             canvas.text(x, y, &fit(text, width.saturating_sub(x + 1)), *style);
         }
     }
@@ -299,14 +299,15 @@ struct Columns {
 }
 
 impl Columns {
-    fn of(width: u16) -> Columns {
-        let free = width.saturating_sub(1 + 5 + 12 + 12 + 9 + 10);
-        let tag = (free * 2 / 5).min(20);
-        Columns { tag, what: free.saturating_sub(tag).min(44) }
+    fn of(cx: &Cx, width: u16) -> Columns {
+        let free = width.saturating_sub(1 + 5 + 10 + 11 + 9 + 10);
+        let longest = cx.snapshot.alarms.iter().map(|alarm| text::width(&subject(cx, alarm.id))).max().unwrap_or(8);
+        let tag = longest.min(free / 2);
+        Columns { tag, what: free.saturating_sub(tag + 1).min(44) }
     }
     fn row(&self, [mark, time, tag, what, value, state, since]: [&str; 7]) -> String {
-        let (tag, what) = (pad(tag, self.tag.saturating_sub(1)), pad(what, self.what.saturating_sub(1)));
-        format!("{} {} {tag} {what} {} {} {}", pad(mark, 4), pad(time, 11), pad_left(value, 11), pad(state, 8), pad_left(since, 9))
+        let (tag, what) = (pad(tag, self.tag), pad(what, self.what));
+        format!("{} {} {tag} {what} {} {} {}", pad(mark, 4), pad(time, 9), pad_left(value, 10), pad(state, 8), pad_left(since, 8))
     }
 }
 

@@ -8,7 +8,7 @@ use crate::{
         command::Command,
         def::{DeviceDef, DeviceId, TagId},
         snapshot::{DeviceState, Snapshot},
-        tag::{Poll, TagDef},
+        tag::{Access, Poll, TagDef},
     },
     ui::{
         Act, Cx,
@@ -197,17 +197,20 @@ fn in_groups<'a>(cx: &Cx<'a>, device: DeviceId) -> Vec<&'a TagDef> {
 
 fn parameter(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagDef, selected: bool) {
     let theme = cx.theme;
-    let shown = value::show(cx, tag.id);
+    let mut shown = value::show(cx, tag.id);
+    if tag.access == Access::Write {
+        shown.text = "–".to_owned();
+    }
     let old = matches!(tag.poll, Poll::Every(_)) && cx.age(tag.id).as_secs() < 60 && cx.snapshot.sample(tag.id).quality.is_good();
     let read = if old { String::new() } else { age(cx.age(tag.id)) };
-    let range = if tag.labels.is_empty() { range_words(cx, tag.id) } else { format!("one of {}", tag.labels.len()) };
+    let range = range_words(cx, tag.id);
     let range = range.trim_start_matches("range ").trim_end_matches(&shown.unit).trim_end().to_owned();
     let pen = if tag.writable() { theme.pick("✎", "w") } else { " " };
     let meaning = if shown.note.is_empty() || cx.snapshot.sample(tag.id).value.is_some() { &tag.meaning } else { &shown.note };
     let name = format!("{} {}", pad(&tag.short, columns.short), tag.label);
     let row = columns.row([pen, &name, &shown.text, &shown.unit, &range, &read, meaning]);
     canvas.text(1, y, &row, if selected { theme.focus() } else { theme.normal() });
-    if !selected && !cx.snapshot.sample(tag.id).quality.is_good() {
+    if !selected && tag.access != Access::Write && !cx.snapshot.sample(tag.id).quality.is_good() {
         canvas.text(1 + columns.value_at(), y, &pad_left(&shown.text, Columns::VALUE), shown.style);
     }
 }

@@ -34,12 +34,12 @@ pub enum Action {
     Motion,
 }
 
-/// Keys of this tab; the plant file adds its own.
+/// Keys of this tab; the plant file adds its own, and [`Mimic::hints`] tells the four arrows as one.
 pub const KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Left), label: "", help: "select the item to the left", action: Action::Move(-1, 0) },
-    Key { chord: code(KeyCode::Right), label: "", help: "select the item to the right", action: Action::Move(1, 0) },
-    Key { chord: code(KeyCode::Up), label: "", help: "select the item above", action: Action::Move(0, -1) },
-    Key { chord: code(KeyCode::Down), label: "", help: "select the item below", action: Action::Move(0, 1) },
+    Key { chord: code(KeyCode::Left), label: "", help: "", action: Action::Move(-1, 0) },
+    Key { chord: code(KeyCode::Right), label: "", help: "", action: Action::Move(1, 0) },
+    Key { chord: code(KeyCode::Up), label: "", help: "", action: Action::Move(0, -1) },
+    Key { chord: code(KeyCode::Down), label: "", help: "", action: Action::Move(0, 1) },
     Key { chord: code(KeyCode::Enter), label: "open", help: "faceplate of the selected item", action: Action::Open },
     Key { chord: char('M'), label: "", help: "motion of agitators and arrows off and on", action: Action::Motion },
 ];

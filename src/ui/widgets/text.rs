@@ -201,11 +201,11 @@ pub fn clock(at: Timestamp, zone: &TimeZone) -> String {
     at.to_zoned(zone.clone()).strftime("%H:%M:%S").to_string()
 }
 
-/// Local date and time, without the date when it is the same day as `now`.
+/// Local time in at most nine columns: `14:02:31` today, `Fri 14:02` in the last six days, else `11-02 14h`.
 pub fn moment(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
-    let (at, now) = (at.to_zoned(zone.clone()), now.to_zoned(zone.clone()));
-    let form = if at.date() == now.date() { "%H:%M:%S" } else { "%m-%d %H:%M" };
-    at.strftime(form).to_string()
+    let (days, at) = (between(at, now).as_secs() / 86_400, at.to_zoned(zone.clone()));
+    let today = at.date() == now.to_zoned(zone.clone()).date();
+    at.strftime(if today { "%H:%M:%S" } else if days < 6 { "%a %H:%M" } else { "%m-%d %Hh" }).to_string()
 }
 
 #[cfg(test)]

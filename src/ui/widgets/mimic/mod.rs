@@ -112,7 +112,7 @@ pub fn place(item: &MimicItem) -> Option<Place> {
 pub(super) fn alarm_mark(cx: &Cx, tag: TagId) -> Option<(&'static str, Style)> {
     let alarm = cx.snapshot.alarms_of(tag).next()?;
     let priority = cx.def().alarm(alarm.id).priority;
-    Some((cx.theme.priority_mark(priority).trim(), cx.theme.alarm(priority, alarm.state, cx.flash())))
+    Some((cx.theme.priority_tag(priority), cx.theme.alarm(priority, alarm.state, cx.flash())))
 }
 
 /// Writes a value with unit, doubt and alarm mark; returns the column after it. `within` is cut to the room.

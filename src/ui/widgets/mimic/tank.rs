@@ -33,7 +33,8 @@ impl Tank<'_> {
     pub fn view(&self, cx: &Cx, canvas: &mut Canvas, at: Box, selected: bool, motion: bool) {
         let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
         canvas.frame("", cx.theme.dim());
-        let label = fit(&format!(" {} ", self.label), at.width.saturating_sub(2));
+        let room = at.width.saturating_sub(2);
+        let label = if width(self.label) + 2 <= room { format!(" {} ", self.label) } else { fit(self.label, room) };
         canvas.text(1, 0, &label, label_style(cx, selected));
         let (columns, rows) = (at.width.saturating_sub(2), at.height.saturating_sub(2));
         let eighths = self.level.and_then(|level| eighths(cx, level, rows));
@@ -61,7 +62,9 @@ impl Tank<'_> {
             let shown = value::show(cx, tag);
             let mark = alarm_mark(cx, tag).map_or(0, |(mark, _)| width(mark) + 1);
             let length = width(&shown.within(room.saturating_sub(mark))) + mark;
-            put_value(cx, canvas, room.saturating_sub(length) / 2, y as u16, tag, room);
+            let x = room.saturating_sub(length) / 2;
+            canvas.run(x.saturating_sub(1), y as u16, length + 2, ' ', cx.theme.normal());
+            put_value(cx, canvas, x, y as u16, tag, room);
         }
     }
 
@@ -72,9 +75,10 @@ impl Tank<'_> {
         let mut y = canvas.height();
         if let Some(heater) = self.heater {
             y = y.saturating_sub(1);
+            canvas.run(0, y, 15, ' ', theme.normal());
             match value::is_on(cx, heater) {
                 Some(true) => {
-                    let x = canvas.text(1, y, theme.pick("≋≋≋ ", "### "), theme.running());
+                    let x = canvas.text(1, y, theme.pick("≋≋≋ ", "^^^ "), theme.running());
                     put_value(cx, canvas, x, y, heater, 11);
                 }
                 Some(false) => {
@@ -96,7 +100,9 @@ impl Tank<'_> {
                 (Some(false), _) => (theme.pick("╶─┼─╴", "-|-"), theme.dim()),
                 (None, _) => (" ? ", theme.trouble()),
             };
-            let x = canvas.text(centre.saturating_sub(5), y, picture, style);
+            let x = centre.saturating_sub(5);
+            canvas.run(x.saturating_sub(1), y, width(picture) + width(&shown.text) + 3, ' ', theme.normal());
+            let x = canvas.text(x, y, picture, style);
             canvas.text(x + 1, y, &shown.text, if on == Some(true) { theme.running() } else { shown.style });
         }
     }
