@@ -13,7 +13,7 @@ use jiff::{Timestamp, tz::TimeZone};
 
 use crate::history::HistoryError;
 
-/// Opens that never ended before the files are set aside.
+/// Opens that never ended before the log is set aside, as the part that is replayed; after one more, the file too.
 pub const FAILED_OPENS_MAX: u32 = 2;
 
 /// A file beside the database that exists only while it is being opened. Replaying a damaged log can abort the whole
@@ -49,11 +49,6 @@ impl Opening {
         Ok(opening)
     }
 
-    /// Starts counting anew, after the files were set aside.
-    pub fn forget(&mut self) {
-        self.count(1);
-    }
-
     /// A full disk must not keep the store closed either: a count that cannot be written is not kept.
     fn count(&mut self, count: u32) {
         let written =
@@ -71,19 +66,40 @@ impl Drop for Opening {
     }
 }
 
-/// Moves a database and its log aside under the time of day; returns the new path. Nothing is ever deleted.
-pub fn set_aside(db: &Path, now: Timestamp) -> Result<PathBuf, HistoryError> {
+/// The logs that DuckDB keeps beside a database: the ordinary one and those of a checkpoint under way.
+const LOGS: [&str; 3] = [".wal", ".wal.checkpoint", ".wal.recovery"];
+
+/// What is set aside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The log alone: the file stays, as it was at its last checkpoint.
+    Log,
+    /// The file and its log.
+    Everything,
+}
+
+/// Is there a log beside the database?
+pub fn has_log(db: &Path) -> bool {
+    LOGS.iter().any(|log| beside(db, log).exists())
+}
+
+/// Moves a database and its log, or the log alone, aside under the time of day; returns the new path of the database
+/// (the log's is the same with `.wal`). Nothing is ever deleted.
+pub fn set_aside(db: &Path, part: Part, now: Timestamp) -> Result<PathBuf, HistoryError> {
     let stamp = now.to_zoned(TimeZone::UTC).strftime("%Y%m%dT%H%M%SZ").to_string();
-    let free = |path: &PathBuf| !path.exists() && !beside(path, ".wal").exists();
     let target = (1..)
         .map(|n| match n {
             1 => beside(db, &format!(".damaged-{stamp}")),
             n => beside(db, &format!(".damaged-{stamp}-{n}")),
         })
-        .find(free)
+        .find(|path| !path.exists() && !has_log(path))
         .expect("some number is free");
-    // The log first: a database without its log is merely older, a log that meets a new database would be replayed.
-    for suffix in [".wal", ""] {
+    // The logs first: a database without its log is merely older, a log that meets a new database would be replayed.
+    let file = match part {
+        Part::Log => None,
+        Part::Everything => Some(""),
+    };
+    for suffix in LOGS.into_iter().chain(file) {
         let (from, to) = (beside(db, suffix), beside(&target, suffix));
         if from.exists() {
             fs::rename(&from, &to).map_err(|error| HistoryError::Engine(format!("{}: {error}", from.display())))?;
@@ -94,7 +110,8 @@ pub fn set_aside(db: &Path, now: Timestamp) -> Result<PathBuf, HistoryError> {
 
 /// Bytes of the database and its log.
 pub fn size(db: &Path) -> u64 {
-    [db.to_owned(), beside(db, ".wal")].iter().filter_map(|path| fs::metadata(path).ok()).map(|meta| meta.len()).sum()
+    let bytes = |suffix| fs::metadata(beside(db, suffix)).map_or(0, |meta| meta.len());
+    LOGS.into_iter().chain([""]).map(bytes).sum()
 }
 
 /// The path with something appended: DuckDB itself names its log so.
@@ -196,7 +213,7 @@ mod tests {
         for text in ["one", "two"] {
             fs::write(&db, text).unwrap();
             fs::write(beside(&db, ".wal"), text).unwrap();
-            targets.push(set_aside(&db, at("2026-11-21T06:00:00Z")).unwrap());
+            targets.push(set_aside(&db, Part::Everything, at("2026-11-21T06:00:00Z")).unwrap());
         }
         assert!(targets[0].ends_with("x.duckdb.damaged-20261121T060000Z"));
         for (target, text) in targets.iter().zip(["one", "two"]) {

@@ -82,7 +82,7 @@ impl Store {
         let actions = self.whole_list(&sql::actions_oldest(), span, action)?;
         let mut tags = Vec::new();
         for tag in self.reported_tags() {
-            let label = self.label(tag, until)?;
+            let label = self.label(tag, from, until)?;
             let in_alarm = figures::time_in_alarm(active.iter().chain(&alarms), &label.tag, from, until);
             let samples = self.samples(tag, from, until)?;
             tags.push(sound(samples, |samples| figures::figures(label, samples, from, until, in_alarm))?);
@@ -103,18 +103,18 @@ impl Store {
     }
 
     /// Name, unit and decimals of a tag as they stood at the end of a period; the device may choose the last two.
-    fn label(&self, tag: TagId, until: Timestamp) -> Result<Label, HistoryError> {
+    fn label(&self, tag: TagId, from: Timestamp, until: Timestamp) -> Result<Label, HistoryError> {
         let def = self.def.tag(tag);
         let decimals = match def.decimals {
             Decimals::Fixed(decimals) => decimals,
-            Decimals::From(tag) => match self.latest_good(tag, until)? {
+            Decimals::From(tag) => match self.latest_good(tag, from, until)? {
                 Some(decimals) if (0.0..=9.0).contains(&decimals) => decimals as u8,
                 Some(_) | None => DECIMALS_UNKNOWN,
             },
         };
         let chosen = match &def.unit_from {
-            Some((from, units)) => {
-                let value = self.latest_good(*from, until)?;
+            Some((chooser, units)) => {
+                let value = self.latest_good(*chooser, from, until)?;
                 units.iter().find(|(number, _)| value == Some(*number as f64)).map(|(_, unit)| unit.clone())
             }
             None => None,
@@ -137,7 +137,7 @@ impl Store {
         let (sv, pv) = (self.samples(face.sv, from, until)?, self.samples(face.pv, from, until)?);
         let zone = &self.def.time_zone;
         let rows = sound(sv, |sv| sound(pv, |pv| figures::record(sv, pv, interval, zone, from, until)))??;
-        Ok((rows, Some((def.name.clone(), self.label(face.pv, until)?.unit))))
+        Ok((rows, Some((def.name.clone(), self.label(face.pv, from, until)?.unit))))
     }
 
     /// The samples of a tag that matter in a span, in order of time, beginning [`HOLD_MAX`] before it.
@@ -157,8 +157,8 @@ impl Store {
         self.db.query_row(sql::COUNT_SAMPLES, params, |row| row.get(0)).map_err(engine)
     }
 
-    fn latest_good(&self, tag: TagId, until: Timestamp) -> Result<Option<f64>, HistoryError> {
-        let since = until.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN);
+    fn latest_good(&self, tag: TagId, from: Timestamp, until: Timestamp) -> Result<Option<f64>, HistoryError> {
+        let since = from.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN);
         let params = params![self.id(tag), utc(since), utc(until)];
         self.db.query_row(sql::LATEST_GOOD, params, |row| row.get(0)).map_err(engine)
     }

@@ -9,7 +9,7 @@ use duckdb::{
 use jiff::Timestamp;
 
 use super::{
-    files::{self, Failure, Opening},
+    files::{self, Failure, Opening, Part},
     sql,
 };
 use crate::{
@@ -44,31 +44,38 @@ pub struct Opened {
 impl Store {
     /// Opens or creates the store.
     ///
-    /// Damaged files are set aside and a new store is begun; so are files whose opening never ended twice before.
+    /// A damaged log is set aside: the file is then as old as its last checkpoint, some minutes. A damaged file is set
+    /// aside with its log and a new store is begun. So it is with files whose opening never ended twice before.
     /// [`HistoryError::Locked`] if another process has it, [`HistoryError::Engine`] for any other obstacle.
     pub fn open(path: &Path, def: &Arc<PlantDef>, now: Timestamp) -> Result<Opened, HistoryError> {
-        let mut opening = Opening::begin(path)?;
+        let opening = Opening::begin(path)?;
         let mut trouble = None;
-        let mut set_aside = |why: &str| -> Result<(), HistoryError> {
-            let target = files::set_aside(path, now)?;
-            trouble = Some(format!("history damaged ({why}), set aside as {}", target.display()));
+        let mut set_aside = |part: Part, why: &str| -> Result<(), HistoryError> {
+            let target = files::set_aside(path, part, now)?;
+            let what = match part {
+                Part::Log => "the last minutes of the history are",
+                Part::Everything => "the history is",
+            };
+            trouble = Some(format!("{what} damaged ({why}) and set aside as {}", target.display()));
             Ok(())
         };
-        if opening.failed >= files::FAILED_OPENS_MAX {
-            set_aside("opening it never ended")?;
-            opening.forget();
+        match opening.failed {
+            0..files::FAILED_OPENS_MAX => {}
+            files::FAILED_OPENS_MAX if files::has_log(path) => set_aside(Part::Log, "opening it never ended")?,
+            _ => set_aside(Part::Everything, "opening it never ended")?,
         }
-        let store = match Store::open_file(path, def) {
-            Ok(store) => store,
-            Err(Failure::Obstacle(error)) => return Err(error),
-            Err(Failure::Damaged(why)) => {
-                set_aside(&why)?;
-                Store::open_file(path, def).map_err(|failure| match failure {
-                    Failure::Obstacle(error) => error,
-                    Failure::Damaged(why) => HistoryError::Engine(why),
-                })?
+        let mut opened = Store::open_file(path, def);
+        for part in [Part::Log, Part::Everything] {
+            let Err(Failure::Damaged(why)) = &opened else { break };
+            if part == Part::Everything || files::has_log(path) {
+                set_aside(part, why)?;
+                opened = Store::open_file(path, def);
             }
-        };
+        }
+        let store = opened.map_err(|failure| match failure {
+            Failure::Obstacle(error) => error,
+            Failure::Damaged(why) => HistoryError::Engine(why),
+        })?;
         drop(opening);
         Ok(Opened { store, trouble })
     }
@@ -153,6 +160,10 @@ impl Store {
             return Err(Failure::Obstacle(HistoryError::Engine(words)));
         }
         store.register_tags().map_err(failed)?;
+        if store.ids.contains(&None) {
+            let words = "the file has known 65536 tags, more cannot be numbered: begin a new one";
+            return Err(Failure::Obstacle(HistoryError::Engine(words.into())));
+        }
         // Read what every start reads, so that damage shows while the files can still be set aside.
         store.extent().map_err(|error| files::diagnose(path, &error.to_string()))?;
         Ok(store)

@@ -1,6 +1,6 @@
 //! What the history thread does, without the thread: gathers records, commits, retries, answers, keeps the status.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
@@ -17,6 +17,9 @@ use crate::{
 pub const PENDING_MAX: usize = 200_000;
 /// Commits between two checkpoints: five minutes of one a second.
 const CHECKPOINT_EVERY: u32 = 300;
+/// A clock that is behind the last record by more than this has been set back or lost its time. The end of the curves
+/// of a dead station alone may lie a second ahead.
+const CLOCK_STEP: Duration = Duration::from_secs(5);
 /// Failed commits between two attempts to open the store anew.
 const REOPEN_EVERY: u32 = 10;
 
@@ -43,13 +46,15 @@ impl Writer {
     pub fn open(path: PathBuf, def: Arc<PlantDef>, now: Timestamp) -> Result<Writer, HistoryError> {
         let Opened { store, trouble } = Store::open(&path, &def, now)?;
         store.end_curves_left_behind(now)?;
+        let ahead = store.extent()?.map(|(_, last)| last).filter(|last| *last > now + CLOCK_STEP);
+        let clock = ahead.map(|last| format!("the clock is behind the last record, {last:.0}: is it right?"));
         let mut writer = Writer {
             store: Some(store),
             path,
             def,
             pending: Vec::new(),
             status: HistoryStatus::default(),
-            opened_with: trouble,
+            opened_with: trouble.or(clock),
             failing: None,
             unchecked: None,
             failures: 0,

@@ -1,0 +1,201 @@
+//! The store against damage, a dead station and a second process.
+
+use std::{
+    fs,
+    io::{BufRead, BufReader, Write},
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+};
+
+use super::{super::files::beside, super::store::Store, PV, def, folder, good, means, open, series, step};
+use crate::{
+    history::HistoryError,
+    plant::record::{AlarmStep, Record},
+    report::testing::sec,
+};
+
+#[test]
+fn a_report_without_the_station_reads_but_never_creates() {
+    let (_folder, db) = folder();
+    let missing = Store::open_read_only(&db, &def()).err();
+    assert_eq!(missing, Some(HistoryError::Missing { path: db.display().to_string() }));
+    assert!(!db.exists());
+    // A station that died with a log: the log is read, the file is not changed, the curve ends.
+    die_after_writing(&db);
+    let (before, log) = (fs::read(&db).unwrap(), fs::read(beside(&db, ".wal")).unwrap());
+    let store = Store::open_read_only(&db, &def()).unwrap();
+    assert_eq!(means(&store, PV, 0, 60, 3), [Some(27.0), None, None]);
+    assert!((series(&store, PV, 0, 10, 1).good - 1.0).abs() < 1e-9);
+    drop(store);
+    assert_eq!((fs::read(&db).unwrap(), fs::read(beside(&db, ".wal")).unwrap()), (before, log));
+}
+
+#[test]
+fn a_file_that_is_not_a_database_is_set_aside_and_recording_begins_anew() {
+    for damage in [b"not a database".to_vec(), vec![0; 20_000], vec![0xA5; 20_000]] {
+        let (_folder, db) = folder();
+        fs::write(&db, &damage).unwrap();
+        let opened = Store::open(&db, &def(), sec(0)).unwrap();
+        let aside = beside(&db, ".damaged-19700101T000000Z");
+        assert_eq!(fs::read(&aside).unwrap(), damage);
+        assert!(opened.trouble.unwrap().contains("set aside as"));
+        opened.store.append(&[good(PV, 0, 27.0)]).unwrap();
+    }
+}
+
+#[test]
+fn a_file_cut_or_scribbled_over_is_set_aside() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.append(&(0..20_000).map(|i| good(PV, i, f64::from(i as u32).sqrt())).collect::<Vec<_>>()).unwrap();
+    drop(store);
+    let whole = fs::read(&db).unwrap();
+    let mut scribbled = whole.clone();
+    scribbled[4096..12_288].fill(0x5A);
+    for damaged in [whole[..whole.len() / 2].to_vec(), whole[..4096].to_vec(), scribbled] {
+        fs::write(&db, &damaged).unwrap();
+        // In a process of its own, because DuckDB may end the process.
+        let opens = open_until_it_lives(&db);
+        assert!(opens <= 3, "{opens} opens");
+        let aside = fs::read_dir(db.parent().unwrap())
+            .unwrap()
+            .filter(|entry| entry.as_ref().unwrap().file_name().to_string_lossy().contains(".damaged-"));
+        assert_eq!(aside.count(), 1);
+        for entry in fs::read_dir(db.parent().unwrap()).unwrap() {
+            fs::remove_file(entry.unwrap().path()).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_log_torn_at_any_length_never_keeps_the_station_down() {
+    let (_folder, db) = folder();
+    die_after_writing(&db);
+    let (file, log) = (fs::read(&db).unwrap(), fs::read(beside(&db, ".wal")).unwrap());
+    assert!(log.len() > 100, "the child left a log");
+    let cuts = [0, 1, 7, 20, log.len() / 3, log.len() / 2, log.len() - 9, log.len() - 1];
+    let torn = cuts.map(|cut| log[..cut].to_vec());
+    let flipped = [30, log.len() / 2, log.len() - 20].map(|at| {
+        let mut log = log.clone();
+        log[at] ^= 0xFF;
+        log
+    });
+    for torn in torn.into_iter().chain(flipped) {
+        fs::write(&db, &file).unwrap();
+        fs::write(beside(&db, ".wal"), &torn).unwrap();
+        let opens = open_until_it_lives(&db);
+        assert!(opens <= 3, "{opens} opens");
+        // What a checkpoint had brought into the file is still there, whatever happened to the log.
+        let store = Store::open(&db, &def(), sec(20)).unwrap().store;
+        assert!((0..5).all(|second| means(&store, PV, second, second + 1, 1) == [Some(27.0)]));
+    }
+}
+
+#[test]
+fn files_whose_opening_never_ended_twice_are_set_aside_before_the_third() {
+    let (_folder, db) = folder();
+    open(&db, 0).append(&[good(PV, 0, 27.0)]).unwrap();
+    fs::write(beside(&db, ".opening"), "1").unwrap();
+    assert_eq!(means(&open(&db, 0), PV, 0, 1, 1), [Some(27.0)]);
+    // First the log, because it is what is replayed; the file keeps what it has.
+    let log = beside(&db, ".wal");
+    fs::write(&log, "poison").unwrap();
+    fs::write(beside(&db, ".opening"), "2").unwrap();
+    let opened = Store::open(&db, &def(), sec(0)).unwrap();
+    assert!(opened.trouble.unwrap().contains("the last minutes of the history are damaged (opening it never ended)"));
+    assert_eq!(means(&opened.store, PV, 0, 1, 1), [Some(27.0)]);
+    assert_eq!(fs::read(beside(&db, ".damaged-19700101T000000Z.wal")).unwrap(), b"poison");
+    drop(opened.store);
+    // If that did not help, the file.
+    fs::write(beside(&db, ".opening"), "3").unwrap();
+    let opened = Store::open(&db, &def(), sec(0)).unwrap();
+    assert!(opened.trouble.unwrap().contains("the history is damaged (opening it never ended)"));
+    assert!(beside(&db, ".damaged-19700101T000000Z-2").exists());
+    assert!(!beside(&db, ".opening").exists());
+}
+
+#[test]
+fn a_second_process_is_told_who_has_the_file() {
+    let (_folder, db) = folder();
+    let mut holder = child("hold", &db);
+    let mut ready = String::new();
+    let mut lines = BufReader::new(holder.stdout.take().unwrap());
+    while !ready.contains("ready") {
+        ready.clear();
+        assert_ne!(lines.read_line(&mut ready).unwrap(), 0, "the child ended");
+    }
+    let expect = format!("process {} (", holder.id());
+    let refused = [Store::open(&db, &def(), sec(0)).err(), Store::open_read_only(&db, &def()).err()];
+    drop(holder.stdin.take());
+    holder.wait().unwrap();
+    for error in refused {
+        match error {
+            Some(HistoryError::Locked { path, by }) => {
+                assert_eq!(path, db.display().to_string());
+                assert!(by.starts_with(&expect), "{by}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(!beside(&db, ".opening").exists());
+    open(&db, 0);
+}
+
+// What follows runs in child processes: this test program again, with one helper test and a job in the environment.
+
+const JOB: &str = "SIGHTGLASS_TEST_JOB";
+const FILE: &str = "SIGHTGLASS_TEST_FILE";
+
+fn child(job: &str, db: &Path) -> Child {
+    Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "history::io::tests::damage::job_of_a_child_process", "--nocapture"])
+        .env(JOB, job)
+        .env(FILE, db)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+/// A child commits a few seconds of records and dies without closing anything.
+fn die_after_writing(db: &Path) {
+    assert!(!child("write and die", db).wait().unwrap().success());
+}
+
+/// Starts processes until one opens the store and stores something; returns how many it took.
+fn open_until_it_lives(db: &Path) -> usize {
+    (1..=5).find(|_| child("open", db).wait().unwrap().success()).expect("one of five opens is good")
+}
+
+/// Does a job if the environment names one; in an ordinary run it checks that none is named.
+#[test]
+fn job_of_a_child_process() {
+    let Ok(job) = std::env::var(JOB) else {
+        assert_eq!(std::env::var(FILE).ok(), None);
+        return;
+    };
+    let db = PathBuf::from(std::env::var(FILE).unwrap());
+    let store = Store::open(&db, &def(), sec(20)).unwrap().store;
+    match job.as_str() {
+        "write and die" => {
+            for second in 0..10 {
+                if second == 5 {
+                    store.checkpoint().unwrap();
+                }
+                store
+                    .append(&[good(PV, second, 27.0), Record::Alarm(step(second, "high", AlarmStep::Raised))])
+                    .unwrap();
+            }
+            std::process::abort();
+        }
+        "open" => store.append(&[good(PV, 20, 28.0)]).unwrap(),
+        "hold" => {
+            let mut out = std::io::stdout();
+            writeln!(out, "\nready").and_then(|()| out.flush()).unwrap();
+            let mut rest = String::new();
+            std::io::stdin().read_line(&mut rest).unwrap();
+        }
+        other => panic!("no such job: {other}"),
+    }
+}
