@@ -32,7 +32,7 @@ fn ago(seconds: i64) -> Timestamp {
     now() - SignedDuration::from_secs(seconds)
 }
 
-/// The made-up past of a tag: PV swings, SV steps ten minutes ago, the rest climbs.
+/// The made-up past of a tag: PV swings, SV steps five minutes ago, the rest climbs.
 fn past(tag: TagId, at: Timestamp) -> f64 {
     let seconds = at.duration_since(now()).as_secs_f64();
     match tag.0 {
