@@ -182,6 +182,7 @@ impl Trends {
                     self.data.trouble = None;
                     self.take_curves(cx, series, asked);
                 } else if hours.is_some() {
+                    self.data.trouble = None;
                     self.data.hours = series.into_iter().map(|series| (series.tag, series)).collect();
                 }
             }

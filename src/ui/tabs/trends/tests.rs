@@ -32,7 +32,7 @@ fn ago(seconds: i64) -> Timestamp {
     now() - SignedDuration::from_secs(seconds)
 }
 
-/// The made-up past of a tag: PV swings, SV steps ten minutes ago, the rest climbs.
+/// The made-up past of a tag: PV swings, SV steps five minutes ago, the rest climbs.
 fn past(tag: TagId, at: Timestamp) -> f64 {
     let seconds = at.duration_since(now()).as_secs_f64();
     match tag.0 {
@@ -294,7 +294,11 @@ fn trouble_of_the_history_is_told() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     let (id, _) = stand.asked[0].clone();
     stand.send(Msg::Answer(id, Err(HistoryError::Engine("disk full".to_owned()))));
-    assert!(stand.screen().contains("history: disk full"));
+    for keys in ["", "m", "m←", "v"] {
+        stand.press(keys);
+        assert!(stand.screen().contains("history: disk full"), "{}", stand.screen());
+    }
+    stand.press("vl");
     stand.live(5, |_| Some(60.0));
     stand.answer();
     assert!(!stand.screen().contains("disk full"));
@@ -314,7 +318,7 @@ fn keys_move_through_time() {
     check("+++++++++", "window 1 min   live ●");
     check("----------------", "window 24 h   live ●");
     check("+", "window 12 h   live ●");
-    check("←", "past 11-20 23:");
+    check("←", "past 11-20 23:03 – 11-21 11:03");
     check("→", "live ●");
     check("u", "update 2 s");
     check("m", "all since midnight");

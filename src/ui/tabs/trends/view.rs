@@ -1,6 +1,6 @@
 //! The picture of the trends tab: title, chart, legend with figures; or the list of values.
 
-use jiff::Timestamp;
+use jiff::{Timestamp, tz::TimeZone};
 use ratatui::{
     Frame,
     layout::Rect,
@@ -19,9 +19,9 @@ use crate::{
         Cx,
         theme::Glyphs,
         widgets::{
-            chart::{Axis, Chart, Curve, Plan, mark},
+            chart::{Axis, Chart, Curve, Plan, mark, trace::Trace},
             spark::spark,
-            text::{Canvas, clock, fit, moment, pad},
+            text::{Canvas, clock, fit, pad},
             value,
         },
     },
@@ -29,6 +29,8 @@ use crate::{
 
 /// Rows that the chart keeps, whatever the legend wants.
 const CHART_ROWS_MIN: u16 = 7;
+
+static NO_TRACE: Trace = Trace::EMPTY;
 
 /// Draws the tab.
 pub fn draw(trends: &Trends, cx: &Cx, frame: &mut Frame, area: Rect) {
@@ -69,58 +71,51 @@ fn draw_title(trends: &Trends, cx: &Cx, canvas: &mut Canvas) {
         (None, Some(tag)) => def.tag(tag).name.clone(),
         (None, None) => String::new(),
     };
+    let trouble = trouble(trends, cx);
+    let brief = trouble.is_some() && canvas.width() < 120;
     let mut x = canvas.text(1, 0, &name, theme.strong());
     let groups = def.trends.len() + usize::from(trends.picked.is_some());
-    if groups > 1 {
+    if groups > 1 && !brief {
         x = canvas.text(x + 1, 0, &format!("group {}/{}", trends.group + 1, groups), theme.dim());
     }
-    x = match (trends.accumulate, trends.since) {
-        (true, since) => {
-            let from = since.filter(|since| *since > midnight(cx.now, zone));
-            let local =
-                |since: Timestamp| since.to_zoned(zone.clone()).strftime("%H:%M, the first value today").to_string();
-            let from = from.map_or("midnight".to_owned(), local);
-            canvas.text(x + 3, 0, &format!("all since {from}"), theme.normal())
-        }
-        (false, _) => {
-            canvas.text(x + 3, 0, &format!("window {}", window_words(WINDOWS[trends.window])), theme.normal())
-        }
+    let since = trends.since.filter(|since| *since > midnight(cx.now, zone)).map(|since| since.to_zoned(zone.clone()));
+    let window = match (trends.accumulate, since) {
+        (true, None) => "all since midnight".to_owned(),
+        (true, Some(since)) if brief => format!("all since {}", since.strftime("%H:%M")),
+        (true, Some(since)) => format!("all since {}, the first value today", since.strftime("%H:%M")),
+        (false, _) => format!("window {}", window_words(WINDOWS[trends.window])),
     };
-    x = match trends.end {
-        None => {
-            canvas.text(x + 3, 0, if theme.glyphs == Glyphs::Braille { "live ●" } else { "live *" }, theme.normal())
+    x = canvas.text(x + 3, 0, &window, theme.normal());
+    if trends.end.is_some() {
+        x = canvas.text(x + 3, 0, &format!(" past {} ", stretch(view.from, view.to, cx.now, zone)), theme.focus());
+    } else {
+        x = canvas.text(x + 3, 0, if theme.glyphs == Glyphs::Braille { "live ●" } else { "live *" }, theme.normal());
+        if !brief {
+            x = canvas.text(x + 3, 0, &format!("update {}", rate_words(RATES[trends.rate])), theme.normal());
         }
-        Some(_) => {
-            let (from, to) = (moment(view.from, cx.now, zone), moment(view.to, cx.now, zone));
-            canvas.text(x + 3, 0, &format!(" past {from} – {to} "), theme.focus())
-        }
-    };
-    if trends.end.is_none() {
-        x = canvas.text(x + 3, 0, &format!("update {}", rate_words(RATES[trends.rate])), theme.normal());
     }
-    let slow = trends.errands.curves.waiting(cx.now).filter(|waiting| *waiting >= super::real(cx, 2.0));
-    let trouble = match (&trends.data.trouble, slow) {
-        (Some(trouble), _) => Some(trouble.clone()),
-        (None, Some(_)) => Some("waiting for the history".to_owned()),
-        (None, None) => None,
-    };
     if let Some(trouble) = trouble {
         let room = canvas.width().saturating_sub(x + 3);
-        canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&trouble, room.saturating_sub(1)), theme.trouble());
+        canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&trouble, room), theme.trouble());
     }
+}
+
+/// What is wrong with the history, or that it keeps us waiting.
+fn trouble(trends: &Trends, cx: &Cx) -> Option<String> {
+    let errands = [&trends.errands.curves, &trends.errands.hours];
+    let slow = errands.iter().filter_map(|errand| errand.waiting(cx.now)).any(|time| time >= super::real(cx, 2.0));
+    trends.data.trouble.clone().or_else(|| slow.then(|| "waiting for the history".to_owned()))
 }
 
 fn chart<'a>(trends: &'a Trends, cx: &Cx<'a>) -> Chart<'a> {
     let view = trends.span(cx);
-    let curve = |(n, pen): (usize, Pen)| {
-        Some(Curve {
-            trace: trends.data.traces.get(&pen.tag)?,
-            pen: n,
-            unit: cx.snapshot.unit(pen.tag),
-            fixed: pen.scale,
-            resolution: resolution(cx, pen.tag),
-            dashed: is_set_value(cx, pen.tag),
-        })
+    let curve = |(n, pen): (usize, Pen)| Curve {
+        trace: trends.data.traces.get(&pen.tag).unwrap_or(&NO_TRACE),
+        pen: n,
+        unit: cx.snapshot.unit(pen.tag),
+        fixed: pen.scale,
+        resolution: resolution(cx, pen.tag),
+        dashed: is_set_value(cx, pen.tag),
     };
     let names: Vec<&str> = trends.drawn(cx).iter().map(|(_, pen)| cx.def().tag(pen.tag).name.as_str()).collect();
     let marks = trends.data.raised.iter().filter(|record| names.contains(&&*record.subject));
@@ -130,7 +125,7 @@ fn chart<'a>(trends: &'a Trends, cx: &Cx<'a>) -> Chart<'a> {
         from: view.from,
         to: view.to,
         now: cx.now,
-        curves: trends.drawn(cx).into_iter().filter_map(curve).collect(),
+        curves: trends.drawn(cx).into_iter().map(curve).collect(),
         cursor: None,
         marks: marks.map(|record| (record.at, cx.theme.severity(record.priority))).collect(),
     }
@@ -284,12 +279,11 @@ fn draw_values(trends: &Trends, cx: &Cx, canvas: &mut Canvas, first: usize, sele
         canvas.text_right(end, 1, text, theme.dim());
     }
     canvas.text(high + 2, 1, "last hour", theme.dim());
-    canvas.text_right(
-        canvas.width().saturating_sub(1),
-        0,
-        &format!("{} curve   v back", theme.pick("⏎", "Enter")),
-        theme.dim(),
-    );
+    let (words, style) = match trouble(trends, cx) {
+        Some(trouble) => (trouble, theme.trouble()),
+        None => (format!("{} curve   v back", theme.pick("⏎", "Enter")), theme.dim()),
+    };
+    canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&words, canvas.width().saturating_sub(30)), style);
     for (y, (n, tag)) in all.iter().enumerate().skip(first).take(rows).enumerate() {
         let (y, def, shown) = (y as u16 + 2, cx.def().tag(*tag), value::show(cx, *tag));
         let style = if n == selected { theme.strong() } else { theme.normal() };
@@ -332,8 +326,19 @@ fn number(value: f64) -> String {
 }
 
 /// `14:02:31`, with the date before it when it is not today.
-fn moment_exact(at: Timestamp, now: Timestamp, zone: &jiff::tz::TimeZone) -> String {
+fn moment_exact(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
     let (local, now) = (at.to_zoned(zone.clone()), now.to_zoned(zone.clone()));
     let form = if local.date() == now.date() { "%H:%M:%S" } else { "%m-%d %H:%M:%S" };
     local.strftime(form).to_string()
+}
+
+/// `13:40:04 – 13:50:04` today, `11-20 13:40 – 13:50` on another day, both dates where it spans midnight.
+fn stretch(from: Timestamp, to: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
+    let [from, to, now] = [from, to, now].map(|at| at.to_zoned(zone.clone()));
+    let (first, last) = match (from.date() == to.date(), from.date() == now.date()) {
+        (true, true) => ("%H:%M:%S", "%H:%M:%S"),
+        (true, false) => ("%m-%d %H:%M", "%H:%M"),
+        (false, _) => ("%m-%d %H:%M", "%m-%d %H:%M"),
+    };
+    format!("{} – {}", from.strftime(first), to.strftime(last))
 }

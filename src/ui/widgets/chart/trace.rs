@@ -28,6 +28,9 @@ pub struct Span {
 }
 
 impl Trace {
+    /// Nothing is known.
+    pub const EMPTY: Trace = Trace { past: None, live: VecDeque::new() };
+
     /// Takes an answer of the history that surely holds all that happened before `sure`: older live values are given
     /// up, except the one that still held then.
     pub fn set_past(&mut self, series: Series, sure: Timestamp) {
