@@ -27,7 +27,7 @@ pub fn view(cx: &Cx, canvas: &mut Canvas, at: Box, tag: TagId, window: Duration,
         canvas.text(0, 1, if series.is_some() { "no good value" } else { "reading …" }, theme.dim());
         return;
     };
-    let label = |value| format!("{}", cx.snapshot.format(tag, value));
+    let label = |value| cx.snapshot.format(tag, value);
     let (top, bottom) = (label(high), label(low));
     let room = top.len().max(bottom.len()) as u16 + 1;
     let (rows, columns) = (at.height.saturating_sub(1), at.width.saturating_sub(room));
