@@ -1,5 +1,7 @@
 //! Panels beside the picture: a controller with its bar, and a sequence with its steps.
 
+use ratatui::style::Modifier;
+
 use super::{Box, alarm_mark, label_style, put_value, unit::states};
 use crate::{
     plant::def::{Condition, DeviceDef, Faceplate, Level, Subject, TagId},
@@ -72,7 +74,8 @@ fn bar(cx: &Cx, canvas: &mut Canvas, y: u16, plate: &Faceplate) {
         canvas.glyph(x, y, '▼', theme.set_value());
     }
     if let Some(x) = cx.snapshot.sample(plate.pv).trusted().and_then(column) {
-        let style = alarm_mark(cx, plate.pv).map_or(theme.strong(), |(_, style)| style);
+        // Never reversed: a reversed full block is an empty one.
+        let style = alarm_mark(cx, plate.pv).map_or(theme.strong(), |(_, style)| style.remove_modifier(Modifier::REVERSED));
         canvas.glyph(x, y, '█', style);
     }
 }

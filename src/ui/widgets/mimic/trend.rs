@@ -39,7 +39,7 @@ pub fn view(
         canvas.text(0, 1, if series.is_some() { "no good value" } else { "reading …" }, theme.dim());
         return;
     };
-    let label = |value| format!("{}", cx.snapshot.format(tag, value));
+    let label = |value| cx.snapshot.format(tag, value);
     let (top, bottom) = (label(high), label(low));
     let room = top.len().max(bottom.len()) as u16 + 1;
     let (rows, columns) = (at.height.saturating_sub(1), at.width.saturating_sub(room));
