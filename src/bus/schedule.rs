@@ -119,16 +119,18 @@ impl Schedule {
         Some((release.max(health.rests_until), release + within))
     }
 
-    /// The block has been read, well or not: its next release is the next point of its grid that is not over yet.
-    pub fn done(&mut self, index: usize, now: Timestamp) {
+    /// The block has been read, well or not, from `started` to `now`: that served its releases up to `started`. What was
+    /// released and is over by now is missed; the next release is the first point of its grid that is not.
+    pub fn done(&mut self, index: usize, started: Timestamp, now: Timestamp) {
         let poll = &mut self.polls[index];
         poll.urgent = None;
         poll.release = match (poll.period, poll.release) {
             (Some(period), Some(release)) if release <= now => {
-                let behind = Duration::try_from(now.duration_since(release)).unwrap_or_default();
-                let periods = (behind.as_nanos() / period.as_nanos().max(1)).max(1) as u32;
-                self.missed += u64::from(periods - 1);
-                Some(release + period * periods)
+                let served = if release <= started { periods_in(release, started, period) + 1 } else { 0 };
+                let over = periods_in(release, now, period).max(served);
+                // Of the releases served together only the last was in time.
+                self.missed += u64::from(over - served.min(1));
+                Some(release + period * over)
             }
             (Some(_), release) => release,
             (None, _) => None,
@@ -189,6 +191,12 @@ impl Schedule {
     }
 }
 
+/// Whole periods between two moments.
+fn periods_in(from: Timestamp, to: Timestamp, period: Duration) -> u32 {
+    let span = Duration::try_from(to.duration_since(from)).unwrap_or_default();
+    u32::try_from(span.as_nanos() / period.as_nanos().max(1)).unwrap_or(u32::MAX)
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -220,7 +228,7 @@ mod tests {
                 Next::Run(index) => {
                     log.push((now, index));
                     now += 40;
-                    schedule.done(index, at(now));
+                    schedule.done(index, at(now - 40), at(now));
                 }
                 Next::WaitUntil(until) => now = until.as_millisecond(),
                 Next::Idle => panic!("periodic polls are never idle"),
@@ -234,10 +242,10 @@ mod tests {
     fn what_is_missed_is_counted_and_not_piled_up() {
         let mut schedule = Schedule::new(&[block(0, every(100))], at(0));
         assert_eq!(schedule.next(at(0)), Next::Run(0));
-        schedule.done(0, at(350));
+        schedule.done(0, at(0), at(350));
         assert_eq!(schedule.missed(), 2, "the releases at 100 and 200 are lost, that of 300 is late");
         assert_eq!(schedule.next(at(350)), Next::Run(0));
-        schedule.done(0, at(360));
+        schedule.done(0, at(350), at(360));
         assert_eq!(schedule.next(at(360)), Next::WaitUntil(at(400)));
     }
 
@@ -246,25 +254,23 @@ mod tests {
         let blocks = [block(0, every(1000)), block(0, Poll::Once), block(1, every(1000))];
         let mut schedule = Schedule::new(&blocks, at(0));
         for index in [0, 1, 2] {
-            schedule.done(index, at(10));
+            schedule.done(index, at(0), at(10));
         }
         let device = DeviceId(0);
         assert!(!schedule.failed(device, at(1000)));
         assert!(!schedule.failed(device, at(2000)));
         assert!(schedule.failed(device, at(3000)), "given up with the third");
         assert!(schedule.is_down(device));
-        schedule.done(0, at(3000));
-        while schedule.next(at(3000)) == Next::Run(2) {
-            schedule.done(2, at(3000));
-        }
+        schedule.done(0, at(3000), at(3000));
+        schedule.done(2, at(3000), at(3000));
         assert_eq!(schedule.next(at(3999)), Next::WaitUntil(at(4000)), "probe and other device both at 4 s");
         assert!(!schedule.failed(device, at(4100)), "it is told once");
-        schedule.done(2, at(4100));
+        schedule.done(2, at(4100), at(4100));
         assert_eq!(schedule.next(at(4500)), Next::WaitUntil(at(5000)), "the other device goes on at its rate");
         schedule.answered(device, at(6100));
         let mut due = Vec::new();
         while let Next::Run(index) = schedule.next(at(6100)) {
-            schedule.done(index, at(6100));
+            schedule.done(index, at(6100), at(6100));
             due.push(index);
         }
         due.sort_unstable();
@@ -289,7 +295,7 @@ mod tests {
                 match schedule.next(at(now)) {
                     Next::Run(index) => {
                         now += cost;
-                        schedule.done(index, at(now));
+                        schedule.done(index, at(now - cost), at(now));
                         last[index] = now;
                     }
                     Next::WaitUntil(until) => now = until.as_millisecond(),

@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn spans_and_speeds_are_checked() {
         assert_eq!(span("10m"), Ok(std::time::Duration::from_secs(600)));
-        assert!(span("ten").unwrap_err().contains("found `ten`, expected"));
+        assert!(span("ten").is_err_and(|error| error.contains("found `ten`, expected")));
         assert!(span("-5s").is_err());
         assert_eq!(speed("60"), Ok(60.0));
         assert!(speed("0").is_err());

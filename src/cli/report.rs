@@ -8,7 +8,7 @@ use crate::{
     report::{ask, csv},
 };
 
-use super::{CliError, StationArgs, load, paths, say};
+use super::{CliError, StationArgs, load, run, say};
 
 /// Arguments of `report`.
 #[derive(Debug, clap::Args)]
@@ -46,8 +46,10 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let now = jiff::Timestamp::now();
     let period = ask::period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref(), now)
         .map_err(|error| CliError::Usage(error.to_string()))?;
-    let history = args.station.history.clone().unwrap_or_else(|| paths::history_of(&def.name));
-    let report = Store::open_read_only(&history, &def)?.report(&period, now)?;
+    let store = Store::open_read_only(&run::history_file(&def, &args.station), &def)?;
+    // A demonstration that ran faster than time has stored what is yet to come.
+    let until = store.extent()?.map_or(now, |(_, last)| last.max(now));
+    let report = store.report(&period, until)?;
     let dialect = dialect(def.report.csv, args.separator.as_deref(), args.bom);
     let bytes = match args.record {
         true => csv::record_csv(&report, &def, dialect),

@@ -139,10 +139,8 @@ impl Desk {
         if board.trusted_raw(tag).is_some_and(|now| scale::same_raw(def.point.kind, now, raw)) {
             return Err(Outcome::Unchanged);
         }
-        let unlock = match def.write_unlock {
-            None => None,
-            Some((key, value)) => Some((key, scale::to_raw(self.def.tag(key), value, 0).unwrap_or(value))),
-        };
+        let raw_of = |key, value| scale::to_raw(self.def.tag(key), value, 0).unwrap_or(value);
+        let unlock = def.write_unlock.map(|(key, value)| (key, raw_of(key, value)));
         Ok((raw, unlock))
     }
 

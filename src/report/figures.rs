@@ -108,7 +108,10 @@ pub fn record(
 fn on_grid(zone: &TimeZone, interval: Duration, at: Timestamp) -> Option<Timestamp> {
     const DAY: i64 = 86_400_000_000;
     let interval = i64::try_from(interval.as_micros()).ok().filter(|interval| *interval > 0)?;
-    let mut at = at;
+    // Instants are whole microseconds in the history; what a period was typed or computed with may be finer.
+    let micros = at.as_microsecond();
+    let whole = Timestamp::from_microsecond(micros).ok()?;
+    let mut at = if whole < at { Timestamp::from_microsecond(micros + 1).ok()? } else { whole };
     loop {
         let local = at.as_microsecond() + i64::from(zone.to_offset(at).seconds()) * 1_000_000;
         let of_day = local.rem_euclid(DAY);

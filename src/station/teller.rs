@@ -50,6 +50,8 @@ fn device_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
         let (old, new) = (before.device(device.id).state, after.device(device.id).state);
         let was_down = matches!(old, DeviceState::Down { .. } | DeviceState::Unknown);
         match new {
+            // A line that is gone has been told; its devices go with it.
+            DeviceState::Down { .. } if after.line(device.line).state != LineState::Connected => {}
             DeviceState::Down { .. } if !matches!(old, DeviceState::Down { .. }) => {
                 let why = after.device(device.id).last_fault.map(|(_, fault)| format!(": {fault}")).unwrap_or_default();
                 lines.push(format!("device {} (unit {}): not answering{why}", device.name, device.unit));

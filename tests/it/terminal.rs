@@ -110,7 +110,7 @@ impl Drop for Terminal {
 fn every_tab_opens_and_q_asks_before_leaving() {
     let mut terminal = Terminal::start(80, 24, &["demo", "--speed", "10"]);
     terminal.wait_for("TK-1");
-    for (key, text) in [("2", "window"), ("3", "guidance"), ("4", "FUJI"), ("5", "shift"), ("1", "TK-2")] {
+    for (key, text) in [("2", "window"), ("3", "unacknowledged"), ("4", "FUJI"), ("5", "RUNNING"), ("1", "TK-2")] {
         terminal.keys(key);
         terminal.wait_for(text);
     }
@@ -162,7 +162,7 @@ fn a_closed_session_ends_the_program() {
 #[test]
 fn a_tiny_terminal_is_no_reason_to_fall() {
     let mut terminal = Terminal::start(12, 3, &["demo"]);
-    terminal.wait_for("small");
+    terminal.wait_for("too");
     terminal.signal("TERM");
     terminal.end();
     terminal.assert_restored();

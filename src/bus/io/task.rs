@@ -241,6 +241,7 @@ impl Task {
         index: usize,
     ) -> Result<Result<(), Leave>, Ended> {
         let block = self.blocks[index].clone();
+        let started = self.clock.now();
         let outcome = match self.in_step(link, schedule, &block).await {
             Ok(true) => self.read_twice(link, schedule, &block).await,
             // The unit must rest before it can be asked anything that could be mistaken.
@@ -248,7 +249,7 @@ impl Task {
             Err(trouble) => Err(trouble),
         };
         let at = self.clock.now();
-        schedule.done(index, at);
+        schedule.done(index, started, at);
         link.rest(self.def.device(block.device).gap);
         match outcome {
             Ok(values) => {

@@ -75,7 +75,8 @@ fn bar(cx: &Cx, canvas: &mut Canvas, y: u16, plate: &Faceplate) {
     }
     if let Some(x) = cx.snapshot.sample(plate.pv).trusted().and_then(column) {
         // Never reversed: a reversed full block is an empty one.
-        let style = alarm_mark(cx, plate.pv).map_or(theme.strong(), |(_, style)| style.remove_modifier(Modifier::REVERSED));
+        let style =
+            alarm_mark(cx, plate.pv).map_or(theme.strong(), |(_, style)| style.remove_modifier(Modifier::REVERSED));
         canvas.glyph(x, y, '█', style);
     }
 }
