@@ -343,7 +343,7 @@ fn mimic(id: &impl Fn(&str) -> TagId) -> MimicDef {
             MimicItem::Pipe { points: vec![(32, 12), (40, 12), (40, 12)], flow: vec![id("PLC-1.SV-1")] },
             MimicItem::Valve { place: place(35, 12, 1, 1), label: "SV-1".to_owned(), tag: id("PLC-1.SV-1"), vertical: false },
             MimicItem::Pipe { points: vec![(33, 16), (4, 16), (4, 6)], flow: vec![id("PLC-1.P-1")] },
-            MimicItem::Pump { place: place(18, 16, 5, 1), label: "P-1".to_owned(), tag: id("PLC-1.P-1") },
+            MimicItem::Pump { place: place(18, 16, 12, 1), label: "P-1".to_owned(), tag: id("PLC-1.P-1") },
             MimicItem::Value { place: place(34, 8, 16, 1), label: "flow".to_owned(), tag: id("PLC-1.FLOW") },
             MimicItem::Sequence {
                 place: place(53, 0, 26, 4),

@@ -123,9 +123,18 @@ impl Controllers {
         self.heading(cx, device, &mut canvas);
         faceplate_row(cx, device, &mut canvas);
         let (width, height) = (canvas.width(), canvas.height());
-        self.table(cx, &mut canvas.part(0, 2, width, height.saturating_sub(3)));
-        if let Some(text) = last_write(cx, self.device) {
-            canvas.text(1, height.saturating_sub(1), &fit(&text.0, width.saturating_sub(2)), if text.1 { cx.theme.trouble() } else { cx.theme.dim() });
+        let below = self.table(cx, &mut canvas.part(0, 2, width, height.saturating_sub(4)));
+        let (end, bottom) = (width.saturating_sub(1), height.saturating_sub(1));
+        if let Some(tag) = self.selected(cx) {
+            let words = if tag.meaning.is_empty() { &tag.label } else { &tag.meaning };
+            let x = canvas.text(1, bottom.saturating_sub(1), &tag.name, cx.theme.strong());
+            canvas.text(x + 2, bottom.saturating_sub(1), &fit(words, end.saturating_sub(x + 2)), cx.theme.normal());
+        }
+        if let Some((words, trouble)) = last_write(cx, self.device) {
+            canvas.text(1, bottom, &fit(&words, end.saturating_sub(12)), if trouble { cx.theme.trouble() } else { cx.theme.dim() });
+        }
+        if below > 0 {
+            canvas.text_right(end, bottom, &format!("{below} more ▼"), cx.theme.normal());
         }
     }
 
@@ -153,8 +162,8 @@ impl Controllers {
         canvas.text_right(end, 0, &format!("{}/{count}", self.device.0 + 1), theme.dim());
     }
 
-    /// Parameters under the names of their groups, the selected one in sight.
-    fn table(&self, cx: &Cx, canvas: &mut Canvas) {
+    /// Parameters under the names of their groups, the selected one in sight; returns how many rows are out of sight below.
+    fn table(&self, cx: &Cx, canvas: &mut Canvas) -> usize {
         let theme = cx.theme;
         let columns = Columns::of(cx, self.device, canvas.width());
         canvas.text(1, 0, &columns.row(["", "parameter", "value", "", "range", "age", "meaning"]), theme.dim());
@@ -180,10 +189,7 @@ impl Controllers {
                 }
             }
         }
-        if rows.len() > first + room {
-            let end = canvas.width().saturating_sub(1);
-            canvas.text_right(end, 0, &format!("{} more {}", rows.len() - first - room, theme.pick("▼", "below")), theme.normal());
-        }
+        rows.len().saturating_sub(first + room)
     }
 }
 
@@ -260,13 +266,15 @@ impl Columns {
         let short = cx.def().tags_of(device).map(|tag| tag.short.chars().count()).max().unwrap_or(0).min(10) as u16;
         let label = cx.def().tags_of(device).map(|tag| tag.label.chars().count()).max().unwrap_or(0) as u16;
         let free = width.saturating_sub(3 + Columns::VALUE + Columns::UNIT + Columns::RANGE + Columns::AGE + 5);
-        let name = (short + 1 + label).min(free * 3 / 4);
+        let name = (short + 1 + label).min(free);
         Columns { short, name, meaning: free.saturating_sub(name) }
     }
     fn value_at(&self) -> u16 {
         2 + self.name + 1
     }
     fn row(&self, [pen, name, value, unit, range, age, meaning]: [&str; 7]) -> String {
+        // The line below the table has the selected meaning in full: a stump of it in the table helps nobody.
+        let meaning = if self.meaning < 12 { "" } else { meaning };
         format!(
             "{pen:1} {} {} {} {} {} {}",
             pad(name, self.name),

@@ -119,7 +119,7 @@ impl Sequence<'_> {
         }
         let last = at.height.saturating_sub(1).max(1);
         self.steps(cx, &mut canvas.part(0, 1, at.width, last.saturating_sub(1)));
-        states(cx, &mut canvas, 0, last, self.states);
+        states(cx, &mut canvas, last, self.states);
     }
 
     fn steps(&self, cx: &Cx, canvas: &mut Canvas) {
