@@ -47,7 +47,16 @@ pub fn layout(screen: Rect) -> Layout {
     let small = screen.width < SIZE_MIN.0 || screen.height < SIZE_MIN.1;
     if small {
         let none = Rect { width: 0, height: 0, ..screen };
-        return Layout { header: none, tabs: none, banner: row(0), rule: none, body: none, status: none, footer: none, small };
+        return Layout {
+            header: none,
+            tabs: none,
+            banner: row(0),
+            rule: none,
+            body: none,
+            status: none,
+            footer: none,
+            small,
+        };
     }
     Layout {
         header: row(0),
@@ -87,28 +96,32 @@ fn too_small(cx: &Cx, frame: &mut Frame) {
     let area = frame.area();
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (width, height) = SIZE_MIN;
-    canvas.text(0, 1, &fit(&format!("screen too small: {}x{}, needs {width}x{height}", area.width, area.height), area.width), cx.theme.normal());
+    canvas.text(
+        0,
+        1,
+        &fit(&format!("screen too small: {}x{}, needs {width}x{height}", area.width, area.height), area.width),
+        cx.theme.normal(),
+    );
     canvas.text(0, 2, "q quit", cx.theme.dim());
 }
 
 fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     let theme = cx.theme;
     let x = canvas.text(1, 0, "sightglass", theme.dim());
-    canvas.text(x + 2, 0, &cx.def().title, theme.strong());
+    let start = canvas.text(x + 2, 0, &fit(&cx.def().title, canvas.width() / 3), theme.strong()) + 2;
     let mut end = canvas.width().saturating_sub(1);
+    // The most needed first, from the right; what no longer fits is left out.
     let mut put = |text: &str, style: Style| {
-        canvas.text_right(end, 0, text, style);
-        end = end.saturating_sub(width(text) + 2);
+        if end >= start + width(text) {
+            canvas.text_right(end, 0, text, style);
+            end = end.saturating_sub(width(text) + 2);
+        }
     };
     if model.clock.silent >= SILENCE {
         // The clock stands still on purpose: nobody knows what the plant does.
         put(&format!("STATION SILENT {}", running(model.clock.silent)), theme.trouble());
     } else {
         put(&clock(cx.now, &cx.def().time_zone), theme.normal());
-    }
-    put(&fit(&model.operator, 12), theme.dim());
-    if cx.snapshot.speed != 1.0 {
-        put(&format!("speed ×{}", cx.snapshot.speed), theme.strong());
     }
     let history = &cx.snapshot.history;
     if history.lost > 0 {
@@ -121,13 +134,19 @@ fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {
         let (text, style) = line_words(cx, line);
         put(&text, style);
     }
+    if cx.snapshot.speed != 1.0 {
+        put(&format!("speed ×{}", cx.snapshot.speed), theme.strong());
+    }
+    put(&fit(&model.operator, 12), theme.dim());
 }
 
 /// A line in the header: `L1 ▪ tx rx 62 %`, or why it is not connected and when it is tried again.
 fn line_words(cx: &Cx, line: &LineDef) -> (String, Style) {
     let status = cx.snapshot.line(line.id);
     let counters = &status.counters;
-    let recent = |at: Option<jiff::Timestamp>| at.is_some_and(|at| between(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0));
+    let recent = |at: Option<jiff::Timestamp>| {
+        at.is_some_and(|at| between(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0))
+    };
     match &status.state {
         LineState::Connected => {
             let tx = if recent(counters.last_tx) { "tx" } else { "--" };
@@ -196,10 +215,11 @@ fn alarm_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
 
 /// How many of each priority: `[1]!1 (3)2`.
 fn counts(cx: &Cx) -> String {
-    let all = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low].into_iter().filter_map(|priority| {
-        let count = cx.snapshot.alarms.iter().filter(|alarm| cx.def().alarm(alarm.id).priority == priority).count();
-        (count > 0).then(|| format!("{}×{count}", cx.theme.priority_tag(priority)))
-    });
+    let all =
+        [Priority::Critical, Priority::High, Priority::Medium, Priority::Low].into_iter().filter_map(|priority| {
+            let count = cx.snapshot.alarms.iter().filter(|alarm| cx.def().alarm(alarm.id).priority == priority).count();
+            (count > 0).then(|| format!("{}×{count}", cx.theme.priority_tag(priority)))
+        });
     all.collect::<Vec<_>>().join(" ")
 }
 
@@ -244,7 +264,12 @@ pub fn order_words(cx: &Cx, command: &Command, old: Option<f64>) -> String {
     match command {
         Command::Write { tag, value } => {
             let old = old.map_or("?".to_owned(), |old| cx.snapshot.format(*tag, old));
-            let text = format!("{} {old} → {} {}", cx.def().tag(*tag).name, cx.snapshot.format(*tag, *value), cx.snapshot.unit(*tag));
+            let text = format!(
+                "{} {old} → {} {}",
+                cx.def().tag(*tag).name,
+                cx.snapshot.format(*tag, *value),
+                cx.snapshot.unit(*tag)
+            );
             text.trim_end().to_owned()
         }
         Command::Acknowledge(alarm) => format!("acknowledge {} {}", subject(cx, *alarm), cx.def().alarm(*alarm).text),
@@ -257,7 +282,11 @@ pub fn order_words(cx: &Cx, command: &Command, old: Option<f64>) -> String {
 
 /// As many keys as fit; those of every tab stand at the right end.
 fn footer(cx: &Cx, canvas: &mut Canvas, hints: &[Hint], global: bool) {
-    let tail: Vec<Hint> = if global { keys::hints(keys::GLOBAL).into_iter().filter(|hint| !hint.label.is_empty()).collect() } else { Vec::new() };
+    let tail: Vec<Hint> = if global {
+        keys::hints(keys::GLOBAL).into_iter().filter(|hint| !hint.label.is_empty()).collect()
+    } else {
+        Vec::new()
+    };
     let room = |hint: &Hint| width(&hint.key) + 1 + width(&hint.label) + 2;
     let mut end = canvas.width().saturating_sub(1 + tail.iter().map(room).sum::<u16>());
     let mut x = 1;

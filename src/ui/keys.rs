@@ -128,12 +128,27 @@ pub const GLOBAL: &[Key<Global>] = &[
     Key { chord: char('5'), label: "", help: "reports", action: Global::Show(4) },
     Key { chord: code(KeyCode::Tab), label: "", help: "next tab", action: Global::Next },
     Key { chord: code(KeyCode::BackTab), label: "", help: "previous tab", action: Global::Previous },
-    Key { chord: char('a'), label: "", help: "acknowledge the selected or most urgent alarm", action: Global::Acknowledge },
+    Key {
+        chord: char('a'),
+        label: "",
+        help: "acknowledge the selected or most urgent alarm",
+        action: Global::Acknowledge,
+    },
     Key { chord: char('A'), label: "", help: "acknowledge all alarms (asks first)", action: Global::AcknowledgeAll },
-    Key { chord: code(KeyCode::Esc), label: "", help: "close a window; take the last outcome off the screen", action: Global::Dismiss },
+    Key {
+        chord: code(KeyCode::Esc),
+        label: "",
+        help: "close a window; take the last outcome off the screen",
+        action: Global::Dismiss,
+    },
     Key { chord: ctrl('l'), label: "", help: "draw everything anew", action: Global::Redraw },
     Key { chord: ctrl('c'), label: "", help: "leave (asks first)", action: Global::Quit },
-    Key { chord: char('q'), label: "quit", help: "leave (asks first); the station keeps running", action: Global::Quit },
+    Key {
+        chord: char('q'),
+        label: "quit",
+        help: "leave (asks first); the station keeps running",
+        action: Global::Quit,
+    },
     Key { chord: char('?'), label: "help", help: "all keys", action: Global::Help },
 ];
 

@@ -215,7 +215,8 @@ impl Model {
     /// The alarm that `a` is for: the one selected on the alarms tab, else the most urgent unacknowledged.
     fn alarm_to_acknowledge(&self) -> Option<AlarmId> {
         let selected = (self.tabs.shown == Tab::Alarms).then(|| self.tabs.alarms.selected(&self.cx())).flatten();
-        let alarm = selected.or_else(|| self.snapshot.alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()))?;
+        let alarm =
+            selected.or_else(|| self.snapshot.alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()))?;
         alarm.state.needs_acknowledgement().then_some(alarm.id)
     }
 }
@@ -292,7 +293,10 @@ fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
             Some(id) => vec![Act::Order(Command::Acknowledge(id))],
             None => Vec::new(),
         },
-        Global::AcknowledgeAll => Confirm::acknowledge_all(&model.cx()).map(|confirm| Act::Open(Modal::Confirm(confirm))).into_iter().collect(),
+        Global::AcknowledgeAll => Confirm::acknowledge_all(&model.cx())
+            .map(|confirm| Act::Open(Modal::Confirm(confirm)))
+            .into_iter()
+            .collect(),
         Global::Redraw => vec![Act::Do(Effect::Redraw)],
         Global::Dismiss => {
             model.watch = None;

@@ -82,7 +82,11 @@ impl Theme {
     }
     /// Labels, units, frames: there when looked for.
     pub fn dim(&self) -> Style {
-        self.fg((140, 142, 144), 245, Color::Reset).add_modifier(if self.colours == Colours::Sixteen { Modifier::DIM } else { Modifier::empty() })
+        self.fg((140, 142, 144), 245, Color::Reset).add_modifier(if self.colours == Colours::Sixteen {
+            Modifier::DIM
+        } else {
+            Modifier::empty()
+        })
     }
     /// Headings and the keys of the footer.
     pub fn strong(&self) -> Style {
@@ -230,7 +234,15 @@ mod tests {
     fn without_colour_no_role_asks_for_one() {
         let theme = Theme::PLAIN;
         let pens = (0..8).map(|n| theme.pen(n));
-        let roles = [theme.normal(), theme.dim(), theme.strong(), theme.focus(), theme.liquid(), theme.trouble(), theme.severity(Priority::High)];
+        let roles = [
+            theme.normal(),
+            theme.dim(),
+            theme.strong(),
+            theme.focus(),
+            theme.liquid(),
+            theme.trouble(),
+            theme.severity(Priority::High),
+        ];
         for style in pens.chain(roles) {
             assert_eq!((style.fg, style.bg), (None, None));
         }

@@ -49,7 +49,12 @@ impl Screen {
         crossterm::style::force_color_output(true);
         terminal::enable_raw_mode()?;
         RAISED.store(true, Ordering::SeqCst);
-        let raised = crossterm::execute!(io::stdout(), terminal::EnterAlternateScreen, cursor::Hide, event::EnableBracketedPaste);
+        let raised = crossterm::execute!(
+            io::stdout(),
+            terminal::EnterAlternateScreen,
+            cursor::Hide,
+            event::EnableBracketedPaste
+        );
         let screen = raised.and_then(|()| Ok(Screen { terminal: Terminal::new(Wire::new()?)? }));
         if screen.is_err() {
             restore();
@@ -99,7 +104,12 @@ pub fn own<T>(work: impl FnOnce() -> T) -> T {
 /// Puts everything back, the first time it is called. Errors are of no use to anyone: the terminal may be gone.
 fn restore() {
     if RAISED.swap(false, Ordering::SeqCst) {
-        let _ = crossterm::execute!(io::stdout(), event::DisableBracketedPaste, terminal::LeaveAlternateScreen, cursor::Show);
+        let _ = crossterm::execute!(
+            io::stdout(),
+            event::DisableBracketedPaste,
+            terminal::LeaveAlternateScreen,
+            cursor::Show
+        );
         let _ = terminal::disable_raw_mode();
     }
 }

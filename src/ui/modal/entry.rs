@@ -56,7 +56,8 @@ impl Entry {
         let theme = cx.theme;
         let def = cx.def().tag(self.tag);
         let room = body.width.saturating_sub(8).min(64);
-        let mut rows: Vec<(String, Style)> = vec![(range_words(cx, self.tag), theme.normal()), (wire_words(def), theme.dim())];
+        let mut rows: Vec<(String, Style)> =
+            vec![(range_words(cx, self.tag), theme.normal()), (wire_words(def), theme.dim())];
         let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
         let problem = self.problem.clone().unwrap_or_default();
@@ -87,7 +88,9 @@ pub fn range_words(cx: &Cx, tag: TagId) -> String {
     match cx.snapshot.range(tag) {
         Some((min, max)) => {
             let unit = cx.snapshot.unit(tag);
-            format!("range {} … {} {unit}", cx.snapshot.format(tag, min), cx.snapshot.format(tag, max)).trim_end().to_owned()
+            format!("range {} … {} {unit}", cx.snapshot.format(tag, min), cx.snapshot.format(tag, max))
+                .trim_end()
+                .to_owned()
         }
         None => "range not known".to_owned(),
     }
@@ -95,7 +98,9 @@ pub fn range_words(cx: &Cx, tag: TagId) -> String {
 
 /// The number if it can be written; else what is wrong with it. Courtesy: the station checks again.
 fn check(cx: &Cx, tag: TagId, text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| if text.is_empty() { "type a number".to_owned() } else { format!("{text} is not a number") })?;
+    let value: f64 = text
+        .parse()
+        .map_err(|_| if text.is_empty() { "type a number".to_owned() } else { format!("{text} is not a number") })?;
     let decimals = usize::from(cx.snapshot.decimals[tag.index()]);
     let typed = text.split_once('.').map_or(0, |(_, fraction)| fraction.trim_end_matches('0').len());
     if typed > decimals {
@@ -120,7 +125,9 @@ mod tests {
         let fixture = Fixture::normal();
         let sv = fixture.tag("TIC-1.SV");
         with_cx(&fixture.snapshot(), |cx| {
-            let check = |text: &str, expect: Result<f64, &str>| assert_eq!(check(cx, sv, text), expect.map_err(str::to_owned), "{text}");
+            let check = |text: &str, expect: Result<f64, &str>| {
+                assert_eq!(check(cx, sv, text), expect.map_err(str::to_owned), "{text}")
+            };
             check("70", Ok(70.0));
             check("70.5", Ok(70.5));
             check("70.50", Ok(70.5));

@@ -114,7 +114,18 @@ fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)>
         ("read", format!("{read} ({poll})"), theme.normal()),
         ("range", range_words(cx, tag).trim_start_matches("range ").to_owned(), theme.normal()),
         ("access", format!("{access}  {}  map row {}", wire_words(def), def.confidence.word()), theme.normal()),
-        ("device", format!("{} {} unit {} on {}  {}", device.name, device.model, device.unit, cx.def().line(device.line).name, device_words(cx, def.device)), theme.normal()),
+        (
+            "device",
+            format!(
+                "{} {} unit {} on {}  {}",
+                device.name,
+                device.model,
+                device.unit,
+                cx.def().line(device.line).name,
+                device_words(cx, def.device)
+            ),
+            theme.normal(),
+        ),
     ];
     for alarm in cx.snapshot.alarms_of(tag) {
         let def = cx.def().alarm(alarm.id);
@@ -122,7 +133,9 @@ fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)>
         rows.push(("alarm", text, theme.alarm(def.priority, alarm.state, cx.flash())));
     }
     let meaning = wrap(&def.meaning, room.saturating_sub(9));
-    rows.extend(meaning.into_iter().enumerate().map(|(n, line)| (if n == 0 { "meaning" } else { "" }, line, theme.normal())));
+    rows.extend(
+        meaning.into_iter().enumerate().map(|(n, line)| (if n == 0 { "meaning" } else { "" }, line, theme.normal())),
+    );
     rows
 }
 

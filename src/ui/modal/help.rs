@@ -27,7 +27,12 @@ pub(super) fn view(row: u16, cx: &Cx, tabs: &Tabs, frame: &mut Frame, body: Rect
     let global = keys::hints(keys::GLOBAL);
     let heading = |text: &str| Hint::new("", text, "");
     let own = own.into_iter().filter(|hint| !hint.help.is_empty());
-    let rows: Vec<Hint> = [heading(tabs.shown.title())].into_iter().chain(own).chain([heading(""), heading("every tab")]).chain(global).collect();
+    let rows: Vec<Hint> = [heading(tabs.shown.title())]
+        .into_iter()
+        .chain(own)
+        .chain([heading(""), heading("every tab")])
+        .chain(global)
+        .collect();
     let keys = rows.iter().map(|hint| width(&hint.key)).max().unwrap_or(0);
     let inner = rows.iter().map(|hint| keys + 2 + width(&hint.help)).max().unwrap_or(0).max(40);
     let shown = body.height.saturating_sub(2);

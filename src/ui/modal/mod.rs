@@ -130,6 +130,7 @@ pub(super) fn window<'a>(cx: &Cx, frame: &'a mut Frame, body: Rect, title: &str,
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     canvas.clear();
     canvas.frame(&fit(title, width.saturating_sub(6)), cx.theme.strong());
-    let area = Rect::new(area.x + 2.min(width), area.y + 1.min(height), width.saturating_sub(4), height.saturating_sub(2));
+    let area =
+        Rect::new(area.x + 2.min(width), area.y + 1.min(height), width.saturating_sub(4), height.saturating_sub(2));
     Canvas::new(frame.buffer_mut(), area)
 }

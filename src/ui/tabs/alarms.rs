@@ -45,8 +45,18 @@ pub const KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::PageDown), label: "", help: "ten rows down", action: Action::Move(10) },
     Key { chord: code(KeyCode::Home), label: "", help: "first row", action: Action::Move(-9_999) },
     Key { chord: code(KeyCode::End), label: "", help: "last row", action: Action::Move(9_999) },
-    Key { chord: code(KeyCode::Enter), label: "open", help: "faceplate of what the alarm watches", action: Action::Open },
-    Key { chord: char('j'), label: "journal", help: "journal of alarms and operator actions, and back", action: Action::Journal },
+    Key {
+        chord: code(KeyCode::Enter),
+        label: "open",
+        help: "faceplate of what the alarm watches",
+        action: Action::Open,
+    },
+    Key {
+        chord: char('j'),
+        label: "journal",
+        help: "journal of alarms and operator actions, and back",
+        action: Action::Journal,
+    },
     Key { chord: char('c'), label: "controller", help: "parameters of the alarm's device", action: Action::Controller },
 ];
 
@@ -86,9 +96,9 @@ impl Alarms {
         Alarms::default()
     }
 
-    /// The selected alarm: the chosen one while it lives, else the first.
+    /// The selected alarm: the chosen one while it lives, else the first; none while the journal is shown.
     pub fn selected<'a>(&self, cx: &Cx<'a>) -> Option<&'a ActiveAlarm> {
-        cx.snapshot.alarms.get(self.place(cx))
+        cx.snapshot.alarms.get(self.place(cx)).filter(|_| self.journal.is_none())
     }
 
     /// A key of [`KEYS`].
@@ -102,7 +112,9 @@ impl Alarms {
                 self.journal = if self.journal.is_some() { None } else { Some(Journal::default()) };
                 self.on_snapshot(cx)
             }
-            Action::Open => self.faceplate(cx).map(|faceplate| Act::Open(Modal::Faceplate(faceplate))).into_iter().collect(),
+            Action::Open => {
+                self.faceplate(cx).map(|faceplate| Act::Open(Modal::Faceplate(faceplate))).into_iter().collect()
+            }
             Action::Controller => match self.selected(cx).map(|alarm| cx.def().alarm(alarm.id).subject) {
                 Some(Subject::Device(device)) => vec![Act::ShowDevice(device)],
                 Some(Subject::Tag(tag)) => vec![Act::ShowDevice(cx.def().tag(tag).device)],
@@ -207,7 +219,12 @@ impl Alarms {
             let style = if n == place { style.patch(theme.focus()).fg(style.fg.unwrap_or_default()) } else { style };
             canvas.text(1, y, &columns.row(cells(cx, alarm).each_ref().map(String::as_str)), style);
             if n != place {
-                canvas.text(1, y, theme.priority_mark(def.priority), theme.alarm(def.priority, alarm.state, cx.flash()));
+                canvas.text(
+                    1,
+                    y,
+                    theme.priority_mark(def.priority),
+                    theme.alarm(def.priority, alarm.state, cx.flash()),
+                );
             }
         }
         if alarms.len() > first + room {
@@ -224,16 +241,24 @@ impl Alarms {
         let length = canvas.width();
         canvas.run(0, 0, length, '─', theme.dim());
         let condition = condition_words(cx, alarm.id);
-        let title = format!(" {} {} {} {condition} ", theme.priority_tag(def.priority), subject(cx, alarm.id), def.text);
+        let title =
+            format!(" {} {} {} {condition} ", theme.priority_tag(def.priority), subject(cx, alarm.id), def.text);
         canvas.text(1, 0, &fit(&title, length.saturating_sub(2)), theme.strong());
         let guidance = &def.guidance;
-        let respond = guidance.respond.map(|span| format!(" (respond within {} min)", span.as_secs().div_ceil(60))).unwrap_or_default();
+        let respond = guidance
+            .respond
+            .map(|span| format!(" (respond within {} min)", span.as_secs().div_ceil(60)))
+            .unwrap_or_default();
         let now = match def.subject {
             Subject::Tag(tag) => format!("{}, raised at {}", value::show(cx, tag).whole(), raised_value(cx, alarm)),
             Subject::Device(device) => device_words(cx, device),
         };
-        let rows: [(&str, &str); 4] =
-            [("now", &now), ("cause", &guidance.cause), ("effect", &guidance.effect), ("action", &format!("{}{respond}", guidance.action))];
+        let rows: [(&str, &str); 4] = [
+            ("now", &now),
+            ("cause", &guidance.cause),
+            ("effect", &guidance.effect),
+            ("action", &format!("{}{respond}", guidance.action)),
+        ];
         let mut y = 1;
         for (label, text) in rows {
             let text = if text.is_empty() { "–" } else { text };
@@ -275,7 +300,13 @@ impl Journal {
             let number = |value: Option<f64>| value.map(|value| format!(" {value}")).unwrap_or_default();
             let by = row.by.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
             let mark = cx.theme.priority_mark(row.priority);
-            let text = format!("{mark} {} {} {}{}{by}", pad(&row.subject, 12), pad(&row.text, 22), pad(row.step.word(), 12), number(row.value));
+            let text = format!(
+                "{mark} {} {} {}{}{by}",
+                pad(&row.subject, 12),
+                pad(&row.text, 22),
+                pad(row.step.word(), 12),
+                number(row.value)
+            );
             (row.at, text, cx.theme.normal())
         });
         let actions = self.actions.iter().map(|row| {
@@ -283,7 +314,14 @@ impl Journal {
                 (old, Some(new)) => format!("{} → {new}  ", old.as_deref().unwrap_or("?")),
                 (_, None) => String::new(),
             };
-            let text = format!("  {}  {} {} {change}{} by {}", cx.theme.pick("·", "."), pad(&row.target, 12), row.action, row.outcome, row.by);
+            let text = format!(
+                "  {}  {} {} {change}{} by {}",
+                cx.theme.pick("·", "."),
+                pad(&row.target, 12),
+                row.action,
+                row.outcome,
+                row.by
+            );
             (row.at, text, cx.theme.strong())
         });
         let mut rows: Vec<_> = alarms.chain(actions).collect();
@@ -307,7 +345,14 @@ impl Columns {
     }
     fn row(&self, [mark, time, tag, what, value, state, since]: [&str; 7]) -> String {
         let (tag, what) = (pad(tag, self.tag), pad(what, self.what));
-        format!("{} {} {tag} {what} {} {} {}", pad(mark, 4), pad(time, 9), pad_left(value, 10), pad(state, 8), pad_left(since, 8))
+        format!(
+            "{} {} {tag} {what} {} {} {}",
+            pad(mark, 4),
+            pad(time, 9),
+            pad_left(value, 10),
+            pad(state, 8),
+            pad_left(since, 8)
+        )
     }
 }
 

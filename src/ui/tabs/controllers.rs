@@ -6,7 +6,8 @@ use ratatui::{Frame, layout::Rect};
 use crate::{
     plant::{
         command::Command,
-        def::{DeviceDef, DeviceId, TagId},
+        def::{DeviceDef, DeviceId, LineId, TagId},
+        event::LineState,
         snapshot::{DeviceState, Snapshot},
         tag::{Access, Poll, TagDef},
     },
@@ -14,7 +15,7 @@ use crate::{
         Act, Cx,
         chrome::{order_words, outcome_words},
         keys::{Key, char, code},
-        modal::{Choice, Faceplate, Modal, entry::range_words, faceplate::device_words},
+        modal::{Choice, Confirm, Faceplate, Modal, entry::range_words, faceplate::device_words},
         widgets::{
             text::{Canvas, age, clock, fit, pad, pad_left},
             value,
@@ -39,6 +40,8 @@ pub enum Action {
     Tune,
     /// Run or standby.
     Run,
+    /// Close the device's line, or open it again.
+    Line,
 }
 
 /// Keys of this tab.
@@ -51,11 +54,22 @@ pub const KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::PageDown), label: "", help: "ten parameters down", action: Action::Move(10) },
     Key { chord: code(KeyCode::Home), label: "", help: "first parameter", action: Action::Move(-9_999) },
     Key { chord: code(KeyCode::End), label: "", help: "last parameter", action: Action::Move(9_999) },
-    Key { chord: code(KeyCode::Enter), label: "edit", help: "change the parameter, or look at a read-only one", action: Action::Edit },
+    Key {
+        chord: code(KeyCode::Enter),
+        label: "edit",
+        help: "change the parameter, or look at a read-only one",
+        action: Action::Edit,
+    },
     Key { chord: char('u'), label: "refresh", help: "read all parameters of the device now", action: Action::Refresh },
     Key { chord: char('f'), label: "actions", help: "actions of the device (save to memory)", action: Action::Actions },
     Key { chord: char('T'), label: "tune", help: "auto-tuning, if the device has it", action: Action::Tune },
     Key { chord: char('S'), label: "standby", help: "run or standby, if the device has it", action: Action::Run },
+    Key {
+        chord: char('L'),
+        label: "line",
+        help: "disconnect the device's line, or connect it again (asks first)",
+        action: Action::Line,
+    },
 ];
 
 /// State of this tab.
@@ -98,13 +112,19 @@ impl Controllers {
             }
             Action::Edit => match self.selected(cx) {
                 Some(tag) if tag.writable() => write(Some(tag.id)),
-                Some(tag) => Faceplate::new(tag.label.clone(), vec![tag.id]).map(|plate| Act::Open(Modal::Faceplate(plate))).into_iter().collect(),
+                Some(tag) => Faceplate::new(tag.label.clone(), vec![tag.id])
+                    .map(|plate| Act::Open(Modal::Faceplate(plate)))
+                    .into_iter()
+                    .collect(),
                 None => Vec::new(),
             },
             Action::Refresh => vec![Act::Order(Command::Refresh(self.device))],
-            Action::Actions => Choice::actions(cx, self.device).map(|choice| Act::Open(Modal::Choice(choice))).into_iter().collect(),
+            Action::Actions => {
+                Choice::actions(cx, self.device).map(|choice| Act::Open(Modal::Choice(choice))).into_iter().collect()
+            }
             Action::Tune => write(device.faceplate.as_ref().and_then(|plate| plate.tune)),
             Action::Run => write(device.faceplate.as_ref().and_then(|plate| plate.run)),
+            Action::Line => vec![Act::Open(Modal::Confirm(connect(cx, device.line)))],
         }
     }
 
@@ -131,7 +151,12 @@ impl Controllers {
             canvas.text(x + 2, bottom.saturating_sub(1), &fit(words, end.saturating_sub(x + 2)), cx.theme.normal());
         }
         if let Some((words, trouble)) = last_write(cx, self.device) {
-            canvas.text(1, bottom, &fit(&words, end.saturating_sub(12)), if trouble { cx.theme.trouble() } else { cx.theme.dim() });
+            canvas.text(
+                1,
+                bottom,
+                &fit(&words, end.saturating_sub(12)),
+                if trouble { cx.theme.trouble() } else { cx.theme.dim() },
+            );
         }
         if below > 0 {
             canvas.text_right(end, bottom, &format!("{below} more ▼"), cx.theme.normal());
@@ -151,7 +176,12 @@ impl Controllers {
         let count = cx.def().devices.len();
         let x = canvas.text(1, 0, &format!("‹ {} ›", device.name), theme.focus());
         let line = &cx.def().line(device.line).name;
-        let x = canvas.text(x + 2, 0, &format!("{}  {}  unit {}  {line}", device.model, device.title, device.unit), theme.normal());
+        let x = canvas.text(
+            x + 2,
+            0,
+            &format!("{}  {}  unit {}  {line}", device.model, device.title, device.unit),
+            theme.normal(),
+        );
         let (mark, style) = match cx.snapshot.device(device.id).state {
             DeviceState::Answering => ("✓", theme.normal()),
             DeviceState::Unknown => ("?", theme.dim()),
@@ -201,18 +231,38 @@ fn in_groups<'a>(cx: &Cx<'a>, device: DeviceId) -> Vec<&'a TagDef> {
     sorted
 }
 
+/// Closing a line is asked with what it means for everything on it.
+fn connect(cx: &Cx, line: LineId) -> Confirm {
+    let name = &cx.def().line(line).name;
+    if cx.snapshot.line(line).state == LineState::Disconnected {
+        return Confirm::order(
+            format!("connect {name}"),
+            format!("Open line {name} and read its devices again?"),
+            Command::Connect(line, true),
+        );
+    }
+    let devices: Vec<&str> =
+        cx.def().devices.iter().filter(|device| device.line == line).map(|device| device.name.as_str()).collect();
+    let words =
+        format!("Close line {name}? {} will be read no more, and their alarms cannot be seen.", devices.join(", "));
+    Confirm::order(format!("disconnect {name}"), words, Command::Connect(line, false))
+}
+
 fn parameter(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagDef, selected: bool) {
     let theme = cx.theme;
     let mut shown = value::show(cx, tag.id);
     if tag.access == Access::Write {
         shown.text = "–".to_owned();
     }
-    let old = matches!(tag.poll, Poll::Every(_)) && cx.age(tag.id).as_secs() < 60 && cx.snapshot.sample(tag.id).quality.is_good();
+    let old = matches!(tag.poll, Poll::Every(_))
+        && cx.age(tag.id).as_secs() < 60
+        && cx.snapshot.sample(tag.id).quality.is_good();
     let read = if old { String::new() } else { age(cx.age(tag.id)) };
     let range = range_words(cx, tag.id);
     let range = range.trim_start_matches("range ").trim_end_matches(&shown.unit).trim_end().to_owned();
     let pen = if tag.writable() { theme.pick("✎", "w") } else { " " };
-    let meaning = if shown.note.is_empty() || cx.snapshot.sample(tag.id).value.is_some() { &tag.meaning } else { &shown.note };
+    let meaning =
+        if shown.note.is_empty() || cx.snapshot.sample(tag.id).value.is_some() { &tag.meaning } else { &shown.note };
     let name = format!("{} {}", pad(&tag.short, columns.short), tag.label);
     let row = columns.row([pen, &name, &shown.text, &shown.unit, &range, &read, meaning]);
     canvas.text(1, y, &row, if selected { theme.focus() } else { theme.normal() });
@@ -224,7 +274,14 @@ fn parameter(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagD
 /// `PV 72.4 °C │ SV 70.0 °C │ MV 12.0 % │ PID │ AT off │ RUN`, for devices that have these.
 fn faceplate_row(cx: &Cx, device: &DeviceDef, canvas: &mut Canvas) {
     let Some(plate) = &device.faceplate else { return };
-    let parts = [("PV", Some(plate.pv)), ("SV", Some(plate.sv)), ("MV", plate.mv), ("", plate.mode), ("AT", plate.tune), ("", plate.run)];
+    let parts = [
+        ("PV", Some(plate.pv)),
+        ("SV", Some(plate.sv)),
+        ("MV", plate.mv),
+        ("", plate.mode),
+        ("AT", plate.tune),
+        ("", plate.run),
+    ];
     let mut x = 1;
     for (name, tag) in parts.into_iter().filter_map(|(name, tag)| Some((name, tag?))) {
         if x > 1 {

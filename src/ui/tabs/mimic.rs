@@ -92,7 +92,8 @@ impl Mimic {
     /// The plant's keys first: they are what the tab is for.
     pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
         let commands = cx.def().mimic.commands.iter();
-        let commands = commands.map(|command| Hint::new(command.key, &command.label, format!("{} (asks first)", command.label)));
+        let commands =
+            commands.map(|command| Hint::new(command.key, &command.label, format!("{} (asks first)", command.label)));
         commands.chain([Hint::new("←↑↓→", "select", "select an item")]).chain(keys::hints(KEYS)).collect()
     }
 
@@ -108,7 +109,8 @@ impl Mimic {
             MimicItem::Trend { tag, window, place } => {
                 let from = cx.now - SignedDuration::try_from(*window).ok()?;
                 let width = stretch(cx, cx.area).place(*place).width;
-                let question = Question::Series { tags: vec![*tag], from, to: cx.now, buckets: usize::from(width.max(1)) * 2 };
+                let question =
+                    Question::Series { tags: vec![*tag], from, to: cx.now, buckets: usize::from(width.max(1)) * 2 };
                 Some(Act::ask(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(n as u32), question))
             }
             MimicItem::Tank { .. }
@@ -154,14 +156,23 @@ impl Mimic {
         let motion = self.motion && cx.theme.motion;
         match item {
             MimicItem::Tank { place, label, level, temperature, heater, agitator } => {
-                let tank = Tank { label, level: *level, temperature: *temperature, heater: *heater, agitator: *agitator };
+                let tank =
+                    Tank { label, level: *level, temperature: *temperature, heater: *heater, agitator: *agitator };
                 tank.view(cx, canvas, stretch.place(*place), selected, motion);
             }
-            MimicItem::Valve { place, label, tag, vertical } => unit::valve(cx, canvas, stretch.spot(*place), label, *tag, *vertical, selected),
-            MimicItem::Pump { place, label, tag } => unit::pump(cx, canvas, stretch.place(*place), label, *tag, selected),
+            MimicItem::Valve { place, label, tag, vertical } => {
+                unit::valve(cx, canvas, stretch.spot(*place), label, *tag, *vertical, selected)
+            }
+            MimicItem::Pump { place, label, tag } => {
+                unit::pump(cx, canvas, stretch.place(*place), label, *tag, selected)
+            }
             MimicItem::Pipe { points, flow } => pipe::view(cx, canvas, points, flow, stretch, motion),
-            MimicItem::Value { place, label, tag } => unit::labelled(cx, canvas, stretch.place(*place), label, *tag, selected),
-            MimicItem::Controller { place, device } => panel::controller(cx, canvas, stretch.place(*place), cx.def().device(*device), selected),
+            MimicItem::Value { place, label, tag } => {
+                unit::labelled(cx, canvas, stretch.place(*place), label, *tag, selected)
+            }
+            MimicItem::Controller { place, device } => {
+                panel::controller(cx, canvas, stretch.place(*place), cx.def().device(*device), selected)
+            }
             MimicItem::Sequence { place, label, step, remaining, states } => {
                 let sequence = panel::Sequence { label, step: *step, remaining: *remaining, states };
                 sequence.view(cx, canvas, stretch.place(*place), selected);
@@ -237,7 +248,9 @@ mod tests {
         let mut open: Vec<usize> = neighbour(&items, None, (1, 0)).into_iter().collect();
         while let Some(n) = open.pop() {
             if !std::mem::replace(&mut reached[n], true) {
-                open.extend([(1, 0), (-1, 0), (0, 1), (0, -1)].into_iter().filter_map(|way| neighbour(&items, Some(n), way)));
+                open.extend(
+                    [(1, 0), (-1, 0), (0, 1), (0, -1)].into_iter().filter_map(|way| neighbour(&items, Some(n), way)),
+                );
             }
         }
         for (n, item) in items.iter().enumerate() {

@@ -205,7 +205,14 @@ pub fn clock(at: Timestamp, zone: &TimeZone) -> String {
 pub fn moment(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
     let (days, at) = (between(at, now).as_secs() / 86_400, at.to_zoned(zone.clone()));
     let today = at.date() == now.to_zoned(zone.clone()).date();
-    at.strftime(if today { "%H:%M:%S" } else if days < 6 { "%a %H:%M" } else { "%m-%d %Hh" }).to_string()
+    at.strftime(if today {
+        "%H:%M:%S"
+    } else if days < 6 {
+        "%a %H:%M"
+    } else {
+        "%m-%d %Hh"
+    })
+    .to_string()
 }
 
 #[cfg(test)]

@@ -31,7 +31,9 @@ pub fn show(cx: &Cx, tag: TagId) -> Shown {
     let unit = cx.snapshot.unit(tag).to_owned();
     match (sample.quality, words(cx, tag)) {
         (Quality::Good, Some(text)) => Shown { text, unit, note: String::new(), style },
-        (Quality::Uncertain(_), Some(text)) => Shown { text: format!("{text}?"), unit, note: text::age(cx.age(tag)), style },
+        (Quality::Uncertain(_), Some(text)) => {
+            Shown { text: format!("{text}?"), unit, note: text::age(cx.age(tag)), style }
+        }
         (quality, _) => {
             let note = quality.cause().unwrap_or(Cause::NotRead).words().to_owned();
             Shown { text: "----".to_owned(), unit: String::new(), note, style }
@@ -46,7 +48,12 @@ fn words(cx: &Cx, tag: TagId) -> Option<String> {
     if def.bit_labels.is_empty() {
         return Some(cx.snapshot.format(tag, value));
     }
-    let set: Vec<&str> = def.bit_labels.iter().filter(|(bit, _)| value as u64 >> (*bit).min(63) & 1 == 1).map(|(_, name)| name.as_str()).collect();
+    let set: Vec<&str> = def
+        .bit_labels
+        .iter()
+        .filter(|(bit, _)| value as u64 >> (*bit).min(63) & 1 == 1)
+        .map(|(_, name)| name.as_str())
+        .collect();
     Some(if set.is_empty() { "none".to_owned() } else { set.join(", ") })
 }
 
@@ -61,7 +68,10 @@ impl Shown {
     }
     /// As much as fits: the note goes first, then the unit; the doubt itself is part of the text and stays.
     pub fn within(&self, room: u16) -> String {
-        [self.whole(), self.with_unit()].into_iter().find(|text| text::width(text) <= room).unwrap_or_else(|| text::fit(&self.text, room))
+        [self.whole(), self.with_unit()]
+            .into_iter()
+            .find(|text| text::width(text) <= room)
+            .unwrap_or_else(|| text::fit(&self.text, room))
     }
 }
 

@@ -23,7 +23,7 @@ pub struct Stretch {
 
 /// A rectangle of the screen, relative to the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Box {
+pub struct Bounds {
     /// Left column.
     pub x: u16,
     /// Top row.
@@ -57,11 +57,11 @@ impl Stretch {
         ((f64::from(y) + 0.5) * self.y) as u16
     }
     /// A nominal rectangle.
-    pub fn place(self, place: Place) -> Box {
+    pub fn place(self, place: Place) -> Bounds {
         let (x, y) = (self.column(place.x), self.row(place.y));
         let right = self.column(place.x.saturating_add(place.width.max(1)));
         let bottom = self.row(place.y.saturating_add(place.height.max(1)));
-        Box { x, y, width: right.saturating_sub(x).max(1), height: bottom.saturating_sub(y).max(1) }
+        Bounds { x, y, width: right.saturating_sub(x).max(1), height: bottom.saturating_sub(y).max(1) }
     }
     /// Where a single symbol stands.
     pub fn spot(self, place: Place) -> (u16, u16) {
@@ -72,13 +72,23 @@ impl Stretch {
 /// The tags of an item, the most telling first; none for pipes and words.
 pub fn tags(cx: &Cx, item: &MimicItem) -> Vec<TagId> {
     match item {
-        MimicItem::Tank { level, temperature, heater, agitator, .. } => [*temperature, *level, *heater, *agitator].into_iter().flatten().collect(),
-        MimicItem::Valve { tag, .. } | MimicItem::Pump { tag, .. } | MimicItem::Value { tag, .. } | MimicItem::Trend { tag, .. } => vec![*tag],
+        MimicItem::Tank { level, temperature, heater, agitator, .. } => {
+            [*temperature, *level, *heater, *agitator].into_iter().flatten().collect()
+        }
+        MimicItem::Valve { tag, .. }
+        | MimicItem::Pump { tag, .. }
+        | MimicItem::Value { tag, .. }
+        | MimicItem::Trend { tag, .. } => vec![*tag],
         MimicItem::Controller { device, .. } => match &cx.def().device(*device).faceplate {
-            Some(plate) => [Some(plate.sv), Some(plate.pv), plate.mv, plate.run, plate.mode, plate.tune].into_iter().flatten().collect(),
+            Some(plate) => [Some(plate.sv), Some(plate.pv), plate.mv, plate.run, plate.mode, plate.tune]
+                .into_iter()
+                .flatten()
+                .collect(),
             None => Vec::new(),
         },
-        MimicItem::Sequence { step, remaining, states, .. } => [*step].into_iter().chain(*remaining).chain(states.iter().copied()).collect(),
+        MimicItem::Sequence { step, remaining, states, .. } => {
+            [*step].into_iter().chain(*remaining).chain(states.iter().copied()).collect()
+        }
         MimicItem::Pipe { .. } | MimicItem::Text { .. } => Vec::new(),
     }
 }
@@ -86,9 +96,14 @@ pub fn tags(cx: &Cx, item: &MimicItem) -> Vec<TagId> {
 /// What the item is called.
 pub fn title(cx: &Cx, item: &MimicItem) -> String {
     match item {
-        MimicItem::Tank { label, .. } | MimicItem::Valve { label, .. } | MimicItem::Pump { label, .. } | MimicItem::Sequence { label, .. } => label.clone(),
+        MimicItem::Tank { label, .. }
+        | MimicItem::Valve { label, .. }
+        | MimicItem::Pump { label, .. }
+        | MimicItem::Sequence { label, .. } => label.clone(),
         MimicItem::Value { tag, .. } | MimicItem::Trend { tag, .. } => cx.def().tag(*tag).label.clone(),
-        MimicItem::Controller { device, .. } => format!("{} {}", cx.def().device(*device).name, cx.def().device(*device).title),
+        MimicItem::Controller { device, .. } => {
+            format!("{} {}", cx.def().device(*device).name, cx.def().device(*device).title)
+        }
         MimicItem::Pipe { .. } => String::new(),
         MimicItem::Text { text, .. } => text.clone(),
     }
@@ -151,6 +166,9 @@ mod tests {
     #[test]
     fn a_small_screen_cuts_and_never_squeezes() {
         let stretch = Stretch::new((80, 18), (60, 10));
-        assert_eq!(stretch.place(Place { x: 54, y: 6, width: 26, height: 6 }), Box { x: 54, y: 6, width: 26, height: 6 });
+        assert_eq!(
+            stretch.place(Place { x: 54, y: 6, width: 26, height: 6 }),
+            Bounds { x: 54, y: 6, width: 26, height: 6 }
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use ratatui::style::Modifier;
 
-use super::{Box, alarm_mark, label_style, put_value, unit::states};
+use super::{Bounds, alarm_mark, label_style, put_value, unit::states};
 use crate::{
     plant::def::{Condition, DeviceDef, Faceplate, Level, Subject, TagId},
     ui::{
@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// A controller: PV, SV, MV, a bar of the range with SV and limits, and its states.
-pub fn controller(cx: &Cx, canvas: &mut Canvas, at: Box, device: &DeviceDef, selected: bool) {
+pub fn controller(cx: &Cx, canvas: &mut Canvas, at: Bounds, device: &DeviceDef, selected: bool) {
     let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
     let theme = cx.theme;
     let x = canvas.text(0, 0, &device.name, label_style(cx, selected));
@@ -75,16 +75,21 @@ fn bar(cx: &Cx, canvas: &mut Canvas, y: u16, plate: &Faceplate) {
     }
     if let Some(x) = cx.snapshot.sample(plate.pv).trusted().and_then(column) {
         // Never reversed: a reversed full block is an empty one.
-        let style = alarm_mark(cx, plate.pv).map_or(theme.strong(), |(_, style)| style.remove_modifier(Modifier::REVERSED));
+        let style =
+            alarm_mark(cx, plate.pv).map_or(theme.strong(), |(_, style)| style.remove_modifier(Modifier::REVERSED));
         canvas.glyph(x, y, '█', style);
     }
 }
 
 /// The limits of a tag's alarms.
 fn limits(cx: &Cx, tag: TagId) -> impl Iterator<Item = f64> {
-    cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag)).filter_map(|alarm| match alarm.condition {
-        Condition::Limit { level: Level::HighHigh | Level::High | Level::Low | Level::LowLow, limit, .. } => Some(limit),
-        Condition::Deviation { .. } | Condition::State { .. } | Condition::NotAnswering => None,
+    cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag)).filter_map(|alarm| {
+        match alarm.condition {
+            Condition::Limit { level: Level::HighHigh | Level::High | Level::Low | Level::LowLow, limit, .. } => {
+                Some(limit)
+            }
+            Condition::Deviation { .. } | Condition::State { .. } | Condition::NotAnswering => None,
+        }
     })
 }
 
@@ -103,7 +108,7 @@ pub struct Sequence<'a> {
 
 impl Sequence<'_> {
     /// Draws heading, steps with the present one marked, and states.
-    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, at: Box, selected: bool) {
+    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, at: Bounds, selected: bool) {
         let theme = cx.theme;
         let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
         let x = canvas.text(0, 0, self.label, label_style(cx, selected));
@@ -111,29 +116,34 @@ impl Sequence<'_> {
         let x = canvas.text(x + 2, 0, &shown.text, if shown.note.is_empty() { theme.strong() } else { shown.style });
         if let Some(left) = self.remaining {
             let text = match cx.snapshot.sample(left).trusted() {
-                Some(seconds) if seconds >= 0.0 => format!("{} left", running(std::time::Duration::from_secs_f64(seconds.min(1e7)))),
+                Some(seconds) if seconds >= 0.0 => {
+                    format!("{} left", running(std::time::Duration::from_secs_f64(seconds.min(1e7))))
+                }
                 Some(_) | None => format!("{} left", value::show(cx, left).text),
             };
             let end = at.width;
             canvas.text_right(end.max(x + 1 + width(&text)), 0, &text, theme.normal());
         }
         let last = at.height.saturating_sub(1).max(1);
-        self.steps(cx, &mut canvas.part(0, 1, at.width, last.saturating_sub(1)));
-        states(cx, &mut canvas, last, self.states);
+        let rows = self.steps(cx, &mut canvas.part(0, 1, at.width, last.saturating_sub(1)));
+        states(cx, &mut canvas, (rows + 2).min(last), self.states);
     }
 
-    fn steps(&self, cx: &Cx, canvas: &mut Canvas) {
+    /// Draws the steps; returns the rows that they take.
+    fn steps(&self, cx: &Cx, canvas: &mut Canvas) -> u16 {
         let theme = cx.theme;
         let now = cx.snapshot.sample(self.step).trusted();
         let (mut x, mut y) = (0, 0);
         for (number, name) in &cx.def().tag(self.step).labels {
             let present = now == Some(*number as f64);
-            let text = if present { format!("{}{name}", theme.pick("▸", ">")) } else { format!(" {}", name.to_lowercase()) };
+            let text =
+                if present { format!("{}{name}", theme.pick("▸", ">")) } else { format!(" {}", name.to_lowercase()) };
             let text = fit(&text, canvas.width());
             if x + width(&text) > canvas.width() {
                 (x, y) = (0, y + 1);
             }
             x = canvas.text(x, y, &text, if present { theme.strong() } else { theme.dim() }) + 1;
         }
+        y + 1
     }
 }

@@ -53,7 +53,8 @@ pub fn view(cx: &Cx, canvas: &mut Canvas, points: &[(u16, u16)], flow: &[TagId],
 /// The cells of a pipe in the order of its flow. The ends reach to the edge of their nominal cells, so that they touch
 /// what stands beside them at every size.
 fn steps(points: &[(u16, u16)], stretch: Stretch) -> Vec<Step> {
-    let corners: Vec<(u16, u16)> = points.iter().enumerate().map(|(n, point)| corner(points, n, *point, stretch)).collect();
+    let corners: Vec<(u16, u16)> =
+        points.iter().enumerate().map(|(n, point)| corner(points, n, *point, stretch)).collect();
     let mut steps: Vec<Step> = Vec::new();
     for pair in corners.windows(2) {
         let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
@@ -117,7 +118,9 @@ fn arrow_head(way: Way) -> char {
 /// A straight or bent piece: heavy while it flows, light while it does not.
 fn bend(from: Way, to: Way, heavy: bool) -> char {
     let (light, strong) = match (from, to) {
-        (Way::Right, Way::Right) | (Way::Left, Way::Left) | (Way::Right, Way::Left) | (Way::Left, Way::Right) => ('─', '━'),
+        (Way::Right, Way::Right) | (Way::Left, Way::Left) | (Way::Right, Way::Left) | (Way::Left, Way::Right) => {
+            ('─', '━')
+        }
         (Way::Down, Way::Down) | (Way::Up, Way::Up) | (Way::Down, Way::Up) | (Way::Up, Way::Down) => ('│', '┃'),
         (Way::Right, Way::Down) | (Way::Up, Way::Left) => ('┐', '┓'),
         (Way::Right, Way::Up) | (Way::Down, Way::Left) => ('┘', '┛'),

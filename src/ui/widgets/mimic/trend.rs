@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ratatui::style::Style;
 
-use super::{Box, label_style};
+use super::{Bounds, label_style};
 use crate::{
     history::Series,
     plant::def::TagId,
@@ -16,15 +16,27 @@ use crate::{
 };
 
 /// Draws the curve of a tag, a gap where nothing good is known.
-pub fn view(cx: &Cx, canvas: &mut Canvas, at: Box, tag: TagId, window: Duration, series: Option<&Series>, selected: bool) {
+pub fn view(
+    cx: &Cx,
+    canvas: &mut Canvas,
+    at: Bounds,
+    tag: TagId,
+    window: Duration,
+    series: Option<&Series>,
+    selected: bool,
+) {
     let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
     let theme = cx.theme;
     let minutes = window.as_secs() / 60;
-    let span = if minutes.is_multiple_of(60) && minutes > 0 { format!("{} h", minutes / 60) } else { format!("{minutes} min") };
+    let span = if minutes.is_multiple_of(60) && minutes > 0 {
+        format!("{} h", minutes / 60)
+    } else {
+        format!("{minutes} min")
+    };
     let x = canvas.text(0, 0, &fit(&cx.def().tag(tag).name, at.width), label_style(cx, selected));
     canvas.text(x + 1, 0, &format!("last {span}"), theme.dim());
     let Some((series, (low, _, high))) = series.and_then(|series| Some((series, series.summary?))) else {
-        canvas.text(0, 1, if series.is_some() { "no good value" } else { "reading …" }, theme.dim());
+        canvas.text(0, 1, if series.is_some() { "no good value" } else { "no curve yet" }, theme.dim());
         return;
     };
     let label = |value| cx.snapshot.format(tag, value);

@@ -1,6 +1,6 @@
 //! Valves, pumps and single values: a shape that is filled while it works, a name and a word.
 
-use super::{Box, label_style, put_value};
+use super::{Bounds, label_style, put_value};
 use crate::{
     plant::def::TagId,
     ui::{
@@ -13,7 +13,15 @@ use crate::{
 };
 
 /// A valve at a spot: bow tie, name above (beside, in a vertical pipe) and its state in a word.
-pub fn valve(cx: &Cx, canvas: &mut Canvas, (x, y): (u16, u16), label: &str, tag: TagId, vertical: bool, selected: bool) {
+pub fn valve(
+    cx: &Cx,
+    canvas: &mut Canvas,
+    (x, y): (u16, u16),
+    label: &str,
+    tag: TagId,
+    vertical: bool,
+    selected: bool,
+) {
     let theme = cx.theme;
     let on = value::is_on(cx, tag);
     let word = word(cx, tag, ("OPEN", "SHUT"));
@@ -36,7 +44,7 @@ pub fn valve(cx: &Cx, canvas: &mut Canvas, (x, y): (u16, u16), label: &str, tag:
 }
 
 /// A pump in a pipe: a filled disc while it runs, a ring while it rests. Where its place is narrow the word stands above.
-pub fn pump(cx: &Cx, canvas: &mut Canvas, at: Box, label: &str, tag: TagId, selected: bool) {
+pub fn pump(cx: &Cx, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagId, selected: bool) {
     let theme = cx.theme;
     let (shape, style) = match value::is_on(cx, tag) {
         Some(true) => (theme.pick("●", "@"), theme.running()),
@@ -58,7 +66,7 @@ pub fn pump(cx: &Cx, canvas: &mut Canvas, at: Box, label: &str, tag: TagId, sele
 }
 
 /// A label and its value.
-pub fn labelled(cx: &Cx, canvas: &mut Canvas, at: Box, label: &str, tag: TagId, selected: bool) {
+pub fn labelled(cx: &Cx, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagId, selected: bool) {
     let style = if selected { cx.theme.focus() } else { cx.theme.dim() };
     let x = if label.is_empty() { at.x } else { canvas.text(at.x, at.y, &fit(label, at.width / 2), style) + 1 };
     let room = at.width.saturating_sub(x.saturating_sub(at.x));
