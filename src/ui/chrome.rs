@@ -108,21 +108,20 @@ fn too_small(cx: &Cx, frame: &mut Frame) {
 fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     let theme = cx.theme;
     let x = canvas.text(1, 0, "sightglass", theme.dim());
-    canvas.text(x + 2, 0, &cx.def().title, theme.strong());
+    let start = canvas.text(x + 2, 0, &fit(&cx.def().title, canvas.width() / 3), theme.strong()) + 2;
     let mut end = canvas.width().saturating_sub(1);
+    // The most needed first, from the right; what no longer fits is left out.
     let mut put = |text: &str, style: Style| {
-        canvas.text_right(end, 0, text, style);
-        end = end.saturating_sub(width(text) + 2);
+        if end >= start + width(text) {
+            canvas.text_right(end, 0, text, style);
+            end = end.saturating_sub(width(text) + 2);
+        }
     };
     if model.clock.silent >= SILENCE {
         // The clock stands still on purpose: nobody knows what the plant does.
         put(&format!("STATION SILENT {}", running(model.clock.silent)), theme.trouble());
     } else {
         put(&clock(cx.now, &cx.def().time_zone), theme.normal());
-    }
-    put(&fit(&model.operator, 12), theme.dim());
-    if cx.snapshot.speed != 1.0 {
-        put(&format!("speed ×{}", cx.snapshot.speed), theme.strong());
     }
     let history = &cx.snapshot.history;
     if history.lost > 0 {
@@ -135,6 +134,10 @@ fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {
         let (text, style) = line_words(cx, line);
         put(&text, style);
     }
+    if cx.snapshot.speed != 1.0 {
+        put(&format!("speed ×{}", cx.snapshot.speed), theme.strong());
+    }
+    put(&fit(&model.operator, 12), theme.dim());
 }
 
 /// A line in the header: `L1 ▪ tx rx 62 %`, or why it is not connected and when it is tried again.

@@ -29,7 +29,7 @@ pub fn thai_cells(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Makes a drawn frame safe for the terminal: no SARA AM, and only seven bits for the ASCII glyph set.
+/// Makes a drawn frame safe for the terminal: no SARA AM, and only characters of the glyph set.
 pub fn finish(buffer: &mut Buffer, theme: &Theme) {
     for cell in &mut buffer.content {
         if cell.symbol().is_ascii() {
@@ -39,23 +39,64 @@ pub fn finish(buffer: &mut Buffer, theme: &Theme) {
             let symbol = thai_cells(cell.symbol()).into_owned();
             cell.set_symbol(&symbol);
         }
-        if theme.glyphs == Glyphs::Ascii {
-            let plain = cell.symbol().chars().next().map_or(' ', ascii);
-            cell.set_char(plain);
+        let first = cell.symbol().chars().next().unwrap_or(' ');
+        match theme.glyphs {
+            Glyphs::Braille => {}
+            Glyphs::Block => {
+                if let Some(c) = console(first) {
+                    cell.set_char(c);
+                }
+            }
+            Glyphs::Ascii => {
+                cell.set_char(ascii(first));
+            }
         }
     }
+}
+
+/// The nearest character that the fonts of the Linux console have (code page 437), for those that they lack.
+fn console(c: char) -> Option<char> {
+    Some(match c {
+        '━' => '═',
+        '┃' => '║',
+        '┏' => '╔',
+        '┓' => '╗',
+        '┗' => '╚',
+        '┛' => '╝',
+        '╌' | '┄' | '╶' | '╴' | '–' | '−' => '-',
+        '┆' | '╵' | '╷' => ':',
+        '╂' => '┼',
+        '▁' | '▂' => '_',
+        '▃' | '▅' => '▄',
+        '▆' | '▇' => '█',
+        '▶' | '▸' => '►',
+        '◀' | '◂' => '◄',
+        '▷' | '›' => '>',
+        '◁' | '‹' => '<',
+        '▪' | '◆' => '■',
+        '□' | '◇' | '△' => '○',
+        '●' => '•',
+        '≋' => '≈',
+        '✎' => 'w',
+        '✓' => '√',
+        '✗' => 'x',
+        '⏎' => '┘',
+        '…' => '.',
+        '\u{2800}'..='\u{28ff}' => '·',
+        _ => return None,
+    })
 }
 
 /// The nearest character of seven bits, one cell wide.
 fn ascii(c: char) -> char {
     match c {
-        '─' | '┄' | '╌' | '━' | '═' | '╶' | '╴' | '–' | '−' => '-',
+        '─' | '┄' | '╌' | '╶' | '╴' | '–' | '−' => '-',
+        '━' | '═' => '=',
         '│' | '┃' | '║' | '╵' | '╷' | '┆' | '▏' => '|',
-        '┌' | '┐' | '└' | '┘' | '├' | '┤' | '┬' | '┴' | '┼' | '╔' | '╗' | '╚' | '╝' | '╫' | '╪' | '╢' | '╟' => {
-            '+'
-        }
-        '▶' | '▸' | '►' | '→' => '>',
-        '◀' | '◂' | '◄' | '←' => '<',
+        '┌' | '┐' | '└' | '┘' | '├' | '┤' | '┬' | '┴' | '┼' | '╂' | '┏' | '┓' | '┗' | '┛' | '╔' | '╗' | '╚' | '╝'
+        | '╫' | '╪' | '╢' | '╟' => '+',
+        '▶' | '▷' | '▸' | '►' | '→' | '›' => '>',
+        '◀' | '◁' | '◂' | '◄' | '←' | '‹' => '<',
         '▲' | '▴' | '↑' => '^',
         '▼' | '▾' | '↓' => 'v',
         '⏎' => '/',

@@ -96,9 +96,9 @@ impl Alarms {
         Alarms::default()
     }
 
-    /// The selected alarm: the chosen one while it lives, else the first.
+    /// The selected alarm: the chosen one while it lives, else the first; none while the journal is shown.
     pub fn selected<'a>(&self, cx: &Cx<'a>) -> Option<&'a ActiveAlarm> {
-        cx.snapshot.alarms.get(self.place(cx))
+        cx.snapshot.alarms.get(self.place(cx)).filter(|_| self.journal.is_none())
     }
 
     /// A key of [`KEYS`].

@@ -6,7 +6,8 @@ use ratatui::{Frame, layout::Rect};
 use crate::{
     plant::{
         command::Command,
-        def::{DeviceDef, DeviceId, TagId},
+        def::{DeviceDef, DeviceId, LineId, TagId},
+        event::LineState,
         snapshot::{DeviceState, Snapshot},
         tag::{Access, Poll, TagDef},
     },
@@ -14,7 +15,7 @@ use crate::{
         Act, Cx,
         chrome::{order_words, outcome_words},
         keys::{Key, char, code},
-        modal::{Choice, Faceplate, Modal, entry::range_words, faceplate::device_words},
+        modal::{Choice, Confirm, Faceplate, Modal, entry::range_words, faceplate::device_words},
         widgets::{
             text::{Canvas, age, clock, fit, pad, pad_left},
             value,
@@ -39,6 +40,8 @@ pub enum Action {
     Tune,
     /// Run or standby.
     Run,
+    /// Close the device's line, or open it again.
+    Line,
 }
 
 /// Keys of this tab.
@@ -61,6 +64,12 @@ pub const KEYS: &[Key<Action>] = &[
     Key { chord: char('f'), label: "actions", help: "actions of the device (save to memory)", action: Action::Actions },
     Key { chord: char('T'), label: "tune", help: "auto-tuning, if the device has it", action: Action::Tune },
     Key { chord: char('S'), label: "standby", help: "run or standby, if the device has it", action: Action::Run },
+    Key {
+        chord: char('L'),
+        label: "line",
+        help: "disconnect the device's line, or connect it again (asks first)",
+        action: Action::Line,
+    },
 ];
 
 /// State of this tab.
@@ -115,6 +124,7 @@ impl Controllers {
             }
             Action::Tune => write(device.faceplate.as_ref().and_then(|plate| plate.tune)),
             Action::Run => write(device.faceplate.as_ref().and_then(|plate| plate.run)),
+            Action::Line => vec![Act::Open(Modal::Confirm(connect(cx, device.line)))],
         }
     }
 
@@ -133,14 +143,23 @@ impl Controllers {
         self.heading(cx, device, &mut canvas);
         faceplate_row(cx, device, &mut canvas);
         let (width, height) = (canvas.width(), canvas.height());
-        self.table(cx, &mut canvas.part(0, 2, width, height.saturating_sub(3)));
-        if let Some(text) = last_write(cx, self.device) {
+        let below = self.table(cx, &mut canvas.part(0, 2, width, height.saturating_sub(4)));
+        let (end, bottom) = (width.saturating_sub(1), height.saturating_sub(1));
+        if let Some(tag) = self.selected(cx) {
+            let words = if tag.meaning.is_empty() { &tag.label } else { &tag.meaning };
+            let x = canvas.text(1, bottom.saturating_sub(1), &tag.name, cx.theme.strong());
+            canvas.text(x + 2, bottom.saturating_sub(1), &fit(words, end.saturating_sub(x + 2)), cx.theme.normal());
+        }
+        if let Some((words, trouble)) = last_write(cx, self.device) {
             canvas.text(
                 1,
-                height.saturating_sub(1),
-                &fit(&text.0, width.saturating_sub(2)),
-                if text.1 { cx.theme.trouble() } else { cx.theme.dim() },
+                bottom,
+                &fit(&words, end.saturating_sub(12)),
+                if trouble { cx.theme.trouble() } else { cx.theme.dim() },
             );
+        }
+        if below > 0 {
+            canvas.text_right(end, bottom, &format!("{below} more ▼"), cx.theme.normal());
         }
     }
 
@@ -173,8 +192,8 @@ impl Controllers {
         canvas.text_right(end, 0, &format!("{}/{count}", self.device.0 + 1), theme.dim());
     }
 
-    /// Parameters under the names of their groups, the selected one in sight.
-    fn table(&self, cx: &Cx, canvas: &mut Canvas) {
+    /// Parameters under the names of their groups, the selected one in sight; returns how many rows are out of sight below.
+    fn table(&self, cx: &Cx, canvas: &mut Canvas) -> usize {
         let theme = cx.theme;
         let columns = Columns::of(cx, self.device, canvas.width());
         canvas.text(1, 0, &columns.row(["", "parameter", "value", "", "range", "age", "meaning"]), theme.dim());
@@ -200,15 +219,7 @@ impl Controllers {
                 }
             }
         }
-        if rows.len() > first + room {
-            let end = canvas.width().saturating_sub(1);
-            canvas.text_right(
-                end,
-                0,
-                &format!("{} more {}", rows.len() - first - room, theme.pick("▼", "below")),
-                theme.normal(),
-            );
-        }
+        rows.len().saturating_sub(first + room)
     }
 }
 
@@ -218,6 +229,23 @@ fn in_groups<'a>(cx: &Cx<'a>, device: DeviceId) -> Vec<&'a TagDef> {
     let mut sorted = tags.clone();
     sorted.sort_by_key(|tag| tags.iter().position(|first| first.group == tag.group));
     sorted
+}
+
+/// Closing a line is asked with what it means for everything on it.
+fn connect(cx: &Cx, line: LineId) -> Confirm {
+    let name = &cx.def().line(line).name;
+    if cx.snapshot.line(line).state == LineState::Disconnected {
+        return Confirm::order(
+            format!("connect {name}"),
+            format!("Open line {name} and read its devices again?"),
+            Command::Connect(line, true),
+        );
+    }
+    let devices: Vec<&str> =
+        cx.def().devices.iter().filter(|device| device.line == line).map(|device| device.name.as_str()).collect();
+    let words =
+        format!("Close line {name}? {} will be read no more, and their alarms cannot be seen.", devices.join(", "));
+    Confirm::order(format!("disconnect {name}"), words, Command::Connect(line, false))
 }
 
 fn parameter(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagDef, selected: bool) {
@@ -295,13 +323,15 @@ impl Columns {
         let short = cx.def().tags_of(device).map(|tag| tag.short.chars().count()).max().unwrap_or(0).min(10) as u16;
         let label = cx.def().tags_of(device).map(|tag| tag.label.chars().count()).max().unwrap_or(0) as u16;
         let free = width.saturating_sub(3 + Columns::VALUE + Columns::UNIT + Columns::RANGE + Columns::AGE + 5);
-        let name = (short + 1 + label).min(free * 3 / 4);
+        let name = (short + 1 + label).min(free);
         Columns { short, name, meaning: free.saturating_sub(name) }
     }
     fn value_at(&self) -> u16 {
         2 + self.name + 1
     }
     fn row(&self, [pen, name, value, unit, range, age, meaning]: [&str; 7]) -> String {
+        // The line below the table has the selected meaning in full: a stump of it in the table helps nobody.
+        let meaning = if self.meaning < 12 { "" } else { meaning };
         format!(
             "{pen:1} {} {} {} {} {} {}",
             pad(name, self.name),

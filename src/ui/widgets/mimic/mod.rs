@@ -23,7 +23,7 @@ pub struct Stretch {
 
 /// A rectangle of the screen, relative to the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Box {
+pub struct Bounds {
     /// Left column.
     pub x: u16,
     /// Top row.
@@ -57,11 +57,11 @@ impl Stretch {
         ((f64::from(y) + 0.5) * self.y) as u16
     }
     /// A nominal rectangle.
-    pub fn place(self, place: Place) -> Box {
+    pub fn place(self, place: Place) -> Bounds {
         let (x, y) = (self.column(place.x), self.row(place.y));
         let right = self.column(place.x.saturating_add(place.width.max(1)));
         let bottom = self.row(place.y.saturating_add(place.height.max(1)));
-        Box { x, y, width: right.saturating_sub(x).max(1), height: bottom.saturating_sub(y).max(1) }
+        Bounds { x, y, width: right.saturating_sub(x).max(1), height: bottom.saturating_sub(y).max(1) }
     }
     /// Where a single symbol stands.
     pub fn spot(self, place: Place) -> (u16, u16) {
@@ -168,7 +168,7 @@ mod tests {
         let stretch = Stretch::new((80, 18), (60, 10));
         assert_eq!(
             stretch.place(Place { x: 54, y: 6, width: 26, height: 6 }),
-            Box { x: 54, y: 6, width: 26, height: 6 }
+            Bounds { x: 54, y: 6, width: 26, height: 6 }
         );
     }
 }

@@ -2,7 +2,7 @@
 
 use ratatui::style::Modifier;
 
-use super::{Box, alarm_mark, label_style, put_value, unit::states};
+use super::{Bounds, alarm_mark, label_style, put_value, unit::states};
 use crate::{
     plant::def::{Condition, DeviceDef, Faceplate, Level, Subject, TagId},
     ui::{
@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// A controller: PV, SV, MV, a bar of the range with SV and limits, and its states.
-pub fn controller(cx: &Cx, canvas: &mut Canvas, at: Box, device: &DeviceDef, selected: bool) {
+pub fn controller(cx: &Cx, canvas: &mut Canvas, at: Bounds, device: &DeviceDef, selected: bool) {
     let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
     let theme = cx.theme;
     let x = canvas.text(0, 0, &device.name, label_style(cx, selected));
@@ -108,7 +108,7 @@ pub struct Sequence<'a> {
 
 impl Sequence<'_> {
     /// Draws heading, steps with the present one marked, and states.
-    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, at: Box, selected: bool) {
+    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, at: Bounds, selected: bool) {
         let theme = cx.theme;
         let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
         let x = canvas.text(0, 0, self.label, label_style(cx, selected));
@@ -125,11 +125,12 @@ impl Sequence<'_> {
             canvas.text_right(end.max(x + 1 + width(&text)), 0, &text, theme.normal());
         }
         let last = at.height.saturating_sub(1).max(1);
-        self.steps(cx, &mut canvas.part(0, 1, at.width, last.saturating_sub(1)));
-        states(cx, &mut canvas, 0, last, self.states);
+        let rows = self.steps(cx, &mut canvas.part(0, 1, at.width, last.saturating_sub(1)));
+        states(cx, &mut canvas, (rows + 2).min(last), self.states);
     }
 
-    fn steps(&self, cx: &Cx, canvas: &mut Canvas) {
+    /// Draws the steps; returns the rows that they take.
+    fn steps(&self, cx: &Cx, canvas: &mut Canvas) -> u16 {
         let theme = cx.theme;
         let now = cx.snapshot.sample(self.step).trusted();
         let (mut x, mut y) = (0, 0);
@@ -143,5 +144,6 @@ impl Sequence<'_> {
             }
             x = canvas.text(x, y, &text, if present { theme.strong() } else { theme.dim() }) + 1;
         }
+        y + 1
     }
 }

@@ -1,6 +1,6 @@
 //! A vessel: its liquid follows the level, its agitator turns, its heater glows, and none of them without a good value.
 
-use super::{Box, alarm_mark, label_style, put_value};
+use super::{Bounds, alarm_mark, label_style, put_value};
 use crate::{
     plant::def::TagId,
     ui::{
@@ -30,7 +30,7 @@ pub struct Tank<'a> {
 
 impl Tank<'_> {
     /// Draws the vessel into its box.
-    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, at: Box, selected: bool, motion: bool) {
+    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, at: Bounds, selected: bool, motion: bool) {
         let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
         canvas.frame("", cx.theme.dim());
         let room = at.width.saturating_sub(2);

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ratatui::style::Style;
 
-use super::{Box, label_style};
+use super::{Bounds, label_style};
 use crate::{
     history::Series,
     plant::def::TagId,
@@ -19,7 +19,7 @@ use crate::{
 pub fn view(
     cx: &Cx,
     canvas: &mut Canvas,
-    at: Box,
+    at: Bounds,
     tag: TagId,
     window: Duration,
     series: Option<&Series>,
@@ -36,7 +36,7 @@ pub fn view(
     let x = canvas.text(0, 0, &fit(&cx.def().tag(tag).name, at.width), label_style(cx, selected));
     canvas.text(x + 1, 0, &format!("last {span}"), theme.dim());
     let Some((series, (low, _, high))) = series.and_then(|series| Some((series, series.summary?))) else {
-        canvas.text(0, 1, if series.is_some() { "no good value" } else { "reading …" }, theme.dim());
+        canvas.text(0, 1, if series.is_some() { "no good value" } else { "no curve yet" }, theme.dim());
         return;
     };
     let label = |value| cx.snapshot.format(tag, value);

@@ -1,12 +1,12 @@
 //! Valves, pumps and single values: a shape that is filled while it works, a name and a word.
 
-use super::{Box, label_style, put_value};
+use super::{Bounds, label_style, put_value};
 use crate::{
     plant::def::TagId,
     ui::{
         Cx,
         widgets::{
-            text::{Canvas, fit, pad, width},
+            text::{Canvas, fit, width},
             value,
         },
     },
@@ -43,22 +43,30 @@ pub fn valve(
     }
 }
 
-/// A pump in a pipe: a filled disc while it runs, a ring while it rests.
-pub fn pump(cx: &Cx, canvas: &mut Canvas, at: Box, label: &str, tag: TagId, selected: bool) {
+/// A pump in a pipe: a filled disc while it runs, a ring while it rests. Where its place is narrow the word stands above.
+pub fn pump(cx: &Cx, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagId, selected: bool) {
     let theme = cx.theme;
     let (shape, style) = match value::is_on(cx, tag) {
         Some(true) => (theme.pick("●", "@"), theme.running()),
         Some(false) => (theme.pick("○", "o"), theme.normal()),
         None => ("?", theme.trouble()),
     };
-    let x = canvas.text(at.x, at.y + at.height / 2, &format!("({shape} "), style);
-    let x = canvas.text(x, at.y + at.height / 2, label, label_style(cx, selected));
     let word = word(cx, tag, ("RUN", "STOP"));
-    canvas.text(x, at.y + at.height / 2, &format!(" {word})"), style);
+    let y = at.y + at.height / 2;
+    let beside = at.width >= width(label) + width(&word) + 5;
+    let (open, close) = if at.width >= width(label) + 4 { ("(", ")") } else { ("", "") };
+    let x = canvas.text(at.x, y, &format!("{open}{shape} "), style);
+    let x = canvas.text(x, y, label, label_style(cx, selected));
+    if beside {
+        canvas.text(x, y, &format!(" {word}{close}"), style);
+    } else {
+        canvas.text(x, y, close, style);
+        canvas.text(at.x + width(open) + 2, y.saturating_sub(1), &word, style);
+    }
 }
 
 /// A label and its value.
-pub fn labelled(cx: &Cx, canvas: &mut Canvas, at: Box, label: &str, tag: TagId, selected: bool) {
+pub fn labelled(cx: &Cx, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagId, selected: bool) {
     let style = if selected { cx.theme.focus() } else { cx.theme.dim() };
     let x = if label.is_empty() { at.x } else { canvas.text(at.x, at.y, &fit(label, at.width / 2), style) + 1 };
     let room = at.width.saturating_sub(x.saturating_sub(at.x));
@@ -68,13 +76,17 @@ pub fn labelled(cx: &Cx, canvas: &mut Canvas, at: Box, label: &str, tag: TagId, 
     }
 }
 
-/// Tags of two states: name and word side by side.
-pub fn states(cx: &Cx, canvas: &mut Canvas, x: u16, y: u16, tags: &[TagId]) {
-    let mut x = x;
+/// Tags of few states side by side: label and word, or the word alone where there is no room for labels.
+pub fn states(cx: &Cx, canvas: &mut Canvas, y: u16, tags: &[TagId]) {
+    let label = |tag: &TagId| cx.def().tag(*tag).label.as_str();
+    let room: u16 = tags.iter().map(|tag| width(label(tag)) + width(&value::show(cx, *tag).text) + 3).sum();
+    let mut x = 0;
     for tag in tags {
         let shown = value::show(cx, *tag);
-        x = canvas.text(x, y, &cx.def().tag(*tag).label, cx.theme.dim()) + 1;
-        x = canvas.text(x, y, &pad(&shown.text, width(&shown.text) + 2), shown.style);
+        if room <= canvas.width() + 2 {
+            x = canvas.text(x, y, label(tag), cx.theme.dim()) + 1;
+        }
+        x = canvas.text(x, y, &shown.text, shown.style) + 2;
     }
 }
 

@@ -1,0 +1,250 @@
+//! Keys through `update`: nothing is done unasked, and what was done is told.
+
+use std::{sync::Arc, time::Duration};
+
+use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+
+use super::{model, order_of, screen, type_keys};
+use crate::{
+    history::{Answer, HistoryError, Question},
+    plant::{
+        command::{Command, NotConfirmed, OrderStatus, Outcome, Refusal},
+        def::{AlarmId, Priority},
+        event::{Fault, LineState},
+        record::{ActionRecord, AlarmRecord, AlarmStep},
+    },
+    ui::{
+        Effect, Msg,
+        fixture::{self, Fixture},
+        modal::Modal,
+        tabs::Tab,
+        theme::Theme,
+        update,
+    },
+};
+
+#[test]
+fn a_number_is_written_only_after_enter() {
+    let fixture = Fixture::normal();
+    let mut model = model(&fixture, Theme::FULL);
+    assert_eq!(type_keys(&mut model, "s65.5"), []);
+    let effects = type_keys(&mut model, "⏎");
+    assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
+    assert_eq!(model.modal, None);
+    assert!(screen(&mut model, 80, 24).contains("TIC-1.SV ? → 65.5 °C  sent"));
+}
+
+#[test]
+fn escape_changes_nothing() {
+    for keys in ["s65⎋", "r⎋", "m⎋", "A⎋", "q⎋", "4⏎⎋", "4T↓⏎⎋", "4f⏎⎋", "⎋⎋⎋"] {
+        let mut model = model(&Fixture::alarm(), Theme::FULL);
+        let effects = type_keys(&mut model, keys);
+        assert!(effects.iter().all(|effect| matches!(effect, Effect::Ask(..))), "{keys}: {effects:?}");
+        assert_eq!(model.modal, None, "{keys}");
+    }
+}
+
+#[test]
+fn a_toggle_is_asked_and_does_what_it_said() {
+    let fixture = Fixture::normal();
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "r");
+    assert!(screen(&mut model, 80, 24).contains("old RUN  →  new STOP"));
+    // Meanwhile someone else stops it: the window still writes STOP, not the opposite of what is now.
+    let mut later = fixture.clone();
+    later.set("PLC-1.RUN", 0.0);
+    update(&mut model, Msg::Snapshot(later.snapshot()));
+    let effects = type_keys(&mut model, "⏎");
+    assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 }));
+}
+
+#[test]
+fn a_toggle_of_the_unknown_becomes_a_choice() {
+    let fixture = Fixture::line_down();
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "r");
+    assert!(matches!(model.modal, Some(Modal::Choice(_))));
+}
+
+#[test]
+fn a_paste_never_acts() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    for window in ["", "r", "?", "q", "4⏎"] {
+        model.modal = None;
+        type_keys(&mut model, window);
+        let effects = update(&mut model, Msg::Paste("q\ry\r\n1".to_owned()));
+        assert_eq!(effects, [], "{window}");
+    }
+    model.modal = None;
+    type_keys(&mut model, "1s");
+    assert_eq!(update(&mut model, Msg::Paste("66\r\n".to_owned())), []);
+    assert!(model.modal.is_some(), "the pasted line end did not confirm");
+    assert!(order_of(&type_keys(&mut model, "⏎")).is_some());
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn no_key_by_accident_gives_an_order(keys in "[1-5smrqA?fTSLjcM0-9.hlx↑↓←→⎋⇥ ]{1,60}") {
+        let mut model = model(&Fixture::alarm(), Theme::FULL);
+        screen(&mut model, 80, 24);
+        let effects = type_keys(&mut model, &keys);
+        proptest::prop_assert_eq!(order_of(&effects), None);
+        screen(&mut model, 80, 24);
+    }
+}
+
+#[test]
+fn closing_a_line_is_asked_and_opening_it_too() {
+    let mut fixture = Fixture::normal();
+    let line = fixture.def.lines[0].id;
+    for (state, open) in [(LineState::Connected, false), (LineState::Disconnected, true)] {
+        fixture.line.state = state;
+        let mut model = model(&fixture, Theme::FULL);
+        assert_eq!(order_of(&type_keys(&mut model, "4L")), None);
+        assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&Command::Connect(line, open)));
+    }
+}
+
+#[test]
+fn the_journal_tells_alarms_and_deeds_in_one_order() {
+    let mut model = model(&Fixture::alarm(), Theme::FULL);
+    let effects = type_keys(&mut model, "3j");
+    let ago = |seconds| fixture::now() - jiff::SignedDuration::from_secs(seconds);
+    let step = |seconds, step, by: Option<&str>| AlarmRecord {
+        at: ago(seconds),
+        subject: "TIC-1.PV".into(),
+        text: "temperature high".into(),
+        priority: Priority::High,
+        step,
+        value: Some(72.1),
+        limit: Some(72.0),
+        by: by.map(Arc::from),
+    };
+    let deed = ActionRecord {
+        at: ago(700),
+        by: "tech1".into(),
+        action: "write".into(),
+        target: "TIC-1.SV".into(),
+        old: Some("60.0 °C".into()),
+        new: Some("70.0 °C".into()),
+        outcome: "verified".into(),
+    };
+    for effect in effects {
+        let Effect::Ask(id, question) = effect else { continue };
+        let answer = match question {
+            Question::Journal { .. } => Answer::Journal(vec![
+                step(100, AlarmStep::Acknowledged, Some("tech1")),
+                step(800, AlarmStep::Raised, None),
+                step(90_000, AlarmStep::Raised, None),
+            ]),
+            Question::Actions { .. } => Answer::Actions(vec![deed.clone()]),
+            Question::Series { .. } | Question::Report { .. } => continue,
+        };
+        update(&mut model, Msg::Answer(id, Ok(answer)));
+    }
+    insta::assert_snapshot!("journal_80x24", screen(&mut model, 80, 24));
+}
+
+#[test]
+fn leaving_is_asked() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    assert_eq!(type_keys(&mut model, "qn"), []);
+    assert_eq!(type_keys(&mut model, "q⏎"), [Effect::Quit]);
+    let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
+    assert_eq!(update(&mut model, Msg::Key(ctrl_c)), []);
+    assert_eq!(type_keys(&mut model, "y"), [Effect::Quit]);
+    // Out of a text entry as well.
+    type_keys(&mut model, "s12");
+    update(&mut model, Msg::Key(ctrl_c));
+    assert_eq!(type_keys(&mut model, "⏎"), [Effect::Quit]);
+}
+
+#[test]
+fn acknowledging_takes_the_most_urgent_or_the_selected() {
+    let fixture = Fixture::alarm();
+    let mut model = model(&fixture, Theme::FULL);
+    assert_eq!(order_of(&type_keys(&mut model, "a")), Some(&Command::Acknowledge(fixture.alarms[0].id)));
+    assert_eq!(order_of(&type_keys(&mut model, "3↓↓a")), Some(&Command::Acknowledge(fixture.alarms[2].id)));
+    assert_eq!(order_of(&type_keys(&mut model, "↑a")), None, "already acknowledged");
+    assert_eq!(order_of(&type_keys(&mut model, "A")), None, "all: asks first");
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&Command::AcknowledgeAll));
+    let mut quiet = super::model(&Fixture::normal(), Theme::FULL);
+    assert_eq!(type_keys(&mut quiet, "aA"), []);
+    assert_eq!(quiet.modal, None);
+}
+
+#[test]
+fn a_selected_alarm_stays_selected_when_the_list_moves() {
+    let mut fixture = Fixture::alarm();
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "3↓↓");
+    let chosen = fixture.alarms[2].id;
+    let newer = crate::plant::snapshot::ActiveAlarm { id: AlarmId(1), ..fixture.alarms[0].clone() };
+    fixture.alarms.insert(0, newer);
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    assert_eq!(model.tabs.alarms.selected(&model.cx()).map(|alarm| alarm.id), Some(chosen));
+}
+
+#[test]
+fn the_outcome_of_an_order_is_told_until_it_is_dismissed() {
+    let fixture = Fixture::normal();
+    let check = |outcome: Outcome, expect: &str| {
+        let mut model = model(&fixture, Theme::FULL);
+        let effects = type_keys(&mut model, "s60⏎");
+        let Some(Effect::Order(id, command)) = effects.first().cloned() else { panic!("{effects:?}") };
+        let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
+        snapshot.orders =
+            vec![OrderStatus { id, by: Arc::from("tech1"), command, at: snapshot.at, old: Some(70.0), outcome }];
+        update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
+        // The station forgets old orders; the terminal still knows its own.
+        update(&mut model, Msg::Snapshot(fixture.snapshot()));
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains(expect), "{expect} is missing:\n{shown}");
+        type_keys(&mut model, "⎋");
+        assert!(!screen(&mut model, 80, 24).contains("TIC-1.SV 70.0"));
+    };
+    check(Outcome::Pending, "TIC-1.SV 70.0 → 60.0 °C  pending");
+    check(Outcome::Verified, "TIC-1.SV 70.0 → 60.0 °C  verified 14:02:31");
+    check(Outcome::Unchanged, "unchanged, nothing written");
+    check(Outcome::Refused(Refusal::ReadOnly), "REFUSED: read only");
+    check(Outcome::NotConfirmed(NotConfirmed::Different(65.0)), "NOT CONFIRMED: read back 65");
+    check(Outcome::Failed(Fault::Timeout), "FAILED, may or may not have taken effect");
+}
+
+#[test]
+fn an_order_that_never_left_is_told() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    let effects = type_keys(&mut model, "s60⏎");
+    let Some(Effect::Order(id, _)) = effects.first() else { panic!("{effects:?}") };
+    update(&mut model, Msg::Undelivered(*id, "station too busy"));
+    assert!(screen(&mut model, 80, 24).contains("NOT SENT: station too busy"));
+}
+
+#[test]
+fn the_journal_is_asked_only_while_it_is_shown() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    let asks = |effects: Vec<Effect>| {
+        effects.iter().filter(|effect| matches!(effect, Effect::Ask(id, _) if id.tab == Tab::Alarms)).count()
+    };
+    let tick = || Msg::Tick { silent: Duration::ZERO };
+    assert_eq!(asks(type_keys(&mut model, "3")), 0);
+    assert_eq!(asks(type_keys(&mut model, "j")), 2, "alarms and actions");
+    assert_eq!((0..10).map(|_| asks(update(&mut model, tick()))).sum::<usize>(), 2, "once more in five seconds");
+    type_keys(&mut model, "1");
+    assert_eq!((0..30).map(|_| asks(update(&mut model, tick()))).sum::<usize>(), 0);
+}
+
+#[test]
+fn a_history_without_answer_is_said_so() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    let effects = type_keys(&mut model, "3j");
+    assert!(screen(&mut model, 80, 24).contains("reading …"));
+    for effect in effects {
+        if let Effect::Ask(id, _) = effect {
+            update(&mut model, Msg::Answer(id, Err(HistoryError::Engine("disk full".to_owned()))));
+        }
+    }
+    assert!(screen(&mut model, 80, 24).contains("history: disk full"));
+}

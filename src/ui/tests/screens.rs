@@ -1,0 +1,242 @@
+//! Screens as an operator sees them: every tab in every mood, every size, with and without colour.
+
+use std::{collections::HashSet, sync::Arc, time::Duration};
+
+use ratatui::buffer::Buffer;
+
+use super::{draw, model, screen, text, type_keys};
+use crate::{
+    plant::{
+        alarm::AlarmState,
+        def::Priority,
+        sample::{Cause, Quality, Sample},
+    },
+    ui::{
+        Model, Msg, edge,
+        fixture::{self, Fixture},
+        modal::{self, Modal},
+        tabs::Tab,
+        theme::{Colours, Glyphs, Theme},
+        update, widgets,
+    },
+};
+
+#[test]
+fn screens_in_every_mood() {
+    let moods = [("normal", Fixture::normal()), ("alarm", Fixture::alarm()), ("line_down", Fixture::line_down())];
+    for (mood, fixture) in &moods {
+        for (tab, name) in [(Tab::Mimic, "mimic"), (Tab::Alarms, "alarms"), (Tab::Controllers, "controllers")] {
+            for (width, height) in [(80, 24), (120, 40)] {
+                let mut model = model(fixture, Theme::FULL);
+                model.tabs.shown = tab;
+                insta::assert_snapshot!(format!("{name}_{mood}_{width}x{height}"), screen(&mut model, width, height));
+            }
+        }
+    }
+}
+
+#[test]
+fn windows_on_top() {
+    for (name, keys) in [
+        ("help", "?"),
+        ("leave", "q"),
+        ("enter_sv", "s6"),
+        ("toggle_run", "r"),
+        ("faceplate", "→↓⏎"),
+        ("choose_mode", "4↓↓↓↓⏎"),
+        ("confirm_tuning", "4T↓⏎"),
+        ("not_verified", "4↓↓↓↓↓↓↓⏎"),
+        ("actions", "4f⏎"),
+        ("acknowledge_all", "A"),
+    ] {
+        let mut model = model(&Fixture::alarm(), Theme::FULL);
+        screen(&mut model, 80, 24);
+        type_keys(&mut model, keys);
+        insta::assert_snapshot!(format!("window_{name}"), screen(&mut model, 80, 24));
+    }
+}
+
+#[test]
+fn the_mimic_in_seven_bits() {
+    let mut model = model(&Fixture::alarm(), Theme::PLAIN);
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.is_ascii());
+    insta::assert_snapshot!("mimic_alarm_ascii", shown);
+}
+
+#[test]
+fn the_linux_console_gets_characters_of_its_font() {
+    let console = Theme { colours: Colours::Sixteen, glyphs: Glyphs::Block, motion: true };
+    let mut model = model(&Fixture::alarm(), console);
+    let shown = screen(&mut model, 80, 24);
+    let font = "─│┌┐└┘├┤┬┴┼═║╔╗╚╝╢╫►◄▲▼█▄▒°·×←↑→↓≈•○■√┘";
+    let strange: Vec<char> = shown.chars().filter(|c| !c.is_ascii() && !font.contains(*c)).collect();
+    assert!(strange.is_empty(), "{strange:?}");
+}
+
+#[test]
+fn no_size_is_too_small_to_survive() {
+    let all = [Tab::Mimic, Tab::Trends, Tab::Alarms, Tab::Controllers, Tab::Reports];
+    let sizes = (0..40).flat_map(|width| (0..20).map(move |height| (width, height)));
+    let large = [(59, 16), (60, 15), (60, 16), (61, 17), (79, 23), (81, 25), (200, 60), (400, 20), (70, 200)];
+    for fixture in [Fixture::alarm(), Fixture::line_down()] {
+        let mut model = model(&fixture, Theme::FULL);
+        for (width, height) in sizes.clone().chain(large) {
+            for tab in all {
+                model.tabs.shown = tab;
+                screen(&mut model, width, height);
+            }
+        }
+        for keys in ["?", "q", "s", "r", "→⏎", "4⏎", "4f", "4T", "A"] {
+            model.modal = None;
+            screen(&mut model, 80, 24);
+            type_keys(&mut model, keys);
+            for (width, height) in sizes.clone().chain(large) {
+                screen(&mut model, width, height);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_tiny_screen_still_shows_the_alarm() {
+    let mut model = model(&Fixture::alarm(), Theme::FULL);
+    let shown = screen(&mut model, 50, 5);
+    assert!(shown.contains("‹2›! TIC-1.PV temperature high"), "{shown}");
+    assert!(shown.contains("screen too small: 50x5, needs 60x16"), "{shown}");
+}
+
+#[test]
+fn without_colour_every_state_and_quality_looks_different() {
+    let theme = Theme { colours: Colours::None, glyphs: Glyphs::Ascii, motion: false };
+    let mut looks = HashSet::new();
+    let mut states = 0;
+    for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
+        for state in [AlarmState::Unacknowledged, AlarmState::Acknowledged, AlarmState::Returned] {
+            let mut fixture = Fixture::alarm();
+            fixture.alarms.truncate(1);
+            fixture.alarms[0].state = state;
+            fixture.def.alarms[0].priority = priority;
+            let mut model = model(&fixture, theme);
+            model.tabs.shown = Tab::Alarms;
+            let buffer = draw(&mut model, 80, 24);
+            assert!(
+                buffer
+                    .content
+                    .iter()
+                    .all(|cell| cell.fg == ratatui::style::Color::Reset && cell.bg == ratatui::style::Color::Reset)
+            );
+            looks.insert(text(&buffer));
+            states += 1;
+        }
+    }
+    assert_eq!(looks.len(), states, "two alarm states look the same in plain text");
+    let good = Fixture::normal();
+    let at = fixture::now();
+    let looks: HashSet<String> = Cause::ALL
+        .into_iter()
+        .flat_map(|cause| [Sample::bad(cause, at), Sample::good(64.2, at).doubted(cause)])
+        .chain([Sample::good(64.2, at)])
+        .map(|sample| {
+            let mut fixture = good.clone();
+            let pv = fixture.tag("TIC-1.PV");
+            fixture.samples[pv.index()] = sample;
+            let mut model = model(&fixture, theme);
+            model.modal = modal::Faceplate::new("PV", vec![pv]).map(Modal::Faceplate);
+            let shown = screen(&mut model, 80, 24);
+            let word = match sample.quality {
+                Quality::Good => "good",
+                Quality::Uncertain(_) => "uncertain: ",
+                Quality::Bad(_) => "bad: ",
+            };
+            assert!(shown.contains(&format!("quality  {word}")), "{shown}");
+            shown
+        })
+        .collect();
+    assert_eq!(looks.len(), 2 * Cause::ALL.len() + 1, "two qualities look the same in plain text");
+}
+
+#[test]
+fn a_silent_station_is_believed_no_more() {
+    let fixture = Fixture::normal();
+    let mut model = model(&fixture, Theme::FULL);
+    update(&mut model, Msg::Tick { silent: Duration::from_secs(2) });
+    assert!(screen(&mut model, 80, 24).contains("64.2 °C"));
+    update(&mut model, Msg::Tick { silent: Duration::from_secs(7) });
+    let shown = screen(&mut model, 80, 24);
+    assert!(
+        shown.contains("STATION SILENT 00:07") && shown.contains("64.2? °C 7s") && !shown.contains("64.2 °C"),
+        "{shown}"
+    );
+    assert!(!shown.contains('█'), "no picture without a good value:\n{shown}");
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    assert!(screen(&mut model, 80, 24).contains("64.2 °C"));
+}
+
+#[test]
+fn trouble_of_the_store_is_in_the_header() {
+    let mut snapshot = Arc::unwrap_or_clone(Fixture::normal().snapshot());
+    snapshot.history.lost = 12;
+    snapshot.history.trouble = Some("disk full".to_owned());
+    snapshot.speed = 60.0;
+    let mut model = Model::new(Arc::new(snapshot), Theme::FULL, 1, Arc::from("tech1"));
+    let shown = screen(&mut model, 120, 40);
+    let header = shown.lines().next().unwrap_or_default();
+    for words in ["history: disk full", "12 records lost", "speed ×60"] {
+        assert!(header.contains(words), "{header}");
+    }
+}
+
+#[test]
+fn only_unacknowledged_alarms_flash() {
+    for (state, flashes) in
+        [(AlarmState::Unacknowledged, true), (AlarmState::Acknowledged, false), (AlarmState::Returned, false)]
+    {
+        let mut fixture = Fixture::alarm();
+        fixture.alarms.truncate(1);
+        fixture.alarms[0].state = state;
+        let mut model = model(&fixture, Theme { motion: false, ..Theme::FULL });
+        model.tabs.shown = Tab::Alarms;
+        let first = draw(&mut model, 80, 24);
+        model.clock.phase += 2;
+        let second = draw(&mut model, 80, 24);
+        assert_eq!(first != second, flashes, "{state:?}");
+    }
+}
+
+#[test]
+fn the_next_frame_leaves_nothing_of_the_last_one() {
+    // Thai clusters and ordinary text, drawn over each other: the diffed screen must equal a fresh one.
+    use ratatui::backend::{Backend, CrosstermBackend};
+    let texts = ["อุณหภูมิน้ำ", "ถังน้ำร้อน", "ทำงาน", "PV 72.4 °C", "", "น้ำ", "ำ"];
+    let frame = |seed: usize| {
+        let mut buffer = Buffer::empty(ratatui::layout::Rect::new(0, 0, 24, 3));
+        for y in 0..3u16 {
+            let text = texts[(seed * 7 + usize::from(y) * 3 + seed / 3) % texts.len()];
+            let area = buffer.area;
+            let mut canvas = widgets::text::Canvas::new(&mut buffer, area);
+            canvas.text((seed * 5 % 9) as u16, y, text, Theme::FULL.normal());
+        }
+        edge::finish(&mut buffer, &Theme::FULL);
+        buffer
+    };
+    let send = |parser: &mut vt100::Parser, from: &Buffer, to: &Buffer| {
+        let mut bytes = Vec::new();
+        CrosstermBackend::new(&mut bytes).draw(from.diff_iter(to)).expect("a vector takes every byte");
+        parser.process(&bytes);
+    };
+    let empty = Buffer::empty(ratatui::layout::Rect::new(0, 0, 24, 3));
+    let mut living = vt100::Parser::new(3, 24, 0);
+    let mut last = empty.clone();
+    for seed in 0..300 {
+        let next = frame(seed);
+        send(&mut living, &last, &next);
+        let mut fresh = vt100::Parser::new(3, 24, 0);
+        send(&mut fresh, &empty, &next);
+        let rows = |parser: &vt100::Parser| {
+            parser.screen().rows(0, 24).map(|row| row.trim_end().to_owned()).collect::<Vec<_>>()
+        };
+        assert_eq!(rows(&living), rows(&fresh), "frame {seed}");
+        last = next;
+    }
+}
