@@ -117,6 +117,8 @@ fn every_tab_opens_and_q_asks_before_leaving() {
     terminal.keys("?");
     terminal.wait_for("help");
     terminal.keys("\x1b");
+    // Esc and a letter in one go would be Alt and the letter.
+    terminal.wait_for("q quit");
     terminal.keys("q");
     terminal.wait_for("Leave");
     terminal.keys("\r");
