@@ -109,35 +109,43 @@ fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     let theme = cx.theme;
     let x = canvas.text(1, 0, "sightglass", theme.dim());
     let start = canvas.text(x + 2, 0, &fit(&cx.def().title, canvas.width() / 3), theme.strong()) + 2;
+    let mut parts = header_parts(model, cx);
     let mut end = canvas.width().saturating_sub(1);
-    // The most needed first, from the right; what no longer fits is left out.
-    let mut put = |text: &str, style: Style| {
-        if end >= start + width(text) {
-            canvas.text_right(end, 0, text, style);
-            end = end.saturating_sub(width(text) + 2);
-        }
-    };
-    if model.clock.silent >= SILENCE {
-        // The clock stands still on purpose: nobody knows what the plant does.
-        put(&format!("STATION SILENT {}", running(model.clock.silent)), theme.trouble());
+    while parts.iter().map(|(_, text, _)| width(text) + 2).sum::<u16>() > end.saturating_sub(start) + 2 {
+        let Some(least) = parts.iter().map(|(need, _, _)| *need).max() else { break };
+        parts.retain(|(need, _, _)| *need != least);
+    }
+    for (_, text, style) in parts {
+        canvas.text_right(end, 0, &text, style);
+        end = end.saturating_sub(width(&text) + 2);
+    }
+}
+
+/// What the header tells, from the right, each with its need: the greatest number is the first to be left out.
+fn header_parts(model: &Model, cx: &Cx) -> Vec<(usize, String, Style)> {
+    let theme = cx.theme;
+    let time = if model.clock.silent >= SILENCE {
+        (0, format!("STATION SILENT {}", running(model.clock.silent)), theme.trouble())
     } else {
-        put(&clock(cx.now, &cx.def().time_zone), theme.normal());
+        (0, clock(cx.now, &cx.def().time_zone), theme.normal())
+    };
+    let mut parts = vec![time, (9, fit(&model.operator, 12), theme.dim())];
+    if cx.snapshot.speed != 1.0 {
+        parts.push((8, format!("speed ×{}", cx.snapshot.speed), theme.strong()));
     }
     let history = &cx.snapshot.history;
     if history.lost > 0 {
-        put(&format!("{} records lost", history.lost), theme.trouble());
+        parts.push((1, format!("{} records lost", history.lost), theme.trouble()));
     }
     if let Some(trouble) = &history.trouble {
-        put(&fit(&format!("history: {trouble}"), 28), theme.trouble());
+        parts.push((2, fit(&format!("history: {trouble}"), 28), theme.trouble()));
     }
     for line in cx.def().lines.iter().rev() {
         let (text, style) = line_words(cx, line);
-        put(&text, style);
+        let connected = cx.snapshot.line(line.id).state == LineState::Connected;
+        parts.push((if connected { 10 + line.id.index() } else { 3 }, text, style));
     }
-    if cx.snapshot.speed != 1.0 {
-        put(&format!("speed ×{}", cx.snapshot.speed), theme.strong());
-    }
-    put(&fit(&model.operator, 12), theme.dim());
+    parts
 }
 
 /// A line in the header: `L1 ▪ tx rx 62 %`, or why it is not connected and when it is tried again.

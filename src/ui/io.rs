@@ -1,6 +1,8 @@
 //! The terminal's loop: keys, snapshots, answers and ticks become messages; effects become orders, questions and frames.
 
 mod screen;
+#[cfg(test)]
+mod tests;
 
 use std::{
     io,
@@ -214,18 +216,4 @@ fn save(path: &Path, bytes: &[u8]) -> io::Result<PathBuf> {
     std::fs::write(&part, bytes)?;
     std::fs::rename(&part, path)?;
     std::path::absolute(path)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_saved_report_is_whole_and_named() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("reports/morning.csv");
-        assert_eq!(save(&path, b"a,b\n").expect("a writable folder"), path);
-        assert_eq!(std::fs::read(&path).expect("the report"), b"a,b\n");
-        assert_eq!(std::fs::read_dir(folder.path().join("reports")).expect("the folder").count(), 1);
-    }
 }
