@@ -131,7 +131,7 @@ def bytes_a_second(seconds, folder):
     # Nothing changes: a slave whose registers stand still.
     if not os.path.exists(PYTHON):
         return say("nothing changes: not measured, the tests install pymodbus", "-")
-    slave = subprocess.Popen([PYTHON, f"{HERE}/tests/peers/slave.py", "tcp", "15502"], stdout=subprocess.PIPE, text=True)
+    slave = subprocess.Popen([PYTHON, f"{HERE}/tests/peers/slave.py", "tcp", "15502", "calm"], stdout=subprocess.PIPE, text=True)
     slave.stdout.readline()
     threading.Thread(target=slave.stdout.read, daemon=True).start()
     terminal = Terminal(["tank", "--port", "L1=127.0.0.1:15502", "--history", f"{folder}/n.duckdb"], folder)
