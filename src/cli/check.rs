@@ -12,15 +12,15 @@ use super::{CliError, render, say};
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A plant file, or the name of a shipped plant
-    plant: PathBuf,
+    /// A plant file or device profile, or the name of a shipped one
+    file: PathBuf,
 }
 
 /// Checks; on success prints what would be read, and how busy each line would be.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let def = profile::load(&args.plant, &Search::usual()).map_err(|errors| CliError::Profile(render(&errors)))?;
+    let def = profile::check(&args.file, &Search::usual()).map_err(|errors| CliError::Profile(render(&errors)))?;
     let (tags, alarms) = (def.tags.len(), def.alarms.len());
-    say(&format!("{}: {} is good: {tags} tags, {alarms} alarms", args.plant.display(), def.title));
+    say(&format!("{}: {} is good: {tags} tags, {alarms} alarms", args.file.display(), def.title));
     for line in plan::describe(&def) {
         say(&line);
     }

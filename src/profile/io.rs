@@ -109,6 +109,21 @@ pub(super) fn device(name: &str, search: &Search) -> Result<Option<Text>, String
     }
 }
 
+/// The device profile that an argument of `check` means: a file without lines and devices of its own, or a known name.
+pub(super) fn device_file(argument: &Path, search: &Search) -> Option<(String, Text)> {
+    let stem = argument.file_stem()?.to_str().filter(|stem| plain(stem))?.to_owned();
+    if !argument.is_file() {
+        let text = argument.to_str().filter(|name| plain(name)).and_then(|name| device(name, search).ok().flatten());
+        return text.map(|text| (stem, text));
+    }
+    let bytes = read(argument).ok()?;
+    let words = String::from_utf8_lossy(&bytes).into_owned();
+    let has = |key: &str| words.lines().any(|line| line.trim_start().starts_with(key));
+    let is_plant = has("[[line]]") || has("[[device]]") || has("time_zone");
+    let is_device = !is_plant && (has("[[tag]]") || has("tag =") || has("vendor") || has("[link]"));
+    is_device.then(|| (stem, Text { file: argument.display().to_string(), bytes }))
+}
+
 /// The names of all plants and device profiles, with where each comes from.
 pub(super) fn list(search: &Search) -> Vec<Listed> {
     let mut all = Vec::new();

@@ -54,6 +54,20 @@ pub fn load(plant: &Path, search: &Search) -> Result<Arc<PlantDef>, Errors> {
     plant::build(&found.name, &found.text, &library).map(Arc::new)
 }
 
+/// Checks a plant file or a device profile, by path or name. A device is checked as the only one of a plant of its own,
+/// unit 1 on a serial line of 9600 baud, so that its read plan can be told.
+pub fn check(file: &Path, search: &Search) -> Result<Arc<PlantDef>, Errors> {
+    let Some((stem, text)) = io::device_file(file, search) else { return load(file, search) };
+    let around = format!(
+        "title = \"{stem}\"\ntime_zone = \"UTC\"\n[[line]]\nname = \"L1\"\nmode = \"rtu\"\nport = \"/dev/ttyUSB0\"\nbaud = 9600\nparity = \"N\"\n\
+         [[device]]\nname = \"D-1\"\nprofile = \"{stem}\"\nline = \"L1\"\nunit = 1\n"
+    );
+    let plant = plant::Text { file: format!("a plant around {}", text.file), bytes: around.into_bytes() };
+    let (file, bytes) = (text.file, text.bytes);
+    let find = |_: &str| Ok(Some(plant::Text { file: file.clone(), bytes: bytes.clone() }));
+    plant::build(&stem, &plant, &plant::Library { find: &find, names: vec![stem.clone()] }).map(Arc::new)
+}
+
 /// A plant or device profile that could be loaded by its name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Listed {

@@ -38,7 +38,14 @@ fn check_prints_the_read_plan_or_every_error() {
     for word in ["L1", "TIC-1", "PLC-1", "4 / 0x04", "%"] {
         assert!(out.contains(word), "no `{word}` in:\n{out}");
     }
+    let (code, out, err) = run(&["check", "fuji_pxr"]);
+    assert!(code == Some(0) && out.contains("31001"), "a device profile alone: {out}{err}");
     let folder = folder();
+    let file = folder.path().join("my_pxr.toml");
+    let (_, text, _) = run(&["profiles", "fuji_pxr"]);
+    fs::write(&file, text.replacen("type = \"int16\"", "type = \"int17\"", 1)).unwrap();
+    let (code, _, err) = run(&["check", file.to_str().unwrap()]);
+    assert!(code == Some(2) && err.contains("int17") && err.contains("1 problem"), "{err}");
     let file = folder.path().join("bad.toml");
     fs::write(
         &file,

@@ -259,6 +259,9 @@ fn parameter(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagD
         && cx.snapshot.sample(tag.id).quality.is_good();
     let read = if old { String::new() } else { age(cx.age(tag.id)) };
     let range = range_words(cx, tag.id);
+    // What is only read needs no range; what can be written says that its range is not known.
+    let none = !tag.writable() && tag.labels.is_empty() && cx.snapshot.range(tag.id).is_none();
+    let range = if none { "–".to_owned() } else { range };
     let range = range.trim_start_matches("range ").trim_end_matches(&shown.unit).trim_end().to_owned();
     let pen = if tag.writable() { theme.pick("✎", "w") } else { " " };
     let meaning =

@@ -114,7 +114,9 @@ impl Sequence<'_> {
         let x = canvas.text(0, 0, self.label, label_style(cx, selected));
         let shown = value::show(cx, self.step);
         let x = canvas.text(x + 2, 0, &shown.text, if shown.note.is_empty() { theme.strong() } else { shown.style });
-        if let Some(left) = self.remaining {
+        // A step without a time of its own has nothing left to tell.
+        let untimed = |left: &TagId| cx.snapshot.sample(*left).trusted() == Some(0.0);
+        if let Some(left) = self.remaining.filter(|left| !untimed(left)) {
             let text = match cx.snapshot.sample(left).trusted() {
                 Some(seconds) if seconds >= 0.0 => {
                     format!("{} left", running(std::time::Duration::from_secs_f64(seconds.min(1e7))))
