@@ -17,36 +17,57 @@ const OWED_MAX: usize = 16;
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Debt {
     owed: Vec<Shape>,
+    /// A loopback is owed: the next *refusal* of a loopback may be the answer to that one.
+    loopback: bool,
 }
 
 impl Debt {
     /// A request of this shape was not answered in time.
     pub fn owe(&mut self, shape: Shape) {
-        if !self.owed.contains(&shape) && self.owed.len() < OWED_MAX {
+        if shape.is_loopback() {
+            self.loopback = true;
+        } else if !self.owed.contains(&shape) && self.owed.len() < OWED_MAX {
             self.owed.push(shape);
         }
     }
 
     /// Could an answer of this shape be an owed one?
     pub fn is_ambiguous(&self, shape: Shape) -> bool {
-        self.owed.contains(&shape) || self.owed.len() == OWED_MAX
+        !shape.is_loopback() && (self.owed.contains(&shape) || self.owed.len() == OWED_MAX)
+    }
+
+    /// Does the refusal of a loopback (exception 01, by devices that do not have it) prove as much as its echo?
+    pub fn refusal_proves(&self) -> bool {
+        !self.loopback
+    }
+
+    /// How many shapes are owed.
+    pub fn count(&self) -> usize {
+        self.owed.len()
     }
 
     /// Nothing older can come any more.
     pub fn clear(&mut self) {
-        self.owed.clear();
+        *self = Debt::default();
     }
 
     /// Does the unit owe nothing?
     pub fn is_clear(&self) -> bool {
-        self.owed.is_empty()
+        self.owed.is_empty() && !self.loopback
     }
 
     /// A read that brings the unit back into step: part of a block that is read anyway, with a count whose answer cannot
-    /// be mistaken. `None`: there is none, only rest helps.
+    /// be mistaken. `None`: there is none, see [`loopback`].
     pub fn probe<'a>(&self, blocks: impl Iterator<Item = &'a Block>) -> Option<[u8; 6]> {
         blocks.flat_map(probes).find(|request| shape_of(request).is_some_and(|shape| !self.is_ambiguous(shape)))
     }
+}
+
+/// Diagnostics 08 / 00, return query data: the request comes back as it was sent, so with a number of its own it cannot be
+/// mistaken for anything (Modbus application protocol V1.1b3, 6.8). It changes nothing in the device.
+pub fn loopback(unit: u8, number: u16) -> [u8; 6] {
+    let [high, low] = number.to_be_bytes();
+    [unit, 0x08, 0, 0, high, low]
 }
 
 /// Reads of the first part of a block, the shortest first: each has a shape of its own.
@@ -94,6 +115,18 @@ mod tests {
             debt.owe(shape_of(&[1, 3, 0, 0, 0, count]).unwrap());
         }
         assert!(debt.is_ambiguous(shape_of(&[1, 4, 0, 0, 0, 99]).unwrap()));
+    }
+
+    #[test]
+    fn a_loopback_is_never_ambiguous_and_its_first_refusal_is_proof() {
+        let mut debt = Debt::default();
+        let shape = |number| shape_of(&loopback(1, number)).unwrap();
+        assert!(debt.refusal_proves());
+        debt.owe(shape(7));
+        assert!(!debt.is_clear() && !debt.refusal_proves());
+        assert!(!debt.is_ambiguous(shape(8)));
+        debt.clear();
+        assert!(debt.is_clear() && debt.refusal_proves());
     }
 
     #[test]

@@ -124,6 +124,11 @@ impl Shape {
             && self.echo.is_none_or(|echo| answer.get(2..6) == Some(&echo[..]))
     }
 
+    /// The echo of diagnostics 08.
+    pub fn is_loopback(self) -> bool {
+        self.function == 0x08
+    }
+
     /// Length of the message.
     pub fn length(self) -> usize {
         self.length

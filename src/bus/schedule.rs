@@ -177,6 +177,11 @@ impl Schedule {
         self.health(device).probe_at.is_some()
     }
 
+    /// Must the device be left alone now (it is settling, or owes answers)?
+    pub fn is_resting(&self, device: DeviceId, now: Timestamp) -> bool {
+        now < self.health(device).rests_until
+    }
+
     /// Releases that were skipped because the line had no time.
     pub fn missed(&self) -> u64 {
         self.missed
@@ -282,6 +287,7 @@ mod tests {
         let mut schedule = Schedule::new(&[block(0, every(100))], at(0));
         schedule.rest(DeviceId(0), at(700));
         assert_eq!(schedule.next(at(0)), Next::WaitUntil(at(700)));
+        assert!(schedule.is_resting(DeviceId(0), at(699)) && !schedule.is_resting(DeviceId(0), at(700)));
     }
 
     proptest! {

@@ -236,6 +236,7 @@ fn judge(fault: Fault) -> Verdict {
         // 05 acknowledge and 06 busy pass; any other exception means that there is no such value.
         Fault::Exception(ExceptionCode(0x05 | 0x06)) => Verdict::Doubt(Cause::Exception),
         Fault::Exception(_) => Verdict::Gone(Cause::Exception),
+        Fault::NotANumber => Verdict::Gone(Cause::SensorFault),
         Fault::NotConnected => Verdict::Gone(Cause::NotConnected),
         Fault::Resting => Verdict::Gone(Cause::DeviceDown),
     }
@@ -291,6 +292,7 @@ mod tests {
             (Fault::Crc { got: 1, computed: 2 }, Uncertain(Cause::Corrupt)),
             (Fault::Exception(ExceptionCode(2)), Bad(Cause::Exception)),
             (Fault::Exception(ExceptionCode(6)), Uncertain(Cause::Exception)),
+            (Fault::NotANumber, Bad(Cause::SensorFault)),
             (Fault::NotConnected, Bad(Cause::NotConnected)),
             (Fault::Resting, Bad(Cause::DeviceDown)),
         ] {

@@ -129,14 +129,17 @@ pub enum Fault {
     /// The echo of a write names another address or value.
     #[error("echo of the write differs from the request")]
     WrongEcho,
+    /// The answer is good, but the registers hold no number of the tag's type (a BCD digit above 9, NaN).
+    #[error("the registers hold no number of this type")]
+    NotANumber,
     /// The device said no.
     #[error("{0}")]
     Exception(ExceptionCode),
     /// The port or connection is not open.
     #[error("line not connected")]
     NotConnected,
-    /// The unit is resting after having failed; nothing was sent.
-    #[error("device not answering, next try later")]
+    /// The device is left alone (it has failed, or is saving its settings); nothing was sent.
+    #[error("the device rests, try again later")]
     Resting,
 }
 
@@ -150,7 +153,7 @@ impl Fault {
             | Fault::WrongFunction { .. }
             | Fault::WrongLength { .. }
             | Fault::WrongEcho => true,
-            Fault::Timeout | Fault::Exception(_) | Fault::NotConnected | Fault::Resting => false,
+            Fault::Timeout | Fault::NotANumber | Fault::Exception(_) | Fault::NotConnected | Fault::Resting => false,
         }
     }
 }

@@ -186,7 +186,7 @@ impl Plant {
             }
             Fault::NotConnected => return,
             // A device that says no is there.
-            Fault::Exception(_) => status.state = DeviceState::Answering,
+            Fault::Exception(_) | Fault::NotANumber => status.state = DeviceState::Answering,
             Fault::Timeout
             | Fault::Crc { .. }
             | Fault::Truncated { .. }

@@ -55,11 +55,24 @@ impl Terminal {
 
     /// Waits until the screen holds a text.
     fn wait_for(&mut self, text: &str) {
+        self.wait(text, true);
+    }
+
+    /// Waits until the screen holds a text no more.
+    fn wait_gone(&mut self, text: &str) {
+        self.wait(text, false);
+    }
+
+    fn wait(&mut self, text: &str, there: bool) {
         let end = Instant::now() + PATIENCE;
-        while !self.parser.screen().contents().contains(text) {
+        while self.parser.screen().contents().contains(text) != there {
             match self.bytes.recv_timeout(end.saturating_duration_since(Instant::now())) {
                 Ok(bytes) => self.take(&bytes),
-                Err(_) => panic!("`{text}` never came; the screen:\n{}", self.parser.screen().contents()),
+                Err(_) => panic!(
+                    "`{text}` never {}; the screen:\n{}",
+                    if there { "came" } else { "went" },
+                    self.parser.screen().contents()
+                ),
             }
         }
     }
@@ -115,10 +128,10 @@ fn every_tab_opens_and_q_asks_before_leaving() {
         terminal.wait_for(text);
     }
     terminal.keys("?");
-    terminal.wait_for("help");
+    terminal.wait_for("every tab");
     terminal.keys("\x1b");
     // Esc and a letter in one go would be Alt and the letter.
-    terminal.wait_for("q quit");
+    terminal.wait_gone("every tab");
     terminal.keys("q");
     terminal.wait_for("Leave");
     terminal.keys("\r");

@@ -25,7 +25,7 @@ use tokio_modbus::{
 use super::{clock::Clock, transport::Stream};
 use crate::{
     bus::{
-        debt::Debt,
+        debt::{self, Debt},
         frame::{self, Mbap, Shape},
     },
     plant::{
@@ -85,6 +85,8 @@ pub struct Link {
     quiet_until: Instant,
     /// What each unit owes, by unit address.
     debts: Vec<Debt>,
+    /// Numbers of loopbacks.
+    loopbacks: u16,
     /// How late an owed answer has ever come, by unit address.
     late_max: Vec<Duration>,
     /// When the unit last failed to answer in time.
@@ -115,6 +117,7 @@ impl Link {
             timeout: line.timeout,
             quiet_until: Instant::now(),
             debts: vec![Debt::default(); 256],
+            loopbacks: 0,
             late_max: vec![Duration::ZERO; 256],
             asked_last: vec![None; 256],
             ring: VecDeque::new(),
@@ -184,11 +187,29 @@ impl Link {
         &self.debts[usize::from(unit)]
     }
 
+    /// Brings a unit into step by a loopback, where no read can: after it nothing older can come any more.
+    pub async fn loopback(&mut self, unit: u8) -> Result<(), Trouble> {
+        self.loopbacks = self.loopbacks.wrapping_add(1);
+        let proves = self.debt(unit).refusal_proves();
+        match self.exchange(&debt::loopback(unit, self.loopbacks)).await {
+            Ok(_) => Ok(()),
+            Err(Trouble::Fault(Fault::Exception(_))) if proves => {
+                self.debts[usize::from(unit)].clear();
+                Ok(())
+            }
+            // It may be the answer to an earlier loopback: the unit is alive, but not in step.
+            Err(Trouble::Fault(Fault::Exception(_))) => Err(Fault::Timeout.into()),
+            Err(trouble) => Err(trouble),
+        }
+    }
+
     /// For a unit that no probe can bring into step: how much longer it must rest before its debt may be forgotten,
-    /// `None` once it is forgotten. It rests twice as long as it has ever been late, five timeouts at the least.
+    /// `None` once it is forgotten. For each answer that it owes it rests twice as long as it has ever been late, ten
+    /// timeouts at the least: patience, not proof, and needed only for devices that do not answer a loopback at all.
     pub fn forget_debt(&mut self, unit: u8) -> Option<Duration> {
         let unit = usize::from(unit);
-        let rest = (2 * self.late_max[unit]).max(5 * self.timeout).max(Duration::from_secs(3));
+        let each = (2 * self.late_max[unit]).max(10 * self.timeout);
+        let rest = each * self.debts[unit].count().max(1) as u32;
         let waited = self.asked_last[unit].map_or(rest, |asked| asked.elapsed());
         if waited < rest {
             return Some(rest - waited);
@@ -385,6 +406,7 @@ impl Link {
             | Fault::WrongFunction { .. }
             | Fault::WrongLength { .. }
             | Fault::WrongEcho
+            | Fault::NotANumber
             | Fault::NotConnected
             | Fault::Resting => self.counters.corrupt += 1,
         }

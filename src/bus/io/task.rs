@@ -242,10 +242,8 @@ impl Task {
     ) -> Result<Result<(), Leave>, Ended> {
         let block = self.blocks[index].clone();
         let started = self.clock.now();
-        let outcome = match self.in_step(link, schedule, &block).await {
-            Ok(true) => self.read_twice(link, schedule, &block).await,
-            // The unit must rest before it can be asked anything that could be mistaken.
-            Ok(false) => return Ok(Ok(())),
+        let outcome = match self.in_step(link, &block).await {
+            Ok(()) => self.read_twice(link, &block).await,
             Err(trouble) => Err(trouble),
         };
         let at = self.clock.now();
@@ -277,33 +275,30 @@ impl Task {
         Ok(Ok(()))
     }
 
-    /// Makes sure that the answer to a block cannot be mistaken for one that the unit still owes. `false`: not now.
-    async fn in_step(&mut self, link: &mut Link, schedule: &mut Schedule, block: &Block) -> Result<bool, Trouble> {
+    /// Makes sure that the answer to a block cannot be mistaken for one that the unit still owes: by a read of another
+    /// shape if there is one, else by a loopback, else by patience.
+    async fn in_step(&self, link: &mut Link, block: &Block) -> Result<(), Trouble> {
         if !link.is_ambiguous(&block.request()) {
-            return Ok(true);
+            return Ok(());
         }
         let own = std::iter::once(block);
         let others = self.blocks.iter().filter(|other| other.device == block.device && *other != block);
         if let Some(probe) = link.debt(block.unit).probe(own.chain(others)) {
-            return link.exchange(&probe).await.map(|_| true);
+            return link.exchange(&probe).await.map(drop);
         }
-        match link.forget_debt(block.unit) {
-            None => Ok(true),
-            Some(real) => {
-                let plant = real.mul_f64(self.clock.speed());
-                schedule.rest(block.device, self.clock.now() + plant);
-                Ok(false)
-            }
+        match link.loopback(block.unit).await {
+            Err(Trouble::Fault(_)) if link.forget_debt(block.unit).is_none() => Ok(()),
+            other => other,
         }
     }
 
     /// Reads a block; a spoiled answer is asked for once more. It counts as owed, so the unit is brought into step first.
-    async fn read_twice(&mut self, link: &mut Link, schedule: &mut Schedule, block: &Block) -> Result<Answer, Trouble> {
+    async fn read_twice(&self, link: &mut Link, block: &Block) -> Result<Answer, Trouble> {
         match read(link, block).await {
-            Err(Trouble::Fault(fault)) if fault.is_corrupt() => match self.in_step(link, schedule, block).await? {
-                true => read(link, block).await,
-                false => Err(fault.into()),
-            },
+            Err(Trouble::Fault(fault)) if fault.is_corrupt() => {
+                self.in_step(link, block).await?;
+                read(link, block).await
+            }
             other => other,
         }
     }
@@ -318,14 +313,15 @@ impl Task {
         unlock: Option<(&TagDef, f64)>,
         verify: bool,
     ) -> Result<WriteResult, String> {
-        let device = self.def.device(tag.device);
+        let def = self.def.clone();
+        let device = def.device(tag.device);
         let (unit, write_gap) = (device.unit, device.write_gap);
-        if schedule.is_down(tag.device) {
+        if schedule.is_down(tag.device) || schedule.is_resting(tag.device, self.clock.now()) {
             return Ok(WriteResult::NotSent(Fault::Resting));
         }
         for (tag, raw) in unlock.into_iter().chain([(tag, raw)]) {
             // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
-            let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::WrongEcho)) };
+            let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
             let sent = link.call(unit, request).await;
             link.rest(write_gap);
             match sent {
@@ -335,20 +331,23 @@ impl Task {
                 Err(Trouble::Fault(fault)) => return Ok(WriteResult::Lost(fault)),
             }
         }
+        // An action such as saving to non-volatile memory wants the device left alone, not the line.
+        if let Some(action) = device.actions.iter().find(|action| action.tag == tag.id) {
+            schedule.rest(tag.device, self.clock.now() + action.settle);
+            return Ok(WriteResult::Accepted);
+        }
         if !verify {
             return Ok(WriteResult::Accepted);
         }
         let block = single(tag, unit);
-        match self.in_step(link, schedule, &block).await {
-            Ok(true) => {}
-            Ok(false) => return Ok(WriteResult::NotRead(Fault::Resting)),
-            Err(Trouble::Gone(why)) => return Err(why),
-            Err(Trouble::Fault(fault)) => return Ok(WriteResult::NotRead(fault)),
-        }
-        match self.read_twice(link, schedule, &block).await {
+        let back = match self.in_step(link, &block).await {
+            Ok(()) => self.read_twice(link, &block).await,
+            Err(trouble) => Err(trouble),
+        };
+        match back {
             Ok(values) => Ok(match value_of(tag, &block, &values) {
                 Some(back) => WriteResult::ReadBack(back),
-                None => WriteResult::NotRead(Fault::WrongLength { got: 0, asked: tag.point.len() }),
+                None => WriteResult::NotRead(Fault::NotANumber),
             }),
             Err(Trouble::Gone(why)) => Err(why),
             Err(Trouble::Fault(fault)) => Ok(WriteResult::NotRead(fault)),
@@ -385,8 +384,7 @@ impl Task {
         let values = decoded.into_iter().filter_map(|(tag, value)| Some((tag, value?))).collect();
         self.tell(Event::Read { at, device: block.device, values, reply }).await?;
         if !spoiled.is_empty() {
-            // A device failure in the words of the standard: the register holds no number (BCD digit above 9, NaN).
-            self.tell_failed(at, block.device, spoiled, Fault::Exception(ExceptionCode(0x04))).await?;
+            self.tell_failed(at, block.device, spoiled, Fault::NotANumber).await?;
         }
         Ok(())
     }

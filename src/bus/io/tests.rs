@@ -259,7 +259,7 @@ async fn an_in_order_gateway_is_in_step_again_within_one_poll() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
     #[test]
     fn no_mixture_of_faults_puts_a_value_into_a_wrong_tag(
         tcp in any::<bool>(),
