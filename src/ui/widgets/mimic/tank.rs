@@ -82,7 +82,7 @@ impl Tank<'_> {
                     put_value(cx, canvas, x, y, heater, 11);
                 }
                 Some(false) => {
-                    canvas.text(1, y, theme.pick("─── heater off", "--- heater off"), theme.dim());
+                    canvas.text(1, y, theme.pick("─── off", "--- heater off"), theme.dim());
                 }
                 None => {
                     canvas.text(1, y, "heater ?", theme.trouble());
