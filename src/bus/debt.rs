@@ -72,8 +72,8 @@ pub fn loopback(unit: u8, number: u16) -> [u8; 6] {
 
 /// Reads of the first part of a block, the shortest first: each has a shape of its own.
 fn probes(block: &Block) -> impl Iterator<Item = [u8; 6]> {
-    let step = if block.table.is_bits() { 8 } else { 1 };
-    let counts = (1..block.count).step_by(step).chain([block.count]);
+    let (first, step) = if block.table.is_bits() { (1, 8) } else { (block.alignment.max(1), block.alignment.max(1)) };
+    let counts = (first..block.count).step_by(usize::from(step)).chain([block.count]);
     let block = block.clone();
     counts.map(move |count| Block { count, ..block.clone() }.request())
 }

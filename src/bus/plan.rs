@@ -24,6 +24,8 @@ pub struct Block {
     pub tags: Vec<TagId>,
     /// How often.
     pub poll: Poll,
+    /// Address and count are multiples of this (registers only).
+    pub alignment: u16,
 }
 
 impl Block {
@@ -53,19 +55,25 @@ fn blocks_of<'a>(device: &DeviceDef, tags: impl Iterator<Item = &'a TagDef>) -> 
     for tag in tags {
         let joined = blocks.last_mut().is_some_and(|block| join(block, tag, &device.limits));
         if !joined {
-            let (address, end) = aligned(tag.point.address, span_end(tag), tag.point.table, &device.limits);
-            blocks.push(Block {
-                device: device.id,
-                unit: device.unit,
-                table: tag.point.table,
-                address,
-                count: (end - u32::from(address)) as u16,
-                tags: vec![tag.id],
-                poll: tag.poll,
-            });
+            blocks.push(single(device, tag));
         }
     }
     blocks
+}
+
+/// The block that reads one tag alone.
+pub fn single(device: &DeviceDef, tag: &TagDef) -> Block {
+    let (address, end) = aligned(tag.point.address, span_end(tag), tag.point.table, &device.limits);
+    Block {
+        device: device.id,
+        unit: device.unit,
+        table: tag.point.table,
+        address,
+        count: (end - u32::from(address)) as u16,
+        tags: vec![tag.id],
+        poll: tag.poll,
+        alignment: device.limits.alignment,
+    }
 }
 
 /// Takes a tag into a block if it is of the same kind, near enough, and the limits hold.

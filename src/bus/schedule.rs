@@ -103,7 +103,7 @@ impl Schedule {
 
     /// When a block may be read, and by when it should be.
     fn due(&self, index: usize, poll: &Pending) -> Option<(Timestamp, Timestamp)> {
-        let health = self.health(poll.device);
+        let health = self.health(poll.device)?;
         if let Some(probe_at) = health.probe_at {
             // A device that is down is probed with its first block only.
             let first = self.polls.iter().position(|other| other.device == poll.device) == Some(index);
@@ -137,9 +137,17 @@ impl Schedule {
         };
     }
 
+    /// A block that is read once could not be: it is due again soon.
+    pub fn again(&mut self, index: usize, now: Timestamp) {
+        let poll = &mut self.polls[index];
+        if poll.period.is_none() {
+            poll.release = Some(now + ONCE_WITHIN);
+        }
+    }
+
     /// The device answered (an exception is an answer too). If it was down, everything of it is due.
     pub fn answered(&mut self, device: DeviceId, now: Timestamp) {
-        let health = self.health_mut(device);
+        let Some(health) = self.health_mut(device) else { return };
         health.failures = 0;
         health.backoff.reset();
         if health.probe_at.take().is_some() {
@@ -149,7 +157,7 @@ impl Schedule {
 
     /// The device did not answer. `true` if it is given up with this.
     pub fn failed(&mut self, device: DeviceId, now: Timestamp) -> bool {
-        let health = self.health_mut(device);
+        let Some(health) = self.health_mut(device) else { return false };
         health.failures = health.failures.saturating_add(1);
         if health.failures < FAILURES_MAX {
             return false;
@@ -161,7 +169,7 @@ impl Schedule {
 
     /// The device is not to be asked before `until`.
     pub fn rest(&mut self, device: DeviceId, until: Timestamp) {
-        let health = self.health_mut(device);
+        let Some(health) = self.health_mut(device) else { return };
         health.rests_until = health.rests_until.max(until);
     }
 
@@ -174,12 +182,12 @@ impl Schedule {
 
     /// Is the device given up?
     pub fn is_down(&self, device: DeviceId) -> bool {
-        self.health(device).probe_at.is_some()
+        self.health(device).is_some_and(|health| health.probe_at.is_some())
     }
 
     /// Must the device be left alone now (it is settling, or owes answers)?
     pub fn is_resting(&self, device: DeviceId, now: Timestamp) -> bool {
-        now < self.health(device).rests_until
+        self.health(device).is_some_and(|health| now < health.rests_until)
     }
 
     /// Releases that were skipped because the line had no time.
@@ -187,12 +195,13 @@ impl Schedule {
         self.missed
     }
 
-    fn health(&self, device: DeviceId) -> &Health {
-        self.devices.iter().find(|health| health.device == device).expect("made from the same blocks")
+    /// `None` for a device of which nothing is read.
+    fn health(&self, device: DeviceId) -> Option<&Health> {
+        self.devices.iter().find(|health| health.device == device)
     }
 
-    fn health_mut(&mut self, device: DeviceId) -> &mut Health {
-        self.devices.iter_mut().find(|health| health.device == device).expect("made from the same blocks")
+    fn health_mut(&mut self, device: DeviceId) -> Option<&mut Health> {
+        self.devices.iter_mut().find(|health| health.device == device)
     }
 }
 
@@ -216,7 +225,7 @@ mod tests {
     fn block(device: u16, poll: Poll) -> Block {
         let unit = device as u8 + 1;
         let tags = vec![TagId(0)];
-        Block { device: DeviceId(device), unit, table: Table::Input, address: 0, count: 1, tags, poll }
+        Block { device: DeviceId(device), unit, table: Table::Input, address: 0, count: 1, tags, poll, alignment: 1 }
     }
 
     fn every(ms: u64) -> Poll {

@@ -164,6 +164,17 @@ impl Fault {
 pub struct ExceptionCode(pub u8);
 
 impl ExceptionCode {
+    /// The gateway says that the device behind it is away; the device itself has said nothing.
+    pub fn is_of_gateway(self) -> bool {
+        matches!(self.0, 0x0A | 0x0B)
+    }
+
+    /// Certainly without effect, if it answers a write: not so for 04 (failed on the way), 05 (accepted, still working)
+    /// and 0B (the gateway has heard nothing back).
+    pub fn is_refusal(self) -> bool {
+        !matches!(self.0, 0x04 | 0x05 | 0x0B)
+    }
+
     /// The meaning in the words of the standard.
     pub fn words(self) -> &'static str {
         match self.0 {

@@ -319,6 +319,12 @@ fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Acce
     if matches!(point.table, Table::Discrete | Table::Input) {
         problems.add(at, format!("a {} can only be read", point.table.word())).label("expected access = \"r\"");
     }
+    if point.field.is_some() {
+        problems
+            .add(at, "a field of bits inside a word cannot be written")
+            .label("expected access = \"r\"")
+            .help("writing it would overwrite the other bits of the word");
+    }
     if let Some(verify) = row.verify.filter(|verify| !verify.value) {
         let problem = problems.add(verify.at, "a write is always verified").label("leave this out");
         problem.help("a tag that cannot be read back has access = \"w\"");

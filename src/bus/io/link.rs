@@ -90,7 +90,7 @@ pub struct Link {
     /// How late an owed answer has ever come, by unit address.
     late_max: Vec<Duration>,
     /// When the unit last failed to answer in time.
-    asked_last: Vec<Option<Instant>>,
+    failed_last: Vec<Option<Instant>>,
     ring: VecDeque<FrameLog>,
     /// Totals of this line; `utilisation`, `opens` and `missed` are the task's.
     pub counters: LineCounters,
@@ -115,11 +115,12 @@ impl Link {
             tcp,
             transaction: 0,
             timeout: line.timeout,
-            quiet_until: Instant::now(),
+            // What was asked before an earlier port went away may still be answered.
+            quiet_until: Instant::now() + if tcp { Duration::ZERO } else { line.timeout },
             debts: vec![Debt::default(); 256],
             loopbacks: 0,
             late_max: vec![Duration::ZERO; 256],
-            asked_last: vec![None; 256],
+            failed_last: vec![None; 256],
             ring: VecDeque::new(),
             counters,
             reply: Duration::ZERO,
@@ -159,6 +160,8 @@ impl Link {
     /// Sends a message (unit and PDU) and gives the checked answer message. Sent once, never repeated.
     pub async fn exchange(&mut self, message: &[u8]) -> Result<Vec<u8>, Trouble> {
         let unit = usize::from(message.first().copied().unwrap_or(0));
+        // An answer proves that nothing older is to come only if it could not itself have been older.
+        let proof = !self.is_ambiguous(message);
         self.wait_for_silence().await;
         self.drain()?;
         let started = Instant::now();
@@ -168,7 +171,9 @@ impl Link {
         match &outcome {
             Ok(_) => {
                 self.counters.ok += 1;
-                self.debts[unit].clear();
+                if proof {
+                    self.debts[unit].clear();
+                }
             }
             Err(Trouble::Fault(fault)) => self.account(message, *fault),
             Err(Trouble::Gone(_)) => {}
@@ -210,7 +215,7 @@ impl Link {
         let unit = usize::from(unit);
         let each = (2 * self.late_max[unit]).max(10 * self.timeout);
         let rest = each * self.debts[unit].count().max(1) as u32;
-        let waited = self.asked_last[unit].map_or(rest, |asked| asked.elapsed());
+        let waited = self.failed_last[unit].map_or(rest, |failed| failed.elapsed());
         if waited < rest {
             return Some(rest - waited);
         }
@@ -241,14 +246,18 @@ impl Link {
     }
 
     async fn wait_for_silence(&mut self) {
-        while Instant::now() < self.quiet_until {
-            let until = self.quiet_until;
+        // A device that never stops talking, or a second master, must not hold the line for ever: it spoils what is sent
+        // then, and that is told.
+        let limit = self.quiet_until.max(Instant::now()) + self.timeout;
+        while Instant::now() < self.quiet_until.min(limit) {
+            let until = self.quiet_until.min(limit);
             // A gone port shows itself at the write that follows.
             let _ = tokio::time::timeout_at(until, self.idle_quietly()).await;
-            if until == self.quiet_until {
+            if until == self.quiet_until.min(limit) {
                 tokio::time::sleep_until(until).await;
             }
         }
+        self.quiet_until = self.quiet_until.min(limit);
     }
 
     /// As [`Link::idle`], but every byte that comes prolongs the silence to be kept.
@@ -277,8 +286,11 @@ impl Link {
         self.transaction = self.transaction.wrapping_add(1);
         let out = if self.tcp { frame::with_mbap(self.transaction, message) } else { frame::with_crc(message) };
         let gone = |error: std::io::Error| Trouble::Gone(error.to_string());
-        self.port.write_all(&out).await.map_err(gone)?;
-        self.port.flush().await.map_err(gone)?;
+        // No flush: on a serial port that waits for the last byte to leave, and blocks the thread while it does.
+        match tokio::time::timeout(self.timeout + self.char_time * 512, self.port.write_all(&out)).await {
+            Ok(written) => written.map_err(gone)?,
+            Err(_) => return Err(Trouble::Gone("the port takes no bytes".into())),
+        }
         self.counters.requests += 1;
         self.counters.sent_bytes += out.len() as u64;
         self.counters.last_tx = Some(self.clock.now());
@@ -397,7 +409,10 @@ impl Link {
         match fault {
             Fault::Exception(_) => {
                 self.counters.exceptions += 1;
-                return;
+                // An exception names no address: while the unit owes, it may be the answer to an older request.
+                if self.tcp || self.debts[unit].is_clear() {
+                    return;
+                }
             }
             Fault::Timeout => self.counters.timeouts += 1,
             Fault::Crc { .. }
@@ -417,7 +432,10 @@ impl Link {
             if let Some(shape) = shape {
                 self.debts[unit].owe(shape);
             }
-            self.asked_last[unit] = Some(Instant::now());
+            // Patience counts from the last request that may be answered late; a loopback cannot be mistaken.
+            if !shape.is_some_and(Shape::is_loopback) {
+                self.failed_last[unit] = Some(Instant::now());
+            }
             let longest = shape.map_or(frame::MESSAGE_MAX, Shape::length) + 2;
             self.rest_at_least(self.char_time * longest as u32 + self.silence);
         }
@@ -438,10 +456,10 @@ impl Link {
         self.counters.stale += 1;
         tracing::debug!(bytes = %hex(bytes), "stale bytes dropped");
         if let Some(unit) = bytes.first().map(|unit| usize::from(*unit))
-            && let Some(asked) = self.asked_last[unit].filter(|_| !self.debts[unit].is_clear())
+            && let Some(failed) = self.failed_last[unit].filter(|_| !self.debts[unit].is_clear())
         {
-            // `asked_last` is the moment of the timeout, so the whole lateness includes the timeout itself.
-            self.late_max[unit] = self.late_max[unit].max(asked.elapsed() + self.timeout);
+            // The whole lateness includes the timeout itself.
+            self.late_max[unit] = self.late_max[unit].max(failed.elapsed() + self.timeout);
         }
         self.log(false, bytes.to_vec(), Cow::Borrowed("stale, dropped"));
     }
@@ -471,17 +489,19 @@ enum Verdict {
 
 /// Looks for a frame with a good CRC at the beginning, then behind noise.
 fn verdict(message: &[u8], buffer: &[u8]) -> Verdict {
+    let begins = |rest: &[u8]| rest.len() >= 2 && rest[0] == message[0] && rest[1] & 0x7F == message[1];
     for start in 0..buffer.len() {
         let rest = &buffer[start..];
         let Some(length) = frame::answer_length(rest).filter(|length| length + 2 <= rest.len()) else { continue };
         let Ok(answer) = frame::without_crc(&rest[..length + 2]) else { continue };
-        return match frame::check_answer(message, answer) {
-            Ok(()) | Err(Fault::Exception(_)) => Verdict::Answer(start..start + length),
-            Err(fault) => Verdict::Foreign(start + length + 2, fault),
-        };
+        match frame::check_answer(message, answer) {
+            Ok(()) | Err(Fault::Exception(_)) => return Verdict::Answer(start..start + length),
+            // Inside what may be the answer a chance check is no frame: it would cut the answer in two.
+            Err(_) if (0..start).any(|earlier| begins(&buffer[earlier..])) => {}
+            Err(fault) => return Verdict::Foreign(start + length + 2, fault),
+        }
     }
     // No good frame yet. Is there one of the right beginning and full length, but spoiled?
-    let begins = |rest: &[u8]| rest.len() >= 2 && rest[0] == message[0] && rest[1] & 0x7F == message[1];
     let mut beginnings = (0..buffer.len()).map(|start| &buffer[start..]).filter(|rest| begins(rest)).peekable();
     if beginnings.peek().is_none() {
         return Verdict::Nothing;
@@ -508,11 +528,10 @@ fn left_over(message: &[u8], buffer: &[u8]) -> Fault {
     if buffer.len() < expected {
         return Fault::Truncated { got: buffer.len() as u16, expected: expected as u16 };
     }
-    let (got, computed) = match frame::without_crc(buffer) {
-        Err(Fault::Crc { got, computed }) => (got, computed),
-        _ => (0, 0),
-    };
-    Fault::Crc { got, computed }
+    match frame::without_crc(buffer) {
+        Err(fault) => fault,
+        Ok(message) => Fault::WrongLength { got: message.len() as u16, asked: expected as u16 - 2 },
+    }
 }
 
 /// `01 03 03 EA`.

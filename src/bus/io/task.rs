@@ -21,9 +21,10 @@ use crate::{
     plant::{
         PlantDef,
         command::{BusRequest, WriteId},
-        def::{DeviceId, LineDef, LineId, TagId},
+        def::{ActionDef, DeviceId, LineDef, LineId, TagId, Transport},
         event::{Event, ExceptionCode, Fault, LineCounters, LineState, WriteResult},
-        tag::{Kind, Table, TagDef},
+        scale,
+        tag::{Table, TagDef},
     },
 };
 
@@ -223,11 +224,24 @@ impl Task {
                         return Ok(Err(Leave::Lost(why)));
                     }
                 };
-                if let WriteResult::ReadBack(raw) = result {
-                    let (device, values) = (tag.device, vec![(tag.id, raw)]);
-                    self.tell(Event::Read { at: self.clock.now(), device, values, reply: link.reply }).await?;
+                let tcp = matches!(self.line_def().transport, Transport::Tcp { .. });
+                let unanswered = tcp && matches!(result, WriteResult::Lost(Fault::Timeout));
+                match result {
+                    WriteResult::ReadBack(raw) => {
+                        let (device, values) = (tag.device, vec![(tag.id, raw)]);
+                        self.tell(Event::Read { at: self.clock.now(), device, values, reply: link.reply }).await?;
+                    }
+                    // What the device holds now is not known until it is read again.
+                    WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => {
+                        schedule.refresh(tag.device, self.clock.now());
+                    }
+                    WriteResult::Refused(_) | WriteResult::NotSent(_) => {}
                 }
                 self.tell_wrote(id, result).await?;
+                if unanswered {
+                    // The system would go on sending it for minutes; a closed connection takes it back.
+                    return Ok(Err(Leave::Lost("a write was not answered".into())));
+                }
                 Ok(Ok(()))
             }
         }
@@ -256,15 +270,18 @@ impl Task {
                 self.tell_values(at, &block, decoded, link.reply).await?;
             }
             Err(Trouble::Gone(why)) => return Ok(Err(Leave::Lost(why))),
-            Err(Trouble::Fault(fault @ Fault::Exception(code))) => {
+            Err(Trouble::Fault(fault @ Fault::Exception(code))) if !code.is_of_gateway() => {
                 schedule.answered(block.device, at);
+                schedule.again(index, at);
                 self.tell_failed(at, block.device, block.tags.clone(), fault).await?;
-                if code == ExceptionCode(0x02) && self.split(index) {
+                let its_own = link.debt(block.unit).is_clear();
+                if code == ExceptionCode(0x02) && its_own && self.split(index) {
                     let mut fresh = Schedule::new(&self.blocks, at);
                     std::mem::swap(schedule, &mut fresh);
                 }
             }
             Err(Trouble::Fault(fault)) => {
+                schedule.again(index, at);
                 self.tell_failed(at, block.device, block.tags.clone(), fault).await?;
                 if schedule.failed(block.device, at) {
                     let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
@@ -284,7 +301,11 @@ impl Task {
         let own = std::iter::once(block);
         let others = self.blocks.iter().filter(|other| other.device == block.device && *other != block);
         if let Some(probe) = link.debt(block.unit).probe(own.chain(others)) {
-            return link.exchange(&probe).await.map(drop);
+            match link.exchange(&probe).await {
+                // The device does not read parts of a block, or this answers an older request: neither proves anything.
+                Err(Trouble::Fault(Fault::Exception(_))) => {}
+                other => return other.map(drop),
+            }
         }
         match link.loopback(block.unit).await {
             Err(Trouble::Fault(_)) if link.forget_debt(block.unit).is_none() => Ok(()),
@@ -319,6 +340,10 @@ impl Task {
         if schedule.is_down(tag.device) || schedule.is_resting(tag.device, self.clock.now()) {
             return Ok(WriteResult::NotSent(Fault::Resting));
         }
+        // A key of another device would be written to an address of this one.
+        if unlock.is_some_and(|(key, _)| key.device != tag.device) {
+            return Ok(WriteResult::NotSent(Fault::NotANumber));
+        }
         for (tag, raw) in unlock.into_iter().chain([(tag, raw)]) {
             // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
             let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
@@ -327,19 +352,21 @@ impl Task {
             match sent {
                 Ok(_) => schedule.answered(tag.device, self.clock.now()),
                 Err(Trouble::Gone(why)) => return Err(why),
-                Err(Trouble::Fault(Fault::Exception(code))) => return Ok(WriteResult::Refused(code)),
+                Err(Trouble::Fault(Fault::Exception(code))) if code.is_refusal() => {
+                    return Ok(WriteResult::Refused(code));
+                }
                 Err(Trouble::Fault(fault)) => return Ok(WriteResult::Lost(fault)),
             }
         }
         // An action such as saving to non-volatile memory wants the device left alone, not the line.
-        if let Some(action) = device.actions.iter().find(|action| action.tag == tag.id) {
+        let is_this = |action: &&ActionDef| action.tag == tag.id && scale::to_raw(tag, action.value, 0) == Some(raw);
+        if let Some(action) = device.actions.iter().find(is_this) {
             schedule.rest(tag.device, self.clock.now() + action.settle);
-            return Ok(WriteResult::Accepted);
         }
         if !verify {
             return Ok(WriteResult::Accepted);
         }
-        let block = single(tag, unit);
+        let block = plan::single(device, tag);
         let back = match self.in_step(link, &block).await {
             Ok(()) => self.read_twice(link, &block).await,
             Err(trouble) => Err(trouble),
@@ -361,8 +388,8 @@ impl Task {
             return false;
         }
         tracing::warn!(address = block.address, count = block.count, "exception 02: the block is split");
-        let unit = block.unit;
-        let singles = block.tags.iter().map(|tag| Block { poll: block.poll, ..single(self.def.tag(*tag), unit) });
+        let device = self.def.device(block.device);
+        let singles = block.tags.iter().map(|tag| plan::single(device, self.def.tag(*tag)));
         let singles: Vec<Block> = singles.collect();
         self.blocks.splice(index..=index, singles);
         true
@@ -465,19 +492,6 @@ fn value_of(tag: &TagDef, block: &Block, values: &Answer) -> Option<f64> {
     }
 }
 
-/// A block of one tag only.
-fn single(tag: &TagDef, unit: u8) -> Block {
-    Block {
-        device: tag.device,
-        unit,
-        table: tag.point.table,
-        address: tag.point.address,
-        count: tag.point.len(),
-        tags: vec![tag.id],
-        poll: tag.poll,
-    }
-}
-
 /// The request that writes a raw number: function 5 or 6 for one, 15 or 16 for more or where the profile says so.
 fn write_request(tag: &TagDef, raw: f64) -> Option<Request<'static>> {
     let address = tag.point.address;
@@ -487,10 +501,7 @@ fn write_request(tag: &TagDef, raw: f64) -> Option<Request<'static>> {
             Some(_) | None => Request::WriteSingleCoil(address, raw != 0.0),
         }),
         Table::Holding => {
-            let words = match tag.point.kind {
-                Kind::Bool => vec![u16::from(raw != 0.0)],
-                _ => codec::encode(tag.point, raw)?,
-            };
+            let words = codec::encode(tag.point, raw)?;
             Some(match (words.as_slice(), tag.write_fc) {
                 ([word], None | Some(6)) => Request::WriteSingleRegister(address, *word),
                 _ => Request::WriteMultipleRegisters(address, Cow::Owned(words)),
