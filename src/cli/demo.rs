@@ -85,7 +85,7 @@ fn plug_into(def: &mut PlantDef, path: &std::path::Path) {
 async fn headless(session: Session, clock: Clock, args: &Args) -> Result<(), CliError> {
     let from = clock.now();
     let queries = session.queries.clone();
-    let last = run::follow(session, clock, args.duration).await;
+    let last = run::follow(session, clock, args.duration).await?;
     let period = Period { name: "demo".into(), from, to: clock.now() };
     let report = ask_report(&queries, period).await?;
     for line in summary(&last, &report) {
@@ -150,8 +150,11 @@ impl Scratch {
         if let Some(history) = &args.history {
             return Ok(Scratch { history: history.clone(), folder: None });
         }
-        let folder = std::env::temp_dir().join(format!("sightglass-demo-{}", std::process::id()));
-        std::fs::create_dir_all(&folder)
+        // Made by nobody else and for nobody else: the temporary folder is everybody's.
+        let started = Timestamp::now().as_microsecond();
+        let folder = std::env::temp_dir().join(format!("sightglass-demo-{}-{started}", std::process::id()));
+        std::os::unix::fs::DirBuilderExt::mode(&mut std::fs::DirBuilder::new(), 0o700)
+            .create(&folder)
             .map_err(|error| CliError::Io { what: format!("cannot make {}", folder.display()), error })?;
         Ok(Scratch { history: folder.join("demo.duckdb"), folder: Some(folder) })
     }

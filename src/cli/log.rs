@@ -13,7 +13,10 @@ const DAYS: usize = 7;
 /// Starts logging; the guard writes what is left when it is dropped. `SIGHTGLASS_LOG` sets the level (`debug`);
 /// the file `-` is standard error, for an init system that keeps it.
 pub fn start(file: Option<&Path>) -> Result<WorkerGuard, CliError> {
-    let failed = |error: std::io::Error| CliError::Io { what: "cannot open the log".into(), error };
+    let failed = |folder: &Path, error: std::io::Error| CliError::Io {
+        what: format!("cannot write a log in {}", folder.display()),
+        error,
+    };
     if file.is_some_and(|file| file.as_os_str() == "-") {
         let (writer, guard) = tracing_appender::non_blocking(std::io::stderr());
         init(writer);
@@ -24,19 +27,24 @@ pub fn start(file: Option<&Path>) -> Result<WorkerGuard, CliError> {
             let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
             let folder = folder.map_or_else(|| PathBuf::from("."), Path::to_path_buf);
             let name = file.file_name().ok_or_else(|| CliError::Usage("--log: expected a file name".into()))?;
-            std::fs::create_dir_all(&folder).map_err(failed)?;
-            rolling::never(folder, name)
+            if !folder.is_dir() {
+                return Err(CliError::Usage(format!("--log: no folder {}", folder.display())));
+            }
+            rolling::Builder::new()
+                .filename_prefix(name.to_string_lossy())
+                .build(&folder)
+                .map_err(|error| failed(&folder, std::io::Error::other(error)))?
         }
         None => {
             let folder = paths::state_folder();
-            std::fs::create_dir_all(&folder).map_err(failed)?;
+            std::fs::create_dir_all(&folder).map_err(|error| failed(&folder, error))?;
             rolling::Builder::new()
                 .rotation(rolling::Rotation::DAILY)
                 .filename_prefix("sightglass")
                 .filename_suffix("log")
                 .max_log_files(DAYS)
-                .build(folder)
-                .map_err(|error| failed(std::io::Error::other(error)))?
+                .build(&folder)
+                .map_err(|error| failed(&folder, std::io::Error::other(error)))?
         }
     };
     let (writer, guard) = tracing_appender::non_blocking(writer);

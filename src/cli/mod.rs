@@ -59,7 +59,7 @@ enum Command {
 /// What every command that starts a station takes.
 #[derive(Debug, Clone, Default, clap::Args)]
 struct StationArgs {
-    /// File of the history [default: the user's state folder, one file a plant]
+    /// File of the history [default: one file a plant in the state folder; `demo` keeps none]
     #[arg(long, value_name = "FILE")]
     history: Option<PathBuf>,
     /// Use another port for a line: LINE=/dev/ttyUSB0 or LINE=HOST:TCPPORT
@@ -81,6 +81,8 @@ enum CliError {
     History(#[from] HistoryError),
     #[error(transparent)]
     Ui(#[from] ui::io::UiError),
+    #[error("the station has ended by itself, see the log")]
+    StationGone,
     #[error("{what}: {error}")]
     Io { what: String, error: std::io::Error },
 }
@@ -88,9 +90,9 @@ enum CliError {
 impl CliError {
     fn exit_code(&self) -> u8 {
         match self {
-            CliError::Profile(_) | CliError::Usage(_) => 2,
+            CliError::Profile(_) | CliError::Usage(_) | CliError::History(HistoryError::Foreign { .. }) => 2,
             CliError::History(HistoryError::Locked { .. }) => 3,
-            CliError::History(_) | CliError::Ui(_) | CliError::Io { .. } => 1,
+            CliError::History(_) | CliError::Ui(_) | CliError::StationGone | CliError::Io { .. } => 1,
         }
     }
 }

@@ -7,12 +7,17 @@ use crate::plant::{
     def::{Parity, Serial, Transport},
 };
 
-/// `$XDG_STATE_HOME/sightglass` or `~/.local/state/sightglass`: histories and logs.
+/// Histories and logs: `$STATE_DIRECTORY` (set by an init system), `$XDG_STATE_HOME/sightglass`,
+/// `~/.local/state/sightglass`, or `/var/lib/sightglass` for a service without a home. Never a temporary folder: what is
+/// kept there is gone at the next start.
 pub fn state_folder() -> PathBuf {
+    if let Some(given) = env::var_os("STATE_DIRECTORY").filter(|given| !given.is_empty()) {
+        return PathBuf::from(given);
+    }
     let absolute = |path: std::ffi::OsString| Some(PathBuf::from(path)).filter(|path| path.is_absolute());
     let state = env::var_os("XDG_STATE_HOME").and_then(absolute);
     let home = || env::var_os("HOME").and_then(absolute).map(|home| home.join(".local/state"));
-    state.or_else(home).unwrap_or_else(env::temp_dir).join("sightglass")
+    state.or_else(home).unwrap_or_else(|| PathBuf::from("/var/lib")).join("sightglass")
 }
 
 /// The history of a plant.

@@ -38,12 +38,14 @@ pub fn main(args: Args) -> Result<(), CliError> {
         say(&format!("{}: {} tags on {} lines", def.title, def.tags.len(), def.lines.len()));
         let session = station.session("station");
         let last = follow(session, clock, args.duration).await;
-        if args.print {
-            values(&last).iter().for_each(|line| say(line));
+        if args.print
+            && let Ok(last) = &last
+        {
+            values(last).iter().for_each(|line| say(line));
         }
         station.stop().await;
         say("stopped");
-        Ok(())
+        last.map(drop)
     })
 }
 
@@ -93,7 +95,7 @@ fn start(def: &Arc<PlantDef>, clock: Clock, history: PathBuf) -> Result<station:
 }
 
 /// Tells what changes until the time is over, a signal comes, or the station ends; gives the last snapshot.
-pub async fn follow(mut session: Session, clock: Clock, duration: Option<Duration>) -> Arc<Snapshot> {
+pub async fn follow(mut session: Session, clock: Clock, duration: Option<Duration>) -> Result<Arc<Snapshot>, CliError> {
     let mut before = session.snapshots.borrow_and_update().clone();
     let end = over(clock, duration);
     tokio::pin!(end);
@@ -105,7 +107,7 @@ pub async fn follow(mut session: Session, clock: Clock, duration: Option<Duratio
             () = &mut told_to_stop => break,
             changed = session.snapshots.changed() => {
                 if changed.is_err() {
-                    break;
+                    return Err(CliError::StationGone);
                 }
                 let after = session.snapshots.borrow_and_update().clone();
                 let time = after.at.to_zoned(after.def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S");
@@ -116,7 +118,7 @@ pub async fn follow(mut session: Session, clock: Clock, duration: Option<Duratio
             }
         }
     }
-    session.snapshots.borrow().clone()
+    Ok(session.snapshots.borrow().clone())
 }
 
 /// Returns when a span of plant time is over; never without one.

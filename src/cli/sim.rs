@@ -54,7 +54,7 @@ struct Link(PathBuf);
 impl Link {
     fn make(link: PathBuf, target: &std::path::Path) -> Result<Link, CliError> {
         // A link that a killed program left behind is replaced; anything else is not ours to remove.
-        if link.is_symlink() {
+        if std::fs::read_link(&link).is_ok_and(|old| old.starts_with("/dev/pts")) {
             let _ = std::fs::remove_file(&link);
         }
         std::os::unix::fs::symlink(target, &link)

@@ -111,6 +111,12 @@ pub enum HistoryError {
     /// The engine failed.
     #[error("history: {0}")]
     Engine(String),
+    /// The file is something else: it is left alone.
+    #[error("{path} is not a history, and is left alone: give another name, best one that ends in .duckdb")]
+    Foreign {
+        /// The file.
+        path: String,
+    },
     /// There is nothing to read: no station has written here.
     #[error("no history at {path}: has the station of this plant ever run here?")]
     Missing {

@@ -20,6 +20,11 @@ pub const PERIODS_BAD: u32 = 10;
 /// An unchanged good value is stored again after this time, so that a silent stretch in the history means "no data".
 pub const STORE_EVERY: Duration = Duration::from_secs(60);
 
+/// More decimals than any device announces.
+const DECIMALS_MAX: f64 = 6.0;
+/// A value that is never read by itself is doubted after this time.
+const NEVER_READ_AGAIN: Duration = Duration::from_secs(60);
+
 /// What is known of every tag.
 #[derive(Debug, Clone)]
 pub struct Board {
@@ -90,7 +95,12 @@ impl Board {
         for tag in tags {
             match judge(fault) {
                 // The last value of a device that is known to be gone is not doubtful but past.
-                Verdict::Doubt(_) if self.sample(*tag).quality.is_bad() => {}
+                // The reading is doubted all the same: what has made it bad may go before it is read again.
+                Verdict::Doubt(cause) if self.sample(*tag).quality.is_bad() => {
+                    if let Some(reading) = &mut self.raw[tag.index()] {
+                        reading.doubt = Some(cause);
+                    }
+                }
                 Verdict::Doubt(cause) => self.doubt(*tag, cause),
                 Verdict::Gone(cause) => self.drop_value(*tag, cause, at),
             }
@@ -111,8 +121,14 @@ impl Board {
     pub fn age(&mut self, at: Timestamp) {
         let def = self.def.clone();
         for tag in &def.tags {
-            let Poll::Every(period) = tag.poll else { continue };
             let sample = self.sample(tag.id);
+            let period = match tag.poll {
+                Poll::Every(period) => period,
+                Poll::Once => continue,
+                // Known from a write or a look; it may have changed since.
+                Poll::Never if sample.quality.is_good() => NEVER_READ_AGAIN / PERIODS_UNCERTAIN,
+                Poll::Never => continue,
+            };
             let age = Duration::try_from(at.duration_since(sample.at)).unwrap_or_default();
             if sample.quality.is_bad() {
                 continue;
@@ -131,10 +147,12 @@ impl Board {
         for tag in self.def.tags.iter().filter(|tag| tag.store) {
             let sample = self.samples[tag.id.index()];
             let stored = &mut self.stored[tag.id.index()];
-            if !is_due(tag, sample, *stored) {
+            if !is_due(tag, sample, *stored, at) {
                 continue;
             }
-            let record = if sample.quality.is_good() { sample } else { Sample { at, ..sample } };
+            // A good value that has not been read since it was last stored still stands: it is stored again as of now.
+            let fresh = sample.quality.is_good() && stored.is_none_or(|stored| stored.at < sample.at);
+            let record = if fresh { sample } else { Sample { at, ..sample } };
             *stored = Some(record);
             records.push(Record::Sample(tag.id, record));
         }
@@ -145,7 +163,12 @@ impl Board {
     pub fn scaling_decimals(&self, tag: &TagDef) -> Option<u8> {
         match tag.decimals {
             Decimals::Fixed(_) => Some(0),
-            Decimals::From(from) => self.sample(from).trusted().map(|decimals| decimals as u8),
+            Decimals::From(from) => {
+                // A register that holds anything else would scale every value to nothing.
+                let known =
+                    self.sample(from).trusted().filter(|n| n.fract() == 0.0 && (0.0..=DECIMALS_MAX).contains(n));
+                known.map(|decimals| decimals as u8)
+            }
         }
     }
 
@@ -188,16 +211,18 @@ impl Board {
     fn settle(&mut self, tag: TagId) {
         let Some(Reading { raw, at, doubt }) = self.raw[tag.index()] else { return };
         let tag = self.def.tag(tag);
-        let fault_word = tag.quality_from.map(|(from, mask)| (self.sample(from), mask));
-        let sample = match (tag.bad_if.contains(&(raw as i64)), self.scaling_decimals(tag)) {
+        let fault_word = tag.quality_from.map(|(from, mask)| (self.sample(from), self.trusted_raw(from), mask));
+        let no_value = tag.bad_if.iter().any(|bad| *bad as f64 == raw);
+        let sample = match (no_value, self.scaling_decimals(tag)) {
             (true, _) => Sample::bad(Cause::SensorFault, at),
             (false, None) => Sample::bad(Cause::Unscaled, at),
             (false, Some(decimals)) => Sample::good(scale::to_value(tag, raw, decimals), at),
         };
         let sample = match fault_word {
             None => sample,
-            Some((word, mask)) => match word.trusted() {
-                Some(bits) if bits as u64 & mask != 0 => Sample::bad(Cause::SensorFault, at),
+            // The raw number: a status word may be signed, and is never meant to be scaled.
+            Some((word, bits, mask)) => match bits {
+                Some(bits) if bits as i64 as u64 & mask != 0 => Sample::bad(Cause::SensorFault, at),
                 Some(_) => sample,
                 None => sample.doubted(word.quality.cause().unwrap_or(Cause::NotRead)),
             },
@@ -242,9 +267,9 @@ fn judge(fault: Fault) -> Verdict {
     }
 }
 
-fn is_due(tag: &TagDef, sample: Sample, stored: Option<Sample>) -> bool {
+fn is_due(tag: &TagDef, sample: Sample, stored: Option<Sample>, at: Timestamp) -> bool {
     let Some(stored) = stored else { return true };
-    let waited = sample.at.duration_since(stored.at);
+    let waited = at.duration_since(stored.at);
     stored.quality != sample.quality
         || match (stored.value, sample.value) {
             (Some(old), Some(new)) => {
@@ -282,6 +307,25 @@ mod tests {
         board.read(&[(FAULT, 2.0)], at(3));
         assert_eq!(board.sample(PV).quality, Quality::Bad(Cause::SensorFault));
         assert_eq!(board.sample(PV).value, None);
+    }
+
+    #[test]
+    fn an_impossible_number_of_decimals_is_no_scale() {
+        for decimals in [65_535.0, -1.0, 7.0, 0.5] {
+            let mut board = board();
+            board.read(&[(DP, decimals), (PV, 724.0)], at(1));
+            assert_eq!(board.sample(PV).quality, Quality::Bad(Cause::Unscaled), "{decimals} decimals");
+        }
+    }
+
+    #[test]
+    fn a_signed_fault_word_counts_with_all_its_bits() {
+        let mut board = board();
+        board.read(&[(FAULT, f64::from(i16::MIN)), (PV, 724.0)], at(1));
+        assert_eq!(board.sample(PV).quality, Quality::Bad(Cause::SensorFault));
+        board.failed(&[PV], Fault::Timeout, at(2));
+        board.read(&[(FAULT, 0.0)], at(3));
+        assert_eq!(board.sample(PV).quality, Quality::Uncertain(Cause::Timeout), "not read since");
     }
 
     #[test]
@@ -349,14 +393,14 @@ mod tests {
             board.records(at(second)).iter().filter(|record| pv(record)).count()
         };
         assert_eq!(count(&mut board, 0), 1);
-        for (second, raw, expect) in [(1, 724.0, 0), (2, 725.0, 1), (61, 725.0, 0), (62, 725.0, 1)] {
+        for (second, raw, expect) in [(1, 724.0, 0), (2, 725.0, 1), (61, 725.0, 0), (62, 725.0, 1), (121, 725.0, 0)] {
             board.read(&[(PV, raw)], at(second));
             assert_eq!(count(&mut board, second), expect, "at {second} s");
         }
-        board.failed(&[PV], Fault::Timeout, at(63));
-        let records = board.records(at(63));
-        let doubted = Sample { value: Some(72.5), quality: Quality::Uncertain(Cause::Timeout), at: at(63) };
-        assert!(records.contains(&Record::Sample(PV, doubted)), "the doubt begins at 63 s: {records:?}");
-        assert!(board.records(at(64)).is_empty());
+        board.failed(&[PV], Fault::Timeout, at(122));
+        let records = board.records(at(122));
+        let doubted = Sample { value: Some(72.5), quality: Quality::Uncertain(Cause::Timeout), at: at(122) };
+        assert!(records.contains(&Record::Sample(PV, doubted)), "the doubt begins at 122 s: {records:?}");
+        assert_eq!(count(&mut board, 123), 0);
     }
 }

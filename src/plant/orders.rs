@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use super::{
     board::Board,
     command::{BusRequest, Command, NotConfirmed, Order, OrderId, OrderStatus, Outcome, Refusal, WriteId},
-    def::{PlantDef, TagId},
+    def::{LineId, PlantDef, TagId},
     event::{Fault, WriteResult},
     record::ActionRecord,
     scale,
@@ -65,6 +65,24 @@ impl Desk {
         }
     }
 
+    /// Takes an order to open or close a line; it ends when the line says so.
+    pub fn connect(&mut self, order: &Order, at: Timestamp) {
+        self.open(order, None, at);
+    }
+
+    /// A line is open (or trying to be) or closed: orders that wished so are done.
+    pub fn connected(&mut self, line: LineId, open: bool, board: &Board) -> Option<ActionRecord> {
+        let wished = Command::Connect(line, open);
+        let waits = |status: &&OrderStatus| status.command == wished && status.outcome == Outcome::Pending;
+        let id = self.orders.iter().find(waits)?.id;
+        self.close(id, Outcome::Verified, board)
+    }
+
+    /// The tag that a write under way writes.
+    pub fn tag_of(&self, id: WriteId) -> Option<TagId> {
+        self.writes.iter().find(|write| write.0 == id).map(|write| write.2)
+    }
+
     /// Takes an order that needs nothing but to be on record.
     pub fn note(&mut self, order: &Order, outcome: Outcome, board: &Board, at: Timestamp) -> Option<ActionRecord> {
         self.open(order, None, at);
@@ -91,18 +109,33 @@ impl Desk {
         self.close(order, outcome, board)
     }
 
-    /// The line had no room for a write: it was not sent.
-    pub fn undeliverable(&mut self, id: WriteId, board: &Board) -> Option<ActionRecord> {
-        let index = self.writes.iter().position(|write| write.0 == id)?;
-        let (_, order, ..) = self.writes.swap_remove(index);
-        self.close(order, Outcome::Refused(Refusal::Busy), board)
+    /// The line had no room for a request: nothing was sent, and whoever wished it is told.
+    pub fn undeliverable(&mut self, line: LineId, request: &BusRequest, board: &Board) -> Option<ActionRecord> {
+        let busy = Outcome::Refused(Refusal::Busy);
+        match request {
+            BusRequest::Write { id, .. } => {
+                let index = self.writes.iter().position(|write| write.0 == *id)?;
+                let (_, order, ..) = self.writes.swap_remove(index);
+                self.close(order, busy, board)
+            }
+            BusRequest::Connect(open) => {
+                let wished = Command::Connect(line, *open);
+                let id = self.orders.iter().find(|status| status.command == wished)?.id;
+                self.close(id, busy, board)
+            }
+            BusRequest::Refresh(device) => {
+                let wished = Command::Refresh(*device);
+                self.orders.iter_mut().find(|status| status.command == wished)?.outcome = busy;
+                None
+            }
+        }
     }
 
-    /// Gives up writes that nobody has answered for.
-    pub fn expire(&mut self, at: Timestamp, board: &Board) -> Vec<ActionRecord> {
+    /// Gives up orders that nobody has answered for. The bus waits in real time, so `speed` is plant seconds per real one.
+    pub fn expire(&mut self, at: Timestamp, speed: f64, board: &Board) -> Vec<ActionRecord> {
         let late = |status: &OrderStatus| {
             status.outcome == Outcome::Pending
-                && PENDING_MAX < Duration::try_from(at.duration_since(status.at)).unwrap_or_default()
+                && PENDING_MAX.mul_f64(speed) < Duration::try_from(at.duration_since(status.at)).unwrap_or_default()
         };
         let ids: Vec<OrderId> = self.orders.iter().filter(|status| late(status)).map(|status| status.id).collect();
         self.writes.retain(|write| !ids.contains(&write.1));

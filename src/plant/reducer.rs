@@ -9,9 +9,9 @@ use super::{
     board::Board,
     command::{BusRequest, Command, Order, Outcome, Refusal, WriteId},
     def::{AlarmId, Condition, DeviceId, LineId, PlantDef, Subject, TagId},
-    event::{Event, Fault, LineState},
+    event::{Event, Fault, LineState, WriteResult},
     orders::Desk,
-    record::{AlarmRecord, Record},
+    record::{ActionRecord, AlarmRecord, Record},
     sample::Cause,
     snapshot::{DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
 };
@@ -76,15 +76,12 @@ impl Plant {
                 self.failed(device, &tags, fault, at);
                 (at, None)
             }
-            Event::Line { at, line, state } => {
-                self.line_changed(line, state, at);
-                (at, None)
-            }
+            Event::Line { at, line, state } => (at, self.line_changed(line, state, at)),
             Event::Counters { at, line, counters } => {
                 self.lines[line.index()].counters = counters;
                 (at, None)
             }
-            Event::Wrote { at, id, result } => (at, self.desk.wrote(id, result, &self.board)),
+            Event::Wrote { at, id, result } => (at, self.wrote(id, result, at)),
         };
         let mut effects = self.settle(at);
         effects.records.extend(action.map(Record::Action));
@@ -122,8 +119,14 @@ impl Plant {
                 None
             }
             Command::Connect(line, open) => {
-                effects.bus.push((line, BusRequest::Connect(open)));
-                self.desk.note(&order, Outcome::Verified, &self.board, at)
+                let is_open = self.lines[line.index()].state != LineState::Disconnected;
+                if is_open == open {
+                    self.desk.note(&order, Outcome::Unchanged, &self.board, at)
+                } else {
+                    self.desk.connect(&order, at);
+                    effects.bus.push((line, BusRequest::Connect(open)));
+                    None
+                }
             }
         };
         effects.records.extend(action.map(Record::Action));
@@ -131,9 +134,9 @@ impl Plant {
         effects
     }
 
-    /// The queue to a line was full: the write was not sent.
-    pub fn on_undeliverable(&mut self, id: WriteId) -> Effects {
-        let action = self.desk.undeliverable(id, &self.board);
+    /// The queue to a line was full: the request was not sent.
+    pub fn on_undeliverable(&mut self, line: LineId, request: &BusRequest) -> Effects {
+        let action = self.desk.undeliverable(line, request, &self.board);
         Effects { bus: Vec::new(), records: action.map(Record::Action).into_iter().collect() }
     }
 
@@ -145,7 +148,7 @@ impl Plant {
     /// Time passes: values age, delays run out.
     pub fn on_tick(&mut self, at: Timestamp) -> Effects {
         self.board.age(at);
-        let expired = self.desk.expire(at, &self.board);
+        let expired = self.desk.expire(at, self.speed, &self.board);
         let mut effects = self.settle(at);
         effects.records.extend(expired.into_iter().map(Record::Action));
         effects
@@ -171,6 +174,18 @@ impl Plant {
         self.def.device(self.def.tag(tag).device).line
     }
 
+    /// A write ended. Unless it was read back or certainly had no effect, the value held until now is in doubt.
+    fn wrote(&mut self, id: WriteId, result: WriteResult, at: Timestamp) -> Option<ActionRecord> {
+        let in_doubt = match &result {
+            WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => self.desk.tag_of(id),
+            WriteResult::ReadBack(_) | WriteResult::Refused(_) | WriteResult::NotSent(_) => None,
+        };
+        if let Some(tag) = in_doubt {
+            self.board.failed(&[tag], Fault::Timeout, at);
+        }
+        self.desk.wrote(id, result, &self.board)
+    }
+
     fn failed(&mut self, device: DeviceId, tags: &[TagId], fault: Fault, at: Timestamp) {
         self.board.failed(tags, fault, at);
         let status = &mut self.devices[device.index()];
@@ -185,9 +200,11 @@ impl Plant {
                 return;
             }
             Fault::NotConnected => return,
-            // A device that says no is there.
-            Fault::Exception(_) | Fault::NotANumber => status.state = DeviceState::Answering,
-            Fault::Timeout
+            // A device that says no is there; a gateway that says that it is away speaks for itself.
+            Fault::Exception(code) if !code.is_of_gateway() => status.state = DeviceState::Answering,
+            Fault::NotANumber => status.state = DeviceState::Answering,
+            Fault::Exception(_)
+            | Fault::Timeout
             | Fault::Crc { .. }
             | Fault::Truncated { .. }
             | Fault::WrongUnit { .. }
@@ -205,7 +222,14 @@ impl Plant {
         status.last_fault = Some((at, fault));
     }
 
-    fn line_changed(&mut self, line: LineId, state: LineState, at: Timestamp) {
+    fn line_changed(&mut self, line: LineId, state: LineState, at: Timestamp) -> Option<ActionRecord> {
+        let status = &mut self.lines[line.index()];
+        status.lost_since = match &state {
+            LineState::Waiting { .. } => status.lost_since.or(Some(at)),
+            LineState::Connecting => status.lost_since,
+            LineState::Connected | LineState::Disconnected => None,
+        };
+        let open = state != LineState::Disconnected;
         // A closed line is the operator's wish: its devices are not asked, so their silence is no fault.
         let gone = match &state {
             LineState::Waiting { .. } => Some(DeviceState::Down { since: at }),
@@ -213,7 +237,8 @@ impl Plant {
             LineState::Connecting | LineState::Connected => None,
         };
         self.lines[line.index()].state = state;
-        let Some(device_state) = gone else { return };
+        let action = self.desk.connected(line, open, &self.board);
+        let Some(device_state) = gone else { return action };
         for device in self.def.devices.iter().filter(|device| device.line == line) {
             let status = &mut self.devices[device.id.index()];
             if !matches!((status.state, device_state), (DeviceState::Down { .. }, DeviceState::Down { .. })) {
@@ -221,6 +246,7 @@ impl Plant {
             }
             self.board.gone(device.id, Cause::NotConnected, at);
         }
+        action
     }
 
     /// Judges the alarms and gathers what must be stored.
@@ -268,7 +294,7 @@ mod tests {
     use crate::plant::{
         alarm::AlarmState,
         command::{NotConfirmed, OrderId},
-        event::{ExceptionCode, WriteResult},
+        event::ExceptionCode,
         fixture::{self, DP, FAULT, HIGH, PLC, PV, RUN, SILENT, SV, TIC},
         record::AlarmStep,
         sample::Quality,
@@ -343,6 +369,45 @@ mod tests {
         ] {
             assert_eq!(write(&mut running(), value, result.clone()), (outcome, sent), "{value} {result:?}");
         }
+    }
+
+    #[test]
+    fn after_a_write_that_may_have_failed_the_old_value_is_not_trusted() {
+        for result in [WriteResult::Lost(Fault::Timeout), WriteResult::NotRead(Fault::Timeout)] {
+            let mut plant = running();
+            write(&mut plant, 72.5, result);
+            assert_eq!(plant.snapshot().sample(SV).quality, Quality::Uncertain(Cause::Timeout));
+            // The correction is really written, not taken for unchanged.
+            assert_eq!(write(&mut plant, 70.0, WriteResult::ReadBack(700.0)), (Outcome::Verified, Some(700.0)));
+        }
+    }
+
+    #[test]
+    fn a_line_is_closed_when_it_says_so() {
+        let mut plant = running();
+        let effects = plant.on_order(order(1, Command::Connect(L1, false)), at(1));
+        assert_eq!((effects.bus.len(), effects.records.len()), (1, 0));
+        assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Pending);
+        let effects = plant.on_event(Event::Line { at: at(2), line: L1, state: LineState::Disconnected });
+        assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Verified);
+        assert!(
+            effects
+                .records
+                .iter()
+                .any(|record| matches!(record, Record::Action(deed) if &*deed.action == "disconnect"))
+        );
+        plant.on_order(order(2, Command::Connect(L1, false)), at(3));
+        assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Unchanged);
+        let effects = plant.on_order(order(3, Command::Connect(L1, true)), at(4));
+        plant.on_undeliverable(L1, &effects.bus[0].1);
+        assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Busy));
+    }
+
+    #[test]
+    fn a_gateway_that_answers_for_a_dead_device_is_not_the_device() {
+        let mut plant = running();
+        plant.on_event(fail(1, &[PV], Fault::Exception(ExceptionCode(0x0B))));
+        assert_eq!(plant.snapshot().devices[TIC.index()].state, DeviceState::Failing(1));
     }
 
     #[test]
@@ -445,8 +510,7 @@ mod tests {
     fn a_full_queue_is_told_to_the_operator() {
         let mut plant = running();
         let effects = plant.on_order(order(1, Command::Write { tag: SV, value: 72.5 }), at(1));
-        let BusRequest::Write { id, .. } = effects.bus[0].1 else { panic!("a write was ordered") };
-        plant.on_undeliverable(id);
+        plant.on_undeliverable(effects.bus[0].0, &effects.bus[0].1);
         assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Busy));
     }
 }

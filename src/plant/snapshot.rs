@@ -62,10 +62,15 @@ impl Snapshot {
     pub fn unit(&self, tag: TagId) -> &str {
         let def = self.def.tag(tag);
         let chosen = def.unit_from.as_ref().and_then(|(from, units)| {
-            let value = self.sample(*from).trusted()?;
+            let value = self.sample(*from).value?;
             units.iter().find(|(number, _)| *number as f64 == value).map(|(_, unit)| unit.as_str())
         });
-        chosen.unwrap_or(&def.unit)
+        match (&def.unit_from, chosen) {
+            (_, Some(unit)) => unit,
+            // The device has not said whether it counts in °C or °F.
+            (Some(_), None) if self.sample(tag).value.is_some() => "?",
+            (Some(_), None) | (None, None) => &def.unit,
+        }
     }
     /// Lowest and highest permitted value of a tag, where both are known now.
     pub fn range(&self, tag: TagId) -> Option<(f64, f64)> {
@@ -98,6 +103,8 @@ pub struct LineStatus {
     pub state: LineState,
     /// Totals since the start.
     pub counters: LineCounters,
+    /// Since when it has not been connected although it should be.
+    pub lost_since: Option<Timestamp>,
 }
 
 /// A device as it stands.

@@ -2,6 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
+use jiff::Timestamp;
 use tokio::{
     sync::{mpsc, watch},
     task::JoinHandle,
@@ -15,7 +16,7 @@ use crate::{
         Effects, Plant, PlantDef, Snapshot,
         command::{BusRequest, Order},
         def::LineId,
-        event::Event,
+        event::{Event, LineState},
         record::Record,
     },
 };
@@ -70,7 +71,7 @@ pub fn start(options: Options) -> Result<Station, HistoryError> {
         let (requests, request_queue) = mpsc::channel(REQUESTS);
         links.push(requests);
         let link = task::run(def.clone(), line.id, clock, connector, events.clone(), request_queue, stopped.clone());
-        tasks.push(tokio::spawn(link));
+        tasks.push(tokio::spawn(supervise(tokio::spawn(link), line.id, clock, events.clone(), stopped.clone())));
     }
     let mut plant = Plant::new(def, clock.now(), clock.speed());
     plant.restore(&history.restored);
@@ -86,6 +87,25 @@ pub fn start(options: Options) -> Result<Station, HistoryError> {
     };
     tasks.push(tokio::spawn(desk.run(event_queue, order_queue)));
     Ok(Station { snapshots, orders, history, stop, tasks, terminals: 0 })
+}
+
+/// Waits for the end of a link. One that ends before the station does takes its values with it, visibly.
+async fn supervise(
+    link: JoinHandle<()>,
+    line: LineId,
+    clock: Clock,
+    events: mpsc::Sender<Event>,
+    stopped: watch::Receiver<bool>,
+) {
+    let ended = link.await;
+    if *stopped.borrow() {
+        return;
+    }
+    tracing::error!(?ended, "a link has ended by itself");
+    let why = "internal error, see the log; restart the station".to_owned();
+    let state = LineState::Waiting { why, retry_at: Timestamp::MAX };
+    // If the plant has gone too there is nobody left to tell.
+    let _ = events.send(Event::Line { at: clock.now(), line, state }).await;
 }
 
 impl Station {
@@ -179,9 +199,8 @@ impl PlantTask {
     }
 
     fn send(&mut self, line: LineId, request: BusRequest) {
-        let Err(refused) = self.links[line.index()].try_send(request) else { return };
-        if let BusRequest::Write { id, .. } = refused.into_inner() {
-            let effects = self.plant.on_undeliverable(id);
+        if let Err(refused) = self.links[line.index()].try_send(request) {
+            let effects = self.plant.on_undeliverable(line, &refused.into_inner());
             self.keep(effects.records);
         }
     }

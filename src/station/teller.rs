@@ -35,11 +35,10 @@ fn line_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
             LineState::Connected => "connected".into(),
             LineState::Disconnected => "closed by an operator".into(),
             // Every failed try would be a line; the first says it all.
-            LineState::Waiting { .. } if matches!(old, LineState::Waiting { .. }) => return None,
+            LineState::Waiting { .. } if before.lines[index].lost_since.is_some() => return None,
             LineState::Waiting { why, .. } => format!("not connected: {why}"),
         };
-        let known = matches!(old, LineState::Connecting) && *new == LineState::Connecting;
-        (old != new && !known).then(|| format!("line {}: {words}", after.def.lines[index].name))
+        (old != new).then(|| format!("line {}: {words}", after.def.lines[index].name))
     };
     (0..after.lines.len()).filter_map(changed).collect()
 }

@@ -61,7 +61,7 @@ impl Fixture {
             def,
             samples,
             alarms: Vec::new(),
-            line: LineStatus { state: LineState::Connected, counters },
+            line: LineStatus { state: LineState::Connected, counters, lost_since: None },
             devices,
         }
     }

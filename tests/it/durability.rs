@@ -45,6 +45,19 @@ fn killed_twenty_times_while_writing() {
 fn number(line: &str, name: &str) -> Option<u64> {
     line.split(name).nth(1)?.chars().take_while(char::is_ascii_digit).collect::<String>().parse().ok()
 }
+/// Somebody's other file, named by mistake, is refused and stays as it is.
+#[test]
+fn a_file_that_is_no_history_is_left_alone() {
+    let folder = folder();
+    let file = folder.path().join("tank.toml");
+    std::fs::write(&file, "title = \"mine\"\n").unwrap();
+    let mut demo = Process::start(sightglass().args(["demo", "--headless", "--for", "1s", "--history"]).arg(&file));
+    assert_eq!(demo.end(), Some(2));
+    assert!(demo.said.iter().any(|line| line.contains("is not a history")), "{:?}", demo.said);
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "title = \"mine\"\n");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing was set aside");
+}
+
 /// The cable is pulled and plugged again: values go bad at once and come back by themselves.
 #[test]
 fn an_unplugged_port_comes_back() {

@@ -87,7 +87,7 @@ struct Task {
 impl Task {
     /// Opens, serves, waits, for ever.
     async fn outer(mut self) -> Result<(), Ended> {
-        let mut backoff = Backoff::default();
+        let mut backoff = Backoff::for_ports();
         loop {
             self.tell_state(LineState::Connecting).await?;
             let why = match self.connector.open().await {

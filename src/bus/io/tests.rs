@@ -379,6 +379,42 @@ async fn a_hole_in_a_block_costs_only_itself() {
     assert_eq!(holes.into_iter().collect::<Vec<_>>(), ["U1.21", "U2.21"]);
 }
 
+/// A device with a single register that ignores loopbacks: nothing tells its answers apart, so only patience helps – and
+/// it does help.
+#[tokio::test(start_paused = true)]
+async fn a_device_that_nothing_brings_into_step_is_read_again_after_a_rest() {
+    let mut def = plant(false);
+    def.devices.truncate(1);
+    def.tags.retain(|tag| tag.device == DeviceId(0) && tag.point.address == 400);
+    def.tags[0].id = TagId(0);
+    let mut line = line(def.clone());
+    line.plug(false, |number, message| if number == 3 || message[1] == 8 { Deed::Silent } else { Deed::Answer });
+    for _ in 0..3 {
+        line.read(&def).await;
+    }
+    assert_eq!(line.fault(&def).await, Fault::Timeout);
+    line.read(&def).await;
+}
+
+/// A late refusal, code 02, is no hole: the block stays whole.
+#[tokio::test(start_paused = true)]
+async fn a_late_refusal_splits_no_block() {
+    let def = plant(false);
+    let mut line = line(def.clone());
+    line.plug(false, |number, _| match number {
+        2 => Deed::Silent,
+        3 | 4 => Deed::Exception(2),
+        _ => Deed::Answer,
+    });
+    let mut whole = 0;
+    for _ in 0..200 {
+        if let Event::Read { values, .. } = line.next(&def).await {
+            whole += usize::from(values.len() == 4);
+        }
+    }
+    assert!(60 < whole, "blocks of four are read as blocks of four: {whole}");
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_port_that_goes_away_comes_back_by_itself() {
     let def = plant(false);

@@ -25,6 +25,21 @@ pub struct Opening {
     pub failed: u32,
 }
 
+/// Refuses a file that is certainly no history, so that nobody's other file is ever set aside as a damaged one. Reads it
+/// only if its name is not that of a history, and before DuckDB has it.
+pub fn refuse_foreign(db: &Path) -> Result<(), HistoryError> {
+    if db.extension().is_some_and(|ending| ending == "duckdb") || size(db) == 0 {
+        return Ok(());
+    }
+    // A DuckDB file has these letters behind the check sum of its first block.
+    let mut head = [0; 12];
+    let read = File::open(db).and_then(|mut file| file.read_exact(&mut head));
+    match read {
+        Ok(()) if &head[8..] == b"DUCK" => Ok(()),
+        Ok(()) | Err(_) => Err(HistoryError::Foreign { path: db.display().to_string() }),
+    }
+}
+
 impl Opening {
     /// Marks that the store is being opened. [`HistoryError::Locked`] if another process is just opening it.
     pub fn begin(db: &Path) -> Result<Opening, HistoryError> {

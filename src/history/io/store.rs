@@ -50,6 +50,7 @@ impl Store {
     /// aside with its log and a new store is begun. So it is with files whose opening never ended twice before.
     /// [`HistoryError::Locked`] if another process has it, [`HistoryError::Engine`] for any other obstacle.
     pub fn open(path: &Path, def: &Arc<PlantDef>, now: Timestamp) -> Result<Opened, HistoryError> {
+        files::refuse_foreign(path)?;
         let opening = Opening::begin(path)?;
         let mut trouble = None;
         let mut set_aside = |part: Part, why: &str| -> Result<(), HistoryError> {
@@ -88,6 +89,7 @@ impl Store {
         if !path.is_file() {
             return Err(HistoryError::Missing { path: path.display().to_string() });
         }
+        files::refuse_foreign(path)?;
         let failed = |message: String| match files::diagnose(path, &message) {
             Failure::Obstacle(error) => error,
             Failure::Damaged(why) => HistoryError::Engine(why),
