@@ -196,6 +196,7 @@ fn is_fatal(error: &HistoryError) -> bool {
     match error {
         HistoryError::Engine(words) => words.contains("FATAL") || words.contains("invalidated"),
         HistoryError::Locked { .. }
+        | HistoryError::Foreign { .. }
         | HistoryError::Missing { .. }
         | HistoryError::TooManyRows { .. }
         | HistoryError::EmptyPeriod => false,
