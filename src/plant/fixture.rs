@@ -9,7 +9,7 @@ use super::{
         AlarmDef, AlarmId, Condition, DeviceDef, DeviceId, Guidance, Level, Limits, LineDef, LineId, MimicDef, Parity,
         PlantDef, Priority, ReportDef, Serial, Subject, TagId, Transport,
     },
-    tag::{Access, Bound, Confidence, Decimals, Kind, Order, Point, Poll, Table, TagDef},
+    tag::{Access, Bound, Decimals, Kind, Order, Point, Table, TagDef},
 };
 
 /// Process value, decimals from [`DP`], bad while [`FAULT`] is not zero.
@@ -47,14 +47,14 @@ pub fn plant() -> PlantDef {
         faceplate: None,
         actions: Vec::new(),
     };
-    let alarm = |id, subject, condition, on_delay| AlarmDef {
+    let alarm = |id: AlarmId, subject, condition, on_delay| AlarmDef {
         id,
         subject,
         condition,
         priority: Priority::High,
         on_delay,
         off_delay: Duration::ZERO,
-        text: format!("alarm {}", id_number(id)),
+        text: format!("alarm {}", id.0),
         guidance: Guidance::default(),
     };
     PlantDef {
@@ -118,45 +118,8 @@ pub fn shared() -> Arc<PlantDef> {
     Arc::new(plant())
 }
 
-fn id_number(id: AlarmId) -> u16 {
-    id.0
-}
-
 fn tag(id: TagId, short: &str, table: Table, address: u16) -> TagDef {
-    TagDef {
-        id,
-        device: TIC,
-        name: format!("TIC-1.{short}"),
-        short: short.into(),
-        label: short.to_lowercase(),
-        meaning: String::new(),
-        point: Point {
-            table,
-            address,
-            kind: if table.is_bits() { Kind::Bool } else { Kind::I16 },
-            order: Order::Abcd,
-            field: None,
-        },
-        scale: 1.0,
-        offset: 0.0,
-        decimals: Decimals::Fixed(0),
-        unit: "°C".into(),
-        unit_from: None,
-        min: None,
-        max: None,
-        access: Access::Read,
-        confirm: None,
-        labels: Vec::new(),
-        bit_labels: Vec::new(),
-        bad_if: Vec::new(),
-        quality_from: None,
-        write_fc: None,
-        write_unlock: None,
-        group: String::new(),
-        poll: Poll::Every(Duration::from_secs(1)),
-        deadband: 0.0,
-        store: true,
-        confidence: Confidence::Proven,
-        source: String::new(),
-    }
+    let kind = if table.is_bits() { Kind::Bool } else { Kind::I16 };
+    let point = Point { table, address, kind, order: Order::Abcd, field: None };
+    TagDef { unit: "°C".into(), ..TagDef::new(id, TIC, &format!("TIC-1.{short}"), point) }
 }

@@ -66,6 +66,40 @@ pub struct TagDef {
 }
 
 impl TagDef {
+    /// A plain quantity: read only, unscaled, without unit, read every second, stored. A caller changes what it knows
+    /// better: `TagDef { unit: "°C".into(), ..TagDef::new(…) }`.
+    pub fn new(id: TagId, device: DeviceId, name: &str, point: Point) -> TagDef {
+        TagDef {
+            id,
+            device,
+            name: name.to_owned(),
+            short: name.split_once('.').map_or(name, |(_, short)| short).to_owned(),
+            label: String::new(),
+            meaning: String::new(),
+            point,
+            scale: 1.0,
+            offset: 0.0,
+            decimals: Decimals::Fixed(0),
+            unit: String::new(),
+            unit_from: None,
+            min: None,
+            max: None,
+            access: Access::Read,
+            confirm: None,
+            labels: Vec::new(),
+            bit_labels: Vec::new(),
+            bad_if: Vec::new(),
+            quality_from: None,
+            write_fc: None,
+            write_unlock: None,
+            group: String::new(),
+            poll: Poll::Every(Duration::from_secs(1)),
+            deadband: 0.0,
+            store: true,
+            confidence: Confidence::Proven,
+            source: String::new(),
+        }
+    }
     /// May an operator write it?
     pub fn writable(&self) -> bool {
         self.access != Access::Read

@@ -6,7 +6,7 @@ use jiff::{Timestamp, civil::time, tz::TimeZone};
 
 use crate::plant::{
     def::{CsvDialect, DeviceDef, DeviceId, Faceplate, Limits, LineId, MimicDef, PlantDef, ReportDef, ShiftDef, TagId},
-    tag::{Access, Confidence, Decimals, Kind, Order, Point, Poll, Table, TagDef},
+    tag::{Decimals, Kind, Order, Point, Table, TagDef},
 };
 
 /// Seconds after the epoch as an instant.
@@ -82,34 +82,13 @@ pub const THREE: [(&str, i8, i8); 3] = [("morning", 6, 0), ("afternoon", 14, 0),
 
 /// A stored tag of TIC-1 with one decimal; MV in percent, the others in degrees.
 pub fn tag(id: u16, short: &str) -> TagDef {
+    let point = Point { table: Table::Input, address: id, kind: Kind::I16, order: Order::Abcd, field: None };
+    let unit = if short == "MV" { "%" } else { "°C" };
+    let name = format!("TIC-1.{short}");
     TagDef {
-        id: TagId(id),
-        device: DeviceId(0),
-        name: format!("TIC-1.{short}"),
-        short: short.into(),
-        label: String::new(),
-        meaning: String::new(),
-        point: Point { table: Table::Input, address: id, kind: Kind::I16, order: Order::Abcd, field: None },
         scale: 0.1,
-        offset: 0.0,
         decimals: Decimals::Fixed(1),
-        unit: if short == "MV" { "%".into() } else { "°C".into() },
-        unit_from: None,
-        min: None,
-        max: None,
-        access: Access::Read,
-        confirm: None,
-        labels: Vec::new(),
-        bit_labels: Vec::new(),
-        bad_if: Vec::new(),
-        quality_from: None,
-        write_fc: None,
-        write_unlock: None,
-        group: String::new(),
-        poll: Poll::Every(Duration::from_secs(1)),
-        deadband: 0.0,
-        store: true,
-        confidence: Confidence::Proven,
-        source: String::new(),
+        unit: unit.into(),
+        ..TagDef::new(TagId(id), DeviceId(0), &name, point)
     }
 }

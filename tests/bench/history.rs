@@ -11,7 +11,7 @@ use sightglass::{
         def::{CsvDialect, DeviceId, MimicDef, PlantDef, ReportDef, TagId},
         record::Record,
         sample::Sample,
-        tag::{Access, Confidence, Decimals, Kind, Order, Point, Poll, Table, TagDef},
+        tag::{Decimals, Kind, Order, Point, Table, TagDef},
     },
     report::Period,
 };
@@ -22,36 +22,9 @@ const TAGS: u16 = 24;
 const WEEK: i64 = 7 * 86_400;
 
 fn tag(id: u16) -> TagDef {
-    TagDef {
-        id: TagId(id),
-        device: DeviceId(0),
-        name: format!("TIC-1.T{id}"),
-        short: format!("T{id}"),
-        label: String::new(),
-        meaning: String::new(),
-        point: Point { table: Table::Input, address: id, kind: Kind::I16, order: Order::Abcd, field: None },
-        scale: 0.1,
-        offset: 0.0,
-        decimals: Decimals::Fixed(1),
-        unit: "°C".into(),
-        unit_from: None,
-        min: None,
-        max: None,
-        access: Access::Read,
-        confirm: None,
-        labels: Vec::new(),
-        bit_labels: Vec::new(),
-        bad_if: Vec::new(),
-        quality_from: None,
-        write_fc: None,
-        write_unlock: None,
-        group: String::new(),
-        poll: Poll::Every(Duration::from_secs(1)),
-        deadband: 0.0,
-        store: true,
-        confidence: Confidence::Proven,
-        source: String::new(),
-    }
+    let point = Point { table: Table::Input, address: id, kind: Kind::I16, order: Order::Abcd, field: None };
+    let plain = TagDef::new(TagId(id), DeviceId(0), &format!("TIC-1.T{id}"), point);
+    TagDef { scale: 0.1, decimals: Decimals::Fixed(1), unit: "°C".into(), ..plain }
 }
 
 fn tank() -> Arc<PlantDef> {
