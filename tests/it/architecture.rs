@@ -86,7 +86,7 @@ fn lib_names_the_modules_in_their_order() {
 fn the_outside_world_is_spelled_io() {
     let outside = [
         "tokio",
-        "duckdb",
+        "duckdb::",
         "std::fs",
         "std::net",
         "std::process",
