@@ -52,7 +52,7 @@ enum Command {
     Check(check::Args),
     /// Lists the known profiles, or prints one
     Profiles(profiles::Args),
-    /// Writes the report of a shift or period from the history as CSV
+    /// Writes the report of a shift or period from the history as CSV, while no station has the history open
     Report(report::Args),
 }
 
@@ -79,6 +79,8 @@ enum CliError {
     Usage(String),
     #[error(transparent)]
     History(#[from] HistoryError),
+    #[error("{0}\nask it: 5, then e, in the terminal of that station writes the report; or stop it first")]
+    InUse(HistoryError),
     #[error(transparent)]
     Ui(#[from] ui::io::UiError),
     #[error("the station has ended by itself, see the log")]
@@ -91,7 +93,7 @@ impl CliError {
     fn exit_code(&self) -> u8 {
         match self {
             CliError::Profile(_) | CliError::Usage(_) | CliError::History(HistoryError::Foreign { .. }) => 2,
-            CliError::History(HistoryError::Locked { .. }) => 3,
+            CliError::History(HistoryError::Locked { .. }) | CliError::InUse(_) => 3,
             CliError::History(_) | CliError::Ui(_) | CliError::StationGone | CliError::Io { .. } => 1,
         }
     }

@@ -1,9 +1,9 @@
-//! `sightglass report`: the report of a shift or period from the history as CSV.
+//! `sightglass report`: the report of a shift or period from the history as CSV, while no station has it open.
 
 use std::{io::Write, path::PathBuf, sync::Arc};
 
 use crate::{
-    history::io::store::Store,
+    history::{HistoryError, io::store::Store},
     plant::def::CsvDialect,
     report::{ask, csv},
 };
@@ -46,7 +46,10 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let now = jiff::Timestamp::now();
     let period = ask::period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref(), now)
         .map_err(|error| CliError::Usage(error.to_string()))?;
-    let store = Store::open_read_only(&run::history_file(&def, &args.station), &def)?;
+    let store = Store::open_read_only(&run::history_file(&def, &args.station), &def).map_err(|error| match error {
+        error @ HistoryError::Locked { .. } => CliError::InUse(error),
+        other => CliError::History(other),
+    })?;
     // A demonstration that ran faster than time has stored what is yet to come.
     let until = store.extent().map_or(now, |(_, last)| last.max(now));
     let report = store.report(&period, until)?;
