@@ -5,7 +5,7 @@ use ratatui::{Frame, layout::Rect, style::Style};
 use super::{
     Cx, Model, SILENCE, Watch,
     keys::{self, Hint},
-    modal::{confirm::subject, faceplate::device_words},
+    modal::{Modal, confirm::subject, faceplate::device_words},
     tabs::Tab,
     widgets::text::{Canvas, between, clock, fit, running, width},
 };
@@ -75,7 +75,7 @@ pub fn view(model: &Model, cx: &Cx, frame: &mut Frame) {
     let parts = layout(frame.area());
     banner(cx, &mut Canvas::new(frame.buffer_mut(), parts.banner));
     if parts.small {
-        return too_small(cx, frame);
+        return too_small(model, cx, frame);
     }
     header(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.header));
     tab_bar(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.tabs));
@@ -92,17 +92,26 @@ pub fn view(model: &Model, cx: &Cx, frame: &mut Frame) {
     }
 }
 
-fn too_small(cx: &Cx, frame: &mut Frame) {
+/// All that is left below the banner of a small screen: its size and how to leave.
+fn too_small(model: &Model, cx: &Cx, frame: &mut Frame) {
     let area = frame.area();
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (width, height) = SIZE_MIN;
-    canvas.text(
-        0,
-        1,
-        &fit(&format!("screen too small: {}x{}, needs {width}x{height}", area.width, area.height), area.width),
-        cx.theme.normal(),
-    );
-    canvas.text(0, 2, "q quit", cx.theme.dim());
+    let size = format!("too small: {}x{}", area.width, area.height);
+    let words = [format!("screen {size}, needs {width}x{height}"), format!("{size}, needs {width}x{height}"), size];
+    let fits = words.iter().find(|words| super::widgets::text::width(words) <= area.width);
+    canvas.text(0, 1, fits.map_or("too small", String::as_str), cx.theme.normal());
+    // The question stands above the size where there are too few rows for both.
+    match &model.modal {
+        Some(Modal::Confirm(confirm)) if confirm.is_quit() => {
+            let y = if area.height > 2 { 2 } else { area.height.saturating_sub(1) };
+            canvas.run(0, y, area.width, ' ', cx.theme.normal());
+            canvas.text(0, y, "Quit? ⏎ quit  Esc stay", cx.theme.strong());
+        }
+        Some(_) | None => {
+            canvas.text(0, 2, "q quit", cx.theme.dim());
+        }
+    }
 }
 
 fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {

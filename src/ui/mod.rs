@@ -212,9 +212,16 @@ impl Model {
         context(&self.snapshot, &self.theme, self.clock, self.screen)
     }
 
-    /// The alarm that `a` is for: the one selected on the alarms tab, else the most urgent unacknowledged.
+    /// Is the screen too small for more than the banner?
+    pub fn small(&self) -> bool {
+        chrome::layout(self.screen).small
+    }
+
+    /// The alarm that `a` is for: the one selected on the alarms tab if that can be seen, else the most urgent
+    /// unacknowledged, which is the banner's.
     fn alarm_to_acknowledge(&self) -> Option<AlarmId> {
-        let selected = (self.tabs.shown == Tab::Alarms).then(|| self.tabs.alarms.selected(&self.cx())).flatten();
+        let selectable = self.tabs.shown == Tab::Alarms && !self.small();
+        let selected = selectable.then(|| self.tabs.alarms.selected(&self.cx())).flatten();
         let alarm =
             selected.or_else(|| self.snapshot.alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()))?;
         alarm.state.needs_acknowledgement().then_some(alarm.id)
@@ -234,6 +241,10 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Resize(width, height) => {
             model.screen = Rect::new(0, 0, width, height);
+            if model.small() {
+                // A window that cannot be seen must not take keys. What it held is dropped, nothing is done.
+                model.modal.take_if(|modal| !modal.is_quit());
+            }
             with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
         }
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
@@ -277,6 +288,9 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
         return acts;
     }
     match keys::find(keys::GLOBAL, event) {
+        Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw)) => on_global(model, global),
+        // Nobody gives orders to what cannot be seen.
+        Some(_) | None if model.small() => Vec::new(),
         Some(global) => on_global(model, global),
         None => with_tabs(model, |tabs, cx| tabs.on_key(cx, event)),
     }

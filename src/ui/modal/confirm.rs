@@ -39,8 +39,13 @@ pub enum Intent {
 impl Confirm {
     /// Leave?
     pub fn quit() -> Confirm {
-        let notes = vec!["Leave this terminal?".to_owned()];
-        Confirm { intent: Intent::Quit, title: "leave".to_owned(), notes }
+        let notes = ["Quit?", "Polling and alarms stop with it: the station runs inside this terminal."];
+        Confirm { intent: Intent::Quit, title: "quit".to_owned(), notes: notes.map(str::to_owned).to_vec() }
+    }
+
+    /// Is it the question whether to leave?
+    pub fn is_quit(&self) -> bool {
+        self.intent == Intent::Quit
     }
 
     /// Acknowledge all? `None` when there is nothing to acknowledge.
@@ -86,13 +91,18 @@ impl Confirm {
     /// What Enter does.
     pub fn verb(&self) -> &'static str {
         match &self.intent {
-            Intent::Quit => "leave",
+            Intent::Quit => "quit",
             Intent::Order(Command::Write { .. }) => "write and verify",
             Intent::Order(Command::Acknowledge(_) | Command::AcknowledgeAll) => "acknowledge",
             Intent::Order(Command::Refresh(_)) => "refresh",
             Intent::Order(Command::Connect(_, true)) => "connect",
             Intent::Order(Command::Connect(_, false)) => "disconnect",
         }
+    }
+
+    /// What Esc does.
+    pub fn escape(&self) -> &'static str {
+        if self.is_quit() { "stay" } else { "leave it as it is" }
     }
 
     pub(super) fn on_key(self, event: KeyEvent) -> Next {
@@ -113,7 +123,7 @@ impl Confirm {
             rows.push((wire_words(cx.def().tag(*tag)), cx.theme.dim()));
         }
         rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));
-        let keys = format!("⏎ {}   Esc leave it as it is", self.verb());
+        let keys = format!("⏎ {}   Esc {}", self.verb(), self.escape());
         let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&keys));
         let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + 2));
         for (y, (text, style)) in rows.iter().enumerate() {

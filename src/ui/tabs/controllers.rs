@@ -15,7 +15,7 @@ use crate::{
         Act, Cx,
         chrome::{order_words, outcome_words},
         keys::{Key, char, code},
-        modal::{Choice, Confirm, Faceplate, Modal, entry::range_words, faceplate::device_words},
+        modal::{Choice, Confirm, Faceplate, Modal, Notice, entry::range_words, faceplate::device_words},
         widgets::{
             text::{Canvas, age, clock, fit, pad, pad_left},
             value,
@@ -120,7 +120,9 @@ impl Controllers {
             },
             Action::Refresh => vec![Act::Order(Command::Refresh(self.device))],
             Action::Actions => {
-                Choice::actions(cx, self.device).map(|choice| Act::Open(Modal::Choice(choice))).into_iter().collect()
+                let actions = Choice::actions(cx, self.device).map(Modal::Choice);
+                let window = actions.map(|list| Notice::unreachable(cx, self.device).map_or(list, Modal::Notice));
+                window.map(Act::Open).into_iter().collect()
             }
             Action::Tune => write(device.faceplate.as_ref().and_then(|plate| plate.tune)),
             Action::Run => write(device.faceplate.as_ref().and_then(|plate| plate.run)),

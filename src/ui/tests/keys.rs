@@ -12,6 +12,8 @@ use crate::{
         def::{AlarmId, Priority},
         event::{Fault, LineState},
         record::{ActionRecord, AlarmRecord, AlarmStep},
+        sample::{Cause, Sample},
+        snapshot::DeviceState,
     },
     ui::{
         Effect, Msg,
@@ -32,6 +34,81 @@ fn a_number_is_written_only_after_enter() {
     assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
     assert_eq!(model.modal, None);
     assert!(screen(&mut model, 80, 24).contains("TIC-1.SV ? → 65.5 °C  sent"));
+}
+
+#[test]
+fn what_is_typed_is_what_is_written_or_refused() {
+    let fixture = Fixture::normal();
+    let check = |keys: &str, expect: Result<f64, &str>| {
+        let mut model = model(&fixture, Theme::FULL);
+        let order = order_of(&type_keys(&mut model, keys)).cloned();
+        let shown = screen(&mut model, 80, 24);
+        match expect {
+            Ok(value) => assert_eq!(order, Some(Command::Write { tag: fixture.tag("TIC-1.SV"), value }), "{keys}"),
+            Err(words) => {
+                assert_eq!(order, None, "{keys}");
+                assert!(shown.contains(words), "{words} is missing:\n{shown}");
+            }
+        }
+    };
+    check("s3,5⏎", Ok(3.5));
+    check("s7OO⏎", Err("\"7OO\" is no number"));
+    check("s1e5⏎", Err("\"1e5\" is no number"));
+    check("s7 0", Err("new 7 0"));
+    check(&format!("s{}⏎", "7".repeat(70)), Err("not all of it was taken"));
+}
+
+#[test]
+fn a_device_that_does_not_answer_is_said_so_before_anything_is_typed() {
+    let check = |fixture: &Fixture, keys: &str, expect: &str| {
+        let mut model = model(fixture, Theme::FULL);
+        type_keys(&mut model, keys);
+        assert!(matches!(model.modal, Some(Modal::Notice(_))), "{keys}: {:?}", model.modal);
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains(expect), "{expect} is missing:\n{shown}");
+        assert_eq!(order_of(&type_keys(&mut model, "70⏎")), None);
+    };
+    let mut silent = Fixture::normal();
+    silent.devices[0].state = DeviceState::Down { since: fixture::now() };
+    for keys in ["s", "4↓⏎", "4f", "4T", "4S"] {
+        check(&silent, keys, "TIC-1 is not answering");
+    }
+    check(&Fixture::line_down(), "r", "PLC-1 is not answering");
+    let mut closed = Fixture::normal();
+    closed.line.state = LineState::Disconnected;
+    check(&closed, "s", "Line L1 was disconnected by an operator.");
+}
+
+#[test]
+fn a_screen_too_small_to_see_takes_no_orders() {
+    let fixture = Fixture::alarm();
+    let small = |keys: &str| {
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, keys);
+        screen(&mut model, 50, 10);
+        model
+    };
+    for keys in ["s65⏎", "r⏎", "m⏎", "A⏎", "4T↓⏎⏎", "4u", "4L⏎", "?", "5w⏎"] {
+        let mut model = small("");
+        let shown = model.tabs.shown;
+        assert_eq!(type_keys(&mut model, keys), [], "{keys}");
+        assert_eq!((&model.modal, model.tabs.shown), (&None, shown), "{keys}");
+    }
+    for keys in ["s65", "r", "A", "4T↓⏎", "?", "→⏎"] {
+        let mut model = small(keys);
+        assert_eq!(model.modal, None, "{keys}: a window that nobody sees is closed");
+        assert_eq!(type_keys(&mut model, "⏎"), [], "{keys}");
+    }
+    let mut model = small("3↓↓");
+    assert_eq!(
+        order_of(&type_keys(&mut model, "a")),
+        Some(&Command::Acknowledge(fixture.alarms[0].id)),
+        "the banner's"
+    );
+    type_keys(&mut model, "q");
+    assert!(screen(&mut model, 50, 10).contains("Quit? ⏎ quit  Esc stay"));
+    assert_eq!(type_keys(&mut model, "⎋"), []);
+    assert_eq!(type_keys(&mut model, "q⏎"), [Effect::Quit]);
 }
 
 #[test]
@@ -60,7 +137,9 @@ fn a_toggle_is_asked_and_does_what_it_said() {
 
 #[test]
 fn a_toggle_of_the_unknown_becomes_a_choice() {
-    let fixture = Fixture::line_down();
+    let mut fixture = Fixture::normal();
+    let run = fixture.tag("PLC-1.RUN");
+    fixture.samples[run.index()] = Sample::bad(Cause::NotRead, fixture::now());
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "r");
     assert!(matches!(model.modal, Some(Modal::Choice(_))));
