@@ -119,7 +119,9 @@ impl Confirm {
         let room = body.width.saturating_sub(8).min(68);
         let mut rows: Vec<(String, Style)> = Vec::new();
         if let Intent::Order(Command::Write { tag, value }) = &self.intent {
-            rows.push((old_and_new(cx, *tag, *value), cx.theme.strong()));
+            let change = old_and_new(cx, *tag, *value);
+            let lines = if width(&change) <= room { vec![change] } else { wrap(&change, room) };
+            rows.extend(lines.into_iter().map(|line| (line, cx.theme.strong())));
             rows.push((wire_words(cx.def().tag(*tag)), cx.theme.dim()));
         }
         rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));

@@ -73,7 +73,8 @@ impl Faceplate {
             let shown = value::show(cx, *tag);
             let name = if usize::from(y) == self.selected { cx.theme.focus() } else { cx.theme.normal() };
             let x = canvas.text(0, y, &pad(&def.name, names), name);
-            let x = canvas.text(x + 2, y, &shown.whole(), shown.style);
+            let room = canvas.width().saturating_sub(x + 2);
+            let x = canvas.text(x + 2, y, &shown.within(room), shown.style);
             let left = canvas.width().saturating_sub(x + 2);
             canvas.text(x + 2, y, &fit(&def.label, left), cx.theme.dim());
         }
@@ -93,11 +94,17 @@ impl Faceplate {
 fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)> {
     let (theme, def, sample) = (cx.theme, cx.def().tag(tag), cx.snapshot.sample(tag));
     let quality = match sample.quality {
+        _ if def.access == Access::Write => "none: write only".to_owned(),
         Quality::Good => "good".to_owned(),
         Quality::Uncertain(cause) => format!("uncertain: {}", cause.words()),
         Quality::Bad(cause) => format!("bad: {}", cause.words()),
     };
-    let read = format!("{} ago, {}", age(cx.age(tag)), clock(sample.at, &cx.def().time_zone));
+    let read = match def.access {
+        Access::Write => "never".to_owned(),
+        Access::Read | Access::ReadWrite => {
+            format!("{} ago, {}", age(cx.age(tag)), clock(sample.at, &cx.def().time_zone))
+        }
+    };
     let poll = match def.poll {
         Poll::Every(period) => format!("every {} s", period.as_secs_f64()),
         Poll::Once => "once, and on refresh".to_owned(),

@@ -289,7 +289,31 @@ fn the_outcome_of_an_order_is_told_until_it_is_dismissed() {
     check(Outcome::Unchanged, "unchanged, nothing written");
     check(Outcome::Refused(Refusal::ReadOnly), "REFUSED: read only");
     check(Outcome::NotConfirmed(NotConfirmed::Different(65.0)), "NOT CONFIRMED: read back 65");
+    check(Outcome::NotConfirmed(NotConfirmed::NoReadBack), "accepted (cannot be read back)");
     check(Outcome::Failed(Fault::Timeout), "FAILED, may or may not have taken effect");
+}
+
+#[test]
+fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
+    let fixture = Fixture::normal();
+    let check = |outcome: Outcome, stays: bool| {
+        let mut model = model(&fixture, Theme::FULL);
+        let effects = type_keys(&mut model, "s60⏎");
+        let Some(Effect::Order(id, command)) = effects.first().cloned() else { panic!("{effects:?}") };
+        let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
+        let status = OrderStatus { id, by: Arc::from("tech1"), command, at: snapshot.at, old: Some(70.0), outcome };
+        snapshot.orders = vec![status];
+        update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
+        let mut after = |ticks: usize| {
+            (0..ticks).for_each(|_| drop(update(&mut model, Msg::Tick { silent: Duration::ZERO })));
+            screen(&mut model, 80, 24).contains("14:02:31 ─") || screen(&mut model, 80, 24).contains("─ 14:02:31 ")
+        };
+        assert!(after(119));
+        assert_eq!(after(1), stays);
+    };
+    check(Outcome::Verified, false);
+    check(Outcome::Refused(Refusal::ReadOnly), true);
+    check(Outcome::Failed(Fault::Timeout), true);
 }
 
 #[test]
