@@ -312,7 +312,7 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
         Outcome::NotConfirmed(why @ (NotConfirmed::Different(_) | NotConfirmed::NotRead(_))) => {
             (format!("NOT CONFIRMED: {why}"), true)
         }
-        Outcome::Failed(fault) => (format!("FAILED, may or may not have taken effect: {fault}"), true),
+        Outcome::Failed(fault) => (format!("FAILED, may have taken effect: {fault}"), true),
     }
 }
 

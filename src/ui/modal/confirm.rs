@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
-use super::{Modal, Next, window};
+use super::{Modal, Next, faceplate::manual_note, window};
 use crate::{
     plant::{
         command::Command,
@@ -39,7 +39,7 @@ pub enum Intent {
 impl Confirm {
     /// Leave?
     pub fn quit() -> Confirm {
-        let notes = ["Quit?", "Polling and alarms stop with it: the station runs inside this terminal."];
+        let notes = ["Quit?", "Polling and alarms stop too: the station runs in this terminal."];
         Confirm { intent: Intent::Quit, title: "quit".to_owned(), notes: notes.map(str::to_owned).to_vec() }
     }
 
@@ -73,7 +73,8 @@ impl Confirm {
     pub fn write(cx: &Cx, tag: TagId, value: f64) -> Confirm {
         let def = cx.def().tag(tag);
         let intent = Intent::Order(Command::Write { tag, value });
-        Confirm { intent, title: format!("write {}", def.name), notes: write_notes(def) }
+        let notes = manual_note(cx, tag).map(|note| format!("! {note}")).into_iter().chain(write_notes(def)).collect();
+        Confirm { intent, title: format!("write {}", def.name), notes }
     }
 
     /// A write with words of its own (an action of a device).

@@ -36,7 +36,9 @@ impl Line {
     /// An editing key; `false` if it is none.
     pub fn on_key(&mut self, event: KeyEvent) -> bool {
         let known = self.edit(event);
-        self.missed &= !self.text.is_empty();
+        // Taking everything away starts anew; a key that was not taken does not.
+        let typed = matches!(event.code, KeyCode::Char(_)) && !event.modifiers.contains(KeyModifiers::CONTROL);
+        self.missed &= typed || !self.text.is_empty();
         known
     }
 

@@ -68,11 +68,14 @@ fn the_mimic_in_seven_bits() {
 #[test]
 fn the_linux_console_gets_characters_of_its_font() {
     let console = Theme { colours: Colours::Sixteen, glyphs: Glyphs::Block, motion: true };
-    let mut model = model(&Fixture::alarm(), console);
-    let shown = screen(&mut model, 80, 24);
-    let font = "─│┌┐└┘├┤┬┴┼═║╔╗╚╝╢╫►◄▲▼█▄▒°·×←↑→↓≈•○■√┘";
-    let strange: Vec<char> = shown.chars().filter(|c| !c.is_ascii() && !font.contains(*c)).collect();
-    assert!(strange.is_empty(), "{strange:?}");
+    let font = "─│┌┐└┘├┤┬┴┼═║╔╗╚╝╢╫►◄▲▼█▄▀▒░°·×←↑→↓≈•○■√┘";
+    for tab in Tab::ALL {
+        let mut model = model(&Fixture::alarm(), console);
+        model.tabs.shown = tab;
+        let shown = screen(&mut model, 80, 24);
+        let strange: Vec<char> = shown.chars().filter(|c| !c.is_ascii() && !font.contains(*c)).collect();
+        assert!(strange.is_empty(), "{tab:?}: {strange:?}");
+    }
 }
 
 #[test]
@@ -184,6 +187,27 @@ fn what_cannot_be_read_does_not_wait_to_be_read() {
     type_keys(&mut model, "4f");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("now – write only") && !shown.contains("not read"), "{shown}");
+}
+
+#[test]
+fn without_colour_a_little_liquid_is_seen() {
+    for (glyphs, shallow, body) in [(Glyphs::Braille, '░', '▒'), (Glyphs::Block, '░', '▒'), (Glyphs::Ascii, ':', '#')]
+    {
+        let theme = Theme { colours: Colours::None, glyphs, motion: false };
+        let liquid = |level: f64| {
+            let mut fixture = Fixture::normal();
+            for tank in ["PLC-1.LT-1", "PLC-1.TK-2", "PLC-1.TK-3"] {
+                fixture.set(tank, 0.0);
+            }
+            fixture.set("PLC-1.LT-1", level);
+            let shown = screen(&mut model(&fixture, theme), 80, 24);
+            let bottom = shown.lines().nth(16).unwrap_or_default().to_owned();
+            bottom.chars().skip(16).take(15).filter(|c| *c == shallow || *c == body).count()
+        };
+        assert_eq!(liquid(0.0), 0, "{glyphs:?}");
+        assert!(liquid(0.3) > 2, "{glyphs:?}: a little beside the heater's words");
+        assert!(liquid(8.0) > 2, "{glyphs:?}: liquid behind the heater's words");
+    }
 }
 
 #[test]
