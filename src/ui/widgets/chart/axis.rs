@@ -73,7 +73,8 @@ impl Scale {
     pub fn divided(self, n: usize) -> Option<Scale> {
         let step = (self.high - self.low) / n.max(1) as f64;
         let power = 10f64.powf((step.log10() + 1e-9).floor());
-        let factors: &[f64] = if step >= 10.0 { &[1.0, 2.0, 2.5, 3.0, 4.0, 5.0] } else { &[1.0, 2.0, 3.0, 4.0, 5.0] };
+        let factors: &[f64] = &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 2.5];
+        let factors = if step >= 10.0 { factors } else { &factors[..7] };
         let round = factors.iter().find(|factor| (step / power - **factor).abs() < 1e-6)?;
         let scale = Scale { step: round * power, ..self };
         (scale.intervals() == Some(n)).then_some(scale)
