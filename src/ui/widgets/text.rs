@@ -148,7 +148,7 @@ pub fn fit_words(text: &str, room: u16) -> String {
         return text.to_owned();
     }
     let ends = text.match_indices(' ').map(|(at, _)| &text[..at]);
-    match ends.filter(|part| width(part) + 2 <= room).last() {
+    match ends.rev().find(|part| width(part) + 2 <= room) {
         Some(part) => format!("{} …", part.trim_end()),
         None if room > 0 => "…".to_owned(),
         None => String::new(),
