@@ -213,12 +213,20 @@ fn check_inside(item: &MimicItem, at: Span, size: (u16, u16), problems: &mut Pro
     }
 }
 
+/// Letters that mean something on every screen, so that no plant can give them another meaning.
+const KEYS_TAKEN: [char; 2] = ['a', 'q'];
+
 fn command(table: &CommandTable, defs: &Defs, keys: &mut Unique, problems: &mut Problems) -> Option<MimicCommand> {
     let (key, name) = (table.key.as_ref()?, table.tag.as_ref()?);
     let mut letters = key.value.chars();
     let letter = letters.next().filter(|c| c.is_ascii_lowercase() && letters.next().is_none());
     if letter.is_none() {
         problems.add(key.at, format!("`{}` is not a key", key.value)).label("expected one lower-case letter");
+    }
+    if letter.is_some_and(|letter| KEYS_TAKEN.contains(&letter)) {
+        problems
+            .add(key.at, format!("key `{}` is taken", key.value))
+            .label("on every screen `a` acknowledges an alarm and `q` quits");
     }
     keys.insert(&key.value, key.at, format!("duplicate key `{}`", key.value), problems);
     let tag = defs.tag(name, problems)?;

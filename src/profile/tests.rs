@@ -343,6 +343,15 @@ fn a_file_that_is_no_toml_is_told_from_one_that_is_wrong() {
 }
 
 #[test]
+fn a_key_of_every_screen_is_no_command_of_a_plant() {
+    for key in ["a", "q"] {
+        let from = "[mimic]\n";
+        let to = format!("[mimic]\ncommand = [{{ key = \"{key}\", label = \"go\", tag = \"D1.MODE\" }}]\n");
+        check(from, &to, &[&format!("key `{key}` is taken"), "`a` acknowledges an alarm and `q` quits"]);
+    }
+}
+
+#[test]
 fn a_missing_file_names_the_plants_there_are() {
     let check = |argument: &str, expect: &str| {
         let errors = super::load(std::path::Path::new(argument), &super::Search::shipped()).expect_err("no such plant");

@@ -5,16 +5,16 @@ use ratatui::{Frame, layout::Rect, style::Style};
 use super::{
     Cx, Model, SILENCE, Watch,
     keys::{self, Hint},
-    modal::{confirm::subject, faceplate::device_words},
+    modal::{Modal, confirm::subject, faceplate::device_words},
     tabs::Tab,
-    widgets::text::{Canvas, between, clock, fit, running, width},
+    widgets::text::{Canvas, between, clock, fit, fit_words, running, width},
 };
 use crate::plant::{
     alarm::AlarmState,
-    command::{Command, Outcome},
+    command::{Command, NotConfirmed, Outcome},
     def::{LineDef, Priority},
     event::LineState,
-    snapshot::ActiveAlarm,
+    snapshot::{ActiveAlarm, DeviceState},
 };
 
 /// Least size in which the tabs make sense; 80x24 shows everything.
@@ -73,9 +73,9 @@ pub fn layout(screen: Rect) -> Layout {
 /// Draws the whole screen.
 pub fn view(model: &Model, cx: &Cx, frame: &mut Frame) {
     let parts = layout(frame.area());
-    banner(cx, &mut Canvas::new(frame.buffer_mut(), parts.banner));
+    banner(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.banner));
     if parts.small {
-        return too_small(cx, frame);
+        return too_small(model, cx, frame);
     }
     header(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.header));
     tab_bar(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.tabs));
@@ -92,17 +92,26 @@ pub fn view(model: &Model, cx: &Cx, frame: &mut Frame) {
     }
 }
 
-fn too_small(cx: &Cx, frame: &mut Frame) {
+/// All that is left below the banner of a small screen: its size and how to leave.
+fn too_small(model: &Model, cx: &Cx, frame: &mut Frame) {
     let area = frame.area();
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (width, height) = SIZE_MIN;
-    canvas.text(
-        0,
-        1,
-        &fit(&format!("screen too small: {}x{}, needs {width}x{height}", area.width, area.height), area.width),
-        cx.theme.normal(),
-    );
-    canvas.text(0, 2, "q quit", cx.theme.dim());
+    let size = format!("too small: {}x{}", area.width, area.height);
+    let words = [format!("screen {size}, needs {width}x{height}"), format!("{size}, needs {width}x{height}"), size];
+    let fits = words.iter().find(|words| super::widgets::text::width(words) <= area.width);
+    canvas.text(0, 1, fits.map_or("too small", String::as_str), cx.theme.normal());
+    // The question stands above the size where there are too few rows for both.
+    match &model.modal {
+        Some(Modal::Confirm(confirm)) if confirm.is_quit() => {
+            let y = if area.height > 2 { 2 } else { area.height.saturating_sub(1) };
+            canvas.run(0, y, area.width, ' ', cx.theme.normal());
+            canvas.text(0, y, "Quit? ⏎ quit  Esc stay", cx.theme.strong());
+        }
+        Some(_) | None => {
+            canvas.text(0, 2, "q quit", cx.theme.dim());
+        }
+    }
 }
 
 fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {
@@ -137,8 +146,8 @@ fn header_parts(model: &Model, cx: &Cx) -> Vec<(usize, String, Style)> {
     if history.lost > 0 {
         parts.push((1, format!("{} records lost", history.lost), theme.trouble()));
     }
-    if let Some(trouble) = &history.trouble {
-        parts.push((2, fit(&format!("history: {trouble}"), 28), theme.trouble()));
+    if history.trouble.is_some() {
+        parts.push((2, "history: see 3".to_owned(), theme.trouble()));
     }
     for line in cx.def().lines.iter().rev() {
         let (text, style) = line_words(cx, line);
@@ -185,11 +194,20 @@ fn tab_bar(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     }
 }
 
-/// The most urgent alarm that waits for an acknowledgement, else the most urgent one, and the counts by priority.
-fn banner(cx: &Cx, canvas: &mut Canvas) {
+/// The most urgent alarm that waits for an acknowledgement, else trouble of the history, else the most urgent alarm; and
+/// the counts by priority. "No alarms" is said only when alarms could be seen.
+fn banner(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     let alarms = &cx.snapshot.alarms;
-    let Some(alarm) = alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()).or(alarms.first()) else {
-        canvas.text(1, 0, "no alarms", cx.theme.dim());
+    let urgent = alarms.iter().find(|alarm| alarm.state.needs_acknowledgement());
+    let trouble = cx.snapshot.history.trouble.as_ref().map(|trouble| format!("history: {trouble}"));
+    let other = alarms.first().filter(|_| trouble.is_none());
+    let Some(alarm) = urgent.or(other) else {
+        let blind = blind_words(model, cx).filter(|_| alarms.is_empty());
+        let room = canvas.width().saturating_sub(1);
+        match [blind, trouble].into_iter().flatten().reduce(|blind, trouble| format!("{blind}   {trouble}")) {
+            Some(words) => canvas.text(1, 0, &fit_words(&words, room), cx.theme.trouble()),
+            None => canvas.text(1, 0, "no alarms", cx.theme.dim()),
+        };
         return;
     };
     let def = cx.def().alarm(alarm.id);
@@ -197,13 +215,32 @@ fn banner(cx: &Cx, canvas: &mut Canvas) {
     let mark = cx.theme.alarm(def.priority, alarm.state, cx.flash());
     let x = canvas.text(1, 0, cx.theme.priority_mark(def.priority), mark) + 1;
     let (text, room) = (alarm_words(cx, alarm), canvas.width());
+    let text = if x + width(&text) <= room { text } else { fit_words(&text, room.saturating_sub(x)) };
     let ack = if waiting { "a ack " } else { "" };
     // The alarm itself comes first; the counts and the key only where there is room left.
     let tails = [format!("{}   {ack}", counts(cx)), ack.to_owned(), String::new()];
     let fits = |tail: &&String| x + width(&text) + 2 + width(tail) <= room;
     let tail = tails.iter().find(fits).map_or("", String::as_str);
-    canvas.text(x, 0, &fit(&text, room.saturating_sub(x)), cx.theme.alarm(def.priority, alarm.state, false));
+    canvas.text(x, 0, &text, cx.theme.alarm(def.priority, alarm.state, false));
     canvas.text_right(room, 0, tail, cx.theme.normal());
+}
+
+/// Why alarms may be there without being seen: `alarms not judged: L1 disconnected`.
+fn blind_words(model: &Model, cx: &Cx) -> Option<String> {
+    let snapshot = cx.snapshot;
+    let silent = (model.clock.silent >= SILENCE).then(|| "station silent".to_owned());
+    let lines = cx.def().lines.iter().filter_map(|line| match snapshot.line(line.id).state {
+        LineState::Connected => None,
+        LineState::Disconnected => Some(format!("{} disconnected", line.name)),
+        LineState::Connecting | LineState::Waiting { .. } => Some(format!("{} not connected", line.name)),
+    });
+    let devices = cx.def().devices.iter().filter(|device| snapshot.line(device.line).state == LineState::Connected);
+    let devices = devices.filter_map(|device| match snapshot.device(device.id).state {
+        DeviceState::Down { .. } => Some(format!("{} not answering", device.name)),
+        DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_) => None,
+    });
+    let blind: Vec<String> = silent.into_iter().chain(lines).chain(devices).collect();
+    (!blind.is_empty()).then(|| format!("alarms not judged: {}", blind.join(", ")))
 }
 
 /// `TIC-1.PV temperature high  72.4 °C  UNACK 00:41`.
@@ -236,7 +273,16 @@ fn status(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     canvas.run(0, 0, length, '─', cx.theme.dim());
     if let Some(watch) = &model.watch {
         let (text, style) = watch_words(cx, watch);
-        canvas.text(1, 0, &fit(&format!(" {text} "), length.saturating_sub(2)), style);
+        let room = length.saturating_sub(4);
+        // The time stays whatever must be cut: an old outcome is not a new one.
+        let text = match &watch.status {
+            Some(status) if width(&text) > room => {
+                let at = clock(status.at, &cx.def().time_zone);
+                format!("{at} {}", fit_words(&text, room.saturating_sub(width(&at) + 1)))
+            }
+            Some(_) | None => fit_words(&text, room),
+        };
+        canvas.text(1, 0, &format!(" {text} "), style);
     }
 }
 
@@ -262,8 +308,11 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
         Outcome::Verified => ("verified".to_owned(), false),
         Outcome::Unchanged => ("unchanged, nothing written".to_owned(), false),
         Outcome::Refused(why) => (format!("REFUSED: {why}"), true),
-        Outcome::NotConfirmed(why) => (format!("NOT CONFIRMED: {why}"), true),
-        Outcome::Failed(fault) => (format!("FAILED, may or may not have taken effect: {fault}"), true),
+        Outcome::NotConfirmed(NotConfirmed::NoReadBack) => ("accepted (cannot be read back)".to_owned(), false),
+        Outcome::NotConfirmed(why @ (NotConfirmed::Different(_) | NotConfirmed::NotRead(_))) => {
+            (format!("NOT CONFIRMED: {why}"), true)
+        }
+        Outcome::Failed(fault) => (format!("FAILED, may have taken effect: {fault}"), true),
     }
 }
 

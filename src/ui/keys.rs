@@ -142,11 +142,11 @@ pub const GLOBAL: &[Key<Global>] = &[
         action: Global::Dismiss,
     },
     Key { chord: ctrl('l'), label: "", help: "draw everything anew", action: Global::Redraw },
-    Key { chord: ctrl('c'), label: "", help: "leave (asks first)", action: Global::Quit },
+    Key { chord: ctrl('c'), label: "", help: "quit (asks first)", action: Global::Quit },
     Key {
         chord: char('q'),
         label: "quit",
-        help: "leave (asks first); the station keeps running",
+        help: "quit (asks first); polling and alarms stop with it",
         action: Global::Quit,
     },
     Key { chord: char('?'), label: "help", help: "all keys", action: Global::Help },

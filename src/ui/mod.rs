@@ -23,7 +23,7 @@ use ratatui::{Frame, layout::Rect};
 use crate::{
     history::{Answer, HistoryError, Question},
     plant::{
-        command::{Command, OrderId, OrderStatus},
+        command::{Command, OrderId, OrderStatus, Outcome},
         def::{AlarmId, DeviceId, PlantDef},
         sample::Cause,
         snapshot::Snapshot,
@@ -36,6 +36,9 @@ use theme::Theme;
 
 /// A station that has said nothing for so long (real time) is silent: its values are doubted.
 pub const SILENCE: Duration = Duration::from_secs(5);
+
+/// An outcome that is no worry is shown for so many ticks: a minute of real time.
+const OUTCOME_TICKS: u32 = 120;
 
 /// All that a terminal knows.
 #[derive(Debug)]
@@ -80,6 +83,8 @@ pub struct Watch {
     pub command: Command,
     /// As last seen in a snapshot.
     pub status: Option<OrderStatus>,
+    /// Tick at which it was given, and at which its outcome last changed.
+    pub changed_at: u32,
     /// Why it never left the terminal.
     pub undelivered: Option<&'static str>,
 }
@@ -212,9 +217,16 @@ impl Model {
         context(&self.snapshot, &self.theme, self.clock, self.screen)
     }
 
-    /// The alarm that `a` is for: the one selected on the alarms tab, else the most urgent unacknowledged.
+    /// Is the screen too small for more than the banner?
+    pub fn small(&self) -> bool {
+        chrome::layout(self.screen).small
+    }
+
+    /// The alarm that `a` is for: the one selected on the alarms tab if that can be seen, else the most urgent
+    /// unacknowledged, which is the banner's.
     fn alarm_to_acknowledge(&self) -> Option<AlarmId> {
-        let selected = (self.tabs.shown == Tab::Alarms).then(|| self.tabs.alarms.selected(&self.cx())).flatten();
+        let selectable = self.tabs.shown == Tab::Alarms && !self.small();
+        let selected = selectable.then(|| self.tabs.alarms.selected(&self.cx())).flatten();
         let alarm =
             selected.or_else(|| self.snapshot.alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()))?;
         alarm.state.needs_acknowledgement().then_some(alarm.id)
@@ -234,6 +246,10 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Resize(width, height) => {
             model.screen = Rect::new(0, 0, width, height);
+            if model.small() {
+                // A window that cannot be seen must not take keys. What it held is dropped, nothing is done.
+                model.modal.take_if(|modal| !modal.is_quit());
+            }
             with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
         }
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
@@ -277,6 +293,9 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
         return acts;
     }
     match keys::find(keys::GLOBAL, event) {
+        Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw)) => on_global(model, global),
+        // Nobody gives orders to what cannot be seen.
+        Some(_) | None if model.small() => Vec::new(),
         Some(global) => on_global(model, global),
         None => with_tabs(model, |tabs, cx| tabs.on_key(cx, event)),
     }
@@ -311,6 +330,9 @@ fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<Act> {
     if let Some(watch) = &mut model.watch
         && let Some(status) = model.snapshot.orders.iter().find(|status| status.id == watch.id)
     {
+        if watch.status.as_ref() != Some(status) {
+            watch.changed_at = model.clock.phase;
+        }
         watch.status = Some(status.clone());
     }
     with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
@@ -319,6 +341,8 @@ fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<Act> {
 fn on_tick(model: &mut Model, silent: Duration) -> Vec<Act> {
     model.clock.phase = model.clock.phase.wrapping_add(1);
     model.clock.silent = silent;
+    let phase = model.clock.phase;
+    model.watch.take_if(|watch| watch.is_done() && phase.wrapping_sub(watch.changed_at) >= OUTCOME_TICKS);
     if silent >= SILENCE && model.snapshot.samples.iter().any(|sample| sample.quality.is_good()) {
         let doubted = Arc::make_mut(&mut model.snapshot);
         for sample in doubted.samples.iter_mut().filter(|sample| sample.quality.is_good()) {
@@ -341,7 +365,8 @@ fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
             Act::Order(command) => {
                 model.ordered = model.ordered.wrapping_add(1);
                 let id = OrderId { terminal: model.terminal, number: model.ordered };
-                model.watch = Some(Watch { id, command: command.clone(), status: None, undelivered: None });
+                let changed_at = model.clock.phase;
+                model.watch = Some(Watch { id, command: command.clone(), status: None, changed_at, undelivered: None });
                 effects.push(Effect::Order(id, command));
             }
             Act::Do(effect) => effects.push(effect),
@@ -359,6 +384,15 @@ fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         Act::Open(_) | Act::Show(_) | Act::ShowDevice(_) | Act::Order(_) => None,
     });
     effects.collect()
+}
+
+impl Watch {
+    /// Has it ended as wished? Such an outcome leaves the screen by itself; trouble stays, with its time, until it is
+    /// dismissed.
+    fn is_done(&self) -> bool {
+        let outcome = self.status.as_ref().map(|status| &status.outcome);
+        outcome.is_some_and(|outcome| *outcome != Outcome::Pending && !chrome::outcome_words(outcome).1)
+    }
 }
 
 impl Intent {

@@ -12,7 +12,9 @@ use super::{Effect, Model, Msg, fixture::Fixture, theme::Theme, update, view};
 use crate::plant::command::Command;
 
 pub fn model(fixture: &Fixture, theme: Theme) -> Model {
-    Model::new(fixture.snapshot(), theme, 1, Arc::from("tech1"))
+    let mut model = Model::new(fixture.snapshot(), theme, 1, Arc::from("tech1"));
+    update(&mut model, Msg::Resize(80, 24));
+    model
 }
 
 pub fn draw(model: &mut Model, width: u16, height: u16) -> Buffer {

@@ -53,7 +53,7 @@ impl Theme {
     pub fn detect(env: impl Fn(&str) -> Option<String>) -> Theme {
         let set = |name: &str| env(name).unwrap_or_default();
         let term = set("TERM");
-        let console = term == "linux";
+        let console = term.starts_with("linux");
         let colours = if !set("NO_COLOR").is_empty() || term.starts_with("vt") {
             Colours::None
         } else if matches!(set("COLORTERM").as_str(), "truecolor" | "24bit") {
@@ -223,7 +223,10 @@ mod tests {
         check(&[("TERM", "xterm-256color"), ("COLORTERM", "truecolor"), utf8], Colours::True, Glyphs::Braille);
         check(&[("TERM", "tmux-256color"), utf8], Colours::Indexed, Glyphs::Braille);
         check(&[("TERM", "xterm"), utf8], Colours::Sixteen, Glyphs::Braille);
-        check(&[("TERM", "linux"), utf8], Colours::Sixteen, Glyphs::Block);
+        for term in ["linux", "linux-16color"] {
+            check(&[("TERM", term), utf8], Colours::Sixteen, Glyphs::Block);
+        }
+        check(&[("TERM", "linux")], Colours::Sixteen, Glyphs::Ascii);
         check(&[("TERM", "xterm"), ("LC_ALL", "C"), utf8], Colours::Sixteen, Glyphs::Ascii);
         check(&[("TERM", "vt220")], Colours::None, Glyphs::Ascii);
         check(&[("TERM", "xterm-256color"), ("NO_COLOR", "1"), utf8], Colours::None, Glyphs::Braille);

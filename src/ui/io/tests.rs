@@ -131,7 +131,7 @@ fn every_way_out_restores_the_terminal_once() {
     const PASSED: &str = "test result: ok";
     let mut pty = Pty::start();
     pty.press("q");
-    pty.wait_for("Leave this terminal?");
+    pty.wait_for("Quit?");
     pty.press("\r");
     pty.ends_restored(PASSED);
     for signal in [Signal::TERM, Signal::HUP] {
@@ -157,7 +157,7 @@ fn a_panic_elsewhere_leaves_the_screen_alone() {
     let seen = String::from_utf8_lossy(&pty.seen);
     assert!(!seen.contains("a task of the station") && !seen.contains("\x1b[?1049l"), "{seen}");
     pty.press("\x03");
-    pty.wait_for("Leave this terminal?");
+    pty.wait_for("Quit?");
     pty.press("y");
     pty.ends_restored("test result: ok");
 }

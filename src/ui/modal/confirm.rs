@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
-use super::{Modal, Next, window};
+use super::{Modal, Next, faceplate::manual_note, window};
 use crate::{
     plant::{
         command::Command,
@@ -39,8 +39,13 @@ pub enum Intent {
 impl Confirm {
     /// Leave?
     pub fn quit() -> Confirm {
-        let notes = vec!["Leave this terminal?".to_owned()];
-        Confirm { intent: Intent::Quit, title: "leave".to_owned(), notes }
+        let notes = ["Quit?", "Polling and alarms stop too: the station runs in this terminal."];
+        Confirm { intent: Intent::Quit, title: "quit".to_owned(), notes: notes.map(str::to_owned).to_vec() }
+    }
+
+    /// Is it the question whether to leave?
+    pub fn is_quit(&self) -> bool {
+        self.intent == Intent::Quit
     }
 
     /// Acknowledge all? `None` when there is nothing to acknowledge.
@@ -68,7 +73,8 @@ impl Confirm {
     pub fn write(cx: &Cx, tag: TagId, value: f64) -> Confirm {
         let def = cx.def().tag(tag);
         let intent = Intent::Order(Command::Write { tag, value });
-        Confirm { intent, title: format!("write {}", def.name), notes: write_notes(def) }
+        let notes = manual_note(cx, tag).map(|note| format!("! {note}")).into_iter().chain(write_notes(def)).collect();
+        Confirm { intent, title: format!("write {}", def.name), notes }
     }
 
     /// A write with words of its own (an action of a device).
@@ -86,13 +92,18 @@ impl Confirm {
     /// What Enter does.
     pub fn verb(&self) -> &'static str {
         match &self.intent {
-            Intent::Quit => "leave",
+            Intent::Quit => "quit",
             Intent::Order(Command::Write { .. }) => "write and verify",
             Intent::Order(Command::Acknowledge(_) | Command::AcknowledgeAll) => "acknowledge",
             Intent::Order(Command::Refresh(_)) => "refresh",
             Intent::Order(Command::Connect(_, true)) => "connect",
             Intent::Order(Command::Connect(_, false)) => "disconnect",
         }
+    }
+
+    /// What Esc does.
+    pub fn escape(&self) -> &'static str {
+        if self.is_quit() { "stay" } else { "leave it as it is" }
     }
 
     pub(super) fn on_key(self, event: KeyEvent) -> Next {
@@ -109,11 +120,13 @@ impl Confirm {
         let room = body.width.saturating_sub(8).min(68);
         let mut rows: Vec<(String, Style)> = Vec::new();
         if let Intent::Order(Command::Write { tag, value }) = &self.intent {
-            rows.push((old_and_new(cx, *tag, *value), cx.theme.strong()));
+            let change = old_and_new(cx, *tag, *value);
+            let lines = if width(&change) <= room { vec![change] } else { wrap(&change, room) };
+            rows.extend(lines.into_iter().map(|line| (line, cx.theme.strong())));
             rows.push((wire_words(cx.def().tag(*tag)), cx.theme.dim()));
         }
         rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));
-        let keys = format!("⏎ {}   Esc leave it as it is", self.verb());
+        let keys = format!("⏎ {}   Esc {}", self.verb(), self.escape());
         let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&keys));
         let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + 2));
         for (y, (text, style)) in rows.iter().enumerate() {

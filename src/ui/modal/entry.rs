@@ -34,12 +34,16 @@ pub struct Entry {
 impl Entry {
     /// An empty entry.
     pub fn new(tag: TagId) -> Entry {
-        Entry { tag, line: Line::only("0123456789.-"), problem: None }
+        Entry { tag, line: Line::default(), problem: None }
     }
 
     pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Enter).is(event) {
-            match check(cx, self.tag, &self.line.text()) {
+            let checked = match self.line.missed() {
+                true => Err("not all of it was taken; Ctrl-U empties the line".to_owned()),
+                false => check(cx, self.tag, &self.line.text()),
+            };
+            match checked {
                 Ok(value) if cx.def().tag(self.tag).confirm.is_some() => {
                     return Next::Stay(Modal::Confirm(Confirm::write(cx, self.tag, value)));
                 }
@@ -98,14 +102,17 @@ pub fn range_words(cx: &Cx, tag: TagId) -> String {
 
 /// The number if it can be written; else what is wrong with it. Courtesy: the station checks again.
 fn check(cx: &Cx, tag: TagId, text: &str) -> Result<f64, String> {
-    let value: f64 = text
-        .parse()
-        .map_err(|_| if text.is_empty() { "type a number".to_owned() } else { format!("{text} is not a number") })?;
+    let text = text.trim();
+    if text.is_empty() {
+        return Err("type a number".to_owned());
+    }
+    let (value, typed) = number(text).ok_or_else(|| format!("\"{text}\" is no number"))?;
+    // Zeros count: where no decimals are taken, `1,000` and `1.000` mean a thousand to their author, and are refused.
     let decimals = usize::from(cx.snapshot.decimals[tag.index()]);
-    let typed = text.split_once('.').map_or(0, |(_, fraction)| fraction.trim_end_matches('0').len());
     if typed > decimals {
         return Err(match decimals {
             0 => "whole numbers only".to_owned(),
+            1 => "at most 1 decimal".to_owned(),
             n => format!("at most {n} decimals"),
         });
     }
@@ -113,6 +120,16 @@ fn check(cx: &Cx, tag: TagId, text: &str) -> Result<f64, String> {
         Some((min, max)) if !(min..=max).contains(&value) => Err(format!("outside {}", range_words(cx, tag))),
         Some(_) | None => Ok(value),
     }
+}
+
+/// A plain number and its decimals: sign, digits and one decimal mark, a point or a comma. No exponent, no `inf`.
+fn number(text: &str) -> Option<(f64, usize)> {
+    let plain = text.replacen(',', ".", 1);
+    let (whole, fraction) = plain.split_once('.').unwrap_or((&plain, ""));
+    let whole = whole.strip_prefix(['-', '+']).unwrap_or(whole);
+    let digits = |text: &str| text.bytes().all(|c| c.is_ascii_digit());
+    let numeric = digits(whole) && digits(fraction) && !(whole.is_empty() && fraction.is_empty());
+    numeric.then(|| plain.parse().ok()).flatten().map(|value| (value, fraction.len()))
 }
 
 #[cfg(test)]
@@ -130,10 +147,16 @@ mod tests {
             };
             check("70", Ok(70.0));
             check("70.5", Ok(70.5));
-            check("70.50", Ok(70.5));
+            check("3,5", Ok(3.5));
+            check("+3,5 ", Ok(3.5));
+            check("-0", Ok(0.0));
+            check("70.50", Err("at most 1 decimal"));
             check("", Err("type a number"));
-            check("7-0", Err("7-0 is not a number"));
-            check("70.55", Err("at most 1 decimals"));
+            for text in ["7-0", "7OO", "1e1", "1e5", "7 0", "1,0.5", "1.0.5", "inf", "NaN", "-", ".", "0x10", "๗"] {
+                check(text, Err(&format!("\"{text}\" is no number")));
+            }
+            check("70.55", Err("at most 1 decimal"));
+            check("1,000", Err("at most 1 decimal"));
             check("1000", Err("outside range 0.0 … 120.0 °C"));
         });
     }

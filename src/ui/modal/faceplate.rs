@@ -41,8 +41,12 @@ impl Faceplate {
         if self.tags.len() > 1 {
             hints.push(hint("↑↓", "select"));
         }
-        if cx.def().tag(self.tag()).writable() {
-            hints.push(hint("⏎", "write"));
+        if let Some(tag) = command_tag(cx, self.tag()) {
+            let manual = tag != self.tag();
+            hints.push(hint(
+                "⏎",
+                &if manual { format!("write {}", cx.def().tag(tag).short) } else { "write".to_owned() },
+            ));
         }
         hints.push(hint("Esc", "close"));
         hints
@@ -53,7 +57,8 @@ impl Faceplate {
             KeyCode::Up => self.selected = self.selected.saturating_sub(1),
             KeyCode::Down => self.selected = (self.selected + 1).min(self.tags.len() - 1),
             KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => {
-                return Next::Stay(Modal::write(cx, self.tag()).unwrap_or(Modal::Faceplate(self)));
+                let window = command_tag(cx, self.tag()).and_then(|tag| Modal::write(cx, tag));
+                return Next::Stay(window.unwrap_or(Modal::Faceplate(self)));
             }
             KeyCode::Char('q') => return Next::Close,
             _ => {}
@@ -73,7 +78,8 @@ impl Faceplate {
             let shown = value::show(cx, *tag);
             let name = if usize::from(y) == self.selected { cx.theme.focus() } else { cx.theme.normal() };
             let x = canvas.text(0, y, &pad(&def.name, names), name);
-            let x = canvas.text(x + 2, y, &shown.whole(), shown.style);
+            let room = canvas.width().saturating_sub(x + 2);
+            let x = canvas.text(x + 2, y, &shown.within(room), shown.style);
             let left = canvas.width().saturating_sub(x + 2);
             canvas.text(x + 2, y, &fit(&def.label, left), cx.theme.dim());
         }
@@ -93,11 +99,17 @@ impl Faceplate {
 fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)> {
     let (theme, def, sample) = (cx.theme, cx.def().tag(tag), cx.snapshot.sample(tag));
     let quality = match sample.quality {
+        _ if def.access == Access::Write => "none: write only".to_owned(),
         Quality::Good => "good".to_owned(),
         Quality::Uncertain(cause) => format!("uncertain: {}", cause.words()),
         Quality::Bad(cause) => format!("bad: {}", cause.words()),
     };
-    let read = format!("{} ago, {}", age(cx.age(tag)), clock(sample.at, &cx.def().time_zone));
+    let read = match def.access {
+        Access::Write => "never".to_owned(),
+        Access::Read | Access::ReadWrite => {
+            format!("{} ago, {}", age(cx.age(tag)), clock(sample.at, &cx.def().time_zone))
+        }
+    };
     let poll = match def.poll {
         Poll::Every(period) => format!("every {} s", period.as_secs_f64()),
         Poll::Once => "once, and on refresh".to_owned(),
@@ -127,6 +139,10 @@ fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)>
             theme.normal(),
         ),
     ];
+    if let Some(manual) = manual_tag(cx, tag) {
+        rows.push(("manual", format!("⏎ writes {}", cx.def().tag(manual).name), theme.strong()));
+        rows.extend(manual_note(cx, manual).map(|note| ("", note, theme.strong())));
+    }
     for alarm in cx.snapshot.alarms_of(tag) {
         let def = cx.def().alarm(alarm.id);
         let text = format!("{} {} {}", theme.priority_mark(def.priority), def.text, alarm.state.word());
@@ -137,6 +153,33 @@ fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)>
         meaning.into_iter().enumerate().map(|(n, line)| (if n == 0 { "meaning" } else { "" }, line, theme.normal())),
     );
     rows
+}
+
+/// What Enter writes for a tag: itself, or the manual command of an output that is only read.
+fn command_tag(cx: &Cx, tag: TagId) -> Option<TagId> {
+    if cx.def().tag(tag).writable() { Some(tag) } else { manual_tag(cx, tag) }
+}
+
+/// The manual command of an output that is only read: `MAN.P-1` for `P-1`, on the same device.
+fn manual_tag(cx: &Cx, tag: TagId) -> Option<TagId> {
+    let def = cx.def().tag(tag);
+    let mut others = cx.def().tags_of(def.device);
+    let manual = others.find(|other| other.short.strip_prefix("MAN.") == Some(def.short.as_str()) && other.writable());
+    manual.filter(|_| !def.writable()).map(|manual| manual.id)
+}
+
+/// Said of a manual command while its device's `AUTO` is on, or while nobody knows.
+pub(super) fn manual_note(cx: &Cx, tag: TagId) -> Option<String> {
+    let def = cx.def().tag(tag);
+    let auto = cx.def().tags_of(def.device).find(|other| other.short == "AUTO")?;
+    if !def.short.starts_with("MAN.") {
+        return None;
+    }
+    match value::is_on(cx, auto.id) {
+        Some(false) => None,
+        Some(true) => Some(format!("acts in MANUAL only, and {} is on", auto.name)),
+        None => Some(format!("acts in MANUAL only, and {} is not known", auto.name)),
+    }
 }
 
 /// How a device stands, in words.

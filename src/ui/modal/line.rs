@@ -15,25 +15,34 @@ const CHARS_MAX: usize = 64;
 pub struct Line {
     text: Vec<char>,
     cursor: usize,
-    allowed: Option<&'static str>,
+    /// Something that was typed or pasted is not in the text; until the text is empty again nobody may trust it.
+    missed: bool,
 }
 
 impl Line {
     /// Any text.
     pub fn new(text: &str) -> Line {
         let text: Vec<char> = text.chars().take(CHARS_MAX).collect();
-        Line { cursor: text.len(), text, allowed: None }
-    }
-    /// Only these characters; others are ignored.
-    pub fn only(allowed: &'static str) -> Line {
-        Line { allowed: Some(allowed), ..Line::default() }
+        Line { cursor: text.len(), text, missed: false }
     }
     /// What has been entered.
     pub fn text(&self) -> String {
         self.text.iter().collect()
     }
+    /// Was anything left out since the text was last empty? Such a text says something else than its author meant.
+    pub fn missed(&self) -> bool {
+        self.missed
+    }
     /// An editing key; `false` if it is none.
     pub fn on_key(&mut self, event: KeyEvent) -> bool {
+        let known = self.edit(event);
+        // Taking everything away starts anew; a key that was not taken does not.
+        let typed = matches!(event.code, KeyCode::Char(_)) && !event.modifiers.contains(KeyModifiers::CONTROL);
+        self.missed &= typed || !self.text.is_empty();
+        known
+    }
+
+    fn edit(&mut self, event: KeyEvent) -> bool {
         let ctrl = event.modifiers.contains(KeyModifiers::CONTROL);
         match event.code {
             KeyCode::Char('u') if ctrl => {
@@ -42,7 +51,9 @@ impl Line {
             }
             KeyCode::Char('a') if ctrl => self.cursor = 0,
             KeyCode::Char('e') if ctrl => self.cursor = self.text.len(),
-            KeyCode::Char(c) if !ctrl && !event.modifiers.contains(KeyModifiers::ALT) => self.insert(c),
+            // Over a slow line a lone Esc and a digit arrive as Alt with that digit: it is not taken, and that is told.
+            KeyCode::Char(_) if event.modifiers.contains(KeyModifiers::ALT) => self.missed = true,
+            KeyCode::Char(c) if !ctrl => self.insert(c),
             KeyCode::Backspace if self.cursor > 0 => {
                 self.cursor -= 1;
                 self.text.remove(self.cursor);
@@ -58,29 +69,35 @@ impl Line {
         }
         true
     }
-    /// Pasted text: control characters (a line end above all) are left out, so a paste never confirms anything.
+    /// Pasted text: control characters (a line end above all) become blanks, so a paste never confirms anything and
+    /// two lines never become one number.
     pub fn paste(&mut self, text: &str) {
         for c in text.trim().chars() {
-            self.insert(c);
+            self.insert(if c.is_control() { ' ' } else { c });
         }
     }
-    /// Draws text and cursor; returns the column after it.
+    /// Draws text and cursor; returns the column after it. A text that is too wide is drawn from a later character on,
+    /// marked with `…`, so that the cursor stays in sight.
     pub fn view(&self, theme: &Theme, canvas: &mut Canvas, x: u16, y: u16) -> u16 {
-        let text = self.text();
-        let end = canvas.text(x, y, &text, theme.strong());
-        let before: String = self.text[..self.cursor].iter().collect();
-        let at = x + width(&before);
+        let room = canvas.width().saturating_sub(x + 1);
+        let part = |from: usize| self.text[from..self.cursor].iter().collect::<String>();
+        let first = (0..=self.cursor).find(|from| width(&part(*from)) + u16::from(*from > 0) <= room);
+        let first = first.unwrap_or(self.cursor);
+        let start = if first > 0 { canvas.text(x, y, theme.ellipsis(), theme.strong()) } else { x };
+        let end = canvas.text(start, y, &self.text[first..].iter().collect::<String>(), theme.strong());
+        let at = start + width(&part(first));
         let under = self.text.get(self.cursor).copied().unwrap_or(' ');
         canvas.glyph(at, y, under, theme.focus());
         end.max(at + 1)
     }
 
     fn insert(&mut self, c: char) {
-        let welcome = !c.is_control() && self.allowed.is_none_or(|allowed| allowed.contains(c));
-        if welcome && self.text.len() < CHARS_MAX {
-            self.text.insert(self.cursor, c);
-            self.cursor += 1;
+        if c.is_control() || self.text.len() >= CHARS_MAX {
+            self.missed = true;
+            return;
         }
+        self.text.insert(self.cursor, c);
+        self.cursor += 1;
     }
 }
 
@@ -89,7 +106,7 @@ mod tests {
     use super::*;
 
     fn check(keys: &[KeyCode], expect: &str) {
-        let mut line = Line::only("0123456789.-");
+        let mut line = Line::default();
         for code in keys {
             line.on_key(KeyEvent::new(*code, KeyModifiers::NONE));
         }
@@ -100,7 +117,7 @@ mod tests {
     fn typing_corrects_itself() {
         use KeyCode::{Backspace, Char, Delete, End, Home, Left};
         check(&[Char('7'), Char('2')], "72");
-        check(&[Char('7'), Char('x'), Char('2')], "72");
+        check(&[Char('7'), Char('x'), Char('2')], "7x2");
         check(&[Char('7'), Char('2'), Left, Char('0')], "702");
         check(&[Char('7'), Char('2'), Backspace, Backspace, Backspace], "");
         check(&[Char('7'), Char('2'), Home, Delete, End, Char('5')], "25");
@@ -110,8 +127,15 @@ mod tests {
     fn a_paste_is_text_and_has_a_bound() {
         let mut line = Line::new("");
         line.paste("12\r\n34\u{1b}[A\n");
-        assert_eq!(line.text(), "1234[A");
+        assert_eq!(line.text(), "12  34 [A");
+        assert!(!line.missed());
         line.paste(&"9".repeat(1_000));
         assert_eq!(line.text().len(), CHARS_MAX);
+        assert!(line.missed(), "what did not fit is not forgotten");
+        line.on_key(KeyEvent::new(KeyCode::Char('u'), KeyModifiers::CONTROL));
+        assert!(!line.missed());
+        line.on_key(KeyEvent::new(KeyCode::Char('5'), KeyModifiers::ALT));
+        line.on_key(KeyEvent::new(KeyCode::Char('7'), KeyModifiers::NONE));
+        assert!(line.missed(), "an Alt digit is not taken, but noticed");
     }
 }

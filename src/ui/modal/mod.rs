@@ -6,6 +6,7 @@ pub mod entry;
 pub mod faceplate;
 pub mod help;
 pub mod line;
+pub mod notice;
 pub mod prompt;
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -15,6 +16,7 @@ pub use choice::Choice;
 pub use confirm::{Confirm, Intent};
 pub use entry::Entry;
 pub use faceplate::Faceplate;
+pub use notice::Notice;
 pub use prompt::Prompt;
 
 use super::{
@@ -40,6 +42,8 @@ pub enum Modal {
     Prompt(Prompt),
     /// What there is to know about an item of the mimic.
     Faceplate(Faceplate),
+    /// Words to be read: why something cannot be done now.
+    Notice(Notice),
 }
 
 /// What a key did to a window.
@@ -54,13 +58,15 @@ pub enum Next {
 }
 
 impl Modal {
-    /// The window in which an operator writes this tag: a list for an enumeration, else a number; `None` if it is read-only.
+    /// The window in which an operator writes this tag: a list for an enumeration, else a number; `None` if it is
+    /// read-only. Where the device cannot be reached the window says so, before anything is typed.
     pub fn write(cx: &Cx, tag: TagId) -> Option<Modal> {
         let def = cx.def().tag(tag);
-        match (def.writable(), def.labels.is_empty()) {
-            (false, _) => None,
-            (true, true) => Some(Modal::Entry(Entry::new(tag))),
-            (true, false) => Some(Modal::Choice(Choice::values(cx, tag))),
+        match (def.writable(), Notice::unreachable(cx, def.device), def.labels.is_empty()) {
+            (false, ..) => None,
+            (true, Some(notice), _) => Some(Modal::Notice(notice)),
+            (true, None, true) => Some(Modal::Entry(Entry::new(tag))),
+            (true, None, false) => Some(Modal::Choice(Choice::values(cx, tag))),
         }
     }
 
@@ -79,6 +85,7 @@ impl Modal {
             Modal::Choice(choice) => choice.on_key(cx, event),
             Modal::Prompt(prompt) => prompt.on_key(cx, tabs, event),
             Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
+            Modal::Notice(notice) => notice.on_key(event),
         };
         match next {
             Next::Stay(modal) => (Some(modal), Vec::new()),
@@ -87,12 +94,17 @@ impl Modal {
         }
     }
 
+    /// Is it the question whether to leave? The only window that a screen of any size can show.
+    pub fn is_quit(&self) -> bool {
+        matches!(self, Modal::Confirm(confirm) if confirm.is_quit())
+    }
+
     /// Pasted text goes into a text line, or nowhere.
     pub fn on_paste(&mut self, text: &str) {
         match self {
             Modal::Entry(entry) => entry.line.paste(text),
             Modal::Prompt(prompt) => prompt.line.paste(text),
-            Modal::Help(_) | Modal::Confirm(_) | Modal::Choice(_) | Modal::Faceplate(_) => {}
+            Modal::Help(_) | Modal::Confirm(_) | Modal::Choice(_) | Modal::Faceplate(_) | Modal::Notice(_) => {}
         }
     }
 
@@ -101,11 +113,12 @@ impl Modal {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         match self {
             Modal::Help(_) => vec![hint("↑↓", "scroll"), hint("Esc", "close")],
-            Modal::Confirm(confirm) => vec![hint("⏎", confirm.verb()), hint("Esc", "leave it as it is")],
+            Modal::Confirm(confirm) => vec![hint("⏎", confirm.verb()), hint("Esc", confirm.escape())],
             Modal::Entry(_) => vec![hint("⏎", "write and verify"), hint("Esc", "leave unchanged")],
             Modal::Choice(_) => vec![hint("↑↓", "select"), hint("⏎", "next"), hint("Esc", "leave unchanged")],
             Modal::Prompt(_) => vec![hint("⏎", "take it"), hint("Esc", "leave")],
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
+            Modal::Notice(_) => vec![hint("Esc", "close")],
         }
     }
 
@@ -118,6 +131,7 @@ impl Modal {
             Modal::Choice(choice) => choice.view(cx, frame, body),
             Modal::Prompt(prompt) => prompt.view(cx, frame, body),
             Modal::Faceplate(faceplate) => faceplate.view(cx, frame, body),
+            Modal::Notice(notice) => notice.view(cx, frame, body),
         }
     }
 }

@@ -18,7 +18,7 @@ use crate::{
         keys::{Key, char, code},
         modal::{Faceplate, Modal, confirm::subject, faceplate::device_words},
         widgets::{
-            text::{self, Canvas, between, fit, moment, pad, pad_left, running, wrap},
+            text::{self, Canvas, between, fit, fit_words, moment, pad, pad_left, running, wrap},
             value,
         },
     },
@@ -158,9 +158,12 @@ impl Alarms {
     /// Draws it.
     pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
+        let top = history_trouble(cx, &mut canvas);
+        let (width, height) = (canvas.width(), canvas.height());
+        let mut rest = canvas.part(0, top, width, height.saturating_sub(top));
         match &self.journal {
-            Some(journal) => journal.view(cx, &mut canvas),
-            None => self.list(cx, &mut canvas),
+            Some(journal) => journal.view(cx, &mut rest),
+            None => self.list(cx, &mut rest),
         }
     }
 
@@ -290,7 +293,7 @@ impl Journal {
         for (y, (at, text, style)) in rows.iter().skip(self.first).enumerate() {
             let y = y as u16 + 1;
             let x = canvas.text(1, y, &pad(&moment(*at, cx.now, &cx.def().time_zone), 10), theme.dim());
-            canvas.text(x, y, &fit(text, width.saturating_sub(x + 1)), *style);
+            canvas.text(x, y, &fit_words(text, width.saturating_sub(x + 1)), *style);
         }
     }
 
@@ -330,6 +333,18 @@ impl Journal {
     }
 }
 
+/// What is wrong with the history, whole, in at most a third of the tab; returns the rows taken. The header has no room
+/// for it.
+fn history_trouble(cx: &Cx, canvas: &mut Canvas) -> u16 {
+    let Some(trouble) = &cx.snapshot.history.trouble else { return 0 };
+    let lines = wrap(&format!("history: {trouble}"), canvas.width().saturating_sub(2));
+    let lines = lines.iter().take(usize::from(canvas.height() / 3).max(1));
+    lines.enumerate().fold(0, |_, (y, line)| {
+        canvas.text(1, y as u16, line, cx.theme.trouble());
+        y as u16 + 1
+    })
+}
+
 /// Widths of the columns between mark and state; wider screens give room to tag and words.
 struct Columns {
     tag: u16,
@@ -364,7 +379,7 @@ fn cells(cx: &Cx, alarm: &ActiveAlarm) -> [String; 7] {
         subject(cx, alarm.id),
         format!("{} {}", def.text, condition_words(cx, alarm.id)),
         match def.subject {
-            Subject::Tag(tag) => value::show(cx, tag).with_unit(),
+            Subject::Tag(tag) => value::show(cx, tag).within(10),
             Subject::Device(_) => "–".to_owned(),
         },
         alarm.state.word().to_owned(),

@@ -15,9 +15,9 @@ use crate::{
         Act, Cx,
         chrome::{order_words, outcome_words},
         keys::{Key, char, code},
-        modal::{Choice, Confirm, Faceplate, Modal, entry::range_words, faceplate::device_words},
+        modal::{Choice, Confirm, Faceplate, Modal, Notice, entry::range_words, faceplate::device_words},
         widgets::{
-            text::{Canvas, age, clock, fit, pad, pad_left},
+            text::{Canvas, age, clock, fit, fit_words, pad, pad_left, whole, width},
             value,
         },
     },
@@ -120,7 +120,9 @@ impl Controllers {
             },
             Action::Refresh => vec![Act::Order(Command::Refresh(self.device))],
             Action::Actions => {
-                Choice::actions(cx, self.device).map(|choice| Act::Open(Modal::Choice(choice))).into_iter().collect()
+                let actions = Choice::actions(cx, self.device).map(Modal::Choice);
+                let window = actions.map(|list| Notice::unreachable(cx, self.device).map_or(list, Modal::Notice));
+                window.map(Act::Open).into_iter().collect()
             }
             Action::Tune => write(device.faceplate.as_ref().and_then(|plate| plate.tune)),
             Action::Run => write(device.faceplate.as_ref().and_then(|plate| plate.run)),
@@ -154,7 +156,7 @@ impl Controllers {
             canvas.text(
                 1,
                 bottom,
-                &fit(&words, end.saturating_sub(12)),
+                &fit_words(&words, end.saturating_sub(12)),
                 if trouble { cx.theme.trouble() } else { cx.theme.dim() },
             );
         }
@@ -176,20 +178,19 @@ impl Controllers {
         let count = cx.def().devices.len();
         let x = canvas.text(1, 0, &format!("‹ {} ›", device.name), theme.focus());
         let line = &cx.def().line(device.line).name;
-        let x = canvas.text(
-            x + 2,
-            0,
-            &format!("{}  {}  unit {}  {line}", device.model, device.title, device.unit),
-            theme.normal(),
-        );
+        // On a narrow screen whether it answers counts for more than what it is for.
+        let title = if canvas.width() < 80 { String::new() } else { format!("{}  ", device.title) };
+        let words = format!("{}  {title}unit {}  {line}", device.model, device.unit);
+        let x = canvas.text(x + 2, 0, &words, theme.normal());
         let (mark, style) = match cx.snapshot.device(device.id).state {
             DeviceState::Answering => ("✓", theme.normal()),
             DeviceState::Unknown => ("?", theme.dim()),
             DeviceState::Failing(_) | DeviceState::Down { .. } => ("✗", theme.trouble()),
         };
-        canvas.text(x + 2, 0, &format!("{mark} {}", device_words(cx, device.id)), style);
-        let end = canvas.width().saturating_sub(1);
-        canvas.text_right(end, 0, &format!("{}/{count}", self.device.0 + 1), theme.dim());
+        let (end, place) = (canvas.width().saturating_sub(1), format!("{}/{count}", self.device.0 + 1));
+        let room = end.saturating_sub(x + 2 + width(&place) + 1);
+        canvas.text(x + 2, 0, &fit_words(&format!("{mark} {}", device_words(cx, device.id)), room), style);
+        canvas.text_right(end, 0, &place, theme.dim());
     }
 
     /// Parameters under the names of their groups, the selected one in sight; returns how many rows are out of sight below.
@@ -250,14 +251,12 @@ fn connect(cx: &Cx, line: LineId) -> Confirm {
 
 fn parameter(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagDef, selected: bool) {
     let theme = cx.theme;
-    let mut shown = value::show(cx, tag.id);
-    if tag.access == Access::Write {
-        shown.text = "–".to_owned();
-    }
+    let shown = value::show(cx, tag.id);
+    let text = shown.bare(Columns::VALUE);
     let old = matches!(tag.poll, Poll::Every(_))
         && cx.age(tag.id).as_secs() < 60
         && cx.snapshot.sample(tag.id).quality.is_good();
-    let read = if old { String::new() } else { age(cx.age(tag.id)) };
+    let read = if old || tag.access == Access::Write { String::new() } else { age(cx.age(tag.id)) };
     let range = range_words(cx, tag.id);
     // What is only read needs no range; what can be written says that its range is not known.
     let none = !tag.writable() && tag.labels.is_empty() && cx.snapshot.range(tag.id).is_none();
@@ -267,10 +266,10 @@ fn parameter(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagD
     let meaning =
         if shown.note.is_empty() || cx.snapshot.sample(tag.id).value.is_some() { &tag.meaning } else { &shown.note };
     let name = format!("{} {}", pad(&tag.short, columns.short), tag.label);
-    let row = columns.row([pen, &name, &shown.text, &shown.unit, &range, &read, meaning]);
+    let row = columns.row([pen, &name, &text, &shown.unit, &whole(&range, Columns::RANGE), &read, meaning]);
     canvas.text(1, y, &row, if selected { theme.focus() } else { theme.normal() });
     if !selected && tag.access != Access::Write && !cx.snapshot.sample(tag.id).quality.is_good() {
-        canvas.text(1 + columns.value_at(), y, &pad_left(&shown.text, Columns::VALUE), shown.style);
+        canvas.text(1 + columns.value_at(), y, &pad_left(&text, Columns::VALUE), shown.style);
     }
 }
 
@@ -294,7 +293,9 @@ fn faceplate_row(cx: &Cx, device: &DeviceDef, canvas: &mut Canvas) {
             x = canvas.text(x, 1, name, cx.theme.dim()) + 1;
         }
         let shown = value::show(cx, tag);
-        x = canvas.text(x, 1, &shown.with_unit(), shown.style);
+        let room = canvas.width().saturating_sub(x);
+        let text = if width(&shown.with_unit()) <= room { shown.with_unit() } else { shown.bare(room) };
+        x = canvas.text(x, 1, &text, shown.style);
     }
 }
 

@@ -15,7 +15,7 @@ use crate::{
     ui::{
         Act, Cx,
         keys::{self, Hint, Key, char, code},
-        modal::{Choice, Confirm, Faceplate, Modal},
+        modal::{Choice, Confirm, Faceplate, Modal, Notice},
         widgets::{
             mimic::{Stretch, panel, pipe, place, tags, tank::Tank, title, trend, unit},
             text::{Canvas, fit},
@@ -193,11 +193,14 @@ fn stretch(cx: &Cx, area: Rect) -> Stretch {
     Stretch::new(cx.def().mimic.size, (area.width, area.height))
 }
 
-/// The window of a plant command: a fixed value or the other of two states is asked at once; a toggle of a state that
+/// The window of a plant command, or why it cannot be given: a fixed value or the other of two states is asked at once; a toggle of a state that
 /// nobody knows becomes a list, and anything else is entered.
 fn intent(cx: &Cx, command: &MimicCommand) -> Option<Modal> {
     let tag = command.tag;
     let def = cx.def().tag(tag);
+    if let Some(notice) = Notice::unreachable(cx, def.device) {
+        return Some(Modal::Notice(notice));
+    }
     if let Some(value) = command.value {
         return Some(Modal::Confirm(Confirm::write(cx, tag, value)));
     }

@@ -110,7 +110,12 @@ impl Tabs {
         match self.shown {
             Tab::Mimic => self.mimic.hints(cx),
             Tab::Trends => keys::hints(trends::KEYS),
-            Tab::Alarms => keys::hints(alarms::KEYS),
+            Tab::Alarms => {
+                // Keys of every tab, but here is where they are looked for.
+                let ack = Hint::new("a", "ack", "acknowledge the selected alarm");
+                let all = Hint::new("A", "all", "acknowledge all alarms (asks first)");
+                [ack, all].into_iter().chain(keys::hints(alarms::KEYS)).collect()
+            }
             Tab::Controllers => keys::hints(controllers::KEYS),
             Tab::Reports => keys::hints(reports::KEYS),
         }

@@ -12,11 +12,13 @@ use crate::{
         def::{AlarmId, Priority},
         event::{Fault, LineState},
         record::{ActionRecord, AlarmRecord, AlarmStep},
+        sample::{Cause, Sample},
+        snapshot::DeviceState,
     },
     ui::{
         Effect, Msg,
         fixture::{self, Fixture},
-        modal::Modal,
+        modal::{Faceplate, Modal},
         tabs::Tab,
         theme::Theme,
         update,
@@ -32,6 +34,104 @@ fn a_number_is_written_only_after_enter() {
     assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
     assert_eq!(model.modal, None);
     assert!(screen(&mut model, 80, 24).contains("TIC-1.SV ? → 65.5 °C  sent"));
+}
+
+#[test]
+fn what_is_typed_is_what_is_written_or_refused() {
+    let fixture = Fixture::normal();
+    let check = |keys: &str, expect: Result<f64, &str>| {
+        let mut model = model(&fixture, Theme::FULL);
+        let order = order_of(&type_keys(&mut model, keys)).cloned();
+        let shown = screen(&mut model, 80, 24);
+        match expect {
+            Ok(value) => assert_eq!(order, Some(Command::Write { tag: fixture.tag("TIC-1.SV"), value }), "{keys}"),
+            Err(words) => {
+                assert_eq!(order, None, "{keys}");
+                assert!(shown.contains(words), "{words} is missing:\n{shown}");
+            }
+        }
+    };
+    check("s3,5⏎", Ok(3.5));
+    check("s7OO⏎", Err("\"7OO\" is no number"));
+    check("s1e5⏎", Err("\"1e5\" is no number"));
+    check("s7 0", Err("new 7 0"));
+    check(&format!("s{}⏎", "7".repeat(70)), Err("not all of it was taken"));
+}
+
+#[test]
+fn a_device_that_does_not_answer_is_said_so_before_anything_is_typed() {
+    let check = |fixture: &Fixture, keys: &str, expect: &str| {
+        let mut model = model(fixture, Theme::FULL);
+        type_keys(&mut model, keys);
+        assert!(matches!(model.modal, Some(Modal::Notice(_))), "{keys}: {:?}", model.modal);
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains(expect), "{expect} is missing:\n{shown}");
+        assert_eq!(order_of(&type_keys(&mut model, "70⏎")), None);
+    };
+    let mut silent = Fixture::normal();
+    silent.devices[0].state = DeviceState::Down { since: fixture::now() };
+    for keys in ["s", "4↓⏎", "4f", "4T", "4S"] {
+        check(&silent, keys, "TIC-1 is not answering");
+    }
+    check(&Fixture::line_down(), "r", "PLC-1 is not answering");
+    let mut closed = Fixture::normal();
+    closed.line.state = LineState::Disconnected;
+    check(&closed, "s", "Line L1 was disconnected by an operator.");
+}
+
+#[test]
+fn a_screen_too_small_to_see_takes_no_orders() {
+    let fixture = Fixture::alarm();
+    let small = |keys: &str| {
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, keys);
+        screen(&mut model, 50, 10);
+        model
+    };
+    for keys in ["s65⏎", "r⏎", "m⏎", "A⏎", "4T↓⏎⏎", "4u", "4L⏎", "?", "5w⏎"] {
+        let mut model = small("");
+        let shown = model.tabs.shown;
+        assert_eq!(type_keys(&mut model, keys), [], "{keys}");
+        assert_eq!((&model.modal, model.tabs.shown), (&None, shown), "{keys}");
+    }
+    for keys in ["s65", "r", "A", "4T↓⏎", "?", "→⏎"] {
+        let mut model = small(keys);
+        assert_eq!(model.modal, None, "{keys}: a window that nobody sees is closed");
+        assert_eq!(type_keys(&mut model, "⏎"), [], "{keys}");
+    }
+    let mut model = small("3↓↓");
+    assert_eq!(
+        order_of(&type_keys(&mut model, "a")),
+        Some(&Command::Acknowledge(fixture.alarms[0].id)),
+        "the banner's"
+    );
+    type_keys(&mut model, "q");
+    assert!(screen(&mut model, 50, 10).contains("Quit? ⏎ quit  Esc stay"));
+    assert_eq!(type_keys(&mut model, "⎋"), []);
+    assert_eq!(type_keys(&mut model, "q⏎"), [Effect::Quit]);
+}
+
+#[test]
+fn a_pump_is_switched_by_its_manual_command() {
+    let mut fixture = Fixture::normal();
+    for (auto, told) in [(1.0, true), (0.0, false)] {
+        fixture.set("PLC-1.AUTO", auto);
+        let mut model = model(&fixture, Theme::FULL);
+        model.modal = Faceplate::new("P-1", vec![fixture.tag("PLC-1.P-1")]).map(Modal::Faceplate);
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains("⏎ writes PLC-1.MAN.P-1") && shown.contains("⏎ write MAN.P-1"), "{shown}");
+        assert_eq!(shown.contains("acts in MANUAL only, and PLC-1.AUTO is on"), told, "{shown}");
+        assert_eq!(order_of(&type_keys(&mut model, "⏎↓⏎")), None, "asks first");
+        let shown = screen(&mut model, 80, 24);
+        assert_eq!(shown.contains("! acts in MANUAL only, and PLC-1.AUTO is on"), told, "{shown}");
+        let order = Command::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
+        assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
+    }
+    // One without such a command has nothing to write.
+    let mut model = model(&fixture, Theme::FULL);
+    model.modal = Faceplate::new("SV-1", vec![fixture.tag("PLC-1.SV-1")]).map(Modal::Faceplate);
+    type_keys(&mut model, "⏎");
+    assert!(matches!(model.modal, Some(Modal::Faceplate(_))));
 }
 
 #[test]
@@ -60,7 +160,9 @@ fn a_toggle_is_asked_and_does_what_it_said() {
 
 #[test]
 fn a_toggle_of_the_unknown_becomes_a_choice() {
-    let fixture = Fixture::line_down();
+    let mut fixture = Fixture::normal();
+    let run = fixture.tag("PLC-1.RUN");
+    fixture.samples[run.index()] = Sample::bad(Cause::NotRead, fixture::now());
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "r");
     assert!(matches!(model.modal, Some(Modal::Choice(_))));
@@ -210,7 +312,31 @@ fn the_outcome_of_an_order_is_told_until_it_is_dismissed() {
     check(Outcome::Unchanged, "unchanged, nothing written");
     check(Outcome::Refused(Refusal::ReadOnly), "REFUSED: read only");
     check(Outcome::NotConfirmed(NotConfirmed::Different(65.0)), "NOT CONFIRMED: read back 65");
-    check(Outcome::Failed(Fault::Timeout), "FAILED, may or may not have taken effect");
+    check(Outcome::NotConfirmed(NotConfirmed::NoReadBack), "accepted (cannot be read back)");
+    check(Outcome::Failed(Fault::Timeout), "FAILED, may have taken effect");
+}
+
+#[test]
+fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
+    let fixture = Fixture::normal();
+    let check = |outcome: Outcome, stays: bool| {
+        let mut model = model(&fixture, Theme::FULL);
+        let effects = type_keys(&mut model, "s60⏎");
+        let Some(Effect::Order(id, command)) = effects.first().cloned() else { panic!("{effects:?}") };
+        let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
+        let status = OrderStatus { id, by: Arc::from("tech1"), command, at: snapshot.at, old: Some(70.0), outcome };
+        snapshot.orders = vec![status];
+        update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
+        let mut after = |ticks: usize| {
+            (0..ticks).for_each(|_| drop(update(&mut model, Msg::Tick { silent: Duration::ZERO })));
+            screen(&mut model, 80, 24).contains("14:02:31 ─") || screen(&mut model, 80, 24).contains("─ 14:02:31 ")
+        };
+        assert!(after(119));
+        assert_eq!(after(1), stays);
+    };
+    check(Outcome::Verified, false);
+    check(Outcome::Refused(Refusal::ReadOnly), true);
+    check(Outcome::Failed(Fault::Timeout), true);
 }
 
 #[test]

@@ -9,6 +9,7 @@ use crate::{
     plant::{
         alarm::AlarmState,
         def::Priority,
+        event::LineState,
         sample::{Cause, Quality, Sample},
     },
     ui::{
@@ -67,11 +68,14 @@ fn the_mimic_in_seven_bits() {
 #[test]
 fn the_linux_console_gets_characters_of_its_font() {
     let console = Theme { colours: Colours::Sixteen, glyphs: Glyphs::Block, motion: true };
-    let mut model = model(&Fixture::alarm(), console);
-    let shown = screen(&mut model, 80, 24);
-    let font = "─│┌┐└┘├┤┬┴┼═║╔╗╚╝╢╫►◄▲▼█▄▒°·×←↑→↓≈•○■√┘";
-    let strange: Vec<char> = shown.chars().filter(|c| !c.is_ascii() && !font.contains(*c)).collect();
-    assert!(strange.is_empty(), "{strange:?}");
+    let font = "─│┌┐└┘├┤┬┴┼═║╔╗╚╝╢╫►◄▲▼█▄▀▒░°·×←↑→↓≈•○■√┘";
+    for tab in Tab::ALL {
+        let mut model = model(&Fixture::alarm(), console);
+        model.tabs.shown = tab;
+        let shown = screen(&mut model, 80, 24);
+        let strange: Vec<char> = shown.chars().filter(|c| !c.is_ascii() && !font.contains(*c)).collect();
+        assert!(strange.is_empty(), "{tab:?}: {strange:?}");
+    }
 }
 
 #[test]
@@ -104,6 +108,106 @@ fn a_tiny_screen_still_shows_the_alarm() {
     let shown = screen(&mut model, 50, 5);
     assert!(shown.contains("‹2›! TIC-1.PV temperature high"), "{shown}");
     assert!(shown.contains("screen too small: 50x5, needs 60x16"), "{shown}");
+}
+
+#[test]
+fn a_screen_of_any_width_says_that_it_is_too_small() {
+    for (width, expect) in
+        [(50, "screen too small: 50x6, needs 60x16"), (30, "too small: 30x6, needs 60x16"), (20, "too small: 20x6")]
+    {
+        let mut model = model(&Fixture::normal(), Theme::FULL);
+        assert_eq!(screen(&mut model, width, 6).lines().nth(1), Some(expect));
+    }
+}
+
+#[test]
+fn nobody_says_no_alarms_who_cannot_see_them() {
+    let check = |state: LineState, expect: &str| {
+        let mut fixture = Fixture::normal();
+        fixture.line.state = state;
+        let shown = screen(&mut model(&fixture, Theme::FULL), 80, 24);
+        let banner = shown.lines().nth(2).unwrap_or_default();
+        assert_eq!(banner.trim(), expect);
+    };
+    check(LineState::Connected, "no alarms");
+    check(LineState::Disconnected, "alarms not judged: L1 disconnected");
+    check(LineState::Connecting, "alarms not judged: L1 not connected");
+    let waiting = LineState::Waiting { why: "No such file".to_owned(), retry_at: fixture::now() };
+    check(waiting, "alarms not judged: L1 not connected");
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    update(&mut model, Msg::Tick { silent: Duration::from_secs(7) });
+    assert!(screen(&mut model, 80, 24).contains("alarms not judged: station silent"));
+}
+
+#[test]
+fn no_screen_is_so_narrow_that_a_number_is_cut() {
+    // Every number of the screen stands in the wide screen too: a cut one would not.
+    let mut fixture = Fixture::alarm();
+    fixture.set("TIC-1.MV", 100.0);
+    let numbers = |text: &str| -> HashSet<String> {
+        let words = text.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == ':'));
+        words.filter(|word| word.contains('.') && word.len() > 1).map(str::to_owned).collect()
+    };
+    for tab in [Tab::Mimic, Tab::Alarms, Tab::Controllers] {
+        let mut model = model(&fixture, Theme::FULL);
+        model.tabs.shown = tab;
+        let whole = numbers(&screen(&mut model, 200, 60));
+        for width in 60..100 {
+            let shown = screen(&mut model, width, 40);
+            let cut: Vec<String> = numbers(&shown).difference(&whole).cloned().collect();
+            assert!(cut.is_empty(), "{tab:?} at {width}: {cut:?}\n{shown}");
+        }
+    }
+    let mut model = model(&fixture, Theme::FULL);
+    let shown = screen(&mut model, 60, 24);
+    assert!(shown.contains("MV  ##"), "{shown}");
+}
+
+#[test]
+fn what_is_too_narrow_for_all_words_overlaps_none() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    model.tabs.shown = Tab::Controllers;
+    let shown = screen(&mut model, 60, 16);
+    let heading = shown.lines().nth(4).unwrap_or_default();
+    assert!(heading.ends_with(" 1/2") && heading.contains("✓ answering"), "{heading}");
+}
+
+#[test]
+fn the_alarms_tab_tells_its_most_important_key() {
+    let mut model = model(&Fixture::alarm(), Theme::FULL);
+    model.tabs.shown = Tab::Alarms;
+    assert!(screen(&mut model, 80, 24).lines().last().is_some_and(|footer| footer.contains("a ack")));
+    type_keys(&mut model, "?");
+    assert!(screen(&mut model, 80, 24).contains("acknowledge the selected alarm"));
+}
+
+#[test]
+fn what_cannot_be_read_does_not_wait_to_be_read() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    type_keys(&mut model, "4f");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("now – write only") && !shown.contains("not read"), "{shown}");
+}
+
+#[test]
+fn without_colour_a_little_liquid_is_seen() {
+    for (glyphs, shallow, body) in [(Glyphs::Braille, '░', '▒'), (Glyphs::Block, '░', '▒'), (Glyphs::Ascii, ':', '#')]
+    {
+        let theme = Theme { colours: Colours::None, glyphs, motion: false };
+        let liquid = |level: f64| {
+            let mut fixture = Fixture::normal();
+            for tank in ["PLC-1.LT-1", "PLC-1.TK-2", "PLC-1.TK-3"] {
+                fixture.set(tank, 0.0);
+            }
+            fixture.set("PLC-1.LT-1", level);
+            let shown = screen(&mut model(&fixture, theme), 80, 24);
+            let bottom = shown.lines().nth(16).unwrap_or_default().to_owned();
+            bottom.chars().skip(16).take(15).filter(|c| *c == shallow || *c == body).count()
+        };
+        assert_eq!(liquid(0.0), 0, "{glyphs:?}");
+        assert!(liquid(0.3) > 2, "{glyphs:?}: a little beside the heater's words");
+        assert!(liquid(8.0) > 2, "{glyphs:?}: liquid behind the heater's words");
+    }
 }
 
 #[test]
@@ -182,9 +286,18 @@ fn trouble_of_the_store_is_in_the_header() {
     let mut model = Model::new(Arc::new(snapshot), Theme::FULL, 1, Arc::from("tech1"));
     let shown = screen(&mut model, 120, 40);
     let header = shown.lines().next().unwrap_or_default();
-    for words in ["history: disk full", "12 records lost", "speed ×60"] {
+    for words in ["history: see 3", "12 records lost", "speed ×60"] {
         assert!(header.contains(words), "{header}");
     }
+    assert!(shown.lines().nth(2).is_some_and(|banner| banner.contains("history: disk full")), "{shown}");
+    let mut alarm = Arc::unwrap_or_clone(Fixture::alarm().snapshot());
+    alarm.history.trouble = Some("the disk is full and nothing has been written since 13:10, ".repeat(2));
+    let mut model = Model::new(Arc::new(alarm), Theme::FULL, 1, Arc::from("tech1"));
+    model.tabs.shown = Tab::Alarms;
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.lines().nth(2).is_some_and(|banner| banner.contains("temperature high")), "the alarm first: {shown}");
+    assert!(shown.lines().nth(4).is_some_and(|row| row.contains("history: the disk is full")), "{shown}");
+    assert!(shown.lines().nth(5).is_some_and(|row| row.trim_end().ends_with("13:10,")), "whole: {shown}");
 }
 
 #[test]

@@ -112,7 +112,7 @@ impl Chart<'_> {
         let rows = if area.height >= 6 { area.height - 3 } else { area.height };
         // The width of the labels wants the scales, the scales want the data in the columns of the final width:
         // the labels' width is settled first, on all data in sight.
-        let rough = self.scales(&self.columns(usize::from(area.width)), usize::from(rows));
+        let rough = self.scales(&self.columns(usize::from(area.width)), rows.div_ceil(2).into());
         let gutter = |axis: Axis| {
             let scales = rough.iter().filter(|(of, _)| *of == axis).map(|(_, scale)| *scale);
             let labels = scales.flat_map(|scale| scale.ticks().into_iter().map(move |tick| scale.label(tick).len()));
@@ -129,22 +129,52 @@ impl Chart<'_> {
             height: rows,
         };
         let columns = self.columns(usize::from(plot.width) * raster(self.theme).dots().0);
-        let scales = self.scales(&columns, usize::from(rows));
-        Plan { plot, scales, columns }
+        if plot.height == area.height {
+            let scales = self.scales(&columns, rows.div_ceil(2).into());
+            return Plan { plot, scales, columns };
+        }
+        let (height, scales) = self.even(&columns, rows);
+        Plan { plot: Rect { height, ..plot }, scales, columns }
     }
 
     fn columns(&self, count: usize) -> Vec<Vec<Option<Span>>> {
         self.curves.iter().map(|curve| curve.trace.columns(self.from, self.to, self.now, count)).collect()
     }
 
+    /// Height and scales whose labels stand evenly: the intervals of each axis divide the rows between its ends. Up to
+    /// three rows are given up for that; where nothing fits, the labels stand as they fall.
+    fn even(&self, columns: &[Vec<Option<Span>>], rows: u16) -> (u16, Vec<(Axis, Scale)>) {
+        let wanted = usize::from(rows.div_ceil(2)).min(6);
+        let usual = self.scales(columns, wanted);
+        let other: Vec<Vec<(Axis, Scale)>> = (1..wanted).map(|ticks| self.scales(columns, ticks)).collect();
+        let choice = |height: u16| {
+            let gaps = usize::from(height - 1);
+            let even = |scale: &Scale| scale.intervals().is_some_and(|n| n > 1 && gaps.is_multiple_of(n) && gaps > n);
+            let best = |(place, (axis, scale)): (usize, &(Axis, Scale))| {
+                let divided = (2..=wanted).filter_map(|n| scale.divided(n));
+                let all = divided.chain(other.iter().map(|scales| scales[place].1)).chain([*scale]);
+                let best = all.filter(even).max_by_key(|scale| scale.intervals());
+                // What has no labels needs no even ones.
+                best.or((*axis == Axis::Own).then_some(*scale)).map(|best| (*axis, best))
+            };
+            let scales: Vec<(Axis, Scale)> = usual.iter().enumerate().map(best).collect::<Option<_>>()?;
+            let least = scales.iter().filter_map(|(_, scale)| scale.intervals()).min().unwrap_or(0).min(4) as i32;
+            Some((2 * least - i32::from(rows - height), height, scales))
+        };
+        let choices = (rows.saturating_sub(3).max(3)..=rows).rev().filter_map(choice);
+        // Of equals the first, which is the highest.
+        let best = choices.reduce(|best, next| if next.0 > best.0 { next } else { best });
+        best.map_or((rows, usual), |(_, height, scales)| (height, scales))
+    }
+
     /// Axis and scale of each curve: curves of one unit share a scale.
-    fn scales(&self, columns: &[Vec<Option<Span>>], rows: usize) -> Vec<(Axis, Scale)> {
+    fn scales(&self, columns: &[Vec<Option<Span>>], intervals: usize) -> Vec<(Axis, Scale)> {
         let scale = |curve: &Curve| {
             let same = || self.curves.iter().zip(columns).filter(|(other, _)| other.unit == curve.unit);
             let spans = same().flat_map(|(_, columns)| columns.iter().flatten()).map(|span| (span.min, span.max));
             let fixed = same().filter_map(|(curve, _)| curve.fixed);
             let resolution = same().map(|(curve, _)| curve.resolution).fold(f64::INFINITY, f64::min);
-            Scale::fit(spans.reduce(widen), fixed.reduce(widen), resolution, rows.div_ceil(2).min(6))
+            Scale::fit(spans.reduce(widen), fixed.reduce(widen), resolution, intervals.clamp(1, 6))
         };
         self.axes().into_iter().zip(self.curves.iter().map(scale)).collect()
     }

@@ -137,6 +137,24 @@ pub fn fit(text: &str, room: u16) -> String {
     out
 }
 
+/// The text, or `##` where it does not fit: for numbers, a part of which is another number.
+pub fn whole(text: &str, room: u16) -> String {
+    if width(text) <= room { text.to_owned() } else { "#".repeat(usize::from(room.min(2))) }
+}
+
+/// The text, cut with `…` between two words, so that no number in it is cut.
+pub fn fit_words(text: &str, room: u16) -> String {
+    if width(text) <= room {
+        return text.to_owned();
+    }
+    let ends = text.match_indices(' ').map(|(at, _)| &text[..at]);
+    match ends.rev().find(|part| width(part) + 2 <= room) {
+        Some(part) => format!("{} …", part.trim_end()),
+        None if room > 0 => "…".to_owned(),
+        None => String::new(),
+    }
+}
+
 /// The text, cut or filled with blanks to exactly this width.
 pub fn pad(text: &str, room: u16) -> String {
     let text = fit(text, room);
@@ -227,6 +245,20 @@ mod tests {
         assert_eq!(fit("temperature", 0), "");
         assert_eq!(pad("PV", 4), "PV  ");
         assert_eq!(pad_left("7", 3), "  7");
+    }
+
+    #[test]
+    fn a_cut_sentence_has_no_cut_number() {
+        let check = |room, expect: &str| assert_eq!(fit_words("SV 60.0 → 100.0 °C verified", room), expect, "{room}");
+        check(27, "SV 60.0 → 100.0 °C verified");
+        check(26, "SV 60.0 → 100.0 °C …");
+        check(16, "SV 60.0 → …");
+        check(2, "…");
+        check(0, "");
+        assert_eq!(
+            (whole("100.0", 5).as_str(), whole("100.0", 4).as_str(), whole("100.0", 1).as_str()),
+            ("100.0", "##", "#")
+        );
     }
 
     #[test]

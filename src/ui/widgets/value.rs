@@ -7,6 +7,7 @@ use crate::{
     plant::{
         def::TagId,
         sample::{Cause, Quality},
+        tag::Access,
     },
     ui::Cx,
 };
@@ -20,6 +21,8 @@ pub struct Shown {
     pub unit: String,
     /// Why not to trust it: the age of an uncertain value, the cause of a bad one; empty if good.
     pub note: String,
+    /// A number, which is shown whole or not at all; words may be cut with a mark.
+    pub number: bool,
     /// Look of the text.
     pub style: Style,
 }
@@ -28,16 +31,23 @@ pub struct Shown {
 pub fn show(cx: &Cx, tag: TagId) -> Shown {
     let sample = cx.snapshot.sample(tag);
     let style = cx.theme.quality(sample.quality);
+    let def = cx.def().tag(tag);
     let unit = cx.snapshot.unit(tag).to_owned();
+    let number = def.labels.is_empty() && def.bit_labels.is_empty();
+    let nothing = |text: &str, note: &str, style| Shown {
+        text: text.to_owned(),
+        unit: String::new(),
+        note: note.to_owned(),
+        number: false,
+        style,
+    };
     match (sample.quality, words(cx, tag)) {
-        (Quality::Good, Some(text)) => Shown { text, unit, note: String::new(), style },
+        _ if def.access == Access::Write => nothing("–", "write only", cx.theme.dim()),
+        (Quality::Good, Some(text)) => Shown { text, unit, note: String::new(), number, style },
         (Quality::Uncertain(_), Some(text)) => {
-            Shown { text: format!("{text}?"), unit, note: text::age(cx.age(tag)), style }
+            Shown { text: format!("{text}?"), unit, note: text::age(cx.age(tag)), number, style }
         }
-        (quality, _) => {
-            let note = quality.cause().unwrap_or(Cause::NotRead).words().to_owned();
-            Shown { text: "----".to_owned(), unit: String::new(), note, style }
-        }
+        (quality, _) => nothing("----", quality.cause().unwrap_or(Cause::NotRead).words(), style),
     }
 }
 
@@ -66,16 +76,45 @@ impl Shown {
     pub fn whole(&self) -> String {
         if self.note.is_empty() { self.with_unit() } else { format!("{} {}", self.with_unit(), self.note) }
     }
+    /// The text alone, `##` for a number that does not fit: a part of a number is another number.
+    pub fn bare(&self, room: u16) -> String {
+        if self.number { text::whole(&self.text, room) } else { text::fit(&self.text, room) }
+    }
     /// As much as fits: the note goes first, then the unit; the doubt itself is part of the text and stays.
     pub fn within(&self, room: u16) -> String {
         [self.whole(), self.with_unit()]
             .into_iter()
             .find(|text| text::width(text) <= room)
-            .unwrap_or_else(|| text::fit(&self.text, room))
+            .unwrap_or_else(|| self.bare(room))
     }
 }
 
 /// `on` for a good value that is not zero; `None` when nobody can say.
 pub fn is_on(cx: &Cx, tag: TagId) -> Option<bool> {
     cx.snapshot.sample(tag).trusted().map(|value| value != 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ui::fixture::{Fixture, with_cx};
+
+    #[test]
+    fn a_number_is_whole_or_not_there() {
+        let mut fixture = Fixture::normal();
+        fixture.set("TIC-1.MV", 100.0);
+        let check = |name: &str, room: u16, expect: &str| {
+            with_cx(&fixture.snapshot(), |cx| {
+                assert_eq!(show(cx, fixture.tag(name)).within(room), expect, "{name} in {room}");
+            });
+        };
+        check("TIC-1.MV", 7, "100.0 %");
+        check("TIC-1.MV", 6, "100.0");
+        check("TIC-1.MV", 5, "100.0");
+        check("TIC-1.MV", 4, "##");
+        check("TIC-1.MV", 1, "#");
+        check("TIC-1.MV", 0, "");
+        check("PLC-1.AUTO", 3, "AU…");
+        check("TIC-1.FIX", 20, "– write only");
+    }
 }

@@ -51,6 +51,7 @@ fn past(tag: TagId, at: Timestamp) -> f64 {
 impl Stand {
     fn new(theme: Theme, width: u16, height: u16) -> Stand {
         let mut model = Model::new(Fixture::normal().snapshot(), theme, 1, "tech1".into());
+        update(&mut model, Msg::Resize(80, 24));
         let begin = ago(86_400);
         update(&mut model, Msg::Resize(width, height));
         let mut stand = Stand { model, asked: Vec::new(), begin, gap: (begin, begin) };

@@ -32,8 +32,16 @@ impl Scale {
         let least = (10.0 * resolution).max(low.abs().max(high.abs()) * 1e-9);
         let least = if least > 0.0 { least } else { 1.0 };
         if high - low < least {
-            let middle = low / 2.0 + high / 2.0;
-            (low, high) = (middle - least / 2.0, middle + least / 2.0);
+            let (positive, middle) = (low >= 0.0, low / 2.0 + high / 2.0);
+            (low, high) = match (low, high) {
+                // Nothing all the time: a plain scale, not one around a nought.
+                (0.0, 0.0) => (0.0, least.max(1.0)),
+                _ => (middle - least / 2.0, middle + least / 2.0),
+            };
+            // What is never negative gets no negative scale.
+            if positive && low < 0.0 {
+                (low, high) = (0.0, high - low);
+            }
         }
         // Rounding outwards may need a longer step, once or twice.
         let mut step = nice_step(high - low, ticks);
@@ -59,6 +67,25 @@ impl Scale {
         let count = (last - first).clamp(0.0, 100.0) as usize;
         // Adding zero turns a negative zero into a plain one.
         (0..=count).map(|n| (first + n as f64) * self.step + 0.0).collect()
+    }
+
+    /// The same range in `n` intervals, if that makes ticks that people count in: 25 for 0 … 100, 400 for 0 … 1600.
+    pub fn divided(self, n: usize) -> Option<Scale> {
+        let step = (self.high - self.low) / n.max(1) as f64;
+        let power = 10f64.powf((step.log10() + 1e-9).floor());
+        let factors: &[f64] = &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 2.5];
+        let factors = if step >= 10.0 { factors } else { &factors[..7] };
+        let round = factors.iter().find(|factor| (step / power - **factor).abs() < 1e-6)?;
+        let scale = Scale { step: round * power, ..self };
+        (scale.intervals() == Some(n)).then_some(scale)
+    }
+
+    /// Intervals between ticks; `None` where the ends of the scale are no ticks.
+    pub fn intervals(self) -> Option<usize> {
+        let ticks = self.ticks();
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-6 * self.step;
+        let ends = near(*ticks.first()?, self.low) && near(*ticks.last()?, self.high);
+        ends.then_some(ticks.len() - 1)
     }
 
     /// A tick as text, with the decimals that its step needs.
@@ -152,12 +179,30 @@ mod tests {
         check(Some((-3.0, 4.0)), None, 0.1, 4, "-4 … 4 | -4 -2 0 2 4");
         check(Some((70.0, 70.1)), None, 0.1, 5, "69.5 … 71 | 69.5 70.0 70.5 71.0");
         check(Some((70.0, 70.0)), None, 0.1, 4, "69.5 … 70.5 | 69.5 70.0 70.5");
-        check(Some((0.0, 0.0)), None, 0.0, 4, "-0.5 … 0.5 | -0.5 0.0 0.5");
+        check(Some((0.0, 0.0)), None, 0.0, 4, "0 … 1 | 0.0 0.5 1.0");
+        check(Some((0.0, 0.0)), None, 0.01, 5, "0 … 1 | 0.0 0.2 0.4 0.6 0.8 1.0");
+        check(Some((0.02, 0.02)), None, 0.01, 5, "0 … 0.1 | 0.00 0.02 0.04 0.06 0.08 0.10");
         check(Some((10.0, 60.0)), Some((0.0, 100.0)), 0.1, 4, "0 … 100 | 0 50 100");
         check(Some((10.0, 107.0)), Some((0.0, 100.0)), 0.1, 4, "0 … 150 | 0 50 100 150");
         check(None, Some((0.0, 25.0)), 0.1, 5, "0 … 25 | 0 5 10 15 20 25");
         check(None, None, 0.1, 2, "0 … 1 | 0.0 0.5 1.0");
         check(Some((5.0, 15.0)), Some((7.0, 3.0)), 0.1, 2, "5 … 15 | 5 10 15");
+    }
+
+    #[test]
+    fn a_given_range_is_divided_into_round_parts_or_not_at_all() {
+        let check = |low: f64, high: f64, n: usize, expect: Option<f64>| {
+            let scale = Scale { low, high, step: high - low }.divided(n);
+            assert_eq!(scale.map(|scale| scale.step), expect, "{low} … {high} / {n}");
+        };
+        check(0.0, 100.0, 4, Some(25.0));
+        check(0.0, 100.0, 5, Some(20.0));
+        check(0.0, 100.0, 3, None);
+        check(0.0, 1600.0, 4, Some(400.0));
+        check(0.0, 10.0, 4, None);
+        check(0.0, 30.0, 3, Some(10.0));
+        check(10.0, 60.0, 2, None);
+        check(50.0, 80.0, 3, Some(10.0));
     }
 
     #[test]

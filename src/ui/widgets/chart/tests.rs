@@ -136,3 +136,20 @@ fn time_that_was_not_read_yet_is_blank_and_not_called_a_gap() {
     let picture = picture(&chart(&Theme::FULL, vec![curve(&unread, 0, "°C")]), 60, 8);
     assert!(!picture.contains("no data"), "{picture}");
 }
+
+#[test]
+fn the_labels_of_an_axis_stand_evenly() {
+    let pv = trace((0..=100).map(|n| f64::from(n % 60)));
+    for (fixed, least) in [(Some((0.0, 100.0)), 3), (Some((0.0, 1600.0)), 3), (None, 3)] {
+        for height in 11..30 {
+            let chart = chart(&Theme::FULL, vec![Curve { fixed, ..curve(&pv, 0, "°C") }]);
+            let plan = chart.plan(Rect::new(0, 0, 80, height));
+            let scale = plan.scales[0].1;
+            let rows: Vec<i32> =
+                scale.ticks().into_iter().map(|tick| i32::from(chart.row(scale, tick, plan.plot.height))).collect();
+            let gaps: Vec<i32> = rows.windows(2).map(|pair| pair[0] - pair[1]).collect();
+            assert!(gaps.windows(2).all(|pair| pair[0] == pair[1]), "{fixed:?} in {height} rows: {rows:?}");
+            assert!(rows.len() >= least, "{fixed:?} in {height} rows: {rows:?}");
+        }
+    }
+}

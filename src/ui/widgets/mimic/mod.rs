@@ -130,13 +130,23 @@ pub(super) fn alarm_mark(cx: &Cx, tag: TagId) -> Option<(&'static str, Style)> {
     Some((cx.theme.priority_tag(priority), cx.theme.alarm(priority, alarm.state, cx.flash())))
 }
 
-/// Writes a value with unit, doubt and alarm mark; returns the column after it. `within` is cut to the room.
+/// Writes a value with unit, doubt and alarm mark; returns the column after it. What does not fit into the room or on
+/// the screen goes in this order: the mark, the unit, the number itself (`##`).
 pub(super) fn put_value(cx: &Cx, canvas: &mut Canvas, x: u16, y: u16, tag: TagId, room: u16) -> u16 {
+    let room = room.min(canvas.width().saturating_sub(x));
     let mark = alarm_mark(cx, tag);
     let taken = mark.map_or(0, |(mark, _)| super::text::width(mark) + 1);
     let shown = super::value::show(cx, tag);
-    let x = canvas.text(x, y, &shown.within(room.saturating_sub(taken)), shown.style);
+    let taken = if super::text::width(&shown.text) + taken > room { 0 } else { taken };
+    let text = shown.within(room - taken);
+    let x = canvas.text(x, y, &text, shown.style);
     match mark {
+        // Without room for the mark its colour and its flashing stand on the number.
+        Some((_, style)) if taken == 0 => {
+            let length = super::text::width(&text);
+            canvas.paint(x - length.min(x), y, length, 1, style);
+            x
+        }
         Some((mark, style)) => canvas.text(x + 1, y, mark, style),
         None => x,
     }

@@ -8,7 +8,7 @@ use crate::{
     ui::{
         Cx,
         widgets::{
-            text::{Canvas, fit, running, width},
+            text::{Canvas, fit, running, whole, width},
             value,
         },
     },
@@ -19,7 +19,8 @@ pub fn controller(cx: &Cx, canvas: &mut Canvas, at: Bounds, device: &DeviceDef, 
     let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
     let theme = cx.theme;
     let x = canvas.text(0, 0, &device.name, label_style(cx, selected));
-    canvas.text(x + 2, 0, &device.model, theme.dim());
+    let room = canvas.width().saturating_sub(x + 2);
+    canvas.text(x + 2, 0, &fit(&device.model, room), theme.dim());
     let Some(plate) = &device.faceplate else { return };
     let mut y = 1;
     for (name, tag) in [("PV", Some(plate.pv)), ("SV", Some(plate.sv)), ("MV", plate.mv)] {
@@ -41,7 +42,8 @@ pub fn controller(cx: &Cx, canvas: &mut Canvas, at: Bounds, device: &DeviceDef, 
         if Some(tag) == plate.tune {
             x = canvas.text(x, y + 1, "AT", theme.dim()) + 1;
         }
-        x = canvas.text(x, y + 1, &shown.text, shown.style) + 2;
+        let room = canvas.width().saturating_sub(x);
+        x = canvas.text(x, y + 1, &shown.bare(room), shown.style) + 2;
     }
 }
 
@@ -49,8 +51,12 @@ pub fn controller(cx: &Cx, canvas: &mut Canvas, at: Bounds, device: &DeviceDef, 
 fn scale(cx: &Cx, canvas: &mut Canvas, y: u16, pv: TagId) {
     let Some((min, max)) = cx.snapshot.range(pv) else { return };
     let end = canvas.width();
-    canvas.text(0, y, &cx.snapshot.format(pv, min), cx.theme.dim());
-    canvas.text_right(end, y, &format!("{} {}", cx.snapshot.format(pv, max), cx.snapshot.unit(pv)), cx.theme.dim());
+    let (low, high) =
+        (cx.snapshot.format(pv, min), format!("{} {}", cx.snapshot.format(pv, max), cx.snapshot.unit(pv)));
+    if width(&low) + 1 + width(&high) <= end {
+        canvas.text(0, y, &low, cx.theme.dim());
+        canvas.text_right(end, y, &high, cx.theme.dim());
+    }
 }
 
 /// `├───┃────▼──█──┃────┤`: PV filled, SV as a triangle, alarm limits as bars. Without a good PV the bar has no PV.
@@ -123,8 +129,9 @@ impl Sequence<'_> {
                 }
                 Some(_) | None => format!("{} left", value::show(cx, left).text),
             };
-            let end = at.width;
-            canvas.text_right(end.max(x + 1 + width(&text)), 0, &text, theme.normal());
+            let room = canvas.width().saturating_sub(x + 1);
+            let end = canvas.width();
+            canvas.text_right(end, 0, &whole(&text, room), theme.normal());
         }
         let last = at.height.saturating_sub(1).max(1);
         let rows = self.steps(cx, &mut canvas.part(0, 1, at.width, last.saturating_sub(1)));

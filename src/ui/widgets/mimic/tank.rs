@@ -1,5 +1,7 @@
 //! A vessel: its liquid follows the level, its agitator turns, its heater glows, and none of them without a good value.
 
+use ratatui::style::Style;
+
 use super::{Bounds, alarm_mark, label_style, put_value};
 use crate::{
     plant::def::TagId,
@@ -46,10 +48,15 @@ impl Tank<'_> {
         self.fittings(cx, &mut inside, motion);
         self.values(cx, &mut inside);
         // Text over liquid stands on the liquid, not in a hole.
-        if let Some(eighths) = eighths.filter(|_| cx.theme.colours != Colours::None) {
-            let full = (eighths / 8) as u16;
-            let top = inside.height().saturating_sub(full);
-            let width = inside.width();
+        let Some(eighths) = eighths else { return };
+        let full = (eighths / 8) as u16;
+        let (top, width) = (inside.height().saturating_sub(full), inside.width());
+        if cx.theme.colours == Colours::None {
+            (top..inside.height()).for_each(|y| fill_around(&mut inside, y, BODY));
+            if eighths % 8 > 0 && top > 0 {
+                fill_around(&mut inside, top - 1, SHALLOW);
+            }
+        } else {
             inside.paint(0, top, width, full, cx.theme.under_liquid());
         }
     }
@@ -124,12 +131,33 @@ fn eighths(cx: &Cx, level: TagId, rows: u16) -> Option<u32> {
     let value = cx.snapshot.sample(level).trusted()?;
     let (min, max) = cx.snapshot.range(level)?;
     let share = ((value - min) / (max - min)).clamp(0.0, 1.0);
-    share.is_finite().then(|| (share * f64::from(rows) * 8.0).round() as u32)
+    // A little is not nothing.
+    let least = u32::from(share > 0.005);
+    share.is_finite().then(|| ((share * f64::from(rows) * 8.0).round() as u32).max(least))
+}
+
+/// Without colour liquid is a pattern, so that it is seen beside words and above the bottom of the vessel.
+const BODY: char = '▒';
+/// A row that is filled in part.
+const SHALLOW: char = '░';
+
+/// Fills the blanks of a row, except those next to words.
+fn fill_around(canvas: &mut Canvas, y: u16, glyph: char) {
+    let width = canvas.width();
+    let free = |canvas: &Canvas, x: u16| canvas.symbol(x, y).is_some_and(|symbol| matches!(symbol, " " | "▒" | "░"));
+    let empty: Vec<bool> = (0..width).map(|x| free(canvas, x)).collect();
+    for x in 0..width {
+        let around = usize::from(x).saturating_sub(1)..(usize::from(x) + 2).min(empty.len());
+        if empty[around].iter().all(|empty| *empty) {
+            canvas.glyph(x, y, glyph, Style::new());
+        }
+    }
 }
 
 fn liquid(cx: &Cx, canvas: &mut Canvas, eighths: u32) {
     const SURFACE: [char; 7] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇'];
-    let body = if cx.theme.colours == Colours::None { '▒' } else { '█' };
+    let plain = cx.theme.colours == Colours::None;
+    let body = if plain { BODY } else { '█' };
     let (width, height) = (canvas.width(), canvas.height());
     let full = (eighths / 8) as u16;
     for y in height.saturating_sub(full)..height {
@@ -137,6 +165,7 @@ fn liquid(cx: &Cx, canvas: &mut Canvas, eighths: u32) {
     }
     let rest = (eighths % 8) as usize;
     if rest > 0 && full < height {
-        canvas.run(0, height - full - 1, width, SURFACE[rest - 1], cx.theme.liquid());
+        let surface = if plain { SHALLOW } else { SURFACE[rest - 1] };
+        canvas.run(0, height - full - 1, width, surface, cx.theme.liquid());
     }
 }

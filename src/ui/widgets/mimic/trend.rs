@@ -11,7 +11,7 @@ use crate::{
     ui::{
         Cx,
         theme::Glyphs,
-        widgets::text::{Canvas, fit},
+        widgets::text::{Canvas, fit, whole},
     },
 };
 
@@ -41,11 +41,12 @@ pub fn view(
     };
     let label = |value| cx.snapshot.format(tag, value);
     let (top, bottom) = (label(high), label(low));
-    let room = top.len().max(bottom.len()) as u16 + 1;
-    let (rows, columns) = (at.height.saturating_sub(1), at.width.saturating_sub(room));
-    canvas.text_right(at.width, 1, &top, theme.dim());
+    let (end, room) = (canvas.width(), top.len().max(bottom.len()) as u16 + 1);
+    let (rows, columns) = (at.height.saturating_sub(1), end.saturating_sub(room));
+    let [top, bottom] = [top, bottom].map(|text| whole(&text, end));
+    canvas.text_right(end, 1, &top, theme.dim());
     if rows > 1 {
-        canvas.text_right(at.width, rows, &bottom, theme.dim());
+        canvas.text_right(end, rows, &bottom, theme.dim());
     }
     let style = theme.pen(0);
     curve(&mut canvas.part(0, 1, columns, rows), series, (low, high), theme.glyphs, style);

@@ -86,7 +86,8 @@ pub fn states(cx: &Cx, canvas: &mut Canvas, y: u16, tags: &[TagId]) {
         if room <= canvas.width() + 2 {
             x = canvas.text(x, y, label(tag), cx.theme.dim()) + 1;
         }
-        x = canvas.text(x, y, &shown.text, shown.style) + 2;
+        let left = canvas.width().saturating_sub(x);
+        x = canvas.text(x, y, &shown.bare(left), shown.style) + 2;
     }
 }
 

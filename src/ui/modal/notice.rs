@@ -1,0 +1,61 @@
+//! Words to be read: why something cannot be done now.
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect};
+
+use super::{Modal, Next, window};
+use crate::{
+    plant::{def::DeviceId, event::LineState, snapshot::DeviceState},
+    ui::{
+        Cx,
+        widgets::text::{clock, width, wrap},
+    },
+};
+
+/// A window without a deed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Notice {
+    title: String,
+    words: Vec<String>,
+}
+
+impl Notice {
+    /// Why nothing can be written to this device now; `None` if it can be tried.
+    pub fn unreachable(cx: &Cx, device: DeviceId) -> Option<Notice> {
+        let def = cx.def().device(device);
+        let line = &cx.def().line(def.line).name;
+        let why = match (&cx.snapshot.line(def.line).state, cx.snapshot.device(device).state) {
+            (LineState::Disconnected, _) => format!("Line {line} was disconnected by an operator."),
+            (LineState::Waiting { why, .. }, _) => format!("Line {line} is not connected: {why}."),
+            (LineState::Connecting, _) => format!("Line {line} is being connected."),
+            (LineState::Connected, DeviceState::Down { since }) => {
+                format!("Nothing heard since {}.", clock(since, &cx.def().time_zone))
+            }
+            (LineState::Connected, DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_)) => {
+                return None;
+            }
+        };
+        let words = vec![format!("{} is not answering", def.name), why, "Nothing can be written now.".to_owned()];
+        Some(Notice { title: def.name.clone(), words })
+    }
+
+    pub(super) fn on_key(self, event: KeyEvent) -> Next {
+        match event.code {
+            KeyCode::Enter | KeyCode::Char('q') => Next::Close,
+            _ => Next::Stay(Modal::Notice(self)),
+        }
+    }
+
+    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+        let room = body.width.saturating_sub(8).min(64);
+        let rows: Vec<String> = self.words.iter().flat_map(|words| wrap(words, room)).collect();
+        let inner = rows.iter().map(|row| width(row)).max().unwrap_or(0);
+        let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + 2));
+        for (y, row) in rows.iter().enumerate() {
+            let style = if y == 0 { cx.theme.trouble() } else { cx.theme.normal() };
+            canvas.text(0, y as u16, row, style);
+        }
+        let last = canvas.height().saturating_sub(1);
+        canvas.text(0, last, "Esc close", cx.theme.strong());
+    }
+}
