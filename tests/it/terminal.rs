@@ -133,7 +133,7 @@ fn every_tab_opens_and_q_asks_before_leaving() {
     // Esc and a letter in one go would be Alt and the letter.
     terminal.wait_gone("every tab");
     terminal.keys("q");
-    terminal.wait_for("Leave");
+    terminal.wait_for("Quit?");
     terminal.keys("\r");
     assert_eq!(terminal.end(), 0);
     terminal.assert_restored();
