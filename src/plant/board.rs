@@ -32,6 +32,8 @@ pub struct Board {
     /// What was last read, by tag; `None` when there is no value to stand on.
     raw: Vec<Option<Reading>>,
     samples: Vec<Sample>,
+    /// Decimals that the device last announced, by tag: for showing what was, while it does not answer.
+    decimals_seen: Vec<u8>,
     /// What the history last got, by tag.
     stored: Vec<Option<Sample>>,
     /// Tags whose value depends on this one (decimals, fault word), by tag.
@@ -59,6 +61,7 @@ impl Board {
         Board {
             raw: vec![None; count],
             samples: vec![Sample::bad(Cause::NotRead, at); count],
+            decimals_seen: vec![0; count],
             stored: vec![None; count],
             dependents,
             def,
@@ -172,11 +175,11 @@ impl Board {
         }
     }
 
-    /// Decimals to show a tag with.
+    /// Decimals to show a tag with: those that the device announces, or announced last.
     pub fn shown_decimals(&self, tag: &TagDef) -> u8 {
         match tag.decimals {
             Decimals::Fixed(decimals) => decimals,
-            Decimals::From(_) => self.scaling_decimals(tag).unwrap_or(0),
+            Decimals::From(_) => self.scaling_decimals(tag).unwrap_or(self.decimals_seen[tag.id.index()]),
         }
     }
 
@@ -210,7 +213,11 @@ impl Board {
     /// read again: nobody else's answer revives it.
     fn settle(&mut self, tag: TagId) {
         let Some(Reading { raw, at, doubt }) = self.raw[tag.index()] else { return };
-        let tag = self.def.tag(tag);
+        let def = self.def.clone();
+        let tag = def.tag(tag);
+        if let Some(decimals) = self.scaling_decimals(tag) {
+            self.decimals_seen[tag.id.index()] = decimals;
+        }
         let fault_word = tag.quality_from.map(|(from, mask)| (self.sample(from), self.trusted_raw(from), mask));
         let no_value = tag.bad_if.iter().any(|bad| *bad as f64 == raw);
         let sample = match (no_value, self.scaling_decimals(tag)) {
@@ -380,6 +387,7 @@ mod tests {
     fn a_device_that_is_gone_takes_its_values_with_it() {
         let mut board = board();
         board.gone(TIC, Cause::NotConnected, at(5));
+        assert_eq!(board.shown_decimals(fixture::shared().tag(PV)), 1, "what was keeps its decimals");
         assert_eq!(board.sample(PV), Sample::bad(Cause::NotConnected, at(5)));
         board.failed(&[PV], Fault::Timeout, at(6));
         assert_eq!(board.sample(PV).quality, Quality::Bad(Cause::NotConnected), "a probe in vain changes nothing");
