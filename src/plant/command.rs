@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 
+pub use super::id::WriteId;
 use super::{
     def::{AlarmId, DeviceId, LineId, TagId},
     event::{ExceptionCode, Fault},
@@ -133,10 +134,6 @@ pub enum NotConfirmed {
     #[error("accepted, not read back")]
     NoReadBack,
 }
-
-/// Identifies a write on its way through the bus.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct WriteId(pub u64);
 
 /// What the plant asks of a link task.
 #[derive(Debug, Clone, PartialEq)]

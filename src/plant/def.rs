@@ -6,36 +6,7 @@ use jiff::{civil::Time, tz::TimeZone};
 
 use super::tag::TagDef;
 
-macro_rules! id {
-    ($(#[$doc:meta])* $name:ident) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        pub struct $name(pub u16);
-        impl $name {
-            /// The position in the plant's list of these.
-            pub fn index(self) -> usize {
-                usize::from(self.0)
-            }
-        }
-    };
-}
-
-id!(
-    /// A line in [`PlantDef::lines`].
-    LineId
-);
-id!(
-    /// A device in [`PlantDef::devices`].
-    DeviceId
-);
-id!(
-    /// A tag in [`PlantDef::tags`].
-    TagId
-);
-id!(
-    /// An alarm in [`PlantDef::alarms`].
-    AlarmId
-);
+pub use super::id::{AlarmId, DeviceId, LineId, TagId};
 
 /// Everything that a plant file says, checked.
 #[derive(Debug, Clone)]

@@ -4,10 +4,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 
-use super::{
-    command::WriteId,
-    def::{DeviceId, LineId, TagId},
-};
+use super::id::{DeviceId, LineId, TagId, WriteId};
 
 /// One fact from the bus. Every event carries the time at which it became true.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,6 +7,7 @@
 //!               values alarms orders
 //! ```
 
+pub mod id;
 pub mod sample;
 pub mod def;
 pub mod tag;

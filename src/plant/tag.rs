@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::def::{DeviceId, TagId};
+use super::id::{DeviceId, TagId};
 
 /// Definition of a tag.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,0 +1,36 @@
+//! Numbers that name things: lines, devices, tags, alarms, writes.
+
+macro_rules! id {
+    ($(#[$doc:meta])* $name:ident) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct $name(pub u16);
+        impl $name {
+            /// The position in the plant's list of these.
+            pub fn index(self) -> usize {
+                usize::from(self.0)
+            }
+        }
+    };
+}
+
+id!(
+    /// A line in [`super::PlantDef::lines`].
+    LineId
+);
+id!(
+    /// A device in [`super::PlantDef::devices`].
+    DeviceId
+);
+id!(
+    /// A tag in [`super::PlantDef::tags`].
+    TagId
+);
+id!(
+    /// An alarm in [`super::PlantDef::alarms`].
+    AlarmId
+);
+
+/// Identifies a write on its way through the bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct WriteId(pub u64);
