@@ -116,7 +116,7 @@ impl Link {
             transaction: 0,
             timeout: line.timeout,
             // What was asked before an earlier port went away may still be answered.
-            quiet_until: Instant::now() + if tcp { Duration::ZERO } else { line.timeout },
+            quiet_until: Instant::now() + if tcp || counters.requests == 0 { Duration::ZERO } else { line.timeout },
             debts: vec![Debt::default(); 256],
             loopbacks: 0,
             late_max: vec![Duration::ZERO; 256],
