@@ -163,6 +163,11 @@ pub fn check_answer(request: &[u8], answer: &[u8]) -> Result<(), Fault> {
     if shape.fits(answer) { Ok(()) } else { Err(Fault::WrongEcho) }
 }
 
+/// `01 03 03 EA`.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ")
+}
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {

@@ -1,6 +1,7 @@
 //! How it is read and written: frames, codecs, blocks, the schedule; bytes move only in [`io`].
 
 pub mod frame;
+pub mod gather;
 pub mod codec;
 pub mod plan;
 pub mod backoff;

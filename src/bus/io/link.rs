@@ -27,6 +27,7 @@ use crate::{
     bus::{
         debt::{self, Debt},
         frame::{self, Mbap, Shape},
+        gather::{self, Verdict},
     },
     plant::{
         def::{LineDef, Transport},
@@ -314,7 +315,7 @@ impl Link {
         // What came and did not fit: it names the fault if nothing better comes.
         let mut misfit: Option<Fault> = None;
         loop {
-            let wait_until = match verdict(message, &buffer) {
+            let wait_until = match gather::verdict(message, &buffer) {
                 Verdict::Answer(range) => {
                     if 0 < range.start {
                         self.counters.stale += 1;
@@ -322,7 +323,9 @@ impl Link {
                     }
                     let answer = buffer[range.clone()].to_vec();
                     self.log(false, buffer[range.start..range.end + 2].to_vec(), Cow::Borrowed("ok"));
-                    return finish(message, answer);
+                    // An exception is an answer for the line, but a fault for the caller.
+                    frame::check_answer(message, &answer)?;
+                    return Ok(answer);
                 }
                 Verdict::Foreign(end, fault) => {
                     self.take_stale_counted(&buffer[..end]);
@@ -338,9 +341,9 @@ impl Link {
             match self.read_until(wait_until, &mut buffer, sent_at).await? {
                 true if buffer.len() <= GATHER_MAX => {}
                 _ => {
-                    let fault = match verdict(message, &buffer) {
+                    let fault = match gather::verdict(message, &buffer) {
                         Verdict::Spoiled(fault) => fault,
-                        _ => misfit.unwrap_or_else(|| left_over(message, &buffer)),
+                        _ => misfit.unwrap_or_else(|| gather::left_over(message, &buffer)),
                     };
                     if !buffer.is_empty() {
                         self.log(false, buffer, Cow::Owned(fault.to_string()));
@@ -425,7 +428,7 @@ impl Link {
             | Fault::NotConnected
             | Fault::Resting => self.counters.corrupt += 1,
         }
-        tracing::debug!(unit, request = %hex(message), %fault, "a request failed");
+        tracing::debug!(unit, request = %frame::hex(message), %fault, "a request failed");
         // Even what looked like a spoiled answer may have been noise, with the answer still on its way.
         if !self.tcp {
             let shape = frame::shape_of(message);
@@ -454,7 +457,7 @@ impl Link {
 
     fn take_stale_counted(&mut self, bytes: &[u8]) {
         self.counters.stale += 1;
-        tracing::debug!(bytes = %hex(bytes), "stale bytes dropped");
+        tracing::debug!(bytes = %frame::hex(bytes), "stale bytes dropped");
         if let Some(unit) = bytes.first().map(|unit| usize::from(*unit))
             && let Some(failed) = self.failed_last[unit].filter(|_| !self.debts[unit].is_clear())
         {
@@ -470,71 +473,4 @@ impl Link {
         }
         self.ring.push_back(FrameLog { at: self.clock.now(), sent, bytes, verdict });
     }
-}
-
-/// What the bytes gathered so far are.
-#[derive(Debug, PartialEq, Eq)]
-enum Verdict {
-    /// They hold the answer: this range is its message, two bytes of CRC follow.
-    Answer(std::ops::Range<usize>),
-    /// They begin with a whole good frame that is not the answer and ends here.
-    Foreign(usize, Fault),
-    /// No bytes, or nothing that looks like the answer.
-    Nothing,
-    /// The beginning of the answer.
-    Begun,
-    /// A frame of full length whose check does not fit.
-    Spoiled(Fault),
-}
-
-/// Looks for a frame with a good CRC at the beginning, then behind noise.
-fn verdict(message: &[u8], buffer: &[u8]) -> Verdict {
-    let begins = |rest: &[u8]| rest.len() >= 2 && rest[0] == message[0] && rest[1] & 0x7F == message[1];
-    for start in 0..buffer.len() {
-        let rest = &buffer[start..];
-        let Some(length) = frame::answer_length(rest).filter(|length| length + 2 <= rest.len()) else { continue };
-        let Ok(answer) = frame::without_crc(&rest[..length + 2]) else { continue };
-        match frame::check_answer(message, answer) {
-            Ok(()) | Err(Fault::Exception(_)) => return Verdict::Answer(start..start + length),
-            // Inside what may be the answer a chance check is no frame: it would cut the answer in two.
-            Err(_) if (0..start).any(|earlier| begins(&buffer[earlier..])) => {}
-            Err(fault) => return Verdict::Foreign(start + length + 2, fault),
-        }
-    }
-    // No good frame yet. Is there one of the right beginning and full length, but spoiled?
-    let mut beginnings = (0..buffer.len()).map(|start| &buffer[start..]).filter(|rest| begins(rest)).peekable();
-    if beginnings.peek().is_none() {
-        return Verdict::Nothing;
-    }
-    let spoiled = beginnings.find_map(|rest| {
-        let frame = rest.get(..frame::answer_length(rest)? + 2)?;
-        frame::without_crc(frame).err()
-    });
-    spoiled.map_or(Verdict::Begun, Verdict::Spoiled)
-}
-
-/// An exception is a fault for the caller, but an answer for the line.
-fn finish(message: &[u8], answer: Vec<u8>) -> Result<Vec<u8>, Trouble> {
-    frame::check_answer(message, &answer)?;
-    Ok(answer)
-}
-
-/// Names what is left at the deadline.
-fn left_over(message: &[u8], buffer: &[u8]) -> Fault {
-    if buffer.is_empty() {
-        return Fault::Timeout;
-    }
-    let expected = frame::shape_of(message).map_or(5, |shape| shape.length() + 2);
-    if buffer.len() < expected {
-        return Fault::Truncated { got: buffer.len() as u16, expected: expected as u16 };
-    }
-    match frame::without_crc(buffer) {
-        Err(fault) => fault,
-        Ok(message) => Fault::WrongLength { got: message.len() as u16, asked: expected as u16 - 2 },
-    }
-}
-
-/// `01 03 03 EA`.
-pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ")
 }

@@ -396,6 +396,24 @@ async fn a_device_that_nothing_brings_into_step_is_read_again_after_a_rest() {
     line.read(&def).await;
 }
 
+/// A device that never stops talking: it is told as a failure, and the line still obeys.
+#[tokio::test(start_paused = true)]
+async fn a_chattering_line_is_told_and_can_be_closed() {
+    let def = plant(false);
+    let mut line = line(def.clone());
+    let (ours, mut theirs) = tokio::io::duplex(4096);
+    line.ports.try_send(ours).expect("room for a port");
+    tokio::spawn(async move {
+        while theirs.write_all(&[0x55, 0xAA]).await.is_ok() {
+            tokio::time::sleep(2 * MS).await;
+        }
+    });
+    let fault = line.fault(&def).await;
+    assert!(fault.is_corrupt(), "noise is told as noise, not as silence: {fault}");
+    line.requests.send(BusRequest::Connect(false)).await.expect("the line runs");
+    line.until(&def, |event| matches!(event, Event::Line { state: LineState::Disconnected, .. }).then_some(())).await;
+}
+
 /// A late refusal, code 02, is no hole: the block stays whole.
 #[tokio::test(start_paused = true)]
 async fn a_late_refusal_splits_no_block() {

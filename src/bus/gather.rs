@@ -1,0 +1,117 @@
+//! What the bytes that have come over an RTU line are: the answer, somebody else's frame, noise, or the beginning of one.
+
+use super::frame;
+use crate::plant::event::Fault;
+
+/// What the bytes gathered so far are.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// They hold the answer: this range is its message, two bytes of CRC follow.
+    Answer(std::ops::Range<usize>),
+    /// They begin with a whole good frame that is not the answer and ends here.
+    Foreign(usize, Fault),
+    /// No bytes, or nothing that looks like the answer.
+    Nothing,
+    /// The beginning of the answer.
+    Begun,
+    /// A frame of full length whose check does not fit.
+    Spoiled(Fault),
+}
+
+/// Looks for a frame with a good CRC at the beginning, then behind noise.
+pub fn verdict(message: &[u8], buffer: &[u8]) -> Verdict {
+    let begins = |rest: &[u8]| rest.len() >= 2 && rest[0] == message[0] && rest[1] & 0x7F == message[1];
+    for start in 0..buffer.len() {
+        let rest = &buffer[start..];
+        let Some(length) = frame::answer_length(rest).filter(|length| length + 2 <= rest.len()) else { continue };
+        let Ok(answer) = frame::without_crc(&rest[..length + 2]) else { continue };
+        match frame::check_answer(message, answer) {
+            Ok(()) | Err(Fault::Exception(_)) => return Verdict::Answer(start..start + length),
+            // Inside what may be the answer a chance check is no frame: it would cut the answer in two.
+            Err(_) if (0..start).any(|earlier| begins(&buffer[earlier..])) => {}
+            Err(fault) => return Verdict::Foreign(start + length + 2, fault),
+        }
+    }
+    // No good frame yet. Is there one of the right beginning and full length, but spoiled?
+    let mut beginnings = (0..buffer.len()).map(|start| &buffer[start..]).filter(|rest| begins(rest)).peekable();
+    if beginnings.peek().is_none() {
+        return Verdict::Nothing;
+    }
+    let spoiled = beginnings.find_map(|rest| {
+        let frame = rest.get(..frame::answer_length(rest)? + 2)?;
+        frame::without_crc(frame).err()
+    });
+    spoiled.map_or(Verdict::Begun, Verdict::Spoiled)
+}
+
+/// Names what is left at the deadline.
+pub fn left_over(message: &[u8], buffer: &[u8]) -> Fault {
+    if buffer.is_empty() {
+        return Fault::Timeout;
+    }
+    let expected = frame::shape_of(message).map_or(5, |shape| shape.length() + 2);
+    if buffer.len() < expected {
+        return Fault::Truncated { got: buffer.len() as u16, expected: expected as u16 };
+    }
+    match frame::without_crc(buffer) {
+        Err(fault) => fault,
+        Ok(message) => Fault::WrongLength { got: message.len() as u16, asked: expected as u16 - 2 },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bus::frame::with_crc;
+
+    const REQUEST: [u8; 6] = [1, 3, 0, 10, 0, 2];
+
+    fn answer() -> Vec<u8> {
+        with_crc(&[1, 3, 4, 0, 10, 0, 11])
+    }
+
+    fn check(bytes: &[u8], expect: Verdict) {
+        assert_eq!(verdict(&REQUEST, bytes), expect, "{}", frame::hex(bytes));
+    }
+
+    #[test]
+    fn an_answer_is_found_whole_and_behind_noise() {
+        check(&[], Verdict::Nothing);
+        check(&answer(), Verdict::Answer(0..7));
+        check(&[&[0xFF, 0x00, 0x55], &answer()[..]].concat(), Verdict::Answer(3..10));
+        for cut in 2..answer().len() {
+            check(&answer()[..cut], Verdict::Begun);
+        }
+        check(&[0xFF, 0x00, 0x55], Verdict::Nothing);
+    }
+
+    #[test]
+    fn a_refusal_is_an_answer_and_another_unit_is_not() {
+        check(&with_crc(&[1, 0x83, 2]), Verdict::Answer(0..3));
+        check(&with_crc(&[2, 3, 4, 0, 10, 0, 11]), Verdict::Foreign(9, Fault::WrongUnit { got: 2, asked: 1 }));
+        check(&with_crc(&[1, 3, 2, 0, 10]), Verdict::Foreign(7, Fault::WrongLength { got: 5, asked: 7 }));
+    }
+
+    #[test]
+    fn a_spoiled_answer_is_named_and_not_taken() {
+        let mut spoiled = answer();
+        spoiled[4] ^= 1;
+        assert!(matches!(verdict(&REQUEST, &spoiled), Verdict::Spoiled(Fault::Crc { .. })));
+    }
+
+    #[test]
+    fn a_chance_check_inside_the_answer_does_not_cut_it() {
+        // The data of the answer begin like a short good frame of another unit.
+        let request = [1, 3, 0, 10, 0, 4];
+        let inner = with_crc(&[2, 0x83, 2]);
+        let whole = with_crc(&[&[1, 3, 8], &inner[..], &[0, 0, 0]].concat());
+        assert_eq!(verdict(&request, &whole[..10]), Verdict::Begun);
+        assert_eq!(verdict(&request, &whole), Verdict::Answer(0..11));
+    }
+
+    #[test]
+    fn what_is_left_at_the_deadline_has_a_name() {
+        assert_eq!(left_over(&REQUEST, &[]), Fault::Timeout);
+        assert_eq!(left_over(&REQUEST, &answer()[..4]), Fault::Truncated { got: 4, expected: 9 });
+    }
+}
