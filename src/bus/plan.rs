@@ -110,7 +110,7 @@ fn aligned(start: u16, end: u32, table: Table, limits: &Limits) -> (u16, u32) {
 /// Modbus over serial line V1.02, 2.5.1; over TCP the wire costs nothing worth counting.
 pub fn cost(block: &Block, line: &LineDef, device: &DeviceDef) -> Duration {
     match &line.transport {
-        Transport::Rtu { serial, .. } => {
+        Transport::Serial { serial, .. } => {
             let silence = serial.silence().max(line.gap).max(device.gap);
             serial.char_time() * (8 + block.answer_bytes()) + serial.silence() + silence
         }
@@ -137,12 +137,7 @@ pub fn describe(def: &PlantDef) -> Vec<String> {
     for line in &def.lines {
         let load = utilisation(def, line.id);
         text.push(String::new());
-        text.push(format!(
-            "line {}: {}, timeout {} ms",
-            line.name,
-            transport_words(&line.transport),
-            line.timeout.as_millis()
-        ));
+        text.push(format!("line {}: {}, timeout {} ms", line.name, line.transport, line.timeout.as_millis()));
         text.push(
             "  device      function     wire address             Modicon         count  tags  every    worst case"
                 .into(),
@@ -178,22 +173,6 @@ fn block_words(def: &PlantDef, line: &LineDef, block: &Block) -> String {
     )
 }
 
-/// `RTU /dev/ttyUSB0 9600 8N1` or `TCP host:502`.
-pub fn transport_words(transport: &Transport) -> String {
-    use crate::plant::def::Parity;
-    match transport {
-        Transport::Rtu { port, serial } => {
-            let parity = match serial.parity {
-                Parity::None => 'N',
-                Parity::Even => 'E',
-                Parity::Odd => 'O',
-            };
-            format!("RTU {port} {} {}{parity}{}", serial.baud, serial.data_bits, serial.stop_bits)
-        }
-        Transport::Tcp { host, port } => format!("TCP {host}:{port}"),
-    }
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
@@ -224,7 +203,7 @@ mod tests {
         let mut def = fixture::plant();
         let mut block = blocks(&def, LineId(0)).remove(0);
         for (baud, words, ms) in [(9600, 1, 25.2), (9600, 10, 45.8), (19_200, 125, 154.7), (115_200, 32, 10.9)] {
-            let Transport::Rtu { serial, .. } = &mut def.lines[0].transport else { panic!("serial") };
+            let Transport::Serial { serial, .. } = &mut def.lines[0].transport else { panic!("serial") };
             (serial.baud, serial.stop_bits) = (baud, 2);
             block.count = words;
             let cost = cost(&block, &def.lines[0], &def.devices[0]).as_secs_f64() * 1e3;
@@ -248,7 +227,7 @@ mod tests {
         ) {
             let mut def = fixture::plant();
             def.devices[0].limits =
-                Limits { read_words_max: words_max, read_bits_max: bits_max, write_words_max: 1, gap_words_max: gap, alignment };
+                Limits { read_words_max: words_max, read_bits_max: bits_max, write_words_max: 1, gap_words_max: gap, alignment, in_flight_max: 1 };
             let sample = def.tags[0].clone();
             let tables = [Table::Coil, Table::Discrete, Table::Input, Table::Holding];
             let kinds = [Kind::U16, Kind::F32, Kind::U64, Kind::Bcd32];

@@ -75,7 +75,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 /// Puts every line of the plant on the simulated one.
 fn plug_into(def: &mut PlantDef, path: &std::path::Path) {
     for line in &mut def.lines {
-        if let Transport::Rtu { port, .. } = &mut line.transport {
+        if let Transport::Serial { port, .. } = &mut line.transport {
             *port = path.display().to_string();
         }
     }

@@ -4,7 +4,7 @@ use std::{env, path::PathBuf};
 
 use crate::plant::{
     PlantDef,
-    def::{Parity, Serial, Transport},
+    def::{Framing, Rs485, Serial, Transport},
 };
 
 /// Histories and logs: `$STATE_DIRECTORY` (set by an init system), `$XDG_STATE_HOME/sightglass`,
@@ -42,16 +42,21 @@ pub fn replace_port(def: &mut PlantDef, text: &str) -> Result<(), String> {
         .find(|line| line.name == name)
         .ok_or_else(|| format!("--port: no line `{name}`, the plant has {}", names.join(", ")))?;
     line.transport = if port.starts_with('/') {
-        let serial = match &line.transport {
-            Transport::Rtu { serial, .. } => *serial,
-            Transport::Tcp { .. } => Serial { baud: 9600, data_bits: 8, parity: Parity::None, stop_bits: 1 },
+        let (framing, rs485) = match &line.transport {
+            Transport::Serial { framing, rs485, .. } => (*framing, *rs485),
+            Transport::Tcp { .. } => (Framing::Rtu, Rs485::Off),
         };
-        Transport::Rtu { port: port.to_owned(), serial }
+        let serial = line.transport.serial().unwrap_or(Serial::USUAL);
+        Transport::Serial { port: port.to_owned(), serial, framing, rs485 }
     } else {
         let parsed = port.rsplit_once(':').and_then(|(host, port)| Some((host.to_owned(), port.parse().ok()?)));
         let (host, port) =
             parsed.ok_or_else(|| format!("--port: found `{port}`, expected an absolute path or HOST:TCPPORT"))?;
-        Transport::Tcp { host, port }
+        let framing = match &line.transport {
+            Transport::Tcp { framing, .. } => *framing,
+            Transport::Serial { .. } => Framing::Mbap,
+        };
+        Transport::Tcp { host, port, framing }
     };
     Ok(())
 }
@@ -65,10 +70,10 @@ mod tests {
     fn a_line_moves_to_another_port_and_keeps_its_baud_rate() {
         let mut def = fixture::plant();
         replace_port(&mut def, "L1=/dev/ttyUSB0").expect("a good port");
-        let Transport::Rtu { port, serial } = &def.lines[0].transport else { panic!("not serial") };
+        let Transport::Serial { port, serial, .. } = &def.lines[0].transport else { panic!("not serial") };
         assert_eq!((port.as_str(), serial.baud), ("/dev/ttyUSB0", 9600));
         replace_port(&mut def, "L1=localhost:1502").expect("a good port");
-        assert_eq!(def.lines[0].transport, Transport::Tcp { host: "localhost".into(), port: 1502 });
+        assert_eq!(def.lines[0].transport, Transport::tcp("localhost", 1502));
     }
 
     #[test]

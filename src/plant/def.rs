@@ -6,7 +6,10 @@ use jiff::{civil::Time, tz::TimeZone};
 
 use super::tag::TagDef;
 
-pub use super::id::{AlarmId, DeviceId, LineId, TagId};
+pub use super::{
+    id::{AlarmId, DeviceId, LineId, TagId},
+    line::{Framing, LineDef, Parity, Rs485, Serial, Transport},
+};
 
 /// Everything that a plant file says, checked.
 #[derive(Debug, Clone)]
@@ -64,79 +67,6 @@ impl PlantDef {
     }
 }
 
-/// One serial line or TCP endpoint. Serial parameters and timeouts belong to the line, never to a device.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LineDef {
-    /// Its place.
-    pub id: LineId,
-    /// `L1`.
-    pub name: String,
-    /// How its bytes travel.
-    pub transport: Transport,
-    /// How long an answer may take, from the last byte of the request.
-    pub timeout: Duration,
-    /// Least silence before a request, beyond the 3.5 characters of the standard.
-    pub gap: Duration,
-}
-
-/// How the bytes of a line travel.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Transport {
-    /// Modbus RTU over a serial port.
-    Rtu {
-        /// Path of the port, best `/dev/serial/by-id/…`.
-        port: String,
-        /// Baud rate, framing and parity.
-        serial: Serial,
-    },
-    /// Modbus TCP.
-    Tcp {
-        /// Host name or address.
-        host: String,
-        /// TCP port, 502 by default.
-        port: u16,
-    },
-}
-
-/// Serial parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Serial {
-    /// Bits a second.
-    pub baud: u32,
-    /// 7 or 8.
-    pub data_bits: u8,
-    /// Parity bit.
-    pub parity: Parity,
-    /// 1 or 2.
-    pub stop_bits: u8,
-}
-
-impl Serial {
-    /// Bits of one character on the wire: start, data, parity, stop.
-    pub fn bits_per_char(self) -> u32 {
-        1 + u32::from(self.data_bits) + u32::from(self.parity != Parity::None) + u32::from(self.stop_bits)
-    }
-    /// Time of one character on the wire.
-    pub fn char_time(self) -> Duration {
-        Duration::from_nanos(u64::from(self.bits_per_char()) * 1_000_000_000 / u64::from(self.baud))
-    }
-    /// The silence between frames: 3.5 characters, fixed 1.75 ms above 19200 baud (Modbus serial line V1.02, 2.5.1.1).
-    pub fn silence(self) -> Duration {
-        if self.baud > 19_200 { Duration::from_micros(1_750) } else { self.char_time() * 7 / 2 }
-    }
-}
-
-/// Parity of a serial character.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Parity {
-    /// No parity bit.
-    None,
-    /// Even.
-    Even,
-    /// Odd.
-    Odd,
-}
-
 /// One device on a line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeviceDef {
@@ -148,7 +78,7 @@ pub struct DeviceDef {
     pub title: String,
     /// The line it sits on.
     pub line: LineId,
-    /// Unit address: 1–247 on a serial line, 0–255 over TCP.
+    /// Unit address: 1–247 on a serial line, 0 there for a broadcast (write only), 0–255 over TCP.
     pub unit: u8,
     /// Name of its profile: `fuji_pxr`.
     pub profile: String,
@@ -179,6 +109,20 @@ pub struct Limits {
     pub gap_words_max: u16,
     /// Blocks start and end on multiples of this (2 for meters that refuse odd counts).
     pub alignment: u16,
+    /// Requests that may be under way at once, over Modbus TCP only.
+    pub in_flight_max: u16,
+}
+
+impl Limits {
+    /// What the standard allows (Modbus application protocol V1.1b3, section 6), one request at a time.
+    pub const STANDARD: Limits = Limits {
+        read_words_max: 125,
+        read_bits_max: 2_000,
+        write_words_max: 123,
+        gap_words_max: 8,
+        alignment: 1,
+        in_flight_max: 1,
+    };
 }
 
 /// The tags that a controller is operated by.

@@ -6,7 +6,7 @@ use jiff::tz::TimeZone;
 
 use super::{
     def::{
-        AlarmDef, AlarmId, Condition, DeviceDef, DeviceId, Guidance, Level, Limits, LineDef, LineId, MimicDef, Parity,
+        AlarmDef, AlarmId, Condition, DeviceDef, DeviceId, Guidance, Level, Limits, LineDef, LineId, MimicDef,
         PlantDef, Priority, ReportDef, Serial, Subject, TagId, Transport,
     },
     tag::{Access, Bound, Decimals, Kind, Order, Point, Table, TagDef},
@@ -41,7 +41,13 @@ pub fn plant() -> PlantDef {
         unit,
         profile: "fixture".into(),
         model: "FIXTURE".into(),
-        limits: Limits { read_words_max: 60, read_bits_max: 128, write_words_max: 60, gap_words_max: 8, alignment: 1 },
+        limits: Limits {
+            read_words_max: 60,
+            read_bits_max: 128,
+            write_words_max: 60,
+            gap_words_max: 8,
+            ..Limits::STANDARD
+        },
         gap: Duration::ZERO,
         write_gap: Duration::ZERO,
         faceplate: None,
@@ -62,14 +68,8 @@ pub fn plant() -> PlantDef {
         title: "Fixture".into(),
         time_zone: TimeZone::UTC,
         lines: vec![LineDef {
-            id: LineId(0),
-            name: "L1".into(),
-            transport: Transport::Rtu {
-                port: "/dev/null".into(),
-                serial: Serial { baud: 9600, data_bits: 8, parity: Parity::None, stop_bits: 1 },
-            },
             timeout: Duration::from_millis(300),
-            gap: Duration::ZERO,
+            ..LineDef::new(LineId(0), "L1", Transport::rtu("/dev/null", Serial::USUAL))
         }],
         devices: vec![device(TIC, "TIC-1", 1), device(PLC, "PLC-1", 2)],
         tags: vec![

@@ -9,6 +9,7 @@
 
 pub mod id;
 pub mod sample;
+pub mod line;
 pub mod def;
 pub mod tag;
 pub mod scale;

@@ -58,8 +58,7 @@ pub(super) fn limits(
 ) -> (Limits, Duration, Duration) {
     let layers: Vec<Raw> =
         [&device.limits, &profile.limits].into_iter().flatten().map(|raw| raw.value.clone()).collect();
-    let standard =
-        Limits { read_words_max: 125, read_bits_max: 2000, write_words_max: 123, gap_words_max: 8, alignment: 1 };
+    let standard = Limits::STANDARD;
     if layers.is_empty() {
         return (standard, Duration::ZERO, Duration::ZERO);
     }
@@ -74,14 +73,18 @@ pub(super) fn limits(
         value.value
     };
     let limits = Limits {
-        read_words_max: within(table.read_words_max, 125, "read_words_max"),
-        read_bits_max: within(table.read_bits_max, 2000, "read_bits_max"),
-        write_words_max: within(table.write_words_max, 123, "write_words_max"),
+        read_words_max: within(table.read_words_max, standard.read_words_max, "read_words_max"),
+        read_bits_max: within(table.read_bits_max, standard.read_bits_max, "read_bits_max"),
+        write_words_max: within(table.write_words_max, standard.write_words_max, "write_words_max"),
         gap_words_max: table.gap_words_max.map_or(8, |gap| gap.value),
         alignment: table.alignment.map_or(1, |alignment| alignment.value),
+        in_flight_max: table.in_flight_max.map_or(1, |count| count.value),
     };
     if let Some(alignment) = table.alignment.filter(|alignment| !matches!(alignment.value, 1 | 2 | 4)) {
         problems.add(alignment.at, format!("alignment = {} is not known", alignment.value)).label("expected 1, 2 or 4");
+    }
+    if let Some(count) = table.in_flight_max.filter(|count| !(1..=64).contains(&count.value)) {
+        problems.add(count.at, format!("in_flight_max = {} is not possible", count.value)).label("expected 1 to 64");
     }
     let millis = |value: Option<At<u16>>| Duration::from_millis(value.map_or(0, |value| u64::from(value.value)));
     (limits, millis(table.gap_ms), millis(table.write_gap_ms))

@@ -16,8 +16,8 @@ use super::{
     tag::{self, Surroundings},
 };
 use crate::plant::{
-    def::{DeviceDef, DeviceId, LineDef, LineId, MimicDef, PlantDef, TagId, Transport},
-    tag::TagDef,
+    def::{DeviceDef, DeviceId, LineDef, LineId, MimicDef, PlantDef, TagId},
+    tag::{Access, TagDef},
 };
 
 /// A text and the name the user knows it by.
@@ -132,12 +132,32 @@ fn devices(
         devices.push(def);
     }
     let tags = device::link(defined, problems);
+    check_broadcasts(&devices, &known, lines, &tags, problems);
     for (def, device) in devices.iter_mut().zip(&known) {
         let face = device.profile.faceplate.as_ref().map(|face| &face.value);
         def.faceplate = face.and_then(|face| device::faceplate(face, device.name, &names, &tags, problems));
         def.actions = device::actions(&device.profile.actions, device.name, &names, &tags, problems);
     }
     (devices, tags, names)
+}
+
+/// Unit 0 of a serial line is everybody: it can be written, and nobody answers a read.
+fn check_broadcasts(
+    devices: &[DeviceDef],
+    known: &[Known],
+    lines: &[LineDef],
+    tags: &[TagDef],
+    problems: &mut Problems,
+) {
+    for (device, known) in devices.iter().zip(known) {
+        let serial = lines.iter().any(|line| line.id == device.line && line.transport.serial().is_some());
+        let readable = tags.iter().find(|tag| tag.device == device.id && tag.access != Access::Write);
+        if let (true, 0, Some(unit), Some(tag)) = (serial, device.unit, known.table.unit, readable) {
+            problems
+                .add(unit.at, format!("unit 0 is a broadcast, which nobody answers: {} can never be read", tag.name))
+                .label("expected 1 to 247, or a profile whose tags all have access = \"w\"");
+        }
+    }
 }
 
 fn known_devices<'a>(
@@ -232,12 +252,10 @@ fn check_devices(file: &PlantFile, lines: &[LineDef], problems: &mut Problems) {
         }
         let (Some(unit), Some(id)) = (device.unit, line_of(device, lines)) else { continue };
         let Some(def) = lines.iter().find(|line| line.id == id) else { continue };
-        if matches!(def.transport, Transport::Rtu { .. }) && !(1..=247).contains(&unit.value) {
+        // 0 is the broadcast address: allowed for what is only written, which is checked with the tags.
+        if def.transport.serial().is_some() && !(0..=247).contains(&unit.value) {
             let problem = problems.add(unit.at, format!("unit {} cannot be used on a serial line", unit.value));
-            problem.label("expected 1 to 247");
-            if unit.value == 0 {
-                problem.help("0 is the broadcast address: every device obeys and none answers");
-            }
+            problem.label("expected 1 to 247, or 0 for a broadcast");
         }
         let place = format!("unit {} is used twice on line {}", unit.value, line.value);
         units.insert(&place, unit.at, place.as_str(), problems);

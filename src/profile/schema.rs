@@ -9,7 +9,7 @@ use super::{
     reader::{Choice, Numbered, Raw, table, words},
 };
 use crate::plant::{
-    def::{Parity, Priority},
+    def::{Parity, Priority, Rs485},
     tag::{Access, Confidence, Kind, Order, Table},
 };
 
@@ -31,7 +31,7 @@ table!(
 
 table!(
     /// A `[[line]]` on a serial port.
-    RtuTable, "a line with mode = \"rtu\"" {
+    SerialTable, "a line on a serial port" {
         need "name" name: String,
         need "mode" mode: String,
         need "port" port: String,
@@ -39,20 +39,24 @@ table!(
         opt "data_bits" data_bits: u8,
         need "parity" parity: Parity,
         opt "stop_bits" stop_bits: u8,
+        opt "rs485" rs485: Rs485,
         opt "timeout_ms" timeout_ms: u16,
         opt "gap_ms" gap_ms: u16,
+        opt "idle_ms" idle_ms: u16,
+        opt "turnaround_ms" turnaround_ms: u16,
     }
 );
 
 table!(
     /// A `[[line]]` over TCP.
-    TcpTable, "a line with mode = \"tcp\"" {
+    TcpTable, "a line over TCP" {
         need "name" name: String,
         need "mode" mode: String,
         need "host" host: String,
         opt "tcp_port" tcp_port: u16,
         opt "timeout_ms" timeout_ms: u16,
         opt "gap_ms" gap_ms: u16,
+        opt "idle_ms" idle_ms: u16,
     }
 );
 
@@ -104,6 +108,7 @@ table!(
         opt "write_words_max" write_words_max: u16,
         opt "gap_words_max" gap_words_max: u16,
         opt "alignment" alignment: u16,
+        opt "in_flight_max" in_flight_max: u16,
         opt "gap_ms" gap_ms: u16,
         opt "write_gap_ms" write_gap_ms: u16,
     }
@@ -274,6 +279,8 @@ table!(
         opt "bom" bom: bool,
     }
 );
+
+words!(Rs485, "RS-485 direction control" { "off" => Rs485::Off, "rts-high" => Rs485::RtsHigh, "rts-low" => Rs485::RtsLow, });
 
 words!(Parity, "parity" { "N" => Parity::None, "E" => Parity::Even, "O" => Parity::Odd, });
 

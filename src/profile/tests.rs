@@ -236,7 +236,7 @@ fn a_mistyped_word_brings_the_right_one() {
     );
     check("value = \"on\"", "value = \"onn\"", &["`onn` is not a state of D1.MODE", "did you mean `on`?"]);
     check("kind = \"value\"", "kind = \"valve_\"", &["unknown kind `valve_`", "did you mean `valve`?"]);
-    check("mode = \"rtu\"", "mode = \"ascii\"", &["unknown mode `ascii`", "known: rtu, tcp"]);
+    check("mode = \"rtu\"", "mode = \"asci\"", &["unknown mode `asci`", "did you mean `ascii`?"]);
     check(
         "priority = \"high\"",
         "priority = \"urgent\"",
@@ -254,7 +254,7 @@ fn a_name_is_used_once() {
     check("name = \"PLC\"", "name = \"D1\"", &["[small.toml:19:8]", "duplicate device `D1`", "first here"]);
     check("[[device]]", "[[line]]\nname = \"L1\"\nmode = \"tcp\"\nhost = \"a\"\n[[device]]", &["duplicate line `L1`"]);
     check("unit = 2", "unit = 1", &["[small.toml:22:8]", "unit 1 is used twice on line L1", "first here"]);
-    check("unit = 2", "unit = 0", &["unit 0 cannot be used on a serial line", "broadcast"]);
+    check("unit = 2", "unit = 0", &["unit 0 is a broadcast", "PLC.STEP can never be read", "expected 1 to 247"]);
 }
 
 #[test]
@@ -377,7 +377,7 @@ fn all_problems_come_at_once_and_in_file_order() {
     insta::assert_snapshot!(lines.join("\n"), @"
     small.toml:2:13: unknown time zone `Mars/Base`
     small.toml:8:8: 9601 is not a usual baud rate
-    small.toml:22:8: unit 0 cannot be used on a serial line
+    small.toml:22:8: unit 0 is a broadcast, which nobody answers: PLC.STEP can never be read
     small.toml:27:1: unknown key `deadbnd` in an alarm
     meter.toml:16:8: unknown unit `C`
     plc.toml:9:16: `V2008` does not exist: DirectLOGIC counts in octal

@@ -46,6 +46,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
                 write_words_max: 60,
                 gap_words_max: 4,
                 alignment: 1,
+                in_flight_max: 1,
             },
             gap: Duration::ZERO,
             write_gap: Duration::ZERO,

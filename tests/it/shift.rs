@@ -13,7 +13,7 @@ use sightglass::{
     plant::{
         PlantDef,
         command::{Command as Wish, Order, OrderId, Outcome},
-        def::{CsvDialect, Transport},
+        def::CsvDialect,
     },
     profile::{self, Search},
     report::{ask, csv},
@@ -102,7 +102,7 @@ fn start_on_simulation(def: &Arc<PlantDef>, clock: Clock, history: &Path) -> sta
     let (ours, theirs) = tokio::io::duplex(1024);
     let (ports, streams) = mpsc::channel(1);
     ports.try_send(ours).unwrap();
-    let Transport::Rtu { serial, .. } = def.lines[0].transport else { panic!("the tank has a serial line") };
+    let Some(serial) = def.lines[0].transport.serial() else { panic!("the tank has a serial line") };
     tokio::spawn(serve_rtu(theirs, RigHandle::spawn(Rig::demo(), clock), serial));
     let connectors = vec![Connector::Memory(streams)];
     station::io::start(station::io::Options { def: def.clone(), clock, history: history.to_owned(), connectors })

@@ -105,7 +105,7 @@ impl Link {
     /// A link on a freshly opened port. `counters` go on from an earlier opening.
     pub fn new(port: Box<dyn Stream>, line: &LineDef, clock: Clock, counters: LineCounters) -> Link {
         let (char_time, silence, tcp) = match &line.transport {
-            Transport::Rtu { serial, .. } => (serial.char_time(), serial.silence().max(line.gap), false),
+            Transport::Serial { serial, .. } => (serial.char_time(), serial.silence().max(line.gap), false),
             Transport::Tcp { .. } => (Duration::ZERO, line.gap, true),
         };
         Link {

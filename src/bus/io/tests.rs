@@ -36,7 +36,14 @@ const MS: Duration = Duration::from_millis(1);
 fn plant(tcp: bool) -> PlantDef {
     let mut def = fixture::plant();
     let sample = def.tags[1].clone();
-    let limits = Limits { read_words_max: 60, read_bits_max: 100, write_words_max: 60, gap_words_max: 0, alignment: 1 };
+    let limits = Limits {
+        read_words_max: 60,
+        read_bits_max: 100,
+        write_words_max: 60,
+        gap_words_max: 0,
+        alignment: 1,
+        in_flight_max: 1,
+    };
     def.devices =
         (0..2).map(|n| DeviceDef { id: DeviceId(n), unit: n as u8 + 1, limits, ..def.devices[0].clone() }).collect();
     let every = Poll::Every(Duration::from_secs(1));
@@ -59,7 +66,7 @@ fn plant(tcp: bool) -> PlantDef {
         .collect();
     def.alarms.clear();
     if tcp {
-        def.lines[0].transport = Transport::Tcp { host: "memory".into(), port: 502 };
+        def.lines[0].transport = Transport::tcp("memory", 502);
     }
     def
 }

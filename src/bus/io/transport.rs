@@ -31,8 +31,8 @@ impl Connector {
     /// Opens the port or connection; the error is in words for an operator.
     pub async fn open(&mut self) -> Result<Box<dyn Stream>, String> {
         match self {
-            Connector::Real(Transport::Rtu { port, serial }) => open_serial(port, *serial),
-            Connector::Real(Transport::Tcp { host, port }) => open_tcp(host, *port).await,
+            Connector::Real(Transport::Serial { port, serial, .. }) => open_serial(port, *serial),
+            Connector::Real(Transport::Tcp { host, port, .. }) => open_tcp(host, *port).await,
             Connector::Memory(streams) => match streams.try_recv() {
                 Ok(stream) => Ok(Box::new(stream)),
                 Err(_) => Err("no such port".into()),
@@ -116,13 +116,12 @@ mod tests {
 
     #[tokio::test]
     async fn errors_say_what_to_do() {
-        let serial = Serial { baud: 9600, data_bits: 8, parity: Parity::None, stop_bits: 1 };
-        let missing = Transport::Rtu { port: "/dev/no-such-port".into(), serial };
+        let missing = Transport::rtu("/dev/no-such-port", Serial::USUAL);
         let words = Connector::Real(missing).open().await.err().unwrap();
         assert_eq!(words, "/dev/no-such-port: no such port");
         // A port that was just free and is closed again refuses.
         let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-        let closed = Transport::Tcp { host: "127.0.0.1".into(), port };
+        let closed = Transport::tcp("127.0.0.1", port);
         let words = Connector::Real(closed).open().await.err().unwrap();
         assert!(words.contains("refused"), "{words}");
     }

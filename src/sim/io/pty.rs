@@ -57,14 +57,14 @@ mod tests {
     use super::*;
     use crate::bus::frame::with_crc;
     use crate::bus::io::clock::Clock;
-    use crate::plant::def::{Parity, Serial};
+    use crate::plant::def::Serial;
     use crate::sim::io::{RigHandle, serve_rtu};
     use crate::sim::rig::Rig;
 
     #[tokio::test]
     async fn a_client_can_close_the_port_and_come_back() {
         let (pty, path) = open_pty().expect("a pseudo-terminal is free");
-        let serial = Serial { baud: 9600, data_bits: 8, parity: Parity::None, stop_bits: 1 };
+        let serial = Serial::USUAL;
         let rig = RigHandle::spawn(Rig::demo(), Clock::starting_at(jiff::Timestamp::UNIX_EPOCH, 20.0));
         tokio::spawn(serve_rtu(pty, rig, serial));
         for _ in 0..3 {

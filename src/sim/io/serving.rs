@@ -11,10 +11,7 @@ use tokio::{net::TcpListener, task::JoinHandle};
 use super::{RigHandle, open_pty, serve_rtu, serve_tcp};
 use crate::{
     bus::io::clock::Clock,
-    plant::{
-        PlantDef,
-        def::{Parity, Serial, Transport},
-    },
+    plant::{PlantDef, def::Serial},
     sim::rig::Rig,
 };
 
@@ -83,9 +80,5 @@ fn rig_of(def: &PlantDef) -> Result<Rig, SimError> {
 }
 
 fn serial_of(def: &PlantDef) -> Serial {
-    let serial = def.lines.iter().find_map(|line| match &line.transport {
-        Transport::Rtu { serial, .. } => Some(*serial),
-        Transport::Tcp { .. } => None,
-    });
-    serial.unwrap_or(Serial { baud: 9600, data_bits: 8, parity: Parity::None, stop_bits: 1 })
+    def.lines.iter().find_map(|line| line.transport.serial()).unwrap_or(Serial::USUAL)
 }

@@ -1,0 +1,196 @@
+//! The lines of a plant as its file describes them: what the bytes travel on, how they are framed, how long to wait.
+
+use std::time::Duration;
+
+use super::id::LineId;
+
+/// One serial line or TCP endpoint. Serial parameters, mode and timeouts belong to the line, never to a device.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LineDef {
+    /// Its place.
+    pub id: LineId,
+    /// `L1`.
+    pub name: String,
+    /// How its bytes travel.
+    pub transport: Transport,
+    /// How long an answer may take, from the last byte of the request.
+    pub timeout: Duration,
+    /// Least silence before a request, beyond the 3.5 characters of the standard.
+    pub gap: Duration,
+    /// Silence that ends an answer which is not complete. Frames end by their length first; USB adapters hand bytes over
+    /// in batches (16 ms is common) and gateways later still, so this is far more than 3.5 characters.
+    pub idle: Duration,
+    /// Time after a broadcast in which devices act on it (serial lines; Modbus over serial line V1.02, 2.4.1: 100–200 ms).
+    pub turnaround: Duration,
+}
+
+impl LineDef {
+    /// A line with the waiting times that suit most: 1 s for an answer, no extra gap.
+    pub fn new(id: LineId, name: &str, transport: Transport) -> LineDef {
+        LineDef {
+            id,
+            name: name.to_owned(),
+            transport,
+            timeout: Duration::from_secs(1),
+            gap: Duration::ZERO,
+            idle: Duration::from_millis(50),
+            turnaround: Duration::from_millis(100),
+        }
+    }
+}
+
+/// How the bytes of a line travel.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Transport {
+    /// A serial port.
+    Serial {
+        /// Path of the port, best `/dev/serial/by-id/…`.
+        port: String,
+        /// Baud rate, framing and parity.
+        serial: Serial,
+        /// RTU or ASCII.
+        framing: Framing,
+        /// Who switches the direction of an RS-485 driver.
+        rs485: Rs485,
+    },
+    /// A TCP connection.
+    Tcp {
+        /// Host name or address.
+        host: String,
+        /// TCP port, 502 by default.
+        port: u16,
+        /// MBAP, or RTU frames as serial servers pass them on.
+        framing: Framing,
+    },
+}
+
+impl Transport {
+    /// RTU on a serial port.
+    pub fn rtu(port: &str, serial: Serial) -> Transport {
+        Transport::Serial { port: port.to_owned(), serial, framing: Framing::Rtu, rs485: Rs485::Off }
+    }
+
+    /// Modbus TCP.
+    pub fn tcp(host: &str, port: u16) -> Transport {
+        Transport::Tcp { host: host.to_owned(), port, framing: Framing::Mbap }
+    }
+
+    /// How frames are delimited and checked.
+    pub fn framing(&self) -> Framing {
+        match self {
+            Transport::Serial { framing, .. } | Transport::Tcp { framing, .. } => *framing,
+        }
+    }
+
+    /// The serial parameters, if it is a serial port.
+    pub fn serial(&self) -> Option<Serial> {
+        match self {
+            Transport::Serial { serial, .. } => Some(*serial),
+            Transport::Tcp { .. } => None,
+        }
+    }
+
+    /// The word for the mode: `RTU`, `ASCII`, `TCP`, `RTU over TCP`.
+    pub fn mode(&self) -> &'static str {
+        match (self, self.framing()) {
+            (Transport::Serial { .. }, Framing::Rtu) => "RTU",
+            (Transport::Serial { .. }, _) => "ASCII",
+            (Transport::Tcp { .. }, Framing::Mbap) => "TCP",
+            (Transport::Tcp { .. }, Framing::Rtu) => "RTU over TCP",
+            (Transport::Tcp { .. }, Framing::Ascii) => "ASCII over TCP",
+        }
+    }
+}
+
+/// `RTU /dev/ttyUSB0 9600 8N1` or `TCP host:502`.
+impl std::fmt::Display for Transport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Transport::Serial { port, serial, .. } => write!(f, "{} {port} {serial}", self.mode()),
+            Transport::Tcp { host, port, .. } => write!(f, "{} {host}:{port}", self.mode()),
+        }
+    }
+}
+
+/// How frames are delimited and checked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Framing {
+    /// Binary, ended by silence, CRC-16.
+    Rtu,
+    /// `:` hexadecimal digits, LRC, CR LF.
+    Ascii,
+    /// The header of Modbus TCP, with a transaction id and a length.
+    Mbap,
+}
+
+/// Serial parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Serial {
+    /// Bits a second.
+    pub baud: u32,
+    /// 7 or 8.
+    pub data_bits: u8,
+    /// Parity bit.
+    pub parity: Parity,
+    /// 1 or 2.
+    pub stop_bits: u8,
+}
+
+impl Serial {
+    /// 9600 8N1, the least common denominator of controllers.
+    pub const USUAL: Serial = Serial { baud: 9_600, data_bits: 8, parity: Parity::None, stop_bits: 1 };
+
+    /// Bits of one character on the wire: start, data, parity, stop.
+    pub fn bits_per_char(self) -> u32 {
+        1 + u32::from(self.data_bits) + u32::from(self.parity != Parity::None) + u32::from(self.stop_bits)
+    }
+    /// Time of one character on the wire.
+    pub fn char_time(self) -> Duration {
+        Duration::from_nanos(u64::from(self.bits_per_char()) * 1_000_000_000 / u64::from(self.baud))
+    }
+    /// The silence between frames: 3.5 characters, fixed 1.75 ms above 19200 baud (Modbus serial line V1.02, 2.5.1.1).
+    pub fn silence(self) -> Duration {
+        if self.baud > 19_200 { Duration::from_micros(1_750) } else { self.char_time() * 7 / 2 }
+    }
+}
+
+/// `9600 8N1`.
+impl std::fmt::Display for Serial {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {}{}{}", self.baud, self.data_bits, self.parity.letter(), self.stop_bits)
+    }
+}
+
+/// Parity of a serial character.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Parity {
+    /// No parity bit.
+    None,
+    /// Even.
+    Even,
+    /// Odd.
+    Odd,
+}
+
+impl Parity {
+    /// `N`, `E`, `O`.
+    pub fn letter(self) -> char {
+        match self {
+            Parity::None => 'N',
+            Parity::Even => 'E',
+            Parity::Odd => 'O',
+        }
+    }
+}
+
+/// Who switches the direction of an RS-485 driver on a serial port.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Rs485 {
+    /// Nobody needs to: RS-232, or an adapter that does it itself.
+    #[default]
+    Off,
+    /// The kernel, by RTS high while sending.
+    RtsHigh,
+    /// The kernel, by RTS low while sending.
+    RtsLow,
+}
