@@ -5,6 +5,8 @@
 //! whose answer cannot be mistaken for an owed one. A serial device answers in order; a valid answer to such a request
 //! therefore proves that nothing older is still to come, and the debt is cleared.
 
+use std::time::Duration;
+
 use super::{
     frame::{Shape, shape_of},
     plan::Block,
@@ -78,6 +80,92 @@ fn probes(block: &Block) -> impl Iterator<Item = [u8; 6]> {
     counts.map(move |count| Block { count, ..block.clone() }.request())
 }
 
+/// What all units of a line owe, and how late they have ever been. Times are spans since the link was opened.
+#[derive(Debug, Clone)]
+pub struct Debts {
+    units: Vec<Unit>,
+    /// How long an answer may take.
+    timeout: Duration,
+    /// Numbers of loopbacks.
+    loopbacks: u16,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Unit {
+    debt: Debt,
+    /// How late an owed answer has ever come, its timeout included.
+    late_max: Duration,
+    /// When it last failed to answer in time.
+    failed_at: Option<Duration>,
+}
+
+impl Debts {
+    /// Nobody owes anything.
+    pub fn new(timeout: Duration) -> Debts {
+        Debts { units: vec![Unit::default(); 256], timeout, loopbacks: 0 }
+    }
+
+    /// What a unit owes.
+    pub fn of(&self, unit: u8) -> &Debt {
+        &self.units[usize::from(unit)].debt
+    }
+
+    /// Could the answer to this message be mistaken for one that its unit still owes?
+    pub fn is_ambiguous(&self, message: &[u8]) -> bool {
+        let Some(unit) = message.first() else { return false };
+        let debt = self.of(*unit);
+        shape_of(message).map_or(!debt.is_clear(), |shape| debt.is_ambiguous(shape))
+    }
+
+    /// Nothing older than its last answer can come from this unit any more.
+    pub fn clear(&mut self, unit: u8) {
+        self.units[usize::from(unit)].debt.clear();
+    }
+
+    /// A request was not answered, or only by something spoiled.
+    pub fn failed(&mut self, message: &[u8], now: Duration) {
+        let Some(unit) = message.first().map(|unit| &mut self.units[usize::from(*unit)]) else { return };
+        let shape = shape_of(message);
+        if let Some(shape) = shape {
+            unit.debt.owe(shape);
+        }
+        // Patience counts from the last request that may be answered late; a loopback cannot be mistaken.
+        if !shape.is_some_and(Shape::is_loopback) {
+            unit.failed_at = Some(now);
+        }
+    }
+
+    /// Bytes of this unit came that nobody waits for. `true` if it owed them.
+    pub fn came_late(&mut self, unit: u8, now: Duration) -> bool {
+        let timeout = self.timeout;
+        let unit = &mut self.units[usize::from(unit)];
+        let Some(failed_at) = unit.failed_at.filter(|_| !unit.debt.is_clear()) else { return false };
+        unit.late_max = unit.late_max.max(now.saturating_sub(failed_at) + timeout);
+        true
+    }
+
+    /// The next loopback of a unit, with a number of its own.
+    pub fn next_loopback(&mut self, unit: u8) -> [u8; 6] {
+        self.loopbacks = self.loopbacks.wrapping_add(1);
+        loopback(unit, self.loopbacks)
+    }
+
+    /// For a unit that no probe can bring into step: how much longer it must rest before its debt may be forgotten,
+    /// `None` once it is forgotten. For each answer that it owes it rests twice as long as it has ever been late, ten
+    /// timeouts at the least: patience, not proof, and needed only for devices that do not answer a loopback at all.
+    pub fn forget(&mut self, unit: u8, now: Duration) -> Option<Duration> {
+        let unit = &mut self.units[usize::from(unit)];
+        let each = (2 * unit.late_max).max(10 * self.timeout);
+        let rest = each * unit.debt.count().max(1) as u32;
+        let waited = unit.failed_at.map_or(rest, |failed_at| now.saturating_sub(failed_at));
+        if waited < rest {
+            return Some(rest - waited);
+        }
+        unit.debt.clear();
+        None
+    }
+}
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
@@ -135,5 +223,20 @@ mod tests {
         debt.owe(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap());
         assert!(!debt.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 6]).unwrap()));
         assert!(debt.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap()));
+    }
+
+    #[test]
+    fn a_unit_that_was_late_must_rest_longer() {
+        let s = Duration::from_secs;
+        let mut debts = Debts::new(s(1));
+        let request = [1, 3, 0, 0, 0, 2];
+        assert_eq!(debts.forget(1, s(0)), None, "who owes nothing has nothing to forget");
+        debts.failed(&request, s(100));
+        assert!(debts.is_ambiguous(&request) && !debts.is_ambiguous(&[2, 3, 0, 0, 0, 2]));
+        assert_eq!(debts.forget(1, s(104)), Some(s(6)), "ten timeouts");
+        assert!(debts.came_late(1, s(108)) && !debts.came_late(2, s(108)));
+        assert_eq!(debts.forget(1, s(110)), Some(s(8)), "twice the 9 s that it was late");
+        assert_eq!(debts.forget(1, s(118)), None);
+        assert!(!debts.is_ambiguous(&request));
     }
 }

@@ -2,7 +2,11 @@
 //!
 //! A *message* is unit and PDU without any check: `01 03 03 EA 00 01`. RTU appends a CRC, TCP prepends the MBAP header.
 
-use crate::plant::event::{ExceptionCode, Fault};
+use super::ascii;
+use crate::plant::{
+    def::Framing,
+    event::{ExceptionCode, Fault},
+};
 
 /// Longest message: unit and 253 bytes of PDU.
 pub const MESSAGE_MAX: usize = 254;
@@ -38,6 +42,45 @@ pub fn with_mbap(transaction: u16, message: &[u8]) -> Vec<u8> {
     frame.extend_from_slice(&(message.len() as u16).to_be_bytes());
     frame.extend_from_slice(message);
     frame
+}
+
+/// A message as a frame of a line; only MBAP uses the transaction.
+pub fn wrap(framing: Framing, transaction: u16, message: &[u8]) -> Vec<u8> {
+    match framing {
+        Framing::Rtu => with_crc(message),
+        Framing::Ascii => ascii::encode(message),
+        Framing::Mbap => with_mbap(transaction, message),
+    }
+}
+
+/// The message of a whole frame, if its check fits.
+pub fn unwrap(framing: Framing, frame: &[u8]) -> Result<Vec<u8>, Fault> {
+    match framing {
+        Framing::Rtu => without_crc(frame).map(<[u8]>::to_vec),
+        Framing::Ascii => ascii::decode(frame),
+        Framing::Mbap => match mbap(frame) {
+            Mbap::Whole { end, .. } => Ok(frame[6..end].to_vec()),
+            Mbap::Incomplete | Mbap::Broken => Err(Fault::Truncated { got: frame.len() as u16, expected: 8 }),
+        },
+    }
+}
+
+/// Characters on the wire for a message of this length.
+pub fn wrapped_length(framing: Framing, message: usize) -> usize {
+    match framing {
+        Framing::Rtu => message + 2,
+        Framing::Ascii => 2 * message + 5,
+        Framing::Mbap => message + 6,
+    }
+}
+
+/// The unit that a frame, or the beginning of one, names.
+pub fn unit_of(framing: Framing, frame: &[u8]) -> Option<u8> {
+    match framing {
+        Framing::Rtu => frame.first().copied(),
+        Framing::Ascii => u8::from_str_radix(std::str::from_utf8(frame.get(1..3)?).ok()?, 16).ok(),
+        Framing::Mbap => frame.get(6).copied(),
+    }
 }
 
 /// What stands at the beginning of a TCP stream.

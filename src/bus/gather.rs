@@ -1,12 +1,13 @@
-//! What the bytes that have come over an RTU line are: the answer, somebody else's frame, noise, or the beginning of one.
+//! What the bytes that have come over a line are: the answer, somebody else's frame, noise, or the beginning of one.
+//! For lines without transaction ids; Modbus TCP tells by its header.
 
-use super::frame;
-use crate::plant::event::Fault;
+use super::{ascii, frame};
+use crate::plant::{def::Framing, event::Fault};
 
 /// What the bytes gathered so far are.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// They hold the answer: this range is its message, two bytes of CRC follow.
+    /// They hold the answer: this range is its frame, check included.
     Answer(std::ops::Range<usize>),
     /// They begin with a whole good frame that is not the answer and ends here.
     Foreign(usize, Fault),
@@ -18,15 +19,23 @@ pub enum Verdict {
     Spoiled(Fault),
 }
 
+/// Looks for the answer to a message.
+pub fn verdict(framing: Framing, message: &[u8], buffer: &[u8]) -> Verdict {
+    match framing {
+        Framing::Ascii => in_characters(message, buffer),
+        Framing::Rtu | Framing::Mbap => in_bytes(message, buffer),
+    }
+}
+
 /// Looks for a frame with a good CRC at the beginning, then behind noise.
-pub fn verdict(message: &[u8], buffer: &[u8]) -> Verdict {
+fn in_bytes(message: &[u8], buffer: &[u8]) -> Verdict {
     let begins = |rest: &[u8]| rest.len() >= 2 && rest[0] == message[0] && rest[1] & 0x7F == message[1];
     for start in 0..buffer.len() {
         let rest = &buffer[start..];
         let Some(length) = frame::answer_length(rest).filter(|length| length + 2 <= rest.len()) else { continue };
         let Ok(answer) = frame::without_crc(&rest[..length + 2]) else { continue };
         match frame::check_answer(message, answer) {
-            Ok(()) | Err(Fault::Exception(_)) => return Verdict::Answer(start..start + length),
+            Ok(()) | Err(Fault::Exception(_)) => return Verdict::Answer(start..start + length + 2),
             // Inside what may be the answer a chance check is no frame: it would cut the answer in two.
             Err(_) if (0..start).any(|earlier| begins(&buffer[earlier..])) => {}
             Err(fault) => return Verdict::Foreign(start + length + 2, fault),
@@ -44,18 +53,43 @@ pub fn verdict(message: &[u8], buffer: &[u8]) -> Verdict {
     spoiled.map_or(Verdict::Begun, Verdict::Spoiled)
 }
 
+/// Looks at each run of characters that a `:` begins: a second `:` before the end drops what came before.
+fn in_characters(message: &[u8], buffer: &[u8]) -> Verdict {
+    let mut seen = Verdict::Nothing;
+    let mut start = 0;
+    while let Some(colon) = buffer[start..].iter().position(|char| *char == b':').map(|at| start + at) {
+        let rest = &buffer[colon + 1..];
+        let Some(last) = rest.iter().position(|char| matches!(char, b':' | b'\n')).map(|at| colon + 1 + at) else {
+            let expected = ascii::FRAME_MAX as u16;
+            let too_long = Verdict::Spoiled(Fault::WrongLength { got: rest.len() as u16 + 1, asked: expected });
+            return if rest.len() < ascii::FRAME_MAX { Verdict::Begun } else { too_long };
+        };
+        if buffer[last] == b':' {
+            start = last;
+            continue;
+        }
+        start = last + 1;
+        match ascii::decode(&buffer[colon..start]).map(|answer| frame::check_answer(message, &answer)) {
+            Ok(Ok(()) | Err(Fault::Exception(_))) => return Verdict::Answer(colon..start),
+            Ok(Err(fault)) => return Verdict::Foreign(start, fault),
+            Err(fault) => seen = Verdict::Spoiled(fault),
+        }
+    }
+    seen
+}
+
 /// Names what is left at the deadline.
-pub fn left_over(message: &[u8], buffer: &[u8]) -> Fault {
+pub fn left_over(framing: Framing, message: &[u8], buffer: &[u8]) -> Fault {
     if buffer.is_empty() {
         return Fault::Timeout;
     }
-    let expected = frame::shape_of(message).map_or(5, |shape| shape.length() + 2);
+    let expected = frame::wrapped_length(framing, frame::shape_of(message).map_or(3, |shape| shape.length()));
     if buffer.len() < expected {
         return Fault::Truncated { got: buffer.len() as u16, expected: expected as u16 };
     }
-    match frame::without_crc(buffer) {
+    match frame::unwrap(framing, buffer) {
         Err(fault) => fault,
-        Ok(message) => Fault::WrongLength { got: message.len() as u16, asked: expected as u16 - 2 },
+        Ok(answer) => Fault::WrongLength { got: answer.len() as u16, asked: expected as u16 },
     }
 }
 
@@ -71,14 +105,14 @@ mod tests {
     }
 
     fn check(bytes: &[u8], expect: Verdict) {
-        assert_eq!(verdict(&REQUEST, bytes), expect, "{}", frame::hex(bytes));
+        assert_eq!(verdict(Framing::Rtu, &REQUEST, bytes), expect, "{}", frame::hex(bytes));
     }
 
     #[test]
     fn an_answer_is_found_whole_and_behind_noise() {
         check(&[], Verdict::Nothing);
-        check(&answer(), Verdict::Answer(0..7));
-        check(&[&[0xFF, 0x00, 0x55], &answer()[..]].concat(), Verdict::Answer(3..10));
+        check(&answer(), Verdict::Answer(0..9));
+        check(&[&[0xFF, 0x00, 0x55], &answer()[..]].concat(), Verdict::Answer(3..12));
         for cut in 2..answer().len() {
             check(&answer()[..cut], Verdict::Begun);
         }
@@ -87,7 +121,7 @@ mod tests {
 
     #[test]
     fn a_refusal_is_an_answer_and_another_unit_is_not() {
-        check(&with_crc(&[1, 0x83, 2]), Verdict::Answer(0..3));
+        check(&with_crc(&[1, 0x83, 2]), Verdict::Answer(0..5));
         check(&with_crc(&[2, 3, 4, 0, 10, 0, 11]), Verdict::Foreign(9, Fault::WrongUnit { got: 2, asked: 1 }));
         check(&with_crc(&[1, 3, 2, 0, 10]), Verdict::Foreign(7, Fault::WrongLength { got: 5, asked: 7 }));
     }
@@ -96,7 +130,7 @@ mod tests {
     fn a_spoiled_answer_is_named_and_not_taken() {
         let mut spoiled = answer();
         spoiled[4] ^= 1;
-        assert!(matches!(verdict(&REQUEST, &spoiled), Verdict::Spoiled(Fault::Crc { .. })));
+        assert!(matches!(verdict(Framing::Rtu, &REQUEST, &spoiled), Verdict::Spoiled(Fault::Crc { .. })));
     }
 
     #[test]
@@ -105,13 +139,31 @@ mod tests {
         let request = [1, 3, 0, 10, 0, 4];
         let inner = with_crc(&[2, 0x83, 2]);
         let whole = with_crc(&[&[1, 3, 8], &inner[..], &[0, 0, 0]].concat());
-        assert_eq!(verdict(&request, &whole[..10]), Verdict::Begun);
-        assert_eq!(verdict(&request, &whole), Verdict::Answer(0..11));
+        assert_eq!(verdict(Framing::Rtu, &request, &whole[..10]), Verdict::Begun);
+        assert_eq!(verdict(Framing::Rtu, &request, &whole), Verdict::Answer(0..13));
     }
 
     #[test]
     fn what_is_left_at_the_deadline_has_a_name() {
-        assert_eq!(left_over(&REQUEST, &[]), Fault::Timeout);
-        assert_eq!(left_over(&REQUEST, &answer()[..4]), Fault::Truncated { got: 4, expected: 9 });
+        assert_eq!(left_over(Framing::Rtu, &REQUEST, &[]), Fault::Timeout);
+        assert_eq!(left_over(Framing::Rtu, &REQUEST, &answer()[..4]), Fault::Truncated { got: 4, expected: 9 });
+    }
+
+    #[test]
+    fn in_ascii_a_colon_begins_and_a_line_feed_ends() {
+        let of = |bytes: &[u8]| verdict(Framing::Ascii, &REQUEST, bytes);
+        let whole = ascii::encode(&[1, 3, 4, 0, 10, 0, 11]);
+        assert_eq!(of(&whole), Verdict::Answer(0..19));
+        assert_eq!(of(&[b"\x00#".as_slice(), &whole].concat()), Verdict::Answer(2..21));
+        assert_eq!(of(&[&whole[..7], &whole].concat()), Verdict::Answer(7..26), "a second colon begins anew");
+        assert_eq!(of(b"noise"), Verdict::Nothing);
+        for cut in 1..whole.len() {
+            assert_eq!(of(&whole[..cut]), Verdict::Begun, "cut at {cut}");
+        }
+        assert!(matches!(of(b":0103040009000AE5\r\n"), Verdict::Answer(_)));
+        assert!(matches!(of(b":0103040009000AE6\r\n"), Verdict::Spoiled(Fault::Lrc { .. })));
+        let other = ascii::encode(&[2, 3, 4, 0, 10, 0, 11]);
+        assert_eq!(of(&other), Verdict::Foreign(19, Fault::WrongUnit { got: 2, asked: 1 }));
+        assert_eq!(of(&ascii::encode(&[1, 0x83, 2])), Verdict::Answer(0..11));
     }
 }

@@ -1,5 +1,6 @@
 //! How it is read and written: frames, codecs, blocks, the schedule; bytes move only in [`io`].
 
+pub mod ascii;
 pub mod frame;
 pub mod gather;
 pub mod codec;

@@ -91,6 +91,17 @@ pub enum Fault {
         /// Over the bytes received.
         computed: u16,
     },
+    /// The check of an ASCII frame did not fit.
+    #[error("LRC error: got {got:02X}, computed {computed:02X}")]
+    Lrc {
+        /// As received.
+        got: u8,
+        /// Over the bytes received.
+        computed: u8,
+    },
+    /// A character that has no place in an ASCII frame.
+    #[error("character {0:02X} in an ASCII frame, expected a hexadecimal digit")]
+    NotHex(u8),
     /// The frame ended too early.
     #[error("answer cut short: {got} of {expected} bytes")]
     Truncated {
@@ -145,6 +156,8 @@ impl Fault {
     pub fn is_corrupt(self) -> bool {
         match self {
             Fault::Crc { .. }
+            | Fault::Lrc { .. }
+            | Fault::NotHex(_)
             | Fault::Truncated { .. }
             | Fault::WrongUnit { .. }
             | Fault::WrongFunction { .. }
@@ -223,6 +236,10 @@ pub struct LineCounters {
     pub exceptions: u64,
     /// Frames or bytes that nobody had asked for any more.
     pub stale: u64,
+    /// Of these, answers to requests that had been given up.
+    pub late: u64,
+    /// Frames sent and received, and runs of bytes that were none.
+    pub frames: u64,
     /// Times the port or connection was opened.
     pub opens: u64,
     /// Polls that could not start in their period and were skipped.

@@ -14,6 +14,8 @@ pub mod def;
 pub mod tag;
 pub mod scale;
 pub mod event;
+pub mod traffic;
+pub mod tally;
 pub mod command;
 pub mod record;
 pub mod alarm;

@@ -1,17 +1,16 @@
-//! The link layer of one open port: whole frames out, checked answers in, every byte accounted for.
-//!
-//! PDUs are made and read by tokio-modbus, with a fresh context for every request on one end of a pipe; what travels on
-//! the port is ours:
+//! The link layer of one open port: whole frames out, checked answers in.
 //!
 //! ```text
-//!  call(Request) ─> tokio-modbus ─> pipe ─> message ─> exchange ─> port     RTU: CRC, silences, debt
-//!       Response <─ tokio-modbus <─ pipe <─ message <─ (checked) <─ port     TCP: MBAP, own transaction ids
+//!  call(Request) ─> tokio-modbus ─> pipe ─> message ─┐
+//!  exchange(message) ────────────────────────────────┼─> wire    RTU, ASCII: check, silences, debts; one at a time
+//!  exchange_all(messages) ───────────────────────────┘           MBAP: transaction ids; several under way
 //! ```
+//!
+//! PDUs are made and read by tokio-modbus, with a fresh context for every request on one end of a pipe; what travels on
+//! the port is ours.
 
-use std::{borrow::Cow, collections::VecDeque, time::Duration};
+use std::{borrow::Cow, sync::Arc, time::Duration};
 
-use futures_util::FutureExt;
-use jiff::Timestamp;
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
     time::Instant,
@@ -22,24 +21,20 @@ use tokio_modbus::{
     slave::Slave,
 };
 
-use super::{clock::Clock, transport::Stream};
+use super::{clock::Clock, pause::Pause, transport::Stream, wire::Wire};
 use crate::{
     bus::{
-        debt::{self, Debt},
+        debt::Debt,
         frame::{self, Mbap, Shape},
         gather::{self, Verdict},
     },
     plant::{
-        def::{LineDef, Transport},
-        event::{Fault, LineCounters},
+        def::{Framing, LineDef},
+        event::{ExceptionCode, Fault, LineCounters},
+        traffic::{Exchange, Frame},
     },
 };
 
-/// Frames kept for inspection.
-const RING: usize = 1_000;
-/// USB adapters hand bytes over in batches (16 ms is common), gateways even later: only a longer silence ends a frame
-/// that is not complete. Frames end by length first, so this costs nothing on a good line.
-const IDLE_MIN: Duration = Duration::from_millis(50);
 /// Most bytes gathered for one answer, noise included; more is no Modbus.
 const GATHER_MAX: usize = 4_096;
 
@@ -58,74 +53,40 @@ impl From<Fault> for Trouble {
     }
 }
 
-/// One frame or run of bytes as it went over the port.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FrameLog {
-    /// When.
-    pub at: Timestamp,
-    /// `true` for bytes that we sent.
-    pub sent: bool,
-    /// The bytes.
-    pub bytes: Vec<u8>,
-    /// `ok`, or what was wrong with it.
-    pub verdict: Cow<'static, str>,
+/// A request with what came back; the message of a good answer is in `answer`.
+#[derive(Debug, Clone)]
+pub struct Answered {
+    /// Unit and PDU of the answer, or why there is none.
+    pub answer: Result<Vec<u8>, Fault>,
+    /// Both as they were on the wire.
+    pub exchange: Arc<Exchange>,
 }
 
 /// The link on one open port.
 pub struct Link {
-    port: Box<dyn Stream>,
-    clock: Clock,
-    /// Time of one character and of the silence between frames, real time; zero over TCP.
-    char_time: Duration,
-    silence: Duration,
-    /// Frames carry a transaction id.
-    tcp: bool,
+    wire: Wire,
     transaction: u16,
     timeout: Duration,
-    /// Nothing is sent before this.
-    quiet_until: Instant,
-    /// What each unit owes, by unit address.
-    debts: Vec<Debt>,
-    /// Numbers of loopbacks.
-    loopbacks: u16,
-    /// How late an owed answer has ever come, by unit address.
-    late_max: Vec<Duration>,
-    /// When the unit last failed to answer in time.
-    failed_last: Vec<Option<Instant>>,
-    ring: VecDeque<FrameLog>,
-    /// Totals of this line; `utilisation`, `opens` and `missed` are the task's.
-    pub counters: LineCounters,
-    /// From the last byte sent to the first byte received, of the last answer.
-    pub reply: Duration,
+    idle: Duration,
+    turnaround: Duration,
+    /// What the last exchange was; `None` before the first.
+    pub last: Option<Arc<Exchange>>,
     /// Real time in which the line was busy.
     pub busy: Duration,
 }
 
 impl Link {
     /// A link on a freshly opened port. `counters` go on from an earlier opening.
-    pub fn new(port: Box<dyn Stream>, line: &LineDef, clock: Clock, counters: LineCounters) -> Link {
-        let (char_time, silence, tcp) = match &line.transport {
-            Transport::Serial { serial, .. } => (serial.char_time(), serial.silence().max(line.gap), false),
-            Transport::Tcp { .. } => (Duration::ZERO, line.gap, true),
-        };
+    pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, counters: LineCounters) -> Link {
+        let wire = Wire::new(port, pause, line, clock, counters);
         Link {
-            port,
-            clock,
-            char_time: clock.real_span(char_time),
-            silence: clock.real_span(silence),
-            tcp,
             transaction: 0,
             timeout: line.timeout,
-            // What was asked before an earlier port went away may still be answered.
-            quiet_until: Instant::now() + if tcp || counters.requests == 0 { Duration::ZERO } else { line.timeout },
-            debts: vec![Debt::default(); 256],
-            loopbacks: 0,
-            late_max: vec![Duration::ZERO; 256],
-            failed_last: vec![None; 256],
-            ring: VecDeque::new(),
-            counters,
-            reply: Duration::ZERO,
+            idle: wire.silence.max(line.idle),
+            turnaround: clock.real_span(line.turnaround),
+            last: None,
             busy: Duration::ZERO,
+            wire,
         }
     }
 
@@ -137,7 +98,7 @@ impl Link {
         done?;
         match answer {
             Ok(Ok(response)) => Ok(response),
-            Ok(Err(code)) => Err(Fault::Exception(crate::plant::event::ExceptionCode(code.into())).into()),
+            Ok(Err(code)) => Err(Fault::Exception(ExceptionCode(code.into())).into()),
             // The frame was whole and checked, so its content is what the other side got wrong.
             Err(error) => {
                 tracing::warn!(unit, %error, "an answer that cannot be read");
@@ -160,47 +121,113 @@ impl Link {
 
     /// Sends a message (unit and PDU) and gives the checked answer message. Sent once, never repeated.
     pub async fn exchange(&mut self, message: &[u8]) -> Result<Vec<u8>, Trouble> {
-        let unit = usize::from(message.first().copied().unwrap_or(0));
+        if self.framing() == Framing::Mbap {
+            let mut answers = self.exchange_all(&[message]).await?;
+            let answered = answers.pop().map_or(Err(Fault::Timeout), |answered| answered.answer);
+            return answered.map_err(Trouble::Fault);
+        }
         // An answer proves that nothing older is to come only if it could not itself have been older.
-        let proof = !self.is_ambiguous(message);
-        self.wait_for_silence().await;
-        self.drain()?;
+        let proof = !self.wire.debts.is_ambiguous(message);
+        let frame = frame::wrap(self.framing(), 0, message);
+        let sent_at = self.wire.send(&frame).await?;
         let started = Instant::now();
-        let outcome = self.transact(message).await;
+        self.note_sent(message, frame.clone());
+        let gathered = match message.first() {
+            Some(0) => Gathered::nothing(Ok(vec![])),
+            _ => self.gather(message, sent_at).await?,
+        };
         self.busy += started.elapsed();
-        self.rest_at_least(self.silence);
-        match &outcome {
+        let rest = if message.first() == Some(&0) {
+            sent_at.saturating_duration_since(Instant::now()) + self.turnaround
+        } else {
+            self.wire.silence
+        };
+        self.wire.rest(rest);
+        match &gathered.answer {
             Ok(_) => {
-                self.counters.ok += 1;
-                if proof {
-                    self.debts[unit].clear();
+                self.wire.counters.ok += 1;
+                if let Some(unit) = message.first().filter(|_| proof) {
+                    self.wire.debts.clear(*unit);
                 }
             }
-            Err(Trouble::Fault(fault)) => self.account(message, *fault),
-            Err(Trouble::Gone(_)) => {}
+            Err(fault) => self.account(message, *fault),
         }
-        outcome
+        self.keep(frame, gathered).answer.map_err(Trouble::Fault)
+    }
+
+    /// Sends several messages at once over Modbus TCP and gives their answers in the same order: they may overtake each
+    /// other on the way. `Err` only when the connection is gone or out of step.
+    pub async fn exchange_all(&mut self, messages: &[&[u8]]) -> Result<Vec<Answered>, Trouble> {
+        let first = self.transaction.wrapping_add(1);
+        let mut frames = Vec::with_capacity(messages.len());
+        for message in messages {
+            self.transaction = self.transaction.wrapping_add(1);
+            frames.push(frame::with_mbap(self.transaction, message));
+        }
+        let sent_at = self.wire.send(&frames.concat()).await?;
+        for (message, frame) in messages.iter().zip(&frames) {
+            self.note_sent(message, frame.clone());
+        }
+        let gathered = self.gather_mbap(messages, first, sent_at).await?;
+        self.busy += sent_at.elapsed();
+        self.wire.rest(self.wire.silence);
+        let mut answers = Vec::with_capacity(messages.len());
+        for ((message, frame), gathered) in messages.iter().zip(frames).zip(gathered) {
+            match &gathered.answer {
+                Ok(_) => self.wire.counters.ok += 1,
+                Err(fault) => self.account(message, *fault),
+            }
+            answers.push(self.keep(frame, gathered));
+        }
+        Ok(answers)
+    }
+
+    /// Sends bytes as they are and gives everything that comes back until the line is silent: for tests of the line.
+    pub async fn send_raw(&mut self, bytes: &[u8]) -> Result<(Vec<u8>, Option<Duration>), Trouble> {
+        let sent_at = self.wire.send(bytes).await?;
+        self.note_sent(&[], bytes.to_vec());
+        let deadline = sent_at + self.timeout + self.wire.char_time * frame::MESSAGE_MAX as u32;
+        let (mut buffer, mut reply) = (Vec::new(), None);
+        let mut until = deadline;
+        while self.wire.receive(until, &mut buffer).await? && buffer.len() < GATHER_MAX {
+            reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
+            until = (Instant::now() + self.idle).min(deadline);
+        }
+        if !buffer.is_empty() {
+            self.wire.record(false, buffer.clone(), Cow::Borrowed("received"));
+        }
+        self.wire.rest(self.wire.silence);
+        // What was sent may have been a request whose answer is still to come.
+        let request = frame::unwrap(self.framing(), bytes);
+        if let (true, Ok(message)) = (buffer.is_empty() && self.framing() != Framing::Mbap, request) {
+            self.wire.debts.failed(&message, self.wire.age());
+        }
+        Ok((buffer, reply))
+    }
+
+    /// How messages are framed.
+    pub fn framing(&self) -> Framing {
+        self.wire.framing()
     }
 
     /// Could the answer to this message be mistaken for one that its unit still owes?
     pub fn is_ambiguous(&self, message: &[u8]) -> bool {
-        let Some(shape) = frame::shape_of(message) else { return !self.debt(message[0]).is_clear() };
-        self.debt(message[0]).is_ambiguous(shape)
+        self.framing() != Framing::Mbap && self.wire.debts.is_ambiguous(message)
     }
 
     /// What a unit owes.
     pub fn debt(&self, unit: u8) -> &Debt {
-        &self.debts[usize::from(unit)]
+        self.wire.debts.of(unit)
     }
 
     /// Brings a unit into step by a loopback, where no read can: after it nothing older can come any more.
     pub async fn loopback(&mut self, unit: u8) -> Result<(), Trouble> {
-        self.loopbacks = self.loopbacks.wrapping_add(1);
         let proves = self.debt(unit).refusal_proves();
-        match self.exchange(&debt::loopback(unit, self.loopbacks)).await {
+        let loopback = self.wire.debts.next_loopback(unit);
+        match self.exchange(&loopback).await {
             Ok(_) => Ok(()),
             Err(Trouble::Fault(Fault::Exception(_))) if proves => {
-                self.debts[usize::from(unit)].clear();
+                self.wire.debts.clear(unit);
                 Ok(())
             }
             // It may be the answer to an earlier loopback: the unit is alive, but not in step.
@@ -209,126 +236,76 @@ impl Link {
         }
     }
 
-    /// For a unit that no probe can bring into step: how much longer it must rest before its debt may be forgotten,
-    /// `None` once it is forgotten. For each answer that it owes it rests twice as long as it has ever been late, ten
-    /// timeouts at the least: patience, not proof, and needed only for devices that do not answer a loopback at all.
+    /// See [`crate::bus::debt::Debts::forget`].
     pub fn forget_debt(&mut self, unit: u8) -> Option<Duration> {
-        let unit = usize::from(unit);
-        let each = (2 * self.late_max[unit]).max(10 * self.timeout);
-        let rest = each * self.debts[unit].count().max(1) as u32;
-        let waited = self.failed_last[unit].map_or(rest, |failed| failed.elapsed());
-        if waited < rest {
-            return Some(rest - waited);
-        }
-        self.debts[unit].clear();
-        None
+        self.wire.debts.forget(unit, self.wire.age())
     }
 
     /// Nothing is sent for this long (plant time), for devices that need it.
     pub fn rest(&mut self, plant: Duration) {
-        self.rest_at_least(self.clock.real_span(plant));
+        self.wire.rest(self.wire.clock().real_span(plant));
     }
 
     /// Reads and drops what comes while nobody has asked; returns only when the port is gone.
     pub async fn idle(&mut self) -> String {
-        let mut buffer = [0; 512];
-        loop {
-            match self.port.read(&mut buffer).await {
-                Ok(0) => return "closed by the other side".into(),
-                Err(error) => return error.to_string(),
-                Ok(count) => self.take_stale(&buffer[..count]),
-            }
-        }
+        self.wire.idle().await
     }
 
-    /// The latest frames, oldest first.
-    pub fn frames(&self) -> impl Iterator<Item = &FrameLog> {
-        self.ring.iter()
+    /// Totals of this line; `utilisation`, `opens` and `missed` are the task's.
+    pub fn counters(&mut self) -> &mut LineCounters {
+        &mut self.wire.counters
     }
 
-    async fn wait_for_silence(&mut self) {
-        // A device that never stops talking, or a second master, must not hold the line for ever: it spoils what is sent
-        // then, and that is told.
-        let limit = self.quiet_until.max(Instant::now()) + self.timeout;
-        while Instant::now() < self.quiet_until.min(limit) {
-            let until = self.quiet_until.min(limit);
-            // A gone port shows itself at the write that follows.
-            let _ = tokio::time::timeout_at(until, self.idle_quietly()).await;
-            if until == self.quiet_until.min(limit) {
-                tokio::time::sleep_until(until).await;
-            }
-        }
-        self.quiet_until = self.quiet_until.min(limit);
+    /// The frames since they were last taken, oldest first.
+    pub fn take_frames(&mut self) -> Vec<Frame> {
+        self.wire.take_frames()
     }
 
-    /// As [`Link::idle`], but every byte that comes prolongs the silence to be kept.
-    async fn idle_quietly(&mut self) {
-        let mut buffer = [0; 512];
-        while let Ok(count @ 1..) = self.port.read(&mut buffer).await {
-            self.take_stale(&buffer[..count]);
-            self.rest_at_least(self.silence);
-        }
+    fn note_sent(&mut self, message: &[u8], frame: Vec<u8>) {
+        self.wire.counters.requests += 1;
+        let broadcast = message.first() == Some(&0) && self.framing() != Framing::Mbap;
+        self.wire.record(true, frame, Cow::Borrowed(if broadcast { "sent to all" } else { "sent" }));
     }
 
-    /// Drops what lies in the kernel: it was sent before we asked. Over TCP the transaction id tells.
-    fn drain(&mut self) -> Result<(), Trouble> {
-        let mut buffer = [0; 512];
-        loop {
-            match self.port.read(&mut buffer).now_or_never() {
-                None => return Ok(()),
-                Some(Ok(0)) => return Err(Trouble::Gone("closed by the other side".into())),
-                Some(Err(error)) => return Err(Trouble::Gone(error.to_string())),
-                Some(Ok(count)) => self.take_stale(&buffer[..count]),
-            }
-        }
-    }
-
-    async fn transact(&mut self, message: &[u8]) -> Result<Vec<u8>, Trouble> {
-        self.transaction = self.transaction.wrapping_add(1);
-        let out = if self.tcp { frame::with_mbap(self.transaction, message) } else { frame::with_crc(message) };
-        let gone = |error: std::io::Error| Trouble::Gone(error.to_string());
-        // No flush: on a serial port that waits for the last byte to leave, and blocks the thread while it does.
-        match tokio::time::timeout(self.timeout + self.char_time * 512, self.port.write_all(&out)).await {
-            Ok(written) => written.map_err(gone)?,
-            Err(_) => return Err(Trouble::Gone("the port takes no bytes".into())),
-        }
-        self.counters.requests += 1;
-        self.counters.sent_bytes += out.len() as u64;
-        self.counters.last_tx = Some(self.clock.now());
-        // The write returns before the bytes have left the port: the answer's time begins with the last of them.
-        let sent_at = Instant::now() + self.char_time * out.len() as u32;
-        self.log(true, out, Cow::Borrowed("sent"));
-        let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length) + 2;
-        let deadline = sent_at + self.timeout + self.char_time * longest as u32;
-        if self.tcp {
-            self.gather_tcp(message, sent_at, deadline).await
-        } else {
-            self.gather_rtu(message, sent_at, deadline).await
-        }
+    fn keep(&mut self, request: Vec<u8>, gathered: Gathered) -> Answered {
+        let took = Duration::from_secs_f64(gathered.took.as_secs_f64() * self.wire.clock().speed());
+        let now = self.wire.clock().now();
+        let exchange = Arc::new(Exchange {
+            at: now.checked_sub(took).unwrap_or(now),
+            framing: self.framing(),
+            request,
+            answer: gathered.frame,
+            outcome: gathered.answer.as_ref().map(drop).map_err(|fault| *fault),
+            reply: gathered.reply,
+            tries: 1,
+        });
+        self.last = Some(exchange.clone());
+        Answered { answer: gathered.answer, exchange }
     }
 
     /// Gathers until a frame has come that answers the message. Whole frames that do not (another unit, an owed answer)
     /// are dropped, and waiting goes on inside the same deadline.
-    async fn gather_rtu(&mut self, message: &[u8], sent_at: Instant, deadline: Instant) -> Result<Vec<u8>, Trouble> {
-        let idle = self.silence.max(IDLE_MIN);
+    async fn gather(&mut self, message: &[u8], sent_at: Instant) -> Result<Gathered, Trouble> {
+        let framing = self.framing();
+        let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);
+        let deadline = sent_at + self.timeout + self.wire.char_time * frame::wrapped_length(framing, longest) as u32;
         let mut buffer: Vec<u8> = Vec::new();
         // What came and did not fit: it names the fault if nothing better comes.
         let mut misfit: Option<Fault> = None;
+        let mut reply = None;
         loop {
-            let wait_until = match gather::verdict(message, &buffer) {
+            let verdict = gather::verdict(framing, message, &buffer);
+            let wait_until = match verdict {
                 Verdict::Answer(range) => {
-                    if 0 < range.start {
-                        self.counters.stale += 1;
-                        self.log(false, buffer[..range.start].to_vec(), Cow::Borrowed("noise before the answer"));
-                    }
-                    let answer = buffer[range.clone()].to_vec();
-                    self.log(false, buffer[range.start..range.end + 2].to_vec(), Cow::Borrowed("ok"));
-                    // An exception is an answer for the line, but a fault for the caller.
-                    frame::check_answer(message, &answer)?;
-                    return Ok(answer);
+                    self.wire.drop_stale(&buffer[..range.start]);
+                    let frame = buffer[range].to_vec();
+                    self.wire.record(false, frame.clone(), Cow::Borrowed("ok"));
+                    let answer = frame::unwrap(framing, &frame)
+                        .and_then(|answer| frame::check_answer(message, &answer).map(|()| answer));
+                    return Ok(Gathered { answer, frame, reply, took: sent_at.elapsed() });
                 }
                 Verdict::Foreign(end, fault) => {
-                    self.take_stale_counted(&buffer[..end]);
+                    self.wire.drop_stale(&buffer[..end]);
                     buffer.drain(..end);
                     misfit = Some(fault);
                     continue;
@@ -336,89 +313,92 @@ impl Link {
                 // Nothing, or noise: the answer may still come.
                 Verdict::Nothing => deadline,
                 // The frame may still grow, or it is spoiled; silence decides.
-                Verdict::Begun | Verdict::Spoiled(_) => (Instant::now() + idle).min(deadline),
+                Verdict::Begun | Verdict::Spoiled(_) => (Instant::now() + self.idle).min(deadline),
             };
-            match self.read_until(wait_until, &mut buffer, sent_at).await? {
-                true if buffer.len() <= GATHER_MAX => {}
-                _ => {
-                    let fault = match gather::verdict(message, &buffer) {
-                        Verdict::Spoiled(fault) => fault,
-                        _ => misfit.unwrap_or_else(|| gather::left_over(message, &buffer)),
-                    };
-                    if !buffer.is_empty() {
-                        self.log(false, buffer, Cow::Owned(fault.to_string()));
-                    }
-                    return Err(fault.into());
-                }
+            if self.wire.receive(wait_until, &mut buffer).await? && buffer.len() <= GATHER_MAX {
+                reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
+                continue;
             }
+            let fault = match verdict {
+                Verdict::Spoiled(fault) => fault,
+                _ => misfit.unwrap_or_else(|| gather::left_over(framing, message, &buffer)),
+            };
+            if !buffer.is_empty() {
+                self.wire.record(false, buffer.clone(), Cow::Owned(fault.to_string()));
+            }
+            return Ok(Gathered { answer: Err(fault), frame: buffer, reply, took: sent_at.elapsed() });
         }
     }
 
-    /// Gathers until the frame with our transaction id has come; others are late answers and are dropped.
-    async fn gather_tcp(&mut self, message: &[u8], sent_at: Instant, deadline: Instant) -> Result<Vec<u8>, Trouble> {
-        let mut buffer: Vec<u8> = Vec::new();
-        loop {
-            match frame::mbap(&buffer) {
-                Mbap::Incomplete => {}
+    /// Gathers the answers to the transactions that begin with `first`; others are late answers and are dropped.
+    async fn gather_mbap(
+        &mut self,
+        messages: &[&[u8]],
+        first: u16,
+        sent_at: Instant,
+    ) -> Result<Vec<Gathered>, Trouble> {
+        let deadline = sent_at + self.timeout;
+        let mut gathered: Vec<Option<Gathered>> = vec![None; messages.len()];
+        let (mut buffer, mut start, mut open): (Vec<u8>, usize, usize) = (Vec::new(), 0, messages.len());
+        while 0 < open {
+            match frame::mbap(&buffer[start..]) {
+                Mbap::Incomplete => {
+                    buffer.drain(..start);
+                    start = 0;
+                    if self.wire.receive(deadline, &mut buffer).await? {
+                        continue;
+                    }
+                    if !buffer.is_empty() {
+                        self.wire.record(false, buffer, Cow::Borrowed("cut short"));
+                        // The rest may come later and would stand before the next header.
+                        return Err(Trouble::Gone("an answer was cut short, the stream is out of step".into()));
+                    }
+                    break;
+                }
                 Mbap::Broken => {
-                    self.log(false, buffer, Cow::Borrowed("no MBAP header"));
+                    self.wire.record(false, buffer.split_off(start), Cow::Borrowed("no MBAP header"));
                     return Err(Trouble::Gone("the stream is out of step".into()));
                 }
-                Mbap::Whole { transaction, end } if transaction == self.transaction => {
-                    let answer = buffer[6..end].to_vec();
-                    self.log(false, buffer[..end].to_vec(), Cow::Borrowed("ok"));
-                    frame::check_answer(message, &answer)?;
-                    return Ok(answer);
+                Mbap::Whole { transaction, end } => {
+                    let frame = buffer[start..start + end].to_vec();
+                    start += end;
+                    let index = usize::from(transaction.wrapping_sub(first));
+                    let Some(slot) = gathered.get_mut(index).filter(|slot| slot.is_none()) else {
+                        self.wire.drop_stale(&frame);
+                        continue;
+                    };
+                    let answer = frame[6..].to_vec();
+                    let answer = frame::check_answer(messages[index], &answer).map(|()| answer);
+                    let took = sent_at.elapsed();
+                    *slot = Some(Gathered { answer, frame: frame.clone(), reply: Some(took), took });
+                    open -= 1;
+                    self.wire.record(false, frame, Cow::Borrowed("ok"));
                 }
-                Mbap::Whole { end, .. } => {
-                    self.take_stale_counted(&buffer[..end]);
-                    buffer.drain(..end);
-                    continue;
-                }
-            }
-            if !self.read_until(deadline, &mut buffer, sent_at).await? {
-                if !buffer.is_empty() {
-                    self.log(false, buffer, Cow::Borrowed("cut short"));
-                    // The rest may come later and would stand before the next header.
-                    return Err(Trouble::Gone("an answer was cut short, the stream is out of step".into()));
-                }
-                return Err(Fault::Timeout.into());
             }
         }
+        // What stands behind the last answer nobody has asked for.
+        self.wire.drop_stale(&buffer[start..]);
+        let missing = || Gathered { took: sent_at.elapsed(), ..Gathered::nothing(Err(Fault::Timeout)) };
+        Ok(gathered.into_iter().map(|slot| slot.unwrap_or_else(missing)).collect())
     }
 
-    /// Reads more bytes; `false` if none came before `until`.
-    async fn read_until(&mut self, until: Instant, buffer: &mut Vec<u8>, sent_at: Instant) -> Result<bool, Trouble> {
-        let mut chunk = [0; 512];
-        match tokio::time::timeout_at(until, self.port.read(&mut chunk)).await {
-            Err(_) => Ok(false),
-            Ok(Ok(0)) => Err(Trouble::Gone("closed by the other side".into())),
-            Ok(Err(error)) => Err(Trouble::Gone(error.to_string())),
-            Ok(Ok(count)) => {
-                if buffer.is_empty() {
-                    self.reply = Instant::now().saturating_duration_since(sent_at);
-                }
-                self.counters.received_bytes += count as u64;
-                self.counters.last_rx = Some(self.clock.now());
-                buffer.extend_from_slice(&chunk[..count]);
-                Ok(true)
-            }
-        }
-    }
-
-    /// Counts a fault. The unit owes the answer, and the line rests until the longest late frame has passed.
+    /// Counts a fault. On a line without transaction ids the unit owes the answer, and the line rests until the longest
+    /// late frame has passed.
     fn account(&mut self, message: &[u8], fault: Fault) {
-        let unit = usize::from(message[0]);
+        let Some(unit) = message.first() else { return };
+        let mbap = self.framing() == Framing::Mbap;
         match fault {
             Fault::Exception(_) => {
-                self.counters.exceptions += 1;
+                self.wire.counters.exceptions += 1;
                 // An exception names no address: while the unit owes, it may be the answer to an older request.
-                if self.tcp || self.debts[unit].is_clear() {
+                if mbap || self.wire.debts.of(*unit).is_clear() {
                     return;
                 }
             }
-            Fault::Timeout => self.counters.timeouts += 1,
+            Fault::Timeout => self.wire.counters.timeouts += 1,
             Fault::Crc { .. }
+            | Fault::Lrc { .. }
+            | Fault::NotHex(_)
             | Fault::Truncated { .. }
             | Fault::WrongUnit { .. }
             | Fault::WrongFunction { .. }
@@ -426,51 +406,32 @@ impl Link {
             | Fault::WrongEcho
             | Fault::NotANumber
             | Fault::NotConnected
-            | Fault::Resting => self.counters.corrupt += 1,
+            | Fault::Resting => self.wire.counters.corrupt += 1,
         }
         tracing::debug!(unit, request = %frame::hex(message), %fault, "a request failed");
         // Even what looked like a spoiled answer may have been noise, with the answer still on its way.
-        if !self.tcp {
-            let shape = frame::shape_of(message);
-            if let Some(shape) = shape {
-                self.debts[unit].owe(shape);
-            }
-            // Patience counts from the last request that may be answered late; a loopback cannot be mistaken.
-            if !shape.is_some_and(Shape::is_loopback) {
-                self.failed_last[unit] = Some(Instant::now());
-            }
-            let longest = shape.map_or(frame::MESSAGE_MAX, Shape::length) + 2;
-            self.rest_at_least(self.char_time * longest as u32 + self.silence);
+        if !mbap {
+            self.wire.debts.failed(message, self.wire.age());
+            let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);
+            let chars = frame::wrapped_length(self.framing(), longest) as u32;
+            self.wire.rest(self.wire.char_time * chars + self.wire.silence);
         }
     }
+}
 
-    fn rest_at_least(&mut self, real: Duration) {
-        self.quiet_until = self.quiet_until.max(Instant::now() + real);
-    }
+/// What was gathered for one request.
+#[derive(Debug, Clone)]
+struct Gathered {
+    answer: Result<Vec<u8>, Fault>,
+    /// As it was on the wire.
+    frame: Vec<u8>,
+    reply: Option<Duration>,
+    /// From the last byte sent until now.
+    took: Duration,
+}
 
-    /// Bytes that nobody waits for.
-    fn take_stale(&mut self, bytes: &[u8]) {
-        self.counters.received_bytes += bytes.len() as u64;
-        self.counters.last_rx = Some(self.clock.now());
-        self.take_stale_counted(bytes);
-    }
-
-    fn take_stale_counted(&mut self, bytes: &[u8]) {
-        self.counters.stale += 1;
-        tracing::debug!(bytes = %frame::hex(bytes), "stale bytes dropped");
-        if let Some(unit) = bytes.first().map(|unit| usize::from(*unit))
-            && let Some(failed) = self.failed_last[unit].filter(|_| !self.debts[unit].is_clear())
-        {
-            // The whole lateness includes the timeout itself.
-            self.late_max[unit] = self.late_max[unit].max(failed.elapsed() + self.timeout);
-        }
-        self.log(false, bytes.to_vec(), Cow::Borrowed("stale, dropped"));
-    }
-
-    fn log(&mut self, sent: bool, bytes: Vec<u8>, verdict: Cow<'static, str>) {
-        if self.ring.len() == RING {
-            self.ring.pop_front();
-        }
-        self.ring.push_back(FrameLog { at: self.clock.now(), sent, bytes, verdict });
+impl Gathered {
+    fn nothing(answer: Result<Vec<u8>, Fault>) -> Gathered {
+        Gathered { answer, frame: Vec::new(), reply: None, took: Duration::ZERO }
     }
 }

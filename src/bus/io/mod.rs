@@ -2,6 +2,8 @@
 
 pub mod clock;
 pub mod transport;
+pub mod pause;
+pub mod wire;
 pub mod link;
 pub mod task;
 

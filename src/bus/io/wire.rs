@@ -1,0 +1,207 @@
+//! The bytes of one open port: silences are kept, every byte is counted and goes on record, what nobody waits for is dropped.
+
+use std::{borrow::Cow, time::Duration};
+
+use futures_util::FutureExt;
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    time::Instant,
+};
+
+use super::{clock::Clock, link::Trouble, pause::Pause, transport::Stream};
+use crate::{
+    bus::{debt::Debts, frame},
+    plant::{
+        def::{Framing, LineDef},
+        event::LineCounters,
+        traffic::{FRAMES_MAX, Frame},
+    },
+};
+
+/// One open port.
+pub struct Wire {
+    port: Box<dyn Stream>,
+    pause: Pause,
+    clock: Clock,
+    framing: Framing,
+    /// Time of one character and of the silence between frames, real time; zero over TCP.
+    pub char_time: Duration,
+    pub silence: Duration,
+    timeout: Duration,
+    /// Nothing is sent before this.
+    quiet_until: Instant,
+    opened: Instant,
+    /// What each unit owes; bytes that come late pay.
+    pub debts: Debts,
+    /// Frames since they were last taken.
+    frames: Vec<Frame>,
+    /// Totals of the line; `utilisation`, `opens` and `missed` are the task's.
+    pub counters: LineCounters,
+}
+
+impl Wire {
+    /// A freshly opened port. `counters` go on from an earlier opening.
+    pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, counters: LineCounters) -> Wire {
+        let (char_time, silence) = match line.transport.serial() {
+            Some(serial) => (serial.char_time(), serial.silence().max(line.gap)),
+            None => (Duration::ZERO, line.gap),
+        };
+        let framing = line.transport.framing();
+        // What was asked before an earlier port went away may still be answered.
+        let may_come = framing != Framing::Mbap && 0 < counters.requests;
+        Wire {
+            port,
+            pause,
+            clock,
+            framing,
+            char_time: clock.real_span(char_time),
+            silence: clock.real_span(silence),
+            timeout: line.timeout,
+            quiet_until: Instant::now() + if may_come { line.timeout } else { Duration::ZERO },
+            opened: Instant::now(),
+            debts: Debts::new(line.timeout),
+            frames: Vec::new(),
+            counters,
+        }
+    }
+
+    /// Plant time.
+    pub fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    /// How messages are framed.
+    pub fn framing(&self) -> Framing {
+        self.framing
+    }
+
+    /// Time since the port was opened.
+    pub fn age(&self) -> Duration {
+        self.opened.elapsed()
+    }
+
+    /// Nothing is sent for this long (real time).
+    pub fn rest(&mut self, real: Duration) {
+        self.quiet_until = self.quiet_until.max(Instant::now() + real);
+    }
+
+    /// Sends bytes when the line has been silent long enough, and gives the moment when the last of them has left.
+    pub async fn send(&mut self, bytes: &[u8]) -> Result<Instant, Trouble> {
+        self.wait_for_silence().await;
+        if self.framing != Framing::Mbap {
+            self.drain()?;
+        }
+        // No flush: on a serial port that waits for the last byte to leave, and blocks the thread while it does.
+        match tokio::time::timeout(self.timeout + self.char_time * 512, self.port.write_all(bytes)).await {
+            Ok(written) => written.map_err(|error| Trouble::Gone(error.to_string()))?,
+            Err(_) => return Err(Trouble::Gone("the port takes no bytes".into())),
+        }
+        self.counters.sent_bytes += bytes.len() as u64;
+        self.counters.last_tx = Some(self.clock.now());
+        Ok(Instant::now() + self.char_time * bytes.len() as u32)
+    }
+
+    /// Appends what comes next to `buffer`; `false` if nothing came before `until`.
+    pub async fn receive(&mut self, until: Instant, buffer: &mut Vec<u8>) -> Result<bool, Trouble> {
+        let mut chunk = [0; 4_096];
+        // What is there already costs no timer.
+        let read = match self.port.read(&mut chunk).now_or_never() {
+            Some(read) => read,
+            None => match tokio::time::timeout_at(until, self.port.read(&mut chunk)).await {
+                Err(_) => return Ok(false),
+                Ok(read) => read,
+            },
+        };
+        let count = received(read)?;
+        self.counters.received_bytes += count as u64;
+        self.counters.last_rx = Some(self.clock.now());
+        buffer.extend_from_slice(&chunk[..count]);
+        Ok(true)
+    }
+
+    /// Reads and drops what comes while nobody has asked; returns only when the port is gone.
+    pub async fn idle(&mut self) -> String {
+        let mut buffer = Vec::new();
+        loop {
+            match self.receive(Instant::now() + Duration::from_secs(3_600), &mut buffer).await {
+                Ok(_) => self.drop_stale(&std::mem::take(&mut buffer)),
+                Err(Trouble::Gone(why)) => return why,
+                Err(Trouble::Fault(fault)) => return fault.to_string(),
+            }
+        }
+    }
+
+    /// Bytes that nobody waits for, or not any more: on record, and on the account of the unit that owed them.
+    pub fn drop_stale(&mut self, bytes: &[u8]) {
+        if bytes.is_empty() {
+            return;
+        }
+        self.counters.stale += 1;
+        tracing::debug!(bytes = %frame::hex(bytes), "stale bytes dropped");
+        let late = frame::unit_of(self.framing, bytes).is_some_and(|unit| self.debts.came_late(unit, self.age()));
+        if late {
+            self.counters.late += 1;
+        }
+        self.record(false, bytes.to_vec(), Cow::Borrowed(if late { "late, dropped" } else { "stale, dropped" }));
+    }
+
+    /// Puts bytes on record.
+    pub fn record(&mut self, sent: bool, bytes: Vec<u8>, verdict: Cow<'static, str>) {
+        self.counters.frames += 1;
+        // Between two reports a fast line carries more than anybody can look at: the latest are enough.
+        if self.frames.len() == 2 * FRAMES_MAX {
+            self.frames.drain(..FRAMES_MAX);
+        }
+        let unit = frame::unit_of(self.framing, &bytes);
+        let (at, framing, number) = (self.clock.now(), self.framing, self.counters.frames);
+        self.frames.push(Frame { at, sent, bytes, framing, verdict, unit, number });
+    }
+
+    /// The frames since they were last taken, oldest first.
+    pub fn take_frames(&mut self) -> Vec<Frame> {
+        std::mem::take(&mut self.frames)
+    }
+
+    async fn wait_for_silence(&mut self) {
+        // A device that never stops talking, or a second master, must not hold the line for ever: it spoils what is sent
+        // then, and that is told.
+        let limit = self.quiet_until.max(Instant::now()) + self.timeout;
+        let mut buffer = [0; 512];
+        while Instant::now() < self.quiet_until.min(limit) {
+            let until = self.quiet_until.min(limit);
+            let read = tokio::select! {
+                () = self.pause.until(until) => break,
+                read = self.port.read(&mut buffer) => read,
+            };
+            // A gone port shows itself at the write that follows.
+            let Ok(count @ 1..) = read else {
+                self.pause.until(until).await;
+                break;
+            };
+            self.counters.received_bytes += count as u64;
+            self.drop_stale(&buffer[..count]);
+            self.rest(self.silence);
+        }
+        self.quiet_until = self.quiet_until.min(limit);
+    }
+
+    /// Drops what lies in the kernel: it was sent before we asked. (Over Modbus TCP the transaction id tells.)
+    fn drain(&mut self) -> Result<(), Trouble> {
+        let mut buffer = [0; 512];
+        while let Some(read) = self.port.read(&mut buffer).now_or_never() {
+            let count = received(read)?;
+            self.counters.received_bytes += count as u64;
+            self.drop_stale(&buffer[..count]);
+        }
+        Ok(())
+    }
+}
+
+/// No bytes mean the end of the stream.
+fn received(read: std::io::Result<usize>) -> Result<usize, Trouble> {
+    match read {
+        Ok(0) => Err(Trouble::Gone("closed by the other side".into())),
+        Ok(count) => Ok(count),
+        Err(error) => Err(Trouble::Gone(error.to_string())),
+    }
+}

@@ -1,0 +1,193 @@
+//! Counters of requests: how many, how they ended, how long they took. One kind for a poll, a device and a line.
+
+use std::time::Duration;
+
+use super::event::{ExceptionCode, Fault};
+
+/// How requests ended.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Tally {
+    /// Requests sent, retries included.
+    pub requests: u64,
+    /// Valid normal answers.
+    pub ok: u64,
+    /// No answer in time.
+    pub timeouts: u64,
+    /// Answers whose CRC or LRC did not fit.
+    pub check: u64,
+    /// Answers cut short, of a wrong length, or with characters that cannot be.
+    pub length: u64,
+    /// Answers of another unit or to another function, or with a wrong echo.
+    pub foreign: u64,
+    /// Exception answers by code.
+    pub exceptions: Vec<(ExceptionCode, u64)>,
+    /// Requests that were sent again because the answer was spoiled.
+    pub retries: u64,
+    /// Answers to requests that had been given up.
+    pub late: u64,
+    /// From the last byte sent to the first byte received.
+    pub reply: Spread,
+    /// How long after its point of the grid a poll was sent.
+    pub jitter: Spread,
+    /// Releases of the poll that were skipped because the line had no time.
+    pub missed: u64,
+    /// The latest outcomes, bit 0 the newest, 1 a failure; see [`Tally::recent`].
+    recent: u64,
+}
+
+impl Tally {
+    /// Counts one request.
+    pub fn count(&mut self, outcome: Result<(), Fault>, reply: Option<Duration>) {
+        self.requests += 1;
+        if let Some(reply) = reply {
+            self.reply.add(reply);
+        }
+        self.recent = self.recent << 1 | u64::from(outcome.is_err());
+        let Err(fault) = outcome else {
+            self.ok += 1;
+            return;
+        };
+        match fault {
+            Fault::Timeout => self.timeouts += 1,
+            Fault::Crc { .. } | Fault::Lrc { .. } => self.check += 1,
+            Fault::Truncated { .. } | Fault::WrongLength { .. } | Fault::NotHex(_) | Fault::NotANumber => {
+                self.length += 1;
+            }
+            Fault::WrongUnit { .. } | Fault::WrongFunction { .. } | Fault::WrongEcho => self.foreign += 1,
+            Fault::Exception(code) => match self.exceptions.iter_mut().find(|(known, _)| *known == code) {
+                Some((_, count)) => *count += 1,
+                None => self.exceptions.push((code, 1)),
+            },
+            // Nothing was sent.
+            Fault::NotConnected | Fault::Resting => self.requests -= 1,
+        }
+    }
+
+    /// Spoiled answers of all kinds.
+    pub fn corrupt(&self) -> u64 {
+        self.check + self.length + self.foreign
+    }
+
+    /// Exception answers of all codes.
+    pub fn exceptions_total(&self) -> u64 {
+        self.exceptions.iter().map(|(_, count)| count).sum()
+    }
+
+    /// Failures among the latest 64 requests, and how many requests that were.
+    pub fn recent(&self) -> (u32, u32) {
+        (self.recent.count_ones(), self.requests.min(64) as u32)
+    }
+
+    /// Did the newest request fail?
+    pub fn failed_last(&self) -> bool {
+        self.recent & 1 == 1
+    }
+}
+
+/// Buckets of a [`Spread`]: four to every doubling, from 0.1 ms to 6.5 s.
+const BUCKETS: usize = 64;
+const LEAST_S: f64 = 1e-4;
+
+/// Durations: the last, the greatest, the mean, and percentiles to about a fifth of their value.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spread {
+    last: Duration,
+    max: Duration,
+    sum: Duration,
+    count: u64,
+    buckets: [u32; BUCKETS],
+}
+
+impl Default for Spread {
+    fn default() -> Self {
+        Spread { last: Duration::ZERO, max: Duration::ZERO, sum: Duration::ZERO, count: 0, buckets: [0; BUCKETS] }
+    }
+}
+
+impl Spread {
+    /// Takes one more.
+    pub fn add(&mut self, span: Duration) {
+        (self.last, self.max) = (span, self.max.max(span));
+        self.sum += span;
+        self.count += 1;
+        let bucket = &mut self.buckets[bucket_of(span)];
+        *bucket = bucket.saturating_add(1);
+    }
+
+    /// How many there were.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The last; `None` before the first.
+    pub fn last(&self) -> Option<Duration> {
+        (0 < self.count).then_some(self.last)
+    }
+
+    /// The greatest.
+    pub fn max(&self) -> Option<Duration> {
+        (0 < self.count).then_some(self.max)
+    }
+
+    /// The mean.
+    pub fn mean(&self) -> Option<Duration> {
+        (0 < self.count).then(|| self.sum.div_f64(self.count as f64))
+    }
+
+    /// 99 of 100 were not longer than this (the upper end of a bucket, at most a fifth too much).
+    pub fn p99(&self) -> Option<Duration> {
+        let total: u64 = self.buckets.iter().map(|count| u64::from(*count)).sum();
+        let rank = (total * 99).div_ceil(100);
+        let mut seen = 0;
+        let bucket = self.buckets.iter().position(|count| {
+            seen += u64::from(*count);
+            0 < total && rank <= seen
+        })?;
+        let end = LEAST_S * ((bucket + 1) as f64 / 4.0).exp2();
+        Some(Duration::from_secs_f64(end).min(self.max))
+    }
+}
+
+fn bucket_of(span: Duration) -> usize {
+    let doublings = (span.as_secs_f64() / LEAST_S).max(1.0).log2();
+    ((4.0 * doublings) as usize).min(BUCKETS - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_way_to_end_is_counted_once() {
+        let mut tally = Tally::default();
+        tally.count(Ok(()), Some(Duration::from_millis(12)));
+        tally.count(Err(Fault::Timeout), None);
+        tally.count(Err(Fault::Crc { got: 1, computed: 2 }), None);
+        tally.count(Err(Fault::WrongUnit { got: 1, asked: 2 }), None);
+        tally.count(Err(Fault::Truncated { got: 1, expected: 2 }), None);
+        for _ in 0..2 {
+            tally.count(Err(Fault::Exception(ExceptionCode(2))), None);
+        }
+        tally.count(Err(Fault::Resting), None);
+        let sum = tally.ok + tally.timeouts + tally.corrupt() + tally.exceptions_total();
+        assert_eq!((tally.requests, sum), (7, 7));
+        assert_eq!(tally.exceptions, [(ExceptionCode(2), 2)]);
+        assert!(tally.failed_last());
+    }
+
+    #[test]
+    fn one_slow_answer_in_a_hundred_shows_in_the_maximum_and_two_in_the_percentile() {
+        let mut spread = Spread::default();
+        assert_eq!((spread.last(), spread.p99()), (None, None));
+        for _ in 0..99 {
+            spread.add(Duration::from_millis(10));
+        }
+        spread.add(Duration::from_millis(400));
+        let p99 = spread.p99().expect("a hundred answers").as_secs_f64() * 1e3;
+        assert!((10.0..12.1).contains(&p99), "{p99}");
+        assert_eq!(spread.max(), Some(Duration::from_millis(400)));
+        spread.add(Duration::from_millis(400));
+        assert_eq!(spread.p99(), Some(Duration::from_millis(400)));
+        assert_eq!(spread.mean().map(|mean| mean.as_micros()), Some((990 + 800) * 1000 / 101));
+    }
+}

@@ -1,0 +1,113 @@
+//! What went over a line: frames as bytes, requests with their answers. The evidence behind every value.
+
+use std::{borrow::Cow, collections::VecDeque, sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use super::{event::Fault, line::Framing};
+
+/// Frames that a line remembers.
+pub const FRAMES_MAX: usize = 1_000;
+
+/// One frame or run of bytes as it went over a line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// When.
+    pub at: Timestamp,
+    /// `true` for bytes that we sent.
+    pub sent: bool,
+    /// The bytes as they were on the wire.
+    pub bytes: Vec<u8>,
+    /// How the line frames its messages.
+    pub framing: Framing,
+    /// `sent`, `ok`, or what was wrong with it.
+    pub verdict: Cow<'static, str>,
+    /// The unit that was asked or has answered, if that is known.
+    pub unit: Option<u8>,
+    /// Running number on its line, from 1.
+    pub number: u64,
+}
+
+/// The latest frames of a line, oldest first. Cheap to clone: a snapshot carries it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Frames {
+    chunks: VecDeque<Arc<[Frame]>>,
+    count: usize,
+}
+
+impl Frames {
+    /// Appends newer frames; the oldest beyond [`FRAMES_MAX`] are let go.
+    pub fn extend(&mut self, newer: Vec<Frame>) {
+        if newer.is_empty() {
+            return;
+        }
+        self.count += newer.len();
+        self.chunks.push_back(newer.into());
+        while let Some(oldest) = self.chunks.front().filter(|oldest| FRAMES_MAX <= self.count - oldest.len()) {
+            self.count -= oldest.len();
+            self.chunks.pop_front();
+        }
+    }
+
+    /// All of them, oldest first.
+    pub fn iter(&self) -> impl DoubleEndedIterator<Item = &Frame> {
+        self.chunks.iter().flat_map(|chunk| chunk.iter())
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Has nothing gone over the line yet?
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+}
+
+/// A request and what came back: why a value is what it is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Exchange {
+    /// When the request was sent.
+    pub at: Timestamp,
+    /// How the line frames its messages.
+    pub framing: Framing,
+    /// The request as it was on the wire.
+    pub request: Vec<u8>,
+    /// The answer as it was on the wire; empty if none came.
+    pub answer: Vec<u8>,
+    /// `Ok`, or what was wrong.
+    pub outcome: Result<(), Fault>,
+    /// From the last byte sent to the first byte received; `None` if none came.
+    pub reply: Option<Duration>,
+    /// 1, or 2 if a spoiled answer was asked for again.
+    pub tries: u8,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_latest_frames_are_kept_and_the_oldest_let_go() {
+        let frame = |number| Frame {
+            at: Timestamp::UNIX_EPOCH,
+            sent: true,
+            bytes: vec![1],
+            framing: Framing::Rtu,
+            verdict: "sent".into(),
+            unit: Some(1),
+            number,
+        };
+        let mut frames = Frames::default();
+        for second in 0..50u64 {
+            frames.extend((second * 30..second * 30 + 30).map(frame).collect());
+            let numbers: Vec<u64> = frames.iter().map(|frame| frame.number).collect();
+            assert_eq!(numbers.len(), frames.len());
+            assert_eq!(numbers.last(), Some(&(second * 30 + 29)));
+            assert!(numbers.is_sorted());
+            assert!(frames.len() < FRAMES_MAX + 30);
+        }
+        assert!(FRAMES_MAX <= frames.len());
+    }
+}
