@@ -12,7 +12,8 @@ pub fn lrc(bytes: &[u8]) -> u8 {
 
 /// The frame of a message.
 pub fn encode(message: &[u8]) -> Vec<u8> {
-    let digits = message.iter().chain([&lrc(message)]).map(|byte| format!("{byte:02X}"));
+    let check = lrc(message);
+    let digits = message.iter().chain([&check]).map(|byte| format!("{byte:02X}"));
     format!(":{}\r\n", digits.collect::<String>()).into_bytes()
 }
 

@@ -58,6 +58,18 @@ pub fn encode(point: Point, value: f64) -> Option<Vec<u16>> {
     Some(from_bytes(point.order, &bits.to_be_bytes()[8 - count..]))
 }
 
+/// The masks of a mask write (function 22: result = (word AND and) OR (or AND NOT and)) that sets a field of bits inside
+/// a word and leaves the other bits to the device (V1.1b3, 6.16).
+pub fn field_masks(point: Point, value: f64) -> Option<(u16, u16)> {
+    let (low, width) = point.field.filter(|_| point.kind.words() == 1)?;
+    let field = mask(width);
+    if value.fract() != 0.0 || value < 0.0 || field as f64 <= value - 1.0 {
+        return None;
+    }
+    let on_wire = |bits: u64| from_bytes(point.order, &(bits as u16).to_be_bytes())[0];
+    Some((!on_wire(field << low), on_wire((value as u64) << low)))
+}
+
 /// Whole numbers up to here an `f64` carries exactly.
 const EXACT: f64 = 9_007_199_254_740_992.0;
 
@@ -162,6 +174,22 @@ mod tests {
         assert_eq!(decode(field, &[0x0020]), Some(2.0));
         assert_eq!(encode(field, 2.0), None);
         assert_eq!(decode(Point { field: Some((0, 16)), ..field }, &[0xFFFF]), Some(65_535.0));
+    }
+
+    #[test]
+    fn a_field_of_bits_is_set_without_touching_the_others() {
+        let field = Point { field: Some((4, 2)), ..point(Kind::U16, Order::Abcd) };
+        assert_eq!(field_masks(field, 2.0), Some((0xFFCF, 0x0020)));
+        assert_eq!(field_masks(field, 4.0), None, "two bits hold 0 to 3");
+        let swapped = Point { order: Order::Badc, ..field };
+        assert_eq!(field_masks(swapped, 2.0), Some((0xCFFF, 0x2000)));
+        for (word, value) in [(0x1234u16, 3.0), (0xFFFF, 0.0), (0, 1.0)] {
+            let (and, or) = field_masks(field, value).expect("it fits");
+            let set = (word & and) | (or & !and);
+            assert_eq!(decode(field, &[set]), Some(value));
+            assert_eq!(set & !0x30, word & !0x30);
+        }
+        assert_eq!(field_masks(point(Kind::U16, Order::Abcd), 1.0), None);
     }
 
     proptest! {

@@ -8,4 +8,6 @@ pub mod plan;
 pub mod backoff;
 pub mod schedule;
 pub mod debt;
+pub mod tool;
+pub mod books;
 pub mod io;

@@ -173,6 +173,11 @@ impl Schedule {
         health.rests_until = health.rests_until.max(until);
     }
 
+    /// When a block is read next; `None` for one that is read once and has been.
+    pub fn release(&self, index: usize) -> Option<Timestamp> {
+        self.polls.get(index).and_then(|poll| poll.release)
+    }
+
     /// Everything of a device is due now; its grid stays.
     pub fn refresh(&mut self, device: DeviceId, now: Timestamp) {
         for poll in self.polls.iter_mut().filter(|poll| poll.device == device) {

@@ -6,8 +6,9 @@ use jiff::Timestamp;
 
 pub use super::id::WriteId;
 use super::{
-    def::{AlarmId, DeviceId, LineId, TagId},
+    def::{AlarmId, DeviceId, LineDef, LineId, TagId},
     event::{ExceptionCode, Fault},
+    tool::Tool,
 };
 
 /// One wish of one operator.
@@ -48,6 +49,14 @@ pub enum Command {
     Refresh(DeviceId),
     /// Open (`true`) or close a line.
     Connect(LineId, bool),
+    /// Try other settings on the line of the same id, until the station ends or they are saved or taken back.
+    Configure(Box<LineDef>),
+    /// Write the settings in use into the plant file.
+    SaveSettings(LineId),
+    /// Test a line.
+    Test(LineId, Tool),
+    /// Stop the test of a line.
+    StopTest(LineId),
 }
 
 /// How an order stands.
@@ -116,6 +125,9 @@ pub enum Refusal {
     /// Another write to this tag is still under way.
     #[error("a write to this tag is under way")]
     UnderWay,
+    /// The settings could not be written into the plant file.
+    #[error("not saved: {0}")]
+    NotSaved(String),
     /// Nothing to do: the alarm is not unacknowledged.
     #[error("nothing to acknowledge")]
     NothingToAcknowledge,
@@ -155,4 +167,17 @@ pub enum BusRequest {
     Refresh(DeviceId),
     /// Open or close the port.
     Connect(bool),
+    /// Use these settings from now on.
+    Configure(Box<LineDef>),
+    /// Start a tool; the one at work is stopped.
+    Test {
+        /// The order it comes by.
+        id: OrderId,
+        /// Who ordered it.
+        by: Arc<str>,
+        /// What.
+        tool: Tool,
+    },
+    /// Stop the tool at work.
+    StopTest,
 }

@@ -4,7 +4,14 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 
-use super::id::{DeviceId, LineId, TagId, WriteId};
+use std::sync::Arc;
+
+use super::{
+    id::{DeviceId, LineId, TagId, WriteId},
+    line_report::LineReport,
+    tool::ToolRun,
+    traffic::Exchange,
+};
 
 /// One fact from the bus. Every event carries the time at which it became true.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +26,8 @@ pub enum Event {
         values: Vec<(TagId, f64)>,
         /// From the last byte sent to the first byte received.
         reply: Duration,
+        /// The evidence.
+        exchange: Option<Arc<Exchange>>,
     },
     /// A block could not be read.
     Failed {
@@ -30,6 +39,8 @@ pub enum Event {
         tags: Vec<TagId>,
         /// Why.
         fault: Fault,
+        /// The evidence, if anything was sent.
+        exchange: Option<Arc<Exchange>>,
     },
     /// A line changed its state.
     Line {
@@ -40,14 +51,23 @@ pub enum Event {
         /// The new state.
         state: LineState,
     },
-    /// Counters of a line, about once a second.
-    Counters {
+    /// What a line says of itself, about once a second.
+    Report {
         /// When.
         at: Timestamp,
         /// Which.
         line: LineId,
-        /// Totals since the start.
-        counters: LineCounters,
+        /// Settings, counters, polls, frames.
+        report: Arc<LineReport>,
+    },
+    /// A tool has come further.
+    Tool {
+        /// When.
+        at: Timestamp,
+        /// Where it is at work.
+        line: LineId,
+        /// How it stands.
+        run: Arc<ToolRun>,
     },
     /// A write came to its end on the wire.
     Wrote {
@@ -219,6 +239,21 @@ pub enum LineState {
     },
     /// Closed by an operator.
     Disconnected,
+    /// An operator's test has the line for itself: nobody is polled.
+    Testing,
+}
+
+/// Errors that the driver of a serial port has counted since the port was opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct UartCounters {
+    /// Characters whose parity bit did not fit.
+    pub parity: u32,
+    /// Characters without their stop bit.
+    pub framing: u32,
+    /// Characters lost because they were not fetched in time.
+    pub overrun: u32,
+    /// Breaks: the line held low for longer than a character.
+    pub breaks: u32,
 }
 
 /// Counters of a line since the start of the station.
@@ -240,6 +275,8 @@ pub struct LineCounters {
     pub late: u64,
     /// Frames sent and received, and runs of bytes that were none.
     pub frames: u64,
+    /// What the serial port itself has counted, where it does.
+    pub uart: Option<UartCounters>,
     /// Times the port or connection was opened.
     pub opens: u64,
     /// Polls that could not start in their period and were skipped.
@@ -250,6 +287,8 @@ pub struct LineCounters {
     pub received_bytes: u64,
     /// Share of the last ten seconds in which the line was busy, 0–1.
     pub utilisation: f32,
+    /// The same over the last minute.
+    pub utilisation_minute: f32,
     /// Last byte sent.
     pub last_tx: Option<Timestamp>,
     /// Last byte received.

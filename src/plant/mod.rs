@@ -16,6 +16,8 @@ pub mod scale;
 pub mod event;
 pub mod traffic;
 pub mod tally;
+pub mod line_report;
+pub mod tool;
 pub mod command;
 pub mod record;
 pub mod alarm;

@@ -65,9 +65,14 @@ impl Desk {
         }
     }
 
-    /// Takes an order to open or close a line; it ends when the line says so.
-    pub fn connect(&mut self, order: &Order, at: Timestamp) {
+    /// Takes an order whose outcome somebody else will tell.
+    pub fn take(&mut self, order: &Order, at: Timestamp) {
         self.open(order, None, at);
+    }
+
+    /// An order has come to its end.
+    pub fn end(&mut self, id: OrderId, outcome: Outcome, board: &Board) -> Option<ActionRecord> {
+        self.close(id, outcome, board)
     }
 
     /// A line is open (or trying to be) or closed: orders that wished so are done.
@@ -126,6 +131,20 @@ impl Desk {
             BusRequest::Refresh(device) => {
                 let wished = Command::Refresh(*device);
                 self.orders.iter_mut().find(|status| status.command == wished)?.outcome = busy;
+                None
+            }
+            BusRequest::Configure(_) | BusRequest::Test { .. } | BusRequest::StopTest => {
+                let of_line = |command: &Command| match command {
+                    Command::Configure(settings) => settings.id == line,
+                    Command::Test(tested, _) | Command::StopTest(tested) => *tested == line,
+                    Command::Write { .. }
+                    | Command::Acknowledge(_)
+                    | Command::AcknowledgeAll
+                    | Command::Refresh(_)
+                    | Command::Connect(..)
+                    | Command::SaveSettings(_) => false,
+                };
+                self.orders.iter_mut().find(|status| of_line(&status.command))?.outcome = busy;
                 None
             }
         }
@@ -226,10 +245,21 @@ fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
         Command::Refresh(device) => ("refresh", def.device(*device).name.clone(), None),
         Command::Connect(line, true) => ("connect", def.line(*line).name.clone(), None),
         Command::Connect(line, false) => ("disconnect", def.line(*line).name.clone(), None),
+        Command::Configure(settings) => ("configure", settings.name.clone(), Some(settings.transport.to_string())),
+        Command::SaveSettings(line) => ("save settings", def.line(*line).name.clone(), None),
+        Command::Test(line, tool) => ("test", def.line(*line).name.clone(), Some(tool.to_string())),
+        Command::StopTest(line) => ("stop test", def.line(*line).name.clone(), None),
     };
     let old = match &status.command {
         Command::Write { tag, .. } => status.old.map(|old| value_words(board, def.tag(*tag), old)),
-        Command::Acknowledge(_) | Command::AcknowledgeAll | Command::Refresh(_) | Command::Connect(..) => None,
+        Command::Acknowledge(_)
+        | Command::AcknowledgeAll
+        | Command::Refresh(_)
+        | Command::Connect(..)
+        | Command::Configure(_)
+        | Command::SaveSettings(_)
+        | Command::Test(..)
+        | Command::StopTest(_) => None,
     };
     ActionRecord {
         at: status.at,

@@ -1,5 +1,7 @@
 //! The reducer of facts: event, order or tick in, effects out. The only place where the plant changes.
 
+mod service;
+
 use std::sync::Arc;
 
 use jiff::Timestamp;
@@ -7,13 +9,14 @@ use jiff::Timestamp;
 use super::{
     alarm::{Book, condition::Facts},
     board::Board,
-    command::{BusRequest, Command, Order, Outcome, Refusal, WriteId},
-    def::{AlarmId, Condition, DeviceId, LineId, PlantDef, Subject, TagId},
+    command::{BusRequest, Command, Order, OrderId, Outcome, Refusal, WriteId},
+    def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, Subject, TagId},
     event::{Event, Fault, LineState, WriteResult},
     orders::Desk,
     record::{ActionRecord, AlarmRecord, Record},
     sample::Cause,
     snapshot::{DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
+    traffic::Exchange,
 };
 
 /// What must happen outside because of what became true inside.
@@ -23,6 +26,8 @@ pub struct Effects {
     pub bus: Vec<(LineId, BusRequest)>,
     /// Lines of the history.
     pub records: Vec<Record>,
+    /// Settings of a line for the plant file, and the order that wishes it.
+    pub save: Option<(OrderId, LineDef)>,
 }
 
 /// All that is true. Owned by the plant task, seen by everyone else as [`Snapshot`]s.
@@ -35,6 +40,8 @@ pub struct Plant {
     desk: Desk,
     lines: Vec<LineStatus>,
     devices: Vec<DeviceStatus>,
+    /// The last request for each tag, by [`TagId`].
+    evidence: Arc<Vec<Option<Arc<Exchange>>>>,
     history: HistoryStatus,
     speed: f64,
 }
@@ -48,6 +55,7 @@ impl Plant {
             desk: Desk::new(def.clone()),
             lines: vec![LineStatus::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); def.devices.len()],
+            evidence: Arc::new(vec![None; def.tags.len()]),
             history: HistoryStatus::default(),
             def,
             at,
@@ -63,8 +71,9 @@ impl Plant {
     /// Takes a fact from the bus.
     pub fn on_event(&mut self, event: Event) -> Effects {
         let (at, action) = match event {
-            Event::Read { at, device, values, reply } => {
+            Event::Read { at, device, values, reply, exchange } => {
                 self.board.read(&values, at);
+                self.keep_evidence(values.iter().map(|(tag, _)| *tag), exchange);
                 let status = &mut self.devices[device.index()];
                 status.state = DeviceState::Answering;
                 status.reply = Some(reply);
@@ -72,13 +81,20 @@ impl Plant {
                 status.values += values.len() as u64;
                 (at, None)
             }
-            Event::Failed { at, device, tags, fault } => {
+            Event::Failed { at, device, tags, fault, exchange } => {
+                self.keep_evidence(tags.iter().copied(), exchange);
                 self.failed(device, &tags, fault, at);
                 (at, None)
             }
             Event::Line { at, line, state } => (at, self.line_changed(line, state, at)),
-            Event::Counters { at, line, counters } => {
-                self.lines[line.index()].counters = counters;
+            Event::Report { at, line, report } => {
+                let status = &mut self.lines[line.index()];
+                status.counters = report.counters;
+                status.report = Some(report);
+                (at, None)
+            }
+            Event::Tool { at, line, run } => {
+                self.lines[line.index()].test = Some(run);
                 (at, None)
             }
             Event::Wrote { at, id, result } => (at, self.wrote(id, result, at)),
@@ -91,7 +107,7 @@ impl Plant {
     /// Takes a wish of an operator.
     pub fn on_order(&mut self, order: Order, at: Timestamp) -> Effects {
         let mut effects = Effects::default();
-        let action = match order.command {
+        let action = match order.command.clone() {
             Command::Write { tag, value } => match self.desk.write(&self.board, &order, tag, value, at) {
                 Ok(request) => {
                     effects.bus.push((self.line_of(tag), request));
@@ -123,10 +139,13 @@ impl Plant {
                 if is_open == open {
                     self.desk.note(&order, Outcome::Unchanged, &self.board, at)
                 } else {
-                    self.desk.connect(&order, at);
+                    self.desk.take(&order, at);
                     effects.bus.push((line, BusRequest::Connect(open)));
                     None
                 }
+            }
+            Command::Configure(_) | Command::SaveSettings(_) | Command::Test(..) | Command::StopTest(_) => {
+                self.line_order(&order, at, &mut effects)
             }
         };
         effects.records.extend(action.map(Record::Action));
@@ -137,7 +156,7 @@ impl Plant {
     /// The queue to a line was full: the request was not sent.
     pub fn on_undeliverable(&mut self, line: LineId, request: &BusRequest) -> Effects {
         let action = self.desk.undeliverable(line, request, &self.board);
-        Effects { bus: Vec::new(), records: action.map(Record::Action).into_iter().collect() }
+        Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
     }
 
     /// The store says how it stands.
@@ -161,6 +180,7 @@ impl Plant {
             def: self.def.clone(),
             samples: self.board.samples().to_vec(),
             decimals: self.def.tags.iter().map(|tag| self.board.shown_decimals(tag)).collect(),
+            evidence: self.evidence.clone(),
             lines: self.lines.clone(),
             devices: self.devices.clone(),
             alarms: self.book.active(),
@@ -172,6 +192,15 @@ impl Plant {
 
     fn line_of(&self, tag: TagId) -> LineId {
         self.def.device(self.def.tag(tag).device).line
+    }
+
+    /// The bytes behind what was just learned of some tags. A value keeps its own when nothing was sent for it.
+    fn keep_evidence(&mut self, tags: impl Iterator<Item = TagId>, exchange: Option<Arc<Exchange>>) {
+        let Some(exchange) = exchange else { return };
+        let evidence = Arc::make_mut(&mut self.evidence);
+        for tag in tags {
+            evidence[tag.index()] = Some(exchange.clone());
+        }
     }
 
     /// A write ended. Unless it was read back or certainly had no effect, the value held until now is in doubt.
@@ -229,13 +258,13 @@ impl Plant {
         status.lost_since = match &state {
             LineState::Waiting { .. } => status.lost_since.or(Some(at)),
             LineState::Connecting => status.lost_since,
-            LineState::Connected | LineState::Disconnected => None,
+            LineState::Connected | LineState::Disconnected | LineState::Testing => None,
         };
         let open = state != LineState::Disconnected;
         // A closed line is the operator's wish: its devices are not asked, so their silence is no fault.
         let gone = match &state {
             LineState::Waiting { .. } => Some(DeviceState::Down { since: at }),
-            LineState::Disconnected => Some(DeviceState::Unknown),
+            LineState::Disconnected | LineState::Testing => Some(DeviceState::Unknown),
             LineState::Connecting | LineState::Connected => None,
         };
         self.lines[line.index()].state = state;
@@ -258,7 +287,7 @@ impl Plant {
         let steps = self.book.judge(self.at, |alarm| facts(def, board, devices, alarm));
         let mut records = self.board.records(self.at);
         records.extend(steps.into_iter().map(Record::Alarm));
-        Effects { bus: Vec::new(), records }
+        Effects { records, ..Effects::default() }
     }
 }
 
@@ -309,11 +338,17 @@ mod tests {
     }
 
     fn read(second: i64, values: &[(TagId, f64)]) -> Event {
-        Event::Read { at: at(second), device: TIC, values: values.to_vec(), reply: Duration::from_millis(12) }
+        Event::Read {
+            at: at(second),
+            device: TIC,
+            values: values.to_vec(),
+            reply: Duration::from_millis(12),
+            exchange: None,
+        }
     }
 
     fn fail(second: i64, tags: &[TagId], fault: Fault) -> Event {
-        Event::Failed { at: at(second), device: TIC, tags: tags.to_vec(), fault }
+        Event::Failed { at: at(second), device: TIC, tags: tags.to_vec(), fault, exchange: None }
     }
 
     fn running() -> Plant {

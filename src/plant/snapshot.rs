@@ -7,9 +7,12 @@ use jiff::Timestamp;
 use super::{
     alarm::AlarmState,
     command::OrderStatus,
-    def::{AlarmId, DeviceId, LineId, PlantDef, TagId},
+    def::{AlarmId, DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Fault, LineCounters, LineState},
+    line_report::LineReport,
     sample::Sample,
+    tool::ToolRun,
+    traffic::Exchange,
 };
 
 /// The plant at one instant. Losing an intermediate snapshot is harmless.
@@ -23,6 +26,8 @@ pub struct Snapshot {
     pub samples: Vec<Sample>,
     /// Decimals to show, by [`TagId`] (they may come from the device).
     pub decimals: Vec<u8>,
+    /// The last request that was made for each tag, with its answer, by [`TagId`]: why a value is what it is.
+    pub evidence: Arc<Vec<Option<Arc<Exchange>>>>,
     /// Lines, by [`LineId`].
     pub lines: Vec<LineStatus>,
     /// Devices, by [`DeviceId`].
@@ -103,6 +108,12 @@ pub struct LineStatus {
     pub state: LineState,
     /// Totals since the start.
     pub counters: LineCounters,
+    /// Settings, polls and frames; `None` until the line has reported.
+    pub report: Option<Arc<LineReport>>,
+    /// Settings as they were before somebody tried others.
+    pub settings_before: Option<Arc<LineDef>>,
+    /// The test at work, or the last one.
+    pub test: Option<Arc<ToolRun>>,
     /// Since when it has not been connected although it should be.
     pub lost_since: Option<Timestamp>,
 }

@@ -34,6 +34,7 @@ fn line_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
             LineState::Connecting => return None,
             LineState::Connected => "connected".into(),
             LineState::Disconnected => "closed by an operator".into(),
+            LineState::Testing => "nobody is polled while a test has it".into(),
             // Every failed try would be a line; the first says it all.
             LineState::Waiting { .. } if before.lines[index].lost_since.is_some() => return None,
             LineState::Waiting { why, .. } => format!("not connected: {why}"),
@@ -98,7 +99,14 @@ fn order_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
             let value = after.format(tag, value);
             Some(format!("{}: {name} := {value} {unit} {}", order.by, outcome_words(&order.outcome)))
         }
-        Command::Acknowledge(_) | Command::AcknowledgeAll | Command::Refresh(_) | Command::Connect(..) => None,
+        Command::Acknowledge(_)
+        | Command::AcknowledgeAll
+        | Command::Refresh(_)
+        | Command::Connect(..)
+        | Command::Configure(_)
+        | Command::SaveSettings(_)
+        | Command::Test(..)
+        | Command::StopTest(_) => None,
     })
     .collect()
 }
@@ -129,8 +137,8 @@ mod tests {
         plant.on_event(Event::Line { at: at(0), line: LineId(0), state: LineState::Connected });
         assert_eq!(tell(&plant), ["line L1: connected"]);
         assert!(tell(&plant).is_empty());
-        plant.on_event(Event::Failed { at: at(1), device: TIC, tags: vec![PV], fault: Fault::Timeout });
-        plant.on_event(Event::Failed { at: at(3), device: TIC, tags: vec![PV], fault: Fault::Resting });
+        plant.on_event(Event::Failed { at: at(1), device: TIC, tags: vec![PV], fault: Fault::Timeout, exchange: None });
+        plant.on_event(Event::Failed { at: at(3), device: TIC, tags: vec![PV], fault: Fault::Resting, exchange: None });
         assert_eq!(
             tell(&plant),
             ["device TIC-1 (unit 1): not answering: no answer in time", "alarm 2 RAISED: TIC-1 alarm 1"]

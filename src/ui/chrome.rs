@@ -178,6 +178,7 @@ fn line_words(cx: &Cx, line: &LineDef) -> (String, Style) {
             (format!("{} DOWN retry {left}s", line.name), cx.theme.trouble())
         }
         LineState::Disconnected => (format!("{} DISCONNECTED", line.name), cx.theme.trouble()),
+        LineState::Testing => (format!("{} TEST", line.name), cx.theme.trouble()),
     }
 }
 
@@ -232,6 +233,7 @@ fn blind_words(model: &Model, cx: &Cx) -> Option<String> {
     let lines = cx.def().lines.iter().filter_map(|line| match snapshot.line(line.id).state {
         LineState::Connected => None,
         LineState::Disconnected => Some(format!("{} disconnected", line.name)),
+        LineState::Testing => Some(format!("{} given to a test", line.name)),
         LineState::Connecting | LineState::Waiting { .. } => Some(format!("{} not connected", line.name)),
     });
     let devices = cx.def().devices.iter().filter(|device| snapshot.line(device.line).state == LineState::Connected);
@@ -334,6 +336,10 @@ pub fn order_words(cx: &Cx, command: &Command, old: Option<f64>) -> String {
         Command::Refresh(device) => format!("refresh {}", cx.def().device(*device).name),
         Command::Connect(line, true) => format!("connect {}", cx.def().line(*line).name),
         Command::Connect(line, false) => format!("disconnect {}", cx.def().line(*line).name),
+        Command::Configure(settings) => format!("settings of {}", settings.name),
+        Command::SaveSettings(line) => format!("save settings of {}", cx.def().line(*line).name),
+        Command::Test(line, tool) => format!("{} {tool}", cx.def().line(*line).name),
+        Command::StopTest(line) => format!("stop test of {}", cx.def().line(*line).name),
     }
 }
 

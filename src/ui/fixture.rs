@@ -61,7 +61,7 @@ impl Fixture {
             def,
             samples,
             alarms: Vec::new(),
-            line: LineStatus { state: LineState::Connected, counters, lost_since: None },
+            line: LineStatus { state: LineState::Connected, counters, ..LineStatus::default() },
             devices,
         }
     }
@@ -141,6 +141,7 @@ impl Fixture {
             Decimals::From(_) => 1,
         });
         Arc::new(Snapshot {
+            evidence: Arc::new(vec![None; self.def.tags.len()]),
             at: now(),
             samples: self.samples.clone(),
             decimals: decimals.collect(),

@@ -17,6 +17,7 @@ use tokio::{
 };
 use tokio_modbus::{
     Request, Response,
+    bytes::Bytes,
     client::{Client, rtu},
     slave::Slave,
 };
@@ -96,6 +97,10 @@ impl Link {
         let mut context = rtu::attach_slave(theirs, Slave(unit));
         let (answer, done) = tokio::join!(context.call(request), self.carry(ours));
         done?;
+        if unit == 0 && self.framing() != Framing::Mbap {
+            // A broadcast: nobody answers, so there is nothing to read.
+            return Ok(Response::Custom(0, Bytes::new()));
+        }
         match answer {
             Ok(Ok(response)) => Ok(response),
             Ok(Err(code)) => Err(Fault::Exception(ExceptionCode(code.into())).into()),
@@ -213,6 +218,16 @@ impl Link {
     /// Could the answer to this message be mistaken for one that its unit still owes?
     pub fn is_ambiguous(&self, message: &[u8]) -> bool {
         self.framing() != Framing::Mbap && self.wire.debts.is_ambiguous(message)
+    }
+
+    /// How long an answer may take.
+    pub fn timeout(&self) -> Duration {
+        self.timeout
+    }
+
+    /// Another time from now on, for a tool in a hurry.
+    pub fn set_timeout(&mut self, timeout: Duration) {
+        self.timeout = timeout;
     }
 
     /// What a unit owes.

@@ -1,10 +1,13 @@
 //! The edge of the bus: ports, sockets, clocks.
 
 pub mod clock;
+pub mod uart;
+pub mod ports;
 pub mod transport;
 pub mod pause;
 pub mod wire;
 pub mod link;
+pub mod testing;
 pub mod task;
 
 #[cfg(test)]

@@ -24,7 +24,10 @@ impl Pause {
     pub fn exact() -> Pause {
         let flags = TimerfdFlags::NONBLOCK | TimerfdFlags::CLOEXEC;
         let timer = rustix::time::timerfd_create(TimerfdClockId::Monotonic, flags).map_err(std::io::Error::from);
-        match timer.and_then(AsyncFd::new) {
+        // SAFETY: the descriptor is owned by what is registered, and nobody takes it out.
+        #[allow(unsafe_code)]
+        let registered = timer.and_then(|timer| unsafe { AsyncFd::register(timer) }.map_err(std::io::Error::from));
+        match registered {
             Ok(timer) => Pause::Exact(timer),
             Err(error) => {
                 tracing::warn!(%error, "no exact timer: silences are kept to the next millisecond");

@@ -194,7 +194,7 @@ impl Line {
                     assert_eq!(*raw, f64::from(def.tag(*tag).point.address), "a value in a wrong tag: {event:?}");
                 }
             }
-            if !matches!(event, Event::Counters { .. }) {
+            if !matches!(event, Event::Report { .. }) {
                 return event;
             }
         }

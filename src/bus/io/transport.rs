@@ -7,9 +7,13 @@ use tokio::{
     net::TcpStream,
     sync::mpsc,
 };
-use tokio_serial::SerialPortBuilderExt;
+use tokio_serial::{SerialPortBuilderExt, SerialStream};
 
-use crate::plant::def::{Parity, Serial, Transport};
+use super::{pause::Pause, ports, uart};
+use crate::plant::{
+    def::{Parity, Rs485, Serial, Transport},
+    event::UartCounters,
+};
 
 /// A TCP connection must stand within this time.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
@@ -17,6 +21,16 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
 /// An open port or connection.
 pub trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
 impl<T: AsyncRead + AsyncWrite + Send + Unpin> Stream for T {}
+
+/// An open port or connection with what belongs to it.
+pub struct Opened {
+    /// The bytes.
+    pub stream: Box<dyn Stream>,
+    /// How silences are kept on it.
+    pub pause: Pause,
+    /// What its driver has counted, if it counts.
+    pub uart: Option<Box<dyn Fn() -> Option<UartCounters> + Send + Sync>>,
+}
 
 /// How a line is opened.
 #[derive(Debug)]
@@ -29,19 +43,40 @@ pub enum Connector {
 
 impl Connector {
     /// Opens the port or connection; the error is in words for an operator.
-    pub async fn open(&mut self) -> Result<Box<dyn Stream>, String> {
+    pub async fn open(&mut self) -> Result<Opened, String> {
         match self {
-            Connector::Real(Transport::Serial { port, serial, .. }) => open_serial(port, *serial),
-            Connector::Real(Transport::Tcp { host, port, .. }) => open_tcp(host, *port).await,
+            Connector::Real(transport) => open(transport).await,
             Connector::Memory(streams) => match streams.try_recv() {
-                Ok(stream) => Ok(Box::new(stream)),
+                Ok(stream) => Ok(Opened { stream: Box::new(stream), pause: Pause::Coarse, uart: None }),
                 Err(_) => Err("no such port".into()),
             },
         }
     }
+
+    /// Opens it once with other settings.
+    pub async fn open_as(&mut self, transport: &Transport) -> Result<Opened, String> {
+        match self {
+            Connector::Real(_) => open(transport).await,
+            Connector::Memory(_) => self.open().await,
+        }
+    }
+
+    /// Other settings from now on.
+    pub fn retarget(&mut self, transport: &Transport) {
+        if let Connector::Real(real) = self {
+            *real = transport.clone();
+        }
+    }
 }
 
-fn open_serial(path: &str, serial: Serial) -> Result<Box<dyn Stream>, String> {
+async fn open(transport: &Transport) -> Result<Opened, String> {
+    match transport {
+        Transport::Serial { port, serial, rs485, .. } => open_serial(port, *serial, *rs485),
+        Transport::Tcp { host, port, .. } => open_tcp(host, *port).await,
+    }
+}
+
+fn open_serial(path: &str, serial: Serial, rs485: Rs485) -> Result<Opened, String> {
     use tokio_serial::{DataBits, FlowControl, StopBits};
     let builder = tokio_serial::new(path, serial.baud)
         .data_bits(if serial.data_bits == 7 { DataBits::Seven } else { DataBits::Eight })
@@ -53,28 +88,17 @@ fn open_serial(path: &str, serial: Serial) -> Result<Box<dyn Stream>, String> {
         .stop_bits(if serial.stop_bits == 2 { StopBits::Two } else { StopBits::One })
         .flow_control(FlowControl::None);
     // The port is taken exclusively: a second master on the line is refused by the system.
-    match builder.open_native_async() {
-        Ok(stream) => Ok(Box::new(stream)),
-        Err(error) => Err(serial_words(path, &error)),
+    let stream: SerialStream = builder.open_native_async().map_err(|error| ports::why_not(path, &error))?;
+    if rs485 != Rs485::Off {
+        uart::set_rs485(&stream, rs485).map_err(|error| {
+            format!("{path}: its driver does not switch the direction of RS-485 ({error}); use rs485 = \"off\"")
+        })?;
     }
+    let count = uart::counter(&stream);
+    Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), uart: count })
 }
 
-fn serial_words(path: &str, error: &tokio_serial::Error) -> String {
-    use tokio_serial::ErrorKind;
-    let words = error.to_string();
-    match error.kind {
-        ErrorKind::Io(io::ErrorKind::NotFound) => format!("{path}: no such port"),
-        ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
-            format!("{path}: no permission (is the user in the group dialout?)")
-        }
-        ErrorKind::NoDevice if words.to_lowercase().contains("busy") => format!("{path}: in use by another program"),
-        ErrorKind::NoDevice | ErrorKind::InvalidInput | ErrorKind::Unknown | ErrorKind::Io(_) => {
-            format!("{path}: {words}")
-        }
-    }
-}
-
-async fn open_tcp(host: &str, port: u16) -> Result<Box<dyn Stream>, String> {
+async fn open_tcp(host: &str, port: u16) -> Result<Opened, String> {
     let connect = TcpStream::connect((host, port));
     let stream = match tokio::time::timeout(CONNECT_TIMEOUT, connect).await {
         Err(_) => return Err(format!("{host}:{port}: no connection within {} s", CONNECT_TIMEOUT.as_secs())),
@@ -86,7 +110,7 @@ async fn open_tcp(host: &str, port: u16) -> Result<Box<dyn Stream>, String> {
     if let Err(error) = notice_silence(&stream) {
         tracing::debug!(%error, "no keepalive on {host}:{port}");
     }
-    Ok(Box::new(stream))
+    Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), uart: None })
 }
 
 /// A peer that has vanished without a word is noticed within half a minute, and what was sent to it is taken back: left to
@@ -118,7 +142,7 @@ mod tests {
     async fn errors_say_what_to_do() {
         let missing = Transport::rtu("/dev/no-such-port", Serial::USUAL);
         let words = Connector::Real(missing).open().await.err().unwrap();
-        assert_eq!(words, "/dev/no-such-port: no such port");
+        assert!(words.starts_with("/dev/no-such-port: no such port ("), "{words}");
         // A port that was just free and is closed again refuses.
         let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let closed = Transport::tcp("127.0.0.1", port);

@@ -24,8 +24,9 @@ pub struct Wire {
     pause: Pause,
     clock: Clock,
     framing: Framing,
-    /// Time of one character and of the silence between frames, real time; zero over TCP.
+    /// Time of one character, real time; zero over TCP.
     pub char_time: Duration,
+    /// Silence between frames, real time.
     pub silence: Duration,
     timeout: Duration,
     /// Nothing is sent before this.

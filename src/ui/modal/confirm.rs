@@ -98,6 +98,10 @@ impl Confirm {
             Intent::Order(Command::Refresh(_)) => "refresh",
             Intent::Order(Command::Connect(_, true)) => "connect",
             Intent::Order(Command::Connect(_, false)) => "disconnect",
+            Intent::Order(Command::Configure(_)) => "use these settings",
+            Intent::Order(Command::SaveSettings(_)) => "save",
+            Intent::Order(Command::Test(..)) => "send",
+            Intent::Order(Command::StopTest(_)) => "stop",
         }
     }
 

@@ -26,6 +26,7 @@ impl Notice {
         let line = &cx.def().line(def.line).name;
         let why = match (&cx.snapshot.line(def.line).state, cx.snapshot.device(device).state) {
             (LineState::Disconnected, _) => format!("Line {line} was disconnected by an operator."),
+            (LineState::Testing, _) => format!("A test has line {line} for itself (tab Bus)."),
             (LineState::Waiting { why, .. }, _) => format!("Line {line} is not connected: {why}."),
             (LineState::Connecting, _) => format!("Line {line} is being connected."),
             (LineState::Connected, DeviceState::Down { since }) => {

@@ -303,7 +303,14 @@ fn faceplate_row(cx: &Cx, device: &DeviceDef, canvas: &mut Canvas) {
 fn last_write(cx: &Cx, device: DeviceId) -> Option<(String, bool)> {
     let order = cx.snapshot.orders.iter().find(|order| match order.command {
         Command::Write { tag, .. } => cx.def().tag(tag).device == device,
-        Command::Acknowledge(_) | Command::AcknowledgeAll | Command::Refresh(_) | Command::Connect(..) => false,
+        Command::Acknowledge(_)
+        | Command::AcknowledgeAll
+        | Command::Refresh(_)
+        | Command::Connect(..)
+        | Command::Configure(_)
+        | Command::SaveSettings(_)
+        | Command::Test(..)
+        | Command::StopTest(_) => false,
     })?;
     let (words, trouble) = outcome_words(&order.outcome);
     let what = order_words(cx, &order.command, order.old);

@@ -1,0 +1,130 @@
+//! Line tools at work: between polls, or alone on the port when they try other serial parameters.
+
+use std::sync::Arc;
+
+use tokio::sync::mpsc::error::TryRecvError;
+
+use super::{Ended, Leave, REPORT_EVERY, Task, Turn};
+use crate::{
+    bus::{
+        io::{
+            link::{Link, Trouble},
+            testing,
+        },
+        schedule::Next,
+    },
+    plant::{
+        command::BusRequest,
+        event::{Event, Fault, WriteResult},
+        tool::ToolState,
+    },
+};
+
+/// A busy line gives a tool every so many-th turn.
+const POLLS_BETWEEN: u32 = 4;
+
+impl Task {
+    pub(super) fn is_turn_of_test(&self, next: Next) -> bool {
+        let idle = !matches!(next, Next::Run(_));
+        self.job.as_ref().is_some_and(|job| job.next().is_some()) && (idle || POLLS_BETWEEN <= self.polls_since_test)
+    }
+
+    /// One step of the tool, between polls.
+    pub(super) async fn test_step(&mut self, link: &mut Link) -> Turn {
+        self.polls_since_test = 0;
+        let Some(job) = &mut self.job else { return Ok(Ok(())) };
+        let Some(step) = job.next().cloned() else { return Ok(Ok(())) };
+        match testing::step(link, &step).await {
+            Ok(came) => {
+                job.take(came);
+                self.tell_test().await.map(Ok)
+            }
+            Err(Trouble::Gone(why)) => Ok(Err(Leave::Lost(why))),
+            Err(Trouble::Fault(_)) => Ok(Ok(())),
+        }
+    }
+
+    /// The tool has the port for itself, opened with the serial parameters that each step wants.
+    pub(super) async fn test_alone(&mut self) -> Result<(), Ended> {
+        let mut open: Option<Link> = None;
+        let mut settings = self.settings.clone();
+        while let Some(step) = self.job.as_ref().and_then(|job| job.next().cloned()) {
+            if *self.stop.borrow() {
+                return Err(Ended);
+            }
+            if !self.hear_while_testing().await? {
+                break;
+            }
+            let wanted = testing::settings_for(&self.settings, &step);
+            let mut link = match open.take().filter(|_| wanted == settings) {
+                Some(link) => link,
+                None => match self.connector.open_as(&wanted.transport).await {
+                    Ok(opened) => Link::new(opened.stream, opened.pause, &wanted, self.clock, self.counters),
+                    Err(why) => {
+                        self.end_test(&why).await?;
+                        break;
+                    }
+                },
+            };
+            settings = wanted;
+            let came = testing::step(&mut link, &step).await;
+            self.close_second(&mut link, REPORT_EVERY);
+            match (came, &mut self.job) {
+                (Ok(came), Some(job)) => job.take(came),
+                (Err(Trouble::Gone(why)), _) => {
+                    self.end_test(&why).await?;
+                    break;
+                }
+                (Ok(_), None) | (Err(Trouble::Fault(_)), _) => {}
+            }
+            self.tell_test().await?;
+            open = Some(link);
+        }
+        self.tell_test().await
+    }
+
+    /// Takes what operators want while nobody is polled; `false` when the test must stop.
+    async fn hear_while_testing(&mut self) -> Result<bool, Ended> {
+        loop {
+            match self.requests.try_recv() {
+                Err(TryRecvError::Empty) => return Ok(true),
+                Err(TryRecvError::Disconnected) => return Err(Ended),
+                Ok(BusRequest::Write { id, .. }) => {
+                    self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
+                }
+                Ok(BusRequest::StopTest | BusRequest::Connect(_) | BusRequest::Test { .. }) => {
+                    self.stop_test().await?;
+                    return Ok(false);
+                }
+                Ok(BusRequest::Configure(settings)) => self.configure(*settings),
+                Ok(BusRequest::Refresh(_)) => {}
+            }
+        }
+    }
+
+    /// An operator stops the tool at work.
+    pub(super) async fn stop_test(&mut self) -> Result<(), Ended> {
+        if let Some(job) = &mut self.job {
+            job.stop(ToolState::Cancelled);
+        }
+        self.tell_test().await
+    }
+
+    /// The line cannot go on with the tool at work.
+    pub(super) async fn end_test(&mut self, why: &str) -> Result<(), Ended> {
+        if let Some(job) = &mut self.job {
+            job.stop(ToolState::Failed(why.to_owned()));
+        }
+        self.tell_test().await
+    }
+
+    /// Tells how the tool stands, and forgets it when it is over.
+    pub(super) async fn tell_test(&mut self) -> Result<(), Ended> {
+        let Some(job) = &self.job else { return Ok(()) };
+        let run = Arc::new(job.run().clone());
+        if job.run().state != ToolState::Running {
+            self.job = None;
+        }
+        self.tell(Event::Tool { at: self.clock.now(), line: self.line, run }).await
+    }
+}

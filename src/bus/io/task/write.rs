@@ -1,0 +1,157 @@
+//! Writing: once, read back, never repeated.
+
+use std::borrow::Cow;
+
+use tokio_modbus::Request;
+
+use super::{Leave, Task, Turn, poll::value_of};
+use crate::{
+    bus::{
+        codec,
+        io::link::{Link, Trouble},
+        plan,
+        schedule::Schedule,
+    },
+    plant::{
+        command::WriteId,
+        def::{ActionDef, DeviceDef, Framing},
+        event::{Event, Fault, WriteResult},
+        scale,
+        tag::{Table, TagDef},
+    },
+};
+
+impl Task {
+    /// Carries a write and tells how it ended.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) async fn write(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        id: WriteId,
+        tag: &TagDef,
+        raw: f64,
+        unlock: Option<(&TagDef, f64)>,
+        verify: bool,
+    ) -> Turn {
+        let result = match self.write_once(link, schedule, tag, raw, unlock, verify).await {
+            Ok(result) => result,
+            Err(why) => {
+                // The port went away under the write: it may or may not have arrived.
+                self.tell_wrote(id, WriteResult::Lost(Fault::NotConnected)).await?;
+                return Ok(Err(Leave::Lost(why)));
+            }
+        };
+        let tcp = self.settings.transport.framing() == Framing::Mbap;
+        let unanswered = tcp && matches!(result, WriteResult::Lost(Fault::Timeout));
+        match result {
+            WriteResult::ReadBack(raw) => {
+                let (device, values) = (tag.device, vec![(tag.id, raw)]);
+                let exchange = link.last.clone();
+                let reply = exchange.as_ref().and_then(|exchange| exchange.reply).unwrap_or_default();
+                self.tell(Event::Read { at: self.clock.now(), device, values, reply, exchange }).await?;
+            }
+            // What the device holds now is not known until it is read again.
+            WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => {
+                schedule.refresh(tag.device, self.clock.now());
+            }
+            WriteResult::Refused(_) | WriteResult::NotSent(_) => {}
+        }
+        self.tell_wrote(id, result).await?;
+        if unanswered {
+            // The system would go on sending it for minutes; a closed connection takes it back.
+            return Ok(Err(Leave::Lost("a write was not answered".into())));
+        }
+        Ok(Ok(()))
+    }
+
+    /// Writes once, reads back. `Err` when the port is gone.
+    async fn write_once(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        tag: &TagDef,
+        raw: f64,
+        unlock: Option<(&TagDef, f64)>,
+        verify: bool,
+    ) -> Result<WriteResult, String> {
+        let def = self.def.clone();
+        let device = def.device(tag.device);
+        if schedule.is_down(tag.device) || schedule.is_resting(tag.device, self.clock.now()) {
+            return Ok(WriteResult::NotSent(Fault::Resting));
+        }
+        // A key of another device would be written to an address of this one.
+        if unlock.is_some_and(|(key, _)| key.device != tag.device) {
+            return Ok(WriteResult::NotSent(Fault::NotANumber));
+        }
+        for (tag, raw) in unlock.into_iter().chain([(tag, raw)]) {
+            // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
+            let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
+            match self.send_write(link, device, request).await {
+                Ok(()) => schedule.answered(tag.device, self.clock.now()),
+                Err(Trouble::Gone(why)) => return Err(why),
+                Err(Trouble::Fault(Fault::Exception(code))) if code.is_refusal() => {
+                    return Ok(WriteResult::Refused(code));
+                }
+                Err(Trouble::Fault(fault)) => return Ok(WriteResult::Lost(fault)),
+            }
+        }
+        // An action such as saving to non-volatile memory wants the device left alone, not the line.
+        let is_this = |action: &&ActionDef| action.tag == tag.id && scale::to_raw(tag, action.value, 0) == Some(raw);
+        if let Some(action) = device.actions.iter().find(is_this) {
+            schedule.rest(tag.device, self.clock.now() + action.settle);
+        }
+        if !verify {
+            return Ok(WriteResult::Accepted);
+        }
+        let block = plan::single(device, tag);
+        let back = match self.in_step(link, &block).await {
+            Ok(()) => self.read_twice(link, &block).await,
+            Err(trouble) => Err(trouble),
+        };
+        match back {
+            Ok(values) => Ok(match value_of(tag, &block, &values) {
+                Some(back) => WriteResult::ReadBack(back),
+                None => WriteResult::NotRead(Fault::NotANumber),
+            }),
+            Err(Trouble::Gone(why)) => Err(why),
+            Err(Trouble::Fault(fault)) => Ok(WriteResult::NotRead(fault)),
+        }
+    }
+
+    async fn send_write(&mut self, link: &mut Link, device: &DeviceDef, request: Request<'_>) -> Result<(), Trouble> {
+        let sent = link.call(device.unit, request).await.map(drop);
+        link.rest(device.write_gap);
+        if let Some(last) = &link.last {
+            self.books.asked(device.id, last.outcome, last.reply);
+        }
+        sent
+    }
+}
+
+/// The request that writes a raw number: function 5 or 6 for one, 15 or 16 for more or where the profile says so, 22 for a
+/// field of bits, 23 where the profile wants the answer to bring the new value along.
+fn write_request(tag: &TagDef, raw: f64) -> Option<Request<'static>> {
+    let address = tag.point.address;
+    match tag.point.table {
+        Table::Coil => Some(match tag.write_fc {
+            Some(15) => Request::WriteMultipleCoils(address, Cow::Owned(vec![raw != 0.0])),
+            Some(_) | None => Request::WriteSingleCoil(address, raw != 0.0),
+        }),
+        Table::Holding if tag.point.field.is_some() => {
+            let (and, or) = codec::field_masks(tag.point, raw)?;
+            Some(Request::MaskWriteRegister(address, and, or))
+        }
+        Table::Holding => {
+            let words = codec::encode(tag.point, raw)?;
+            Some(match (words.as_slice(), tag.write_fc) {
+                ([word], None | Some(6)) => Request::WriteSingleRegister(address, *word),
+                (_, Some(23)) => {
+                    Request::ReadWriteMultipleRegisters(address, words.len() as u16, address, Cow::Owned(words))
+                }
+                _ => Request::WriteMultipleRegisters(address, Cow::Owned(words)),
+            })
+        }
+        Table::Discrete | Table::Input => None,
+    }
+}

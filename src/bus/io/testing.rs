@@ -1,0 +1,72 @@
+//! Carries the steps of a line tool over a link.
+
+use super::{
+    clock::Clock,
+    link::{Link, Trouble},
+    transport::Connector,
+};
+use crate::{
+    bus::tool::{Ask, Came, Job, Step},
+    plant::{
+        def::{LineDef, Transport},
+        event::{Fault, LineCounters},
+        tool::{ToolRun, ToolState},
+    },
+};
+
+/// One step. `Err` only when the port is gone.
+pub async fn step(link: &mut Link, step: &Step) -> Result<Came, Trouble> {
+    match &step.ask {
+        Ask::Raw(bytes) => link.send_raw(bytes).await.map(|(bytes, reply)| Came::Bytes(bytes, reply)),
+        Ask::Message(message) => {
+            let usual = link.timeout();
+            link.set_timeout(step.timeout.unwrap_or(usual));
+            let answer = match link.exchange(message).await {
+                Ok(answer) => Ok(Ok(answer)),
+                Err(Trouble::Fault(fault)) => Ok(Err(fault)),
+                Err(gone) => Err(gone),
+            };
+            link.set_timeout(usual);
+            let exchange = link.last.clone().ok_or(Trouble::Fault(Fault::Timeout))?;
+            Ok(Came::Answer(answer?, exchange))
+        }
+    }
+}
+
+/// The settings of a line with the serial parameters that a step wants.
+pub fn settings_for(line: &LineDef, step: &Step) -> LineDef {
+    let mut settings = line.clone();
+    if let (Transport::Serial { serial, .. }, Some(wanted)) = (&mut settings.transport, step.serial) {
+        *serial = wanted;
+    }
+    settings
+}
+
+/// Runs a tool to its end on a line that nobody polls; `progress` sees every step and may stop it by `false`.
+pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&ToolRun) -> bool) -> ToolRun {
+    let mut connector = Connector::Real(line.transport.clone());
+    let mut open: Option<(LineDef, Link)> = None;
+    while let Some(next) = job.next().cloned() {
+        let wanted = settings_for(line, &next);
+        let mut link = match open.take().filter(|(settings, _)| *settings == wanted) {
+            Some((_, link)) => link,
+            None => match connector.open_as(&wanted.transport).await {
+                Ok(opened) => Link::new(opened.stream, opened.pause, &wanted, Clock::real(), LineCounters::default()),
+                Err(why) => {
+                    job.stop(ToolState::Failed(why));
+                    break;
+                }
+            },
+        };
+        match step(&mut link, &next).await {
+            Ok(came) => job.take(came),
+            Err(Trouble::Gone(why)) => job.stop(ToolState::Failed(why)),
+            Err(Trouble::Fault(fault)) => job.stop(ToolState::Failed(fault.to_string())),
+        }
+        if !progress(job.run()) {
+            job.stop(ToolState::Cancelled);
+        }
+        open = Some((wanted, link));
+    }
+    job.run().clone()
+}

@@ -1,0 +1,131 @@
+//! What only the driver of a serial port knows or can do: its error counters, and the direction of RS-485.
+//!
+//! The two kernel interfaces have no safe wrapper in any library we use; each is one call with a structure of its own.
+#![allow(unsafe_code)]
+
+use std::{
+    ffi::c_void,
+    io,
+    os::fd::{AsRawFd, BorrowedFd, OwnedFd},
+};
+
+use rustix::ioctl::{Ioctl, IoctlOutput, Opcode};
+use tokio_serial::SerialStream;
+
+use crate::plant::{def::Rs485, event::UartCounters};
+
+/// Reads the error counters of a port whenever it is called; `None` for a port whose driver does not count (a
+/// pseudo-terminal, many USB adapters).
+pub fn counter(port: &SerialStream) -> Option<Box<dyn Fn() -> Option<UartCounters> + Send + Sync>> {
+    // A second handle, so that the counters outlive no port: it is closed with this closure.
+    let handle: OwnedFd = borrowed(port).try_clone_to_owned().ok()?;
+    // SAFETY: TIOCGICOUNT fills one `serial_icounter_struct`, which `Counts` is, field by field.
+    let read = move || unsafe { rustix::ioctl::ioctl(&handle, ReadCounts(Counts::default())) }.ok();
+    let first = read()?;
+    Some(Box::new(move || {
+        let now = read()?;
+        let since = |now: i32, first: i32| now.wrapping_sub(first).unsigned_abs();
+        Some(UartCounters {
+            parity: since(now.parity, first.parity),
+            framing: since(now.frame, first.frame),
+            overrun: since(now.overrun, first.overrun) + since(now.buf_overrun, first.buf_overrun),
+            breaks: since(now.brk, first.brk),
+        })
+    }))
+}
+
+/// Makes the driver switch the direction of an RS-485 transceiver by RTS.
+pub fn set_rs485(port: &SerialStream, mode: Rs485) -> io::Result<()> {
+    let polarity = match mode {
+        Rs485::Off => return Ok(()),
+        Rs485::RtsHigh => RTS_ON_SEND,
+        Rs485::RtsLow => RTS_AFTER_SEND,
+    };
+    let config = Rs485Config { flags: ENABLED | polarity, delays: [0; 2], padding: [0; 5] };
+    // SAFETY: TIOCSRS485 reads and writes back one `serial_rs485`, which `Rs485Config` is, field by field.
+    unsafe { rustix::ioctl::ioctl(borrowed(port), SetRs485(config)) }.map_err(io::Error::from)
+}
+
+fn borrowed(port: &SerialStream) -> BorrowedFd<'_> {
+    // SAFETY: the descriptor is open for as long as the port that is borrowed here.
+    unsafe { BorrowedFd::borrow_raw(port.as_raw_fd()) }
+}
+
+/// `struct serial_icounter_struct` of linux/serial.h.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default)]
+struct Counts {
+    modem: [i32; 4],
+    rx: i32,
+    tx: i32,
+    frame: i32,
+    overrun: i32,
+    parity: i32,
+    brk: i32,
+    buf_overrun: i32,
+    reserved: [i32; 9],
+}
+
+/// `struct serial_rs485` of linux/serial.h.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+struct Rs485Config {
+    flags: u32,
+    delays: [u32; 2],
+    padding: [u32; 5],
+}
+
+const ENABLED: u32 = 1;
+const RTS_ON_SEND: u32 = 1 << 1;
+const RTS_AFTER_SEND: u32 = 1 << 2;
+
+struct ReadCounts(Counts);
+
+// SAFETY: the opcode is that of TIOCGICOUNT, and the pointer is to the structure it fills.
+unsafe impl Ioctl for ReadCounts {
+    type Output = Counts;
+    const IS_MUTATING: bool = true;
+
+    fn opcode(&self) -> Opcode {
+        0x545D
+    }
+    fn as_ptr(&mut self) -> *mut c_void {
+        (&raw mut self.0).cast()
+    }
+    unsafe fn output_from_ptr(_: IoctlOutput, filled: *mut c_void) -> rustix::io::Result<Counts> {
+        // SAFETY: it is the pointer that `as_ptr` gave.
+        Ok(unsafe { filled.cast::<Counts>().read() })
+    }
+}
+
+struct SetRs485(Rs485Config);
+
+// SAFETY: the opcode is that of TIOCSRS485, and the pointer is to the structure it reads and writes back.
+unsafe impl Ioctl for SetRs485 {
+    type Output = ();
+    const IS_MUTATING: bool = true;
+
+    fn opcode(&self) -> Opcode {
+        0x542F
+    }
+    fn as_ptr(&mut self) -> *mut c_void {
+        (&raw mut self.0).cast()
+    }
+    unsafe fn output_from_ptr(_: IoctlOutput, _: *mut c_void) -> rustix::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_port_that_neither_counts_nor_switches_says_so() {
+        let (port, _other) = SerialStream::pair().unwrap();
+        assert!(counter(&port).is_none());
+        assert!(set_rs485(&port, Rs485::RtsHigh).is_err());
+        assert!(set_rs485(&port, Rs485::Off).is_ok());
+    }
+}

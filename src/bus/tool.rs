@@ -1,0 +1,468 @@
+//! Line tools as pure step machines: which request is next, and what its answer tells.
+
+use std::{collections::VecDeque, sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use crate::plant::{
+    command::OrderId,
+    def::Serial,
+    event::Fault,
+    tag::Table,
+    tool::{FINDINGS_MAX, Finding, Scan, Tool, ToolRun, ToolState},
+    traffic::Exchange,
+};
+
+/// What is to be sent next.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// With these serial parameters; `None` for the line's own.
+    pub serial: Option<Serial>,
+    /// The answer may take this long; `None` for the line's own timeout.
+    pub timeout: Option<Duration>,
+    /// What.
+    pub ask: Ask,
+}
+
+/// A request, or bytes as they are.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ask {
+    /// Unit and PDU; the line frames it.
+    Message(Vec<u8>),
+    /// A whole frame, good or bad.
+    Raw(Vec<u8>),
+}
+
+/// What came of a step.
+#[derive(Debug, Clone)]
+pub enum Came {
+    /// The answer to a message, or why there is none, and both as they were on the wire.
+    Answer(Result<Vec<u8>, Fault>, Arc<Exchange>),
+    /// All bytes that came back for raw ones.
+    Bytes(Vec<u8>, Option<Duration>),
+}
+
+/// A tool at work.
+#[derive(Debug, Clone)]
+pub struct Job {
+    run: ToolRun,
+    steps: VecDeque<Step>,
+}
+
+impl Job {
+    /// Ready for its first step.
+    pub fn new(id: OrderId, by: Arc<str>, tool: Tool, at: Timestamp) -> Job {
+        let steps = steps_of(&tool);
+        let total = steps.len() as u32;
+        let run = ToolRun {
+            id,
+            by,
+            tool,
+            started: at,
+            done: 0,
+            total,
+            now: String::new(),
+            state: ToolState::Running,
+            findings: Vec::new(),
+        };
+        let mut job = Job { run, steps };
+        job.tell_now();
+        job
+    }
+
+    /// How it stands.
+    pub fn run(&self) -> &ToolRun {
+        &self.run
+    }
+
+    /// Does it need the line for itself, because it tries other serial parameters?
+    pub fn is_exclusive(&self) -> bool {
+        self.steps.iter().any(|step| step.serial.is_some())
+    }
+
+    /// The next step; `None` when it is done or was stopped.
+    pub fn next(&self) -> Option<&Step> {
+        self.steps.front().filter(|_| self.run.state == ToolState::Running)
+    }
+
+    /// Stops it.
+    pub fn stop(&mut self, state: ToolState) {
+        if self.run.state == ToolState::Running {
+            self.run.state = state;
+        }
+    }
+
+    /// Takes what came of the step that was next.
+    pub fn take(&mut self, came: Came) {
+        let Some(step) = self.steps.pop_front() else { return };
+        self.run.done += 1;
+        match (&self.run.tool, came) {
+            (_, Came::Bytes(bytes, reply)) => self.found(Finding::Bytes { bytes, reply }),
+            (Tool::Scan(_), Came::Answer(answer, _)) => self.take_unit(&step, answer),
+            (_, Came::Answer(answer, exchange)) => {
+                self.found(Finding::Exchange(exchange));
+                self.take_answer(&step, answer);
+            }
+        }
+        self.run.total = self.run.done + self.steps.len() as u32;
+        if self.steps.is_empty() {
+            self.conclude();
+            self.run.state = ToolState::Done;
+        }
+        self.tell_now();
+    }
+
+    fn take_answer(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
+        let Ask::Message(request) = &step.ask else { return };
+        let answer = match answer {
+            Ok(answer) => answer,
+            Err(fault) => {
+                self.found(Finding::Failed { what: words(request), fault });
+                self.after_failure(request, fault);
+                return;
+            }
+        };
+        match (request.get(1), answer.get(1)) {
+            (Some(0x2B), _) => self.take_identification(request, &answer),
+            (Some(0x11), _) => {
+                let text = text_of(answer.get(3..).unwrap_or_default());
+                self.found(Finding::Object { name: "ServerId".into(), text });
+            }
+            (Some(0x01..=0x04), _) => {
+                if let Some(finding) = values(request, &answer) {
+                    self.found(finding);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A device without 2B/0E may know 11; a block that does not exist as a whole may exist in parts.
+    fn after_failure(&mut self, request: &[u8], fault: Fault) {
+        match (&self.run.tool, fault) {
+            (Tool::Identify { unit }, Fault::Exception(_)) if request.get(1..4) == Some(&[0x2B, 0x0E, 0x01]) => {
+                self.steps.clear();
+                self.steps.push_back(step(vec![*unit, 0x11]));
+            }
+            (Tool::Read { unit, table, address, count }, Fault::Exception(code)) if code.0 == 2 && 1 < *count => {
+                if self.run.done == 1 {
+                    let singles = (0..*count).map(|n| step(read(*unit, *table, address.wrapping_add(n), 1)));
+                    self.steps.extend(singles);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Objects: id, length, text. If more follow, they are asked for (V1.1b3, 6.21).
+    fn take_identification(&mut self, request: &[u8], answer: &[u8]) {
+        let [unit, _, _, code, ..] = *request else { return };
+        let (more, next, count) = match answer {
+            [_, _, _, _, _, more, next, count, ..] => (*more, *next, *count),
+            _ => return,
+        };
+        let mut rest = answer.get(8..).unwrap_or_default();
+        for _ in 0..count {
+            let [id, length, tail @ ..] = rest else { break };
+            let (text, tail) = tail.split_at(tail.len().min(usize::from(*length)));
+            self.found(Finding::Object { name: object_name(*id), text: text_of(text) });
+            rest = tail;
+        }
+        // A device that always says "more" at the same place would be asked for ever.
+        if more == 0xFF && next != request[4] {
+            self.steps.push_front(step(vec![unit, 0x2B, 0x0E, code, next]));
+        }
+    }
+
+    fn take_unit(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
+        let Ask::Message(request) = &step.ask else { return };
+        let words = match answer {
+            Ok(answer) => match answer.get(3..5) {
+                Some([high, low]) => format!("register 0 = {}", u16::from_be_bytes([*high, *low])),
+                _ => "answers".into(),
+            },
+            Err(fault @ Fault::Exception(code)) if !code.is_of_gateway() => fault.to_string(),
+            // Spoiled bytes are a trace too: somebody may be there with another parity or baud rate.
+            Err(fault) if fault.is_corrupt() => format!("something is there: {fault}"),
+            Err(_) => return,
+        };
+        self.found(Finding::Unit { unit: request[0], serial: step.serial, words });
+    }
+
+    fn conclude(&mut self) {
+        let verdict = match &self.run.tool {
+            Tool::Loopback { .. } => loopback_words(&self.run.findings, self.run.done),
+            Tool::Scan(scan) => {
+                let units = self.run.findings.iter().filter(|found| matches!(found, Finding::Unit { .. })).count();
+                match units {
+                    0 => format!("no unit answers within {} ms", scan.timeout.as_millis()),
+                    1 => "1 answer".into(),
+                    count => format!("{count} answers"),
+                }
+            }
+            Tool::Send(_) | Tool::Identify { .. } | Tool::Read { .. } => return,
+        };
+        self.found(Finding::Verdict(verdict));
+    }
+
+    fn found(&mut self, finding: Finding) {
+        if self.run.findings.len() < FINDINGS_MAX {
+            self.run.findings.push(finding);
+        }
+    }
+
+    fn tell_now(&mut self) {
+        self.run.now = match self.steps.front().map(|step| (&step.ask, step.serial)) {
+            Some((Ask::Message(request), Some(serial))) => format!("{} at {serial}", words(request)),
+            Some((Ask::Message(request), None)) => words(request),
+            Some((Ask::Raw(_), _)) => "bytes as they are".into(),
+            None => String::new(),
+        };
+    }
+}
+
+fn steps_of(tool: &Tool) -> VecDeque<Step> {
+    match tool {
+        Tool::Send(bytes) => VecDeque::from([Step { serial: None, timeout: None, ask: Ask::Raw(bytes.clone()) }]),
+        Tool::Loopback { unit, data, count } => {
+            let message = |n: u16| {
+                let [high, low] = data.wrapping_add(n).to_be_bytes();
+                step(vec![*unit, 0x08, 0, 0, high, low])
+            };
+            (0..*count).map(message).collect()
+        }
+        // Basic objects, then the regular ones that follow them (id 3 and on).
+        Tool::Identify { unit } => {
+            VecDeque::from([step(vec![*unit, 0x2B, 0x0E, 0x01, 0]), step(vec![*unit, 0x2B, 0x0E, 0x02, 3])])
+        }
+        Tool::Read { unit, table, address, count } => VecDeque::from([step(read(*unit, *table, *address, *count))]),
+        Tool::Scan(scan) => scan_steps(scan),
+    }
+}
+
+fn scan_steps(scan: &Scan) -> VecDeque<Step> {
+    let serials: Vec<Option<Serial>> =
+        if scan.serials.is_empty() { vec![None] } else { scan.serials.iter().copied().map(Some).collect() };
+    let of = |serial| {
+        (scan.first..=scan.last).map(move |unit| Step {
+            serial,
+            timeout: Some(scan.timeout),
+            ask: Ask::Message(read(unit, Table::Holding, 0, 1)),
+        })
+    };
+    serials.into_iter().flat_map(of).collect()
+}
+
+fn step(message: Vec<u8>) -> Step {
+    Step { serial: None, timeout: None, ask: Ask::Message(message) }
+}
+
+fn read(unit: u8, table: Table, address: u16, count: u16) -> Vec<u8> {
+    let ([a, b], [c, d]) = (address.to_be_bytes(), count.to_be_bytes());
+    vec![unit, table.read_fc(), a, b, c, d]
+}
+
+/// `unit 3, 08 / 0x08`.
+fn words(request: &[u8]) -> String {
+    match request {
+        [unit, function, ..] => format!("unit {unit}, function {function} / 0x{function:02X}"),
+        _ => String::new(),
+    }
+}
+
+fn values(request: &[u8], answer: &[u8]) -> Option<Finding> {
+    let word = |at: usize| Some(u16::from_be_bytes([*request.get(at)?, *request.get(at + 1)?]));
+    let (address, count) = (word(2)?, word(4)?);
+    let data = answer.get(3..)?;
+    let (table, bits) = match request[1] {
+        0x01 => (Table::Coil, true),
+        0x02 => (Table::Discrete, true),
+        0x03 => (Table::Holding, false),
+        _ => (Table::Input, false),
+    };
+    let words = if bits {
+        let bit = |n: u16| u16::from(data.get(usize::from(n / 8)).is_some_and(|byte| byte >> (n % 8) & 1 == 1));
+        (0..count).map(bit).collect()
+    } else {
+        data.as_chunks::<2>().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
+    };
+    Some(Finding::Values { table, address, words })
+}
+
+fn loopback_words(findings: &[Finding], sent: u32) -> String {
+    let replies: Vec<Duration> = findings
+        .iter()
+        .filter_map(|finding| match finding {
+            Finding::Exchange(exchange) => exchange.outcome.is_ok().then_some(exchange.reply).flatten(),
+            _ => None,
+        })
+        .collect();
+    let ms = |span: Option<&Duration>| span.map_or(0.0, |span| span.as_secs_f64() * 1e3);
+    let (least, most) = (ms(replies.iter().min()), ms(replies.iter().max()));
+    match replies.len() {
+        0 => format!("none of {sent} came back"),
+        back => format!("{back} of {sent} came back, {least:.1} to {most:.1} ms"),
+    }
+}
+
+/// Name of a device identification object (V1.1b3, 6.21).
+pub fn object_name(id: u8) -> String {
+    let known = [
+        "VendorName",
+        "ProductCode",
+        "MajorMinorRevision",
+        "VendorUrl",
+        "ProductName",
+        "ModelName",
+        "UserApplicationName",
+    ];
+    known.get(usize::from(id)).map_or_else(|| format!("object {id} / 0x{id:02X}"), |name| (*name).to_owned())
+}
+
+/// Text of a device: what cannot be printed is shown as hexadecimal digits.
+fn text_of(bytes: &[u8]) -> String {
+    let printable = |byte: &u8| (0x20..0x7F).contains(byte);
+    bytes
+        .iter()
+        .map(|byte| if printable(byte) { char::from(*byte).to_string() } else { format!("\\x{byte:02X}") })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::{def::Framing, event::ExceptionCode};
+
+    /// Runs a tool against a device given as a function from request to answer.
+    fn run(tool: Tool, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>) -> ToolRun {
+        let id = OrderId { terminal: 1, number: 1 };
+        let mut job = Job::new(id, "anna".into(), tool, Timestamp::UNIX_EPOCH);
+        for _ in 0..10_000 {
+            let Some(next) = job.next() else { return job.run().clone() };
+            let came = match next.ask.clone() {
+                Ask::Raw(bytes) => Came::Bytes(bytes, Some(Duration::from_millis(1))),
+                Ask::Message(request) => {
+                    let answer = device(&request);
+                    let exchange = Exchange {
+                        at: Timestamp::UNIX_EPOCH,
+                        framing: Framing::Mbap,
+                        outcome: answer.as_ref().map(drop).map_err(|fault| *fault),
+                        answer: answer.clone().unwrap_or_default(),
+                        request,
+                        reply: answer.is_ok().then_some(Duration::from_millis(12)),
+                        tries: 1,
+                    };
+                    Came::Answer(answer, Arc::new(exchange))
+                }
+            };
+            job.take(came);
+        }
+        panic!("it never ends")
+    }
+
+    fn verdict(run: &ToolRun) -> &str {
+        match run.findings.last() {
+            Some(Finding::Verdict(words)) => words,
+            other => panic!("no verdict but {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_scan_finds_who_answers_and_who_refuses() {
+        let scan = Scan { first: 1, last: 20, serials: vec![], timeout: Duration::from_millis(100) };
+        let found = run(Tool::Scan(scan), |request| match request[0] {
+            3 => Ok(vec![3, 3, 2, 0, 77]),
+            17 => Err(Fault::Exception(ExceptionCode(2))),
+            18 => Err(Fault::Exception(ExceptionCode(0x0B))),
+            _ => Err(Fault::Timeout),
+        });
+        assert_eq!((found.done, found.total, &found.state), (20, 20, &ToolState::Done));
+        let units: Vec<_> = found
+            .findings
+            .iter()
+            .filter_map(|finding| match finding {
+                Finding::Unit { unit, words, .. } => Some((*unit, words.as_str())),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(units, [(3, "register 0 = 77"), (17, "exception 02, illegal data address")]);
+        assert_eq!(verdict(&found), "2 answers");
+    }
+
+    #[test]
+    fn a_scan_over_several_settings_needs_the_line_for_itself() {
+        let serials = vec![Serial::USUAL, Serial { baud: 19_200, ..Serial::USUAL }];
+        let scan = Scan { first: 1, last: 3, serials, timeout: Duration::from_millis(100) };
+        let job = Job::new(OrderId { terminal: 1, number: 1 }, "anna".into(), Tool::Scan(scan), Timestamp::UNIX_EPOCH);
+        assert!(job.is_exclusive());
+        assert_eq!(job.run().total, 6);
+    }
+
+    #[test]
+    fn loopbacks_are_counted() {
+        let tool = Tool::Loopback { unit: 1, data: 0xA537, count: 3 };
+        let all = run(tool.clone(), |request| Ok(request.to_vec()));
+        assert_eq!(verdict(&all), "3 of 3 came back, 12.0 to 12.0 ms");
+        let none = run(tool, |_| Err(Fault::Timeout));
+        assert_eq!(verdict(&none), "none of 3 came back");
+    }
+
+    #[test]
+    fn an_identification_in_pieces_is_asked_to_its_end() {
+        let objects = ["ACME", "PM", "1.0", "http://acme.example"];
+        let found = run(Tool::Identify { unit: 1 }, |request| {
+            let (code, id) = (request[3], usize::from(request[4]));
+            let Some(text) = objects.get(id).filter(|_| code == 1 || 3 <= id) else {
+                return Err(Fault::Exception(ExceptionCode(2)));
+            };
+            let last = id == if code == 1 { 2 } else { 3 };
+            let more = if last { [0, 0] } else { [0xFF, id as u8 + 1] };
+            let head = [1, 0x2B, 0x0E, code, 0x82, more[0], more[1], 1, id as u8, text.len() as u8];
+            Ok(head.into_iter().chain(text.bytes()).collect())
+        });
+        let names: Vec<_> = found
+            .findings
+            .iter()
+            .filter_map(|finding| match finding {
+                Finding::Object { name, text } => Some(format!("{name} {text}")),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(
+            names,
+            ["VendorName ACME", "ProductCode PM", "MajorMinorRevision 1.0", "VendorUrl http://acme.example"]
+        );
+    }
+
+    #[test]
+    fn a_device_without_identification_is_asked_for_its_server_id() {
+        let found = run(Tool::Identify { unit: 1 }, |request| match request[1] {
+            0x11 => Ok(vec![1, 0x11, 3, b'X', 0xFF, b'Y']),
+            _ => Err(Fault::Exception(ExceptionCode(1))),
+        });
+        let server = Finding::Object { name: "ServerId".into(), text: "X\\xFFY".into() };
+        assert!(found.findings.contains(&server), "{:?}", found.findings);
+    }
+
+    #[test]
+    fn a_block_with_a_hole_is_read_register_by_register() {
+        let tool = Tool::Read { unit: 1, table: Table::Holding, address: 10, count: 3 };
+        let found = run(tool, |request| {
+            let (first, count) = (u16::from(request[3]), u16::from(request[5]));
+            if (first..first + count).contains(&11) {
+                return Err(Fault::Exception(ExceptionCode(2)));
+            }
+            Ok([1, 3, 2 * count as u8].into_iter().chain((first..first + count).flat_map(u16::to_be_bytes)).collect())
+        });
+        let read: Vec<_> = found
+            .findings
+            .iter()
+            .filter_map(|finding| match finding {
+                Finding::Values { address, words, .. } => Some((*address, words.clone())),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(read, [(10, vec![10]), (12, vec![12])]);
+        assert_eq!((found.done, found.total), (4, 4));
+    }
+}

@@ -1,0 +1,66 @@
+//! What a line says of itself, about once a second: settings, counters, polls, frames.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use super::{
+    event::LineCounters,
+    id::{DeviceId, TagId},
+    line::LineDef,
+    tag::{Poll, Table},
+    tally::Tally,
+    traffic::Frames,
+};
+
+/// One line, as its task sees it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LineReport {
+    /// Settings in use; they differ from the plant file's while a technician tries others.
+    pub settings: LineDef,
+    /// Totals since the start.
+    pub counters: LineCounters,
+    /// The read plan, block by block.
+    pub polls: Vec<PollReport>,
+    /// What each device of the line has answered.
+    pub devices: Vec<(DeviceId, Tally)>,
+    /// Busy share of each of the last seconds, newest last, at most 60.
+    pub busy: Vec<f32>,
+    /// The latest frames.
+    pub frames: Frames,
+}
+
+impl LineReport {
+    /// The poll that reads a tag.
+    pub fn poll_of(&self, tag: TagId) -> Option<&PollReport> {
+        self.polls.iter().find(|poll| poll.tags.contains(&tag))
+    }
+
+    /// What a device has answered.
+    pub fn device(&self, id: DeviceId) -> Option<&Tally> {
+        self.devices.iter().find(|(device, _)| *device == id).map(|(_, tally)| tally)
+    }
+}
+
+/// One block of the read plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PollReport {
+    /// Who is asked.
+    pub device: DeviceId,
+    /// Which table.
+    pub table: Table,
+    /// First address, 0-based.
+    pub address: u16,
+    /// Registers or bits.
+    pub count: u16,
+    /// The tags in it.
+    pub tags: Arc<[TagId]>,
+    /// How often.
+    pub poll: Poll,
+    /// Worst time of a good read on the wire.
+    pub cost: Duration,
+    /// When it is read next, if that is known.
+    pub next: Option<Timestamp>,
+    /// Counters.
+    pub tally: Tally,
+}

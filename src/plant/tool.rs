@@ -1,0 +1,162 @@
+//! Line tools: what a technician can ask of a line beyond polling, how far it has come, and what was found.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use super::{command::OrderId, event::Fault, line::Serial, tag::Table, traffic::Exchange};
+
+/// Findings that a run keeps at most.
+pub const FINDINGS_MAX: usize = 1_000;
+
+/// A test of a line.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Tool {
+    /// Sends these bytes as they are, check included, and gathers whatever comes back.
+    Send(Vec<u8>),
+    /// Diagnostics 08/00, return query data, so many times.
+    Loopback {
+        /// Who is asked.
+        unit: u8,
+        /// The word that must come back.
+        data: u16,
+        /// How often.
+        count: u16,
+    },
+    /// Device identification 2B/0E, and 11 report server id where that is unknown.
+    Identify {
+        /// Who is asked.
+        unit: u8,
+    },
+    /// Reads registers or bits at once, and one by one if the device does not have them all.
+    Read {
+        /// Who is asked.
+        unit: u8,
+        /// Which table.
+        table: Table,
+        /// First address, 0-based.
+        address: u16,
+        /// Registers or bits.
+        count: u16,
+    },
+    /// Looks for units.
+    Scan(Scan),
+}
+
+/// In a few words, for the record.
+impl std::fmt::Display for Tool {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Tool::Send(bytes) => {
+                write!(f, "send")?;
+                bytes.iter().try_for_each(|byte| write!(f, " {byte:02X}"))
+            }
+            Tool::Loopback { unit, count, .. } => write!(f, "loopback unit {unit}, {count} times"),
+            Tool::Identify { unit } => write!(f, "identify unit {unit}"),
+            Tool::Read { unit, table, address, count } => {
+                write!(f, "read unit {unit} {} {address} / 0x{address:04X}, {count}", table.word())
+            }
+            Tool::Scan(scan) => {
+                write!(f, "scan units {} to {}", scan.first, scan.last)?;
+                if scan.serials.is_empty() { Ok(()) } else { write!(f, " at {} settings", scan.serials.len()) }
+            }
+        }
+    }
+}
+
+/// Where to look for units: one request each, any answer counts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scan {
+    /// First unit address.
+    pub first: u8,
+    /// Last unit address.
+    pub last: u8,
+    /// Serial parameters to try; empty for those that the line has. While others are tried the line polls nobody.
+    pub serials: Vec<Serial>,
+    /// How long an answer may take.
+    pub timeout: Duration,
+}
+
+/// A tool at work, or done.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToolRun {
+    /// The order it came by.
+    pub id: OrderId,
+    /// Who ordered it.
+    pub by: Arc<str>,
+    /// What.
+    pub tool: Tool,
+    /// When it began.
+    pub started: Timestamp,
+    /// Steps done.
+    pub done: u32,
+    /// Steps in all.
+    pub total: u32,
+    /// What it is doing: `unit 17 at 9600 8N1`.
+    pub now: String,
+    /// How it stands.
+    pub state: ToolState,
+    /// What was found, in order; at most [`FINDINGS_MAX`].
+    pub findings: Vec<Finding>,
+}
+
+/// How a tool stands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ToolState {
+    /// At work.
+    Running,
+    /// All steps are done.
+    Done,
+    /// Stopped by an operator.
+    Cancelled,
+    /// The line went away, or would not open.
+    Failed(String),
+}
+
+/// What a tool has found.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Finding {
+    /// A request with its answer.
+    Exchange(Arc<Exchange>),
+    /// Bytes that came back for bytes sent as they were; empty if the line stayed silent.
+    Bytes {
+        /// As they came.
+        bytes: Vec<u8>,
+        /// From the last byte sent to the first byte received.
+        reply: Option<Duration>,
+    },
+    /// A unit answers.
+    Unit {
+        /// Its address.
+        unit: u8,
+        /// With these serial parameters, if others than the line's own were tried.
+        serial: Option<Serial>,
+        /// What it answered: `register 0 = 123`, `exception 02, illegal data address`.
+        words: String,
+    },
+    /// Part of a device's identification.
+    Object {
+        /// `VendorName`.
+        name: String,
+        /// What the device says.
+        text: String,
+    },
+    /// Registers or bits (0 or 1) that were read.
+    Values {
+        /// Which table.
+        table: Table,
+        /// Address of the first.
+        address: u16,
+        /// One a register or bit.
+        words: Vec<u16>,
+    },
+    /// A step failed.
+    Failed {
+        /// What was asked: `unit 3, loopback 08/00`.
+        what: String,
+        /// Why.
+        fault: Fault,
+    },
+    /// A conclusion: `10 of 10 came back, 11.8 to 12.4 ms`.
+    Verdict(String),
+}
