@@ -260,6 +260,8 @@ fn judge(fault: Fault) -> Verdict {
     match fault {
         Fault::Timeout => Verdict::Doubt(Cause::Timeout),
         Fault::Crc { .. }
+        | Fault::Lrc { .. }
+        | Fault::NotHex(_)
         | Fault::Truncated { .. }
         | Fault::WrongUnit { .. }
         | Fault::WrongFunction { .. }

@@ -91,6 +91,17 @@ pub enum Fault {
         /// Over the bytes received.
         computed: u16,
     },
+    /// The check of an ASCII frame did not fit.
+    #[error("LRC error: got {got:02X}, computed {computed:02X}")]
+    Lrc {
+        /// As received.
+        got: u8,
+        /// Over the bytes received.
+        computed: u8,
+    },
+    /// A character of an ASCII frame is no hexadecimal digit.
+    #[error("character {0:#04X} in an ASCII frame is no hex digit")]
+    NotHex(u8),
     /// The frame ended too early.
     #[error("answer cut short: {got} of {expected} bytes")]
     Truncated {
@@ -145,6 +156,8 @@ impl Fault {
     pub fn is_corrupt(self) -> bool {
         match self {
             Fault::Crc { .. }
+            | Fault::Lrc { .. }
+            | Fault::NotHex(_)
             | Fault::Truncated { .. }
             | Fault::WrongUnit { .. }
             | Fault::WrongFunction { .. }

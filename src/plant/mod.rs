@@ -10,6 +10,7 @@
 pub mod id;
 pub mod sample;
 pub mod line;
+pub mod traffic;
 pub mod def;
 pub mod tag;
 pub mod scale;

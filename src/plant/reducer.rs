@@ -206,6 +206,8 @@ impl Plant {
             Fault::Exception(_)
             | Fault::Timeout
             | Fault::Crc { .. }
+            | Fault::Lrc { .. }
+            | Fault::NotHex(_)
             | Fault::Truncated { .. }
             | Fault::WrongUnit { .. }
             | Fault::WrongFunction { .. }

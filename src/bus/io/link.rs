@@ -419,6 +419,8 @@ impl Link {
             }
             Fault::Timeout => self.counters.timeouts += 1,
             Fault::Crc { .. }
+            | Fault::Lrc { .. }
+            | Fault::NotHex(_)
             | Fault::Truncated { .. }
             | Fault::WrongUnit { .. }
             | Fault::WrongFunction { .. }
