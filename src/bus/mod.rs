@@ -2,6 +2,8 @@
 
 pub mod frame;
 pub mod gather;
+pub mod ascii;
+pub mod explain;
 pub mod codec;
 pub mod plan;
 pub mod backoff;
