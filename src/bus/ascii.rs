@@ -1,56 +1,253 @@
-//! Modbus ASCII: `:`, two hexadecimal digits a byte, LRC, CR LF (Modbus over serial line V1.02, 2.5.2).
+//! Modbus ASCII: `:`, the message in hexadecimal digits, LRC, CR LF.
 
+use std::ops::Range;
+
+use super::{frame, gather::Verdict};
 use crate::plant::event::Fault;
 
-/// Longest frame, in characters.
+/// Longest frame, from `:` to LF (Modbus over serial line V1.02, 2.5.2.1).
 pub const FRAME_MAX: usize = 513;
 
-/// Longitudinal redundancy check: two's complement of the sum of all bytes.
+const END: &[u8] = b"\r\n";
+
+/// The longitudinal redundancy check: two's complement of the sum of all bytes, without carry.
 pub fn lrc(bytes: &[u8]) -> u8 {
-    bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte)).wrapping_neg()
+    bytes.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte)).wrapping_neg()
 }
 
-/// The frame of a message.
+/// The frame of a message (unit and PDU): `01 03 …` becomes `:0103…` with LRC and CR LF.
 pub fn encode(message: &[u8]) -> Vec<u8> {
-    let check = lrc(message);
-    let digits = message.iter().chain([&check]).map(|byte| format!("{byte:02X}"));
-    format!(":{}\r\n", digits.collect::<String>()).into_bytes()
+    let digits = |byte: &u8| format!("{byte:02X}").into_bytes();
+    let mut frame = b":".to_vec();
+    frame.extend(message.iter().flat_map(digits));
+    frame.extend(digits(&lrc(message)));
+    frame.extend(END);
+    frame
 }
 
-/// The message of a frame from `:` to LF, if its LRC fits. Small letters are taken, as some devices send them.
-pub fn decode(frame: &[u8]) -> Result<Vec<u8>, Fault> {
-    let inner = frame.strip_prefix(b":").unwrap_or(frame);
-    let inner = inner.strip_suffix(b"\n").unwrap_or(inner);
-    let digits = inner.strip_suffix(b"\r").unwrap_or(inner);
-    let mut bytes = Vec::with_capacity(digits.len() / 2);
-    let digit = |char: u8| char::from(char).to_digit(16).map(|digit| digit as u8).ok_or(Fault::NotHex(char));
-    let (pairs, rest) = digits.as_chunks::<2>();
-    for [high, low] in pairs {
-        bytes.push(digit(*high)? << 4 | digit(*low)?);
+/// The bytes that hexadecimal digits of either case stand for.
+///
+/// # Errors
+/// [`Fault::NotHex`] names the first other character; [`Fault::Truncated`] an odd count.
+pub fn decode(digits: &[u8]) -> Result<Vec<u8>, Fault> {
+    let value = |digit: &u8| char::from(*digit).to_digit(16).map(|value| value as u8).ok_or(Fault::NotHex(*digit));
+    let values = digits.iter().map(value).collect::<Result<Vec<u8>, Fault>>()?;
+    let (pairs, odd) = values.as_chunks::<2>();
+    match odd {
+        [] => Ok(pairs.iter().map(|[high, low]| high << 4 | low).collect()),
+        [..] => Err(Fault::Truncated { got: digits.len() as u16, expected: digits.len() as u16 + 1 }),
     }
-    let too_short = Fault::Truncated { got: frame.len() as u16, expected: (frame.len() + 1).max(9) as u16 };
-    if !rest.is_empty() || bytes.len() < 3 {
-        return Err(too_short);
+}
+
+/// The message of a whole frame (`:` to LF), if it is well formed and its LRC fits.
+pub fn open(frame: &[u8]) -> Result<Vec<u8>, Fault> {
+    let cut = Fault::Truncated { got: frame.len() as u16, expected: frame.len() as u16 + 2 };
+    let digits = frame.strip_prefix(b":").and_then(|rest| rest.strip_suffix(END)).ok_or(cut)?;
+    if frame.len() > FRAME_MAX {
+        return Err(Fault::WrongLength { got: frame.len() as u16, asked: FRAME_MAX as u16 });
     }
-    let Some((got, message)) = bytes.split_last() else { return Err(too_short) };
-    let computed = lrc(message);
-    if *got == computed { Ok(message.to_vec()) } else { Err(Fault::Lrc { got: *got, computed }) }
+    let mut message = decode(digits)?;
+    let got = message.pop().ok_or(Fault::Truncated { got: frame.len() as u16, expected: 9 })?;
+    let computed = lrc(&message);
+    match message.len() {
+        0 | 1 => Err(Fault::Truncated { got: frame.len() as u16, expected: 9 }),
+        _ if got == computed => Ok(message),
+        _ => Err(Fault::Lrc { got, computed }),
+    }
+}
+
+/// What the bytes that have come over an ASCII line are.
+pub fn verdict(message: &[u8], buffer: &[u8]) -> Verdict {
+    let mut spoiled = None;
+    for frame in frames(buffer) {
+        let answer = match open(&buffer[frame.clone()]) {
+            Ok(answer) => answer,
+            Err(fault) => {
+                spoiled.get_or_insert(fault);
+                continue;
+            }
+        };
+        return match frame::check_answer(message, &answer) {
+            Ok(()) | Err(Fault::Exception(_)) => Verdict::Answer(frame),
+            Err(fault) => Verdict::Foreign(frame.end, fault),
+        };
+    }
+    match (open_frame(buffer), spoiled) {
+        (Some(open), _) if open.len() <= FRAME_MAX => Verdict::Begun,
+        (Some(open), _) => Verdict::Spoiled(Fault::WrongLength { got: open.len() as u16, asked: FRAME_MAX as u16 }),
+        (None, Some(fault)) => Verdict::Spoiled(fault),
+        (None, None) => Verdict::Nothing,
+    }
+}
+
+/// Names what is left at the deadline.
+pub fn left_over(message: &[u8], buffer: &[u8]) -> Fault {
+    let spoiled = frames(buffer).find_map(|frame| open(&buffer[frame]).err());
+    let expected = 2 * frame::shape_of(message).map_or(3, frame::Shape::length) + 5;
+    let cut = || Fault::Truncated { got: open_frame(buffer).unwrap_or(buffer).len() as u16, expected: expected as u16 };
+    if buffer.is_empty() { Fault::Timeout } else { spoiled.unwrap_or_else(cut) }
+}
+
+/// Every run from a `:` to its CR LF. A second `:` restarts; what stands between frames is noise.
+fn frames(buffer: &[u8]) -> impl Iterator<Item = Range<usize>> {
+    let ends = (0..=buffer.len()).filter(|end| buffer[..*end].ends_with(END));
+    let mut from = 0;
+    ends.filter_map(move |end| {
+        let start = from + buffer[from..end].iter().rposition(|byte| *byte == b':')?;
+        from = end;
+        Some(start..end)
+    })
+}
+
+/// The beginning of a frame that has not ended.
+fn open_frame(buffer: &[u8]) -> Option<&[u8]> {
+    let start = buffer.iter().rposition(|byte| *byte == b':')?;
+    let rest = &buffer[start..];
+    (!rest.windows(END.len()).any(|pair| pair == END)).then_some(rest)
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use crate::{bus::gather, plant::def::Framing};
+
+    const REQUEST: [u8; 6] = [1, 3, 0, 10, 0, 2];
+    const ANSWER: [u8; 7] = [1, 3, 4, 0, 10, 0, 11];
+
+    fn check(bytes: &[u8], expect: Verdict) {
+        assert_eq!(verdict(&REQUEST, bytes), expect, "{}", bytes.escape_ascii());
+    }
 
     #[test]
-    fn a_frame_is_told_apart_from_a_spoiled_one() {
-        let frame = encode(&[0x01, 0x03, 0x03, 0xEA, 0x00, 0x01]);
-        assert_eq!(frame, b":010303EA00010E\r\n");
-        assert_eq!(decode(&frame), Ok(vec![0x01, 0x03, 0x03, 0xEA, 0x00, 0x01]));
-        assert_eq!(decode(b":010303ea00010e\r\n"), decode(&frame));
-        assert_eq!(decode(b":010303EA00020E\r\n"), Err(Fault::Lrc { got: 0x0E, computed: 0x0D }));
-        assert_eq!(decode(b":01030#EA00010E\r\n"), Err(Fault::NotHex(b'#')));
-        for cut in 0..frame.len() - 2 {
-            assert!(decode(&frame[..cut]).is_err(), "cut at {cut}");
+    fn a_frame_looks_as_the_standard_writes_it() {
+        assert_eq!(encode(&[0x01, 0x03, 0x03, 0xEA, 0x00, 0x01]), b":010303EA00010E\r\n");
+        assert_eq!(open(b":010303ea00010e\r\n"), Ok(vec![0x01, 0x03, 0x03, 0xEA, 0x00, 0x01]));
+        assert_eq!(lrc(&[]), 0);
+    }
+
+    #[test]
+    fn an_answer_is_found_whole_and_behind_noise_and_cut_at_every_character() {
+        let whole = encode(&ANSWER);
+        let length = whole.len();
+        check(&whole, Verdict::Answer(0..length));
+        assert_eq!(open(&whole), Ok(ANSWER.to_vec()));
+        check(&[], Verdict::Nothing);
+        check(b"\xFF\x00\r\n0A", Verdict::Nothing);
+        for cut in 1..whole.len() {
+            check(&whole[..cut], Verdict::Begun);
+            let behind = [&whole[..cut], &whole].concat();
+            check(&behind, Verdict::Answer(cut..cut + length));
+            assert_eq!(left_over(&REQUEST, &whole[..cut]), Fault::Truncated { got: cut as u16, expected: 19 });
+        }
+        check(&[b"\xFF\r\n0", &whole[..]].concat(), Verdict::Answer(4..4 + length));
+        check(&whole.to_ascii_lowercase(), Verdict::Answer(0..length));
+    }
+
+    #[test]
+    fn a_refusal_is_an_answer_and_another_unit_is_not() {
+        check(&encode(&[1, 0x83, 2]), Verdict::Answer(0..11));
+        let other = encode(&[2, 3, 4, 0, 10, 0, 11]);
+        check(&other, Verdict::Foreign(other.len(), Fault::WrongUnit { got: 2, asked: 1 }));
+    }
+
+    #[test]
+    fn each_way_of_being_spoiled_has_its_name() {
+        for (bytes, fault) in [
+            (&b":0103FD\r\n"[..], Fault::Lrc { got: 0xFD, computed: 0xFC }),
+            (b":01G3FC\r\n", Fault::NotHex(b'G')),
+            (b":01 03FC\r\n", Fault::NotHex(b' ')),
+            (b":0103F\r\n", Fault::Truncated { got: 5, expected: 6 }),
+            (b":01FF\r\n", Fault::Truncated { got: 7, expected: 9 }),
+            (b":\r\n", Fault::Truncated { got: 3, expected: 9 }),
+        ] {
+            check(bytes, Verdict::Spoiled(fault));
+            assert_eq!(left_over(&REQUEST, bytes), fault);
+            // The good answer behind it is taken all the same.
+            let behind = [bytes, &encode(&ANSWER)].concat();
+            check(&behind, Verdict::Answer(bytes.len()..bytes.len() + 19));
+        }
+        assert_eq!(left_over(&REQUEST, &[]), Fault::Timeout);
+    }
+
+    #[test]
+    fn a_frame_without_end_is_given_up_at_513_characters() {
+        let long = [b":", &[b'0'; 600][..]].concat();
+        check(&long[..513], Verdict::Begun);
+        check(&long[..514], Verdict::Spoiled(Fault::WrongLength { got: 514, asked: 513 }));
+        let longest = encode(&[1; 254]);
+        assert_eq!((longest.len(), open(&longest)), (FRAME_MAX, Ok(vec![1; 254])));
+        let longer = encode(&[1; 255]);
+        assert_eq!(open(&longer), Err(Fault::WrongLength { got: 515, asked: 513 }));
+    }
+
+    /// Rows of the published examples: id, kind, message, CRC and LRC as printed.
+    fn vectors() -> Vec<(String, String, Vec<u8>, String, String)> {
+        let mut rows = csv::Reader::from_reader(include_str!("../../tests/vectors/frames.csv").as_bytes());
+        rows.records()
+            .map(|row| {
+                let row = row.unwrap();
+                let bytes = row[3].split(' ').map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect();
+                (row[0].to_owned(), row[1].to_owned(), bytes, row[4].to_owned(), row[5].to_owned())
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_published_frame_travels_in_all_three_forms() {
+        let (mut in_ascii, mut in_rtu) = (0, 0);
+        for (id, kind, message, crc, check) in vectors() {
+            let whole = encode(&message);
+            assert_eq!(open(&whole), Ok(message.clone()), "{id}");
+            let printed = u8::from_str_radix(&check, 16).unwrap();
+            assert_eq!(lrc(&message) == printed, kind != "negative", "{id}");
+            in_ascii += 1;
+            if kind == "negative" {
+                let frame = format!(":{}{check}\r\n", frame::hex(&message).replace(' ', ""));
+                let fault = Fault::Lrc { got: printed, computed: lrc(&message) };
+                assert_eq!(open(frame.as_bytes()), Err(fault), "{id}");
+            }
+            if !crc.is_empty() {
+                let sent = frame::with_crc(&message);
+                assert!(frame::hex(&sent).ends_with(&crc), "{id}");
+                assert_eq!(frame::without_crc(&sent), Ok(&message[..]), "{id}");
+                in_rtu += 1;
+            }
+            let sent = frame::with_mbap(0x1234, &message);
+            assert_eq!(frame::mbap(&sent), frame::Mbap::Whole { transaction: 0x1234, end: sent.len() }, "{id}");
+            assert_eq!(sent[6..], message, "{id}");
+        }
+        assert_eq!((in_ascii, in_rtu), (25, 23));
+    }
+
+    /// Each published answer, alone, behind noise and cut at every byte, against every published request.
+    #[test]
+    fn every_published_answer_belongs_to_its_request_and_to_no_other() {
+        let rows = vectors();
+        let of = |wanted: &'static str| rows.iter().filter(move |row| row.1 == wanted);
+        for (id, _, answer, ..) in of("response") {
+            for (other, _, request, ..) in of("request") {
+                let (ascii, rtu) = (encode(answer), frame::with_crc(answer));
+                for noise in [&b""[..], b"\xFF\x55"] {
+                    let in_ascii = verdict(request, &[noise, &ascii].concat());
+                    let in_rtu = gather::verdict(Framing::Rtu, request, &[noise, &rtu].concat());
+                    assert_eq!(matches!(in_ascii, Verdict::Answer(_)), id == other, "{id} to {other}: {in_ascii:?}");
+                    assert_eq!(matches!(in_rtu, Verdict::Answer(_)), id == other, "{id} to {other}: {in_rtu:?}");
+                }
+                for cut in 0..ascii.len() {
+                    assert!(!matches!(verdict(request, &ascii[..cut]), Verdict::Answer(_)), "{id} cut at {cut}");
+                }
+                for cut in 0..rtu.len() {
+                    assert!(
+                        !matches!(gather::verdict(Framing::Rtu, request, &rtu[..cut]), Verdict::Answer(_)),
+                        "{id} cut at {cut}"
+                    );
+                }
+                let tcp = frame::with_mbap(7, answer);
+                for cut in 0..tcp.len() {
+                    assert_eq!(frame::mbap(&tcp[..cut]), frame::Mbap::Incomplete, "{id} cut at {cut}");
+                }
+            }
         }
     }
 }

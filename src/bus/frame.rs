@@ -57,7 +57,7 @@ pub fn wrap(framing: Framing, transaction: u16, message: &[u8]) -> Vec<u8> {
 pub fn unwrap(framing: Framing, frame: &[u8]) -> Result<Vec<u8>, Fault> {
     match framing {
         Framing::Rtu => without_crc(frame).map(<[u8]>::to_vec),
-        Framing::Ascii => ascii::decode(frame),
+        Framing::Ascii => ascii::open(frame),
         Framing::Mbap => match mbap(frame) {
             Mbap::Whole { end, .. } => Ok(frame[6..end].to_vec()),
             Mbap::Incomplete | Mbap::Broken => Err(Fault::Truncated { got: frame.len() as u16, expected: 8 }),

@@ -22,7 +22,7 @@ pub enum Verdict {
 /// Looks for the answer to a message.
 pub fn verdict(framing: Framing, message: &[u8], buffer: &[u8]) -> Verdict {
     match framing {
-        Framing::Ascii => in_characters(message, buffer),
+        Framing::Ascii => ascii::verdict(message, buffer),
         Framing::Rtu | Framing::Mbap => in_bytes(message, buffer),
     }
 }
@@ -53,33 +53,11 @@ fn in_bytes(message: &[u8], buffer: &[u8]) -> Verdict {
     spoiled.map_or(Verdict::Begun, Verdict::Spoiled)
 }
 
-/// Looks at each run of characters that a `:` begins: a second `:` before the end drops what came before.
-fn in_characters(message: &[u8], buffer: &[u8]) -> Verdict {
-    let mut seen = Verdict::Nothing;
-    let mut start = 0;
-    while let Some(colon) = buffer[start..].iter().position(|char| *char == b':').map(|at| start + at) {
-        let rest = &buffer[colon + 1..];
-        let Some(last) = rest.iter().position(|char| matches!(char, b':' | b'\n')).map(|at| colon + 1 + at) else {
-            let expected = ascii::FRAME_MAX as u16;
-            let too_long = Verdict::Spoiled(Fault::WrongLength { got: rest.len() as u16 + 1, asked: expected });
-            return if rest.len() < ascii::FRAME_MAX { Verdict::Begun } else { too_long };
-        };
-        if buffer[last] == b':' {
-            start = last;
-            continue;
-        }
-        start = last + 1;
-        match ascii::decode(&buffer[colon..start]).map(|answer| frame::check_answer(message, &answer)) {
-            Ok(Ok(()) | Err(Fault::Exception(_))) => return Verdict::Answer(colon..start),
-            Ok(Err(fault)) => return Verdict::Foreign(start, fault),
-            Err(fault) => seen = Verdict::Spoiled(fault),
-        }
-    }
-    seen
-}
-
 /// Names what is left at the deadline.
 pub fn left_over(framing: Framing, message: &[u8], buffer: &[u8]) -> Fault {
+    if framing == Framing::Ascii {
+        return ascii::left_over(message, buffer);
+    }
     if buffer.is_empty() {
         return Fault::Timeout;
     }
@@ -147,23 +125,5 @@ mod tests {
     fn what_is_left_at_the_deadline_has_a_name() {
         assert_eq!(left_over(Framing::Rtu, &REQUEST, &[]), Fault::Timeout);
         assert_eq!(left_over(Framing::Rtu, &REQUEST, &answer()[..4]), Fault::Truncated { got: 4, expected: 9 });
-    }
-
-    #[test]
-    fn in_ascii_a_colon_begins_and_a_line_feed_ends() {
-        let of = |bytes: &[u8]| verdict(Framing::Ascii, &REQUEST, bytes);
-        let whole = ascii::encode(&[1, 3, 4, 0, 10, 0, 11]);
-        assert_eq!(of(&whole), Verdict::Answer(0..19));
-        assert_eq!(of(&[b"\x00#".as_slice(), &whole].concat()), Verdict::Answer(2..21));
-        assert_eq!(of(&[&whole[..7], &whole].concat()), Verdict::Answer(7..26), "a second colon begins anew");
-        assert_eq!(of(b"noise"), Verdict::Nothing);
-        for cut in 1..whole.len() {
-            assert_eq!(of(&whole[..cut]), Verdict::Begun, "cut at {cut}");
-        }
-        assert!(matches!(of(b":0103040009000AE5\r\n"), Verdict::Answer(_)));
-        assert!(matches!(of(b":0103040009000AE6\r\n"), Verdict::Spoiled(Fault::Lrc { .. })));
-        let other = ascii::encode(&[2, 3, 4, 0, 10, 0, 11]);
-        assert_eq!(of(&other), Verdict::Foreign(19, Fault::WrongUnit { got: 2, asked: 1 }));
-        assert_eq!(of(&ascii::encode(&[1, 0x83, 2])), Verdict::Answer(0..11));
     }
 }

@@ -3,6 +3,7 @@
 pub mod ascii;
 pub mod frame;
 pub mod gather;
+pub mod explain;
 pub mod codec;
 pub mod plan;
 pub mod backoff;

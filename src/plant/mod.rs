@@ -10,11 +10,11 @@
 pub mod id;
 pub mod sample;
 pub mod line;
+pub mod traffic;
 pub mod def;
 pub mod tag;
 pub mod scale;
 pub mod event;
-pub mod traffic;
 pub mod tally;
 pub mod line_report;
 pub mod tool;

@@ -1,0 +1,162 @@
+//! What stands around a message: CRC, LRC, MBAP header; which of them it is, when nobody said so.
+
+use super::Field;
+use crate::{
+    bus::{
+        ascii,
+        frame::{self, Mbap, hex},
+    },
+    plant::line::Framing,
+};
+
+/// A message and what stood around it.
+pub(super) struct Envelope {
+    /// `None`: a message without check or header.
+    pub framing: Option<Framing>,
+    /// Unit and PDU, as far as they could be read.
+    pub message: Vec<u8>,
+    /// Where the message begins in the frame, and how many characters one of its bytes takes there.
+    pub offset: usize,
+    pub step: usize,
+    pub before: Vec<Field>,
+    pub after: Vec<Field>,
+    /// What is wrong with the frame around the message.
+    pub fault: Option<String>,
+}
+
+/// The framing of bytes that nobody has named: `:` is ASCII, a header whose length fits is TCP, a CRC that fits is RTU.
+pub fn recognise(bytes: &[u8]) -> Option<Framing> {
+    if bytes.starts_with(b":") {
+        Some(Framing::Ascii)
+    } else if matches!(frame::mbap(bytes), Mbap::Whole { end, .. } if end == bytes.len()) {
+        Some(Framing::Mbap)
+    } else if 4 <= bytes.len() && frame::without_crc(bytes).is_ok() {
+        Some(Framing::Rtu)
+    } else {
+        None
+    }
+}
+
+/// Unit and PDU of a frame, whether or not its check fits; `None` if there are none.
+pub fn message_of(bytes: &[u8], framing: Framing) -> Option<Vec<u8>> {
+    let message = open(bytes, Some(framing)).message;
+    (2 <= message.len()).then_some(message)
+}
+
+/// Takes a frame apart.
+pub(super) fn open(bytes: &[u8], framing: Option<Framing>) -> Envelope {
+    match framing {
+        Some(Framing::Rtu) => rtu(bytes),
+        Some(Framing::Ascii) => in_ascii(bytes),
+        Some(Framing::Mbap) => mbap(bytes),
+        None => bare(bytes),
+    }
+}
+
+fn bare(bytes: &[u8]) -> Envelope {
+    let message = bytes.to_vec();
+    Envelope { framing: None, message, offset: 0, step: 1, before: Vec::new(), after: Vec::new(), fault: None }
+}
+
+fn rtu(bytes: &[u8]) -> Envelope {
+    let framing = Some(Framing::Rtu);
+    let Some((message, check)) = bytes.split_last_chunk::<2>().filter(|(message, _)| !message.is_empty()) else {
+        return Envelope { framing, fault: Some(too_short(bytes.len(), 4, "bytes")), ..bare(bytes) };
+    };
+    let fault = frame::without_crc(bytes).err();
+    let computed = frame::crc16(message).to_le_bytes();
+    let words = match fault {
+        None => "right".to_owned(),
+        Some(_) if computed == [check[1], check[0]] => {
+            format!("bytes swapped: {} is right, low byte first", hex(&computed))
+        }
+        Some(_) => format!("wrong, computed {}", hex(&computed)),
+    };
+    let after = vec![Field { range: message.len()..bytes.len(), hex: hex(check), name: "CRC".into(), words }];
+    Envelope { framing, after, fault: fault.map(|fault| fault.to_string()), ..bare(message) }
+}
+
+fn in_ascii(bytes: &[u8]) -> Envelope {
+    let field = |from: usize, to: usize, name: &str, words: String| Field {
+        range: from..to,
+        hex: hex(&bytes[from..to]),
+        name: name.into(),
+        words,
+    };
+    let framing = Some(Framing::Ascii);
+    let start = usize::from(bytes.starts_with(b":"));
+    let end = bytes.iter().position(|byte| matches!(byte, b'\r' | b'\n')).unwrap_or(bytes.len()).max(start);
+    let mut fault = ascii::open(bytes).err().map(|fault| fault.to_string());
+    let mut before = Vec::new();
+    if start == 1 {
+        before.push(field(0, 1, "start", "`:` begins an ASCII frame".into()));
+    } else {
+        fault = Some("no `:` at the beginning".into());
+    }
+    let mut after = Vec::new();
+    let message = match ascii::decode(&bytes[start..end]) {
+        Ok(mut message) => {
+            if let Some(got) = message.pop() {
+                let computed = ascii::lrc(&message);
+                let words = if got == computed { "right".into() } else { format!("wrong, computed {computed:02X}") };
+                after.push(Field { hex: format!("{got:02X}"), ..field(end - 2, end, "LRC", words) });
+            }
+            message
+        }
+        Err(why) => {
+            after.push(field(start, end, "digits", format!("\"{}\"", bytes[start..end].escape_ascii())));
+            fault = Some(match bytes[start..end].iter().position(|digit| !digit.is_ascii_hexdigit()) {
+                Some(at) => {
+                    format!("`{}` at character {} is no hex digit", bytes[start + at].escape_ascii(), start + at + 1)
+                }
+                None => format!("odd count of hex digits: {}", why),
+            });
+            Vec::new()
+        }
+    };
+    if end < bytes.len() {
+        let right = &bytes[end..] == b"\r\n";
+        after.push(field(end, bytes.len(), "end", if right { "CR LF" } else { "must be CR LF" }.into()));
+    } else if before.len() == 1 && matches!(&fault, Some(words) if words.contains("cut short")) {
+        fault = Some("CR LF missing at the end".into());
+    }
+    Envelope { framing, message, offset: start, step: 2, before, after, fault }
+}
+
+fn mbap(bytes: &[u8]) -> Envelope {
+    let framing = Some(Framing::Mbap);
+    if bytes.len() < 8 {
+        return Envelope { framing, fault: Some(too_short(bytes.len(), 8, "bytes")), ..bare(bytes) };
+    }
+    let word = |at: usize| u16::from_be_bytes([bytes[at], bytes[at + 1]]);
+    let field = |at: usize, name: &str, words: String| Field {
+        range: at..at + 2,
+        hex: hex(&bytes[at..at + 2]),
+        name: name.into(),
+        words,
+    };
+    let (protocol, length, follow) = (word(2), usize::from(word(4)), bytes.len() - 6);
+    let before = vec![
+        field(0, "transaction", format!("{}, the answer repeats it", word(0))),
+        field(2, "protocol", if protocol == 0 { "0, Modbus".into() } else { format!("{protocol}, must be 0") }),
+        field(
+            4,
+            "length",
+            if length == follow { format!("{length} bytes follow") } else { format!("says {length}, {follow} follow") },
+        ),
+    ];
+    let fault = if protocol != 0 {
+        Some(format!("MBAP protocol {protocol}, expected 0"))
+    } else if length != follow {
+        Some(format!("MBAP length says {length}, {follow} bytes follow"))
+    } else if frame::MESSAGE_MAX < length {
+        Some(format!("MBAP length {length}, at most {} is allowed", frame::MESSAGE_MAX))
+    } else {
+        None
+    };
+    Envelope { framing, before, offset: 6, fault, ..bare(&bytes[6..]) }
+}
+
+fn too_short(got: usize, least: usize, what: &str) -> String {
+    format!("too short for a frame: {got} {what}, the shortest has {least}")
+}

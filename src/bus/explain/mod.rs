@@ -1,0 +1,245 @@
+//! Frames in words: every byte of a frame with its name and meaning, and one line that says it all.
+//!
+//! ```text
+//!  bytes ─> envelope ─> message ─┬─> request ─┐
+//!           CRC LRC MBAP         └─> answer ──┴─> the reading that fits ─> Explained
+//! ```
+
+mod answer;
+mod envelope;
+pub mod names;
+mod reader;
+mod request;
+
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
+
+use self::{envelope::Envelope, reader::Reader};
+use super::frame;
+use crate::plant::{line::Framing, traffic::Frame};
+
+pub use envelope::{message_of, recognise};
+
+/// Who a frame comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// The master asks.
+    Request,
+    /// A device answers.
+    Answer,
+}
+
+/// A run of bytes with its meaning.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Field {
+    /// Its place in the frame as it travels (in characters of an ASCII frame).
+    pub range: Range<usize>,
+    /// The bytes it stands for: `03 EA`.
+    pub hex: String,
+    /// `unit`, `address`, `41003 / 0x03EA`.
+    pub name: String,
+    /// What it says.
+    pub words: String,
+}
+
+/// A frame in words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Explained {
+    /// How it is framed; `None`: a message without check or header.
+    pub framing: Option<Framing>,
+    /// Who it comes from; `None` where request and answer are the same bytes.
+    pub direction: Option<Direction>,
+    /// Unit and PDU.
+    pub message: Vec<u8>,
+    /// Every byte, in order.
+    pub fields: Vec<Field>,
+    /// One line: `unit 1 read holding registers 41003–41012 (0x03EA, 10)`.
+    pub summary: String,
+    /// `ok`, or the first thing that is wrong.
+    pub verdict: String,
+    /// What else these bytes may be.
+    pub also: Option<String>,
+}
+
+impl Explained {
+    /// The summary in at most `width` characters; cut between words, so that no number is cut.
+    pub fn brief(&self, width: usize) -> String {
+        if self.summary.chars().count() <= width {
+            return self.summary.clone();
+        }
+        let room: String = self.summary.chars().take(width.saturating_sub(1)).collect();
+        let kept = room.rsplit_once(' ').map_or("", |(kept, _)| kept);
+        if width == 0 { String::new() } else { format!("{kept} …").trim_start().to_owned() }
+    }
+}
+
+/// Tells a frame in words. What is not told – framing, direction – is recognised. `asked` is the request message (unit
+/// and PDU) that the frame answers: it gives the values their addresses, and the answer is checked against it.
+pub fn explain(
+    bytes: &[u8],
+    framing: Option<Framing>,
+    direction: Option<Direction>,
+    asked: Option<&[u8]>,
+) -> Explained {
+    let asked_of =
+        |message: &[u8]| asked.filter(|asked| asked.get(1).copied() == message.get(1).map(|code| code & 0x7F));
+    let direction = direction.or(asked.map(|_| Direction::Answer));
+    let mut envelope = envelope::open(bytes, framing.or_else(|| recognise(bytes)));
+    let mut read = Readings::of(&envelope, asked_of(&envelope.message));
+    if envelope.framing.is_none() && !read.fit(direction) {
+        // A CRC that does not fit is an RTU frame all the same, if the rest makes sense.
+        let rtu = envelope::open(bytes, Some(Framing::Rtu));
+        let readings = Readings::of(&rtu, asked_of(&rtu.message));
+        if readings.fit(direction) {
+            (envelope, read) = (rtu, readings);
+        }
+    }
+    let (direction, reading, also) = read.choose(direction);
+    let wrong = asked.filter(|_| direction != Some(Direction::Request)).and_then(|asked| {
+        let fault = frame::check_answer(asked, &envelope.message).err()?;
+        (!matches!(fault, crate::plant::event::Fault::Exception(_))).then(|| fault.to_string())
+    });
+    let verdict = envelope.fault.clone().or(reading.trouble).or(wrong).unwrap_or_else(|| "ok".into());
+    let place = |field: Field| Field {
+        range: field.range.start * envelope.step + envelope.offset..field.range.end * envelope.step + envelope.offset,
+        ..field
+    };
+    let mut fields = envelope.before;
+    fields.extend(reading.fields.into_iter().map(place));
+    fields.extend(envelope.after);
+    Explained {
+        framing: envelope.framing,
+        direction,
+        message: envelope.message,
+        fields,
+        summary: reading.summary,
+        verdict,
+        also,
+    }
+}
+
+/// Tells a frame of a line in words; `before` are the earlier frames of the line, the latest first: one of them is the
+/// request of an answer.
+pub fn of_line<'a>(frame: &Frame, before: impl Iterator<Item = &'a Frame>) -> Explained {
+    let framing = Some(frame.framing);
+    if frame.sent {
+        return explain(&frame.bytes, framing, Some(Direction::Request), None);
+    }
+    explain(&frame.bytes, framing, Some(Direction::Answer), request_of(frame, before).as_deref())
+}
+
+/// Earlier frames among which the request of an answer is looked for.
+const BEFORE: usize = 16;
+
+fn request_of<'a>(answer: &Frame, before: impl Iterator<Item = &'a Frame>) -> Option<Vec<u8>> {
+    let message = message_of(&answer.bytes, answer.framing)?;
+    before.take(BEFORE).filter(|frame| frame.sent && frame.framing == answer.framing).find_map(|frame| {
+        let request = message_of(&frame.bytes, frame.framing)?;
+        let same = answer.framing != Framing::Mbap || frame.bytes[..2] == answer.bytes[..2];
+        (same && request[0] == message[0] && request[1] == message[1] & 0x7F).then_some(request)
+    })
+}
+
+/// A message read as a request, or as an answer.
+struct Reading {
+    fields: Vec<Field>,
+    summary: String,
+    trouble: Option<String>,
+    fits: bool,
+    /// Bytes that made sense.
+    sense: usize,
+}
+
+struct Readings {
+    request: Reading,
+    answer: Reading,
+    /// The answer to this function repeats the request.
+    echo: bool,
+}
+
+impl Readings {
+    fn of(envelope: &Envelope, asked: Option<&[u8]>) -> Readings {
+        let message = &envelope.message;
+        let mbap = envelope.framing == Some(Framing::Mbap);
+        let echo = matches!(message.get(1), Some(0x05 | 0x06 | 0x08 | 0x15 | 0x16));
+        Readings {
+            request: read(message, mbap, Direction::Request, None),
+            answer: read(message, mbap, Direction::Answer, asked),
+            echo,
+        }
+    }
+
+    fn fit(&self, direction: Option<Direction>) -> bool {
+        match direction {
+            Some(Direction::Request) => self.request.fits,
+            Some(Direction::Answer) => self.answer.fits,
+            None => self.request.fits || self.answer.fits,
+        }
+    }
+
+    /// The reading that fits best, and the other one in a line if it fits too.
+    fn choose(self, told: Option<Direction>) -> (Option<Direction>, Reading, Option<String>) {
+        let Readings { request, answer, echo } = self;
+        match (told, request.fits, answer.fits) {
+            (Some(Direction::Request), ..) => (told, request, None),
+            (Some(Direction::Answer), ..) => (told, answer, None),
+            (None, true, true) if echo => (None, request, Some("its answer, which repeats the request".into())),
+            (None, true, true) => {
+                let also = format!("an answer: {}", answer.summary);
+                (Some(Direction::Request), request, Some(also))
+            }
+            (None, true, false) => (Some(Direction::Request), request, None),
+            (None, false, true) => (Some(Direction::Answer), answer, None),
+            (None, false, false) if request.sense < answer.sense => (Some(Direction::Answer), answer, None),
+            (None, false, false) => (Some(Direction::Request), request, None),
+        }
+    }
+}
+
+fn read(message: &[u8], mbap: bool, direction: Direction, asked: Option<&[u8]>) -> Reading {
+    let mut reader = Reader::new(message);
+    let summary = read_message(&mut reader, mbap, direction, asked);
+    let (fits, sense) = (reader.fits(), reader.at);
+    reader.finish();
+    let summary = summary.unwrap_or_else(|| match message {
+        [unit, function, ..] => format!("unit {unit} {}, cut short", function_name(*function)),
+        [] | [_] => format!("no frame: {}", frame::hex(message)).trim_end_matches(": ").to_owned(),
+    });
+    Reading { fields: reader.fields, summary, trouble: reader.trouble, fits, sense }
+}
+
+fn read_message(reader: &mut Reader, mbap: bool, direction: Direction, asked: Option<&[u8]>) -> Option<String> {
+    let unit = reader.byte("unit", |unit| unit_words(unit, mbap))?;
+    let function = reader.byte("function", |code| match code {
+        0x80.. => format!("{code} / 0x{code:02X}: exception to {}", function_words(code & 0x7F)),
+        _ => function_words(code),
+    })?;
+    match direction {
+        Direction::Answer => answer::read(reader, function, asked),
+        Direction::Request => {
+            let what = request::read(reader, function)?;
+            Some(if unit == 0 && !mbap { format!("broadcast {what}") } else { format!("unit {unit} {what}") })
+        }
+    }
+}
+
+fn unit_words(unit: u8, mbap: bool) -> String {
+    match unit {
+        0 | 255 if mbap => format!("{unit}, the device itself, no gateway"),
+        0 => "0, broadcast: all obey, none answers".into(),
+        1..=247 => format!("{unit}"),
+        248..=255 if mbap => format!("{unit}"),
+        248..=255 => format!("{unit}, reserved on serial lines (1–247)"),
+    }
+}
+
+/// `3 / 0x03 read holding registers`.
+pub fn function_words(code: u8) -> String {
+    format!("{code} / 0x{code:02X} {}", names::function(code).unwrap_or("not in the standard"))
+}
+
+fn function_name(code: u8) -> String {
+    names::function(code & 0x7F).map_or_else(|| format!("function {code} / 0x{code:02X}"), str::to_owned)
+}

@@ -1,0 +1,123 @@
+//! The names of the standard: functions, sub-functions, identification objects, and what to do about an exception.
+
+use crate::plant::tag::Table;
+
+/// Name of a function (Modbus application protocol V1.1b3, section 6); `None` for one that the standard does not know.
+pub fn function(code: u8) -> Option<&'static str> {
+    Some(match code {
+        0x01 => "read coils",
+        0x02 => "read discrete inputs",
+        0x03 => "read holding registers",
+        0x04 => "read input registers",
+        0x05 => "write single coil",
+        0x06 => "write single register",
+        0x07 => "read exception status",
+        0x08 => "diagnostics",
+        0x0B => "get comm event counter",
+        0x0C => "get comm event log",
+        0x0F => "write multiple coils",
+        0x10 => "write multiple registers",
+        0x11 => "report server id",
+        0x14 => "read file record",
+        0x15 => "write file record",
+        0x16 => "mask write register",
+        0x17 => "read/write multiple registers",
+        0x18 => "read FIFO queue",
+        0x2B => "encapsulated interface transport",
+        _ => return None,
+    })
+}
+
+/// The table that a function works on.
+pub fn table(function: u8) -> Table {
+    match function {
+        0x01 | 0x05 | 0x0F => Table::Coil,
+        0x02 => Table::Discrete,
+        0x04 => Table::Input,
+        _ => Table::Holding,
+    }
+}
+
+/// Name of a sub-function of diagnostics 08 (V1.1b3, 6.8.1).
+pub(super) fn diagnostic(code: u16) -> &'static str {
+    match code {
+        0x00 => "return query data (loopback)",
+        0x01 => "restart communications option",
+        0x02 => "return diagnostic register",
+        0x03 => "change ASCII input delimiter",
+        0x04 => "force listen only mode",
+        0x0A => "clear counters and diagnostic register",
+        0x0B => "return bus message count",
+        0x0C => "return bus communication error count",
+        0x0D => "return bus exception error count",
+        0x0E => "return server message count",
+        0x0F => "return server no response count",
+        0x10 => "return server NAK count",
+        0x11 => "return server busy count",
+        0x12 => "return bus character overrun count",
+        0x14 => "clear overrun counter and flag",
+        _ => "reserved sub-function",
+    }
+}
+
+/// Name of a device identification object (V1.1b3, 6.21).
+pub fn object(id: u8) -> &'static str {
+    match id {
+        0x00 => "VendorName",
+        0x01 => "ProductCode",
+        0x02 => "MajorMinorRevision",
+        0x03 => "VendorUrl",
+        0x04 => "ProductName",
+        0x05 => "ModelName",
+        0x06 => "UserApplicationName",
+        0x07..=0x7F => "reserved object",
+        0x80..=0xFF => "private object",
+    }
+}
+
+/// Name of a read device identification code.
+pub(super) fn identification(code: u8) -> &'static str {
+    match code {
+        1 => "basic identification",
+        2 => "regular identification",
+        3 => "extended identification",
+        4 => "one object",
+        _ => "unknown read code",
+    }
+}
+
+/// What a technician does about an exception.
+pub fn advice(code: u8) -> &'static str {
+    match code {
+        0x01 => "the device does not know this function: use another one (06 instead of 16, 04 instead of 03)",
+        0x02 => {
+            "no such address, or the block runs past the last one: check the register map and off-by-one, read less"
+        }
+        0x03 => "value or count not allowed: check the range of the value and the device's limit of words a request",
+        0x04 => "the device failed while doing it: look at the device, do not repeat a write blindly",
+        0x05 => "accepted, takes longer: wait and read the result later",
+        0x06 => "the device is busy: ask again later",
+        0x08 => "the device's memory is damaged: ask once more, then service",
+        0x0A => "the gateway has no way to this unit: check the gateway's settings and the unit id",
+        0x0B => "the device behind the gateway does not answer: check its power, wiring, unit number and baud rate",
+        _ => "not in the standard: see the manual of the device",
+    }
+}
+
+/// `41003`.
+pub(super) fn modicon(function: u8, address: u16) -> String {
+    table(function).modicon(address)
+}
+
+/// `41003–41012`, or `41003` for one.
+pub(super) fn span(function: u8, address: u16, count: u16) -> String {
+    match count {
+        0 | 1 => modicon(function, address),
+        _ => format!("{}–{}", modicon(function, address), modicon(function, address.saturating_add(count - 1))),
+    }
+}
+
+/// `41003 / 0x03EA, wire address 1002`.
+pub(super) fn place(function: u8, address: u16) -> String {
+    format!("{} / 0x{address:04X}, wire address {address}", modicon(function, address))
+}

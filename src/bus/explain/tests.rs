@@ -1,0 +1,169 @@
+//! What a technician reads about a frame.
+#![allow(clippy::unwrap_used)]
+
+use super::*;
+use crate::bus::{ascii, frame::with_crc, frame::with_mbap};
+
+/// Message in hex; request in hex or nothing; the summary expected.
+fn check(message: &str, asked: &str, summary: &str) -> Explained {
+    let bytes = |text: &str| text.split_whitespace().map(|b| u8::from_str_radix(b, 16).unwrap()).collect::<Vec<u8>>();
+    let (message, asked) = (bytes(message), bytes(asked));
+    let asked = (!asked.is_empty()).then_some(&asked[..]);
+    let mut told = Vec::new();
+    for frame in [with_crc(&message), ascii::encode(&message), with_mbap(1, &message), message.clone()] {
+        let explained = explain(&frame, None, None, asked);
+        assert_eq!(explained.summary, summary);
+        assert_eq!(explained.verdict, "ok", "{summary}");
+        assert_eq!(explained.message, message);
+        // Every byte is told, once and in order.
+        let mut at = 0;
+        for field in &explained.fields {
+            assert_eq!(field.range.start, at, "{summary}: {field:?}");
+            at = field.range.end;
+        }
+        assert_eq!(at, frame.len(), "{summary}");
+        told.push(explained);
+    }
+    assert_eq!(
+        told.iter().map(|told| told.framing).collect::<Vec<_>>(),
+        [Some(Framing::Rtu), Some(Framing::Ascii), Some(Framing::Mbap), None]
+    );
+    told.remove(0)
+}
+
+#[test]
+fn requests_are_told_with_both_forms_of_the_address() {
+    for (message, summary) in [
+        ("01 03 03 EA 00 0A", "unit 1 read holding registers 41003–41012 (0x03EA, 10)"),
+        ("01 04 00 00 00 01", "unit 1 read input registers 30001 (0x0000, 1)"),
+        ("11 01 00 13 00 25", "unit 17 read coils 00020–00056 (0x0013, 37)"),
+        ("02 02 08 00 00 08", "unit 2 read discrete inputs 12049–12056 (0x0800, 8)"),
+        ("11 05 00 AC FF 00", "unit 17 write coil 00173 on (0x00AC)"),
+        ("01 06 03 EA 00 32", "unit 1 write register 41003 = 50 (0x03EA, 0x0032)"),
+        ("00 06 00 01 00 03", "broadcast write register 40002 = 3 (0x0001, 0x0003)"),
+        ("11 07", "unit 17 read exception status"),
+        ("11 08 00 00 A5 37", "unit 17 diagnostics return query data (loopback), data A5 37"),
+        ("11 0B", "unit 17 get comm event counter"),
+        ("11 0F 00 13 00 0A 02 CD 01", "unit 17 write coils 00020–00029 (0x0013, 10): 1011 0011 10"),
+        ("11 10 00 01 00 02 04 00 0A 01 02", "unit 17 write registers 40002–40003 (0x0001, 2): 000A 0102"),
+        ("11 11", "unit 17 report server id"),
+        ("11 14 07 06 00 04 00 01 00 02", "unit 17 read file record file 4 record 1, 2 registers"),
+        ("11 15 09 06 00 04 00 07 00 01 06 AF", "unit 17 write file record file 4 record 7, 1 registers: 06AF"),
+        ("11 16 00 04 00 F2 00 25", "unit 17 mask write 40005 and 00F2 or 0025 (0x0004)"),
+        (
+            "11 17 00 03 00 06 00 0E 00 01 02 00 FF",
+            "unit 17 read 40004–40009 (0x0003, 6), write 40015 (0x000E, 1): 00FF",
+        ),
+        ("11 18 04 DE", "unit 17 read FIFO queue 41247 (0x04DE)"),
+        ("11 2B 0E 01 00", "unit 17 read device identification, basic identification from VendorName"),
+        ("01 03 41 FF 00 01", "unit 1 read holding registers 416896 (0x41FF, 1)"),
+        ("01 41 DE AD", "unit 1 function 65 / 0x41: DE AD"),
+    ] {
+        check(message, "", summary);
+    }
+}
+
+#[test]
+fn answers_are_told_with_the_addresses_of_their_request() {
+    for (message, asked, summary) in [
+        ("01 03 04 00 C8 FF FE", "01 03 03 EA 00 02", "2 registers: 00C8 FFFE"),
+        ("11 01 05 CD 6B B2 0E 1B", "11 01 00 13 00 25", "37 bits: 1011 0011 1101 0110 0100 1101 0111 0000 1101 1"),
+        ("01 83 02", "01 03 03 EA 00 02", "exception 02 illegal data address"),
+        ("11 05 00 AC FF 00", "11 05 00 AC FF 00", "written: coil 00173 on"),
+        ("01 06 03 EA 00 32", "01 06 03 EA 00 32", "written: 41003 = 50"),
+        ("11 10 00 01 00 02", "11 10 00 01 00 02 04 00 0A 01 02", "written: 40002–40003 (0x0001, 2)"),
+        ("11 07 6D", "11 07", "exception status 6D (01101101)"),
+        ("11 0B FF FF 01 08", "11 0B", "busy, 264 events"),
+        ("11 0C 08 00 00 01 08 01 21 20 00", "11 0C", "ready, 264 events, 289 messages"),
+        ("11 11 05 50 58 52 34 FF", "11 11", "server id \"PXR4\\xff\""),
+        ("11 14 06 05 06 0D FE 00 20", "11 14 07 06 00 04 00 01 00 02", "file records 0DFE 0020"),
+        ("11 18 00 06 00 02 01 B8 12 84", "11 18 04 DE", "2 queued: 01B8 1284"),
+        ("01 2B 0E 01 01 00 00 02 00 03 41 42 43 01 01 58", "01 2B 0E 01 00", "VendorName \"ABC\", ProductCode \"X\""),
+    ] {
+        check(message, asked, summary);
+    }
+    let told = check("01 03 04 00 C8 FF FE", "01 03 03 EA 00 02", "2 registers: 00C8 FFFE");
+    let of = |name: &str| told.fields.iter().find(|field| field.name == name).unwrap().words.clone();
+    assert_eq!(of("41003 / 0x03EA"), "0x00C8  200");
+    assert_eq!(of("41004 / 0x03EB"), "0xFFFE  65534 or -2");
+    let told = check("01 03 04 00 C8 FF FE", "", "2 registers: 00C8 FFFE");
+    assert_eq!((told.direction, told.fields[3].name.as_str()), (Some(Direction::Answer), "register 1"));
+}
+
+#[test]
+fn what_may_be_two_things_says_so() {
+    let told = check("01 06 03 EA 00 32", "", "unit 1 write register 41003 = 50 (0x03EA, 0x0032)");
+    assert_eq!((told.direction, told.also.as_deref()), (None, Some("its answer, which repeats the request")));
+    // Eight bytes that begin 01 01 03: a request from 00769, or 24 coils.
+    let told = check("01 01 03 00 00 05", "", "unit 1 read coils 00769–00773 (0x0300, 5)");
+    assert_eq!(told.also.as_deref(), Some("an answer: 24 bits: 0000 0000 0000 0000 1010 0000"));
+    let told = check("01 03 03 EA 00 01", "", "unit 1 read holding registers 41003 (0x03EA, 1)");
+    assert_eq!(told.also, None);
+}
+
+#[test]
+fn broken_frames_say_what_is_wrong_and_what_it_should_be() {
+    let verdict = |bytes: &[u8]| explain(bytes, None, None, None).verdict;
+    assert_eq!(verdict(&[1, 3, 3, 0xEA, 0, 1, 0xA5, 0xBB]), "CRC error: got BBA5, computed BAA5");
+    assert_eq!(verdict(b":010303EA00010F\r\n"), "LRC error: got 0F, computed 0E");
+    assert_eq!(verdict(b":010303EA00010E"), "CR LF missing at the end");
+    assert_eq!(verdict(b":01G303EA00010E\r\n"), "`G` at character 4 is no hex digit");
+    assert_eq!(verdict(&[1, 3, 3, 0xEA, 0]), "cut short: 1 byte of count missing");
+    assert_eq!(verdict(&[1, 3, 4, 0, 1, 0]), "cut short: 1 byte of register 2 missing");
+    assert_eq!(verdict(&[1, 6, 0, 1, 0, 1, 9]), "1 byte too many");
+    assert_eq!(verdict(&[]), "cut short: 1 byte of unit missing");
+    let tcp = |bytes: &[u8]| explain(bytes, Some(Framing::Mbap), None, None).verdict;
+    assert_eq!(tcp(&[0, 1, 0, 0, 0, 9, 1, 3, 0, 0, 0, 1]), "MBAP length says 9, 6 bytes follow");
+    assert_eq!(tcp(&[0, 1, 0, 7, 0, 6, 1, 3, 0, 0, 0, 1]), "MBAP protocol 7, expected 0");
+    let swapped = explain(&[1, 3, 3, 0xEA, 0, 1, 0xBA, 0xA5], None, None, None);
+    assert!(swapped.fields.last().unwrap().words.starts_with("bytes swapped: A5 BA is right"));
+    let asked = [1, 3, 0, 0, 0, 1];
+    let answer = explain(&with_crc(&[2, 3, 2, 0, 1]), None, None, Some(&asked));
+    assert_eq!(answer.verdict, "answer from unit 2, asked unit 1");
+}
+
+#[test]
+fn a_brief_summary_cuts_no_number() {
+    let told = check("01 03 04 00 C8 FF FE", "", "2 registers: 00C8 FFFE");
+    assert_eq!(told.brief(22), "2 registers: 00C8 FFFE");
+    assert_eq!(told.brief(21), "2 registers: 00C8 …");
+    assert_eq!(told.brief(1), "…");
+    assert_eq!(told.brief(0), "");
+}
+
+#[test]
+fn an_answer_on_a_line_finds_its_request_before_it() {
+    let frame = |sent: bool, message: &[u8], transaction: u16| Frame {
+        at: jiff::Timestamp::UNIX_EPOCH,
+        sent,
+        bytes: with_mbap(transaction, message),
+        framing: Framing::Mbap,
+        verdict: "ok".into(),
+        unit: Some(1),
+        number: 0,
+    };
+    let line = [frame(true, &[1, 3, 0, 10, 0, 1], 1), frame(true, &[1, 3, 0, 20, 0, 1], 2)];
+    let told = of_line(&frame(false, &[1, 3, 2, 0, 5], 1), line.iter().rev());
+    assert_eq!(told.fields[6].name, "40011 / 0x000A");
+    let told = of_line(&frame(false, &[1, 3, 2, 0, 5], 3), line.iter().rev());
+    assert_eq!(told.fields[6].name, "register 1");
+}
+
+proptest::proptest! {
+    /// Whatever came over the line, it is told, byte by byte.
+    #[test]
+    fn no_bytes_are_beyond_words(
+        bytes in proptest::collection::vec(proptest::num::u8::ANY, 0..300),
+        framing in proptest::option::of(proptest::sample::select(vec![Framing::Rtu, Framing::Ascii, Framing::Mbap])),
+        direction in proptest::option::of(proptest::sample::select(vec![Direction::Request, Direction::Answer])),
+    ) {
+        let told = explain(&bytes, framing, direction, None);
+        proptest::prop_assert!(!told.summary.is_empty() && !told.verdict.is_empty());
+        let mut at = 0;
+        for field in &told.fields {
+            proptest::prop_assert_eq!(field.range.start, at);
+            at = field.range.end;
+        }
+        proptest::prop_assert_eq!(at, bytes.len());
+    }
+}
