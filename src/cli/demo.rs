@@ -109,7 +109,7 @@ async fn ask_report(
     queries.send(Query { question: Question::Report { period }, reply }).await.map_err(|_| gone())?;
     match answer.await.map_err(|_| gone())?? {
         Answer::Report(report) => Ok(report),
-        Answer::Series(_) | Answer::Journal(_) | Answer::Actions(_) => {
+        Answer::Series(_) | Answer::Journal(_) | Answer::Actions(_) | Answer::LineMinutes(_) => {
             Err(HistoryError::Engine("answered another question".into()))
         }
     }

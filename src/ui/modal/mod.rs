@@ -8,6 +8,7 @@ pub mod help;
 pub mod line;
 pub mod notice;
 pub mod prompt;
+pub mod why;
 
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
@@ -18,6 +19,7 @@ pub use entry::Entry;
 pub use faceplate::Faceplate;
 pub use notice::Notice;
 pub use prompt::Prompt;
+pub use why::Why;
 
 use super::{
     Act, Cx,
@@ -44,6 +46,8 @@ pub enum Modal {
     Faceplate(Faceplate),
     /// Words to be read: why something cannot be done now.
     Notice(Notice),
+    /// Why a value is what it is.
+    Why(Why),
 }
 
 /// What a key did to a window.
@@ -86,6 +90,7 @@ impl Modal {
             Modal::Prompt(prompt) => prompt.on_key(cx, tabs, event),
             Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
             Modal::Notice(notice) => notice.on_key(event),
+            Modal::Why(why) => why.on_key(event),
         };
         match next {
             Next::Stay(modal) => (Some(modal), Vec::new()),
@@ -104,7 +109,12 @@ impl Modal {
         match self {
             Modal::Entry(entry) => entry.line.paste(text),
             Modal::Prompt(prompt) => prompt.line.paste(text),
-            Modal::Help(_) | Modal::Confirm(_) | Modal::Choice(_) | Modal::Faceplate(_) | Modal::Notice(_) => {}
+            Modal::Help(_)
+            | Modal::Confirm(_)
+            | Modal::Choice(_)
+            | Modal::Faceplate(_)
+            | Modal::Notice(_)
+            | Modal::Why(_) => {}
         }
     }
 
@@ -119,6 +129,7 @@ impl Modal {
             Modal::Prompt(_) => vec![hint("⏎", "take it"), hint("Esc", "leave")],
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
             Modal::Notice(_) => vec![hint("Esc", "close")],
+            Modal::Why(why) => why.hints(),
         }
     }
 
@@ -132,6 +143,7 @@ impl Modal {
             Modal::Prompt(prompt) => prompt.view(cx, frame, body),
             Modal::Faceplate(faceplate) => faceplate.view(cx, frame, body),
             Modal::Notice(notice) => notice.view(cx, frame, body),
+            Modal::Why(why) => why.view(cx, frame, body),
         }
     }
 }

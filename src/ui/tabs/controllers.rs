@@ -15,7 +15,7 @@ use crate::{
         Act, Cx,
         chrome::{order_words, outcome_words},
         keys::{Key, char, code},
-        modal::{Choice, Confirm, Faceplate, Modal, Notice, entry::range_words, faceplate::device_words},
+        modal::{Choice, Confirm, Faceplate, Modal, Notice, Why, entry::range_words, faceplate::device_words},
         widgets::{
             text::{Canvas, age, clock, fit, fit_words, pad, pad_left, whole, width},
             value,
@@ -32,6 +32,8 @@ pub enum Action {
     Move(isize),
     /// Edit the selected parameter, or look at it if it is read-only.
     Edit,
+    /// Say why the selected value is what it is.
+    Why,
     /// Read everything now.
     Refresh,
     /// Pick one of the device's actions.
@@ -59,6 +61,12 @@ pub const KEYS: &[Key<Action>] = &[
         label: "edit",
         help: "change the parameter, or look at a read-only one",
         action: Action::Edit,
+    },
+    Key {
+        chord: char('w'),
+        label: "why",
+        help: "why the value is what it is: quality, scaling, bytes",
+        action: Action::Why,
     },
     Key { chord: char('u'), label: "refresh", help: "read all parameters of the device now", action: Action::Refresh },
     Key { chord: char('f'), label: "actions", help: "actions of the device (save to memory)", action: Action::Actions },
@@ -118,6 +126,10 @@ impl Controllers {
                     .collect(),
                 None => Vec::new(),
             },
+            Action::Why => {
+                let tags = in_groups(cx, self.device).into_iter().map(|tag| tag.id).collect();
+                Why::open(Why::new(tags, self.selected))
+            }
             Action::Refresh => vec![Act::Order(Command::Refresh(self.device))],
             Action::Actions => {
                 let actions = Choice::actions(cx, self.device).map(Modal::Choice);
