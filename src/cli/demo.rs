@@ -55,7 +55,8 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let def = Arc::new(def);
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
         let history = scratch.history.clone();
-        let mut station = station::start(station::Options { def: def.clone(), clock, history, connectors })?;
+        let mut station =
+            station::start(station::Options { def: def.clone(), clock, history, connectors, file: None })?;
         let result = if args.headless {
             say(&format!("{}: simulated on {}", def.title, simulated.path().display()));
             headless(station.session("demo"), clock, &args).await

@@ -7,6 +7,7 @@
 //! | `terminal` | the program as a person sees it, in a pseudo-terminal: starts, keys, leaves the terminal as it was |
 //! | `peers` | against programs that we did not write: pymodbus, mbpoll, over a pseudo-terminal pair and TCP |
 //! | `shift` | a whole shift in virtual time, and its report read by an independent reader |
+//! | `settings` | settings of a line: tried out, saved into the plant file |
 //! | `durability` | killed, unplugged, locked, damaged |
 //! | `support` | what the others share: processes with deadlines, peers and their installation |
 #![allow(missing_docs, clippy::unwrap_used)]
@@ -15,6 +16,7 @@ mod architecture;
 mod commands;
 mod durability;
 mod peers;
+mod settings;
 mod shift;
 mod support;
 mod terminal;

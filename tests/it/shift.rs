@@ -105,8 +105,14 @@ fn start_on_simulation(def: &Arc<PlantDef>, clock: Clock, history: &Path) -> sta
     let Some(serial) = def.lines[0].transport.serial() else { panic!("the tank has a serial line") };
     tokio::spawn(serve_rtu(theirs, RigHandle::spawn(Rig::demo(), clock), serial));
     let connectors = vec![Connector::Memory(streams)];
-    station::io::start(station::io::Options { def: def.clone(), clock, history: history.to_owned(), connectors })
-        .unwrap()
+    station::io::start(station::io::Options {
+        def: def.clone(),
+        clock,
+        history: history.to_owned(),
+        connectors,
+        file: None,
+    })
+    .unwrap()
 }
 
 /// Lets plant time pass. Virtual time must not run away from the thread that stores: once a plant minute this waits, in

@@ -8,6 +8,7 @@ pub mod help;
 pub mod line;
 pub mod notice;
 pub mod prompt;
+pub mod settings;
 pub mod why;
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -19,6 +20,7 @@ pub use entry::Entry;
 pub use faceplate::Faceplate;
 pub use notice::Notice;
 pub use prompt::Prompt;
+pub use settings::Settings;
 pub use why::Why;
 
 use super::{
@@ -48,6 +50,8 @@ pub enum Modal {
     Notice(Notice),
     /// Why a value is what it is.
     Why(Why),
+    /// How a line communicates.
+    Settings(Settings),
 }
 
 /// What a key did to a window.
@@ -59,6 +63,8 @@ pub enum Next {
     Close,
     /// It is gone, and this is to be done.
     Do(Vec<Act>),
+    /// It stays, and this is to be done.
+    Both(Modal, Vec<Act>),
 }
 
 impl Modal {
@@ -91,11 +97,13 @@ impl Modal {
             Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
             Modal::Notice(notice) => notice.on_key(event),
             Modal::Why(why) => why.on_key(event),
+            Modal::Settings(settings) => settings.on_key(cx, event),
         };
         match next {
             Next::Stay(modal) => (Some(modal), Vec::new()),
             Next::Close => (None, Vec::new()),
             Next::Do(acts) => (None, acts),
+            Next::Both(modal, acts) => (Some(modal), acts),
         }
     }
 
@@ -109,6 +117,7 @@ impl Modal {
         match self {
             Modal::Entry(entry) => entry.line.paste(text),
             Modal::Prompt(prompt) => prompt.line.paste(text),
+            Modal::Settings(settings) => settings.on_paste(text),
             Modal::Help(_)
             | Modal::Confirm(_)
             | Modal::Choice(_)
@@ -130,6 +139,7 @@ impl Modal {
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
             Modal::Notice(_) => vec![hint("Esc", "close")],
             Modal::Why(why) => why.hints(),
+            Modal::Settings(settings) => settings.hints(),
         }
     }
 
@@ -144,6 +154,7 @@ impl Modal {
             Modal::Faceplate(faceplate) => faceplate.view(cx, frame, body),
             Modal::Notice(notice) => notice.view(cx, frame, body),
             Modal::Why(why) => why.view(cx, frame, body),
+            Modal::Settings(settings) => settings.view(cx, frame, body),
         }
     }
 }

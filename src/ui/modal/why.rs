@@ -97,7 +97,7 @@ impl Why {
         }
         let (inner, below) = (canvas.area(), (rows.len() as u16).saturating_sub(first + canvas.height()));
         if 0 < below {
-            let words = format!(" {below} more {} ", cx.theme.pick("↓", "down"));
+            let words = format!(" {below} more ↓ ");
             let frame_row = Rect { y: inner.bottom(), height: 1, ..inner };
             Canvas::new(frame.buffer_mut(), frame_row).text_right(inner.width, 0, &words, cx.theme.strong());
         }

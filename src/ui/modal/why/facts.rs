@@ -64,7 +64,7 @@ fn value_rows(cx: &Cx, def: &TagDef, exchange: Option<&Exchange>, found: Option<
         _ if def.access == Access::Write => "write only: nobody can read it".to_owned(),
         Quality::Good => format!("good, read {} ago at {at}", age(cx.age(def.id))),
         Quality::Uncertain(cause) => {
-            format!("uncertain: {}; last read {} ago at {at}", cause.words(), age(cx.age(def.id)))
+            format!("uncertain: {}; read {} ago at {at}", cause.words(), age(cx.age(def.id)))
         }
         Quality::Bad(cause) => format!("bad: {}, since {at}", cause.words()),
     };
@@ -285,7 +285,7 @@ fn every_byte(
         rows.push(Row { label: "", text: heading, style: cx.theme.strong(), wraps: false });
         for field in &told.fields {
             let own = marked.is_some_and(|marked| field.range.start < marked.end && marked.start < field.range.end);
-            let mark = if own { cx.theme.pick("▸", ">") } else { " " };
+            let mark = if own { "▸" } else { " " };
             let text = format!("{mark} {:<12} {:<16} {}", field.hex, field.name, field.words);
             let style = if own { cx.theme.strong() } else { cx.theme.normal() };
             // Long fields (a text) are cut: the frame itself stands above.
