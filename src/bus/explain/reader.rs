@@ -13,16 +13,23 @@ pub(super) struct Reader<'a> {
     pub fields: Vec<Field>,
     /// The first thing that does not fit.
     pub trouble: Option<String>,
+    /// Bytes read before it was found.
+    sense: Option<usize>,
 }
 
 impl<'a> Reader<'a> {
     pub fn new(message: &'a [u8]) -> Reader<'a> {
-        Reader { message, at: 0, fields: Vec::new(), trouble: None }
+        Reader { message, at: 0, fields: Vec::new(), trouble: None, sense: None }
     }
 
     /// Everything was read, and nothing was wrong.
     pub fn fits(&self) -> bool {
         self.trouble.is_none() && self.at == self.message.len()
+    }
+
+    /// How many bytes made sense.
+    pub fn sense(&self) -> usize {
+        self.sense.unwrap_or(self.at)
     }
 
     /// Bytes not yet read.
@@ -94,6 +101,7 @@ impl<'a> Reader<'a> {
     /// Notes what does not fit; the first note stands.
     pub fn wrong(&mut self, words: String) {
         self.trouble.get_or_insert(words);
+        self.sense.get_or_insert(self.at);
     }
 
     /// Names what is left over.
