@@ -7,7 +7,6 @@
 
 mod answer;
 mod envelope;
-pub mod names;
 mod reader;
 mod request;
 
@@ -17,7 +16,7 @@ mod tests;
 use std::ops::Range;
 
 use self::{envelope::Envelope, reader::Reader};
-use super::frame;
+use super::{complaint, frame, names};
 use crate::plant::{line::Framing, traffic::Frame};
 
 pub use envelope::{message_of, recognise};
@@ -148,6 +147,8 @@ struct Reading {
     summary: String,
     trouble: Option<String>,
     fits: bool,
+    /// No device would refuse its counts and values.
+    sound: bool,
     /// Bytes that made sense.
     sense: usize,
 }
@@ -155,19 +156,25 @@ struct Reading {
 struct Readings {
     request: Reading,
     answer: Reading,
-    /// The answer to this function repeats the request.
-    echo: bool,
+    /// Why both readings are the same, if they are: the answer repeats the request, or nobody knows the function.
+    same: Option<&'static str>,
 }
 
 impl Readings {
     fn of(envelope: &Envelope, asked: Option<&[u8]>) -> Readings {
         let message = &envelope.message;
         let mbap = envelope.framing == Some(Framing::Mbap);
-        let echo = matches!(message.get(1), Some(0x05 | 0x06 | 0x08 | 0x15 | 0x16));
+        let same = match message.get(1) {
+            Some(0x05 | 0x06 | 0x08 | 0x15 | 0x16) => Some("its answer, which repeats the request"),
+            Some(0..=0x7F) if names::function(message[1]).is_none() => {
+                Some("an answer; the standard has no such function")
+            }
+            Some(_) | None => None,
+        };
         Readings {
             request: read(message, mbap, Direction::Request, None),
             answer: read(message, mbap, Direction::Answer, asked),
-            echo,
+            same,
         }
     }
 
@@ -181,11 +188,15 @@ impl Readings {
 
     /// The reading that fits best, and the other one in a line if it fits too.
     fn choose(self, told: Option<Direction>) -> (Option<Direction>, Reading, Option<String>) {
-        let Readings { request, answer, echo } = self;
+        let Readings { request, answer, same } = self;
         match (told, request.fits, answer.fits) {
             (Some(Direction::Request), ..) => (told, request, None),
             (Some(Direction::Answer), ..) => (told, answer, None),
-            (None, true, true) if echo => (None, request, Some("its answer, which repeats the request".into())),
+            (None, true, true) if same.is_some() => (None, request, same.map(str::to_owned)),
+            (None, true, true) if !request.sound => {
+                let also = format!("a request: {}", request.summary);
+                (Some(Direction::Answer), answer, Some(also))
+            }
             (None, true, true) => {
                 let also = format!("an answer: {}", answer.summary);
                 (Some(Direction::Request), request, Some(also))
@@ -201,13 +212,14 @@ impl Readings {
 fn read(message: &[u8], mbap: bool, direction: Direction, asked: Option<&[u8]>) -> Reading {
     let mut reader = Reader::new(message);
     let summary = read_message(&mut reader, mbap, direction, asked);
-    let (fits, sense) = (reader.fits(), reader.at);
+    let (fits, sense) = (reader.fits(), reader.sense());
+    let sound = complaint::check_request(message, Framing::Mbap).is_empty();
     reader.finish();
     let summary = summary.unwrap_or_else(|| match message {
         [unit, function, ..] => format!("unit {unit} {}, cut short", function_name(*function)),
         [] | [_] => format!("no frame: {}", frame::hex(message)).trim_end_matches(": ").to_owned(),
     });
-    Reading { fields: reader.fields, summary, trouble: reader.trouble, fits, sense }
+    Reading { fields: reader.fields, summary, trouble: reader.trouble, fits, sound, sense }
 }
 
 fn read_message(reader: &mut Reader, mbap: bool, direction: Direction, asked: Option<&[u8]>) -> Option<String> {
