@@ -96,6 +96,8 @@ pub fn explain(
         }
     }
     let (direction, reading, also) = read.choose(direction);
+    // Bytes without unit and function come from nobody.
+    let direction = direction.filter(|_| 2 <= envelope.message.len());
     let wrong = asked.filter(|_| direction != Some(Direction::Request)).and_then(|asked| {
         let fault = frame::check_answer(asked, &envelope.message).err()?;
         (!matches!(fault, crate::plant::event::Fault::Exception(_))).then(|| fault.to_string())
