@@ -129,7 +129,8 @@ fn tell(typed: &Typed, framing: Option<Framing>, asked: Option<&Explained>) -> V
         lines.extend(wrap(&format!("wrong: {}", told.verdict), WIDTH, 2));
     }
     if let Some(also) = &told.also {
-        lines.extend(wrap(&format!("may also be {also}"), WIDTH, 2));
+        let words = if told.direction.is_none() { also.clone() } else { format!("may also be {also}") };
+        lines.extend(wrap(&words, WIDTH, 2));
     }
     if told.direction != Some(Direction::Answer) && told.verdict == "ok" {
         for complaint in check_request(&told.message, told.framing.unwrap_or(Framing::Rtu)) {

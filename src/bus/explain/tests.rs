@@ -102,7 +102,10 @@ fn unit_0_is_a_broadcast_on_a_serial_line_only() {
 #[test]
 fn what_may_be_two_things_says_so() {
     let told = check("01 06 03 EA 00 32", "", "unit 1 write register 41003 = 50 (0x03EA, 0x0032)");
-    assert_eq!((told.direction, told.also.as_deref()), (None, Some("its answer, which repeats the request")));
+    assert_eq!(
+        (told.direction, told.also.as_deref()),
+        (None, Some("the answer repeats the request: these bytes may be either"))
+    );
     // Eight bytes that begin 01 01 03: a request from 00769, or 24 coils.
     let told = check("01 01 03 00 00 05", "", "unit 1 read coils 00769–00773 (0x0300, 5)");
     assert_eq!(told.also.as_deref(), Some("an answer: 24 bits: 0000 0000 0000 0000 1010 0000"));
