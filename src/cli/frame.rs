@@ -1,6 +1,6 @@
 //! `sightglass frame`: bytes in words.
 
-use std::io::{IsTerminal, Read};
+use std::io::{BufRead, IsTerminal};
 
 use crate::{
     bus::{
@@ -54,18 +54,20 @@ pub fn main(args: Args) -> Result<(), CliError> {
     if std::io::stdin().is_terminal() {
         say_error("one frame a line, Ctrl-D ends");
     }
-    let mut text = Vec::new();
-    let failed = |error| CliError::Io { what: "cannot read standard input".into(), error };
-    std::io::stdin().read_to_end(&mut text).map_err(failed)?;
-    lines(&String::from_utf8_lossy(&text), framing)
+    lines(std::io::stdin().lock(), framing)
 }
 
-/// Tells the frames of a text, a line each. An answer behind its request gets its addresses.
-fn lines(text: &str, framing: Option<Framing>) -> Result<(), CliError> {
+/// Tells frames as their lines come. An answer behind its request gets its addresses.
+fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> {
     let (mut frames, mut spoiled) = (0, 0);
     let mut asked: Option<Explained> = None;
-    for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-        let typed = match typed::parse(line, framing) {
+    for (index, line) in input.split(b'\n').enumerate() {
+        let line = line.map_err(|error| CliError::Io { what: "cannot read standard input".into(), error })?;
+        let line = String::from_utf8_lossy(&line);
+        if line.trim().is_empty() {
+            continue;
+        }
+        let typed = match typed::parse(&line, framing) {
             Ok(typed) => typed,
             Err(error) => {
                 say_error(&format!("line {}: {error}", index + 1));
@@ -79,7 +81,7 @@ fn lines(text: &str, framing: Option<Framing>) -> Result<(), CliError> {
         frames += 1;
         tell(&typed, framing, asked.as_ref()).iter().for_each(|line| say(line));
         let told = explained(&typed, framing, None);
-        asked = (told.direction != Some(Direction::Answer) && typed.sent != Some(false)).then_some(told);
+        asked = (told.direction != Some(Direction::Answer)).then_some(told);
     }
     match (frames, spoiled) {
         (0, 0) => Err(CliError::Usage(typed::TypedError::Empty.to_string())),
@@ -108,25 +110,27 @@ fn explained(typed: &Typed, framing: Option<Framing>, asked: Option<&Explained>)
 /// The lines about one frame: what it is, every byte, the checks, what is wrong with it.
 fn tell(typed: &Typed, framing: Option<Framing>, asked: Option<&Explained>) -> Vec<String> {
     let told = explained(typed, framing, asked);
-    let kind = match told.framing {
-        Some(Framing::Rtu) => "RTU",
-        Some(Framing::Ascii) => "ASCII",
-        Some(Framing::Mbap) => "TCP",
-        None => "message without check",
-    };
     let direction = match told.direction {
         Some(Direction::Request) => "request",
         Some(Direction::Answer) => "answer",
-        None => "request or answer",
+        None if told.also.is_some() => "request or answer",
+        None => "bytes",
     };
-    let mut lines = wrap(&format!("{kind} {direction}: {}", told.summary), WIDTH, 2);
+    let kind = match told.framing {
+        Some(Framing::Rtu) => format!("RTU {direction}"),
+        Some(Framing::Ascii) => format!("ASCII {direction}"),
+        Some(Framing::Mbap) => format!("TCP {direction}"),
+        None => format!("{direction} without CRC or header"),
+    };
+    let mut lines = wrap(&format!("{kind}: {}", told.summary), WIDTH, 2);
     lines.extend(table(&told));
     lines.extend(checks(&told));
     if told.verdict != "ok" {
         lines.extend(wrap(&format!("wrong: {}", told.verdict), WIDTH, 2));
     }
     if let Some(also) = &told.also {
-        lines.extend(wrap(&format!("may also be {also}"), WIDTH, 2));
+        let words = if told.direction.is_none() { also.clone() } else { format!("may also be {also}") };
+        lines.extend(wrap(&words, WIDTH, 2));
     }
     if told.direction != Some(Direction::Answer) && told.verdict == "ok" {
         for complaint in check_request(&told.message, told.framing.unwrap_or(Framing::Rtu)) {

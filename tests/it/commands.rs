@@ -90,7 +90,7 @@ fn a_frame_is_told_in_words() {
 /// Two good lines and a bad one between them: all are told, and scripts see that one was bad.
 #[test]
 fn frames_of_a_log_come_from_standard_input() {
-    let log = "TX 01 03 03 EA 00 02 E5 BB\nhello\nRX 01 03 04 00 C8 FF FE BA 7D\n";
+    let log = "TX 01 03 03 EA 00 02 E5 BB\nhello\nRX 01 03 04 00 C8 FF FE BB BD\n";
     let mut child = sightglass()
         .arg("frame")
         .stdin(std::process::Stdio::piped())

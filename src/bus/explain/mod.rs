@@ -58,7 +58,7 @@ pub struct Explained {
     pub summary: String,
     /// `ok`, or the first thing that is wrong.
     pub verdict: String,
-    /// What else these bytes may be.
+    /// What else these bytes may be: the other reading, or why both are the same.
     pub also: Option<String>,
 }
 
@@ -96,6 +96,8 @@ pub fn explain(
         }
     }
     let (direction, reading, also) = read.choose(direction);
+    // Bytes without unit and function come from nobody.
+    let direction = direction.filter(|_| 2 <= envelope.message.len());
     let wrong = asked.filter(|_| direction != Some(Direction::Request)).and_then(|asked| {
         let fault = frame::check_answer(asked, &envelope.message).err()?;
         (!matches!(fault, crate::plant::event::Fault::Exception(_))).then(|| fault.to_string())
@@ -165,9 +167,9 @@ impl Readings {
         let message = &envelope.message;
         let mbap = envelope.framing == Some(Framing::Mbap);
         let same = match message.get(1) {
-            Some(0x05 | 0x06 | 0x08 | 0x15 | 0x16) => Some("its answer, which repeats the request"),
+            Some(0x05 | 0x06 | 0x08 | 0x15 | 0x16) => Some("the answer repeats the request: these bytes may be either"),
             Some(0..=0x7F) if names::function(message[1]).is_none() => {
-                Some("an answer; the standard has no such function")
+                Some("the standard has no such function: request and answer cannot be told apart")
             }
             Some(_) | None => None,
         };

@@ -111,7 +111,7 @@ impl<'a> Reader<'a> {
             return;
         }
         let words = if self.trouble.is_none() { "does not belong to this message" } else { "cannot be told" };
-        self.wrong(format!("{left} {} too many", if left == 1 { "byte" } else { "bytes" }));
+        self.wrong(format!("{} too many", names::counted(left, "byte")));
         self.name(self.at..self.message.len(), "rest".into(), words.into());
     }
 
@@ -119,10 +119,7 @@ impl<'a> Reader<'a> {
         let range = self.at..self.at + count;
         let Some(bytes) = self.message.get(range.clone()) else {
             let missing = count - self.left();
-            self.wrong(format!(
-                "cut short: {missing} {} of {name} missing",
-                if missing == 1 { "byte" } else { "bytes" }
-            ));
+            self.wrong(format!("cut short: {} of {name} missing", names::counted(missing, "byte")));
             return None;
         };
         self.at = range.end;
