@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::pdu;
-use super::rig::{Rig, reply_delay};
+use super::rig::{BROADCAST, Rig, reply_delay};
 use crate::bus::frame::with_crc;
 
 /// What is wrong with a unit.
@@ -60,9 +59,16 @@ impl Faults {
     /// Lets the rig answer a request, or the fault in its place. `None`: nothing comes back.
     pub fn answer(&self, rig: &mut Rig, unit: u8, request: &[u8]) -> Option<Answer> {
         let plain = |pdu| Answer { unit, pdu, damage: Damage::None, delay: reply_delay(unit) };
+        if unit == BROADCAST {
+            rig.broadcast(request, |unit| !matches!(self.of(unit), Fault::Silent | Fault::Exception(_)));
+            return None;
+        }
         match self.of(unit) {
             Fault::None => rig.respond(unit, request).map(plain),
-            Fault::Silent => None,
+            Fault::Silent => {
+                rig.overhear(unit);
+                None
+            }
             Fault::Late(by) => {
                 rig.respond(unit, request).map(plain).map(|answer| Answer { delay: answer.delay + by, ..answer })
             }
@@ -72,7 +78,7 @@ impl Faults {
             Fault::Truncated => {
                 rig.respond(unit, request).map(plain).map(|answer| Answer { damage: Damage::Cut, ..answer })
             }
-            Fault::Exception(code) => request.first().map(|function| plain(pdu::exception(*function, code))),
+            Fault::Exception(code) => rig.refuse(unit, request, code).map(plain),
         }
     }
 }
