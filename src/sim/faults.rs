@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use super::ascii;
 use super::rig::{BROADCAST, Rig, reply_delay};
 use crate::bus::frame::with_crc;
 
@@ -99,6 +100,21 @@ impl Answer {
         frame
     }
 
+    /// The characters on a line in ASCII mode.
+    pub fn ascii(&self) -> Vec<u8> {
+        let mut frame = ascii::encode(&self.message());
+        match self.damage {
+            Damage::None => {}
+            Damage::Check => {
+                // The last digit of the LRC becomes another one.
+                let digit = frame.len() - 3;
+                frame[digit] = if frame[digit] == b'0' { b'1' } else { b'0' };
+            }
+            Damage::Cut => frame.truncate(frame.len() / 2),
+        }
+        frame
+    }
+
     /// The bytes on a TCP connection. There is no check to spoil: a wrong transaction number is the nearest thing.
     pub fn tcp(&self, transaction: u16) -> Vec<u8> {
         let transaction = if self.damage == Damage::Check { transaction ^ 0xFF00 } else { transaction };
@@ -146,6 +162,26 @@ mod tests {
         check(Fault::BadCrc, Some((7, false)), true);
         check(Fault::Truncated, Some((3, false)), true);
         check(Fault::Exception(4), Some((5, true)), false);
+    }
+
+    #[test]
+    fn the_same_answer_in_ascii() {
+        let (mut rig, mut faults) = (Rig::new(), Faults::default());
+        let frame = |faults: &Faults, rig: &mut Rig| faults.answer(rig, 1, &READ_SV).map(|answer| answer.ascii());
+        assert_eq!(frame(&faults, &mut rig).as_deref(), Some(&b":01030202BC3C\r\n"[..]));
+        faults.set(1, Fault::BadCrc);
+        assert_eq!(frame(&faults, &mut rig).as_deref(), Some(&b":01030202BC30\r\n"[..]));
+        faults.set(1, Fault::Truncated);
+        assert_eq!(frame(&faults, &mut rig).as_deref(), Some(&b":010302"[..]));
+    }
+
+    #[test]
+    fn a_broadcast_passes_by_a_silent_unit() {
+        let (mut rig, mut faults) = (Rig::new(), Faults::default());
+        faults.set(1, Fault::Silent);
+        assert_eq!(faults.answer(&mut rig, 0, &WRITE_SV), None);
+        assert_eq!(rig.respond(1, &READ_SV), Some(vec![3, 2, 0x02, 0xBC]));
+        assert_eq!(rig.respond(2, &READ_SV), Some(vec![3, 2, 0x01, 0xF4]));
     }
 
     #[test]

@@ -15,5 +15,6 @@ pub mod pxr;
 pub mod dl06;
 pub mod rig;
 pub mod faults;
+pub mod ascii;
 pub mod wire;
 pub mod io;
