@@ -1,13 +1,12 @@
-//! Against programs that we did not write.
+//! Our master against slaves that we did not write.
 
 use std::{
-    fs::OpenOptions,
-    io::{Read, Write},
-    path::Path,
-    process::{Command, Output},
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
 };
 
-use crate::support::{Cable, Process, folder, free_port, have, python, sightglass};
+use crate::support::{Cable, Process, folder, free_port, have, libmodbus_server, python, sightglass};
 
 /// What the slave of `peers/slave.py` holds, as an operator should see it.
 const SEEN: [(&str, &str); 8] = [
@@ -28,22 +27,53 @@ fn slave(python: &Path, kind: &str, place: &str) -> Process {
     slave
 }
 
-/// Runs the station headless on a port until it has read everything, and compares what it prints.
-fn read_all_from(port: &str) {
+/// Runs the station headless for a while and gives what it says, with what it prints of each tag at the end.
+fn station(plant: &str, port: &str, time: &str) -> Vec<String> {
     let folder = folder();
     let mut station = Process::start(
         sightglass()
-            .args(["run", "tank", "--print", "--for", "12s", "--port", &format!("L1={port}")])
+            .args(["run", plant, "--print", "--for", time, "--port", &format!("L1={port}")])
             .arg("--history")
-            .arg(folder.path().join("tank.duckdb"))
+            .arg(folder.path().join("history.duckdb"))
             .env("XDG_STATE_HOME", folder.path()),
     );
     assert_eq!(station.end(), Some(0), "{}", station.said.join("\n"));
+    std::mem::take(&mut station.said)
+}
+
+/// `value unit quality` of a tag, as the station printed it.
+fn printed(said: &[String], tag: &str) -> String {
+    let line = said.iter().find(|line| line.split_whitespace().next() == Some(tag));
+    let line = line.unwrap_or_else(|| panic!("no {tag} in:\n{}", said.join("\n")));
+    line.split_whitespace().skip(1).collect::<Vec<_>>().join(" ")
+}
+
+fn plant(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peers").join(name)
+}
+
+/// A plant file of ours with its line in another mode, in this folder.
+fn in_mode(plant: &Path, mode: &str, folder: &Path) -> PathBuf {
+    let text = fs::read_to_string(plant).unwrap();
+    let (before, after) = text.split_once("[[line]]").unwrap();
+    let after = after.split_once("\n\n").unwrap().1;
+    let ends = match mode {
+        "rtu" | "ascii" => "port = \"/dev/null\"\nbaud = 9600\nparity = \"N\"",
+        _ => "host = \"localhost\"",
+    };
+    let line = format!("[[line]]\nname = \"L1\"\nmode = \"{mode}\"\ntimeout_ms = 300\n{ends}");
+    let file = folder.join("plant.toml");
+    fs::write(&file, format!("{before}{line}\n\n{after}")).unwrap();
+    fs::copy(plant.with_file_name("number.toml"), folder.join("number.toml")).unwrap();
+    file
+}
+
+/// Runs the station until it has read everything, and compares what it prints.
+fn read_all_from(port: &str) {
+    let said = station("tank", port, "12s");
     for (tag, value) in SEEN {
-        let line = station.said.iter().find(|line| line.split_whitespace().next() == Some(tag));
-        let line = line.unwrap_or_else(|| panic!("no {tag} in:\n{}", station.said.join("\n")));
-        let words: Vec<&str> = line.split_whitespace().skip(1).collect();
-        assert!(words.join(" ").starts_with(&format!("{value} good")), "{line}, expected {value}");
+        let seen = printed(&said, tag);
+        assert!(seen.starts_with(&format!("{value} good")), "{tag}: {seen}, expected {value}");
     }
 }
 
@@ -64,60 +94,76 @@ fn the_station_reads_pymodbus_over_tcp() {
     read_all_from(&format!("127.0.0.1:{port}"));
 }
 
-fn sim(args: &[&str], said: &str) -> (Process, String) {
-    let mut sim = Process::start(sightglass().args(["sim", "tank"]).args(args));
-    let line = sim.wait_for(said);
-    let place = line.rsplit(' ').next().unwrap().to_owned();
-    (sim, place)
-}
-
-fn mbpoll(args: &[&str]) -> (bool, String) {
-    let Output { status, stdout, stderr } = Command::new("mbpoll").args(args).output().unwrap();
-    (status.success(), String::from_utf8_lossy(&stdout).into_owned() + &String::from_utf8_lossy(&stderr))
-}
-
+/// One unit for each way to answer wrongly, and one that is well, on one line.
 #[test]
-fn mbpoll_reads_and_writes_the_simulated_plant_over_a_serial_line() {
-    if !have("mbpoll", "mbpoll") {
-        return;
+fn a_faulty_answer_is_never_shown_as_a_value() {
+    let Some(python) = python().filter(|_| have("socat", "socat")) else { return };
+    let folder = folder();
+    let cable = Cable::plug(folder.path());
+    let _slave = slave(&python, "rtu", cable.ends[1].to_str().unwrap());
+    let said = read_faults("rtu", cable.ends[0].to_str().unwrap());
+    for (tag, expect) in [
+        ("WELL.N", "10 good"),
+        ("SPOILED.N", "---- bad: device not answering"),
+        ("SILENT.N", "---- bad: device not answering"),
+        ("NOISY.N", "510 good"),
+        ("CUT.N", "---- bad: device not answering"),
+    ] {
+        assert!(printed(&said, tag).starts_with(expect), "{tag}: {}", printed(&said, tag));
     }
-    let (_sim, path) = sim(&[], "serves");
-    let rtu = ["-m", "rtu", "-b", "9600", "-P", "none", "-0", "-1"];
-    let call = |args: &[&str]| mbpoll(&[&rtu[..], args].concat());
-    // SV in tenths of a degree, then written and read back; Y0 to Y3; an address that does not exist.
-    let (ok, out) = call(&["-a", "1", "-t", "4", "-r", "1002", "-c", "1", &path]);
-    assert!(ok && out.contains("[1002]: \t700"), "{out}");
-    let (ok, out) = call(&["-a", "1", "-t", "4", "-r", "1002", &path, "655"]);
-    assert!(ok && out.contains("Written 1 references"), "{out}");
-    let (ok, out) = call(&["-a", "1", "-t", "4", "-r", "1002", "-c", "1", &path]);
-    assert!(ok && out.contains("[1002]: \t655"), "{out}");
-    let (ok, out) = call(&["-a", "2", "-t", "0", "-r", "2048", "-c", "4", &path]);
-    assert!(ok && out.contains("[2048]:") && out.contains("[2051]:"), "{out}");
-    let (ok, out) = call(&["-a", "1", "-t", "4", "-r", "9000", "-c", "1", &path]);
-    assert!(!ok && out.to_lowercase().contains("illegal data address"), "{out}");
-}
-
-#[test]
-fn mbpoll_reads_the_simulated_plant_over_tcp() {
-    if !have("mbpoll", "mbpoll") {
-        return;
+    for (unit, why) in
+        [("LATE", "no answer in time"), ("SPOILED", "CRC error"), ("SILENT", "no answer in time"), ("CUT", "cut short")]
+    {
+        assert!(said.iter().any(|line| line.contains(unit) && line.contains(why)), "{unit} {why}: {}", said.join("\n"));
     }
-    let (_sim, place) = sim(&["--tcp", "127.0.0.1:0"], "serves");
-    let port = place.rsplit(':').next().unwrap();
-    let (ok, out) =
-        mbpoll(&["-m", "tcp", "-p", port, "-a", "1", "-0", "-1", "-t", "4", "-r", "1002", "-c", "1", "127.0.0.1"]);
-    assert!(ok && out.contains("[1002]: \t700"), "{out}");
 }
 
-/// The two exchanges recorded on the real devices, byte for byte.
 #[test]
-fn the_recorded_exchanges_of_the_thesis() {
-    let (_sim, path) = sim(&[], "serves");
-    let mut port = OpenOptions::new().read(true).write(true).open(path).unwrap();
-    for frame in [[0x01, 0x06, 0x03, 0xEA, 0x00, 0x32, 0x29, 0xAF], [0x02, 0x06, 0x41, 0x40, 0xFF, 0xFF, 0x9D, 0xA1]] {
-        port.write_all(&frame).unwrap();
-        let mut answer = [0; 8];
-        port.read_exact(&mut answer).unwrap();
-        assert_eq!(answer, frame);
+fn a_faulty_answer_over_tcp_is_never_shown_as_a_value() {
+    let Some(python) = python() else { return };
+    let port = free_port();
+    let _slave = slave(&python, "tcp", &port.to_string());
+    let said = read_faults("tcp", &format!("127.0.0.1:{port}"));
+    println!("{}", said.join("\n"));
+    assert!(printed(&said, "SPOILED.N").starts_with("---- bad"), "{}", said.join("\n"));
+    assert!(printed(&said, "SILENT.N").starts_with("---- bad"), "{}", said.join("\n"));
+}
+
+/// Lets the station poll the units 3 to 8 of the slave. Every register there holds its address: no tag may ever be shown with
+/// another number, whatever came and when.
+fn read_faults(mode: &str, port: &str) -> Vec<String> {
+    let folder = folder();
+    let said = station(in_mode(&plant("faults.toml"), mode, folder.path()).to_str().unwrap(), port, "15s");
+    for (tag, address) in
+        [("WELL", "10"), ("LATE", "210"), ("SPOILED", "310"), ("SILENT", "410"), ("NOISY", "510"), ("CUT", "610")]
+    {
+        let seen = printed(&said, &format!("{tag}.N"));
+        let value = seen.split(' ').next().unwrap();
+        assert!(value == address || value == "----", "{tag}: {seen}");
+    }
+    said
+}
+
+/// The fixed values of its unit-test.h, and the deliberate faults of its unit-test-server.c.
+#[test]
+fn the_station_reads_the_server_of_libmodbus() {
+    let Some(_server) = libmodbus_server() else { return };
+    let said = station(plant("libmodbus.toml").to_str().unwrap(), "127.0.0.1:1502", "10s");
+    // UT_INPUT_BITS_TAB begins AC DB, the lowest bit first.
+    for (bit, expect) in [0, 0, 1, 1, 0, 1, 0, 1, 1, 1].into_iter().enumerate() {
+        let seen = printed(&said, &format!("UT.BIT{bit}"));
+        assert!(seen.starts_with(&format!("{expect} good")), "bit {bit}: {seen}");
+    }
+    for (tag, expect) in [
+        ("INPUT", "10 good"),
+        ("COIL", "0 good"),
+        ("REGISTER", "0 good"),
+        ("LATE", "0 good"),
+        ("SHORT", "---- bad"),
+        ("BUSY", "---- bad"),
+        ("NOWHERE", "---- bad: refused by the device"),
+    ] {
+        let seen = printed(&said, &format!("UT.{tag}"));
+        assert!(seen.starts_with(expect), "{tag}: {seen}");
     }
 }

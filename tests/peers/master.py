@@ -116,14 +116,15 @@ def ask_what_every_master_can(master):
     print("SV above its limit", master.write_one(PXR, 1002, 9999))
 
 
-def ask_what_only_pymodbus_can(master, serial):
+def ask_what_only_pymodbus_can(master, mode):
     master.write_register(2010, 0x12, device_id=DL06)
     master.mask_write_register(address=2010, and_mask=0xF2, or_mask=0x25, device_id=DL06)
     print("masked", master.holding(DL06, 2010, 1))
     exchange = master.readwrite_registers(read_address=2010, read_count=3, write_address=2011, values=[7, 8], device_id=DL06)
     print("exchanged", exchange.registers)
     master.write_registers(2020, [2, 440, 512], device_id=DL06)
-    print("queue", master.read_fifo_queue(address=2020, device_id=DL06).values)
+    if "rtu" not in mode:  # there pymodbus 3.16.1 takes the answer for two bytes shorter than it is
+        print("queue", master.read_fifo_queue(address=2020, device_id=DL06).values)
     print("echo", master.diag_query_data(b"\xa5\x37", device_id=DL06).message)
     master.diag_clear_counters(device_id=DL06)
     print("no queue", master.read_fifo_queue(address=9000, device_id=DL06))
@@ -133,7 +134,7 @@ def ask_what_only_pymodbus_can(master, serial):
     log = master.diag_get_comm_event_log(device_id=DL06)
     print("log", log.event_count, log.message_count, bytes(log.events[:6]).hex(" "))
     print("status", f"{master.read_exception_status(device_id=DL06).status & 0x81:08b}")
-    print("server id", bytes(master.report_device_id(device_id=DL06).identifier))
+    print("server id", bytes(master.report_device_id(device_id=DL06).identifier[:8]))
     basic = master.read_device_information(read_code=1, object_id=0, device_id=DL06)
     print("basic", basic.information[0], basic.information[1], sorted(basic.information), basic.more_follows)
     regular = master.read_device_information(read_code=2, object_id=0, device_id=DL06)
@@ -143,7 +144,7 @@ def ask_what_only_pymodbus_can(master, serial):
     print("one", master.read_device_information(read_code=4, object_id=4, device_id=DL06).information)
     print("not there", master.read_device_information(read_code=4, object_id=9, device_id=DL06))
     print("PXR has none", master.read_device_information(read_code=1, object_id=0, device_id=PXR))
-    if serial:
+    if mode != "tcp":
         master.client.write_register(1002, 500, device_id=0, no_response_expected=True)
         print("broadcast", master.holding(PXR, 1002, 1), master.holding(DL06, 1002, 1))
 
@@ -154,5 +155,5 @@ if library == "minimalmodbus":
 else:
     master = Pymodbus(mode, place)
     ask_what_every_master_can(master)
-    ask_what_only_pymodbus_can(master, mode != "tcp")
+    ask_what_only_pymodbus_can(master, mode)
 print("end")
