@@ -10,14 +10,14 @@ use crate::support::{Cable, Process, folder, free_port, have, libmodbus_server, 
 
 /// What the slave of `peers/slave.py` holds, as an operator should see it.
 const SEEN: [(&str, &str); 8] = [
-    ("TIC-1.PV", "-1.5 °C"),
-    ("TIC-1.SV", "70.0 °C"),
-    ("TIC-1.MV", "12.34 %"),
-    ("TIC-1.P", "5.0 % FS"),
-    ("TIC-1.I", "240.0 s"),
-    ("PLC-1.STEP", "HEAT"),
-    ("PLC-1.LT-1", "10.2 cm"),
-    ("PLC-1.RUN", "RUN"),
+    ("TIC-1.PV", "-1.5 °C good"),
+    ("TIC-1.SV", "70.0 °C good"),
+    ("TIC-1.MV", "12.34 % good"),
+    ("TIC-1.P", "5.0 % FS good"),
+    ("TIC-1.I", "240.0 s good"),
+    ("PLC-1.STEP", "HEAT good"),
+    ("PLC-1.LT-1", "10.2 cm good"),
+    ("PLC-1.RUN", "RUN good"),
 ];
 
 fn slave(python: &Path, kind: &str, place: &str) -> Process {
@@ -28,12 +28,13 @@ fn slave(python: &Path, kind: &str, place: &str) -> Process {
 }
 
 /// Runs the station headless for a while and gives what it says, with what it prints of each tag at the end.
-fn station(plant: &str, port: &str, time: &str) -> Vec<String> {
+fn station(plant: &Path, port: &str, time: &str) -> Vec<String> {
     let folder = folder();
     let mut station = Process::start(
         sightglass()
-            .args(["run", plant, "--print", "--for", time, "--port", &format!("L1={port}")])
-            .arg("--history")
+            .arg("run")
+            .arg(plant)
+            .args(["--print", "--for", time, "--port", &format!("L1={port}"), "--history"])
             .arg(folder.path().join("history.duckdb"))
             .env("XDG_STATE_HOME", folder.path()),
     );
@@ -52,29 +53,10 @@ fn plant(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peers").join(name)
 }
 
-/// A plant file of ours with its line in another mode, in this folder.
-fn in_mode(plant: &Path, mode: &str, folder: &Path) -> PathBuf {
-    let text = fs::read_to_string(plant).unwrap();
-    let (before, after) = text.split_once("[[line]]").unwrap();
-    let after = after.split_once("\n\n").unwrap().1;
-    let ends = match mode {
-        "rtu" | "ascii" => "port = \"/dev/null\"\nbaud = 9600\nparity = \"N\"",
-        _ => "host = \"localhost\"",
-    };
-    let line = format!("[[line]]\nname = \"L1\"\nmode = \"{mode}\"\ntimeout_ms = 300\n{ends}");
-    let file = folder.join("plant.toml");
-    fs::write(&file, format!("{before}{line}\n\n{after}")).unwrap();
-    fs::copy(plant.with_file_name("number.toml"), folder.join("number.toml")).unwrap();
-    file
-}
-
 /// Runs the station until it has read everything, and compares what it prints.
 fn read_all_from(port: &str) {
-    let said = station("tank", port, "12s");
-    for (tag, value) in SEEN {
-        let seen = printed(&said, tag);
-        assert!(seen.starts_with(&format!("{value} good")), "{tag}: {seen}, expected {value}");
-    }
+    let said = station(Path::new("tank"), port, "12s");
+    check(&said, &SEEN);
 }
 
 #[test]
@@ -94,22 +76,67 @@ fn the_station_reads_pymodbus_over_tcp() {
     read_all_from(&format!("127.0.0.1:{port}"));
 }
 
-/// One unit for each way to answer wrongly, and one that is well, on one line.
+/// A unit that is well and one for each way to answer wrongly: name, unit and the register that it is asked for, which says
+/// what is wrong (`peers/slave.py`).
+const WELL: (&str, u8, &str) = ("WELL", 3, "10");
+const LATE: (&str, u8, &str) = ("LATE", 4, "210");
+const SPOILED: (&str, u8, &str) = ("SPOILED", 5, "310");
+const SILENT: (&str, u8, &str) = ("SILENT", 6, "410");
+const NOISY: (&str, u8, &str) = ("NOISY", 7, "510");
+const CUT: (&str, u8, &str) = ("CUT", 8, "610");
+
+/// A plant with these units on one line, in any mode that plant files know.
+fn plant_with(units: &[(&str, u8, &str)], mode: &str) -> String {
+    let ends = match mode {
+        "rtu" | "ascii" => "port = \"/dev/null\"\nbaud = 9600\nparity = \"N\"",
+        _ => "host = \"localhost\"",
+    };
+    let mut text = format!(
+        "title = \"Faults\"\ntime_zone = \"UTC\"\n[[line]]\nname = \"L1\"\nmode = \"{mode}\"\ntimeout_ms = 300\n{ends}\n"
+    );
+    for (name, unit, address) in units {
+        text += &format!(
+            "[[device]]\nname = \"{name}\"\nprofile = \"number\"\nline = \"L1\"\nunit = {unit}\nfast = \"500ms\"\n"
+        );
+        text += &format!("[[device.tag]]\nname = \"N\"\naddress = {address}\n");
+    }
+    text
+}
+
+/// Lets the station poll units of the slave. Every register there holds its address: no tag may ever be shown with another
+/// number, whatever came and when.
+fn read_faults(units: &[(&str, u8, &str)], mode: &str, port: &str) -> Vec<String> {
+    let folder = folder();
+    let file = folder.path().join("faults.toml");
+    fs::write(&file, plant_with(units, mode)).unwrap();
+    fs::copy(plant("number.toml"), folder.path().join("number.toml")).unwrap();
+    let said = station(&file, port, "12s");
+    for (name, _, address) in units {
+        let seen = printed(&said, &format!("{name}.N"));
+        let value = seen.split(' ').next().unwrap();
+        assert!(value == *address || value == "----", "{name}: {seen}");
+    }
+    said
+}
+
+/// Compares the beginning of what the station printed of tags.
+fn check(said: &[String], expect: &[(&str, &str)]) {
+    for (tag, expect) in expect {
+        let seen = printed(said, tag);
+        assert!(seen.starts_with(expect), "{tag}: {seen}, expected {expect} in:\n{}", said.join("\n"));
+    }
+}
+
 #[test]
 fn a_faulty_answer_is_never_shown_as_a_value() {
     let Some(python) = python().filter(|_| have("socat", "socat")) else { return };
     let folder = folder();
     let cable = Cable::plug(folder.path());
     let _slave = slave(&python, "rtu", cable.ends[1].to_str().unwrap());
-    let said = read_faults("rtu", cable.ends[0].to_str().unwrap());
-    for (tag, expect) in [
-        ("WELL.N", "10 good"),
-        ("SPOILED.N", "---- bad: device not answering"),
-        ("SILENT.N", "---- bad: device not answering"),
-        ("NOISY.N", "510 good"),
-        ("CUT.N", "---- bad: device not answering"),
-    ] {
-        assert!(printed(&said, tag).starts_with(expect), "{tag}: {}", printed(&said, tag));
+    let said = read_faults(&[WELL, LATE, SPOILED, SILENT, NOISY, CUT], "rtu", cable.ends[0].to_str().unwrap());
+    check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
+    for tag in ["SPOILED.N", "SILENT.N", "CUT.N"] {
+        check(&said, &[(tag, "---- bad: device not answering")]);
     }
     for (unit, why) in
         [("LATE", "no answer in time"), ("SPOILED", "CRC error"), ("SILENT", "no answer in time"), ("CUT", "cut short")]
@@ -123,47 +150,41 @@ fn a_faulty_answer_over_tcp_is_never_shown_as_a_value() {
     let Some(python) = python() else { return };
     let port = free_port();
     let _slave = slave(&python, "tcp", &port.to_string());
-    let said = read_faults("tcp", &format!("127.0.0.1:{port}"));
-    println!("{}", said.join("\n"));
-    assert!(printed(&said, "SPOILED.N").starts_with("---- bad"), "{}", said.join("\n"));
-    assert!(printed(&said, "SILENT.N").starts_with("---- bad"), "{}", said.join("\n"));
+    let said = read_faults(&[WELL, LATE, SPOILED, SILENT, NOISY], "tcp", &format!("127.0.0.1:{port}"));
+    check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
+    check(&said, &[("SPOILED.N", "---- bad: device not answering"), ("SILENT.N", "---- bad: device not answering")]);
 }
 
-/// Lets the station poll the units 3 to 8 of the slave. Every register there holds its address: no tag may ever be shown with
-/// another number, whatever came and when.
-fn read_faults(mode: &str, port: &str) -> Vec<String> {
-    let folder = folder();
-    let said = station(in_mode(&plant("faults.toml"), mode, folder.path()).to_str().unwrap(), port, "15s");
-    for (tag, address) in
-        [("WELL", "10"), ("LATE", "210"), ("SPOILED", "310"), ("SILENT", "410"), ("NOISY", "510"), ("CUT", "610")]
-    {
-        let seen = printed(&said, &format!("{tag}.N"));
-        let value = seen.split(' ').next().unwrap();
-        assert!(value == address || value == "----", "{tag}: {seen}");
-    }
-    said
+/// Over TCP half an answer puts the whole stream out of step.
+#[test]
+fn half_an_answer_over_tcp_is_never_shown_as_a_value() {
+    let Some(python) = python() else { return };
+    let port = free_port();
+    let _slave = slave(&python, "tcp", &port.to_string());
+    let said = read_faults(&[WELL, CUT], "tcp", &format!("127.0.0.1:{port}"));
+    check(&said, &[("CUT.N", "---- bad")]);
+    assert!(said.iter().any(|line| line.contains("WELL (unit 3): answers")), "{}", said.join("\n"));
 }
 
 /// The fixed values of its unit-test.h, and the deliberate faults of its unit-test-server.c.
 #[test]
 fn the_station_reads_the_server_of_libmodbus() {
     let Some(_server) = libmodbus_server() else { return };
-    let said = station(plant("libmodbus.toml").to_str().unwrap(), "127.0.0.1:1502", "10s");
+    let said = station(&plant("libmodbus.toml"), "127.0.0.1:1502", "10s");
     // UT_INPUT_BITS_TAB begins AC DB, the lowest bit first.
     for (bit, expect) in [0, 0, 1, 1, 0, 1, 0, 1, 1, 1].into_iter().enumerate() {
-        let seen = printed(&said, &format!("UT.BIT{bit}"));
-        assert!(seen.starts_with(&format!("{expect} good")), "bit {bit}: {seen}");
+        check(&said, &[(&format!("UT.BIT{bit}"), &format!("{expect} good"))]);
     }
-    for (tag, expect) in [
-        ("INPUT", "10 good"),
-        ("COIL", "0 good"),
-        ("REGISTER", "0 good"),
-        ("LATE", "0 good"),
-        ("SHORT", "---- bad"),
-        ("BUSY", "---- bad"),
-        ("NOWHERE", "---- bad: refused by the device"),
-    ] {
-        let seen = printed(&said, &format!("UT.{tag}"));
-        assert!(seen.starts_with(expect), "{tag}: {seen}");
-    }
+    check(
+        &said,
+        &[
+            ("UT.INPUT", "10 good"),
+            ("UT.COIL", "0 good"),
+            ("UT.REGISTER", "0 good"),
+            ("UT.LATE", "0 good"),
+            ("UT.SHORT", "---- bad"),
+            ("UT.BUSY", "---- bad"),
+            ("UT.NOWHERE", "---- bad: refused by the device"),
+        ],
+    );
 }

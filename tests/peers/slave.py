@@ -6,7 +6,8 @@ Unit 1 looks like a FUJI PXR4, unit 2 like a KOYO DL06; any other register holds
 holds its address, and the address says what is wrong with the answer:
 
     200-299 comes 1.5 s late      300-399 has a wrong check (over TCP: a foreign transaction number)
-    400-499 never comes           500-599 has noise before it           600-699 breaks off
+    400-499 never comes           600-699 breaks off
+    500-599 has noise before it (over TCP: an answer with a foreign transaction number and another value)
 
 It says "ready" when it serves, then one line for each request that it answers. "calm": nothing moves, nothing is wrong.
 """
@@ -83,6 +84,8 @@ def trace_packet(sending, frame):
         case 4:
             return b""
         case 5:
+            if KIND == "tcp":
+                return spoiled(frame)[:-1] + b"\x55" + frame
             return b"\xff\x00\x55" + frame
         case 6:
             return frame[:-4]
