@@ -25,9 +25,11 @@ pub(super) struct Envelope {
     pub fault: Option<String>,
 }
 
-/// The framing of bytes that nobody has named: `:` is ASCII, a header whose length fits is TCP, a CRC that fits is RTU.
+/// The framing of bytes that nobody has named: `:` and text is ASCII, a header whose length fits is TCP, a CRC that fits is RTU.
 pub fn recognise(bytes: &[u8]) -> Option<Framing> {
-    if bytes.starts_with(b":") {
+    // Unit 58 of a binary frame is a `:` too, but what follows it is no text.
+    let text = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
+    if bytes.starts_with(b":") && bytes.iter().all(text) {
         Some(Framing::Ascii)
     } else if matches!(frame::mbap(bytes), Mbap::Whole { end, .. } if end == bytes.len()) {
         Some(Framing::Mbap)

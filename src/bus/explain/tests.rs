@@ -100,6 +100,12 @@ fn unit_0_is_a_broadcast_on_a_serial_line_only() {
 }
 
 #[test]
+fn unit_58_is_not_taken_for_the_colon_of_ascii() {
+    check("3A 03 00 00 00 01", "", "unit 58 read holding registers 40001 (0x0000, 1)");
+    check("3A 2B 0E 01 00", "", "unit 58 read device identification, basic identification from VendorName");
+}
+
+#[test]
 fn what_may_be_two_things_says_so() {
     let told = check("01 06 03 EA 00 32", "", "unit 1 write register 41003 = 50 (0x03EA, 0x0032)");
     assert_eq!(
