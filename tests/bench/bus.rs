@@ -62,8 +62,8 @@ fn cycle(libmodbus: Option<&Path>) {
         let over = minimum * 20;
         let (path, slave) = PacedSlave::start(baud);
         let def = plant(vec![Transport::rtu(path.to_str().unwrap(), serial)], 1, BLOCKS, Duration::from_millis(1), 1);
-        let (served, seconds) = measured_station(def, over, || slave.served());
-        let ours = seconds / (served as f64 / f64::from(BLOCKS)) / minimum.as_secs_f64();
+        let ((from, to), seconds) = measured_station(def, over, || slave.served());
+        let ours = seconds / ((to - from) as f64 / f64::from(BLOCKS)) / minimum.as_secs_f64();
         let hasty = slave.hasty();
         let theirs = libmodbus.map(|program| {
             let (path, _slave) = PacedSlave::start(baud);
@@ -84,8 +84,8 @@ fn dead() {
     let rate = |dead: Option<u8>| {
         let (path, slave) = PacedSlave::start_on(serial, dead);
         let def = plant(vec![Transport::rtu(path.to_str().unwrap(), serial)], 8, 1, Duration::from_secs(1), 1);
-        let (served, seconds) = measured_station(def, Duration::from_secs(30), || slave.served());
-        served as f64 / seconds
+        let ((from, to), seconds) = measured_station(def, Duration::from_secs(30), || slave.served());
+        (to - from) as f64 / seconds
     };
     let (all, seven) = (rate(None), rate(Some(8)));
     println!("one of eight units dead at 9600 baud, 10 registers a second each, timeout 300 ms:");
@@ -126,10 +126,9 @@ fn whole_station() {
     ] {
         let def = plant(lines, devices, BLOCKS, period, 1);
         let tags = def.tags.len();
-        let mut before = (0.0, 0);
-        let now = || (cpu(ClockId::ProcessCPUTime), wakeups());
-        let (_, seconds) = measured_with(def, Duration::from_secs(10), &mut || before = now(), || 0);
-        let (cpu, wakeups) = (now().0 - before.0, now().1.saturating_sub(before.1));
+        let ((before, after), seconds) =
+            measured_station(def, Duration::from_secs(10), || (cpu(ClockId::ProcessCPUTime), wakeups()));
+        let (cpu, wakeups) = (after.0 - before.0, after.1.saturating_sub(before.1));
         println!("station with {what}, {tags} tags:");
         println!("  {:.2} % of a core, {:.0} wake-ups a second", cpu / seconds * 100.0, wakeups as f64 / seconds);
     }
@@ -183,12 +182,9 @@ fn plant(lines: Vec<Transport>, devices: u16, blocks: u16, period: Duration, in_
     Arc::new(def)
 }
 
-/// Runs a whole station with history for a while; gives what `count` grew by, and the seconds.
-fn measured_station(def: Arc<PlantDef>, over: Duration, count: impl Fn() -> u64) -> (u64, f64) {
-    measured_with(def, over, &mut || {}, count)
-}
-
-fn measured_with(def: Arc<PlantDef>, over: Duration, begin: &mut dyn FnMut(), count: impl Fn() -> u64) -> (u64, f64) {
+/// Runs a whole station with history and a terminal for a while; gives what `look` sees at the beginning and at the end of
+/// it, and the seconds.
+fn measured_station<T>(def: Arc<PlantDef>, over: Duration, look: impl Fn() -> T) -> ((T, T), f64) {
     let folder = tempfile::tempdir().unwrap();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
     runtime.block_on(async {
@@ -199,12 +195,11 @@ fn measured_with(def: Arc<PlantDef>, over: Duration, begin: &mut dyn FnMut(), co
         let mut session = running.session("bench");
         // The first second opens ports and files.
         tokio::time::sleep(Duration::from_secs(1)).await;
-        begin();
-        let (from, start) = (count(), Instant::now());
+        let (from, start) = (look(), Instant::now());
         // A terminal that takes every snapshot.
-        let look = async { while session.snapshots.changed().await.is_ok() {} };
-        let _ = tokio::time::timeout(over, look).await;
-        let result = (count() - from, start.elapsed().as_secs_f64());
+        let terminal = async { while session.snapshots.changed().await.is_ok() {} };
+        let _ = tokio::time::timeout(over, terminal).await;
+        let result = ((from, look()), start.elapsed().as_secs_f64());
         running.stop().await;
         result
     })
