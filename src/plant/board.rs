@@ -103,6 +103,9 @@ impl Board {
             match judge(fault) {
                 // The last value of a device that is known to be gone is not doubtful but past.
                 // The reading is doubted all the same: what has made it bad may go before it is read again.
+                Verdict::Doubt(cause) if self.sample(*tag).quality == Quality::Bad(Cause::NotRead) => {
+                    self.set(*tag, Sample::bad(cause, at));
+                }
                 Verdict::Doubt(cause) if self.sample(*tag).quality.is_bad() => {
                     if let Some(reading) = &mut self.raw[tag.index()] {
                         reading.doubt = Some(cause);

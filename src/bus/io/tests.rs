@@ -247,7 +247,7 @@ async fn a_late_refusal_splits_no_block() {
 async fn a_port_that_goes_away_comes_back_by_itself() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
-    for _ in 0..3 {
+    for _ in 0..100 {
         let served = line.plug(Mode::Rtu, |_, _| Deed::Answer);
         line.read(&def).await;
         served.abort();
