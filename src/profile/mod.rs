@@ -39,6 +39,7 @@ use std::{
 pub use self::{
     diagnostic::{Errors, render},
     io::{PlantFile, Search},
+    line::BAUDS,
 };
 use crate::plant::def::PlantDef;
 

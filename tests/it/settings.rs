@@ -13,7 +13,7 @@ use sightglass::{
     },
     profile::{self, PlantFile, Search},
     sim::{
-        io::{RigHandle, serve_rtu},
+        io::{RigHandle, Wire, serve_line},
         rig::Rig,
     },
     station::{self, Session},
@@ -32,7 +32,8 @@ fn start(def: &Arc<PlantDef>, file: Option<PlantFile>, history: &Path) -> statio
     for _ in 0..3 {
         let (ours, theirs) = tokio::io::duplex(1024);
         ports.try_send(ours).unwrap();
-        tokio::spawn(serve_rtu(theirs, rig.clone(), Serial::USUAL));
+        let wire = Wire { serial: Serial::USUAL, ascii: false };
+        tokio::spawn(serve_line(theirs, rig.clone(), wire, Duration::from_secs(86_400)));
     }
     let options = station::io::Options {
         def: def.clone(),

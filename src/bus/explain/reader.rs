@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::{Field, names};
-use crate::bus::frame;
+use super::Field;
+use crate::bus::{frame, names};
 
 /// The reading of one message as a request or as an answer.
 pub(super) struct Reader<'a> {
@@ -13,16 +13,23 @@ pub(super) struct Reader<'a> {
     pub fields: Vec<Field>,
     /// The first thing that does not fit.
     pub trouble: Option<String>,
+    /// Bytes read before it was found.
+    sense: Option<usize>,
 }
 
 impl<'a> Reader<'a> {
     pub fn new(message: &'a [u8]) -> Reader<'a> {
-        Reader { message, at: 0, fields: Vec::new(), trouble: None }
+        Reader { message, at: 0, fields: Vec::new(), trouble: None, sense: None }
     }
 
     /// Everything was read, and nothing was wrong.
     pub fn fits(&self) -> bool {
         self.trouble.is_none() && self.at == self.message.len()
+    }
+
+    /// How many bytes made sense.
+    pub fn sense(&self) -> usize {
+        self.sense.unwrap_or(self.at)
     }
 
     /// Bytes not yet read.
@@ -94,6 +101,7 @@ impl<'a> Reader<'a> {
     /// Notes what does not fit; the first note stands.
     pub fn wrong(&mut self, words: String) {
         self.trouble.get_or_insert(words);
+        self.sense.get_or_insert(self.at);
     }
 
     /// Names what is left over.
@@ -102,26 +110,16 @@ impl<'a> Reader<'a> {
         if left == 0 {
             return;
         }
-        if self.trouble.is_none() {
-            self.wrong(format!("{left} {} too many", if left == 1 { "byte" } else { "bytes" }));
-        }
-        let range = self.at..self.message.len();
-        self.at = range.end;
-        self.name(range, "rest".into(), "does not belong to this message".into());
+        let words = if self.trouble.is_none() { "does not belong to this message" } else { "cannot be told" };
+        self.wrong(format!("{} too many", names::counted(left, "byte")));
+        self.name(self.at..self.message.len(), "rest".into(), words.into());
     }
 
     fn take(&mut self, count: usize, name: &str) -> Option<(Range<usize>, &'a [u8])> {
         let range = self.at..self.at + count;
         let Some(bytes) = self.message.get(range.clone()) else {
             let missing = count - self.left();
-            self.wrong(format!(
-                "cut short: {missing} {} of {name} missing",
-                if missing == 1 { "byte" } else { "bytes" }
-            ));
-            if 0 < self.left() {
-                self.name(self.at..self.message.len(), name.to_owned(), "cut short".into());
-                self.at = self.message.len();
-            }
+            self.wrong(format!("cut short: {} of {name} missing", names::counted(missing, "byte")));
             return None;
         };
         self.at = range.end;
