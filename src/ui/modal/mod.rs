@@ -51,7 +51,7 @@ pub enum Modal {
     /// Why a value is what it is.
     Why(Why),
     /// How a line communicates.
-    Settings(Settings),
+    Settings(Box<Settings>),
 }
 
 /// What a key did to a window.
