@@ -203,10 +203,11 @@ impl Controllers {
         let x = canvas.text(1, 0, &format!("‹ {} ›", device.name), theme.focus());
         let line = &cx.def().line(device.line).name;
         // On a narrow screen whether it answers counts for more than what it is for.
-        let title = if canvas.width() < 80 { String::new() } else { format!("{}  ", device.title) };
+        let status = cx.snapshot.device(device.id);
+        let least = if status.diagnosis.is_some() { 100 } else { 80 };
+        let title = if canvas.width() < least { String::new() } else { format!("{}  ", device.title) };
         let words = format!("{}  {title}unit {}  {line}", device.model, device.unit);
         let x = canvas.text(x + 2, 0, &words, theme.normal());
-        let status = cx.snapshot.device(device.id);
         let (mark, style) = match (status.diagnosis, status.state) {
             (Some(reason), _) => (signal_mark(reason.signal()), theme.trouble()),
             (None, DeviceState::Answering) => ("✓".to_owned(), theme.normal()),
