@@ -8,6 +8,8 @@ pub mod help;
 pub mod line;
 pub mod notice;
 pub mod prompt;
+pub mod settings;
+pub mod why;
 
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
@@ -18,6 +20,8 @@ pub use entry::Entry;
 pub use faceplate::Faceplate;
 pub use notice::Notice;
 pub use prompt::Prompt;
+pub use settings::Settings;
+pub use why::Why;
 
 use super::{
     Act, Cx,
@@ -44,6 +48,10 @@ pub enum Modal {
     Faceplate(Faceplate),
     /// Words to be read: why something cannot be done now.
     Notice(Notice),
+    /// Why a value is what it is.
+    Why(Why),
+    /// How a line communicates.
+    Settings(Settings),
 }
 
 /// What a key did to a window.
@@ -55,6 +63,8 @@ pub enum Next {
     Close,
     /// It is gone, and this is to be done.
     Do(Vec<Act>),
+    /// It stays, and this is to be done.
+    Both(Modal, Vec<Act>),
 }
 
 impl Modal {
@@ -86,11 +96,14 @@ impl Modal {
             Modal::Prompt(prompt) => prompt.on_key(cx, tabs, event),
             Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
             Modal::Notice(notice) => notice.on_key(event),
+            Modal::Why(why) => why.on_key(event),
+            Modal::Settings(settings) => settings.on_key(cx, event),
         };
         match next {
             Next::Stay(modal) => (Some(modal), Vec::new()),
             Next::Close => (None, Vec::new()),
             Next::Do(acts) => (None, acts),
+            Next::Both(modal, acts) => (Some(modal), acts),
         }
     }
 
@@ -104,7 +117,13 @@ impl Modal {
         match self {
             Modal::Entry(entry) => entry.line.paste(text),
             Modal::Prompt(prompt) => prompt.line.paste(text),
-            Modal::Help(_) | Modal::Confirm(_) | Modal::Choice(_) | Modal::Faceplate(_) | Modal::Notice(_) => {}
+            Modal::Settings(settings) => settings.on_paste(text),
+            Modal::Help(_)
+            | Modal::Confirm(_)
+            | Modal::Choice(_)
+            | Modal::Faceplate(_)
+            | Modal::Notice(_)
+            | Modal::Why(_) => {}
         }
     }
 
@@ -119,6 +138,8 @@ impl Modal {
             Modal::Prompt(_) => vec![hint("⏎", "take it"), hint("Esc", "leave")],
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
             Modal::Notice(_) => vec![hint("Esc", "close")],
+            Modal::Why(why) => why.hints(),
+            Modal::Settings(settings) => settings.hints(),
         }
     }
 
@@ -132,6 +153,8 @@ impl Modal {
             Modal::Prompt(prompt) => prompt.view(cx, frame, body),
             Modal::Faceplate(faceplate) => faceplate.view(cx, frame, body),
             Modal::Notice(notice) => notice.view(cx, frame, body),
+            Modal::Why(why) => why.view(cx, frame, body),
+            Modal::Settings(settings) => settings.view(cx, frame, body),
         }
     }
 }
