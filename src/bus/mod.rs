@@ -3,7 +3,10 @@
 pub mod ascii;
 pub mod frame;
 pub mod gather;
+pub mod names;
+pub mod complaint;
 pub mod explain;
+pub mod typed;
 pub mod codec;
 pub mod plan;
 pub mod backoff;

@@ -1,11 +1,10 @@
 //! Answers in words, function by function; with the request, values get their addresses.
 
 use super::{
-    names,
     reader::{Reader, bit_words, hex_words, text},
     request,
 };
-use crate::plant::event::ExceptionCode;
+use crate::{bus::names, plant::event::ExceptionCode};
 
 /// Reads the data of an answer behind its function. Gives the summary, without the unit; `None` if it is cut short.
 /// `asked` is the request message, if it is known to be of the same function.

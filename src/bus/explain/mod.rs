@@ -7,7 +7,6 @@
 
 mod answer;
 mod envelope;
-pub mod names;
 mod reader;
 mod request;
 
@@ -17,7 +16,7 @@ mod tests;
 use std::ops::Range;
 
 use self::{envelope::Envelope, reader::Reader};
-use super::frame;
+use super::{complaint, frame, names};
 use crate::plant::{line::Framing, traffic::Frame};
 
 pub use envelope::{message_of, recognise};
@@ -148,6 +147,8 @@ struct Reading {
     summary: String,
     trouble: Option<String>,
     fits: bool,
+    /// No device would refuse its counts and values.
+    sound: bool,
     /// Bytes that made sense.
     sense: usize,
 }
@@ -186,6 +187,10 @@ impl Readings {
             (Some(Direction::Request), ..) => (told, request, None),
             (Some(Direction::Answer), ..) => (told, answer, None),
             (None, true, true) if echo => (None, request, Some("its answer, which repeats the request".into())),
+            (None, true, true) if !request.sound => {
+                let also = format!("a request: {}", request.summary);
+                (Some(Direction::Answer), answer, Some(also))
+            }
             (None, true, true) => {
                 let also = format!("an answer: {}", answer.summary);
                 (Some(Direction::Request), request, Some(also))
@@ -202,12 +207,13 @@ fn read(message: &[u8], mbap: bool, direction: Direction, asked: Option<&[u8]>) 
     let mut reader = Reader::new(message);
     let summary = read_message(&mut reader, mbap, direction, asked);
     let (fits, sense) = (reader.fits(), reader.at);
+    let sound = complaint::check_request(message, Framing::Mbap).is_empty();
     reader.finish();
     let summary = summary.unwrap_or_else(|| match message {
         [unit, function, ..] => format!("unit {unit} {}, cut short", function_name(*function)),
         [] | [_] => format!("no frame: {}", frame::hex(message)).trim_end_matches(": ").to_owned(),
     });
-    Reading { fields: reader.fields, summary, trouble: reader.trouble, fits, sense }
+    Reading { fields: reader.fields, summary, trouble: reader.trouble, fits, sound, sense }
 }
 
 fn read_message(reader: &mut Reader, mbap: bool, direction: Direction, asked: Option<&[u8]>) -> Option<String> {

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::{Field, names};
-use crate::bus::frame;
+use super::Field;
+use crate::bus::{frame, names};
 
 /// The reading of one message as a request or as an answer.
 pub(super) struct Reader<'a> {
@@ -102,12 +102,9 @@ impl<'a> Reader<'a> {
         if left == 0 {
             return;
         }
-        if self.trouble.is_none() {
-            self.wrong(format!("{left} {} too many", if left == 1 { "byte" } else { "bytes" }));
-        }
-        let range = self.at..self.message.len();
-        self.at = range.end;
-        self.name(range, "rest".into(), "does not belong to this message".into());
+        let words = if self.trouble.is_none() { "does not belong to this message" } else { "cannot be told" };
+        self.wrong(format!("{left} {} too many", if left == 1 { "byte" } else { "bytes" }));
+        self.name(self.at..self.message.len(), "rest".into(), words.into());
     }
 
     fn take(&mut self, count: usize, name: &str) -> Option<(Range<usize>, &'a [u8])> {
@@ -118,10 +115,6 @@ impl<'a> Reader<'a> {
                 "cut short: {missing} {} of {name} missing",
                 if missing == 1 { "byte" } else { "bytes" }
             ));
-            if 0 < self.left() {
-                self.name(self.at..self.message.len(), name.to_owned(), "cut short".into());
-                self.at = self.message.len();
-            }
             return None;
         };
         self.at = range.end;

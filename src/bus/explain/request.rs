@@ -1,9 +1,7 @@
 //! Requests in words, function by function.
 
-use super::{
-    names::{self, place, span},
-    reader::{Reader, bit_words, hex_words, text},
-};
+use super::reader::{Reader, bit_words, hex_words, text};
+use crate::bus::names::{self, place, span};
 
 /// Reads the data of a request behind its function. Gives the summary, without the unit; `None` if it is cut short.
 pub(super) fn read(reader: &mut Reader, function: u8) -> Option<String> {

@@ -40,7 +40,6 @@ fn requests_are_told_with_both_forms_of_the_address() {
         ("02 02 08 00 00 08", "unit 2 read discrete inputs 12049–12056 (0x0800, 8)"),
         ("11 05 00 AC FF 00", "unit 17 write coil 00173 on (0x00AC)"),
         ("01 06 03 EA 00 32", "unit 1 write register 41003 = 50 (0x03EA, 0x0032)"),
-        ("00 06 00 01 00 03", "broadcast write register 40002 = 3 (0x0001, 0x0003)"),
         ("11 07", "unit 17 read exception status"),
         ("11 08 00 00 A5 37", "unit 17 diagnostics return query data (loopback), data A5 37"),
         ("11 0B", "unit 17 get comm event counter"),
@@ -91,12 +90,24 @@ fn answers_are_told_with_the_addresses_of_their_request() {
 }
 
 #[test]
+fn unit_0_is_a_broadcast_on_a_serial_line_only() {
+    let message = [0, 6, 0, 1, 0, 3];
+    let rtu = explain(&with_crc(&message), None, None, None);
+    assert_eq!(rtu.summary, "broadcast write register 40002 = 3 (0x0001, 0x0003)");
+    assert!(rtu.fields[0].words.contains("none answers"));
+    assert!(explain(&with_mbap(1, &message), None, None, None).fields[3].words.contains("the device itself"));
+}
+
+#[test]
 fn what_may_be_two_things_says_so() {
     let told = check("01 06 03 EA 00 32", "", "unit 1 write register 41003 = 50 (0x03EA, 0x0032)");
     assert_eq!((told.direction, told.also.as_deref()), (None, Some("its answer, which repeats the request")));
     // Eight bytes that begin 01 01 03: a request from 00769, or 24 coils.
     let told = check("01 01 03 00 00 05", "", "unit 1 read coils 00769–00773 (0x0300, 5)");
     assert_eq!(told.also.as_deref(), Some("an answer: 24 bits: 0000 0000 0000 0000 1010 0000"));
+    // A request for 27397 coils would be refused: this is an answer.
+    let told = check("01 01 03 CD 6B 05", "", "24 bits: 1011 0011 1101 0110 1010 0000");
+    assert!(told.also.unwrap().starts_with("a request: unit 1 read coils"));
     let told = check("01 03 03 EA 00 01", "", "unit 1 read holding registers 41003 (0x03EA, 1)");
     assert_eq!(told.also, None);
 }
@@ -109,7 +120,7 @@ fn broken_frames_say_what_is_wrong_and_what_it_should_be() {
     assert_eq!(verdict(b":010303EA00010E"), "CR LF missing at the end");
     assert_eq!(verdict(b":01G303EA00010E\r\n"), "`G` at character 4 is no hex digit");
     assert_eq!(verdict(&[1, 3, 3, 0xEA, 0]), "cut short: 1 byte of count missing");
-    assert_eq!(verdict(&[1, 3, 4, 0, 1, 0]), "cut short: 1 byte of register 2 missing");
+    assert_eq!(verdict(&[1, 3, 4, 0, 1]), "cut short: 2 bytes of register 2 missing");
     assert_eq!(verdict(&[1, 6, 0, 1, 0, 1, 9]), "1 byte too many");
     assert_eq!(verdict(&[]), "cut short: 1 byte of unit missing");
     let tcp = |bytes: &[u8]| explain(bytes, Some(Framing::Mbap), None, None).verdict;

@@ -39,7 +39,7 @@ pub fn table(function: u8) -> Table {
 }
 
 /// Name of a sub-function of diagnostics 08 (V1.1b3, 6.8.1).
-pub(super) fn diagnostic(code: u16) -> &'static str {
+pub fn diagnostic(code: u16) -> &'static str {
     match code {
         0x00 => "return query data (loopback)",
         0x01 => "restart communications option",
@@ -76,7 +76,7 @@ pub fn object(id: u8) -> &'static str {
 }
 
 /// Name of a read device identification code.
-pub(super) fn identification(code: u8) -> &'static str {
+pub fn identification(code: u8) -> &'static str {
     match code {
         1 => "basic identification",
         2 => "regular identification",
@@ -105,12 +105,12 @@ pub fn advice(code: u8) -> &'static str {
 }
 
 /// `41003`.
-pub(super) fn modicon(function: u8, address: u16) -> String {
+pub fn modicon(function: u8, address: u16) -> String {
     table(function).modicon(address)
 }
 
 /// `41003–41012`, or `41003` for one.
-pub(super) fn span(function: u8, address: u16, count: u16) -> String {
+pub fn span(function: u8, address: u16, count: u16) -> String {
     match count {
         0 | 1 => modicon(function, address),
         _ => format!("{}–{}", modicon(function, address), modicon(function, address.saturating_add(count - 1))),
@@ -118,6 +118,6 @@ pub(super) fn span(function: u8, address: u16, count: u16) -> String {
 }
 
 /// `41003 / 0x03EA, wire address 1002`.
-pub(super) fn place(function: u8, address: u16) -> String {
+pub fn place(function: u8, address: u16) -> String {
     format!("{} / 0x{address:04X}, wire address {address}", modicon(function, address))
 }
