@@ -7,7 +7,7 @@ use crate::plant::line::Framing;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Complaint {
     /// Not even unit and function.
-    #[error("{0} bytes, expected unit and function at least")]
+    #[error("{bytes}, expected unit and function at least", bytes = names::counted(*.0, "byte"))]
     TooShort(usize),
     /// Longer than 254 bytes of unit and PDU.
     #[error("{0} bytes of unit and PDU, at most 254 are allowed")]
@@ -180,7 +180,7 @@ mod tests {
             ],
         );
         says(&[1, 3, 0, 0], &["4 bytes of unit and PDU, function 3 / 0x03 has 6"]);
-        says(&[1], &["1 bytes, expected unit and function at least"]);
+        says(&[1], &["1 byte, expected unit and function at least"]);
         says(&[1, 0x83, 2], &["function 131 / 0x83 is an exception, no request"]);
         says(&[1, 0x41, 2], &["function 65 / 0x41 is not in the standard"]);
         assert_eq!(check_request(&[0, 3, 0, 0, 0, 1], Framing::Mbap), []);

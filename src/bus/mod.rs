@@ -7,6 +7,8 @@ pub mod names;
 pub mod complaint;
 pub mod explain;
 pub mod typed;
+pub mod filter;
+pub mod capture;
 pub mod codec;
 pub mod plan;
 pub mod backoff;

@@ -121,3 +121,8 @@ pub fn span(function: u8, address: u16, count: u16) -> String {
 pub fn place(function: u8, address: u16) -> String {
     format!("{} / 0x{address:04X}, wire address {address}", modicon(function, address))
 }
+
+/// `1 byte`, `2 bytes`.
+pub fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}

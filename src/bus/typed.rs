@@ -116,7 +116,7 @@ fn ascii_frame(digits: &str, skipped: usize) -> Result<Vec<u8>, TypedError> {
         }
         bytes.push(letter as u8);
     }
-    if bytes.len() % 2 == 0 {
+    if bytes.len().is_multiple_of(2) {
         return Err(TypedError::OddDigits { position: skipped + 2, found: digits.trim().to_owned() });
     }
     bytes.extend(b"\r\n");

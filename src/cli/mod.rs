@@ -2,6 +2,7 @@
 
 mod check;
 mod demo;
+mod frame;
 mod log;
 mod paths;
 mod profiles;
@@ -23,7 +24,7 @@ const EXIT_CODES: &str = "\
 Exit codes:
   0  done, or left by the operator
   1  failed while running (the message says why)
-  2  wrong arguments, or errors in a profile
+  2  wrong arguments, errors in a profile, or bytes that cannot be read
   3  the history is in use by another process";
 
 /// The control room of a small plant in a terminal: process mimic, trends, alarms, controllers and shift reports over
@@ -54,6 +55,8 @@ enum Command {
     Profiles(profiles::Args),
     /// Writes the report of a shift or period from the history as CSV, while no station has the history open
     Report(report::Args),
+    /// Tells a Modbus frame in words: every byte, CRC and LRC, what is wrong with it
+    Frame(frame::Args),
 }
 
 /// What every command that starts a station takes.
@@ -110,6 +113,7 @@ pub fn main() -> ExitCode {
         Some(Command::Check(args)) => check::main(args),
         Some(Command::Profiles(args)) => profiles::main(args),
         Some(Command::Report(args)) => report::main(args),
+        Some(Command::Frame(args)) => frame::main(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

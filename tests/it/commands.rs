@@ -13,7 +13,7 @@ fn run(args: &[&str]) -> (Option<i32>, String, String) {
 fn help_names_every_command_and_the_exit_codes() {
     let (code, out, _) = run(&["--help"]);
     assert_eq!(code, Some(0));
-    for word in ["demo", "run", "sim", "check", "profiles", "report", "Exit codes:"] {
+    for word in ["demo", "run", "sim", "check", "profiles", "report", "frame", "Exit codes:"] {
         assert!(out.contains(word), "no `{word}` in:\n{out}");
     }
     let (code, out, _) = run(&["--version"]);
@@ -72,6 +72,40 @@ fn shipped_profiles_are_in_the_binary() {
     assert!(out.contains("FUJI") && out.parse::<toml::Table>().is_ok(), "{out}");
     let (code, _, err) = run(&["profiles", "fuji_prx"]);
     assert!(code == Some(2) && err.contains("fuji_pxr"), "{err}");
+}
+
+#[test]
+fn a_frame_is_told_in_words() {
+    let (code, out, err) = run(&["frame", "01", "03", "03", "EA", "00", "01", "A5", "BA"]);
+    assert_eq!(code, Some(0), "{err}");
+    for word in
+        ["RTU request: unit 1 read holding registers 41003 (0x03EA, 1)", "3 / 0x03", "wire address 1002", "right"]
+    {
+        assert!(out.contains(word), "no `{word}` in:\n{out}");
+    }
+    let (code, _, err) = run(&["frame", "01 0G"]);
+    assert!(code == Some(2) && err.contains("position 5: `G` is no hex digit"), "{err}");
+}
+
+/// Two good lines and a bad one between them: all are told, and scripts see that one was bad.
+#[test]
+fn frames_of_a_log_come_from_standard_input() {
+    let log = "TX 01 03 03 EA 00 02 E5 BB\nhello\nRX 01 03 04 00 C8 FF FE BB BD\n";
+    let mut child = sightglass()
+        .arg("frame")
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::io::Write::write_all(&mut child.stdin.take().unwrap(), log.as_bytes()).unwrap();
+    let Output { status, stdout, stderr } = child.wait_with_output().unwrap();
+    let (out, err) = (String::from_utf8(stdout).unwrap(), String::from_utf8(stderr).unwrap());
+    assert_eq!(status.code(), Some(2), "{out}{err}");
+    assert!(err.contains("line 2: position 1: `h` is no hex digit") && err.contains("1 of 3 lines"), "{err}");
+    // The answer has the addresses of the request before it.
+    assert!(out.contains("41004 / 0x03EB") && out.contains("65534 or -2"), "{out}");
+    assert!(out.lines().all(|line| line.chars().count() <= 80), "{out}");
 }
 
 #[test]

@@ -6,12 +6,14 @@
 //! | `commands` | the program as scripts see it: help, exit codes, messages, the headless demo and its report |
 //! | `terminal` | the program as a person sees it, in a pseudo-terminal: starts, keys, leaves the terminal as it was |
 //! | `peers` | against programs that we did not write: pymodbus, mbpoll, over a pseudo-terminal pair and TCP |
+//! | `capture` | saved traffic, opened by Wireshark's own reader |
 //! | `shift` | a whole shift in virtual time, and its report read by an independent reader |
 //! | `durability` | killed, unplugged, locked, damaged |
 //! | `support` | what the others share: processes with deadlines, peers and their installation |
 #![allow(missing_docs, clippy::unwrap_used)]
 
 mod architecture;
+mod capture;
 mod commands;
 mod durability;
 mod peers;

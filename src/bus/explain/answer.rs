@@ -4,7 +4,10 @@ use super::{
     reader::{Reader, bit_words, hex_words, text},
     request,
 };
-use crate::{bus::names, plant::event::ExceptionCode};
+use crate::{
+    bus::names::{self, counted},
+    plant::event::ExceptionCode,
+};
 
 /// Reads the data of an answer behind its function. Gives the summary, without the unit; `None` if it is cut short.
 /// `asked` is the request message, if it is known to be of the same function.
@@ -43,21 +46,20 @@ fn exception(reader: &mut Reader) -> Option<String> {
 fn bits(reader: &mut Reader, function: u8, start: Option<u16>, count: Option<u16>) -> Option<String> {
     let bytes = match count.map(|count| usize::from(count).div_ceil(8)) {
         Some(expected) => request::byte_count(reader, expected)?,
-        None => usize::from(reader.byte("byte count", |count| format!("{count} bytes follow"))?),
+        None => usize::from(reader.byte("byte count", request::follow)?),
     };
     let count = count.map_or(8 * bytes, |count| usize::from(count).min(8 * bytes));
     let bits = reader.bits(function, start, count)?;
-    Some(format!("{count} {}: {}", if count == 1 { "bit" } else { "bits" }, bit_words(&bits)))
+    Some(format!("{}: {}", counted(count, "bit"), bit_words(&bits)))
 }
 
 fn registers(reader: &mut Reader, function: u8, start: Option<u16>) -> Option<String> {
-    let bytes = usize::from(reader.byte("byte count", |count| format!("{count} bytes follow"))?);
+    let bytes = usize::from(reader.byte("byte count", request::follow)?);
     if bytes % 2 == 1 {
         reader.wrong(format!("byte count {bytes} is odd, registers have two bytes"));
     }
     let values = reader.registers(function, start, bytes / 2)?;
-    let count = values.len();
-    Some(format!("{count} {}: {}", if count == 1 { "register" } else { "registers" }, hex_words(&values)))
+    Some(format!("{}: {}", counted(values.len(), "register"), hex_words(&values)))
 }
 
 fn status(reader: &mut Reader) -> Option<String> {
@@ -74,14 +76,14 @@ fn counters(reader: &mut Reader) -> Option<(&'static str, u16)> {
         _ => "unknown status",
     };
     let status = reader.word("status", |status| words(status).to_owned())?;
-    let events = reader.word("event count", |count| format!("{count} messages done"))?;
+    let events = reader.word("event count", |count| format!("{} done", counted(count.into(), "message")))?;
     Some((words(status), events))
 }
 
 fn event_log(reader: &mut Reader) -> Option<String> {
-    let bytes = usize::from(reader.byte("byte count", |count| format!("{count} bytes follow"))?);
+    let bytes = usize::from(reader.byte("byte count", request::follow)?);
     let (status, events) = counters(reader)?;
-    let messages = reader.word("message count", |count| format!("{count} messages seen"))?;
+    let messages = reader.word("message count", |count| format!("{} seen", counted(count.into(), "message")))?;
     if bytes < 6 {
         reader.wrong(format!("byte count says {bytes}, expected 6 or more"));
     }
@@ -90,17 +92,17 @@ fn event_log(reader: &mut Reader) -> Option<String> {
 }
 
 fn server_id(reader: &mut Reader) -> Option<String> {
-    let bytes = usize::from(reader.byte("byte count", |count| format!("{count} bytes follow"))?);
+    let bytes = usize::from(reader.byte("byte count", request::follow)?);
     let id = reader.bytes("id and run", bytes, |bytes| format!("{}, run state FF on, 00 off", text(bytes)))?;
     Some(format!("server id {}", text(id)))
 }
 
 fn file_records(reader: &mut Reader) -> Option<String> {
-    let bytes = usize::from(reader.byte("byte count", |count| format!("{count} bytes follow"))?);
+    let bytes = usize::from(reader.byte("byte count", request::follow)?);
     let end = reader.at + bytes;
     let mut groups = Vec::new();
     while reader.at < end {
-        let length = usize::from(reader.byte("group length", |count| format!("{count} bytes follow"))?);
+        let length = usize::from(reader.byte("group length", request::follow)?);
         let kind = reader.byte("reference", |kind| if kind == 6 { "file record" } else { "must be 06" }.into())?;
         if kind != 6 {
             reader.wrong(format!("reference type {kind:02X}, expected 06"));
@@ -117,7 +119,7 @@ fn file_echo(reader: &mut Reader) -> Option<String> {
 
 fn fifo(reader: &mut Reader) -> Option<String> {
     let bytes = reader.word("byte count", |count| format!("{count} bytes follow"))?;
-    let count = reader.word("FIFO count", |count| format!("{count} registers queued"))?;
+    let count = reader.word("FIFO count", |count| format!("{} queued", counted(count.into(), "register")))?;
     if u32::from(bytes) != 2 + 2 * u32::from(count) {
         reader.wrong(format!("byte count says {bytes}, {} fit", 2 + 2 * u32::from(count)));
     }
@@ -141,11 +143,11 @@ fn identification(reader: &mut Reader) -> Option<String> {
         0 => "none".into(),
         _ => format!("ask on from {id} {}", names::object(id)),
     })?;
-    let count = reader.byte("objects", |count| format!("{count} objects"))?;
+    let count = reader.byte("objects", |count| counted(count.into(), "object"))?;
     let mut objects = Vec::new();
     for _ in 0..count {
         let id = reader.byte("object", |id| format!("{id} {}", names::object(id)))?;
-        let length = usize::from(reader.byte("length", |length| format!("{length} bytes"))?);
+        let length = usize::from(reader.byte("length", |length| counted(length.into(), "byte"))?);
         let value = reader.bytes(names::object(id), length, text)?;
         objects.push(format!("{} {}", names::object(id), text(value)));
     }

@@ -5,6 +5,7 @@ use crate::{
     bus::{
         ascii,
         frame::{self, Mbap, hex},
+        names::counted,
     },
     plant::line::Framing,
 };
@@ -24,9 +25,11 @@ pub(super) struct Envelope {
     pub fault: Option<String>,
 }
 
-/// The framing of bytes that nobody has named: `:` is ASCII, a header whose length fits is TCP, a CRC that fits is RTU.
+/// The framing of bytes that nobody has named: `:` and text is ASCII, a header whose length fits is TCP, a CRC that fits is RTU.
 pub fn recognise(bytes: &[u8]) -> Option<Framing> {
-    if bytes.starts_with(b":") {
+    // Unit 58 of a binary frame is a `:` too, but what follows it is no text.
+    let text = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
+    if bytes.starts_with(b":") && bytes.iter().all(text) {
         Some(Framing::Ascii)
     } else if matches!(frame::mbap(bytes), Mbap::Whole { end, .. } if end == bytes.len()) {
         Some(Framing::Mbap)
@@ -61,10 +64,11 @@ fn bare(bytes: &[u8]) -> Envelope {
 fn rtu(bytes: &[u8]) -> Envelope {
     let framing = Some(Framing::Rtu);
     let Some((message, check)) = bytes.split_last_chunk::<2>().filter(|(message, _)| !message.is_empty()) else {
-        return Envelope { framing, fault: Some(too_short(bytes.len(), 4, "bytes")), ..bare(bytes) };
+        return Envelope { framing, fault: Some(too_short(bytes.len(), 4)), ..bare(bytes) };
     };
-    let fault = frame::without_crc(bytes).err();
     let computed = frame::crc16(message).to_le_bytes();
+    // As the bytes stand on the wire, low byte first.
+    let fault = (*check != computed).then(|| format!("CRC error: got {}, computed {}", hex(check), hex(&computed)));
     let words = match fault {
         None => "right".to_owned(),
         Some(_) if computed == [check[1], check[0]] => {
@@ -73,7 +77,7 @@ fn rtu(bytes: &[u8]) -> Envelope {
         Some(_) => format!("wrong, computed {}", hex(&computed)),
     };
     let after = vec![Field { range: message.len()..bytes.len(), hex: hex(check), name: "CRC".into(), words }];
-    Envelope { framing, after, fault: fault.map(|fault| fault.to_string()), ..bare(message) }
+    Envelope { framing, after, fault, ..bare(message) }
 }
 
 fn in_ascii(bytes: &[u8]) -> Envelope {
@@ -126,7 +130,7 @@ fn in_ascii(bytes: &[u8]) -> Envelope {
 fn mbap(bytes: &[u8]) -> Envelope {
     let framing = Some(Framing::Mbap);
     if bytes.len() < 8 {
-        return Envelope { framing, fault: Some(too_short(bytes.len(), 8, "bytes")), ..bare(bytes) };
+        return Envelope { framing, fault: Some(too_short(bytes.len(), 8)), ..bare(bytes) };
     }
     let word = |at: usize| u16::from_be_bytes([bytes[at], bytes[at + 1]]);
     let field = |at: usize, name: &str, words: String| Field {
@@ -157,6 +161,6 @@ fn mbap(bytes: &[u8]) -> Envelope {
     Envelope { framing, before, offset: 6, fault, ..bare(&bytes[6..]) }
 }
 
-fn too_short(got: usize, least: usize, what: &str) -> String {
-    format!("too short for a frame: {got} {what}, the shortest has {least}")
+fn too_short(got: usize, least: usize) -> String {
+    format!("too short for a frame: {}, the shortest has {least}", counted(got, "byte"))
 }

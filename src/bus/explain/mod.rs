@@ -58,7 +58,7 @@ pub struct Explained {
     pub summary: String,
     /// `ok`, or the first thing that is wrong.
     pub verdict: String,
-    /// What else these bytes may be.
+    /// What else these bytes may be: the other reading, or why both are the same.
     pub also: Option<String>,
 }
 
@@ -96,6 +96,8 @@ pub fn explain(
         }
     }
     let (direction, reading, also) = read.choose(direction);
+    // Bytes without unit and function come from nobody.
+    let direction = direction.filter(|_| 2 <= envelope.message.len());
     let wrong = asked.filter(|_| direction != Some(Direction::Request)).and_then(|asked| {
         let fault = frame::check_answer(asked, &envelope.message).err()?;
         (!matches!(fault, crate::plant::event::Fault::Exception(_))).then(|| fault.to_string())
@@ -156,19 +158,25 @@ struct Reading {
 struct Readings {
     request: Reading,
     answer: Reading,
-    /// The answer to this function repeats the request.
-    echo: bool,
+    /// Why both readings are the same, if they are: the answer repeats the request, or nobody knows the function.
+    same: Option<&'static str>,
 }
 
 impl Readings {
     fn of(envelope: &Envelope, asked: Option<&[u8]>) -> Readings {
         let message = &envelope.message;
         let mbap = envelope.framing == Some(Framing::Mbap);
-        let echo = matches!(message.get(1), Some(0x05 | 0x06 | 0x08 | 0x15 | 0x16));
+        let same = match message.get(1) {
+            Some(0x05 | 0x06 | 0x08 | 0x15 | 0x16) => Some("the answer repeats the request: these bytes may be either"),
+            Some(0..=0x7F) if names::function(message[1]).is_none() => {
+                Some("the standard has no such function: request and answer cannot be told apart")
+            }
+            Some(_) | None => None,
+        };
         Readings {
             request: read(message, mbap, Direction::Request, None),
             answer: read(message, mbap, Direction::Answer, asked),
-            echo,
+            same,
         }
     }
 
@@ -182,11 +190,11 @@ impl Readings {
 
     /// The reading that fits best, and the other one in a line if it fits too.
     fn choose(self, told: Option<Direction>) -> (Option<Direction>, Reading, Option<String>) {
-        let Readings { request, answer, echo } = self;
+        let Readings { request, answer, same } = self;
         match (told, request.fits, answer.fits) {
             (Some(Direction::Request), ..) => (told, request, None),
             (Some(Direction::Answer), ..) => (told, answer, None),
-            (None, true, true) if echo => (None, request, Some("its answer, which repeats the request".into())),
+            (None, true, true) if same.is_some() => (None, request, same.map(str::to_owned)),
             (None, true, true) if !request.sound => {
                 let also = format!("a request: {}", request.summary);
                 (Some(Direction::Answer), answer, Some(also))
@@ -206,7 +214,7 @@ impl Readings {
 fn read(message: &[u8], mbap: bool, direction: Direction, asked: Option<&[u8]>) -> Reading {
     let mut reader = Reader::new(message);
     let summary = read_message(&mut reader, mbap, direction, asked);
-    let (fits, sense) = (reader.fits(), reader.at);
+    let (fits, sense) = (reader.fits(), reader.sense());
     let sound = complaint::check_request(message, Framing::Mbap).is_empty();
     reader.finish();
     let summary = summary.unwrap_or_else(|| match message {

@@ -13,16 +13,23 @@ pub(super) struct Reader<'a> {
     pub fields: Vec<Field>,
     /// The first thing that does not fit.
     pub trouble: Option<String>,
+    /// Bytes read before it was found.
+    sense: Option<usize>,
 }
 
 impl<'a> Reader<'a> {
     pub fn new(message: &'a [u8]) -> Reader<'a> {
-        Reader { message, at: 0, fields: Vec::new(), trouble: None }
+        Reader { message, at: 0, fields: Vec::new(), trouble: None, sense: None }
     }
 
     /// Everything was read, and nothing was wrong.
     pub fn fits(&self) -> bool {
         self.trouble.is_none() && self.at == self.message.len()
+    }
+
+    /// How many bytes made sense.
+    pub fn sense(&self) -> usize {
+        self.sense.unwrap_or(self.at)
     }
 
     /// Bytes not yet read.
@@ -94,6 +101,7 @@ impl<'a> Reader<'a> {
     /// Notes what does not fit; the first note stands.
     pub fn wrong(&mut self, words: String) {
         self.trouble.get_or_insert(words);
+        self.sense.get_or_insert(self.at);
     }
 
     /// Names what is left over.
@@ -103,7 +111,7 @@ impl<'a> Reader<'a> {
             return;
         }
         let words = if self.trouble.is_none() { "does not belong to this message" } else { "cannot be told" };
-        self.wrong(format!("{left} {} too many", if left == 1 { "byte" } else { "bytes" }));
+        self.wrong(format!("{} too many", names::counted(left, "byte")));
         self.name(self.at..self.message.len(), "rest".into(), words.into());
     }
 
@@ -111,10 +119,7 @@ impl<'a> Reader<'a> {
         let range = self.at..self.at + count;
         let Some(bytes) = self.message.get(range.clone()) else {
             let missing = count - self.left();
-            self.wrong(format!(
-                "cut short: {missing} {} of {name} missing",
-                if missing == 1 { "byte" } else { "bytes" }
-            ));
+            self.wrong(format!("cut short: {} of {name} missing", names::counted(missing, "byte")));
             return None;
         };
         self.at = range.end;

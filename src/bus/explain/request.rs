@@ -1,7 +1,7 @@
 //! Requests in words, function by function.
 
 use super::reader::{Reader, bit_words, hex_words, text};
-use crate::bus::names::{self, place, span};
+use crate::bus::names::{self, counted, place, span};
 
 /// Reads the data of a request behind its function. Gives the summary, without the unit; `None` if it is cut short.
 pub(super) fn read(reader: &mut Reader, function: u8) -> Option<String> {
@@ -29,6 +29,10 @@ pub(super) fn read(reader: &mut Reader, function: u8) -> Option<String> {
         }
         0x2B => identification(reader),
         0x07 | 0x0B | 0x0C | 0x11 => names::function(function).map(str::to_owned),
+        0x80.. => {
+            reader.wrong(format!("function {function} / 0x{function:02X} is an exception, no request"));
+            None
+        }
         _ => unknown(reader, function),
     }
 }
@@ -41,11 +45,8 @@ pub(super) fn range(function: u8, address: u16, count: u16) -> String {
 /// Address and count.
 pub(super) fn block(reader: &mut Reader, function: u8, prefix: &str, what: &str) -> Option<(u16, u16)> {
     let address = reader.word(&format!("{prefix}address"), |address| place(function, address))?;
-    let items = if names::table(function).is_bits() { "bits" } else { "registers" };
-    let count = reader.word(&format!("{prefix}count"), |count| match count {
-        1 => format!("1 {} {what}", items.trim_end_matches('s')),
-        _ => format!("{count} {items} {what}"),
-    })?;
+    let item = if names::table(function).is_bits() { "bit" } else { "register" };
+    let count = reader.word(&format!("{prefix}count"), |count| format!("{} {what}", counted(count.into(), item)))?;
     Some((address, count))
 }
 
@@ -81,9 +82,17 @@ fn write_coils(reader: &mut Reader) -> Option<String> {
     Some(format!("write coils {}: {}", range(0x0F, address, count), bit_words(&bits)))
 }
 
+/// Words of a byte count.
+pub(super) fn follow(count: u8) -> String {
+    match count {
+        1 => "1 byte follows".into(),
+        _ => format!("{count} bytes follow"),
+    }
+}
+
 /// The byte count, which must be this.
 pub(super) fn byte_count(reader: &mut Reader, expected: usize) -> Option<usize> {
-    let count = usize::from(reader.byte("byte count", |count| format!("{count} bytes follow"))?);
+    let count = usize::from(reader.byte("byte count", follow)?);
     if count != expected {
         reader.wrong(format!("byte count says {count}, {expected} fit"));
     }
@@ -100,7 +109,7 @@ pub(super) fn diagnostics(reader: &mut Reader, data: &str) -> Option<String> {
     let code = reader.word("sub-function", |code| format!("{code} / 0x{code:04X} {}", names::diagnostic(code)))?;
     let words = |bytes: &[u8]| match bytes {
         [high, low] => format!("{}", u16::from_be_bytes([*high, *low])),
-        [..] => format!("{} bytes", bytes.len()),
+        [..] => counted(bytes.len(), "byte"),
     };
     let count = reader.left().max(2);
     let bytes = reader.bytes(data, count, words)?;
@@ -124,7 +133,7 @@ fn read_write(reader: &mut Reader) -> Option<String> {
 }
 
 fn files(reader: &mut Reader, function: u8) -> Option<String> {
-    let bytes = usize::from(reader.byte("byte count", |count| format!("{count} bytes follow"))?);
+    let bytes = usize::from(reader.byte("byte count", follow)?);
     let end = reader.at + bytes;
     let mut groups = Vec::new();
     while reader.at < end {
@@ -141,10 +150,10 @@ pub(super) fn file_group(reader: &mut Reader, with_data: bool) -> Option<String>
     }
     let file = reader.word("file", |file| format!("file {file}"))?;
     let record = reader.word("record", |record| format!("from record {record}"))?;
-    let length = reader.word("length", |length| format!("{length} registers"))?;
+    let length = reader.word("length", |length| counted(length.into(), "register"))?;
     let data = if with_data { reader.registers(0x03, None, usize::from(length))? } else { Vec::new() };
     let data = if data.is_empty() { String::new() } else { format!(": {}", hex_words(&data)) };
-    Some(format!("file {file} record {record}, {length} registers{data}"))
+    Some(format!("file {file} record {record}, {}{data}", counted(length.into(), "register")))
 }
 
 fn identification(reader: &mut Reader) -> Option<String> {
@@ -171,7 +180,7 @@ pub(super) fn mei(reader: &mut Reader) -> Option<u8> {
 /// A function that is not in the standard: its bytes as they are.
 pub(super) fn unknown(reader: &mut Reader, function: u8) -> Option<String> {
     let left = reader.left();
-    let bytes = reader.bytes("data", left, |bytes| format!("{} bytes", bytes.len()))?;
+    let bytes = reader.bytes("data", left, |bytes| counted(bytes.len(), "byte"))?;
     Some(
         format!("function {function} / 0x{function:02X}: {}", crate::bus::frame::hex(bytes))
             .trim_end_matches(": ")

@@ -47,7 +47,7 @@ fn requests_are_told_with_both_forms_of_the_address() {
         ("11 10 00 01 00 02 04 00 0A 01 02", "unit 17 write registers 40002–40003 (0x0001, 2): 000A 0102"),
         ("11 11", "unit 17 report server id"),
         ("11 14 07 06 00 04 00 01 00 02", "unit 17 read file record file 4 record 1, 2 registers"),
-        ("11 15 09 06 00 04 00 07 00 01 06 AF", "unit 17 write file record file 4 record 7, 1 registers: 06AF"),
+        ("11 15 09 06 00 04 00 07 00 01 06 AF", "unit 17 write file record file 4 record 7, 1 register: 06AF"),
         ("11 16 00 04 00 F2 00 25", "unit 17 mask write 40005 and 00F2 or 0025 (0x0004)"),
         (
             "11 17 00 03 00 06 00 0E 00 01 02 00 FF",
@@ -67,6 +67,7 @@ fn answers_are_told_with_the_addresses_of_their_request() {
     for (message, asked, summary) in [
         ("01 03 04 00 C8 FF FE", "01 03 03 EA 00 02", "2 registers: 00C8 FFFE"),
         ("11 01 05 CD 6B B2 0E 1B", "11 01 00 13 00 25", "37 bits: 1011 0011 1101 0110 0100 1101 0111 0000 1101 1"),
+        ("0A 81 02", "", "exception 02 illegal data address"),
         ("01 83 02", "01 03 03 EA 00 02", "exception 02 illegal data address"),
         ("11 05 00 AC FF 00", "11 05 00 AC FF 00", "written: coil 00173 on"),
         ("01 06 03 EA 00 32", "01 06 03 EA 00 32", "written: 41003 = 50"),
@@ -99,9 +100,18 @@ fn unit_0_is_a_broadcast_on_a_serial_line_only() {
 }
 
 #[test]
+fn unit_58_is_not_taken_for_the_colon_of_ascii() {
+    check("3A 03 00 00 00 01", "", "unit 58 read holding registers 40001 (0x0000, 1)");
+    check("3A 2B 0E 01 00", "", "unit 58 read device identification, basic identification from VendorName");
+}
+
+#[test]
 fn what_may_be_two_things_says_so() {
     let told = check("01 06 03 EA 00 32", "", "unit 1 write register 41003 = 50 (0x03EA, 0x0032)");
-    assert_eq!((told.direction, told.also.as_deref()), (None, Some("its answer, which repeats the request")));
+    assert_eq!(
+        (told.direction, told.also.as_deref()),
+        (None, Some("the answer repeats the request: these bytes may be either"))
+    );
     // Eight bytes that begin 01 01 03: a request from 00769, or 24 coils.
     let told = check("01 01 03 00 00 05", "", "unit 1 read coils 00769–00773 (0x0300, 5)");
     assert_eq!(told.also.as_deref(), Some("an answer: 24 bits: 0000 0000 0000 0000 1010 0000"));
@@ -115,7 +125,7 @@ fn what_may_be_two_things_says_so() {
 #[test]
 fn broken_frames_say_what_is_wrong_and_what_it_should_be() {
     let verdict = |bytes: &[u8]| explain(bytes, None, None, None).verdict;
-    assert_eq!(verdict(&[1, 3, 3, 0xEA, 0, 1, 0xA5, 0xBB]), "CRC error: got BBA5, computed BAA5");
+    assert_eq!(verdict(&[1, 3, 3, 0xEA, 0, 1, 0xA5, 0xBB]), "CRC error: got A5 BB, computed A5 BA");
     assert_eq!(verdict(b":010303EA00010F\r\n"), "LRC error: got 0F, computed 0E");
     assert_eq!(verdict(b":010303EA00010E"), "CR LF missing at the end");
     assert_eq!(verdict(b":01G303EA00010E\r\n"), "`G` at character 4 is no hex digit");

@@ -1,0 +1,190 @@
+//! `sightglass frame`: bytes in words.
+
+use std::io::{BufRead, IsTerminal};
+
+use crate::{
+    bus::{
+        ascii,
+        complaint::check_request,
+        explain::{self, Direction, Explained},
+        frame::{crc16, hex},
+        typed::{self, Typed},
+    },
+    plant::line::Framing,
+};
+
+use super::{CliError, say, say_error};
+
+/// Arguments of `frame`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Bytes in hex (`01 03 00 00 00 01`, `0x01,0x03…`), an ASCII frame (`:0103…`) or lines of a log (`TX 01 03 …`);
+    /// none or `-`: lines from standard input
+    #[arg(value_name = "BYTES", allow_hyphen_values = true)]
+    bytes: Vec<String>,
+    /// The bytes are an RTU frame, with CRC
+    #[arg(long, group = "framing")]
+    rtu: bool,
+    /// The bytes are the characters of an ASCII frame, from `:` to CR LF
+    #[arg(long, group = "framing")]
+    ascii: bool,
+    /// The bytes are a Modbus TCP frame, with its header
+    #[arg(long, group = "framing")]
+    tcp: bool,
+}
+
+/// Columns of the table.
+const WIDTH: usize = 80;
+/// Most bytes on one row.
+const BYTES: usize = 8;
+
+/// Tells every frame; a line that cannot be read is told on standard error, and the others all the same.
+pub fn main(args: Args) -> Result<(), CliError> {
+    let framing = match (args.rtu, args.ascii, args.tcp) {
+        (true, ..) => Some(Framing::Rtu),
+        (_, true, _) => Some(Framing::Ascii),
+        (.., true) => Some(Framing::Mbap),
+        (false, false, false) => None,
+    };
+    if !args.bytes.is_empty() && args.bytes != ["-"] {
+        let typed = typed::parse(&args.bytes.join(" "), framing).map_err(|error| CliError::Usage(error.to_string()))?;
+        tell(&typed, framing, None).iter().for_each(|line| say(line));
+        return Ok(());
+    }
+    if std::io::stdin().is_terminal() {
+        say_error("one frame a line, Ctrl-D ends");
+    }
+    lines(std::io::stdin().lock(), framing)
+}
+
+/// Tells frames as their lines come. An answer behind its request gets its addresses.
+fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> {
+    let (mut frames, mut spoiled) = (0, 0);
+    let mut asked: Option<Explained> = None;
+    for (index, line) in input.split(b'\n').enumerate() {
+        let line = line.map_err(|error| CliError::Io { what: "cannot read standard input".into(), error })?;
+        let line = String::from_utf8_lossy(&line);
+        if line.trim().is_empty() {
+            continue;
+        }
+        let typed = match typed::parse(&line, framing) {
+            Ok(typed) => typed,
+            Err(error) => {
+                say_error(&format!("line {}: {error}", index + 1));
+                spoiled += 1;
+                continue;
+            }
+        };
+        if 0 < frames {
+            say("");
+        }
+        frames += 1;
+        tell(&typed, framing, asked.as_ref()).iter().for_each(|line| say(line));
+        let told = explained(&typed, framing, None);
+        asked = (told.direction != Some(Direction::Answer)).then_some(told);
+    }
+    match (frames, spoiled) {
+        (0, 0) => Err(CliError::Usage(typed::TypedError::Empty.to_string())),
+        (_, 0) => Ok(()),
+        _ => Err(CliError::Usage(format!("{spoiled} of {} lines cannot be read", frames + spoiled))),
+    }
+}
+
+fn explained(typed: &Typed, framing: Option<Framing>, asked: Option<&Explained>) -> Explained {
+    let direction = typed.sent.map(|sent| if sent { Direction::Request } else { Direction::Answer });
+    // Only what may be an answer to the request before it is read as one.
+    let plain = explain::explain(&typed.bytes, typed.framing.or(framing), direction, None);
+    let matching = asked.filter(|asked| {
+        let same =
+            |at: usize, mask: u8| plain.message.get(at).map(|byte| byte & mask) == asked.message.get(at).copied();
+        direction != Some(Direction::Request) && same(0, 0xFF) && same(1, 0x7F)
+    });
+    match matching {
+        Some(asked) if plain.direction != Some(Direction::Request) => {
+            explain::explain(&typed.bytes, typed.framing.or(framing), Some(Direction::Answer), Some(&asked.message))
+        }
+        Some(_) | None => plain,
+    }
+}
+
+/// The lines about one frame: what it is, every byte, the checks, what is wrong with it.
+fn tell(typed: &Typed, framing: Option<Framing>, asked: Option<&Explained>) -> Vec<String> {
+    let told = explained(typed, framing, asked);
+    let direction = match told.direction {
+        Some(Direction::Request) => "request",
+        Some(Direction::Answer) => "answer",
+        None if told.also.is_some() => "request or answer",
+        None => "bytes",
+    };
+    let kind = match told.framing {
+        Some(Framing::Rtu) => format!("RTU {direction}"),
+        Some(Framing::Ascii) => format!("ASCII {direction}"),
+        Some(Framing::Mbap) => format!("TCP {direction}"),
+        None => format!("{direction} without CRC or header"),
+    };
+    let mut lines = wrap(&format!("{kind}: {}", told.summary), WIDTH, 2);
+    lines.extend(table(&told));
+    lines.extend(checks(&told));
+    if told.verdict != "ok" {
+        lines.extend(wrap(&format!("wrong: {}", told.verdict), WIDTH, 2));
+    }
+    if let Some(also) = &told.also {
+        let words = if told.direction.is_none() { also.clone() } else { format!("may also be {also}") };
+        lines.extend(wrap(&words, WIDTH, 2));
+    }
+    if told.direction != Some(Direction::Answer) && told.verdict == "ok" {
+        for complaint in check_request(&told.message, told.framing.unwrap_or(Framing::Rtu)) {
+            lines.extend(wrap(&format!("must not be sent: {complaint}"), WIDTH, 2));
+        }
+    }
+    lines
+}
+
+/// Both checks of the message, as they would be sent.
+fn checks(told: &Explained) -> Option<String> {
+    let message = &told.message;
+    (2 <= message.len())
+        .then(|| format!("CRC {}   LRC {:02X}", hex(&crc16(message).to_le_bytes()), ascii::lrc(message)))
+}
+
+/// Offset counted from 0, bytes, field, meaning.
+fn table(told: &Explained) -> Vec<String> {
+    let hex_rows = |hex: &str| -> Vec<String> {
+        let bytes: Vec<&str> = hex.split(' ').collect();
+        bytes.chunks(BYTES).map(|row| row.join(" ")).collect()
+    };
+    let widest = |lengths: &mut dyn Iterator<Item = usize>, least: usize| lengths.max().unwrap_or(0).max(least);
+    let hex_width = widest(&mut told.fields.iter().map(|field| field.hex.len().min(3 * BYTES - 1)), 5);
+    let name_width = widest(&mut told.fields.iter().map(|field| field.name.chars().count()), 5);
+    let words_width = WIDTH.saturating_sub(2 + 4 + 2 + hex_width + 2 + name_width + 2).max(20);
+    let row = |at: &str, hex: &str, name: &str, words: &str| {
+        format!("  {at:>4}  {hex:hex_width$}  {name:name_width$}  {words}").trim_end().to_owned()
+    };
+    let mut lines = vec![row("at", "bytes", "field", "meaning")];
+    for field in &told.fields {
+        let (hex, words) = (hex_rows(&field.hex), wrap(&field.words, words_width, 0));
+        for index in 0..hex.len().max(words.len()) {
+            let part = |rows: &[String]| rows.get(index).cloned().unwrap_or_default();
+            let at = if index == 0 { field.range.start.to_string() } else { String::new() };
+            let name = if index == 0 { field.name.as_str() } else { "" };
+            lines.push(row(&at, &part(&hex), name, &part(&words)));
+        }
+    }
+    lines
+}
+
+/// Cuts a text between words; lines behind the first are indented.
+fn wrap(text: &str, width: usize, indent: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    let mut line = String::new();
+    for word in text.split(' ') {
+        if !line.trim().is_empty() && width < line.chars().count() + 1 + word.chars().count() {
+            lines.push(std::mem::replace(&mut line, " ".repeat(indent)));
+        } else if !line.is_empty() {
+            line.push(' ');
+        }
+        line.push_str(word);
+    }
+    lines.push(line);
+    lines
+}
