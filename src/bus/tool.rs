@@ -4,6 +4,7 @@ use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
+use super::names;
 use crate::plant::{
     command::OrderId,
     def::Serial,
@@ -299,24 +300,20 @@ fn loopback_words(findings: &[Finding], sent: u32) -> String {
         .collect();
     let ms = |span: Option<&Duration>| span.map_or(0.0, |span| span.as_secs_f64() * 1e3);
     let (least, most) = (ms(replies.iter().min()), ms(replies.iter().max()));
+    let refused = findings.iter().any(|finding| matches!(finding, Finding::Failed { fault: Fault::Exception(_), .. }));
     match replies.len() {
+        0 if refused => "the unit answers, but does not have loopbacks: line and unit work".to_owned(),
         0 => format!("none of {sent} came back"),
         back => format!("{back} of {sent} came back, {least:.1} to {most:.1} ms"),
     }
 }
 
-/// Name of a device identification object (V1.1b3, 6.21).
-pub fn object_name(id: u8) -> String {
-    let known = [
-        "VendorName",
-        "ProductCode",
-        "MajorMinorRevision",
-        "VendorUrl",
-        "ProductName",
-        "ModelName",
-        "UserApplicationName",
-    ];
-    known.get(usize::from(id)).map_or_else(|| format!("object {id} / 0x{id:02X}"), |name| (*name).to_owned())
+/// The name of an identification object; those without one by number.
+fn object_name(id: u8) -> String {
+    match id {
+        0..=6 => names::object(id).to_owned(),
+        7.. => format!("{} {id} / 0x{id:02X}", names::object(id)),
+    }
 }
 
 /// Text of a device: what cannot be printed is shown as hexadecimal digits.
@@ -405,6 +402,9 @@ mod tests {
         assert_eq!(verdict(&all), "3 of 3 came back, 12.0 to 12.0 ms");
         let none = run(tool, |_| Err(Fault::Timeout));
         assert_eq!(verdict(&none), "none of 3 came back");
+        let tool = Tool::Loopback { unit: 1, data: 0, count: 3 };
+        let without = run(tool, |_| Err(Fault::Exception(ExceptionCode(1))));
+        assert!(verdict(&without).starts_with("the unit answers"), "{}", verdict(&without));
     }
 
     #[test]

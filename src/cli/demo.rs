@@ -50,7 +50,8 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let scratch = Scratch::new(&args.station)?;
     runtime()?.block_on(async {
         let clock = Clock::starting_at(Timestamp::now(), args.speed);
-        let simulated = sim::io::start_pty(&def, clock).map_err(|error| simulation_error(&args.plant, error))?;
+        let simulated = sim::io::start_pty(&def, clock, sim::io::Mode::of(&def), sim::io::serial_of(&def))
+            .map_err(|error| simulation_error(&args.plant, error))?;
         plug_into(&mut def, simulated.path());
         let def = Arc::new(def);
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();

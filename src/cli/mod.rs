@@ -9,6 +9,7 @@ mod profiles;
 mod report;
 mod run;
 mod sim;
+mod tools;
 
 use std::{
     io::IsTerminal,
@@ -57,6 +58,14 @@ enum Command {
     Report(report::Args),
     /// Tells a Modbus frame in words: every byte, CRC and LRC, what is wrong with it
     Frame(frame::Args),
+    /// Looks for units on a line: addresses, baud rates, parities
+    Scan(tools::scan::Args),
+    /// Asks one unit who it is, or reads some of its registers
+    Probe(tools::probe::Args),
+    /// Tests a line: does a unit send back what it is sent
+    Loopback(tools::loopback::Args),
+    /// Sends bytes to a line and shows everything that comes back
+    Raw(tools::raw::Args),
 }
 
 /// What every command that starts a station takes.
@@ -86,6 +95,8 @@ enum CliError {
     InUse(HistoryError),
     #[error(transparent)]
     Ui(#[from] ui::io::UiError),
+    #[error("{0}")]
+    Failed(String),
     #[error("the station has ended by itself, see the log")]
     StationGone,
     #[error("{what}: {error}")]
@@ -97,7 +108,11 @@ impl CliError {
         match self {
             CliError::Profile(_) | CliError::Usage(_) | CliError::History(HistoryError::Foreign { .. }) => 2,
             CliError::History(HistoryError::Locked { .. }) | CliError::InUse(_) => 3,
-            CliError::History(_) | CliError::Ui(_) | CliError::StationGone | CliError::Io { .. } => 1,
+            CliError::History(_)
+            | CliError::Ui(_)
+            | CliError::StationGone
+            | CliError::Failed(_)
+            | CliError::Io { .. } => 1,
         }
     }
 }
@@ -114,6 +129,10 @@ pub fn main() -> ExitCode {
         Some(Command::Profiles(args)) => profiles::main(args),
         Some(Command::Report(args)) => report::main(args),
         Some(Command::Frame(args)) => frame::main(args),
+        Some(Command::Scan(args)) => tools::scan::main(args),
+        Some(Command::Probe(args)) => tools::probe::main(args),
+        Some(Command::Loopback(args)) => tools::loopback::main(args),
+        Some(Command::Raw(args)) => tools::raw::main(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -38,6 +38,7 @@ use std::{
 pub use self::{
     diagnostic::{Errors, render},
     io::Search,
+    line::BAUDS,
 };
 use crate::plant::def::PlantDef;
 

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::pdu;
-use super::rig::{Rig, reply_delay};
+use super::ascii;
+use super::rig::{BROADCAST, Rig, reply_delay};
 use crate::bus::frame::with_crc;
 
 /// What is wrong with a unit.
@@ -60,9 +60,16 @@ impl Faults {
     /// Lets the rig answer a request, or the fault in its place. `None`: nothing comes back.
     pub fn answer(&self, rig: &mut Rig, unit: u8, request: &[u8]) -> Option<Answer> {
         let plain = |pdu| Answer { unit, pdu, damage: Damage::None, delay: reply_delay(unit) };
+        if unit == BROADCAST {
+            rig.broadcast(request, |unit| !matches!(self.of(unit), Fault::Silent | Fault::Exception(_)));
+            return None;
+        }
         match self.of(unit) {
             Fault::None => rig.respond(unit, request).map(plain),
-            Fault::Silent => None,
+            Fault::Silent => {
+                rig.overhear(unit);
+                None
+            }
             Fault::Late(by) => {
                 rig.respond(unit, request).map(plain).map(|answer| Answer { delay: answer.delay + by, ..answer })
             }
@@ -72,7 +79,7 @@ impl Faults {
             Fault::Truncated => {
                 rig.respond(unit, request).map(plain).map(|answer| Answer { damage: Damage::Cut, ..answer })
             }
-            Fault::Exception(code) => request.first().map(|function| plain(pdu::exception(*function, code))),
+            Fault::Exception(code) => rig.refuse(unit, request, code).map(plain),
         }
     }
 }
@@ -87,6 +94,21 @@ impl Answer {
                 if let Some(last) = frame.last_mut() {
                     *last ^= 0xFF;
                 }
+            }
+            Damage::Cut => frame.truncate(frame.len() / 2),
+        }
+        frame
+    }
+
+    /// The characters on a line in ASCII mode.
+    pub fn ascii(&self) -> Vec<u8> {
+        let mut frame = ascii::encode(&self.message());
+        match self.damage {
+            Damage::None => {}
+            Damage::Check => {
+                // The last digit of the LRC becomes another one.
+                let digit = frame.len() - 3;
+                frame[digit] = if frame[digit] == b'0' { b'1' } else { b'0' };
             }
             Damage::Cut => frame.truncate(frame.len() / 2),
         }
@@ -140,6 +162,26 @@ mod tests {
         check(Fault::BadCrc, Some((7, false)), true);
         check(Fault::Truncated, Some((3, false)), true);
         check(Fault::Exception(4), Some((5, true)), false);
+    }
+
+    #[test]
+    fn the_same_answer_in_ascii() {
+        let (mut rig, mut faults) = (Rig::new(), Faults::default());
+        let frame = |faults: &Faults, rig: &mut Rig| faults.answer(rig, 1, &READ_SV).map(|answer| answer.ascii());
+        assert_eq!(frame(&faults, &mut rig).as_deref(), Some(&b":01030202BC3C\r\n"[..]));
+        faults.set(1, Fault::BadCrc);
+        assert_eq!(frame(&faults, &mut rig).as_deref(), Some(&b":01030202BC30\r\n"[..]));
+        faults.set(1, Fault::Truncated);
+        assert_eq!(frame(&faults, &mut rig).as_deref(), Some(&b":010302"[..]));
+    }
+
+    #[test]
+    fn a_broadcast_passes_by_a_silent_unit() {
+        let (mut rig, mut faults) = (Rig::new(), Faults::default());
+        faults.set(1, Fault::Silent);
+        assert_eq!(faults.answer(&mut rig, 0, &WRITE_SV), None);
+        assert_eq!(rig.respond(1, &READ_SV), Some(vec![3, 2, 0x02, 0xBC]));
+        assert_eq!(rig.respond(2, &READ_SV), Some(vec![3, 2, 0x01, 0xF4]));
     }
 
     #[test]

@@ -3,16 +3,18 @@
 //! ```text
 //!  tank  <── actuators ── dl06 <── at SV ── pxr <── probe ── tank        one step of 0.1 s in `rig`
 //!                          │                 │
-//!                          └─ pdu::serve ────┘                           one Modbus server for both devices
+//!                        slave ─ pdu::serve ─ slave                       one Modbus server for both devices, which count
 //!                                  │
-//!                          faults: silent, late, damaged ── io: RTU on a pty, TCP
+//!                          faults: silent, late, damaged ── io: RTU or ASCII on a pty, TCP, RTU over TCP
 //! ```
 
 pub mod tank;
 pub mod pdu;
+pub mod slave;
 pub mod pxr;
 pub mod dl06;
 pub mod rig;
 pub mod faults;
+pub mod ascii;
 pub mod wire;
 pub mod io;

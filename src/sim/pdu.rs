@@ -1,5 +1,9 @@
 //! One Modbus server for every simulated device: parses a request, keeps the limits, refuses with the right exception.
 
+mod identity;
+
+pub use identity::Identity;
+
 /// Why a device refuses (Modbus application protocol V1.1b3, 7).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
@@ -34,7 +38,7 @@ pub enum Bits {
 /// Which kind of words a request means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Words {
-    /// Functions 03, 06, 10.
+    /// Functions 03, 06, 10, 16, 17, 18.
     Holding,
     /// Function 04.
     Input,
@@ -46,6 +50,8 @@ pub trait Registers: Clone {
     const FUNCTIONS: &'static [u8];
     /// Words that one request may read or write.
     const WORDS_MAX: u16;
+    /// What it says of itself, for the functions 11 and 2B.
+    const IDENTITY: Identity;
 
     /// One bit.
     fn bit(&self, kind: Bits, address: u16) -> Result<bool, Refusal>;
@@ -55,6 +61,14 @@ pub trait Registers: Clone {
     fn word(&self, kind: Words, address: u16) -> Result<u16, Refusal>;
     /// Writes one holding register.
     fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal>;
+    /// Eight bits of the maker's choice, for function 07.
+    fn exception_status(&self) -> u8 {
+        0
+    }
+    /// Whether its run lamp is on, for function 11.
+    fn running(&self) -> bool {
+        true
+    }
 }
 
 /// Answers a request. The PDU holds function and data, neither unit nor check; an empty one has no answer.
@@ -68,31 +82,65 @@ pub fn exception(function: u8, code: u8) -> Vec<u8> {
     vec![function | 0x80, code]
 }
 
-/// Most bits of one read and of one write, words of one write (V1.1b3, 6.1, 6.11, 6.12).
+/// Most bits of one read and of one write, words of one write, words written together with a read, words of a queue
+/// (V1.1b3, 6.1, 6.11, 6.12, 6.17, 6.18).
 const READ_BITS_MAX: u16 = 2000;
 const WRITE_BITS_MAX: u16 = 1968;
 const WRITE_WORDS_MAX: u16 = 123;
+const EXCHANGE_WRITE_MAX: u16 = 121;
+const QUEUE_MAX: u16 = 31;
 
+/// A request of a wrong length is refused with 03, which the standard gives to "the implied length is incorrect".
 fn answer<D: Registers>(device: &mut D, function: u8, data: &[u8]) -> Result<Vec<u8>, Refusal> {
     if !D::FUNCTIONS.contains(&function) {
         return Err(Refusal::Function);
     }
-    let [a, b, c, d, rest @ ..] = data else { return Err(Refusal::Value) };
-    let (address, operand) = (u16::from_be_bytes([*a, *b]), u16::from_be_bytes([*c, *d]));
-    match function {
-        0x01 => read_bits(device, function, Bits::Coils, address, operand),
-        0x02 => read_bits(device, function, Bits::Discretes, address, operand),
-        0x03 => read_words(device, function, Words::Holding, address, operand),
-        0x04 => read_words(device, function, Words::Input, address, operand),
-        0x05 => write_bit(device, address, operand)?.echo(function, data),
-        0x06 => write_words(device, address, &[operand])?.echo(function, data),
-        0x0F => write_bits(device, address, operand, rest)?.echo(function, data),
-        0x10 => {
-            let values = block_of_words(operand, D::WORDS_MAX.min(WRITE_WORDS_MAX), rest)?;
-            write_words(device, address, &values)?.echo(function, data)
+    let word = |high: u8, low: u8| u16::from_be_bytes([high, low]);
+    match (function, data) {
+        (0x01..=0x06, &[a, b, c, d]) => plain(device, function, word(a, b), word(c, d)),
+        (0x07, []) => Ok(vec![function, device.exception_status()]),
+        (0x0F, &[a, b, c, d, ref block @ ..]) => {
+            write_bits(device, word(a, b), word(c, d), block)?;
+            Ok(echo(function, &data[..4]))
         }
-        _ => Err(Refusal::Function),
+        (0x10, &[a, b, c, d, ref block @ ..]) => {
+            let values = block_of_words(word(c, d), D::WORDS_MAX.min(WRITE_WORDS_MAX), block)?;
+            write_words(device, word(a, b), &values)?;
+            Ok(echo(function, &data[..4]))
+        }
+        (0x11, []) => Ok(identity::report(&D::IDENTITY, device.running())),
+        (0x16, &[a, b, and_high, and_low, or_high, or_low]) => {
+            let (address, and, or) = (word(a, b), word(and_high, and_low), word(or_high, or_low));
+            let value = device.word(Words::Holding, address)? & and | or & !and;
+            device.write_word(address, value)?;
+            Ok(echo(function, data))
+        }
+        (0x17, &[a, b, c, d, e, f, g, h, ref block @ ..]) => {
+            let values = block_of_words(word(g, h), D::WORDS_MAX.min(EXCHANGE_WRITE_MAX), block)?;
+            let mut trial = device.clone();
+            write_words(&mut trial, word(e, f), &values)?;
+            let reply = read_words(&trial, function, Words::Holding, word(a, b), word(c, d))?;
+            *device = trial;
+            Ok(reply)
+        }
+        (0x18, &[a, b]) => read_queue(device, function, word(a, b)),
+        (0x2B, &[identity::MEI_TYPE, code, object]) => identity::read(&D::IDENTITY, code, object),
+        (0x2B, &[other, ..]) if other != identity::MEI_TYPE => Err(Refusal::Function),
+        _ => Err(Refusal::Value),
     }
+}
+
+/// The functions 01–06: an address and a count or a value.
+fn plain<D: Registers>(device: &mut D, function: u8, address: u16, operand: u16) -> Result<Vec<u8>, Refusal> {
+    match function {
+        0x01 => return read_bits(device, function, Bits::Coils, address, operand),
+        0x02 => return read_bits(device, function, Bits::Discretes, address, operand),
+        0x03 => return read_words(device, function, Words::Holding, address, operand),
+        0x04 => return read_words(device, function, Words::Input, address, operand),
+        0x05 => write_bit(device, address, operand)?,
+        _ => write_words(device, address, &[operand])?,
+    }
+    Ok(echo(function, &[address.to_be_bytes(), operand.to_be_bytes()].concat()))
 }
 
 fn read_bits<D: Registers>(device: &D, function: u8, kind: Bits, address: u16, count: u16) -> Result<Vec<u8>, Refusal> {
@@ -119,17 +167,16 @@ fn read_words<D: Registers>(
     Ok(reply)
 }
 
-fn write_bit<D: Registers>(device: &mut D, address: u16, operand: u16) -> Result<Written, Refusal> {
+fn write_bit<D: Registers>(device: &mut D, address: u16, operand: u16) -> Result<(), Refusal> {
     let on = match operand {
         0xFF00 => true,
         0x0000 => false,
         _ => return Err(Refusal::Value),
     };
-    device.write_bit(address, on)?;
-    Ok(Written)
+    device.write_bit(address, on)
 }
 
-fn write_bits<D: Registers>(device: &mut D, address: u16, count: u16, rest: &[u8]) -> Result<Written, Refusal> {
+fn write_bits<D: Registers>(device: &mut D, address: u16, count: u16, rest: &[u8]) -> Result<(), Refusal> {
     let addresses = span(address, count, WRITE_BITS_MAX)?;
     let [bytes, packed @ ..] = rest else { return Err(Refusal::Value) };
     if usize::from(*bytes) != packed.len() || packed.len() != usize::from(count.div_ceil(8)) {
@@ -140,7 +187,7 @@ fn write_bits<D: Registers>(device: &mut D, address: u16, count: u16, rest: &[u8
         trial.write_bit(at, packed[place / 8] >> (place % 8) & 1 == 1)?;
     }
     *device = trial;
-    Ok(Written)
+    Ok(())
 }
 
 fn block_of_words(count: u16, max: u16, rest: &[u8]) -> Result<Vec<u16>, Refusal> {
@@ -152,12 +199,12 @@ fn block_of_words(count: u16, max: u16, rest: &[u8]) -> Result<Vec<u16>, Refusal
     Ok(packed.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect())
 }
 
-fn write_words<D: Registers>(device: &mut D, address: u16, values: &[u16]) -> Result<Written, Refusal> {
+fn write_words<D: Registers>(device: &mut D, address: u16, values: &[u16]) -> Result<(), Refusal> {
     let addresses = span(address, values.len() as u16, WRITE_WORDS_MAX)?;
     let mut trial = device.clone();
     addresses.zip(values).try_for_each(|(at, value)| trial.write_word(at, *value))?;
     *device = trial;
-    Ok(Written)
+    Ok(())
 }
 
 /// The addresses of a request: a wrong count is a wrong value, an end beyond 65535 a wrong address.
@@ -168,15 +215,23 @@ fn span(address: u16, count: u16, max: u16) -> Result<std::ops::RangeInclusive<u
     Ok(address..=address.checked_add(count - 1).ok_or(Refusal::Address)?)
 }
 
-/// A write that was done; every write is answered with function, address and value or count.
-struct Written;
-
-impl Written {
-    fn echo(self, function: u8, data: &[u8]) -> Result<Vec<u8>, Refusal> {
-        let mut reply = vec![function];
-        reply.extend_from_slice(&data[..4]);
-        Ok(reply)
+/// A queue as the standard keeps it: its count at the address, its words behind; reading takes nothing out (V1.1b3, 6.18).
+fn read_queue<D: Registers>(device: &D, function: u8, address: u16) -> Result<Vec<u8>, Refusal> {
+    let count = device.word(Words::Holding, address)?;
+    if count > QUEUE_MAX {
+        return Err(Refusal::Value);
     }
+    let mut reply = vec![function, 0, (2 + 2 * count) as u8, 0, count as u8];
+    for place in 1..=count {
+        let at = address.checked_add(place).ok_or(Refusal::Address)?;
+        reply.extend_from_slice(&device.word(Words::Holding, at)?.to_be_bytes());
+    }
+    Ok(reply)
+}
+
+/// A write that was done is answered with what it said.
+fn echo(function: u8, data: &[u8]) -> Vec<u8> {
+    [&[function], data].concat()
 }
 
 #[cfg(test)]
@@ -197,8 +252,9 @@ mod tests {
     }
 
     impl Registers for Small {
-        const FUNCTIONS: &'static [u8] = &[1, 3, 5, 6, 15, 16];
+        const FUNCTIONS: &'static [u8] = &[1, 3, 5, 6, 7, 15, 16, 0x16, 0x17, 0x18];
         const WORDS_MAX: u16 = 6;
+        const IDENTITY: Identity = Identity { server_id: 1, objects: &[] };
 
         fn bit(&self, _: Bits, address: u16) -> Result<bool, Refusal> {
             Ok(self.bits[place(address)?])
@@ -239,10 +295,48 @@ mod tests {
         check(&[3, 0, 100, 0, 0], &[0x83, 3]);
         check(&[3, 0, 100, 0, 7], &[0x83, 3]);
         check(&[3, 0, 100], &[0x83, 3]);
+        check(&[3, 0, 100, 0, 1, 0], &[0x83, 3]);
         check(&[5, 0, 100, 0, 1], &[0x85, 3]);
         check(&[6, 0, 100, 0xFF, 0xFF], &[0x86, 3]);
         check(&[15, 0, 100, 0, 3, 2, 0b101], &[0x8F, 3]);
         check(&[16, 0, 100, 0, 2, 3, 0, 1, 0], &[0x90, 3]);
+    }
+
+    #[test]
+    fn a_mask_touches_only_its_bits() {
+        let mut device = Small::default();
+        device.words[4] = 0x12;
+        let mask = [0x16, 0, 104, 0, 0xF2, 0, 0x25];
+        assert_eq!(serve(&mut device, &mask).as_deref(), Some(&mask[..]));
+        // The example of the standard (V1.1b3, 6.16).
+        assert_eq!(device.words[4], 0x17);
+        check(&[0x16, 0, 99, 0, 0, 0, 0], &[0x96, 2]);
+        check(&[0x16, 0, 104, 0, 0, 0xFF, 0xFF], &[0x96, 3]);
+    }
+
+    #[test]
+    fn an_exchange_writes_before_it_reads_or_does_nothing() {
+        let mut device = Small::default();
+        let exchange = |read: u8, count: u8, value: u8| [0x17, 0, read, 0, count, 0, 101, 0, 1, 2, value, 9];
+        assert_eq!(serve(&mut device, &exchange(100, 2, 0)).as_deref(), Some(&[0x17, 4, 0, 0, 0, 9][..]));
+        assert_eq!(serve(&mut device, &exchange(107, 2, 1)).as_deref(), Some(&[0x97, 2][..]));
+        assert_eq!(serve(&mut device, &exchange(100, 0, 1)).as_deref(), Some(&[0x97, 3][..]));
+        assert_eq!(serve(&mut device, &exchange(100, 1, 0xFF)).as_deref(), Some(&[0x97, 3][..]));
+        assert_eq!(device.words[1], 9);
+    }
+
+    #[test]
+    fn a_queue_is_read_by_its_count_and_stays() {
+        let mut device = Small::default();
+        device.words = [0, 2, 440, 512, 0, 7, 40, 0];
+        for _ in 0..2 {
+            let queue = [0x18, 0, 6, 0, 2, 0x01, 0xB8, 0x02, 0];
+            assert_eq!(serve(&mut device, &[0x18, 0, 101]).as_deref(), Some(&queue[..]));
+        }
+        assert_eq!(serve(&mut device, &[0x18, 0, 100]).as_deref(), Some(&[0x18, 0, 2, 0, 0][..]));
+        assert_eq!(serve(&mut device, &[0x18, 0, 105]).as_deref(), Some(&[0x98, 2][..]));
+        assert_eq!(serve(&mut device, &[0x18, 0, 106]).as_deref(), Some(&[0x98, 3][..]));
+        assert_eq!(serve(&mut device, &[7]).as_deref(), Some(&[7, 0][..]));
     }
 
     #[test]

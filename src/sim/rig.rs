@@ -4,10 +4,12 @@ use std::time::Duration;
 
 use super::dl06::sequence::Step;
 use super::dl06::{Dl06, Outputs, SCAN};
-use super::pdu;
 use super::pxr::{Pxr, SAMPLE, Sensor};
+use super::slave::Slave;
 use super::tank::{AMBIENT_C, Readings, Tank};
 
+/// The address that means every unit of a serial line.
+pub const BROADCAST: u8 = 0;
 /// Unit address of the PXR4.
 pub const PXR_UNIT: u8 = 1;
 /// Unit address of the DL06.
@@ -24,8 +26,8 @@ const SCANS_PER_SAMPLE: u32 = (SAMPLE.as_millis() / SCAN.as_millis()) as u32;
 #[derive(Debug, Clone)]
 pub struct Rig {
     tank: Tank,
-    pxr: Pxr,
-    plc: Dl06,
+    pxr: Slave<Pxr>,
+    plc: Slave<Dl06>,
     sensor_open: bool,
     owed: Duration,
     steps: u32,
@@ -63,13 +65,13 @@ impl Rig {
     /// In the middle of work: running in automatic with TK-1 nearly full, so that something moves at once.
     pub fn demo() -> Rig {
         let mut rig = Rig::filled(4.7);
-        rig.plc.start();
+        rig.plc.device.start();
         rig
     }
 
     fn filled(control_l: f64) -> Rig {
-        let (tank, pxr) = (Tank::new(control_l, AMBIENT_C), Pxr::new(AMBIENT_C));
-        Rig { tank, pxr, plc: Dl06::new(), sensor_open: false, owed: Duration::ZERO, steps: 0 }
+        let (pxr, plc) = (Slave::new(Pxr::new(AMBIENT_C)), Slave::new(Dl06::new()));
+        Rig { tank: Tank::new(control_l, AMBIENT_C), pxr, plc, sensor_open: false, owed: Duration::ZERO, steps: 0 }
     }
 
     /// Lets plant time pass. What is left over below one step is kept for the next call.
@@ -81,13 +83,54 @@ impl Rig {
         }
     }
 
-    /// Answers a request, or `None`: no such unit, a broadcast, an empty request.
+    /// Answers a request, or `None`: no such unit, a broadcast (which all obey), an empty request.
     pub fn respond(&mut self, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
+        if unit == BROADCAST {
+            self.broadcast(pdu, |_| true);
+            return None;
+        }
+        self.overhear(unit);
         match unit {
-            PXR_UNIT => pdu::serve(&mut self.pxr, pdu),
-            DL06_UNIT => pdu::serve(&mut self.plc, pdu),
+            PXR_UNIT => self.pxr.respond(pdu),
+            DL06_UNIT => self.plc.respond(pdu),
             _ => None,
         }
+    }
+
+    /// Every unit that hears does what a broadcast says. Nobody answers.
+    pub fn broadcast(&mut self, pdu: &[u8], hears: impl Fn(u8) -> bool) {
+        if hears(PXR_UNIT) {
+            self.pxr.obey(pdu);
+        }
+        if hears(DL06_UNIT) {
+            self.plc.obey(pdu);
+        }
+    }
+
+    /// A unit refuses a request with this code, whatever it says.
+    pub fn refuse(&mut self, unit: u8, pdu: &[u8], code: u8) -> Option<Vec<u8>> {
+        self.overhear(unit);
+        match unit {
+            PXR_UNIT => self.pxr.refuse(pdu, code),
+            DL06_UNIT => self.plc.refuse(pdu, code),
+            _ => None,
+        }
+    }
+
+    /// The units other than this one count a message that is not theirs.
+    pub fn overhear(&mut self, unit: u8) {
+        if unit != PXR_UNIT {
+            self.pxr.hear();
+        }
+        if unit != DL06_UNIT {
+            self.plc.hear();
+        }
+    }
+
+    /// Something passed on the line that no unit could read.
+    pub fn spoiled(&mut self) {
+        self.pxr.hear_spoiled();
+        self.plc.hear_spoiled();
     }
 
     /// Breaks or repairs the wire of the temperature sensor.
@@ -97,27 +140,28 @@ impl Rig {
 
     /// Turns a panel switch X0–X3 of the PLC.
     pub fn set_switch(&mut self, switch: u16, on: bool) {
-        self.plc.set_switch(switch, on);
+        self.plc.device.set_switch(switch, on);
     }
 
     /// Takes the power away and gives it back: the controller loses what it did not save, the PLC stops.
     pub fn power_cycle(&mut self) {
-        self.pxr.power_cycle();
-        self.plc = Dl06::new();
+        self.pxr.device.power_cycle();
+        self.pxr = Slave::new(self.pxr.device.clone());
+        self.plc = Slave::new(Dl06::new());
     }
 
     /// What is really so.
     pub fn truth(&self) -> Truth {
         Truth {
             probe_c: self.tank.probe_c(),
-            pv_c: self.pxr.pv_c(),
-            sv_c: self.pxr.sv_c(),
-            mv_percent: self.pxr.mv_percent(),
+            pv_c: self.pxr.device.pv_c(),
+            sv_c: self.pxr.device.sv_c(),
+            mv_percent: self.pxr.device.mv_percent(),
             readings: self.tank.readings(),
-            outputs: self.plc.outputs(),
-            step: self.plc.step(),
-            fault: self.plc.fault(),
-            saves: self.pxr.saves(),
+            outputs: self.plc.device.outputs(),
+            step: self.plc.device.step(),
+            fault: self.plc.device.fault(),
+            saves: self.pxr.device.saves(),
         }
     }
 
@@ -125,10 +169,10 @@ impl Rig {
         let readings = self.tank.readings();
         if self.steps.is_multiple_of(SCANS_PER_SAMPLE) {
             let sensor = if self.sensor_open { Sensor::Open } else { Sensor::Pt100(self.tank.probe_c()) };
-            self.pxr.sample(sensor, readings.heater_w);
+            self.pxr.device.sample(sensor, readings.heater_w);
         }
-        self.plc.scan(self.pxr.at_sv(), &readings);
-        self.tank.step(SCAN.as_secs_f64(), &self.plc.actuators(&readings, self.pxr.mv_percent()));
+        self.plc.device.scan(self.pxr.device.at_sv(), &readings);
+        self.tank.step(SCAN.as_secs_f64(), &self.plc.device.actuators(&readings, self.pxr.device.mv_percent()));
         self.steps = self.steps.wrapping_add(1);
     }
 }
@@ -209,6 +253,32 @@ mod tests {
         for unit in [0, 3, 247] {
             assert_eq!(rig.respond(unit, &[3, 0, 0, 0, 1]), None);
         }
+    }
+
+    /// 41003 is SV of the controller and plain V memory of the PLC.
+    #[test]
+    fn a_broadcast_is_obeyed_by_every_unit() {
+        let mut rig = Rig::new();
+        assert_eq!(rig.respond(0, &[16, 0x03, 0xEA, 0, 1, 2, 0x01, 0xF4]), None);
+        for unit in [PXR_UNIT, DL06_UNIT] {
+            assert_eq!(rig.respond(unit, &[3, 0x03, 0xEA, 0, 1]), Some(vec![3, 2, 0x01, 0xF4]));
+        }
+    }
+
+    #[test]
+    fn a_unit_counts_what_passes_on_its_line() {
+        let mut rig = Rig::new();
+        let counter = |rig: &mut Rig, which: u8| rig.respond(2, &[8, 0, which, 0, 0]).map(|reply| reply[4]);
+        for unit in [1, 2, 9, 0] {
+            rig.respond(unit, &[3, 0x03, 0xEA, 0, 1]);
+        }
+        rig.spoiled();
+        // All four messages and this question; one that was spoiled; unit 2, the broadcast and the three questions.
+        assert_eq!(counter(&mut rig, 0x0B), Some(5));
+        assert_eq!(counter(&mut rig, 0x0C), Some(1));
+        assert_eq!(counter(&mut rig, 0x0E), Some(5));
+        rig.power_cycle();
+        assert_eq!(counter(&mut rig, 0x0B), Some(1));
     }
 
     /// Advances second by second until the sequence has left a step; says how long that took.
@@ -330,7 +400,7 @@ mod tests {
             requests in prop::collection::vec(
                 (
                     1..3_u8,
-                    prop::sample::select(vec![1_u8, 2, 3, 4, 5, 6, 15, 16, 43]),
+                    prop::sample::select(vec![1_u8, 2, 3, 4, 5, 6, 8, 15, 16, 22, 23, 24, 43]),
                     prop::sample::select(vec![0_u16, 990, 1024, 2040, 3072, 16_384, 65_500]),
                     0..60_u16,
                     prop::collection::vec(any::<u8>(), 2..40),
@@ -340,7 +410,7 @@ mod tests {
         ) {
             let mut rig = Rig::demo();
             for (unit, function, base, above, mut rest) in requests {
-                if function >= 15 {
+                if matches!(function, 15 | 16) {
                     // A block that fits its own counts reaches the registers, not only the parser.
                     let words = rest.len() / 2;
                     rest.truncate(2 * words);

@@ -1,11 +1,79 @@
 //! Requests on a serial line as a slave finds them: by the length that the function tells, by silence where it does not.
 
+use super::ascii;
 use crate::bus::frame::crc16;
 
 /// Twice the longest frame of a serial line (Modbus serial line V1.02, 2.5.1): one whole and the beginning of a next.
 const BYTES_MAX: usize = 2 * 256;
 
-/// Collects bytes and cuts whole requests with a right check out of them.
+/// A request as a slave found it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Request {
+    /// Unit and PDU, without the check.
+    pub message: Vec<u8>,
+    /// How many characters it took on the wire.
+    pub characters: usize,
+}
+
+/// What a slave listens with.
+#[derive(Debug, Clone)]
+pub enum Ears {
+    /// For RTU.
+    Rtu(Receiver),
+    /// For ASCII.
+    Ascii(ascii::Receiver),
+}
+
+impl Ears {
+    /// For RTU, or for ASCII with so many data bits.
+    pub fn new(ascii: bool, data_bits: u8) -> Ears {
+        if ascii { Ears::Ascii(ascii::Receiver::new(data_bits)) } else { Ears::Rtu(Receiver::default()) }
+    }
+
+    /// Adds characters as they arrive.
+    pub fn push(&mut self, characters: &[u8]) {
+        match self {
+            Ears::Rtu(receiver) => receiver.push(characters),
+            Ears::Ascii(receiver) => receiver.push(characters),
+        }
+    }
+
+    /// The next thing that is complete: a request, or `None` in its place if it could not be read.
+    pub fn take(&mut self) -> Option<Option<Request>> {
+        match self {
+            Ears::Rtu(receiver) => receiver.take().map(|frame| Some(request(frame))),
+            Ears::Ascii(receiver) => receiver.take(),
+        }
+    }
+
+    /// The line was silent for long enough to end a frame.
+    pub fn silence(&mut self) -> Option<Option<Request>> {
+        match self {
+            Ears::Rtu(receiver) if receiver.is_empty() => None,
+            Ears::Rtu(receiver) => Some(receiver.silence().map(request)),
+            Ears::Ascii(receiver) => {
+                receiver.silence();
+                receiver.take()
+            }
+        }
+    }
+
+    /// Whether nothing waits for its rest.
+    pub fn is_empty(&self) -> bool {
+        match self {
+            Ears::Rtu(receiver) => receiver.is_empty(),
+            Ears::Ascii(receiver) => receiver.is_empty(),
+        }
+    }
+}
+
+fn request(mut frame: Vec<u8>) -> Request {
+    let characters = frame.len();
+    frame.truncate(characters.saturating_sub(2));
+    Request { message: frame, characters }
+}
+
+/// Collects the bytes of RTU and cuts whole frames with a right check out of them.
 #[derive(Debug, Clone, Default)]
 pub struct Receiver {
     bytes: Vec<u8>,
@@ -51,11 +119,16 @@ impl Receiver {
         };
         match self.bytes.get(1) {
             None => Length::TooEarly,
+            // An echo may be of any length; with two bytes of data, as is usual, the check fits here.
+            Some(0x08) if self.bytes.get(7).is_some() && crc16(&self.bytes[..8]) != 0 => Length::BySilence,
             Some(0x01..=0x06 | 0x08) => Length::Known(8),
             Some(0x07 | 0x0B | 0x0C | 0x11) => Length::Known(4),
+            Some(0x18) => Length::Known(6),
             Some(0x0F | 0x10) => counted(6, 9),
             Some(0x16) => Length::Known(10),
             Some(0x17) => counted(10, 13),
+            Some(0x2B) if self.bytes.get(2) == Some(&0x0E) => Length::Known(7),
+            Some(0x2B) if self.bytes.len() < 3 => Length::TooEarly,
             Some(_) => Length::BySilence,
         }
     }
@@ -77,11 +150,14 @@ mod tests {
     use crate::bus::frame::with_crc;
 
     fn requests() -> Vec<Vec<u8>> {
-        let messages: [&[u8]; 5] = [
+        let messages: [&[u8]; 8] = [
             &[1, 3, 3, 0xEA, 0, 1],
             &[2, 15, 12, 0, 0, 9, 2, 0xFF, 1],
             &[1, 16, 3, 0xED, 0, 2, 4, 0, 50, 0, 0],
             &[2, 0x11],
+            &[2, 0x18, 4, 0],
+            &[2, 8, 0, 0, 0xA5, 0x37],
+            &[2, 0x2B, 14, 1, 0],
             &[2, 0x17, 0, 0, 0, 1, 0, 0, 0, 1, 2, 0, 0],
         ];
         messages.iter().map(|message| with_crc(message)).collect()
@@ -133,11 +209,12 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_function_ends_with_the_silence() {
-        let mut receiver = Receiver::default();
-        let identify = with_crc(&[1, 0x2B, 14, 1, 0]);
-        receiver.push(&identify);
-        assert_eq!(receiver.take(), None);
-        assert_eq!(receiver.silence(), Some(identify));
+    fn a_request_of_unknown_length_ends_with_the_silence() {
+        for message in [&[1, 0x42, 14, 1, 0][..], &[2, 8, 0, 0, 1, 2, 3, 4, 5], &[2, 0x2B, 13, 1, 2, 3]] {
+            let (mut receiver, frame) = (Receiver::default(), with_crc(message));
+            receiver.push(&frame);
+            assert_eq!(receiver.take(), None);
+            assert_eq!(receiver.silence(), Some(frame));
+        }
     }
 }

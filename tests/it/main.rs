@@ -5,7 +5,8 @@
 //! | `architecture` | the rules of the house: the line of modules, the io edge, file headers |
 //! | `commands` | the program as scripts see it: help, exit codes, messages, the headless demo and its report |
 //! | `terminal` | the program as a person sees it, in a pseudo-terminal: starts, keys, leaves the terminal as it was |
-//! | `peers` | against programs that we did not write: pymodbus, mbpoll, over a pseudo-terminal pair and TCP |
+//! | `peers` | our master against slaves that we did not write: pymodbus, libmodbus |
+//! | `masters` | our simulated slaves, and those of the benches, against masters that we did not write: mbpoll, pymodbus, minimalmodbus |
 //! | `capture` | saved traffic, opened by Wireshark's own reader |
 //! | `shift` | a whole shift in virtual time, and its report read by an independent reader |
 //! | `durability` | killed, unplugged, locked, damaged |
@@ -16,6 +17,7 @@ mod architecture;
 mod capture;
 mod commands;
 mod durability;
+mod masters;
 mod peers;
 mod shift;
 mod support;

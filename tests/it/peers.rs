@@ -1,24 +1,23 @@
-//! Against programs that we did not write.
+//! Our master against slaves that we did not write.
 
 use std::{
-    fs::OpenOptions,
-    io::{Read, Write},
-    path::Path,
-    process::{Command, Output},
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
 };
 
-use crate::support::{Cable, Process, folder, free_port, have, python, sightglass};
+use crate::support::{Cable, Process, folder, free_port, have, libmodbus_server, python, sightglass};
 
 /// What the slave of `peers/slave.py` holds, as an operator should see it.
 const SEEN: [(&str, &str); 8] = [
-    ("TIC-1.PV", "-1.5 °C"),
-    ("TIC-1.SV", "70.0 °C"),
-    ("TIC-1.MV", "12.34 %"),
-    ("TIC-1.P", "5.0 % FS"),
-    ("TIC-1.I", "240.0 s"),
-    ("PLC-1.STEP", "HEAT"),
-    ("PLC-1.LT-1", "10.2 cm"),
-    ("PLC-1.RUN", "RUN"),
+    ("TIC-1.PV", "-1.5 °C good"),
+    ("TIC-1.SV", "70.0 °C good"),
+    ("TIC-1.MV", "12.34 % good"),
+    ("TIC-1.P", "5.0 % FS good"),
+    ("TIC-1.I", "240.0 s good"),
+    ("PLC-1.STEP", "HEAT good"),
+    ("PLC-1.LT-1", "10.2 cm good"),
+    ("PLC-1.RUN", "RUN good"),
 ];
 
 fn slave(python: &Path, kind: &str, place: &str) -> Process {
@@ -28,23 +27,36 @@ fn slave(python: &Path, kind: &str, place: &str) -> Process {
     slave
 }
 
-/// Runs the station headless on a port until it has read everything, and compares what it prints.
-fn read_all_from(port: &str) {
+/// Runs the station headless for a while and gives what it says, with what it prints of each tag at the end.
+fn station(plant: &Path, port: &str, time: &str) -> Vec<String> {
     let folder = folder();
     let mut station = Process::start(
         sightglass()
-            .args(["run", "tank", "--print", "--for", "12s", "--port", &format!("L1={port}")])
-            .arg("--history")
-            .arg(folder.path().join("tank.duckdb"))
+            .arg("run")
+            .arg(plant)
+            .args(["--print", "--for", time, "--port", &format!("L1={port}"), "--history"])
+            .arg(folder.path().join("history.duckdb"))
             .env("XDG_STATE_HOME", folder.path()),
     );
     assert_eq!(station.end(), Some(0), "{}", station.said.join("\n"));
-    for (tag, value) in SEEN {
-        let line = station.said.iter().find(|line| line.split_whitespace().next() == Some(tag));
-        let line = line.unwrap_or_else(|| panic!("no {tag} in:\n{}", station.said.join("\n")));
-        let words: Vec<&str> = line.split_whitespace().skip(1).collect();
-        assert!(words.join(" ").starts_with(&format!("{value} good")), "{line}, expected {value}");
-    }
+    std::mem::take(&mut station.said)
+}
+
+/// `value unit quality` of a tag, as the station printed it.
+fn printed(said: &[String], tag: &str) -> String {
+    let line = said.iter().find(|line| line.split_whitespace().next() == Some(tag));
+    let line = line.unwrap_or_else(|| panic!("no {tag} in:\n{}", said.join("\n")));
+    line.split_whitespace().skip(1).collect::<Vec<_>>().join(" ")
+}
+
+fn plant(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peers").join(name)
+}
+
+/// Runs the station until it has read everything, and compares what it prints.
+fn read_all_from(port: &str) {
+    let said = station(Path::new("tank"), port, "12s");
+    check(&said, &SEEN);
 }
 
 #[test]
@@ -64,60 +76,115 @@ fn the_station_reads_pymodbus_over_tcp() {
     read_all_from(&format!("127.0.0.1:{port}"));
 }
 
-fn sim(args: &[&str], said: &str) -> (Process, String) {
-    let mut sim = Process::start(sightglass().args(["sim", "tank"]).args(args));
-    let line = sim.wait_for(said);
-    let place = line.rsplit(' ').next().unwrap().to_owned();
-    (sim, place)
+/// A unit that is well and one for each way to answer wrongly: name, unit and the register that it is asked for, which says
+/// what is wrong (`peers/slave.py`).
+const WELL: (&str, u8, &str) = ("WELL", 3, "10");
+const LATE: (&str, u8, &str) = ("LATE", 4, "210");
+const SPOILED: (&str, u8, &str) = ("SPOILED", 5, "310");
+const SILENT: (&str, u8, &str) = ("SILENT", 6, "410");
+const NOISY: (&str, u8, &str) = ("NOISY", 7, "510");
+const CUT: (&str, u8, &str) = ("CUT", 8, "610");
+
+/// A plant with these units on one line, in any mode that plant files know.
+fn plant_with(units: &[(&str, u8, &str)], mode: &str) -> String {
+    let ends = match mode {
+        "rtu" | "ascii" => "port = \"/dev/null\"\nbaud = 9600\nparity = \"N\"",
+        _ => "host = \"localhost\"",
+    };
+    let mut text = format!(
+        "title = \"Faults\"\ntime_zone = \"UTC\"\n[[line]]\nname = \"L1\"\nmode = \"{mode}\"\ntimeout_ms = 300\n{ends}\n"
+    );
+    for (name, unit, address) in units {
+        text += &format!(
+            "[[device]]\nname = \"{name}\"\nprofile = \"number\"\nline = \"L1\"\nunit = {unit}\nfast = \"500ms\"\n"
+        );
+        text += &format!("[[device.tag]]\nname = \"N\"\naddress = {address}\n");
+    }
+    text
 }
 
-fn mbpoll(args: &[&str]) -> (bool, String) {
-    let Output { status, stdout, stderr } = Command::new("mbpoll").args(args).output().unwrap();
-    (status.success(), String::from_utf8_lossy(&stdout).into_owned() + &String::from_utf8_lossy(&stderr))
+/// Lets the station poll units of the slave. Every register there holds its address: no tag may ever be shown with another
+/// number, whatever came and when.
+fn read_faults(units: &[(&str, u8, &str)], mode: &str, port: &str) -> Vec<String> {
+    let folder = folder();
+    let file = folder.path().join("faults.toml");
+    fs::write(&file, plant_with(units, mode)).unwrap();
+    fs::copy(plant("number.toml"), folder.path().join("number.toml")).unwrap();
+    let said = station(&file, port, "12s");
+    for (name, _, address) in units {
+        let seen = printed(&said, &format!("{name}.N"));
+        let value = seen.split(' ').next().unwrap();
+        assert!(value == *address || value == "----", "{name}: {seen}");
+    }
+    said
+}
+
+/// Compares the beginning of what the station printed of tags.
+fn check(said: &[String], expect: &[(&str, &str)]) {
+    for (tag, expect) in expect {
+        let seen = printed(said, tag);
+        assert!(seen.starts_with(expect), "{tag}: {seen}, expected {expect} in:\n{}", said.join("\n"));
+    }
 }
 
 #[test]
-fn mbpoll_reads_and_writes_the_simulated_plant_over_a_serial_line() {
-    if !have("mbpoll", "mbpoll") {
-        return;
+fn a_faulty_answer_is_never_shown_as_a_value() {
+    let Some(python) = python().filter(|_| have("socat", "socat")) else { return };
+    let folder = folder();
+    let cable = Cable::plug(folder.path());
+    let _slave = slave(&python, "rtu", cable.ends[1].to_str().unwrap());
+    let said = read_faults(&[WELL, LATE, SPOILED, SILENT, NOISY, CUT], "rtu", cable.ends[0].to_str().unwrap());
+    check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
+    for tag in ["SPOILED.N", "SILENT.N", "CUT.N"] {
+        check(&said, &[(tag, "---- bad: device not answering")]);
     }
-    let (_sim, path) = sim(&[], "serves");
-    let rtu = ["-m", "rtu", "-b", "9600", "-P", "none", "-0", "-1"];
-    let call = |args: &[&str]| mbpoll(&[&rtu[..], args].concat());
-    // SV in tenths of a degree, then written and read back; Y0 to Y3; an address that does not exist.
-    let (ok, out) = call(&["-a", "1", "-t", "4", "-r", "1002", "-c", "1", &path]);
-    assert!(ok && out.contains("[1002]: \t700"), "{out}");
-    let (ok, out) = call(&["-a", "1", "-t", "4", "-r", "1002", &path, "655"]);
-    assert!(ok && out.contains("Written 1 references"), "{out}");
-    let (ok, out) = call(&["-a", "1", "-t", "4", "-r", "1002", "-c", "1", &path]);
-    assert!(ok && out.contains("[1002]: \t655"), "{out}");
-    let (ok, out) = call(&["-a", "2", "-t", "0", "-r", "2048", "-c", "4", &path]);
-    assert!(ok && out.contains("[2048]:") && out.contains("[2051]:"), "{out}");
-    let (ok, out) = call(&["-a", "1", "-t", "4", "-r", "9000", "-c", "1", &path]);
-    assert!(!ok && out.to_lowercase().contains("illegal data address"), "{out}");
+    for (unit, why) in
+        [("LATE", "no answer in time"), ("SPOILED", "CRC error"), ("SILENT", "no answer in time"), ("CUT", "cut short")]
+    {
+        assert!(said.iter().any(|line| line.contains(unit) && line.contains(why)), "{unit} {why}: {}", said.join("\n"));
+    }
 }
 
 #[test]
-fn mbpoll_reads_the_simulated_plant_over_tcp() {
-    if !have("mbpoll", "mbpoll") {
-        return;
-    }
-    let (_sim, place) = sim(&["--tcp", "127.0.0.1:0"], "serves");
-    let port = place.rsplit(':').next().unwrap();
-    let (ok, out) =
-        mbpoll(&["-m", "tcp", "-p", port, "-a", "1", "-0", "-1", "-t", "4", "-r", "1002", "-c", "1", "127.0.0.1"]);
-    assert!(ok && out.contains("[1002]: \t700"), "{out}");
+fn a_faulty_answer_over_tcp_is_never_shown_as_a_value() {
+    let Some(python) = python() else { return };
+    let port = free_port();
+    let _slave = slave(&python, "tcp", &port.to_string());
+    let said = read_faults(&[WELL, LATE, SPOILED, SILENT, NOISY], "tcp", &format!("127.0.0.1:{port}"));
+    check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
+    check(&said, &[("SPOILED.N", "---- bad: device not answering"), ("SILENT.N", "---- bad: device not answering")]);
 }
 
-/// The two exchanges recorded on the real devices, byte for byte.
+/// Over TCP half an answer puts the whole stream out of step.
 #[test]
-fn the_recorded_exchanges_of_the_thesis() {
-    let (_sim, path) = sim(&[], "serves");
-    let mut port = OpenOptions::new().read(true).write(true).open(path).unwrap();
-    for frame in [[0x01, 0x06, 0x03, 0xEA, 0x00, 0x32, 0x29, 0xAF], [0x02, 0x06, 0x41, 0x40, 0xFF, 0xFF, 0x9D, 0xA1]] {
-        port.write_all(&frame).unwrap();
-        let mut answer = [0; 8];
-        port.read_exact(&mut answer).unwrap();
-        assert_eq!(answer, frame);
+fn half_an_answer_over_tcp_is_never_shown_as_a_value() {
+    let Some(python) = python() else { return };
+    let port = free_port();
+    let _slave = slave(&python, "tcp", &port.to_string());
+    let said = read_faults(&[WELL, CUT], "tcp", &format!("127.0.0.1:{port}"));
+    check(&said, &[("CUT.N", "---- bad")]);
+    assert!(said.iter().any(|line| line.contains("WELL (unit 3): answers")), "{}", said.join("\n"));
+}
+
+/// The fixed values of its unit-test.h, and the deliberate faults of its unit-test-server.c.
+#[test]
+fn the_station_reads_the_server_of_libmodbus() {
+    let Some(_server) = libmodbus_server() else { return };
+    let said = station(&plant("libmodbus.toml"), "127.0.0.1:1502", "10s");
+    // UT_INPUT_BITS_TAB begins AC DB, the lowest bit first.
+    for (bit, expect) in [0, 0, 1, 1, 0, 1, 0, 1, 1, 1].into_iter().enumerate() {
+        check(&said, &[(&format!("UT.BIT{bit}"), &format!("{expect} good"))]);
     }
+    check(
+        &said,
+        &[
+            ("UT.INPUT", "10 good"),
+            ("UT.COIL", "0 good"),
+            ("UT.REGISTER", "0 good"),
+            ("UT.LATE", "0 good"),
+            ("UT.SHORT", "---- bad"),
+            ("UT.BUSY", "---- bad"),
+            ("UT.NOWHERE", "---- bad: refused by the device"),
+        ],
+    );
 }

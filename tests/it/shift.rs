@@ -18,7 +18,7 @@ use sightglass::{
     profile::{self, Search},
     report::{ask, csv},
     sim::{
-        io::{RigHandle, serve_rtu},
+        io::{RigHandle, Wire, serve_line},
         rig::Rig,
     },
     station::{self, Session},
@@ -103,7 +103,8 @@ fn start_on_simulation(def: &Arc<PlantDef>, clock: Clock, history: &Path) -> sta
     let (ports, streams) = mpsc::channel(1);
     ports.try_send(ours).unwrap();
     let Some(serial) = def.lines[0].transport.serial() else { panic!("the tank has a serial line") };
-    tokio::spawn(serve_rtu(theirs, RigHandle::spawn(Rig::demo(), clock), serial));
+    let (rig, wire) = (RigHandle::spawn(Rig::demo(), clock), Wire { serial, ascii: false });
+    tokio::spawn(serve_line(theirs, rig, wire, Duration::from_secs(86_400)));
     let connectors = vec![Connector::Memory(streams)];
     station::io::start(station::io::Options { def: def.clone(), clock, history: history.to_owned(), connectors })
         .unwrap()

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     sync::{
-        OnceLock,
+        Mutex, MutexGuard, OnceLock, PoisonError,
         mpsc::{Receiver, RecvTimeoutError, channel},
     },
     time::{Duration, Instant},
@@ -125,14 +125,12 @@ pub fn have(program: &str, package: &str) -> bool {
     let found =
         || Command::new("which").arg(program).stdout(Stdio::null()).status().is_ok_and(|status| status.success());
     if !found() {
-        let _ = Command::new("sh")
-            .args(["-c", &format!("(apt-get install -y -qq {package} || (apt-get update -qq && apt-get install -y -qq {package})) >/dev/null 2>&1")])
-            .status();
+        install(package);
     }
     present(found(), &format!("{program} (Debian package {package})"))
 }
 
-/// The Python with pymodbus, in a virtual environment of the tests.
+/// The Python with pymodbus and minimalmodbus, in a virtual environment of the tests.
 pub fn python() -> Option<PathBuf> {
     static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
     PYTHON
@@ -141,19 +139,57 @@ pub fn python() -> Option<PathBuf> {
             let python = folder.join("bin/python");
             let works = || {
                 Command::new(&python)
-                    .args(["-c", "import pymodbus, serial; assert pymodbus.__version__ == '3.16.1'"])
+                    .args(["-c", "import minimalmodbus, pymodbus, serial; assert (minimalmodbus.__version__, pymodbus.__version__) == ('2.1.1', '3.16.1')"])
                     .stderr(Stdio::null())
                     .status()
                     .is_ok_and(|status| status.success())
             };
             if !works() {
                 let _ = Command::new("python3").args(["-m", "venv"]).arg(&folder).status();
-                let pip = ["-m", "pip", "-q", "install", "pymodbus[serial]==3.16.1"];
+                let pip = ["-m", "pip", "-q", "install", "pymodbus[serial]==3.16.1", "minimalmodbus==2.1.1"];
                 let _ = Command::new(&python).args(pip).status();
             }
-            present(works(), "pymodbus 3.16.1 (PyPI, through python3 -m venv)").then_some(python)
+            present(works(), "pymodbus 3.16.1 and minimalmodbus 2.1.1 (PyPI, through python3 -m venv)").then_some(python)
         })
         .clone()
+}
+
+/// libmodbus's own server for unit tests, while it runs. It serves one connection and ends.
+pub struct LibmodbusServer {
+    _process: Process,
+    /// Its port is fixed, so there is one server at a time.
+    _turn: MutexGuard<'static, ()>,
+}
+
+/// Builds and starts the server that Debian's libmodbus-dev brings as an example: unit 17 on 127.0.0.1:1502.
+pub fn libmodbus_server() -> Option<LibmodbusServer> {
+    const SOURCE: &str = "/usr/share/doc/libmodbus-dev/examples/unit-test-server.c";
+    static TURN: Mutex<()> = Mutex::new(());
+    let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    if !Path::new(SOURCE).exists() {
+        install("libmodbus-dev");
+    }
+    let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join("libmodbus-unit-test-server");
+    let built = || {
+        let mut cc = Command::new("cc");
+        cc.args(["-I/usr/include/modbus", SOURCE, "-lmodbus", "-o"]).arg(&program);
+        cc.stderr(Stdio::null()).status().is_ok_and(|status| status.success())
+    };
+    if !present(have("cc", "gcc") && built(), &format!("{SOURCE} (Debian package libmodbus-dev), built with cc")) {
+        return None;
+    }
+    if let Err(error) = TcpListener::bind("127.0.0.1:1502") {
+        assert!(std::env::var_os("CI").is_none(), "under CI port 1502 must be free: {error}");
+        eprintln!("SKIPPED: port 1502, which the server of libmodbus insists on, is taken: {error}");
+        return None;
+    }
+    Some(LibmodbusServer { _process: Process::start(&mut Command::new(&program)), _turn: turn })
+}
+
+fn install(package: &str) {
+    let get = format!("apt-get install -y -qq {package}");
+    let _ =
+        Command::new("sh").args(["-c", &format!("({get} || (apt-get update -qq && {get})) >/dev/null 2>&1")]).status();
 }
 
 fn present(found: bool, what: &str) -> bool {

@@ -1,6 +1,15 @@
-"""A pymodbus slave for the tests: unit 1 looks like a FUJI PXR4, unit 2 like a KOYO DL06; any other register holds its address.
+"""A pymodbus slave for the tests.
 
-    slave.py rtu PORT | slave.py tcp TCPPORT [calm]        says "ready" when it serves, then one line for each request that it answers
+    slave.py rtu PORT | ascii PORT | tcp TCPPORT | rtu-over-tcp TCPPORT   [calm]
+
+Unit 1 looks like a FUJI PXR4, unit 2 like a KOYO DL06; any other register holds its address. In the units 3 to 8 every register
+holds its address, and the address says what is wrong with the answer:
+
+    200-299 comes 1.5 s late      300-399 has a wrong check (over TCP: a foreign transaction number)
+    400-499 never comes           600-699 breaks off
+    500-599 has noise before it (over TCP: an answer with a foreign transaction number and another value)
+
+It says "ready" when it serves, then one line for each request that it answers. "calm": nothing moves, nothing is wrong.
 """
 
 import asyncio
@@ -9,6 +18,10 @@ import sys
 from pymodbus import FramerType
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
+
+KIND, WHERE = sys.argv[1:3]
+CALM = sys.argv[3:] == ["calm"]
+asked = {"unit": 0, "address": 0}
 
 
 def registers(changes):
@@ -20,9 +33,6 @@ def registers(changes):
 
 def bits(on):
     return [SimData(0, values=[address in on for address in range(4096)], datatype=DataType.BITS)]
-
-
-CALM = sys.argv[3:] == ["calm"]  # nothing moves, nothing is wrong
 
 
 def pxr():
@@ -41,20 +51,61 @@ def dl06():
     return SimDevice(2, simdata=(bits(coils), bits(discretes), registers(holding), registers(inputs)))
 
 
+def faulty(unit):
+    async def late(_function, _start, address, _count, _current, _values):
+        if 200 <= address < 300:
+            await asyncio.sleep(1.5)
+
+    return SimDevice(unit, simdata=(bits(set()), bits(set()), registers({}), registers({})), action=late)
+
+
 def trace_pdu(sending, pdu):
     if not sending:
+        asked.update(unit=pdu.dev_id, address=getattr(pdu, "address", 0))
         print(f"asked unit {pdu.dev_id} function {pdu.function_code} address {getattr(pdu, 'address', '-')}", flush=True)
     return pdu
 
 
+def spoiled(frame):
+    """The frame with a check that does not fit."""
+    if KIND == "tcp":
+        return bytes([frame[0] ^ 0xFF]) + frame[1:]
+    if KIND == "ascii":
+        return frame[:-3] + (b"1" if frame[-3:-2] == b"0" else b"0") + frame[-2:]
+    return frame[:-1] + bytes([frame[-1] ^ 0xFF])
+
+
+def trace_packet(sending, frame):
+    if not sending or not frame or asked["unit"] < 3:
+        return frame
+    match asked["address"] // 100:
+        case 3:
+            return spoiled(frame)
+        case 4:
+            return b""
+        case 5:
+            if KIND == "tcp":
+                return spoiled(frame)[:-1] + b"\x55" + frame
+            return b"\xff\x00\x55" + frame
+        case 6:
+            return frame[:-4]
+        case _:
+            return frame
+
+
 async def main():
-    kind, where = sys.argv[1:3]
-    context = [pxr(), dl06()]
-    if kind == "tcp":
-        server = ModbusTcpServer(context, address=("127.0.0.1", int(where)), trace_pdu=trace_pdu)
-    else:
-        server = ModbusSerialServer(context, framer=FramerType.RTU, port=where, baudrate=9600, bytesize=8, parity="N",
-                                    stopbits=1, trace_pdu=trace_pdu, ignore_missing_devices=True)
+    context = [pxr(), dl06()] + [faulty(unit) for unit in range(3, 9)]
+    traces = {"trace_pdu": trace_pdu, "trace_packet": trace_packet}
+    match KIND:
+        case "tcp" | "rtu-over-tcp":
+            framer = FramerType.SOCKET if KIND == "tcp" else FramerType.RTU
+            server = ModbusTcpServer(context, framer=framer, address=("127.0.0.1", int(WHERE)), **traces)
+        case "rtu" | "ascii":
+            framer = FramerType.RTU if KIND == "rtu" else FramerType.ASCII
+            server = ModbusSerialServer(context, framer=framer, port=WHERE, baudrate=9600, bytesize=8, parity="N", stopbits=1,
+                                        ignore_missing_devices=True, **traces)
+        case _:
+            sys.exit(__doc__)
     await server.serve_forever(background=True)
     print("ready", flush=True)
     await asyncio.Event().wait()

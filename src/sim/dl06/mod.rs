@@ -8,7 +8,7 @@ use std::time::Duration;
 use memory::Memory;
 use sequence::{Conditions, Sequence, Step};
 
-use super::pdu::{Bits, Refusal, Registers, Words};
+use super::pdu::{Bits, Identity, Refusal, Registers, Words};
 use super::tank::{Actuators, Readings};
 
 /// Time of one scan.
@@ -34,6 +34,24 @@ const C_FAULT: u16 = 7;
 const V_STEP: u16 = 0o2000;
 /// V2010 and on: measurements that the real rig lacks, as plain binary words.
 const V_SIGNALS: u16 = 0o2010;
+
+/// The last object is long, so that all of them do not fit into one answer.
+const IDENTITY: Identity = Identity {
+    server_id: 6,
+    objects: &[
+        (0x00, "KOYO"),
+        (0x01, "D0-06DD1"),
+        (0x02, env!("CARGO_PKG_VERSION")),
+        (0x03, "https://www.koyoele.co.jp"),
+        (0x04, "DirectLOGIC 06 (simulated)"),
+        (0x05, "DL06"),
+        (
+            0x06,
+            "water tank: fills TK-1 from TK-2 with pump P-1 through valve SV-2, heats while agitator M-1 turns, holds at \
+             the set value of TIC-1 for three minutes, drains through valve SV-1, cools, returns the water, begins again",
+        ),
+    ],
+};
 
 /// The outputs as the lamps show them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -185,9 +203,12 @@ fn bcd(value: u16) -> u16 {
     digit(1000) << 12 | digit(100) << 8 | digit(10) << 4 | digit(1)
 }
 
+/// The PLC's manual names 01–06, 0F and 10; ours knows all others too, so that tools for diagnosis find somebody to talk to.
 impl Registers for Dl06 {
-    const FUNCTIONS: &'static [u8] = &[0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F, 0x10];
+    const FUNCTIONS: &'static [u8] =
+        &[0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x08, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x16, 0x17, 0x18, 0x2B];
     const WORDS_MAX: u16 = 125;
+    const IDENTITY: Identity = IDENTITY;
 
     fn bit(&self, kind: Bits, address: u16) -> Result<bool, Refusal> {
         self.memory.bit(kind, address)
@@ -204,6 +225,15 @@ impl Registers for Dl06 {
 
     fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
         self.memory.write_word(address, value)
+    }
+
+    /// The relays C0–C7: run, automatic, four commands, fault.
+    fn exception_status(&self) -> u8 {
+        (C_RUN..=C_FAULT).fold(0, |status, relay| status | u8::from(self.memory.c.get(relay)) << relay)
+    }
+
+    fn running(&self) -> bool {
+        self.memory.c.get(C_RUN)
     }
 }
 

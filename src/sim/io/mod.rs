@@ -1,13 +1,13 @@
-//! The edge of the simulated plant: its clock, its serial line, its TCP port.
+//! The edge of the simulated plant: its clock, its serial lines, its TCP port.
 
+mod line;
 mod owner;
 mod pty;
-mod rtu;
 mod serving;
 mod tcp;
 
+pub use line::{Wire, serve_line};
 pub use owner::RigHandle;
 pub use pty::{Pty, open_pty};
-pub use rtu::serve_rtu;
-pub use serving::{Serving, SimError, start_pty, start_tcp};
-pub use tcp::serve_tcp;
+pub use serving::{Mode, Serving, SimError, serial_of, start_pty, start_tcp};
+pub use tcp::{Speech, serve_tcp};

@@ -40,6 +40,7 @@ enum Told {
     SensorOpen(bool),
     Switch(u16, bool),
     PowerCycle,
+    Spoiled,
 }
 
 impl RigHandle {
@@ -80,6 +81,11 @@ impl RigHandle {
     /// Takes the power from all devices and gives it back.
     pub async fn power_cycle(&self) {
         self.tell(Told::PowerCycle).await;
+    }
+
+    /// Something passed on the line that no unit could read.
+    pub async fn spoiled(&self) {
+        self.tell(Told::Spoiled).await;
     }
 
     /// What is really so in the rig now; `None` once its task has ended.
@@ -134,6 +140,7 @@ fn obey(rig: &mut Rig, faults: &mut Faults, order: Order) {
                 Told::SensorOpen(open) => rig.set_sensor_open(open),
                 Told::Switch(switch, on) => rig.set_switch(switch, on),
                 Told::PowerCycle => rig.power_cycle(),
+                Told::Spoiled => rig.spoiled(),
             }
             done.send(()).ok();
         }

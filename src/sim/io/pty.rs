@@ -58,7 +58,7 @@ mod tests {
     use crate::bus::frame::with_crc;
     use crate::bus::io::clock::Clock;
     use crate::plant::def::Serial;
-    use crate::sim::io::{RigHandle, serve_rtu};
+    use crate::sim::io::{RigHandle, Wire, serve_line};
     use crate::sim::rig::Rig;
 
     #[tokio::test]
@@ -66,7 +66,7 @@ mod tests {
         let (pty, path) = open_pty().expect("a pseudo-terminal is free");
         let serial = Serial::USUAL;
         let rig = RigHandle::spawn(Rig::demo(), Clock::starting_at(jiff::Timestamp::UNIX_EPOCH, 20.0));
-        tokio::spawn(serve_rtu(pty, rig, serial));
+        tokio::spawn(serve_line(pty, rig, Wire { serial, ascii: false }, Duration::from_secs(60)));
         for _ in 0..3 {
             let name = path.to_str().expect("the path is ASCII");
             let mut port = tokio_serial::new(name, 9600).open_native_async().expect("the port opens");

@@ -1,4 +1,4 @@
-//! Serves the rig over Modbus TCP to several clients at once.
+//! Serves the rig over TCP to several clients at once: Modbus TCP, or the frames of a serial line.
 
 use std::io;
 use std::time::Duration;
@@ -8,7 +8,8 @@ use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio::time::timeout;
 
-use super::RigHandle;
+use super::{RigHandle, Wire, serve_line};
+use crate::sim::rig::BROADCAST;
 
 /// Clients at once; one more is turned away by closing its connection.
 const CLIENTS_MAX: usize = 16;
@@ -17,8 +18,17 @@ const IDLE_MAX: Duration = Duration::from_secs(600);
 /// Unit and PDU, as the header counts them (Modbus messaging on TCP/IP V1.0b, 3.1.3).
 const LENGTHS: std::ops::RangeInclusive<u16> = 2..=254;
 
+/// What is spoken over TCP.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Speech {
+    /// Modbus TCP.
+    Mbap,
+    /// The frames of a serial line, as a serial server passes them on.
+    Line(Wire),
+}
+
 /// Serves until the listener fails. Clients are cut off when this future is dropped.
-pub async fn serve_tcp(listener: TcpListener, rig: RigHandle) -> io::Result<()> {
+pub async fn serve_tcp(listener: TcpListener, rig: RigHandle, speech: Speech) -> io::Result<()> {
     let mut clients = JoinSet::new();
     loop {
         tokio::select! {
@@ -26,7 +36,13 @@ pub async fn serve_tcp(listener: TcpListener, rig: RigHandle) -> io::Result<()> 
                 Ok((stream, _)) if clients.len() < CLIENTS_MAX => {
                     // Without this small answers wait for the client's acknowledgement; if it fails they are just slower.
                     stream.set_nodelay(true).ok();
-                    clients.spawn(serve_client(stream, rig.clone()));
+                    let rig = rig.clone();
+                    clients.spawn(async move {
+                        match speech {
+                            Speech::Mbap => serve_client(stream, rig).await,
+                            Speech::Line(wire) => serve_line(stream, rig, wire, IDLE_MAX).await,
+                        }
+                    });
                 }
                 Ok(_turned_away) => {}
                 Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => {}
@@ -37,9 +53,13 @@ pub async fn serve_tcp(listener: TcpListener, rig: RigHandle) -> io::Result<()> 
     }
 }
 
-/// Serves one client in the order of its requests until it leaves, falls silent or breaks the protocol.
+/// Serves one client in the order of its requests until it leaves, falls silent or breaks the protocol. TCP knows no
+/// broadcast: unit 0 is a stranger.
 async fn serve_client<S: AsyncRead + AsyncWrite + Unpin>(mut stream: S, rig: RigHandle) -> io::Result<()> {
     while let Some((transaction, unit, pdu)) = timeout(IDLE_MAX, receive(&mut stream)).await?? {
+        if unit == BROADCAST {
+            continue;
+        }
         if let Some(answer) = rig.ask(unit, &pdu).await {
             rig.clock().sleep(answer.delay).await;
             timeout(IDLE_MAX, stream.write_all(&answer.tcp(transaction))).await??;
@@ -64,11 +84,15 @@ async fn receive<S: AsyncRead + Unpin>(stream: &mut S) -> io::Result<Option<(u16
 
 #[cfg(test)]
 mod tests {
+    use std::net::SocketAddr;
+
     use jiff::Timestamp;
     use tokio::net::TcpStream;
 
     use super::*;
+    use crate::bus::frame::with_crc;
     use crate::bus::io::clock::Clock;
+    use crate::plant::def::Serial;
     use crate::sim::rig::Rig;
 
     async fn exchange(client: &mut TcpStream, request: &[u8], expect: &[u8]) {
@@ -79,12 +103,23 @@ mod tests {
         assert_eq!(reply, expect);
     }
 
-    #[tokio::test]
-    async fn several_clients_share_one_rig() {
+    /// Ten times as fast as life.
+    async fn serve(speech: Speech) -> SocketAddr {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port is free");
         let address = listener.local_addr().expect("a bound listener has an address");
-        let rig = RigHandle::spawn(Rig::new(), Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0));
-        tokio::spawn(serve_tcp(listener, rig));
+        let rig = RigHandle::spawn(Rig::new(), Clock::starting_at(Timestamp::UNIX_EPOCH, 10.0));
+        tokio::spawn(serve_tcp(listener, rig, speech));
+        address
+    }
+
+    async fn ends(client: &mut TcpStream) -> bool {
+        let ended = timeout(Duration::from_secs(5), client.read(&mut [0; 1])).await.expect("the connection ends");
+        matches!(ended, Ok(0) | Err(_))
+    }
+
+    #[tokio::test]
+    async fn several_clients_share_one_rig() {
+        let address = serve(Speech::Mbap).await;
         let connect = || async { TcpStream::connect(address).await.expect("the server accepts") };
         let (mut one, mut two) = (connect().await, connect().await);
         let write = [0, 7, 0, 0, 0, 6, 1, 6, 0x03, 0xEA, 0x01, 0xF4];
@@ -93,8 +128,44 @@ mod tests {
         exchange(&mut two, &read, &[0, 8, 0, 0, 0, 5, 1, 3, 2, 0x01, 0xF4]).await;
         // A request that is not Modbus ends its own connection and no other.
         one.write_all(b"GET / HTTP/1.1\r\n").await.expect("the server takes bytes");
-        let ended = timeout(Duration::from_secs(5), one.read(&mut [0; 1])).await.expect("the connection ends");
-        assert!(matches!(ended, Ok(0) | Err(_)));
+        assert!(ends(&mut one).await);
         exchange(&mut two, &read, &[0, 8, 0, 0, 0, 5, 1, 3, 2, 0x01, 0xF4]).await;
+    }
+
+    #[tokio::test]
+    async fn requests_of_one_segment_are_answered_in_order_and_half_a_frame_waits() {
+        let mut client = TcpStream::connect(serve(Speech::Mbap).await).await.expect("the server accepts");
+        let read = |transaction: u8, function: u8| [0, transaction, 0, 0, 0, 6, 1, function, 0x03, 0xEA, 0, 1];
+        let segment =
+            [&read(1, 3)[..], &[0, 2, 0, 0, 0, 6, 0, 6, 0x03, 0xEA, 0, 9], &read(3, 1), &read(4, 3)[..7]].concat();
+        let answered = [&[0, 1, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC][..], &[0, 3, 0, 0, 0, 3, 1, 0x81, 1]].concat();
+        exchange(&mut client, &segment, &answered).await;
+        exchange(&mut client, &read(4, 3)[7..], &[0, 4, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]).await;
+        // A length that no frame has.
+        client.write_all(&[0, 5, 0, 0, 1, 0, 1]).await.expect("the server takes bytes");
+        assert!(ends(&mut client).await);
+    }
+
+    #[tokio::test]
+    async fn a_client_too_many_is_turned_away() {
+        let address = serve(Speech::Mbap).await;
+        let mut clients = Vec::new();
+        for transaction in 0..CLIENTS_MAX as u8 {
+            let mut client = TcpStream::connect(address).await.expect("the server accepts");
+            let read = [0, transaction, 0, 0, 0, 6, 1, 3, 0x03, 0xEA, 0, 1];
+            exchange(&mut client, &read, &[0, transaction, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]).await;
+            clients.push(client);
+        }
+        assert!(ends(&mut TcpStream::connect(address).await.expect("the system accepts")).await);
+    }
+
+    #[tokio::test]
+    async fn the_frames_of_a_serial_line_pass_over_tcp() {
+        let rtu = Speech::Line(Wire { serial: Serial::USUAL, ascii: false });
+        let mut client = TcpStream::connect(serve(rtu).await).await.expect("the server accepts");
+        let broadcast = with_crc(&[0, 6, 0x03, 0xEA, 0, 50]);
+        let requests = [&broadcast[..], &with_crc(&[1, 3, 0x03, 0xEA, 0, 1])].concat();
+        exchange(&mut client, &requests, &with_crc(&[1, 3, 2, 0, 50])).await;
+        exchange(&mut client, &with_crc(&[2, 3, 0x03, 0xEA, 0, 1]), &with_crc(&[2, 3, 2, 0, 50])).await;
     }
 }

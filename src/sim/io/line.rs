@@ -1,8 +1,9 @@
-//! Serves the rig as slaves on a serial line that takes the time of a real one.
+//! Serves the rig as slaves on a line that takes the time of a real one: RTU or ASCII, on any stream of bytes.
 //!
 //! ```text
 //!  request arrives     its last byte        slave knows       answer begins      last byte of answer: written here
 //!  |— bytes · char ————|— 3.5 characters ———|— device delay ——|— bytes · char ————|
+//!                       (RTU only)
 //! ```
 
 use std::io;
@@ -14,23 +15,47 @@ use tokio::time::{Instant, sleep_until, timeout};
 use super::RigHandle;
 use crate::bus::io::clock::Clock;
 use crate::plant::def::Serial;
-use crate::sim::wire::Receiver;
+use crate::sim::faults::Answer;
+use crate::sim::wire::{Ears, Request};
 
 /// Requests and answers under way at once; a request beyond that is not heard.
 const JOBS_MAX: usize = 8;
 /// Silence that ends a frame of unknown length, in real time: bytes of one write may come in pieces.
 const SILENCE_REAL_MIN: Duration = Duration::from_millis(20);
+/// Time that characters of one ASCII frame may be apart (Modbus serial line V1.02, 2.5.2.1).
+const SILENCE_ASCII: Duration = Duration::from_secs(1);
 /// An answer that nobody takes for this long is dropped (the other end of a pty is closed and its buffer full).
 const WRITE_MAX: Duration = Duration::from_secs(1);
 /// Timers tick in 1 ms, so an answer may be this late for no other reason; the next request is credited with it.
 const TICK: Duration = Duration::from_millis(2);
 
-/// Serves until the stream ends or fails. Everything on the wire runs in the plant time of the rig's clock.
-pub async fn serve_rtu<S>(mut stream: S, rig: RigHandle, serial: Serial) -> io::Result<()>
+/// What a line is: how frames are spelled on it and how fast.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wire {
+    /// Baud rate and bits of a character.
+    pub serial: Serial,
+    /// ASCII; RTU otherwise.
+    pub ascii: bool,
+}
+
+impl Wire {
+    /// Silence between a request and its answer.
+    fn gap(self) -> Duration {
+        if self.ascii { Duration::ZERO } else { self.serial.silence() }
+    }
+
+    fn spell(self, answer: &Answer) -> Vec<u8> {
+        if self.ascii { answer.ascii() } else { answer.rtu() }
+    }
+}
+
+/// Serves until the stream ends, fails, or brings nothing for longer than `idle_max`. Everything on the wire runs in the
+/// plant time of the rig's clock.
+pub async fn serve_line<S>(mut stream: S, rig: RigHandle, wire: Wire, idle_max: Duration) -> io::Result<()>
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
-    let mut line = Line::new(rig.clock(), serial);
+    let mut line = Line::new(rig.clock(), wire);
     let mut bytes = [0; 256];
     loop {
         tokio::select! {
@@ -46,6 +71,10 @@ where
                     Err(_nobody_takes_it) => {}
                 },
             },
+            () = sleep_until(line.latest + idle_max) => return Ok(()),
+        }
+        for _ in 0..std::mem::take(&mut line.spoiled) {
+            rig.spoiled().await;
         }
     }
 }
@@ -53,8 +82,10 @@ where
 /// What happens on the line, and when.
 struct Line {
     clock: Clock,
-    serial: Serial,
-    receiver: Receiver,
+    wire: Wire,
+    ears: Ears,
+    /// Frames that could not be read since the rig was told.
+    spoiled: usize,
     /// Since when the request that is arriving has been on the wire, and when its latest bytes came.
     began: Instant,
     latest: Instant,
@@ -81,12 +112,13 @@ enum Due {
 }
 
 impl Line {
-    fn new(clock: Clock, serial: Serial) -> Line {
+    fn new(clock: Clock, wire: Wire) -> Line {
         let now = Instant::now();
         Line {
             clock,
-            serial,
-            receiver: Receiver::default(),
+            wire,
+            ears: Ears::new(wire.ascii, wire.serial.data_bits),
+            spoiled: 0,
             began: now,
             latest: now,
             sent: now,
@@ -97,48 +129,53 @@ impl Line {
 
     /// Bytes have arrived. They come at once, but the request is not over before its time on the wire.
     fn heard(&mut self, now: Instant, bytes: &[u8]) {
-        if self.receiver.is_empty() {
+        if self.ears.is_empty() {
             // A master that asks again at once was held up by the late answer; the lateness must not add up.
             let at_once = now - self.sent < SILENCE_REAL_MIN;
             self.began = if at_once { now.checked_sub(self.credit).unwrap_or(now) } else { now };
             self.credit = Duration::ZERO;
         }
         self.latest = now;
-        self.receiver.push(bytes);
-        while let Some(request) = self.receiver.take() {
-            self.accept(request);
+        self.ears.push(bytes);
+        while let Some(frame) = self.ears.take() {
+            self.accept(frame);
         }
     }
 
-    fn accept(&mut self, request: Vec<u8>) {
-        let on_wire = self.began + self.time_of(request.len());
+    fn accept(&mut self, frame: Option<Request>) {
+        let Some(Request { message, characters }) = frame else {
+            self.spoiled += 1;
+            return;
+        };
+        let on_wire = self.began + self.time_of(characters);
         // Bytes that really came later than the line's pace count from when they came.
         let over = if on_wire + TICK < self.latest { self.latest } else { on_wire };
         self.began = over;
         if self.jobs.len() < JOBS_MAX {
-            let at = over + self.clock.real_span(self.serial.silence());
-            self.jobs.push(Job { at, what: What::Execute(request) });
+            let at = over + self.clock.real_span(self.wire.gap());
+            self.jobs.push(Job { at, what: What::Execute(message) });
         }
     }
 
     /// The next moment at which something is due.
     fn next(&self) -> Instant {
-        let silence = (!self.receiver.is_empty()).then(|| self.silent_at());
+        let silence = (!self.ears.is_empty()).then(|| self.silent_at());
         self.jobs.iter().map(|job| job.at).chain(silence).min().unwrap_or(self.latest)
     }
 
     fn waits(&self) -> bool {
-        !self.jobs.is_empty() || !self.receiver.is_empty()
+        !self.jobs.is_empty() || !self.ears.is_empty()
     }
 
     fn silent_at(&self) -> Instant {
-        self.latest + self.clock.real_span(self.serial.silence()).max(SILENCE_REAL_MIN)
+        let silence = if self.wire.ascii { SILENCE_ASCII } else { self.wire.serial.silence() };
+        self.latest + self.clock.real_span(silence).max(SILENCE_REAL_MIN)
     }
 
     fn due(&mut self, now: Instant) -> Due {
-        if !self.receiver.is_empty() && self.silent_at() <= now {
-            if let Some(request) = self.receiver.silence() {
-                self.accept(request);
+        if !self.ears.is_empty() && self.silent_at() <= now {
+            if let Some(frame) = self.ears.silence() {
+                self.accept(frame);
             }
             return Due::Nothing;
         }
@@ -157,9 +194,9 @@ impl Line {
 
     /// The device acts now, and its answer is over after its delay and its time on the wire.
     async fn execute(&mut self, at: Instant, request: &[u8], rig: &RigHandle) {
-        let [unit, pdu @ .., _, _] = request else { return };
+        let [unit, pdu @ ..] = request else { return };
         if let Some(answer) = rig.ask(*unit, pdu).await {
-            let frame = answer.rtu();
+            let frame = self.wire.spell(&answer);
             let at = at + self.clock.real_span(answer.delay) + self.time_of(frame.len());
             self.jobs.push(Job { at, what: What::Send(frame) });
         }
@@ -167,8 +204,8 @@ impl Line {
 
     /// Real time of so many characters.
     fn time_of(&self, characters: usize) -> Duration {
-        let bits = characters as f64 * f64::from(self.serial.bits_per_char());
-        self.clock.real_span(Duration::from_secs_f64(bits / f64::from(self.serial.baud)))
+        let bits = characters as f64 * f64::from(self.wire.serial.bits_per_char());
+        self.clock.real_span(Duration::from_secs_f64(bits / f64::from(self.wire.serial.baud)))
     }
 }
 
@@ -183,14 +220,18 @@ mod tests {
     use crate::sim::faults::Fault;
     use crate::sim::rig::Rig;
 
+    const FOR_EVER: Duration = Duration::from_secs(86_400 * 365);
     const READ_TEN: &[u8] = &[1, 4, 0x03, 0xE8, 0, 10];
     const READ_STEP: &[u8] = &[2, 3, 4, 0, 0, 1];
 
     fn line(baud: u32, parity: Parity, speed: f64) -> (DuplexStream, RigHandle) {
-        let serial = Serial { baud, data_bits: 8, parity, stop_bits: 1 };
+        serve(Serial { baud, data_bits: 8, parity, stop_bits: 1 }, false, speed)
+    }
+
+    fn serve(serial: Serial, ascii: bool, speed: f64) -> (DuplexStream, RigHandle) {
         let rig = RigHandle::spawn(Rig::demo(), Clock::starting_at(Timestamp::UNIX_EPOCH, speed));
         let (master, slave) = duplex(1024);
-        tokio::spawn(serve_rtu(slave, rig.clone(), serial));
+        tokio::spawn(serve_line(slave, rig.clone(), Wire { serial, ascii }, FOR_EVER));
         (master, rig)
     }
 
@@ -282,9 +323,58 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_broadcast_and_a_stranger_are_not_answered() {
+    async fn a_broadcast_is_obeyed_but_not_answered_nor_is_a_stranger() {
         let (mut master, _rig) = line(9600, Parity::None, 1.0);
         assert_eq!(ask(&mut master, &[0, 6, 0x03, 0xEA, 0, 1]).await.0, Vec::<u8>::new());
         assert_eq!(ask(&mut master, &[9, 3, 0, 0, 0, 1]).await.0, Vec::<u8>::new());
+        for unit in [1, 2] {
+            assert_eq!(ask(&mut master, &[unit, 3, 0x03, 0xEA, 0, 1]).await.0, with_crc(&[unit, 3, 2, 0, 1]));
+        }
+    }
+
+    /// The counter of bus communication errors (08/0C) of unit 2.
+    #[tokio::test(start_paused = true)]
+    async fn a_slave_counts_the_frames_that_it_could_not_read() {
+        let (mut master, _rig) = line(9600, Parity::None, 1.0);
+        for spoiled in [&[1, 3, 0, 0, 0, 1, 0, 0][..], &[0xFF], &[2; 300]] {
+            master.write_all(spoiled).await.expect("the line takes bytes");
+            assert_eq!(gather(&mut master).await.0, Vec::<u8>::new());
+        }
+        let answer = ask(&mut master, &[2, 8, 0, 0x0C, 0, 0]).await.0;
+        assert_eq!(answer, with_crc(&[2, 8, 0, 0x0C, 0, 3]));
+    }
+
+    const SEVEN_BITS: Serial = Serial { baud: 9600, data_bits: 7, parity: Parity::Even, stop_bits: 1 };
+
+    async fn ask_ascii(master: &mut DuplexStream, frame: &str) -> (String, Duration) {
+        master.write_all(frame.as_bytes()).await.expect("the line takes requests");
+        let (answer, took) = gather(master).await;
+        (String::from_utf8(answer).expect("ASCII"), took)
+    }
+
+    /// 17 characters there, 15 back, 5 ms of the device, no silence between.
+    #[tokio::test(start_paused = true)]
+    async fn ascii_takes_its_own_time() {
+        let (mut master, _rig) = serve(SEVEN_BITS, true, 1.0);
+        let (answer, took) = ask_ascii(&mut master, ":010303EA00010E\r\n").await;
+        assert_eq!(answer, ":01030202BC3C\r\n");
+        let (took_ms, wire_ms) = (took.as_secs_f64() * 1e3, 320.0 / 9.6 + 5.0);
+        assert!((wire_ms..wire_ms + 2.0).contains(&took_ms), "{took_ms} ms, the wire needs {wire_ms} ms");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn ascii_waits_a_second_for_a_character_and_begins_anew_with_a_colon() {
+        let (mut master, rig) = serve(SEVEN_BITS, true, 1.0);
+        master.write_all(b":010303EA").await.expect("the line takes bytes");
+        tokio::time::advance(Duration::from_millis(900)).await;
+        assert_eq!(ask_ascii(&mut master, "00010E\r\n").await.0, ":01030202BC3C\r\n");
+        // `gather` waits two seconds: too long for a frame.
+        assert_eq!(ask_ascii(&mut master, ":010303EA").await.0, "");
+        assert_eq!(ask_ascii(&mut master, "00010E\r\n").await.0, "");
+        assert_eq!(ask_ascii(&mut master, ":0103:010303EA00010E\r\n").await.0, ":01030202BC3C\r\n");
+        assert_eq!(ask_ascii(&mut master, ":010303EA00010F\r\n").await.0, "");
+        assert_eq!(ask_ascii(&mut master, ":0208000C0000EA\r\n").await.0, ":0208000C0003E7\r\n");
+        rig.set_fault(1, Fault::BadCrc).await;
+        assert_eq!(ask_ascii(&mut master, ":010303EA00010E\r\n").await.0, ":01030202BC30\r\n");
     }
 }

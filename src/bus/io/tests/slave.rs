@@ -1,0 +1,260 @@
+//! A scripted slave in memory, for every mode, and a line task that polls it. Register N holds N.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
+    sync::{mpsc, watch},
+};
+
+use crate::{
+    bus::{
+        frame::{self, Mbap},
+        io::{clock::Clock, task, transport::Connector},
+    },
+    plant::{
+        PlantDef,
+        command::BusRequest,
+        def::{DeviceDef, DeviceId, Framing, Limits, LineId, Rs485, Serial, TagId, Transport},
+        event::{Event, Fault},
+        fixture,
+        tag::{Kind, Point, Poll, Table, TagDef},
+    },
+};
+
+/// How line and slave speak.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mode {
+    Rtu,
+    Ascii,
+    RtuOverTcp,
+    Tcp,
+    /// With sixteen requests under way.
+    Tcp16,
+}
+
+impl Mode {
+    pub const ALL: [Mode; 5] = [Mode::Rtu, Mode::Ascii, Mode::RtuOverTcp, Mode::Tcp, Mode::Tcp16];
+
+    pub fn framing(self) -> Framing {
+        self.transport().framing()
+    }
+
+    /// Answers carry the transaction of their request.
+    pub fn has_ids(self) -> bool {
+        self.framing() == Framing::Mbap
+    }
+
+    fn transport(self) -> Transport {
+        let serial = |framing, data_bits| Transport::Serial {
+            port: "memory".into(),
+            serial: Serial { data_bits, ..Serial::USUAL },
+            framing,
+            rs485: Rs485::Off,
+        };
+        match self {
+            Mode::Rtu => serial(Framing::Rtu, 8),
+            Mode::Ascii => serial(Framing::Ascii, 7),
+            Mode::RtuOverTcp => Transport::Tcp { host: "memory".into(), port: 502, framing: Framing::Rtu },
+            Mode::Tcp | Mode::Tcp16 => Transport::tcp("memory", 502),
+        }
+    }
+
+    /// Where the request at the beginning of the buffer ends, once it is whole. Requests here have eight bytes in RTU.
+    fn end(self, buffer: &[u8]) -> Option<usize> {
+        match self.framing() {
+            Framing::Rtu => (8 <= buffer.len()).then_some(8),
+            Framing::Ascii => buffer.iter().position(|char| *char == b'\n').map(|last| last + 1),
+            Framing::Mbap => match frame::mbap(buffer) {
+                Mbap::Whole { end, .. } => Some(end),
+                Mbap::Incomplete | Mbap::Broken => None,
+            },
+        }
+    }
+}
+
+pub const MS: Duration = Duration::from_millis(1);
+
+/// Two units with the same map: holding registers 10–13, 20–23, 400 (alone), once 600.
+pub fn plant(mode: Mode) -> PlantDef {
+    let mut def = fixture::plant();
+    let sample = def.tags[1].clone();
+    let limits = Limits {
+        read_words_max: 60,
+        read_bits_max: 100,
+        write_words_max: 60,
+        gap_words_max: 0,
+        alignment: 1,
+        in_flight_max: if mode == Mode::Tcp16 { 16 } else { 1 },
+    };
+    def.devices =
+        (0..2).map(|n| DeviceDef { id: DeviceId(n), unit: n as u8 + 1, limits, ..def.devices[0].clone() }).collect();
+    let every = Poll::Every(Duration::from_secs(1));
+    let rows: Vec<(u16, Poll)> = [10, 11, 12, 13, 20, 21, 22, 23, 400]
+        .into_iter()
+        .map(|address| (address, every))
+        .chain([(600, Poll::Once)])
+        .collect();
+    def.tags = (0..2u16)
+        .flat_map(|device| rows.iter().map(move |row| (device, *row)))
+        .enumerate()
+        .map(|(index, (device, (address, poll)))| TagDef {
+            id: TagId(index as u16),
+            device: DeviceId(device),
+            name: format!("U{}.{address}", device + 1),
+            point: Point { table: Table::Holding, address, kind: Kind::U16, ..sample.point },
+            poll,
+            ..sample.clone()
+        })
+        .collect();
+    def.alarms.clear();
+    def.lines[0].transport = mode.transport();
+    def
+}
+
+/// What the slave does with its n-th request.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Deed {
+    Answer,
+    /// Answers after this time; the next request waits for its turn, as behind a gateway.
+    Late(Duration),
+    Silent,
+    /// The answer in two pieces, cut here, the second piece after this time.
+    Torn(usize, Duration),
+    /// Only the first bytes of the answer.
+    Cut(usize),
+    BadCheck,
+    Noise(Vec<u8>),
+    /// These message bytes instead of the answer, with a good check.
+    Instead(Vec<u8>),
+    Exception(u8),
+}
+
+fn correct(message: &[u8]) -> Vec<u8> {
+    let word = |index: usize| u16::from_be_bytes([message[index], message[index + 1]]);
+    match message[1] {
+        3 => {
+            let values = (word(2)..word(2) + word(4)).flat_map(u16::to_be_bytes);
+            [message[0], 3, 2 * message[5]].into_iter().chain(values).collect()
+        }
+        _ => message.to_vec(),
+    }
+}
+
+/// Serves until the stream closes; `script(n, message)` says what to do with the n-th request.
+async fn slave(mut stream: DuplexStream, mode: Mode, mut script: impl FnMut(usize, &[u8]) -> Deed) {
+    let mut buffer = Vec::new();
+    for number in 0.. {
+        let (transaction, message) = loop {
+            if let Some(end) = mode.end(&buffer) {
+                let frame: Vec<u8> = buffer.drain(..end).collect();
+                let transaction = u16::from_be_bytes([frame[0], frame[1]]);
+                let message = frame::unwrap(mode.framing(), &frame).expect("the master sends good frames");
+                break (transaction, message);
+            }
+            let mut chunk = [0; 256];
+            match stream.read(&mut chunk).await {
+                Ok(0) | Err(_) => return,
+                Ok(count) => buffer.extend_from_slice(&chunk[..count]),
+            }
+        };
+        let framed = |message: &[u8]| frame::wrap(mode.framing(), transaction, message);
+        let answer = framed(&correct(&message));
+        let send = match script(number, &message) {
+            Deed::Answer => answer,
+            Deed::Late(delay) => {
+                tokio::time::sleep(delay).await;
+                answer
+            }
+            Deed::Silent => continue,
+            Deed::Torn(at, pause) => {
+                let at = at.min(answer.len() - 1);
+                let _ = stream.write_all(&answer[..at]).await;
+                tokio::time::sleep(pause).await;
+                answer[at..].to_vec()
+            }
+            Deed::Cut(at) => answer[..at.min(answer.len() - 1)].to_vec(),
+            Deed::BadCheck => {
+                let mut spoiled = answer;
+                let check = spoiled.len() - if mode == Mode::Ascii { 4 } else { 1 };
+                spoiled[check] ^= if mode == Mode::Ascii { 1 } else { 0xFF };
+                spoiled
+            }
+            Deed::Noise(noise) => noise.into_iter().chain(answer).collect(),
+            Deed::Instead(message) => framed(&message),
+            Deed::Exception(code) => framed(&[message[0], message[1] | 0x80, code]),
+        };
+        if stream.write_all(&send).await.is_err() {
+            return;
+        }
+    }
+}
+
+/// A running line: its events, its requests, and the way to plug in ports.
+pub struct Line {
+    pub events: mpsc::Receiver<Event>,
+    pub requests: mpsc::Sender<BusRequest>,
+    pub ports: mpsc::Sender<DuplexStream>,
+    _stop: watch::Sender<bool>,
+}
+
+pub fn line(def: PlantDef) -> Line {
+    let (sender, events) = mpsc::channel(64);
+    let (requests, queue) = mpsc::channel(4);
+    let (ports, streams) = mpsc::channel(8);
+    let (stop, stopped) = watch::channel(false);
+    let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
+    tokio::spawn(task::run(Arc::new(def), LineId(0), clock, Connector::Memory(streams), sender, queue, stopped));
+    Line { events, requests, ports, _stop: stop }
+}
+
+impl Line {
+    pub fn plug(
+        &self,
+        mode: Mode,
+        script: impl FnMut(usize, &[u8]) -> Deed + Send + 'static,
+    ) -> tokio::task::JoinHandle<()> {
+        let (ours, theirs) = tokio::io::duplex(4096);
+        self.ports.try_send(ours).expect("room for a port");
+        tokio::spawn(slave(theirs, mode, script))
+    }
+
+    /// The next event that is no counter; every value is checked against its address.
+    pub async fn next(&mut self, def: &PlantDef) -> Event {
+        loop {
+            let event = self.events.recv().await.expect("the line runs");
+            if let Event::Read { values, .. } = &event {
+                for (tag, raw) in values {
+                    assert_eq!(*raw, f64::from(def.tag(*tag).point.address), "a value in a wrong tag: {event:?}");
+                }
+            }
+            if !matches!(event, Event::Report { .. }) {
+                return event;
+            }
+        }
+    }
+
+    /// Goes on to the first event of which `pick` makes something.
+    pub async fn until<T>(&mut self, def: &PlantDef, mut pick: impl FnMut(&Event) -> Option<T>) -> T {
+        for _ in 0..10_000 {
+            let event = self.next(def).await;
+            if let Some(found) = pick(&event) {
+                return found;
+            }
+        }
+        panic!("it never came")
+    }
+
+    pub async fn fault(&mut self, def: &PlantDef) -> Fault {
+        self.until(def, |event| match event {
+            Event::Failed { fault, .. } => Some(*fault),
+            _ => None,
+        })
+        .await
+    }
+
+    pub async fn read(&mut self, def: &PlantDef) {
+        self.until(def, |event| matches!(event, Event::Read { .. }).then_some(())).await;
+    }
+}

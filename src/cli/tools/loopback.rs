@@ -1,0 +1,48 @@
+//! `sightglass loopback`: does a unit send back what it is sent.
+
+use super::{PortArgs, exchange_lines, run};
+use crate::{
+    cli::{CliError, say},
+    plant::{
+        event::Fault,
+        tool::{Finding, Tool},
+    },
+};
+
+/// Arguments of `loopback`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    port: PortArgs,
+    /// Unit address
+    #[arg(long, short, default_value = "1", value_parser = clap::value_parser!(u8).range(1..))]
+    unit: u8,
+    /// How often
+    #[arg(long, short, default_value = "10", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    count: u16,
+    /// Show every byte
+    #[arg(long, short)]
+    verbose: bool,
+}
+
+/// Diagnostics 08/00 with a number that counts up.
+pub fn main(args: Args) -> Result<(), CliError> {
+    let line = args.port.line()?;
+    say(&format!("loopback 08/00 to unit {} on {}", args.unit, line.transport));
+    let tool = Tool::Loopback { unit: args.unit, data: 0xA537, count: args.count };
+    let run = run(&line, tool, |finding| match finding {
+        Finding::Exchange(exchange) if args.verbose => exchange_lines(exchange),
+        Finding::Failed { what, fault } if !args.verbose => vec![format!("{what}: {fault}")],
+        Finding::Verdict(words) => vec![words.clone()],
+        Finding::Exchange(_)
+        | Finding::Failed { .. }
+        | Finding::Bytes { .. }
+        | Finding::Unit { .. }
+        | Finding::Object { .. }
+        | Finding::Values { .. } => Vec::new(),
+    })?;
+    let refused = |fault: &Fault| matches!(fault, Fault::Exception(_));
+    let lost = |finding: &&Finding| matches!(finding, Finding::Failed { fault, .. } if !refused(fault));
+    let lost = run.findings.iter().filter(lost).count();
+    if lost == 0 { Ok(()) } else { Err(CliError::Failed(format!("{lost} of {} did not come back", args.count))) }
+}

@@ -1,0 +1,224 @@
+//! Tools for a line without a plant: which port, which settings, and how their findings are told.
+
+pub mod loopback;
+pub mod probe;
+pub mod raw;
+pub mod scan;
+
+use std::{io::IsTerminal, sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use crate::{
+    bus::{explain, frame::hex, io::testing, tool::Job},
+    plant::{
+        command::OrderId,
+        def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
+        tool::{Finding, Tool, ToolRun, ToolState},
+        traffic::Exchange,
+    },
+    profile::BAUDS,
+};
+
+use super::{CliError, runtime, say};
+
+/// The port that a tool works on.
+#[derive(Debug, Clone, clap::Args)]
+pub struct PortArgs {
+    /// A serial port (/dev/ttyUSB0), or HOST or HOST:TCPPORT
+    #[arg(value_name = "PORT")]
+    port: String,
+    /// rtu, ascii, tcp or rtu-over-tcp [default: rtu on a serial port, else tcp]
+    #[arg(long, value_parser = ["rtu", "ascii", "tcp", "rtu-over-tcp"])]
+    mode: Option<String>,
+    /// Baud rate
+    #[arg(long, default_value = "9600")]
+    baud: u32,
+    /// Parity: N, E or O
+    #[arg(long, default_value = "N", ignore_case = true, value_parser = ["N", "E", "O"])]
+    parity: String,
+    /// Data bits [default: 8, in ASCII 7]
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(7..=8))]
+    data: Option<u8>,
+    /// Stop bits
+    #[arg(long, value_name = "BITS", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
+    stop: u8,
+    /// How long an answer may take, in milliseconds
+    #[arg(long, value_name = "MS", default_value = "500", value_parser = clap::value_parser!(u64).range(10..=60_000))]
+    timeout: u64,
+}
+
+impl PortArgs {
+    /// The line that the arguments describe.
+    pub fn line(&self) -> Result<LineDef, CliError> {
+        let is_path = self.port.starts_with('/');
+        let mode = self.mode.as_deref().unwrap_or(if is_path { "rtu" } else { "tcp" });
+        let (serial_mode, framing) = match mode {
+            "rtu" => (true, Framing::Rtu),
+            "ascii" => (true, Framing::Ascii),
+            "rtu-over-tcp" => (false, Framing::Rtu),
+            _ => (false, Framing::Mbap),
+        };
+        if serial_mode != is_path {
+            let expected = if serial_mode { "a path such as /dev/ttyUSB0" } else { "HOST or HOST:TCPPORT" };
+            return Err(CliError::Usage(format!("port: found `{}`, expected {expected} for {mode}", self.port)));
+        }
+        let transport = if is_path {
+            Transport::Serial { port: self.port.clone(), serial: self.serial(framing)?, framing, rs485: Rs485::Off }
+        } else {
+            let (host, port) = self.port.rsplit_once(':').unwrap_or((&self.port, "502"));
+            let tcp_port = port.parse().map_err(|_| {
+                CliError::Usage(format!("port: found `{port}` in `{}`, expected a TCP port up to 65535", self.port))
+            })?;
+            Transport::Tcp { host: host.to_owned(), port: tcp_port, framing }
+        };
+        Ok(LineDef { timeout: Duration::from_millis(self.timeout), ..LineDef::new(LineId(0), "line", transport) })
+    }
+
+    fn serial(&self, framing: Framing) -> Result<Serial, CliError> {
+        let data_bits = self.data.unwrap_or(if framing == Framing::Ascii { 7 } else { 8 });
+        if framing == Framing::Rtu && data_bits != 8 {
+            return Err(CliError::Usage("--data: found 7, expected 8: Modbus RTU sends whole bytes".into()));
+        }
+        let parity = parity(&self.parity);
+        Ok(Serial { baud: baud(self.baud)?, data_bits, parity, stop_bits: self.stop })
+    }
+}
+
+/// `N`, `E` or `O`, checked by the arguments.
+fn parity(letter: &str) -> Parity {
+    match letter.to_ascii_uppercase().as_str() {
+        "E" => Parity::Even,
+        "O" => Parity::Odd,
+        _ => Parity::None,
+    }
+}
+
+fn baud(baud: u32) -> Result<u32, CliError> {
+    let known = || BAUDS.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+    if BAUDS.contains(&baud) {
+        return Ok(baud);
+    }
+    Err(CliError::Usage(format!("--baud: found {baud}, expected one of {}", known())))
+}
+
+/// Runs a tool and tells each finding when it comes. Ctrl-C ends it between two steps.
+pub fn run(line: &LineDef, tool: Tool, tell: impl Fn(&Finding) -> Vec<String>) -> Result<ToolRun, CliError> {
+    let job = Job::new(OrderId { terminal: 0, number: 0 }, Arc::from("cli"), tool, Timestamp::now());
+    let shown = std::io::stderr().is_terminal();
+    let mut told = 0;
+    let run = runtime()?.block_on(async {
+        let work = testing::run(line, job, |run: &ToolRun| {
+            run.findings[told..].iter().flat_map(&tell).for_each(|text| say(&text));
+            told = run.findings.len();
+            if shown && 1 < run.total {
+                progress(run);
+            }
+            true
+        });
+        tokio::select! {
+            run = work => Some(run),
+            _ = tokio::signal::ctrl_c() => None,
+        }
+    });
+    if shown {
+        clear_progress();
+    }
+    let Some(run) = run else { return Err(CliError::Failed("stopped".into())) };
+    run.findings[told.min(run.findings.len())..].iter().flat_map(&tell).for_each(|text| say(&text));
+    match &run.state {
+        ToolState::Failed(why) => Err(CliError::Failed(why.clone())),
+        ToolState::Running | ToolState::Done | ToolState::Cancelled => Ok(run),
+    }
+}
+
+fn progress(run: &ToolRun) {
+    use std::io::Write;
+    let _ = write!(std::io::stderr(), "\r\x1b[K{} of {}  {}", run.done, run.total, run.now);
+}
+
+fn clear_progress() {
+    use std::io::Write;
+    let _ = write!(std::io::stderr(), "\r\x1b[K");
+}
+
+/// Request and answer, byte for byte and in words.
+pub fn exchange_lines(exchange: &Exchange) -> Vec<String> {
+    let request = explain::explain(&exchange.request, Some(exchange.framing), Some(explain::Direction::Request), None);
+    let mut lines =
+        vec![format!("TX {}", shown(&exchange.request, exchange.framing)), format!("   {}", request.summary)];
+    if exchange.answer.is_empty() {
+        lines.push(match exchange.outcome {
+            Ok(()) => "   no answer is expected".to_owned(),
+            Err(fault) => format!("RX {fault}"),
+        });
+        return lines;
+    }
+    lines.extend(answer_lines(&exchange.answer, exchange.framing, &request.message));
+    let reply = exchange.reply.map(|reply| format!(", after {:.1} ms", reply.as_secs_f64() * 1e3)).unwrap_or_default();
+    match exchange.outcome {
+        Ok(()) => lines.push(format!("   ok{reply}")),
+        Err(fault) => lines.push(format!("   {fault}{reply}")),
+    }
+    lines
+}
+
+/// What came back, byte for byte and in words.
+pub fn answer_lines(bytes: &[u8], framing: Framing, request: &[u8]) -> Vec<String> {
+    let asked = (!request.is_empty()).then_some(request);
+    let answer = explain::explain(bytes, Some(framing), Some(explain::Direction::Answer), asked);
+    vec![format!("RX {}", shown(bytes, framing)), format!("   {}", answer.summary)]
+}
+
+/// Bytes in hexadecimal digits, an ASCII frame as its characters.
+pub fn shown(bytes: &[u8], framing: Framing) -> String {
+    match framing {
+        Framing::Ascii => bytes.escape_ascii().to_string(),
+        Framing::Rtu | Framing::Mbap => hex(bytes),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        port: PortArgs,
+    }
+
+    fn line(args: &str) -> Result<String, String> {
+        let parsed =
+            Line::try_parse_from(std::iter::once("x").chain(args.split(' '))).map_err(|error| error.to_string())?;
+        parsed.port.line().map(|line| line.transport.to_string()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_path_is_rtu_and_a_host_is_tcp() {
+        for (args, expect) in [
+            ("/dev/ttyUSB0", "RTU /dev/ttyUSB0 9600 8N1"),
+            ("/dev/ttyUSB0 --mode ascii --parity e --baud 19200", "ASCII /dev/ttyUSB0 19200 7E1"),
+            ("plc", "TCP plc:502"),
+            ("plc:1502 --mode rtu-over-tcp", "RTU over TCP plc:1502"),
+        ] {
+            assert_eq!(line(args).as_deref(), Ok(expect), "{args}");
+        }
+    }
+
+    #[test]
+    fn wrong_settings_are_told_with_what_was_expected() {
+        for (args, part) in [
+            ("/dev/ttyUSB0 --mode tcp", "expected HOST or HOST:TCPPORT for tcp"),
+            ("plc --mode rtu", "expected a path such as /dev/ttyUSB0"),
+            ("plc:99999", "found `99999` in `plc:99999`, expected a TCP port"),
+            ("/dev/ttyUSB0 --baud 9601", "found 9601, expected one of 300"),
+            ("/dev/ttyUSB0 --data 7", "found 7, expected 8"),
+            ("/dev/ttyUSB0 --parity X", "[possible values: N, E, O]"),
+        ] {
+            assert!(line(args).is_err_and(|error| error.contains(part)), "{args}: {:?}", line(args));
+        }
+    }
+}

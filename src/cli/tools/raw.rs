@@ -1,0 +1,93 @@
+//! `sightglass raw`: bytes as they are, and everything that comes back.
+
+use super::{PortArgs, answer_lines, run, shown};
+use crate::{
+    bus::{complaint::check_request, explain, frame, typed},
+    cli::{CliError, say, say_error},
+    plant::{
+        def::Framing,
+        tool::{Finding, Tool},
+    },
+};
+
+/// Arguments of `raw`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    port: PortArgs,
+    /// Bytes in hex: unit, function, data; the check (TCP: the header) is added unless it is there
+    #[arg(value_name = "BYTES", required = true, allow_hyphen_values = true)]
+    bytes: Vec<String>,
+    /// Add nothing: send exactly these bytes
+    #[arg(long)]
+    as_is: bool,
+    /// Send it although something is wrong with it, or every unit would obey it
+    #[arg(long)]
+    force: bool,
+}
+
+/// Sends once; an answer that is no Modbus is shown all the same.
+pub fn main(args: Args) -> Result<(), CliError> {
+    let line = args.port.line()?;
+    let framing = line.transport.framing();
+    let typed =
+        typed::parse(&args.bytes.join(" "), Some(framing)).map_err(|error| CliError::Usage(error.to_string()))?;
+    let whole = frame::unwrap(framing, &typed.bytes).ok();
+    let (message, frame) = match whole {
+        _ if args.as_is => (whole.unwrap_or_default(), typed.bytes),
+        Some(message) => (message, typed.bytes),
+        None => (typed.bytes.clone(), frame::wrap(framing, 1, &typed.bytes)),
+    };
+    refuse(&message, framing, &args)?;
+    let told = explain::explain(&frame, Some(framing), Some(explain::Direction::Request), None);
+    say(&format!("TX {}", shown(&frame, framing)));
+    say(&format!("   {}", told.summary));
+    let request = message.clone();
+    let run = run(&line, Tool::Send(frame), |finding| match finding {
+        Finding::Bytes { bytes, .. } if bytes.is_empty() => Vec::new(),
+        Finding::Bytes { bytes, reply } => {
+            let mut lines = answer_lines(bytes, framing, &request);
+            let verdict = match frame::unwrap(framing, bytes).and_then(|answer| frame::check_answer(&request, &answer))
+            {
+                Ok(()) => "ok".to_owned(),
+                Err(fault) => fault.to_string(),
+            };
+            let after = reply.map(|reply| format!(", after {:.1} ms", reply.as_secs_f64() * 1e3)).unwrap_or_default();
+            lines.push(format!("   {verdict}{after}"));
+            lines
+        }
+        Finding::Exchange(_)
+        | Finding::Unit { .. }
+        | Finding::Object { .. }
+        | Finding::Values { .. }
+        | Finding::Failed { .. }
+        | Finding::Verdict(_) => Vec::new(),
+    })?;
+    let silent = run.findings.iter().all(|finding| matches!(finding, Finding::Bytes { bytes, .. } if bytes.is_empty()));
+    let broadcast = framing != Framing::Mbap && message.first() == Some(&0);
+    match (silent, broadcast) {
+        (true, false) => Err(CliError::Failed(format!("no answer within {} ms", line.timeout.as_millis()))),
+        (true, true) => {
+            say("   sent to all; nobody answers a broadcast");
+            Ok(())
+        }
+        (false, _) => Ok(()),
+    }
+}
+
+/// What is wrong with a request stops it, unless it is wished all the same.
+fn refuse(message: &[u8], framing: Framing, args: &Args) -> Result<(), CliError> {
+    let mut complaints: Vec<String> =
+        check_request(message, framing).into_iter().map(|complaint| complaint.to_string()).collect();
+    if framing != Framing::Mbap && message.first() == Some(&0) && complaints.is_empty() {
+        complaints.push("unit 0 is a broadcast: every unit on the line obeys it and none answers".into());
+    }
+    if complaints.is_empty() {
+        return Ok(());
+    }
+    if args.force {
+        complaints.iter().for_each(|complaint| say_error(&format!("sent all the same: {complaint}")));
+        return Ok(());
+    }
+    Err(CliError::Usage(format!("nothing was sent (--force sends it): {}", complaints.join("; "))))
+}

@@ -1,0 +1,115 @@
+//! `sightglass scan`: who is on a line, at which settings.
+
+use std::time::Duration;
+
+use super::{PortArgs, baud, parity, run};
+use crate::{
+    cli::{CliError, say},
+    plant::{
+        def::Serial,
+        tool::{Finding, Scan, Tool},
+    },
+    profile::BAUDS,
+};
+
+/// Arguments of `scan`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    port: PortArgs,
+    /// Unit addresses, FIRST-LAST or one
+    #[arg(long, short, value_name = "UNITS", default_value = "1-247", value_parser = units)]
+    units: (u8, u8),
+    /// Try these baud rates too: a list with commas, or `all`
+    #[arg(long, value_name = "LIST")]
+    bauds: Option<String>,
+    /// Try these parities too: a list of N, E, O with commas, or `all`
+    #[arg(long, value_name = "LIST")]
+    parities: Option<String>,
+}
+
+/// One request to every unit; who answers, even with a refusal, is there.
+pub fn main(args: Args) -> Result<(), CliError> {
+    let line = args.port.line()?;
+    let serials = match line.transport.serial() {
+        Some(serial) => serials(&args, serial)?,
+        None if args.bauds.is_some() || args.parities.is_some() => {
+            return Err(CliError::Usage("--bauds and --parities need a serial port".into()));
+        }
+        None => Vec::new(),
+    };
+    let (first, last) = args.units;
+    // Time for request and answer on the wire of the slowest setting is added by the link.
+    let scan = Scan { first, last, serials, timeout: line.timeout.min(Duration::from_secs(60)) };
+    let requests = scan.serials.len().max(1) * (usize::from(last - first) + 1);
+    let most = line.timeout * requests as u32;
+    say(&format!("{} on {}: {requests} requests, {:.0} s at most", "scan", line.transport, most.as_secs_f64().ceil()));
+    run(&line, Tool::Scan(scan), |finding| match finding {
+        Finding::Unit { unit, serial, words } => {
+            let settings = serial.map(|serial| format!(" at {serial}")).unwrap_or_default();
+            vec![format!("unit {unit:3}{settings}: {words}")]
+        }
+        Finding::Verdict(words) => vec![words.clone()],
+        Finding::Exchange(_)
+        | Finding::Bytes { .. }
+        | Finding::Object { .. }
+        | Finding::Values { .. }
+        | Finding::Failed { .. } => Vec::new(),
+    })
+    .map(drop)
+}
+
+/// Every combination that is asked for; none: only the settings of the port.
+fn serials(args: &Args, usual: Serial) -> Result<Vec<Serial>, CliError> {
+    if args.bauds.is_none() && args.parities.is_none() {
+        return Ok(Vec::new());
+    }
+    let bauds: Vec<u32> = match args.bauds.as_deref() {
+        None => vec![usual.baud],
+        Some("all") => BAUDS.iter().copied().filter(|baud| (1_200..=115_200).contains(baud)).collect(),
+        Some(list) => list
+            .split(',')
+            .map(|word| {
+                let number = word.trim().parse().map_err(|_| {
+                    CliError::Usage(format!("--bauds: found `{word}`, expected numbers with commas, or all"))
+                })?;
+                baud(number)
+            })
+            .collect::<Result<_, _>>()?,
+    };
+    let parities: Vec<String> = match args.parities.as_deref() {
+        None => vec![usual.parity.letter().to_string()],
+        Some("all") => vec!["N".into(), "E".into(), "O".into()],
+        Some(list) => list.split(',').map(|word| word.trim().to_ascii_uppercase()).collect(),
+    };
+    if let Some(wrong) = parities.iter().find(|word| !matches!(word.as_str(), "N" | "E" | "O")) {
+        return Err(CliError::Usage(format!("--parities: found `{wrong}`, expected N, E, O with commas, or all")));
+    }
+    let with = |baud: u32| parities.iter().map(move |word| Serial { baud, parity: parity(word), ..usual });
+    Ok(bauds.into_iter().flat_map(with).collect())
+}
+
+/// `1-247` or `17`.
+fn units(text: &str) -> Result<(u8, u8), String> {
+    let wrong = || format!("found `{text}`, expected a unit such as 17 or a range such as 1-32, 1 to 255");
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let number = |word: &str| word.trim().parse::<u8>().map_err(|_| wrong());
+    match (number(first)?, number(last)?) {
+        (first @ 1.., last) if first <= last => Ok((first, last)),
+        _ => Err(wrong()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_one_or_a_range() {
+        assert_eq!(units("17"), Ok((17, 17)));
+        assert_eq!(units("1-32"), Ok((1, 32)));
+        for wrong in ["0", "0-5", "9-3", "1-256", "all", ""] {
+            assert!(units(wrong).is_err_and(|error| error.contains("expected a unit")), "{wrong}");
+        }
+    }
+}

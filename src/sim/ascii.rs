@@ -1,0 +1,171 @@
+//! Modbus ASCII as a slave hears and speaks it: `:`, two digits a byte, LRC, CR LF.
+//!
+//! Written without a look at the master's codec, so that each is a test of the other.
+
+use super::wire::Request;
+
+/// Longest frame: `:`, 2 × 255 digits, CR LF (Modbus serial line V1.02, 2.5.2).
+const FRAME_MAX: usize = 513;
+
+/// Collects characters and cuts whole requests with a right check out of them.
+#[derive(Debug, Clone)]
+pub struct Receiver {
+    /// A UART with seven data bits never delivers an eighth.
+    mask: u8,
+    /// From `:` on.
+    frame: Vec<u8>,
+    /// What is complete but not taken yet: `None` if it could not be read.
+    done: Vec<Option<Request>>,
+}
+
+impl Receiver {
+    /// For 7 or 8 data bits.
+    pub fn new(data_bits: u8) -> Receiver {
+        Receiver { mask: if data_bits == 7 { 0x7F } else { 0xFF }, frame: Vec::new(), done: Vec::new() }
+    }
+
+    /// Adds characters as they arrive. What stands before a `:` is nothing; a `:` inside begins anew.
+    pub fn push(&mut self, characters: &[u8]) {
+        for character in characters {
+            let character = character & self.mask;
+            match character {
+                b':' => {
+                    self.break_off();
+                    self.frame.push(b':');
+                }
+                _ if self.frame.is_empty() => {}
+                b'\n' if self.frame.ends_with(b"\r") => {
+                    self.frame.push(b'\n');
+                    self.done.push(read(&self.frame));
+                    self.frame.clear();
+                }
+                _ if self.frame.len() >= FRAME_MAX => self.break_off(),
+                _ => self.frame.push(character),
+            }
+        }
+    }
+
+    /// The next frame that ended: a request, or `None` in its place if it could not be read.
+    pub fn take(&mut self) -> Option<Option<Request>> {
+        (!self.done.is_empty()).then(|| self.done.remove(0))
+    }
+
+    /// The line was silent for longer than characters of a frame may be apart: what has come of it is lost.
+    pub fn silence(&mut self) {
+        self.break_off();
+    }
+
+    /// Whether nothing waits for its rest.
+    pub fn is_empty(&self) -> bool {
+        self.frame.is_empty()
+    }
+
+    fn break_off(&mut self) {
+        if !self.frame.is_empty() {
+            self.frame.clear();
+            self.done.push(None);
+        }
+    }
+}
+
+/// The frame of a message (unit and PDU).
+pub fn encode(message: &[u8]) -> Vec<u8> {
+    let mut frame = String::from(":");
+    for byte in message.iter().chain([&lrc(message)]) {
+        frame.push_str(&format!("{byte:02X}"));
+    }
+    frame.push_str("\r\n");
+    frame.into_bytes()
+}
+
+/// Two's complement of the sum of all bytes (Modbus serial line V1.02, 6.2.1).
+fn lrc(message: &[u8]) -> u8 {
+    message.iter().fold(0_u8, |sum, byte| sum.wrapping_sub(*byte))
+}
+
+/// Reads `:` … CR LF. Digits may be small, as some masters write them.
+fn read(frame: &[u8]) -> Option<Request> {
+    let digits = frame.strip_prefix(b":")?.strip_suffix(b"\r\n")?;
+    let digit = |character: u8| char::from(character).to_digit(16).map(|value| value as u8);
+    let pairs = digits.chunks(2).map(|pair| match pair {
+        [high, low] => Some(digit(*high)? << 4 | digit(*low)?),
+        _ => None,
+    });
+    let mut message = pairs.collect::<Option<Vec<u8>>>()?;
+    let check = message.pop()?;
+    (message.len() >= 2 && check == lrc(&message)).then(|| Request { message, characters: frame.len() })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn check(data_bits: u8, heard: &[u8], expect: &[Option<&[u8]>]) {
+        let mut receiver = Receiver::new(data_bits);
+        receiver.push(heard);
+        let taken: Vec<_> = std::iter::from_fn(|| receiver.take()).map(|it| it.map(|it| it.message)).collect();
+        let taken: Vec<_> = taken.iter().map(Option::as_deref).collect();
+        assert_eq!(taken, expect, "heard {}", String::from_utf8_lossy(heard));
+    }
+
+    const READ: &[u8] = &[0x11, 3, 0, 0x6B, 0, 3];
+
+    #[test]
+    fn requests_are_read_and_spoiled_ones_noticed() {
+        check(8, b":1103006B00037E\r\n", &[Some(READ)]);
+        check(8, b":1103006b00037e\r\n", &[Some(READ)]);
+        check(8, b"\xFF\x00noise:1103006B00037E\r\n", &[Some(READ)]);
+        check(8, b":1103:1103006B00037E\r\n:1103006B00037E\r\n", &[None, Some(READ), Some(READ)]);
+        check(8, b":1103006B00037F\r\n", &[None]);
+        check(8, b":1103006B0003 7E\r\n", &[None]);
+        check(8, b":1103006B0003E\r\n", &[None]);
+        check(8, b":\r\n", &[None]);
+        check(8, b"1103006B00037E\r\n", &[]);
+        check(8, b":1103006B00037E\n", &[]);
+    }
+
+    #[test]
+    fn the_eighth_bit_counts_only_where_there_is_one() {
+        let parity: Vec<u8> = b":1103006B00037E\r\n".iter().map(|character| character | 0x80).collect();
+        check(7, &parity, &[Some(READ)]);
+        check(8, &parity, &[]);
+    }
+
+    #[test]
+    fn the_printed_vectors_are_spelled_as_they_are_printed() {
+        let table = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/vectors/frames.csv"));
+        let mut seen = 0;
+        for row in csv::Reader::from_reader(table.expect("the vectors are there").as_bytes()).records() {
+            let row = row.expect("a row");
+            let bytes = |cell: &str| -> Vec<u8> {
+                cell.split(' ').map(|byte| u8::from_str_radix(byte, 16).expect("two hex digits")).collect()
+            };
+            if row[1] != *"negative" {
+                assert_eq!(vec![lrc(&bytes(&row[3]))], bytes(&row[5]), "{row:?}");
+                seen += 1;
+            }
+        }
+        assert!(seen > 15, "{seen} vectors");
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_spelled_is_read(message in prop::collection::vec(any::<u8>(), 2..254)) {
+            check(7, &encode(&message), &[Some(&message)]);
+        }
+
+        #[test]
+        fn rubbish_is_bounded_and_forgotten(rubbish in prop::collection::vec(any::<u8>(), 0..2000)) {
+            let mut receiver = Receiver::new(8);
+            receiver.push(&rubbish);
+            prop_assert!(receiver.frame.len() <= FRAME_MAX);
+            receiver.silence();
+            prop_assert!(receiver.is_empty());
+            while receiver.take().is_some() {}
+            receiver.push(&encode(READ));
+            prop_assert_eq!(receiver.take().flatten().map(|it| it.message), Some(READ.to_vec()));
+        }
+    }
+}

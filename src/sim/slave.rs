@@ -1,0 +1,238 @@
+//! A device as a slave on its line: it counts what it hears and says, and tells that by the functions 08, 0B and 0C.
+
+use std::collections::VecDeque;
+
+use super::pdu::{self, Refusal, Registers};
+
+/// The functions that a broadcast may carry.
+const WRITES: [u8; 5] = [0x05, 0x06, 0x0F, 0x10, 0x16];
+/// Events in the log (V1.1b3, 6.10); the oldest makes room.
+const LOG_MAX: usize = 64;
+
+/// A device with its counters.
+#[derive(Debug, Clone)]
+pub struct Slave<D> {
+    /// What it serves.
+    pub device: D,
+    counters: Counters,
+}
+
+/// The counters of function 08, sub-functions 0B to 12, in their order (V1.1b3, 6.8), and those of 0B and 0C. All wrap.
+#[derive(Debug, Clone, Default)]
+struct Counters {
+    diagnostic: [u16; 8],
+    done: u16,
+    log: VecDeque<u8>,
+}
+
+/// Places in [`Counters::diagnostic`].
+const HEARD: usize = 0;
+const SPOILED: usize = 1;
+const EXCEPTIONS: usize = 2;
+const ADDRESSED: usize = 3;
+const UNANSWERED: usize = 4;
+const NEGATIVE: usize = 5;
+const BUSY: usize = 6;
+
+/// Bits of an event (V1.1b3, 6.10).
+const RECEIVED: u8 = 1 << 7;
+const RECEIVED_SPOILED: u8 = RECEIVED | 1 << 1;
+const RECEIVED_BROADCAST: u8 = RECEIVED | 1 << 6;
+const SENT: u8 = 1 << 6;
+
+impl<D: Registers> Slave<D> {
+    /// All counters at zero.
+    pub fn new(device: D) -> Slave<D> {
+        Slave { device, counters: Counters::default() }
+    }
+
+    /// A message for another unit passed on the line.
+    pub fn hear(&mut self) {
+        self.counters.count(HEARD);
+    }
+
+    /// A message passed that nobody could read.
+    pub fn hear_spoiled(&mut self) {
+        self.counters.count(SPOILED);
+        self.counters.note(RECEIVED_SPOILED);
+    }
+
+    /// Answers a request; an empty one has no answer.
+    pub fn respond(&mut self, pdu: &[u8]) -> Option<Vec<u8>> {
+        let (&function, data) = pdu.split_first()?;
+        self.counters.addressed(RECEIVED);
+        let reply = match function {
+            0x08 | 0x0B | 0x0C if D::FUNCTIONS.contains(&function) => {
+                self.counters.serve(function, data).unwrap_or_else(|refusal| pdu::exception(function, refusal.code()))
+            }
+            _ => pdu::serve(&mut self.device, pdu)?,
+        };
+        self.counters.answered(function, &reply);
+        Some(reply)
+    }
+
+    /// Does what a broadcast says; nobody hears whether it could.
+    pub fn obey(&mut self, pdu: &[u8]) {
+        self.counters.addressed(RECEIVED_BROADCAST);
+        self.counters.count(UNANSWERED);
+        if let Some(function) = pdu.first().copied().filter(|function| WRITES.contains(function))
+            && let Some(reply) = pdu::serve(&mut self.device, pdu)
+        {
+            self.counters.answered(function, &reply);
+        }
+    }
+
+    /// Refuses a request with a code of somebody's choice.
+    pub fn refuse(&mut self, pdu: &[u8], code: u8) -> Option<Vec<u8>> {
+        let reply = pdu::exception(*pdu.first()?, code);
+        self.counters.addressed(RECEIVED);
+        self.counters.answered(pdu[0], &reply);
+        Some(reply)
+    }
+}
+
+impl Counters {
+    fn count(&mut self, place: usize) {
+        self.diagnostic[place] = self.diagnostic[place].wrapping_add(1);
+    }
+
+    fn note(&mut self, event: u8) {
+        self.log.truncate(LOG_MAX - 1);
+        self.log.push_front(event);
+    }
+
+    fn addressed(&mut self, event: u8) {
+        self.count(HEARD);
+        self.count(ADDRESSED);
+        self.note(event);
+    }
+
+    /// Function 0B itself does not count as done, nor does what was refused (V1.1b3, 6.9).
+    fn answered(&mut self, function: u8, reply: &[u8]) {
+        let event = match reply {
+            [0x80..=0xFF, code] => {
+                self.count(EXCEPTIONS);
+                match code {
+                    1..=3 => 1 << 0,
+                    5 | 6 => {
+                        self.count(BUSY);
+                        1 << 2
+                    }
+                    7 => {
+                        self.count(NEGATIVE);
+                        1 << 3
+                    }
+                    _ => 1 << 1,
+                }
+            }
+            _ => {
+                self.done = self.done.wrapping_add(u16::from(function != 0x0B));
+                0
+            }
+        };
+        self.note(SENT | event);
+    }
+
+    fn serve(&mut self, function: u8, data: &[u8]) -> Result<Vec<u8>, Refusal> {
+        let ready = [0, 0];
+        match (function, data) {
+            (0x08, [high, low, data @ ..]) => self.diagnose(u16::from_be_bytes([*high, *low]), data),
+            (0x0B, []) => Ok([&[function], &ready[..], &self.done.to_be_bytes()].concat()),
+            (0x0C, []) => {
+                let counts = [ready, self.done.to_be_bytes(), self.diagnostic[HEARD].to_be_bytes()].concat();
+                let length = (counts.len() + self.log.len()) as u8;
+                Ok([function, length].into_iter().chain(counts).chain(self.log.iter().copied()).collect())
+            }
+            _ => Err(Refusal::Value),
+        }
+    }
+
+    fn diagnose(&mut self, what: u16, data: &[u8]) -> Result<Vec<u8>, Refusal> {
+        let reply = |data: &[u8]| Ok([&[0x08], &what.to_be_bytes()[..], data].concat());
+        match what {
+            0x00 => reply(data),
+            0x0A | 0x0B..=0x12 if data != [0, 0] => Err(Refusal::Value),
+            0x0A => {
+                (self.diagnostic, self.done) = ([0; 8], 0);
+                reply(data)
+            }
+            0x0B..=0x12 => reply(&self.diagnostic[usize::from(what - 0x0B)].to_be_bytes()),
+            _ => Err(Refusal::Function),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::dl06::Dl06;
+    use crate::sim::pxr::Pxr;
+
+    fn ask(slave: &mut Slave<Dl06>, request: &[u8], expect: &[u8]) {
+        assert_eq!(slave.respond(request).as_deref(), Some(expect), "request {request:02X?}");
+    }
+
+    fn counters(slave: &Slave<Dl06>) -> [u16; 8] {
+        let mut copy = slave.clone();
+        std::array::from_fn(|place| {
+            let reply = copy.counters.serve(8, &[0, 0x0B + place as u8, 0, 0]).expect("every counter is there");
+            u16::from_be_bytes([reply[3], reply[4]])
+        })
+    }
+
+    #[test]
+    fn an_echo_brings_back_every_byte() {
+        let slave = &mut Slave::new(Dl06::new());
+        ask(slave, &[8, 0, 0, 0xA5, 0x37], &[8, 0, 0, 0xA5, 0x37]);
+        ask(slave, &[8, 0, 0], &[8, 0, 0]);
+        ask(slave, &[8, 0, 0, 1, 2, 3, 4, 5], &[8, 0, 0, 1, 2, 3, 4, 5]);
+        ask(slave, &[8, 0, 0x0B, 0, 1], &[0x88, 3]);
+        ask(slave, &[8, 0, 0x15, 0, 0], &[0x88, 1]);
+        ask(slave, &[8, 0], &[0x88, 3]);
+    }
+
+    #[test]
+    fn what_happens_on_the_line_is_counted() {
+        let slave = &mut Slave::new(Dl06::new());
+        ask(slave, &[3, 4, 0, 0, 1], &[3, 2, 0, 0]);
+        ask(slave, &[3, 4, 0, 0, 0], &[0x83, 3]);
+        slave.hear();
+        slave.hear_spoiled();
+        slave.obey(&[6, 4, 0x10, 0, 1]);
+        slave.refuse(&[3, 4, 0, 0, 1], 6);
+        slave.refuse(&[3, 4, 0, 0, 1], 7);
+        assert_eq!(counters(slave), [6, 1, 3, 5, 1, 1, 1, 0]);
+        ask(slave, &[0x0B], &[0x0B, 0, 0, 0, 2]);
+        // Newest first; the request for the log is in it already.
+        let log = [0x80, 0x40, 0x80, 0x48, 0x80, 0x44, 0x80, 0x40, 0xC0, 0x82, 0x41, 0x80, 0x40, 0x80];
+        ask(slave, &[0x0C], &[&[0x0C, 20, 0, 0, 0, 2, 0, 8], &log[..]].concat());
+        ask(slave, &[8, 0, 0x0A, 0, 0], &[8, 0, 0x0A, 0, 0]);
+        assert_eq!(counters(slave), [0; 8]);
+    }
+
+    #[test]
+    fn the_log_keeps_the_latest_64_events() {
+        let slave = &mut Slave::new(Dl06::new());
+        (0..100).for_each(|_| slave.hear_spoiled());
+        let reply = slave.respond(&[0x0C]).expect("an answer");
+        assert_eq!((reply.len(), reply[1], reply[8], reply[9], reply[71]), (72, 70, 0x80, 0x82, 0x82));
+    }
+
+    #[test]
+    fn a_broadcast_is_obeyed_only_where_it_writes() {
+        let slave = &mut Slave::new(Dl06::new());
+        slave.obey(&[8, 0, 0x0A, 0, 0]);
+        slave.obey(&[6, 4, 0x20, 0x12, 0x34]);
+        slave.obey(&[]);
+        ask(slave, &[3, 4, 0x20, 0, 1], &[3, 2, 0x12, 0x34]);
+        assert_eq!(counters(slave)[ADDRESSED], 4);
+    }
+
+    #[test]
+    fn a_controller_without_diagnostics_says_so() {
+        let mut pxr = Slave::new(Pxr::new(27.0));
+        for function in [0x07, 0x08, 0x0B, 0x0C, 0x11, 0x16, 0x17, 0x18, 0x2B] {
+            assert_eq!(pxr.respond(&[function, 0, 0, 0, 0]), Some(vec![function | 0x80, 1]));
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! Slaves for benches, in which register N holds N: [`PacedSlave`] at the pace of a UART, [`TcpSlave`] as fast as it can.
+#![allow(dead_code, reason = "each bench takes what it needs")]
+
+mod paced;
+mod tcp;
+
+pub use paced::PacedSlave;
+pub use tcp::TcpSlave;
+
+use sightglass::sim::pdu::{self, Bits, Identity, Refusal, Registers, Words};
+
+/// Every register holds its address, odd coils are on; what is written is acknowledged and forgotten.
+#[derive(Clone)]
+struct Numbers;
+
+impl Registers for Numbers {
+    const FUNCTIONS: &'static [u8] = &[0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F, 0x10];
+    const WORDS_MAX: u16 = 125;
+    const IDENTITY: Identity = Identity { server_id: 0, objects: &[] };
+
+    fn bit(&self, _: Bits, address: u16) -> Result<bool, Refusal> {
+        Ok(address % 2 == 1)
+    }
+
+    fn write_bit(&mut self, _: u16, _: bool) -> Result<(), Refusal> {
+        Ok(())
+    }
+
+    fn word(&self, _: Words, address: u16) -> Result<u16, Refusal> {
+        Ok(address)
+    }
+
+    fn write_word(&mut self, _: u16, _: u16) -> Result<(), Refusal> {
+        Ok(())
+    }
+}
+
+/// The answer message (unit and PDU) of any unit but the broadcast.
+fn answer(message: &[u8]) -> Option<Vec<u8>> {
+    let (&unit, request) = message.split_first().filter(|(unit, _)| **unit != 0)?;
+    let mut reply = pdu::serve(&mut Numbers, request)?;
+    reply.insert(0, unit);
+    Some(reply)
+}

@@ -1,0 +1,119 @@
+//! A slave on a pseudo-terminal whose bytes come when a UART would deliver them.
+//!
+//! ```text
+//!  the master writes          over on the wire          the answer begins        its last byte is here
+//!  |— characters of request ——|— t3.5 ——————————————————|— characters of answer —|
+//! ```
+//! A pseudo-terminal carries a request at once; it is over only when a real line would have carried it, counted from its first
+//! byte. The answer comes in pieces of eight characters, as Linux takes them out of a 16550, the last piece when it is over.
+
+use std::{
+    fs::{File, OpenOptions},
+    io::{Read, Write},
+    path::PathBuf,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use rustix::{
+    pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
+    termios::{OptionalActions, tcgetattr, tcsetattr},
+};
+use sightglass::{bus::frame::with_crc, plant::def::Serial, sim::wire::Receiver};
+
+/// Characters that the UART hands over at once.
+const FIFO: usize = 8;
+/// The system wakes a sleeper this late at most, as a rule; the rest is spun.
+const SPIN: Duration = Duration::from_micros(200);
+/// Silence that ends what could not be read.
+const SILENCE: Duration = Duration::from_millis(20);
+
+/// Keeps the line open. The slave's thread ends once this is dropped and every client has closed the port.
+pub struct PacedSlave {
+    _port: File,
+    served: Arc<AtomicU64>,
+    hasty: Arc<AtomicU64>,
+}
+
+impl PacedSlave {
+    /// Serves at so many baud with 8N1. The path is the port for a master to open.
+    pub fn start(baud: u32) -> (PathBuf, PacedSlave) {
+        PacedSlave::start_on(Serial { baud, ..Serial::USUAL })
+    }
+
+    /// Serves with other bits to a character.
+    pub fn start_on(serial: Serial) -> (PathBuf, PacedSlave) {
+        let line = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+        grantpt(&line).unwrap();
+        unlockpt(&line).unwrap();
+        let path = PathBuf::from(ptsname(&line, Vec::new()).unwrap().into_string().unwrap());
+        let port = OpenOptions::new().read(true).write(true).open(&path).unwrap();
+        let mut raw = tcgetattr(&port).unwrap();
+        raw.make_raw();
+        tcsetattr(&port, OptionalActions::Now, &raw).unwrap();
+        let slave = PacedSlave { _port: port, served: Arc::default(), hasty: Arc::default() };
+        let (served, hasty) = (slave.served.clone(), slave.hasty.clone());
+        thread::spawn(move || serve(File::from(line), serial, &served, &hasty));
+        (path, slave)
+    }
+
+    /// Requests answered so far.
+    pub fn served(&self) -> u64 {
+        self.served.load(Ordering::Relaxed)
+    }
+
+    /// Requests that began before the answer was followed by its 3.5 characters of silence: on a real line they are lost.
+    pub fn hasty(&self) -> u64 {
+        self.hasty.load(Ordering::Relaxed)
+    }
+}
+
+fn serve(mut line: File, serial: Serial, served: &AtomicU64, hasty: &AtomicU64) {
+    let character = serial.char_time();
+    let (mut receiver, mut bytes) = (Receiver::default(), [0; 512]);
+    let (mut began, mut latest, mut quiet) = (Instant::now(), Instant::now(), Instant::now());
+    // The read fails when nobody holds the other end any more.
+    while let Ok(count) = line.read(&mut bytes) {
+        let now = Instant::now();
+        if now - latest > SILENCE {
+            receiver.silence();
+        }
+        if receiver.is_empty() {
+            began = now;
+            hasty.fetch_add(u64::from(now < quiet), Ordering::Relaxed);
+        }
+        latest = now;
+        receiver.push(&bytes[..count]);
+        while let Some(request) = receiver.take() {
+            let over = (began + character * request.len() as u32).max(now);
+            began = over;
+            let Some(answer) = super::answer(&request[..request.len() - 2]) else { continue };
+            let Ok(end) = say(&mut line, &with_crc(&answer), over + serial.silence(), character) else { return };
+            quiet = end + serial.silence();
+            served.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Delivers a frame that begins at a given time; says when its last character was over.
+fn say(line: &mut File, frame: &[u8], begins: Instant, character: Duration) -> std::io::Result<Instant> {
+    let mut over = begins;
+    for piece in frame.chunks(FIFO) {
+        over += character * piece.len() as u32;
+        wait_until(over);
+        line.write_all(piece)?;
+    }
+    Ok(over)
+}
+
+/// Sleeps until just before and spins the rest.
+fn wait_until(time: Instant) {
+    thread::sleep(time.saturating_duration_since(Instant::now()).saturating_sub(SPIN));
+    while Instant::now() < time {
+        std::hint::spin_loop();
+    }
+}
