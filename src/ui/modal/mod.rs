@@ -22,7 +22,7 @@ pub use prompt::Prompt;
 use super::{
     Act, Cx,
     keys::{self, Hint},
-    tabs::Tabs,
+    tabs::{Tabs, bus},
     widgets::text::{Canvas, fit, width},
 };
 use crate::plant::def::TagId;
@@ -44,6 +44,8 @@ pub enum Modal {
     Faceplate(Faceplate),
     /// Words to be read: why something cannot be done now.
     Notice(Notice),
+    /// A frame, a block, a test of the bus tab.
+    Bus(Box<bus::Window>),
 }
 
 /// What a key did to a window.
@@ -86,6 +88,7 @@ impl Modal {
             Modal::Prompt(prompt) => prompt.on_key(cx, tabs, event),
             Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
             Modal::Notice(notice) => notice.on_key(event),
+            Modal::Bus(window) => window.on_key(cx, tabs, event),
         };
         match next {
             Next::Stay(modal) => (Some(modal), Vec::new()),
@@ -104,6 +107,7 @@ impl Modal {
         match self {
             Modal::Entry(entry) => entry.line.paste(text),
             Modal::Prompt(prompt) => prompt.line.paste(text),
+            Modal::Bus(window) => window.on_paste(text),
             Modal::Help(_) | Modal::Confirm(_) | Modal::Choice(_) | Modal::Faceplate(_) | Modal::Notice(_) => {}
         }
     }
@@ -119,6 +123,7 @@ impl Modal {
             Modal::Prompt(_) => vec![hint("⏎", "take it"), hint("Esc", "leave")],
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
             Modal::Notice(_) => vec![hint("Esc", "close")],
+            Modal::Bus(window) => window.hints(),
         }
     }
 
@@ -132,6 +137,7 @@ impl Modal {
             Modal::Prompt(prompt) => prompt.view(cx, frame, body),
             Modal::Faceplate(faceplate) => faceplate.view(cx, frame, body),
             Modal::Notice(notice) => notice.view(cx, frame, body),
+            Modal::Bus(window) => window.view(cx, frame, body),
         }
     }
 }
