@@ -190,7 +190,7 @@ fn measured_station<T>(def: Arc<PlantDef>, over: Duration, look: impl Fn() -> T)
     runtime.block_on(async {
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
         let history = folder.path().join("bench.duckdb");
-        let options = station::Options { def, clock: Clock::real(), history, connectors };
+        let options = station::Options { def, clock: Clock::real(), history, connectors, file: None };
         let mut running = station::start(options).unwrap();
         let mut session = running.session("bench");
         // The first second opens ports and files.
