@@ -299,6 +299,12 @@ pub fn watch_words(cx: &Cx, watch: &Watch) -> (String, Style) {
         };
     };
     let (words, trouble) = outcome_words(&status.outcome);
+    let words = match (&status.command, &status.outcome) {
+        // Whether they are the right ones only the devices can tell.
+        (Command::Configure(_), Outcome::Verified) => "in use".to_owned(),
+        (Command::SaveSettings(_), Outcome::Verified) => "written into the plant file".to_owned(),
+        _ => words,
+    };
     let at = clock(status.at, &cx.def().time_zone);
     (format!("{what}  {words} {at}"), if trouble { theme.trouble() } else { theme.done() })
 }
