@@ -3,7 +3,7 @@
 mod health;
 mod service;
 
-use std::sync::Arc;
+use std::{mem::discriminant, sync::Arc};
 
 use jiff::Timestamp;
 
@@ -267,6 +267,9 @@ impl Plant {
             LineState::Connecting => status.lost_since,
             LineState::Connected | LineState::Disconnected | LineState::Testing => None,
         };
+        if status.since.is_none() || discriminant(&status.state) != discriminant(&state) {
+            status.since = Some(at);
+        }
         let open = state != LineState::Disconnected;
         // A closed line is the operator's wish: its devices are not asked, so their silence is no fault.
         let gone = match &state {

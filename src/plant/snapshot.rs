@@ -115,6 +115,8 @@ pub struct LineStatus {
     pub settings_before: Option<Arc<LineDef>>,
     /// The test at work, or the last one.
     pub test: Option<Arc<ToolRun>>,
+    /// When it came into this state.
+    pub since: Option<Timestamp>,
     /// Since when it has not been connected although it should be.
     pub lost_since: Option<Timestamp>,
 }

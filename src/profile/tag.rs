@@ -12,7 +12,7 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceId, Limits, TagId},
-    tag::{Access, Bound, Confidence, Decimals, Kind, Point, Poll, Table, TagDef},
+    tag::{Access, Bound, Class, Confidence, Decimals, Kind, Point, Poll, Table, TagDef},
 };
 
 /// What a tag must know of its device.
@@ -29,6 +29,8 @@ pub(super) struct Surroundings<'a> {
 /// A defined tag and what must still be checked when all tags are there.
 pub(super) struct Defined {
     pub tag: TagDef,
+    /// The class, if it is written.
+    pub class: Option<Class>,
     /// Where its address stands; `None` if it has no valid point.
     pub address_at: Option<Span>,
     /// Tags that this one needs to be shown right.
@@ -89,13 +91,16 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
         write_unlock: None,
         group: text(&row.group),
         poll,
+        // Known when all tags and alarms are.
+        class: Class::Soft,
         deadband: row.deadband.map_or(0.0, |deadband| deadband.value),
         store: row.store.map_or(access != Access::Write && matches!(poll, Poll::Every(_)), |store| store.value),
         confidence: row.confidence.map_or(Confidence::Medium, |confidence| confidence.value),
         source: text(&row.source),
     };
     let address_at = point.and(row.address.map(|address| address.at));
-    Defined { tag, address_at, needs: links.needs, unlock: links.unlock }
+    let class = row.class.map(|class| class.value);
+    Defined { tag, class, address_at, needs: links.needs, unlock: links.unlock }
 }
 
 /// Stands in for an address that is wrong; it never leaves the loader.
@@ -319,21 +324,22 @@ fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Acce
     if matches!(point.table, Table::Discrete | Table::Input) {
         problems.add(at, format!("a {} can only be read", point.table.word())).label("expected access = \"r\"");
     }
-    if point.field.is_some() {
+    if point.field.is_some() && row.write_fc.is_none() {
         problems
-            .add(at, "a field of bits inside a word cannot be written")
-            .label("expected access = \"r\"")
-            .help("writing it would overwrite the other bits of the word");
+            .add(at, "a field of bits inside a word cannot be written by a whole word")
+            .label("expected access = \"r\", or write_fc = 22")
+            .help("it would overwrite the other bits; function 22, mask write, does not, if the device has it");
     }
     if let Some(verify) = row.verify.filter(|verify| !verify.value) {
         let problem = problems.add(verify.at, "a write is always verified").label("leave this out");
         problem.help("a tag that cannot be read back has access = \"w\"");
     }
     if let Some(fc) = row.write_fc {
-        let allowed: &[u8] = match (point.table.is_bits(), point.len()) {
-            (true, _) => &[5, 15],
-            (false, 1) => &[6, 16],
-            (false, _) => &[16],
+        let allowed: &[u8] = match (point.table.is_bits(), point.field.is_some(), point.len()) {
+            (true, ..) => &[5, 15],
+            (false, true, _) => &[22],
+            (false, false, 1) => &[6, 16, 23],
+            (false, false, _) => &[16, 23],
         };
         if !allowed.contains(&fc.value) {
             let problem = problems.add(fc.at, format!("function {} cannot write this tag", fc.value));

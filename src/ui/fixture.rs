@@ -1,10 +1,13 @@
 //! A small but complete tank plant for tests of the screens, in three moods: normal, alarm, line down.
 
 mod plant;
+mod traffic;
 
 use std::{sync::Arc, time::Duration};
 
 use jiff::{SignedDuration, Timestamp};
+
+pub use traffic::more_frames;
 
 use super::{Cx, theme::Theme};
 use crate::plant::{
@@ -126,6 +129,20 @@ impl Fixture {
             returned_at: None,
             value: None,
         }];
+        plant
+    }
+
+    /// The line has reported: plan, tallies, frames, all well.
+    pub fn traffic() -> Fixture {
+        let mut plant = Fixture::normal();
+        traffic::good(&mut plant);
+        plant
+    }
+
+    /// Replies near the timeout, CRC errors, a refused block, and the PLC gone.
+    pub fn traffic_trouble() -> Fixture {
+        let mut plant = Fixture::traffic();
+        traffic::trouble(&mut plant);
         plant
     }
 

@@ -19,7 +19,7 @@ use tokio::{
     time::{Instant, MissedTickBehavior, interval, sleep_until},
 };
 
-use super::{AskId, Effect, Model, Msg, theme::Theme, update, view};
+use super::{AskId, Effect, Model, Msg, tabs::Tab, theme::Theme, update, view};
 use crate::{
     history::{HistoryError, Question, io::Query},
     plant::command::Order,
@@ -168,7 +168,7 @@ impl Loop {
                     own(|| update(&mut self.model, Msg::Undelivered(id, why)));
                 }
                 Effect::Ask(id, question) => self.ask(id, question),
-                Effect::SaveReport { path, bytes } => self.save(path, bytes),
+                Effect::SaveReport { tab, path, bytes } => self.save(tab, path, bytes),
                 Effect::Redraw => self.screen.renew()?,
                 Effect::Quit => return Ok(true),
             }
@@ -190,11 +190,11 @@ impl Loop {
         });
     }
 
-    fn save(&self, path: PathBuf, bytes: Vec<u8>) {
+    fn save(&self, tab: Tab, path: PathBuf, bytes: Vec<u8>) {
         let outbox = self.outbox.clone();
         tokio::task::spawn_blocking(move || {
             let saved = save(&path, &bytes).map_err(|error| format!("{}: {error}", path.display()));
-            let _ = outbox.blocking_send(Msg::Saved(saved));
+            let _ = outbox.blocking_send(Msg::Saved(tab, saved));
         });
     }
 

@@ -102,8 +102,8 @@ pub enum Msg {
     Snapshot(Arc<Snapshot>),
     /// The history answered.
     Answer(AskId, Result<Answer, HistoryError>),
-    /// A report was written, or why not.
-    Saved(Result<PathBuf, String>),
+    /// A file of this tab was written, or why not.
+    Saved(Tab, Result<PathBuf, String>),
     /// The station did not take this order: its queue is full, or it has gone.
     Undelivered(OrderId, &'static str),
     /// Half a second passed; so long ago (real time) came the last snapshot.
@@ -120,8 +120,10 @@ pub enum Effect {
     Order(OrderId, Command),
     /// Ask the history.
     Ask(AskId, Question),
-    /// Write a report; answered by [`Msg::Saved`].
+    /// Write a report or a capture; answered by [`Msg::Saved`].
     SaveReport {
+        /// The tab that wants it.
+        tab: Tab,
         /// Where, relative to the working folder.
         path: PathBuf,
         /// What.
@@ -254,7 +256,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
         Msg::Answer(id, answer) => with_tabs(model, |tabs, cx| tabs.on_answer(cx, id, answer)),
-        Msg::Saved(result) => with_tabs(model, |tabs, cx| tabs.reports.on_saved(cx, result)),
+        Msg::Saved(tab, result) => with_tabs(model, |tabs, cx| tabs.on_saved(cx, tab, result)),
         Msg::Undelivered(id, why) => {
             if let Some(watch) = model.watch.as_mut().filter(|watch| watch.id == id) {
                 watch.undelivered = Some(why);

@@ -44,6 +44,7 @@ pub fn type_keys(model: &mut Model, keys: &str) -> Vec<Effect> {
         '↓' => KeyCode::Down,
         '←' => KeyCode::Left,
         '→' => KeyCode::Right,
+        '\u{8}' => KeyCode::Backspace,
         c => KeyCode::Char(c),
     };
     keys.chars().flat_map(|c| update(model, Msg::Key(KeyEvent::new(code(c), KeyModifiers::NONE)))).collect()

@@ -7,23 +7,35 @@ use crate::ui::{
     widgets::text::{Canvas, width},
 };
 
-/// Longest text that can be entered.
+/// Longest text that can be entered, unless more is asked for.
 const CHARS_MAX: usize = 64;
 
 /// A text and the place of its cursor.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Line {
     text: Vec<char>,
     cursor: usize,
+    /// Most characters that it takes.
+    room: usize,
     /// Something that was typed or pasted is not in the text; until the text is empty again nobody may trust it.
     missed: bool,
+}
+
+impl Default for Line {
+    fn default() -> Line {
+        Line::new("")
+    }
 }
 
 impl Line {
     /// Any text.
     pub fn new(text: &str) -> Line {
-        let text: Vec<char> = text.chars().take(CHARS_MAX).collect();
-        Line { cursor: text.len(), text, missed: false }
+        Line::long(text, CHARS_MAX)
+    }
+    /// A text of at most so many characters.
+    pub fn long(text: &str, room: usize) -> Line {
+        let text: Vec<char> = text.chars().take(room).collect();
+        Line { cursor: text.len(), text, room, missed: false }
     }
     /// What has been entered.
     pub fn text(&self) -> String {
@@ -92,7 +104,7 @@ impl Line {
     }
 
     fn insert(&mut self, c: char) {
-        if c.is_control() || self.text.len() >= CHARS_MAX {
+        if c.is_control() || self.text.len() >= self.room {
             self.missed = true;
             return;
         }

@@ -26,7 +26,7 @@ pub use why::Why;
 use super::{
     Act, Cx,
     keys::{self, Hint},
-    tabs::Tabs,
+    tabs::{Tabs, bus},
     widgets::text::{Canvas, fit, width},
 };
 use crate::plant::def::TagId;
@@ -52,6 +52,8 @@ pub enum Modal {
     Why(Why),
     /// How a line communicates.
     Settings(Box<Settings>),
+    /// A frame, a block, a test of the bus tab.
+    Bus(Box<bus::Window>),
 }
 
 /// What a key did to a window.
@@ -98,6 +100,7 @@ impl Modal {
             Modal::Notice(notice) => notice.on_key(event),
             Modal::Why(why) => why.on_key(event),
             Modal::Settings(settings) => settings.on_key(cx, event),
+            Modal::Bus(window) => window.on_key(cx, tabs, event),
         };
         match next {
             Next::Stay(modal) => (Some(modal), Vec::new()),
@@ -124,6 +127,7 @@ impl Modal {
             | Modal::Faceplate(_)
             | Modal::Notice(_)
             | Modal::Why(_) => {}
+            Modal::Bus(window) => window.on_paste(text),
         }
     }
 
@@ -140,6 +144,7 @@ impl Modal {
             Modal::Notice(_) => vec![hint("Esc", "close")],
             Modal::Why(why) => why.hints(),
             Modal::Settings(settings) => settings.hints(),
+            Modal::Bus(window) => window.hints(),
         }
     }
 
@@ -155,6 +160,7 @@ impl Modal {
             Modal::Notice(notice) => notice.view(cx, frame, body),
             Modal::Why(why) => why.view(cx, frame, body),
             Modal::Settings(settings) => settings.view(cx, frame, body),
+            Modal::Bus(window) => window.view(cx, frame, body),
         }
     }
 }

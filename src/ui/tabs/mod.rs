@@ -4,11 +4,14 @@
 //! when it is shown, only while it is shown: ask here what is due), `on_answer`, `view`, and where it opens a text entry, `on_text`.
 
 pub mod alarms;
+pub mod bus;
 pub mod controllers;
 mod errand;
 pub mod mimic;
 pub mod reports;
 pub mod trends;
+
+use std::path::PathBuf;
 
 use crossterm::event::KeyEvent;
 use ratatui::{Frame, layout::Rect};
@@ -35,11 +38,13 @@ pub enum Tab {
     Controllers,
     /// Shift reports.
     Reports,
+    /// Lines, their plan, frames and tests.
+    Bus,
 }
 
 impl Tab {
     /// Every tab, in the order of its number key.
-    pub const ALL: [Tab; 5] = [Tab::Mimic, Tab::Trends, Tab::Alarms, Tab::Controllers, Tab::Reports];
+    pub const ALL: [Tab; 6] = [Tab::Mimic, Tab::Trends, Tab::Alarms, Tab::Controllers, Tab::Reports, Tab::Bus];
 
     /// Its heading.
     pub fn title(self) -> &'static str {
@@ -49,6 +54,7 @@ impl Tab {
             Tab::Alarms => "Alarms",
             Tab::Controllers => "Controllers",
             Tab::Reports => "Reports",
+            Tab::Bus => "Bus",
         }
     }
     /// The tab so many further on, around the end.
@@ -73,6 +79,8 @@ pub struct Tabs {
     pub controllers: controllers::Controllers,
     /// Tab 5.
     pub reports: reports::Reports,
+    /// Tab 6.
+    pub bus: bus::Bus,
 }
 
 impl Tabs {
@@ -85,6 +93,7 @@ impl Tabs {
             alarms: alarms::Alarms::new(snapshot),
             controllers: controllers::Controllers::new(snapshot),
             reports: reports::Reports::new(snapshot),
+            bus: bus::Bus::new(snapshot),
         }
     }
 
@@ -102,6 +111,7 @@ impl Tabs {
             Tab::Alarms => act(alarms::KEYS, event, |action| self.alarms.on_key(cx, action)),
             Tab::Controllers => act(controllers::KEYS, event, |action| self.controllers.on_key(cx, action)),
             Tab::Reports => act(reports::KEYS, event, |action| self.reports.on_key(cx, action)),
+            Tab::Bus => self.bus.on_key(cx, event),
         }
     }
 
@@ -118,6 +128,7 @@ impl Tabs {
             }
             Tab::Controllers => keys::hints(controllers::KEYS),
             Tab::Reports => keys::hints(reports::KEYS),
+            Tab::Bus => self.bus.hints(cx),
         }
     }
 
@@ -129,6 +140,7 @@ impl Tabs {
             Tab::Alarms => self.alarms.on_snapshot(cx),
             Tab::Controllers => self.controllers.on_snapshot(cx),
             Tab::Reports => self.reports.on_snapshot(cx),
+            Tab::Bus => self.bus.on_snapshot(cx),
         }
     }
 
@@ -138,7 +150,7 @@ impl Tabs {
             Tab::Mimic => self.mimic.on_answer(cx, id.number, answer),
             Tab::Trends => self.trends.on_answer(cx, id.number, answer),
             Tab::Alarms => self.alarms.on_answer(cx, id.number, answer),
-            Tab::Controllers => Vec::new(),
+            Tab::Controllers | Tab::Bus => Vec::new(),
             Tab::Reports => self.reports.on_answer(cx, id.number, answer),
         }
     }
@@ -148,8 +160,19 @@ impl Tabs {
         match self.shown {
             Tab::Trends => self.trends.on_text(cx, text),
             Tab::Reports => self.reports.on_text(cx, text),
+            Tab::Bus => self.bus.on_text(cx, text),
             Tab::Mimic | Tab::Alarms | Tab::Controllers => Ok(Vec::new()),
         }
+    }
+
+    /// A file was written, or why not: told to the tab that wanted it, shown or not.
+    pub fn on_saved(&mut self, cx: &Cx, tab: Tab, result: Result<PathBuf, String>) -> Vec<Act> {
+        match tab {
+            Tab::Reports => return self.reports.on_saved(cx, result),
+            Tab::Bus => self.bus.on_saved(result),
+            Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Controllers => {}
+        }
+        Vec::new()
     }
 
     /// Draws the shown tab.
@@ -160,6 +183,7 @@ impl Tabs {
             Tab::Alarms => self.alarms.view(cx, frame, area),
             Tab::Controllers => self.controllers.view(cx, frame, area),
             Tab::Reports => self.reports.view(cx, frame, area),
+            Tab::Bus => self.bus.view(cx, frame, area),
         }
     }
 }

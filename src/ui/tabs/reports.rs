@@ -247,7 +247,7 @@ impl Reports {
         };
         self.export = Export::Writing;
         let bytes = shift_csv(report, cx.def(), self.dialect);
-        vec![Act::Do(Effect::SaveReport { path: self.path(cx, report), bytes })]
+        vec![Act::Do(Effect::SaveReport { tab: Tab::Reports, path: self.path(cx, report), bytes })]
     }
 
     fn path(&self, cx: &Cx, report: &ShiftReport) -> PathBuf {

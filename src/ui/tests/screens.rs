@@ -81,7 +81,7 @@ fn the_linux_console_gets_characters_of_its_font() {
 
 #[test]
 fn no_size_is_too_small_to_survive() {
-    let all = [Tab::Mimic, Tab::Trends, Tab::Alarms, Tab::Controllers, Tab::Reports];
+    let all = [Tab::Mimic, Tab::Trends, Tab::Alarms, Tab::Controllers, Tab::Reports, Tab::Bus];
     let sizes = (0..40).flat_map(|width| (0..20).map(move |height| (width, height)));
     let large = [(59, 16), (60, 15), (60, 16), (61, 17), (79, 23), (81, 25), (200, 60), (400, 20), (70, 200)];
     for fixture in [Fixture::alarm(), Fixture::line_down()] {

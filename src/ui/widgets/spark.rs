@@ -45,6 +45,17 @@ fn bars_of(glyphs: Glyphs) -> &'static [char] {
     }
 }
 
+/// Shares from 0 to 1, newest last, on a scale that does not move: how busy a line was. The oldest are at the left.
+pub fn shares(values: &[f32], cells: usize, glyphs: Glyphs) -> String {
+    let glyphs = bars_of(glyphs);
+    let each = values.len().div_ceil(cells.max(1)).max(1);
+    let glyph = |part: &[f32]| {
+        let mean = part.iter().sum::<f32>() / part.len() as f32;
+        glyphs[(mean.clamp(0.0, 1.0) * (glyphs.len() - 1) as f32).round() as usize]
+    };
+    values.rchunks(each).rev().map(glyph).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
@@ -68,6 +79,13 @@ mod tests {
         };
         assert_eq!(spark(&series, cells, 0.1, Glyphs::Braille), expect, "{values:?}");
         assert_eq!(spark(&series, cells, 0.1, Glyphs::Ascii), expect_ascii, "{values:?}");
+    }
+
+    #[test]
+    fn how_busy_a_line_was_is_seen_on_a_scale_that_does_not_move() {
+        assert_eq!(shares(&[0.0, 0.5, 1.0, 0.52], 8, Glyphs::Braille), "▁▅█▅");
+        assert_eq!(shares(&[0.0, 0.0, 1.0, 1.0, 0.0], 3, Glyphs::Ascii), "_--");
+        assert_eq!(shares(&[], 8, Glyphs::Ascii), "");
     }
 
     #[test]

@@ -37,7 +37,7 @@ impl Stand {
         for effect in update(&mut self.model, msg) {
             match effect {
                 Effect::Ask(id, question) if id.tab == Tab::Reports => self.asked.push((id, question)),
-                Effect::SaveReport { path, bytes } => self.saved.push((path, bytes)),
+                Effect::SaveReport { path, bytes, .. } => self.saved.push((path, bytes)),
                 Effect::Ask(..) | Effect::Order(..) | Effect::Redraw | Effect::Quit => {}
             }
         }
@@ -178,12 +178,12 @@ fn the_csv_that_is_written_is_the_report_that_is_shown() {
     let Stand { model, .. } = &stand;
     let shown = model.tabs.reports.report.as_ref().expect("a report is shown");
     assert_eq!(bytes, shift_csv(shown, &model.snapshot.def, CsvDialect::default()));
-    stand.send(Msg::Saved(Ok(path)));
+    stand.send(Msg::Saved(Tab::Reports, Ok(path)));
     assert!(stand.screen().contains("✓ written reports/2026-11-21-afternoon-until-1402.csv"));
     stand.press(";e");
     let (_, bytes) = stand.saved.pop().expect("the key writes");
     assert!(bytes.starts_with(b"\xef\xbb\xbf"), "the other dialect is for spreadsheets");
-    stand.send(Msg::Saved(Err("disk full".to_owned())));
+    stand.send(Msg::Saved(Tab::Reports, Err("disk full".to_owned())));
     assert!(stand.screen().contains("not written: disk full"));
 }
 

@@ -1,0 +1,358 @@
+//! Tab 6: the line explains itself: how it does, its read plan, its frames, and tests of it. Four pages.
+
+mod frames;
+mod line;
+mod plan;
+mod registers;
+mod request;
+mod results;
+mod rows;
+mod test;
+mod window;
+
+#[cfg(test)]
+mod tests;
+
+use std::path::PathBuf;
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect};
+
+pub use window::Window;
+
+use crate::{
+    plant::{
+        def::{LineDef, LineId},
+        event::LineState,
+        line_report::LineReport,
+        snapshot::{LineStatus, Snapshot},
+    },
+    ui::{
+        Act, Cx,
+        keys::{self, Hint, Key, char, code},
+        widgets::text::{Canvas, between, fit_words, running, width},
+    },
+};
+use test::Tried;
+
+/// What is shown of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Page {
+    /// Settings, load, counters, devices.
+    Line,
+    /// The read plan, block by block.
+    Plan,
+    /// What went over the line.
+    Frames,
+    /// Tests of the line.
+    Test,
+}
+
+impl Page {
+    const ALL: [Page; 4] = [Page::Line, Page::Plan, Page::Frames, Page::Test];
+
+    fn title(self) -> &'static str {
+        match self {
+            Page::Line => "Line",
+            Page::Plan => "Plan",
+            Page::Frames => "Frames",
+            Page::Test => "Test",
+        }
+    }
+}
+
+/// What a key means here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// So many pages on.
+    Turn(isize),
+    /// This page.
+    Show(Page),
+    /// The next line of the plant.
+    NextLine,
+    /// So many rows down.
+    Move(isize),
+    /// So many screens down.
+    Screen(isize),
+    /// To the first or last row.
+    Jump(isize),
+    /// Opens what is selected.
+    Open,
+    /// Holds the frames still, or lets them run.
+    Freeze,
+    /// Asks which frames are shown.
+    Filter,
+    /// Writes the frames to files.
+    Save,
+    /// Prepares a test.
+    Try(Tried),
+    /// The last test once more.
+    Again,
+    /// Stops the test at work.
+    Stop,
+}
+
+/// Keys of every page.
+pub const KEYS: &[Key<Action>] = &[
+    Key { chord: code(KeyCode::Left), label: "", help: "the page before", action: Action::Turn(-1) },
+    Key { chord: code(KeyCode::Right), label: "page", help: "the next page", action: Action::Turn(1) },
+    Key { chord: char('L'), label: "", help: "page Line", action: Action::Show(Page::Line) },
+    Key { chord: char('P'), label: "", help: "page Plan", action: Action::Show(Page::Plan) },
+    Key { chord: char('F'), label: "", help: "page Frames", action: Action::Show(Page::Frames) },
+    Key { chord: char('T'), label: "", help: "page Test", action: Action::Show(Page::Test) },
+    Key { chord: char('n'), label: "", help: "the next line of the plant", action: Action::NextLine },
+    Key { chord: code(KeyCode::PageUp), label: "", help: "a screen up", action: Action::Screen(-1) },
+    Key { chord: code(KeyCode::PageDown), label: "", help: "a screen down", action: Action::Screen(1) },
+    Key { chord: code(KeyCode::Home), label: "", help: "to the first row", action: Action::Jump(-1) },
+    Key { chord: code(KeyCode::End), label: "", help: "to the last row", action: Action::Jump(1) },
+    Key { chord: code(KeyCode::Up), label: "", help: "a row up", action: Action::Move(-1) },
+];
+/// Keys of the first page. `c` is for the settings of the line.
+const LINE_KEYS: &[Key<Action>] =
+    &[Key { chord: code(KeyCode::Down), label: "scroll", help: "a row down", action: Action::Move(1) }];
+const PLAN_KEYS: &[Key<Action>] = &[
+    Key { chord: code(KeyCode::Down), label: "select", help: "a row down", action: Action::Move(1) },
+    Key { chord: code(KeyCode::Enter), label: "tags", help: "the tags of the block", action: Action::Open },
+];
+const FRAMES_KEYS: &[Key<Action>] = &[
+    Key { chord: code(KeyCode::Down), label: "select", help: "a row down", action: Action::Move(1) },
+    Key { chord: char(' '), label: "hold", help: "hold the frames still, or let them run", action: Action::Freeze },
+    Key { chord: code(KeyCode::Enter), label: "decode", help: "every byte of the frame", action: Action::Open },
+    Key { chord: char('f'), label: "filter", help: "choose which frames are shown", action: Action::Filter },
+    Key { chord: char('x'), label: "save", help: "write them as text and for Wireshark", action: Action::Save },
+];
+const TEST_KEYS: &[Key<Action>] = &[
+    Key { chord: code(KeyCode::Down), label: "select", help: "a row down", action: Action::Move(1) },
+    Key { chord: code(KeyCode::Enter), label: "start", help: "start the selected test", action: Action::Open },
+    Key { chord: char('t'), label: "", help: "type bytes and send them", action: Action::Try(Tried::Bytes) },
+    Key { chord: char('f'), label: "", help: "a request by its fields", action: Action::Try(Tried::Request) },
+    Key { chord: char('b'), label: "", help: "browse registers", action: Action::Try(Tried::Registers) },
+    Key { chord: char('l'), label: "", help: "loopback", action: Action::Try(Tried::Loopback) },
+    Key { chord: char('i'), label: "", help: "identify a device", action: Action::Try(Tried::Identify) },
+    Key { chord: char('s'), label: "", help: "scan for units", action: Action::Try(Tried::Scan) },
+    Key { chord: char('r'), label: "again", help: "the last test once more", action: Action::Again },
+    Key { chord: char('x'), label: "stop", help: "stop the test at work", action: Action::Stop },
+];
+
+/// State of this tab.
+#[derive(Debug)]
+pub struct Bus {
+    line: LineId,
+    page: Page,
+    /// First row shown of the first page.
+    first: usize,
+    plan: plan::Plan,
+    frames: frames::Ring,
+    /// The bench of tests.
+    pub(super) test: test::Bench,
+}
+
+impl Bus {
+    /// The first line of the plant.
+    pub fn new(_snapshot: &Snapshot) -> Bus {
+        Bus {
+            line: LineId(0),
+            page: Page::Line,
+            first: 0,
+            plan: plan::Plan::default(),
+            frames: frames::Ring::default(),
+            test: test::Bench::default(),
+        }
+    }
+
+    /// Any key: first those of the page, then those of every page.
+    pub fn on_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+        let action = keys::find(page_keys(self.page), event).or_else(|| keys::find(KEYS, event));
+        let (Some(action), Some(at)) = (action, Place::of(cx, self.line)) else { return Vec::new() };
+        let screen = isize::try_from(self.room(cx)).unwrap_or(1).max(2) - 1;
+        match action {
+            Action::Turn(by) => {
+                let place = Page::ALL.iter().position(|page| *page == self.page).unwrap_or(0) as isize;
+                self.page = Page::ALL[(place + by).rem_euclid(Page::ALL.len() as isize) as usize];
+            }
+            Action::Show(page) => self.page = page,
+            Action::NextLine => self.next_line(cx),
+            Action::Move(by) => self.scroll(cx, &at, by),
+            Action::Screen(by) => self.scroll(cx, &at, by * screen),
+            Action::Jump(by) => self.scroll(cx, &at, by * 100_000),
+            Action::Open => return self.open(cx, &at),
+            Action::Freeze => self.frames.toggle(cx, &at),
+            Action::Filter => return vec![self.frames.ask_filter()],
+            Action::Save => return self.frames.save(cx, &at),
+            Action::Try(tried) => return self.test.open(cx, &at, tried),
+            Action::Again => return test::again(cx, &at),
+            Action::Stop => return test::stop(&at),
+        }
+        self.on_snapshot(cx)
+    }
+
+    /// The keys of the moment.
+    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+        let mut hints = keys::hints(page_keys(self.page));
+        if self.page == Page::Test && !Place::of(cx, self.line).is_some_and(|at| at.is_testing()) {
+            for hint in hints.iter_mut().filter(|hint| hint.label == "stop") {
+                hint.label.clear();
+            }
+        }
+        let mut common = keys::hints(KEYS);
+        if 1 < cx.def().lines.len() {
+            common.iter_mut().filter(|hint| hint.key == "n").for_each(|hint| hint.label = "line".to_owned());
+        }
+        // `↑` stands last of the common keys, so that it is shown with the page's own `↓`.
+        common.into_iter().chain(hints).collect()
+    }
+
+    /// News: frames that run are taken in now and then.
+    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+        if let (Page::Frames, Some(at)) = (self.page, Place::of(cx, self.line)) {
+            self.frames.follow(cx, &at);
+        }
+        Vec::new()
+    }
+
+    /// A filter was typed.
+    pub fn on_text(&mut self, _cx: &Cx, text: &str) -> Result<Vec<Act>, String> {
+        self.frames.set_filter(text).map(|()| Vec::new())
+    }
+
+    /// A capture was written, or why not.
+    pub fn on_saved(&mut self, result: Result<PathBuf, String>) {
+        self.frames.on_saved(result);
+    }
+
+    /// Draws it.
+    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+        let mut canvas = Canvas::new(frame.buffer_mut(), area);
+        let Some(at) = Place::of(cx, self.line) else {
+            canvas.text(1, 1, "this plant has no lines", cx.theme.normal());
+            return;
+        };
+        self.heading(cx, &at, &mut canvas);
+        let (width, height) = (canvas.width(), canvas.height());
+        let mut page = canvas.part(0, 1, width, height.saturating_sub(1));
+        match self.page {
+            Page::Line => rows::draw(cx, &mut page, &line::rows(cx, &at, width), self.first),
+            Page::Plan => self.plan.view(cx, &at, &mut page),
+            Page::Frames => self.frames.view(cx, &at, &mut page),
+            Page::Test => self.test.view(cx, &at, &mut page),
+        }
+    }
+}
+
+impl Bus {
+    /// Rows that a page has below the heading.
+    fn room(&self, cx: &Cx) -> usize {
+        usize::from(cx.area.height.saturating_sub(1))
+    }
+
+    fn next_line(&mut self, cx: &Cx) {
+        let count = cx.def().lines.len().max(1) as u16;
+        self.line = LineId((self.line.0 + 1) % count);
+        (self.first, self.plan) = (0, plan::Plan::default());
+        self.frames.forget();
+        self.test.first = None;
+    }
+
+    fn scroll(&mut self, cx: &Cx, at: &Place, by: isize) {
+        match self.page {
+            Page::Line => {
+                let rows = line::rows(cx, at, cx.area.width).len();
+                self.first = self.first.saturating_add_signed(by).min(rows.saturating_sub(self.room(cx)));
+            }
+            Page::Plan => self.plan.scroll(at, by),
+            Page::Frames => self.frames.scroll(cx, at, by),
+            Page::Test => self.test.scroll(cx, at, by),
+        }
+    }
+
+    fn open(&mut self, cx: &Cx, at: &Place) -> Vec<Act> {
+        match self.page {
+            Page::Line => Vec::new(),
+            Page::Plan => self.plan.open(at).into_iter().collect(),
+            Page::Frames => self.frames.open(at).into_iter().collect(),
+            Page::Test => self.test.open(cx, at, self.test.selected()),
+        }
+    }
+
+    /// The pages, and the line with its state.
+    fn heading(&self, cx: &Cx, at: &Place, canvas: &mut Canvas) {
+        let mut x = 1;
+        for page in Page::ALL {
+            let shown = page == self.page;
+            let text = if shown { format!("‹{}›", page.title()) } else { format!(" {} ", page.title()) };
+            x = canvas.text(x, 0, &text, if shown { cx.theme.focus() } else { cx.theme.dim() });
+        }
+        let end = canvas.width().saturating_sub(1);
+        let place = match cx.def().lines.len() {
+            1 => String::new(),
+            count => format!(" {}/{count}", at.id.0 + 1),
+        };
+        let words =
+            fit_words(&format!("{}{place}  {}", at.settings.name, state_words(cx, at)), end.saturating_sub(x + 2));
+        let style = if at.status.state == LineState::Connected { cx.theme.normal() } else { cx.theme.trouble() };
+        canvas.text(end.saturating_sub(width(&words)), 0, &words, style);
+    }
+}
+
+/// A line and all that is known of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Place<'a> {
+    /// Which.
+    id: LineId,
+    /// Its state and totals.
+    status: &'a LineStatus,
+    /// In use now.
+    settings: &'a LineDef,
+    /// `None` until the line has reported.
+    report: Option<&'a LineReport>,
+}
+
+impl<'a> Place<'a> {
+    fn of(cx: &Cx<'a>, id: LineId) -> Option<Place<'a>> {
+        let def = cx.def().lines.get(id.index())?;
+        let status = cx.snapshot.lines.get(id.index())?;
+        let report = status.report.as_deref();
+        Some(Place { id, status, settings: report.map_or(def, |report| &report.settings), report })
+    }
+
+    fn is_testing(&self) -> bool {
+        use crate::plant::tool::ToolState;
+        self.status.test.as_ref().is_some_and(|run| run.state == ToolState::Running)
+    }
+}
+
+/// `connected since 13:02:11`, `DOWN 00:12: No such file or directory, next try in 4s`.
+fn state_words(cx: &Cx, at: &Place) -> String {
+    let zone = &cx.def().time_zone;
+    let since = at
+        .status
+        .since
+        .map_or(String::new(), |since| format!(" since {}", crate::ui::widgets::text::moment(since, cx.now, zone)));
+    match &at.status.state {
+        LineState::Connected => format!("connected{since}"),
+        LineState::Connecting => "connecting".to_owned(),
+        LineState::Waiting { why, retry_at } => {
+            let lost =
+                at.status.lost_since.map_or(String::new(), |lost| format!(" {}", running(between(lost, cx.now))));
+            format!("DOWN{lost}, next try in {}s: {why}", between(cx.now, *retry_at).as_secs())
+        }
+        LineState::Disconnected => format!("DISCONNECTED by an operator{since}"),
+        LineState::Testing => format!("TEST{since}, nobody is polled"),
+    }
+}
+
+fn page_keys(page: Page) -> &'static [Key<Action>] {
+    match page {
+        Page::Line => LINE_KEYS,
+        Page::Plan => PLAN_KEYS,
+        Page::Frames => FRAMES_KEYS,
+        Page::Test => TEST_KEYS,
+    }
+}
+
+/// The keys of each page together with those of every page, for the test that no key means two things.
+#[cfg(test)]
+pub fn all_chords() -> Vec<(&'static str, Vec<keys::Chord>)> {
+    let chords = |page: &Page| page_keys(*page).iter().chain(KEYS).map(|key| key.chord).collect();
+    Page::ALL.iter().map(|page| (page.title(), chords(page))).collect()
+}

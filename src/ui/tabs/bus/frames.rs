@@ -1,0 +1,256 @@
+//! Page Frames: what went over the line, newest at the bottom, in words; runs, or is held still.
+
+use std::path::PathBuf;
+
+use super::{
+    Place, Window,
+    rows::first_for,
+    window::{Sheet, Shown},
+};
+use crate::{
+    bus::{capture, explain, filter::Filter, frame::hex},
+    plant::{
+        def::Framing,
+        traffic::{Frame, Frames},
+    },
+    ui::{
+        Act, Cx, Effect,
+        modal::{Modal, Prompt},
+        tabs::Tab,
+        widgets::text::{Canvas, fit, fit_words, pad, width},
+    },
+};
+
+/// The page takes in what is new every so many half seconds: reading needs time, and slow lines have few bytes a second.
+const EVERY: u32 = 4;
+
+/// The frames as they are shown.
+#[derive(Debug)]
+pub struct Ring {
+    /// Takes in what is new.
+    runs: bool,
+    held: Frames,
+    /// Tick at which they were taken in; `None` before the first time.
+    taken: Option<u32>,
+    /// Number of the selected frame; `None`: the newest.
+    selected: Option<u64>,
+    filter: Filter,
+    saved: Vec<Result<PathBuf, String>>,
+}
+
+impl Default for Ring {
+    fn default() -> Ring {
+        Ring {
+            runs: true,
+            held: Frames::default(),
+            taken: None,
+            selected: None,
+            filter: Filter::default(),
+            saved: Vec::new(),
+        }
+    }
+}
+
+impl Ring {
+    /// Another line: its frames are taken in at once.
+    pub fn forget(&mut self) {
+        *self = Ring { filter: self.filter.clone(), ..Ring::default() };
+    }
+
+    /// Takes in what is new, if it runs and it is time.
+    pub fn follow(&mut self, cx: &Cx, at: &Place) {
+        let due = self.taken.is_none_or(|taken| EVERY <= cx.phase.wrapping_sub(taken));
+        if (self.runs || self.taken.is_none()) && due {
+            self.take(cx, at);
+        }
+    }
+
+    fn take(&mut self, cx: &Cx, at: &Place) {
+        if let Some(report) = at.report {
+            self.held = report.frames.clone();
+            self.taken = Some(cx.phase);
+        }
+    }
+
+    /// Holds still, or runs on from the newest frame.
+    pub fn toggle(&mut self, cx: &Cx, at: &Place) {
+        self.runs = !self.runs;
+        self.selected = None;
+        if self.runs {
+            self.take(cx, at);
+        }
+    }
+
+    /// Moves the selection; looking back holds still.
+    pub fn scroll(&mut self, cx: &Cx, at: &Place, by: isize) {
+        if self.taken.is_none() {
+            self.take(cx, at);
+        }
+        self.runs = false;
+        let shown = self.shown();
+        let place = self.place(&shown).saturating_add_signed(by).min(shown.len().saturating_sub(1));
+        self.selected = shown.get(place).map(|frame| frame.number);
+    }
+
+    /// The selected frame, byte by byte.
+    pub fn open(&mut self, at: &Place) -> Option<Act> {
+        let shown = self.shown();
+        let frame = (*shown.get(self.place(&shown))?).clone();
+        self.selected = Some(frame.number);
+        self.runs = false;
+        let before: Vec<Frame> = self.before(frame.number).take(16).cloned().collect();
+        let shown = Shown::Frame { line: at.settings.name.clone(), frame: Box::new(frame), before };
+        Some(Act::Open(Modal::Bus(Box::new(Window::Sheet(Sheet::new(shown))))))
+    }
+
+    /// Asks for the filter.
+    pub fn ask_filter(&self) -> Act {
+        let hint = "unit 1   fc 3   tx   rx   error   03EA (bytes); all must hold; empty: all frames";
+        Act::Open(Modal::Prompt(Prompt::new("which frames", hint, &self.filter.to_string())))
+    }
+
+    /// Takes a filter that was typed.
+    pub fn set_filter(&mut self, text: &str) -> Result<(), String> {
+        self.filter = Filter::parse(text).map_err(|error| error.to_string())?;
+        Ok(())
+    }
+
+    /// Writes the frames that are shown, as text and as a capture.
+    pub fn save(&mut self, cx: &Cx, at: &Place) -> Vec<Act> {
+        if self.taken.is_none() {
+            self.take(cx, at);
+        }
+        let frames: Vec<Frame> = self.shown().into_iter().cloned().collect();
+        self.saved.clear();
+        if frames.is_empty() {
+            self.saved.push(Err("there is no frame to save".to_owned()));
+            return Vec::new();
+        }
+        let stamp = cx.now.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d-%H%M%S").to_string();
+        let name = |end: &str| cx.def().report.folder.join(format!("{}-{stamp}.{end}", at.settings.name));
+        let save = |path, bytes| Act::Do(Effect::SaveReport { tab: Tab::Bus, path, bytes });
+        vec![save(name("txt"), capture::text(&frames).into_bytes()), save(name("pcapng"), capture::pcapng(&frames))]
+    }
+
+    /// A file was written, or why not.
+    pub fn on_saved(&mut self, result: Result<PathBuf, String>) {
+        self.saved.push(result);
+    }
+
+    /// Draws it.
+    pub fn view(&self, cx: &Cx, at: &Place, canvas: &mut Canvas) {
+        let theme = cx.theme;
+        // Before the first message has come the page is drawn from the report itself.
+        let held = at.report.map(|report| report.frames.clone()).unwrap_or_default();
+        let now = Ring { held, filter: self.filter.clone(), ..Ring::default() };
+        let ring = if self.taken.is_some() { self } else { &now };
+        let shown = ring.shown();
+        let (width, height) = (canvas.width(), canvas.height());
+        let (words, style) = self.heading(cx, shown.len());
+        canvas.text(1, 0, &fit_words(&words, width.saturating_sub(2)), style);
+        let notice = self.notice();
+        let room = usize::from(height).saturating_sub(1 + notice.len());
+        if shown.is_empty() {
+            canvas.text(1, 2, "no frame yet, or none that passes the filter", theme.dim());
+        }
+        let place = ring.place(&shown);
+        let first = first_for(place, shown.len(), room);
+        for (y, frame) in shown.iter().skip(first).take(room).enumerate() {
+            let selected = self.selected.is_some() && first + y == place;
+            ring.row(cx, frame, selected, &mut canvas.part(0, y as u16 + 1, width, 1));
+        }
+        for (n, (words, good)) in notice.iter().enumerate() {
+            let y = height.saturating_sub((notice.len() - n) as u16);
+            canvas.text(1, y, words, if *good { theme.done() } else { theme.trouble() });
+        }
+    }
+
+    fn heading(&self, cx: &Cx, count: usize) -> (String, ratatui::style::Style) {
+        let filter = self.filter.to_string();
+        let filter = if filter.is_empty() { String::new() } else { format!("   filter: {filter}") };
+        let state = if self.runs { "running, newest below" } else { "HELD STILL, space lets it run" };
+        let style = if self.runs { cx.theme.dim() } else { cx.theme.strong() };
+        (format!("{count} of {} frames, {state}{filter}", self.held.len().max(count)), style)
+    }
+
+    /// What became of the files, and how to open them.
+    fn notice(&self) -> Vec<(String, bool)> {
+        let mut lines = Vec::new();
+        for result in &self.saved {
+            match result {
+                Ok(path) => {
+                    let wireshark = path.extension().is_some_and(|end| end == "pcapng");
+                    let how = if wireshark { "open with: wireshark " } else { "read with: less " };
+                    lines.push((format!("written; {how}{}", path.display()), true));
+                }
+                Err(why) => lines.push((format!("NOT WRITTEN: {why}"), false)),
+            }
+        }
+        lines
+    }
+
+    fn shown(&self) -> Vec<&Frame> {
+        self.held.iter().filter(|frame| self.filter.matches(frame)).collect()
+    }
+
+    /// Place of the selected frame among those shown, or of the next one that is; else the last.
+    fn place(&self, shown: &[&Frame]) -> usize {
+        let last = shown.len().saturating_sub(1);
+        self.selected.map_or(last, |number| shown.partition_point(|frame| frame.number < number).min(last))
+    }
+
+    /// Earlier frames, the latest first.
+    fn before(&self, number: u64) -> impl Iterator<Item = &Frame> {
+        self.held.iter().rev().skip_while(move |frame| number <= frame.number)
+    }
+
+    /// `14:02:31.412 TX 01 03 03 EA 00 0A E5 BD  unit 1 read holding registers 41003–41012`.
+    fn row(&self, cx: &Cx, frame: &Frame, selected: bool, canvas: &mut Canvas) {
+        let theme = cx.theme;
+        let good = matches!(&*frame.verdict, "ok" | "sent" | "received");
+        let time = frame.at.to_zoned(cx.def().time_zone.clone()).strftime("%H:%M:%S%.3f").to_string();
+        let bytes = bytes_text(frame.framing, &frame.bytes);
+        let told = explain::of_line(frame, self.before(frame.number));
+        let bytes_room = (canvas.width().saturating_sub(18) * 2 / 5).clamp(11, 60);
+        let words = if good { told.summary.clone() } else { format!("✗ {}   {}", frame.verdict, told.summary) };
+        let refused = !frame.sent && told.message.get(1).is_some_and(|code| 0x80 <= *code);
+        let words = if refused && good { format!("! {words}") } else { words };
+        let style = match (selected, good && !refused) {
+            (true, _) => theme.focus(),
+            (false, false) => theme.trouble(),
+            (false, true) if frame.sent => theme.dim(),
+            (false, true) => theme.normal(),
+        };
+        let direction = if frame.sent { "TX" } else { "RX" };
+        let x = canvas.text(
+            1,
+            0,
+            &format!("{time} {direction} {} ", pad(&cut_bytes(&bytes, bytes_room), bytes_room)),
+            style,
+        );
+        let room = canvas.width().saturating_sub(x + 1);
+        canvas.text(x, 0, &pad(&fit_words(&words, room), room), style);
+    }
+}
+
+/// The bytes as they are written: hex, or the characters of an ASCII frame.
+pub fn bytes_text(framing: Framing, bytes: &[u8]) -> String {
+    match framing {
+        Framing::Ascii => bytes.escape_ascii().to_string(),
+        Framing::Rtu | Framing::Mbap => hex(bytes),
+    }
+}
+
+/// Whole bytes only: `01 03 14 00 …`.
+fn cut_bytes(text: &str, room: u16) -> String {
+    if text.contains(' ') { fit_words(text, room) } else { fit(text, room) }
+}
+
+/// How wide hex bytes are, for windows that break them into rows.
+pub fn broken(text: &str, room: u16) -> Vec<String> {
+    if text.contains(' ') || width(text) <= room {
+        return crate::ui::widgets::text::wrap(text, room);
+    }
+    let letters: Vec<char> = text.chars().collect();
+    letters.chunks(usize::from(room.max(1))).map(|part| part.iter().collect()).collect()
+}

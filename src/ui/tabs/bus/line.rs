@@ -1,0 +1,390 @@
+//! Page Line: settings, load, how requests ended, how each device answers, and what to do about what is wrong.
+
+use std::time::Duration;
+
+use super::{
+    Place,
+    rows::{self, Flow, Row, bar, number, plain, words},
+};
+use crate::{
+    bus::names,
+    plant::{
+        def::{DeviceDef, LineDef, Transport},
+        event::{Fault, LineState},
+        line_report::LineReport,
+        snapshot::DeviceState,
+        tag::Poll,
+        tally::Tally,
+    },
+    ui::{
+        Cx,
+        widgets::{
+            spark,
+            text::{between, clock, running, wrap},
+        },
+    },
+};
+
+/// A reply that takes this share of the timeout is near it.
+const NEAR: f64 = 0.8;
+
+/// All rows of the page.
+pub fn rows(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
+    let mut rows = settings(cx, at, width);
+    match at.report {
+        Some(report) => {
+            rows.extend(load(cx, report, width));
+            rows.extend(counters(cx, at, report, width));
+            rows.extend(devices(cx, at, report, width));
+        }
+        None => rows.push(plain("nothing heard from this line yet", cx.theme.trouble())),
+    }
+    let worries = worries(cx, at);
+    if !worries.is_empty() {
+        rows.push(Row::new());
+    }
+    for worry in worries {
+        let lines = wrap(&worry, width.saturating_sub(5));
+        let mark = |n: usize| if n == 0 { "! " } else { "  " };
+        rows.extend(
+            lines.into_iter().enumerate().map(|(n, line)| plain(mark(n).to_owned() + &line, cx.theme.trouble())),
+        );
+    }
+    rows
+}
+
+fn settings(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
+    let (theme, line) = (cx.theme, at.settings);
+    let mut flow = Flow::new("settings", theme.dim(), width);
+    flow.add(plain(line.transport.to_string(), theme.strong()));
+    flow.add(value(cx, "timeout", &ms(line.timeout)));
+    if let Some(serial) = line.transport.serial() {
+        flow.add(value(cx, "silence", &ms(serial.silence().max(line.gap))));
+        flow.add(value(cx, "end of answer", &ms(line.idle)));
+    }
+    let lamp = |on: bool| if on { theme.pick("●", "@") } else { theme.pick("○", "o") };
+    let counters = &at.status.counters;
+    let recent = |at: Option<jiff::Timestamp>| {
+        at.is_some_and(|at| between(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0))
+    };
+    let (tx, rx) = (recent(counters.last_tx), recent(counters.last_rx));
+    let deaf = tx && !rx;
+    let lamps = format!("TX {} RX {}{}", lamp(tx), lamp(rx), if deaf { " nothing comes back" } else { "" });
+    flow.add(plain(lamps, if deaf { theme.trouble() } else { theme.normal() }));
+    flow.rows()
+}
+
+fn load(cx: &Cx, report: &LineReport, width: u16) -> Vec<Row> {
+    let (theme, counters) = (cx.theme, &report.counters);
+    let (now, minute) = (f64::from(counters.utilisation), f64::from(counters.utilisation_minute));
+    let mut flow = Flow::new("load", theme.dim(), width);
+    let style = if now < 0.9 { theme.normal() } else { theme.trouble() };
+    let mark = if now < 0.9 { "" } else { "! " };
+    flow.add(vec![
+        (format!("{mark}{:>3.0} % ", now * 100.0), style),
+        (bar(cx, now, 12), style),
+        (format!(" {:>3.0} % of the last minute ", minute * 100.0), theme.normal()),
+        (spark::shares(&report.busy, 30, theme.glyphs), theme.dim()),
+    ]);
+    let mut rows = flow.rows();
+    let mut flow = Flow::new("cycle", theme.dim(), width);
+    let plan = Planned::of(report);
+    flow.add(value(cx, "blocks", &plan.blocks.to_string()));
+    flow.add(value(cx, "one round", &format!("{} at worst", ms(plan.round))));
+    if let Some(measured) = plan.measured {
+        flow.add(value(cx, "measured", &ms(measured)));
+    }
+    flow.add(value(cx, "planned load", &format!("{:.0} %", plan.load * 100.0)));
+    flow.add(count(cx, "missed", counters.missed, missed_lately(report)));
+    rows.extend(flow.rows());
+    rows
+}
+
+/// What the periodic reads take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Planned {
+    blocks: usize,
+    /// All of them once, at worst.
+    round: Duration,
+    /// All of them once, with the replies as they were: `None` before every block has answered.
+    measured: Option<Duration>,
+    /// Share of the line's time at worst.
+    load: f64,
+}
+
+impl Planned {
+    fn of(report: &LineReport) -> Planned {
+        let mut plan = Planned { blocks: 0, round: Duration::ZERO, measured: Some(Duration::ZERO), load: 0.0 };
+        for poll in &report.polls {
+            let Poll::Every(period) = poll.poll else { continue };
+            plan.blocks += 1;
+            plan.round += poll.cost;
+            plan.load += poll.cost.as_secs_f64() / period.as_secs_f64();
+            plan.measured = plan.measured.zip(poll.tally.reply.mean()).map(|(sum, reply)| sum + poll.cost + reply);
+        }
+        plan
+    }
+}
+
+fn missed_lately(report: &LineReport) -> bool {
+    0.9 <= report.counters.utilisation && 0 < report.counters.missed
+}
+
+fn counters(cx: &Cx, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
+    let (theme, counters) = (cx.theme, &report.counters);
+    let sum = Tallies::of(report);
+    let ill = sum.lately;
+    let mut flow = Flow::new("requests", theme.dim(), width);
+    flow.add(plain(grouped(counters.requests), theme.normal()));
+    flow.add(value(cx, "ok", &grouped(counters.ok)));
+    flow.add(count(cx, "no answer", counters.timeouts, ill));
+    flow.add(count(cx, "corrupt", counters.corrupt, ill));
+    for (name, kind) in [("check", sum.check), ("length", sum.length), ("not ours", sum.foreign)] {
+        if 0 < kind {
+            flow.add(count(cx, name, kind, ill));
+        }
+    }
+    flow.add(count(cx, "refused", counters.exceptions, ill));
+    for (code, times) in &sum.exceptions {
+        flow.add(count(cx, &format!("{:02X} {}", code.0, code.words()), *times, ill));
+    }
+    flow.add(value(cx, "asked again", &grouped(sum.retries)));
+    flow.add(count(cx, "late", counters.late, ill));
+    flow.add(count(cx, "stale", counters.stale, ill));
+    let mut rows = flow.rows();
+    let mut flow = Flow::new("traffic", theme.dim(), width);
+    flow.add(value(cx, "bytes out", &grouped(counters.sent_bytes)));
+    flow.add(value(cx, "in", &grouped(counters.received_bytes)));
+    flow.add(value(cx, "frames", &grouped(counters.frames)));
+    let lost = at.status.state != LineState::Connected;
+    flow.add(count(cx, "reconnects", counters.opens.saturating_sub(1), lost));
+    rows.extend(flow.rows());
+    if let Some(uart) = counters.uart {
+        let mut flow = Flow::new("port", theme.dim(), width);
+        let kinds =
+            [("parity", uart.parity), ("framing", uart.framing), ("overrun", uart.overrun), ("break", uart.breaks)];
+        for (name, times) in kinds {
+            flow.add(count(cx, name, u64::from(times), ill));
+        }
+        rows.extend(flow.rows());
+    }
+    rows
+}
+
+/// The tallies of all devices together.
+#[derive(Debug, Default)]
+struct Tallies {
+    check: u64,
+    length: u64,
+    foreign: u64,
+    retries: u64,
+    exceptions: Vec<(crate::plant::event::ExceptionCode, u64)>,
+    /// Has one of the latest requests failed?
+    lately: bool,
+}
+
+impl Tallies {
+    fn of(report: &LineReport) -> Tallies {
+        let mut sum = Tallies::default();
+        for (_, tally) in &report.devices {
+            sum.check += tally.check;
+            sum.length += tally.length;
+            sum.foreign += tally.foreign;
+            sum.retries += tally.retries;
+            sum.lately |= 0 < tally.recent().0;
+            for (code, times) in &tally.exceptions {
+                match sum.exceptions.iter_mut().find(|(known, _)| known == code) {
+                    Some((_, count)) => *count += times,
+                    None => sum.exceptions.push((*code, *times)),
+                }
+            }
+        }
+        sum
+    }
+}
+
+fn devices(cx: &Cx, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
+    let columns = [
+        words("", 0),
+        words("device", 0),
+        number("unit", 0),
+        words("state", 0),
+        number("ok", 2),
+        number("failed", 1),
+        number("of last", 4),
+        number("reply", 1),
+        number("p99", 3),
+        number("max", 3),
+        words("of the timeout", 5),
+    ];
+    let mut styles = Vec::new();
+    let mut lines = Vec::new();
+    for device in cx.def().devices.iter().filter(|device| device.line == at.id) {
+        let Some(tally) = report.device(device.id) else { continue };
+        let ill = is_ill(cx, device) || near(tally, report.settings.timeout).is_some();
+        let mark = match cx.snapshot.device(device.id).state {
+            DeviceState::Down { .. } => "✗",
+            DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_) if ill => "!",
+            DeviceState::Answering => "✓",
+            DeviceState::Unknown | DeviceState::Failing(_) => "?",
+        };
+        styles.push(if ill { cx.theme.trouble() } else { cx.theme.normal() });
+        let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
+        let (failed, of) = tally.recent();
+        let share = tally.reply.p99().map(|p99| p99.as_secs_f64() / report.settings.timeout.as_secs_f64());
+        lines.push([
+            mark.to_owned(),
+            device.name.clone(),
+            device.unit.to_string(),
+            state(cx, device),
+            grouped(tally.ok),
+            grouped(tally.requests - tally.ok),
+            format!("{failed}/{of}"),
+            span(tally.reply.last()),
+            span(tally.reply.p99()),
+            span(tally.reply.max()),
+            share.map_or(String::new(), |share| bar(cx, share, 8)),
+        ]);
+    }
+    let (heading, lines) = rows::table(&columns, &lines, width.saturating_sub(2));
+    let mut rows = vec![Row::new(), plain(heading, cx.theme.dim())];
+    rows.extend(lines.into_iter().zip(styles).map(|(line, style)| plain(line, style)));
+    rows
+}
+
+fn state(cx: &Cx, device: &DeviceDef) -> String {
+    match cx.snapshot.device(device.id).state {
+        DeviceState::Unknown => "not asked".to_owned(),
+        DeviceState::Answering => "answering".to_owned(),
+        DeviceState::Failing(times) => format!("failing {times}×"),
+        DeviceState::Down { since } => format!("DOWN {}", running(between(since, cx.now))),
+    }
+}
+
+fn is_ill(cx: &Cx, device: &DeviceDef) -> bool {
+    match cx.snapshot.device(device.id).state {
+        DeviceState::Failing(_) | DeviceState::Down { .. } => true,
+        DeviceState::Unknown | DeviceState::Answering => false,
+    }
+}
+
+/// The longest usual reply, if it comes near the timeout.
+fn near(tally: &Tally, timeout: Duration) -> Option<Duration> {
+    tally.reply.p99().filter(|p99| timeout.mul_f64(NEAR) <= *p99)
+}
+
+/// What is wrong and what to do about it, a sentence each.
+fn worries(cx: &Cx, at: &Place) -> Vec<String> {
+    let mut worries = Vec::new();
+    if let Some(before) = &at.status.settings_before {
+        worries.push(format!("these settings are tried, not saved; before: {}", before.transport));
+    }
+    let Some(report) = at.report else { return worries };
+    if missed_lately(report) {
+        worries.push(format!(
+            "the line is full: {} reads were skipped. Poll less often, or raise the baud rate",
+            grouped(report.counters.missed)
+        ));
+    }
+    for device in cx.def().devices.iter().filter(|device| device.line == at.id) {
+        let Some(tally) = report.device(device.id) else { continue };
+        worries
+            .extend(of_device(cx, at.settings, device, tally).into_iter().map(|why| format!("{}: {why}", device.name)));
+    }
+    let uart = report.counters.uart.unwrap_or_default();
+    if 0 < uart.parity + uart.framing && Tallies::of(report).lately {
+        worries
+            .push("the port counts parity or framing errors: compare baud rate and parity with the devices".to_owned());
+    }
+    worries
+}
+
+fn of_device(cx: &Cx, line: &LineDef, device: &DeviceDef, tally: &Tally) -> Vec<String> {
+    let mut worries = Vec::new();
+    if let Some(p99) = near(tally, line.timeout) {
+        worries.push(format!("replies take {} of {} ms: raise the timeout", p99.as_millis(), line.timeout.as_millis()));
+    }
+    let status = cx.snapshot.device(device.id);
+    let (true, Some((when, fault))) = (0 < tally.recent().0 && is_ill(cx, device), status.last_fault) else {
+        return worries;
+    };
+    let when = clock(when, &cx.def().time_zone);
+    let advice = match fault {
+        Fault::Timeout => {
+            let cost = ms(line.timeout + probe(line));
+            format!("look at its power, wiring and unit number; every probe costs the line {cost}")
+        }
+        Fault::Crc { .. } | Fault::Lrc { .. } | Fault::Truncated { .. } | Fault::NotHex(_) => {
+            "look at baud rate, parity, termination and shield of the line".to_owned()
+        }
+        Fault::Exception(code) => names::advice(code.0).to_owned(),
+        Fault::WrongUnit { .. } | Fault::WrongFunction { .. } | Fault::WrongLength { .. } | Fault::WrongEcho => {
+            "is there another master, or a unit number twice?".to_owned()
+        }
+        Fault::NotANumber | Fault::NotConnected | Fault::Resting => String::new(),
+    };
+    worries.push(format!("{fault} at {when}: {advice}").trim_end_matches(": ").to_owned());
+    worries
+}
+
+/// Time of a request on the wire.
+fn probe(line: &LineDef) -> Duration {
+    match &line.transport {
+        Transport::Serial { serial, .. } => serial.char_time() * 8 + serial.silence(),
+        Transport::Tcp { .. } => Duration::ZERO,
+    }
+}
+
+fn value(cx: &Cx, label: &str, text: &str) -> Row {
+    vec![(format!("{label} "), cx.theme.dim()), (text.to_owned(), cx.theme.normal())]
+}
+
+/// A count of what should not happen: quiet at zero and when it is long ago.
+fn count(cx: &Cx, label: &str, times: u64, lately: bool) -> Row {
+    match (times, lately) {
+        (0, _) | (_, false) => value(cx, label, &grouped(times)),
+        (_, true) => plain(format!("!{label} {}", grouped(times)), cx.theme.trouble()),
+    }
+}
+
+/// `12 345`: a thin look for long counts.
+pub fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let parts: Vec<&str> =
+        digits.as_bytes().rchunks(3).rev().map(|part| std::str::from_utf8(part).unwrap_or_default()).collect();
+    parts.join(" ")
+}
+
+/// `45.8 ms`, `300 ms`, `2.5 s`.
+pub fn ms(span: Duration) -> String {
+    match span.as_secs_f64() {
+        seconds @ 10.0.. => format!("{seconds:.0} s"),
+        seconds @ 1.0.. => format!("{seconds:.1} s"),
+        seconds => format!("{} ms", tenths(seconds * 1e3)),
+    }
+}
+
+/// Milliseconds without the unit, for tables.
+pub fn short_ms(span: Duration) -> String {
+    tenths(span.as_secs_f64() * 1e3)
+}
+
+fn tenths(ms: f64) -> String {
+    if 99.95 <= ms || ms.fract() == 0.0 { format!("{ms:.0}") } else { format!("{ms:.1}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_easily() {
+        assert_eq!([0, 12, 1_234, 1_234_567].map(grouped), ["0", "12", "1 234", "1 234 567"]);
+        let check = |micros, expect: &str| assert_eq!(ms(Duration::from_micros(micros)), expect);
+        check(4_010, "4.0 ms");
+        check(300_000, "300 ms");
+        check(99_960, "100 ms");
+        check(2_500_000, "2.5 s");
+        check(70_000_000, "70 s");
+    }
+}

@@ -1,0 +1,199 @@
+//! Page Plan: every block of the read plan with its addresses, its cost and how its reads end.
+
+use std::time::Duration;
+
+use super::{
+    Place, Window,
+    line::{grouped, ms, short_ms},
+    rows::{self, first_for, number, words},
+    window::{Sheet, Shown},
+};
+use crate::{
+    bus::names,
+    plant::{
+        line_report::{LineReport, PollReport},
+        tag::Poll,
+    },
+    ui::{
+        Act, Cx,
+        modal::Modal,
+        widgets::text::{Canvas, between, fit_words},
+    },
+};
+
+/// Rows below the table that tell of the selected block.
+const DETAIL: u16 = 4;
+
+/// Which block is selected.
+#[derive(Debug, Default)]
+pub struct Plan {
+    selected: usize,
+}
+
+impl Plan {
+    /// Moves the selection.
+    pub fn scroll(&mut self, at: &Place, by: isize) {
+        let last = at.report.map_or(0, |report| report.polls.len()).saturating_sub(1);
+        self.selected = self.selected.saturating_add_signed(by).min(last);
+    }
+
+    /// The tags of the selected block.
+    pub fn open(&self, at: &Place) -> Option<Act> {
+        let poll = at.report?.polls.get(self.selected)?;
+        let shown = Shown::Block { line: at.id, device: poll.device, table: poll.table, address: poll.address };
+        Some(Act::Open(Modal::Bus(Box::new(Window::Sheet(Sheet::new(shown))))))
+    }
+
+    /// Draws it.
+    pub fn view(&self, cx: &Cx, at: &Place, canvas: &mut Canvas) {
+        let theme = cx.theme;
+        let Some(report) = at.report.filter(|report| !report.polls.is_empty()) else {
+            canvas.text(1, 0, "nothing is polled on this line yet", theme.normal());
+            return;
+        };
+        let (summary, over) = summary(report);
+        canvas.text(1, 0, &summary, if over { theme.trouble() } else { theme.normal() });
+        let (width, height) = (canvas.width(), canvas.height());
+        let lines: Vec<_> = report.polls.iter().map(|poll| cells(cx, poll)).collect();
+        let (heading, lines) = rows::table(&COLUMNS, &lines, width.saturating_sub(2));
+        canvas.text(1, 1, &heading, theme.dim());
+        let room = usize::from(height.saturating_sub(2 + DETAIL)).max(1);
+        let selected = self.selected.min(lines.len() - 1);
+        let first = first_for(selected, lines.len(), room);
+        for (y, n) in (first..lines.len()).take(room).enumerate() {
+            let style = match (n == selected, ill(&report.polls[n])) {
+                (true, _) => theme.focus(),
+                (false, true) => theme.trouble(),
+                (false, false) => theme.normal(),
+            };
+            canvas.text(1, 2 + y as u16, &lines[n], style);
+        }
+        let below = lines.len().saturating_sub(first + room);
+        if 0 < below {
+            canvas.text_right(width.saturating_sub(1), 1 + room as u16, &format!(" {below} more ▼"), theme.strong());
+        }
+        let bottom = (2 + lines.len().min(room) as u16).min(height.saturating_sub(DETAIL - 1));
+        for (n, line) in detail(cx, &report.polls[selected]).into_iter().enumerate() {
+            let style = if line.starts_with('!') { theme.trouble() } else { theme.normal() };
+            canvas.text(1, bottom + n as u16 + 1, &fit_words(&line, width.saturating_sub(2)), style);
+        }
+    }
+}
+
+const COLUMNS: [rows::Column; 15] = [
+    words("", 0),
+    words("device", 0),
+    words("function", 1),
+    words("registers", 0),
+    words("wire", 2),
+    number("n", 3),
+    number("tags", 8),
+    number("every", 2),
+    number("ms", 4),
+    number("next", 6),
+    number("ok", 1),
+    number("failed", 1),
+    number("reply", 3),
+    number("late", 7),
+    number("missed", 9),
+];
+
+fn cells(cx: &Cx, poll: &PollReport) -> [String; 15] {
+    let (code, tally) = (poll.table.read_fc(), &poll.tally);
+    let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
+    let next = poll.next.map_or("–".to_owned(), |next| format!("{:.1}", between(cx.now, next).as_secs_f64()));
+    [
+        if ill(poll) { "!" } else { " " }.to_owned(),
+        cx.def().device(poll.device).name.clone(),
+        format!("{code} / 0x{code:02X}"),
+        names::span(code, poll.address, poll.count),
+        format!("0x{:04X}", poll.address),
+        poll.count.to_string(),
+        poll.tags.len().to_string(),
+        every(poll.poll),
+        short_ms(poll.cost),
+        next,
+        grouped(tally.ok),
+        grouped(tally.requests - tally.ok),
+        span(tally.reply.last()),
+        span(tally.jitter.max()),
+        grouped(tally.missed),
+    ]
+}
+
+/// `1 s`, `once`.
+fn every(poll: Poll) -> String {
+    match poll {
+        Poll::Every(period) if period.subsec_nanos() == 0 => format!("{} s", period.as_secs()),
+        Poll::Every(period) => ms(period),
+        Poll::Once => "once".to_owned(),
+        Poll::Never => "asked".to_owned(),
+    }
+}
+
+fn ill(poll: &PollReport) -> bool {
+    poll.tally.failed_last() && 0 < poll.tally.requests
+}
+
+/// Blocks, load, and whether it fits; `true` if it does not.
+fn summary(report: &LineReport) -> (String, bool) {
+    let share = |poll: &PollReport| match poll.poll {
+        Poll::Every(period) => poll.cost.as_secs_f64() / period.as_secs_f64(),
+        Poll::Once | Poll::Never => 0.0,
+    };
+    let load: f64 = report.polls.iter().map(share).sum();
+    let blocks = report.polls.len();
+    let words =
+        format!("{blocks} {} take {:.0} % of the line at worst", plural(blocks, "block", "blocks"), load * 100.0);
+    match load {
+        1.0.. => (format!("! {words}: too much, reads will be skipped"), true),
+        _ => (words, false),
+    }
+}
+
+/// `1 block`, `2 blocks`: the word for a count.
+pub fn plural<'a>(count: usize, one: &'a str, many: &'a str) -> &'a str {
+    if count == 1 { one } else { many }
+}
+
+/// All that the table has no room for.
+fn detail(cx: &Cx, poll: &PollReport) -> Vec<String> {
+    let (device, code, tally) = (cx.def().device(poll.device), poll.table.read_fc(), &poll.tally);
+    let last = poll.address.saturating_add(poll.count.saturating_sub(1));
+    let used: u16 = poll.tags.iter().map(|tag| cx.def().tag(*tag).point.len()).sum();
+    let over = poll.count.saturating_sub(used);
+    let over = if over == 0 { String::new() } else { format!(", {over} between them read over") };
+    let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
+    let mut lines = vec![
+        format!(
+            "{} unit {}, {code} / 0x{code:02X} {}: {} = wire {}–{} (0x{:04X}–0x{last:04X}), {} {}{over}",
+            device.name,
+            device.unit,
+            names::function(code).unwrap_or_default(),
+            names::span(code, poll.address, poll.count),
+            poll.address,
+            last,
+            poll.address,
+            poll.tags.len(),
+            plural(poll.tags.len(), "tag", "tags"),
+        ),
+        format!(
+            "reply {} ms, p99 {}, max {}   sent late by {} ms at most   missed {}   asked again {}",
+            span(tally.reply.last()),
+            span(tally.reply.p99()),
+            span(tally.reply.max()),
+            span(tally.jitter.max()),
+            grouped(tally.missed),
+            grouped(tally.retries),
+        ),
+    ];
+    let fault = poll.tags.iter().find_map(|tag| {
+        let exchange = cx.snapshot.evidence.get(tag.index())?.as_ref()?;
+        exchange.outcome.err()
+    });
+    if let Some(fault) = fault.filter(|_| ill(poll)) {
+        let (failed, of) = tally.recent();
+        lines.push(format!("! {fault}; {failed} of the last {of} failed"));
+    }
+    lines
+}

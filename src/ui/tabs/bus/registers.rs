@@ -1,0 +1,198 @@
+//! The register browser: every register in hex and as numbers, and the selected pair as 32 bits in all four orders.
+
+use std::collections::BTreeMap;
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame as Screen, layout::Rect};
+
+use super::{Place, Window, rows::first_for, test};
+use crate::{
+    bus::codec,
+    plant::{
+        def::LineId,
+        tag::{Kind, Order, Point, Table},
+        tool::{Finding, Tool, ToolState},
+    },
+    ui::{
+        Act, Cx,
+        keys::char,
+        modal::{Modal, Next, window},
+        widgets::text::{Canvas, fit_words},
+    },
+};
+
+/// Registers of a device.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Registers {
+    line: LineId,
+    unit: u8,
+    table: Table,
+    address: u16,
+    count: u16,
+    selected: u16,
+    problem: Option<String>,
+}
+
+impl Registers {
+    /// Those that a test reads; `None` for another test.
+    pub fn new(line: LineId, tool: &Tool) -> Option<Registers> {
+        let Tool::Read { unit, table, address, count } = *tool else { return None };
+        Some(Registers { line, unit, table, address, count, selected: 0, problem: None })
+    }
+
+    fn tool(&self) -> Tool {
+        Tool::Read { unit: self.unit, table: self.table, address: self.address, count: self.count }
+    }
+
+    /// A key.
+    pub fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+        let last = self.count.saturating_sub(1);
+        self.problem = None;
+        match event.code {
+            KeyCode::Up => self.selected = self.selected.saturating_sub(1),
+            KeyCode::Down => self.selected = (self.selected + 1).min(last),
+            KeyCode::PageUp => self.selected = self.selected.saturating_sub(8),
+            KeyCode::PageDown => self.selected = self.selected.saturating_add(8).min(last),
+            KeyCode::Home => self.selected = 0,
+            KeyCode::End => self.selected = last,
+            KeyCode::Char('q') => return Next::Close,
+            _ if char('r').is(event) => {
+                let started =
+                    Place::of(cx, self.line).ok_or_else(String::new).and_then(|at| test::start(&at, self.tool()));
+                match started {
+                    Ok(act) => {
+                        let stay = Act::Open(Modal::Bus(Box::new(Window::Registers(self))));
+                        return Next::Do(vec![act, stay]);
+                    }
+                    Err(why) => self.problem = Some(why),
+                }
+            }
+            _ => {}
+        }
+        Window::Registers(self).stay()
+    }
+
+    /// Words by address, and how the test stands.
+    fn values(&self, cx: &Cx) -> (BTreeMap<u16, u16>, String, bool) {
+        let run = cx.snapshot.lines.get(self.line.index()).and_then(|line| line.test.as_ref());
+        let Some(run) = run.filter(|run| run.tool == self.tool()) else {
+            return (BTreeMap::new(), "asked, nothing came yet".to_owned(), false);
+        };
+        let mut words = BTreeMap::new();
+        let mut fault = None;
+        for finding in &run.findings {
+            match finding {
+                Finding::Values { address, words: found, .. } => {
+                    words.extend(found.iter().enumerate().map(|(n, word)| (address.wrapping_add(n as u16), *word)));
+                }
+                Finding::Failed { fault: why, .. } => fault = Some(*why),
+                Finding::Exchange(_)
+                | Finding::Bytes { .. }
+                | Finding::Unit { .. }
+                | Finding::Object { .. }
+                | Finding::Verdict(_) => {}
+            }
+        }
+        let at = crate::ui::widgets::text::clock(run.started, &cx.def().time_zone);
+        let (state, ill) = match (&run.state, fault) {
+            (ToolState::Running, _) => (format!("reading, {} of {} requests", run.done, run.total), false),
+            (ToolState::Failed(why), _) => (format!("FAILED: {why}"), true),
+            (ToolState::Cancelled, _) => ("STOPPED".to_owned(), true),
+            (ToolState::Done, Some(why)) => (format!("read {at}; ---- where the device says: {why}"), true),
+            (ToolState::Done, None) => (format!("read {at}"), false),
+        };
+        (words, state, ill)
+    }
+
+    /// Draws it.
+    pub fn view(&self, cx: &Cx, screen: &mut Screen, body: Rect) {
+        let theme = cx.theme;
+        let (words, state, ill) = self.values(cx);
+        let title = format!("unit {}, {} from {}", self.unit, self.table.word(), self.table.modicon(self.address));
+        let pair = if self.table.is_bits() { 0 } else { 6 };
+        let wanted = self.count.saturating_add(pair + 4);
+        let mut canvas = window(cx, screen, body, &title, (74.min(body.width), wanted));
+        let (width, height) = (canvas.width(), canvas.height());
+        let (state, ill) = self.problem.clone().map_or((state, ill), |why| (why, true));
+        canvas.text(0, 0, &fit_words(&state, width), if ill { theme.trouble() } else { theme.normal() });
+        let heading = if self.table.is_bits() { "bit" } else { "hex       unsigned   signed  bits" };
+        canvas.text(0, 1, &format!("  {:18} {heading}", "register / wire"), theme.dim());
+        let room = usize::from(height.saturating_sub(pair + 3)).max(1);
+        let first = first_for(usize::from(self.selected), usize::from(self.count), room);
+        for (y, n) in (first..usize::from(self.count)).take(room).enumerate() {
+            let address = self.address.wrapping_add(n as u16);
+            let style = if n == usize::from(self.selected) { theme.focus() } else { theme.normal() };
+            canvas.text(0, y as u16 + 2, &self.row(address, words.get(&address)), style);
+        }
+        let below = usize::from(self.count).saturating_sub(first + room);
+        if 0 < below {
+            canvas.text_right(width, 1 + room as u16, &format!(" {below} more ▼"), theme.strong());
+        }
+        if 0 < pair {
+            let y = (2 + room.min(usize::from(self.count)) as u16).min(height.saturating_sub(pair + 1));
+            self.pair(cx, &words, &mut canvas.part(0, y, width, pair));
+        }
+        canvas.text(0, height.saturating_sub(1), "↑↓ move   r read again   Esc close", theme.strong());
+    }
+
+    /// `41003 / 0x03EA     02BC         700      700  0000 0010 1011 1100`.
+    fn row(&self, address: u16, word: Option<&u16>) -> String {
+        let place = format!("{} / 0x{address:04X}", self.table.modicon(address));
+        let value = match word {
+            None => "----".to_owned(),
+            Some(bit) if self.table.is_bits() => bit.to_string(),
+            Some(word) => {
+                let bits = [word >> 12, word >> 8 & 15, word >> 4 & 15, word & 15].map(|four| format!("{four:04b}"));
+                format!("{word:04X}  {word:>12} {:>8}  {}", word.cast_signed(), bits.join(" "))
+            }
+        };
+        format!("  {place:18} {value}")
+    }
+
+    /// The selected register and the next one as one value.
+    fn pair(&self, cx: &Cx, words: &BTreeMap<u16, u16>, canvas: &mut Canvas) {
+        let theme = cx.theme;
+        let first = self.address.wrapping_add(self.selected);
+        let second = first.wrapping_add(1);
+        let (Some(a), Some(b)) = (words.get(&first), words.get(&second)) else {
+            canvas.text(0, 1, "32 bits: select a register that is followed by another", theme.dim());
+            return;
+        };
+        let (from, to) = (self.table.modicon(first), self.table.modicon(second));
+        canvas.text(0, 1, &format!("  {:18} unsigned 32    signed 32  float", format!("{from}+{to}")), theme.dim());
+        for (y, (name, order)) in ORDERS.into_iter().enumerate() {
+            canvas.text(0, y as u16 + 2, &format!("  {name:18} {}", pair_words([*a, *b], order)), theme.normal());
+        }
+    }
+}
+
+const ORDERS: [(&str, Order); 4] =
+    [("ABCD", Order::Abcd), ("CDAB", Order::Cdab), ("BADC", Order::Badc), ("DCBA", Order::Dcba)];
+
+/// `  4294901760       -65536  -1.5`.
+fn pair_words(words: [u16; 2], order: Order) -> String {
+    let point = |kind| Point { table: Table::Holding, address: 0, kind, order, field: None };
+    let number = |kind| codec::decode(point(kind), &words);
+    let whole = |kind| number(kind).map_or("–".to_owned(), |value| format!("{value:.0}"));
+    let float = number(Kind::F32).map_or("no number".to_owned(), |value| {
+        let value = value as f32;
+        let plain = value == 0.0 || (1e-4..1e7).contains(&value.abs());
+        if plain { format!("{value}") } else { format!("{value:e}") }
+    });
+    format!("{:>11} {:>12}  {float}", whole(Kind::U32), whole(Kind::I32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pair_is_read_in_all_four_orders() {
+        let check = |order, expect: &str| assert_eq!(pair_words([0x42C8, 0x0000], order).trim_start(), expect);
+        check(Order::Abcd, "1120403456   1120403456  100");
+        check(Order::Cdab, "17096        17096  2.3957e-41");
+        check(Order::Badc, "3359768576  -935198720  -524288");
+        check(Order::Dcba, "51266        51266  7.1839e-41");
+        assert!(pair_words([0x7FC0, 0], Order::Abcd).ends_with("no number"));
+    }
+}

@@ -1,0 +1,425 @@
+//! Tests by their fields: a request, a loopback, an identification, a scan, registers. What is typed is told at once.
+
+use std::{ops::RangeInclusive, time::Duration};
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame as Screen, layout::Rect};
+
+use super::{
+    Place, Window,
+    line::ms,
+    test::{self, Bench, TRANSACTION, Tried},
+};
+use crate::{
+    bus::{
+        complaint,
+        explain::{self, Direction},
+        frame::{self, hex},
+        names,
+    },
+    plant::{
+        def::{Framing, LineDef, LineId, Parity, Serial},
+        tag::Table,
+        tool::{Scan, Tool},
+    },
+    ui::{
+        Act, Cx, keys,
+        modal::{Next, line::Line, window},
+        widgets::text::{pad, width, wrap},
+    },
+};
+
+/// A test with its fields.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Form {
+    line: LineId,
+    tried: Tried,
+    fields: Vec<Field>,
+    /// The field that is edited.
+    at: usize,
+    problem: Option<String>,
+}
+
+/// One field.
+#[derive(Debug, Clone, PartialEq)]
+struct Field {
+    label: &'static str,
+    input: Input,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Input {
+    Text(Line),
+    /// One of a few.
+    Choice(Vec<String>, usize),
+}
+
+/// A form that makes sense: the test, and what it does in words.
+#[derive(Debug)]
+struct Built {
+    tool: Tool,
+    told: Vec<String>,
+}
+
+/// Functions that the form offers.
+const FUNCTIONS: [u8; 8] = [3, 4, 1, 2, 6, 5, 16, 15];
+/// Baud rates and characters that a scan over all settings tries, the usual ones first.
+const BAUDS: [u32; 8] = [9_600, 19_200, 115_200, 38_400, 57_600, 4_800, 2_400, 1_200];
+const CHARACTERS: [(Parity, u8); 4] = [(Parity::None, 1), (Parity::Even, 1), (Parity::Odd, 1), (Parity::None, 2)];
+
+impl Form {
+    /// With what suits most.
+    pub fn new(cx: &Cx, at: &Place, tried: Tried) -> Form {
+        let unit = cx.def().devices.iter().find(|device| device.line == at.id).map_or(1, |device| device.unit);
+        let text = |label, text: &str| Field { label, input: Input::Text(Line::long(text, 400)) };
+        let choice = |label, options: Vec<String>| Field { label, input: Input::Choice(options, 0) };
+        let unit = text("unit", &unit.to_string());
+        let fields = match tried {
+            Tried::Bytes | Tried::Request => vec![
+                unit,
+                choice("function", FUNCTIONS.map(explain::function_words).to_vec()),
+                text("address", "40001"),
+                text("count", "1"),
+            ],
+            Tried::Registers => vec![
+                unit,
+                choice(
+                    "table",
+                    TABLES.map(|table| names::function(table.read_fc()).unwrap_or_default().to_owned()).to_vec(),
+                ),
+                text("address", "40001"),
+                text("count", "16"),
+            ],
+            Tried::Loopback => vec![unit, text("times", "10")],
+            Tried::Identify => vec![unit],
+            Tried::Scan => {
+                let mut settings = vec![format!("as the line has now: {}", at.settings.transport)];
+                if at.settings.transport.serial().is_some() {
+                    settings.push("all baud rates and parities; polling pauses".to_owned());
+                }
+                vec![
+                    text("from unit", "1"),
+                    text("to unit", "247"),
+                    choice("settings", settings),
+                    text("wait ms", "200"),
+                ]
+            }
+        };
+        Form { line: at.id, tried, fields, at: 0, problem: None }
+    }
+
+    /// Is it for this test of this line?
+    pub fn is(&self, line: LineId, tried: Tried) -> bool {
+        (self.line, self.tried) == (line, tried)
+    }
+
+    /// A key; what is filled in is kept for the next time.
+    pub fn on_key(mut self, cx: &Cx, bench: &mut Bench, event: KeyEvent) -> Next {
+        let last = self.fields.len() - 1;
+        if keys::code(KeyCode::Enter).is(event) {
+            match self.start(cx) {
+                Ok(acts) => {
+                    (bench.form, bench.first) = (Some(self), None);
+                    return Next::Do(acts);
+                }
+                Err(problem) => self.problem = Some(problem),
+            }
+            return Window::Form(self).stay();
+        }
+        self.problem = None;
+        match event.code {
+            KeyCode::Up | KeyCode::BackTab => self.at = self.at.saturating_sub(1),
+            KeyCode::Down => self.at = (self.at + 1).min(last),
+            KeyCode::Tab => self.at = (self.at + 1) % (last + 1),
+            _ => self.edit(event),
+        }
+        bench.form = Some(self.clone());
+        Window::Form(self).stay()
+    }
+
+    /// Pasted text.
+    pub fn on_paste(&mut self, text: &str) {
+        if let Input::Text(line) = &mut self.fields[self.at].input {
+            line.paste(text);
+        }
+    }
+
+    fn edit(&mut self, event: KeyEvent) {
+        match &mut self.fields[self.at].input {
+            Input::Text(line) => {
+                line.on_key(event);
+            }
+            Input::Choice(options, at) => match event.code {
+                KeyCode::Left => *at = (*at + options.len() - 1) % options.len(),
+                KeyCode::Right | KeyCode::Char(' ') => *at = (*at + 1) % options.len(),
+                _ => {}
+            },
+        }
+        if let (Tried::Request, Some(function)) = (self.tried, FUNCTIONS.get(self.chosen(1))) {
+            self.fields[3].label = match function {
+                1..=4 => "count",
+                5 | 6 => "value",
+                _ => "values",
+            };
+        }
+    }
+
+    fn start(&self, cx: &Cx) -> Result<Vec<Act>, String> {
+        let at = Place::of(cx, self.line).ok_or("this line has gone")?;
+        let missed = |field: &Field| matches!(&field.input, Input::Text(line) if line.missed());
+        if self.fields.iter().any(missed) {
+            return Err("not all of it was taken; Ctrl-U empties a field".to_owned());
+        }
+        let tool = self.build(at.settings)?.tool;
+        let mut acts = vec![test::start(&at, tool.clone())?];
+        if self.tried == Tried::Registers {
+            acts.extend(test::registers(self.line, &tool));
+        }
+        Ok(acts)
+    }
+
+    fn text(&self, n: usize) -> String {
+        match &self.fields[n].input {
+            Input::Text(line) => line.text().trim().to_owned(),
+            Input::Choice(options, at) => options[*at].clone(),
+        }
+    }
+
+    fn chosen(&self, n: usize) -> usize {
+        match &self.fields[n].input {
+            Input::Choice(_, at) => *at,
+            Input::Text(_) => 0,
+        }
+    }
+
+    fn build(&self, line: &LineDef) -> Result<Built, String> {
+        let framing = line.transport.framing();
+        let top = if framing == Framing::Mbap { 255 } else { 247 };
+        let unit = |n: usize| number(&self.text(n), self.fields[n].label, 0..=top).map(|unit| unit as u8);
+        match self.tried {
+            Tried::Bytes | Tried::Request => {
+                let message = message(unit(0)?, FUNCTIONS[self.chosen(1)], &self.text(2), &self.text(3))?;
+                let told = request_words(&message, framing)?;
+                Ok(Built { tool: Tool::Send(frame::wrap(framing, TRANSACTION, &message)), told })
+            }
+            Tried::Registers => {
+                let (unit, table) = (unit(0)?, TABLES[self.chosen(1)]);
+                let address = address(&self.text(2), table)?;
+                let count = number(&self.text(3), "count", 1..=if table.is_bits() { 2_000 } else { 125 })? as u16;
+                let told = request_words(&read(unit, table, address, count), framing)?;
+                Ok(Built { tool: Tool::Read { unit, table, address, count }, told })
+            }
+            Tried::Loopback => {
+                let (unit, count) = (unit(0)?, number(&self.text(1), "times", 1..=1_000)? as u16);
+                let told = vec![format!("sends a word to unit {unit} and waits for the same word, {count} times")];
+                Ok(Built { tool: Tool::Loopback { unit, data: 0xA537, count }, told })
+            }
+            Tried::Identify => {
+                let unit = unit(0)?;
+                let told = vec![format!("asks unit {unit} for its maker, product and version; else for its server id")];
+                Ok(Built { tool: Tool::Identify { unit }, told })
+            }
+            Tried::Scan => self.build_scan(line, unit(0)?, unit(1)?),
+        }
+    }
+
+    fn build_scan(&self, line: &LineDef, first: u8, last: u8) -> Result<Built, String> {
+        if last < first {
+            return Err(format!("from unit {first} to unit {last}: the first is the greater one"));
+        }
+        let timeout = Duration::from_millis(number(&self.text(3), "wait ms", 10..=10_000)? as u64);
+        let serials = if self.chosen(2) == 1 { all_settings(line) } else { Vec::new() };
+        let (units, settings) = (u32::from(last - first) + 1, serials.len().max(1) as u32);
+        let longest = ms(timeout * units * settings);
+        let told =
+            vec![format!("{units} units, {settings} settings: {longest} at most. Any answer counts, also a refusal.")];
+        Ok(Built { tool: Tool::Scan(Scan { first, last, serials, timeout }), told })
+    }
+
+    /// Draws it.
+    pub fn view(&self, cx: &Cx, screen: &mut Screen, body: Rect) {
+        let Some(at) = Place::of(cx, self.line) else { return };
+        let theme = cx.theme;
+        let room = body.width.saturating_sub(8).min(72);
+        let mut told = match self.build(at.settings) {
+            Ok(built) => {
+                built.told.iter().flat_map(|words| wrap(words, room)).map(|line| (line, theme.normal())).collect()
+            }
+            Err(why) => {
+                wrap(&format!("! {why}"), room).into_iter().map(|line| (line, theme.trouble())).collect::<Vec<_>>()
+            }
+        };
+        let problem = self.problem.clone().or_else(|| test::closed(&at));
+        let problem = problem.filter(|why| !told.iter().any(|(line, _)| line.ends_with(why.as_str())));
+        told.extend(
+            problem
+                .map(|why| wrap(&format!("! {why}"), room))
+                .into_iter()
+                .flatten()
+                .map(|line| (line, theme.trouble())),
+        );
+        let rows = self.fields.len() as u16;
+        let mut canvas = window(cx, screen, body, self.title(), (room, rows + told.len() as u16 + 3));
+        for (n, field) in self.fields.iter().enumerate() {
+            let y = n as u16;
+            let mark = if n == self.at { "▸ " } else { "  " };
+            let x = canvas.text(0, y, mark, theme.strong());
+            let x = canvas.text(x, y, &pad(field.label, 10), theme.dim());
+            match &field.input {
+                Input::Text(line) if n == self.at => {
+                    line.view(theme, &mut canvas, x, y);
+                }
+                Input::Text(line) => {
+                    canvas.text(x, y, &line.text(), theme.normal());
+                }
+                Input::Choice(options, chosen) => {
+                    let style = if n == self.at { theme.focus() } else { theme.normal() };
+                    canvas.text(x, y, &format!("‹ {} ›", options[*chosen]), style);
+                }
+            }
+        }
+        for (n, (line, style)) in told.iter().enumerate() {
+            canvas.text(0, rows + 1 + n as u16, line, *style);
+        }
+        let last = canvas.height().saturating_sub(1);
+        let keys = "↑↓ field   ←→ choose   ⏎ start   Esc close";
+        canvas.text(0, last, &pad(keys, width(keys)), theme.strong());
+    }
+
+    fn title(&self) -> &'static str {
+        match self.tried {
+            Tried::Bytes | Tried::Request => "request by fields",
+            Tried::Registers => "browse registers",
+            Tried::Loopback => "loopback",
+            Tried::Identify => "identify a device",
+            Tried::Scan => "scan for units",
+        }
+    }
+}
+
+const TABLES: [Table; 4] = [Table::Holding, Table::Input, Table::Coil, Table::Discrete];
+
+fn read(unit: u8, table: Table, address: u16, count: u16) -> Vec<u8> {
+    let ([a, b], [c, d]) = (address.to_be_bytes(), count.to_be_bytes());
+    vec![unit, table.read_fc(), a, b, c, d]
+}
+
+/// The request in words, and its bytes; `Err` with what no device can take.
+fn request_words(message: &[u8], framing: Framing) -> Result<Vec<String>, String> {
+    if let Some(complaint) = complaint::check_request(message, framing).first() {
+        return Err(complaint.to_string());
+    }
+    let told =
+        explain::explain(&frame::wrap(framing, TRANSACTION, message), Some(framing), Some(Direction::Request), None);
+    Ok(vec![told.summary, hex(message)])
+}
+
+/// Unit and PDU of a request.
+fn message(unit: u8, function: u8, place: &str, rest: &str) -> Result<Vec<u8>, String> {
+    let start = address(place, names::table(function))?.to_be_bytes();
+    let mut message = vec![unit, function, start[0], start[1]];
+    let each = || rest.split([' ', ',', ';']).filter(|word| !word.is_empty());
+    match function {
+        1..=4 => message.extend((number(rest, "count", 1..=2_000)? as u16).to_be_bytes()),
+        5 => message.extend(if bit(rest)? { [0xFF, 0] } else { [0, 0] }),
+        6 => message.extend(register(rest)?.to_be_bytes()),
+        15 => {
+            let bits = each().map(bit).collect::<Result<Vec<bool>, String>>()?;
+            let byte = |part: &[bool]| part.iter().rev().fold(0u8, |byte, on| byte << 1 | u8::from(*on));
+            let bytes: Vec<u8> = bits.chunks(8).map(byte).collect();
+            message.extend((bits.len() as u16).to_be_bytes());
+            message.push(bytes.len() as u8);
+            message.extend(bytes);
+        }
+        _ => {
+            let values = each().map(register).collect::<Result<Vec<u16>, String>>()?;
+            message.extend((values.len() as u16).to_be_bytes());
+            message.push((2 * values.len()) as u8);
+            message.extend(values.iter().flat_map(|value| value.to_be_bytes()));
+        }
+    }
+    Ok(message)
+}
+
+/// `123`, `-5`, `0x3EA`.
+fn number(text: &str, what: &str, range: RangeInclusive<i64>) -> Result<i64, String> {
+    let text = text.trim();
+    let digits = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
+    let value = digits.map_or_else(|| text.parse(), |digits| i64::from_str_radix(digits, 16));
+    let expected = || format!("{what}: found `{text}`, expected {} to {}", range.start(), range.end());
+    value.ok().filter(|value| range.contains(value)).ok_or_else(expected)
+}
+
+fn register(text: &str) -> Result<u16, String> {
+    number(text, "value", -32_768..=65_535).map(|value| value as u16)
+}
+
+fn bit(text: &str) -> Result<bool, String> {
+    match text.trim().to_ascii_lowercase().as_str() {
+        "1" | "on" => Ok(true),
+        "0" | "off" => Ok(false),
+        other => Err(format!("value: found `{other}`, expected 1 or 0")),
+    }
+}
+
+/// The wire address: `41003` is a Modicon number of its table, `1002` and `0x03EA` are as sent. Five digits or more that
+/// begin with the digit of a table are a Modicon number; a wire address as great as that is written in hexadecimal.
+pub fn address(text: &str, table: Table) -> Result<u16, String> {
+    let digits = text.trim();
+    let modicon = matches!(digits.len(), 5 | 6) && digits.bytes().all(|byte| byte.is_ascii_digit());
+    let named =
+        TABLES.into_iter().find(|table| digits.starts_with(char::from(b'0' + table.digit()))).filter(|_| modicon);
+    let Some(named) = named else { return number(digits, "address", 0..=65_535).map(|address| address as u16) };
+    if named != table {
+        return Err(format!("address: {digits} is of the table {}, this is {}", named.word(), table.word()));
+    }
+    let place = digits[1..].parse::<u32>().ok().and_then(|number| u16::try_from(number.checked_sub(1)?).ok());
+    place.ok_or_else(|| format!("address: {digits} does not exist, the first is {}", table.modicon(0)))
+}
+
+/// All settings that devices are found with; RTU needs eight data bits.
+fn all_settings(line: &LineDef) -> Vec<Serial> {
+    let data_bits = if line.transport.framing() == Framing::Ascii { 7 } else { 8 };
+    let of = |baud| CHARACTERS.map(|(parity, stop_bits)| Serial { baud, data_bits, parity, stop_bits });
+    BAUDS.into_iter().flat_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_are_read_as_manuals_write_them() {
+        let check = |text: &str, table, expect: Result<u16, &str>| {
+            assert_eq!(address(text, table), expect.map_err(str::to_owned), "{text}");
+        };
+        check("41003", Table::Holding, Ok(1002));
+        check("400001", Table::Holding, Ok(0));
+        check("31008", Table::Input, Ok(1007));
+        check("00017", Table::Coil, Ok(16));
+        check("1002", Table::Holding, Ok(1002));
+        check("0x3EA", Table::Holding, Ok(1002));
+        check("0xA02B", Table::Holding, Ok(41_003));
+        check("20000", Table::Holding, Ok(20_000));
+        check("41003", Table::Coil, Err("address: 41003 is of the table holding, this is coil"));
+        check("40000", Table::Holding, Err("address: 40000 does not exist, the first is 40001"));
+        check("465537", Table::Holding, Err("address: 465537 does not exist, the first is 40001"));
+        check("x", Table::Holding, Err("address: found `x`, expected 0 to 65535"));
+    }
+
+    #[test]
+    fn fields_become_the_bytes_of_the_standard() {
+        let check = |function, place: &str, rest: &str, expect: &str| {
+            let bytes = message(17, function, place, rest);
+            assert_eq!(bytes.map(|bytes| hex(&bytes)).as_deref(), Ok(expect), "{function} {place} {rest}");
+        };
+        // Modbus application protocol V1.1b3, sections 6.3, 6.5, 6.6, 6.11 and 6.12.
+        check(3, "40108", "3", "11 03 00 6B 00 03");
+        check(5, "00173", "on", "11 05 00 AC FF 00");
+        check(6, "40002", "3", "11 06 00 01 00 03");
+        check(6, "40002", "-2", "11 06 00 01 FF FE");
+        check(15, "00020", "1 0 1 1 0 0 1 1 1 0", "11 0F 00 13 00 0A 02 CD 01");
+        check(16, "40002", "0x000A, 0x0102", "11 10 00 01 00 02 04 00 0A 01 02");
+        assert!(message(1, 6, "40002", "65536").is_err_and(|why| why.contains("expected -32768 to 65535")));
+    }
+}

@@ -1,0 +1,135 @@
+//! What came of a test, in words.
+
+use jiff::SignedDuration;
+
+use super::{
+    Place,
+    frames::{broken, bytes_text},
+    line::{ms, short_ms},
+    rows::{Row, bar, plain},
+    window::{exchange_rows, told_rows},
+};
+use crate::{
+    bus::explain::{self, Direction},
+    plant::tool::{Finding, Tool, ToolRun, ToolState},
+    ui::{
+        Cx,
+        widgets::text::{between, clock, wrap},
+    },
+};
+
+/// The last test of a line, or how to begin.
+pub fn rows(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
+    let theme = cx.theme;
+    let room = width.saturating_sub(3);
+    let Some(run) = &at.status.test else {
+        return vec![plain("nothing tried yet: ⏎ starts the selected test; polling goes on meanwhile", theme.dim())];
+    };
+    let mut rows = heading(cx, run);
+    let bare = matches!(run.tool, Tool::Send(_));
+    if let Tool::Send(bytes) = &run.tool {
+        let framing = at.settings.transport.framing();
+        let told = explain::explain(bytes, Some(framing), Some(Direction::Request), None);
+        let sent = broken(&format!("TX {}", bytes_text(framing, bytes)), room);
+        rows.extend(sent.into_iter().map(|line| plain(line, theme.dim())));
+        rows.extend(wrap(&told.summary, room - 3).into_iter().map(|line| plain(format!("   {line}"), theme.dim())));
+    }
+    for finding in &run.findings {
+        match finding {
+            Finding::Bytes { bytes, reply } => rows.extend(came_back(cx, at, run, bytes, *reply, room)),
+            Finding::Exchange(exchange) if matches!(run.tool, Tool::Loopback { .. }) => {
+                let reply = exchange.reply.map_or("–".to_owned(), |reply| format!("{} ms", short_ms(reply)));
+                rows.push(match exchange.outcome {
+                    Ok(()) => plain(format!("✓ came back after {reply}"), theme.normal()),
+                    Err(fault) => plain(format!("✗ {fault}"), theme.trouble()),
+                });
+            }
+            Finding::Exchange(exchange) => rows.extend(exchange_rows(cx, exchange, room)),
+            Finding::Unit { unit, serial, words } => {
+                let serial = serial.map_or(String::new(), |serial| format!(" at {serial}"));
+                rows.push(plain(format!("● unit {unit}{serial}: {words}"), theme.strong()));
+            }
+            Finding::Object { name, text } => {
+                rows.push(vec![(format!("{name:20} "), theme.dim()), (text.clone(), theme.strong())])
+            }
+            Finding::Values { table, address, words } => {
+                let from = format!("{} / 0x{address:04X}", table.modicon(*address));
+                let values = words.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+                rows.extend(
+                    wrap(&format!("{from}: {values}"), room).into_iter().map(|line| plain(line, theme.strong())),
+                );
+            }
+            // The exchange before it has said so already.
+            Finding::Failed { .. } if !bare => {}
+            Finding::Failed { what, fault } => rows.push(plain(format!("✗ {what}: {fault}"), theme.trouble())),
+            Finding::Verdict(words) => rows.push(plain(words.clone(), theme.strong())),
+        }
+    }
+    rows
+}
+
+/// What, by whom, when, how it stands; and how far it has come.
+fn heading(cx: &Cx, run: &ToolRun) -> Vec<Row> {
+    let theme = cx.theme;
+    let at = clock(run.started, &cx.def().time_zone);
+    let (state, style) = match &run.state {
+        ToolState::Running => ("at work".to_owned(), theme.strong()),
+        ToolState::Done => ("done".to_owned(), theme.normal()),
+        ToolState::Cancelled => ("STOPPED".to_owned(), theme.trouble()),
+        ToolState::Failed(why) => (format!("FAILED: {why}"), theme.trouble()),
+    };
+    let what = match &run.tool {
+        Tool::Send(_) => "sent".to_owned(),
+        tool @ (Tool::Loopback { .. } | Tool::Identify { .. } | Tool::Read { .. } | Tool::Scan(_)) => tool.to_string(),
+    };
+    let mut rows = vec![vec![(format!("{at} {what} by {}   ", run.by), theme.normal()), (state, style)]];
+    if run.state == ToolState::Running && 1 < run.total {
+        let share = f64::from(run.done) / f64::from(run.total);
+        let left = remaining(cx, run).map_or(String::new(), |left| format!(", {} left", ms(left)));
+        let words = format!(" {} of {}{left}   {}", run.done, run.total, run.now);
+        rows.push(vec![(bar(cx, share, 20), theme.normal()), (words, theme.normal())]);
+    }
+    rows
+}
+
+/// Time left, if the steps to come take as long as those before.
+fn remaining(cx: &Cx, run: &ToolRun) -> Option<std::time::Duration> {
+    let spent = between(run.started, cx.now).as_secs_f64() / cx.snapshot.speed.clamp(0.01, 1e6);
+    let each = spent / f64::from((0 < run.done).then_some(run.done)?);
+    SignedDuration::try_from_secs_f64(each * f64::from(run.total.saturating_sub(run.done))).ok()?.try_into().ok()
+}
+
+/// What came back for bytes, decoded.
+fn came_back(
+    cx: &Cx,
+    at: &Place,
+    run: &ToolRun,
+    bytes: &[u8],
+    reply: Option<std::time::Duration>,
+    room: u16,
+) -> Vec<Row> {
+    let theme = cx.theme;
+    let framing = at.settings.transport.framing();
+    if bytes.is_empty() {
+        return vec![plain(format!("✗ nothing came back within {}", ms(at.settings.timeout)), theme.trouble())];
+    }
+    let asked = match &run.tool {
+        Tool::Send(sent) => explain::message_of(sent, framing),
+        Tool::Loopback { .. } | Tool::Identify { .. } | Tool::Read { .. } | Tool::Scan(_) => None,
+    };
+    let told = explain::explain(bytes, Some(framing), Some(Direction::Answer), asked.as_deref());
+    let mut rows: Vec<Row> = broken(&format!("RX {}", bytes_text(framing, bytes)), room)
+        .into_iter()
+        .map(|line| plain(line, theme.normal()))
+        .collect();
+    let reply = reply.map_or(String::new(), |reply| format!("   after {} ms", short_ms(reply)));
+    let refused = told.message.get(1).is_some_and(|code| 0x80 <= *code);
+    let (mark, style) = match (told.verdict.as_str(), refused) {
+        ("ok", false) => ("✓ ok".to_owned(), theme.normal()),
+        ("ok", true) => ("✗ the device refuses".to_owned(), theme.trouble()),
+        (verdict, _) => (format!("✗ {verdict}"), theme.trouble()),
+    };
+    rows.push(plain(format!("{mark}{reply}"), style));
+    rows.extend(told_rows(cx, &told, room));
+    rows
+}

@@ -1,0 +1,147 @@
+//! Rows of styled words that scroll, words that flow into rows, and tables that leave out columns where there is no room.
+
+use ratatui::style::Style;
+
+use crate::ui::{
+    Cx,
+    widgets::text::{Canvas, fit_words, pad, pad_left, width},
+};
+
+/// A row of the screen: words with their looks, one behind the other.
+pub type Row = Vec<(String, Style)>;
+
+/// A row of one look.
+pub fn plain(text: impl Into<String>, style: Style) -> Row {
+    vec![(text.into(), style)]
+}
+
+/// Draws rows from `first` on, a column free on the left; says how many more there are below.
+pub fn draw(cx: &Cx, canvas: &mut Canvas, rows: &[Row], first: usize) {
+    let room = usize::from(canvas.height());
+    let first = first.min(rows.len().saturating_sub(room));
+    for (y, row) in rows.iter().skip(first).take(room).enumerate() {
+        let mut x = 1;
+        for (text, style) in row {
+            x = canvas.text(x, y as u16, &fit_words(text, canvas.width().saturating_sub(x)), *style);
+        }
+    }
+    let below = rows.len().saturating_sub(first + room);
+    let above = if 0 < first { format!(" {first} ▲") } else { String::new() };
+    let mark = if 0 < below { format!("{above} {below} more ▼") } else { above };
+    canvas.text_right(canvas.width(), canvas.height().saturating_sub(1), &mark, cx.theme.strong());
+}
+
+/// Words that flow into rows of a width, never broken inside.
+pub struct Flow {
+    rows: Vec<Row>,
+    at: u16,
+    width: u16,
+    indent: u16,
+}
+
+impl Flow {
+    /// Rows of this width that begin with a label.
+    pub fn new(label: &str, style: Style, width: u16) -> Flow {
+        let indent = 10;
+        Flow { rows: vec![plain(pad(label, indent), style)], at: indent, width: width.saturating_sub(2), indent }
+    }
+
+    /// Adds words that stay together.
+    pub fn add(&mut self, parts: Row) -> &mut Flow {
+        let long: u16 = parts.iter().map(|(text, _)| width(text)).sum();
+        if self.width < self.at + long && self.indent < self.at {
+            self.rows.push(plain(" ".repeat(usize::from(self.indent)), Style::new()));
+            self.at = self.indent;
+        }
+        if let Some(row) = self.rows.last_mut() {
+            row.extend(parts);
+            row.push(("   ".to_owned(), Style::new()));
+        }
+        self.at += long + 3;
+        self
+    }
+
+    /// The rows.
+    pub fn rows(self) -> Vec<Row> {
+        self.rows
+    }
+}
+
+/// A column of a table.
+pub struct Column {
+    /// Its heading.
+    pub title: &'static str,
+    /// Numbers stand at the right.
+    pub right: bool,
+    /// The greatest is the first to be left out.
+    pub need: u8,
+}
+
+/// A column of words.
+pub const fn words(title: &'static str, need: u8) -> Column {
+    Column { title, right: false, need }
+}
+
+/// A column of numbers.
+pub const fn number(title: &'static str, need: u8) -> Column {
+    Column { title, right: true, need }
+}
+
+/// Headings and lines of a table, as wide as their widest cell; columns that do not fit are left out whole.
+pub fn table<const N: usize>(columns: &[Column; N], lines: &[[String; N]], room: u16) -> (String, Vec<String>) {
+    let widest = |n: usize| lines.iter().map(|line| width(&line[n])).max().unwrap_or(0).max(width(columns[n].title));
+    let mut kept: Vec<(usize, u16)> = (0..N).map(|n| (n, widest(n))).collect();
+    while room < kept.iter().map(|(_, width)| width + 1).sum::<u16>() && 1 < kept.len() {
+        let Some(least) = kept.iter().map(|(n, _)| columns[*n].need).max() else { break };
+        kept.retain(|(n, _)| columns[*n].need != least);
+    }
+    let line = |cells: &dyn Fn(usize) -> String| {
+        let cell = |(n, width): &(usize, u16)| {
+            let text = cells(*n);
+            if columns[*n].right { pad_left(&text, *width) } else { pad(&text, *width) }
+        };
+        kept.iter().map(cell).collect::<Vec<_>>().join(" ")
+    };
+    let heading = line(&|n| columns[n].title.to_owned());
+    (heading, lines.iter().map(|cells| line(&|n| cells[n].clone())).collect())
+}
+
+/// First row to show so that the selected one is in sight, near the middle.
+pub fn first_for(selected: usize, count: usize, room: usize) -> usize {
+    selected.saturating_sub(room / 2).min(count.saturating_sub(room))
+}
+
+/// A share as a bar: `██████────`.
+pub fn bar(cx: &Cx, share: f64, cells: usize) -> String {
+    let full = ((share.clamp(0.0, 1.0) * cells as f64).round() as usize).max(usize::from(0.0 < share));
+    "█".repeat(full) + &cx.theme.pick("─", "-").repeat(cells - full)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_without_room_leaves_out_whole_columns() {
+        let columns = [words("device", 0), number("ok", 1), number("jitter", 9)];
+        let lines = [["TIC-1", "812", "3"], ["PLC-1", "7", "12"]].map(|line| line.map(str::to_owned));
+        let check = |room, heading: &str, first: &str| {
+            let (shown, rows) = table(&columns, &lines, room);
+            assert_eq!((shown.as_str(), rows[0].as_str()), (heading, first), "{room}");
+        };
+        check(40, "device  ok jitter", "TIC-1  812      3");
+        check(17, "device  ok", "TIC-1  812");
+        check(9, "device", "TIC-1 ");
+    }
+
+    #[test]
+    fn words_flow_into_the_next_row_whole() {
+        let mut flow = Flow::new("bytes", Style::new(), 30);
+        for text in ["sent 1 200", "received 48 000", "x"] {
+            flow.add(plain(text, Style::new()));
+        }
+        let rows: Vec<String> =
+            flow.rows().iter().map(|row| row.iter().map(|(text, _)| text.as_str()).collect::<String>()).collect();
+        assert_eq!(rows, ["bytes     sent 1 200   ", "          received 48 000   x   "]);
+    }
+}

@@ -1,0 +1,393 @@
+//! Page Test: what a technician can try on a line, and what came of it; and the entry for bytes.
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame as Screen, layout::Rect};
+
+use super::{
+    Place, Window,
+    frames::broken,
+    registers::Registers,
+    request::Form,
+    results,
+    rows::{self, Row, plain},
+};
+use crate::{
+    bus::{
+        ascii, complaint,
+        explain::{self, Direction, Explained},
+        frame::{self, Mbap, hex},
+        typed,
+    },
+    plant::{
+        command::Command,
+        def::{Framing, LineId},
+        event::LineState,
+        tool::Tool,
+    },
+    ui::{
+        Act, Cx, keys,
+        modal::{Confirm, Modal, Next, line::Line},
+        widgets::text::{Canvas, fit, fit_words, pad, wrap},
+    },
+};
+
+/// Transaction of a Modbus TCP request that somebody typed; polls use others.
+pub const TRANSACTION: u16 = 0xFFFE;
+/// Characters of the longest frame: 260 bytes in hex with blanks.
+const ENTRY_MAX: usize = 800;
+
+/// What can be tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tried {
+    /// Bytes as they are.
+    Bytes,
+    /// A request by its fields.
+    Request,
+    /// Registers of a device.
+    Registers,
+    /// Diagnostics 08/00.
+    Loopback,
+    /// Device identification.
+    Identify,
+    /// Which units answer.
+    Scan,
+}
+
+impl Tried {
+    const ALL: [Tried; 6] =
+        [Tried::Bytes, Tried::Request, Tried::Registers, Tried::Loopback, Tried::Identify, Tried::Scan];
+
+    /// Its key, its name and what it is for.
+    fn words(self) -> [&'static str; 3] {
+        match self {
+            Tried::Bytes => ["t", "type bytes", "hex of a request: what it means at once, its check added"],
+            Tried::Request => ["f", "request by fields", "unit, function, address (41003 or 0x03EA), count or value"],
+            Tried::Registers => ["b", "browse registers", "hex, numbers, 32 bits and float in all four orders"],
+            Tried::Loopback => ["l", "loopback", "08 / 0x08: does the line carry what is sent, and how fast"],
+            Tried::Identify => ["i", "identify", "43 / 0x2B: maker, product, version of a device"],
+            Tried::Scan => ["s", "scan for units", "who answers, with these or with all serial settings"],
+        }
+    }
+}
+
+/// State of the page.
+#[derive(Debug, Default)]
+pub struct Bench {
+    selected: usize,
+    /// First row shown of the results; `None`: the last ones.
+    pub first: Option<usize>,
+    /// What was typed last, and whether its check is left out.
+    pub text: String,
+    /// As it is typed, without a check.
+    pub bare: bool,
+    /// The form that was filled in last.
+    pub form: Option<Form>,
+}
+
+impl Bench {
+    /// The selected test.
+    pub fn selected(&self) -> Tried {
+        Tried::ALL[self.selected.min(Tried::ALL.len() - 1)]
+    }
+
+    /// Opens the entry of a test.
+    pub fn open(&mut self, cx: &Cx, at: &Place, tried: Tried) -> Vec<Act> {
+        self.selected = Tried::ALL.iter().position(|known| *known == tried).unwrap_or(0);
+        self.first = None;
+        let window = match tried {
+            Tried::Bytes => Window::Send(Send {
+                line: at.id,
+                text: Line::long(&self.text, ENTRY_MAX),
+                bare: self.bare,
+                problem: None,
+            }),
+            Tried::Request | Tried::Registers | Tried::Loopback | Tried::Identify | Tried::Scan => {
+                let last = self.form.take_if(|form| form.is(at.id, tried));
+                Window::Form(last.unwrap_or_else(|| Form::new(cx, at, tried)))
+            }
+        };
+        vec![Act::Open(Modal::Bus(Box::new(window)))]
+    }
+
+    /// Single rows move the selection; screens scroll the results.
+    pub fn scroll(&mut self, cx: &Cx, at: &Place, by: isize) {
+        if by.abs() == 1 {
+            self.selected = self.selected.saturating_add_signed(by).min(Tried::ALL.len() - 1);
+            return;
+        }
+        let room = usize::from(cx.area.height).saturating_sub(TOP as usize + 1).max(1);
+        let count = results::rows(cx, at, cx.area.width).len();
+        let end = count.saturating_sub(room);
+        let by = by.clamp(-(count as isize), count as isize);
+        let by = if by.unsigned_abs() < count { by.signum() * room.saturating_sub(1).max(1) as isize } else { by };
+        let first = self.first.unwrap_or(end).saturating_add_signed(by).min(end);
+        self.first = (first < end).then_some(first);
+    }
+
+    /// Draws it: the tests, then what came of the last one.
+    pub fn view(&self, cx: &Cx, at: &Place, canvas: &mut Canvas) {
+        let theme = cx.theme;
+        let (width, height) = (canvas.width(), canvas.height());
+        let tests = height.saturating_sub(3).min(TOP - 2);
+        let first = rows::first_for(self.selected, Tried::ALL.len(), usize::from(tests));
+        for (y, (n, tried)) in Tried::ALL.into_iter().enumerate().skip(first).take(usize::from(tests)).enumerate() {
+            let [key, name, what] = tried.words();
+            let y = y as u16;
+            let chosen = n == self.selected;
+            let x = canvas.text(1, y, key, theme.strong());
+            let x = canvas.text(x + 1, y, &pad(name, 18), if chosen { theme.focus() } else { theme.normal() });
+            canvas.text(x + 1, y, &fit_words(what, width.saturating_sub(x + 2)), theme.dim());
+        }
+        canvas.run(1, tests, width.saturating_sub(2), '─', theme.dim());
+        if let Some(why) = closed(at) {
+            canvas.text(3, tests, &format!(" ! {} ", fit_words(&why, width.saturating_sub(10))), theme.trouble());
+        }
+        let rows = results::rows(cx, at, width);
+        let mut below = canvas.part(0, tests + 1, width, height.saturating_sub(tests + 1));
+        rows::draw(cx, &mut below, &rows, self.first.unwrap_or(usize::MAX));
+    }
+}
+
+/// Rows of the tests with the line below them.
+const TOP: u16 = Tried::ALL.len() as u16 + 2;
+
+/// Why nothing can be sent on a line; `None` if it is open.
+pub fn closed(at: &Place) -> Option<String> {
+    let name = &at.settings.name;
+    match &at.status.state {
+        LineState::Connected | LineState::Testing => None,
+        LineState::Connecting => Some(format!("line {name} is being connected: nothing can be sent yet")),
+        LineState::Waiting { why, .. } => Some(format!("line {name} is not connected: {why}")),
+        LineState::Disconnected => Some(format!("line {name} is closed: connect it first (tab 4, L)")),
+    }
+}
+
+/// Starts a test, or asks first; `Err` says why it cannot be started.
+pub fn start(at: &Place, tool: Tool) -> Result<Act, String> {
+    let alone = matches!(&tool, Tool::Scan(scan) if !scan.serials.is_empty());
+    if let Some(why) = closed(at).filter(|_| !alone) {
+        return Err(why);
+    }
+    let question = danger(at, &tool);
+    let order = Command::Test(at.id, tool);
+    Ok(match question {
+        Some(words) => Act::Open(Modal::Confirm(Confirm::order(format!("test of {}", at.settings.name), words, order))),
+        None => Act::Order(order),
+    })
+}
+
+/// What must be asked before a test; `None` for one that only reads.
+fn danger(at: &Place, tool: &Tool) -> Option<String> {
+    match tool {
+        Tool::Scan(scan) if !scan.serials.is_empty() => Some(format!(
+            "Polling of {} pauses while other settings are tried, and its alarms are not judged. Start the scan?",
+            at.settings.name
+        )),
+        Tool::Scan(_) | Tool::Loopback { .. } | Tool::Identify { .. } | Tool::Read { .. } => None,
+        Tool::Send(bytes) => {
+            let framing = at.settings.transport.framing();
+            let told = explain::explain(bytes, Some(framing), Some(Direction::Request), None);
+            let whole = told.verdict == "ok" && complaint::check_request(&told.message, framing).is_empty();
+            let broadcast = told.message.first() == Some(&0) && framing != Framing::Mbap;
+            match (whole, broadcast, only_reads(&told.message)) {
+                (true, false, true) => None,
+                (true, true, _) => {
+                    Some(format!("{}. Every device of the line obeys, none answers. Send it?", told.summary))
+                }
+                (true, false, false) => Some(format!(
+                    "{}. This is past all limits of the plant file and is not read back. Send it?",
+                    told.summary
+                )),
+                (false, ..) => Some(format!(
+                    "These bytes are no good request: {}. Send {} all the same?",
+                    told.verdict,
+                    hex(bytes)
+                )),
+            }
+        }
+    }
+}
+
+/// Does this request change nothing in a device? Diagnostics do, all but the echo.
+fn only_reads(message: &[u8]) -> bool {
+    match message.get(1) {
+        Some(0x01..=0x04 | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18 | 0x2B) => true,
+        Some(0x08) => message.get(2..4) == Some(&[0, 0]),
+        Some(_) | None => false,
+    }
+}
+
+/// The last test once more.
+pub fn again(_cx: &Cx, at: &Place) -> Vec<Act> {
+    let Some(run) = &at.status.test else { return Vec::new() };
+    start(at, run.tool.clone()).into_iter().collect()
+}
+
+/// Stops the test at work.
+pub fn stop(at: &Place) -> Vec<Act> {
+    if at.is_testing() { vec![Act::Order(Command::StopTest(at.id))] } else { Vec::new() }
+}
+
+/// Bytes on their way onto a line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Send {
+    line: LineId,
+    text: Line,
+    /// As typed, without a check.
+    bare: bool,
+    problem: Option<String>,
+}
+
+/// What was typed, as it would go over the line.
+#[derive(Debug)]
+struct Ready {
+    frame: Vec<u8>,
+    /// What was added to what was typed.
+    added: String,
+    told: Explained,
+    complaints: Vec<String>,
+}
+
+impl Send {
+    /// A key; what is typed is kept for the next time.
+    pub fn on_key(mut self, cx: &Cx, bench: &mut Bench, event: KeyEvent) -> Next {
+        if keys::code(KeyCode::Tab).is(event) {
+            self.bare = !self.bare;
+            self.problem = None;
+        } else if keys::code(KeyCode::Enter).is(event) {
+            match self.send(cx) {
+                Ok(Act::Order(command)) => {
+                    bench.first = None;
+                    return Next::Do(vec![Act::Order(command), Act::Open(Modal::Bus(Box::new(Window::Send(self))))]);
+                }
+                Ok(act) => return Next::Do(vec![act]),
+                Err(problem) => self.problem = Some(problem),
+            }
+        } else if self.text.on_key(event) {
+            self.problem = None;
+        }
+        (bench.text, bench.bare) = (self.text.text(), self.bare);
+        Window::Send(self).stay()
+    }
+
+    /// Pasted text.
+    pub fn on_paste(&mut self, text: &str) {
+        self.text.paste(text);
+    }
+
+    fn send(&self, cx: &Cx) -> Result<Act, String> {
+        let at = Place::of(cx, self.line).ok_or("this line has gone")?;
+        if self.text.missed() {
+            return Err("not all of it was taken; Ctrl-U empties the line".to_owned());
+        }
+        start(&at, Tool::Send(self.ready(at.settings.transport.framing())?.frame))
+    }
+
+    fn ready(&self, framing: Framing) -> Result<Ready, String> {
+        let typed = typed::parse(&self.text.text(), Some(framing)).map_err(|error| error.to_string())?;
+        let (frame, added) = if self.bare { (typed.bytes.clone(), String::new()) } else { dress(&typed, framing) };
+        let told = explain::explain(&frame, Some(framing), Some(Direction::Request), None);
+        let mut complaints: Vec<String> =
+            complaint::check_request(&told.message, framing).iter().map(ToString::to_string).collect();
+        if told.verdict != "ok" && complaints.is_empty() {
+            complaints.push(told.verdict.clone());
+        }
+        Ok(Ready { frame, added, told, complaints })
+    }
+
+    /// Draws it over the tests, so that what comes back is seen below.
+    pub fn view(&self, cx: &Cx, screen: &mut Screen, body: Rect) {
+        let Some(at) = Place::of(cx, self.line) else { return };
+        let theme = cx.theme;
+        let area = Rect { height: (TOP + 1).min(body.height), ..body };
+        let mut outer = Canvas::new(screen.buffer_mut(), area);
+        outer.clear();
+        outer.frame(&format!("send on {}, {}", at.settings.name, at.settings.transport), theme.strong());
+        let (width, height) = (area.width.saturating_sub(4), area.height.saturating_sub(2));
+        let mut canvas = outer.part(2, 1, width, height);
+        let x = canvas.text(0, 0, "bytes ", theme.dim());
+        self.text.view(theme, &mut canvas, x, 0);
+        let framing = at.settings.transport.framing();
+        let rows = if self.text.text().trim().is_empty() {
+            vec![
+                plain("such as 01 03 03 EA 00 01: unit, function, address, count; or a line of a log", theme.dim()),
+                plain("the check that the line needs is added", theme.dim()),
+            ]
+        } else {
+            match self.ready(framing) {
+                Ok(ready) => ready.rows(cx, self.bare, width),
+                Err(why) => wrap(&why, width).into_iter().map(|line| plain(line, theme.trouble())).collect(),
+            }
+        };
+        let problem = self.problem.clone().or_else(|| closed(&at));
+        let room = height.saturating_sub(2 + u16::from(problem.is_some()));
+        for (y, row) in rows.iter().take(usize::from(room)).enumerate() {
+            let mut x = 0;
+            for (text, style) in row {
+                x = canvas.text(x, y as u16 + 1, text, *style);
+            }
+        }
+        let last = height.saturating_sub(1);
+        if let Some(problem) = problem {
+            canvas.text(0, last.saturating_sub(1), &fit(&format!("! {problem}"), width), theme.trouble());
+        }
+        let check = if self.bare { "with its check" } else { "as typed, without check" };
+        canvas.text(0, last, &format!("⏎ send   Tab {check}   Esc close"), theme.strong());
+    }
+}
+
+impl Ready {
+    fn rows(&self, cx: &Cx, bare: bool, width: u16) -> Vec<Row> {
+        let theme = cx.theme;
+        let added = match (bare, self.added.is_empty()) {
+            (true, _) => "as typed, nothing added".to_owned(),
+            (false, true) => "it has its check".to_owned(),
+            (false, false) => self.added.clone(),
+        };
+        let mut rows = vec![plain(fit_words(&added, width), theme.normal())];
+        let lines = wrap(&self.told.summary, width);
+        rows.extend(lines.into_iter().map(|line| plain(line, theme.strong())));
+        for complaint in &self.complaints {
+            rows.extend(wrap(&format!("! {complaint}"), width).into_iter().map(|line| plain(line, theme.trouble())));
+        }
+        if rows.len() < 4 {
+            let bytes = broken(
+                &format!(
+                    "sent as {}",
+                    super::frames::bytes_text(self.told.framing.unwrap_or(Framing::Rtu), &self.frame)
+                ),
+                width,
+            );
+            rows.extend(bytes.into_iter().map(|line| plain(line, theme.dim())));
+        }
+        rows
+    }
+}
+
+/// The frame of what was typed, and what was added to it, if it is not a frame already.
+fn dress(typed: &typed::Typed, framing: Framing) -> (Vec<u8>, String) {
+    let bytes = &typed.bytes;
+    match framing {
+        Framing::Rtu if 4 <= bytes.len() && frame::without_crc(bytes).is_ok() => (bytes.clone(), String::new()),
+        Framing::Rtu => {
+            let whole = frame::with_crc(bytes);
+            let crc = hex(&whole[bytes.len()..]);
+            (whole, format!("+ CRC {crc}"))
+        }
+        Framing::Ascii if typed.framing == Some(Framing::Ascii) => (bytes.clone(), String::new()),
+        Framing::Ascii => (ascii::encode(bytes), format!("+ LRC {:02X}, as : hex CR LF", ascii::lrc(bytes))),
+        Framing::Mbap if matches!(frame::mbap(bytes), Mbap::Whole { end, .. } if end == bytes.len()) => {
+            (bytes.clone(), String::new())
+        }
+        Framing::Mbap => {
+            let whole = frame::with_mbap(TRANSACTION, bytes);
+            let header = hex(&whole[..6]);
+            (whole, format!("+ header {header}"))
+        }
+    }
+}
+
+/// The window of the registers that were read.
+pub fn registers(line: LineId, tool: &Tool) -> Option<Act> {
+    Registers::new(line, tool).map(|window| Act::Open(Modal::Bus(Box::new(Window::Registers(window)))))
+}

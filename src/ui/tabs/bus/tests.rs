@@ -1,0 +1,385 @@
+//! The bus tab in the whole terminal: what a technician sees and what the keys do.
+
+use std::{sync::Arc, time::Duration};
+
+use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+
+use crate::{
+    bus::frame::with_crc,
+    plant::{
+        command::{Command, OrderId},
+        def::{Framing, LineId, Serial},
+        event::{ExceptionCode, Fault, LineState},
+        tag::Table,
+        tool::{Finding, Scan, Tool, ToolRun, ToolState},
+        traffic::Exchange,
+    },
+    ui::{
+        Effect, Model, Msg,
+        fixture::{Fixture, now},
+        modal::Modal,
+        tabs::Tab,
+        tests::{model, order_of, screen, type_keys},
+        theme::Theme,
+        update,
+    },
+};
+
+const L1: LineId = LineId(0);
+
+fn bus(fixture: &Fixture, theme: Theme, keys: &str) -> Model {
+    let mut model = model(fixture, theme);
+    type_keys(&mut model, "6");
+    type_keys(&mut model, keys);
+    model
+}
+
+fn run(tool: Tool, state: ToolState, done: u32, total: u32, findings: Vec<Finding>) -> Arc<ToolRun> {
+    let id = OrderId { terminal: 1, number: 1 };
+    let started = now() - jiff::SignedDuration::from_secs(8);
+    let words = "unit 17, function 3 / 0x03 at 9600 8E1".to_owned();
+    Arc::new(ToolRun { id, by: "tech1".into(), tool, started, done, total, now: words, state, findings })
+}
+
+fn read_of_three() -> Arc<ToolRun> {
+    let tool = Tool::Read { unit: 1, table: Table::Holding, address: 1_002, count: 3 };
+    let exchange = Exchange {
+        at: now(),
+        framing: Framing::Rtu,
+        request: with_crc(&[1, 3, 3, 0xEA, 0, 3]),
+        answer: with_crc(&[1, 3, 6, 0x42, 0xC8, 0, 0, 0xFF, 0xFE]),
+        outcome: Ok(()),
+        reply: Some(Duration::from_micros(12_300)),
+        tries: 1,
+    };
+    let values = Finding::Values { table: Table::Holding, address: 1_002, words: vec![0x42C8, 0, 0xFFFE] };
+    run(tool, ToolState::Done, 1, 1, vec![Finding::Exchange(Arc::new(exchange)), values])
+}
+
+#[test]
+fn every_page_well_and_in_trouble() {
+    let moods = [("well", Fixture::traffic()), ("trouble", Fixture::traffic_trouble())];
+    for (mood, fixture) in &moods {
+        for (page, keys) in [("line", "L"), ("plan", "P"), ("frames", "F"), ("test", "T")] {
+            for (width, height) in [(80, 24), (120, 40)] {
+                let mut model = bus(fixture, Theme::FULL, keys);
+                insta::assert_snapshot!(format!("{page}_{mood}_{width}x{height}"), screen(&mut model, width, height));
+            }
+        }
+    }
+}
+
+#[test]
+fn every_page_in_seven_bits_tells_what_is_wrong() {
+    for (page, keys, words) in [
+        ("line", "L", "! PLC-1: no answer in time at 14:01:50"),
+        ("plan", "P", "! TIC-1"),
+        ("frames", "F", "x CRC error: got 3C51"),
+        ("test", "T", "scan for units"),
+    ] {
+        let mut model = bus(&Fixture::traffic_trouble(), Theme::PLAIN, keys);
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.is_ascii() && shown.contains(words), "{page}:\n{shown}");
+    }
+}
+
+#[test]
+fn pages_are_turned_by_arrows_and_letters() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "");
+    for (keys, page) in
+        [("", "‹Line›"), ("→", "‹Plan›"), ("→→", "‹Test›"), ("→", "‹Line›"), ("←", "‹Test›"), ("F", "‹Frames›")]
+    {
+        type_keys(&mut model, keys);
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains(page), "{keys}: {page}\n{shown}");
+    }
+    let before = screen(&mut model, 80, 24);
+    for key in ["c", "w", "z"] {
+        assert_eq!(type_keys(&mut model, key), []);
+    }
+    assert_eq!(screen(&mut model, 80, 24), before);
+}
+
+#[test]
+fn a_quiet_line_has_no_warnings_and_a_bad_one_says_what_to_do() {
+    let quiet = screen(&mut bus(&Fixture::traffic(), Theme::FULL, ""), 80, 24);
+    assert!(!quiet.contains('!') && !quiet.contains('✗'), "{quiet}");
+    let bad = screen(&mut bus(&Fixture::traffic_trouble(), Theme::FULL, ""), 120, 40);
+    for words in [
+        "replies take 288 of 300 ms: raise the timeout",
+        "look at its power, wiring and unit number; every probe costs the line 312 ms",
+        "look at baud rate, parity, termination and shield",
+        "!corrupt 6",
+        "02 illegal data address 2",
+        "the line is full: 41 reads were skipped",
+    ] {
+        assert!(bad.contains(words), "{words} is missing:\n{bad}");
+    }
+}
+
+#[test]
+fn frames_are_held_still_while_they_are_read() {
+    let mut fixture = Fixture::traffic();
+    let mut model = bus(&fixture, Theme::FULL, "F↑↑");
+    let held = screen(&mut model, 80, 24);
+    assert!(held.contains("HELD STILL"), "{held}");
+    crate::ui::fixture::more_frames(&mut fixture);
+    for _ in 0..6 {
+        update(&mut model, Msg::Tick { silent: Duration::ZERO });
+        update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    }
+    let body = |shown: &str| shown.lines().skip(4).take(18).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(body(&screen(&mut model, 80, 24)), body(&held));
+    type_keys(&mut model, " ");
+    let running = screen(&mut model, 80, 24);
+    assert!(running.contains("running, newest below") && running.contains("07 D0 00 01"), "{running}");
+}
+
+#[test]
+fn running_frames_are_taken_in_every_two_seconds() {
+    let mut fixture = Fixture::traffic();
+    let mut model = bus(&fixture, Theme::FULL, "F");
+    crate::ui::fixture::more_frames(&mut fixture);
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    assert!(!screen(&mut model, 80, 24).contains("07 D0 00 01"), "slow lines have few bytes");
+    for _ in 0..4 {
+        update(&mut model, Msg::Tick { silent: Duration::ZERO });
+    }
+    assert!(screen(&mut model, 80, 24).contains("07 D0 00 01"));
+}
+
+#[test]
+fn a_frame_is_opened_byte_by_byte() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "F⏎");
+    insta::assert_snapshot!("window_frame", screen(&mut model, 80, 24));
+    type_keys(&mut model, "⎋↑⏎");
+    let request = screen(&mut model, 80, 24);
+    assert!(request.contains("TX sent") && request.contains("41004"), "{request}");
+}
+
+#[test]
+fn a_filter_shows_what_passes_or_says_what_it_expects() {
+    let mut model = bus(&Fixture::traffic_trouble(), Theme::FULL, "Ferror");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("error▏") || shown.contains("which frames"), "{shown}");
+    type_keys(&mut model, "⎋ferror⏎");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("3 of 126 frames") && shown.contains("filter: error"), "{shown}");
+    type_keys(&mut model, "f bogus⏎");
+    assert!(screen(&mut model, 80, 24).contains("found `bogus`, expected unit N, fc N, tx, rx, error"));
+}
+
+#[test]
+fn frames_are_saved_as_text_and_for_wireshark() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "F");
+    let saved: Vec<_> = type_keys(&mut model, "x")
+        .into_iter()
+        .filter_map(|effect| match effect {
+            Effect::SaveReport { tab, path, bytes } => Some((tab, path, bytes)),
+            Effect::Order(..) | Effect::Ask(..) | Effect::Redraw | Effect::Quit => None,
+        })
+        .collect();
+    let names: Vec<String> = saved.iter().map(|(_, path, _)| path.display().to_string()).collect();
+    assert_eq!(names, ["reports/L1-2026-11-21-140231.txt", "reports/L1-2026-11-21-140231.pcapng"]);
+    assert!(saved.iter().all(|(tab, ..)| *tab == Tab::Bus));
+    assert_eq!(String::from_utf8_lossy(&saved[0].2).lines().count(), 120);
+    assert_eq!(saved[1].2[..4], [0x0A, 0x0D, 0x0D, 0x0A]);
+    for (tab, path, _) in saved {
+        update(&mut model, Msg::Saved(tab, Ok(path)));
+    }
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("open with: wireshark reports/L1-2026-11-21-140231.pcapng"), "{shown}");
+    update(&mut model, Msg::Saved(Tab::Bus, Err("disk full".to_owned())));
+    assert!(screen(&mut model, 80, 24).contains("NOT WRITTEN: disk full"));
+}
+
+#[test]
+fn the_tags_of_a_block_are_shown_with_their_values() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "P⏎");
+    insta::assert_snapshot!("window_block", screen(&mut model, 80, 24));
+}
+
+#[test]
+fn typed_bytes_are_told_at_once_and_never_act_as_keys() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "Tt");
+    assert_eq!(type_keys(&mut model, "01 03 03 EA 00 01"), []);
+    insta::assert_snapshot!("window_send", screen(&mut model, 80, 24));
+    let effects = type_keys(&mut model, "⏎");
+    assert_eq!(order_of(&effects), Some(&Command::Test(L1, Tool::Send(with_crc(&[1, 3, 3, 0xEA, 0, 1])))));
+    assert!(matches!(model.modal, Some(Modal::Bus(_))), "the entry stays for the next one");
+    type_keys(&mut model, "⎋⏎");
+    assert!(screen(&mut model, 80, 24).contains("01 03 03 EA 00 01"), "it is remembered");
+    update(&mut model, Msg::Paste("q1a\n".to_owned()));
+    assert!(matches!(model.modal, Some(Modal::Bus(_))));
+}
+
+#[test]
+fn bytes_go_out_as_typed_where_no_check_is_wanted() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "Tt⇥01 03 03 EA 00 01 00 00⏎");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("These bytes are no good request: CRC"), "{shown}");
+    let effects = type_keys(&mut model, "⏎");
+    assert_eq!(order_of(&effects), Some(&Command::Test(L1, Tool::Send(vec![1, 3, 3, 0xEA, 0, 1, 0, 0]))));
+}
+
+#[test]
+fn writes_and_broadcasts_are_asked_first() {
+    for (typed, bytes, words) in [
+        ("01 06 03 EA 00 32", vec![1, 6, 3, 0xEA, 0, 0x32], "This is past all limits of the plant file"),
+        ("00 06 03 EA 00 32", vec![0, 6, 3, 0xEA, 0, 0x32], "Every device of the line obeys, none answers."),
+        ("01 08 00 01 00 00", vec![1, 8, 0, 1, 0, 0], "This is past all limits"),
+        ("00 03 03 EA 00 01", vec![0, 3, 3, 0xEA, 0, 1], "nobody answers a broadcast"),
+    ] {
+        let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Tt{typed}"));
+        let before = screen(&mut model, 80, 24);
+        assert_eq!(order_of(&type_keys(&mut model, "⏎")), None, "{typed}");
+        let shown = screen(&mut model, 120, 40).replace("│", " ").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(shown.contains(words) || before.contains(words), "{words}:\n{before}\n{shown}");
+        let effects = type_keys(&mut model, "⏎");
+        assert_eq!(order_of(&effects), Some(&Command::Test(L1, Tool::Send(with_crc(&bytes)))), "{typed}");
+    }
+}
+
+#[test]
+fn a_request_is_built_of_fields_with_either_kind_of_address() {
+    let check = |keys: &str, expect: &[u8]| {
+        let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Tf{keys}"));
+        let mut effects = type_keys(&mut model, "⏎");
+        if matches!(model.modal, Some(Modal::Confirm(_))) {
+            effects = type_keys(&mut model, "⏎");
+        }
+        assert_eq!(order_of(&effects), Some(&Command::Test(L1, Tool::Send(with_crc(expect)))), "{keys}");
+    };
+    let clear = "\u{8}".repeat(6);
+    check(&format!("↓↓{clear}41003"), &[1, 3, 3, 0xEA, 0, 1]);
+    check(&format!("↓↓{clear}1002↓{clear}4"), &[1, 3, 3, 0xEA, 0, 4]);
+    check(&format!("{clear}17↓↓{clear}0x3EA"), &[17, 3, 3, 0xEA, 0, 1]);
+    check(&format!("↓→→→→↓{clear}41003↓{clear}-2"), &[1, 6, 3, 0xEA, 0xFF, 0xFE]);
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Tf↓↓{clear}31003⏎"));
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("31003 is of the table input, this is holding"), "{shown}");
+}
+
+#[test]
+fn a_closed_line_says_so_instead_of_sending() {
+    let mut fixture = Fixture::traffic();
+    fixture.line.state = LineState::Disconnected;
+    for keys in ["Tt01 03 00 00 00 01⏎", "Tl⏎", "Ti⏎", "Tb⏎", "Ts⏎"] {
+        let mut model = bus(&fixture, Theme::FULL, "");
+        assert_eq!(order_of(&type_keys(&mut model, keys)), None, "{keys}");
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains("line L1 is closed: connect it first"), "{keys}:\n{shown}");
+    }
+}
+
+#[test]
+fn a_scan_of_all_settings_is_asked_and_shows_how_far_it_is() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "Ts↓↓→");
+    insta::assert_snapshot!("window_scan", screen(&mut model, 80, 24));
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), None);
+    assert!(screen(&mut model, 80, 24).contains("Polling of L1 pauses while other settings are tried"));
+    let effects = type_keys(&mut model, "⏎");
+    let Some(Command::Test(_, tool @ Tool::Scan(scan))) = order_of(&effects) else { panic!("{effects:?}") };
+    assert_eq!((scan.first, scan.last, scan.serials.len()), (1, 247, 32));
+    let mut fixture = Fixture::traffic();
+    fixture.line.state = LineState::Testing;
+    let even = Serial { parity: crate::plant::def::Parity::Even, ..Serial::USUAL };
+    let found = Finding::Unit { unit: 3, serial: Some(even), words: "register 0 = 77".to_owned() };
+    fixture.line.test = Some(run(tool.clone(), ToolState::Running, 40, 7_904, vec![found]));
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    insta::assert_snapshot!("scan_at_work", screen(&mut model, 80, 24));
+    assert_eq!(order_of(&type_keys(&mut model, "x")), Some(&Command::StopTest(L1)));
+}
+
+#[test]
+fn what_came_back_is_told_in_words() {
+    let mut fixture = Fixture::traffic();
+    let sent = with_crc(&[1, 3, 3, 0xEA, 0, 1]);
+    let bytes = with_crc(&[1, 3, 2, 0, 0xC8]);
+    let reply = Some(Duration::from_micros(12_400));
+    fixture.line.test =
+        Some(run(Tool::Send(sent.clone()), ToolState::Done, 1, 1, vec![Finding::Bytes { bytes, reply }]));
+    insta::assert_snapshot!("test_answered_80x24", screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24));
+    insta::assert_snapshot!("test_answered_120x40", screen(&mut bus(&fixture, Theme::FULL, "T"), 120, 40));
+    let check = |finding: Finding, words: &str| {
+        let mut fixture = Fixture::traffic();
+        fixture.line.test = Some(run(Tool::Send(sent.clone()), ToolState::Done, 1, 1, vec![finding]));
+        let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24);
+        assert!(shown.contains(words), "{words} is missing:\n{shown}");
+    };
+    check(Finding::Bytes { bytes: Vec::new(), reply: None }, "✗ nothing came back within 300 ms");
+    check(Finding::Bytes { bytes: with_crc(&[1, 0x83, 2]), reply }, "✗ the device refuses   after 12.4 ms");
+    check(Finding::Bytes { bytes: vec![1, 3, 2, 0, 0xC8, 0, 0], reply }, "✗ CRC");
+}
+
+#[test]
+fn loopback_and_identification_are_told_in_words() {
+    let mut fixture = Fixture::traffic();
+    let exchange = |outcome: Result<(), Fault>| {
+        let request = with_crc(&[1, 8, 0, 0, 0xA5, 0x37]);
+        let answer = if outcome.is_ok() { request.clone() } else { Vec::new() };
+        let reply = outcome.is_ok().then_some(Duration::from_millis(12));
+        Finding::Exchange(Arc::new(Exchange {
+            at: now(),
+            framing: Framing::Rtu,
+            request,
+            answer,
+            outcome,
+            reply,
+            tries: 1,
+        }))
+    };
+    let tool = Tool::Loopback { unit: 1, data: 0xA537, count: 2 };
+    let verdict = Finding::Verdict("1 of 2 came back, 12.0 to 12.0 ms".to_owned());
+    let findings = vec![exchange(Ok(())), exchange(Err(Fault::Timeout)), verdict];
+    fixture.line.test = Some(run(tool, ToolState::Done, 2, 2, findings));
+    let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24);
+    for words in ["✓ came back after 12 ms", "✗ no answer in time", "1 of 2 came back"] {
+        assert!(shown.contains(words), "{words} is missing:\n{shown}");
+    }
+    let object = Finding::Object { name: "VendorName".to_owned(), text: "FUJI".to_owned() };
+    fixture.line.test = Some(run(Tool::Identify { unit: 1 }, ToolState::Done, 1, 1, vec![object]));
+    assert!(screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24).contains("VendorName           FUJI"));
+}
+
+#[test]
+fn registers_are_browsed_in_all_four_orders() {
+    let mut fixture = Fixture::traffic();
+    let clear = "\u{8}".repeat(6);
+    let mut model = bus(&fixture, Theme::FULL, &format!("Tb↓↓{clear}41003↓{clear}3"));
+    let effects = type_keys(&mut model, "⏎");
+    let run = read_of_three();
+    assert_eq!(order_of(&effects), Some(&Command::Test(L1, run.tool.clone())));
+    fixture.line.test = Some(run);
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    insta::assert_snapshot!("window_registers", screen(&mut model, 80, 24));
+    let effects = type_keys(&mut model, "↓r");
+    assert!(order_of(&effects).is_some() && matches!(model.modal, Some(Modal::Bus(_))), "read again, still open");
+    let mut refused = (*read_of_three()).clone();
+    refused.findings.pop();
+    refused.findings.push(Finding::Failed { what: "unit 1".to_owned(), fault: Fault::Exception(ExceptionCode(2)) });
+    fixture.line.test = Some(Arc::new(refused));
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("---- where the device says: exception 02, illegal data address"), "{shown}");
+}
+
+#[test]
+fn no_size_breaks_a_page_or_a_window() {
+    let mut fixture = Fixture::traffic_trouble();
+    let scan = Scan { first: 1, last: 9, serials: vec![], timeout: Duration::from_millis(100) };
+    fixture.line.test = Some(run(Tool::Scan(scan), ToolState::Running, 3, 9, Vec::new()));
+    for keys in ["L", "P", "F", "T", "P⏎", "F⏎", "Tt01 03", "Tf", "Tb⏎", "Ts"] {
+        let mut model = bus(&fixture, Theme::FULL, keys);
+        for (width, height) in [(60, 16), (61, 17), (79, 23), (81, 25), (200, 60), (400, 20), (70, 200)] {
+            screen(&mut model, width, height);
+        }
+    }
+}
+
+#[test]
+fn backspace_is_a_key_of_the_entries() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "Tt01 03x");
+    update(&mut model, Msg::Key(KeyEvent::new(KeyCode::Backspace, KeyModifiers::NONE)));
+    assert!(!screen(&mut model, 80, 24).contains("03x"));
+}

@@ -1,0 +1,279 @@
+//! Windows of this tab: sheets to read, and entries for tests.
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame as Screen, layout::Rect};
+
+use super::{
+    frames::{broken, bytes_text},
+    line::short_ms,
+    registers::Registers,
+    request::Form,
+    rows::{self, Row, plain},
+    test::Send,
+};
+use crate::{
+    bus::{explain, frame::hex, names},
+    plant::{
+        def::{DeviceId, LineId},
+        tag::Table,
+        traffic::{Exchange, Frame},
+    },
+    ui::{
+        Cx,
+        keys::Hint,
+        modal::{Modal, Next, window},
+        tabs::Tabs,
+        widgets::{
+            text::{age, fit, pad, width, wrap},
+            value,
+        },
+    },
+};
+
+/// A window of this tab.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Window {
+    /// Something to read.
+    Sheet(Sheet),
+    /// Bytes or words to be sent.
+    Send(Send),
+    /// A test with its fields.
+    Form(Form),
+    /// Registers of a device.
+    Registers(Registers),
+}
+
+impl Window {
+    /// A key.
+    pub fn on_key(self, cx: &Cx, tabs: &mut Tabs, event: KeyEvent) -> Next {
+        match self {
+            Window::Sheet(sheet) => sheet.on_key(event),
+            Window::Send(send) => send.on_key(cx, &mut tabs.bus.test, event),
+            Window::Form(form) => form.on_key(cx, &mut tabs.bus.test, event),
+            Window::Registers(registers) => registers.on_key(cx, event),
+        }
+    }
+
+    /// Stays open.
+    pub fn stay(self) -> Next {
+        Next::Stay(Modal::Bus(Box::new(self)))
+    }
+
+    /// Pasted text goes into the entry.
+    pub fn on_paste(&mut self, text: &str) {
+        match self {
+            Window::Send(send) => send.on_paste(text),
+            Window::Form(form) => form.on_paste(text),
+            Window::Sheet(_) | Window::Registers(_) => {}
+        }
+    }
+
+    /// The keys of the moment.
+    pub fn hints(&self) -> Vec<Hint> {
+        let hint = |key: &str, label: &str| Hint::new(key, label, "");
+        match self {
+            Window::Sheet(_) => vec![hint("↑↓", "scroll"), hint("Esc", "close")],
+            Window::Send(_) => vec![hint("⏎", "send"), hint("Tab", "check on or off"), hint("Esc", "close")],
+            Window::Form(_) => {
+                vec![hint("↑↓", "field"), hint("←→", "choose"), hint("⏎", "start"), hint("Esc", "close")]
+            }
+            Window::Registers(_) => vec![hint("↑↓", "move"), hint("r", "read again"), hint("Esc", "close")],
+        }
+    }
+
+    /// Draws it.
+    pub fn view(&self, cx: &Cx, screen: &mut Screen, body: Rect) {
+        match self {
+            Window::Sheet(sheet) => sheet.view(cx, screen, body),
+            Window::Send(send) => send.view(cx, screen, body),
+            Window::Form(form) => form.view(cx, screen, body),
+            Window::Registers(registers) => registers.view(cx, screen, body),
+        }
+    }
+}
+
+/// Rows to read, drawn anew with every snapshot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sheet {
+    shown: Shown,
+    first: usize,
+}
+
+/// What a sheet shows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shown {
+    /// One frame, byte by byte.
+    Frame {
+        /// Name of its line.
+        line: String,
+        /// The frame.
+        frame: Box<Frame>,
+        /// Earlier frames, the latest first: one of them is the request.
+        before: Vec<Frame>,
+    },
+    /// The tags of a block.
+    Block {
+        /// On which line.
+        line: LineId,
+        /// Of which device.
+        device: DeviceId,
+        /// In which table.
+        table: Table,
+        /// From which address on.
+        address: u16,
+    },
+}
+
+impl Sheet {
+    /// From its first row.
+    pub fn new(shown: Shown) -> Sheet {
+        Sheet { shown, first: 0 }
+    }
+
+    fn on_key(mut self, event: KeyEvent) -> Next {
+        match event.code {
+            KeyCode::Up => self.first = self.first.saturating_sub(1),
+            KeyCode::Down => self.first += 1,
+            KeyCode::PageUp => self.first = self.first.saturating_sub(8),
+            KeyCode::PageDown => self.first += 8,
+            KeyCode::Home => self.first = 0,
+            KeyCode::Enter | KeyCode::Char('q') => return Next::Close,
+            _ => {}
+        }
+        // No sheet has more rows; the view stops at its last one.
+        self.first = self.first.min(400);
+        Window::Sheet(self).stay()
+    }
+
+    fn view(&self, cx: &Cx, screen: &mut Screen, body: Rect) {
+        let room = body.width.saturating_sub(6);
+        let (title, rows) = match &self.shown {
+            Shown::Frame { line, frame, before } => {
+                let told = explain::of_line(frame, before.iter());
+                (format!("frame {} on {line}", frame.number), frame_rows(cx, frame, &told, room))
+            }
+            Shown::Block { line, device, table, address } => {
+                (format!("tags of {} from {}", cx.def().device(*device).name, table.modicon(*address)), {
+                    block_rows(cx, *line, *device, *table, *address)
+                })
+            }
+        };
+        let wide = rows.iter().map(|row| row.iter().map(|(text, _)| width(text)).sum::<u16>()).max().unwrap_or(0);
+        let mut canvas = window(cx, screen, body, &title, (wide.min(room).max(40) + 1, rows.len() as u16));
+        rows::draw(cx, &mut canvas, &rows, self.first);
+    }
+}
+
+/// Every byte of a frame with its name and meaning.
+fn frame_rows(cx: &Cx, frame: &Frame, told: &explain::Explained, room: u16) -> Vec<Row> {
+    let theme = cx.theme;
+    let at = frame.at.to_zoned(cx.def().time_zone.clone()).strftime("%H:%M:%S%.6f");
+    let direction = if frame.sent { "TX sent" } else { "RX received" };
+    let count = frame.bytes.len();
+    let mut rows = vec![plain(format!("{at}  {direction}, {count} bytes"), theme.normal())];
+    rows.extend(
+        broken(&bytes_text(frame.framing, &frame.bytes), room).into_iter().map(|line| plain(line, theme.strong())),
+    );
+    let good = matches!(&*frame.verdict, "ok" | "sent" | "received");
+    let verdict = if good { frame.verdict.to_string() } else { format!("✗ {}", frame.verdict) };
+    rows.push(plain(verdict, if good { theme.normal() } else { theme.trouble() }));
+    if told.verdict != "ok" && told.verdict != *frame.verdict {
+        rows.push(plain(format!("! {}", told.verdict), theme.trouble()));
+    }
+    rows.extend(told_rows(cx, told, room));
+    rows
+}
+
+/// Summary and fields.
+pub fn told_rows(cx: &Cx, told: &explain::Explained, room: u16) -> Vec<Row> {
+    let theme = cx.theme;
+    let mut rows: Vec<Row> = wrap(&told.summary, room).into_iter().map(|line| plain(line, theme.strong())).collect();
+    let widest = |text: fn(&explain::Field) -> &str, most| {
+        told.fields.iter().map(|field| width(text(field))).max().unwrap_or(0).min(most)
+    };
+    let (bytes, name) = (widest(|field| &field.hex, 17), widest(|field| &field.name, 17));
+    for field in &told.fields {
+        let words = room.saturating_sub(bytes + name + 4).max(12);
+        let mut lines = wrap(&field.words, words).into_iter();
+        let first = lines.next().unwrap_or_default();
+        rows.push(vec![
+            (pad(&field.hex, bytes) + "  ", theme.normal()),
+            (pad(&field.name, name) + "  ", theme.dim()),
+            (first, theme.normal()),
+        ]);
+        let indent = " ".repeat(usize::from(bytes + name + 4));
+        rows.extend(lines.map(|line| plain(indent.clone() + &line, theme.normal())));
+    }
+    if let Some(also) = &told.also {
+        rows.extend(wrap(&format!("or: {also}"), room).into_iter().map(|line| plain(line, theme.dim())));
+    }
+    rows
+}
+
+/// A request and its answer in words.
+pub fn exchange_rows(cx: &Cx, exchange: &Exchange, room: u16) -> Vec<Row> {
+    let theme = cx.theme;
+    let framing = Some(exchange.framing);
+    let asked = explain::message_of(&exchange.request, exchange.framing);
+    let request = explain::explain(&exchange.request, framing, Some(explain::Direction::Request), None);
+    let row = |direction: &str, bytes: &[u8], words: &str, style| {
+        let mut lines = broken(&format!("{direction} {}", bytes_text(exchange.framing, bytes)), room);
+        lines.extend(wrap(words, room.saturating_sub(3)).into_iter().map(|line| format!("   {line}")));
+        lines.into_iter().map(|line| plain(line, style)).collect::<Vec<Row>>()
+    };
+    let mut rows = row("TX", &exchange.request, &request.summary, theme.dim());
+    let reply = exchange.reply.map_or(String::new(), |reply| format!("   after {} ms", short_ms(reply)));
+    let outcome = exchange.outcome.map_or_else(|fault| format!("✗ {fault}{reply}"), |()| format!("✓ ok{reply}"));
+    let style = if exchange.outcome.is_ok() { theme.normal() } else { theme.trouble() };
+    if !exchange.answer.is_empty() {
+        let answer = explain::explain(&exchange.answer, framing, Some(explain::Direction::Answer), asked.as_deref());
+        rows.extend(row("RX", &exchange.answer, &answer.summary, style));
+    }
+    rows.push(plain(outcome, style));
+    rows
+}
+
+/// The tags of a block as they stand.
+fn block_rows(cx: &Cx, line: LineId, device: DeviceId, table: Table, address: u16) -> Vec<Row> {
+    let report = cx.snapshot.line(line).report.as_deref();
+    let poll = report.and_then(|report| {
+        report.polls.iter().find(|poll| (poll.device, poll.table, poll.address) == (device, table, address))
+    });
+    let Some(poll) = poll else {
+        return vec![plain("this block is no longer in the plan", cx.theme.trouble())];
+    };
+    let lines: Vec<[String; 5]> = poll
+        .tags
+        .iter()
+        .map(|tag| {
+            let def = cx.def().tag(*tag);
+            let wire = def.point.address;
+            let shown = value::show(cx, *tag);
+            let place = format!("{} / 0x{wire:04X}", table.modicon(wire));
+            [def.name.clone(), place, shown.with_unit(), fit(&age(cx.age(*tag)), 6), def.label.clone()]
+        })
+        .collect();
+    let columns = [
+        rows::words("tag", 0),
+        rows::words("address", 0),
+        rows::number("value", 0),
+        rows::number("age", 2),
+        rows::words("what", 3),
+    ];
+    let (heading, lines) = rows::table(&columns, &lines, cx.area.width.saturating_sub(8));
+    let code = table.read_fc();
+    let what = format!(
+        "{code} / 0x{code:02X} {}: {} (0x{address:04X}), {} in one request",
+        names::function(code).unwrap_or_default(),
+        names::span(code, address, poll.count),
+        poll.count
+    );
+    let mut rows = vec![plain(what, cx.theme.normal()), plain(heading, cx.theme.dim())];
+    rows.extend(poll.tags.iter().zip(lines).map(|(tag, line)| plain(line, value::show(cx, *tag).style)));
+    let last = poll.tags.first().and_then(|tag| cx.snapshot.evidence.get(tag.index())?.clone());
+    if let Some(exchange) = last {
+        rows.push(Row::new());
+        rows.push(plain(format!("last read: {}", hex(&exchange.answer)), cx.theme.dim()));
+    }
+    rows
+}
