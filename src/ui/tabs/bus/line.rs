@@ -30,27 +30,26 @@ const NEAR: f64 = 0.8;
 
 /// All rows of the page.
 pub fn rows(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
-    let mut rows = settings(cx, at, width);
-    match at.report {
-        Some(report) => {
-            rows.extend(load(cx, report, width));
-            rows.extend(counters(cx, at, report, width));
-            rows.extend(devices(cx, at, report, width));
-        }
-        None => rows.push(plain("nothing heard from this line yet", cx.theme.trouble())),
-    }
-    let worries = worries(cx, at);
-    if !worries.is_empty() {
-        rows.push(Row::new());
-    }
-    for worry in worries {
-        let lines = wrap(&worry, width.saturating_sub(5));
-        let mark = |n: usize| if n == 0 { "! " } else { "  " };
-        rows.extend(
-            lines.into_iter().enumerate().map(|(n, line)| plain(mark(n).to_owned() + &line, cx.theme.trouble())),
-        );
-    }
+    let mut rows: Vec<Row> = worries(cx, at).iter().flat_map(|worry| sentence(cx, worry, width)).collect();
+    rows.extend(settings(cx, at, width));
+    let Some(report) = at.report else {
+        rows.push(plain("nothing heard from this line yet", cx.theme.trouble()));
+        return rows;
+    };
+    rows.extend(load(cx, report, width));
+    rows.push(Row::new());
+    rows.extend(devices(cx, at, report, width));
+    rows.push(Row::new());
+    rows.extend(counters(cx, at, report, width));
     rows
+}
+
+/// `! what is wrong`, over as many rows as it needs.
+fn sentence(cx: &Cx, words: &str, width: u16) -> Vec<Row> {
+    let lines = wrap(words, width.saturating_sub(5)).into_iter().enumerate();
+    lines
+        .map(|(n, line)| plain(if n == 0 { format!("! {line}") } else { format!("  {line}") }, cx.theme.trouble()))
+        .collect()
 }
 
 fn settings(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
@@ -84,17 +83,17 @@ fn load(cx: &Cx, report: &LineReport, width: u16) -> Vec<Row> {
         (format!("{mark}{:>3.0} % ", now * 100.0), style),
         (bar(cx, now, 12), style),
         (format!(" {:>3.0} % of the last minute ", minute * 100.0), theme.normal()),
-        (spark::shares(&report.busy, 30, theme.glyphs), theme.dim()),
+        (spark::shares(&report.busy, usize::from(width.saturating_sub(60)).clamp(10, 60), theme.glyphs), theme.dim()),
     ]);
     let mut rows = flow.rows();
     let mut flow = Flow::new("cycle", theme.dim(), width);
     let plan = Planned::of(report);
     flow.add(value(cx, "blocks", &plan.blocks.to_string()));
-    flow.add(value(cx, "one round", &format!("{} at worst", ms(plan.round))));
+    flow.add(value(cx, "one round", &format!("{} on the wire", ms(plan.round))));
     if let Some(measured) = plan.measured {
-        flow.add(value(cx, "measured", &ms(measured)));
+        flow.add(value(cx, "with replies", &ms(measured)));
     }
-    flow.add(value(cx, "planned load", &format!("{:.0} %", plan.load * 100.0)));
+    flow.add(value(cx, "planned", &format!("{:.0} %", plan.load * 100.0)));
     flow.add(count(cx, "missed", counters.missed, missed_lately(report)));
     rows.extend(flow.rows());
     rows
@@ -247,7 +246,7 @@ fn devices(cx: &Cx, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
         ]);
     }
     let (heading, lines) = rows::table(&columns, &lines, width.saturating_sub(2));
-    let mut rows = vec![Row::new(), plain(heading, cx.theme.dim())];
+    let mut rows = vec![plain(heading, cx.theme.dim())];
     rows.extend(lines.into_iter().zip(styles).map(|(line, style)| plain(line, style)));
     rows
 }

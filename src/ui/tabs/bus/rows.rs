@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn words_flow_into_the_next_row_whole() {
-        let mut flow = Flow::new("bytes", Style::new(), 30);
+        let mut flow = Flow::new("bytes", Style::new(), 33);
         for text in ["sent 1 200", "received 48 000", "x"] {
             flow.add(plain(text, Style::new()));
         }
