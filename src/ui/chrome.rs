@@ -298,7 +298,11 @@ pub fn watch_words(cx: &Cx, watch: &Watch) -> (String, Style) {
             None => (format!("{what}  sent …"), theme.normal()),
         };
     };
-    let (words, trouble) = outcome_words(&status.outcome);
+    let (words, trouble) = match (&watch.command, &status.outcome) {
+        // The line has taken it; what comes of it stands on the bus tab.
+        (Command::Test(..), Outcome::Verified) => ("begun".to_owned(), false),
+        (_, outcome) => outcome_words(outcome),
+    };
     let at = clock(status.at, &cx.def().time_zone);
     (format!("{what}  {words} {at}"), if trouble { theme.trouble() } else { theme.done() })
 }

@@ -171,7 +171,7 @@ impl Bus {
                 self.page = Page::ALL[(place + by).rem_euclid(Page::ALL.len() as isize) as usize];
             }
             Action::Show(page) => self.page = page,
-            Action::NextLine => self.next_line(cx),
+            Action::NextLine => self.choose_line(cx, 1),
             Action::Move(by) => self.scroll(cx, &at, by),
             Action::Screen(by) => self.scroll(cx, &at, by * screen),
             Action::Jump(by) => self.scroll(cx, &at, by * 100_000),
@@ -245,9 +245,10 @@ impl Bus {
         usize::from(cx.area.height.saturating_sub(1))
     }
 
-    fn next_line(&mut self, cx: &Cx) {
-        let count = cx.def().lines.len().max(1) as u16;
-        self.line = LineId((self.line.0 + 1) % count);
+    /// So many lines on, around the end.
+    fn choose_line(&mut self, cx: &Cx, by: isize) {
+        let count = cx.def().lines.len().max(1) as isize;
+        self.line = LineId((self.line.index() as isize + by).rem_euclid(count) as u16);
         (self.first, self.plan) = (0, plan::Plan::default());
         self.frames.forget();
         self.test.first = None;
@@ -255,9 +256,10 @@ impl Bus {
 
     fn scroll(&mut self, cx: &Cx, at: &Place, by: isize) {
         match self.page {
+            Page::Line if by.abs() == 1 && 1 < cx.def().lines.len() => self.choose_line(cx, by),
             Page::Line => {
                 let rows = line::rows(cx, at, cx.area.width).len();
-                self.first = self.first.saturating_add_signed(by).min(rows.saturating_sub(self.room(cx)));
+                self.first = self.first.saturating_add_signed(by).min(rows::last_first(rows, self.room(cx)));
             }
             Page::Plan => self.plan.scroll(at, by),
             Page::Frames => self.frames.scroll(cx, at, by),

@@ -5,6 +5,7 @@ use std::time::Duration;
 use super::{
     Place,
     rows::{self, Flow, Row, bar, number, plain, words},
+    state_words,
 };
 use crate::{
     bus::names,
@@ -30,7 +31,8 @@ const NEAR: f64 = 0.8;
 
 /// All rows of the page.
 pub fn rows(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
-    let mut rows: Vec<Row> = worries(cx, at).iter().flat_map(|worry| sentence(cx, worry, width)).collect();
+    let mut rows = lines(cx, at);
+    rows.extend(worries(cx, at).iter().flat_map(|worry| sentence(cx, worry, width)));
     rows.extend(settings(cx, at, width));
     let Some(report) = at.report else {
         rows.push(plain("nothing heard from this line yet", cx.theme.trouble()));
@@ -42,6 +44,27 @@ pub fn rows(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
     rows.push(Row::new());
     rows.extend(counters(cx, at, report, width));
     rows
+}
+
+/// Every line with its state, to choose one; nothing where there is only one.
+fn lines(cx: &Cx, at: &Place) -> Vec<Row> {
+    let lines = &cx.def().lines;
+    if lines.len() < 2 {
+        return Vec::new();
+    }
+    let row = |line: &LineDef| {
+        let chosen = line.id == at.id;
+        let place = Place::of(cx, line.id)?;
+        let busy = f64::from(place.status.counters.utilisation) * 100.0;
+        let words = format!("{:8} {}  {busy:.0} %  {}", line.name, place.settings.transport, state_words(cx, &place));
+        let style = match (chosen, place.status.state == LineState::Connected) {
+            (true, _) => cx.theme.focus(),
+            (false, true) => cx.theme.normal(),
+            (false, false) => cx.theme.trouble(),
+        };
+        Some(plain(format!("{} {words}", if chosen { "▸" } else { " " }), style))
+    };
+    lines.iter().filter_map(row).chain([Row::new()]).collect()
 }
 
 /// `! what is wrong`, over as many rows as it needs.
@@ -90,10 +113,7 @@ fn load(cx: &Cx, report: &LineReport, width: u16) -> Vec<Row> {
     let plan = Planned::of(report);
     flow.add(value(cx, "blocks", &plan.blocks.to_string()));
     flow.add(value(cx, "one round", &format!("{} on the wire", ms(plan.round))));
-    if let Some(measured) = plan.measured {
-        flow.add(value(cx, "with replies", &ms(measured)));
-    }
-    flow.add(value(cx, "planned", &format!("{:.0} %", plan.load * 100.0)));
+    flow.add(value(cx, "load at worst", &format!("{:.0} %", plan.load * 100.0)));
     flow.add(count(cx, "missed", counters.missed, missed_lately(report)));
     rows.extend(flow.rows());
     rows
@@ -105,21 +125,18 @@ struct Planned {
     blocks: usize,
     /// All of them once, at worst.
     round: Duration,
-    /// All of them once, with the replies as they were: `None` before every block has answered.
-    measured: Option<Duration>,
     /// Share of the line's time at worst.
     load: f64,
 }
 
 impl Planned {
     fn of(report: &LineReport) -> Planned {
-        let mut plan = Planned { blocks: 0, round: Duration::ZERO, measured: Some(Duration::ZERO), load: 0.0 };
+        let mut plan = Planned { blocks: 0, round: Duration::ZERO, load: 0.0 };
         for poll in &report.polls {
             let Poll::Every(period) = poll.poll else { continue };
             plan.blocks += 1;
             plan.round += poll.cost;
             plan.load += poll.cost.as_secs_f64() / period.as_secs_f64();
-            plan.measured = plan.measured.zip(poll.tally.reply.mean()).map(|(sum, reply)| sum + poll.cost + reply);
         }
         plan
     }
@@ -357,6 +374,7 @@ pub fn grouped(count: u64) -> String {
 /// `45.8 ms`, `300 ms`, `2.5 s`.
 pub fn ms(span: Duration) -> String {
     match span.as_secs_f64() {
+        seconds @ 120.0.. => format!("{:.0} min", seconds / 60.0),
         seconds @ 10.0.. => format!("{seconds:.0} s"),
         seconds @ 1.0.. => format!("{seconds:.1} s"),
         seconds => format!("{} ms", tenths(seconds * 1e3)),
@@ -385,5 +403,6 @@ mod tests {
         check(99_960, "100 ms");
         check(2_500_000, "2.5 s");
         check(70_000_000, "70 s");
+        check(1_580_800_000, "26 min");
     }
 }

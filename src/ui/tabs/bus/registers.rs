@@ -126,7 +126,7 @@ impl Registers {
         }
         let below = usize::from(self.count).saturating_sub(first + room);
         if 0 < below {
-            canvas.text_right(width, 1 + room as u16, &format!(" {below} more ▼"), theme.strong());
+            canvas.text_right(width, 0, &format!(" {below} more ▼"), theme.strong());
         }
         if 0 < pair {
             let y = (2 + room.min(usize::from(self.count)) as u16).min(height.saturating_sub(pair + 1));
