@@ -16,4 +16,5 @@ pub mod schedule;
 pub mod debt;
 pub mod tool;
 pub mod books;
+pub mod evidence;
 pub mod io;

@@ -56,7 +56,8 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let def = Arc::new(def);
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
         let history = scratch.history.clone();
-        let mut station = station::start(station::Options { def: def.clone(), clock, history, connectors })?;
+        let mut station =
+            station::start(station::Options { def: def.clone(), clock, history, connectors, file: None })?;
         let result = if args.headless {
             say(&format!("{}: simulated on {}", def.title, simulated.path().display()));
             headless(station.session("demo"), clock, &args).await
@@ -110,7 +111,7 @@ async fn ask_report(
     queries.send(Query { question: Question::Report { period }, reply }).await.map_err(|_| gone())?;
     match answer.await.map_err(|_| gone())?? {
         Answer::Report(report) => Ok(report),
-        Answer::Series(_) | Answer::Journal(_) | Answer::Actions(_) => {
+        Answer::Series(_) | Answer::Journal(_) | Answer::Actions(_) | Answer::LineMinutes(_) => {
             Err(HistoryError::Engine("answered another question".into()))
         }
     }

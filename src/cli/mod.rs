@@ -180,13 +180,21 @@ fn speed(text: &str) -> Result<f64, String> {
 }
 
 fn load(plant: &str, station: &StationArgs) -> Result<crate::plant::PlantDef, CliError> {
+    load_with_file(plant, station).map(|(def, _)| def)
+}
+
+/// The plant, and the file that its settings can be saved into.
+fn load_with_file(
+    plant: &str,
+    station: &StationArgs,
+) -> Result<(crate::plant::PlantDef, Option<profile::PlantFile>), CliError> {
     let errors = |errors: profile::Errors| CliError::Profile(render(&errors));
-    let def = profile::load(Path::new(plant), &profile::Search::usual()).map_err(errors)?;
+    let (def, file) = profile::load_with_file(Path::new(plant), &profile::Search::usual()).map_err(errors)?;
     let mut def = std::sync::Arc::unwrap_or_clone(def);
     for port in &station.ports {
         paths::replace_port(&mut def, port).map_err(CliError::Usage)?;
     }
-    Ok(def)
+    Ok((def, file))
 }
 
 /// Errors of a profile, in colour where somebody looks and has not refused it.

@@ -7,11 +7,12 @@ use tokio::signal::unix::{SignalKind, signal};
 use crate::{
     bus::io::{clock::Clock, transport::Connector},
     plant::{PlantDef, Snapshot, sample::Quality},
+    profile::PlantFile,
     station::{Session, io as station, teller},
     ui,
 };
 
-use super::{CliError, StationArgs, load, log, paths, runtime, say, span};
+use super::{CliError, StationArgs, load_with_file, log, paths, runtime, say, span};
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
@@ -30,11 +31,12 @@ pub struct Args {
 
 /// Runs the station until it is told to stop; says on standard output what changes.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let def = Arc::new(load(&args.plant, &args.station)?);
+    let (def, file) = load_with_file(&args.plant, &args.station)?;
+    let def = Arc::new(def);
     let _log = log::start(args.station.log.as_deref())?;
     runtime()?.block_on(async {
         let clock = Clock::real();
-        let mut station = start(&def, clock, history_file(&def, &args.station))?;
+        let mut station = start(&def, clock, history_file(&def, &args.station), file)?;
         say(&format!("{}: {} tags on {} lines", def.title, def.tags.len(), def.lines.len()));
         let session = station.session("station");
         let last = follow(session, clock, args.duration).await;
@@ -51,11 +53,12 @@ pub fn main(args: Args) -> Result<(), CliError> {
 
 /// Station and terminal in one process.
 pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
-    let def = Arc::new(load(plant, args)?);
+    let (def, file) = load_with_file(plant, args)?;
+    let def = Arc::new(def);
     ui::io::require_terminal()?;
     let _log = log::start(args.log.as_deref())?;
     runtime()?.block_on(async {
-        let mut station = start(&def, Clock::real(), history_file(&def, args))?;
+        let mut station = start(&def, Clock::real(), history_file(&def, args), file)?;
         let session = station.session(&paths::operator());
         let result = ui::io::run(session, ui::io::Options::default()).await;
         station.stop().await;
@@ -85,13 +88,18 @@ pub fn history_file(def: &PlantDef, args: &StationArgs) -> PathBuf {
 }
 
 /// A station on the lines of its plant.
-fn start(def: &Arc<PlantDef>, clock: Clock, history: PathBuf) -> Result<station::Station, CliError> {
+fn start(
+    def: &Arc<PlantDef>,
+    clock: Clock,
+    history: PathBuf,
+    file: Option<PlantFile>,
+) -> Result<station::Station, CliError> {
     if let Some(folder) = history.parent() {
         std::fs::create_dir_all(folder)
             .map_err(|error| CliError::Io { what: format!("cannot make {}", folder.display()), error })?;
     }
     let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
-    Ok(station::start(station::Options { def: def.clone(), clock, history, connectors })?)
+    Ok(station::start(station::Options { def: def.clone(), clock, history, connectors, file })?)
 }
 
 /// Tells what changes until the time is over, a signal comes, or the station ends; gives the last snapshot.

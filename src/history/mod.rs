@@ -9,7 +9,8 @@ use jiff::Timestamp;
 
 use crate::{
     plant::{
-        def::TagId,
+        def::{LineId, TagId},
+        line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord},
     },
     report::{Period, ShiftReport},
@@ -47,6 +48,17 @@ pub enum Question {
         /// At most so many.
         limit: usize,
     },
+    /// What a line counted, minute by minute, oldest first.
+    LineMinutes {
+        /// Which line.
+        line: LineId,
+        /// From.
+        from: Timestamp,
+        /// To.
+        to: Timestamp,
+        /// At most so many, the latest.
+        limit: usize,
+    },
     /// The report of a period.
     Report {
         /// Which period.
@@ -63,6 +75,8 @@ pub enum Answer {
     Journal(Vec<AlarmRecord>),
     /// Deeds of operators.
     Actions(Vec<ActionRecord>),
+    /// Minutes of a line.
+    LineMinutes(Vec<LineMinute>),
     /// The report.
     Report(Box<ShiftReport>),
 }

@@ -36,6 +36,8 @@ pub struct Board {
     decimals_seen: Vec<u8>,
     /// What the history last got, by tag.
     stored: Vec<Option<Sample>>,
+    /// Tags whose sample was set since records were last taken; a tag may be here twice.
+    touched: Vec<TagId>,
     /// Tags whose value depends on this one (decimals, fault word), by tag.
     dependents: Vec<Vec<TagId>>,
 }
@@ -63,6 +65,8 @@ impl Board {
             samples: vec![Sample::bad(Cause::NotRead, at); count],
             decimals_seen: vec![0; count],
             stored: vec![None; count],
+            // That nothing is known is a fact to store too.
+            touched: def.tags.iter().map(|tag| tag.id).collect(),
             dependents,
             def,
         }
@@ -99,6 +103,9 @@ impl Board {
             match judge(fault) {
                 // The last value of a device that is known to be gone is not doubtful but past.
                 // The reading is doubted all the same: what has made it bad may go before it is read again.
+                Verdict::Doubt(cause) if self.sample(*tag).quality == Quality::Bad(Cause::NotRead) => {
+                    self.set(*tag, Sample::bad(cause, at));
+                }
                 Verdict::Doubt(cause) if self.sample(*tag).quality.is_bad() => {
                     if let Some(reading) = &mut self.raw[tag.index()] {
                         reading.doubt = Some(cause);
@@ -125,6 +132,10 @@ impl Board {
         let def = self.def.clone();
         for tag in &def.tags {
             let sample = self.sample(tag.id);
+            let stored = self.stored[tag.id.index()];
+            if stored.is_none_or(|stored| is_due(tag, sample, Some(stored), at)) {
+                self.touched.push(tag.id);
+            }
             let period = match tag.poll {
                 Poll::Every(period) => period,
                 Poll::Once => continue,
@@ -147,7 +158,10 @@ impl Board {
     /// Doubts are stored with the time at which they arose, not with the time of the value that they doubt.
     pub fn records(&mut self, at: Timestamp) -> Vec<Record> {
         let mut records = Vec::new();
-        for tag in self.def.tags.iter().filter(|tag| tag.store) {
+        let mut touched = std::mem::take(&mut self.touched);
+        touched.sort_unstable();
+        touched.dedup();
+        for tag in touched.drain(..).map(|tag| self.def.tag(tag)).filter(|tag| tag.store) {
             let sample = self.samples[tag.id.index()];
             let stored = &mut self.stored[tag.id.index()];
             if !is_due(tag, sample, *stored, at) {
@@ -159,6 +173,8 @@ impl Board {
             *stored = Some(record);
             records.push(Record::Sample(tag.id, record));
         }
+        // Its room is used again.
+        self.touched = touched;
         records
     }
 
@@ -201,12 +217,17 @@ impl Board {
         if let Some(reading) = &mut self.raw[tag.index()] {
             reading.doubt = Some(cause);
         }
-        self.samples[tag.index()] = self.sample(tag).doubted(cause);
+        self.set(tag, self.sample(tag).doubted(cause));
     }
 
     fn drop_value(&mut self, tag: TagId, cause: Cause, at: Timestamp) {
         self.raw[tag.index()] = None;
-        self.samples[tag.index()] = Sample::bad(cause, at);
+        self.set(tag, Sample::bad(cause, at));
+    }
+
+    fn set(&mut self, tag: TagId, sample: Sample) {
+        self.samples[tag.index()] = sample;
+        self.touched.push(tag);
     }
 
     /// Makes the sample of a tag from its reading and all that it depends on. A doubt stays until the tag itself is
@@ -234,10 +255,11 @@ impl Board {
                 None => sample.doubted(word.quality.cause().unwrap_or(Cause::NotRead)),
             },
         };
-        self.samples[tag.id.index()] = match doubt {
+        let sample = match doubt {
             Some(cause) if !sample.quality.is_bad() => sample.doubted(cause),
             Some(_) | None => sample,
         };
+        self.set(tag.id, sample);
     }
 }
 

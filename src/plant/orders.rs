@@ -37,6 +37,11 @@ impl Desk {
     }
 
     /// The latest orders, newest first.
+    pub fn orders(&self) -> impl Iterator<Item = &OrderStatus> {
+        self.orders.iter()
+    }
+
+    /// The same, for a snapshot.
     pub fn shown(&self) -> Vec<OrderStatus> {
         self.orders.iter().cloned().collect()
     }

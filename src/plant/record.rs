@@ -1,4 +1,4 @@
-//! What the plant leaves behind for the history: samples, steps of alarms, deeds of operators.
+//! What the plant leaves behind for the history: samples, steps of alarms, deeds of operators, minutes of lines.
 
 use std::sync::Arc;
 
@@ -6,6 +6,7 @@ use jiff::Timestamp;
 
 use super::{
     def::{Priority, TagId},
+    line_minute::LineMinute,
     sample::Sample,
 };
 
@@ -18,6 +19,8 @@ pub enum Record {
     Alarm(AlarmRecord),
     /// A deed of an operator.
     Action(ActionRecord),
+    /// A minute of a line.
+    Line(LineMinute),
 }
 
 /// A step in the life of an alarm. Names, not ids: a journal outlives the plant file.

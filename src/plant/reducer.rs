@@ -1,5 +1,6 @@
 //! The reducer of facts: event, order or tick in, effects out. The only place where the plant changes.
 
+mod health;
 mod service;
 
 use std::{mem::discriminant, sync::Arc};
@@ -12,6 +13,7 @@ use super::{
     command::{BusRequest, Command, Order, OrderId, Outcome, Refusal, WriteId},
     def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, Subject, TagId},
     event::{Event, Fault, LineState, WriteResult},
+    line_minute::LineWatch,
     orders::Desk,
     record::{ActionRecord, AlarmRecord, Record},
     sample::Cause,
@@ -39,6 +41,8 @@ pub struct Plant {
     book: Book,
     desk: Desk,
     lines: Vec<LineStatus>,
+    /// Earlier reports, by [`LineId`].
+    watches: Vec<LineWatch>,
     devices: Vec<DeviceStatus>,
     /// The last request for each tag, by [`TagId`].
     evidence: Arc<Vec<Option<Arc<Exchange>>>>,
@@ -54,6 +58,7 @@ impl Plant {
             book: Book::new(def.clone()),
             desk: Desk::new(def.clone()),
             lines: vec![LineStatus::default(); def.lines.len()],
+            watches: vec![LineWatch::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); def.devices.len()],
             evidence: Arc::new(vec![None; def.tags.len()]),
             history: HistoryStatus::default(),
@@ -168,7 +173,9 @@ impl Plant {
     pub fn on_tick(&mut self, at: Timestamp) -> Effects {
         self.board.age(at);
         let expired = self.desk.expire(at, self.speed, &self.board);
+        let minutes = self.minutes(at);
         let mut effects = self.settle(at);
+        effects.records.extend(minutes);
         effects.records.extend(expired.into_iter().map(Record::Action));
         effects
     }
@@ -182,7 +189,7 @@ impl Plant {
             decimals: self.def.tags.iter().map(|tag| self.board.shown_decimals(tag)).collect(),
             evidence: self.evidence.clone(),
             lines: self.lines.clone(),
-            devices: self.devices.clone(),
+            devices: self.diagnosed(),
             alarms: self.book.active(),
             orders: self.desk.shown(),
             history: self.history.clone(),

@@ -10,6 +10,7 @@ use super::{
     def::{AlarmId, DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Fault, LineCounters, LineState},
     line_report::LineReport,
+    ne107,
     sample::Sample,
     tool::ToolRun,
     traffic::Exchange,
@@ -135,6 +136,8 @@ pub struct DeviceStatus {
     pub failed: u64,
     /// The last failure and its time.
     pub last_fault: Option<(Timestamp, Fault)>,
+    /// What is wrong with it, by NAMUR NE 107; `None` while it is well.
+    pub diagnosis: Option<ne107::Reason>,
 }
 
 /// Whether a device answers.

@@ -32,7 +32,7 @@ pub struct Tally {
     /// Releases of the poll that were skipped because the line had no time.
     pub missed: u64,
     /// The latest outcomes, bit 0 the newest, 1 a failure; see [`Tally::recent`].
-    recent: u64,
+    pub(super) recent: u64,
 }
 
 impl Tally {
@@ -78,6 +78,28 @@ impl Tally {
         (self.recent.count_ones(), self.requests.min(64) as u32)
     }
 
+    /// What was counted after `before`; all of it, if the counters have begun anew since.
+    pub fn since(&self, before: &Tally) -> Tally {
+        let Some(requests) = self.requests.checked_sub(before.requests) else { return self.clone() };
+        let earlier = |code| before.exceptions.iter().find(|(known, _)| *known == code).map_or(0, |(_, count)| *count);
+        let exceptions = self.exceptions.iter().map(|(code, count)| (*code, count.saturating_sub(earlier(*code))));
+        Tally {
+            requests,
+            ok: self.ok.saturating_sub(before.ok),
+            timeouts: self.timeouts.saturating_sub(before.timeouts),
+            check: self.check.saturating_sub(before.check),
+            length: self.length.saturating_sub(before.length),
+            foreign: self.foreign.saturating_sub(before.foreign),
+            exceptions: exceptions.filter(|(_, count)| 0 < *count).collect(),
+            retries: self.retries.saturating_sub(before.retries),
+            late: self.late.saturating_sub(before.late),
+            reply: self.reply.since(&before.reply),
+            jitter: self.jitter.since(&before.jitter),
+            missed: self.missed.saturating_sub(before.missed),
+            recent: self.recent & 1u64.checked_shl(requests.min(64) as u32).map_or(u64::MAX, |bit| bit - 1),
+        }
+    }
+
     /// Did the newest request fail?
     pub fn failed_last(&self) -> bool {
         self.recent & 1 == 1
@@ -114,6 +136,31 @@ impl Spread {
         *bucket = bucket.saturating_add(1);
     }
 
+    /// What was added after `before`; all of it, if it has begun anew since. The greatest is then known as well as a
+    /// percentile is.
+    pub fn since(&self, before: &Spread) -> Spread {
+        let Some(count) = self.count.checked_sub(before.count) else { return self.clone() };
+        let mut buckets = self.buckets;
+        for (bucket, before) in buckets.iter_mut().zip(before.buckets) {
+            *bucket = bucket.saturating_sub(before);
+        }
+        let greatest = buckets.iter().rposition(|count| 0 < *count);
+        let max = greatest.map_or(Duration::ZERO, |bucket| end_of(bucket).min(self.max));
+        Spread { last: self.last.min(max), max, sum: self.sum.saturating_sub(before.sum), count, buckets }
+    }
+
+    /// Adds what another has taken.
+    pub fn merge(&mut self, other: &Spread) {
+        if 0 < other.count {
+            (self.last, self.max) = (other.last, self.max.max(other.max));
+        }
+        self.sum += other.sum;
+        self.count += other.count;
+        for (bucket, other) in self.buckets.iter_mut().zip(other.buckets) {
+            *bucket = bucket.saturating_add(other);
+        }
+    }
+
     /// How many there were.
     pub fn count(&self) -> u64 {
         self.count
@@ -143,9 +190,13 @@ impl Spread {
             seen += u64::from(*count);
             0 < total && rank <= seen
         })?;
-        let end = LEAST_S * ((bucket + 1) as f64 / 4.0).exp2();
-        Some(Duration::from_secs_f64(end).min(self.max))
+        Some(end_of(bucket).min(self.max))
     }
+}
+
+/// The upper end of a bucket.
+fn end_of(bucket: usize) -> Duration {
+    Duration::from_secs_f64(LEAST_S * ((bucket + 1) as f64 / 4.0).exp2())
 }
 
 fn bucket_of(span: Duration) -> usize {

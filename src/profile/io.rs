@@ -1,5 +1,7 @@
 //! Finds and reads plant files and device profiles: beside the plant file, in configuration folders, or in the binary.
 
+mod save;
+
 use std::{
     fs::File,
     io::Read,
@@ -9,6 +11,8 @@ use std::{
 use include_dir::{Dir, include_dir};
 
 use super::{Kind, Listed, diagnostic::Errors, plant::Text};
+
+pub use save::PlantFile;
 
 /// The profiles that come with the program: a new device is one more file here and no Rust.
 static SHIPPED: Dir = include_dir!("$CARGO_MANIFEST_DIR/profiles");
@@ -60,6 +64,13 @@ pub(super) struct Found {
     pub text: Text,
     /// Where it lies; `None` for a shipped one.
     path: Option<PathBuf>,
+}
+
+impl Found {
+    /// The file on disk, to save settings into.
+    pub fn file(&self) -> Option<PlantFile> {
+        Some(PlantFile::new(self.path.as_deref()?, &self.text.bytes))
+    }
 }
 
 /// Reads the plant file that an argument means: a path, or the name of a plant.

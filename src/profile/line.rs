@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::{
-    diagnostic::Problems,
+    diagnostic::{Problems, Span},
     names::{Unique, check_name},
     reader::{At, Node, Raw, Value, text},
     schema::{SerialTable, TcpTable},
@@ -17,12 +17,13 @@ pub(super) fn lines(tables: &[At<Raw>], problems: &mut Problems) -> Vec<LineDef>
     for (index, table) in tables.iter().enumerate() {
         let raw = table.value.clone();
         let Some(mode) = mode(&raw, problems) else { continue };
-        let Some(parts) = (if mode.tcp { tcp(raw, mode, problems) } else { serial(raw, mode, problems) }) else {
-            continue;
-        };
-        check_name(&parts.name, "line", problems);
-        seen.insert(&parts.name.value, parts.name.at, format!("duplicate line `{}`", parts.name.value), problems);
-        lines.push(parts.line(LineId(index as u16), problems));
+        let id = LineId(index as u16);
+        let written = if mode.tcp { tcp(raw, mode, id, problems) } else { serial(raw, mode, id, problems) };
+        let Some(written) = written else { continue };
+        let name = &written.name;
+        check_name(name, "line", problems);
+        seen.insert(&name.value, name.at, format!("duplicate line `{}`", name.value), problems);
+        lines.push(written.line(problems));
     }
     lines
 }
@@ -58,89 +59,182 @@ fn mode(raw: &Raw, problems: &mut Problems) -> Option<Mode> {
     found
 }
 
-/// What both kinds of lines have.
-struct Parts {
+/// The line that a table describes, with the places of its keys.
+struct Written {
+    line: LineDef,
     name: At<String>,
-    transport: Transport,
-    timeout_ms: Option<At<u16>>,
-    gap_ms: Option<At<u16>>,
-    idle_ms: Option<At<u16>>,
-    turnaround_ms: Option<At<u16>>,
+    spans: Vec<(Key, Span)>,
 }
 
-impl Parts {
-    fn line(self, id: LineId, problems: &mut Problems) -> LineDef {
-        if let Some(short) = self.timeout_ms.filter(|timeout| timeout.value < 10) {
-            problems.add(short.at, "no device answers within so little time").label("expected at least 10 ms");
+impl Written {
+    /// The line, after every complaint about a key that is written was added.
+    fn line(self, problems: &mut Problems) -> LineDef {
+        for Complaint { key, what, expected } in complaints(&self.line) {
+            // What is not written has its usual value, or was reported as missing.
+            if let Some((_, at)) = self.spans.iter().find(|(known, _)| *known == key) {
+                problems.add(*at, what).label(expected);
+            }
         }
-        if let Some(short) = self.idle_ms.filter(|idle| idle.value < 2) {
-            problems.add(short.at, "answers come in pieces further apart than this").label("expected at least 2 ms");
-        }
-        let usual = LineDef::new(id, &self.name.value, self.transport);
-        let millis = |written: Option<At<u16>>, usual: Duration| {
-            written.map_or(usual, |value| Duration::from_millis(u64::from(value.value)))
-        };
-        LineDef {
-            timeout: millis(self.timeout_ms, usual.timeout),
-            gap: millis(self.gap_ms, usual.gap),
-            idle: millis(self.idle_ms, usual.idle),
-            turnaround: millis(self.turnaround_ms, usual.turnaround),
-            ..usual
-        }
+        self.line
     }
 }
 
-fn serial(raw: Raw, mode: Mode, problems: &mut Problems) -> Option<Parts> {
+fn serial(raw: Raw, mode: Mode, id: LineId, problems: &mut Problems) -> Option<Written> {
     let table = SerialTable::of(&[raw], problems);
-    if let Some(baud) = table.baud.filter(|baud| !BAUDS.contains(&baud.value)) {
-        let problem = problems.add(baud.at, format!("{} is not a usual baud rate", baud.value));
-        problem.label("expected 300, 600, 1200 … 9600, 19200, 38400, 57600, 115200 …");
-    }
     let ascii = mode.framing == Framing::Ascii;
-    if let Some(bits) = table.data_bits.filter(|bits| bits.value != 8 && !(ascii && bits.value == 7)) {
-        let (what, expected) =
-            if ascii { ("Modbus ASCII sends 7 or 8", "7 or 8") } else { ("Modbus RTU sends 8", "8") };
-        problems.add(bits.at, format!("{what} data bits")).label(format!("expected {expected}"));
-    }
-    if let Some(bits) = table.stop_bits.filter(|bits| !matches!(bits.value, 1 | 2)) {
-        problems.add(bits.at, format!("{} stop bits do not exist", bits.value)).label("expected 1 or 2");
-    }
+    let spans = [
+        (Key::Port, table.port.as_ref().map(|port| port.at)),
+        (Key::Baud, table.baud.map(|baud| baud.at)),
+        (Key::DataBits, table.data_bits.map(|bits| bits.at)),
+        (Key::StopBits, table.stop_bits.map(|bits| bits.at)),
+        (Key::Timeout, table.timeout_ms.map(|time| time.at)),
+        (Key::Idle, table.idle_ms.map(|time| time.at)),
+    ];
     let serial = Serial {
         baud: table.baud.map_or(Serial::USUAL.baud, |baud| baud.value),
-        data_bits: table.data_bits.map_or(if ascii { 7 } else { 8 }, |bits| bits.value),
+        data_bits: table.data_bits.map_or(usual_data_bits(ascii), |bits| bits.value),
         parity: table.parity.map_or(Parity::None, |parity| parity.value),
         stop_bits: table.stop_bits.map_or(1, |bits| bits.value),
     };
-    Some(Parts {
-        name: table.name?,
-        transport: Transport::Serial {
-            port: text(&table.port),
-            serial,
-            framing: mode.framing,
-            rs485: table.rs485.map_or(Rs485::Off, |rs485| rs485.value),
-        },
-        timeout_ms: table.timeout_ms,
-        gap_ms: table.gap_ms,
-        idle_ms: table.idle_ms,
-        turnaround_ms: table.turnaround_ms,
-    })
+    let transport = Transport::Serial {
+        port: text(&table.port),
+        serial,
+        framing: mode.framing,
+        rs485: table.rs485.map_or(Rs485::Off, |rs485| rs485.value),
+    };
+    let name = table.name?;
+    let usual = LineDef::new(id, &name.value, transport);
+    let line = LineDef {
+        timeout: millis(table.timeout_ms, usual.timeout),
+        gap: millis(table.gap_ms, usual.gap),
+        idle: millis(table.idle_ms, usual.idle),
+        turnaround: millis(table.turnaround_ms, usual.turnaround),
+        ..usual
+    };
+    Some(Written { line, name, spans: known(spans) })
+}
+
+fn tcp(raw: Raw, mode: Mode, id: LineId, problems: &mut Problems) -> Option<Written> {
+    let table = TcpTable::of(&[raw], problems);
+    let spans = [
+        (Key::Host, table.host.as_ref().map(|host| host.at)),
+        (Key::TcpPort, table.tcp_port.map(|port| port.at)),
+        (Key::Timeout, table.timeout_ms.map(|time| time.at)),
+        (Key::Idle, table.idle_ms.map(|time| time.at)),
+    ];
+    let (host, port) = (text(&table.host), table.tcp_port.map_or(TCP_PORT, |port| port.value));
+    let name = table.name?;
+    let usual = LineDef::new(id, &name.value, Transport::Tcp { host, port, framing: mode.framing });
+    let line = LineDef {
+        timeout: millis(table.timeout_ms, usual.timeout),
+        gap: millis(table.gap_ms, usual.gap),
+        idle: millis(table.idle_ms, usual.idle),
+        ..usual
+    };
+    Some(Written { line, name, spans: known(spans) })
+}
+
+fn millis(written: Option<At<u16>>, usual: Duration) -> Duration {
+    written.map_or(usual, |value| Duration::from_millis(u64::from(value.value)))
+}
+
+fn known<const N: usize>(spans: [(Key, Option<Span>); N]) -> Vec<(Key, Span)> {
+    spans.into_iter().filter_map(|(key, span)| Some((key, span?))).collect()
+}
+
+/// A setting of a line, for complaints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Key {
+    /// Path of a serial port.
+    Port,
+    /// Baud rate.
+    Baud,
+    /// Bits of a character.
+    DataBits,
+    /// Stop bits.
+    StopBits,
+    /// Host name or address.
+    Host,
+    /// TCP port.
+    TcpPort,
+    /// Longest wait for an answer.
+    Timeout,
+    /// Extra silence before a request.
+    Gap,
+    /// Silence that ends an answer.
+    Idle,
+}
+
+/// What is wrong with a setting.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Complaint {
+    /// Which setting.
+    pub key: Key,
+    /// `9601 is not a usual baud rate`.
+    pub what: String,
+    /// `expected 1 or 2`.
+    pub expected: &'static str,
+}
+
+/// Everything that is wrong with a line: what the plant file and the form of the terminal both hold to.
+pub fn complaints(line: &LineDef) -> Vec<Complaint> {
+    let mut all = Vec::new();
+    let mut check = |wrong: bool, key: Key, what: String, expected: &'static str| {
+        if wrong {
+            all.push(Complaint { key, what, expected });
+        }
+    };
+    match &line.transport {
+        Transport::Serial { port, serial, framing, .. } => {
+            let Serial { baud, data_bits, parity: _, stop_bits } = *serial;
+            let (who, expected) = match framing {
+                Framing::Ascii => ("Modbus ASCII sends 7 or 8", "expected 7 or 8"),
+                Framing::Rtu | Framing::Mbap => ("Modbus RTU sends 8", "expected 8"),
+            };
+            let fits = data_bits == 8 || (data_bits == 7 && *framing == Framing::Ascii);
+            check(port.trim().is_empty(), Key::Port, "a serial line needs a port".into(), "expected /dev/…");
+            let unusual = format!("{baud} is not a usual baud rate");
+            let usual = "expected 300, 600, 1200 … 9600, 19200, 38400, 57600, 115200 …";
+            check(!BAUDS.contains(&baud), Key::Baud, unusual, usual);
+            check(!fits, Key::DataBits, format!("{who} data bits"), expected);
+            let wrong = !matches!(stop_bits, 1 | 2);
+            check(wrong, Key::StopBits, format!("{stop_bits} stop bits do not exist"), "expected 1 or 2");
+        }
+        Transport::Tcp { host, port, framing: _ } => {
+            let named = !host.trim().is_empty();
+            check(!named, Key::Host, "a TCP line needs a host".into(), "expected a name or an address");
+            check(*port == 0, Key::TcpPort, "there is no TCP port 0".into(), "expected 1 to 65535, usually 502");
+        }
+    }
+    let ms = |span: Duration| span.as_millis();
+    let short = "no device answers within so little time";
+    check(ms(line.timeout) < 10, Key::Timeout, short.into(), "expected at least 10 ms");
+    check(MILLIS_MAX < ms(line.timeout), Key::Timeout, "nobody waits so long".into(), "expected at most 65535 ms");
+    check(MILLIS_MAX < ms(line.gap), Key::Gap, "nobody rests so long".into(), "expected at most 65535 ms");
+    let short = "answers come in pieces further apart than this";
+    check(ms(line.idle) < 2, Key::Idle, short.into(), "expected at least 2 ms");
+    all
 }
 
 /// Baud rates that ports and devices know.
 pub const BAUDS: &[u32] =
     &[300, 600, 1_200, 2_400, 4_800, 9_600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600];
 
-fn tcp(raw: Raw, mode: Mode, problems: &mut Problems) -> Option<Parts> {
-    let table = TcpTable::of(&[raw], problems);
-    let (host, port) = (text(&table.host), table.tcp_port.map_or(502, |port| port.value));
-    Some(Parts {
-        name: table.name?,
-        transport: Transport::Tcp { host, port, framing: mode.framing },
-        timeout_ms: table.timeout_ms,
-        gap_ms: table.gap_ms,
-        idle_ms: table.idle_ms,
-        turnaround_ms: None,
-    })
+/// The port of Modbus TCP.
+pub const TCP_PORT: u16 = 502;
+
+/// Longest time that a plant file can say.
+const MILLIS_MAX: u128 = 65_535;
+
+/// Data bits that a line has if nobody says how many.
+pub fn usual_data_bits(ascii: bool) -> u8 {
+    if ascii { 7 } else { 8 }
+}
+
+/// The word of a mode in the plant file: `rtu`, `ascii`, `tcp`, `rtu-over-tcp`; `None` for a mode that has none.
+pub(super) fn mode_word(transport: &Transport) -> Option<&'static str> {
+    let (tcp, framing) = (matches!(transport, Transport::Tcp { .. }), transport.framing());
+    MODES.iter().find(|(_, mode)| (mode.tcp, mode.framing) == (tcp, framing)).map(|(word, _)| *word)
 }
 
 /// The name of a line even if the rest of it is wrong, so that one mistake is reported once.

@@ -14,8 +14,9 @@ mod address;
 mod alarm;
 mod device;
 mod diagnostic;
+mod edit;
 mod io;
-mod line;
+pub mod line;
 mod names;
 mod picture;
 mod plant;
@@ -37,7 +38,7 @@ use std::{
 
 pub use self::{
     diagnostic::{Errors, render},
-    io::Search,
+    io::{PlantFile, Search},
     line::BAUDS,
 };
 use crate::plant::def::PlantDef;
@@ -48,11 +49,17 @@ use crate::plant::def::PlantDef;
 /// A path such as `profiles/plants/tank.toml` that does not exist on disk but is shipped is taken from the program.
 /// Device profiles are looked for beside the plant file, in the folders of `search`, then in the program.
 pub fn load(plant: &Path, search: &Search) -> Result<Arc<PlantDef>, Errors> {
+    load_with_file(plant, search).map(|(def, _)| def)
+}
+
+/// The same, with the file that it was loaded from, to save settings into; `None` for a plant of the program.
+pub fn load_with_file(plant: &Path, search: &Search) -> Result<(Arc<PlantDef>, Option<PlantFile>), Errors> {
     let found = io::plant(plant, search)?;
+    let file = found.file();
     let search = search.beside(&found);
     let names = io::list(&search).into_iter().filter(|listed| listed.kind == Kind::Device).map(|listed| listed.name);
     let library = plant::Library { find: &|name| io::device(name, &search), names: names.collect() };
-    plant::build(&found.name, &found.text, &library).map(Arc::new)
+    plant::build(&found.name, &found.text, &library).map(|def| (Arc::new(def), file))
 }
 
 /// Checks a plant file or a device profile, by path or name. A device is checked as the only one of a plant of its own,

@@ -214,7 +214,7 @@ fn check_inside(item: &MimicItem, at: Span, size: (u16, u16), problems: &mut Pro
 }
 
 /// Letters that mean something on every screen, so that no plant can give them another meaning.
-const KEYS_TAKEN: [char; 2] = ['a', 'q'];
+const KEYS_TAKEN: [char; 3] = ['a', 'q', 'w'];
 
 fn command(table: &CommandTable, defs: &Defs, keys: &mut Unique, problems: &mut Problems) -> Option<MimicCommand> {
     let (key, name) = (table.key.as_ref()?, table.tag.as_ref()?);
@@ -226,7 +226,7 @@ fn command(table: &CommandTable, defs: &Defs, keys: &mut Unique, problems: &mut 
     if letter.is_some_and(|letter| KEYS_TAKEN.contains(&letter)) {
         problems
             .add(key.at, format!("key `{}` is taken", key.value))
-            .label("on every screen `a` acknowledges an alarm and `q` quits");
+            .label("on every screen `a` acknowledges an alarm, `q` quits and `w` says why");
     }
     keys.insert(&key.value, key.at, format!("duplicate key `{}`", key.value), problems);
     let tag = defs.tag(name, problems)?;

@@ -319,21 +319,22 @@ fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Acce
     if matches!(point.table, Table::Discrete | Table::Input) {
         problems.add(at, format!("a {} can only be read", point.table.word())).label("expected access = \"r\"");
     }
-    if point.field.is_some() {
+    if point.field.is_some() && row.write_fc.is_none() {
         problems
-            .add(at, "a field of bits inside a word cannot be written")
-            .label("expected access = \"r\"")
-            .help("writing it would overwrite the other bits of the word");
+            .add(at, "a field of bits inside a word cannot be written by a whole word")
+            .label("expected access = \"r\", or write_fc = 22")
+            .help("it would overwrite the other bits; function 22, mask write, does not, if the device has it");
     }
     if let Some(verify) = row.verify.filter(|verify| !verify.value) {
         let problem = problems.add(verify.at, "a write is always verified").label("leave this out");
         problem.help("a tag that cannot be read back has access = \"w\"");
     }
     if let Some(fc) = row.write_fc {
-        let allowed: &[u8] = match (point.table.is_bits(), point.len()) {
-            (true, _) => &[5, 15],
-            (false, 1) => &[6, 16],
-            (false, _) => &[16],
+        let allowed: &[u8] = match (point.table.is_bits(), point.field.is_some(), point.len()) {
+            (true, ..) => &[5, 15],
+            (false, true, _) => &[22],
+            (false, false, 1) => &[6, 16, 23],
+            (false, false, _) => &[16, 23],
         };
         if !allowed.contains(&fc.value) {
             let problem = problems.add(fc.at, format!("function {} cannot write this tag", fc.value));

@@ -344,10 +344,10 @@ fn a_file_that_is_no_toml_is_told_from_one_that_is_wrong() {
 
 #[test]
 fn a_key_of_every_screen_is_no_command_of_a_plant() {
-    for key in ["a", "q"] {
+    for key in ["a", "q", "w"] {
         let from = "[mimic]\n";
         let to = format!("[mimic]\ncommand = [{{ key = \"{key}\", label = \"go\", tag = \"D1.MODE\" }}]\n");
-        check(from, &to, &[&format!("key `{key}` is taken"), "`a` acknowledges an alarm and `q` quits"]);
+        check(from, &to, &[&format!("key `{key}` is taken"), "`a` acknowledges an alarm, `q` quits and `w` says why"]);
     }
 }
 

@@ -93,7 +93,7 @@ fn read(frame: &[u8]) -> Option<Request> {
     });
     let mut message = pairs.collect::<Option<Vec<u8>>>()?;
     let check = message.pop()?;
-    (message.len() >= 2 && check == lrc(&message)).then(|| Request { message, characters: frame.len() })
+    (message.len() >= 2 && check == lrc(&message)).then_some(Request { message, characters: frame.len() })
 }
 
 #[cfg(test)]

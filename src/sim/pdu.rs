@@ -327,8 +327,7 @@ mod tests {
 
     #[test]
     fn a_queue_is_read_by_its_count_and_stays() {
-        let mut device = Small::default();
-        device.words = [0, 2, 440, 512, 0, 7, 40, 0];
+        let mut device = Small { words: [0, 2, 440, 512, 0, 7, 40, 0], ..Small::default() };
         for _ in 0..2 {
             let queue = [0x18, 0, 6, 0, 2, 0x01, 0xB8, 0x02, 0];
             assert_eq!(serve(&mut device, &[0x18, 0, 101]).as_deref(), Some(&queue[..]));

@@ -151,7 +151,7 @@ impl Counters {
         let reply = |data: &[u8]| Ok([&[0x08], &what.to_be_bytes()[..], data].concat());
         match what {
             0x00 => reply(data),
-            0x0A | 0x0B..=0x12 if data != [0, 0] => Err(Refusal::Value),
+            0x0A..=0x12 if data != [0, 0] => Err(Refusal::Value),
             0x0A => {
                 (self.diagnostic, self.done) = ([0; 8], 0);
                 reply(data)

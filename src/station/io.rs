@@ -14,11 +14,12 @@ use crate::{
     history::{HistoryError, io::thread as history},
     plant::{
         Effects, Plant, PlantDef, Snapshot,
-        command::{BusRequest, Order},
-        def::LineId,
+        command::{BusRequest, Order, OrderId},
+        def::{LineDef, LineId},
         event::{Event, LineState},
         record::Record,
     },
+    profile::PlantFile,
 };
 
 use super::Session;
@@ -45,6 +46,8 @@ pub struct Options {
     pub history: PathBuf,
     /// How each line is opened, by [`LineId`].
     pub connectors: Vec<Connector>,
+    /// The file that settings are saved into; `None` for a plant that has none of its own.
+    pub file: Option<PlantFile>,
 }
 
 /// A running station.
@@ -60,7 +63,7 @@ pub struct Station {
 
 /// Starts history, links and plant, in this order: a store that cannot be opened stops the start.
 pub fn start(options: Options) -> Result<Station, HistoryError> {
-    let Options { def, clock, history, connectors } = options;
+    let Options { def, clock, history, connectors, file } = options;
     let history = history::start(&history, def.clone(), clock)?;
     let (stop, stopped) = watch::channel(false);
     let (events, event_queue) = mpsc::channel(EVENTS);
@@ -80,6 +83,8 @@ pub fn start(options: Options) -> Result<Station, HistoryError> {
         plant,
         clock,
         links,
+        file,
+        saving: None,
         records: history.records.clone(),
         store: history.status.clone(),
         lost: 0,
@@ -139,11 +144,36 @@ impl Station {
     }
 }
 
+/// Said where there is nothing to save into.
+const NO_FILE: &str =
+    "this plant is part of the program; write it to a file with `sightglass profiles NAME` and start that";
+
+/// The plant file on its way to the disk, and for whom.
+struct Saving {
+    order: OrderId,
+    line: LineId,
+    work: JoinHandle<(PlantFile, Result<(), String>)>,
+}
+
+/// For whom, and how it ended.
+type Saved = (OrderId, LineId, Result<(PlantFile, Result<(), String>), tokio::task::JoinError>);
+
+/// Waits for the end of a save; for ever without one.
+async fn saved(saving: &mut Option<Saving>) -> Saved {
+    let Some(Saving { order, line, work }) = saving else { return std::future::pending().await };
+    let saved = (*order, *line, work.await);
+    *saving = None;
+    saved
+}
+
 /// The loop around the reducer: sole owner of the plant.
 struct PlantTask {
     plant: Plant,
     clock: Clock,
     links: Vec<mpsc::Sender<BusRequest>>,
+    /// The plant file, unless it is just being written.
+    file: Option<PlantFile>,
+    saving: Option<Saving>,
     records: mpsc::Sender<Vec<Record>>,
     store: watch::Receiver<crate::plant::snapshot::HistoryStatus>,
     /// Records that the queue to the store had no room for.
@@ -177,6 +207,10 @@ impl PlantTask {
                     self.carry_out(effects);
                     changed = true;
                 }
+                saved = saved(&mut self.saving) => {
+                    self.take_saved(saved);
+                    changed = true;
+                }
                 Ok(()) = self.store.changed() => {
                     self.hear_store();
                     changed = true;
@@ -188,6 +222,11 @@ impl PlantTask {
                 }
             }
         }
+        if self.saving.is_some() {
+            // What was begun is ended: half a second of a disk at the most.
+            let saved = saved(&mut self.saving).await;
+            self.take_saved(saved);
+        }
         self.publish.send_replace(Arc::new(self.plant.snapshot()));
     }
 
@@ -195,6 +234,44 @@ impl PlantTask {
         for (line, request) in effects.bus {
             self.send(line, request);
         }
+        self.keep(effects.records);
+        if let Some((order, settings)) = effects.save {
+            self.save(order, settings);
+        }
+    }
+
+    /// Has the plant file written beside the loop; the outcome comes to [`PlantTask::take_saved`].
+    fn save(&mut self, order: OrderId, settings: LineDef) {
+        let line = settings.id;
+        match (self.file.take(), &self.saving) {
+            (Some(mut file), _) => {
+                let work = tokio::task::spawn_blocking(move || {
+                    let result = file.save(&settings);
+                    (file, result)
+                });
+                self.saving = Some(Saving { order, line, work });
+            }
+            (None, Some(_)) => self.tell_saved(order, line, Err("other settings are just being saved".into())),
+            (None, None) => self.tell_saved(order, line, Err(NO_FILE.into())),
+        }
+    }
+
+    fn take_saved(&mut self, (order, line, done): Saved) {
+        let result = match done {
+            Ok((file, result)) => {
+                self.file = Some(file);
+                result
+            }
+            Err(error) => {
+                tracing::error!(%error, "saving settings ended badly");
+                Err("internal error, see the log".to_owned())
+            }
+        };
+        self.tell_saved(order, line, result);
+    }
+
+    fn tell_saved(&mut self, order: OrderId, line: LineId, result: Result<(), String>) {
+        let effects = self.plant.on_saved(order, line, result);
         self.keep(effects.records);
     }
 

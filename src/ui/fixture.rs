@@ -17,6 +17,7 @@ use crate::plant::{
     sample::{Cause, Sample},
     snapshot::{ActiveAlarm, DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
     tag::*,
+    traffic::Exchange,
 };
 
 /// The instant of every fixture: 2026-11-21 14:02:31 in Bangkok.
@@ -37,6 +38,8 @@ pub struct Fixture {
     pub line: LineStatus,
     /// The devices.
     pub devices: Vec<DeviceStatus>,
+    /// The last request for each tag.
+    pub evidence: Vec<Option<Arc<Exchange>>>,
 }
 
 impl Fixture {
@@ -61,6 +64,7 @@ impl Fixture {
         };
         let devices = vec![answering; def.devices.len()];
         Fixture {
+            evidence: vec![None; def.tags.len()],
             def,
             samples,
             alarms: Vec::new(),
@@ -158,7 +162,7 @@ impl Fixture {
             Decimals::From(_) => 1,
         });
         Arc::new(Snapshot {
-            evidence: Arc::new(vec![None; self.def.tags.len()]),
+            evidence: Arc::new(self.evidence.clone()),
             at: now(),
             samples: self.samples.clone(),
             decimals: decimals.collect(),

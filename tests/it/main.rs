@@ -9,6 +9,7 @@
 //! | `masters` | our simulated slaves, and those of the benches, against masters that we did not write: mbpoll, pymodbus, minimalmodbus |
 //! | `capture` | saved traffic, opened by Wireshark's own reader |
 //! | `shift` | a whole shift in virtual time, and its report read by an independent reader |
+//! | `settings` | settings of a line: tried out, saved into the plant file |
 //! | `durability` | killed, unplugged, locked, damaged |
 //! | `support` | what the others share: processes with deadlines, peers and their installation |
 #![allow(missing_docs, clippy::unwrap_used)]
@@ -19,6 +20,7 @@ mod commands;
 mod durability;
 mod masters;
 mod peers;
+mod settings;
 mod shift;
 mod support;
 mod terminal;

@@ -2,6 +2,8 @@
 
 use std::{
     fs,
+    io::{Read, Write},
+    net::TcpListener,
     path::{Path, PathBuf},
     process::Command,
 };
@@ -145,6 +147,79 @@ fn a_faulty_answer_is_never_shown_as_a_value() {
     }
 }
 
+/// In ASCII a spoiled check is the LRC's, and noise may hold anything but a colon.
+#[test]
+fn a_faulty_answer_in_ascii_is_never_shown_as_a_value() {
+    let Some(python) = python().filter(|_| have("socat", "socat")) else { return };
+    let folder = folder();
+    let cable = Cable::plug(folder.path());
+    let _slave = slave(&python, "ascii", cable.ends[1].to_str().unwrap());
+    let said = read_faults(&[WELL, LATE, SPOILED, SILENT, NOISY, CUT], "ascii", cable.ends[0].to_str().unwrap());
+    check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
+    for tag in ["SPOILED.N", "SILENT.N", "CUT.N"] {
+        check(&said, &[(tag, "---- bad: device not answering")]);
+    }
+    assert!(said.iter().any(|line| line.contains("SPOILED") && line.contains("LRC error")), "{}", said.join("\n"));
+}
+
+#[test]
+fn a_faulty_answer_in_rtu_over_tcp_is_never_shown_as_a_value() {
+    let Some(python) = python() else { return };
+    let port = free_port();
+    let _slave = slave(&python, "rtu-over-tcp", &port.to_string());
+    let place = format!("127.0.0.1:{port}");
+    let said = read_faults(&[WELL, LATE, SPOILED, SILENT, NOISY, CUT], "rtu-over-tcp", &place);
+    check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
+    for tag in ["SPOILED.N", "SILENT.N", "CUT.N"] {
+        check(&said, &[(tag, "---- bad: device not answering")]);
+    }
+}
+
+/// What a TCP peer can do short of answering: stay mute, hang up, answer by halves, talk nonsense.
+#[test]
+fn a_hostile_tcp_peer_costs_values_but_never_shows_a_wrong_one() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let hostile = std::thread::spawn(move || {
+        let mut mute = Vec::new();
+        for (number, client) in listener.incoming().map_while(Result::ok).enumerate() {
+            let mut client = client;
+            let mut request = [0; 12];
+            match number {
+                // Hangs up before it is asked; then in the middle of an answer; then answers no Modbus.
+                0 => drop(client),
+                1 | 2 => {
+                    let _ = client.read_exact(&mut request);
+                    let half = if number == 1 {
+                        [&request[..4], &[0, 5, 3, 3]].concat()
+                    } else {
+                        b"HTTP/1.1 400\r\n".to_vec()
+                    };
+                    let _ = client.write_all(&half);
+                }
+                // Takes the connection and says nothing, ever.
+                3 => mute.push(client),
+                // What comes after it is served well until the station leaves.
+                _ => {
+                    while client.read_exact(&mut request).is_ok() {
+                        let answer = [&request[..4], &[0, 5, request[6], 3, 2, 0, 10]].concat();
+                        let _ = client.write_all(&answer);
+                    }
+                    return number;
+                }
+            }
+        }
+        0
+    });
+    let folder = folder();
+    let file = folder.path().join("hostile.toml");
+    fs::write(&file, plant_with(&[WELL], "tcp")).unwrap();
+    fs::copy(plant("number.toml"), folder.path().join("number.toml")).unwrap();
+    let said = station(&file, &format!("127.0.0.1:{port}"), "40s");
+    assert_eq!(hostile.join().unwrap(), 4, "{}", said.join("\n"));
+    check(&said, &[("WELL.N", "10 good")]);
+}
+
 #[test]
 fn a_faulty_answer_over_tcp_is_never_shown_as_a_value() {
     let Some(python) = python() else { return };
@@ -187,4 +262,18 @@ fn the_station_reads_the_server_of_libmodbus() {
             ("UT.NOWHERE", "---- bad: refused by the device"),
         ],
     );
+}
+
+/// The same server asked by hand: registers as unit-test.h has them, and its refusal in words.
+#[test]
+fn raw_asks_the_server_of_libmodbus() {
+    for (bytes, expect) in
+        [("11 04 01 08 00 01", "RX 00 01 00 00 00 05 11 04 02 00 0A"), ("11 03 01 70 00 01", "exception 06")]
+    {
+        // It serves one connection and ends.
+        let Some(_server) = libmodbus_server() else { return };
+        let mut raw = Process::start(sightglass().args(["raw", "127.0.0.1:1502"]).args(bytes.split(' ')));
+        raw.end();
+        assert!(raw.said.iter().any(|line| line.contains(expect)), "{bytes}: {}", raw.said.join("\n"));
+    }
 }

@@ -106,8 +106,14 @@ fn start_on_simulation(def: &Arc<PlantDef>, clock: Clock, history: &Path) -> sta
     let (rig, wire) = (RigHandle::spawn(Rig::demo(), clock), Wire { serial, ascii: false });
     tokio::spawn(serve_line(theirs, rig, wire, Duration::from_secs(86_400)));
     let connectors = vec![Connector::Memory(streams)];
-    station::io::start(station::io::Options { def: def.clone(), clock, history: history.to_owned(), connectors })
-        .unwrap()
+    station::io::start(station::io::Options {
+        def: def.clone(),
+        clock,
+        history: history.to_owned(),
+        connectors,
+        file: None,
+    })
+    .unwrap()
 }
 
 /// Lets plant time pass. Virtual time must not run away from the thread that stores: once a plant minute this waits, in

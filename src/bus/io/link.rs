@@ -70,6 +70,8 @@ pub struct Link {
     timeout: Duration,
     idle: Duration,
     turnaround: Duration,
+    /// Requests without an answer since something last came.
+    pub unanswered: u32,
     /// What the last exchange was; `None` before the first.
     pub last: Option<Arc<Exchange>>,
     /// Real time in which the line was busy.
@@ -85,6 +87,7 @@ impl Link {
             timeout: line.timeout,
             idle: wire.silence.max(line.idle),
             turnaround: clock.real_span(line.turnaround),
+            unanswered: 0,
             last: None,
             busy: Duration::ZERO,
             wire,
@@ -283,6 +286,8 @@ impl Link {
     }
 
     fn keep(&mut self, request: Vec<u8>, gathered: Gathered) -> Answered {
+        let silent = matches!(gathered.answer, Err(Fault::Timeout));
+        self.unanswered = if silent { self.unanswered.saturating_add(1) } else { 0 };
         let took = Duration::from_secs_f64(gathered.took.as_secs_f64() * self.wire.clock().speed());
         let now = self.wire.clock().now();
         let exchange = Arc::new(Exchange {

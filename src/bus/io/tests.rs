@@ -21,6 +21,7 @@ use crate::plant::{
     command::{BusRequest, WriteId},
     def::{DeviceId, TagId},
     event::{Event, ExceptionCode, Fault, LineState, WriteResult},
+    tag::{Access, TagDef},
 };
 
 /// Runs a line against a script until `polls` block reads have ended; gives good and failed ones.
@@ -247,7 +248,7 @@ async fn a_late_refusal_splits_no_block() {
 async fn a_port_that_goes_away_comes_back_by_itself() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
-    for _ in 0..3 {
+    for _ in 0..100 {
         let served = line.plug(Mode::Rtu, |_, _| Deed::Answer);
         line.read(&def).await;
         served.abort();
@@ -300,5 +301,41 @@ async fn a_write_is_sent_once_whatever_happens() {
         (Deed::Instead(vec![1, 6, 0, 10, 0, 11]), Deed::Answer, WriteResult::Lost(Fault::WrongEcho)),
     ] {
         assert_eq!(write(deed.clone(), read_back).await, (expect, 1), "{deed:?}");
+    }
+}
+
+/// A broadcast is sent once, nobody waits for an answer, and it is told as accepted, not as verified.
+#[tokio::test(start_paused = true)]
+async fn a_broadcast_is_sent_once_and_never_called_verified() {
+    for mode in [Mode::Rtu, Mode::Ascii] {
+        let mut def = plant(mode);
+        def.devices[0].unit = 0;
+        def.tags.retain(|tag| tag.device == DeviceId(1));
+        let everybody = TagDef { device: DeviceId(0), access: Access::Write, ..def.tags[0].clone() };
+        def.tags.insert(0, everybody);
+        for (index, tag) in def.tags.iter_mut().enumerate() {
+            tag.id = TagId(index as u16);
+        }
+        let mut line = line(def.clone());
+        let heard = Arc::new(AtomicUsize::new(0));
+        let count = heard.clone();
+        line.plug(mode, move |_, message| {
+            if message[0] != 0 {
+                return Deed::Answer;
+            }
+            count.fetch_add(1, Ordering::Relaxed);
+            Deed::Silent
+        });
+        line.read(&def).await;
+        let request = BusRequest::Write { id: WriteId(1), tag: TagId(0), raw: 7.0, unlock: None, verify: false };
+        line.requests.send(request).await.expect("the line runs");
+        let result = line
+            .until(&def, |event| match event {
+                Event::Wrote { result, .. } => Some(result.clone()),
+                _ => None,
+            })
+            .await;
+        assert_eq!((result, heard.load(Ordering::Relaxed)), (WriteResult::Accepted, 1), "{mode:?}");
+        line.read(&def).await;
     }
 }

@@ -13,6 +13,7 @@ use crate::{
     history::{Answer, HistoryError, Question, Series, series},
     plant::{
         def::{DeviceId, Priority, TagId},
+        line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord, AlarmStep},
         sample::{Cause, Quality, Sample},
         tag::Decimals,
@@ -48,6 +49,12 @@ impl Store {
                 check_span(*from, *to)?;
                 self.list(&sql::actions_newest(), params![utc(*from), utc(*to), capped(*limit)], action)
                     .map(Answer::Actions)
+            }
+            Question::LineMinutes { line, from, to, limit } => {
+                check_span(*from, *to)?;
+                let name = self.def.lines.get(line.index()).map_or("", |line| &line.name);
+                self.list(sql::LINE_MINUTES, params![name, utc(*from), utc(*to), capped(*limit)], line_minute)
+                    .map(Answer::LineMinutes)
             }
             Question::Report { period } => self.report(period, now).map(|report| Answer::Report(Box::new(report))),
         }
@@ -306,6 +313,27 @@ fn action(row: &Row) -> duckdb::Result<ActionRecord> {
         old: maybe_shared(row, 4)?,
         new: maybe_shared(row, 5)?,
         outcome: shared(row, 6)?,
+    })
+}
+
+fn line_minute(row: &Row) -> duckdb::Result<LineMinute> {
+    let count = |column| row.get::<_, u32>(column).map(u64::from);
+    Ok(LineMinute {
+        at: time(row)?,
+        line: shared(row, 1)?,
+        requests: count(2)?,
+        ok: count(3)?,
+        timeouts: count(4)?,
+        corrupt: count(5)?,
+        exceptions: count(6)?,
+        retries: count(7)?,
+        late: count(8)?,
+        missed: count(9)?,
+        sent_bytes: count(10)?,
+        received_bytes: count(11)?,
+        utilisation: row.get(12)?,
+        reply_p99_ms: row.get(13)?,
+        reply_max_ms: row.get(14)?,
     })
 }
 

@@ -6,7 +6,10 @@
 /// No keys and no indexes: they cost eight times the file. `utc` is a TIMESTAMP, not a BIGINT: both are 64 bits of
 /// microseconds and take the same space on disk (measured), but a TIMESTAMP can be read by a person and by `time_bucket`.
 /// `value` is a DOUBLE because a FLOAT would turn 123456.7 into 123456.703. `quality` is `Quality::code`.
-pub const MIGRATIONS: [&str; 1] = ["
+///
+/// `utc` of `line_minute` is the end of the minute; a line goes by its name, as everything that outlives the plant file.
+pub const MIGRATIONS: [&str; 2] = [
+    "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
 CREATE TABLE alarm_journal (
@@ -15,7 +18,15 @@ CREATE TABLE alarm_journal (
 CREATE TABLE operator_action (
     utc TIMESTAMP NOT NULL, by_whom VARCHAR NOT NULL, action VARCHAR NOT NULL, target VARCHAR NOT NULL,
     old_value VARCHAR, new_value VARCHAR, outcome VARCHAR NOT NULL);
-"];
+",
+    "
+CREATE TABLE line_minute (
+    utc TIMESTAMP NOT NULL, line VARCHAR NOT NULL, requests UINTEGER NOT NULL, ok UINTEGER NOT NULL,
+    timeouts UINTEGER NOT NULL, corrupt UINTEGER NOT NULL, exceptions UINTEGER NOT NULL, retries UINTEGER NOT NULL,
+    late UINTEGER NOT NULL, missed UINTEGER NOT NULL, sent_bytes UINTEGER NOT NULL, received_bytes UINTEGER NOT NULL,
+    utilisation FLOAT NOT NULL, reply_p99_ms FLOAT, reply_max_ms FLOAT);
+",
+];
 
 /// Holds the number of migrations done.
 pub const CREATE_VERSION: &str = "CREATE TABLE IF NOT EXISTS schema_version (version UINTEGER NOT NULL)";
@@ -35,7 +46,7 @@ pub const EXTENT: &str = "SELECT min(a), max(z) FROM (
 
 /// Rows of all tables.
 pub const COUNT_ROWS: &str = "SELECT (SELECT count(*) FROM sample) + (SELECT count(*) FROM alarm_journal)
-    + (SELECT count(*) FROM operator_action)";
+    + (SELECT count(*) FROM operator_action) + (SELECT count(*) FROM line_minute)";
 
 /// Ends every curve: a row (time, no value, quality) for each tag whose last row since an instant has a value.
 pub const END_CURVES: &str = "INSERT INTO sample
@@ -96,3 +107,9 @@ pub fn actions_newest() -> String {
 pub fn actions_oldest() -> String {
     format!("SELECT {DEED} FROM operator_action WHERE utc >= ? AND utc < ? ORDER BY utc, rowid LIMIT ?")
 }
+
+/// Minutes of a line in a span, oldest first; of more than the limit the latest.
+pub const LINE_MINUTES: &str = "SELECT * FROM (
+    SELECT utc, line, requests, ok, timeouts, corrupt, exceptions, retries, late, missed, sent_bytes, received_bytes,
+        utilisation, reply_p99_ms, reply_max_ms
+    FROM line_minute WHERE line = ? AND utc >= ? AND utc < ? ORDER BY utc DESC LIMIT ?) ORDER BY utc";

@@ -16,6 +16,7 @@ use crate::{
     history::HistoryError,
     plant::{
         def::PlantDef,
+        line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord, Record},
         sample::{Cause, Quality, Sample},
     },
@@ -114,12 +115,13 @@ impl Store {
         self.transaction(|| {
             self.append_samples(records)?;
             self.append_alarms(records)?;
-            self.append_actions(records)
+            self.append_actions(records)?;
+            self.append_lines(records)
         })?;
         records.iter().for_each(|record| match record {
             Record::Sample(_, sample) => self.extend(sample.at),
             Record::Alarm(alarm) => self.extend(alarm.at),
-            Record::Action(_) => {}
+            Record::Action(_) | Record::Line(_) => {}
         });
         Ok(())
     }
@@ -154,7 +156,7 @@ impl Store {
         files::size(&self.path)
     }
 
-    /// Rows of all tables: samples, steps of alarms, deeds of operators.
+    /// Rows of all tables: samples, steps of alarms, deeds of operators, minutes of lines.
     pub fn count_rows(&self) -> Result<u64, HistoryError> {
         self.db.query_row(sql::COUNT_ROWS, [], |row| row.get(0)).map_err(engine)
     }
@@ -206,7 +208,8 @@ impl Store {
         self.db.execute_batch(sql::CREATE_VERSION)?;
         let done = self.version()? as usize;
         for (number, migration) in sql::MIGRATIONS.iter().enumerate().skip(done) {
-            self.db.execute_batch("BEGIN")?;
+            // What a station left in the log goes into the file first, see `sql::MIGRATIONS`.
+            self.db.execute_batch("CHECKPOINT; BEGIN")?;
             self.db.execute_batch(migration)?;
             self.db.execute(sql::SET_VERSION, params![number as u32 + 1])?;
             self.db.execute_batch("COMMIT; CHECKPOINT")?;
@@ -257,7 +260,7 @@ impl Store {
     fn append_samples(&self, records: &[Record]) -> duckdb::Result<()> {
         let mut rows = records.iter().filter_map(|record| match record {
             Record::Sample(tag, sample) => Some((self.ids.get(tag.index()).copied().flatten()?, sample)),
-            Record::Alarm(_) | Record::Action(_) => None,
+            Record::Alarm(_) | Record::Action(_) | Record::Line(_) => None,
         });
         let Some(first) = rows.next() else { return Ok(()) };
         let mut appender = self.db.appender("sample")?;
@@ -270,7 +273,7 @@ impl Store {
     fn append_alarms(&self, records: &[Record]) -> duckdb::Result<()> {
         let mut rows = records.iter().filter_map(|record| match record {
             Record::Alarm(alarm) => Some(alarm),
-            Record::Sample(..) | Record::Action(_) => None,
+            Record::Sample(..) | Record::Action(_) | Record::Line(_) => None,
         });
         let Some(first) = rows.next() else { return Ok(()) };
         let mut appender = self.db.appender("alarm_journal")?;
@@ -283,7 +286,7 @@ impl Store {
     fn append_actions(&self, records: &[Record]) -> duckdb::Result<()> {
         let mut rows = records.iter().filter_map(|record| match record {
             Record::Action(action) => Some(action),
-            Record::Sample(..) | Record::Alarm(_) => None,
+            Record::Sample(..) | Record::Alarm(_) | Record::Line(_) => None,
         });
         let Some(first) = rows.next() else { return Ok(()) };
         let mut appender = self.db.appender("operator_action")?;
@@ -292,6 +295,44 @@ impl Store {
         }
         appender.flush()
     }
+
+    fn append_lines(&self, records: &[Record]) -> duckdb::Result<()> {
+        let mut rows = records.iter().filter_map(|record| match record {
+            Record::Line(minute) => Some(minute),
+            Record::Sample(..) | Record::Alarm(_) | Record::Action(_) => None,
+        });
+        let Some(first) = rows.next() else { return Ok(()) };
+        let mut appender = self.db.appender("line_minute")?;
+        for minute in std::iter::once(first).chain(rows) {
+            let LineMinute { at, line, requests, ok, timeouts, corrupt, exceptions, retries, late, missed, .. } =
+                minute;
+            let LineMinute { sent_bytes, received_bytes, utilisation, reply_p99_ms, reply_max_ms, .. } = minute;
+            let (at, utilisation) = (utc(*at), *utilisation);
+            appender.append_row(params![
+                at,
+                line,
+                small(*requests),
+                small(*ok),
+                small(*timeouts),
+                small(*corrupt),
+                small(*exceptions),
+                small(*retries),
+                small(*late),
+                small(*missed),
+                small(*sent_bytes),
+                small(*received_bytes),
+                utilisation,
+                reply_p99_ms,
+                reply_max_ms
+            ])?;
+        }
+        appender.flush()
+    }
+}
+
+/// A count as the column holds it; more than four thousand million in a minute is no count.
+fn small(count: u64) -> u32 {
+    count.try_into().unwrap_or(u32::MAX)
 }
 
 /// One thread, little memory, nothing from the network; and no bit packing, with which some data make a checkpoint fail

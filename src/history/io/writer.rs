@@ -120,7 +120,10 @@ impl Writer {
     pub fn answer(&mut self, question: &Question, now: Timestamp) -> Result<Answer, HistoryError> {
         match question {
             Question::Report { .. } => self.commit(now),
-            Question::Series { .. } | Question::Journal { .. } | Question::Actions { .. } => {}
+            Question::Series { .. }
+            | Question::Journal { .. }
+            | Question::Actions { .. }
+            | Question::LineMinutes { .. } => {}
         }
         self.store()?.answer(question, now)
     }

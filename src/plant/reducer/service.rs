@@ -63,3 +63,122 @@ impl Plant {
         *before = Some(before.take().unwrap_or(in_use)).filter(|before| **before != *tried);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::plant::{
+        def::{Serial, Transport},
+        event::{Event, LineCounters},
+        fixture,
+        line_report::LineReport,
+        traffic::Frames,
+    };
+
+    const L1: LineId = LineId(0);
+
+    fn at(second: i64) -> Timestamp {
+        Timestamp::from_second(second).expect("a small number")
+    }
+
+    fn baud(baud: u32) -> LineDef {
+        let transport = Transport::rtu("/dev/null", Serial { baud, ..Serial::USUAL });
+        LineDef { transport, ..fixture::plant().lines[0].clone() }
+    }
+
+    fn plant() -> Plant {
+        Plant::new(fixture::shared(), at(0), 1.0)
+    }
+
+    /// The line says that it works with these settings.
+    fn works_with(plant: &mut Plant, settings: &LineDef) {
+        let report = Arc::new(LineReport {
+            settings: settings.clone(),
+            counters: LineCounters::default(),
+            polls: Vec::new(),
+            devices: Vec::new(),
+            busy: Vec::new(),
+            frames: Frames::default(),
+        });
+        plant.on_event(Event::Report { at: at(1), line: L1, report });
+    }
+
+    fn order(plant: &mut Plant, number: u32, command: Command) -> Effects {
+        let id = OrderId { terminal: 1, number };
+        plant.on_order(Order { id, by: "anna".into(), command }, at(i64::from(number)))
+    }
+
+    /// Orders other settings and lets the line take them.
+    fn try_out(plant: &mut Plant, number: u32, settings: LineDef) -> Effects {
+        let effects = order(plant, number, Command::Configure(Box::new(settings.clone())));
+        works_with(plant, &settings);
+        effects
+    }
+
+    fn before(plant: &Plant) -> Option<LineDef> {
+        plant.snapshot().line(L1).settings_before.as_deref().cloned()
+    }
+
+    fn deeds(effects: &Effects) -> Vec<(String, String, String, String)> {
+        let deed = |record: &Record| match record {
+            Record::Action(deed) => Some((
+                deed.by.to_string(),
+                deed.action.to_string(),
+                deed.new.as_deref().unwrap_or("").to_owned(),
+                deed.outcome.to_string(),
+            )),
+            Record::Sample(..) | Record::Alarm(_) | Record::Line(_) => None,
+        };
+        effects.records.iter().filter_map(deed).collect()
+    }
+
+    #[test]
+    fn several_tries_are_taken_back_to_what_was_before_the_first() {
+        let mut plant = plant();
+        let at_first = plant.def.line(L1).clone();
+        try_out(&mut plant, 1, baud(19_200));
+        try_out(&mut plant, 2, baud(38_400));
+        try_out(&mut plant, 3, LineDef { timeout: Duration::from_secs(2), ..baud(38_400) });
+        assert_eq!(before(&plant), Some(at_first.clone()));
+        let effects = try_out(&mut plant, 4, at_first.clone());
+        assert_eq!(effects.bus, [(L1, BusRequest::Configure(Box::new(at_first)))]);
+        assert_eq!(before(&plant), None, "there is nothing more to take back");
+    }
+
+    #[test]
+    fn it_is_on_record_who_changed_a_line_and_to_what() {
+        let mut plant = plant();
+        let record = deeds(&try_out(&mut plant, 1, baud(19_200)));
+        let new = "RTU /dev/null 19200 8N1";
+        assert_eq!(record, [("anna".into(), "configure".into(), new.into(), "verified".into())]);
+        let record = deeds(&order(&mut plant, 2, Command::StopTest(L1)));
+        assert_eq!(record, [("anna".into(), "stop test".into(), String::new(), "verified".into())]);
+    }
+
+    #[test]
+    fn what_is_saved_is_what_the_line_works_with() {
+        let mut plant = plant();
+        try_out(&mut plant, 1, baud(19_200));
+        let effects = order(&mut plant, 2, Command::SaveSettings(L1));
+        let id = OrderId { terminal: 1, number: 2 };
+        assert_eq!(effects.save, Some((id, baud(19_200))));
+        assert_eq!(deeds(&effects), [], "not before it is done");
+        assert!(before(&plant).is_some());
+        let saved = plant.on_saved(id, L1, Ok(()));
+        let deed = ("anna".to_owned(), "save settings".to_owned(), String::new(), "verified".to_owned());
+        assert_eq!(deeds(&saved), [deed]);
+        assert_eq!(before(&plant), None);
+    }
+
+    #[test]
+    fn settings_that_were_not_saved_can_still_be_taken_back() {
+        let mut plant = plant();
+        try_out(&mut plant, 1, baud(19_200));
+        order(&mut plant, 2, Command::SaveSettings(L1));
+        let effects = plant.on_saved(OrderId { terminal: 1, number: 2 }, L1, Err("the disk is full".into()));
+        assert_eq!(deeds(&effects)[0].3, "refused: not saved: the disk is full");
+        assert!(before(&plant).is_some());
+    }
+}

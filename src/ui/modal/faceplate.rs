@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
-use super::{Modal, Next, confirm::wire_words, entry::range_words, window};
+use super::{Modal, Next, Why, confirm::wire_words, entry::range_words, window};
 use crate::{
     plant::{
         def::TagId,
@@ -48,6 +48,7 @@ impl Faceplate {
                 &if manual { format!("write {}", cx.def().tag(tag).short) } else { "write".to_owned() },
             ));
         }
+        hints.push(hint("w", "why"));
         hints.push(hint("Esc", "close"));
         hints
     }
@@ -59,6 +60,10 @@ impl Faceplate {
             KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => {
                 let window = command_tag(cx, self.tag()).and_then(|tag| Modal::write(cx, tag));
                 return Next::Stay(window.unwrap_or(Modal::Faceplate(self)));
+            }
+            KeyCode::Char('w') if keys::char('w').is(event) => {
+                let why = Why::new(self.tags.clone(), self.selected.min(self.tags.len() - 1));
+                return Next::Stay(why.map_or(Modal::Faceplate(self), Modal::Why));
             }
             KeyCode::Char('q') => return Next::Close,
             _ => {}

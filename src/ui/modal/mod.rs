@@ -8,6 +8,8 @@ pub mod help;
 pub mod line;
 pub mod notice;
 pub mod prompt;
+pub mod settings;
+pub mod why;
 
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
@@ -18,6 +20,8 @@ pub use entry::Entry;
 pub use faceplate::Faceplate;
 pub use notice::Notice;
 pub use prompt::Prompt;
+pub use settings::Settings;
+pub use why::Why;
 
 use super::{
     Act, Cx,
@@ -44,6 +48,10 @@ pub enum Modal {
     Faceplate(Faceplate),
     /// Words to be read: why something cannot be done now.
     Notice(Notice),
+    /// Why a value is what it is.
+    Why(Why),
+    /// How a line communicates.
+    Settings(Settings),
     /// A frame, a block, a test of the bus tab.
     Bus(Box<bus::Window>),
 }
@@ -57,6 +65,8 @@ pub enum Next {
     Close,
     /// It is gone, and this is to be done.
     Do(Vec<Act>),
+    /// It stays, and this is to be done.
+    Both(Modal, Vec<Act>),
 }
 
 impl Modal {
@@ -88,12 +98,15 @@ impl Modal {
             Modal::Prompt(prompt) => prompt.on_key(cx, tabs, event),
             Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
             Modal::Notice(notice) => notice.on_key(event),
+            Modal::Why(why) => why.on_key(event),
+            Modal::Settings(settings) => settings.on_key(cx, event),
             Modal::Bus(window) => window.on_key(cx, tabs, event),
         };
         match next {
             Next::Stay(modal) => (Some(modal), Vec::new()),
             Next::Close => (None, Vec::new()),
             Next::Do(acts) => (None, acts),
+            Next::Both(modal, acts) => (Some(modal), acts),
         }
     }
 
@@ -107,8 +120,14 @@ impl Modal {
         match self {
             Modal::Entry(entry) => entry.line.paste(text),
             Modal::Prompt(prompt) => prompt.line.paste(text),
+            Modal::Settings(settings) => settings.on_paste(text),
+            Modal::Help(_)
+            | Modal::Confirm(_)
+            | Modal::Choice(_)
+            | Modal::Faceplate(_)
+            | Modal::Notice(_)
+            | Modal::Why(_) => {}
             Modal::Bus(window) => window.on_paste(text),
-            Modal::Help(_) | Modal::Confirm(_) | Modal::Choice(_) | Modal::Faceplate(_) | Modal::Notice(_) => {}
         }
     }
 
@@ -123,6 +142,8 @@ impl Modal {
             Modal::Prompt(_) => vec![hint("⏎", "take it"), hint("Esc", "leave")],
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
             Modal::Notice(_) => vec![hint("Esc", "close")],
+            Modal::Why(why) => why.hints(),
+            Modal::Settings(settings) => settings.hints(),
             Modal::Bus(window) => window.hints(),
         }
     }
@@ -137,6 +158,8 @@ impl Modal {
             Modal::Prompt(prompt) => prompt.view(cx, frame, body),
             Modal::Faceplate(faceplate) => faceplate.view(cx, frame, body),
             Modal::Notice(notice) => notice.view(cx, frame, body),
+            Modal::Why(why) => why.view(cx, frame, body),
+            Modal::Settings(settings) => settings.view(cx, frame, body),
             Modal::Bus(window) => window.view(cx, frame, body),
         }
     }

@@ -16,7 +16,7 @@ use crate::{
     ui::{
         Act, Cx,
         keys::{Key, char, code},
-        modal::{Faceplate, Modal, confirm::subject, faceplate::device_words},
+        modal::{Faceplate, Modal, Why, confirm::subject, faceplate::device_words},
         widgets::{
             text::{self, Canvas, between, fit, fit_words, moment, pad, pad_left, running, wrap},
             value,
@@ -35,6 +35,8 @@ pub enum Action {
     Open,
     /// Show the device of the alarm on the controllers tab.
     Controller,
+    /// Say why the value that the alarm watches is what it is.
+    Why,
 }
 
 /// Keys of this tab.
@@ -56,6 +58,12 @@ pub const KEYS: &[Key<Action>] = &[
         label: "journal",
         help: "journal of alarms and operator actions, and back",
         action: Action::Journal,
+    },
+    Key {
+        chord: char('w'),
+        label: "why",
+        help: "why the value is what it is: quality, scaling, bytes",
+        action: Action::Why,
     },
     Key { chord: char('c'), label: "controller", help: "parameters of the alarm's device", action: Action::Controller },
 ];
@@ -115,6 +123,10 @@ impl Alarms {
             Action::Open => {
                 self.faceplate(cx).map(|faceplate| Act::Open(Modal::Faceplate(faceplate))).into_iter().collect()
             }
+            Action::Why => Why::open(self.selected(cx).and_then(|alarm| match cx.def().alarm(alarm.id).subject {
+                Subject::Tag(tag) => Why::new(vec![tag], 0),
+                Subject::Device(device) => Why::of_device(cx, device),
+            })),
             Action::Controller => match self.selected(cx).map(|alarm| cx.def().alarm(alarm.id).subject) {
                 Some(Subject::Device(device)) => vec![Act::ShowDevice(device)],
                 Some(Subject::Tag(tag)) => vec![Act::ShowDevice(cx.def().tag(tag).device)],
@@ -148,7 +160,7 @@ impl Alarms {
             match answer {
                 Ok(Answer::Journal(rows)) => journal.alarms = rows,
                 Ok(Answer::Actions(rows)) => journal.actions = rows,
-                Ok(Answer::Series(_) | Answer::Report(_)) => {}
+                Ok(Answer::Series(_) | Answer::LineMinutes(_) | Answer::Report(_)) => {}
                 Err(error) => journal.trouble = Some(error.to_string()),
             }
         }

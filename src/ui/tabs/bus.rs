@@ -30,6 +30,7 @@ use crate::{
     ui::{
         Act, Cx,
         keys::{self, Hint, Key, char, code},
+        modal::{Modal, Settings},
         widgets::text::{Canvas, between, fit_words, running, width},
     },
 };
@@ -90,6 +91,8 @@ pub enum Action {
     Again,
     /// Stops the test at work.
     Stop,
+    /// The communication settings of the line.
+    Settings,
 }
 
 /// Keys of every page.
@@ -107,9 +110,11 @@ pub const KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::End), label: "", help: "to the last row", action: Action::Jump(1) },
     Key { chord: code(KeyCode::Up), label: "", help: "a row up", action: Action::Move(-1) },
 ];
-/// Keys of the first page. `c` is for the settings of the line.
-const LINE_KEYS: &[Key<Action>] =
-    &[Key { chord: code(KeyCode::Down), label: "scroll", help: "a row down", action: Action::Move(1) }];
+/// Keys of the first page.
+const LINE_KEYS: &[Key<Action>] = &[
+    Key { chord: code(KeyCode::Down), label: "scroll", help: "a row down", action: Action::Move(1) },
+    Key { chord: char('c'), label: "settings", help: "communication settings of the line", action: Action::Settings },
+];
 const PLAN_KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::Down), label: "select", help: "a row down", action: Action::Move(1) },
     Key { chord: code(KeyCode::Enter), label: "tags", help: "the tags of the block", action: Action::Open },
@@ -182,6 +187,7 @@ impl Bus {
             Action::Try(tried) => return self.test.open(cx, &at, tried),
             Action::Again => return test::again(cx, &at),
             Action::Stop => return test::stop(&at),
+            Action::Settings => return vec![Act::Open(Modal::Settings(Settings::new(cx, self.line)))],
         }
         self.on_snapshot(cx)
     }

@@ -8,6 +8,7 @@ use crate::{
         command::Command,
         def::{DeviceDef, DeviceId, LineId, TagId},
         event::LineState,
+        ne107::Signal,
         snapshot::{DeviceState, Snapshot},
         tag::{Access, Poll, TagDef},
     },
@@ -15,7 +16,9 @@ use crate::{
         Act, Cx,
         chrome::{order_words, outcome_words},
         keys::{Key, char, code},
-        modal::{Choice, Confirm, Faceplate, Modal, Notice, entry::range_words, faceplate::device_words},
+        modal::{
+            Choice, Confirm, Faceplate, Modal, Notice, Settings, Why, entry::range_words, faceplate::device_words,
+        },
         widgets::{
             text::{Canvas, age, clock, fit, fit_words, pad, pad_left, whole, width},
             value,
@@ -32,6 +35,8 @@ pub enum Action {
     Move(isize),
     /// Edit the selected parameter, or look at it if it is read-only.
     Edit,
+    /// Say why the selected value is what it is.
+    Why,
     /// Read everything now.
     Refresh,
     /// Pick one of the device's actions.
@@ -42,6 +47,8 @@ pub enum Action {
     Run,
     /// Close the device's line, or open it again.
     Line,
+    /// Look at the communication settings of the device's line, and change them.
+    Settings,
 }
 
 /// Keys of this tab.
@@ -60,6 +67,12 @@ pub const KEYS: &[Key<Action>] = &[
         help: "change the parameter, or look at a read-only one",
         action: Action::Edit,
     },
+    Key {
+        chord: char('w'),
+        label: "why",
+        help: "why the value is what it is: quality, scaling, bytes",
+        action: Action::Why,
+    },
     Key { chord: char('u'), label: "refresh", help: "read all parameters of the device now", action: Action::Refresh },
     Key { chord: char('f'), label: "actions", help: "actions of the device (save to memory)", action: Action::Actions },
     Key { chord: char('T'), label: "tune", help: "auto-tuning, if the device has it", action: Action::Tune },
@@ -69,6 +82,12 @@ pub const KEYS: &[Key<Action>] = &[
         label: "line",
         help: "disconnect the device's line, or connect it again (asks first)",
         action: Action::Line,
+    },
+    Key {
+        chord: char('c'),
+        label: "settings",
+        help: "communication settings of the device's line: baud rate, parity, timeout …",
+        action: Action::Settings,
     },
 ];
 
@@ -118,6 +137,10 @@ impl Controllers {
                     .collect(),
                 None => Vec::new(),
             },
+            Action::Why => {
+                let tags = in_groups(cx, self.device).into_iter().map(|tag| tag.id).collect();
+                Why::open(Why::new(tags, self.selected))
+            }
             Action::Refresh => vec![Act::Order(Command::Refresh(self.device))],
             Action::Actions => {
                 let actions = Choice::actions(cx, self.device).map(Modal::Choice);
@@ -126,6 +149,7 @@ impl Controllers {
             }
             Action::Tune => write(device.faceplate.as_ref().and_then(|plate| plate.tune)),
             Action::Run => write(device.faceplate.as_ref().and_then(|plate| plate.run)),
+            Action::Settings => vec![Act::Open(Modal::Settings(Settings::new(cx, device.line)))],
             Action::Line => vec![Act::Open(Modal::Confirm(connect(cx, device.line)))],
         }
     }
@@ -182,14 +206,20 @@ impl Controllers {
         let title = if canvas.width() < 80 { String::new() } else { format!("{}  ", device.title) };
         let words = format!("{}  {title}unit {}  {line}", device.model, device.unit);
         let x = canvas.text(x + 2, 0, &words, theme.normal());
-        let (mark, style) = match cx.snapshot.device(device.id).state {
-            DeviceState::Answering => ("✓", theme.normal()),
-            DeviceState::Unknown => ("?", theme.dim()),
-            DeviceState::Failing(_) | DeviceState::Down { .. } => ("✗", theme.trouble()),
+        let status = cx.snapshot.device(device.id);
+        let (mark, style) = match (status.diagnosis, status.state) {
+            (Some(reason), _) => (signal_mark(reason.signal()), theme.trouble()),
+            (None, DeviceState::Answering) => ("✓".to_owned(), theme.normal()),
+            (None, DeviceState::Unknown) => ("?".to_owned(), theme.dim()),
+            (None, DeviceState::Failing(_) | DeviceState::Down { .. }) => ("✗".to_owned(), theme.trouble()),
+        };
+        let words = match status.diagnosis {
+            Some(reason) => format!("{}: {reason}", reason.signal().word()),
+            None => device_words(cx, device.id),
         };
         let (end, place) = (canvas.width().saturating_sub(1), format!("{}/{count}", self.device.0 + 1));
         let room = end.saturating_sub(x + 2 + width(&place) + 1);
-        canvas.text(x + 2, 0, &fit_words(&format!("{mark} {}", device_words(cx, device.id)), room), style);
+        canvas.text(x + 2, 0, &fit_words(&format!("{mark} {words}"), room), style);
         canvas.text_right(end, 0, &place, theme.dim());
     }
 
@@ -222,6 +252,17 @@ impl Controllers {
         }
         rows.len().saturating_sub(first + room)
     }
+}
+
+/// The letter of NE 107 with a shape of its own.
+pub fn signal_mark(signal: Signal) -> String {
+    let shape = match signal {
+        Signal::Failure => '✗',
+        Signal::FunctionCheck => '▼',
+        Signal::OutOfSpecification => '?',
+        Signal::Maintenance => '◆',
+    };
+    format!("{shape}{}", signal.letter())
 }
 
 /// The tags of a device, those of one group together, in the order of the profile.

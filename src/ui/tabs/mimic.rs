@@ -15,7 +15,7 @@ use crate::{
     ui::{
         Act, Cx,
         keys::{self, Hint, Key, char, code},
-        modal::{Choice, Confirm, Faceplate, Modal, Notice},
+        modal::{Choice, Confirm, Faceplate, Modal, Notice, Why},
         widgets::{
             mimic::{Stretch, panel, pipe, place, tags, tank::Tank, title, trend, unit},
             text::{Canvas, fit},
@@ -30,6 +30,8 @@ pub enum Action {
     Move(i32, i32),
     /// Open the faceplate of the selected item.
     Open,
+    /// Say why a value of the selected item is what it is.
+    Why,
     /// Stop or start the motion of agitators and arrows.
     Motion,
 }
@@ -41,6 +43,12 @@ pub const KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::Up), label: "", help: "", action: Action::Move(0, -1) },
     Key { chord: code(KeyCode::Down), label: "", help: "", action: Action::Move(0, 1) },
     Key { chord: code(KeyCode::Enter), label: "open", help: "faceplate of the selected item", action: Action::Open },
+    Key {
+        chord: char('w'),
+        label: "why",
+        help: "why the value is what it is: quality, scaling, bytes",
+        action: Action::Why,
+    },
     Key { chord: char('M'), label: "", help: "motion of agitators and arrows off and on", action: Action::Motion },
 ];
 
@@ -74,6 +82,11 @@ impl Mimic {
         match action {
             Action::Move(dx, dy) => self.selected = neighbour(items, self.selected, (dx, dy)),
             Action::Motion => self.motion = !self.motion,
+            Action::Why => {
+                self.selected = self.selected.or_else(|| neighbour(items, None, (1, 0)));
+                let item = self.selected.and_then(|n| items.get(n));
+                return Why::open(item.and_then(|item| Why::of_all(cx, tags(cx, item))));
+            }
             Action::Open => {
                 let item = self.selected.and_then(|n| items.get(n));
                 let plate = item.and_then(|item| Faceplate::new(title(cx, item), tags(cx, item)));
@@ -132,7 +145,9 @@ impl Mimic {
         if let Some((_, series)) = self.trends.get_mut(place) {
             *series = match answer {
                 Ok(Answer::Series(all)) => all.into_iter().next(),
-                Ok(Answer::Journal(_) | Answer::Actions(_) | Answer::Report(_)) | Err(_) => None,
+                Ok(Answer::Journal(_) | Answer::Actions(_) | Answer::LineMinutes(_) | Answer::Report(_)) | Err(_) => {
+                    None
+                }
             };
         }
         Vec::new()

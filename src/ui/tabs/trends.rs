@@ -25,6 +25,7 @@ use crate::{
     },
     ui::{
         Act, Cx,
+        modal::Why,
         widgets::chart::{self, trace::Trace},
     },
 };
@@ -117,6 +118,11 @@ impl Trends {
             (Some(_), Action::PageBack) => self.select_value(cx, -(self.rows(cx) as isize)),
             (Some(_), Action::PageOn) => self.select_value(cx, self.rows(cx) as isize),
             (Some((_, row)), Action::Open) => self.open(cx, row),
+            (Some((_, row)), Action::Why) => return Why::open(Why::new(stored(cx), row)),
+            (None, Action::Why) => {
+                let pens = self.pens(cx).into_iter().map(|pen| pen.tag).collect();
+                return Why::open(Why::new(pens, self.selected));
+            }
             (_, Action::Values) => {
                 self.values = if self.values.is_some() { None } else { Some((0, 0)) };
                 self.errands.hours.want();
@@ -189,7 +195,7 @@ impl Trends {
             Answer::Journal(records) if raised.is_some() => {
                 self.data.raised = records.into_iter().filter(|record| record.step == AlarmStep::Raised).collect();
             }
-            Answer::Journal(_) | Answer::Actions(_) | Answer::Report(_) => {}
+            Answer::Journal(_) | Answer::Actions(_) | Answer::LineMinutes(_) | Answer::Report(_) => {}
         }
         self.ask(cx)
     }

@@ -10,6 +10,7 @@ use crate::{
         alarm::AlarmState,
         def::Priority,
         event::LineState,
+        ne107::Reason,
         sample::{Cause, Quality, Sample},
     },
     ui::{
@@ -91,7 +92,7 @@ fn no_size_is_too_small_to_survive() {
                 screen(&mut model, width, height);
             }
         }
-        for keys in ["?", "q", "s", "r", "→⏎", "4⏎", "4f", "4T", "A"] {
+        for keys in ["?", "q", "s", "r", "→⏎", "4⏎", "4f", "4T", "A", "w", "4w", "4c"] {
             model.modal = None;
             screen(&mut model, 80, 24);
             type_keys(&mut model, keys);
@@ -170,6 +171,25 @@ fn what_is_too_narrow_for_all_words_overlaps_none() {
     let shown = screen(&mut model, 60, 16);
     let heading = shown.lines().nth(4).unwrap_or_default();
     assert!(heading.ends_with(" 1/2") && heading.contains("✓ answering"), "{heading}");
+}
+
+#[test]
+fn a_device_tells_its_letter_beside_its_name() {
+    for (diagnosis, expect) in [
+        (None, "✓ answering in 12 ms"),
+        (Some(Reason::Down), "✗F failure: not answering"),
+        (Some(Reason::LineClosed), "▼C function check:"),
+        (Some(Reason::Failing { failed: 9, of: 64 }), "?S out of specification:"),
+        (Some(Reason::Late(2)), "◆M maintenance required:"),
+    ] {
+        let mut fixture = Fixture::normal();
+        fixture.devices[0].diagnosis = diagnosis;
+        let mut model = model(&fixture, Theme::FULL);
+        model.tabs.shown = Tab::Controllers;
+        let shown = screen(&mut model, 120, 40);
+        let heading = shown.lines().nth(4).unwrap_or_default();
+        assert!(heading.contains(expect), "{heading}");
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Small drawings that tabs are made of.
 
 pub mod chart;
+pub mod line_trend;
 pub mod mimic;
 pub mod spark;
 pub mod text;

@@ -10,10 +10,7 @@ const ASCII: [char; 5] = ['_', '.', '-', '=', '^'];
 /// of the tag: what moves by no more counts as constant. Console fonts lack most eighth blocks, so only the full glyph
 /// set has them.
 pub fn spark(series: &Series, cells: usize, resolution: f64, glyphs: Glyphs) -> String {
-    let glyphs: &[char] = match glyphs {
-        Glyphs::Braille => &BLOCKS,
-        Glyphs::Block | Glyphs::Ascii => &ASCII,
-    };
+    let glyphs = bars_of(glyphs);
     let count = series.buckets.len();
     let mean = |n: usize| {
         // Every cell stands for at least one column, and every column stands in a cell.
@@ -33,12 +30,24 @@ pub fn spark(series: &Series, cells: usize, resolution: f64, glyphs: Glyphs) -> 
     means.into_iter().map(glyph).collect()
 }
 
-/// Shares from 0 to 1, newest last, on a scale that does not move: how busy a line was. The oldest are at the left.
-pub fn shares(values: &[f32], cells: usize, glyphs: Glyphs) -> String {
-    let glyphs: &[char] = match glyphs {
+/// Values as bars from 0 to `top`, one glyph each; what is not known is blank.
+pub fn bars(values: &[Option<f64>], top: f64, glyphs: Glyphs) -> String {
+    let glyphs = bars_of(glyphs);
+    let last = glyphs.len() - 1;
+    let bar = |value: f64| glyphs[((value / top).clamp(0.0, 1.0) * last as f64).round() as usize];
+    values.iter().map(|value| value.filter(|value| value.is_finite()).map_or(' ', bar)).collect()
+}
+
+fn bars_of(glyphs: Glyphs) -> &'static [char] {
+    match glyphs {
         Glyphs::Braille => &BLOCKS,
         Glyphs::Block | Glyphs::Ascii => &ASCII,
-    };
+    }
+}
+
+/// Shares from 0 to 1, newest last, on a scale that does not move: how busy a line was. The oldest are at the left.
+pub fn shares(values: &[f32], cells: usize, glyphs: Glyphs) -> String {
+    let glyphs = bars_of(glyphs);
     let each = values.len().div_ceil(cells.max(1)).max(1);
     let glyph = |part: &[f32]| {
         let mean = part.iter().sum::<f32>() / part.len() as f32;

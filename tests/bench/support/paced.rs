@@ -42,11 +42,11 @@ pub struct PacedSlave {
 impl PacedSlave {
     /// Serves at so many baud with 8N1. The path is the port for a master to open.
     pub fn start(baud: u32) -> (PathBuf, PacedSlave) {
-        PacedSlave::start_on(Serial { baud, ..Serial::USUAL })
+        PacedSlave::start_on(Serial { baud, ..Serial::USUAL }, None)
     }
 
-    /// Serves with other bits to a character.
-    pub fn start_on(serial: Serial) -> (PathBuf, PacedSlave) {
+    /// Serves with other bits to a character; one unit never answers.
+    pub fn start_on(serial: Serial, dead: Option<u8>) -> (PathBuf, PacedSlave) {
         let line = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
         grantpt(&line).unwrap();
         unlockpt(&line).unwrap();
@@ -57,7 +57,7 @@ impl PacedSlave {
         tcsetattr(&port, OptionalActions::Now, &raw).unwrap();
         let slave = PacedSlave { _port: port, served: Arc::default(), hasty: Arc::default() };
         let (served, hasty) = (slave.served.clone(), slave.hasty.clone());
-        thread::spawn(move || serve(File::from(line), serial, &served, &hasty));
+        thread::spawn(move || serve(File::from(line), serial, dead, &served, &hasty));
         (path, slave)
     }
 
@@ -72,7 +72,7 @@ impl PacedSlave {
     }
 }
 
-fn serve(mut line: File, serial: Serial, served: &AtomicU64, hasty: &AtomicU64) {
+fn serve(mut line: File, serial: Serial, dead: Option<u8>, served: &AtomicU64, hasty: &AtomicU64) {
     let character = serial.char_time();
     let (mut receiver, mut bytes) = (Receiver::default(), [0; 512]);
     let (mut began, mut latest, mut quiet) = (Instant::now(), Instant::now(), Instant::now());
@@ -91,7 +91,8 @@ fn serve(mut line: File, serial: Serial, served: &AtomicU64, hasty: &AtomicU64) 
         while let Some(request) = receiver.take() {
             let over = (began + character * request.len() as u32).max(now);
             began = over;
-            let Some(answer) = super::answer(&request[..request.len() - 2]) else { continue };
+            let heard = Some(&request[..request.len() - 2]).filter(|message| message.first().copied() != dead);
+            let Some(answer) = heard.and_then(super::answer) else { continue };
             let Ok(end) = say(&mut line, &with_crc(&answer), over + serial.silence(), character) else { return };
             quiet = end + serial.silence();
             served.fetch_add(1, Ordering::Relaxed);

@@ -21,6 +21,9 @@ use crate::{
     },
 };
 
+/// Requests in a row without any answer after which a TCP connection is made anew.
+const UNANSWERED_MAX: u32 = 5;
+
 /// How a read has ended: values or a fault, with the evidence.
 pub(super) type Outcome = (Result<Answer, Fault>, Option<Arc<Exchange>>);
 
@@ -49,7 +52,16 @@ impl Task {
         };
         // Nothing new was sent when patience was the only way.
         let exchange = link.last.clone().filter(|last| sent.as_ref().is_none_or(|sent| !Arc::ptr_eq(sent, last)));
-        self.settle(link, schedule, index, at, (answer, exchange)).await.map(Ok)
+        self.settle(link, schedule, index, at, (answer, exchange)).await?;
+        Ok(self.still_there(link))
+    }
+
+    /// A peer may have forgotten a connection, or hold it without ever answering: only a new one tells.
+    fn still_there(&self, link: &Link) -> Result<(), Leave> {
+        if self.settings.transport.serial().is_some() || link.unanswered < UNANSWERED_MAX {
+            return Ok(());
+        }
+        Err(Leave::Lost(format!("no answer to {} requests over this connection", link.unanswered)))
     }
 
     /// Reads all blocks that are due now, at most `in_flight` at once. Transaction ids tell their answers apart.
@@ -78,7 +90,7 @@ impl Task {
             let answer = answered.answer.and_then(|answer| parse(&self.blocks[index], &answer));
             self.settle(link, schedule, index, at, (answer, Some(answered.exchange))).await?;
         }
-        Ok(Ok(()))
+        Ok(self.still_there(link))
     }
 
     /// How many requests may be under way when this block is among them.

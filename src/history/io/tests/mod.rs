@@ -15,7 +15,8 @@ use crate::{
     bus::io::clock::Clock,
     history::{Answer, HistoryError, Question, Series, io::Query},
     plant::{
-        def::{PlantDef, Priority, TagId},
+        def::{LineDef, LineId, PlantDef, Priority, TagId, Transport},
+        line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord, AlarmStep, Record},
         sample::{Cause, Sample},
     },
@@ -218,6 +219,58 @@ fn lists_come_newest_first_within_their_span_and_limit() {
     let question = Question::Actions { from: sec(0), to: sec(10), limit: 1 };
     assert_eq!(store.answer(&question, sec(10)).unwrap(), Answer::Actions(vec![deed(4)]));
     assert_eq!(store.answer(&journal(5, 5, 1), sec(10)), Err(HistoryError::EmptyPeriod));
+}
+
+/// A minute of a line that ends `at`, with so many requests.
+fn minute(line: &str, at: i64, requests: u64) -> LineMinute {
+    LineMinute {
+        at: sec(at),
+        line: line.into(),
+        requests,
+        ok: requests - 3,
+        timeouts: 1,
+        corrupt: 1,
+        exceptions: 1,
+        retries: 2,
+        late: 4,
+        missed: 5,
+        sent_bytes: 480,
+        received_bytes: 1_260,
+        utilisation: 0.62,
+        reply_p99_ms: Some(14.1),
+        reply_max_ms: None,
+    }
+}
+
+#[test]
+fn what_a_line_counted_comes_back_minute_by_minute() {
+    let (_folder, db) = folder();
+    let mut def = plant("Asia/Bangkok", &THREE);
+    def.lines.push(LineDef::new(LineId(0), "L1", Transport::tcp("plc", 502)));
+    let store = Store::open(&db, &Arc::new(def), sec(0)).unwrap().store;
+    let minutes = [minute("L1", 60, 60), minute("L1", 120, 58), minute("L1", 180, 61)];
+    let records = minutes.iter().cloned().chain([minute("L2", 120, 9)]).map(Record::Line);
+    store.append(&records.collect::<Vec<_>>()).unwrap();
+    assert_eq!(store.count_rows().unwrap(), 4);
+    let ask = |from, to, limit| Question::LineMinutes { line: LineId(0), from: sec(from), to: sec(to), limit };
+    for (question, expect) in
+        [(ask(0, 300, 100), &minutes[..]), (ask(60, 180, 100), &minutes[..2]), (ask(0, 300, 2), &minutes[1..])]
+    {
+        assert_eq!(store.answer(&question, sec(300)).unwrap(), Answer::LineMinutes(expect.to_vec()), "{question:?}");
+    }
+}
+
+#[test]
+fn a_history_of_an_older_program_gets_the_new_table_and_keeps_its_rows() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.append(&[good(PV, 0, 27.0)]).unwrap();
+    store.db.execute_batch("DROP TABLE line_minute; DELETE FROM schema_version WHERE version = 2").unwrap();
+    drop(store);
+    let store = open(&db, 10);
+    store.append(&[Record::Line(minute("L1", 60, 60))]).unwrap();
+    // The value, the end of its curve, the minute.
+    assert_eq!(store.count_rows().unwrap(), 3);
 }
 
 #[test]

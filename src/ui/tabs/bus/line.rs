@@ -19,6 +19,7 @@ use crate::{
     },
     ui::{
         Cx,
+        tabs::controllers::signal_mark,
         widgets::{
             spark,
             text::{between, clock, running, wrap},
@@ -237,19 +238,18 @@ fn devices(cx: &Cx, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
     let mut lines = Vec::new();
     for device in cx.def().devices.iter().filter(|device| device.line == at.id) {
         let Some(tally) = report.device(device.id) else { continue };
-        let ill = is_ill(cx, device) || near(tally, report.settings.timeout).is_some();
-        let mark = match cx.snapshot.device(device.id).state {
-            DeviceState::Down { .. } => "✗",
-            DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_) if ill => "!",
-            DeviceState::Answering => "✓",
-            DeviceState::Unknown | DeviceState::Failing(_) => "?",
+        let diagnosed = cx.snapshot.device(device.id).diagnosis.is_some();
+        let ill = diagnosed || is_ill(cx, device) || near(tally, report.settings.timeout).is_some();
+        let mark = match cx.snapshot.device(device.id).diagnosis {
+            Some(reason) => signal_mark(reason.signal()),
+            None => if ill { "!" } else { "✓" }.to_owned(),
         };
         styles.push(if ill { cx.theme.trouble() } else { cx.theme.normal() });
         let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
         let (failed, of) = tally.recent();
         let share = tally.reply.p99().map(|p99| p99.as_secs_f64() / report.settings.timeout.as_secs_f64());
         lines.push([
-            mark.to_owned(),
+            mark,
             device.name.clone(),
             device.unit.to_string(),
             state(cx, device),

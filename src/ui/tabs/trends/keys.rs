@@ -39,6 +39,8 @@ pub enum Action {
     Live,
     /// Curves, or the list of all values.
     Values,
+    /// Say why the selected value is what it is.
+    Why,
 }
 
 /// Keys of this tab.
@@ -57,6 +59,7 @@ pub const KEYS: &[Key<Action>] = &[
     key(char('g'), "group", "next group of pens", Action::Group),
     key(char(' '), "pen", "switch the selected pen on or off", Action::Toggle),
     key(char('v'), "values", "all values with their last hour, or the curves", Action::Values),
+    key(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why),
     key(char('m'), "mode", "moving window, or everything since the start of the day", Action::Mode),
     key(char('u'), "rate", "how often the curves are read anew: 0.5, 1, 2, 5, 10 s", Action::Rate),
     key(code(KeyCode::Enter), "", "in the list of values: show its curve", Action::Open),

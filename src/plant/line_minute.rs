@@ -1,0 +1,243 @@
+//! A minute of a line in figures: what it counted, so that one that goes bad slowly shows as a trend.
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+
+use super::{id::DeviceId, line_report::LineReport, tally::Tally};
+
+/// What a line counted in one minute.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LineMinute {
+    /// The end of the minute.
+    pub at: Timestamp,
+    /// The line by name: the history outlives the plant file.
+    pub line: Arc<str>,
+    /// Requests sent.
+    pub requests: u64,
+    /// Valid normal answers.
+    pub ok: u64,
+    /// No answer in time.
+    pub timeouts: u64,
+    /// Spoiled answers.
+    pub corrupt: u64,
+    /// Exception answers.
+    pub exceptions: u64,
+    /// Requests sent again.
+    pub retries: u64,
+    /// Answers to requests that had been given up.
+    pub late: u64,
+    /// Polls that were left out.
+    pub missed: u64,
+    /// Bytes sent.
+    pub sent_bytes: u64,
+    /// Bytes received.
+    pub received_bytes: u64,
+    /// Share of the minute in which the line was busy, 0–1.
+    pub utilisation: f32,
+    /// 99 of 100 answers began within this time, ms; `None` without an answer.
+    pub reply_p99_ms: Option<f32>,
+    /// The slowest, ms (to about a fifth).
+    pub reply_max_ms: Option<f32>,
+}
+
+impl LineMinute {
+    /// Share of the requests that failed, 0–1; `None` if nothing was asked.
+    pub fn failed(&self) -> Option<f64> {
+        let failed = self.timeouts + self.corrupt + self.exceptions;
+        (0 < self.requests).then(|| failed as f64 / self.requests as f64)
+    }
+}
+
+/// The minute that ends `at`, from the totals before and after it. Counters that have begun anew count from zero.
+pub fn minute(line: Arc<str>, before: &LineReport, after: &LineReport, at: Timestamp) -> LineMinute {
+    let (old, new) = (&before.counters, &after.counters);
+    let anew = new.requests < old.requests || new.sent_bytes < old.sent_bytes;
+    let since = |new: u64, old: u64| if anew { new } else { new.saturating_sub(old) };
+    let devices = devices(after, (!anew).then_some(before));
+    let ms = |span: Option<std::time::Duration>| span.map(|span| span.as_secs_f32() * 1e3);
+    let sent_bytes = since(new.sent_bytes, old.sent_bytes);
+    LineMinute {
+        at,
+        line,
+        requests: since(new.requests, old.requests),
+        ok: since(new.ok, old.ok),
+        timeouts: since(new.timeouts, old.timeouts),
+        corrupt: since(new.corrupt, old.corrupt),
+        exceptions: since(new.exceptions, old.exceptions),
+        retries: devices.retries,
+        late: since(new.late, old.late),
+        missed: since(new.missed, old.missed),
+        sent_bytes,
+        received_bytes: since(new.received_bytes, old.received_bytes),
+        // A line that is not connected reports nothing new: its last figure is not that of this minute.
+        utilisation: if sent_bytes == 0 { 0.0 } else { new.utilisation_minute },
+        reply_p99_ms: ms(devices.reply.p99()),
+        reply_max_ms: ms(devices.reply.max()),
+    }
+}
+
+/// Retries and reply times of all devices of a line since an earlier report.
+fn devices(after: &LineReport, before: Option<&LineReport>) -> Tally {
+    let mut all = Tally::default();
+    for (device, tally) in &after.devices {
+        let since = since(tally, before.and_then(|before| before.device(*device)));
+        all.retries += since.retries;
+        all.reply.merge(&since.reply);
+    }
+    all
+}
+
+fn since(tally: &Tally, before: Option<&Tally>) -> Tally {
+    before.map_or_else(|| tally.clone(), |before| tally.since(before))
+}
+
+/// Earlier reports of a line, to tell what was counted since.
+#[derive(Debug, Clone, Default)]
+pub struct LineWatch {
+    /// The running minute, and the totals at its beginning.
+    minute: Option<(i64, Arc<LineReport>)>,
+    /// The totals ten to twenty minutes ago, and those of at most ten minutes ago.
+    older: Option<Arc<LineReport>>,
+    newer: Option<(Timestamp, Arc<LineReport>)>,
+}
+
+/// "Lately" reaches back once to twice as far, seconds.
+const LATELY_S: i64 = 600;
+
+impl LineWatch {
+    /// Time passes. At the end of a minute: its figures.
+    pub fn tick(&mut self, at: Timestamp, line: &str, report: &Arc<LineReport>) -> Option<LineMinute> {
+        match &self.newer {
+            Some((since, _)) if at.as_second() - since.as_second() < LATELY_S => {}
+            _ => {
+                self.older = self.newer.take().map(|(_, report)| report);
+                self.newer = Some((at, report.clone()));
+            }
+        }
+        let number = at.as_second().div_euclid(60);
+        let Some((_, before)) = self.minute.take_if(|(running, _)| *running != number) else {
+            self.minute.get_or_insert_with(|| (number, report.clone()));
+            return None;
+        };
+        self.minute = Some((number, report.clone()));
+        let end = Timestamp::from_second(number * 60).unwrap_or(at);
+        Some(minute(line.into(), &before, report, end))
+    }
+
+    /// What a device has answered lately, with the polls that were left out.
+    pub fn lately(&self, report: &LineReport, device: DeviceId) -> Tally {
+        // Since the start, as long as that is not long ago.
+        let before = self.older.as_deref();
+        let now = report.device(device).cloned().unwrap_or_default();
+        let missed = |report: &LineReport| -> u64 {
+            report.polls.iter().filter(|poll| poll.device == device).map(|poll| poll.tally.missed).sum()
+        };
+        let tally = since(&now, before.and_then(|before| before.device(device)));
+        Tally { missed: missed(report).saturating_sub(before.map_or(0, missed)), ..tally }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::plant::{
+        event::{Fault, LineCounters},
+        fixture::{self, TIC},
+        traffic::Frames,
+    };
+
+    fn at(second: i64) -> Timestamp {
+        Timestamp::from_second(second).expect("a small number")
+    }
+
+    /// So many good answers in `reply_ms`, so many timeouts.
+    fn report(good: u64, reply_ms: u64, timeouts: u64) -> LineReport {
+        let mut tally = Tally::default();
+        for _ in 0..good {
+            tally.count(Ok(()), Some(Duration::from_millis(reply_ms)));
+        }
+        for _ in 0..timeouts {
+            tally.count(Err(Fault::Timeout), None);
+        }
+        let requests = good + timeouts;
+        LineReport {
+            settings: fixture::plant().lines[0].clone(),
+            counters: LineCounters {
+                requests,
+                ok: good,
+                timeouts,
+                sent_bytes: 8 * requests,
+                received_bytes: 21 * good,
+                utilisation_minute: 0.6,
+                ..LineCounters::default()
+            },
+            polls: Vec::new(),
+            devices: vec![(TIC, tally)],
+            busy: Vec::new(),
+            frames: Frames::default(),
+        }
+    }
+
+    #[test]
+    fn a_minute_is_the_difference_of_its_totals() {
+        let minute = minute("L1".into(), &report(100, 10, 0), &report(155, 10, 5), at(120));
+        assert_eq!((minute.requests, minute.ok, minute.timeouts), (60, 55, 5));
+        assert_eq!((minute.sent_bytes, minute.received_bytes), (480, 55 * 21));
+        assert_eq!(minute.failed(), Some(5.0 / 60.0));
+        assert_eq!(minute.utilisation, 0.6);
+        assert!(minute.reply_p99_ms.is_some_and(|ms| (10.0..12.1).contains(&ms)), "{:?}", minute.reply_p99_ms);
+    }
+
+    #[test]
+    fn a_slow_past_does_not_slow_this_minute() {
+        let (before, mut after) = (report(50, 400, 0), report(50, 400, 0));
+        for _ in 0..10 {
+            after.devices[0].1.count(Ok(()), Some(Duration::from_millis(10)));
+        }
+        after.counters = LineCounters { requests: 60, ok: 60, sent_bytes: 480, ..after.counters };
+        let minute = minute("L1".into(), &before, &after, at(60));
+        assert!(minute.reply_max_ms.is_some_and(|ms| ms < 12.1), "{:?}", minute.reply_max_ms);
+    }
+
+    #[test]
+    fn counters_that_begin_anew_count_from_zero() {
+        let minute = minute("L1".into(), &report(1_000, 400, 9), &report(20, 10, 1), at(60));
+        assert_eq!((minute.requests, minute.ok, minute.timeouts), (21, 20, 1));
+        assert!(minute.reply_max_ms.is_some_and(|ms| ms < 12.1), "{:?}", minute.reply_max_ms);
+    }
+
+    #[test]
+    fn a_line_that_says_nothing_new_is_idle() {
+        let minute = minute("L1".into(), &report(10, 10, 0), &report(10, 10, 0), at(60));
+        assert_eq!((minute.requests, minute.failed(), minute.reply_p99_ms), (0, None, None));
+        assert_eq!(minute.utilisation, 0.0);
+    }
+
+    #[test]
+    fn every_minute_is_told_once_at_its_end() {
+        let mut watch = LineWatch::default();
+        let mut told = Vec::new();
+        for second in 30..250 {
+            let report = Arc::new(report(second as u64, 10, 0));
+            told.extend(watch.tick(at(second), "L1", &report).map(|minute| (minute.at.as_second(), minute.requests)));
+        }
+        assert_eq!(told, [(60, 30), (120, 60), (180, 60), (240, 60)]);
+    }
+
+    #[test]
+    fn lately_forgets_what_was_long_ago() {
+        let mut watch = LineWatch::default();
+        let lately = |watch: &LineWatch, report: &LineReport| watch.lately(report, TIC).timeouts;
+        let bad = Arc::new(report(100, 10, 50));
+        watch.tick(at(0), "L1", &Arc::new(report(0, 10, 0)));
+        watch.tick(at(300), "L1", &bad);
+        assert_eq!(lately(&watch, &bad), 50);
+        watch.tick(at(601), "L1", &bad);
+        assert_eq!(lately(&watch, &bad), 50, "not yet twice ten minutes");
+        watch.tick(at(1_202), "L1", &bad);
+        assert_eq!(lately(&watch, &bad), 0);
+    }
+}

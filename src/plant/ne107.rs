@@ -1,0 +1,260 @@
+//! How a device stands, by NAMUR NE 107: one of four letters with its reason, or nothing while all is well.
+
+use std::{fmt, time::Duration};
+
+use super::{
+    event::{ExceptionCode, LineState},
+    snapshot::DeviceState,
+    tally::Tally,
+};
+
+/// The four status signals of NE 107. A device that is well has none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Signal {
+    /// Its values are not valid.
+    Failure,
+    /// Its values are not valid for the moment, because somebody works on it.
+    FunctionCheck,
+    /// It works outside of what it is meant for: values are late or missing now and then.
+    OutOfSpecification,
+    /// Values are good, but something wears out: to be looked at before it fails.
+    Maintenance,
+}
+
+impl Signal {
+    /// `F`, `C`, `S`, `M`.
+    pub fn letter(self) -> char {
+        match self {
+            Signal::Failure => 'F',
+            Signal::FunctionCheck => 'C',
+            Signal::OutOfSpecification => 'S',
+            Signal::Maintenance => 'M',
+        }
+    }
+
+    /// In the words of the recommendation.
+    pub fn word(self) -> &'static str {
+        match self {
+            Signal::Failure => "failure",
+            Signal::FunctionCheck => "function check",
+            Signal::OutOfSpecification => "out of specification",
+            Signal::Maintenance => "maintenance required",
+        }
+    }
+}
+
+/// Why a device has a signal. Its text is for the operator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reason {
+    /// An operator has closed the line.
+    LineClosed,
+    /// A test has the line.
+    LineTesting,
+    /// The port or connection is gone.
+    NotConnected,
+    /// It has stopped answering.
+    Down,
+    /// It is left alone after an action that takes it some time.
+    Settling,
+    /// Answers come so late that the next ones may come too late.
+    Slow {
+        /// 99 of 100 answers come within this time.
+        p99: Duration,
+        /// How long is waited for an answer.
+        timeout: Duration,
+    },
+    /// Too many of the latest requests failed.
+    Failing {
+        /// So many.
+        failed: u32,
+        /// Of so many.
+        of: u32,
+    },
+    /// Reads were left out, because the line had no time for them.
+    Missed(u64),
+    /// Spoiled or repeated requests.
+    Spoiled {
+        /// So many.
+        spoiled: u64,
+        /// Of so many.
+        of: u64,
+    },
+    /// Answers to requests that had been given up.
+    Late(u64),
+    /// The device says that its memory has failed (exception 08).
+    MemoryParity(u64),
+}
+
+impl Reason {
+    /// Which signal it gives.
+    pub fn signal(self) -> Signal {
+        match self {
+            Reason::NotConnected | Reason::Down => Signal::Failure,
+            Reason::LineClosed | Reason::LineTesting | Reason::Settling => Signal::FunctionCheck,
+            Reason::Slow { .. } | Reason::Failing { .. } | Reason::Missed(_) => Signal::OutOfSpecification,
+            Reason::Spoiled { .. } | Reason::Late(_) | Reason::MemoryParity(_) => Signal::Maintenance,
+        }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Reason::LineClosed => f.write_str("line closed by an operator"),
+            Reason::LineTesting => f.write_str("a test has the line"),
+            Reason::NotConnected => f.write_str("line not connected"),
+            Reason::Down => f.write_str("not answering"),
+            Reason::Settling => f.write_str("left alone after an action"),
+            Reason::Slow { p99, timeout } => {
+                write!(f, "answers take {} of {} ms", p99.as_millis(), timeout.as_millis())
+            }
+            Reason::Failing { failed, of } => write!(f, "{failed} of {of} requests failed"),
+            Reason::Missed(count) => write!(f, "{count} reads left out, line too busy"),
+            Reason::Spoiled { spoiled, of } => write!(f, "{spoiled} of {of} answers spoiled or repeated"),
+            Reason::Late(count) => write!(f, "{count} answers came too late"),
+            Reason::MemoryParity(count) => write!(f, "memory parity error ({count})"),
+        }
+    }
+}
+
+/// What the judgement stands on.
+#[derive(Debug, Clone, Copy)]
+pub struct Evidence<'a> {
+    /// The device.
+    pub device: DeviceState,
+    /// Its line.
+    pub line: &'a LineState,
+    /// It is left alone after an action.
+    pub settling: bool,
+    /// What it has answered lately, its missed polls included.
+    pub lately: &'a Tally,
+    /// How long is waited for an answer.
+    pub timeout: Duration,
+}
+
+/// Fewer requests than these say nothing about shares.
+const REQUESTS_MIN: u64 = 20;
+/// Share of the timeout that answers may take, in hundredths.
+const SLOW_PERCENT: u32 = 80;
+/// Share of the recent requests that may fail, in hundredths.
+const FAILING_PERCENT: u32 = 10;
+/// Share of requests that may be spoiled or repeated, in hundredths.
+const SPOILED_PERCENT: u64 = 1;
+
+/// The worst that can be said of a device; `None` while it is well, or nothing is known.
+pub fn judge(evidence: Evidence) -> Option<Reason> {
+    match evidence.line {
+        LineState::Disconnected => return Some(Reason::LineClosed),
+        LineState::Testing => return Some(Reason::LineTesting),
+        LineState::Waiting { .. } => return Some(Reason::NotConnected),
+        LineState::Connecting | LineState::Connected => {}
+    }
+    // A device that was told to be busy is not one that has failed.
+    if evidence.settling {
+        return Some(Reason::Settling);
+    }
+    match evidence.device {
+        DeviceState::Down { .. } => Some(Reason::Down),
+        DeviceState::Unknown => None,
+        DeviceState::Answering | DeviceState::Failing(_) => {
+            out_of_specification(evidence.lately, evidence.timeout).or_else(|| maintenance(evidence.lately))
+        }
+    }
+}
+
+fn out_of_specification(lately: &Tally, timeout: Duration) -> Option<Reason> {
+    let enough = REQUESTS_MIN <= lately.requests;
+    let slow = lately.reply.p99().filter(|p99| enough && timeout * SLOW_PERCENT < *p99 * 100);
+    let (failed, of) = lately.recent();
+    if let Some(p99) = slow {
+        Some(Reason::Slow { p99, timeout })
+    } else if enough && of * FAILING_PERCENT <= failed * 100 {
+        Some(Reason::Failing { failed, of })
+    } else {
+        (0 < lately.missed).then_some(Reason::Missed(lately.missed))
+    }
+}
+
+fn maintenance(lately: &Tally) -> Option<Reason> {
+    let parity = |(code, count): &(ExceptionCode, u64)| (code.0 == 0x08).then_some(*count);
+    let parity: u64 = lately.exceptions.iter().filter_map(parity).sum();
+    // What is repeated was spoiled: the greater of the two, not their sum.
+    let (spoiled, of) = (lately.corrupt().max(lately.retries), lately.requests);
+    if 0 < parity {
+        Some(Reason::MemoryParity(parity))
+    } else if REQUESTS_MIN <= of && of * SPOILED_PERCENT <= spoiled * 100 {
+        Some(Reason::Spoiled { spoiled, of })
+    } else {
+        (0 < lately.late).then_some(Reason::Late(lately.late))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use jiff::Timestamp;
+
+    use super::*;
+    use crate::plant::event::Fault;
+
+    const UP: DeviceState = DeviceState::Answering;
+    const DOWN: DeviceState = DeviceState::Down { since: Timestamp::UNIX_EPOCH };
+
+    /// `good` answers in `reply_ms`, then these faults.
+    fn tally(good: usize, reply_ms: u64, faults: &[Fault]) -> Tally {
+        let mut tally = Tally::default();
+        for _ in 0..good {
+            tally.count(Ok(()), Some(Duration::from_millis(reply_ms)));
+        }
+        for fault in faults {
+            tally.count(Err(*fault), None);
+        }
+        tally
+    }
+
+    fn check(line: &LineState, device: DeviceState, settling: bool, lately: &Tally, expect: &str) {
+        let timeout = Duration::from_millis(300);
+        let reason = judge(Evidence { device, line, settling, lately, timeout });
+        let words = reason.map(|reason| format!("{} {reason}", reason.signal().letter()));
+        assert_eq!(words.as_deref().unwrap_or(""), expect);
+    }
+
+    #[test]
+    fn the_worst_comes_first() {
+        let well = tally(1_000, 12, &[]);
+        let waiting = LineState::Waiting { why: "gone".into(), retry_at: Timestamp::UNIX_EPOCH };
+        check(&LineState::Connected, UP, false, &well, "");
+        check(&LineState::Connected, DeviceState::Unknown, false, &Tally::default(), "");
+        check(&LineState::Connecting, DeviceState::Unknown, false, &Tally::default(), "");
+        check(&LineState::Connected, DOWN, false, &well, "F not answering");
+        check(&waiting, DOWN, false, &well, "F line not connected");
+        check(&LineState::Disconnected, DeviceState::Unknown, false, &well, "C line closed by an operator");
+        check(&LineState::Testing, DeviceState::Unknown, false, &well, "C a test has the line");
+        check(&LineState::Connected, UP, true, &well, "C left alone after an action");
+        check(&LineState::Connected, DOWN, true, &well, "C left alone after an action");
+    }
+
+    #[test]
+    fn late_and_missing_answers_are_out_of_specification() {
+        let check = |lately: &Tally, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
+        check(&tally(1_000, 200, &[]), "");
+        check(&tally(1_000, 260, &[]), "S answers take 260 of 300 ms");
+        check(&tally(10, 260, &[]), "");
+        check(&tally(94, 12, &[Fault::Timeout; 6]), "");
+        check(&tally(93, 12, &[Fault::Timeout; 7]), "S 7 of 64 requests failed");
+        check(&tally(3, 12, &[Fault::Timeout; 3]), "");
+        let missed = Tally { missed: 2, ..tally(100, 12, &[]) };
+        check(&missed, "S 2 reads left out, line too busy");
+    }
+
+    #[test]
+    fn what_still_works_but_not_as_it_should_asks_for_maintenance() {
+        let check = |lately: &Tally, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
+        let crc = Fault::Crc { got: 1, computed: 2 };
+        check(&tally(199, 12, &[crc]), "");
+        check(&tally(198, 12, &[crc, crc]), "M 2 of 200 answers spoiled or repeated");
+        check(&Tally { retries: 1, ..tally(100, 12, &[]) }, "M 1 of 100 answers spoiled or repeated");
+        check(&Tally { late: 1, ..tally(100, 12, &[]) }, "M 1 answers came too late");
+        check(&tally(100, 12, &[Fault::Exception(ExceptionCode(0x08))]), "M memory parity error (1)");
+        check(&tally(100, 12, &[Fault::Exception(ExceptionCode(0x06))]), "");
+    }
+}

@@ -1,0 +1,90 @@
+//! How lines and devices stand over time: a minute of each line for the history, the diagnosis of each device.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+
+use super::Plant;
+use crate::plant::{
+    command::{Command, Outcome},
+    def::DeviceId,
+    ne107::{self, Evidence},
+    record::Record,
+    snapshot::DeviceStatus,
+};
+
+impl Plant {
+    /// The minutes of lines that end now.
+    pub(super) fn minutes(&mut self, at: Timestamp) -> Vec<Record> {
+        let lines = self.def.lines.iter().zip(&self.lines).zip(&mut self.watches);
+        let minutes = lines.filter_map(|((def, line), watch)| watch.tick(at, &def.name, line.report.as_ref()?));
+        minutes.map(Record::Line).collect()
+    }
+
+    /// Every device with what is wrong with it.
+    pub(super) fn diagnosed(&self) -> Vec<DeviceStatus> {
+        let diagnosed = |(def, status): (&crate::plant::def::DeviceDef, &DeviceStatus)| {
+            let line = &self.lines[def.line.index()];
+            let watch = &self.watches[def.line.index()];
+            let report = line.report.as_deref();
+            let lately = report.map(|report| watch.lately(report, def.id)).unwrap_or_default();
+            let timeout = report.map_or(self.def.line(def.line).timeout, |report| report.settings.timeout);
+            let settling = self.settling(def.id);
+            let evidence = Evidence { device: status.state, line: &line.state, settling, lately: &lately, timeout };
+            DeviceStatus { diagnosis: ne107::judge(evidence), ..*status }
+        };
+        self.def.devices.iter().zip(&self.devices).map(diagnosed).collect()
+    }
+
+    /// Is a device left alone because an action takes it some time (saving its settings)?
+    fn settling(&self, device: DeviceId) -> bool {
+        let actions = &self.def.device(device).actions;
+        self.desk.orders().any(|order| match (&order.command, &order.outcome) {
+            (Command::Write { tag, value }, Outcome::Verified | Outcome::NotConfirmed(_) | Outcome::Failed(_)) => {
+                let age = Duration::try_from(self.at.duration_since(order.at)).unwrap_or_default();
+                actions.iter().any(|action| action.tag == *tag && action.value == *value && age < action.settle)
+            }
+            _ => false,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::plant::{
+        command::{Order, OrderId},
+        def::{ActionDef, LineId},
+        event::{Event, LineState, WriteResult},
+        fixture::{self, DP, PLC, PV, SV, TIC},
+        id::WriteId,
+        ne107::Reason,
+    };
+
+    fn at(second: i64) -> Timestamp {
+        Timestamp::from_second(second).expect("a small number")
+    }
+
+    #[test]
+    fn a_device_that_saves_its_settings_is_not_broken() {
+        let mut def = fixture::plant();
+        let settle = Duration::from_secs(5);
+        def.devices[0].actions =
+            vec![ActionDef { name: "FIX".into(), tag: SV, value: 1.0, settle, confirm: String::new() }];
+        let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+        plant.on_event(Event::Line { at: at(0), line: LineId(0), state: LineState::Connected });
+        let values = vec![(PV, 700.0), (DP, 1.0)];
+        let reply = Duration::from_millis(12);
+        plant.on_event(Event::Read { at: at(0), device: TIC, values, reply, exchange: None });
+        assert_eq!(plant.snapshot().device(TIC).diagnosis, None);
+        let id = OrderId { terminal: 1, number: 1 };
+        plant.on_order(Order { id, by: "anna".into(), command: Command::Write { tag: SV, value: 1.0 } }, at(1));
+        plant.on_event(Event::Wrote { at: at(1), id: WriteId(1), result: WriteResult::ReadBack(10.0) });
+        assert_eq!(plant.snapshot().device(TIC).diagnosis, Some(Reason::Settling));
+        assert_eq!(plant.snapshot().device(PLC).diagnosis, None);
+        plant.on_tick(at(7));
+        assert_eq!(plant.snapshot().device(TIC).diagnosis, None);
+    }
+}

@@ -1,0 +1,168 @@
+//! Writes settings into the plant file: the whole file anew beside it, then over it in one step.
+
+use std::{
+    fs::{self, File},
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+use super::read;
+use crate::{plant::def::LineDef, profile::edit};
+
+/// The plant file as it was when the plant was loaded or last saved.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PlantFile {
+    path: PathBuf,
+    bytes: Vec<u8>,
+}
+
+impl PlantFile {
+    pub(super) fn new(path: &Path, bytes: &[u8]) -> PlantFile {
+        // A link stays a link: what it points to is written.
+        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        PlantFile { path, bytes: bytes.to_vec() }
+    }
+
+    /// Puts the settings of a line into the file; everything else in it stays as it is, comments included. `Err` says in
+    /// words for the operator why nothing was written: the file has changed since, cannot be written, or the settings
+    /// cannot be told in it. Blocks while the disk works.
+    pub fn save(&mut self, settings: &LineDef) -> Result<(), String> {
+        let file = self.path.display();
+        let now = read(&self.path).map_err(|why| format!("{file} cannot be read: {why}"))?;
+        if now != self.bytes {
+            return Err(format!("{file} was changed by somebody since this station has started; restart it first"));
+        }
+        let text = std::str::from_utf8(&now).map_err(|_| format!("{file} is not UTF-8"))?;
+        let text = edit::with_line(text, settings)?;
+        self.replace(text.as_bytes()).map_err(|error| format!("{file} cannot be written: {error}"))?;
+        self.bytes = text.into_bytes();
+        Ok(())
+    }
+
+    /// Whoever loses power now finds the old file or the new one, never half of one.
+    fn replace(&self, bytes: &[u8]) -> std::io::Result<()> {
+        // A file that may not be written is not to be replaced either, although its folder would allow it.
+        let permissions = File::options().append(true).open(&self.path)?.metadata()?.permissions();
+        if permissions.readonly() {
+            return Err(std::io::Error::new(std::io::ErrorKind::PermissionDenied, "it is read-only"));
+        }
+        let mut beside = self.path.clone().into_os_string();
+        beside.push(format!(".new-{}", std::process::id()));
+        let beside = PathBuf::from(beside);
+        let written = write_whole(&beside, bytes, permissions).and_then(|()| fs::rename(&beside, &self.path));
+        if written.is_err() {
+            // What was begun is of no use to anybody.
+            let _ = fs::remove_file(&beside);
+        }
+        written?;
+        let folder = self.path.parent().unwrap_or(Path::new("/"));
+        File::open(folder)?.sync_all()
+    }
+}
+
+fn write_whole(path: &Path, bytes: &[u8], permissions: fs::Permissions) -> std::io::Result<()> {
+    let mut file = File::create(path)?;
+    file.set_permissions(permissions)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+
+    use super::*;
+    use crate::{
+        plant::def::{Serial, Transport},
+        profile::{Search, load, load_with_file},
+    };
+
+    const TEXT: &str = "\
+title = \"Small\" # one line, one device
+time_zone = \"UTC\"
+
+[[line]]
+name = \"L1\"
+mode = \"rtu\"
+port = \"/dev/ttyUSB0\" # the blue adapter
+baud = 9600
+parity = \"N\"
+
+[[device]]
+name = \"TIC-1\"
+profile = \"fuji_pxr\"
+line = \"L1\"
+unit = 1
+";
+
+    struct Plant {
+        _folder: tempfile::TempDir,
+        path: PathBuf,
+        file: PlantFile,
+        line: LineDef,
+    }
+
+    fn plant() -> Plant {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("small.toml");
+        fs::write(&path, TEXT).unwrap();
+        let (def, file) = load_with_file(&path, &Search::shipped()).unwrap();
+        let serial = Serial { baud: 19_200, ..Serial::USUAL };
+        let line = LineDef { transport: Transport::rtu("/dev/ttyUSB0", serial), ..def.lines[0].clone() };
+        Plant { _folder: folder, path, file: file.unwrap(), line }
+    }
+
+    #[test]
+    fn what_is_saved_is_what_is_loaded_next_time() {
+        let mut plant = plant();
+        fs::set_permissions(&plant.path, fs::Permissions::from_mode(0o640)).unwrap();
+        assert_eq!(plant.file.save(&plant.line), Ok(()));
+        assert_eq!(load(&plant.path, &Search::shipped()).unwrap().lines, [plant.line.clone()]);
+        assert_eq!(fs::read_to_string(&plant.path).unwrap(), TEXT.replace("9600", "19200"));
+        assert_eq!(fs::metadata(&plant.path).unwrap().permissions().mode() & 0o777, 0o640);
+        let name = |entry: std::io::Result<fs::DirEntry>| entry.unwrap().file_name();
+        let names: Vec<_> = fs::read_dir(plant.path.parent().unwrap()).unwrap().map(name).collect();
+        assert_eq!(names, ["small.toml"], "nothing is left beside it");
+        // And again, on what was just written.
+        plant.line.timeout = std::time::Duration::from_millis(700);
+        assert_eq!(plant.file.save(&plant.line), Ok(()));
+        assert_eq!(load(&plant.path, &Search::shipped()).unwrap().lines, [plant.line]);
+    }
+
+    #[test]
+    fn somebody_elses_changes_are_not_overwritten() {
+        let mut plant = plant();
+        let other = TEXT.replace("Small", "Large");
+        fs::write(&plant.path, &other).unwrap();
+        let refused = plant.file.save(&plant.line);
+        assert!(refused.as_ref().is_err_and(|why| why.contains("was changed by somebody")), "{refused:?}");
+        assert_eq!(fs::read_to_string(&plant.path).unwrap(), other);
+    }
+
+    #[test]
+    fn a_read_only_file_stays_as_it_is() {
+        let mut plant = plant();
+        fs::set_permissions(&plant.path, fs::Permissions::from_mode(0o444)).unwrap();
+        let refused = plant.file.save(&plant.line);
+        assert!(refused.as_ref().is_err_and(|why| why.contains("cannot be written")), "{refused:?}");
+        assert_eq!(fs::read_to_string(&plant.path).unwrap(), TEXT);
+    }
+
+    #[test]
+    fn a_link_stays_a_link() {
+        let plant = plant();
+        let link = plant.path.with_file_name("link.toml");
+        symlink(&plant.path, &link).unwrap();
+        let (_, file) = load_with_file(&link, &Search::shipped()).unwrap();
+        assert_eq!(file.unwrap().save(&plant.line), Ok(()));
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert!(fs::read_to_string(&plant.path).unwrap().contains("19200"));
+    }
+
+    #[test]
+    fn a_plant_of_the_program_has_no_file() {
+        let (_, file) = load_with_file(Path::new("tank"), &Search::shipped()).unwrap();
+        assert_eq!(file, None);
+    }
+}

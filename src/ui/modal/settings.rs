@@ -1,0 +1,292 @@
+//! The communication settings of a line: tried out, taken back, saved into the plant file.
+
+mod draft;
+#[cfg(test)]
+mod tests;
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect, style::Style};
+
+use super::{Modal, Next, faceplate::device_words, window};
+use crate::{
+    plant::{
+        command::Command,
+        def::{LineDef, LineId},
+        event::LineState,
+        snapshot::DeviceState,
+    },
+    ui::{
+        Act, Cx, keys,
+        keys::Hint,
+        widgets::text::{Canvas, fit, fit_words, wrap},
+    },
+};
+use draft::{Draft, Field};
+
+/// The form.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    line: LineId,
+    draft: Draft,
+    /// The selected row.
+    row: usize,
+    /// What Enter will do, asked once more.
+    asking: Option<Deed>,
+    problem: Option<String>,
+}
+
+/// What can be done here.
+#[derive(Debug, Clone, PartialEq)]
+enum Deed {
+    Use(Box<LineDef>),
+    TakeBack(Box<LineDef>),
+    Save,
+}
+
+impl Settings {
+    /// The settings in use of a line, to be changed.
+    pub fn new(cx: &Cx, line: LineId) -> Settings {
+        // The speed is what differs most often.
+        Settings { line, draft: Draft::of(in_use(cx, line)), row: 2, asking: None, problem: None }.in_range()
+    }
+
+    pub(super) fn hints(&self) -> Vec<Hint> {
+        let hint = |key: &str, label: &str| Hint::new(key, label, "");
+        if self.asking.is_some() {
+            return vec![hint("⏎", "yes"), hint("n", "no"), hint("Esc", "close")];
+        }
+        let mut hints = vec![hint("↑↓", "select")];
+        if self.field().is_choice() {
+            hints.push(hint("←→", "change"));
+        }
+        hints.push(hint("⏎", "use them"));
+        if !self.field().is_text() {
+            hints.extend([hint("u", "take back"), hint("S", "save")]);
+        }
+        hints.push(hint("Esc", "close"));
+        hints
+    }
+
+    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+        let enter = keys::code(KeyCode::Enter).is(event);
+        if let Some(deed) = self.asking.take() {
+            let yes = enter || keys::char('y').is(event);
+            let acts = if yes { vec![Act::Order(self.command(deed))] } else { Vec::new() };
+            return Next::Both(Modal::Settings(self), acts);
+        }
+        self.problem = None;
+        let asked = match event.code {
+            KeyCode::Enter if enter => self.ask_use(cx),
+            KeyCode::Up => self.select(-1),
+            KeyCode::Down | KeyCode::Tab => self.select(1),
+            KeyCode::Left if self.field().is_choice() => self.draft.step(self.field(), -1),
+            KeyCode::Right if self.field().is_choice() => self.draft.step(self.field(), 1),
+            KeyCode::Char(' ') if self.field().is_choice() => self.draft.step(self.field(), 1),
+            _ if self.draft.on_key(self.field(), event) => Ok(None),
+            KeyCode::Char('u') if keys::char('u').is(event) => self.ask_take_back(cx),
+            KeyCode::Char('S') if keys::char('S').is(event) => self.ask_save(cx),
+            KeyCode::Char('q') => return Next::Close,
+            _ => Ok(None),
+        };
+        match asked {
+            Ok(deed) => self.asking = deed,
+            Err(problem) => self.problem = Some(problem),
+        }
+        Next::Stay(Modal::Settings(self.in_range()))
+    }
+
+    pub(super) fn on_paste(&mut self, text: &str) {
+        let field = self.field();
+        if self.asking.is_none() {
+            self.draft.paste(field, text);
+        }
+    }
+
+    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+        let theme = cx.theme;
+        let used = in_use(cx, self.line);
+        let fields = self.draft.fields();
+        let room = body.width.saturating_sub(4).min(72);
+        let (status, pinned) = (self.status(cx, used, room), self.pinned(cx, used, room));
+        let title = format!("communication settings of {}", used.name);
+        let wanted = 1 + fields.len() + 1 + status.len() + 1 + pinned.len();
+        let mut canvas = window(cx, frame, body, &title, (room, wanted as u16));
+        // On a small screen: first the keys and what is asked, then the fields around the selected one, then the rest.
+        let height = usize::from(canvas.height());
+        let shown = fields.len().min(height.saturating_sub(1 + pinned.len()));
+        let first = (self.row + 1).saturating_sub(shown);
+        let new_at = NAME + room.saturating_sub(NAME) / 2;
+        canvas.text(NAME, 0, "in use", theme.dim());
+        canvas.text(new_at, 0, "new", theme.dim());
+        let old = Draft::of(used);
+        for (y, (n, field)) in fields.iter().enumerate().skip(first).take(shown).enumerate() {
+            let y = y as u16 + 1;
+            let selected = n == self.row && self.asking.is_none();
+            canvas.text(2, y, field.name(), if selected { theme.focus() } else { theme.normal() });
+            let before = old.words(*field);
+            canvas.text(NAME, y, &fit(&before, new_at.saturating_sub(NAME + 2)), theme.dim());
+            self.value(cx, &mut canvas, (new_at, y), *field, selected, before != self.draft.words(*field));
+        }
+        let free = height.saturating_sub(1 + shown + pinned.len());
+        let gap = usize::from(status.len() < free);
+        for (n, (text, style)) in status.iter().take(free).enumerate() {
+            canvas.text(0, (1 + shown + gap + n) as u16, text, *style);
+        }
+        for (n, (text, style)) in pinned.iter().enumerate() {
+            canvas.text(0, (height.saturating_sub(pinned.len()) + n) as u16, text, *style);
+        }
+    }
+
+    /// The new value of a field: a text with its cursor, or a choice between arrows; bold where it differs.
+    fn value(&self, cx: &Cx, canvas: &mut Canvas, (x, y): (u16, u16), field: Field, selected: bool, differs: bool) {
+        let theme = cx.theme;
+        let words = self.draft.words(field);
+        let style = if differs { theme.strong() } else { theme.normal() };
+        let end = match (selected, self.draft.text(field)) {
+            (true, Some(line)) => {
+                let rest = canvas.width().saturating_sub(x);
+                x + line.view(theme, &mut canvas.part(x, y, rest, 1), 0, 0)
+            }
+            (true, None) => canvas.text(x, y, &format!("‹ {words} ›"), style),
+            (false, _) => canvas.text(x, y, &words, style),
+        };
+        canvas.text(end + 1, y, field.unit(), theme.dim());
+        if differs {
+            canvas.text_right(canvas.width(), y, "◂ changed", theme.strong());
+        }
+    }
+
+    /// How the line does with what it uses, and what can be taken back.
+    fn status(&self, cx: &Cx, used: &LineDef, room: u16) -> Vec<(String, Style)> {
+        let theme = cx.theme;
+        let (answer, well) = answers(cx, self.line);
+        let style = if well { theme.normal() } else { theme.trouble() };
+        let mut rows: Vec<_> = wrap(&answer, room).into_iter().map(|row| (row, style)).collect();
+        if let Some(before) = &cx.snapshot.line(self.line).settings_before {
+            let words = format!("tried out; before: {}", difference(used, before));
+            rows.extend(wrap(&words, room).into_iter().map(|row| (row, theme.normal())));
+        }
+        rows
+    }
+
+    /// The question, or what is wrong; and the keys.
+    fn pinned(&self, cx: &Cx, used: &LineDef, room: u16) -> Vec<(String, Style)> {
+        let theme = cx.theme;
+        let (words, style) = match (&self.asking, &self.problem) {
+            (Some(deed), _) => (self.question(cx, used, deed), theme.strong()),
+            (None, Some(problem)) => (problem.clone(), theme.trouble()),
+            (None, None) => (String::new(), theme.normal()),
+        };
+        let keys = match self.asking {
+            Some(_) => "⏎ yes   n no",
+            None if self.field().is_text() => "type it   ⏎ use them   Esc close",
+            None => "⏎ use them   u take back   S save into the plant file   Esc close",
+        };
+        let rows = wrap(&words, room).into_iter().map(|row| (row, style));
+        rows.chain([(fit_words(keys, room), theme.strong())]).collect()
+    }
+
+    fn question(&self, cx: &Cx, used: &LineDef, deed: &Deed) -> String {
+        let restart = "Polling starts anew; values are bad until the devices answer.";
+        match deed {
+            Deed::Use(new) => format!("Use {}? {restart}", difference(used, new)),
+            Deed::TakeBack(before) => format!("Take back to {}? {restart}", difference(used, before)),
+            Deed::Save => {
+                format!("Write {} into the plant file of {}? Everything else in it stays.", whole(used), cx.def().title)
+            }
+        }
+    }
+
+    fn command(&self, deed: Deed) -> Command {
+        match deed {
+            Deed::Use(settings) | Deed::TakeBack(settings) => Command::Configure(settings),
+            Deed::Save => Command::SaveSettings(self.line),
+        }
+    }
+
+    fn ask_use(&self, cx: &Cx) -> Result<Option<Deed>, String> {
+        let (used, new) = (in_use(cx, self.line), self.draft.settings()?);
+        if new == *used {
+            return Err("these are the settings in use; change one first".to_owned());
+        }
+        Ok(Some(Deed::Use(Box::new(new))))
+    }
+
+    fn ask_take_back(&mut self, cx: &Cx) -> Result<Option<Deed>, String> {
+        let before = cx.snapshot.line(self.line).settings_before.as_ref();
+        let before = before.ok_or("nothing to take back: nobody has tried other settings")?;
+        self.draft = Draft::of(before);
+        Ok(Some(Deed::TakeBack(Box::new(LineDef::clone(before)))))
+    }
+
+    fn ask_save(&self, cx: &Cx) -> Result<Option<Deed>, String> {
+        let used = in_use(cx, self.line);
+        if self.draft.settings()? != *used {
+            return Err("only what is in use is saved: use these settings first (⏎)".to_owned());
+        }
+        if cx.snapshot.line(self.line).settings_before.is_none() {
+            return Err("nothing to save: these settings are in the plant file".to_owned());
+        }
+        Ok(Some(Deed::Save))
+    }
+
+    fn select(&mut self, by: isize) -> Result<Option<Deed>, String> {
+        self.row = self.row.saturating_add_signed(by);
+        Ok(None)
+    }
+
+    fn field(&self) -> Field {
+        let fields = self.draft.fields();
+        fields[self.row.min(fields.len() - 1)]
+    }
+
+    /// Another mode has another number of rows.
+    fn in_range(mut self) -> Settings {
+        self.row = self.row.min(self.draft.fields().len() - 1);
+        self
+    }
+}
+
+/// Columns of a name.
+const NAME: u16 = 13;
+
+/// The settings that a line works with now.
+fn in_use<'a>(cx: &Cx<'a>, line: LineId) -> &'a LineDef {
+    cx.snapshot.line(line).report.as_ref().map_or(cx.def().line(line), |report| &report.settings)
+}
+
+/// `RTU /dev/ttyUSB0 9600 8N1`, with the times where they differ.
+fn difference(from: &LineDef, to: &LineDef) -> String {
+    let mut words = to.transport.to_string();
+    if from.timeout != to.timeout {
+        words += &format!(", timeout {} ms", to.timeout.as_millis());
+    }
+    if from.gap != to.gap {
+        words += &format!(", gap {} ms", to.gap.as_millis());
+    }
+    words
+}
+
+fn whole(settings: &LineDef) -> String {
+    let (timeout, gap) = (settings.timeout.as_millis(), settings.gap.as_millis());
+    format!("{}, timeout {timeout} ms, gap {gap} ms", settings.transport)
+}
+
+/// Whether the devices of a line answer, in words, and whether that is well.
+fn answers(cx: &Cx, line: LineId) -> (String, bool) {
+    let name = &cx.def().line(line).name;
+    match &cx.snapshot.line(line).state {
+        LineState::Connecting => (format!("{name} is being connected"), true),
+        LineState::Disconnected => (format!("{name} is disconnected: connect it with L on tab 4"), false),
+        LineState::Testing => (format!("a test has {name} for itself"), true),
+        LineState::Waiting { why, .. } => (format!("{name} is not connected: {why}"), false),
+        LineState::Connected => {
+            let devices = cx.def().devices.iter().filter(|device| device.line == line);
+            let well = |state| matches!(state, DeviceState::Answering | DeviceState::Unknown);
+            let all_well = devices.clone().all(|device| well(cx.snapshot.device(device.id).state));
+            let words: Vec<String> =
+                devices.map(|device| format!("{} {}", device.name, device_words(cx, device.id))).collect();
+            (format!("{name} connected: {}", words.join("; ")), all_well)
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! Why a value is what it is: quality and cause, raw number and scaling, address, the bytes that brought it, the device,
+//! the schedule; and what to do when it is not good.
+
+mod bytes;
+mod facts;
+#[cfg(test)]
+mod tests;
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect, style::Style};
+
+use super::{Modal, Next, window};
+use crate::{
+    plant::def::{DeviceId, TagId},
+    ui::{
+        Act, Cx,
+        keys::Hint,
+        widgets::text::{Canvas, fit_words, width, wrap},
+    },
+};
+
+/// The window: one of a few tags, and the first row that is shown.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Why {
+    tags: Vec<TagId>,
+    at: usize,
+    row: u16,
+}
+
+/// A row: what it is about (empty: it goes on), and its words.
+struct Row {
+    label: &'static str,
+    text: String,
+    style: Style,
+    /// Words may go on in further rows; bytes and headings are laid out already.
+    wraps: bool,
+}
+
+impl Why {
+    /// Why about these tags, beginning with the one in place `at`; `None` without any.
+    pub fn new(tags: Vec<TagId>, at: usize) -> Option<Why> {
+        (at < tags.len()).then_some(Why { tags, at, row: 0 })
+    }
+
+    /// About the tags of something, beginning with the first that is not good.
+    pub fn of_all(cx: &Cx, tags: Vec<TagId>) -> Option<Why> {
+        let doubtful = tags.iter().position(|tag| !cx.snapshot.sample(*tag).quality.is_good());
+        Why::new(tags, doubtful.unwrap_or(0))
+    }
+
+    /// About a device as a whole: its first tag that is not good.
+    pub fn of_device(cx: &Cx, device: DeviceId) -> Option<Why> {
+        Why::of_all(cx, cx.def().tags_of(device).map(|tag| tag.id).collect())
+    }
+
+    /// The act that opens it, for a key.
+    pub fn open(why: Option<Why>) -> Vec<Act> {
+        why.map(|why| Act::Open(Modal::Why(why))).into_iter().collect()
+    }
+
+    pub(super) fn hints(&self) -> Vec<Hint> {
+        let hint = |key: &str, label: &str| Hint::new(key, label, "");
+        let others = (1 < self.tags.len()).then(|| hint("←→", "other value"));
+        others.into_iter().chain([hint("↑↓", "scroll"), hint("Esc", "close")]).collect()
+    }
+
+    pub(super) fn on_key(mut self, event: KeyEvent) -> Next {
+        let count = self.tags.len();
+        match event.code {
+            KeyCode::Up => self.row = self.row.saturating_sub(1),
+            KeyCode::Down => self.row = (self.row + 1).min(ROWS_MAX),
+            KeyCode::PageUp => self.row = self.row.saturating_sub(10),
+            KeyCode::PageDown => self.row = (self.row + 10).min(ROWS_MAX),
+            KeyCode::Home => self.row = 0,
+            KeyCode::Left => (self.at, self.row) = ((self.at + count - 1) % count, 0),
+            KeyCode::Right => (self.at, self.row) = ((self.at + 1) % count, 0),
+            KeyCode::Enter | KeyCode::Char('q' | 'w') => return Next::Close,
+            _ => {}
+        }
+        Next::Stay(Modal::Why(self))
+    }
+
+    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+        let tag = self.tags[self.at];
+        let def = cx.def().tag(tag);
+        let room = body.width.saturating_sub(4).min(WIDTH_MAX);
+        let rows = laid_out(facts::rows(cx, tag, room.saturating_sub(LABEL)), room.saturating_sub(LABEL));
+        let shown = body.height.saturating_sub(2);
+        let first = self.row.min((rows.len() as u16).saturating_sub(shown));
+        let place = if self.tags.len() < 2 { String::new() } else { format!("  {}/{}", self.at + 1, self.tags.len()) };
+        let title = format!("why {} {}{place}", def.name, def.label);
+        let mut canvas = window(cx, frame, body, &title, (room, rows.len() as u16));
+        for (y, row) in rows.iter().skip(usize::from(first)).enumerate() {
+            let y = y as u16;
+            canvas.text(0, y, row.label, cx.theme.dim());
+            canvas.text(LABEL, y, &fit_words(&row.text, room.saturating_sub(LABEL)), row.style);
+        }
+        let (inner, below) = (canvas.area(), (rows.len() as u16).saturating_sub(first + canvas.height()));
+        if 0 < below {
+            let words = format!(" {below} more ↓ ");
+            let frame_row = Rect { y: inner.bottom(), height: 1, ..inner };
+            Canvas::new(frame.buffer_mut(), frame_row).text_right(inner.width, 0, &words, cx.theme.strong());
+        }
+    }
+}
+
+/// Columns of the label.
+const LABEL: u16 = 9;
+/// Wider than this a window is harder to read, not easier.
+const WIDTH_MAX: u16 = 100;
+/// Further than this nothing is scrolled.
+const ROWS_MAX: u16 = 999;
+
+/// Words that are too long go on in the next row.
+fn laid_out(rows: Vec<Row>, room: u16) -> Vec<Row> {
+    let mut all = Vec::new();
+    for row in rows {
+        if !row.wraps || width(&row.text) <= room {
+            all.push(row);
+            continue;
+        }
+        for (n, text) in wrap(&row.text, room).into_iter().enumerate() {
+            all.push(Row { label: if n == 0 { row.label } else { "" }, text, style: row.style, wraps: false });
+        }
+    }
+    all
+}

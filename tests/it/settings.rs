@@ -1,0 +1,124 @@
+//! Settings of a line: tried out on a running station, saved into its plant file, and what is said where that cannot be.
+
+use std::{fs, path::Path, sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use sightglass::{
+    bus::io::{clock::Clock, transport::Connector},
+    plant::{
+        PlantDef, Snapshot,
+        command::{Command, Order, OrderId, Outcome, Refusal},
+        def::{LineDef, LineId, Serial, Transport},
+        snapshot::DeviceState,
+    },
+    profile::{self, PlantFile, Search},
+    sim::{
+        io::{RigHandle, Wire, serve_line},
+        rig::Rig,
+    },
+    station::{self, Session},
+};
+use tokio::sync::mpsc;
+
+use crate::support::folder;
+
+const L1: LineId = LineId(0);
+
+/// The tank on a simulated rig whose port can be opened three times.
+fn start(def: &Arc<PlantDef>, file: Option<PlantFile>, history: &Path) -> station::io::Station {
+    let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
+    let (ports, streams) = mpsc::channel(3);
+    let rig = RigHandle::spawn(Rig::demo(), clock);
+    for _ in 0..3 {
+        let (ours, theirs) = tokio::io::duplex(1024);
+        ports.try_send(ours).unwrap();
+        let wire = Wire { serial: Serial::USUAL, ascii: false };
+        tokio::spawn(serve_line(theirs, rig.clone(), wire, Duration::from_secs(86_400)));
+    }
+    let options = station::io::Options {
+        def: def.clone(),
+        clock,
+        history: history.to_owned(),
+        connectors: vec![Connector::Memory(streams)],
+        file,
+    };
+    station::io::start(options).unwrap()
+}
+
+/// Waits, in virtual time, until the plant is so.
+async fn until(session: &mut Session, what: &str, so: impl Fn(&Snapshot) -> bool) {
+    let reached = session.snapshots.wait_for(|snapshot| so(snapshot));
+    let reached = tokio::time::timeout(Duration::from_secs(600), reached).await;
+    assert!(reached.is_ok_and(|reached| reached.is_ok()), "never: {what}");
+}
+
+async fn order(session: &mut Session, number: u32, command: Command) -> Outcome {
+    let id = OrderId { terminal: session.terminal, number };
+    session.orders.try_send(Order { id, by: session.operator.clone(), command }).unwrap();
+    let of = move |snapshot: &Snapshot| snapshot.orders.iter().find(|order| order.id == id).cloned();
+    until(session, "the order has ended", |snapshot| {
+        of(snapshot).is_some_and(|order| order.outcome != Outcome::Pending)
+    })
+    .await;
+    let order = of(&session.snapshots.borrow()).unwrap();
+    order.outcome
+}
+
+fn all_answer(snapshot: &Snapshot) -> bool {
+    snapshot.devices.iter().all(|device| device.state == DeviceState::Answering)
+}
+
+fn faster(def: &PlantDef) -> LineDef {
+    let line = def.lines[0].clone();
+    let Transport::Serial { port, .. } = &line.transport else { panic!("the tank has a serial line") };
+    LineDef { transport: Transport::rtu(port, Serial { baud: 19_200, ..Serial::USUAL }), ..line }
+}
+
+#[tokio::test(start_paused = true)]
+async fn settings_that_were_tried_out_are_in_the_plant_file_after_they_were_saved() {
+    let folder = folder();
+    let path = folder.path().join("tank.toml");
+    let text = profile::text_of("tank", &Search::shipped()).unwrap();
+    fs::write(&path, &text).unwrap();
+    let (def, file) = profile::load_with_file(&path, &Search::shipped()).unwrap();
+    let mut station = start(&def, file, &folder.path().join("tank.duckdb"));
+    let mut session = station.session("anna");
+    until(&mut session, "all answer", all_answer).await;
+
+    let new = faster(&def);
+    assert_eq!(order(&mut session, 1, Command::Configure(Box::new(new.clone()))).await, Outcome::Verified);
+    until(&mut session, "the line works with the new settings", |snapshot| {
+        let report = snapshot.lines[0].report.as_ref();
+        report.is_some_and(|report| report.settings == new) && all_answer(snapshot)
+    })
+    .await;
+    assert_eq!(session.snapshots.borrow().lines[0].settings_before.as_deref(), Some(&def.lines[0]));
+    assert_eq!(fs::read_to_string(&path).unwrap(), text, "trying out writes nothing");
+
+    assert_eq!(order(&mut session, 2, Command::SaveSettings(L1)).await, Outcome::Verified);
+    assert_eq!(fs::read_to_string(&path).unwrap(), text.replace("baud = 9600", "baud = 19200"), "comments and all");
+    assert_eq!(session.snapshots.borrow().lines[0].settings_before, None);
+    assert_eq!(profile::load(&path, &Search::shipped()).unwrap().lines[0], new);
+
+    // Somebody edits the file meanwhile: theirs is not overwritten.
+    fs::write(&path, &text).unwrap();
+    let outcome = order(&mut session, 3, Command::SaveSettings(L1)).await;
+    let Outcome::Refused(Refusal::NotSaved(why)) = outcome else { panic!("{outcome:?}") };
+    assert!(why.contains("was changed by somebody"), "{why}");
+    assert_eq!(fs::read_to_string(&path).unwrap(), text);
+    drop(session);
+    station.stop().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_plant_without_a_file_says_that_nothing_can_be_saved() {
+    let folder = folder();
+    let (def, file) = profile::load_with_file(Path::new("tank"), &Search::shipped()).unwrap();
+    let mut station = start(&def, file, &folder.path().join("tank.duckdb"));
+    let mut session = station.session("anna");
+    let outcome = order(&mut session, 1, Command::SaveSettings(L1)).await;
+    let Outcome::Refused(Refusal::NotSaved(why)) = outcome else { panic!("{outcome:?}") };
+    assert!(why.contains("part of the program"), "{why}");
+    drop(session);
+    station.stop().await;
+}
