@@ -146,7 +146,7 @@ mod tests {
         // A column is 55 minutes: two lie wholly in the absence.
         assert_eq!(rows[0], "errors  ▁▁▁▁▁▁▁▁▁▁▁▁▁▁██▁▁  ▁▁▁▁▁▁    0.0 % now    10 % most");
         assert_eq!(rows[1], "busy    ▅▅▅▅▅▅▅▅▅▅▅▅▅▅▅▅▅▅  ▅▅▅▅▅▅     50 % now    50 % most");
-        assert_eq!(rows[2], "        14:02     02:02      14:02");
+        assert_eq!(rows[2], "        14:02      02:02     14:02");
     }
 
     #[test]
