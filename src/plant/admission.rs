@@ -26,6 +26,22 @@ pub struct Admission {
     pub warnings: Vec<Warning>,
 }
 
+impl Admission {
+    /// Nothing is polled.
+    pub fn of_nothing(line: LineId) -> Admission {
+        Admission {
+            line,
+            utilisation: 0.0,
+            verdict: Verdict::Fits,
+            hard: Verdict::Fits,
+            factor: Some(1),
+            cycle: Duration::ZERO,
+            dead: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
+}
+
 /// Can the polls of a line meet their periods?
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {

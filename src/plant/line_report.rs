@@ -36,6 +36,20 @@ pub struct LineReport {
 }
 
 impl LineReport {
+    /// Nothing has gone over the line yet.
+    pub fn new(settings: LineDef) -> LineReport {
+        LineReport {
+            counters: LineCounters::default(),
+            polls: Vec::new(),
+            refused: Vec::new(),
+            admission: Admission::of_nothing(settings.id),
+            devices: Vec::new(),
+            busy: Vec::new(),
+            frames: Frames::default(),
+            settings,
+        }
+    }
+
     /// The poll that reads a tag.
     pub fn poll_of(&self, tag: TagId) -> Option<&PollReport> {
         self.polls.iter().find(|poll| poll.tags.contains(&tag))

@@ -152,7 +152,9 @@ fn a_new_plan_keeps_the_grid_of_what_stays_and_the_health_of_devices() {
     let stays = block(0, every(1000));
     let mut schedule = Schedule::new(&[block(1, every(500)), stays.clone()], at(0));
     play(&mut schedule, 0, 300, |_, _| 10);
-    (0..3).for_each(|_| drop(schedule.failed(DeviceId(1), at(300))));
+    (0..3).for_each(|_| {
+        schedule.failed(DeviceId(1), at(300));
+    });
     let new = Block { address: 7, ..stays.clone() };
     schedule.replan(&[stays, new, block(1, every(700))], at(300));
     assert!(schedule.is_down(DeviceId(1)));
@@ -234,7 +236,8 @@ fn polls(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<(u64, i64)>
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    // Few random sets of polls are just short of what a line can carry.
+    #![proptest_config(ProptestConfig { cases: 64, max_global_rejects: 65_536, ..ProptestConfig::default() })]
 
     #[test]
     fn nobody_starves_whatever_the_classes(load in polls(1..12), classes in proptest::collection::vec(0usize..3, 12)) {

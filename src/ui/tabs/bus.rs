@@ -30,6 +30,7 @@ use crate::{
     ui::{
         Act, Cx,
         keys::{self, Hint, Key, char, code},
+        modal::{Modal, Settings},
         widgets::text::{Canvas, between, fit_words, running, width},
     },
 };
@@ -90,6 +91,8 @@ pub enum Action {
     Again,
     /// Stops the test at work.
     Stop,
+    /// The communication settings of the line.
+    Settings,
 }
 
 /// Keys of every page.
@@ -107,9 +110,11 @@ pub const KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::End), label: "", help: "to the last row", action: Action::Jump(1) },
     Key { chord: code(KeyCode::Up), label: "", help: "a row up", action: Action::Move(-1) },
 ];
-/// Keys of the first page. `c` is for the settings of the line.
-const LINE_KEYS: &[Key<Action>] =
-    &[Key { chord: code(KeyCode::Down), label: "scroll", help: "a row down", action: Action::Move(1) }];
+/// Keys of the first page.
+const LINE_KEYS: &[Key<Action>] = &[
+    Key { chord: code(KeyCode::Down), label: "scroll", help: "a row down", action: Action::Move(1) },
+    Key { chord: char('c'), label: "settings", help: "communication settings of the line", action: Action::Settings },
+];
 const PLAN_KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::Down), label: "select", help: "a row down", action: Action::Move(1) },
     Key { chord: code(KeyCode::Enter), label: "tags", help: "the tags of the block", action: Action::Open },
@@ -171,7 +176,7 @@ impl Bus {
                 self.page = Page::ALL[(place + by).rem_euclid(Page::ALL.len() as isize) as usize];
             }
             Action::Show(page) => self.page = page,
-            Action::NextLine => self.next_line(cx),
+            Action::NextLine => self.choose_line(cx, 1),
             Action::Move(by) => self.scroll(cx, &at, by),
             Action::Screen(by) => self.scroll(cx, &at, by * screen),
             Action::Jump(by) => self.scroll(cx, &at, by * 100_000),
@@ -182,6 +187,7 @@ impl Bus {
             Action::Try(tried) => return self.test.open(cx, &at, tried),
             Action::Again => return test::again(cx, &at),
             Action::Stop => return test::stop(&at),
+            Action::Settings => return vec![Act::Open(Modal::Settings(Box::new(Settings::new(cx, self.line))))],
         }
         self.on_snapshot(cx)
     }
@@ -245,9 +251,10 @@ impl Bus {
         usize::from(cx.area.height.saturating_sub(1))
     }
 
-    fn next_line(&mut self, cx: &Cx) {
-        let count = cx.def().lines.len().max(1) as u16;
-        self.line = LineId((self.line.0 + 1) % count);
+    /// So many lines on, around the end.
+    fn choose_line(&mut self, cx: &Cx, by: isize) {
+        let count = cx.def().lines.len().max(1) as isize;
+        self.line = LineId((self.line.index() as isize + by).rem_euclid(count) as u16);
         (self.first, self.plan) = (0, plan::Plan::default());
         self.frames.forget();
         self.test.first = None;
@@ -255,9 +262,10 @@ impl Bus {
 
     fn scroll(&mut self, cx: &Cx, at: &Place, by: isize) {
         match self.page {
+            Page::Line if by.abs() == 1 && 1 < cx.def().lines.len() => self.choose_line(cx, by),
             Page::Line => {
                 let rows = line::rows(cx, at, cx.area.width).len();
-                self.first = self.first.saturating_add_signed(by).min(rows.saturating_sub(self.room(cx)));
+                self.first = self.first.saturating_add_signed(by).min(rows::last_first(rows, self.room(cx)));
             }
             Page::Plan => self.plan.scroll(at, by),
             Page::Frames => self.frames.scroll(cx, at, by),

@@ -256,7 +256,7 @@ impl Controllers {
 }
 
 /// The letter of NE 107 with a shape of its own.
-fn signal_mark(signal: Signal) -> String {
+pub fn signal_mark(signal: Signal) -> String {
     let shape = match signal {
         Signal::Failure => '✗',
         Signal::FunctionCheck => '▼',

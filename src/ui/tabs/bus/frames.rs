@@ -17,7 +17,7 @@ use crate::{
         Act, Cx, Effect,
         modal::{Modal, Prompt},
         tabs::Tab,
-        widgets::text::{Canvas, fit, fit_words, pad, width},
+        widgets::text::{Canvas, clock, fit, fit_words, pad, width},
     },
 };
 
@@ -168,7 +168,12 @@ impl Ring {
     fn heading(&self, cx: &Cx, count: usize) -> (String, ratatui::style::Style) {
         let filter = self.filter.to_string();
         let filter = if filter.is_empty() { String::new() } else { format!("   filter: {filter}") };
-        let state = if self.runs { "running, newest below" } else { "HELD STILL, space lets it run" };
+        let zone = &cx.def().time_zone;
+        let newest = self.held.iter().next_back().map_or(String::new(), |frame| clock(frame.at, zone));
+        let state = match self.runs {
+            true => format!("running, newest {newest} below"),
+            false => format!("HELD STILL at {newest}, space lets it run"),
+        };
         let style = if self.runs { cx.theme.dim() } else { cx.theme.strong() };
         (format!("{count} of {} frames, {state}{filter}", self.held.len().max(count)), style)
     }
@@ -204,33 +209,46 @@ impl Ring {
         self.held.iter().rev().skip_while(move |frame| number <= frame.number)
     }
 
-    /// `14:02:31.412 TX 01 03 03 EA 00 0A E5 BD  unit 1 read holding registers 41003–41012`.
+    /// `02:31.412 TX   1 01 03 03 E8 00 03 85 BB  read holding 41001–41003 (0x03E8, 3)`.
     fn row(&self, cx: &Cx, frame: &Frame, selected: bool, canvas: &mut Canvas) {
         let theme = cx.theme;
-        let good = matches!(&*frame.verdict, "ok" | "sent" | "received");
-        let time = frame.at.to_zoned(cx.def().time_zone.clone()).strftime("%H:%M:%S%.3f").to_string();
-        let bytes = bytes_text(frame.framing, &frame.bytes);
+        let wide = 100 <= canvas.width();
+        let time = frame.at.to_zoned(cx.def().time_zone.clone());
+        let time = time.strftime(if wide { "%H:%M:%S%.3f" } else { "%M:%S%.3f" });
         let told = explain::of_line(frame, self.before(frame.number));
-        let bytes_room = (canvas.width().saturating_sub(18) * 2 / 5).clamp(11, 60);
-        let words = if good { told.summary.clone() } else { format!("✗ {}   {}", frame.verdict, told.summary) };
+        let good = matches!(&*frame.verdict, "ok" | "sent" | "received");
         let refused = !frame.sent && told.message.get(1).is_some_and(|code| 0x80 <= *code);
-        let words = if refused && good { format!("! {words}") } else { words };
         let style = match (selected, good && !refused) {
             (true, _) => theme.focus(),
             (false, false) => theme.trouble(),
             (false, true) if frame.sent => theme.dim(),
             (false, true) => theme.normal(),
         };
+        let bytes_room = (canvas.width().saturating_sub(20) * 2 / 5).clamp(11, 60);
+        let bytes = pad(&cut_bytes(&bytes_text(frame.framing, &frame.bytes), bytes_room), bytes_room);
         let direction = if frame.sent { "TX" } else { "RX" };
-        let x = canvas.text(
-            1,
-            0,
-            &format!("{time} {direction} {} ", pad(&cut_bytes(&bytes, bytes_room), bytes_room)),
-            style,
-        );
+        let unit = frame.unit.map_or(String::new(), |unit| unit.to_string());
+        let x = canvas.text(1, 0, &format!("{time} {direction} {unit:>3} {bytes} "), style);
         let room = canvas.width().saturating_sub(x + 1);
+        let summary = if wide { told.summary } else { short(&told.summary) };
+        let words = match (good, refused) {
+            (true, false) => summary,
+            (true, true) => format!("! {summary}"),
+            (false, _) if wide => format!("✗ {}   {summary}", frame.verdict),
+            (false, _) => format!("✗ {}", frame.verdict),
+        };
         canvas.text(x, 0, &pad(&fit_words(&words, room), room), style);
     }
+}
+
+/// Without what the columns before it say: `read holding 41001–41003 (0x03E8, 3)`.
+fn short(summary: &str) -> String {
+    let rest = summary.strip_prefix("unit ").and_then(|rest| rest.split_once(' ')).map_or(summary, |(_, rest)| rest);
+    rest.replacen("holding registers", "holding", 1).replacen("input registers", "input", 1).replacen(
+        " registers:",
+        ":",
+        1,
+    )
 }
 
 /// The bytes as they are written: hex, or the characters of an ASCII frame.

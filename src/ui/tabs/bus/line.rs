@@ -5,6 +5,7 @@ use std::time::Duration;
 use super::{
     Place,
     rows::{self, Flow, Row, bar, number, plain, words},
+    state_words,
 };
 use crate::{
     bus::names,
@@ -18,6 +19,7 @@ use crate::{
     },
     ui::{
         Cx,
+        tabs::controllers::signal_mark,
         widgets::{
             spark,
             text::{between, clock, running, wrap},
@@ -30,27 +32,48 @@ const NEAR: f64 = 0.8;
 
 /// All rows of the page.
 pub fn rows(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
-    let mut rows = settings(cx, at, width);
-    match at.report {
-        Some(report) => {
-            rows.extend(load(cx, report, width));
-            rows.extend(counters(cx, at, report, width));
-            rows.extend(devices(cx, at, report, width));
-        }
-        None => rows.push(plain("nothing heard from this line yet", cx.theme.trouble())),
-    }
-    let worries = worries(cx, at);
-    if !worries.is_empty() {
-        rows.push(Row::new());
-    }
-    for worry in worries {
-        let lines = wrap(&worry, width.saturating_sub(5));
-        let mark = |n: usize| if n == 0 { "! " } else { "  " };
-        rows.extend(
-            lines.into_iter().enumerate().map(|(n, line)| plain(mark(n).to_owned() + &line, cx.theme.trouble())),
-        );
-    }
+    let mut rows = lines(cx, at);
+    rows.extend(worries(cx, at).iter().flat_map(|worry| sentence(cx, worry, width)));
+    rows.extend(settings(cx, at, width));
+    let Some(report) = at.report else {
+        rows.push(plain("nothing heard from this line yet", cx.theme.trouble()));
+        return rows;
+    };
+    rows.extend(load(cx, report, width));
+    rows.push(Row::new());
+    rows.extend(devices(cx, at, report, width));
+    rows.push(Row::new());
+    rows.extend(counters(cx, at, report, width));
     rows
+}
+
+/// Every line with its state, to choose one; nothing where there is only one.
+fn lines(cx: &Cx, at: &Place) -> Vec<Row> {
+    let lines = &cx.def().lines;
+    if lines.len() < 2 {
+        return Vec::new();
+    }
+    let row = |line: &LineDef| {
+        let chosen = line.id == at.id;
+        let place = Place::of(cx, line.id)?;
+        let busy = f64::from(place.status.counters.utilisation) * 100.0;
+        let words = format!("{:8} {}  {busy:.0} %  {}", line.name, place.settings.transport, state_words(cx, &place));
+        let style = match (chosen, place.status.state == LineState::Connected) {
+            (true, _) => cx.theme.focus(),
+            (false, true) => cx.theme.normal(),
+            (false, false) => cx.theme.trouble(),
+        };
+        Some(plain(format!("{} {words}", if chosen { "▸" } else { " " }), style))
+    };
+    lines.iter().filter_map(row).chain([Row::new()]).collect()
+}
+
+/// `! what is wrong`, over as many rows as it needs.
+fn sentence(cx: &Cx, words: &str, width: u16) -> Vec<Row> {
+    let lines = wrap(words, width.saturating_sub(5)).into_iter().enumerate();
+    lines
+        .map(|(n, line)| plain(if n == 0 { format!("! {line}") } else { format!("  {line}") }, cx.theme.trouble()))
+        .collect()
 }
 
 fn settings(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
@@ -84,17 +107,14 @@ fn load(cx: &Cx, report: &LineReport, width: u16) -> Vec<Row> {
         (format!("{mark}{:>3.0} % ", now * 100.0), style),
         (bar(cx, now, 12), style),
         (format!(" {:>3.0} % of the last minute ", minute * 100.0), theme.normal()),
-        (spark::shares(&report.busy, 30, theme.glyphs), theme.dim()),
+        (spark::shares(&report.busy, usize::from(width.saturating_sub(60)).clamp(10, 60), theme.glyphs), theme.dim()),
     ]);
     let mut rows = flow.rows();
     let mut flow = Flow::new("cycle", theme.dim(), width);
     let plan = Planned::of(report);
     flow.add(value(cx, "blocks", &plan.blocks.to_string()));
-    flow.add(value(cx, "one round", &format!("{} at worst", ms(plan.round))));
-    if let Some(measured) = plan.measured {
-        flow.add(value(cx, "measured", &ms(measured)));
-    }
-    flow.add(value(cx, "planned load", &format!("{:.0} %", plan.load * 100.0)));
+    flow.add(value(cx, "one round", &format!("{} on the wire", ms(plan.round))));
+    flow.add(value(cx, "load at worst", &format!("{:.0} %", plan.load * 100.0)));
     flow.add(count(cx, "missed", counters.missed, missed_lately(report)));
     rows.extend(flow.rows());
     rows
@@ -106,21 +126,18 @@ struct Planned {
     blocks: usize,
     /// All of them once, at worst.
     round: Duration,
-    /// All of them once, with the replies as they were: `None` before every block has answered.
-    measured: Option<Duration>,
     /// Share of the line's time at worst.
     load: f64,
 }
 
 impl Planned {
     fn of(report: &LineReport) -> Planned {
-        let mut plan = Planned { blocks: 0, round: Duration::ZERO, measured: Some(Duration::ZERO), load: 0.0 };
+        let mut plan = Planned { blocks: 0, round: Duration::ZERO, load: 0.0 };
         for poll in &report.polls {
             let Poll::Every(period) = poll.poll else { continue };
             plan.blocks += 1;
             plan.round += poll.cost;
             plan.load += poll.cost.as_secs_f64() / period.as_secs_f64();
-            plan.measured = plan.measured.zip(poll.tally.reply.mean()).map(|(sum, reply)| sum + poll.cost + reply);
         }
         plan
     }
@@ -221,19 +238,18 @@ fn devices(cx: &Cx, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
     let mut lines = Vec::new();
     for device in cx.def().devices.iter().filter(|device| device.line == at.id) {
         let Some(tally) = report.device(device.id) else { continue };
-        let ill = is_ill(cx, device) || near(tally, report.settings.timeout).is_some();
-        let mark = match cx.snapshot.device(device.id).state {
-            DeviceState::Down { .. } => "✗",
-            DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_) if ill => "!",
-            DeviceState::Answering => "✓",
-            DeviceState::Unknown | DeviceState::Failing(_) => "?",
+        let diagnosed = cx.snapshot.device(device.id).diagnosis.is_some();
+        let ill = diagnosed || is_ill(cx, device) || near(tally, report.settings.timeout).is_some();
+        let mark = match cx.snapshot.device(device.id).diagnosis {
+            Some(reason) => signal_mark(reason.signal()),
+            None => if ill { "!" } else { "✓" }.to_owned(),
         };
         styles.push(if ill { cx.theme.trouble() } else { cx.theme.normal() });
         let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
         let (failed, of) = tally.recent();
         let share = tally.reply.p99().map(|p99| p99.as_secs_f64() / report.settings.timeout.as_secs_f64());
         lines.push([
-            mark.to_owned(),
+            mark,
             device.name.clone(),
             device.unit.to_string(),
             state(cx, device),
@@ -247,7 +263,7 @@ fn devices(cx: &Cx, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
         ]);
     }
     let (heading, lines) = rows::table(&columns, &lines, width.saturating_sub(2));
-    let mut rows = vec![Row::new(), plain(heading, cx.theme.dim())];
+    let mut rows = vec![plain(heading, cx.theme.dim())];
     rows.extend(lines.into_iter().zip(styles).map(|(line, style)| plain(line, style)));
     rows
 }
@@ -358,6 +374,7 @@ pub fn grouped(count: u64) -> String {
 /// `45.8 ms`, `300 ms`, `2.5 s`.
 pub fn ms(span: Duration) -> String {
     match span.as_secs_f64() {
+        seconds @ 120.0.. => format!("{:.0} min", seconds / 60.0),
         seconds @ 10.0.. => format!("{seconds:.0} s"),
         seconds @ 1.0.. => format!("{seconds:.1} s"),
         seconds => format!("{} ms", tenths(seconds * 1e3)),
@@ -386,5 +403,6 @@ mod tests {
         check(99_960, "100 ms");
         check(2_500_000, "2.5 s");
         check(70_000_000, "70 s");
+        check(1_580_800_000, "26 min");
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{
     Place, Window,
     line::{grouped, ms, short_ms},
-    rows::{self, first_for, number, words},
+    rows::{self, first_for, number, plain, words},
     window::{Sheet, Shown},
 };
 use crate::{
@@ -17,12 +17,12 @@ use crate::{
     ui::{
         Act, Cx,
         modal::Modal,
-        widgets::text::{Canvas, between, fit_words},
+        widgets::text::{Canvas, between, wrap},
     },
 };
 
 /// Rows below the table that tell of the selected block.
-const DETAIL: u16 = 4;
+const DETAIL: u16 = 5;
 
 /// Which block is selected.
 #[derive(Debug, Default)]
@@ -70,13 +70,17 @@ impl Plan {
         }
         let below = lines.len().saturating_sub(first + room);
         if 0 < below {
-            canvas.text_right(width.saturating_sub(1), 1 + room as u16, &format!(" {below} more ▼"), theme.strong());
+            canvas.text_right(width.saturating_sub(1), 0, &format!(" {below} more ▼"), theme.strong());
         }
         let bottom = (2 + lines.len().min(room) as u16).min(height.saturating_sub(DETAIL - 1));
-        for (n, line) in detail(cx, &report.polls[selected]).into_iter().enumerate() {
-            let style = if line.starts_with('!') { theme.trouble() } else { theme.normal() };
-            canvas.text(1, bottom + n as u16 + 1, &fit_words(&line, width.saturating_sub(2)), style);
-        }
+        let told = detail(cx, &report.polls[selected]);
+        let style = |line: &str| if line.starts_with('!') { theme.trouble() } else { theme.normal() };
+        let rows = told.iter().flat_map(|line| {
+            let parts = wrap(line, width.saturating_sub(2));
+            parts.into_iter().map(move |part| plain(part, style(line)))
+        });
+        let mut below = canvas.part(0, bottom + 1, width, height.saturating_sub(bottom + 1));
+        rows::draw(cx, &mut below, &rows.collect::<Vec<_>>(), 0);
     }
 }
 
@@ -164,6 +168,8 @@ fn detail(cx: &Cx, poll: &PollReport) -> Vec<String> {
     let over = poll.count.saturating_sub(used);
     let over = if over == 0 { String::new() } else { format!(", {over} between them read over") };
     let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
+    let late =
+        tally.jitter.max().map_or("never sent late".to_owned(), |late| format!("sent late by {} at most", ms(late)));
     let mut lines = vec![
         format!(
             "{} unit {}, {code} / 0x{code:02X} {}: {} = wire {}–{} (0x{:04X}–0x{last:04X}), {} {}{over}",
@@ -178,11 +184,10 @@ fn detail(cx: &Cx, poll: &PollReport) -> Vec<String> {
             plural(poll.tags.len(), "tag", "tags"),
         ),
         format!(
-            "reply {} ms, p99 {}, max {}   sent late by {} ms at most   missed {}   asked again {}",
+            "reply {} ms, p99 {}, max {}   {late}   missed {}   asked again {}",
             span(tally.reply.last()),
             span(tally.reply.p99()),
             span(tally.reply.max()),
-            span(tally.jitter.max()),
             grouped(tally.missed),
             grouped(tally.retries),
         ),

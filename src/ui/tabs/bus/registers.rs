@@ -98,7 +98,7 @@ impl Registers {
             (ToolState::Running, _) => (format!("reading, {} of {} requests", run.done, run.total), false),
             (ToolState::Failed(why), _) => (format!("FAILED: {why}"), true),
             (ToolState::Cancelled, _) => ("STOPPED".to_owned(), true),
-            (ToolState::Done, Some(why)) => (format!("read {at}; ---- where the device says: {why}"), true),
+            (ToolState::Done, Some(why)) => (format!("read {at}; ---- is {why}"), true),
             (ToolState::Done, None) => (format!("read {at}"), false),
         };
         (words, state, ill)
@@ -126,7 +126,7 @@ impl Registers {
         }
         let below = usize::from(self.count).saturating_sub(first + room);
         if 0 < below {
-            canvas.text_right(width, 1 + room as u16, &format!(" {below} more ▼"), theme.strong());
+            canvas.text_right(width, 0, &format!(" {below} more ▼"), theme.strong());
         }
         if 0 < pair {
             let y = (2 + room.min(usize::from(self.count)) as u16).min(height.saturating_sub(pair + 1));
@@ -191,7 +191,7 @@ mod tests {
         let check = |order, expect: &str| assert_eq!(pair_words([0x42C8, 0x0000], order).trim_start(), expect);
         check(Order::Abcd, "1120403456   1120403456  100");
         check(Order::Cdab, "17096        17096  2.3957e-41");
-        check(Order::Badc, "3359768576  -935198720  -524288");
+        check(Order::Badc, "3359768576   -935198720  -198656");
         check(Order::Dcba, "51266        51266  7.1839e-41");
         assert!(pair_words([0x7FC0, 0], Order::Abcd).ends_with("no number"));
     }

@@ -17,8 +17,10 @@ pub fn plain(text: impl Into<String>, style: Style) -> Row {
 
 /// Draws rows from `first` on, a column free on the left; says how many more there are below.
 pub fn draw(cx: &Cx, canvas: &mut Canvas, rows: &[Row], first: usize) {
-    let room = usize::from(canvas.height());
-    let first = first.min(rows.len().saturating_sub(room));
+    let height = usize::from(canvas.height());
+    // The last row says how much there is more, so that the mark covers nothing.
+    let room = if rows.len() <= height { height } else { height.saturating_sub(1) };
+    let first = first.min(last_first(rows.len(), height));
     for (y, row) in rows.iter().skip(first).take(room).enumerate() {
         let mut x = 1;
         for (text, style) in row {
@@ -28,7 +30,12 @@ pub fn draw(cx: &Cx, canvas: &mut Canvas, rows: &[Row], first: usize) {
     let below = rows.len().saturating_sub(first + room);
     let above = if 0 < first { format!(" {first} ▲") } else { String::new() };
     let mark = if 0 < below { format!("{above} {below} more ▼") } else { above };
-    canvas.text_right(canvas.width(), canvas.height().saturating_sub(1), &mark, cx.theme.strong());
+    canvas.text_right(canvas.width().saturating_sub(1), canvas.height().saturating_sub(1), &mark, cx.theme.strong());
+}
+
+/// The greatest first row that [`draw`] makes use of.
+pub fn last_first(count: usize, height: usize) -> usize {
+    if count <= height { 0 } else { count - height.saturating_sub(1) }
 }
 
 /// Words that flow into rows of a width, never broken inside.
@@ -136,7 +143,7 @@ mod tests {
 
     #[test]
     fn words_flow_into_the_next_row_whole() {
-        let mut flow = Flow::new("bytes", Style::new(), 30);
+        let mut flow = Flow::new("bytes", Style::new(), 33);
         for text in ["sent 1 200", "received 48 000", "x"] {
             flow.add(plain(text, Style::new()));
         }

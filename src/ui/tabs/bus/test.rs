@@ -74,7 +74,7 @@ impl Tried {
 #[derive(Debug, Default)]
 pub struct Bench {
     selected: usize,
-    /// First row shown of the results; `None`: the last ones.
+    /// First row shown of the results; `None` until somebody scrolls.
     pub first: Option<usize>,
     /// What was typed last, and whether its check is left out.
     pub text: String,
@@ -117,11 +117,11 @@ impl Bench {
         }
         let room = usize::from(cx.area.height).saturating_sub(TOP as usize + 1).max(1);
         let count = results::rows(cx, at, cx.area.width).len();
-        let end = count.saturating_sub(room);
+        let end = rows::last_first(count, room);
         let by = by.clamp(-(count as isize), count as isize);
         let by = if by.unsigned_abs() < count { by.signum() * room.saturating_sub(1).max(1) as isize } else { by };
-        let first = self.first.unwrap_or(end).saturating_add_signed(by).min(end);
-        self.first = (first < end).then_some(first);
+        let first = self.first.unwrap_or_else(|| begin(at)).min(end).saturating_add_signed(by).min(end);
+        self.first = Some(first);
     }
 
     /// Draws it: the tests, then what came of the last one.
@@ -144,7 +144,16 @@ impl Bench {
         }
         let rows = results::rows(cx, at, width);
         let mut below = canvas.part(0, tests + 1, width, height.saturating_sub(tests + 1));
-        rows::draw(cx, &mut below, &rows, self.first.unwrap_or(usize::MAX));
+        rows::draw(cx, &mut below, &rows, self.first.unwrap_or_else(|| begin(at)));
+    }
+}
+
+/// First row of the results until somebody scrolls: what has one answer is read from its beginning, what goes on for
+/// long is followed at its end.
+fn begin(at: &Place) -> usize {
+    match at.status.test.as_ref().map(|run| &run.tool) {
+        Some(Tool::Loopback { .. } | Tool::Scan(_)) => usize::MAX,
+        Some(Tool::Send(_) | Tool::Identify { .. } | Tool::Read { .. }) | None => 0,
     }
 }
 
