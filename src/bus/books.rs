@@ -2,12 +2,14 @@
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
-use jiff::Timestamp;
-
-use super::plan::{self, Block};
+use super::{
+    admission,
+    plan::{self, Block},
+    schedule::PollInfo,
+};
 use crate::plant::{
     PlantDef,
-    def::{DeviceId, LineDef, LineId},
+    def::{DeviceId, LineDef, LineId, TagId},
     event::{Fault, LineCounters},
     line_report::{LineReport, PollReport},
     tally::Tally,
@@ -18,6 +20,17 @@ use crate::plant::{
 const BUSY_OVER: usize = 60;
 /// The last of them that `utilisation` is the mean of.
 const BUSY_NOW: usize = 10;
+
+/// The read plan as it stands, for a report.
+#[derive(Debug)]
+pub struct Plan<'a> {
+    /// What is read.
+    pub blocks: &'a [Block],
+    /// How each of them stands in the schedule; empty without a port.
+    pub polls: Vec<PollInfo>,
+    /// Tags that their devices have refused.
+    pub refused: Vec<TagId>,
+}
 
 /// The books of one line. They outlive its openings.
 #[derive(Debug, Clone)]
@@ -41,9 +54,13 @@ impl Books {
         }
     }
 
-    /// The block at `index` was replaced by `count` others, which start with empty books.
-    pub fn split(&mut self, index: usize, count: usize) {
-        self.polls.splice(index..=index, std::iter::repeat_n(Tally::default(), count));
+    /// The plan has changed: blocks that stay keep their tally, others begin anew.
+    pub fn replan(&mut self, old: &[Block], new: &[Block]) {
+        let kept = |block: &Block| {
+            let place = old.iter().position(|old| old.request() == block.request() && old.poll == block.poll)?;
+            self.polls.get(place).cloned()
+        };
+        self.polls = new.iter().map(|block| kept(block).unwrap_or_default()).collect();
     }
 
     /// The tally of a poll.
@@ -51,22 +68,25 @@ impl Books {
         &mut self.polls[index]
     }
 
-    /// The tally of a device.
-    pub fn device(&mut self, device: DeviceId) -> Option<&mut Tally> {
-        self.devices.iter_mut().find(|(id, _)| *id == device).map(|(_, tally)| tally)
-    }
-
-    /// A request for a poll has ended.
-    pub fn polled(&mut self, index: usize, device: DeviceId, outcome: Result<(), Fault>, reply: Option<Duration>) {
-        self.polls[index].count(outcome, reply);
-        self.asked(device, outcome, reply);
+    /// A request for a poll has ended after so many tries; `index` is `None` if the plan has changed meanwhile.
+    pub fn polled(
+        &mut self,
+        index: Option<usize>,
+        device: DeviceId,
+        outcome: Result<(), Fault>,
+        reply: Option<Duration>,
+        tries: u8,
+    ) {
+        let of_device = self.devices.iter_mut().find(|(id, _)| *id == device).map(|(_, tally)| tally);
+        for tally in index.and_then(|index| self.polls.get_mut(index)).into_iter().chain(of_device) {
+            tally.count(outcome, reply);
+            tally.retries += u64::from(tries.saturating_sub(1));
+        }
     }
 
     /// Any other request to a device has ended.
     pub fn asked(&mut self, device: DeviceId, outcome: Result<(), Fault>, reply: Option<Duration>) {
-        if let Some(tally) = self.device(device) {
-            tally.count(outcome, reply);
-        }
+        self.polled(None, device, outcome, reply, 1);
     }
 
     /// A second is over in which the line was busy for this share of it.
@@ -84,16 +104,13 @@ impl Books {
         self.frames.extend(frames);
     }
 
-    /// All of it, for a snapshot. `next` gives the next release of a block.
-    pub fn report(
-        &self,
-        def: &PlantDef,
-        settings: &LineDef,
-        blocks: &[Block],
-        counters: LineCounters,
-        next: impl Fn(usize) -> Option<Timestamp>,
-    ) -> Arc<LineReport> {
+    /// All of it, for a snapshot.
+    pub fn report(&self, def: &PlantDef, settings: &LineDef, plan: Plan, counters: LineCounters) -> Arc<LineReport> {
+        let Plan { blocks, polls, refused } = plan;
         let poll = |(index, (block, tally)): (usize, (&Block, &Tally))| PollReport {
+            class: block.class,
+            factor: polls.get(index).map_or(1, |poll| poll.factor),
+            shed: polls.get(index).is_some_and(|poll| poll.shed),
             device: block.device,
             table: block.table,
             address: block.address,
@@ -101,10 +118,13 @@ impl Books {
             tags: block.tags.as_slice().into(),
             poll: block.poll,
             cost: plan::cost(block, settings, def.device(block.device)),
-            next: next(index),
+            next: polls.get(index).and_then(|poll| poll.next),
             tally: tally.clone(),
         };
+        let tried = LineDef { id: settings.id, ..settings.clone() };
         Arc::new(LineReport {
+            admission: admission::admit_as(def, &tried, blocks),
+            refused,
             settings: settings.clone(),
             counters,
             polls: blocks.iter().zip(&self.polls).enumerate().map(poll).collect(),
@@ -123,7 +143,7 @@ mod tests {
     #[test]
     fn the_load_of_the_last_ten_seconds_and_of_the_last_minute_are_told_apart() {
         let def = fixture::plant();
-        let blocks = plan::blocks(&def, LineId(0));
+        let blocks = plan::blocks(&def, LineId(0), &plan::Holes::default());
         let mut books = Books::new(&def, LineId(0), &blocks);
         let mut counters = LineCounters::default();
         for second in 0..100 {
@@ -131,10 +151,12 @@ mod tests {
         }
         assert!((counters.utilisation - 0.8).abs() < 1e-5, "{}", counters.utilisation);
         assert!((counters.utilisation_minute - 0.3).abs() < 1e-5, "{}", counters.utilisation_minute);
-        books.polled(0, blocks[0].device, Err(Fault::Timeout), None);
-        books.split(0, 3);
-        let report = books.report(&def, &def.lines[0], &blocks[..2], counters, |_| None);
-        assert_eq!(report.polls[0].tally.requests, 0, "the parts of a block begin anew");
+        books.polled(Some(0), blocks[0].device, Err(Fault::Timeout), None, 1);
+        books.polled(Some(1), blocks[1].device, Ok(()), None, 1);
+        books.replan(&blocks, &blocks[1..]);
+        let plan = Plan { blocks: &blocks[1..], polls: Vec::new(), refused: Vec::new() };
+        let report = books.report(&def, &def.lines[0], plan, counters);
+        assert_eq!(report.polls[0].tally.requests, 1, "a block that stays keeps its tally");
         assert_eq!(report.device(blocks[0].device).map(|tally| tally.timeouts), Some(1));
     }
 }

@@ -13,6 +13,7 @@ pub mod codec;
 pub mod plan;
 pub mod backoff;
 pub mod schedule;
+pub mod admission;
 pub mod debt;
 pub mod tool;
 pub mod books;

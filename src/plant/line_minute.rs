@@ -146,7 +146,6 @@ mod tests {
     use crate::plant::{
         event::{Fault, LineCounters},
         fixture::{self, TIC},
-        traffic::Frames,
     };
 
     fn at(second: i64) -> Timestamp {
@@ -164,7 +163,6 @@ mod tests {
         }
         let requests = good + timeouts;
         LineReport {
-            settings: fixture::plant().lines[0].clone(),
             counters: LineCounters {
                 requests,
                 ok: good,
@@ -174,10 +172,8 @@ mod tests {
                 utilisation_minute: 0.6,
                 ..LineCounters::default()
             },
-            polls: Vec::new(),
             devices: vec![(TIC, tally)],
-            busy: Vec::new(),
-            frames: Frames::default(),
+            ..LineReport::new(fixture::plant().lines[0].clone())
         }
     }
 

@@ -5,10 +5,11 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
+    admission::Admission,
     event::LineCounters,
     id::{DeviceId, TagId},
     line::LineDef,
-    tag::{Poll, Table},
+    tag::{Class, Poll, Table},
     tally::Tally,
     traffic::Frames,
 };
@@ -22,6 +23,10 @@ pub struct LineReport {
     pub counters: LineCounters,
     /// The read plan, block by block.
     pub polls: Vec<PollReport>,
+    /// Tags that their devices have refused: they are not asked for any more.
+    pub refused: Vec<TagId>,
+    /// Whether all polls can meet their periods.
+    pub admission: Admission,
     /// What each device of the line has answered.
     pub devices: Vec<(DeviceId, Tally)>,
     /// Busy share of each of the last seconds, newest last, at most 60.
@@ -31,6 +36,20 @@ pub struct LineReport {
 }
 
 impl LineReport {
+    /// Nothing has gone over the line yet.
+    pub fn new(settings: LineDef) -> LineReport {
+        LineReport {
+            counters: LineCounters::default(),
+            polls: Vec::new(),
+            refused: Vec::new(),
+            admission: Admission::of_nothing(settings.id),
+            devices: Vec::new(),
+            busy: Vec::new(),
+            frames: Frames::default(),
+            settings,
+        }
+    }
+
     /// The poll that reads a tag.
     pub fn poll_of(&self, tag: TagId) -> Option<&PollReport> {
         self.polls.iter().find(|poll| poll.tags.contains(&tag))
@@ -59,6 +78,12 @@ pub struct PollReport {
     pub poll: Poll,
     /// Worst time of a good read on the wire.
     pub cost: Duration,
+    /// What happens to it when the line has too much to do.
+    pub class: Class,
+    /// It is read each so many periods now; 1 is every period.
+    pub factor: u32,
+    /// It is left out now, because the line has too much to do.
+    pub shed: bool,
     /// When it is read next, if that is known.
     pub next: Option<Timestamp>,
     /// Counters.

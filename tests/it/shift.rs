@@ -7,7 +7,7 @@ use jiff::{Timestamp, civil::date, tz::TimeZone};
 use sightglass::{
     bus::io::{clock::Clock, transport::Connector},
     history::{
-        Question,
+        Answer, Question,
         io::{Query, store::Store},
     },
     plant::{
@@ -71,6 +71,16 @@ async fn a_shift_of_eight_hours_is_reported_truly() {
     let store = Store::open_read_only(&history, &def).unwrap();
     let now = clock.now();
     let period = ask::period(&def, Some("morning@2026-03-02"), None, None, now).unwrap();
+    let line = def.lines[0].id;
+    let every_minute = Question::LineMinutes { line, from: period.from, to: period.to, limit: 1_000 };
+    let Answer::LineMinutes(minutes) = store.answer(&every_minute, now).unwrap() else { panic!("not minutes") };
+    assert_eq!(minutes.len(), 480, "a row a minute");
+    assert!(minutes.iter().all(|minute| minute.requests == minute.ok && 60 <= minute.requests), "{:?}", minutes[0]);
+    assert!(
+        minutes.iter().all(|minute| 0.05 < minute.utilisation && minute.reply_p99_ms.is_some()),
+        "{:?}",
+        minutes[0]
+    );
     let report = store.report(&period, now).unwrap();
     let file = folder.path().join("morning.csv");
     std::fs::write(&file, csv::shift_csv(&report, &def, CsvDialect::default())).unwrap();

@@ -4,7 +4,7 @@ mod poll;
 mod test;
 mod write;
 
-use std::{sync::Arc, time::Duration};
+use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use tokio::sync::{mpsc, watch};
@@ -17,9 +17,9 @@ use super::{
 use crate::{
     bus::{
         backoff::Backoff,
-        books::Books,
-        plan::{self, Block},
-        schedule::{Next, Schedule},
+        books::{Books, Plan},
+        plan::{self, Block, Holes, Hunt},
+        schedule::{Next, Schedule, WRITE_SHARE, WriteBudget},
         tool::Job,
     },
     plant::{
@@ -31,6 +31,8 @@ use crate::{
     },
 };
 
+/// Writes that wait for their share of the line; more wait in the queue, which refuses them when it is full.
+const WAITING_MAX: usize = 16;
 /// The books are told once in this plant time.
 const REPORT_EVERY: Duration = Duration::from_secs(1);
 
@@ -44,9 +46,14 @@ pub async fn run(
     requests: mpsc::Receiver<BusRequest>,
     stop: watch::Receiver<bool>,
 ) {
-    let blocks = plan::blocks(&def, line);
+    let holes = Holes::default();
+    let blocks = plan::blocks(&def, line, &holes);
     let task = Task {
         books: Books::new(&def, line, &blocks),
+        holes,
+        hunt: Hunt::default(),
+        budget: WriteBudget::new(WRITE_SHARE, clock.now()),
+        waiting: VecDeque::new(),
         settings: def.line(line).clone(),
         clock,
         connector,
@@ -89,8 +96,14 @@ struct Task {
     events: mpsc::Sender<Event>,
     requests: mpsc::Receiver<BusRequest>,
     stop: watch::Receiver<bool>,
-    /// The read plan; holes found on the way are split off.
+    /// The read plan; a block that is refused is split while the search for the culprit goes on.
     blocks: Vec<Block>,
+    /// What the devices do not have, as far as found.
+    holes: Holes,
+    hunt: Hunt,
+    /// The share of the line's time that writes may take from polls, and the writes that wait for it.
+    budget: WriteBudget,
+    waiting: VecDeque<BusRequest>,
     counters: LineCounters,
     books: Books,
     /// The tool at work.
@@ -206,12 +219,9 @@ impl Task {
                 self.close_second(&mut link, REPORT_EVERY);
                 self.tell_report(Some(&schedule)).await?;
             }
-            let request = match self.requests.try_recv() {
-                Ok(request) => Some(request),
-                Err(mpsc::error::TryRecvError::Disconnected) => break Err(Ended),
-                Err(mpsc::error::TryRecvError::Empty) => None,
-            };
-            let turn = match (request, schedule.next(now)) {
+            let next = schedule.next(now);
+            let Ok(request) = self.next_request(next, now) else { break Err(Ended) };
+            let turn = match (request, next) {
                 (Some(request), _) => self.serve_request(&mut link, &mut schedule, request).await?,
                 (None, next) if self.is_turn_of_test(next) => self.test_step(&mut link).await?,
                 (None, Next::Run(index)) => self.poll(&mut link, &mut schedule, index).await?,
@@ -223,7 +233,32 @@ impl Task {
             }
         };
         self.close_second(&mut link, REPORT_EVERY);
+        self.refuse_waiting().await?;
         leave
+    }
+
+    /// What operators want goes first; writes only within their share of the time while polls are due.
+    fn next_request(&mut self, next: Next, now: Timestamp) -> Result<Option<BusRequest>, Ended> {
+        while self.waiting.len() < WAITING_MAX {
+            match self.requests.try_recv() {
+                Ok(write @ BusRequest::Write { .. }) => self.waiting.push_back(write),
+                Ok(other) => return Ok(Some(other)),
+                Err(mpsc::error::TryRecvError::Disconnected) => return Err(Ended),
+                Err(mpsc::error::TryRecvError::Empty) => break,
+            }
+        }
+        let may_go = !matches!(next, Next::Run(_)) || self.budget.allows(now);
+        Ok(if may_go { self.waiting.pop_front() } else { None })
+    }
+
+    /// The port is left: what still waits was never sent.
+    async fn refuse_waiting(&mut self) -> Result<(), Ended> {
+        for request in std::mem::take(&mut self.waiting) {
+            if let BusRequest::Write { id, .. } = request {
+                self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
+            }
+        }
+        Ok(())
     }
 
     /// Nothing is due: drops what comes unasked until something is.
@@ -261,7 +296,11 @@ impl Task {
             BusRequest::Write { id, tag, raw, unlock, verify } => {
                 let def = self.def.clone();
                 let (tag, unlock) = (def.tag(tag), unlock.map(|(tag, raw)| (def.tag(tag), raw)));
-                self.write(link, schedule, id, tag, raw, unlock, verify).await
+                let started = self.clock.now();
+                let turn = self.write(link, schedule, id, tag, raw, unlock, verify).await;
+                let now = self.clock.now();
+                self.budget.spent(Duration::try_from(now.duration_since(started)).unwrap_or_default(), now);
+                turn
             }
         }
     }
@@ -283,8 +322,12 @@ impl Task {
     }
 
     async fn tell_report(&mut self, schedule: Option<&Schedule>) -> Result<(), Ended> {
-        let next = |index| schedule.and_then(|schedule| schedule.release(index));
-        let report = self.books.report(&self.def, &self.settings, &self.blocks, self.counters, next);
+        let plan = Plan {
+            blocks: &self.blocks,
+            polls: schedule.map(|schedule| schedule.polls().collect()).unwrap_or_default(),
+            refused: plan::refused(&self.def, self.line, &self.holes),
+        };
+        let report = self.books.report(&self.def, &self.settings, plan, self.counters);
         self.tell(Event::Report { at: self.clock.now(), line: self.line, report }).await
     }
 

@@ -44,6 +44,8 @@ impl Wire {
     /// A freshly opened port. `counters` go on from an earlier opening.
     pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, counters: LineCounters) -> Wire {
         let (char_time, silence) = match line.transport.serial() {
+            // The frames of ASCII have a beginning and an end of their own.
+            Some(serial) if line.transport.framing() == Framing::Ascii => (serial.char_time(), line.gap),
             Some(serial) => (serial.char_time(), serial.silence().max(line.gap)),
             None => (Duration::ZERO, line.gap),
         };

@@ -71,10 +71,9 @@ mod tests {
     use super::*;
     use crate::plant::{
         def::{Serial, Transport},
-        event::{Event, LineCounters},
+        event::Event,
         fixture,
         line_report::LineReport,
-        traffic::Frames,
     };
 
     const L1: LineId = LineId(0);
@@ -94,14 +93,7 @@ mod tests {
 
     /// The line says that it works with these settings.
     fn works_with(plant: &mut Plant, settings: &LineDef) {
-        let report = Arc::new(LineReport {
-            settings: settings.clone(),
-            counters: LineCounters::default(),
-            polls: Vec::new(),
-            devices: Vec::new(),
-            busy: Vec::new(),
-            frames: Frames::default(),
-        });
+        let report = Arc::new(LineReport::new(settings.clone()));
         plant.on_event(Event::Report { at: at(1), line: L1, report });
     }
 

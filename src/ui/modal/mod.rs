@@ -51,7 +51,7 @@ pub enum Modal {
     /// Why a value is what it is.
     Why(Why),
     /// How a line communicates.
-    Settings(Settings),
+    Settings(Box<Settings>),
     /// A frame, a block, a test of the bus tab.
     Bus(Box<bus::Window>),
 }

@@ -72,7 +72,7 @@ impl Settings {
         if let Some(deed) = self.asking.take() {
             let yes = enter || keys::char('y').is(event);
             let acts = if yes { vec![Act::Order(self.command(deed))] } else { Vec::new() };
-            return Next::Both(Modal::Settings(self), acts);
+            return Next::Both(Modal::Settings(Box::new(self)), acts);
         }
         self.problem = None;
         let asked = match event.code {
@@ -92,7 +92,7 @@ impl Settings {
             Ok(deed) => self.asking = deed,
             Err(problem) => self.problem = Some(problem),
         }
-        Next::Stay(Modal::Settings(self.in_range()))
+        Next::Stay(Modal::Settings(Box::new(self.in_range())))
     }
 
     pub(super) fn on_paste(&mut self, text: &str) {

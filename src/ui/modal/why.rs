@@ -3,6 +3,9 @@
 
 mod bytes;
 mod facts;
+mod service;
+mod value;
+mod wire;
 #[cfg(test)]
 mod tests;
 

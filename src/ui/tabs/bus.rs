@@ -187,7 +187,7 @@ impl Bus {
             Action::Try(tried) => return self.test.open(cx, &at, tried),
             Action::Again => return test::again(cx, &at),
             Action::Stop => return test::stop(&at),
-            Action::Settings => return vec![Act::Open(Modal::Settings(Settings::new(cx, self.line)))],
+            Action::Settings => return vec![Act::Open(Modal::Settings(Box::new(Settings::new(cx, self.line))))],
         }
         self.on_snapshot(cx)
     }

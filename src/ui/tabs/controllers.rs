@@ -149,7 +149,7 @@ impl Controllers {
             }
             Action::Tune => write(device.faceplate.as_ref().and_then(|plate| plate.tune)),
             Action::Run => write(device.faceplate.as_ref().and_then(|plate| plate.run)),
-            Action::Settings => vec![Act::Open(Modal::Settings(Settings::new(cx, device.line)))],
+            Action::Settings => vec![Act::Open(Modal::Settings(Box::new(Settings::new(cx, device.line))))],
             Action::Line => vec![Act::Open(Modal::Confirm(connect(cx, device.line)))],
         }
     }

@@ -10,8 +10,8 @@ use crate::{
     bus::{
         codec,
         io::link::{Link, Trouble},
-        plan::{self, Block},
-        schedule::{Next, Schedule},
+        plan::{self, Block, Hunt},
+        schedule::{Next, Schedule, Served},
     },
     plant::{
         def::{Framing, TagId},
@@ -43,7 +43,8 @@ impl Task {
             Err(trouble) => Err(trouble),
         };
         let at = self.clock.now();
-        schedule.done(index, started, at);
+        let served = schedule.done(index, started, at);
+        self.note_served(index, served);
         link.rest(self.def.device(block.device).gap);
         let answer = match read {
             Ok(answer) => Ok(answer),
@@ -52,7 +53,7 @@ impl Task {
         };
         // Nothing new was sent when patience was the only way.
         let exchange = link.last.clone().filter(|last| sent.as_ref().is_none_or(|sent| !Arc::ptr_eq(sent, last)));
-        self.settle(link, schedule, index, at, (answer, exchange)).await?;
+        self.settle(link, schedule, &block, at, (answer, exchange)).await?;
         Ok(self.still_there(link))
     }
 
@@ -73,10 +74,13 @@ impl Task {
                 break;
             }
             taken.push(index);
-            schedule.done(index, started, started);
+            let served = schedule.done(index, started, started);
+            self.note_served(index, served);
             next = schedule.next(started);
         }
-        let requests: Vec<[u8; 6]> = taken.iter().map(|index| self.blocks[*index].request()).collect();
+        // What one of them tells may change the plan: the places of the others no longer hold then.
+        let taken: Vec<Block> = taken.into_iter().map(|index| self.blocks[index].clone()).collect();
+        let requests: Vec<[u8; 6]> = taken.iter().map(Block::request).collect();
         let messages: Vec<&[u8]> = requests.iter().map(|request| &request[..]).collect();
         let answers = match link.exchange_all(&messages).await {
             Ok(answers) => answers,
@@ -85,10 +89,9 @@ impl Task {
             Err(Trouble::Fault(_)) => return Ok(Ok(())),
         };
         let at = self.clock.now();
-        // A block that is split moves those behind it: the last first.
-        for (index, answered) in taken.into_iter().zip(answers).rev() {
-            let answer = answered.answer.and_then(|answer| parse(&self.blocks[index], &answer));
-            self.settle(link, schedule, index, at, (answer, Some(answered.exchange))).await?;
+        for (block, answered) in taken.iter().zip(answers) {
+            let answer = answered.answer.and_then(|answer| parse(block, &answer));
+            self.settle(link, schedule, block, at, (answer, Some(answered.exchange))).await?;
         }
         Ok(self.still_there(link))
     }
@@ -107,41 +110,52 @@ impl Task {
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
-        index: usize,
+        block: &Block,
         at: Timestamp,
         (answer, exchange): Outcome,
     ) -> Result<(), Ended> {
-        let block = self.blocks[index].clone();
+        let index = self.blocks.iter().position(|planned| planned == block);
         let reply = exchange.as_ref().and_then(|exchange| exchange.reply);
         if let Some(exchange) = &exchange {
-            self.books.polled(index, block.device, answer.as_ref().map(drop).map_err(|fault| *fault), reply);
-            let retries = u64::from(exchange.tries.saturating_sub(1));
-            self.books.poll(index).retries += retries;
-            if let Some(tally) = self.books.device(block.device) {
-                tally.retries += retries;
-            }
+            let outcome = answer.as_ref().map(drop).map_err(|fault| *fault);
+            self.books.polled(index, block.device, outcome, reply, exchange.tries);
         }
         match answer {
             Ok(values) => {
                 schedule.answered(block.device, at);
-                self.tell_values(at, &block, &values, reply.unwrap_or_default(), exchange).await
+                self.tell_values(at, block, &values, reply.unwrap_or_default(), exchange).await?;
+                self.hunt.answered(block);
+                let disproved = self.holes.disproved(block);
+                self.replan(schedule, at, disproved);
+                Ok(())
             }
             Err(fault @ Fault::Exception(code)) if !code.is_of_gateway() => {
                 schedule.answered(block.device, at);
-                schedule.again(index, at);
                 self.tell_failed(at, block.device, block.tags.clone(), fault, exchange).await?;
                 let its_own = link.debt(block.unit).is_clear();
-                if code == ExceptionCode(0x02) && its_own && self.split(index) {
-                    *schedule = Schedule::new(&self.blocks, at);
+                let Some(index) = index else { return Ok(()) };
+                schedule.again(index, at);
+                if code == ExceptionCode(0x02) && its_own {
+                    tracing::debug!(address = block.address, count = block.count, "exception 02: the block is split");
+                    let mut blocks = self.blocks.clone();
+                    blocks.splice(index..=index, self.hunt.refused(&self.def, block));
+                    self.use_plan(schedule, blocks, at);
+                    self.replan(schedule, at, false);
+                } else {
+                    schedule.excused(index, code, at);
                 }
                 Ok(())
             }
             Err(fault) => {
-                schedule.again(index, at);
+                if let Some(index) = index {
+                    schedule.again(index, at);
+                }
                 self.tell_failed(at, block.device, block.tags.clone(), fault, exchange).await?;
                 if schedule.failed(block.device, at) {
                     let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
                     self.tell_failed(at, block.device, tags, Fault::Resting, None).await?;
+                    self.holes.forget(block.device);
+                    self.replan(schedule, at, true);
                 }
                 Ok(())
             }
@@ -169,11 +183,10 @@ impl Task {
         }
     }
 
-    /// Reads a block; a spoiled answer, or one that the device's memory spoiled (exception 08), is asked for once more. It
-    /// counts as owed, so the unit is brought into step first.
+    /// Reads a block; a spoiled answer is asked for once more. It counts as owed, so the unit is brought into step first.
     pub(super) async fn read_twice(&self, link: &mut Link, block: &Block) -> Result<Answer, Trouble> {
         match read(link, block).await {
-            Err(Trouble::Fault(fault)) if fault.is_corrupt() || fault == Fault::Exception(ExceptionCode(0x08)) => {
+            Err(Trouble::Fault(fault)) if fault.is_corrupt() => {
                 self.in_step(link, block).await?;
                 let second = read(link, block).await;
                 if let Some(last) = &mut link.last {
@@ -185,19 +198,27 @@ impl Task {
         }
     }
 
-    /// A block that the device does not have as a whole is read tag by tag from now on. `false`: it was a single tag.
-    fn split(&mut self, index: usize) -> bool {
-        let block = self.blocks[index].clone();
-        if block.tags.len() < 2 {
-            return false;
+    /// Makes the plan anew when the search for what a device does not have has come to an end, or knowledge was `wrong`.
+    fn replan(&mut self, schedule: &mut Schedule, at: Timestamp, wrong: bool) {
+        if self.hunt.conclude(&mut self.holes) || wrong {
+            self.hunt = Hunt::default();
+            let blocks = plan::blocks(&self.def, self.line, &self.holes);
+            self.use_plan(schedule, blocks, at);
         }
-        tracing::warn!(address = block.address, count = block.count, "exception 02: the block is split");
-        let device = self.def.device(block.device);
-        let singles = block.tags.iter().map(|tag| plan::single(device, self.def.tag(*tag)));
-        let singles: Vec<Block> = singles.collect();
-        self.books.split(index, singles.len());
-        self.blocks.splice(index..=index, singles);
-        true
+    }
+
+    fn use_plan(&mut self, schedule: &mut Schedule, blocks: Vec<Block>, at: Timestamp) {
+        self.books.replan(&self.blocks, &blocks);
+        schedule.replan(&blocks, at);
+        self.blocks = blocks;
+    }
+
+    fn note_served(&mut self, index: usize, served: Served) {
+        let tally = self.books.poll(index);
+        tally.missed += u64::from(served.missed);
+        if let Some(jitter) = served.jitter {
+            tally.jitter.add(jitter);
+        }
     }
 
     async fn tell_values(

@@ -16,7 +16,7 @@ use crate::{
         snapshot::DeviceState,
         tag::{Decimals, Poll, Table},
         tally::Tally,
-        traffic::{Exchange, Frames},
+        traffic::Exchange,
     },
     ui::{
         fixture::{self, Fixture},
@@ -43,7 +43,6 @@ fn fixture() -> Fixture {
     tally.jitter.add(Duration::from_millis(2));
     let tags: Vec<_> = plant.def.tags_of(DeviceId(0)).map(|tag| tag.id).collect();
     plant.line.report = Some(Arc::new(LineReport {
-        settings: plant.def.lines[0].clone(),
         counters: plant.line.counters,
         polls: vec![PollReport {
             device: DeviceId(0),
@@ -54,11 +53,13 @@ fn fixture() -> Fixture {
             poll: Poll::Every(Duration::from_secs(1)),
             cost: Duration::from_millis(64),
             next: Some(fixture::now() + SignedDuration::from_millis(600)),
+            class: crate::plant::tag::Class::Soft,
+            factor: 1,
+            shed: false,
             tally: tally.clone(),
         }],
         devices: vec![(DeviceId(0), tally)],
-        busy: Vec::new(),
-        frames: Frames::default(),
+        ..LineReport::new(plant.def.lines[0].clone())
     }));
     for device in &mut plant.devices {
         device.last_fault = Some((ago(71_000), Fault::Timeout));

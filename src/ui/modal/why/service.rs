@@ -1,0 +1,87 @@
+//! How the device and its line do, and how the value's poll keeps its time.
+
+use std::time::Duration;
+
+use super::{
+    Row,
+    facts::{row, span, words},
+};
+use crate::{
+    plant::{
+        def::DeviceDef,
+        event::LineState,
+        sample::Cause,
+        snapshot::DeviceState,
+        tag::{Poll, TagDef},
+        traffic::Exchange,
+    },
+    ui::{
+        Cx,
+        modal::faceplate::device_words,
+        widgets::text::{age, between, running},
+    },
+};
+
+/// How the device stands, how fast it answers, what went wrong last; and its line, if that is not well.
+pub(super) fn device_rows(cx: &Cx, def: &TagDef, device: &DeviceDef, exchange: Option<&Exchange>) -> Vec<Row> {
+    let theme = cx.theme;
+    let status = cx.snapshot.device(device.id);
+    let line = cx.snapshot.line(device.line);
+    let tally = line.report.as_ref().and_then(|report| report.device(device.id));
+    let mut text = device_words(cx, device.id);
+    if let Some(p99) = tally.and_then(|tally| tally.reply.p99()) {
+        text += &format!(", 99 % within {}", span(p99));
+    }
+    if let Some((failed, of)) = tally.map(|tally| tally.recent()).filter(|(failed, _)| 0 < *failed) {
+        text += &format!(", {failed} of the last {of} failed");
+    }
+    let well = matches!(status.state, DeviceState::Answering | DeviceState::Unknown);
+    let mut rows = vec![row("device", text, if well { theme.normal() } else { theme.trouble() })];
+    rows.extend(status.diagnosis.map(|reason| {
+        let signal = reason.signal();
+        row("", format!("{} {}: {reason}", signal.letter(), signal.word()), theme.trouble())
+    }));
+    // What stands above already is not said again.
+    let told = cx.snapshot.sample(def.id).quality.cause() == Some(Cause::NotConnected);
+    rows.extend(line_words(cx, &line.state).filter(|_| !told).map(|words| row("line", words, theme.trouble())));
+    let verdict = exchange.and_then(|exchange| exchange.outcome.err());
+    if let Some((at, fault)) = status.last_fault.filter(|(_, fault)| Some(*fault) != verdict) {
+        let ago = age(between(at, cx.now));
+        rows.push(row("", format!("last fault {ago} ago: {}", words(fault)), theme.dim()));
+    }
+    rows
+}
+
+/// When it is read, with whom, and whether that works out.
+pub(super) fn poll_rows(cx: &Cx, def: &TagDef) -> Vec<Row> {
+    let line = cx.snapshot.line(cx.def().device(def.device).line);
+    let Some(poll) = line.report.as_ref().and_then(|report| report.poll_of(def.id)) else { return Vec::new() };
+    let period = match poll.poll {
+        Poll::Every(period) => format!("every {}", span(period)),
+        Poll::Once => "once, and on refresh".to_owned(),
+        Poll::Never => "never by itself".to_owned(),
+    };
+    let next = poll.next.map(|next| match between(cx.now, next) {
+        Duration::ZERO => ", due now".to_owned(),
+        wait => format!(", next in {}", span(wait)),
+    });
+    let mut text = format!("{period}{}, {} missed", next.unwrap_or_default(), poll.tally.missed);
+    if let Some(p99) = poll.tally.jitter.p99() {
+        text += &format!(", jitter {}", span(p99));
+    }
+    text += &format!(", costs {}", span(poll.cost));
+    vec![row("poll", text, if poll.tally.missed == 0 { cx.theme.normal() } else { cx.theme.trouble() })]
+}
+
+/// What is the matter with a line; `None` while it is connected.
+pub(super) fn line_words(cx: &Cx, state: &LineState) -> Option<String> {
+    match state {
+        LineState::Connected => None,
+        LineState::Connecting => Some("being connected".to_owned()),
+        LineState::Disconnected => Some("disconnected by an operator".to_owned()),
+        LineState::Testing => Some("a test has it for itself".to_owned()),
+        LineState::Waiting { why, retry_at } => {
+            Some(format!("not connected: {why}; tried again in {}", running(between(cx.now, *retry_at))))
+        }
+    }
+}

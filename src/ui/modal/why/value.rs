@@ -1,0 +1,153 @@
+//! The value with quality and cause, what to do about a doubt, and the number that it was made from.
+
+use super::{
+    Row,
+    facts::{row, span, words},
+    service::line_words,
+    wire::kind,
+};
+use crate::{
+    bus::evidence::{self, Found},
+    plant::{
+        def::TagId,
+        event::{Fault, LineState},
+        sample::{Cause, Quality},
+        scale,
+        tag::{Access, Decimals, Poll, TagDef},
+        traffic::Exchange,
+    },
+    ui::{
+        Cx,
+        widgets::{
+            text::{age, clock},
+            value,
+        },
+    },
+};
+
+/// The value with its quality and age, the reason for a doubt, and what to do about it.
+pub(super) fn value_rows(cx: &Cx, def: &TagDef, exchange: Option<&Exchange>, found: Option<&Found>) -> Vec<Row> {
+    let sample = cx.snapshot.sample(def.id);
+    let shown = value::show(cx, def.id);
+    let at = clock(sample.at, &cx.def().time_zone);
+    let quality = match sample.quality {
+        _ if def.access == Access::Write => "write only: nobody can read it".to_owned(),
+        Quality::Good => format!("good, read {} ago at {at}", age(cx.age(def.id))),
+        Quality::Uncertain(cause) => {
+            format!("uncertain: {}; read {} ago at {at}", cause.words(), age(cx.age(def.id)))
+        }
+        Quality::Bad(cause) => format!("bad: {}, since {at}", cause.words()),
+    };
+    let mut rows = vec![row("value", format!("{}  {quality}", shown.with_unit()), shown.style)];
+    let Some(cause) = sample.quality.cause().filter(|_| def.access != Access::Write) else { return rows };
+    if let Some(because) = because(cx, def, cause, exchange, found) {
+        rows.push(row("because", because, cx.theme.normal()));
+    }
+    if let Some(advice) = advice(cx, def, cause, exchange) {
+        rows.push(row("to do", advice, cx.theme.strong()));
+    }
+    rows
+}
+
+/// What the cause does not say by itself: the other tag, the number that means "no value".
+fn because(cx: &Cx, def: &TagDef, cause: Cause, exchange: Option<&Exchange>, found: Option<&Found>) -> Option<String> {
+    let line = cx.def().device(def.device).line;
+    let words_of = |tag: TagId| format!("{} is {}", cx.def().tag(tag).name, value::show(cx, tag).whole());
+    match cause {
+        Cause::NotConnected => line_words(cx, &cx.snapshot.line(line).state),
+        Cause::SensorFault => {
+            let raw = found.and_then(|found| found.raw);
+            if let Some(raw) = raw.filter(|raw| def.bad_if.iter().any(|bad| *bad as f64 == *raw)) {
+                return Some(format!("raw {raw} means \"no value\" for this device"));
+            }
+            match (exchange.and_then(|exchange| exchange.outcome.err()), def.quality_from) {
+                (Some(Fault::NotANumber), _) => Some(words(Fault::NotANumber)),
+                (_, Some((word, mask))) => Some(format!("{} (bits 0x{mask:X} mean a fault)", words_of(word))),
+                (_, None) => None,
+            }
+        }
+        Cause::Unscaled => match def.decimals {
+            Decimals::From(from) => Some(format!("its decimals come from another value: {}", words_of(from))),
+            Decimals::Fixed(_) => None,
+        },
+        Cause::Stale => match def.poll {
+            Poll::Every(period) => Some(format!("read every {}, and not for longer than that", span(period))),
+            Poll::Once | Poll::Never => Some("it is not read by itself".to_owned()),
+        },
+        // The verdict on the last answer says it all.
+        Cause::Corrupt | Cause::Exception | Cause::Timeout | Cause::DeviceDown => None,
+        Cause::NotRead | Cause::OutOfRange | Cause::StationOff => None,
+    }
+}
+
+/// One sentence: what a technician does.
+fn advice(cx: &Cx, def: &TagDef, cause: Cause, exchange: Option<&Exchange>) -> Option<String> {
+    let device = cx.def().device(def.device);
+    let fault = exchange.and_then(|exchange| exchange.outcome.err());
+    let last = cx.snapshot.device(device.id).last_fault.map(|(_, fault)| fault);
+    let of = |fault: Fault| Some(evidence::advice(fault).to_owned());
+    match cause {
+        Cause::NotConnected => match cx.snapshot.line(device.line).state {
+            LineState::Disconnected => Some("connect the line again: tab 4, L".to_owned()),
+            LineState::Testing => Some("wait for the end of the test, or stop it".to_owned()),
+            LineState::Waiting { .. } | LineState::Connecting | LineState::Connected => of(Fault::NotConnected),
+        },
+        Cause::Timeout | Cause::DeviceDown => of(fault.or(last).unwrap_or(Fault::Timeout)),
+        Cause::Corrupt => of(fault.unwrap_or(Fault::Crc { got: 0, computed: 0 })),
+        Cause::Exception => fault.or(last).and_then(of),
+        Cause::SensorFault if fault == Some(Fault::NotANumber) => of(Fault::NotANumber),
+        Cause::SensorFault => Some("check the sensor, its wires and the input range of the device".to_owned()),
+        Cause::Unscaled => Some("make the other value good first; w on it says why it is not".to_owned()),
+        Cause::Stale => match def.poll {
+            Poll::Every(_) => Some("the line may be overloaded: see missed reads below, poll slower".to_owned()),
+            Poll::Once | Poll::Never => Some("read it now: tab 4, u".to_owned()),
+        },
+        Cause::NotRead => match def.poll {
+            Poll::Every(_) | Poll::Once => None,
+            Poll::Never => Some("read it now: tab 4, u".to_owned()),
+        },
+        Cause::OutOfRange => Some("compare the value with the range of the device".to_owned()),
+        Cause::StationOff => None,
+    }
+}
+
+/// `raw 724 (02D4) × 10^-1 = 72.4 °C, decimals from TIC-1.DP`.
+pub(super) fn number(cx: &Cx, def: &TagDef, exchange: Option<&Exchange>, found: Option<&Found>) -> String {
+    let scaling = match def.decimals {
+        Decimals::From(_) => cx.snapshot.decimals[def.id.index()],
+        Decimals::Fixed(_) => 0,
+    };
+    let from_answer = found.and_then(|found| found.raw);
+    // Without an answer that holds it: the number behind the value that is still shown.
+    let shown = cx.snapshot.sample(def.id).value.and_then(|value| scale::to_raw(def, value, scaling));
+    let hex = found.map(|found| found.words.iter().map(|word| format!(" {word:04X}")).collect::<String>());
+    let Some(raw) = from_answer.or(shown) else {
+        return match hex {
+            Some(hex) => format!("none:{hex} is no {}", kind(def.point.kind)),
+            None => "none".to_owned(),
+        };
+    };
+    let hex = hex.filter(|_| !def.point.table.is_bits()).map(|hex| format!(" ({})", hex.trim_start()));
+    let mut words = format!("raw {raw}{}", hex.unwrap_or_default());
+    if 0 < scaling {
+        words += &format!(" × 10^-{scaling}");
+    }
+    if def.scale != 1.0 {
+        words += &format!(" × {}", def.scale);
+    }
+    if def.offset != 0.0 {
+        words += &format!(" {} {}", if def.offset < 0.0 { '−' } else { '+' }, def.offset.abs());
+    }
+    let result = cx.snapshot.format(def.id, scale::to_value(def, raw, scaling));
+    words += &format!(" = {result} {}", cx.snapshot.unit(def.id));
+    let mut words = words.trim_end().to_owned();
+    match def.decimals {
+        Decimals::From(from) => words += &format!(", decimals from {}", cx.def().tag(from).name),
+        Decimals::Fixed(_) if def.scale == 1.0 && def.offset == 0.0 && def.labels.is_empty() => words += ", not scaled",
+        Decimals::Fixed(_) => {}
+    }
+    if from_answer.is_none() && exchange.is_some() {
+        words += ", earlier answer";
+    }
+    words
+}

@@ -1,0 +1,144 @@
+//! Where the value lives, the request and the answer that brought it, in bytes and in words.
+
+use super::{
+    Row, bytes,
+    facts::{row, settings, span, words},
+};
+use crate::{
+    bus::{
+        evidence::Found,
+        explain::{self, Direction, Explained},
+    },
+    plant::{
+        def::DeviceDef,
+        event::LineState,
+        tag::{Access, Kind, Order, Poll, TagDef},
+        traffic::Exchange,
+    },
+    ui::{Cx, widgets::text::clock},
+};
+
+/// Request, answer, verdict; gives both frames in words.
+pub(super) fn exchange_rows(
+    cx: &Cx,
+    def: &TagDef,
+    exchange: &Exchange,
+    found: Option<&Found>,
+    room: u16,
+    rows: &mut Vec<Row>,
+) -> (Explained, Explained) {
+    let theme = cx.theme;
+    let framing = exchange.framing;
+    let request = explain::explain(&exchange.request, Some(framing), Some(Direction::Request), None);
+    let answer =
+        explain::explain(&exchange.answer, Some(framing), Some(Direction::Answer), Some(request.message.as_slice()));
+    let frame = |bytes: &[u8], marked: Option<&std::ops::Range<usize>>| {
+        bytes::telling(bytes::rows(bytes, framing, marked, room.saturating_sub(2)), theme.ellipsis())
+    };
+    let hex = |label, text: String, style| Row { label, text: text.trim_start().to_owned(), style, wraps: false };
+    for (n, text) in frame(&exchange.request, None).into_iter().enumerate() {
+        rows.push(hex(if n == 0 { "asked" } else { "" }, text, theme.normal()));
+    }
+    let at = clock(exchange.at, &cx.def().time_zone);
+    rows.push(row("", format!("{}, at {at}", request.summary), theme.dim()));
+    if exchange.answer.is_empty() {
+        let timeout = settings(cx, def).timeout;
+        rows.push(row("answer", format!("none within {}", span(timeout)), theme.trouble()));
+    } else {
+        for (n, text) in frame(&exchange.answer, found.map(|found| &found.range)).into_iter().enumerate() {
+            rows.push(hex(if n == 0 { "answer" } else { "" }, text, theme.normal()));
+        }
+        rows.push(Row { wraps: false, ..row("", answer.summary.clone(), theme.dim()) });
+    }
+    let reply = exchange.reply.map(|reply| format!(", after {}", span(reply))).unwrap_or_default();
+    let tries = if 1 < exchange.tries { ", second try: the first answer was spoiled" } else { ", first try" };
+    let (verdict, style) = match exchange.outcome {
+        Ok(()) => ("ok".to_owned(), theme.normal()),
+        Err(fault) => (words(fault), theme.trouble()),
+    };
+    rows.push(row("verdict", format!("{verdict}{reply}{tries}"), style));
+    (request, answer)
+}
+
+/// Every byte of both frames, one meaning a row: for who scrolls or has a large screen.
+pub(super) fn every_byte(
+    cx: &Cx,
+    exchange: &Exchange,
+    (request, answer): &(Explained, Explained),
+    found: Option<&Found>,
+    room: u16,
+) -> Vec<Row> {
+    let mut rows = Vec::new();
+    let frames = [("asked", request, None), ("answer", answer, found.map(|found| &found.range))];
+    for (label, told, marked) in
+        frames.into_iter().filter(|(label, ..)| *label == "asked" || !exchange.answer.is_empty())
+    {
+        let heading = format!("{label}, byte by byte");
+        rows.push(Row { label: "", text: heading, style: cx.theme.strong(), wraps: false });
+        for field in &told.fields {
+            let own = marked.is_some_and(|marked| field.range.start < marked.end && marked.start < field.range.end);
+            let mark = if own { "▸" } else { " " };
+            let text = format!("{mark} {:<12} {:<16} {}", field.hex, field.name, field.words);
+            let style = if own { cx.theme.strong() } else { cx.theme.normal() };
+            // Long fields (a text) are cut: the frame itself stands above.
+            let text = text.chars().take(usize::from(room)).collect();
+            rows.push(Row { label: "", text, style, wraps: false });
+        }
+    }
+    rows
+}
+
+pub(super) fn never_asked(cx: &Cx, def: &TagDef) -> &'static str {
+    match (def.access, def.poll, &cx.snapshot.line(cx.def().device(def.device).line).state) {
+        (Access::Write, ..) => "never: it can only be written",
+        (_, Poll::Never, _) => "never: it is not read by itself",
+        (_, _, LineState::Connected) => "not yet: its turn has not come",
+        (_, _, LineState::Connecting | LineState::Waiting { .. } | LineState::Disconnected | LineState::Testing) => {
+            "not yet: nothing could be sent"
+        }
+    }
+}
+
+pub(super) fn place(cx: &Cx, def: &TagDef, device: &DeviceDef) -> String {
+    let line = settings(cx, def);
+    format!("{} {} unit {} on {}, {}", device.name, device.model, device.unit, line.name, line.transport)
+}
+
+/// Function, both numbers of the address, type, word order.
+pub(super) fn point(def: &TagDef) -> String {
+    let point = def.point;
+    let function = explain::function_words(point.table.read_fc());
+    let what = match (point.table.is_bits(), point.field) {
+        (true, _) => "one bit".to_owned(),
+        (false, Some((low, 1))) => format!("bit {low} of a word"),
+        (false, Some((low, bits))) => format!("bits {low}–{} of a word", low + bits - 1),
+        (false, None) => kind(point.kind).to_owned(),
+    };
+    let order = match (point.table.is_bits(), point.order) {
+        (true, _) => "",
+        (false, Order::Abcd | Order::Cdab) if point.kind.words() == 1 => "",
+        (false, Order::Abcd) => " ABCD (high word first)",
+        (false, Order::Cdab) => " CDAB (low word first)",
+        (false, Order::Badc) => " BADC (bytes swapped)",
+        (false, Order::Dcba) => " DCBA (little-endian)",
+    };
+    let address = point.address;
+    format!("{function}  {} / 0x{address:04X}  {what}{order}", point.table.modicon(address))
+}
+
+/// The word of a type in the profiles.
+pub(super) fn kind(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Bool => "bool",
+        Kind::I16 => "int16",
+        Kind::U16 => "uint16",
+        Kind::I32 => "int32",
+        Kind::U32 => "uint32",
+        Kind::I64 => "int64",
+        Kind::U64 => "uint64",
+        Kind::F32 => "float32",
+        Kind::F64 => "float64",
+        Kind::Bcd16 => "bcd16",
+        Kind::Bcd32 => "bcd32",
+    }
+}
