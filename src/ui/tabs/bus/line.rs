@@ -43,6 +43,7 @@ pub fn rows(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
     rows.push(Row::new());
     rows.extend(devices(cx, at, report, width));
     rows.push(Row::new());
+    rows.extend(cycle(cx, report, width));
     rows.extend(counters(cx, at, report, width));
     rows
 }
@@ -107,17 +108,19 @@ fn load(cx: &Cx, report: &LineReport, width: u16) -> Vec<Row> {
         (format!("{mark}{:>3.0} % ", now * 100.0), style),
         (bar(cx, now, 12), style),
         (format!(" {:>3.0} % of the last minute ", minute * 100.0), theme.normal()),
-        (spark::shares(&report.busy, usize::from(width.saturating_sub(60)).clamp(10, 60), theme.glyphs), theme.dim()),
+        (spark::shares(&report.busy, usize::from(width.saturating_sub(60)).min(60), theme.glyphs), theme.dim()),
     ]);
-    let mut rows = flow.rows();
-    let mut flow = Flow::new("cycle", theme.dim(), width);
+    flow.rows()
+}
+
+fn cycle(cx: &Cx, report: &LineReport, width: u16) -> Vec<Row> {
+    let mut flow = Flow::new("cycle", cx.theme.dim(), width);
     let plan = Planned::of(report);
     flow.add(value(cx, "blocks", &plan.blocks.to_string()));
     flow.add(value(cx, "one round", &format!("{} on the wire", ms(plan.round))));
     flow.add(value(cx, "load at worst", &format!("{:.0} %", plan.load * 100.0)));
-    flow.add(count(cx, "missed", counters.missed, missed_lately(report)));
-    rows.extend(flow.rows());
-    rows
+    flow.add(count(cx, "missed", report.counters.missed, missed_lately(report)));
+    flow.rows()
 }
 
 /// What the periodic reads take.

@@ -184,7 +184,7 @@ fn detail(cx: &Cx, poll: &PollReport) -> Vec<String> {
             plural(poll.tags.len(), "tag", "tags"),
         ),
         format!(
-            "reply {} ms, p99 {}, max {}   {late}   missed {}   asked again {}",
+            "reply {} ms, p99 {}, max {}; {late}; missed {}; asked again {}",
             span(tally.reply.last()),
             span(tally.reply.p99()),
             span(tally.reply.max()),

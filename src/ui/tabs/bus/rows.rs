@@ -24,7 +24,8 @@ pub fn draw(cx: &Cx, canvas: &mut Canvas, rows: &[Row], first: usize) {
     for (y, row) in rows.iter().skip(first).take(room).enumerate() {
         let mut x = 1;
         for (text, style) in row {
-            x = canvas.text(x, y as u16, &fit_words(text, canvas.width().saturating_sub(x)), *style);
+            let text = fit_words(text, canvas.width().saturating_sub(x));
+            x = canvas.text(x, y as u16, if text == "…" { "" } else { &text }, *style);
         }
     }
     let below = rows.len().saturating_sub(first + room);

@@ -333,7 +333,7 @@ impl Send {
         for (y, row) in rows.iter().take(usize::from(room)).enumerate() {
             let mut x = 0;
             for (text, style) in row {
-                x = canvas.text(x, y as u16 + 1, text, *style);
+                x = canvas.text(x, y as u16 + 1, &fit_words(text, width.saturating_sub(x)), *style);
             }
         }
         let last = height.saturating_sub(1);
