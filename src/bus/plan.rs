@@ -21,11 +21,16 @@ mod tests;
 pub use cost::{Wire, cost};
 pub use holes::{Holes, Hunt};
 
+use std::time::Duration;
+
 use crate::plant::{
     PlantDef,
     def::{DeviceDef, DeviceId, LineId, TagId},
     tag::{Access, Class, Point, Poll, Table, TagDef},
 };
+
+/// A tag that its device has refused is asked for this often.
+const REFUSED_EVERY: Duration = Duration::from_secs(60);
 
 /// One read request: a run of registers or bits of one device.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -64,23 +69,29 @@ impl Block {
 }
 
 /// The blocks of a line: every readable tag in exactly one, no value split, all within the limits of its device, in the
-/// least time on the wire. Tags that the device has refused are in none, see [`refused`].
+/// least time on the wire. A tag that the device has [`refused`] is asked for alone and seldom.
 pub fn blocks(def: &PlantDef, line: LineId, holes: &Holes) -> Vec<Block> {
     let on_line = def.devices.iter().filter(|device| device.line == line);
     on_line.flat_map(|device| blocks_of(def, device, holes)).collect()
 }
 
 fn blocks_of(def: &PlantDef, device: &DeviceDef, holes: &Holes) -> Vec<Block> {
-    let mut tags: Vec<&TagDef> = readable(def, device).filter(|tag| !is_refused(device, tag, holes)).collect();
-    if tags.is_empty() {
-        // A device that has refused everything is still asked for something: one day it may have another program.
-        tags.extend(readable(def, device).min_by_key(|tag| tag.poll));
-    }
+    let (refused, mut tags): (Vec<&TagDef>, Vec<&TagDef>) =
+        readable(def, device).partition(|tag| is_refused(device, tag, holes));
     tags.sort_by_key(|tag| (tag.poll, tag.point.table, tag.point.address, tag.point.len(), tag.id));
     let wire = Wire::of(def.line(device.line), device);
     let groups = tags.chunk_by(|a, b| (a.poll, a.point.table) == (b.poll, b.point.table));
     let runs = groups.flat_map(|group| cheapest::cut(group, device, wire, holes));
-    runs.map(|run| together(device, run)).collect()
+    runs.map(|run| together(device, run)).chain(refused.iter().map(|tag| asked_again(device, tag))).collect()
+}
+
+/// A device may get another program: what it has refused is asked for now and then, when the line has time.
+fn asked_again(device: &DeviceDef, tag: &TagDef) -> Block {
+    let period = match tag.poll {
+        Poll::Every(period) => period.max(REFUSED_EVERY),
+        Poll::Once | Poll::Never => REFUSED_EVERY,
+    };
+    Block { poll: Poll::Every(period), class: Class::Idle, ..single(device, tag) }
 }
 
 /// The tags of a line that its devices do not have, as their refusals told.

@@ -51,6 +51,8 @@ pub enum Next {
 /// The polls of one line.
 #[derive(Debug, Clone)]
 pub struct Schedule {
+    /// A point of every grid.
+    origin: Timestamp,
     polls: Vec<Pending>,
     devices: Vec<Health>,
     overload: Overload,
@@ -68,8 +70,8 @@ struct Due {
 impl Schedule {
     /// Everything is due at `now`, which is also the origin of the grid.
     pub fn new(blocks: &[Block], now: Timestamp) -> Schedule {
-        let mut schedule =
-            Schedule { polls: Vec::new(), devices: Vec::new(), overload: Overload::default(), fed: false, missed: 0 };
+        let (polls, devices, overload) = (Vec::new(), Vec::new(), Overload::default());
+        let mut schedule = Schedule { origin: now, polls, devices, overload, fed: false, missed: 0 };
         schedule.replan(blocks, now);
         schedule
     }
@@ -89,7 +91,7 @@ impl Schedule {
             self.devices[place].probe.get_or_insert(index);
             let kept =
                 old.iter_mut().find(|old| old.as_ref().is_some_and(|old| old.is_of(block))).and_then(Option::take);
-            self.polls.push(kept.unwrap_or_else(|| Pending::new(block, place, now)).at(place));
+            self.polls.push(kept.unwrap_or_else(|| Pending::new(block, place, self.origin, now)).at(place));
         }
     }
 

@@ -79,61 +79,95 @@ pub fn split(def: &PlantDef, block: &Block) -> Option<([Block; 2], (u32, u32))> 
     Some(([part(&tags[..before]), part(&tags[before..])], (from, to)))
 }
 
-/// The search for what is wrong with a refused block: its parts are polled in its place, and what they answer tells.
+/// The search for what is wrong with a refused block: its parts are polled in its place, and what they answer tells. What
+/// was found must be confirmed by one more refusal, so that a device that stumbled once loses nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Hunt {
     /// Parts that have not answered yet.
     open: Vec<Block>,
-    cuts: Vec<Cut>,
-    /// Holes for certain.
-    found: Vec<(DeviceId, Table, u32, u32)>,
+    /// Each refused block, and what lay between the two parts that it was cut into.
+    cuts: Vec<(Place, Place)>,
+    found: Vec<Place>,
+    /// Found once: holes, if the next read that contains them is refused too.
+    suspects: Vec<Place>,
 }
 
-/// A refused block and what lay between the two parts that it was cut into.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Cut {
+/// Addresses of a table, from the first to before the last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Place {
     device: DeviceId,
     table: Table,
-    whole: (u32, u32),
-    between: (u32, u32),
+    start: u32,
+    end: u32,
+}
+
+impl Place {
+    fn of(block: &Block, (start, end): (u32, u32)) -> Place {
+        Place { device: block.device, table: block.table, start, end }
+    }
+
+    fn contains(&self, other: &Place) -> bool {
+        (self.device, self.table) == (other.device, other.table) && self.start <= other.start && other.end <= self.end
+    }
 }
 
 impl Hunt {
-    /// A block was refused with exception 02: what to poll in its place. Nothing for a single value: the device does not
-    /// have it, and its tags are out of the plan with the next holes.
-    pub fn refused(&mut self, def: &PlantDef, block: &Block) -> Vec<Block> {
+    /// A block was refused with exception 02: what to poll in its place. `None`: leave it, nothing new was learnt.
+    pub fn refused(&mut self, def: &PlantDef, holes: &Holes, block: &Block) -> Option<Vec<Block>> {
+        let whole = Place::of(block, block.range());
+        if holes.touch(whole.device, whole.table, whole.start, whole.end) {
+            return None;
+        }
         self.open.retain(|open| open != block);
-        let whole = block.range();
-        let Some((parts, between)) = split(def, block) else {
-            self.found.push((block.device, block.table, whole.0, whole.1));
-            return Vec::new();
-        };
-        self.cuts.push(Cut { device: block.device, table: block.table, whole, between });
-        self.open.extend(parts.clone());
-        parts.into()
+        let parts = split(def, block);
+        let confirmed = self.suspects.iter().any(|suspect| whole.contains(suspect));
+        match parts {
+            Some((parts, between)) if !confirmed => {
+                self.cuts.push((whole, Place::of(block, between)));
+                self.open.extend(parts.clone());
+                Some(parts.into())
+            }
+            Some((parts, _)) => {
+                self.found.extend(self.suspects.iter().filter(|suspect| whole.contains(suspect)));
+                Some(parts.into())
+            }
+            None => {
+                if !self.found.contains(&whole) {
+                    self.found.push(whole);
+                }
+                Some(vec![block.clone()])
+            }
+        }
     }
 
     /// A block was read. The device has all of it.
     pub fn answered(&mut self, block: &Block) {
+        let whole = Place::of(block, block.range());
         self.open.retain(|open| open != block);
+        self.suspects.retain(|suspect| !whole.contains(suspect));
     }
 
-    /// When every part has answered, or is a hole itself: adds what was found to `holes`. `true` if the plan must be made
-    /// anew. Where both parts of a refused block are sound, the culprit lies between them.
+    /// When every part has answered, or is a hole itself: adds what was confirmed to `holes`. `true` if the plan must be
+    /// made anew. Where both parts of a refused block are sound, the culprit lies between them.
     pub fn conclude(&mut self, holes: &mut Holes) -> bool {
         if !self.open.is_empty() || (self.cuts.is_empty() && self.found.is_empty()) {
             return false;
         }
-        let Hunt { cuts, mut found, .. } = std::mem::take(self);
-        for cut in cuts.into_iter().rev() {
-            let inside = |(device, table, start, end): &(DeviceId, Table, u32, u32)| {
-                (*device, *table) == (cut.device, cut.table) && cut.whole.0 <= *start && *end <= cut.whole.1
-            };
-            if !found.iter().any(inside) {
-                found.push((cut.device, cut.table, cut.between.0, cut.between.1));
+        for (whole, between) in std::mem::take(&mut self.cuts).into_iter().rev() {
+            if !self.found.iter().any(|found| whole.contains(found)) {
+                self.found.push(between);
             }
         }
-        found.into_iter().for_each(|(device, table, start, end)| holes.add(device, table, start, end));
+        let (confirmed, new): (Vec<Place>, Vec<Place>) =
+            self.found.drain(..).partition(|found| self.suspects.contains(found));
+        self.suspects.retain(|suspect| !confirmed.contains(suspect));
+        self.suspects.extend(new);
+        confirmed.iter().for_each(|hole| holes.add(hole.device, hole.table, hole.start, hole.end));
         true
+    }
+
+    /// The plan is made anew for another reason: the search begins again.
+    pub fn reset(&mut self) {
+        *self = Hunt::default();
     }
 }

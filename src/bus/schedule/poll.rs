@@ -71,17 +71,16 @@ pub(super) struct Pending {
 }
 
 impl Pending {
-    pub fn new(block: &Block, place: usize, now: Timestamp) -> Pending {
-        let period = match block.poll {
-            Poll::Every(period) => Some(period),
-            Poll::Once | Poll::Never => None,
-        };
+    /// Due at once, and then on the grid that has a point at `origin`.
+    pub fn new(block: &Block, place: usize, origin: Timestamp, now: Timestamp) -> Pending {
+        let period = period_of(block);
+        let release = period.map_or(now, |period| origin + period * periods_in(origin, now, period));
         Pending {
             block: key(block),
             place,
             class: block.class,
             period,
-            release: Some(now),
+            release: Some(release),
             urgent: None,
             not_before: now,
             missed: 0,
@@ -94,11 +93,7 @@ impl Pending {
 
     /// Does it read this very block, as often?
     pub fn is_of(&self, block: &Block) -> bool {
-        let period = match block.poll {
-            Poll::Every(period) => Some(period),
-            Poll::Once | Poll::Never => None,
-        };
-        (self.block, self.period) == (key(block), period)
+        (self.block, self.period) == (key(block), period_of(block))
     }
 
     pub fn at(self, place: usize) -> Pending {
@@ -180,6 +175,13 @@ impl Pending {
         };
         (self.excuses, self.excused) = (before.saturating_add(1), true);
         Some(delay)
+    }
+}
+
+fn period_of(block: &Block) -> Option<Duration> {
+    match block.poll {
+        Poll::Every(period) => Some(period),
+        Poll::Once | Poll::Never => None,
     }
 }
 

@@ -10,7 +10,7 @@ use crate::{
     bus::{
         codec,
         io::link::{Link, Trouble},
-        plan::{self, Block, Hunt},
+        plan::{self, Block},
         schedule::{Next, Schedule, Served},
     },
     plant::{
@@ -135,10 +135,11 @@ impl Task {
                 let its_own = link.debt(block.unit).is_clear();
                 let Some(index) = index else { return Ok(()) };
                 schedule.again(index, at);
-                if code == ExceptionCode(0x02) && its_own {
+                let hole = code == ExceptionCode(0x02) && its_own;
+                if hole && let Some(parts) = self.hunt.refused(&self.def, &self.holes, block) {
                     tracing::debug!(address = block.address, count = block.count, "exception 02: the block is split");
                     let mut blocks = self.blocks.clone();
-                    blocks.splice(index..=index, self.hunt.refused(&self.def, block));
+                    blocks.splice(index..=index, parts);
                     self.use_plan(schedule, blocks, at);
                     self.replan(schedule, at, false);
                 } else {
@@ -200,8 +201,10 @@ impl Task {
 
     /// Makes the plan anew when the search for what a device does not have has come to an end, or knowledge was `wrong`.
     fn replan(&mut self, schedule: &mut Schedule, at: Timestamp, wrong: bool) {
-        if self.hunt.conclude(&mut self.holes) || wrong {
-            self.hunt = Hunt::default();
+        if wrong {
+            self.hunt.reset();
+        }
+        if wrong || self.hunt.conclude(&mut self.holes) {
             let blocks = plan::blocks(&self.def, self.line, &self.holes);
             self.use_plan(schedule, blocks, at);
         }
