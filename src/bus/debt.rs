@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn a_probe_is_never_of_an_owed_shape() {
-        let blocks = plan::blocks(&fixture::plant(), LineId(0));
+        let blocks = plan::blocks(&fixture::plant(), LineId(0), &plan::Holes::default());
         let inputs = &blocks[0];
         let mut debt = Debt::default();
         assert!(debt.is_clear());

@@ -6,5 +6,6 @@ pub mod codec;
 pub mod plan;
 pub mod backoff;
 pub mod schedule;
+pub mod admission;
 pub mod debt;
 pub mod io;

@@ -1,9 +1,18 @@
-//! `sightglass check`: every error of a file at once, or the read plan of each line.
+//! `sightglass check`: every error of a file at once, or the read plan of each line and whether the line can carry it.
 
 use std::path::PathBuf;
 
 use crate::{
-    bus::plan,
+    bus::{
+        admission,
+        plan::{self, Block, Holes},
+    },
+    plant::{
+        PlantDef,
+        admission::{Admission, DeadDevice},
+        def::{LineDef, LineId},
+        tag::Poll,
+    },
     profile::{self, Search},
 };
 
@@ -16,13 +25,119 @@ pub struct Args {
     file: PathBuf,
 }
 
-/// Checks; on success prints what would be read, and how busy each line would be.
+/// Checks; on success prints what would be read, how busy each line would be, and whether every poll can meet its period.
 pub fn main(args: Args) -> Result<(), CliError> {
     let def = profile::check(&args.file, &Search::usual()).map_err(|errors| CliError::Profile(render(&errors)))?;
     let (tags, alarms) = (def.tags.len(), def.alarms.len());
     say(&format!("{}: {} is good: {tags} tags, {alarms} alarms", args.file.display(), def.title));
-    for line in plan::describe(&def) {
-        say(&line);
+    for line in &def.lines {
+        describe(&def, line.id).iter().for_each(|text| say(text));
     }
     Ok(())
+}
+
+/// The plan of a line and its admission, a line of text each.
+fn describe(def: &PlantDef, line: LineId) -> Vec<String> {
+    let blocks = plan::blocks(def, line, &Holes::default());
+    let line = def.line(line);
+    let mut text = vec![
+        String::new(),
+        format!("line {}: {}, timeout {} ms", line.name, line.transport, line.timeout.as_millis()),
+        "  device      function     wire address             Modicon         count  tags  class  every    worst case  share"
+            .into(),
+    ];
+    text.extend(blocks.iter().map(|block| block_words(def, line, block)));
+    let admission = admission::admit(def, line.id, &blocks);
+    let cycle = admission.cycle.as_secs_f64() * 1e3;
+    text.push(format!("  utilisation {:.1} %, one read of everything {cycle:.1} ms", admission.utilisation * 100.0));
+    text.extend(verdict_words(&admission));
+    text.extend(admission.dead.iter().map(dead_words));
+    text.extend(admission.warnings.iter().map(|warning| format!("  warning: {warning}")));
+    text
+}
+
+fn block_words(def: &PlantDef, line: &LineDef, block: &Block) -> String {
+    let device = def.device(block.device);
+    let function = block.table.read_fc();
+    let last = block.address + (block.count - 1);
+    let cost = plan::cost(block, line, device).as_secs_f64();
+    let (every, share) = match block.poll {
+        Poll::Every(period) => {
+            let period = period.as_secs_f64();
+            (format!("{period} s"), format!("{:4.1} %", cost / period * 100.0))
+        }
+        Poll::Once => ("once".into(), String::new()),
+        Poll::Never => ("never".into(), String::new()),
+    };
+    let text = format!(
+        "  {:10}  {:11}  {:23}  {:14}  {:5}  {:4}  {:5}  {:7}  {:7.1} ms  {share}",
+        device.name,
+        format!("{function} / 0x{function:02X}"),
+        format!("{}–{} / 0x{:04X}", block.address, last, block.address),
+        format!("{}–{}", block.table.modicon(block.address), block.table.modicon(last)),
+        block.count,
+        block.tags.len(),
+        block.class.word(),
+        every,
+        cost * 1e3,
+    );
+    text.trim_end().to_owned()
+}
+
+/// The verdict, and what will happen if it is not good.
+fn verdict_words(admission: &Admission) -> Vec<String> {
+    let mut text = vec![format!("  {}", admission.verdict)];
+    if admission.verdict.fits() {
+        return text;
+    }
+    let consequence = match (admission.factor, admission.hard.fits()) {
+        (Some(1), true) => {
+            "some polls will start late; those of alarm inputs go first if they are late again and again".into()
+        }
+        (Some(factor), true) => format!(
+            "polls of alarm inputs keep their period; identification is left out, process values are read every {factor} periods"
+        ),
+        (Some(_), false) | (None, _) => format!("even the alarm inputs alone do not fit: {}", admission.hard),
+    };
+    text.push(format!("  then: {consequence}"));
+    text
+}
+
+fn dead_words(dead: &DeadDevice) -> String {
+    let probe = dead.probe.as_secs_f64() * 1e3;
+    let load = dead.utilisation * 100.0;
+    format!("  with {} dead: a probe of {probe:.1} ms each 30 s, utilisation {load:.1} %, {}", dead.name, dead.verdict)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::fixture;
+
+    #[test]
+    fn the_plan_is_told_in_both_number_bases_with_its_verdict() {
+        let text = describe(&fixture::plant(), LineId(0)).join("\n");
+        for part in [
+            "9600 8N1",
+            "4 / 0x04",
+            "1000–1007 / 0x03E8",
+            "31001–31008",
+            "utilisation",
+            "every poll meets its period",
+            "with TIC-1 dead: a probe of 312.0 ms",
+            "warning: no parity and one stop bit",
+        ] {
+            assert!(text.contains(part), "no {part} in\n{text}");
+        }
+    }
+
+    #[test]
+    fn a_line_that_cannot_carry_its_polls_says_what_will_happen() {
+        let mut def = fixture::plant();
+        def.tags.iter_mut().for_each(|tag| tag.poll = Poll::Every(std::time::Duration::from_millis(80)));
+        let text = describe(&def, LineId(0)).join("\n");
+        for part in ["too much: the polls want", "then: polls of alarm inputs keep their period", "every 2 periods"] {
+            assert!(text.contains(part), "no {part} in\n{text}");
+        }
+    }
 }

@@ -55,6 +55,8 @@ pub struct TagDef {
     pub group: String,
     /// How often it is read.
     pub poll: Poll,
+    /// What happens to its reading on a line with too much to do.
+    pub class: Class,
     /// Smallest change that is stored; 0 stores every change.
     pub deadband: f64,
     /// Stored in the history.
@@ -94,11 +96,26 @@ impl TagDef {
             write_unlock: None,
             group: String::new(),
             poll: Poll::Every(Duration::from_secs(1)),
+            class: Class::Soft,
             deadband: 0.0,
             store: true,
             confidence: Confidence::Proven,
             source: String::new(),
         }
+    }
+    /// The tags without which its value cannot be shown or judged.
+    pub fn needs(&self) -> impl Iterator<Item = TagId> {
+        let decimals = match self.decimals {
+            Decimals::From(tag) => Some(tag),
+            Decimals::Fixed(_) => None,
+        };
+        let bound = |bound: Option<Bound>| match bound {
+            Some(Bound::From(tag)) => Some(tag),
+            Some(Bound::Fixed(_)) | None => None,
+        };
+        let unit = self.unit_from.as_ref().map(|(tag, _)| *tag);
+        let quality = self.quality_from.map(|(tag, _)| tag);
+        [decimals, quality, unit, bound(self.min), bound(self.max)].into_iter().flatten()
     }
     /// May an operator write it?
     pub fn writable(&self) -> bool {
@@ -278,6 +295,29 @@ pub enum Poll {
     Once,
     /// Never by itself.
     Never,
+}
+
+/// How important it is that a tag is read in time, the most important first. On a line with too much to do idle polls are
+/// shed, then the periods of soft polls are stretched; hard polls keep theirs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Class {
+    /// An alarm is judged by it.
+    Hard,
+    /// A process value.
+    Soft,
+    /// Identification.
+    Idle,
+}
+
+impl Class {
+    /// The word in TOML and on screen.
+    pub fn word(self) -> &'static str {
+        match self {
+            Class::Hard => "hard",
+            Class::Soft => "soft",
+            Class::Idle => "idle",
+        }
+    }
 }
 
 /// How sure a row of a register map is (see the profile's sources).

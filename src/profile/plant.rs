@@ -16,8 +16,9 @@ use super::{
     tag::{self, Surroundings},
 };
 use crate::plant::{
+    class,
     def::{DeviceDef, DeviceId, LineDef, LineId, MimicDef, PlantDef, TagId},
-    tag::{Access, TagDef},
+    tag::{Access, Class, TagDef},
 };
 
 /// A text and the name the user knows it by.
@@ -51,7 +52,7 @@ pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<Plant
 
 fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Problems) -> PlantDef {
     let lines = line::lines(&file.lines, problems);
-    let (devices, tags, names) = devices(file, &lines, library, problems);
+    let Devices { devices, mut tags, names, classes } = devices(file, &lines, library, problems);
     let defs = Defs { names: &names, devices: &devices, tags: &tags };
     let alarms = alarm::alarms(&file.alarms, &defs, problems);
     let mimic =
@@ -59,6 +60,8 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let trends = picture::trends(&file.trends, &defs, problems);
     let shifts = report::shifts(&file.shifts, problems);
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, problems);
+    let classes = class::classes(&tags, &alarms, &classes);
+    tags.iter_mut().zip(classes).for_each(|(tag, class)| tag.class = class);
     PlantDef {
         name: name.to_owned(),
         title: text(&file.title),
@@ -94,12 +97,16 @@ struct Known<'a> {
     profile: Rc<ProfileFile>,
 }
 
-fn devices(
-    file: &PlantFile,
-    lines: &[LineDef],
-    library: &Library,
-    problems: &mut Problems,
-) -> (Vec<DeviceDef>, Vec<TagDef>, Names) {
+/// All devices and their tags.
+struct Devices {
+    devices: Vec<DeviceDef>,
+    tags: Vec<TagDef>,
+    names: Names,
+    /// The classes that are written, by tag.
+    classes: Vec<Option<Class>>,
+}
+
+fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mut Problems) -> Devices {
     check_devices(file, lines, problems);
     let mut names = Names::default();
     let known = known_devices(file, library, &mut names, problems);
@@ -119,7 +126,7 @@ fn devices(
     }
     if count > TAGS_MAX {
         problems.add(file.at, format!("{count} tags are too many")).label(format!("at most {TAGS_MAX}"));
-        return (Vec::new(), Vec::new(), names);
+        return Devices { devices: Vec::new(), tags: Vec::new(), names, classes: Vec::new() };
     }
     let (mut devices, mut defined) = (Vec::new(), Vec::new());
     for (device, rows) in known.iter().zip(rows) {
@@ -131,6 +138,7 @@ fn devices(
         device::check_overlaps(&defined[first..], problems);
         devices.push(def);
     }
+    let classes = defined.iter().map(|defined| defined.class).collect();
     let tags = device::link(defined, problems);
     check_broadcasts(&devices, &known, lines, &tags, problems);
     for (def, device) in devices.iter_mut().zip(&known) {
@@ -138,7 +146,7 @@ fn devices(
         def.faceplate = face.and_then(|face| device::faceplate(face, device.name, &names, &tags, problems));
         def.actions = device::actions(&device.profile.actions, device.name, &names, &tags, problems);
     }
-    (devices, tags, names)
+    Devices { devices, tags, names, classes }
 }
 
 /// Unit 0 of a serial line is everybody: it can be written, and nobody answers a read.

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::plant::{
     def::{Parity, Priority, Rs485},
-    tag::{Access, Confidence, Kind, Order, Table},
+    tag::{Access, Class, Confidence, Kind, Order, Table},
 };
 
 table!(
@@ -148,6 +148,7 @@ table!(
         opt "write_unlock" write_unlock: UnlockTable,
         opt "group" group: String,
         opt "poll" poll: PollWord,
+        opt "class" class: Class,
         opt "deadband" deadband: f64,
         opt "store" store: bool,
         opt "confidence" confidence: Confidence,
@@ -297,6 +298,8 @@ words!(Access, "access" { "r" => Access::Read, "rw" => Access::ReadWrite, "w" =>
 words!(Confidence, "confidence" {
     "proven" => Confidence::Proven, "high" => Confidence::High, "medium" => Confidence::Medium, "low" => Confidence::Low,
 });
+
+words!(Class, "class" { "hard" => Class::Hard, "soft" => Class::Soft, "idle" => Class::Idle, });
 
 words!(Priority, "priority" {
     "critical" => Priority::Critical, "high" => Priority::High, "medium" => Priority::Medium, "low" => Priority::Low,

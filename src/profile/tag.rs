@@ -12,7 +12,7 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceId, Limits, TagId},
-    tag::{Access, Bound, Confidence, Decimals, Kind, Point, Poll, Table, TagDef},
+    tag::{Access, Bound, Class, Confidence, Decimals, Kind, Point, Poll, Table, TagDef},
 };
 
 /// What a tag must know of its device.
@@ -29,6 +29,8 @@ pub(super) struct Surroundings<'a> {
 /// A defined tag and what must still be checked when all tags are there.
 pub(super) struct Defined {
     pub tag: TagDef,
+    /// The class, if it is written.
+    pub class: Option<Class>,
     /// Where its address stands; `None` if it has no valid point.
     pub address_at: Option<Span>,
     /// Tags that this one needs to be shown right.
@@ -89,13 +91,16 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
         write_unlock: None,
         group: text(&row.group),
         poll,
+        // Known when all tags and alarms are.
+        class: Class::Soft,
         deadband: row.deadband.map_or(0.0, |deadband| deadband.value),
         store: row.store.map_or(access != Access::Write && matches!(poll, Poll::Every(_)), |store| store.value),
         confidence: row.confidence.map_or(Confidence::Medium, |confidence| confidence.value),
         source: text(&row.source),
     };
     let address_at = point.and(row.address.map(|address| address.at));
-    Defined { tag, address_at, needs: links.needs, unlock: links.unlock }
+    let class = row.class.map(|class| class.value);
+    Defined { tag, class, address_at, needs: links.needs, unlock: links.unlock }
 }
 
 /// Stands in for an address that is wrong; it never leaves the loader.

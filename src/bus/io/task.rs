@@ -15,7 +15,7 @@ use crate::{
     bus::{
         backoff::Backoff,
         codec,
-        plan::{self, Block},
+        plan::{self, Block, Holes, Hunt},
         schedule::{Next, Schedule},
     },
     plant::{
@@ -43,7 +43,7 @@ pub async fn run(
     requests: mpsc::Receiver<BusRequest>,
     stop: watch::Receiver<bool>,
 ) {
-    let blocks = plan::blocks(&def, line);
+    let blocks = plan::blocks(&def, line, &Holes::default());
     let task = Task {
         clock,
         connector,
@@ -51,6 +51,8 @@ pub async fn run(
         requests,
         stop,
         blocks,
+        holes: Holes::default(),
+        hunt: Hunt::default(),
         counters: LineCounters::default(),
         busy: VecDeque::new(),
         line,
@@ -77,8 +79,11 @@ struct Task {
     events: mpsc::Sender<Event>,
     requests: mpsc::Receiver<BusRequest>,
     stop: watch::Receiver<bool>,
-    /// The read plan; holes found on the way are split off.
+    /// The read plan; a block that is refused is split while the search goes on.
     blocks: Vec<Block>,
+    /// What the devices do not have, as far as found.
+    holes: Holes,
+    hunt: Hunt,
     counters: LineCounters,
     /// Busy share of the last seconds, newest last.
     busy: VecDeque<f32>,
@@ -268,6 +273,9 @@ impl Task {
                 schedule.answered(block.device, at);
                 let decoded = self.decode(&block, &values);
                 self.tell_values(at, &block, decoded, link.reply).await?;
+                self.hunt.answered(&block);
+                let disproved = self.holes.disproved(&block);
+                self.replan(schedule, at, disproved);
             }
             Err(Trouble::Gone(why)) => return Ok(Err(Leave::Lost(why))),
             Err(Trouble::Fault(fault @ Fault::Exception(code))) if !code.is_of_gateway() => {
@@ -275,9 +283,15 @@ impl Task {
                 schedule.again(index, at);
                 self.tell_failed(at, block.device, block.tags.clone(), fault).await?;
                 let its_own = link.debt(block.unit).is_clear();
-                if code == ExceptionCode(0x02) && its_own && self.split(index) {
-                    let mut fresh = Schedule::new(&self.blocks, at);
-                    std::mem::swap(schedule, &mut fresh);
+                let hole = code == ExceptionCode(0x02) && its_own;
+                if hole && let Some(parts) = self.hunt.refused(&self.def, &self.holes, &block) {
+                    tracing::debug!(address = block.address, count = block.count, "exception 02: the block is split");
+                    self.blocks.splice(index..=index, parts);
+                    if !self.replan(schedule, at, false) {
+                        schedule.replan(&self.blocks, at);
+                    }
+                } else {
+                    schedule.excused(index, code, at);
                 }
             }
             Err(Trouble::Fault(fault)) => {
@@ -286,6 +300,8 @@ impl Task {
                 if schedule.failed(block.device, at) {
                     let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
                     self.tell_failed(at, block.device, tags, Fault::Resting).await?;
+                    self.holes.forget(block.device);
+                    self.replan(schedule, at, true);
                 }
             }
         }
@@ -381,18 +397,17 @@ impl Task {
         }
     }
 
-    /// A block that the device does not have as a whole is read tag by tag from now on. `false`: it was a single tag.
-    fn split(&mut self, index: usize) -> bool {
-        let block = self.blocks[index].clone();
-        if block.tags.len() < 2 {
-            return false;
+    /// Makes the plan anew when the search for what a device does not have has come to an end, or knowledge was `wrong`.
+    fn replan(&mut self, schedule: &mut Schedule, at: Timestamp, wrong: bool) -> bool {
+        if wrong {
+            self.hunt.reset();
         }
-        tracing::warn!(address = block.address, count = block.count, "exception 02: the block is split");
-        let device = self.def.device(block.device);
-        let singles = block.tags.iter().map(|tag| plan::single(device, self.def.tag(*tag)));
-        let singles: Vec<Block> = singles.collect();
-        self.blocks.splice(index..=index, singles);
-        true
+        let anew = wrong || self.hunt.conclude(&mut self.holes);
+        if anew {
+            self.blocks = plan::blocks(&self.def, self.line, &self.holes);
+            schedule.replan(&self.blocks, at);
+        }
+        anew
     }
 
     /// The numbers of a block's tags; `None` for those that hold none.

@@ -1,0 +1,80 @@
+//! What a read costs on its line: characters, silences and gaps on a serial port, a round trip over TCP.
+
+use std::time::Duration;
+
+use super::Block;
+use crate::plant::{
+    def::{DeviceDef, Framing, LineDef, Transport},
+    tag::Table,
+};
+
+/// What a transaction over TCP costs beside its bytes: an estimate for a switched network and a device that answers in its
+/// next scan. Only its size against [`TCP_BYTE`] matters for the plan: requests are dear, registers cheap.
+pub const TCP_ROUND_TRIP: Duration = Duration::from_millis(1);
+/// A byte at 100 Mbit/s. What a serial line behind a gateway adds is not known here.
+pub const TCP_BYTE: Duration = Duration::from_nanos(80);
+/// How often a read is repeated after a timeout before the schedule goes on: the next period asks again, others come first.
+pub const RETRIES: u32 = 0;
+
+/// Bytes of the request message: unit, function, address, count.
+const REQUEST: u32 = 6;
+/// Bytes of an answer message without its data: unit, function, byte count.
+const ANSWER: u32 = 3;
+
+/// What reads of one device cost on its line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wire {
+    /// The request on the wire.
+    pub request: Duration,
+    /// Between the last byte of the request and the first of the answer, with a device that takes no time.
+    pub turn: Duration,
+    /// An answer without data.
+    pub answer: Duration,
+    /// One byte of data.
+    pub byte: Duration,
+    /// Silence that is kept after the answer.
+    pub rest: Duration,
+}
+
+impl Wire {
+    /// Modbus over serial line V1.02: 2.5.1 (RTU: two bytes of CRC, silences of 3.5 characters), 2.5.2 (ASCII: `:`, two
+    /// characters a byte with the LRC, CR LF, no silences); Modbus messaging on TCP/IP V1.0b, 3.1.3 (six bytes of header).
+    pub fn of(line: &LineDef, device: &DeviceDef) -> Wire {
+        let framing = line.transport.framing();
+        let (fixed, per_byte) = match framing {
+            Framing::Rtu => (2, 1),
+            Framing::Ascii => (5, 2),
+            Framing::Mbap => (6, 1),
+        };
+        let gap = line.gap.max(device.gap);
+        let (character, turn, rest) = match &line.transport {
+            Transport::Serial { serial, .. } => match framing {
+                Framing::Rtu | Framing::Mbap => (serial.char_time(), serial.silence(), gap.max(serial.silence())),
+                Framing::Ascii => (serial.char_time(), Duration::ZERO, gap),
+            },
+            Transport::Tcp { .. } => (TCP_BYTE, TCP_ROUND_TRIP, gap),
+        };
+        let frame = |message: u32| character * (fixed + per_byte * message);
+        Wire { request: frame(REQUEST), turn, answer: frame(ANSWER), byte: character * per_byte, rest }
+    }
+
+    /// A good read of so many registers or bits.
+    pub fn read(self, table: Table, count: u32) -> Duration {
+        self.request + self.turn + self.answer + self.byte * data_bytes(table, count) + self.rest
+    }
+
+    /// A read that is not answered, with all its retries.
+    pub fn failing(self, timeout: Duration) -> Duration {
+        (self.request + timeout + self.rest) * (1 + RETRIES)
+    }
+}
+
+/// Bytes of data in an answer.
+pub fn data_bytes(table: Table, count: u32) -> u32 {
+    if table.is_bits() { count.div_ceil(8) } else { 2 * count }
+}
+
+/// Worst time that a good read takes on its line, the silences around it and the device's own gap included.
+pub fn cost(block: &Block, line: &LineDef, device: &DeviceDef) -> Duration {
+    Wire::of(line, device).read(block.table, u32::from(block.count))
+}

@@ -1,0 +1,173 @@
+//! What a device refused to read, and how the culprit in a refused block is found with few requests.
+
+use std::collections::BTreeMap;
+
+use super::{Block, together};
+use crate::plant::{
+    def::{DeviceId, PlantDef},
+    tag::{Table, TagDef},
+};
+
+/// Addresses that a device does not have, although the plan would read (over) them. An empty range is a seam: both sides
+/// can be read, but not with one request.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Holes {
+    /// End by start. Ranges never touch the inside of each other.
+    ends: BTreeMap<(DeviceId, Table, u32), u32>,
+}
+
+impl Holes {
+    /// Remembers a hole from `start` up to before `end`.
+    pub fn add(&mut self, device: DeviceId, table: Table, start: u32, end: u32) {
+        let (mut start, mut end) = (start, end);
+        while let Some((old, old_end)) = self.touched(device, table, start, end.max(start + 1)) {
+            (start, end) = (start.min(old), end.max(old_end));
+            self.ends.remove(&(device, table, old));
+        }
+        self.ends.insert((device, table, start), end);
+    }
+
+    /// Would a read from `start` up to before `end` touch a hole?
+    pub fn touch(&self, device: DeviceId, table: Table, start: u32, end: u32) -> bool {
+        self.touched(device, table, start, end).is_some()
+    }
+
+    /// A device may be another one, or have another program, when it comes back: its holes are searched anew.
+    pub fn forget(&mut self, device: DeviceId) {
+        self.ends.retain(|(hole, ..), _| *hole != device);
+    }
+
+    /// A block was read. If it lay on a hole, what is known of its device no longer holds, and `true` says so.
+    pub fn disproved(&mut self, block: &Block) -> bool {
+        let (start, end) = block.range();
+        let wrong = self.touch(block.device, block.table, start, end);
+        if wrong {
+            self.forget(block.device);
+        }
+        wrong
+    }
+
+    fn touched(&self, device: DeviceId, table: Table, start: u32, end: u32) -> Option<(u32, u32)> {
+        let before = self.ends.range((device, table, 0)..(device, table, end));
+        // The last one that begins before the end is also the one that reaches furthest.
+        before.map(|((_, _, hole), hole_end)| (*hole, *hole_end)).next_back().filter(|(_, hole_end)| start < *hole_end)
+    }
+}
+
+/// The two smaller blocks to read instead of one that was refused, and the registers between them; `None` for one value.
+///
+/// A register between tags is the usual culprit, so it is cut at a gap as long as there is one: the middle one, because
+/// each further answer then halves the suspects. Then between neighbours, down to single values.
+pub fn split(def: &PlantDef, block: &Block) -> Option<([Block; 2], (u32, u32))> {
+    let mut tags: Vec<&TagDef> = block.tags.iter().map(|tag| def.tag(*tag)).collect();
+    tags.sort_by_key(|tag| (tag.point.address, tag.point.len(), tag.id));
+    // Places where no value is cut in two: number of tags before, first and last unused register.
+    let mut places: Vec<(usize, u32, u32)> = Vec::new();
+    let mut used = 0;
+    for (before, tag) in tags.iter().enumerate() {
+        let start = u32::from(tag.point.address);
+        if before > 0 && used <= start {
+            places.push((before, used, start));
+        }
+        used = used.max(start + u32::from(tag.point.len()));
+    }
+    let gaps: Vec<_> = places.iter().filter(|(_, from, to)| from < to).copied().collect();
+    let candidates = if gaps.is_empty() { places } else { gaps };
+    let (before, from, to) = *candidates.get(candidates.len() / 2)?;
+    let device = def.device(block.device);
+    let part = |tags| together(device, tags);
+    Some(([part(&tags[..before]), part(&tags[before..])], (from, to)))
+}
+
+/// The search for what is wrong with a refused block: its parts are polled in its place, and what they answer tells. What
+/// was found must be confirmed by one more refusal, so that a device that stumbled once loses nothing.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Hunt {
+    /// Parts that have not answered yet.
+    open: Vec<Block>,
+    /// Each refused block, and what lay between the two parts that it was cut into.
+    cuts: Vec<(Place, Place)>,
+    found: Vec<Place>,
+    /// Found once: holes, if the next read that contains them is refused too.
+    suspects: Vec<Place>,
+}
+
+/// Addresses of a table, from the first to before the last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Place {
+    device: DeviceId,
+    table: Table,
+    start: u32,
+    end: u32,
+}
+
+impl Place {
+    fn of(block: &Block, (start, end): (u32, u32)) -> Place {
+        Place { device: block.device, table: block.table, start, end }
+    }
+
+    fn contains(&self, other: &Place) -> bool {
+        (self.device, self.table) == (other.device, other.table) && self.start <= other.start && other.end <= self.end
+    }
+}
+
+impl Hunt {
+    /// A block was refused with exception 02: what to poll in its place. `None`: leave it, nothing new was learnt.
+    pub fn refused(&mut self, def: &PlantDef, holes: &Holes, block: &Block) -> Option<Vec<Block>> {
+        let whole = Place::of(block, block.range());
+        if holes.touch(whole.device, whole.table, whole.start, whole.end) {
+            return None;
+        }
+        self.open.retain(|open| open != block);
+        let parts = split(def, block);
+        let confirmed = self.suspects.iter().any(|suspect| whole.contains(suspect));
+        match parts {
+            Some((parts, between)) if !confirmed => {
+                self.cuts.push((whole, Place::of(block, between)));
+                self.open.extend(parts.clone());
+                Some(parts.into())
+            }
+            Some((parts, _)) => {
+                self.found.extend(self.suspects.iter().filter(|suspect| whole.contains(suspect)));
+                Some(parts.into())
+            }
+            None => {
+                if !self.found.contains(&whole) {
+                    self.found.push(whole);
+                }
+                Some(vec![block.clone()])
+            }
+        }
+    }
+
+    /// A block was read. The device has all of it.
+    pub fn answered(&mut self, block: &Block) {
+        let whole = Place::of(block, block.range());
+        self.open.retain(|open| open != block);
+        self.suspects.retain(|suspect| !whole.contains(suspect));
+    }
+
+    /// When every part has answered, or is a hole itself: adds what was confirmed to `holes`. `true` if the plan must be
+    /// made anew. Where both parts of a refused block are sound, the culprit lies between them.
+    pub fn conclude(&mut self, holes: &mut Holes) -> bool {
+        if !self.open.is_empty() || (self.cuts.is_empty() && self.found.is_empty()) {
+            return false;
+        }
+        for (whole, between) in std::mem::take(&mut self.cuts).into_iter().rev() {
+            if !self.found.iter().any(|found| whole.contains(found)) {
+                self.found.push(between);
+            }
+        }
+        let (confirmed, new): (Vec<Place>, Vec<Place>) =
+            self.found.drain(..).partition(|found| self.suspects.contains(found));
+        self.suspects.retain(|suspect| !confirmed.contains(suspect));
+        self.suspects.extend(new);
+        confirmed.iter().for_each(|hole| holes.add(hole.device, hole.table, hole.start, hole.end));
+        true
+    }
+
+    /// The plan is made anew for another reason: the search begins again.
+    pub fn reset(&mut self) {
+        *self = Hunt::default();
+    }
+}

@@ -1,0 +1,342 @@
+//! What the plan must keep, and that nothing cheaper exists.
+
+use std::time::Duration;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::plant::{
+    def::{Framing, Limits, LineDef, Parity, Rs485, Serial, Transport},
+    fixture,
+    tag::Kind,
+};
+
+#[test]
+fn neighbours_share_a_block_and_tables_do_not() {
+    let plan = blocks(&fixture::plant(), LineId(0), &Holes::default());
+    let seen: Vec<_> = plan.iter().map(|block| (block.unit, block.table, block.address, block.count)).collect();
+    let expect = [
+        (1, Table::Input, 1000, 8),
+        (1, Table::Holding, 1002, 1),
+        (1, Table::Holding, 1019, 1),
+        (2, Table::Coil, 3072, 1),
+    ];
+    assert_eq!(seen, expect);
+}
+
+#[test]
+fn a_block_is_as_important_as_its_most_important_tag() {
+    let mut def = fixture::plant();
+    def.tags[fixture::PV.index()].class = Class::Idle;
+    def.tags[fixture::FAULT.index()].class = Class::Hard;
+    assert_eq!(blocks(&def, LineId(0), &Holes::default())[0].class, Class::Hard);
+}
+
+fn serial_line(baud: u32, stop_bits: u8, framing: Framing) -> Transport {
+    let serial = Serial { baud, stop_bits, data_bits: 8, parity: Parity::None };
+    Transport::Serial { port: "/dev/null".into(), serial, framing, rs485: Rs485::Off }
+}
+
+/// RTU: the table of the requirements, 11 bits a character. ASCII: 17 + 11 + 4 · words characters of 10 bits, no silences.
+#[test]
+fn costs_are_those_of_the_wire() {
+    let mut def = fixture::plant();
+    let mut block = blocks(&def, LineId(0), &Holes::default()).remove(0);
+    let tcp = |framing| Transport::Tcp { host: "plc".into(), port: 502, framing };
+    for (transport, words, ms) in [
+        (serial_line(9600, 2, Framing::Rtu), 1, 25.2),
+        (serial_line(9600, 2, Framing::Rtu), 10, 45.8),
+        (serial_line(9600, 2, Framing::Rtu), 32, 96.2),
+        (serial_line(9600, 2, Framing::Rtu), 125, 309.4),
+        (serial_line(19_200, 2, Framing::Rtu), 125, 154.7),
+        (serial_line(115_200, 2, Framing::Rtu), 32, 10.9),
+        (serial_line(9600, 1, Framing::Ascii), 1, 33.3),
+        (serial_line(9600, 1, Framing::Ascii), 10, 70.8),
+        (tcp(Framing::Mbap), 125, 1.0 + (12.0 + 9.0 + 250.0) * 80e-6),
+        (tcp(Framing::Rtu), 125, 1.0 + (8.0 + 5.0 + 250.0) * 80e-6),
+    ] {
+        def.lines[0].transport = transport;
+        block.count = words;
+        let cost = cost(&block, &def.lines[0], &def.devices[0]).as_secs_f64() * 1e3;
+        assert!((cost - ms).abs() < 0.06, "{}, {words} words: {cost} ms, expected {ms}", def.lines[0].transport);
+    }
+}
+
+#[test]
+fn a_silent_unit_costs_its_timeout_and_a_gap_of_the_line_counts() {
+    let def = fixture::plant();
+    let line = LineDef { gap: Duration::from_millis(10), ..def.lines[0].clone() };
+    let wire = Wire::of(&line, &def.devices[0]);
+    // 8 characters of 10 bits at 9600 are 8.33 ms, the gap is longer than 3.5 characters.
+    let failing = wire.failing(Duration::from_millis(300)).as_secs_f64() * 1e3;
+    assert!((failing - 318.33).abs() < 0.01, "{failing}");
+}
+
+fn tag(id: u16, address: u16, table: Table, kind: Kind, poll: Poll) -> TagDef {
+    let sample = fixture::plant().tags.remove(0);
+    let kind = if table.is_bits() { Kind::Bool } else { kind };
+    TagDef { id: TagId(id), point: Point { table, address, kind, ..sample.point }, poll, ..sample }
+}
+
+const SECOND: Poll = Poll::Every(Duration::from_secs(1));
+
+fn words(addresses: &[u16]) -> PlantDef {
+    let mut def = fixture::plant();
+    let tag = |(id, address): (usize, &u16)| tag(id as u16, *address, Table::Holding, Kind::U16, SECOND);
+    def.tags = addresses.iter().enumerate().map(tag).collect();
+    def
+}
+
+fn ranges(def: &PlantDef, holes: &Holes) -> Vec<(u32, u32)> {
+    kept(def, holes).iter().map(Block::range).collect()
+}
+
+#[test]
+fn a_request_is_not_filled_up_if_that_costs_a_longer_gap_elsewhere() {
+    let mut def = words(&[0, 6, 7, 12]);
+    def.devices[0].limits.read_words_max = 8;
+    // Greedy would take 0 to 7 and leave 12 alone: 9 words with a gap of 5; this reads 7.
+    assert_eq!(ranges(&def, &Holes::default()), [(0, 1), (6, 13)]);
+}
+
+#[test]
+fn over_tcp_a_gap_is_cheaper_than_a_round_trip_and_in_ascii_as_dear_as_the_device_allows() {
+    let mut def = words(&[0, 30]);
+    def.devices[0].limits.gap_words_max = 40;
+    assert_eq!(ranges(&def, &Holes::default()), [(0, 1), (30, 31)]);
+    def.lines[0].transport = Transport::tcp("plc", 502);
+    assert_eq!(ranges(&def, &Holes::default()), [(0, 31)]);
+    let mut def = words(&[0, 7]);
+    assert_eq!(ranges(&def, &Holes::default()), [(0, 8)], "in RTU six words are cheaper than 20 characters");
+    def.lines[0].transport = serial_line(9600, 1, Framing::Ascii);
+    assert_eq!(ranges(&def, &Holes::default()), [(0, 8)], "24 characters against 28");
+    let mut def = words(&[0, 9]);
+    def.lines[0].transport = serial_line(9600, 1, Framing::Ascii);
+    assert_eq!(ranges(&def, &Holes::default()), [(0, 1), (9, 10)], "32 characters against 28");
+}
+
+#[test]
+fn fields_of_a_word_and_twins_are_read_together() {
+    let def = words(&[5, 5, 5, 6]);
+    let plan = blocks(&def, LineId(0), &Holes::default());
+    assert_eq!(plan.len(), 1);
+    assert_eq!((plan[0].range(), plan[0].tags.len()), ((5, 7), 4));
+}
+
+/// Plays a device that refuses every read which touches one of `missing`, until the plan holds; counts the requests.
+fn hunt(def: &PlantDef, missing: &[u32], count_max: u32) -> (Holes, usize) {
+    let (mut holes, mut search, mut asked) = (Holes::default(), Hunt::default(), 0);
+    let plan = |holes: &Holes| blocks(def, LineId(0), holes).into_iter().rev().collect::<Vec<Block>>();
+    let mut todo = plan(&holes);
+    while let Some(block) = todo.pop() {
+        asked += 1;
+        assert!(asked < 1000, "the search ends");
+        let (start, end) = block.range();
+        if end - start > count_max || missing.iter().any(|hole| (start..end).contains(hole)) {
+            // Behind what waits, as in a schedule.
+            todo.splice(0..0, search.refused(def, &holes, &block).unwrap_or_default());
+        } else {
+            search.answered(&block);
+            assert!(!holes.disproved(&block));
+        }
+        if search.conclude(&mut holes) {
+            todo = plan(&holes);
+        }
+    }
+    (holes, asked)
+}
+
+/// The plan without the tags that are refused and asked for alone.
+fn kept(def: &PlantDef, holes: &Holes) -> Vec<Block> {
+    let refused = refused(def, LineId(0), holes);
+    blocks(def, LineId(0), holes).into_iter().filter(|block| !refused.contains(&block.tags[0])).collect()
+}
+
+#[test]
+fn a_missing_register_between_tags_is_found_and_never_read_over_again() {
+    // Every second register: 15 gaps, the one at 13 is missing.
+    let def = words(&(0..16).map(|n| 2 * n).collect::<Vec<u16>>());
+    let (holes, asked) = hunt(&def, &[13], 125);
+    assert_eq!(ranges(&def, &holes), [(0, 13), (14, 31)]);
+    assert!(refused(&def, LineId(0), &holes).is_empty());
+    assert!(asked <= 12, "{asked} requests for 16 tags");
+}
+
+#[test]
+fn a_missing_tag_is_told_and_its_neighbours_are_read() {
+    let def = words(&[0, 1, 2, 3, 4, 5, 6, 7]);
+    let (holes, asked) = hunt(&def, &[5], 125);
+    assert_eq!(refused(&def, LineId(0), &holes), [TagId(5)]);
+    assert_eq!(ranges(&def, &holes), [(0, 5), (6, 8)]);
+    assert_eq!(asked, 11, "the whole, six parts, the whole again, and the three blocks of the new plan");
+}
+
+#[test]
+fn what_is_refused_is_asked_for_seldom_and_believed_when_it_answers() {
+    let def = words(&[0, 1, 2]);
+    let mut holes = holes_at(&[1]);
+    let plan = blocks(&def, LineId(0), &holes);
+    let seen: Vec<_> = plan.iter().map(|block| (block.range(), block.poll, block.class)).collect();
+    let minute = Poll::Every(Duration::from_secs(60));
+    assert_eq!(seen, [((0, 1), SECOND, Class::Soft), ((2, 3), SECOND, Class::Soft), ((1, 2), minute, Class::Idle)]);
+    let mut search = Hunt::default();
+    assert_eq!(search.refused(&def, &holes, &plan[2]), None, "that is known");
+    assert!(!holes.disproved(&plan[0]) && holes.disproved(&plan[2]));
+    assert_eq!(ranges(&def, &holes), [(0, 3)]);
+}
+
+#[test]
+fn a_device_that_stumbles_once_loses_nothing() {
+    let def = words(&[0, 1, 2, 3]);
+    let (mut holes, mut search) = (Holes::default(), Hunt::default());
+    for _ in 0..3 {
+        let whole = blocks(&def, LineId(0), &holes).remove(0);
+        let parts = search.refused(&def, &holes, &whole).expect("something new");
+        assert!(!search.conclude(&mut holes), "the parts have not answered");
+        parts.iter().for_each(|part| search.answered(part));
+        assert!(search.conclude(&mut holes), "back to the whole block");
+        assert_eq!(ranges(&def, &holes), [(0, 4)]);
+        search.answered(&whole);
+    }
+}
+
+#[test]
+fn a_device_that_takes_fewer_registers_than_it_says_is_read_in_shorter_blocks() {
+    let def = words(&(0..40).collect::<Vec<u16>>());
+    let (holes, _) = hunt(&def, &[], 16);
+    assert!(refused(&def, LineId(0), &holes).is_empty(), "nothing is missing");
+    assert!(ranges(&def, &holes).iter().all(|(start, end)| end - start <= 16));
+}
+
+type Row = (u16, usize, usize, u8);
+
+/// A plant with these tags on its first device: (address, table, kind, poll).
+fn plant_of(rows: &[Row], limits: Limits, transport: Transport) -> PlantDef {
+    let mut def = fixture::plant();
+    def.devices[0].limits = limits;
+    def.lines[0].transport = transport;
+    let tables = [Table::Coil, Table::Discrete, Table::Input, Table::Holding];
+    let kinds = [Kind::U16, Kind::F32, Kind::U64, Kind::Bcd32];
+    let polls = [SECOND, Poll::Once, Poll::Never];
+    let tag = |(id, row): (usize, &Row)| tag(id as u16, row.0, tables[row.1], kinds[row.2], polls[usize::from(row.3)]);
+    def.tags = rows.iter().enumerate().map(tag).collect();
+    def
+}
+
+fn limits() -> impl Strategy<Value = Limits> {
+    (4u16..125, 1u16..2000, 0u16..40, 1u16..3).prop_map(|(words, bits, gap, alignment)| Limits {
+        read_words_max: words,
+        read_bits_max: bits,
+        gap_words_max: gap,
+        alignment,
+        ..Limits::STANDARD
+    })
+}
+
+fn transport() -> impl Strategy<Value = Transport> {
+    prop_oneof![
+        Just(serial_line(9600, 1, Framing::Rtu)),
+        Just(serial_line(115_200, 1, Framing::Rtu)),
+        Just(serial_line(9600, 1, Framing::Ascii)),
+        Just(Transport::tcp("plc", 502)),
+    ]
+}
+
+fn holes_at(addresses: &[u16]) -> Holes {
+    let mut holes = Holes::default();
+    for address in addresses {
+        holes.add(fixture::TIC, Table::Holding, u32::from(*address), u32::from(*address) + 1);
+    }
+    holes
+}
+
+proptest! {
+    #[test]
+    fn every_tag_is_in_one_block_within_the_limits(
+        rows in proptest::collection::vec((0u16..400, 0usize..4, 0usize..4, 0u8..3), 1..60),
+        limits in limits(), transport in transport(), missing in proptest::collection::vec(0u16..400, 0..20),
+    ) {
+        let def = plant_of(&rows, limits, transport);
+        let holes = holes_at(&missing);
+        let plan = blocks(&def, LineId(0), &holes);
+        let refused = refused(&def, LineId(0), &holes);
+        for tag in &def.tags {
+            let holders: Vec<&Block> = plan.iter().filter(|block| block.tags.contains(&tag.id)).collect();
+            prop_assert_eq!(holders.len(), usize::from(tag.poll != Poll::Never));
+            for block in holders {
+                let (start, end) = block.range();
+                prop_assert_eq!(block.table, tag.point.table);
+                prop_assert!(start <= u32::from(tag.point.address) && end_of(tag.point) <= end, "split: {:?}", tag);
+            }
+        }
+        for block in &plan {
+            // A single value that is larger than the limit must be read all the same, and alignment may add to it.
+            let words_max = limits.read_words_max.max(4 + 2 * (limits.alignment - 1));
+            let max = if block.table.is_bits() { limits.read_bits_max } else { words_max };
+            prop_assert!(block.count <= max, "{:?}", block);
+            let (start, end) = block.range();
+            let over = holes.touch(block.device, block.table, start, end);
+            prop_assert_eq!(over, refused.contains(&block.tags[0]), "{:?} and a hole", block);
+            prop_assert!(!over || block.tags.len() == 1);
+            if !block.table.is_bits() {
+                prop_assert_eq!((block.address % limits.alignment, block.count % limits.alignment), (0, 0));
+            }
+        }
+    }
+
+    #[test]
+    fn no_way_to_deal_the_tags_is_cheaper(
+        rows in proptest::collection::vec((0u16..60, 3usize..4, 0usize..4, 0u8..1), 1..9),
+        limits in limits(), words in 4u16..30, transport in transport(),
+        missing in proptest::collection::vec(0u16..60, 0..4),
+    ) {
+        let def = plant_of(&rows, Limits { read_words_max: words, ..limits }, transport);
+        let holes = holes_at(&missing);
+        let refused = refused(&def, LineId(0), &holes);
+        let mut tags = rivals::sorted(&def);
+        tags.retain(|tag| !refused.contains(&tag.id));
+        let least: Duration = rivals::groups(&def, &tags).iter()
+            .map(|(group, device)| rivals::best_of_all(&def, group, device, &holes)).sum();
+        prop_assert_eq!(rivals::wire_time(&def, &kept(&def, &holes)), least);
+    }
+
+    #[test]
+    fn the_plan_is_never_dearer_than_simple_ones(
+        rows in proptest::collection::vec((0u16..600, 0usize..4, 0usize..4, 0u8..2), 1..120),
+        limits in limits(), transport in transport(),
+    ) {
+        // Fixed blocks read over gaps of any length, so the limit of gaps must not stand in the way of the plan.
+        let def = plant_of(&rows, Limits { gap_words_max: 200, alignment: 1, ..limits }, transport);
+        let ours = rivals::wire_time(&def, &blocks(&def, LineId(0), &Holes::default()));
+        let tags = rivals::sorted(&def);
+        let groups = rivals::groups(&def, &tags);
+        let (mut single, mut greedy, mut short, mut long) = <(Vec<_>, Vec<_>, Vec<_>, Vec<_>)>::default();
+        for (group, device) in &groups {
+            single.extend(rivals::singles(group, device));
+            greedy.extend(rivals::greedy(group, device, &Holes::default()));
+            short.extend(rivals::fixed(group, device, 10));
+            long.extend(rivals::fixed(group, device, 60));
+        }
+        for (name, rival) in [("one a tag", single), ("greedy", greedy), ("10 words", short), ("60 words", long)] {
+            let theirs = rivals::wire_time(&def, &rival);
+            prop_assert!(ours <= theirs, "{}: {:?} against our {:?}", name, theirs, ours);
+        }
+    }
+
+    #[test]
+    fn whatever_registers_are_missing_all_others_are_read_in_the_end(
+        addresses in proptest::collection::btree_set(0u16..80, 1..40),
+        missing in proptest::collection::btree_set(0u32..80, 0..12),
+    ) {
+        let def = words(&addresses.iter().copied().collect::<Vec<u16>>());
+        let missing: Vec<u32> = missing.into_iter().collect();
+        let (holes, _) = hunt(&def, &missing, 125);
+        for tag in &def.tags {
+            let gone = missing.contains(&u32::from(tag.point.address));
+            prop_assert_eq!(refused(&def, LineId(0), &holes).contains(&tag.id), gone);
+        }
+        for (start, end) in ranges(&def, &holes) {
+            prop_assert!(!missing.iter().any(|hole| (start..end).contains(hole)));
+        }
+    }
+}

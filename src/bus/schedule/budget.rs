@@ -1,0 +1,84 @@
+//! The share of a line's time that operators' writes may take from polls that are due.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+
+/// Share of the line's time for writes, while polls are due.
+pub const WRITE_SHARE: f64 = 0.2;
+/// What may be spent at once after a quiet time: some sixteen writes with their reading back at 9600 baud.
+const SAVED_MAX: Duration = Duration::from_secs(1);
+/// A write that waited for its timeout is not paid for longer than this, at the usual share.
+const OWED_MAX: Duration = Duration::from_secs(2);
+
+/// A bucket that fills with time: writes go before polls while there is something in it. When nothing is due they go anyway.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WriteBudget {
+    share: f64,
+    /// Seconds; below zero while a write is being paid for.
+    saved: f64,
+    at: Timestamp,
+}
+
+impl WriteBudget {
+    /// Full, with a share of 0–1.
+    pub fn new(share: f64, now: Timestamp) -> WriteBudget {
+        WriteBudget { share: share.clamp(0.01, 1.0), saved: SAVED_MAX.as_secs_f64(), at: now }
+    }
+
+    /// May a write go before a poll that is due?
+    pub fn allows(&self, now: Timestamp) -> bool {
+        0.0 < self.saved_at(now)
+    }
+
+    /// A write, with its reading back, has taken the line for so long.
+    pub fn spent(&mut self, time: Duration, now: Timestamp) {
+        self.saved = (self.saved_at(now) - time.as_secs_f64()).max(-OWED_MAX.as_secs_f64());
+        self.at = now;
+    }
+
+    fn saved_at(&self, now: Timestamp) -> f64 {
+        let passed = Duration::try_from(now.duration_since(self.at)).unwrap_or_default();
+        (self.saved + passed.as_secs_f64() * self.share).min(SAVED_MAX.as_secs_f64())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn at(ms: u64) -> Timestamp {
+        Timestamp::from_millisecond(ms as i64).expect("a small number")
+    }
+
+    #[test]
+    fn a_flood_of_writes_leaves_four_fifths_of_the_line_to_the_polls() {
+        let mut budget = WriteBudget::new(WRITE_SHARE, at(0));
+        let (mut now, mut writes, mut polls) = (0, 0, 0);
+        while now < 100_000 {
+            if budget.allows(at(now)) {
+                budget.spent(Duration::from_millis(60), at(now + 60));
+                writes += 60;
+            } else {
+                polls += 60;
+            }
+            now += 60;
+        }
+        assert!((20_000..=21_100).contains(&writes), "{writes} ms for writes, {polls} ms for polls");
+    }
+
+    proptest! {
+        #[test]
+        fn an_operator_never_waits_longer_than_the_debt_takes(spent in proptest::collection::vec(1u64..60_000, 1..20)) {
+            let mut budget = WriteBudget::new(WRITE_SHARE, at(0));
+            let mut now = 0;
+            for ms in spent {
+                now += ms;
+                budget.spent(Duration::from_millis(ms), at(now));
+            }
+            prop_assert!(budget.allows(at(now + 10_001)), "two seconds at a fifth");
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! One poll of a schedule: its grid, what it costs, and what it waits for.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+
+use crate::{
+    bus::plan::Block,
+    plant::{
+        def::DeviceId,
+        event::ExceptionCode,
+        tag::{Class, Poll, Table},
+    },
+};
+
+/// A hard poll that was late so often in a row means overload, whatever the costs say.
+const LATE_MAX: u32 = 3;
+/// A device that has acknowledged (05) wants to be left alone for a while.
+const ACKNOWLEDGED: Duration = Duration::from_secs(1);
+/// The first wait for a device that is busy (06); it doubles up to [`BUSY_MAX`].
+const BUSY: Duration = Duration::from_millis(100);
+const BUSY_MAX: Duration = Duration::from_secs(5);
+
+/// How a read came off, for the counters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Served {
+    /// How late it began after the point of its grid that it served; `None` for one out of turn.
+    pub jitter: Option<Duration>,
+    /// Releases that it came too late for.
+    pub missed: u32,
+}
+
+/// How a poll stands, for screens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PollInfo {
+    /// What happens to it under overload.
+    pub class: Class,
+    /// Its period, unstretched; `None` for a block that is read once.
+    pub period: Option<Duration>,
+    /// It is read each so many periods now.
+    pub factor: u32,
+    /// It is left out now.
+    pub shed: bool,
+    /// When it is due next; `None` for a block that is read once and has been.
+    pub next: Option<Timestamp>,
+    /// Releases that were skipped because the line had no time.
+    pub missed: u64,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Pending {
+    block: (DeviceId, Table, u16, u16),
+    /// Place of its device among those of the schedule.
+    pub place: usize,
+    pub class: Class,
+    pub period: Option<Duration>,
+    /// Next point of its grid; `None` for a block that is read once and has been.
+    pub release: Option<Timestamp>,
+    /// Asked for out of turn (device came back, operator's wish, retry) at this time.
+    pub urgent: Option<Timestamp>,
+    /// Put off until then.
+    pub not_before: Timestamp,
+    pub missed: u64,
+    /// Measured time of a read in seconds, smoothed.
+    cost: Option<f64>,
+    /// Times in a row that it began a whole period late although its device was free.
+    late: u32,
+    /// Times in a row that the device put it off; and whether the last read was put off.
+    excuses: u32,
+    excused: bool,
+}
+
+impl Pending {
+    /// Due at once, and then on the grid that has a point at `origin`.
+    pub fn new(block: &Block, place: usize, origin: Timestamp, now: Timestamp) -> Pending {
+        let period = period_of(block);
+        let release = period.map_or(now, |period| origin + period * periods_in(origin, now, period));
+        Pending {
+            block: key(block),
+            place,
+            class: block.class,
+            period,
+            release: Some(release),
+            urgent: None,
+            not_before: now,
+            missed: 0,
+            cost: None,
+            late: 0,
+            excuses: 0,
+            excused: false,
+        }
+    }
+
+    /// Does it read this very block, as often?
+    pub fn is_of(&self, block: &Block) -> bool {
+        (self.block, self.period) == (key(block), period_of(block))
+    }
+
+    pub fn at(self, place: usize) -> Pending {
+        Pending { place, ..self }
+    }
+
+    /// When it wants to be read next.
+    pub fn wanted(&self) -> Option<Timestamp> {
+        match (self.urgent, self.release) {
+            (Some(urgent), Some(release)) => Some(urgent.min(release)),
+            (urgent, release) => urgent.or(release),
+        }
+    }
+
+    /// See [`super::Schedule::done`]. `free`: since when its device could be asked at all.
+    pub fn serve(&mut self, factor: u32, shed: bool, free: Timestamp, started: Timestamp, now: Timestamp) -> Served {
+        self.urgent = None;
+        if !std::mem::take(&mut self.excused) {
+            self.excuses = 0;
+        }
+        let spent = span(started, now).as_secs_f64();
+        // An eighth of the news: one timeout does not make a line overloaded.
+        self.cost = Some(self.cost.map_or(spent, |cost| cost + (spent - cost) / 8.0));
+        let mut told = Served { jitter: None, missed: 0 };
+        self.release = match (self.period, self.release) {
+            (Some(period), Some(release)) if release <= now => {
+                let period = period * factor;
+                let served = if release <= started { periods_in(release, started, period) + 1 } else { 0 };
+                let over = periods_in(release, now, period).max(served);
+                if served > 0 {
+                    told.jitter = Some(span(release + period * (served - 1), started));
+                    let waited = span(release.max(free), started);
+                    self.late = if period <= waited { self.late.saturating_add(1) } else { 0 };
+                }
+                // Of the releases served together only the last was in time. What was shed was not to be read at all.
+                told.missed = if shed { 0 } else { over - served.min(1) };
+                Some(release + period * over)
+            }
+            (Some(_), release) => release,
+            (None, _) => None,
+        };
+        self.missed += u64::from(told.missed);
+        told
+    }
+
+    /// Does it come too late again and again?
+    pub fn is_late(&self) -> bool {
+        LATE_MAX <= self.late
+    }
+
+    /// Share of the line's time that it wants at its full rate, as measured.
+    pub fn demand(&self) -> f64 {
+        self.cost.zip(self.period).map_or(0.0, |(cost, period)| cost / period.as_secs_f64())
+    }
+
+    /// Its next release may stand on a later point of the grid than it need.
+    pub fn pull_in(&mut self, now: Timestamp) {
+        if let (Some(period), Some(release)) = (self.period, &mut self.release)
+            && now < *release
+        {
+            *release -= period * periods_in(now, *release, period);
+        }
+    }
+
+    pub fn later(&mut self, until: Timestamp) {
+        self.not_before = self.not_before.max(until);
+        self.urgent = Some(until);
+    }
+
+    /// When to read again after an exception: 05 in a second; 06 after 0.1 s, twice as long each time, 5 s at most; 08 once
+    /// at once. `None`: with the next period (Modbus application protocol V1.1b3, section 7).
+    pub fn retry_after(&mut self, code: ExceptionCode) -> Option<Duration> {
+        let before = self.excuses;
+        let delay = match code.0 {
+            0x05 => ACKNOWLEDGED,
+            0x06 => (BUSY * 2u32.saturating_pow(before.min(16))).min(BUSY_MAX),
+            0x08 if before == 0 => Duration::ZERO,
+            _ => return None,
+        };
+        (self.excuses, self.excused) = (before.saturating_add(1), true);
+        Some(delay)
+    }
+}
+
+fn period_of(block: &Block) -> Option<Duration> {
+    match block.poll {
+        Poll::Every(period) => Some(period),
+        Poll::Once | Poll::Never => None,
+    }
+}
+
+fn key(block: &Block) -> (DeviceId, Table, u16, u16) {
+    (block.device, block.table, block.address, block.count)
+}
+
+fn span(from: Timestamp, to: Timestamp) -> Duration {
+    Duration::try_from(to.duration_since(from)).unwrap_or_default()
+}
+
+/// Whole periods between two moments.
+fn periods_in(from: Timestamp, to: Timestamp, period: Duration) -> u32 {
+    u32::try_from(span(from, to).as_nanos() / period.as_nanos().max(1)).unwrap_or(u32::MAX)
+}

@@ -1,0 +1,310 @@
+//! Played lines: who is read when, and what is left out when there is too much to do.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::{
+    bus::admission::{self, Task, Test},
+    plant::{
+        def::TagId,
+        tag::{Poll, Table},
+    },
+};
+
+fn at(ms: i64) -> Timestamp {
+    Timestamp::from_millisecond(ms).expect("a small number")
+}
+
+fn block(device: u16, poll: Poll) -> Block {
+    classed(device, poll, Class::Soft)
+}
+
+fn classed(device: u16, poll: Poll, class: Class) -> Block {
+    let (unit, tags) = (device as u8 + 1, vec![TagId(0)]);
+    let device = DeviceId(device);
+    Block { device, unit, table: Table::Input, address: 0, count: 1, tags, poll, class, alignment: 1 }
+}
+
+fn every(ms: u64) -> Poll {
+    Poll::Every(Duration::from_millis(ms))
+}
+
+/// One read: which, and when it began.
+type Read = (i64, usize);
+
+/// Plays a line on which block n takes `cost(n, now)` ms; returns what was read.
+fn play(schedule: &mut Schedule, from: i64, to: i64, cost: impl Fn(usize, i64) -> i64) -> Vec<Read> {
+    let (mut now, mut log) = (from, Vec::new());
+    while now < to {
+        match schedule.next(at(now)) {
+            Next::Run(index) => {
+                let spent = cost(index, now);
+                log.push((now, index));
+                schedule.done(index, at(now), at(now + spent));
+                now += spent;
+            }
+            Next::WaitUntil(until) => now = until.as_millisecond(),
+            Next::Idle => break,
+        }
+    }
+    log
+}
+
+#[test]
+fn the_nearest_deadline_goes_first_and_the_grid_does_not_drift() {
+    let mut schedule = Schedule::new(&[block(0, every(1000)), block(0, every(250))], at(0));
+    let log = play(&mut schedule, 0, 1100, |_, _| 40);
+    assert_eq!(log, [(0, 1), (40, 0), (250, 1), (500, 1), (750, 1), (1000, 1), (1040, 0)]);
+    assert_eq!(schedule.missed(), 0);
+}
+
+#[test]
+fn what_is_missed_is_counted_and_not_piled_up() {
+    let mut schedule = Schedule::new(&[block(0, every(100))], at(0));
+    assert_eq!(schedule.next(at(0)), Next::Run(0));
+    let served = schedule.done(0, at(20), at(350));
+    assert_eq!(
+        served,
+        Served { jitter: Some(Duration::from_millis(20)), missed: 2 },
+        "100 and 200 are lost, 300 is late"
+    );
+    assert_eq!((schedule.missed(), schedule.polls().next().map(|poll| poll.missed)), (2, Some(2)));
+    assert_eq!(schedule.next(at(350)), Next::Run(0));
+    assert_eq!(schedule.done(0, at(350), at(360)).jitter, Some(Duration::from_millis(50)));
+    assert_eq!(schedule.next(at(360)), Next::WaitUntil(at(400)));
+    schedule.refresh(DeviceId(0), at(370));
+    assert_eq!(schedule.done(0, at(370), at(380)).jitter, None, "out of turn");
+}
+
+#[test]
+fn a_dead_device_is_probed_with_backoff_and_read_whole_when_it_is_back() {
+    let blocks = [block(0, every(1000)), block(0, Poll::Once), block(1, every(1000))];
+    let mut schedule = Schedule::new(&blocks, at(0));
+    for index in [0, 1, 2] {
+        schedule.done(index, at(0), at(10));
+    }
+    let device = DeviceId(0);
+    assert!(!schedule.failed(device, at(1000)));
+    assert!(!schedule.failed(device, at(2000)));
+    assert!(schedule.failed(device, at(3000)), "given up with the third");
+    assert!(schedule.is_down(device));
+    schedule.done(0, at(3000), at(3000));
+    schedule.done(2, at(3000), at(3000));
+    assert_eq!(schedule.next(at(3999)), Next::WaitUntil(at(4000)), "probe and other device both at 4 s");
+    assert!(!schedule.failed(device, at(4100)), "it is told once");
+    schedule.done(2, at(4100), at(4100));
+    assert_eq!(schedule.next(at(4500)), Next::WaitUntil(at(5000)), "the other device goes on at its rate");
+    schedule.answered(device, at(6100));
+    let mut due = Vec::new();
+    while let Next::Run(index) = schedule.next(at(6100)) {
+        schedule.done(index, at(6100), at(6100));
+        due.push(index);
+    }
+    due.sort_unstable();
+    assert_eq!(due, [0, 1, 2], "also the block that is read once");
+}
+
+#[test]
+fn a_device_at_rest_is_not_asked() {
+    let mut schedule = Schedule::new(&[block(0, every(100))], at(0));
+    schedule.rest(DeviceId(0), at(700));
+    assert_eq!(schedule.next(at(0)), Next::WaitUntil(at(700)));
+    assert!(schedule.is_resting(DeviceId(0), at(699)) && !schedule.is_resting(DeviceId(0), at(700)));
+}
+
+#[test]
+fn a_busy_device_is_asked_again_after_waits_that_grow_and_end() {
+    let mut schedule = Schedule::new(&[block(0, every(60_000)), block(1, every(60_000))], at(0));
+    let (mut now, mut waits) = (0, Vec::new());
+    for _ in 0..9 {
+        schedule.done(0, at(now), at(now));
+        let until = schedule.excused(0, ExceptionCode(6), at(now)).expect("busy").as_millisecond();
+        waits.push(until - now);
+        schedule.done(1, at(now), at(now));
+        assert_eq!(schedule.next(at(now)), Next::WaitUntil(at(until)));
+        now = until;
+    }
+    assert_eq!(waits, [100, 200, 400, 800, 1600, 3200, 5000, 5000, 5000]);
+    schedule.done(0, at(now), at(now));
+    schedule.done(0, at(now), at(now));
+    assert_eq!(schedule.excused(0, ExceptionCode(6), at(now)), Some(at(now + 100)), "it was good in between");
+}
+
+#[test]
+fn an_acknowledge_waits_a_parity_fault_is_tried_once_more_and_a_refusal_not_at_all() {
+    let mut schedule = Schedule::new(&[block(0, every(100))], at(0));
+    schedule.done(0, at(0), at(10));
+    assert_eq!(schedule.excused(0, ExceptionCode(5), at(10)), Some(at(1010)));
+    assert_eq!(schedule.next(at(500)), Next::WaitUntil(at(1010)), "also its own grid waits");
+    schedule.done(0, at(1010), at(1020));
+    schedule.done(0, at(1100), at(1110));
+    assert_eq!(schedule.excused(0, ExceptionCode(8), at(1110)), Some(at(1110)));
+    assert_eq!(schedule.next(at(1110)), Next::Run(0));
+    schedule.done(0, at(1110), at(1120));
+    assert_eq!(schedule.excused(0, ExceptionCode(8), at(1120)), None, "once");
+    for code in [1, 2, 3, 4, 10, 11] {
+        assert_eq!(schedule.excused(0, ExceptionCode(code), at(1120)), None);
+    }
+}
+
+#[test]
+fn a_new_plan_keeps_the_grid_of_what_stays_and_the_health_of_devices() {
+    let stays = block(0, every(1000));
+    let mut schedule = Schedule::new(&[block(1, every(500)), stays.clone()], at(0));
+    play(&mut schedule, 0, 300, |_, _| 10);
+    assert_eq!([300; 3].map(|now| schedule.failed(DeviceId(1), at(now))), [false, false, true]);
+    let new = Block { address: 7, ..stays.clone() };
+    schedule.replan(&[stays, new, block(1, every(700))], at(300));
+    assert!(schedule.is_down(DeviceId(1)));
+    assert_eq!(play(&mut schedule, 300, 1005, |_, _| 10), [(300, 1), (1000, 0)]);
+}
+
+/// Two hard polls, one soft that fills the line, one idle.
+fn crowd() -> [Block; 4] {
+    [
+        classed(0, every(200), Class::Hard),
+        classed(1, every(400), Class::Hard),
+        classed(2, every(100), Class::Soft),
+        classed(3, every(1000), Class::Idle),
+    ]
+}
+
+#[test]
+fn overload_sheds_idle_then_stretches_soft_and_returns_when_it_is_over() {
+    let mut schedule = Schedule::new(&crowd(), at(0));
+    // 20 % + 10 % hard, 85 % soft, 4 % idle.
+    let heavy = |index: usize, _| [40, 40, 85, 40][index];
+    play(&mut schedule, 0, 20_000, heavy);
+    assert_eq!(schedule.load(), Load::Overload { factor: 2 });
+    let told: Vec<_> = schedule.polls().map(|poll| (poll.factor, poll.shed)).collect();
+    assert_eq!(told, [(1, false), (1, false), (2, false), (1, true)]);
+    assert!(schedule.load().to_string().contains("every 2 periods"));
+    let missed = schedule.missed();
+    let log = play(&mut schedule, 20_000, 60_000, heavy);
+    let reads = |log: &[Read], poll| log.iter().filter(|(_, index)| *index == poll).count();
+    assert_eq!((reads(&log, 0), reads(&log, 1), reads(&log, 2)), (200, 100, 200), "hard at full rate, soft at half");
+    assert_eq!(schedule.missed(), missed, "what was told to be stretched is not missed");
+    // The device has become faster: everything fits again.
+    let light = |index: usize, _| [40, 40, 20, 40][index];
+    play(&mut schedule, 60_000, 100_000, light);
+    assert_eq!(schedule.load(), Load::Normal);
+    let log = play(&mut schedule, 100_000, 110_000, light);
+    assert_eq!((reads(&log, 2), reads(&log, 3)), (100, 10));
+}
+
+#[test]
+fn identification_is_read_even_on_a_line_that_is_always_too_full() {
+    let blocks = [classed(0, every(100), Class::Hard), classed(1, Poll::Once, Class::Idle), block(2, every(100))];
+    let mut schedule = Schedule::new(&blocks, at(0));
+    schedule.done(1, at(0), at(1));
+    let cost = |index: usize, _| [90, 30, 90][index];
+    play(&mut schedule, 0, 10_000, cost);
+    schedule.refresh(DeviceId(1), at(10_000));
+    let log = play(&mut schedule, 10_000, 72_000, cost);
+    let first = log.iter().find(|(_, index)| *index == 1).expect("it is read in the end");
+    assert!((70_000..71_000).contains(&first.0), "after a minute: {first:?}");
+}
+
+#[test]
+fn a_load_that_swings_changes_the_rates_seldom() {
+    let mut schedule = Schedule::new(&crowd(), at(0));
+    let (mut changes, mut load) = (0, schedule.load());
+    for second in 0..3600 {
+        // Four seconds too much, twelve seconds little.
+        let soft = if second % 16 < 4 { 90 } else { 10 };
+        play(&mut schedule, second * 1000, second * 1000 + 1000, |index, _| [40, 40, soft, 40][index]);
+        changes += usize::from(load != schedule.load());
+        load = schedule.load();
+    }
+    assert!(0 < changes && changes < 40, "{changes} changes in 225 swings of an hour");
+}
+
+#[test]
+fn five_hundred_polls_have_each_their_turn() {
+    let blocks: Vec<Block> = (0..500).map(|n| block(n % 30, every(20_000))).collect();
+    let mut schedule = Schedule::new(&blocks, at(0));
+    let mut seen: Vec<usize> = play(&mut schedule, 0, 20_000, |_, _| 30).into_iter().map(|(_, index)| index).collect();
+    seen.sort_unstable();
+    assert_eq!(seen, (0..500).collect::<Vec<_>>());
+}
+
+/// Periods and costs of polls, in ms.
+fn polls(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<(u64, i64)>> {
+    proptest::collection::vec((50u64..2000, 1i64..80), count)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn nobody_starves_whatever_the_classes(load in polls(1..12), classes in proptest::collection::vec(0usize..3, 12)) {
+        let class = |n: usize| [Class::Hard, Class::Soft, Class::Idle][classes[n]];
+        let blocks: Vec<Block> =
+            load.iter().enumerate().map(|(n, (period, _))| classed(n as u16, every(*period), class(n))).collect();
+        let mut schedule = Schedule::new(&blocks, at(0));
+        let log = play(&mut schedule, 0, 400_000, |index, _| load[index].1);
+        for index in 0..blocks.len() {
+            let begun = log.iter().filter(|(_, read)| *read == index).map(|(begun, _)| *begun);
+            let times: Vec<i64> = std::iter::once(0).chain(begun).chain([400_000]).collect();
+            let longest = times.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
+            // A stretched period, the wait of a starved one, and its turn among the other starved ones.
+            let bound = (load[index].0 as i64 * i64::from(FACTOR_MAX)).max(2_000) + 60_000 + 2 * 80 * 12 + 2_000;
+            prop_assert!(longest <= bound, "block {} waited {} ms", index, longest);
+        }
+    }
+
+    #[test]
+    fn hard_polls_keep_their_period_if_they_alone_are_admissible(
+        hard in polls(1..5), soft in proptest::collection::vec((50u64..200, 20i64..80), 4..9),
+    ) {
+        // Any one of the others may be under way when a hard poll falls due.
+        let mut tasks: Vec<Task> =
+            hard.iter().map(|(period, cost)| Task { cost: *cost as u64, period: *period }).collect();
+        let blocking = soft.iter().map(|(_, cost)| *cost as u64).max().unwrap_or(0);
+        tasks.push(Task { cost: blocking, period: 600_000 });
+        prop_assume!(admission::test(&tasks) == Test::Accept && admission::utilisation(&tasks) < 0.9);
+        let load: Vec<(u64, i64)> = hard.iter().chain(&soft).copied().collect();
+        let all: Vec<Task> = load.iter().map(|(period, cost)| Task { cost: *cost as u64, period: *period }).collect();
+        prop_assume!(admission::utilisation(&all) > 1.02);
+        let class = |n: usize| if n < hard.len() { Class::Hard } else { Class::Soft };
+        let blocks: Vec<Block> =
+            load.iter().enumerate().map(|(n, (period, _))| classed(n as u16, every(*period), class(n))).collect();
+        let mut schedule = Schedule::new(&blocks, at(0));
+        play(&mut schedule, 0, 20_000, |index, _| load[index].1);
+        prop_assert!(schedule.load() > Load::Normal);
+        let missed = |schedule: &Schedule| schedule.polls().take(hard.len()).map(|poll| poll.missed).sum::<u64>();
+        let before = missed(&schedule);
+        play(&mut schedule, 20_000, 200_000, |index, _| load[index].1);
+        prop_assert_eq!(missed(&schedule), before);
+    }
+
+    #[test]
+    fn a_poll_set_that_is_admitted_misses_nothing(load in polls(1..8)) {
+        let tasks: Vec<Task> =
+            load.iter().map(|(period, cost)| Task { cost: *cost as u64, period: *period }).collect();
+        prop_assume!(admission::test(&tasks) == Test::Accept);
+        let blocks: Vec<Block> =
+            load.iter().enumerate().map(|(n, (period, _))| block(n as u16, every(*period))).collect();
+        let mut schedule = Schedule::new(&blocks, at(0));
+        play(&mut schedule, 0, 100_000, |index, _| load[index].1);
+        prop_assert_eq!((schedule.missed(), schedule.load()), (0, Load::Normal));
+    }
+
+    #[test]
+    fn after_a_long_standstill_each_poll_is_read_once_and_is_back_on_its_grid(load in polls(1..8), pause in 1i64..100_000) {
+        let blocks: Vec<Block> =
+            load.iter().enumerate().map(|(n, (period, _))| block(n as u16, every(*period))).collect();
+        let mut schedule = Schedule::new(&blocks, at(0));
+        let now = play(&mut schedule, 0, 1, |_, _| pause).len() as i64 * pause;
+        let mut due = Vec::new();
+        while let Next::Run(index) = schedule.next(at(now)) {
+            due.push(index);
+            schedule.done(index, at(now), at(now));
+        }
+        prop_assert!(due.len() <= blocks.len(), "{:?}", due);
+        for (poll, (period, _)) in schedule.polls().zip(&load) {
+            let next = poll.next.map_or(0, |next| next.as_millisecond());
+            prop_assert!(next > now && next <= now + *period as i64 && next % *period as i64 == 0);
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Whether the polls of a line can all meet their periods: the verdict, its witness and its warnings, as plain data.
+
+use std::{fmt, time::Duration};
+
+use super::id::{DeviceId, LineId};
+
+/// What the admission test says about a line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Admission {
+    /// Which line.
+    pub line: LineId,
+    /// Share of the line's time that its periodic reads take, 0–1 and beyond.
+    pub utilisation: f64,
+    /// Can all polls meet their periods?
+    pub verdict: Verdict,
+    /// Can those of the alarm inputs, if all others are left out?
+    pub hard: Verdict,
+    /// Process values are read only each so many periods where the line has too much to do; 1 is every period. `None`:
+    /// the hard polls alone are too much.
+    pub factor: Option<u32>,
+    /// Time of one read of every periodic block.
+    pub cycle: Duration,
+    /// What each device costs while it does not answer, in the order of the plant.
+    pub dead: Vec<DeadDevice>,
+    /// What an engineer should know before the plant runs.
+    pub warnings: Vec<Warning>,
+}
+
+/// Can the polls of a line meet their periods?
+#[derive(Debug, Clone, PartialEq)]
+pub enum Verdict {
+    /// Each of them, always.
+    Fits,
+    /// They want more time than there is.
+    TooMuch {
+        /// Share of the time that they want, above 1.
+        utilisation: f64,
+    },
+    /// There is time enough, but a transaction cannot be interrupted: once in a while one comes in the way of others.
+    Blocked(Witness),
+}
+
+impl Verdict {
+    /// Do the polls fit?
+    pub fn fits(&self) -> bool {
+        match self {
+            Verdict::Fits => true,
+            Verdict::TooMuch { .. } | Verdict::Blocked(_) => false,
+        }
+    }
+}
+
+/// A span of time in which a line would have to carry more than goes into it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Witness {
+    /// How long the span is.
+    pub span: Duration,
+    /// How much the line must carry in it.
+    pub demand: Duration,
+    /// The poll that has just begun and cannot be interrupted.
+    pub blocker: PollWords,
+    /// The polls that are due meanwhile, the one with the shortest period first; at most three are named.
+    pub due: Vec<PollWords>,
+    /// How many more are due.
+    pub more: usize,
+}
+
+/// A poll as an engineer knows it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PollWords {
+    /// `TIC-1 input 1000–1007`.
+    pub name: String,
+    /// How often.
+    pub period: Duration,
+    /// Worst time on the wire.
+    pub cost: Duration,
+}
+
+/// A device that does not answer: it is probed each 30 s, and each probe takes the line until its timeout.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DeadDevice {
+    /// Which.
+    pub device: DeviceId,
+    /// `TIC-1`.
+    pub name: String,
+    /// What one probe costs the others.
+    pub probe: Duration,
+    /// What its silence leaves of the line's time to the others: their reads and its probes, 0–1 and beyond.
+    pub utilisation: f64,
+    /// Can the polls of the others still meet their periods?
+    pub verdict: Verdict,
+}
+
+/// Something that works, or seems to, and is better otherwise.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Warning {
+    /// A character without parity has two stop bits by the standard (Modbus over serial line V1.02, 2.5.1).
+    NoParityOneStopBit,
+    /// An answer takes longer on the wire than the timeout of the line.
+    TimeoutBelowAnswer {
+        /// The timeout.
+        timeout: Duration,
+        /// The longest answer.
+        answer: Duration,
+        /// Whose it is.
+        poll: String,
+    },
+    /// The reads leave less than the share that is kept for operators' writes.
+    NoRoomForWrites {
+        /// The share, 0–1.
+        share: f64,
+    },
+    /// A serial server passes frames on over a line of which nothing is known here.
+    SerialServer,
+}
+
+/// `fits`, or what does not, in a sentence.
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Verdict::Fits => f.write_str("every poll meets its period"),
+            Verdict::TooMuch { utilisation } => {
+                write!(f, "too much: the polls want {:.1} % of the line's time", utilisation * 100.0)
+            }
+            Verdict::Blocked(witness) => witness.fmt(f),
+        }
+    }
+}
+
+impl fmt::Display for Witness {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Witness { span, demand, blocker, due, more } = self;
+        write!(f, "in {} the line must carry {}: ", ms(*span), ms(*demand))?;
+        write!(f, "while {} ({}) is read, ", blocker.name, ms(blocker.cost))?;
+        for (place, poll) in due.iter().enumerate() {
+            let comma = if place == 0 { "" } else { ", " };
+            write!(f, "{comma}{} every {} ({})", poll.name, seconds(poll.period), ms(poll.cost))?;
+        }
+        if *more > 0 {
+            write!(f, " and {more} more")?;
+        }
+        write!(f, " cannot meet {} period", if due.len() + more == 1 { "its" } else { "their" })
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Warning::NoParityOneStopBit => f.write_str(
+                "no parity and one stop bit: a disturbed character is noticed less surely; the standard wants E or O, or two stop bits",
+            ),
+            Warning::TimeoutBelowAnswer { timeout, answer, poll } => {
+                write!(f, "timeout {} is shorter than an answer takes on the wire: {poll} needs {}", ms(*timeout), ms(*answer))
+            }
+            Warning::NoRoomForWrites { share } => write!(
+                f,
+                "less than {:.0} % of the time is left for writes: polls are stretched while an operator works",
+                share * 100.0
+            ),
+            Warning::SerialServer => f.write_str(
+                "a serial server: the time on the line behind it is not known here and not counted",
+            ),
+        }
+    }
+}
+
+/// `150.1 ms`, rounded up: what is told is never less than what is.
+fn ms(span: Duration) -> String {
+    let tenths = span.as_micros().div_ceil(100);
+    if tenths % 10 == 0 { format!("{} ms", tenths / 10) } else { format!("{}.{} ms", tenths / 10, tenths % 10) }
+}
+
+fn seconds(span: Duration) -> String {
+    if span < Duration::from_secs(1) { ms(span) } else { format!("{} s", span.as_secs_f64()) }
+}

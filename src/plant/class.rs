@@ -1,0 +1,63 @@
+//! Which tags are alarm inputs, which process values and which identification, as far as the plant itself tells.
+
+use super::{
+    def::{AlarmDef, Condition, Subject},
+    id::TagId,
+    tag::{Class, Poll, TagDef},
+};
+
+/// The class of each tag, by [`TagId`]: hard if an alarm watches it, compares with it or needs it to judge such a tag; idle
+/// if it is read once; else soft. What is `written` for a tag in a file stands above all that.
+pub fn classes(tags: &[TagDef], alarms: &[AlarmDef], written: &[Option<Class>]) -> Vec<Class> {
+    let mut hard = vec![false; tags.len()];
+    let mut found: Vec<TagId> = alarms.iter().flat_map(inputs).collect();
+    while let Some(tag) = found.pop() {
+        if !std::mem::replace(&mut hard[tag.index()], true) {
+            found.extend(tags[tag.index()].needs());
+        }
+    }
+    let of = |tag: &TagDef| match (written.get(tag.id.index()).copied().flatten(), tag.poll) {
+        (Some(class), _) => class,
+        (None, _) if hard[tag.id.index()] => Class::Hard,
+        (None, Poll::Once) => Class::Idle,
+        (None, Poll::Every(_) | Poll::Never) => Class::Soft,
+    };
+    tags.iter().map(of).collect()
+}
+
+/// The tags that an alarm reads by itself. A device that does not answer is noticed by any poll.
+fn inputs(alarm: &AlarmDef) -> impl Iterator<Item = TagId> {
+    let subject = match alarm.subject {
+        Subject::Tag(tag) => Some(tag),
+        Subject::Device(_) => None,
+    };
+    let reference = match alarm.condition {
+        Condition::Deviation { from, .. } => Some(from),
+        Condition::Limit { .. } | Condition::State { .. } | Condition::NotAnswering => None,
+    };
+    subject.into_iter().chain(reference)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::fixture::{self, DP, FAULT, PV, RUN, SV};
+
+    #[test]
+    fn what_an_alarm_needs_is_hard_and_identification_is_idle() {
+        let mut def = fixture::plant();
+        let of = |def: &crate::plant::PlantDef, written: &[Option<Class>], tag: TagId| {
+            classes(&def.tags, &def.alarms, written)[tag.index()]
+        };
+        for (tag, class) in [(PV, Class::Hard), (DP, Class::Hard), (FAULT, Class::Hard), (SV, Class::Soft)] {
+            assert_eq!(of(&def, &[], tag), class, "{tag:?}");
+        }
+        def.alarms[0].condition = Condition::Deviation { from: SV, limit: 5.0, deadband: 1.0 };
+        assert_eq!(of(&def, &[], SV), Class::Hard, "PV is compared with it");
+        def.tags[RUN.index()].poll = Poll::Once;
+        assert_eq!(of(&def, &[], RUN), Class::Idle);
+        def.tags[DP.index()].poll = Poll::Once;
+        assert_eq!(of(&def, &[], DP), Class::Hard, "read once, but nothing can be judged without it");
+        assert_eq!(of(&def, &[Some(Class::Soft)], PV), Class::Soft, "the engineer knows better");
+    }
+}

@@ -1,0 +1,142 @@
+//! What the read plan saves: wire time of a scattered map against simpler ways to read it, and how long planning takes.
+#![allow(clippy::print_stdout, missing_docs)]
+
+#[path = "../../src/bus/plan/rivals.rs"]
+mod rivals;
+
+use std::{
+    hint::black_box,
+    time::{Duration, Instant},
+};
+
+use jiff::tz::TimeZone;
+use sightglass::{
+    bus::plan::{Block, Holes, blocks, cost, single},
+    plant::{
+        PlantDef,
+        def::{
+            CsvDialect, DeviceDef, DeviceId, Limits, LineDef, LineId, MimicDef, ReportDef, Serial, TagId, Transport,
+        },
+        tag::{Kind, Order, Point, Table, TagDef},
+    },
+};
+
+/// A linear congruential generator (Knuth's MMIX): the same map on every machine.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % limit
+    }
+}
+
+fn device(id: u16) -> DeviceDef {
+    DeviceDef {
+        id: DeviceId(id),
+        name: format!("D-{id}"),
+        title: String::new(),
+        line: LineId(0),
+        unit: id as u8 + 1,
+        profile: String::new(),
+        model: String::new(),
+        limits: Limits { gap_words_max: 16, ..Limits::STANDARD },
+        gap: Duration::ZERO,
+        write_gap: Duration::ZERO,
+        faceplate: None,
+        actions: Vec::new(),
+    }
+}
+
+/// Tags of mixed types in runs of one to eight, with gaps of up to `gap` registers between the runs.
+fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
+    let kinds = [Kind::U16, Kind::I16, Kind::F32, Kind::U32, Kind::U16, Kind::U64, Kind::Bcd16, Kind::I16];
+    let mut next = vec![[0u64; 2]; usize::from(devices)];
+    let (mut run, mut place, mut half) = (0, 0, 0);
+    let tag = |id| {
+        if run == 0 {
+            (run, place, half) = (1 + dice.below(8), dice.below(u64::from(devices)) as usize, dice.below(2) as usize);
+            next[place][half] += dice.below(gap);
+        }
+        run -= 1;
+        let kind = kinds[dice.below(8) as usize];
+        let address = next[place][half] as u16;
+        next[place][half] += u64::from(kind.words());
+        let point =
+            Point { table: [Table::Holding, Table::Input][half], address, kind, order: Order::Abcd, field: None };
+        TagDef::new(TagId(id), DeviceId(place as u16), &format!("D-{place}.T{id}"), point)
+    };
+    let tags = (0..tags).map(tag).collect();
+    PlantDef {
+        name: "scattered".into(),
+        title: String::new(),
+        time_zone: TimeZone::UTC,
+        lines: vec![LineDef::new(LineId(0), "L1", Transport::rtu("/dev/null", Serial::USUAL))],
+        devices: (0..devices).map(device).collect(),
+        tags,
+        alarms: Vec::new(),
+        mimic: MimicDef::default(),
+        trends: Vec::new(),
+        shifts: Vec::new(),
+        report: ReportDef { folder: "reports".into(), tags: Vec::new(), record: None, csv: CsvDialect::default() },
+        simulation: None,
+    }
+}
+
+fn compare(def: &PlantDef) {
+    let holes = Holes::default();
+    let plan = blocks(def, LineId(0), &holes);
+    let ours = rivals::wire_time(def, &plan);
+    println!("{} tags on {} devices, {}", def.tags.len(), def.devices.len(), def.lines[0].transport);
+    println!("  our plan          {:4} requests {:8.1} ms", plan.len(), ours.as_secs_f64() * 1e3);
+    let tags = rivals::sorted(def);
+    let groups = rivals::groups(def, &tags);
+    let all = |cut: &dyn Fn(&[TagDef], &DeviceDef) -> Vec<Block>| -> Vec<Block> {
+        groups.iter().flat_map(|(group, device)| cut(group, device)).collect()
+    };
+    for (name, rival) in [
+        ("one a tag", all(&rivals::singles)),
+        ("fixed 10", all(&|group, device| rivals::fixed(group, device, 10))),
+        ("fixed 60", all(&|group, device| rivals::fixed(group, device, 60))),
+        ("greedy", all(&|group, device| rivals::greedy(group, device, &holes))),
+    ] {
+        let theirs = rivals::wire_time(def, &rival);
+        let ratio = ours.as_secs_f64() / theirs.as_secs_f64();
+        println!(
+            "  {name:16}  {:4} requests {:8.1} ms   ours is {ratio:.3} of it",
+            rival.len(),
+            theirs.as_secs_f64() * 1e3
+        );
+    }
+}
+
+/// Eight tags on one device, a thousand maps: the plan against every way to deal them.
+fn against_the_optimum(dice: &mut Dice) {
+    let (mut worst, mut cases) = (1.0f64, 0);
+    for _ in 0..1000 {
+        let def = plant(1, 8, 24, dice);
+        let tags = rivals::sorted(&def);
+        let groups = rivals::groups(&def, &tags);
+        let least: Duration =
+            groups.iter().map(|(group, device)| rivals::best_of_all(&def, group, device, &Holes::default())).sum();
+        let ours = rivals::wire_time(&def, &blocks(&def, LineId(0), &Holes::default()));
+        worst = worst.max(ours.as_secs_f64() / least.as_secs_f64());
+        cases += 1;
+    }
+    println!("against the optimum of an exhaustive search: worst ratio {worst:.3} in {cases} maps of 8 tags");
+}
+
+fn main() {
+    let mut dice = Dice(2026);
+    let def = plant(3, 200, 24, &mut dice);
+    compare(&def);
+    against_the_optimum(&mut dice);
+    let many = plant(5, 10_000, 12, &mut dice);
+    let times = (0..10).map(|_| {
+        let start = Instant::now();
+        black_box(blocks(black_box(&many), LineId(0), &Holes::default()));
+        start.elapsed()
+    });
+    let best = times.min().unwrap_or_default();
+    println!("planning 10 000 tags on 5 devices: {:.2} ms", best.as_secs_f64() * 1e3);
+}
