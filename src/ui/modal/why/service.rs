@@ -55,7 +55,11 @@ pub(super) fn device_rows(cx: &Cx, def: &TagDef, device: &DeviceDef, exchange: O
 /// When it is read, with whom, and whether that works out.
 pub(super) fn poll_rows(cx: &Cx, def: &TagDef) -> Vec<Row> {
     let line = cx.snapshot.line(cx.def().device(def.device).line);
-    let Some(poll) = line.report.as_ref().and_then(|report| report.poll_of(def.id)) else { return Vec::new() };
+    let Some(report) = &line.report else { return Vec::new() };
+    if report.refused.contains(&def.id) {
+        return vec![row("poll", "asked no more: the device refuses this address", cx.theme.trouble())];
+    }
+    let Some(poll) = report.poll_of(def.id) else { return Vec::new() };
     let period = match poll.poll {
         Poll::Every(period) => format!("every {}", span(period)),
         Poll::Once => "once, and on refresh".to_owned(),
@@ -65,12 +69,21 @@ pub(super) fn poll_rows(cx: &Cx, def: &TagDef) -> Vec<Row> {
         Duration::ZERO => ", due now".to_owned(),
         wait => format!(", next in {}", span(wait)),
     });
-    let mut text = format!("{period}{}, {} missed", next.unwrap_or_default(), poll.tally.missed);
+    let busy = match (poll.shed, poll.factor) {
+        (true, _) => ", left out while the line is too busy".to_owned(),
+        (false, 0 | 1) => String::new(),
+        (false, factor) => format!(", now only each {factor} periods: the line is too busy"),
+    };
+    let mut text = format!("{period}{busy}{}, {} missed", next.unwrap_or_default(), poll.tally.missed);
     if let Some(p99) = poll.tally.jitter.p99() {
         text += &format!(", jitter {}", span(p99));
     }
     text += &format!(", costs {}", span(poll.cost));
-    vec![row("poll", text, if poll.tally.missed == 0 { cx.theme.normal() } else { cx.theme.trouble() })]
+    vec![row(
+        "poll",
+        text,
+        if poll.tally.missed == 0 && busy.is_empty() { cx.theme.normal() } else { cx.theme.trouble() },
+    )]
 }
 
 /// What is the matter with a line; `None` while it is connected.
