@@ -11,13 +11,14 @@ use super::{
 use crate::{
     bus::names,
     plant::{
+        admission::Verdict,
         line_report::{LineReport, PollReport},
         tag::Poll,
     },
     ui::{
         Act, Cx,
         modal::Modal,
-        widgets::text::{Canvas, between, wrap},
+        widgets::text::{Canvas, between, fit_words, wrap},
     },
 };
 
@@ -51,9 +52,14 @@ impl Plan {
             canvas.text(1, 0, "nothing is polled on this line yet", theme.normal());
             return;
         };
-        let (summary, over) = summary(report);
-        canvas.text(1, 0, &summary, if over { theme.trouble() } else { theme.normal() });
         let (width, height) = (canvas.width(), canvas.height());
+        let (summary, over) = summary(report);
+        canvas.text(
+            1,
+            0,
+            &fit_words(&summary, width.saturating_sub(14)),
+            if over { theme.trouble() } else { theme.normal() },
+        );
         let lines: Vec<_> = report.polls.iter().map(|poll| cells(cx, poll)).collect();
         let (heading, lines) = rows::table(&COLUMNS, &lines, width.saturating_sub(2));
         canvas.text(1, 1, &heading, theme.dim());
@@ -114,7 +120,7 @@ fn cells(cx: &Cx, poll: &PollReport) -> [String; 15] {
         format!("0x{:04X}", poll.address),
         poll.count.to_string(),
         poll.tags.len().to_string(),
-        every(poll.poll),
+        pace(poll),
         short_ms(poll.cost),
         next,
         grouped(tally.ok),
@@ -123,6 +129,15 @@ fn cells(cx: &Cx, poll: &PollReport) -> [String; 15] {
         span(tally.jitter.max()),
         grouped(tally.missed),
     ]
+}
+
+/// `1 s`, `1 s ×3` where it is stretched, `left out`.
+fn pace(poll: &PollReport) -> String {
+    match (poll.shed, poll.factor) {
+        (true, _) => "left out".to_owned(),
+        (false, 0 | 1) => every(poll.poll),
+        (false, factor) => format!("{} ×{factor}", every(poll.poll)),
+    }
 }
 
 /// `1 s`, `once`.
@@ -139,19 +154,22 @@ fn ill(poll: &PollReport) -> bool {
     poll.tally.failed_last() && 0 < poll.tally.requests
 }
 
-/// Blocks, load, and whether it fits; `true` if it does not.
+/// Blocks, load, and the verdict of the admission test; `true` if they do not fit.
 fn summary(report: &LineReport) -> (String, bool) {
-    let share = |poll: &PollReport| match poll.poll {
-        Poll::Every(period) => poll.cost.as_secs_f64() / period.as_secs_f64(),
-        Poll::Once | Poll::Never => 0.0,
+    let (blocks, admission) = (report.polls.len(), &report.admission);
+    let load = admission.utilisation * 100.0;
+    let words = format!("{blocks} {} take {load:.0} % of the line at worst", plural(blocks, "block", "blocks"));
+    let refused = match report.refused.len() {
+        0 => String::new(),
+        count => format!("; {count} {} refused by the device", plural(count, "tag is", "tags are")),
     };
-    let load: f64 = report.polls.iter().map(share).sum();
-    let blocks = report.polls.len();
-    let words =
-        format!("{blocks} {} take {:.0} % of the line at worst", plural(blocks, "block", "blocks"), load * 100.0);
-    match load {
-        1.0.. => (format!("! {words}: too much, reads will be skipped"), true),
-        _ => (words, false),
+    match &admission.verdict {
+        Verdict::Fits => (format!("{words}: they fit{refused}"), false),
+        Verdict::TooMuch { .. } => (format!("! {words}: TOO MUCH, reads are left out{refused}"), true),
+        Verdict::Blocked(witness) => {
+            let blocker = &witness.blocker.name;
+            (format!("! {words}: some come late behind {blocker}{refused}"), true)
+        }
     }
 }
 
