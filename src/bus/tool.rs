@@ -145,11 +145,11 @@ impl Job {
                 self.steps.clear();
                 self.steps.push_back(step(vec![*unit, 0x11]));
             }
-            (Tool::Read { unit, table, address, count }, Fault::Exception(code)) if code.0 == 2 && 1 < *count => {
-                if self.run.done == 1 {
-                    let singles = (0..*count).map(|n| step(read(*unit, *table, address.wrapping_add(n), 1)));
-                    self.steps.extend(singles);
-                }
+            (Tool::Read { unit, table, address, count }, Fault::Exception(code))
+                if code.0 == 2 && 1 < *count && self.run.done == 1 =>
+            {
+                let singles = (0..*count).map(|n| step(read(*unit, *table, address.wrapping_add(n), 1)));
+                self.steps.extend(singles);
             }
             _ => {}
         }

@@ -183,7 +183,11 @@ impl fmt::Display for Warning {
 /// `150.1 ms`, rounded up: what is told is never less than what is.
 fn ms(span: Duration) -> String {
     let tenths = span.as_micros().div_ceil(100);
-    if tenths % 10 == 0 { format!("{} ms", tenths / 10) } else { format!("{}.{} ms", tenths / 10, tenths % 10) }
+    if tenths.is_multiple_of(10) {
+        format!("{} ms", tenths / 10)
+    } else {
+        format!("{}.{} ms", tenths / 10, tenths % 10)
+    }
 }
 
 fn seconds(span: Duration) -> String {

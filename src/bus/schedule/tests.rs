@@ -244,12 +244,12 @@ proptest! {
             load.iter().enumerate().map(|(n, (period, _))| classed(n as u16, every(*period), class(n))).collect();
         let mut schedule = Schedule::new(&blocks, at(0));
         let log = play(&mut schedule, 0, 400_000, |index, _| load[index].1);
-        for index in 0..blocks.len() {
+        for (index, (period, _)) in load.iter().enumerate() {
             let begun = log.iter().filter(|(_, read)| *read == index).map(|(begun, _)| *begun);
             let times: Vec<i64> = std::iter::once(0).chain(begun).chain([400_000]).collect();
             let longest = times.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
             // A stretched period, the wait of a starved one, and its turn among the other starved ones.
-            let bound = (load[index].0 as i64 * i64::from(FACTOR_MAX)).max(2_000) + 60_000 + 2 * 80 * 12 + 2_000;
+            let bound = (*period as i64 * i64::from(FACTOR_MAX)).max(2_000) + 60_000 + 2 * 80 * 12 + 2_000;
             prop_assert!(longest <= bound, "block {} waited {} ms", index, longest);
         }
     }
