@@ -16,14 +16,18 @@ mod tests;
 use std::path::PathBuf;
 
 use crossterm::event::{KeyCode, KeyEvent};
+use jiff::SignedDuration;
 use ratatui::{Frame, layout::Rect};
 
 pub use window::Window;
 
+use super::{Tab, errand::Errand};
 use crate::{
+    history::{Answer, HistoryError},
     plant::{
         def::{LineDef, LineId},
         event::LineState,
+        line_minute::LineMinute,
         line_report::LineReport,
         snapshot::{LineStatus, Snapshot},
     },
@@ -31,10 +35,19 @@ use crate::{
         Act, Cx,
         keys::{self, Hint, Key, char, code},
         modal::{Modal, Settings},
-        widgets::text::{Canvas, between, fit_words, running, width},
+        widgets::{
+            line_trend::{self, line_trend},
+            text::{Canvas, between, fit_words, running, width},
+        },
     },
 };
 use test::Tried;
+
+/// The day of a line grows by the minute.
+const ASK_EVERY: SignedDuration = SignedDuration::from_secs(60);
+const PATIENCE: SignedDuration = SignedDuration::from_secs(10);
+/// Rows of the day, with one above it.
+const DAY_HEIGHT: u16 = 4;
 
 /// What is shown of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -150,6 +163,10 @@ pub struct Bus {
     frames: frames::Ring,
     /// The bench of tests.
     pub(super) test: test::Bench,
+    /// How the line did over the last day, and the question for it.
+    minutes: Vec<LineMinute>,
+    errand: Errand,
+    asked: u32,
 }
 
 impl Bus {
@@ -162,6 +179,9 @@ impl Bus {
             plan: plan::Plan::default(),
             frames: frames::Ring::default(),
             test: test::Bench::default(),
+            minutes: Vec::new(),
+            errand: Errand::default(),
+            asked: 0,
         }
     }
 
@@ -213,7 +233,19 @@ impl Bus {
         if let (Page::Frames, Some(at)) = (self.page, Place::of(cx, self.line)) {
             self.frames.follow(cx, &at);
         }
-        Vec::new()
+        if self.page != Page::Line || !self.errand.due(cx.now, ASK_EVERY, PATIENCE) {
+            return Vec::new();
+        }
+        self.asked = self.asked.wrapping_add(1);
+        self.errand.asked(self.asked, cx.now);
+        vec![Act::ask(Tab::Bus, self.asked, line_trend::question(self.line, cx.now))]
+    }
+
+    /// The history has answered. Without an answer the day before is left as it was.
+    pub fn on_answer(&mut self, number: u32, answer: Result<Answer, HistoryError>) {
+        if let (Some(_), Ok(Answer::LineMinutes(minutes))) = (self.errand.answered(number), answer) {
+            self.minutes = minutes;
+        }
     }
 
     /// A filter was typed.
@@ -237,7 +269,11 @@ impl Bus {
         let (width, height) = (canvas.width(), canvas.height());
         let mut page = canvas.part(0, 1, width, height.saturating_sub(1));
         match self.page {
-            Page::Line => rows::draw(cx, &mut page, &line::rows(cx, &at, width), self.first),
+            Page::Line => {
+                let rows = line::rows(cx, &at, width);
+                rows::draw(cx, &mut page, &rows, self.first);
+                self.day(cx, &mut page, rows.len() as u16);
+            }
             Page::Plan => self.plan.view(cx, &at, &mut page),
             Page::Frames => self.frames.view(cx, &at, &mut page),
             Page::Test => self.test.view(cx, &at, &mut page),
@@ -251,6 +287,16 @@ impl Bus {
         usize::from(cx.area.height.saturating_sub(1))
     }
 
+    /// How the line did over the last day, below the rows where there is room for it.
+    fn day(&self, cx: &Cx, page: &mut Canvas, rows: u16) {
+        let (width, height) = (page.width(), page.height());
+        if height < rows + DAY_HEIGHT {
+            return;
+        }
+        let mut day = page.part(1, height - DAY_HEIGHT + 1, width.saturating_sub(2), DAY_HEIGHT - 1);
+        line_trend(cx, &mut day, &self.minutes);
+    }
+
     /// So many lines on, around the end.
     fn choose_line(&mut self, cx: &Cx, by: isize) {
         let count = cx.def().lines.len().max(1) as isize;
@@ -258,6 +304,8 @@ impl Bus {
         (self.first, self.plan) = (0, plan::Plan::default());
         self.frames.forget();
         self.test.first = None;
+        self.minutes.clear();
+        self.errand = Errand::default();
     }
 
     fn scroll(&mut self, cx: &Cx, at: &Place, by: isize) {

@@ -150,7 +150,11 @@ impl Tabs {
             Tab::Mimic => self.mimic.on_answer(cx, id.number, answer),
             Tab::Trends => self.trends.on_answer(cx, id.number, answer),
             Tab::Alarms => self.alarms.on_answer(cx, id.number, answer),
-            Tab::Controllers | Tab::Bus => Vec::new(),
+            Tab::Controllers => Vec::new(),
+            Tab::Bus => {
+                self.bus.on_answer(id.number, answer);
+                Vec::new()
+            }
             Tab::Reports => self.reports.on_answer(cx, id.number, answer),
         }
     }
