@@ -46,8 +46,8 @@ use test::Tried;
 /// The day of a line grows by the minute.
 const ASK_EVERY: SignedDuration = SignedDuration::from_secs(60);
 const PATIENCE: SignedDuration = SignedDuration::from_secs(10);
-/// Rows of the day, with one above it.
-const DAY_HEIGHT: u16 = 4;
+/// Rows of the day.
+const DAY_HEIGHT: u16 = 3;
 
 /// What is shown of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -293,7 +293,7 @@ impl Bus {
         if height < rows + DAY_HEIGHT {
             return;
         }
-        let mut day = page.part(1, height - DAY_HEIGHT + 1, width.saturating_sub(2), DAY_HEIGHT - 1);
+        let mut day = page.part(1, height - DAY_HEIGHT, width.saturating_sub(2), DAY_HEIGHT);
         line_trend(cx, &mut day, &self.minutes);
     }
 

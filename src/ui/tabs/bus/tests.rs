@@ -6,10 +6,12 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use crate::{
     bus::frame::with_crc,
+    history::{Answer, Question},
     plant::{
         command::{Command, OrderId},
         def::{Framing, LineId, Serial},
         event::{ExceptionCode, Fault, LineState},
+        line_minute::LineMinute,
         tag::Table,
         tool::{Finding, Scan, Tool, ToolRun, ToolState},
         traffic::Exchange,
@@ -383,4 +385,36 @@ fn backspace_is_a_key_of_the_entries() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "Tt01 03x");
     update(&mut model, Msg::Key(KeyEvent::new(KeyCode::Backspace, KeyModifiers::NONE)));
     assert!(!screen(&mut model, 80, 24).contains("03x"));
+}
+
+#[test]
+fn the_day_of_a_line_is_asked_for_and_shown_as_a_trend() {
+    let mut model = model(&Fixture::traffic(), Theme::FULL);
+    let effects = type_keys(&mut model, "6");
+    let asked = effects.into_iter().find_map(|effect| match effect {
+        Effect::Ask(id, Question::LineMinutes { line: L1, .. }) => Some(id),
+        _ => None,
+    });
+    let minute = |ago: i64| LineMinute {
+        at: now() - jiff::SignedDuration::from_mins(ago),
+        line: "L1".into(),
+        requests: 60,
+        ok: if ago < 60 { 45 } else { 60 },
+        timeouts: if ago < 60 { 15 } else { 0 },
+        corrupt: 0,
+        exceptions: 0,
+        retries: 0,
+        late: 0,
+        missed: 0,
+        sent_bytes: 0,
+        received_bytes: 0,
+        utilisation: 0.5,
+        reply_p99_ms: None,
+        reply_max_ms: None,
+    };
+    let minutes = (0..600).rev().map(minute).collect();
+    update(&mut model, Msg::Answer(asked.expect("it is asked for"), Ok(Answer::LineMinutes(minutes))));
+    let seen = screen(&mut model, 120, 40);
+    let errors = seen.lines().find(|line| line.contains("errors")).expect("a row of errors");
+    assert!(errors.contains('▁') && errors.contains('█') && errors.contains("25 % now"), "{seen}");
 }
