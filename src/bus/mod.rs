@@ -1,4 +1,23 @@
 //! How it is read and written: frames, codecs, blocks, the schedule; bytes move only in [`io`].
+//!
+//! ```text
+//!   tags ──> plan ──> schedule ──> task ──> link ──> wire ──> port        asked
+//!            blocks   whose turn   polls    one      silences,
+//!            (holes)  (classes)    writes   request  every byte on record
+//!                                  tests    (debt)
+//!   values <── codec <── task <── gather <── ascii, frame <── port        answered
+//! ```
+//!
+//! | room | what is decided there |
+//! |---|---|
+//! | [`frame`], [`ascii`], [`gather`] | where a frame begins and ends, whether its check fits, whether it answers what was asked |
+//! | [`debt`] | which answers may still come late, and what may be asked meanwhile |
+//! | [`codec`] | words to numbers and back |
+//! | [`plan`], [`admission`], [`schedule`], [`backoff`] | what is read together, whether it can all be in time, what is read next |
+//! | [`books`] | what is counted |
+//! | [`tool`] | the steps of a test of the line |
+//! | [`explain`], [`names`], [`evidence`] | frames in words |
+//! | [`typed`], [`complaint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
 
 pub mod ascii;
 pub mod frame;
@@ -6,6 +25,7 @@ pub mod gather;
 pub mod names;
 pub mod complaint;
 pub mod explain;
+pub mod evidence;
 pub mod typed;
 pub mod filter;
 pub mod capture;
@@ -17,5 +37,4 @@ pub mod admission;
 pub mod debt;
 pub mod tool;
 pub mod books;
-pub mod evidence;
 pub mod io;
