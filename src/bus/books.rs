@@ -9,6 +9,7 @@ use super::{
 };
 use crate::plant::{
     PlantDef,
+    admission::Admission,
     def::{DeviceId, LineDef, LineId, TagId},
     event::{Fault, LineCounters},
     line_report::{LineReport, PollReport},
@@ -18,6 +19,8 @@ use crate::plant::{
 
 /// Seconds of busyness that are remembered.
 const BUSY_OVER: usize = 60;
+/// A second is closed when about as much time has passed.
+const CLOSED_AFTER_S: f32 = 0.9;
 /// The last of them that `utilisation` is the mean of.
 const BUSY_NOW: usize = 10;
 
@@ -39,7 +42,12 @@ pub struct Books {
     polls: Vec<Tally>,
     devices: Vec<(DeviceId, Tally)>,
     busy: VecDeque<f32>,
+    /// Seconds that the line was busy, of how many, since the last was closed.
+    open: (f32, f32),
+    /// Releases that were skipped, of all polls there have been.
+    missed: u64,
     frames: Frames,
+    admission: Admission,
 }
 
 impl Books {
@@ -50,7 +58,10 @@ impl Books {
             polls: vec![Tally::default(); blocks.len()],
             devices: devices.map(|device| (device.id, Tally::default())).collect(),
             busy: VecDeque::new(),
+            open: (0.0, 0.0),
+            missed: 0,
             frames: Frames::default(),
+            admission: admission::admit(def, line, blocks),
         }
     }
 
@@ -61,11 +72,6 @@ impl Books {
             self.polls.get(place).cloned()
         };
         self.polls = new.iter().map(|block| kept(block).unwrap_or_default()).collect();
-    }
-
-    /// The tally of a poll.
-    pub fn poll(&mut self, index: usize) -> &mut Tally {
-        &mut self.polls[index]
     }
 
     /// A request for a poll has ended after so many tries; `index` is `None` if the plan has changed meanwhile.
@@ -89,18 +95,43 @@ impl Books {
         self.polled(None, device, outcome, reply, 1);
     }
 
-    /// A second is over in which the line was busy for this share of it.
-    pub fn second(&mut self, busy: f32, frames: Vec<Frame>, counters: &mut LineCounters) {
+    /// The line has been busy for this share of a span.
+    pub fn spent(&mut self, share: f32, of: Duration) {
+        let of = of.as_secs_f32();
+        self.open = (self.open.0 + share * of, self.open.1 + of);
+        if self.open.1 < CLOSED_AFTER_S {
+            return;
+        }
         if self.busy.len() == BUSY_OVER {
             self.busy.pop_front();
         }
-        self.busy.push_back(busy.min(1.0));
+        self.busy.push_back((self.open.0 / self.open.1).min(1.0));
+        self.open = (0.0, 0.0);
+    }
+
+    /// A read began so long after its point of the grid, and came too late for some.
+    pub fn served(&mut self, index: usize, jitter: Option<Duration>, missed: u32) {
+        self.missed += u64::from(missed);
+        let tally = &mut self.polls[index];
+        tally.missed += u64::from(missed);
+        if let Some(jitter) = jitter {
+            tally.jitter.add(jitter);
+        }
+    }
+
+    /// The plan or the settings have changed: can all polls still be in time?
+    pub fn admit(&mut self, def: &PlantDef, settings: &LineDef, blocks: &[Block]) {
+        self.admission = admission::admit_as(def, settings, blocks);
+    }
+
+    /// Takes the latest frames, and gives the counters that are kept here.
+    pub fn take(&mut self, frames: Vec<Frame>, counters: &mut LineCounters) {
         let mean = |over: usize| {
             let latest = self.busy.iter().rev().take(over);
-            latest.sum::<f32>() / self.busy.len().min(over) as f32
+            latest.sum::<f32>() / self.busy.len().clamp(1, over) as f32
         };
         (counters.utilisation, counters.utilisation_minute) = (mean(BUSY_NOW), mean(BUSY_OVER));
-        counters.missed = self.polls.iter().map(|tally| tally.missed).sum();
+        counters.missed = self.missed;
         self.frames.extend(frames);
     }
 
@@ -121,9 +152,8 @@ impl Books {
             next: polls.get(index).and_then(|poll| poll.next),
             tally: tally.clone(),
         };
-        let tried = LineDef { id: settings.id, ..settings.clone() };
         Arc::new(LineReport {
-            admission: admission::admit_as(def, &tried, blocks),
+            admission: self.admission.clone(),
             refused,
             settings: settings.clone(),
             counters,
@@ -147,7 +177,8 @@ mod tests {
         let mut books = Books::new(&def, LineId(0), &blocks);
         let mut counters = LineCounters::default();
         for second in 0..100 {
-            books.second(if second < 90 { 0.2 } else { 0.8 }, Vec::new(), &mut counters);
+            books.spent(if second < 90 { 0.2 } else { 0.8 }, Duration::from_secs(1));
+            books.take(Vec::new(), &mut counters);
         }
         assert!((counters.utilisation - 0.8).abs() < 1e-5, "{}", counters.utilisation);
         assert!((counters.utilisation_minute - 0.3).abs() < 1e-5, "{}", counters.utilisation_minute);

@@ -1,4 +1,4 @@
-//! Protection against late answers where frames carry no transaction id (RTU).
+//! Protection against late answers where frames carry no transaction id (RTU and ASCII).
 //!
 //! After a timeout a unit *owes* an answer. It may come at any later moment and would then be taken for the answer to the
 //! next request of the same shape: the value of another tag, called good. So while a unit owes, only a request is sent
@@ -15,12 +15,17 @@ use super::{
 /// Most answers that are remembered as owed; a unit that owes more is asked nothing until it has rested.
 const OWED_MAX: usize = 16;
 
+/// A unit rests no longer than this, however late it seems to have been.
+const REST_MAX: Duration = Duration::from_secs(600);
+
 /// What one unit owes.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Debt {
     owed: Vec<Shape>,
     /// A loopback is owed: the next *refusal* of a loopback may be the answer to that one.
     loopback: bool,
+    /// Functions whose answers have no shape (identification, event log) that are owed.
+    functions: Vec<u8>,
 }
 
 impl Debt {
@@ -30,6 +35,13 @@ impl Debt {
             self.loopback = true;
         } else if !self.owed.contains(&shape) && self.owed.len() < OWED_MAX {
             self.owed.push(shape);
+        }
+    }
+
+    /// A request of a function whose answers have no shape was not answered in time.
+    fn owe_function(&mut self, function: u8) {
+        if !self.functions.contains(&function) {
+            self.functions.push(function);
         }
     }
 
@@ -55,7 +67,7 @@ impl Debt {
 
     /// Does the unit owe nothing?
     pub fn is_clear(&self) -> bool {
-        self.owed.is_empty() && !self.loopback
+        self.owed.is_empty() && self.functions.is_empty() && !self.loopback
     }
 
     /// A read that brings the unit back into step: part of a block that is read anyway, with a count whose answer cannot
@@ -80,7 +92,8 @@ fn probes(block: &Block) -> impl Iterator<Item = [u8; 6]> {
     counts.map(move |count| Block { count, ..block.clone() }.request())
 }
 
-/// What all units of a line owe, and how late they have ever been. Times are spans since the link was opened.
+/// What all units of a line owe, and how late they have ever been. It outlives an opening: what was asked before a port
+/// was closed may be answered when it is open again. Times are spans since the line began.
 #[derive(Debug, Clone)]
 pub struct Debts {
     units: Vec<Unit>,
@@ -105,6 +118,11 @@ impl Debts {
         Debts { units: vec![Unit::default(); 256], timeout, loopbacks: 0 }
     }
 
+    /// Other settings: an answer may take this long from now on.
+    pub fn set_timeout(&mut self, timeout: Duration) {
+        self.timeout = timeout;
+    }
+
     /// What a unit owes.
     pub fn of(&self, unit: u8) -> &Debt {
         &self.units[usize::from(unit)].debt
@@ -114,7 +132,11 @@ impl Debts {
     pub fn is_ambiguous(&self, message: &[u8]) -> bool {
         let Some(unit) = message.first() else { return false };
         let debt = self.of(*unit);
-        shape_of(message).map_or(!debt.is_clear(), |shape| debt.is_ambiguous(shape))
+        match (shape_of(message), message.get(1)) {
+            (Some(shape), _) => debt.is_ambiguous(shape),
+            (None, Some(function)) => debt.functions.contains(function),
+            (None, None) => false,
+        }
     }
 
     /// Nothing older than its last answer can come from this unit any more.
@@ -126,8 +148,10 @@ impl Debts {
     pub fn failed(&mut self, message: &[u8], now: Duration) {
         let Some(unit) = message.first().map(|unit| &mut self.units[usize::from(*unit)]) else { return };
         let shape = shape_of(message);
-        if let Some(shape) = shape {
-            unit.debt.owe(shape);
+        match (shape, message.get(1)) {
+            (Some(shape), _) => unit.debt.owe(shape),
+            (None, Some(function)) => unit.debt.owe_function(*function),
+            (None, None) => {}
         }
         // Patience counts from the last request that may be answered late; a loopback cannot be mistaken.
         if !shape.is_some_and(Shape::is_loopback) {
@@ -156,7 +180,7 @@ impl Debts {
     pub fn forget(&mut self, unit: u8, now: Duration) -> Option<Duration> {
         let unit = &mut self.units[usize::from(unit)];
         let each = (2 * unit.late_max).max(10 * self.timeout);
-        let rest = each * unit.debt.count().max(1) as u32;
+        let rest = (each * unit.debt.count().max(1) as u32).min(REST_MAX);
         let waited = unit.failed_at.map_or(rest, |failed_at| now.saturating_sub(failed_at));
         if waited < rest {
             return Some(rest - waited);

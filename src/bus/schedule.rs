@@ -188,6 +188,11 @@ impl Schedule {
         }
     }
 
+    /// A block that was told as done when it began has taken so long.
+    pub fn spent(&mut self, index: usize, time: Duration) {
+        self.polls[index].spent(time);
+    }
+
     /// A block that is read once could not be: it is due again soon.
     pub fn again(&mut self, index: usize, now: Timestamp) {
         let poll = &mut self.polls[index];
@@ -225,11 +230,6 @@ impl Schedule {
     pub fn rest(&mut self, device: DeviceId, until: Timestamp) {
         let Some(health) = self.health_mut(device) else { return };
         health.rests_until = health.rests_until.max(until);
-    }
-
-    /// When a block is read next; `None` for one that is read once and has been.
-    pub fn release(&self, index: usize) -> Option<Timestamp> {
-        self.polls.get(index).and_then(|poll| poll.release)
     }
 
     /// Everything of a device is due now; its grid stays.

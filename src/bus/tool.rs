@@ -170,7 +170,7 @@ impl Job {
             rest = tail;
         }
         // A device that always says "more" at the same place would be asked for ever.
-        if more == 0xFF && next != request[4] {
+        if more == 0xFF && request[4] < next {
             self.steps.push_front(step(vec![unit, 0x2B, 0x0E, code, next]));
         }
     }
@@ -206,8 +206,10 @@ impl Job {
         self.found(Finding::Verdict(verdict));
     }
 
+    /// Keeps a finding; the last place is for what is concluded from all of them.
     fn found(&mut self, finding: Finding) {
-        if self.run.findings.len() < FINDINGS_MAX {
+        let room = if matches!(finding, Finding::Verdict(_)) { FINDINGS_MAX } else { FINDINGS_MAX - 1 };
+        if self.run.findings.len() < room {
             self.run.findings.push(finding);
         }
     }

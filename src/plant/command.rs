@@ -128,6 +128,9 @@ pub enum Refusal {
     /// The settings could not be written into the plant file.
     #[error("not saved: {0}")]
     NotSaved(String),
+    /// No line has this name and place, or no port can have such settings.
+    #[error("no such line")]
+    NotALine,
     /// Nothing to do: the alarm is not unacknowledged.
     #[error("nothing to acknowledge")]
     NothingToAcknowledge,

@@ -277,6 +277,8 @@ pub struct LineCounters {
     pub frames: u64,
     /// What the serial port itself has counted, where it does.
     pub uart: Option<UartCounters>,
+    /// The adapter gives back what it sends (its receiver stays on while it sends).
+    pub echoes: bool,
     /// Times the port or connection was opened.
     pub opens: u64,
     /// Polls that could not start in their period and were skipped.

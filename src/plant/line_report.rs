@@ -23,7 +23,7 @@ pub struct LineReport {
     pub counters: LineCounters,
     /// The read plan, block by block.
     pub polls: Vec<PollReport>,
-    /// Tags that their devices have refused: they are not asked for any more.
+    /// Tags that their devices have refused: they are asked for once a minute at most.
     pub refused: Vec<TagId>,
     /// Whether all polls can meet their periods.
     pub admission: Admission,

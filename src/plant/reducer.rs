@@ -275,6 +275,10 @@ impl Plant {
         let gone = match &state {
             LineState::Waiting { .. } => Some(DeviceState::Down { since: at }),
             LineState::Disconnected | LineState::Testing => Some(DeviceState::Unknown),
+            // Opened anew at once, with other settings perhaps: what was read before may be of another device.
+            LineState::Connecting if self.lines[line.index()].state == LineState::Connected => {
+                Some(DeviceState::Unknown)
+            }
             LineState::Connecting | LineState::Connected => None,
         };
         self.lines[line.index()].state = state;

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::plant::{
     class,
-    def::{DeviceDef, DeviceId, LineDef, LineId, MimicDef, PlantDef, TagId},
+    def::{DeviceDef, DeviceId, Framing, LineDef, LineId, MimicDef, PlantDef, TagId},
     tag::{Access, Class, TagDef},
 };
 
@@ -158,7 +158,8 @@ fn check_broadcasts(
     problems: &mut Problems,
 ) {
     for (device, known) in devices.iter().zip(known) {
-        let serial = lines.iter().any(|line| line.id == device.line && line.transport.serial().is_some());
+        let broadcasts = |line: &&LineDef| line.id == device.line && line.transport.framing() != Framing::Mbap;
+        let serial = lines.iter().find(broadcasts).is_some();
         let readable = tags.iter().find(|tag| tag.device == device.id && tag.access != Access::Write);
         if let (true, 0, Some(unit), Some(tag)) = (serial, device.unit, known.table.unit, readable) {
             problems

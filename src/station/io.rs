@@ -151,17 +151,17 @@ const NO_FILE: &str =
 /// The plant file on its way to the disk, and for whom.
 struct Saving {
     order: OrderId,
-    line: LineId,
+    settings: LineDef,
     work: JoinHandle<(PlantFile, Result<(), String>)>,
 }
 
 /// For whom, and how it ended.
-type Saved = (OrderId, LineId, Result<(PlantFile, Result<(), String>), tokio::task::JoinError>);
+type Saved = (OrderId, LineDef, Result<(PlantFile, Result<(), String>), tokio::task::JoinError>);
 
 /// Waits for the end of a save; for ever without one.
 async fn saved(saving: &mut Option<Saving>) -> Saved {
-    let Some(Saving { order, line, work }) = saving else { return std::future::pending().await };
-    let saved = (*order, *line, work.await);
+    let Some(Saving { order, settings, work }) = saving else { return std::future::pending().await };
+    let saved = (*order, settings.clone(), work.await);
     *saving = None;
     saved
 }
@@ -200,13 +200,6 @@ impl PlantTask {
                     self.carry_out(effects);
                     (changed, next) = (true, Instant::now());
                 }
-                event = events.recv() => {
-                    // The links have stopped: nothing can become true any more.
-                    let Some(event) = event else { break };
-                    let effects = self.plant.on_event(event);
-                    self.carry_out(effects);
-                    changed = true;
-                }
                 saved = saved(&mut self.saving) => {
                     self.take_saved(saved);
                     changed = true;
@@ -215,8 +208,16 @@ impl PlantTask {
                     self.hear_store();
                     changed = true;
                 }
+                // Before the events: however many there are, values age and orders expire.
                 _ = tick.tick() => {
                     let effects = self.plant.on_tick(self.clock.now());
+                    self.carry_out(effects);
+                    changed = true;
+                }
+                event = events.recv() => {
+                    // The links have stopped: nothing can become true any more.
+                    let Some(event) = event else { break };
+                    let effects = self.plant.on_event(event);
                     self.carry_out(effects);
                     changed = true;
                 }
@@ -242,21 +243,21 @@ impl PlantTask {
 
     /// Has the plant file written beside the loop; the outcome comes to [`PlantTask::take_saved`].
     fn save(&mut self, order: OrderId, settings: LineDef) {
-        let line = settings.id;
         match (self.file.take(), &self.saving) {
             (Some(mut file), _) => {
+                let saved = settings.clone();
                 let work = tokio::task::spawn_blocking(move || {
                     let result = file.save(&settings);
                     (file, result)
                 });
-                self.saving = Some(Saving { order, line, work });
+                self.saving = Some(Saving { order, settings: saved, work });
             }
-            (None, Some(_)) => self.tell_saved(order, line, Err("other settings are just being saved".into())),
-            (None, None) => self.tell_saved(order, line, Err(NO_FILE.into())),
+            (None, Some(_)) => self.tell_saved(order, &settings, Err("other settings are just being saved".into())),
+            (None, None) => self.tell_saved(order, &settings, Err(NO_FILE.into())),
         }
     }
 
-    fn take_saved(&mut self, (order, line, done): Saved) {
+    fn take_saved(&mut self, (order, settings, done): Saved) {
         let result = match done {
             Ok((file, result)) => {
                 self.file = Some(file);
@@ -267,11 +268,11 @@ impl PlantTask {
                 Err("internal error, see the log".to_owned())
             }
         };
-        self.tell_saved(order, line, result);
+        self.tell_saved(order, &settings, result);
     }
 
-    fn tell_saved(&mut self, order: OrderId, line: LineId, result: Result<(), String>) {
-        let effects = self.plant.on_saved(order, line, result);
+    fn tell_saved(&mut self, order: OrderId, settings: &LineDef, result: Result<(), String>) {
+        let effects = self.plant.on_saved(order, settings, result);
         self.keep(effects.records);
     }
 

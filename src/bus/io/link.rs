@@ -22,7 +22,11 @@ use tokio_modbus::{
     slave::Slave,
 };
 
-use super::{clock::Clock, pause::Pause, transport::Stream, wire::Wire};
+use super::{
+    clock::Clock,
+    transport::{CountUart, Opened},
+    wire::{Memory, Wire},
+};
 use crate::{
     bus::{
         debt::Debt,
@@ -36,6 +40,8 @@ use crate::{
     },
 };
 
+/// Characters of an ASCII frame may be this far apart (Modbus over serial line V1.02, 2.5.2.1).
+const ASCII_PAUSE: Duration = Duration::from_secs(1);
 /// Most bytes gathered for one answer, noise included; more is no Modbus.
 const GATHER_MAX: usize = 4_096;
 
@@ -70,7 +76,11 @@ pub struct Link {
     timeout: Duration,
     idle: Duration,
     turnaround: Duration,
-    /// Requests without an answer since something last came.
+    /// What the driver of the port counts.
+    uart: Option<CountUart>,
+    /// The adapter gives back what it sends.
+    echoes: bool,
+    /// Exchanges in a row to which nothing came back.
     pub unanswered: u32,
     /// What the last exchange was; `None` before the first.
     pub last: Option<Arc<Exchange>>,
@@ -79,14 +89,17 @@ pub struct Link {
 }
 
 impl Link {
-    /// A link on a freshly opened port. `counters` go on from an earlier opening.
-    pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, counters: LineCounters) -> Link {
-        let wire = Wire::new(port, pause, line, clock, counters);
+    /// A link on a freshly opened port; `memory` goes on from an earlier opening.
+    pub fn new(opened: Opened, line: &LineDef, clock: Clock, memory: Memory) -> Link {
+        let uart = opened.uart;
+        let wire = Wire::new(opened.stream, opened.pause, line, clock, memory);
         Link {
             transaction: 0,
             timeout: line.timeout,
             idle: wire.silence.max(line.idle),
             turnaround: clock.real_span(line.turnaround),
+            uart,
+            echoes: false,
             unanswered: 0,
             last: None,
             busy: Duration::ZERO,
@@ -142,7 +155,7 @@ impl Link {
         self.note_sent(message, frame.clone());
         let gathered = match message.first() {
             Some(0) => Gathered::nothing(Ok(vec![])),
-            _ => self.gather(message, sent_at).await?,
+            _ => self.gather(message, &frame, sent_at).await?,
         };
         self.busy += started.elapsed();
         let rest = if message.first() == Some(&0) {
@@ -160,6 +173,7 @@ impl Link {
             }
             Err(fault) => self.account(message, *fault),
         }
+        self.note_silence(matches!(gathered.answer, Err(Fault::Timeout)));
         self.keep(frame, gathered).answer.map_err(Trouble::Fault)
     }
 
@@ -179,6 +193,7 @@ impl Link {
         let gathered = self.gather_mbap(messages, first, sent_at).await?;
         self.busy += sent_at.elapsed();
         self.wire.rest(self.wire.silence);
+        self.note_silence(gathered.iter().all(|gathered| matches!(gathered.answer, Err(Fault::Timeout))));
         let mut answers = Vec::with_capacity(messages.len());
         for ((message, frame), gathered) in messages.iter().zip(frames).zip(gathered) {
             match &gathered.answer {
@@ -195,20 +210,30 @@ impl Link {
         let sent_at = self.wire.send(bytes).await?;
         self.note_sent(&[], bytes.to_vec());
         let deadline = sent_at + self.timeout + self.wire.char_time * frame::MESSAGE_MAX as u32;
+        let framing = self.framing();
+        let request = frame::unwrap(framing, bytes).unwrap_or_default();
+        let proof = framing != Framing::Mbap && !self.wire.debts.is_ambiguous(&request);
         let (mut buffer, mut reply) = (Vec::new(), None);
         let mut until = deadline;
-        while self.wire.receive(until, &mut buffer).await? && buffer.len() < GATHER_MAX {
+        let answered = loop {
+            if !self.wire.receive(until, &mut buffer).await? || GATHER_MAX <= buffer.len() {
+                break false;
+            }
             reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
-            until = (Instant::now() + self.idle).min(deadline);
-        }
+            // A request is answered by one frame; what follows bytes that are none only silence tells.
+            match gather::verdict(framing, &request, &buffer) {
+                Verdict::Answer(_) if framing != Framing::Mbap && !request.is_empty() => break true,
+                _ if request.is_empty() => until = (Instant::now() + self.idle).min(deadline),
+                _ => {}
+            }
+        };
         if !buffer.is_empty() {
             self.wire.record(false, buffer.clone(), Cow::Borrowed("received"));
         }
         self.wire.rest(self.wire.silence);
         // What was sent may have been a request whose answer is still to come.
-        let request = frame::unwrap(self.framing(), bytes);
-        if let (true, Ok(message)) = (buffer.is_empty() && self.framing() != Framing::Mbap, request) {
-            self.wire.debts.failed(&message, self.wire.age());
+        if framing != Framing::Mbap && !request.is_empty() && !(answered && proof) {
+            self.owe(&request);
         }
         Ok((buffer, reply))
     }
@@ -269,6 +294,12 @@ impl Link {
         self.wire.idle().await
     }
 
+    /// Asks the driver of the port what it has counted.
+    pub fn count_uart(&mut self) {
+        self.wire.counters.uart = self.uart.as_ref().and_then(|uart| uart());
+        self.wire.counters.echoes = self.echoes;
+    }
+
     /// Totals of this line; `utilisation`, `opens` and `missed` are the task's.
     pub fn counters(&mut self) -> &mut LineCounters {
         &mut self.wire.counters
@@ -279,6 +310,15 @@ impl Link {
         self.wire.take_frames()
     }
 
+    /// What is remembered until the next opening.
+    pub fn memory(&self) -> Memory {
+        self.wire.memory()
+    }
+
+    fn note_silence(&mut self, silent: bool) {
+        self.unanswered = if silent { self.unanswered.saturating_add(1) } else { 0 };
+    }
+
     fn note_sent(&mut self, message: &[u8], frame: Vec<u8>) {
         self.wire.counters.requests += 1;
         let broadcast = message.first() == Some(&0) && self.framing() != Framing::Mbap;
@@ -286,8 +326,6 @@ impl Link {
     }
 
     fn keep(&mut self, request: Vec<u8>, gathered: Gathered) -> Answered {
-        let silent = matches!(gathered.answer, Err(Fault::Timeout));
-        self.unanswered = if silent { self.unanswered.saturating_add(1) } else { 0 };
         let took = Duration::from_secs_f64(gathered.took.as_secs_f64() * self.wire.clock().speed());
         let now = self.wire.clock().now();
         let exchange = Arc::new(Exchange {
@@ -305,8 +343,9 @@ impl Link {
 
     /// Gathers until a frame has come that answers the message. Whole frames that do not (another unit, an owed answer)
     /// are dropped, and waiting goes on inside the same deadline.
-    async fn gather(&mut self, message: &[u8], sent_at: Instant) -> Result<Gathered, Trouble> {
+    async fn gather(&mut self, message: &[u8], sent: &[u8], sent_at: Instant) -> Result<Gathered, Trouble> {
         let framing = self.framing();
+        let mut echo = self.expects_echo(message).then_some(sent);
         let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);
         let deadline = sent_at + self.timeout + self.wire.char_time * frame::wrapped_length(framing, longest) as u32;
         let mut buffer: Vec<u8> = Vec::new();
@@ -314,7 +353,13 @@ impl Link {
         let mut misfit: Option<Fault> = None;
         let mut reply = None;
         loop {
-            let verdict = gather::verdict(framing, message, &buffer);
+            // An adapter that gives back what it sends: its echo is no answer, however much it looks like one.
+            if let Some(sent) = echo.filter(|sent| buffer.starts_with(sent)) {
+                self.wire.record(false, buffer.drain(..sent.len()).collect(), Cow::Borrowed("echo of the adapter"));
+                (self.echoes, echo) = (true, None);
+            }
+            let echo_begun = self.echoes && echo.is_some_and(|sent| sent.starts_with(&buffer));
+            let verdict = if echo_begun { Verdict::Nothing } else { gather::verdict(framing, message, &buffer) };
             let wait_until = match verdict {
                 Verdict::Answer(range) => {
                     self.wire.drop_stale(&buffer[..range.start]);
@@ -333,6 +378,7 @@ impl Link {
                 // Nothing, or noise: the answer may still come.
                 Verdict::Nothing => deadline,
                 // The frame may still grow, or it is spoiled; silence decides.
+                Verdict::Begun if framing == Framing::Ascii => (Instant::now() + ASCII_PAUSE).min(deadline),
                 Verdict::Begun | Verdict::Spoiled(_) => (Instant::now() + self.idle).min(deadline),
             };
             if self.wire.receive(wait_until, &mut buffer).await? && buffer.len() <= GATHER_MAX {
@@ -390,9 +436,13 @@ impl Link {
                     let answer = frame[6..].to_vec();
                     let answer = frame::check_answer(messages[index], &answer).map(|()| answer);
                     let took = sent_at.elapsed();
-                    *slot = Some(Gathered { answer, frame: frame.clone(), reply: Some(took), took });
                     open -= 1;
-                    self.wire.record(false, frame, Cow::Borrowed("ok"));
+                    let verdict = match &answer {
+                        Ok(_) | Err(Fault::Exception(_)) => Cow::Borrowed("ok"),
+                        Err(fault) => Cow::Owned(fault.to_string()),
+                    };
+                    *slot = Some(Gathered { answer, frame: frame.clone(), reply: Some(took), took });
+                    self.wire.record(false, frame, verdict);
                 }
             }
         }
@@ -431,11 +481,22 @@ impl Link {
         tracing::debug!(unit, request = %frame::hex(message), %fault, "a request failed");
         // Even what looked like a spoiled answer may have been noise, with the answer still on its way.
         if !mbap {
-            self.wire.debts.failed(message, self.wire.age());
-            let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);
-            let chars = frame::wrapped_length(self.framing(), longest) as u32;
-            self.wire.rest(self.wire.char_time * chars + self.wire.silence);
+            self.owe(message);
         }
+    }
+
+    /// The answer to this message may still come: it is remembered, and the line rests until it would have passed.
+    fn owe(&mut self, message: &[u8]) {
+        self.wire.debts.failed(message, self.wire.age());
+        let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);
+        let chars = frame::wrapped_length(self.framing(), longest) as u32;
+        self.wire.rest(self.wire.char_time * chars + self.wire.silence);
+    }
+
+    /// Could the sent bytes come back from the adapter? A read cannot be answered by itself, so its echo gives the adapter
+    /// away; from then on the echo of every request is expected.
+    fn expects_echo(&self, message: &[u8]) -> bool {
+        self.echoes || matches!(message.get(1), Some(0x01..=0x04 | 0x17))
     }
 }
 

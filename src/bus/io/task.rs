@@ -13,6 +13,7 @@ use super::{
     clock::Clock,
     link::Link,
     transport::{Connector, Opened},
+    wire::Memory,
 };
 use crate::{
     bus::{
@@ -26,7 +27,7 @@ use crate::{
         PlantDef,
         command::{BusRequest, WriteId},
         def::{DeviceId, LineDef, LineId, TagId},
-        event::{Event, Fault, LineCounters, LineState, WriteResult},
+        event::{Event, Fault, LineState, WriteResult},
         traffic::Exchange,
     },
 };
@@ -54,6 +55,7 @@ pub async fn run(
         hunt: Hunt::default(),
         budget: WriteBudget::new(WRITE_SHARE, clock.now()),
         waiting: VecDeque::new(),
+        memory: Memory::new(def.line(line)),
         settings: def.line(line).clone(),
         clock,
         connector,
@@ -61,7 +63,8 @@ pub async fn run(
         requests,
         stop,
         blocks,
-        counters: LineCounters::default(),
+        put_back: None,
+        closed_at: clock.now(),
         job: None,
         polls_since_test: 0,
         line,
@@ -104,7 +107,12 @@ struct Task {
     /// The share of the line's time that writes may take from polls, and the writes that wait for it.
     budget: WriteBudget,
     waiting: VecDeque<BusRequest>,
-    counters: LineCounters,
+    /// Counters and debts, from one opening to the next.
+    memory: Memory,
+    /// What an operator wished while a test had the line for itself.
+    put_back: Option<BusRequest>,
+    /// When the books were last told what the link has counted.
+    closed_at: Timestamp,
     books: Books,
     /// The tool at work.
     job: Option<Job>,
@@ -122,13 +130,13 @@ impl Task {
             self.tell_state(LineState::Connecting).await?;
             let leave = match self.connector.open().await {
                 Ok(port) => {
-                    self.counters.opens += 1;
+                    self.memory.counters.opens += 1;
                     self.tell_state(LineState::Connected).await?;
                     tracing::info!(line = self.settings.name, transport = %self.settings.transport, "connected");
-                    let answers = self.counters.ok;
+                    let answers = self.memory.counters.ok;
                     let leave = self.serve(port).await?;
                     // A port that opens and dies at once must not be tried in a hurry.
-                    if answers < self.counters.ok {
+                    if answers < self.memory.counters.ok {
                         backoff.reset();
                     }
                     leave
@@ -161,17 +169,20 @@ impl Task {
     /// Waits without a port until a moment, or until an operator opens the line; refuses writes meanwhile.
     async fn wait(&mut self, mut until: Option<Timestamp>) -> Result<(), Ended> {
         loop {
-            let clock = self.clock;
+            let (clock, wake) = (self.clock, until);
             let pause = async {
-                match until {
+                match wake {
                     Some(until) => clock.sleep_until(until).await,
                     None => std::future::pending().await,
                 }
             };
-            let request = tokio::select! {
-                _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
-                () = pause => return Ok(()),
-                request = self.requests.recv() => request.ok_or(Ended)?,
+            let request = match self.put_back.take() {
+                Some(request) => request,
+                None => tokio::select! {
+                    _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
+                    () = pause => return Ok(()),
+                    request = self.requests.recv() => request.ok_or(Ended)?,
+                },
             };
             match request {
                 BusRequest::Write { id, .. } => self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?,
@@ -195,7 +206,12 @@ impl Task {
                     if alone {
                         self.tell_state(LineState::Testing).await?;
                         self.test_alone().await?;
-                        return Ok(());
+                        // A line that an operator has closed stays closed.
+                        if until.is_some() {
+                            return Ok(());
+                        }
+                        self.tell_state(LineState::Disconnected).await?;
+                        continue;
                     }
                     self.end_test("the line is not connected").await?;
                 }
@@ -205,9 +221,12 @@ impl Task {
 
     /// Serves an open port: operators first, then the schedule and the tool at work, else listens.
     async fn serve(&mut self, opened: Opened) -> Result<Leave, Ended> {
-        let mut link = Link::new(opened.stream, opened.pause, &self.settings, self.clock, self.counters);
+        let mut link = Link::new(opened, &self.settings, self.clock, self.memory.clone());
         let mut schedule = Schedule::new(&self.blocks, self.clock.now());
         let mut report_at = self.clock.now() + REPORT_EVERY;
+        self.closed_at = self.clock.now();
+        // Other settings show at once.
+        self.tell_report(Some(&schedule)).await?;
         let leave = loop {
             if *self.stop.borrow() {
                 break Err(Ended);
@@ -215,8 +234,8 @@ impl Task {
             let now = self.clock.now();
             if report_at <= now {
                 report_at = now + REPORT_EVERY;
-                link.counters().uart = opened.uart.as_ref().and_then(|uart| uart());
-                self.close_second(&mut link, REPORT_EVERY);
+                link.count_uart();
+                self.close_second(&mut link);
                 self.tell_report(Some(&schedule)).await?;
             }
             let next = schedule.next(now);
@@ -232,13 +251,16 @@ impl Task {
                 break Ok(leave);
             }
         };
-        self.close_second(&mut link, REPORT_EVERY);
+        self.close_second(&mut link);
         self.refuse_waiting().await?;
         leave
     }
 
     /// What operators want goes first; writes only within their share of the time while polls are due.
     fn next_request(&mut self, next: Next, now: Timestamp) -> Result<Option<BusRequest>, Ended> {
+        if let Some(request) = self.put_back.take() {
+            return Ok(Some(request));
+        }
         while self.waiting.len() < WAITING_MAX {
             match self.requests.try_recv() {
                 Ok(write @ BusRequest::Write { .. }) => self.waiting.push_back(write),
@@ -308,17 +330,19 @@ impl Task {
     /// Other settings, for as long as the station runs or until they are taken back.
     fn configure(&mut self, settings: LineDef) {
         tracing::info!(line = settings.name, transport = %settings.transport, "other settings");
+        self.books.admit(&self.def, &settings, &self.blocks);
         self.connector.retarget(&settings.transport);
         self.settings = settings;
     }
 
-    /// Takes what the link has counted into the books; `over` is the plant time since this was last done.
-    fn close_second(&mut self, link: &mut Link, over: Duration) {
-        let real = self.clock.real_span(over).as_secs_f32();
-        let busy = std::mem::take(&mut link.busy).as_secs_f32() / real;
-        let frames = link.take_frames();
-        self.books.second(busy, frames, link.counters());
-        self.counters = *link.counters();
+    /// Takes what the link has counted since this was last done into the books.
+    fn close_second(&mut self, link: &mut Link) {
+        let now = self.clock.now();
+        let over = Duration::try_from(now.duration_since(self.closed_at)).unwrap_or_default();
+        let busy = std::mem::take(&mut link.busy).as_secs_f32();
+        self.books.spent(busy / self.clock.real_span(over).as_secs_f32().max(1e-6), over);
+        self.books.take(link.take_frames(), link.counters());
+        (self.memory, self.closed_at) = (link.memory(), now);
     }
 
     async fn tell_report(&mut self, schedule: Option<&Schedule>) -> Result<(), Ended> {
@@ -327,7 +351,7 @@ impl Task {
             polls: schedule.map(|schedule| schedule.polls().collect()).unwrap_or_default(),
             refused: plan::refused(&self.def, self.line, &self.holes),
         };
-        let report = self.books.report(&self.def, &self.settings, plan, self.counters);
+        let report = self.books.report(&self.def, &self.settings, plan, self.memory.counters);
         self.tell(Event::Report { at: self.clock.now(), line: self.line, report }).await
     }
 

@@ -4,12 +4,13 @@ use super::{
     clock::Clock,
     link::{Link, Trouble},
     transport::Connector,
+    wire::Memory,
 };
 use crate::{
     bus::tool::{Ask, Came, Job, Step},
     plant::{
         def::{LineDef, Transport},
-        event::{Fault, LineCounters},
+        event::Fault,
         tool::{ToolRun, ToolState},
     },
 };
@@ -19,9 +20,23 @@ pub async fn step(link: &mut Link, step: &Step) -> Result<Came, Trouble> {
     match &step.ask {
         Ask::Raw(bytes) => link.send_raw(bytes).await.map(|(bytes, reply)| Came::Bytes(bytes, reply)),
         Ask::Message(message) => {
-            let usual = link.timeout();
+            let (usual, unanswered) = (link.timeout(), link.unanswered);
             link.set_timeout(step.timeout.unwrap_or(usual));
-            let answer = match link.exchange(message).await {
+            // An answer that the unit still owes would be shown as the answer to this.
+            if let (true, Some(unit)) = (link.is_ambiguous(message), message.first()) {
+                match link.loopback(*unit).await {
+                    Ok(()) | Err(Trouble::Fault(_)) => {}
+                    Err(gone) => return Err(gone),
+                }
+            }
+            let sent = if link.is_ambiguous(message) {
+                Err(Trouble::Fault(Fault::Resting))
+            } else {
+                link.exchange(message).await
+            };
+            // Absent units are what a scan asks for: they say nothing of the connection.
+            link.unanswered = unanswered;
+            let answer = match sent {
                 Ok(answer) => Ok(Ok(answer)),
                 Err(Trouble::Fault(fault)) => Ok(Err(fault)),
                 Err(gone) => Err(gone),
@@ -45,13 +60,14 @@ pub fn settings_for(line: &LineDef, step: &Step) -> LineDef {
 /// Runs a tool to its end on a line that nobody polls; `progress` sees every step and may stop it by `false`.
 pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&ToolRun) -> bool) -> ToolRun {
     let mut connector = Connector::Real(line.transport.clone());
+    let mut memory = Memory::new(line);
     let mut open: Option<(LineDef, Link)> = None;
     while let Some(next) = job.next().cloned() {
         let wanted = settings_for(line, &next);
         let mut link = match open.take().filter(|(settings, _)| *settings == wanted) {
             Some((_, link)) => link,
             None => match connector.open_as(&wanted.transport).await {
-                Ok(opened) => Link::new(opened.stream, opened.pause, &wanted, Clock::real(), LineCounters::default()),
+                Ok(opened) => Link::new(opened, &wanted, Clock::real(), memory.clone()),
                 Err(why) => {
                     job.stop(ToolState::Failed(why));
                     break;
@@ -66,6 +82,7 @@ pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&ToolRun
         if !progress(job.run()) {
             job.stop(ToolState::Cancelled);
         }
+        memory = link.memory();
         open = Some((wanted, link));
     }
     job.run().clone()

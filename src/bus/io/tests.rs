@@ -17,11 +17,13 @@ use proptest::prelude::*;
 use tokio::io::AsyncWriteExt;
 
 use self::slave::{Deed, MS, Mode, line, plant};
+use crate::bus::frame;
 use crate::plant::{
-    command::{BusRequest, WriteId},
-    def::{DeviceId, TagId},
+    command::{BusRequest, OrderId, WriteId},
+    def::{DeviceId, LineDef, Serial, TagId},
     event::{Event, ExceptionCode, Fault, LineState, WriteResult},
     tag::{Access, TagDef},
+    tool::{Scan, Tool},
 };
 
 /// Runs a line against a script until `polls` block reads have ended; gives good and failed ones.
@@ -342,4 +344,88 @@ async fn a_broadcast_is_sent_once_and_never_called_verified() {
         assert_eq!((result, heard.load(Ordering::Relaxed)), (WriteResult::Accepted, 1), "{mode:?}");
         line.read(&def).await;
     }
+}
+
+/// An answer that comes after the port was opened anew – with a longer timeout, as a technician would – is still late.
+#[tokio::test(start_paused = true)]
+async fn a_late_reply_is_known_after_other_settings_too() {
+    let def = plant(Mode::Rtu);
+    let mut line = line(def.clone());
+    let mut gone = false;
+    line.plug(Mode::Rtu, move |_, message| {
+        gone |= message[..4] == [1, 3, 0, 20];
+        if gone && message[0] == 1 { Deed::Silent } else { Deed::Answer }
+    });
+    assert_eq!(line.fault(&def).await, Fault::Timeout);
+    // The answer to the block at 20 comes when the block at 10, of the same shape, would be asked.
+    let late = vec![1, 3, 8, 0, 20, 0, 21, 0, 22, 0, 23];
+    line.plug(Mode::Rtu, move |number, message| {
+        if number == 0 && message[..2] == [1, 3] { Deed::Instead(late.clone()) } else { Deed::Answer }
+    });
+    let settings = LineDef { timeout: 500 * MS, ..def.lines[0].clone() };
+    line.requests.send(BusRequest::Configure(Box::new(settings))).await.expect("the line runs");
+    // Every value that comes is checked against its address.
+    for _ in 0..20 {
+        line.read(&def).await;
+    }
+}
+
+/// The refusal of a write that was given up must not be taken for the refusal of the next: that one may take effect.
+#[tokio::test(start_paused = true)]
+async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
+    let def = plant(Mode::Rtu);
+    let mut line = line(def.clone());
+    let mut writes = 0;
+    line.plug(Mode::Rtu, move |_, message| {
+        writes += usize::from(message[1] == 6);
+        match (message[1], writes) {
+            (6, 1) | (8, _) => Deed::Silent,
+            (6, _) => Deed::Exception(3),
+            _ => Deed::Answer,
+        }
+    });
+    line.read(&def).await;
+    for (id, tag, expect) in
+        [(1, 0, WriteResult::Lost(Fault::Timeout)), (2, 1, WriteResult::Lost(Fault::Exception(ExceptionCode(3))))]
+    {
+        let request = BusRequest::Write { id: WriteId(id), tag: TagId(tag), raw: 10.0, unlock: None, verify: true };
+        line.requests.send(request).await.expect("the line runs");
+        let result = line
+            .until(&def, |event| match event {
+                Event::Wrote { id: done, result, .. } if *done == WriteId(id) => Some(result.clone()),
+                _ => None,
+            })
+            .await;
+        assert_eq!(result, expect);
+    }
+}
+
+/// An adapter that gives back what it sends: its echo is neither an answer nor noise.
+#[tokio::test(start_paused = true)]
+async fn the_echo_of_an_adapter_is_no_answer() {
+    let (_, failed) = poll(Mode::Rtu, 60, |_, message| Deed::Noise(frame::with_crc(message))).await;
+    assert_eq!(failed, 0);
+    // Nothing but the echo, as on a line without a device.
+    let (good, _) = poll(Mode::Rtu, 60, |_, message| match message {
+        [2, ..] => Deed::Answer,
+        _ => Deed::Instead(message.to_vec()),
+    })
+    .await;
+    assert!(0 < good, "the other unit is read");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_line_can_be_closed_while_a_scan_has_it_for_itself() {
+    let def = plant(Mode::Rtu);
+    let mut line = line(def.clone());
+    line.plug(Mode::Rtu, |_, _| Deed::Answer);
+    line.read(&def).await;
+    line.plug(Mode::Rtu, |_, _| Deed::Silent);
+    let serials = vec![Serial::USUAL, Serial { baud: 19_200, ..Serial::USUAL }];
+    let tool = Tool::Scan(Scan { first: 1, last: 247, serials, timeout: 100 * MS });
+    let (id, by) = (OrderId { terminal: 1, number: 1 }, "anna".into());
+    line.requests.send(BusRequest::Test { id, by, tool }).await.expect("the line runs");
+    line.until(&def, |event| matches!(event, Event::Line { state: LineState::Testing, .. }).then_some(())).await;
+    line.requests.send(BusRequest::Connect(false)).await.expect("the line runs");
+    line.until(&def, |event| matches!(event, Event::Line { state: LineState::Disconnected, .. }).then_some(())).await;
 }

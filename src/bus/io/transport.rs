@@ -29,8 +29,11 @@ pub struct Opened {
     /// How silences are kept on it.
     pub pause: Pause,
     /// What its driver has counted, if it counts.
-    pub uart: Option<Box<dyn Fn() -> Option<UartCounters> + Send + Sync>>,
+    pub uart: Option<CountUart>,
 }
+
+/// Reads the error counters of a serial port.
+pub type CountUart = Box<dyn Fn() -> Option<UartCounters> + Send + Sync>;
 
 /// How a line is opened.
 #[derive(Debug)]
@@ -89,8 +92,10 @@ fn open_serial(path: &str, serial: Serial, rs485: Rs485) -> Result<Opened, Strin
         .flow_control(FlowControl::None);
     // The port is taken exclusively: a second master on the line is refused by the system.
     let stream: SerialStream = builder.open_native_async().map_err(|error| ports::why_not(path, &error))?;
+    // A driver remembers what an earlier opening has switched on; one that never could need not be told.
+    let switched = uart::set_rs485(&stream, rs485);
     if rs485 != Rs485::Off {
-        uart::set_rs485(&stream, rs485).map_err(|error| {
+        switched.map_err(|error| {
             format!("{path}: its driver does not switch the direction of RS-485 ({error}); use rs485 = \"off\"")
         })?;
     }

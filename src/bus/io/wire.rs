@@ -18,6 +18,23 @@ use crate::{
     },
 };
 
+/// What a line remembers from one opening of its port to the next.
+#[derive(Debug, Clone)]
+pub struct Memory {
+    /// Totals; `utilisation`, `opens` and `missed` are the task's.
+    pub counters: LineCounters,
+    /// What each unit owes; bytes that come late pay.
+    debts: Debts,
+    born: Instant,
+}
+
+impl Memory {
+    /// Nothing has gone over the line yet.
+    pub fn new(line: &LineDef) -> Memory {
+        Memory { counters: LineCounters::default(), debts: Debts::new(line.timeout), born: Instant::now() }
+    }
+}
+
 /// One open port.
 pub struct Wire {
     port: Box<dyn Stream>,
@@ -31,8 +48,8 @@ pub struct Wire {
     timeout: Duration,
     /// Nothing is sent before this.
     quiet_until: Instant,
-    opened: Instant,
-    /// What each unit owes; bytes that come late pay.
+    born: Instant,
+    /// What each unit owes.
     pub debts: Debts,
     /// Frames since they were last taken.
     frames: Vec<Frame>,
@@ -41,8 +58,10 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// A freshly opened port. `counters` go on from an earlier opening.
-    pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, counters: LineCounters) -> Wire {
+    /// A freshly opened port; `memory` goes on from an earlier opening.
+    pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, memory: Memory) -> Wire {
+        let Memory { counters, mut debts, born } = memory;
+        debts.set_timeout(line.timeout);
         let (char_time, silence) = match line.transport.serial() {
             // The frames of ASCII have a beginning and an end of their own.
             Some(serial) if line.transport.framing() == Framing::Ascii => (serial.char_time(), line.gap),
@@ -61,8 +80,8 @@ impl Wire {
             silence: clock.real_span(silence),
             timeout: line.timeout,
             quiet_until: Instant::now() + if may_come { line.timeout } else { Duration::ZERO },
-            opened: Instant::now(),
-            debts: Debts::new(line.timeout),
+            born,
+            debts,
             frames: Vec::new(),
             counters,
         }
@@ -78,9 +97,14 @@ impl Wire {
         self.framing
     }
 
-    /// Time since the port was opened.
+    /// Time since the line began.
     pub fn age(&self) -> Duration {
-        self.opened.elapsed()
+        self.born.elapsed()
+    }
+
+    /// What is remembered until the next opening.
+    pub fn memory(&self) -> Memory {
+        Memory { counters: self.counters, debts: self.debts.clone(), born: self.born }
     }
 
     /// Nothing is sent for this long (real time).
@@ -141,7 +165,10 @@ impl Wire {
         }
         self.counters.stale += 1;
         tracing::debug!(bytes = %frame::hex(bytes), "stale bytes dropped");
-        let late = frame::unit_of(self.framing, bytes).is_some_and(|unit| self.debts.came_late(unit, self.age()));
+        // Only a whole good frame tells who was late: chance bytes name anybody.
+        let whole = frame::unwrap(self.framing, bytes).ok();
+        let unit = whole.as_ref().and_then(|message| message.first().copied());
+        let late = unit.is_some_and(|unit| self.debts.came_late(unit, self.age()));
         if late {
             self.counters.late += 1;
         }

@@ -35,7 +35,8 @@ impl Health {
     /// It did not answer. `true` if it is given up with this.
     pub fn failed(&mut self, now: Timestamp) -> bool {
         self.failures = self.failures.saturating_add(1);
-        if self.failures < FAILURES_MAX {
+        // What was under way when it was given up says nothing new.
+        if self.failures < FAILURES_MAX || self.probe_at.is_some_and(|probe_at| now < probe_at) {
             return false;
         }
         let goes_down = self.probe_at.is_none();

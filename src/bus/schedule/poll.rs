@@ -114,9 +114,9 @@ impl Pending {
         if !std::mem::take(&mut self.excused) {
             self.excuses = 0;
         }
-        let spent = span(started, now).as_secs_f64();
-        // An eighth of the news: one timeout does not make a line overloaded.
-        self.cost = Some(self.cost.map_or(spent, |cost| cost + (spent - cost) / 8.0));
+        if started < now {
+            self.spent(span(started, now));
+        }
         let mut told = Served { jitter: None, missed: 0 };
         self.release = match (self.period, self.release) {
             (Some(period), Some(release)) if release <= now => {
@@ -137,6 +137,12 @@ impl Pending {
         };
         self.missed += u64::from(told.missed);
         told
+    }
+
+    /// A read has taken so long. An eighth of the news: one timeout does not make a line overloaded.
+    pub fn spent(&mut self, time: Duration) {
+        let spent = time.as_secs_f64();
+        self.cost = Some(self.cost.map_or(spent, |cost| cost + (spent - cost) / 8.0));
     }
 
     /// Does it come too late again and again?

@@ -15,6 +15,11 @@ impl Plant {
     /// Takes an order for a line itself; others are not for this place.
     pub(super) fn line_order(&mut self, order: &Order, at: Timestamp, effects: &mut Effects) -> Option<ActionRecord> {
         match &order.command {
+            Command::Configure(settings)
+                if self.def.lines.get(settings.id.index()).is_none_or(|line| line.name != settings.name) =>
+            {
+                return self.desk.note(order, Outcome::Refused(Refusal::NotALine), &self.board, at);
+            }
             Command::Configure(settings) => {
                 self.remember_settings(settings);
                 effects.bus.push((settings.id, BusRequest::Configure(settings.clone())));
@@ -39,10 +44,11 @@ impl Plant {
     }
 
     /// The plant file was written, or not, with the reason.
-    pub fn on_saved(&mut self, order: OrderId, line: LineId, result: Result<(), String>) -> Effects {
+    pub fn on_saved(&mut self, order: OrderId, saved: &LineDef, result: Result<(), String>) -> Effects {
         let outcome = match result {
             Ok(()) => {
-                self.lines[line.index()].settings_before = None;
+                let tried_since = self.settings(saved.id) != saved;
+                self.lines[saved.id.index()].settings_before = tried_since.then(|| Arc::new(saved.clone()));
                 Outcome::Verified
             }
             Err(why) => Outcome::Refused(Refusal::NotSaved(why)),
@@ -158,7 +164,7 @@ mod tests {
         assert_eq!(effects.save, Some((id, baud(19_200))));
         assert_eq!(deeds(&effects), [], "not before it is done");
         assert!(before(&plant).is_some());
-        let saved = plant.on_saved(id, L1, Ok(()));
+        let saved = plant.on_saved(id, &baud(19_200), Ok(()));
         let deed = ("anna".to_owned(), "save settings".to_owned(), String::new(), "verified".to_owned());
         assert_eq!(deeds(&saved), [deed]);
         assert_eq!(before(&plant), None);
@@ -169,7 +175,7 @@ mod tests {
         let mut plant = plant();
         try_out(&mut plant, 1, baud(19_200));
         order(&mut plant, 2, Command::SaveSettings(L1));
-        let effects = plant.on_saved(OrderId { terminal: 1, number: 2 }, L1, Err("the disk is full".into()));
+        let effects = plant.on_saved(OrderId { terminal: 1, number: 2 }, &baud(19_200), Err("the disk is full".into()));
         assert_eq!(deeds(&effects)[0].3, "refused: not saved: the disk is full");
         assert!(before(&plant).is_some());
     }

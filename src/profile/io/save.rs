@@ -55,13 +55,22 @@ impl PlantFile {
             let _ = fs::remove_file(&beside);
         }
         written?;
+        // The new file is there; only a loss of power right now could still bring the old one back.
         let folder = self.path.parent().unwrap_or(Path::new("/"));
-        File::open(folder)?.sync_all()
+        if let Err(error) = File::open(folder).and_then(|folder| folder.sync_all()) {
+            tracing::warn!(%error, folder = %folder.display(), "the folder could not be synced");
+        }
+        Ok(())
     }
 }
 
 fn write_whole(path: &Path, bytes: &[u8], permissions: fs::Permissions) -> std::io::Result<()> {
-    let mut file = File::create(path)?;
+    // Never through a link that somebody has put there; what an earlier try has left is of no use.
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+        Ok(()) | Err(_) => {}
+    }
+    let mut file = File::create_new(path)?;
     file.set_permissions(permissions)?;
     file.write_all(bytes)?;
     file.sync_all()

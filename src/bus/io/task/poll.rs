@@ -89,6 +89,13 @@ impl Task {
             Err(Trouble::Fault(_)) => return Ok(Ok(())),
         };
         let at = self.clock.now();
+        // They were told as done when they began; what they took counts for the load of the line.
+        let each = Duration::try_from(at.duration_since(started)).unwrap_or_default() / requests.len().max(1) as u32;
+        for block in &taken {
+            if let Some(index) = self.blocks.iter().position(|planned| planned == block) {
+                schedule.spent(index, each);
+            }
+        }
         for (block, answered) in taken.iter().zip(answers) {
             let answer = answered.answer.and_then(|answer| parse(block, &answer));
             self.settle(link, schedule, block, at, (answer, Some(answered.exchange))).await?;
@@ -212,16 +219,13 @@ impl Task {
 
     fn use_plan(&mut self, schedule: &mut Schedule, blocks: Vec<Block>, at: Timestamp) {
         self.books.replan(&self.blocks, &blocks);
+        self.books.admit(&self.def, &self.settings, &blocks);
         schedule.replan(&blocks, at);
         self.blocks = blocks;
     }
 
     fn note_served(&mut self, index: usize, served: Served) {
-        let tally = self.books.poll(index);
-        tally.missed += u64::from(served.missed);
-        if let Some(jitter) = served.jitter {
-            tally.jitter.add(jitter);
-        }
+        self.books.served(index, served.jitter, served.missed);
     }
 
     async fn tell_values(

@@ -4,17 +4,20 @@ use std::sync::Arc;
 
 use tokio::sync::mpsc::error::TryRecvError;
 
-use super::{Ended, Leave, REPORT_EVERY, Task, Turn};
+use super::{Ended, Leave, Task, Turn};
 use crate::{
     bus::{
+        frame::{self, Mbap},
         io::{
             link::{Link, Trouble},
             testing,
         },
         schedule::Next,
+        tool::{Ask, Came},
     },
     plant::{
         command::BusRequest,
+        def::Framing,
         event::{Event, Fault, WriteResult},
         tool::ToolState,
     },
@@ -36,8 +39,10 @@ impl Task {
         let Some(step) = job.next().cloned() else { return Ok(Ok(())) };
         match testing::step(link, &step).await {
             Ok(came) => {
+                let in_step = stays_in_step(link.framing(), &step.ask, &came);
                 job.take(came);
-                self.tell_test().await.map(Ok)
+                self.tell_test().await?;
+                Ok(if in_step { Ok(()) } else { Err(Leave::Reopen) })
             }
             Err(Trouble::Gone(why)) => Ok(Err(Leave::Lost(why))),
             Err(Trouble::Fault(_)) => Ok(Ok(())),
@@ -59,7 +64,7 @@ impl Task {
             let mut link = match open.take().filter(|_| wanted == settings) {
                 Some(link) => link,
                 None => match self.connector.open_as(&wanted.transport).await {
-                    Ok(opened) => Link::new(opened.stream, opened.pause, &wanted, self.clock, self.counters),
+                    Ok(opened) => Link::new(opened, &wanted, self.clock, self.memory.clone()),
                     Err(why) => {
                         self.end_test(&why).await?;
                         break;
@@ -68,7 +73,7 @@ impl Task {
             };
             settings = wanted;
             let came = testing::step(&mut link, &step).await;
-            self.close_second(&mut link, REPORT_EVERY);
+            self.close_second(&mut link);
             match (came, &mut self.job) {
                 (Ok(came), Some(job)) => job.take(came),
                 (Err(Trouble::Gone(why)), _) => {
@@ -92,8 +97,13 @@ impl Task {
                 Ok(BusRequest::Write { id, .. }) => {
                     self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
                 }
-                Ok(BusRequest::StopTest | BusRequest::Connect(_) | BusRequest::Test { .. }) => {
+                Ok(BusRequest::StopTest) => {
                     self.stop_test().await?;
+                    return Ok(false);
+                }
+                Ok(request @ (BusRequest::Connect(_) | BusRequest::Test { .. })) => {
+                    self.stop_test().await?;
+                    self.put_back = Some(request);
                     return Ok(false);
                 }
                 Ok(BusRequest::Configure(settings)) => self.configure(*settings),
@@ -126,5 +136,15 @@ impl Task {
             self.job = None;
         }
         self.tell(Event::Tool { at: self.clock.now(), line: self.line, run }).await
+    }
+}
+
+/// Over Modbus TCP bytes that are no whole frame would be taken together with the next request, and an answer that is still
+/// to come could carry the transaction of a later one: then only a new connection is in step.
+fn stays_in_step(framing: Framing, ask: &Ask, came: &Came) -> bool {
+    let whole = |bytes: &[u8]| matches!(frame::mbap(bytes), Mbap::Whole { end, .. } if end == bytes.len());
+    match (framing, ask, came) {
+        (Framing::Mbap, Ask::Raw(sent), Came::Bytes(received, _)) => whole(sent) && whole(received),
+        (Framing::Mbap | Framing::Rtu | Framing::Ascii, _, _) => true,
     }
 }

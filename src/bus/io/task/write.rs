@@ -42,7 +42,7 @@ impl Task {
                 return Ok(Err(Leave::Lost(why)));
             }
         };
-        let tcp = self.settings.transport.framing() == Framing::Mbap;
+        let tcp = self.settings.transport.serial().is_none();
         let unanswered = tcp && matches!(result, WriteResult::Lost(Fault::Timeout));
         match result {
             WriteResult::ReadBack(raw) => {
@@ -59,8 +59,8 @@ impl Task {
         }
         self.tell_wrote(id, result).await?;
         if unanswered {
-            // The system would go on sending it for minutes; a closed connection takes it back.
-            return Ok(Err(Leave::Lost("a write was not answered".into())));
+            // It may still lie in this machine or on the way; a closed connection takes it back.
+            return Ok(Err(Leave::Reopen));
         }
         Ok(Ok(()))
     }
@@ -87,10 +87,11 @@ impl Task {
         for (tag, raw) in unlock.into_iter().chain([(tag, raw)]) {
             // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
             let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
+            let own = self.owes_nothing(link, device).await?;
             match self.send_write(link, device, request).await {
                 Ok(()) => schedule.answered(tag.device, self.clock.now()),
                 Err(Trouble::Gone(why)) => return Err(why),
-                Err(Trouble::Fault(Fault::Exception(code))) if code.is_refusal() => {
+                Err(Trouble::Fault(Fault::Exception(code))) if own && code.is_refusal() => {
                     return Ok(WriteResult::Refused(code));
                 }
                 Err(Trouble::Fault(fault)) => return Ok(WriteResult::Lost(fault)),
@@ -114,8 +115,23 @@ impl Task {
                 Some(back) => WriteResult::ReadBack(back),
                 None => WriteResult::NotRead(Fault::NotANumber),
             }),
-            Err(Trouble::Gone(why)) => Err(why),
+            // The device has accepted it; that the port is gone shows itself at the next request.
+            Err(Trouble::Gone(_)) => Ok(WriteResult::NotRead(Fault::NotConnected)),
             Err(Trouble::Fault(fault)) => Ok(WriteResult::NotRead(fault)),
+        }
+    }
+
+    /// An exception names no address: only from a unit that owes nothing is it certainly the answer to what was sent. `Err`
+    /// when the port is gone.
+    async fn owes_nothing(&self, link: &mut Link, device: &DeviceDef) -> Result<bool, String> {
+        let broadcast = device.unit == 0;
+        if link.framing() == Framing::Mbap || broadcast || link.debt(device.unit).is_clear() {
+            return Ok(true);
+        }
+        match link.loopback(device.unit).await {
+            Ok(()) => Ok(true),
+            Err(Trouble::Fault(_)) => Ok(link.debt(device.unit).is_clear()),
+            Err(Trouble::Gone(why)) => Err(why),
         }
     }
 
