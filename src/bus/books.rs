@@ -109,6 +109,12 @@ impl Books {
         self.open = (0.0, 0.0);
     }
 
+    /// Nothing is connected: nothing is busy.
+    pub fn rest(&mut self, counters: &mut LineCounters) {
+        self.busy.clear();
+        (self.open, counters.utilisation, counters.utilisation_minute) = ((0.0, 0.0), 0.0, 0.0);
+    }
+
     /// A read began so long after its point of the grid, and came too late for some.
     pub fn served(&mut self, index: usize, jitter: Option<Duration>, missed: u32) {
         self.missed += u64::from(missed);

@@ -19,6 +19,9 @@ pub enum FilterError {
     /// None of the words.
     #[error("found `{0}`, expected unit N, fc N, tx, rx, error, or bytes in hex such as 03EA")]
     Word(String),
+    /// `unit` or `fc` twice: no frame has two of them.
+    #[error("{0} stands there twice, and no frame has two")]
+    Twice(&'static str),
     /// `unit` or `fc` without its number.
     #[error("found `{found}` behind {word}, expected a number from 0 to 255, or 0x00 to 0xFF")]
     Number {
@@ -36,8 +39,8 @@ impl Filter {
         let mut words = text.split_whitespace();
         while let Some(word) = words.next() {
             match word.to_ascii_lowercase().as_str() {
-                "unit" => filter.unit = Some(number("unit", words.next())?),
-                "fc" | "function" => filter.function = Some(number("fc", words.next())?),
+                "unit" => once(&mut filter.unit, "unit", words.next())?,
+                "fc" | "function" => once(&mut filter.function, "fc", words.next())?,
                 "tx" => filter.sent = Some(true),
                 "rx" => filter.sent = Some(false),
                 "error" | "errors" => filter.errors = true,
@@ -60,6 +63,13 @@ impl Filter {
             && self.sent.is_none_or(|sent| frame.sent == sent)
             && (!self.errors || is_error(frame, &message))
             && (contains(&message, &self.bytes) || contains(&frame.bytes, &self.bytes))
+    }
+}
+
+fn once(place: &mut Option<u8>, word: &'static str, found: Option<&str>) -> Result<(), FilterError> {
+    match place.replace(number(word, found)?) {
+        None => Ok(()),
+        Some(_) => Err(FilterError::Twice(word)),
     }
 }
 

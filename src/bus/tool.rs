@@ -178,6 +178,8 @@ impl Job {
     fn take_unit(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
         let Ask::Message(request) = &step.ask else { return };
         let words = match answer {
+            // A broadcast is answered by nobody.
+            Ok(answer) if answer.is_empty() => return,
             Ok(answer) => match answer.get(3..5) {
                 Some([high, low]) => format!("register 0 = {}", u16::from_be_bytes([*high, *low])),
                 _ => "answers".into(),

@@ -285,7 +285,7 @@ unit = 1
             framing: if ascii { Framing::Ascii } else { Framing::Rtu },
             rs485,
         });
-        let tcp = ("[ -~]{0,20}[!-~]", 1u16.., any::<bool>()).prop_map(|(host, port, rtu)| Transport::Tcp {
+        let tcp = ("[ -9;-~]{0,20}[!-9;-~]", 1u16.., any::<bool>()).prop_map(|(host, port, rtu)| Transport::Tcp {
             host,
             port,
             framing: if rtu { Framing::Rtu } else { Framing::Mbap },

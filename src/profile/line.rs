@@ -203,6 +203,9 @@ pub fn complaints(line: &LineDef) -> Vec<Complaint> {
         Transport::Tcp { host, port, framing: _ } => {
             let named = !host.trim().is_empty();
             check(!named, Key::Host, "a TCP line needs a host".into(), "expected a name or an address");
+            // More than one colon is an address of IPv6.
+            let with_port = host.matches(':').count() == 1;
+            check(with_port, Key::Host, format!("`{host}` is no host"), "expected it alone, the port is tcp_port");
             check(*port == 0, Key::TcpPort, "there is no TCP port 0".into(), "expected 1 to 65535, usually 502");
         }
     }

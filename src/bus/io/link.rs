@@ -152,7 +152,7 @@ impl Link {
         let frame = frame::wrap(self.framing(), 0, message);
         let sent_at = self.wire.send(&frame).await?;
         let started = Instant::now();
-        self.note_sent(message, frame.clone());
+        self.note_sent(frame.clone());
         let gathered = match message.first() {
             Some(0) => Gathered::nothing(Ok(vec![])),
             _ => self.gather(message, &frame, sent_at).await?,
@@ -187,8 +187,8 @@ impl Link {
             frames.push(frame::with_mbap(self.transaction, message));
         }
         let sent_at = self.wire.send(&frames.concat()).await?;
-        for (message, frame) in messages.iter().zip(&frames) {
-            self.note_sent(message, frame.clone());
+        for frame in &frames {
+            self.note_sent(frame.clone());
         }
         let gathered = self.gather_mbap(messages, first, sent_at).await?;
         self.busy += sent_at.elapsed();
@@ -208,7 +208,7 @@ impl Link {
     /// Sends bytes as they are and gives everything that comes back until the line is silent: for tests of the line.
     pub async fn send_raw(&mut self, bytes: &[u8]) -> Result<(Vec<u8>, Option<Duration>), Trouble> {
         let sent_at = self.wire.send(bytes).await?;
-        self.note_sent(&[], bytes.to_vec());
+        self.note_sent(bytes.to_vec());
         let deadline = sent_at + self.timeout + self.wire.char_time * frame::MESSAGE_MAX as u32;
         let framing = self.framing();
         let request = frame::unwrap(framing, bytes).unwrap_or_default();
@@ -319,10 +319,9 @@ impl Link {
         self.unanswered = if silent { self.unanswered.saturating_add(1) } else { 0 };
     }
 
-    fn note_sent(&mut self, message: &[u8], frame: Vec<u8>) {
+    fn note_sent(&mut self, frame: Vec<u8>) {
         self.wire.counters.requests += 1;
-        let broadcast = message.first() == Some(&0) && self.framing() != Framing::Mbap;
-        self.wire.record(true, frame, Cow::Borrowed(if broadcast { "sent to all" } else { "sent" }));
+        self.wire.record(true, frame, Cow::Borrowed("sent"));
     }
 
     fn keep(&mut self, request: Vec<u8>, gathered: Gathered) -> Answered {

@@ -36,7 +36,7 @@ pub fn why_not(path: &str, error: &tokio_serial::Error) -> String {
     match error.kind {
         ErrorKind::Io(io::ErrorKind::NotFound) => format!("{path}: no such port ({})", known_words()),
         ErrorKind::Io(io::ErrorKind::PermissionDenied) => format!("{path}: no permission{}", group_words(path)),
-        ErrorKind::NoDevice if words.to_lowercase().contains("busy") => {
+        _ if ["busy", "exclusive lock"].iter().any(|word| words.to_lowercase().contains(word)) => {
             format!("{path}: in use by {}", holder(path).unwrap_or_else(|| "another program".into()))
         }
         // Older kernels and pseudo-terminals say the same of a path that is no port at all.
@@ -63,6 +63,8 @@ fn group_words(path: &str) -> String {
     let groups = fs::read_to_string("/etc/group").unwrap_or_default();
     let is_this = |line: &&str| line.split(':').nth(2) == Some(&gid.to_string());
     match groups.lines().find(is_this).and_then(|line| line.split(':').next()) {
+        // Nobody should join this one.
+        Some("root") => ": it belongs to root; ask the administrator for access (a udev rule)".to_owned(),
         Some(name) => format!(": it belongs to the group {name} (usermod -aG {name} USER, then log in again)"),
         None => format!(": it belongs to the group {gid}"),
     }
@@ -106,7 +108,7 @@ mod tests {
     fn the_group_that_may_use_a_port_is_named() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let words = group_words(&file.path().display().to_string());
-        assert!(words.contains("it belongs to the group"), "{words}");
+        assert!(words.contains("it belongs to"), "{words}");
         assert_eq!(group_words("/dev/no-such-port"), "");
     }
 }

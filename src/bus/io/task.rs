@@ -152,6 +152,7 @@ impl Task {
                 Leave::Closed => {
                     self.end_test("the line was closed").await?;
                     self.tell_state(LineState::Disconnected).await?;
+                    self.tell_report(None).await?;
                     self.wait(None).await?;
                 }
                 Leave::Lost(why) => {
@@ -252,6 +253,7 @@ impl Task {
             }
         };
         self.close_second(&mut link);
+        self.books.rest(&mut self.memory.counters);
         self.refuse_waiting().await?;
         leave
     }

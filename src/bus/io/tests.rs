@@ -385,11 +385,13 @@ async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
         }
     });
     line.read(&def).await;
-    for (id, tag, expect) in
-        [(1, 0, WriteResult::Lost(Fault::Timeout)), (2, 1, WriteResult::Lost(Fault::Exception(ExceptionCode(3))))]
-    {
+    for (id, tag) in [(1, 0), (2, 1)] {
         let request = BusRequest::Write { id: WriteId(id), tag: TagId(tag), raw: 10.0, unlock: None, verify: true };
         line.requests.send(request).await.expect("the line runs");
+    }
+    for (id, expect) in
+        [(1, WriteResult::Lost(Fault::Timeout)), (2, WriteResult::Lost(Fault::Exception(ExceptionCode(3))))]
+    {
         let result = line
             .until(&def, |event| match event {
                 Event::Wrote { id: done, result, .. } if *done == WriteId(id) => Some(result.clone()),

@@ -15,7 +15,7 @@ pub struct Args {
     #[command(flatten)]
     port: PortArgs,
     /// Unit address
-    #[arg(long, short, default_value = "1", value_parser = clap::value_parser!(u8).range(1..))]
+    #[arg(long, short, default_value = "1")]
     unit: u8,
     /// How often
     #[arg(long, short, default_value = "10", value_parser = clap::value_parser!(u16).range(1..=1000))]
@@ -28,6 +28,7 @@ pub struct Args {
 /// Diagnostics 08/00 with a number that counts up.
 pub fn main(args: Args) -> Result<(), CliError> {
     let line = args.port.line()?;
+    args.port.unit(&line, args.unit)?;
     say(&format!("loopback 08/00 to unit {} on {}", args.unit, line.transport));
     let tool = Tool::Loopback { unit: args.unit, data: 0xA537, count: args.count };
     let run = run(&line, tool, |finding| match finding {

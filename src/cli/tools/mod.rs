@@ -75,6 +75,16 @@ impl PortArgs {
         Ok(LineDef { timeout: Duration::from_millis(self.timeout), ..LineDef::new(LineId(0), "line", transport) })
     }
 
+    /// A unit that can answer: on a serial line 0 is everybody, and nobody answers.
+    fn unit(&self, line: &LineDef, unit: u8) -> Result<u8, CliError> {
+        let most = if line.transport.framing() == Framing::Mbap { 255 } else { 247 };
+        let least = u8::from(most == 247);
+        if (least..=most).contains(&unit) {
+            return Ok(unit);
+        }
+        Err(CliError::Usage(format!("--unit: found {unit}, expected {least} to {most}")))
+    }
+
     fn serial(&self, framing: Framing) -> Result<Serial, CliError> {
         let data_bits = self.data.unwrap_or(if framing == Framing::Ascii { 7 } else { 8 });
         if framing == Framing::Rtu && data_bits != 8 {

@@ -37,6 +37,7 @@ pub struct Place {
 /// Reads what is asked for, else the identification.
 pub fn main(args: Args) -> Result<(), CliError> {
     let line = args.port.line()?;
+    args.port.unit(&line, args.unit)?;
     say(&format!("unit {} on {}", args.unit, line.transport));
     let tool = match args.read {
         Some(Place { table, address, count }) => Tool::Read { unit: args.unit, table, address, count },

@@ -2,7 +2,7 @@
 
 use super::{PortArgs, answer_lines, run, shown};
 use crate::{
-    bus::{complaint::check_request, explain, frame, typed},
+    bus::{ascii, complaint::check_request, explain, frame, typed},
     cli::{CliError, say, say_error},
     plant::{
         def::Framing,
@@ -33,20 +33,27 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let typed =
         typed::parse(&args.bytes.join(" "), Some(framing)).map_err(|error| CliError::Usage(error.to_string()))?;
     let whole = frame::unwrap(framing, &typed.bytes).ok();
-    let (message, frame) = match whole {
-        _ if args.as_is => (whole.unwrap_or_default(), typed.bytes),
-        Some(message) => (message, typed.bytes),
-        None => (typed.bytes.clone(), frame::wrap(framing, 1, &typed.bytes)),
+    let (message, frame) = match (whole, typed.framing) {
+        (whole, _) if args.as_is => (whole.unwrap_or_default(), typed.bytes),
+        (Some(message), _) => (message, typed.bytes),
+        // The characters of an ASCII frame mean its message, on any line.
+        (None, Some(Framing::Ascii)) => {
+            let message =
+                ascii::open(&typed.bytes).map_err(|fault| CliError::Usage(format!("nothing was sent: {fault}")))?;
+            let frame = frame::wrap(framing, 1, &message);
+            (message, frame)
+        }
+        (None, _) => (typed.bytes.clone(), frame::wrap(framing, 1, &typed.bytes)),
     };
     refuse(&message, framing, &args)?;
     let told = explain::explain(&frame, Some(framing), Some(explain::Direction::Request), None);
-    say(&format!("TX {}", shown(&frame, framing)));
-    say(&format!("   {}", told.summary));
+    let sent = [format!("TX {}", shown(&frame, framing)), format!("   {}", told.summary)];
     let request = message.clone();
     let run = run(&line, Tool::Send(frame), |finding| match finding {
-        Finding::Bytes { bytes, .. } if bytes.is_empty() => Vec::new(),
+        Finding::Bytes { bytes, .. } if bytes.is_empty() => sent.to_vec(),
         Finding::Bytes { bytes, reply } => {
-            let mut lines = answer_lines(bytes, framing, &request);
+            let mut lines = sent.to_vec();
+            lines.extend(answer_lines(bytes, framing, &request));
             let verdict = match frame::unwrap(framing, bytes).and_then(|answer| frame::check_answer(&request, &answer))
             {
                 Ok(()) => "ok".to_owned(),
@@ -77,8 +84,20 @@ pub fn main(args: Args) -> Result<(), CliError> {
 
 /// What is wrong with a request stops it, unless it is wished all the same.
 fn refuse(message: &[u8], framing: Framing, args: &Args) -> Result<(), CliError> {
+    // Bytes that are to go out as they are may be anything.
+    if args.as_is && message.is_empty() {
+        return Ok(());
+    }
     let mut complaints: Vec<String> =
         check_request(message, framing).into_iter().map(|complaint| complaint.to_string()).collect();
+    if let (Framing::Rtu, Some((inner, check))) = (framing, message.split_last_chunk::<2>())
+        && !complaints.is_empty()
+        && check_request(inner, framing).is_empty()
+    {
+        let [low, high] = frame::crc16(inner).to_le_bytes();
+        let [got_low, got_high] = check;
+        complaints = vec![format!("wrong CRC: found {got_low:02X} {got_high:02X}, expected {low:02X} {high:02X}")];
+    }
     if framing != Framing::Mbap && message.first() == Some(&0) && complaints.is_empty() {
         complaints.push("unit 0 is a broadcast: every unit on the line obeys it and none answers".into());
     }

@@ -43,8 +43,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let scan = Scan { first, last, serials, timeout: line.timeout.min(Duration::from_secs(60)) };
     let requests = scan.serials.len().max(1) * (usize::from(last - first) + 1);
     let most = line.timeout * requests as u32;
-    say(&format!("{} on {}: {requests} requests, {:.0} s at most", "scan", line.transport, most.as_secs_f64().ceil()));
-    run(&line, Tool::Scan(scan), |finding| match finding {
+    let seconds = most.as_secs_f64().ceil();
+    say(&format!("scan on {}: {requests} requests, about {seconds:.0} s if nobody answers", line.transport));
+    let run = run(&line, Tool::Scan(scan), |finding| match finding {
         Finding::Unit { unit, serial, words } => {
             let settings = serial.map(|serial| format!(" at {serial}")).unwrap_or_default();
             vec![format!("unit {unit:3}{settings}: {words}")]
@@ -55,8 +56,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
         | Finding::Object { .. }
         | Finding::Values { .. }
         | Finding::Failed { .. } => Vec::new(),
-    })
-    .map(drop)
+    })?;
+    let found = run.findings.iter().any(|finding| matches!(finding, Finding::Unit { .. }));
+    if found { Ok(()) } else { Err(CliError::Failed("no unit was found".into())) }
 }
 
 /// Every combination that is asked for; none: only the settings of the port.

@@ -9,6 +9,7 @@ use crate::{
         command::Command,
         def::TagId,
         tag::{Access, Confidence, Table, TagDef},
+        tool::Tool,
     },
     ui::{
         Cx, keys,
@@ -100,9 +101,15 @@ impl Confirm {
             Intent::Order(Command::Connect(_, false)) => "disconnect",
             Intent::Order(Command::Configure(_)) => "use these settings",
             Intent::Order(Command::SaveSettings(_)) => "save",
+            Intent::Order(Command::Test(_, Tool::Scan(_))) => "scan",
             Intent::Order(Command::Test(..)) => "send",
             Intent::Order(Command::StopTest(_)) => "stop",
         }
+    }
+
+    /// What is sent to a line past all limits of the plant file comes behind an Enter: a second one must not send it.
+    fn wants_y(&self) -> bool {
+        matches!(&self.intent, Intent::Order(Command::Test(..)))
     }
 
     /// What Esc does.
@@ -111,7 +118,8 @@ impl Confirm {
     }
 
     pub(super) fn on_key(self, event: KeyEvent) -> Next {
-        if keys::code(KeyCode::Enter).is(event) || keys::char('y').is(event) {
+        let enter = keys::code(KeyCode::Enter).is(event) && !self.wants_y();
+        if enter || keys::char('y').is(event) {
             Next::Do(vec![self.intent.act()])
         } else if keys::char('n').is(event) || keys::char('q').is(event) {
             Next::Close
@@ -130,7 +138,8 @@ impl Confirm {
             rows.push((wire_words(cx.def().tag(*tag)), cx.theme.dim()));
         }
         rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));
-        let keys = format!("⏎ {}   Esc {}", self.verb(), self.escape());
+        let yes = if self.wants_y() { "y" } else { "⏎" };
+        let keys = format!("{yes} {}   Esc {}", self.verb(), self.escape());
         let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&keys));
         let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + 2));
         for (y, (text, style)) in rows.iter().enumerate() {

@@ -10,7 +10,7 @@ use ratatui::{Frame, layout::Rect, style::Style};
 use super::{Modal, Next, faceplate::device_words, window};
 use crate::{
     plant::{
-        command::Command,
+        command::{Command, Outcome},
         def::{LineDef, LineId},
         event::LineState,
         snapshot::DeviceState,
@@ -72,6 +72,8 @@ impl Settings {
         if let Some(deed) = self.asking.take() {
             let yes = enter || keys::char('y').is(event);
             let acts = if yes { vec![Act::Order(self.command(deed))] } else { Vec::new() };
+            // Off the text field, so that u and S are keys again.
+            self.row = 0;
             return Next::Both(Modal::Settings(Box::new(self)), acts);
         }
         self.problem = None;
@@ -162,6 +164,9 @@ impl Settings {
         let (answer, well) = answers(cx, self.line);
         let style = if well { theme.normal() } else { theme.trouble() };
         let mut rows: Vec<_> = wrap(&answer, room).into_iter().map(|row| (row, style)).collect();
+        if let Some(why) = not_saved(cx, self.line) {
+            rows.extend(wrap(&why, room).into_iter().map(|row| (row, theme.trouble())));
+        }
         if let Some(before) = &cx.snapshot.line(self.line).settings_before {
             let words = format!("tried out; before: {}", difference(used, before));
             rows.extend(wrap(&words, room).into_iter().map(|row| (row, theme.normal())));
@@ -192,7 +197,10 @@ impl Settings {
             Deed::Use(new) => format!("Use {}? {restart}", difference(used, new)),
             Deed::TakeBack(before) => format!("Take back to {}? {restart}", difference(used, before)),
             Deed::Save => {
-                format!("Write {} into the plant file of {}? Everything else in it stays.", whole(used), cx.def().title)
+                let (answer, well) = answers(cx, self.line);
+                let doubt = if well { String::new() } else { format!("! {answer} ") };
+                let title = &cx.def().title;
+                format!("{doubt}Write {} into the plant file of {title}? Everything else in it stays.", whole(used))
             }
         }
     }
@@ -287,6 +295,17 @@ fn answers(cx: &Cx, line: LineId) -> (String, bool) {
             let words: Vec<String> =
                 devices.map(|device| format!("{} {}", device.name, device_words(cx, device.id))).collect();
             (format!("{name} connected: {}", words.join("; ")), all_well)
+        }
+    }
+}
+
+/// Why the last wish to save the settings of a line was refused, in full.
+fn not_saved(cx: &Cx, line: LineId) -> Option<String> {
+    let saved = cx.snapshot.orders.iter().find(|order| order.command == Command::SaveSettings(line))?;
+    match &saved.outcome {
+        Outcome::Refused(why) => Some(format!("! {why}")),
+        Outcome::Pending | Outcome::Verified | Outcome::Unchanged | Outcome::NotConfirmed(_) | Outcome::Failed(_) => {
+            None
         }
     }
 }

@@ -15,7 +15,10 @@ use crate::{
         tag::{Access, Kind, Order, Poll, TagDef},
         traffic::Exchange,
     },
-    ui::{Cx, widgets::text::clock},
+    ui::{
+        Cx,
+        widgets::text::{between, clock, running},
+    },
 };
 
 /// Request, answer, verdict; gives both frames in words.
@@ -40,6 +43,8 @@ pub(super) fn exchange_rows(
         rows.push(hex(if n == 0 { "asked" } else { "" }, text, theme.normal()));
     }
     let at = clock(exchange.at, &cx.def().time_zone);
+    // What was good then says nothing of now.
+    let old = !cx.snapshot.sample(def.id).quality.is_good() && exchange.outcome.is_ok();
     rows.push(row("", format!("{}, at {at}", request.summary), theme.dim()));
     if exchange.answer.is_empty() {
         let timeout = settings(cx, def).timeout;
@@ -53,6 +58,10 @@ pub(super) fn exchange_rows(
     let reply = exchange.reply.map(|reply| format!(", after {}", span(reply))).unwrap_or_default();
     let tries = if 1 < exchange.tries { ", second try: the first answer was spoiled" } else { ", first try" };
     let (verdict, style) = match exchange.outcome {
+        Ok(()) if old => {
+            let ago = running(between(exchange.at, cx.now));
+            (format!("ok, but {ago} ago: no good answer since"), theme.trouble())
+        }
         Ok(()) => ("ok".to_owned(), theme.normal()),
         Err(fault) => (words(fault), theme.trouble()),
     };

@@ -195,7 +195,9 @@ impl Form {
     fn build(&self, line: &LineDef) -> Result<Built, String> {
         let framing = line.transport.framing();
         let top = if framing == Framing::Mbap { 255 } else { 247 };
-        let unit = |n: usize| number(&self.text(n), self.fields[n].label, 0..=top).map(|unit| unit as u8);
+        // Unit 0 of a serial line is everybody: it can be written to, and answers nothing.
+        let least = if framing == Framing::Mbap || self.tried == Tried::Request { 0 } else { 1 };
+        let unit = |n: usize| number(&self.text(n), self.fields[n].label, least..=top).map(|unit| unit as u8);
         match self.tried {
             Tried::Bytes | Tried::Request => {
                 let message = message(unit(0)?, FUNCTIONS[self.chosen(1)], &self.text(2), &self.text(3))?;
@@ -231,8 +233,9 @@ impl Form {
         let serials = if self.chosen(2) == 1 { all_settings(line) } else { Vec::new() };
         let (units, settings) = (u32::from(last - first) + 1, serials.len().max(1) as u32);
         let longest = ms(timeout * units * settings);
-        let told =
-            vec![format!("{units} units, {settings} settings: {longest} at most. Any answer counts, also a refusal.")];
+        let told = vec![format!(
+            "{units} units, {settings} settings: about {longest}, if nobody answers. Any answer counts, also a refusal."
+        )];
         Ok(Built { tool: Tool::Scan(Scan { first, last, serials, timeout }), told })
     }
 

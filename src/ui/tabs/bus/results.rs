@@ -110,6 +110,13 @@ fn came_back(
 ) -> Vec<Row> {
     let theme = cx.theme;
     let framing = at.settings.transport.framing();
+    let to_all = |sent: &Vec<u8>| {
+        framing != crate::plant::def::Framing::Mbap
+            && explain::message_of(sent, framing).is_some_and(|message| message.first() == Some(&0))
+    };
+    if bytes.is_empty() && matches!(&run.tool, Tool::Send(sent) if to_all(sent)) {
+        return vec![plain("sent to all; nobody answers a broadcast", theme.normal())];
+    }
     if bytes.is_empty() {
         return vec![plain(format!("✗ nothing came back within {}", ms(at.settings.timeout)), theme.trouble())];
     }

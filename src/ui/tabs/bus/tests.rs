@@ -221,7 +221,8 @@ fn bytes_go_out_as_typed_where_no_check_is_wanted() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "Tt⇥01 03 03 EA 00 01 00 00⏎");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("These bytes are no good request: CRC"), "{shown}");
-    let effects = type_keys(&mut model, "⏎");
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), None, "a second Enter sends nothing");
+    let effects = type_keys(&mut model, "y");
     assert_eq!(order_of(&effects), Some(&Command::Test(L1, Tool::Send(vec![1, 3, 3, 0xEA, 0, 1, 0, 0]))));
 }
 
@@ -238,7 +239,7 @@ fn writes_and_broadcasts_are_asked_first() {
         assert_eq!(order_of(&type_keys(&mut model, "⏎")), None, "{typed}");
         let shown = screen(&mut model, 120, 40).replace("│", " ").split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(shown.contains(words) || before.contains(words), "{words}:\n{before}\n{shown}");
-        let effects = type_keys(&mut model, "⏎");
+        let effects = type_keys(&mut model, "y");
         assert_eq!(order_of(&effects), Some(&Command::Test(L1, Tool::Send(with_crc(&bytes)))), "{typed}");
     }
 }
@@ -249,7 +250,7 @@ fn a_request_is_built_of_fields_with_either_kind_of_address() {
         let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Tf{keys}"));
         let mut effects = type_keys(&mut model, "⏎");
         if matches!(model.modal, Some(Modal::Confirm(_))) {
-            effects = type_keys(&mut model, "⏎");
+            effects = type_keys(&mut model, "y");
         }
         assert_eq!(order_of(&effects), Some(&Command::Test(L1, Tool::Send(with_crc(expect)))), "{keys}");
     };
@@ -281,7 +282,7 @@ fn a_scan_of_all_settings_is_asked_and_shows_how_far_it_is() {
     insta::assert_snapshot!("window_scan", screen(&mut model, 80, 24));
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), None);
     assert!(screen(&mut model, 80, 24).contains("Polling of L1 pauses while other settings are tried"));
-    let effects = type_keys(&mut model, "⏎");
+    let effects = type_keys(&mut model, "y");
     let Some(Command::Test(_, tool @ Tool::Scan(scan))) = order_of(&effects) else { panic!("{effects:?}") };
     assert_eq!((scan.first, scan.last, scan.serials.len()), (1, 247, 32));
     let mut fixture = Fixture::traffic();
