@@ -59,6 +59,23 @@ pub enum Command {
     StopTest(LineId),
 }
 
+impl Command {
+    /// The tag and the value that it writes, if it writes one.
+    pub fn written(&self) -> Option<(TagId, f64)> {
+        match self {
+            Command::Write { tag, value } => Some((*tag, *value)),
+            Command::Acknowledge(_)
+            | Command::AcknowledgeAll
+            | Command::Refresh(_)
+            | Command::Connect(..)
+            | Command::Configure(_)
+            | Command::SaveSettings(_)
+            | Command::Test(..)
+            | Command::StopTest(_) => None,
+        }
+    }
+}
+
 /// How an order stands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OrderStatus {

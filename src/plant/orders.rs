@@ -255,17 +255,8 @@ fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
         Command::Test(line, tool) => ("test", def.line(*line).name.clone(), Some(tool.to_string())),
         Command::StopTest(line) => ("stop test", def.line(*line).name.clone(), None),
     };
-    let old = match &status.command {
-        Command::Write { tag, .. } => status.old.map(|old| value_words(board, def.tag(*tag), old)),
-        Command::Acknowledge(_)
-        | Command::AcknowledgeAll
-        | Command::Refresh(_)
-        | Command::Connect(..)
-        | Command::Configure(_)
-        | Command::SaveSettings(_)
-        | Command::Test(..)
-        | Command::StopTest(_) => None,
-    };
+    let old = status.old.zip(status.command.written());
+    let old = old.map(|(old, (tag, _))| value_words(board, def.tag(tag), old));
     ActionRecord {
         at: status.at,
         by: status.by.clone(),

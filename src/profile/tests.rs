@@ -9,7 +9,7 @@ use super::{
 };
 use crate::plant::{
     def::{Condition, PlantDef},
-    tag::Bound,
+    tag::{Bound, Class},
 };
 
 /// A small plant that is right. Each case changes some words of it.
@@ -313,6 +313,22 @@ fn a_plant_file_changes_a_tag_and_says_so_only_where_it_contradicts_itself() {
     let both = "fast = \"1s\"\n[[device.tag]]\nname = \"T\"\nmax = 90\nmax_from = \"DP\"";
     check("fast = \"1s\"", both, &["`max` and `max_from` exclude each other"]);
     check("unit = \"°C\"", "unit_from = \"MODE\"", &["D1.MODE does not tell a unit: `off` is no unit"]);
+}
+
+#[test]
+fn alarm_inputs_are_hard_unless_a_file_says_otherwise() {
+    let class_of = |plant: &str, tag: &str| {
+        let def = load(plant.as_bytes(), METER, PLC).unwrap();
+        def.tag(def.tag_named(tag).unwrap()).class
+    };
+    for (tag, class) in [("D1.T", Class::Hard), ("D1.DP", Class::Hard), ("D1.MODE", Class::Soft)] {
+        assert_eq!(class_of(PLANT, tag), class, "{tag}: an alarm watches T, and DP says where its point is");
+    }
+    let written = PLANT.replace("fast = \"1s\"\n", "fast = \"1s\"\n[[device.tag]]\nname = \"T\"\nclass = \"idle\"\n");
+    assert_eq!(class_of(&written, "D1.T"), Class::Idle);
+    let wrong = written.replace("idle", "idel");
+    let error = load(wrong.as_bytes(), METER, PLC).unwrap_err().to_string();
+    assert!(error.contains("did you mean `idle`?"), "{error}");
 }
 
 #[test]

@@ -88,25 +88,16 @@ fn alarm_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
 }
 
 fn order_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
-    use crate::plant::command::{Command, Outcome};
+    use crate::plant::command::Outcome;
     let news = after.orders.iter().rev().filter(|order| {
         order.outcome != Outcome::Pending
             && before.orders.iter().find(|old| old.id == order.id).is_none_or(|old| old.outcome != order.outcome)
     });
-    news.filter_map(|order| match order.command {
-        Command::Write { tag, value } => {
-            let (name, unit) = (&after.def.tag(tag).name, after.unit(tag));
-            let value = after.format(tag, value);
-            Some(format!("{}: {name} := {value} {unit} {}", order.by, outcome_words(&order.outcome)))
-        }
-        Command::Acknowledge(_)
-        | Command::AcknowledgeAll
-        | Command::Refresh(_)
-        | Command::Connect(..)
-        | Command::Configure(_)
-        | Command::SaveSettings(_)
-        | Command::Test(..)
-        | Command::StopTest(_) => None,
+    news.filter_map(|order| {
+        let (tag, value) = order.command.written()?;
+        let (name, unit) = (&after.def.tag(tag).name, after.unit(tag));
+        let value = after.format(tag, value);
+        Some(format!("{}: {name} := {value} {unit} {}", order.by, outcome_words(&order.outcome)))
     })
     .collect()
 }

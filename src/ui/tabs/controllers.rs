@@ -343,17 +343,9 @@ fn faceplate_row(cx: &Cx, device: &DeviceDef, canvas: &mut Canvas) {
 
 /// The latest write to this device and its outcome, and whether that is a worry.
 fn last_write(cx: &Cx, device: DeviceId) -> Option<(String, bool)> {
-    let order = cx.snapshot.orders.iter().find(|order| match order.command {
-        Command::Write { tag, .. } => cx.def().tag(tag).device == device,
-        Command::Acknowledge(_)
-        | Command::AcknowledgeAll
-        | Command::Refresh(_)
-        | Command::Connect(..)
-        | Command::Configure(_)
-        | Command::SaveSettings(_)
-        | Command::Test(..)
-        | Command::StopTest(_) => false,
-    })?;
+    let to_device = |tag| cx.def().tag(tag).device == device;
+    let order =
+        cx.snapshot.orders.iter().find(|order| order.command.written().is_some_and(|(tag, _)| to_device(tag)))?;
     let (words, trouble) = outcome_words(&order.outcome);
     let what = order_words(cx, &order.command, order.old);
     Some((format!("last: {what}  {words} {} by {}", clock(order.at, &cx.def().time_zone), order.by), trouble))

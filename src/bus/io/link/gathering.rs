@@ -1,0 +1,155 @@
+//! Gathers what comes back until it is the answer, or time is over.
+
+use std::{borrow::Cow, time::Duration};
+
+use tokio::time::Instant;
+
+use super::{Link, Trouble};
+use crate::{
+    bus::{
+        frame::{self, Mbap, Shape},
+        gather::{self, Verdict},
+    },
+    plant::{def::Framing, event::Fault},
+};
+
+/// Characters of an ASCII frame may be this far apart (Modbus over serial line V1.02, 2.5.2.1).
+const ASCII_PAUSE: Duration = Duration::from_secs(1);
+/// Most bytes gathered for one answer, noise included; more is no Modbus.
+pub(super) const GATHER_MAX: usize = 4_096;
+
+/// What was gathered for one request.
+#[derive(Debug, Clone)]
+pub(super) struct Gathered {
+    pub answer: Result<Vec<u8>, Fault>,
+    /// As it was on the wire.
+    pub frame: Vec<u8>,
+    pub reply: Option<Duration>,
+    /// From the last byte sent until now.
+    pub took: Duration,
+}
+
+impl Gathered {
+    pub fn nothing(answer: Result<Vec<u8>, Fault>) -> Gathered {
+        Gathered { answer, frame: Vec::new(), reply: None, took: Duration::ZERO }
+    }
+}
+
+impl Link {
+    /// Gathers until a frame has come that answers the message. Whole frames that do not (another unit, an owed answer)
+    /// are dropped, and waiting goes on inside the same deadline.
+    pub(super) async fn gather(&mut self, message: &[u8], sent: &[u8], sent_at: Instant) -> Result<Gathered, Trouble> {
+        let framing = self.framing();
+        let mut echo = self.expects_echo(message).then_some(sent);
+        let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);
+        let deadline = sent_at + self.timeout + self.wire.char_time * frame::wrapped_length(framing, longest) as u32;
+        let mut buffer: Vec<u8> = Vec::new();
+        // What came and did not fit: it names the fault if nothing better comes.
+        let mut misfit: Option<Fault> = None;
+        let mut reply = None;
+        loop {
+            // An adapter that gives back what it sends: its echo is no answer, however much it looks like one.
+            if let Some(sent) = echo.filter(|sent| buffer.starts_with(sent)) {
+                self.wire.record(false, buffer.drain(..sent.len()).collect(), Cow::Borrowed("echo of the adapter"));
+                (self.echoes, echo) = (true, None);
+            }
+            let echo_begun = self.echoes && echo.is_some_and(|sent| sent.starts_with(&buffer));
+            let verdict = if echo_begun { Verdict::Nothing } else { gather::verdict(framing, message, &buffer) };
+            let wait_until = match verdict {
+                Verdict::Answer(range) => {
+                    self.wire.drop_stale(&buffer[..range.start]);
+                    let frame = buffer[range].to_vec();
+                    self.wire.record(false, frame.clone(), Cow::Borrowed("ok"));
+                    let answer = frame::unwrap(framing, &frame)
+                        .and_then(|answer| frame::check_answer(message, &answer).map(|()| answer));
+                    return Ok(Gathered { answer, frame, reply, took: sent_at.elapsed() });
+                }
+                Verdict::Foreign(end, fault) => {
+                    self.wire.drop_stale(&buffer[..end]);
+                    buffer.drain(..end);
+                    misfit = Some(fault);
+                    continue;
+                }
+                // Nothing, or noise: the answer may still come.
+                Verdict::Nothing => deadline,
+                // The frame may still grow, or it is spoiled; silence decides.
+                Verdict::Begun if framing == Framing::Ascii => (Instant::now() + ASCII_PAUSE).min(deadline),
+                Verdict::Begun | Verdict::Spoiled(_) => (Instant::now() + self.idle).min(deadline),
+            };
+            if self.wire.receive(wait_until, &mut buffer).await? && buffer.len() <= GATHER_MAX {
+                reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
+                continue;
+            }
+            let fault = match verdict {
+                Verdict::Spoiled(fault) => fault,
+                _ => misfit.unwrap_or_else(|| gather::left_over(framing, message, &buffer)),
+            };
+            if !buffer.is_empty() {
+                self.wire.record(false, buffer.clone(), Cow::Owned(fault.to_string()));
+            }
+            return Ok(Gathered { answer: Err(fault), frame: buffer, reply, took: sent_at.elapsed() });
+        }
+    }
+
+    /// Gathers the answers to the transactions that begin with `first`; others are late answers and are dropped.
+    pub(super) async fn gather_mbap(
+        &mut self,
+        messages: &[&[u8]],
+        first: u16,
+        sent_at: Instant,
+    ) -> Result<Vec<Gathered>, Trouble> {
+        let deadline = sent_at + self.timeout;
+        let mut gathered: Vec<Option<Gathered>> = vec![None; messages.len()];
+        let (mut buffer, mut start, mut open): (Vec<u8>, usize, usize) = (Vec::new(), 0, messages.len());
+        while 0 < open {
+            match frame::mbap(&buffer[start..]) {
+                Mbap::Incomplete => {
+                    buffer.drain(..start);
+                    start = 0;
+                    if self.wire.receive(deadline, &mut buffer).await? {
+                        continue;
+                    }
+                    if !buffer.is_empty() {
+                        self.wire.record(false, buffer, Cow::Borrowed("cut short"));
+                        // The rest may come later and would stand before the next header.
+                        return Err(Trouble::Gone("an answer was cut short, the stream is out of step".into()));
+                    }
+                    break;
+                }
+                Mbap::Broken => {
+                    self.wire.record(false, buffer.split_off(start), Cow::Borrowed("no MBAP header"));
+                    return Err(Trouble::Gone("the stream is out of step".into()));
+                }
+                Mbap::Whole { transaction, end } => {
+                    let frame = buffer[start..start + end].to_vec();
+                    start += end;
+                    let index = usize::from(transaction.wrapping_sub(first));
+                    let Some(slot) = gathered.get_mut(index).filter(|slot| slot.is_none()) else {
+                        self.wire.drop_stale(&frame);
+                        continue;
+                    };
+                    let answer = frame[6..].to_vec();
+                    let answer = frame::check_answer(messages[index], &answer).map(|()| answer);
+                    let took = sent_at.elapsed();
+                    open -= 1;
+                    let verdict = match &answer {
+                        Ok(_) | Err(Fault::Exception(_)) => Cow::Borrowed("ok"),
+                        Err(fault) => Cow::Owned(fault.to_string()),
+                    };
+                    *slot = Some(Gathered { answer, frame: frame.clone(), reply: Some(took), took });
+                    self.wire.record(false, frame, verdict);
+                }
+            }
+        }
+        // What stands behind the last answer nobody has asked for.
+        self.wire.drop_stale(&buffer[start..]);
+        let missing = || Gathered { took: sent_at.elapsed(), ..Gathered::nothing(Err(Fault::Timeout)) };
+        Ok(gathered.into_iter().map(|slot| slot.unwrap_or_else(missing)).collect())
+    }
+
+    /// Could the sent bytes come back from the adapter? A read cannot be answered by itself, so its echo gives the adapter
+    /// away; from then on the echo of every request is expected.
+    fn expects_echo(&self, message: &[u8]) -> bool {
+        self.echoes || matches!(message.get(1), Some(0x01..=0x04 | 0x17))
+    }
+}

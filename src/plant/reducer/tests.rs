@@ -1,0 +1,212 @@
+//! The reducer of facts: what an operator would notice.
+
+use std::time::Duration;
+
+use super::*;
+use crate::plant::{
+    alarm::AlarmState,
+    command::{NotConfirmed, OrderId},
+    event::ExceptionCode,
+    fixture::{self, DP, FAULT, HIGH, PLC, PV, RUN, SILENT, SV, TIC},
+    record::AlarmStep,
+    sample::Quality,
+};
+
+const L1: LineId = LineId(0);
+
+fn at(second: i64) -> Timestamp {
+    Timestamp::from_second(second).expect("a small number")
+}
+
+fn read(second: i64, values: &[(TagId, f64)]) -> Event {
+    Event::Read {
+        at: at(second),
+        device: TIC,
+        values: values.to_vec(),
+        reply: Duration::from_millis(12),
+        exchange: None,
+    }
+}
+
+fn fail(second: i64, tags: &[TagId], fault: Fault) -> Event {
+    Event::Failed { at: at(second), device: TIC, tags: tags.to_vec(), fault, exchange: None }
+}
+
+fn running() -> Plant {
+    let mut plant = Plant::new(fixture::shared(), at(0), 1.0);
+    plant.on_event(Event::Line { at: at(0), line: L1, state: LineState::Connected });
+    plant.on_event(read(0, &[(PV, 700.0), (SV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
+    plant
+}
+
+fn order(number: u32, command: Command) -> Order {
+    Order { id: OrderId { terminal: 1, number }, by: "anna".into(), command }
+}
+
+/// Orders `SV := value`, answers with `result`, and gives the outcome and the raw number that was sent.
+fn write(plant: &mut Plant, value: f64, result: WriteResult) -> (Outcome, Option<f64>) {
+    let effects = plant.on_order(order(1, Command::Write { tag: SV, value }), at(1));
+    let sent = effects.bus.first().map(|(_, request)| match request {
+        BusRequest::Write { id, raw, .. } => (*id, *raw),
+        other => panic!("not a write: {other:?}"),
+    });
+    if let Some((id, _)) = sent {
+        assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Pending);
+        plant.on_event(Event::Wrote { at: at(2), id, result });
+    }
+    (plant.snapshot().orders[0].outcome.clone(), sent.map(|(_, raw)| raw))
+}
+
+#[test]
+fn a_write_is_verified_only_by_its_own_read_back() {
+    let refused = |refusal| Outcome::Refused(refusal);
+    for (value, result, outcome, sent) in [
+        (72.5, WriteResult::ReadBack(725.0), Outcome::Verified, Some(725.0)),
+        (72.5, WriteResult::ReadBack(700.0), Outcome::NotConfirmed(NotConfirmed::Different(70.0)), Some(725.0)),
+        (
+            72.5,
+            WriteResult::NotRead(Fault::Timeout),
+            Outcome::NotConfirmed(NotConfirmed::NotRead(Fault::Timeout)),
+            Some(725.0),
+        ),
+        (72.5, WriteResult::Refused(ExceptionCode(3)), refused(Refusal::Exception(ExceptionCode(3))), Some(725.0)),
+        (72.5, WriteResult::Lost(Fault::Timeout), Outcome::Failed(Fault::Timeout), Some(725.0)),
+        (70.0, WriteResult::Accepted, Outcome::Unchanged, None),
+        (100.1, WriteResult::Accepted, refused(Refusal::OutOfRange { min: "0.0".into(), max: "100.0".into() }), None),
+        (
+            f64::NAN,
+            WriteResult::Accepted,
+            refused(Refusal::OutOfRange { min: "0.0".into(), max: "100.0".into() }),
+            None,
+        ),
+    ] {
+        assert_eq!(write(&mut running(), value, result.clone()), (outcome, sent), "{value} {result:?}");
+    }
+}
+
+#[test]
+fn after_a_write_that_may_have_failed_the_old_value_is_not_trusted() {
+    for result in [WriteResult::Lost(Fault::Timeout), WriteResult::NotRead(Fault::Timeout)] {
+        let mut plant = running();
+        write(&mut plant, 72.5, result);
+        assert_eq!(plant.snapshot().sample(SV).quality, Quality::Uncertain(Cause::Timeout));
+        // The correction is really written, not taken for unchanged.
+        assert_eq!(write(&mut plant, 70.0, WriteResult::ReadBack(700.0)), (Outcome::Verified, Some(700.0)));
+    }
+}
+
+#[test]
+fn a_line_is_closed_when_it_says_so() {
+    let mut plant = running();
+    let effects = plant.on_order(order(1, Command::Connect(L1, false)), at(1));
+    assert_eq!((effects.bus.len(), effects.records.len()), (1, 0));
+    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Pending);
+    let effects = plant.on_event(Event::Line { at: at(2), line: L1, state: LineState::Disconnected });
+    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Verified);
+    assert!(
+        effects.records.iter().any(|record| matches!(record, Record::Action(deed) if &*deed.action == "disconnect"))
+    );
+    plant.on_order(order(2, Command::Connect(L1, false)), at(3));
+    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Unchanged);
+    let effects = plant.on_order(order(3, Command::Connect(L1, true)), at(4));
+    plant.on_undeliverable(L1, &effects.bus[0].1);
+    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Busy));
+}
+
+#[test]
+fn a_gateway_that_answers_for_a_dead_device_is_not_the_device() {
+    let mut plant = running();
+    plant.on_event(fail(1, &[PV], Fault::Exception(ExceptionCode(0x0B))));
+    assert_eq!(plant.snapshot().devices[TIC.index()].state, DeviceState::Failing(1));
+}
+
+#[test]
+fn nothing_is_written_blindly() {
+    let mut plant = Plant::new(fixture::shared(), at(0), 1.0);
+    let unknown = Outcome::Refused(Refusal::Unknown("number of decimals".into()));
+    assert_eq!(write(&mut plant, 50.0, WriteResult::Accepted), (unknown, None));
+    for (tag, value, refusal) in [(PV, 1.0, Refusal::ReadOnly), (RUN, 2.0, Refusal::NotAChoice)] {
+        let effects = plant.on_order(order(2, Command::Write { tag, value }), at(1));
+        assert!(effects.bus.is_empty());
+        assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(refusal));
+    }
+}
+
+#[test]
+fn a_second_write_waits_for_the_first_and_a_lost_one_is_given_up() {
+    let mut plant = running();
+    plant.on_order(order(1, Command::Write { tag: SV, value: 71.0 }), at(1));
+    plant.on_order(order(2, Command::Write { tag: SV, value: 72.0 }), at(2));
+    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::UnderWay));
+    let effects = plant.on_tick(at(122));
+    assert_eq!(plant.snapshot().orders[1].outcome, Outcome::Failed(Fault::Timeout));
+    assert!(effects.records.iter().any(|record| matches!(record, Record::Action(_))), "failures are on record too");
+}
+
+#[test]
+fn the_record_of_a_write_has_old_new_and_outcome() {
+    let mut plant = running();
+    let effects = plant.on_order(order(1, Command::Write { tag: SV, value: 72.5 }), at(1));
+    let BusRequest::Write { id, .. } = effects.bus[0].1 else { panic!("a write was ordered") };
+    let effects = plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(725.0) });
+    let Some(Record::Action(action)) = effects.records.last() else { panic!("no action on record") };
+    assert_eq!(
+        (&*action.by, &*action.action, &*action.target, action.old.as_deref(), action.new.as_deref(), &*action.outcome),
+        ("anna", "write", "TIC-1.SV", Some("70.0 °C"), Some("72.5 °C"), "verified")
+    );
+}
+
+#[test]
+fn a_silent_device_fails_then_is_down_then_comes_back() {
+    let mut plant = running();
+    plant.on_event(fail(1, &[PV], Fault::Timeout));
+    let snapshot = plant.snapshot();
+    assert_eq!(snapshot.devices[TIC.index()].state, DeviceState::Failing(1));
+    assert_eq!(snapshot.sample(PV).quality, Quality::Uncertain(Cause::Timeout));
+    assert_eq!(snapshot.sample(SV).quality, Quality::Good, "only what was asked for is in doubt");
+    let effects = plant.on_event(fail(3, &[PV, SV, DP, FAULT], Fault::Resting));
+    assert!(plant.snapshot().samples[..4].iter().all(|sample| sample.quality == Quality::Bad(Cause::DeviceDown)));
+    assert!(
+        effects.records.iter().any(|record| matches!(record, Record::Alarm(step) if step.step == AlarmStep::Raised))
+    );
+    assert_eq!(plant.snapshot().alarms[0].id, SILENT);
+    plant.on_event(read(9, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
+    assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Returned);
+    assert_eq!(plant.snapshot().sample(PV).quality, Quality::Good);
+}
+
+#[test]
+fn an_unplugged_line_takes_all_values_and_a_closed_one_raises_no_alarm() {
+    let mut plant = running();
+    plant.on_event(Event::Line { at: at(1), line: L1, state: LineState::Disconnected });
+    assert_eq!(plant.snapshot().sample(PV).quality, Quality::Bad(Cause::NotConnected));
+    assert!(plant.snapshot().alarms.is_empty());
+    let why = "No such file or directory".to_owned();
+    plant.on_event(Event::Line { at: at(2), line: L1, state: LineState::Waiting { why, retry_at: at(3) } });
+    assert_eq!(plant.snapshot().alarms.iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [SILENT]);
+    assert!(matches!(plant.snapshot().devices[PLC.index()].state, DeviceState::Down { .. }));
+}
+
+#[test]
+fn an_alarm_is_raised_acknowledged_by_name_and_returns() {
+    let mut plant = running();
+    plant.on_event(read(1, &[(PV, 760.0)]));
+    plant.on_event(read(3, &[(PV, 761.0)]));
+    assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Unacknowledged);
+    let effects = plant.on_order(order(1, Command::Acknowledge(HIGH)), at(4));
+    assert!(matches!(&effects.records[0], Record::Alarm(step) if step.by.as_deref() == Some("anna")));
+    let effects = plant.on_order(order(2, Command::AcknowledgeAll), at(4));
+    assert!(!effects.records.iter().any(|record| matches!(record, Record::Alarm(_))), "it was acknowledged already");
+    plant.on_event(fail(5, &[PV], Fault::Timeout));
+    assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Acknowledged, "no answer is no return");
+    plant.on_event(read(6, &[(PV, 700.0)]));
+    assert!(plant.snapshot().alarms.is_empty());
+}
+
+#[test]
+fn a_full_queue_is_told_to_the_operator() {
+    let mut plant = running();
+    let effects = plant.on_order(order(1, Command::Write { tag: SV, value: 72.5 }), at(1));
+    plant.on_undeliverable(effects.bus[0].0, &effects.bus[0].1);
+    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Busy));
+}
