@@ -109,6 +109,15 @@ impl Books {
         self.open = (0.0, 0.0);
     }
 
+    /// Answers of these units came when they had been given up.
+    pub fn late(&mut self, def: &PlantDef, units: &[u8]) {
+        for unit in units {
+            for (device, tally) in &mut self.devices {
+                tally.late += u64::from(def.device(*device).unit == *unit);
+            }
+        }
+    }
+
     /// Nothing is connected: nothing is busy.
     pub fn rest(&mut self, counters: &mut LineCounters) {
         self.busy.clear();

@@ -303,6 +303,11 @@ impl Link {
         &mut self.wire.counters
     }
 
+    /// See [`Wire::take_late`].
+    pub fn take_late(&mut self) -> Vec<u8> {
+        self.wire.take_late()
+    }
+
     /// The frames since they were last taken, oldest first.
     pub fn take_frames(&mut self) -> Vec<Frame> {
         self.wire.take_frames()

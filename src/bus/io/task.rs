@@ -343,6 +343,7 @@ impl Task {
         let over = Duration::try_from(now.duration_since(self.closed_at)).unwrap_or_default();
         let busy = std::mem::take(&mut link.busy).as_secs_f32();
         self.books.spent(busy / self.clock.real_span(over).as_secs_f32().max(1e-6), over);
+        self.books.late(&self.def, &link.take_late());
         self.books.take(link.take_frames(), link.counters());
         (self.memory, self.closed_at) = (link.memory(), now);
     }

@@ -23,6 +23,7 @@ use crate::plant::{
     def::{DeviceId, LineDef, Serial, TagId},
     event::{Event, ExceptionCode, Fault, LineState, WriteResult},
     tag::{Access, TagDef},
+    tally::Tally,
     tool::{Scan, Tool},
 };
 
@@ -430,4 +431,26 @@ async fn a_line_can_be_closed_while_a_scan_has_it_for_itself() {
     line.until(&def, |event| matches!(event, Event::Line { state: LineState::Testing, .. }).then_some(())).await;
     line.requests.send(BusRequest::Connect(false)).await.expect("the line runs");
     line.until(&def, |event| matches!(event, Event::Line { state: LineState::Disconnected, .. }).then_some(())).await;
+}
+
+/// What a retry has cured, and what came late, stands in the books of its device all the same.
+#[tokio::test(start_paused = true)]
+async fn cured_and_late_answers_are_counted_with_their_device() {
+    let def = plant(Mode::Rtu);
+    let mut line = line(def.clone());
+    line.plug(Mode::Rtu, |number, _| match number % 20 {
+        3 => Deed::BadCheck,
+        11 => Deed::Late(700 * MS),
+        _ => Deed::Answer,
+    });
+    for _ in 0..10_000 {
+        let event = line.events.recv().await.expect("the line runs");
+        let Event::Report { report, .. } = event else { continue };
+        let sum = |of: fn(&Tally) -> u64| report.devices.iter().map(|(_, tally)| of(tally)).sum::<u64>();
+        if 0 < sum(|tally| tally.check) && 0 < sum(|tally| tally.retries) && 0 < sum(|tally| tally.late) {
+            assert_eq!(sum(|tally| tally.late), report.counters.late);
+            return;
+        }
+    }
+    panic!("never counted")
 }

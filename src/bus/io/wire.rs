@@ -53,6 +53,8 @@ pub struct Wire {
     pub debts: Debts,
     /// Frames since they were last taken.
     frames: Vec<Frame>,
+    /// Units whose answers came late since this was last taken.
+    late: Vec<u8>,
     /// Totals of the line; `utilisation`, `opens` and `missed` are the task's.
     pub counters: LineCounters,
 }
@@ -83,6 +85,7 @@ impl Wire {
             born,
             debts,
             frames: Vec::new(),
+            late: Vec::new(),
             counters,
         }
     }
@@ -168,11 +171,16 @@ impl Wire {
         // Only a whole good frame tells who was late: chance bytes name anybody.
         let whole = frame::unwrap(self.framing, bytes).ok();
         let unit = whole.as_ref().and_then(|message| message.first().copied());
-        let late = unit.is_some_and(|unit| self.debts.came_late(unit, self.age()));
-        if late {
+        let late = unit.filter(|unit| self.debts.came_late(*unit, self.age()));
+        if let Some(unit) = late {
             self.counters.late += 1;
+            self.late.push(unit);
         }
-        self.record(false, bytes.to_vec(), Cow::Borrowed(if late { "late, dropped" } else { "stale, dropped" }));
+        self.record(
+            false,
+            bytes.to_vec(),
+            Cow::Borrowed(if late.is_some() { "late, dropped" } else { "stale, dropped" }),
+        );
     }
 
     /// Puts bytes on record.
@@ -190,6 +198,11 @@ impl Wire {
     /// The frames since they were last taken, oldest first.
     pub fn take_frames(&mut self) -> Vec<Frame> {
         std::mem::take(&mut self.frames)
+    }
+
+    /// The units whose answers came late since this was last asked, once for each answer.
+    pub fn take_late(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.late)
     }
 
     async fn wait_for_silence(&mut self) {

@@ -39,7 +39,7 @@ impl Task {
         let started = self.clock.now();
         let sent = link.last.clone();
         let read = match self.in_step(link, &block).await {
-            Ok(()) => self.read_twice(link, &block).await,
+            Ok(()) => self.read_twice(link, &block, Some(index)).await,
             Err(trouble) => Err(trouble),
         };
         let at = self.clock.now();
@@ -192,9 +192,16 @@ impl Task {
     }
 
     /// Reads a block; a spoiled answer is asked for once more. It counts as owed, so the unit is brought into step first.
-    pub(super) async fn read_twice(&self, link: &mut Link, block: &Block) -> Result<Answer, Trouble> {
+    pub(super) async fn read_twice(
+        &mut self,
+        link: &mut Link,
+        block: &Block,
+        index: Option<usize>,
+    ) -> Result<Answer, Trouble> {
         match read(link, block).await {
             Err(Trouble::Fault(fault)) if fault.is_corrupt() => {
+                // A retry that cures it must not hide it.
+                self.books.polled(index, block.device, Err(fault), None, 1);
                 self.in_step(link, block).await?;
                 let second = read(link, block).await;
                 if let Some(last) = &mut link.last {

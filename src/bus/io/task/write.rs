@@ -107,7 +107,7 @@ impl Task {
         }
         let block = plan::single(device, tag);
         let back = match self.in_step(link, &block).await {
-            Ok(()) => self.read_twice(link, &block).await,
+            Ok(()) => self.read_twice(link, &block, None).await,
             Err(trouble) => Err(trouble),
         };
         match back {
