@@ -122,9 +122,14 @@ impl Wire {
             self.drain()?;
         }
         // No flush: on a serial port that waits for the last byte to leave, and blocks the thread while it does.
-        match tokio::time::timeout(self.timeout + self.char_time * 512, self.port.write_all(bytes)).await {
-            Ok(written) => written.map_err(|error| Trouble::Gone(error.to_string()))?,
-            Err(_) => return Err(Trouble::Gone("the port takes no bytes".into())),
+        // What the system takes at once, as a rule all of it, costs no timer.
+        let taken = self.port.write(bytes).now_or_never().unwrap_or(Ok(0));
+        let taken = taken.map_err(|error| Trouble::Gone(error.to_string()))?;
+        if let Some(rest @ [_, ..]) = bytes.get(taken..) {
+            match tokio::time::timeout(self.timeout + self.char_time * 512, self.port.write_all(rest)).await {
+                Ok(written) => written.map_err(|error| Trouble::Gone(error.to_string()))?,
+                Err(_) => return Err(Trouble::Gone("the port takes no bytes".into())),
+            }
         }
         self.counters.sent_bytes += bytes.len() as u64;
         self.counters.last_tx = Some(self.clock.now());
@@ -133,7 +138,7 @@ impl Wire {
 
     /// Appends what comes next to `buffer`; `false` if nothing came before `until`.
     pub async fn receive(&mut self, until: Instant, buffer: &mut Vec<u8>) -> Result<bool, Trouble> {
-        let mut chunk = [0; 4_096];
+        let mut chunk = [0; 1_024];
         // What is there already costs no timer.
         let read = match self.port.read(&mut chunk).now_or_never() {
             Some(read) => read,
