@@ -29,7 +29,10 @@ pub fn verdict(framing: Framing, message: &[u8], buffer: &[u8]) -> Verdict {
 
 /// Looks for a frame with a good CRC at the beginning, then behind noise.
 fn in_bytes(message: &[u8], buffer: &[u8]) -> Verdict {
-    let begins = |rest: &[u8]| rest.len() >= 2 && rest[0] == message[0] && rest[1] & 0x7F == message[1];
+    let begins = |rest: &[u8]| match (rest, message) {
+        ([unit, function, ..], [asked_unit, asked, ..]) => unit == asked_unit && function & 0x7F == *asked,
+        _ => false,
+    };
     for start in 0..buffer.len() {
         let rest = &buffer[start..];
         let Some(length) = frame::answer_length(rest).filter(|length| length + 2 <= rest.len()) else { continue };

@@ -33,7 +33,7 @@ use super::{
 use crate::{
     bus::{
         debt::Debt,
-        frame::{self, Shape},
+        frame::{self, Mbap, Shape},
         gather::{self, Verdict},
     },
     plant::{
@@ -219,10 +219,18 @@ impl Link {
             }
             reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
             // A request is answered by one frame; what follows bytes that are none only silence tells.
-            match gather::verdict(framing, &request, &buffer) {
-                Verdict::Answer(_) if framing != Framing::Mbap && !request.is_empty() => break true,
-                _ if request.is_empty() => until = (Instant::now() + self.idle).min(deadline),
-                _ => {}
+            if request.is_empty() {
+                until = (Instant::now() + self.idle).min(deadline);
+                continue;
+            }
+            let whole = match framing {
+                Framing::Mbap => matches!(frame::mbap(&buffer), Mbap::Whole { .. }),
+                Framing::Rtu | Framing::Ascii => {
+                    matches!(gather::verdict(framing, &request, &buffer), Verdict::Answer(_))
+                }
+            };
+            if whole {
+                break true;
             }
         };
         if !buffer.is_empty() {

