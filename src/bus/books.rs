@@ -5,7 +5,7 @@ use std::{collections::VecDeque, sync::Arc, time::Duration};
 use super::{
     admission,
     plan::{self, Block},
-    schedule::PollInfo,
+    schedule::{Load, PollInfo},
 };
 use crate::plant::{
     PlantDef,
@@ -33,6 +33,8 @@ pub struct Plan<'a> {
     pub polls: Vec<PollInfo>,
     /// Tags that their devices have refused.
     pub refused: Vec<TagId>,
+    /// How the schedule copes; normal without a port.
+    pub load: Load,
 }
 
 /// The books of one line. They outlive its openings.
@@ -152,7 +154,7 @@ impl Books {
 
     /// All of it, for a snapshot.
     pub fn report(&self, def: &PlantDef, settings: &LineDef, plan: Plan, counters: LineCounters) -> Arc<LineReport> {
-        let Plan { blocks, polls, refused } = plan;
+        let Plan { blocks, polls, refused, load } = plan;
         let poll = |(index, (block, tally)): (usize, (&Block, &Tally))| PollReport {
             class: block.class,
             factor: polls.get(index).map_or(1, |poll| poll.factor),
@@ -170,6 +172,7 @@ impl Books {
         Arc::new(LineReport {
             admission: self.admission.clone(),
             refused,
+            strain: (load != Load::Normal).then(|| load.to_string()),
             settings: settings.clone(),
             counters,
             polls: blocks.iter().zip(&self.polls).enumerate().map(poll).collect(),
@@ -200,7 +203,7 @@ mod tests {
         books.polled(Some(0), blocks[0].device, Err(Fault::Timeout), None, 1);
         books.polled(Some(1), blocks[1].device, Ok(()), None, 1);
         books.replan(&blocks, &blocks[1..]);
-        let plan = Plan { blocks: &blocks[1..], polls: Vec::new(), refused: Vec::new() };
+        let plan = Plan { blocks: &blocks[1..], polls: Vec::new(), refused: Vec::new(), load: Load::Normal };
         let report = books.report(&def, &def.lines[0], plan, counters);
         assert_eq!(report.polls[0].tally.requests, 1, "a block that stays keeps its tally");
         assert_eq!(report.device(blocks[0].device).map(|tally| tally.timeouts), Some(1));

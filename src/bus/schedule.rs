@@ -58,7 +58,6 @@ pub struct Schedule {
     overload: Overload,
     /// The last read was one that had starved: the next is not.
     fed: bool,
-    missed: u64,
 }
 
 /// When a poll may be read, and what counts against the others.
@@ -71,7 +70,7 @@ impl Schedule {
     /// Everything is due at `now`, which is also the origin of the grid.
     pub fn new(blocks: &[Block], now: Timestamp) -> Schedule {
         let (polls, devices, overload) = (Vec::new(), Vec::new(), Overload::default());
-        let mut schedule = Schedule { origin: now, polls, devices, overload, fed: false, missed: 0 };
+        let mut schedule = Schedule { origin: now, polls, devices, overload, fed: false };
         schedule.replan(blocks, now);
         schedule
     }
@@ -165,7 +164,6 @@ impl Schedule {
         let poll = &mut self.polls[index];
         let free = rests_until.max(poll.not_before);
         let served = poll.serve(factor, shed, free, started, now);
-        self.missed += u64::from(served.missed);
         let late = poll.class == Class::Hard && poll.is_late();
         self.judge(late, now);
         served
@@ -248,11 +246,6 @@ impl Schedule {
     /// Must the device be left alone now (it is settling, or owes answers)?
     pub fn is_resting(&self, device: DeviceId, now: Timestamp) -> bool {
         self.health(device).is_some_and(|health| now < health.rests_until)
-    }
-
-    /// Releases that were skipped because the line had no time.
-    pub fn missed(&self) -> u64 {
-        self.missed
     }
 
     /// How the line copes: what is shed, and by what soft polls are stretched.

@@ -27,6 +27,11 @@ pub struct Admission {
 }
 
 impl Admission {
+    /// What one probe of a device costs the others while it does not answer.
+    pub fn dead_cost(&self, device: DeviceId) -> Option<Duration> {
+        self.dead.iter().find(|dead| dead.device == device).map(|dead| dead.probe)
+    }
+
     /// Nothing is polled.
     pub fn of_nothing(line: LineId) -> Admission {
         Admission {

@@ -25,6 +25,8 @@ pub struct LineReport {
     pub polls: Vec<PollReport>,
     /// Tags that their devices have refused: they are asked for once a minute at most.
     pub refused: Vec<TagId>,
+    /// How the schedule copes with too much to do, in words; `None` while every poll has its period.
+    pub strain: Option<String>,
     /// Whether all polls can meet their periods.
     pub admission: Admission,
     /// What each device of the line has answered.
@@ -42,6 +44,7 @@ impl LineReport {
             counters: LineCounters::default(),
             polls: Vec::new(),
             refused: Vec::new(),
+            strain: None,
             admission: Admission::of_nothing(settings.id),
             devices: Vec::new(),
             busy: Vec::new(),

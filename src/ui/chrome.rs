@@ -301,6 +301,7 @@ pub fn watch_words(cx: &Cx, watch: &Watch) -> (String, Style) {
     let (words, trouble) = match (&status.command, &status.outcome) {
         // The line has taken it; what comes of it stands on the bus tab.
         (Command::Test(..), Outcome::Verified) => ("begun".to_owned(), false),
+        (Command::StopTest(_), Outcome::Verified) => ("done".to_owned(), false),
         // Whether they are the right ones only the devices can tell.
         (Command::Configure(_), Outcome::Verified) => ("in use".to_owned(), false),
         (Command::SaveSettings(_), Outcome::Verified) => ("written into the plant file".to_owned(), false),

@@ -20,7 +20,7 @@ use crate::{
         backoff::Backoff,
         books::{Books, Plan},
         plan::{self, Block, Holes, Hunt},
-        schedule::{Next, Schedule, WRITE_SHARE, WriteBudget},
+        schedule::{Load, Next, Schedule, WRITE_SHARE, WriteBudget},
         tool::Job,
     },
     plant::{
@@ -353,6 +353,7 @@ impl Task {
             blocks: &self.blocks,
             polls: schedule.map(|schedule| schedule.polls().collect()).unwrap_or_default(),
             refused: plan::refused(&self.def, self.line, &self.holes),
+            load: schedule.map_or(Load::Normal, Schedule::load),
         };
         let report = self.books.report(&self.def, &self.settings, plan, self.memory.counters);
         self.tell(Event::Report { at: self.clock.now(), line: self.line, report }).await

@@ -1,6 +1,6 @@
 //! `sightglass loopback`: does a unit send back what it is sent.
 
-use super::{PortArgs, exchange_lines, run};
+use super::{UnitArgs, exchange_lines, run};
 use crate::{
     cli::{CliError, say},
     plant::{
@@ -13,27 +13,20 @@ use crate::{
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    port: PortArgs,
-    /// Unit address
-    #[arg(long, short, default_value = "1")]
-    unit: u8,
+    of: UnitArgs,
     /// How often
     #[arg(long, short, default_value = "10", value_parser = clap::value_parser!(u16).range(1..=1000))]
     count: u16,
-    /// Show every byte
-    #[arg(long, short)]
-    verbose: bool,
 }
 
 /// Diagnostics 08/00 with a number that counts up.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let line = args.port.line()?;
-    args.port.unit(&line, args.unit)?;
-    say(&format!("loopback 08/00 to unit {} on {}", args.unit, line.transport));
-    let tool = Tool::Loopback { unit: args.unit, data: 0xA537, count: args.count };
+    let (line, unit) = args.of.line_and_unit()?;
+    say(&format!("loopback 08/00 to unit {} on {}", unit, line.transport));
+    let tool = Tool::Loopback { unit, data: 0xA537, count: args.count };
     let run = run(&line, tool, |finding| match finding {
-        Finding::Exchange(exchange) if args.verbose => exchange_lines(exchange),
-        Finding::Failed { what, fault } if !args.verbose => vec![format!("{what}: {fault}")],
+        Finding::Exchange(exchange) if args.of.verbose => exchange_lines(exchange),
+        Finding::Failed { what, fault } if !args.of.verbose => vec![format!("{what}: {fault}")],
         Finding::Verdict(words) => vec![words.clone()],
         Finding::Exchange(_)
         | Finding::Failed { .. }

@@ -48,6 +48,31 @@ pub struct PortArgs {
     timeout: u64,
 }
 
+/// A unit on a port.
+#[derive(Debug, Clone, clap::Args)]
+pub struct UnitArgs {
+    #[command(flatten)]
+    port: PortArgs,
+    /// Unit address
+    #[arg(long, short, default_value = "1")]
+    unit: u8,
+    /// Show every byte
+    #[arg(long, short)]
+    verbose: bool,
+}
+
+impl UnitArgs {
+    /// The line, and a unit on it that can answer: on a serial line 0 is everybody, and nobody answers.
+    fn line_and_unit(&self) -> Result<(LineDef, u8), CliError> {
+        let line = self.port.line()?;
+        let (least, most) = if line.transport.framing() == Framing::Mbap { (0, 255) } else { (1, 247) };
+        if (least..=most).contains(&self.unit) {
+            return Ok((line, self.unit));
+        }
+        Err(CliError::Usage(format!("--unit: found {}, expected {least} to {most}", self.unit)))
+    }
+}
+
 impl PortArgs {
     /// The line that the arguments describe.
     pub fn line(&self) -> Result<LineDef, CliError> {
@@ -73,16 +98,6 @@ impl PortArgs {
             Transport::Tcp { host: host.to_owned(), port: tcp_port, framing }
         };
         Ok(LineDef { timeout: Duration::from_millis(self.timeout), ..LineDef::new(LineId(0), "line", transport) })
-    }
-
-    /// A unit that can answer: on a serial line 0 is everybody, and nobody answers.
-    fn unit(&self, line: &LineDef, unit: u8) -> Result<u8, CliError> {
-        let most = if line.transport.framing() == Framing::Mbap { 255 } else { 247 };
-        let least = u8::from(most == 247);
-        if (least..=most).contains(&unit) {
-            return Ok(unit);
-        }
-        Err(CliError::Usage(format!("--unit: found {unit}, expected {least} to {most}")))
     }
 
     fn serial(&self, framing: Framing) -> Result<Serial, CliError> {

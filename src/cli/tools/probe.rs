@@ -1,6 +1,6 @@
 //! `sightglass probe`: what one unit says of itself, and what some of its registers hold.
 
-use super::{PortArgs, exchange_lines, run};
+use super::{UnitArgs, exchange_lines, run};
 use crate::{
     bus::{codec, names},
     cli::{CliError, say},
@@ -14,16 +14,10 @@ use crate::{
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    port: PortArgs,
-    /// Unit address
-    #[arg(long, short, default_value = "1")]
-    unit: u8,
+    of: UnitArgs,
     /// Read this: TABLE:ADDRESS[:COUNT] with the wire address (holding:1002:10), or a Modicon number (41003:10)
     #[arg(long, short, value_name = "WHERE", value_parser = place)]
     read: Option<Place>,
-    /// Show every byte
-    #[arg(long, short)]
-    verbose: bool,
 }
 
 /// Registers or bits of a device.
@@ -36,15 +30,14 @@ pub struct Place {
 
 /// Reads what is asked for, else the identification.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let line = args.port.line()?;
-    args.port.unit(&line, args.unit)?;
-    say(&format!("unit {} on {}", args.unit, line.transport));
+    let (line, unit) = args.of.line_and_unit()?;
+    say(&format!("unit {} on {}", unit, line.transport));
     let tool = match args.read {
-        Some(Place { table, address, count }) => Tool::Read { unit: args.unit, table, address, count },
-        None => Tool::Identify { unit: args.unit },
+        Some(Place { table, address, count }) => Tool::Read { unit, table, address, count },
+        None => Tool::Identify { unit },
     };
     let run = run(&line, tool, |finding| match finding {
-        Finding::Exchange(exchange) if args.verbose => exchange_lines(exchange),
+        Finding::Exchange(exchange) if args.of.verbose => exchange_lines(exchange),
         Finding::Object { name, text } => vec![format!("{name:20}  {text}")],
         Finding::Values { table, address, words } => value_lines(*table, *address, words),
         Finding::Failed { what, fault } => vec![format!("{what}: {fault}")],

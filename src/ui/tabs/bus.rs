@@ -293,7 +293,8 @@ impl Bus {
         if height < rows + DAY_HEIGHT {
             return;
         }
-        let mut day = page.part(1, height - DAY_HEIGHT, width.saturating_sub(2), DAY_HEIGHT);
+        let below = (rows + 1).min(height - DAY_HEIGHT);
+        let mut day = page.part(1, below, width.saturating_sub(2), DAY_HEIGHT);
         line_trend(cx, &mut day, &self.minutes);
     }
 

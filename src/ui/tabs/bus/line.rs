@@ -10,7 +10,7 @@ use super::{
 use crate::{
     bus::names,
     plant::{
-        def::{DeviceDef, LineDef, Transport},
+        def::{DeviceDef, LineDef},
         event::{Fault, LineState},
         line_report::LineReport,
         snapshot::DeviceState,
@@ -299,6 +299,10 @@ fn worries(cx: &Cx, at: &Place) -> Vec<String> {
         worries.push(format!("these settings are tried, not saved; before: {}", before.transport));
     }
     let Some(report) = at.report else { return worries };
+    worries.extend(report.strain.clone());
+    if !report.admission.verdict.fits() {
+        worries.push(report.admission.verdict.to_string());
+    }
     if missed_lately(report) {
         worries.push(format!(
             "the line is full: {} reads were skipped. Poll less often, or raise the baud rate",
@@ -307,8 +311,9 @@ fn worries(cx: &Cx, at: &Place) -> Vec<String> {
     }
     for device in cx.def().devices.iter().filter(|device| device.line == at.id) {
         let Some(tally) = report.device(device.id) else { continue };
-        worries
-            .extend(of_device(cx, at.settings, device, tally).into_iter().map(|why| format!("{}: {why}", device.name)));
+        worries.extend(
+            of_device(cx, at.settings, report, device, tally).into_iter().map(|why| format!("{}: {why}", device.name)),
+        );
     }
     let uart = report.counters.uart.unwrap_or_default();
     if 0 < uart.parity + uart.framing && Tallies::of(report).lately {
@@ -318,7 +323,7 @@ fn worries(cx: &Cx, at: &Place) -> Vec<String> {
     worries
 }
 
-fn of_device(cx: &Cx, line: &LineDef, device: &DeviceDef, tally: &Tally) -> Vec<String> {
+fn of_device(cx: &Cx, line: &LineDef, report: &LineReport, device: &DeviceDef, tally: &Tally) -> Vec<String> {
     let mut worries = Vec::new();
     if let Some(p99) = near(tally, line.timeout) {
         worries.push(format!("replies take {} of {} ms: raise the timeout", p99.as_millis(), line.timeout.as_millis()));
@@ -330,8 +335,9 @@ fn of_device(cx: &Cx, line: &LineDef, device: &DeviceDef, tally: &Tally) -> Vec<
     let when = clock(when, &cx.def().time_zone);
     let advice = match fault {
         Fault::Timeout => {
-            let cost = ms(line.timeout + probe(line));
-            format!("look at its power, wiring and unit number; every probe costs the line {cost}")
+            let cost =
+                report.admission.dead_cost(device.id).map(|cost| format!("; every probe costs the line {}", ms(cost)));
+            format!("look at its power, wiring and unit number{}", cost.unwrap_or_default())
         }
         Fault::Crc { .. } | Fault::Lrc { .. } | Fault::Truncated { .. } | Fault::NotHex(_) => {
             "look at baud rate, parity, termination and shield of the line".to_owned()
@@ -344,14 +350,6 @@ fn of_device(cx: &Cx, line: &LineDef, device: &DeviceDef, tally: &Tally) -> Vec<
     };
     worries.push(format!("{fault} at {when}: {advice}").trim_end_matches(": ").to_owned());
     worries
-}
-
-/// Time of a request on the wire.
-fn probe(line: &LineDef) -> Duration {
-    match &line.transport {
-        Transport::Serial { serial, .. } => serial.char_time() * 8 + serial.silence(),
-        Transport::Tcp { .. } => Duration::ZERO,
-    }
 }
 
 fn value(cx: &Cx, label: &str, text: &str) -> Row {

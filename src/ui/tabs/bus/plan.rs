@@ -79,7 +79,7 @@ impl Plan {
             canvas.text_right(width.saturating_sub(1), 0, &format!(" {below} more ▼"), theme.strong());
         }
         let bottom = (2 + lines.len().min(room) as u16).min(height.saturating_sub(DETAIL - 1));
-        let told = detail(cx, &report.polls[selected]);
+        let told = detail(cx, report, &report.polls[selected]);
         let style = |line: &str| if line.starts_with('!') { theme.trouble() } else { theme.normal() };
         let rows = told.iter().flat_map(|line| {
             let parts = wrap(line, width.saturating_sub(2));
@@ -179,7 +179,7 @@ pub fn plural<'a>(count: usize, one: &'a str, many: &'a str) -> &'a str {
 }
 
 /// All that the table has no room for.
-fn detail(cx: &Cx, poll: &PollReport) -> Vec<String> {
+fn detail(cx: &Cx, report: &LineReport, poll: &PollReport) -> Vec<String> {
     let (device, code, tally) = (cx.def().device(poll.device), poll.table.read_fc(), &poll.tally);
     let last = poll.address.saturating_add(poll.count.saturating_sub(1));
     let used: u16 = poll.tags.iter().map(|tag| cx.def().tag(*tag).point.len()).sum();
@@ -188,6 +188,8 @@ fn detail(cx: &Cx, poll: &PollReport) -> Vec<String> {
     let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
     let late =
         tally.jitter.max().map_or("never sent late".to_owned(), |late| format!("sent late by {} at most", ms(late)));
+    let dead = report.admission.dead_cost(poll.device);
+    let dead = dead.map_or(String::new(), |cost| format!("; while {} is dead a probe costs {}", device.name, ms(cost)));
     let mut lines = vec![
         format!(
             "{} unit {}, {code} / 0x{code:02X} {}: {} = wire {}–{} (0x{:04X}–0x{last:04X}), {} {}{over}",
@@ -202,7 +204,7 @@ fn detail(cx: &Cx, poll: &PollReport) -> Vec<String> {
             plural(poll.tags.len(), "tag", "tags"),
         ),
         format!(
-            "reply {} ms, p99 {}, max {}; {late}; missed {}; asked again {}",
+            "reply {} ms, p99 {}, max {}; {late}; missed {}; asked again {}{dead}",
             span(tally.reply.last()),
             span(tally.reply.p99()),
             span(tally.reply.max()),
