@@ -82,7 +82,7 @@ fn blocks_of(def: &PlantDef, device: &DeviceDef, holes: &Holes) -> Vec<Block> {
     let wire = Wire::of(def.line(device.line), device);
     let groups = tags.chunk_by(|a, b| (a.poll, a.point.table) == (b.poll, b.point.table));
     let runs = groups.flat_map(|group| cheapest::cut(group, device, wire, holes));
-    runs.map(|run| together(device, run)).chain(refused.iter().map(|tag| asked_again(device, tag))).collect()
+    runs.map(|run| together(device, &run)).chain(refused.iter().map(|tag| asked_again(device, tag))).collect()
 }
 
 /// A device may get another program: what it has refused is asked for now and then, when the line has time.
@@ -157,8 +157,7 @@ impl Extent {
 
     /// Within the limits of one request, and free of holes.
     fn allowed(self, device: &DeviceDef, holes: &Holes) -> bool {
-        let max = if self.table.is_bits() { device.limits.read_bits_max } else { device.limits.read_words_max };
-        self.count() <= u32::from(max) && !holes.touch(device.id, self.table, self.start, self.end)
+        self.count() <= device.limits.most(self.table) && !holes.touch(device.id, self.table, self.start, self.end)
     }
 
     /// Most unused registers or bits between two tags: sixteen bits cost as much on the wire as one register.

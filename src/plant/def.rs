@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use jiff::{civil::Time, tz::TimeZone};
 
-use super::tag::TagDef;
+use super::tag::{Table, TagDef};
 
 pub use super::{
     id::{AlarmId, DeviceId, LineId, TagId},
@@ -114,6 +114,11 @@ pub struct Limits {
 }
 
 impl Limits {
+    /// Registers or bits that one read of a table may ask for.
+    pub fn most(&self, table: Table) -> u32 {
+        u32::from(if table.is_bits() { self.read_bits_max } else { self.read_words_max })
+    }
+
     /// What the standard allows (Modbus application protocol V1.1b3, section 6), one request at a time.
     pub const STANDARD: Limits = Limits {
         read_words_max: 125,

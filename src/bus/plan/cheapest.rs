@@ -9,15 +9,25 @@ use crate::plant::{def::DeviceDef, tag::TagDef};
 /// the requests together take the least time on the wire (and are fewest among equals).
 ///
 /// Only runs of neighbours need be looked at: of any two requests where none contains the other, the later one can take
-/// over every tag that it covers from its start on. `best[n]` is the least cost of the first n values; the last request
-/// of them begins at some value, no further back than the limits of the device allow.
-pub(super) fn cut<'a, 'b>(
-    tags: &'b [&'a TagDef],
-    device: &DeviceDef,
-    wire: Wire,
-    holes: &Holes,
-) -> Vec<&'b [&'a TagDef]> {
-    let values = values(tags);
+/// over every tag that it covers from its start on. That fails only for a value that is longer than a request may be: it
+/// can be read alone and nothing can join it, so it is set aside first. `best[n]` is the least cost of the first n values;
+/// the last request of them begins at some value, no further back than the limits of the device allow.
+pub(super) fn cut<'a>(tags: &[&'a TagDef], device: &DeviceDef, wire: Wire, holes: &Holes) -> Vec<Vec<&'a TagDef>> {
+    let too_long = |value: &Value| {
+        let alone = Extent::of(tags[value.tags.start].point, value.end, device);
+        device.limits.most(alone.table) < alone.count()
+    };
+    let (mut runs, mut values): (Vec<Vec<&TagDef>>, Vec<Value>) = (Vec::new(), Vec::new());
+    // The registers of a value that was set aside are no gap, but one before it still lies between its neighbours.
+    let mut gap = 0;
+    for value in self::values(tags) {
+        gap = value.gap.max(gap);
+        if too_long(&value) {
+            runs.push(tags[value.tags].to_vec());
+        } else {
+            values.push(Value { gap: std::mem::take(&mut gap), ..value });
+        }
+    }
     let mut best: Vec<(Duration, usize)> = vec![(Duration::ZERO, 0)];
     let mut first = Vec::with_capacity(values.len());
     for last in 0..values.len() {
@@ -41,13 +51,13 @@ pub(super) fn cut<'a, 'b>(
         best.push(least);
         first.push(start);
     }
-    let mut runs = Vec::new();
     let mut left = values.len();
     while let Some(&start) = left.checked_sub(1).and_then(|last| first.get(last)) {
-        runs.push(&tags[values[start].tags.start..values[left - 1].tags.end]);
+        let run = values[start..left].iter().flat_map(|value| &tags[value.tags.clone()]);
+        runs.push(run.copied().collect());
         left = start;
     }
-    runs.reverse();
+    runs.sort_by_key(|run| (run[0].point.address, run[0].point.len(), run[0].id));
     runs
 }
 

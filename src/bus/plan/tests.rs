@@ -250,6 +250,16 @@ fn holes_at(addresses: &[u16]) -> Holes {
     holes
 }
 
+/// With two-register alignment the four words at 35 take six, which is more than a request of four may ask: the values at
+/// 34 and 36 share one all the same.
+#[test]
+fn a_value_too_long_for_a_request_does_not_part_its_neighbours() {
+    let limits = Limits { read_words_max: 4, gap_words_max: 0, alignment: 2, ..Limits::STANDARD };
+    let def = plant_of(&[(34, 3, 0, 0), (35, 3, 2, 0), (36, 3, 0, 0)], limits, serial_line(9600, 1, Framing::Rtu));
+    let seen: Vec<_> = blocks(&def, LineId(0), &Holes::default()).iter().map(|b| (b.address, b.count)).collect();
+    assert_eq!(seen, [(34, 4), (34, 6)]);
+}
+
 proptest! {
     #[test]
     fn every_tag_is_in_one_block_within_the_limits(
