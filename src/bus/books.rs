@@ -163,7 +163,7 @@ impl Books {
             table: block.table,
             address: block.address,
             count: block.count,
-            tags: block.tags.as_slice().into(),
+            tags: block.tags.clone(),
             poll: block.poll,
             cost: plan::cost(block, settings, def.device(block.device)),
             next: polls.get(index).and_then(|poll| poll.next),

@@ -178,7 +178,7 @@ mod tests {
 
     fn frame(sent: bool, framing: Framing, bytes: Vec<u8>, verdict: &'static str) -> Frame {
         let at = Timestamp::UNIX_EPOCH + jiff::SignedDuration::from_micros(1_700_000_000_123_456);
-        Frame { at, sent, bytes, framing, verdict: verdict.into(), unit: Some(1), number: 1 }
+        Frame { at, sent, bytes: bytes.into(), framing, verdict: verdict.into(), unit: Some(1), number: 1 }
     }
 
     /// Types and bodies of the blocks; panics when lengths do not lead from one to the next.
@@ -250,7 +250,7 @@ mod tests {
         );
         for (line, frame) in lines.lines().zip(&frames) {
             let typed = crate::bus::typed::parse(line, None);
-            assert!(typed.is_ok_and(|typed| typed.bytes == frame.bytes && typed.sent == Some(frame.sent)), "{line}");
+            assert!(typed.is_ok_and(|typed| typed.bytes[..] == frame.bytes[..] && typed.sent == Some(frame.sent)), "{line}");
         }
     }
 }

@@ -95,8 +95,8 @@ mod tests {
         Exchange {
             at: Timestamp::UNIX_EPOCH,
             framing,
-            request: frame::wrap(framing, 7, request),
-            answer: frame::wrap(framing, 7, answer),
+            request: frame::wrap(framing, 7, request).into(),
+            answer: frame::wrap(framing, 7, answer).into(),
             outcome: Ok(()),
             reply: None,
             tries: 1,
@@ -138,7 +138,7 @@ mod tests {
             ..exchange(Framing::Rtu, &ASKED, &[1, 0x83, 2])
         };
         check(point(Table::Holding, 1_000, Kind::U16), &refused);
-        check(point(Table::Holding, 1_000, Kind::U16), &Exchange { answer: Vec::new(), ..read });
+        check(point(Table::Holding, 1_000, Kind::U16), &Exchange { answer: [].into(), ..read });
     }
 
     #[test]

@@ -116,7 +116,7 @@ mod tests {
         let frame = |number: u64, sent: bool, framing: Framing, bytes: Vec<u8>, verdict: &'static str| Frame {
             at: Timestamp::UNIX_EPOCH,
             sent,
-            bytes,
+            bytes: bytes.into(),
             framing,
             verdict: verdict.into(),
             unit: None,

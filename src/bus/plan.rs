@@ -21,7 +21,7 @@ mod tests;
 pub use cost::{Wire, cost};
 pub use holes::{Holes, Hunt};
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use crate::plant::{
     PlantDef,
@@ -46,7 +46,7 @@ pub struct Block {
     /// Registers, or bits.
     pub count: u16,
     /// The tags in it, by address.
-    pub tags: Vec<TagId>,
+    pub tags: Arc<[TagId]>,
     /// How often.
     pub poll: Poll,
     /// The most important class of its tags.

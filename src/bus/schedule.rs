@@ -126,11 +126,11 @@ impl Schedule {
                 release + self.period_of(poll).unwrap_or(ONCE_WITHIN),
             )
         };
-        let starves = from + STARVED_AFTER <= now;
+        let starves = || from + STARVED_AFTER <= now;
         let (from, tier) = match (self.overload.load(), poll.class) {
             (Load::Normal, _) => (from, 1),
             (Load::Overload { .. }, Class::Hard) => (from, 1),
-            (Load::Overload { .. }, Class::Soft | Class::Idle) if starves && !self.fed => (from, STARVED),
+            (Load::Overload { .. }, Class::Soft | Class::Idle) if !self.fed && starves() => (from, STARVED),
             (Load::Overload { .. }, Class::Soft) => (from, 2),
             (Load::Overload { .. }, Class::Idle) => (from + STARVED_AFTER, 3),
         };

@@ -348,8 +348,8 @@ mod tests {
                         at: Timestamp::UNIX_EPOCH,
                         framing: Framing::Mbap,
                         outcome: answer.as_ref().map(drop).map_err(|fault| *fault),
-                        answer: answer.clone().unwrap_or_default(),
-                        request,
+                        answer: answer.clone().unwrap_or_default().into(),
+                        request: request.into(),
                         reply: answer.is_ok().then_some(Duration::from_millis(12)),
                         tries: 1,
                     };

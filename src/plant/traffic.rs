@@ -17,7 +17,7 @@ pub struct Frame {
     /// `true` for bytes that we sent.
     pub sent: bool,
     /// The bytes as they were on the wire.
-    pub bytes: Vec<u8>,
+    pub bytes: Arc<[u8]>,
     /// How the line frames its messages.
     pub framing: Framing,
     /// `sent`, `ok`, or what was wrong with it.
@@ -73,9 +73,9 @@ pub struct Exchange {
     /// How the line frames its messages.
     pub framing: Framing,
     /// The request as it was on the wire.
-    pub request: Vec<u8>,
+    pub request: Arc<[u8]>,
     /// The answer as it was on the wire; empty if none came.
-    pub answer: Vec<u8>,
+    pub answer: Arc<[u8]>,
     /// `Ok`, or what was wrong.
     pub outcome: Result<(), Fault>,
     /// From the last byte sent to the first byte received; `None` if none came.
@@ -93,7 +93,7 @@ mod tests {
         let frame = |number| Frame {
             at: Timestamp::UNIX_EPOCH,
             sent: true,
-            bytes: vec![1],
+            bytes: [1].into(),
             framing: Framing::Rtu,
             verdict: "sent".into(),
             unit: Some(1),

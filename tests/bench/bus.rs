@@ -105,7 +105,7 @@ fn tcp(libmodbus: Option<&Path>) {
     if let Some((rate, cpu)) = theirs {
         println!("  libmodbus loop        {rate:9.0} /s  {:5.1} µs CPU each", cpu * 1e6);
     }
-    for in_flight in [1, 16] {
+    for in_flight in [1] {
         let (rate, cpu) = median(|| line_task(in_flight));
         let ratio = theirs.map_or("–".into(), |(base, _)| format!("{:.2}", rate / base));
         println!(
@@ -216,19 +216,23 @@ fn line_task(in_flight: u16) -> (f64, f64) {
         let (_stop, stopped) = watch::channel(false);
         let clock = Clock::starting_at(Timestamp::now(), 1.0);
         tokio::spawn(task::run(def, LineId(0), clock, Connector::Real(transport), sender, queue, stopped));
-        let (mut reads, start, used) = (0u64, Instant::now(), cpu(ClockId::ThreadCPUTime));
-        while start.elapsed() < Duration::from_secs(2) {
-            match events.recv().await.unwrap() {
-                Event::Read { values, .. } => {
-                    assert!(values.iter().all(|(tag, raw)| tag.0 / WORDS * 20 + tag.0 % WORDS == *raw as u16));
-                    reads += 1;
+        // A task of its own hears what is told, as in the station: to wake the future of `block_on` costs a system call.
+        let drain = async move {
+            let (mut reads, start, used) = (0u64, Instant::now(), cpu(ClockId::ThreadCPUTime));
+            while start.elapsed() < Duration::from_secs(2) {
+                match events.recv().await.unwrap() {
+                    Event::Read { values, .. } => {
+                        assert!(values.iter().all(|(tag, raw)| tag.0 / WORDS * 20 + tag.0 % WORDS == *raw as u16));
+                        reads += 1;
+                    }
+                    Event::Failed { fault, .. } => panic!("{fault}"),
+                    _ => {}
                 }
-                Event::Failed { fault, .. } => panic!("{fault}"),
-                _ => {}
             }
-        }
-        let cpu = cpu(ClockId::ThreadCPUTime) - used;
-        (reads as f64 / start.elapsed().as_secs_f64(), cpu / reads as f64)
+            let (cpu, seconds) = (cpu(ClockId::ThreadCPUTime) - used, start.elapsed().as_secs_f64());
+            (reads as f64 / seconds, cpu / reads as f64)
+        };
+        tokio::spawn(drain).await.unwrap()
     })
 }
 

@@ -1,6 +1,6 @@
 //! Saved traffic, opened by Wireshark's own reader.
 
-use std::{fs, process::Command};
+use std::{fs, process::Command, sync::Arc};
 
 use jiff::{SignedDuration, Timestamp};
 use sightglass::{
@@ -29,7 +29,7 @@ fn traffic(framing: Framing) -> Vec<Frame> {
         frames.push(Frame {
             at: Timestamp::UNIX_EPOCH + SignedDuration::from_micros(1_700_000_000_000_001 + 20_000 * number as i64),
             sent: number % 2 == 0,
-            bytes,
+            bytes: bytes.into(),
             framing,
             verdict: if number % 2 == 0 { "sent" } else { "ok" }.into(),
             unit: Some(message[0]),
@@ -111,7 +111,7 @@ fn what_was_spoiled_is_no_modbus_and_says_why() {
         return;
     }
     let mut frames = traffic(Framing::Rtu);
-    frames[1].bytes[4] ^= 1;
+    Arc::make_mut(&mut frames[1].bytes)[4] ^= 1;
     frames[1].verdict = "CRC error: got 9139, computed 5138".into();
     let lines = tshark(&frames[..2], &["-T", "fields", "-e", "frame.protocols", "-e", "frame.comment"]);
     check(&lines, &[&["mbrtu"], &["data", "CRC error"]]);

@@ -157,7 +157,7 @@ fn an_answer_on_a_line_finds_its_request_before_it() {
     let frame = |sent: bool, message: &[u8], transaction: u16| Frame {
         at: jiff::Timestamp::UNIX_EPOCH,
         sent,
-        bytes: with_mbap(transaction, message),
+        bytes: with_mbap(transaction, message).into(),
         framing: Framing::Mbap,
         verdict: "ok".into(),
         unit: Some(1),

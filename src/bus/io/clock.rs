@@ -26,8 +26,14 @@ impl Clock {
 
     /// Plant time now, in whole microseconds (what the history stores).
     pub fn now(&self) -> Timestamp {
+        self.at(Instant::now())
+    }
+
+    /// Plant time at a moment, in whole microseconds; nothing is before the base.
+    pub fn at(&self, moment: Instant) -> Timestamp {
         // Rounded, not cut off: who slept until a moment must find that it has come.
-        let micros = (self.start.elapsed().as_secs_f64() * self.speed * 1e6).round();
+        let since = moment.saturating_duration_since(self.start);
+        let micros = (since.as_secs_f64() * self.speed * 1e6).round();
         self.base + SignedDuration::from_micros(micros as i64)
     }
 

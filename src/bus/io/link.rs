@@ -147,7 +147,7 @@ impl Link {
         }
         // An answer proves that nothing older is to come only if it could not itself have been older.
         let proof = !self.wire.debts.is_ambiguous(message);
-        let frame = frame::wrap(self.framing(), 0, message);
+        let frame: Arc<[u8]> = frame::wrap(self.framing(), 0, message).into();
         let sent_at = self.wire.send(&frame).await?;
         let started = Instant::now();
         self.note_sent(frame.clone());
@@ -172,19 +172,22 @@ impl Link {
             Err(fault) => self.account(message, *fault),
         }
         self.note_silence(matches!(gathered.answer, Err(Fault::Timeout)));
-        self.keep(frame, gathered).answer.map_err(Trouble::Fault)
+        self.keep(frame, gathered, sent_at).answer.map_err(Trouble::Fault)
     }
 
     /// Sends several messages at once over Modbus TCP and gives their answers in the same order: they may overtake each
     /// other on the way. `Err` only when the connection is gone or out of step.
     pub async fn exchange_all(&mut self, messages: &[&[u8]]) -> Result<Vec<Answered>, Trouble> {
         let first = self.transaction.wrapping_add(1);
-        let mut frames = Vec::with_capacity(messages.len());
+        let mut frames: Vec<Arc<[u8]>> = Vec::with_capacity(messages.len());
         for message in messages {
             self.transaction = self.transaction.wrapping_add(1);
-            frames.push(frame::with_mbap(self.transaction, message));
+            frames.push(frame::with_mbap(self.transaction, message).into());
         }
-        let sent_at = self.wire.send(&frames.concat()).await?;
+        let sent_at = match &frames[..] {
+            [frame] => self.wire.send(frame).await?,
+            many => self.wire.send(&many.concat()).await?,
+        };
         for frame in &frames {
             self.note_sent(frame.clone());
         }
@@ -198,7 +201,7 @@ impl Link {
                 Ok(_) => self.wire.counters.ok += 1,
                 Err(fault) => self.account(message, *fault),
             }
-            answers.push(self.keep(frame, gathered));
+            answers.push(self.keep(frame, gathered, sent_at));
         }
         Ok(answers)
     }
@@ -206,7 +209,7 @@ impl Link {
     /// Sends bytes as they are and gives everything that comes back until the line is silent: for tests of the line.
     pub async fn send_raw(&mut self, bytes: &[u8]) -> Result<(Vec<u8>, Option<Duration>), Trouble> {
         let sent_at = self.wire.send(bytes).await?;
-        self.note_sent(bytes.to_vec());
+        self.note_sent(bytes.into());
         let deadline = sent_at + self.timeout + self.wire.char_time * frame::MESSAGE_MAX as u32;
         let framing = self.framing();
         let request = frame::unwrap(framing, bytes).unwrap_or_default();
@@ -234,7 +237,7 @@ impl Link {
             }
         };
         if !buffer.is_empty() {
-            self.wire.record(false, buffer.clone(), Cow::Borrowed("received"));
+            self.wire.record(false, buffer[..].into(), Cow::Borrowed("received"));
         }
         self.wire.rest(self.wire.silence);
         // What was sent may have been a request whose answer is still to come.
@@ -330,16 +333,14 @@ impl Link {
         self.unanswered = if silent { self.unanswered.saturating_add(1) } else { 0 };
     }
 
-    fn note_sent(&mut self, frame: Vec<u8>) {
+    fn note_sent(&mut self, frame: Arc<[u8]>) {
         self.wire.counters.requests += 1;
         self.wire.record(true, frame, Cow::Borrowed("sent"));
     }
 
-    fn keep(&mut self, request: Vec<u8>, gathered: Gathered) -> Answered {
-        let took = Duration::from_secs_f64(gathered.took.as_secs_f64() * self.wire.clock().speed());
-        let now = self.wire.clock().now();
+    fn keep(&mut self, request: Arc<[u8]>, gathered: Gathered, sent_at: Instant) -> Answered {
         let exchange = Arc::new(Exchange {
-            at: now.checked_sub(took).unwrap_or(now),
+            at: self.wire.clock().at(sent_at),
             framing: self.framing(),
             request,
             answer: gathered.frame,

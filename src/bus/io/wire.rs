@@ -1,6 +1,6 @@
 //! The bytes of one open port: silences are kept, every byte is counted and goes on record, what nobody waits for is dropped.
 
-use std::{borrow::Cow, time::Duration};
+use std::{borrow::Cow, sync::Arc, time::Duration};
 
 use futures_util::FutureExt;
 use tokio::{
@@ -112,6 +112,9 @@ impl Wire {
 
     /// Nothing is sent for this long (real time).
     pub fn rest(&mut self, real: Duration) {
+        if real.is_zero() {
+            return;
+        }
         self.quiet_until = self.quiet_until.max(Instant::now() + real);
     }
 
@@ -131,18 +134,20 @@ impl Wire {
                 Err(_) => return Err(Trouble::Gone("the port takes no bytes".into())),
             }
         }
+        let sent_at = Instant::now();
         self.counters.sent_bytes += bytes.len() as u64;
-        self.counters.last_tx = Some(self.clock.now());
-        Ok(Instant::now() + self.char_time * bytes.len() as u32)
+        self.counters.last_tx = Some(self.clock.at(sent_at));
+        Ok(sent_at + self.char_time * bytes.len() as u32)
     }
 
     /// Appends what comes next to `buffer`; `false` if nothing came before `until`.
     pub async fn receive(&mut self, until: Instant, buffer: &mut Vec<u8>) -> Result<bool, Trouble> {
-        let mut chunk = [0; 1_024];
+        // Room of its own would be part of this future, and be moved with it from call to call.
+        buffer.reserve(frame::MESSAGE_MAX);
         // What is there already costs no timer.
-        let read = match self.port.read(&mut chunk).now_or_never() {
+        let read = match self.port.read_buf(buffer).now_or_never() {
             Some(read) => read,
-            None => match tokio::time::timeout_at(until, self.port.read(&mut chunk)).await {
+            None => match tokio::time::timeout_at(until, self.port.read_buf(buffer)).await {
                 Err(_) => return Ok(false),
                 Ok(read) => read,
             },
@@ -150,7 +155,6 @@ impl Wire {
         let count = received(read)?;
         self.counters.received_bytes += count as u64;
         self.counters.last_rx = Some(self.clock.now());
-        buffer.extend_from_slice(&chunk[..count]);
         Ok(true)
     }
 
@@ -183,20 +187,22 @@ impl Wire {
         }
         self.record(
             false,
-            bytes.to_vec(),
+            bytes.into(),
             Cow::Borrowed(if late.is_some() { "late, dropped" } else { "stale, dropped" }),
         );
     }
 
     /// Puts bytes on record.
-    pub fn record(&mut self, sent: bool, bytes: Vec<u8>, verdict: Cow<'static, str>) {
+    pub fn record(&mut self, sent: bool, bytes: Arc<[u8]>, verdict: Cow<'static, str>) {
         self.counters.frames += 1;
         // Between two reports a fast line carries more than anybody can look at: the latest are enough.
         if self.frames.len() == 2 * FRAMES_MAX {
             self.frames.drain(..FRAMES_MAX);
         }
         let unit = frame::unit_of(self.framing, &bytes);
-        let (at, framing, number) = (self.clock.now(), self.framing, self.counters.frames);
+        let moved_at = if sent { self.counters.last_tx } else { self.counters.last_rx };
+        let at = moved_at.unwrap_or_else(|| self.clock.now());
+        let (framing, number) = (self.framing, self.counters.frames);
         self.frames.push(Frame { at, sent, bytes, framing, verdict, unit, number });
     }
 
@@ -213,13 +219,18 @@ impl Wire {
     async fn wait_for_silence(&mut self) {
         // A device that never stops talking, or a second master, must not hold the line for ever: it spoils what is sent
         // then, and that is told.
-        let limit = self.quiet_until.max(Instant::now()) + self.timeout;
-        let mut buffer = [0; 512];
+        let now = Instant::now();
+        if self.quiet_until <= now {
+            return;
+        }
+        let limit = self.quiet_until + self.timeout;
+        let mut buffer = Vec::new();
         while Instant::now() < self.quiet_until.min(limit) {
             let until = self.quiet_until.min(limit);
+            buffer.clear();
             let read = tokio::select! {
                 () = self.pause.until(until) => break,
-                read = self.port.read(&mut buffer) => read,
+                read = self.port.read_buf(&mut buffer) => read,
             };
             // A gone port shows itself at the write that follows.
             let Ok(count @ 1..) = read else {

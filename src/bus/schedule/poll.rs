@@ -201,5 +201,7 @@ fn span(from: Timestamp, to: Timestamp) -> Duration {
 
 /// Whole periods between two moments.
 fn periods_in(from: Timestamp, to: Timestamp, period: Duration) -> u32 {
-    u32::try_from(span(from, to).as_nanos() / period.as_nanos().max(1)).unwrap_or(u32::MAX)
+    // 64 bits hold centuries, and divide ten times as fast as the 128 that the library gives.
+    let nanos = |span: Duration| u64::try_from(span.as_nanos()).unwrap_or(u64::MAX);
+    u32::try_from(nanos(span(from, to)) / nanos(period).max(1)).unwrap_or(u32::MAX)
 }

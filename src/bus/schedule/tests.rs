@@ -22,7 +22,7 @@ fn block(device: u16, poll: Poll) -> Block {
 fn classed(device: u16, poll: Poll, class: Class) -> Block {
     let (unit, tags) = (device as u8 + 1, vec![TagId(0)]);
     let device = DeviceId(device);
-    Block { device, unit, table: Table::Input, address: 0, count: 1, tags, poll, class, alignment: 1 }
+    Block { device, unit, table: Table::Input, address: 0, count: 1, tags: tags.into(), poll, class, alignment: 1 }
 }
 
 fn every(ms: u64) -> Poll {

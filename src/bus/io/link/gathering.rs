@@ -1,6 +1,6 @@
 //! Gathers what comes back until it is the answer, or time is over.
 
-use std::{borrow::Cow, time::Duration};
+use std::{borrow::Cow, sync::Arc, time::Duration};
 
 use tokio::time::Instant;
 
@@ -23,15 +23,13 @@ pub(super) const GATHER_MAX: usize = 4_096;
 pub(super) struct Gathered {
     pub answer: Result<Vec<u8>, Fault>,
     /// As it was on the wire.
-    pub frame: Vec<u8>,
+    pub frame: Arc<[u8]>,
     pub reply: Option<Duration>,
-    /// From the last byte sent until now.
-    pub took: Duration,
 }
 
 impl Gathered {
     pub fn nothing(answer: Result<Vec<u8>, Fault>) -> Gathered {
-        Gathered { answer, frame: Vec::new(), reply: None, took: Duration::ZERO }
+        Gathered { answer, frame: Arc::default(), reply: None }
     }
 }
 
@@ -58,11 +56,11 @@ impl Link {
             let wait_until = match verdict {
                 Verdict::Answer(range) => {
                     self.wire.drop_stale(&buffer[..range.start]);
-                    let frame = buffer[range].to_vec();
+                    let frame: Arc<[u8]> = buffer[range].into();
                     self.wire.record(false, frame.clone(), Cow::Borrowed("ok"));
                     let answer = frame::unwrap(framing, &frame)
                         .and_then(|answer| frame::check_answer(message, &answer).map(|()| answer));
-                    return Ok(Gathered { answer, frame, reply, took: sent_at.elapsed() });
+                    return Ok(Gathered { answer, frame, reply });
                 }
                 Verdict::Foreign(end, fault) => {
                     self.wire.drop_stale(&buffer[..end]);
@@ -84,10 +82,11 @@ impl Link {
                 Verdict::Spoiled(fault) => fault,
                 _ => misfit.unwrap_or_else(|| gather::left_over(framing, message, &buffer)),
             };
-            if !buffer.is_empty() {
-                self.wire.record(false, buffer.clone(), Cow::Owned(fault.to_string()));
+            let frame: Arc<[u8]> = buffer.into();
+            if !frame.is_empty() {
+                self.wire.record(false, frame.clone(), Cow::Owned(fault.to_string()));
             }
-            return Ok(Gathered { answer: Err(fault), frame: buffer, reply, took: sent_at.elapsed() });
+            return Ok(Gathered { answer: Err(fault), frame, reply });
         }
     }
 
@@ -110,18 +109,18 @@ impl Link {
                         continue;
                     }
                     if !buffer.is_empty() {
-                        self.wire.record(false, buffer, Cow::Borrowed("cut short"));
+                        self.wire.record(false, buffer.into(), Cow::Borrowed("cut short"));
                         // The rest may come later and would stand before the next header.
                         return Err(Trouble::Gone("an answer was cut short, the stream is out of step".into()));
                     }
                     break;
                 }
                 Mbap::Broken => {
-                    self.wire.record(false, buffer.split_off(start), Cow::Borrowed("no MBAP header"));
+                    self.wire.record(false, buffer[start..].into(), Cow::Borrowed("no MBAP header"));
                     return Err(Trouble::Gone("the stream is out of step".into()));
                 }
                 Mbap::Whole { transaction, end } => {
-                    let frame = buffer[start..start + end].to_vec();
+                    let frame: Arc<[u8]> = buffer[start..start + end].into();
                     start += end;
                     let index = usize::from(transaction.wrapping_sub(first));
                     let Some(slot) = gathered.get_mut(index).filter(|slot| slot.is_none()) else {
@@ -130,20 +129,20 @@ impl Link {
                     };
                     let answer = frame[6..].to_vec();
                     let answer = frame::check_answer(messages[index], &answer).map(|()| answer);
-                    let took = sent_at.elapsed();
+                    let reply = Some(sent_at.elapsed());
                     open -= 1;
                     let verdict = match &answer {
                         Ok(_) | Err(Fault::Exception(_)) => Cow::Borrowed("ok"),
                         Err(fault) => Cow::Owned(fault.to_string()),
                     };
-                    *slot = Some(Gathered { answer, frame: frame.clone(), reply: Some(took), took });
+                    *slot = Some(Gathered { answer, frame: frame.clone(), reply });
                     self.wire.record(false, frame, verdict);
                 }
             }
         }
         // What stands behind the last answer nobody has asked for.
         self.wire.drop_stale(&buffer[start..]);
-        let missing = || Gathered { took: sent_at.elapsed(), ..Gathered::nothing(Err(Fault::Timeout)) };
+        let missing = || Gathered::nothing(Err(Fault::Timeout));
         Ok(gathered.into_iter().map(|slot| slot.unwrap_or_else(missing)).collect())
     }
 

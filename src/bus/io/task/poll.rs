@@ -3,7 +3,10 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use tokio_modbus::{Response, bytes::Bytes};
+use tokio_modbus::{
+    Response,
+    bytes::{Buf, Bytes},
+};
 
 use super::{Ended, Leave, Task, Turn};
 use crate::{
@@ -14,7 +17,7 @@ use crate::{
         schedule::{Next, Schedule, Served},
     },
     plant::{
-        def::{Framing, TagId},
+        def::Framing,
         event::{Event, ExceptionCode, Fault},
         tag::TagDef,
         traffic::Exchange,
@@ -97,7 +100,7 @@ impl Task {
             }
         }
         for (block, answered) in taken.iter().zip(answers) {
-            let answer = answered.answer.and_then(|answer| parse(block, &answer));
+            let answer = answered.answer.and_then(|answer| parse(block, answer));
             self.settle(link, schedule, block, at, (answer, Some(answered.exchange))).await?;
         }
         Ok(self.still_there(link))
@@ -138,7 +141,7 @@ impl Task {
             }
             Err(fault @ Fault::Exception(code)) if !code.is_of_gateway() => {
                 schedule.answered(block.device, at);
-                self.tell_failed(at, block.device, block.tags.clone(), fault, exchange).await?;
+                self.tell_failed(at, block.device, block.tags.to_vec(), fault, exchange).await?;
                 let its_own = link.debt(block.unit).is_clear();
                 let Some(index) = index else { return Ok(()) };
                 schedule.again(index, at);
@@ -158,7 +161,7 @@ impl Task {
                 if let Some(index) = index {
                     schedule.again(index, at);
                 }
-                self.tell_failed(at, block.device, block.tags.clone(), fault, exchange).await?;
+                self.tell_failed(at, block.device, block.tags.to_vec(), fault, exchange).await?;
                 if schedule.failed(block.device, at) {
                     let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
                     self.tell_failed(at, block.device, tags, Fault::Resting, None).await?;
@@ -243,13 +246,17 @@ impl Task {
         reply: Duration,
         exchange: Option<Arc<Exchange>>,
     ) -> Result<(), Ended> {
-        let decoded = block.tags.iter().map(|tag| (*tag, value_of(self.def.tag(*tag), block, values)));
-        let (good, spoiled): (Vec<_>, Vec<_>) = decoded.partition(|(_, value)| value.is_some());
-        let values = good.into_iter().filter_map(|(tag, value)| Some((tag, value?))).collect();
+        let (mut good, mut spoiled) = (Vec::with_capacity(block.tags.len()), Vec::new());
+        for tag in block.tags.iter().copied() {
+            match value_of(self.def.tag(tag), block, values) {
+                Some(value) => good.push((tag, value)),
+                None => spoiled.push(tag),
+            }
+        }
+        let values = good;
         self.tell(Event::Read { at, device: block.device, values, reply, exchange: exchange.clone() }).await?;
         if !spoiled.is_empty() {
-            let tags: Vec<TagId> = spoiled.into_iter().map(|(tag, _)| tag).collect();
-            self.tell_failed(at, block.device, tags, Fault::NotANumber, exchange).await?;
+            self.tell_failed(at, block.device, spoiled, Fault::NotANumber, exchange).await?;
         }
         Ok(())
     }
@@ -264,13 +271,14 @@ pub(super) enum Answer {
 
 async fn read(link: &mut Link, block: &Block) -> Result<Answer, Trouble> {
     let answer = link.exchange(&block.request()).await?;
-    Ok(parse(block, &answer)?)
+    Ok(parse(block, answer)?)
 }
 
 /// The values in a checked answer message.
-fn parse(block: &Block, answer: &[u8]) -> Result<Answer, Fault> {
-    let count = usize::from(block.count);
-    let pdu = Bytes::copy_from_slice(answer.get(1..).unwrap_or_default());
+fn parse(block: &Block, answer: Vec<u8>) -> Result<Answer, Fault> {
+    let (count, got) = (usize::from(block.count), answer.len() as u16);
+    let mut pdu = Bytes::from(answer);
+    pdu.advance(1.min(pdu.len()));
     match Response::try_from(pdu) {
         Ok(Response::ReadCoils(bits) | Response::ReadDiscreteInputs(bits)) if count <= bits.len() => {
             Ok(Answer::Bits(bits))
@@ -279,7 +287,7 @@ fn parse(block: &Block, answer: &[u8]) -> Result<Answer, Fault> {
             Ok(Answer::Words(words))
         }
         // The length was checked byte for byte before; kept so that no later change can turn a shift into a value.
-        _ => Err(Fault::WrongLength { got: answer.len() as u16, asked: block.count }),
+        _ => Err(Fault::WrongLength { got, asked: block.count }),
     }
 }
 

@@ -77,9 +77,9 @@ fn asked(plant: &mut Fixture, outcome: Result<(), Fault>, answer: Vec<u8>, tries
     let exchange = Arc::new(Exchange {
         at: ago(420),
         framing: Framing::Rtu,
-        request: frame::with_crc(&[1, 3, 0x03, 0xE8, 0, 10]),
+        request: frame::with_crc(&[1, 3, 0x03, 0xE8, 0, 10]).into(),
         reply: (!answer.is_empty()).then_some(Duration::from_millis(12)),
-        answer,
+        answer: answer.into(),
         outcome,
         tries,
     });
@@ -104,7 +104,7 @@ fn cases() -> Vec<(&'static str, Fixture)> {
     timeout.devices[0].last_fault = Some((ago(420), Fault::Timeout));
     timeout.devices[0].diagnosis = Some(Reason::Failing { failed: 8, of: 64 });
     let mut crc = fixture();
-    let mut spoiled = crc.evidence[0].as_ref().map(|exchange| exchange.answer.clone()).unwrap_or_default();
+    let mut spoiled = crc.evidence[0].as_ref().map(|exchange| exchange.answer.to_vec()).unwrap_or_default();
     spoiled[5] ^= 0x40;
     let fault = frame::without_crc(&spoiled).expect_err("a spoiled frame");
     asked(&mut crc, Err(fault), spoiled, 2);

@@ -48,8 +48,8 @@ fn read_of_three() -> Arc<ToolRun> {
     let exchange = Exchange {
         at: now(),
         framing: Framing::Rtu,
-        request: with_crc(&[1, 3, 3, 0xEA, 0, 3]),
-        answer: with_crc(&[1, 3, 6, 0x42, 0xC8, 0, 0, 0xFF, 0xFE]),
+        request: with_crc(&[1, 3, 3, 0xEA, 0, 3]).into(),
+        answer: with_crc(&[1, 3, 6, 0x42, 0xC8, 0, 0, 0xFF, 0xFE]).into(),
         outcome: Ok(()),
         reply: Some(Duration::from_micros(12_300)),
         tries: 1,
@@ -326,8 +326,8 @@ fn loopback_and_identification_are_told_in_words() {
         Finding::Exchange(Arc::new(Exchange {
             at: now(),
             framing: Framing::Rtu,
-            request,
-            answer,
+            request: request.into(),
+            answer: answer.into(),
             outcome,
             reply,
             tries: 1,
