@@ -243,10 +243,13 @@ impl Task {
         reply: Duration,
         exchange: Option<Arc<Exchange>>,
     ) -> Result<(), Ended> {
-        let decoded = block.tags.iter().map(|tag| (*tag, value_of(self.def.tag(*tag), block, values)));
+        let texts = block.tags.iter().filter_map(|tag| Some((*tag, text_of(self.def.tag(*tag), block, values)?)));
+        let texts = texts.collect();
+        let numbers = block.tags.iter().filter(|tag| !self.def.tag(**tag).is_text());
+        let decoded = numbers.map(|tag| (*tag, value_of(self.def.tag(*tag), block, values)));
         let (good, spoiled): (Vec<_>, Vec<_>) = decoded.partition(|(_, value)| value.is_some());
         let values = good.into_iter().filter_map(|(tag, value)| Some((tag, value?))).collect();
-        self.tell(Event::Read { at, device: block.device, values, reply, exchange: exchange.clone() }).await?;
+        self.tell(Event::Read { at, device: block.device, values, texts, reply, exchange: exchange.clone() }).await?;
         if !spoiled.is_empty() {
             let tags: Vec<TagId> = spoiled.into_iter().map(|(tag, _)| tag).collect();
             self.tell_failed(at, block.device, tags, Fault::NotANumber, exchange).await?;
@@ -280,6 +283,18 @@ fn parse(block: &Block, answer: &[u8]) -> Result<Answer, Fault> {
         }
         // The length was checked byte for byte before; kept so that no later change can turn a shift into a value.
         _ => Err(Fault::WrongLength { got: answer.len() as u16, asked: block.count }),
+    }
+}
+
+/// The text of a tag that holds text.
+fn text_of(tag: &TagDef, block: &Block, values: &Answer) -> Option<Arc<str>> {
+    let start = usize::from(tag.point.address.checked_sub(block.address)?);
+    match values {
+        Answer::Bits(_) => None,
+        Answer::Words(words) => {
+            let words = words.get(start..start + usize::from(tag.point.len()))?;
+            codec::decode_text(tag.point, words).map(Into::into)
+        }
     }
 }
 
