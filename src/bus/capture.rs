@@ -250,7 +250,10 @@ mod tests {
         );
         for (line, frame) in lines.lines().zip(&frames) {
             let typed = crate::bus::typed::parse(line, None);
-            assert!(typed.is_ok_and(|typed| typed.bytes[..] == frame.bytes[..] && typed.sent == Some(frame.sent)), "{line}");
+            assert!(
+                typed.is_ok_and(|typed| typed.bytes[..] == frame.bytes[..] && typed.sent == Some(frame.sent)),
+                "{line}"
+            );
         }
     }
 }

@@ -31,7 +31,47 @@ pub fn decode(point: Point, words: &[u16]) -> Option<f64> {
         Kind::F64 => Some(f64::from_bits(bits)).filter(|value| value.is_finite()),
         Kind::Bcd16 => from_bcd(bits, 4),
         Kind::Bcd32 => from_bcd(bits, 8),
+        Kind::Text(_) => None,
     }
+}
+
+/// What stands for a byte that is no part of a printable character.
+pub const UNPRINTABLE: char = '·';
+
+/// The text that the words of a point hold, two characters a word, in UTF-8 (which plain ASCII is): NULs and blanks at
+/// its end are filling, each byte or character that cannot be printed is shown as [`UNPRINTABLE`], and text of which
+/// nothing can be printed as the hex of its bytes. `None` for a point that holds no text.
+pub fn decode_text(point: Point, words: &[u16]) -> Option<String> {
+    let Kind::Text(count) = point.kind else { return None };
+    let bytes = to_bytes(point.order, words);
+    let bytes = bytes.get(..usize::from(count))?;
+    let end = bytes.iter().rposition(|byte| !matches!(byte, 0 | b' ')).map_or(0, |last| last + 1);
+    let bytes = &bytes[..end];
+    let mut text = String::new();
+    for chunk in bytes.utf8_chunks() {
+        text.extend(chunk.valid().chars().map(|letter| if is_printable(letter) { letter } else { UNPRINTABLE }));
+        text.extend(chunk.invalid().iter().map(|_| UNPRINTABLE));
+    }
+    let nothing = !text.is_empty() && text.chars().all(|letter| letter == UNPRINTABLE || letter == ' ');
+    Some(if nothing { bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ") } else { text })
+}
+
+/// The words that hold a text, filled with NULs; `None` if it is too long, ends in what would be taken for filling, or
+/// has characters that cannot be printed.
+pub fn encode_text(point: Point, text: &str) -> Option<Vec<u16>> {
+    let Kind::Text(count) = point.kind else { return None };
+    let fits = text.len() <= usize::from(count) && !text.ends_with(' ') && text.chars().all(is_printable);
+    let mut bytes = text.as_bytes().to_vec();
+    bytes.resize(usize::from(point.kind.words()) * 2, 0);
+    fits.then(|| from_bytes(point.order, &bytes))
+}
+
+/// Not a control, nor one of the marks that hide, turn round or stand for no character at all.
+fn is_printable(letter: char) -> bool {
+    !letter.is_control()
+        && !matches!(letter, '\u{AD}' | '\u{061C}' | '\u{180E}' | '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}')
+        && !matches!(letter, '\u{2060}'..='\u{206F}' | '\u{FEFF}' | '\u{E000}'..='\u{F8FF}' | '\u{FFF0}'..='\u{FFFF}')
+        && letter < '\u{E0000}'
 }
 
 /// The words to write for a number; `None` if it does not fit the type, is no whole number where one is needed, or the
@@ -53,6 +93,7 @@ pub fn encode(point: Point, value: f64) -> Option<Vec<u16>> {
         Kind::F64 => value.to_bits(),
         Kind::Bcd16 => to_bcd(whole(0.0, 9_999.0)?),
         Kind::Bcd32 => to_bcd(whole(0.0, 99_999_999.0)?),
+        Kind::Text(_) => return None,
     };
     let count = usize::from(point.kind.words()) * 2;
     Some(from_bytes(point.order, &bits.to_be_bytes()[8 - count..]))
@@ -169,6 +210,43 @@ mod tests {
     }
 
     #[test]
+    fn text_is_shown_as_it_is_and_what_cannot_be_printed_as_a_dot() {
+        let check = |bytes: &[u8], count: u8, expect: &str| {
+            let mut bytes = bytes.to_vec();
+            bytes.resize(bytes.len().next_multiple_of(2), 0xFF);
+            let words = from_bytes(Order::Abcd, &bytes);
+            let text = decode_text(point(Kind::Text(count), Order::Abcd), &words);
+            assert_eq!(text.as_deref(), Some(expect), "{bytes:02X?}");
+        };
+        check(b"PXR4TAY1", 8, "PXR4TAY1");
+        check(b"PXR4\0\0  ", 8, "PXR4");
+        check(b"V1.2X?", 5, "V1.2X");
+        check(b"\0\0\0\0", 4, "");
+        check(b"    ", 4, "");
+        check(b" A B", 4, " A B");
+        check(b"A\0B\x1B", 4, "A·B·");
+        check(b"20 \xB0C", 5, "20 ·C");
+        check("20 °C".as_bytes(), 6, "20 °C");
+        check("ถัง\0".as_bytes(), 10, "ถัง");
+        check("AB\u{202E}C".as_bytes(), 6, "AB·C");
+        check(b"\x01\xFF\0\0", 4, "01 FF");
+        check(b"\x01 \xFF\0", 4, "01 20 FF");
+        assert_eq!(decode_text(point(Kind::U16, Order::Abcd), &[0x4142]), None);
+        assert_eq!(decode_text(point(Kind::Text(4), Order::Abcd), &[0x4142]), None, "too few words");
+        assert_eq!(decode(point(Kind::Text(2), Order::Abcd), &[0x3432]), None, "words are no number");
+    }
+
+    #[test]
+    fn a_text_with_swapped_bytes_reads_the_same() {
+        let swapped = point(Kind::Text(5), Order::Badc);
+        assert_eq!(decode_text(swapped, &[0x5850, 0x3452, 0x0041]).as_deref(), Some("PXR4A"));
+        assert_eq!(encode_text(swapped, "PXR4A"), Some(vec![0x5850, 0x3452, 0x0041]));
+        for text in ["PXR4TA", "PXR4 ", "P\nX"] {
+            assert_eq!(encode_text(swapped, text), None, "{text:?} would not read back");
+        }
+    }
+
+    #[test]
     fn a_field_of_bits_is_read_and_never_written() {
         let field = Point { field: Some((4, 2)), ..point(Kind::U16, Order::Abcd) };
         assert_eq!(decode(field, &[0x0020]), Some(2.0));
@@ -193,6 +271,28 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn text_reads_back_as_written(
+            text in "[ -~°ก-๙]{0,40}", spare in 0u8..8, order in prop::sample::select(vec![Order::Abcd, Order::Badc]),
+        ) {
+            let text = text.trim_end_matches(' ');
+            let count = u8::try_from(text.len()).unwrap_or(u8::MAX).saturating_add(spare).max(1);
+            let point = point(Kind::Text(count), order);
+            if let Some(words) = encode_text(point, text) {
+                prop_assert_eq!(words.len(), usize::from(point.len()));
+                let back = decode_text(point, &words);
+                prop_assert_eq!(back.as_deref(), Some(text));
+            } else {
+                prop_assert!(text.len() > usize::from(count), "{text:?} fits into {count}");
+            }
+        }
+
+        #[test]
+        fn no_bytes_break_a_screen(words in prop::collection::vec(any::<u16>(), 8)) {
+            let text = decode_text(point(Kind::Text(16), Order::Abcd), &words);
+            prop_assert!(text.is_some_and(|text| text.chars().all(is_printable)));
+        }
+
         #[test]
         fn what_is_written_reads_back(
             kind in prop::sample::select(vec![

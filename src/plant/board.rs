@@ -32,6 +32,8 @@ pub struct Board {
     /// What was last read, by tag; `None` when there is no value to stand on.
     raw: Vec<Option<Reading>>,
     samples: Vec<Sample>,
+    /// The text of tags that hold text, by tag; `None` while there is none to stand on. Shared with snapshots.
+    texts: Arc<Vec<Option<Arc<str>>>>,
     /// Decimals that the device last announced, by tag: for showing what was, while it does not answer.
     decimals_seen: Vec<u8>,
     /// What the history last got, by tag.
@@ -63,6 +65,7 @@ impl Board {
         Board {
             raw: vec![None; count],
             samples: vec![Sample::bad(Cause::NotRead, at); count],
+            texts: Arc::new(vec![None; count]),
             decimals_seen: vec![0; count],
             stored: vec![None; count],
             // That nothing is known is a fact to store too.
@@ -94,6 +97,21 @@ impl Board {
             for dependent in self.dependents[tag.index()].clone() {
                 self.settle(dependent);
             }
+        }
+    }
+
+    /// The texts, by tag.
+    pub fn texts(&self) -> &Arc<Vec<Option<Arc<str>>>> {
+        &self.texts
+    }
+
+    /// Takes the texts of one answer.
+    pub fn read_texts(&mut self, texts: &[(TagId, Arc<str>)], at: Timestamp) {
+        for (tag, text) in texts {
+            if self.texts[tag.index()].as_ref() != Some(text) {
+                Arc::make_mut(&mut self.texts)[tag.index()] = Some(text.clone());
+            }
+            self.set(*tag, Sample { value: None, quality: Quality::Good, at });
         }
     }
 
@@ -217,11 +235,20 @@ impl Board {
         if let Some(reading) = &mut self.raw[tag.index()] {
             reading.doubt = Some(cause);
         }
-        self.set(tag, self.sample(tag).doubted(cause));
+        let sample = self.sample(tag);
+        // A text is kept beside the sample, which has no number to show for it.
+        let doubted = match self.texts[tag.index()] {
+            Some(_) => Sample { quality: Quality::Uncertain(cause), ..sample },
+            None => sample.doubted(cause),
+        };
+        self.set(tag, doubted);
     }
 
     fn drop_value(&mut self, tag: TagId, cause: Cause, at: Timestamp) {
         self.raw[tag.index()] = None;
+        if self.texts[tag.index()].is_some() {
+            Arc::make_mut(&mut self.texts)[tag.index()] = None;
+        }
         self.set(tag, Sample::bad(cause, at));
     }
 
@@ -316,6 +343,7 @@ fn is_due(tag: &TagDef, sample: Sample, stored: Option<Sample>, at: Timestamp) -
 mod tests {
     use super::*;
     use crate::plant::fixture::{self, DP, FAULT, PV, RUN, TIC};
+    use crate::plant::tag::Kind;
 
     fn at(second: i64) -> Timestamp {
         Timestamp::from_second(second).expect("a small number")
@@ -338,6 +366,24 @@ mod tests {
         board.read(&[(FAULT, 2.0)], at(3));
         assert_eq!(board.sample(PV).quality, Quality::Bad(Cause::SensorFault));
         assert_eq!(board.sample(PV).value, None);
+    }
+
+    #[test]
+    fn a_text_is_trusted_and_doubted_like_a_number_and_never_stored() {
+        let mut def = fixture::plant();
+        (def.tags[PV.index()].point.kind, def.tags[PV.index()].store) = (Kind::Text(8), false);
+        let mut board = Board::new(Arc::new(def), at(0));
+        assert_eq!(board.texts()[PV.index()], None);
+        board.read_texts(&[(PV, "PXR4".into())], at(1));
+        assert_eq!(board.sample(PV), Sample { value: None, quality: Quality::Good, at: at(1) });
+        board.failed(&[PV], Fault::Timeout, at(2));
+        assert_eq!(board.sample(PV).quality, Quality::Uncertain(Cause::Timeout));
+        assert_eq!(board.texts()[PV.index()].as_deref(), Some("PXR4"), "doubtful, not gone");
+        board.gone(TIC, Cause::NotConnected, at(3));
+        assert_eq!(board.sample(PV).quality, Quality::Bad(Cause::NotConnected));
+        assert_eq!(board.texts()[PV.index()], None, "what is not known is not shown");
+        let stored = |record: &Record| matches!(record, Record::Sample(tag, _) if *tag == PV);
+        assert!(!board.records(at(4)).iter().any(stored));
     }
 
     #[test]

@@ -24,6 +24,8 @@ pub enum Event {
         device: DeviceId,
         /// Raw number of every tag in the block.
         values: Vec<(TagId, f64)>,
+        /// Text of every tag in the block that holds text.
+        texts: Vec<(TagId, Arc<str>)>,
         /// From the last byte sent to the first byte received.
         reply: Duration,
         /// The evidence.

@@ -78,14 +78,16 @@ impl Plant {
     /// Takes a fact from the bus.
     pub fn on_event(&mut self, event: Event) -> Effects {
         let (at, action) = match event {
-            Event::Read { at, device, values, reply, exchange } => {
+            Event::Read { at, device, values, texts, reply, exchange } => {
                 self.board.read(&values, at);
-                self.keep_evidence(values.iter().map(|(tag, _)| *tag), exchange);
+                self.board.read_texts(&texts, at);
+                let tags = values.iter().map(|(tag, _)| *tag).chain(texts.iter().map(|(tag, _)| *tag));
+                self.keep_evidence(tags, exchange);
                 let status = &mut self.devices[device.index()];
                 status.state = DeviceState::Answering;
                 status.reply = Some(reply);
                 status.ok += 1;
-                status.values += values.len() as u64;
+                status.values += (values.len() + texts.len()) as u64;
                 (at, None)
             }
             Event::Failed { at, device, tags, fault, exchange } => {
@@ -188,6 +190,7 @@ impl Plant {
             at: self.at,
             def: self.def.clone(),
             samples: self.board.samples().to_vec(),
+            texts: self.board.texts().clone(),
             decimals: self.def.tags.iter().map(|tag| self.board.shown_decimals(tag)).collect(),
             evidence: self.evidence.clone(),
             lines: self.lines.clone(),

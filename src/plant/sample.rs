@@ -119,7 +119,8 @@ impl Quality {
 /// A value with its quality and the instant at which the device said it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// In the tag's unit; bits are 0 or 1, enumerations their number. `None` exactly when the quality is bad.
+    /// In the tag's unit; bits are 0 or 1, enumerations their number. `None` exactly when the quality is bad; a tag that
+    /// holds text never has a number, its text stands in the snapshot.
     pub value: Option<f64>,
     /// How far to trust it.
     pub quality: Quality,

@@ -23,6 +23,8 @@ pub fn to_raw(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
         | Kind::U64
         | Kind::Bcd16
         | Kind::Bcd32 => exact.round(),
+        // Words are no number.
+        Kind::Text(_) => return None,
     };
     let (low, high) = limits(tag);
     (raw.is_finite() && low <= raw && raw <= high).then_some(raw)
@@ -33,6 +35,7 @@ pub fn same_raw(kind: Kind, one: f64, other: f64) -> bool {
     match kind {
         Kind::F32 => one as f32 == other as f32,
         Kind::Bool => (one != 0.0) == (other != 0.0),
+        Kind::Text(_) => false,
         Kind::I16
         | Kind::U16
         | Kind::I32
@@ -64,6 +67,8 @@ fn limits(tag: &TagDef) -> (f64, f64) {
         Kind::F64 => (f64::MIN, f64::MAX),
         Kind::Bcd16 => (0.0, 9_999.0),
         Kind::Bcd32 => (0.0, 99_999_999.0),
+        // An empty range: nothing is inside.
+        Kind::Text(_) => (0.0, -1.0),
     }
 }
 

@@ -25,6 +25,8 @@ pub struct Snapshot {
     pub def: Arc<PlantDef>,
     /// Samples, by [`TagId`].
     pub samples: Vec<Sample>,
+    /// What tags that hold text say, by [`TagId`]; `None` for all others and while the quality is bad.
+    pub texts: Arc<Vec<Option<Arc<str>>>>,
     /// Decimals to show, by [`TagId`] (they may come from the device).
     pub decimals: Vec<u8>,
     /// The last request that was made for each tag, with its answer, by [`TagId`]: why a value is what it is.
@@ -54,6 +56,9 @@ impl Snapshot {
     }
     /// The value of a tag as text with its decimals or enumeration label, without unit; `None` without a value.
     pub fn text(&self, tag: TagId) -> Option<String> {
+        if let Some(text) = &self.texts[tag.index()] {
+            return Some(text.to_string());
+        }
         let value = self.sample(tag).value?;
         Some(self.format(tag, value))
     }

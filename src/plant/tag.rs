@@ -121,6 +121,10 @@ impl TagDef {
     pub fn writable(&self) -> bool {
         self.access != Access::Read
     }
+    /// Does it hold words instead of a number?
+    pub fn is_text(&self) -> bool {
+        matches!(self.point.kind, Kind::Text(_))
+    }
     /// The text of an enumeration's number.
     pub fn label_of(&self, value: f64) -> Option<&str> {
         self.labels.iter().find(|(number, _)| *number as f64 == value).map(|(_, text)| text.as_str())
@@ -230,6 +234,8 @@ pub enum Kind {
     Bcd16,
     /// Eight decimal digits.
     Bcd32,
+    /// So many bytes of text, two a register. It has no number: see [`super::snapshot::Snapshot::text`].
+    Text(u8),
 }
 
 impl Kind {
@@ -239,8 +245,11 @@ impl Kind {
             Kind::Bool | Kind::I16 | Kind::U16 | Kind::Bcd16 => 1,
             Kind::I32 | Kind::U32 | Kind::F32 | Kind::Bcd32 => 2,
             Kind::I64 | Kind::U64 | Kind::F64 => 4,
+            Kind::Text(bytes) => u16::from(bytes).div_ceil(2),
         }
     }
+    /// Longest text, bytes: what one read of 125 registers holds.
+    pub const TEXT_MAX: u8 = 250;
 }
 
 /// Order of the bytes A B C D (A most significant) on the wire.

@@ -139,7 +139,9 @@ pub(super) fn link(defined: Vec<Defined>, problems: &mut Problems) -> Vec<TagDef
                 let found = foreign.map_or("it has no `enum`".to_owned(), |(_, unit)| format!("`{unit}` is no unit"));
                 problems.add(need.at, format!("{} does not tell a unit: {found}", target.name)).label("unit_from");
             }
-            if target.id == tag.id {
+            if target.is_text() {
+                problems.add(need.at, format!("{} is a text", target.name)).label("expected a tag that holds a number");
+            } else if target.id == tag.id {
                 problems.add(need.at, format!("{} needs itself", tag.name)).label("expected another tag");
             } else if tag.poll != Poll::Never && (target.poll == Poll::Never || target.access == Access::Write) {
                 let problem =
@@ -172,7 +174,14 @@ pub(super) fn faceplate(
     tags: &[TagDef],
     problems: &mut Problems,
 ) -> Option<Faceplate> {
-    let mut find = |name: &Option<At<String>>| name.as_ref().and_then(|name| names.near(name, device, problems));
+    let mut find = |name: &Option<At<String>>| {
+        let name = name.as_ref()?;
+        let tag = &tags[names.near(name, device, problems)?.index()];
+        if tag.is_text() {
+            problems.add(name.at, format!("{} is a text", tag.name)).label("expected a tag that holds a number");
+        }
+        Some(tag.id)
+    };
     let (pv, sv) = (find(&table.pv), find(&table.sv));
     let (mv, run, mode, tune) = (find(&table.mv), find(&table.run), find(&table.mode), find(&table.tune));
     let (pv, sv): (TagId, TagId) = (pv?, sv?);

@@ -60,13 +60,17 @@ pub(super) struct Defs<'a> {
 }
 
 impl Defs<'_> {
-    /// A tag by its full name.
+    /// A tag that holds a number, by its full name.
     pub fn tag(&self, name: &At<String>, problems: &mut Problems) -> Option<&TagDef> {
-        self.names.full(name, problems).map(|id| &self.tags[id.index()])
+        let tag = self.names.full(name, problems).map(|id| &self.tags[id.index()])?;
+        if tag.is_text() {
+            problems.add(name.at, format!("{} is a text", tag.name)).label("expected a tag that holds a number");
+        }
+        Some(tag)
     }
-    /// The id of a tag that may be left out.
+    /// The id of a tag that holds a number and may be left out.
     pub fn tag_id(&self, name: &Option<At<String>>, problems: &mut Problems) -> Option<TagId> {
-        name.as_ref().and_then(|name| self.names.full(name, problems))
+        name.as_ref().and_then(|name| self.tag(name, problems)).map(|tag| tag.id)
     }
     /// A device by its name.
     pub fn device(&self, name: &At<String>, problems: &mut Problems) -> Option<DeviceId> {

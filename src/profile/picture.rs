@@ -113,7 +113,9 @@ fn item_of(raw: Raw, defs: &Defs, problems: &mut Problems) -> Option<At<MimicIte
         "pipe" => pipe(PipeItem::of(layers, problems), defs, problems),
         "value" => {
             let item = ValueItem::of(layers, problems);
-            MimicItem::Value { place: item.place(), label: text(&item.label), tag: defs.tag_id(&item.tag, problems)? }
+            // The one item that can show words as well as a number.
+            let tag = defs.names.full(item.tag.as_ref()?, problems)?;
+            MimicItem::Value { place: item.place(), label: text(&item.label), tag }
         }
         "controller" => controller(ControllerItem::of(layers, problems), defs, problems)?,
         "sequence" => sequence(SequenceItem::of(layers, problems), defs, problems)?,
@@ -163,7 +165,7 @@ fn pipe(item: PipeItem, defs: &Defs, problems: &mut Problems) -> MimicItem {
     }
     MimicItem::Pipe {
         points: item.points.iter().map(|point| (point.value[0], point.value[1])).collect(),
-        flow: item.flow.iter().filter_map(|tag| defs.names.full(tag, problems)).collect(),
+        flow: item.flow.iter().filter_map(|tag| Some(defs.tag(tag, problems)?.id)).collect(),
     }
 }
 
@@ -187,7 +189,7 @@ fn sequence(item: SequenceItem, defs: &Defs, problems: &mut Problems) -> Option<
         label: text(&item.label),
         step: step.id,
         remaining: defs.tag_id(&item.remaining, problems),
-        states: item.states.iter().filter_map(|tag| defs.names.full(tag, problems)).collect(),
+        states: item.states.iter().filter_map(|tag| Some(defs.tag(tag, problems)?.id)).collect(),
     })
 }
 

@@ -32,7 +32,7 @@ pub(super) fn report(table: Option<&ReportTable>, defs: &Defs, problems: &mut Pr
     if let Some(folder) = &table.folder {
         report.folder = PathBuf::from(&folder.value);
     }
-    report.tags = table.tags.iter().filter_map(|tag| defs.names.full(tag, problems)).collect();
+    report.tags = table.tags.iter().filter_map(|tag| Some(defs.tag(tag, problems)?.id)).collect();
     if let Some(record) = table.record.as_ref().map(|record| &record.value)
         && let (Some(device), Some(every)) = (&record.device, record.every)
     {

@@ -340,7 +340,7 @@ words!(PollWord, "poll" {
     "fast" => PollWord::Fast, "slow" => PollWord::Slow, "once" => PollWord::Once, "never" => PollWord::Never,
 });
 
-/// The type of a raw value. Strings are known to be wanted, and refused with a clear word.
+/// The type of a raw value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct TypeName(pub Kind);
 
@@ -351,9 +351,14 @@ impl super::reader::Value for TypeName {
         problems: &mut super::diagnostic::Problems,
     ) -> Option<Self> {
         let word = <String as super::reader::Value>::read(value, at, problems)?;
-        if word.starts_with("string") {
-            problems.add(at, "text in registers is not supported yet").label("a string type");
-            return None;
+        if let Some(rest) = word.strip_prefix("string") {
+            let count = rest.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
+            let count = count.and_then(|count| count.trim().parse().ok()).filter(|n| (1..=Kind::TEXT_MAX).contains(n));
+            if count.is_none() {
+                let problem = problems.add(at, format!("`{word}` does not say how long the text is"));
+                problem.label(format!("expected \"string(N)\" with N bytes, 1 to {}", Kind::TEXT_MAX));
+            }
+            return count.map(|count| TypeName(Kind::Text(count)));
         }
         let found = TYPES.iter().find(|(name, _)| *name == word);
         if found.is_none() {

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceId, Limits, TagId},
-    tag::{Access, Bound, Class, Confidence, Decimals, Kind, Point, Poll, Table, TagDef},
+    tag::{Access, Bound, Class, Confidence, Decimals, Kind, Order, Point, Poll, Table, TagDef},
 };
 
 /// What a tag must know of its device.
@@ -49,6 +49,10 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
     let row = TagTable::of(&layers, problems);
     let point = point(&row, around, problems);
     let kind = point.map(|point| (point.kind, point.field.map(|(_, bits)| bits)));
+    let is_text = point.is_some_and(|point| matches!(point.kind, Kind::Text(_)));
+    if let Some(point) = point.filter(|_| is_text) {
+        check_text(&row, point, problems);
+    }
     let links = links(&row, around, problems);
     let decimals = match links.decimals {
         Some(tag) => Decimals::From(tag),
@@ -94,7 +98,8 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
         // Known when all tags and alarms are.
         class: Class::Soft,
         deadband: row.deadband.map_or(0.0, |deadband| deadband.value),
-        store: row.store.map_or(access != Access::Write && matches!(poll, Poll::Every(_)), |store| store.value),
+        store: !is_text
+            && row.store.map_or(access != Access::Write && matches!(poll, Poll::Every(_)), |store| store.value),
         confidence: row.confidence.map_or(Confidence::Medium, |confidence| confidence.value),
         source: text(&row.source),
     };
@@ -104,8 +109,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
 }
 
 /// Stands in for an address that is wrong; it never leaves the loader.
-const NOWHERE: Point =
-    Point { table: Table::Holding, address: 0, kind: Kind::U16, order: crate::plant::tag::Order::Abcd, field: None };
+const NOWHERE: Point = Point { table: Table::Holding, address: 0, kind: Kind::U16, order: Order::Abcd, field: None };
 
 /// The other tags that a row names.
 struct Links {
@@ -228,7 +232,7 @@ fn bit_field(field: &At<Choice>, kind: Kind, table: Table, problems: &mut Proble
         },
     };
     let size = kind.words() * 16;
-    let whole = !table.is_bits() && !matches!(kind, Kind::F32 | Kind::F64 | Kind::Bcd16 | Kind::Bcd32);
+    let whole = !table.is_bits() && !matches!(kind, Kind::F32 | Kind::F64 | Kind::Bcd16 | Kind::Bcd32 | Kind::Text(_));
     let valid = bounds.filter(|(high, low)| low <= high && u16::from(*high) < size && whole);
     if valid.is_none() {
         let problem = problems.add(field.at, "this is not a field of bits");
@@ -313,7 +317,45 @@ fn raw_range((kind, field): Raws) -> Option<(f64, f64)> {
         Kind::U64 => Some((0.0, u64::MAX as f64)),
         Kind::Bcd16 => Some((0.0, 9_999.0)),
         Kind::Bcd32 => Some((0.0, 99_999_999.0)),
-        Kind::F32 | Kind::F64 => None,
+        Kind::F32 | Kind::F64 | Kind::Text(_) => None,
+    }
+}
+
+/// Words have no scale, no limits and no names of numbers, and are neither written nor kept in the history.
+fn check_text(row: &TagTable, point: Point, problems: &mut Problems) {
+    let key = |at: Option<Span>, key: &'static str| at.map(|at| (at, key));
+    let for_numbers = [
+        key(row.scale.map(|key| key.at), "scale"),
+        key(row.offset.map(|key| key.at), "offset"),
+        key(row.decimals.map(|key| key.at), "decimals"),
+        key(row.decimals_from.as_ref().map(|key| key.at), "decimals_from"),
+        key(row.unit.as_ref().map(|key| key.at), "unit"),
+        key(row.unit_from.as_ref().map(|key| key.at), "unit_from"),
+        key(row.min.map(|key| key.at), "min"),
+        key(row.max.map(|key| key.at), "max"),
+        key(row.min_from.as_ref().map(|key| key.at), "min_from"),
+        key(row.max_from.as_ref().map(|key| key.at), "max_from"),
+        key(row.labels.as_ref().map(|key| key.at), "enum"),
+        key(row.bits.as_ref().map(|key| key.at), "bits"),
+        key(row.bad_if.first().map(|key| key.at), "bad_if"),
+        key(row.quality_from.as_ref().map(|key| key.at), "quality_from"),
+        key(row.deadband.map(|key| key.at), "deadband"),
+    ];
+    for (at, key) in for_numbers.into_iter().flatten() {
+        problems.add(at, format!("`{key}` is for numbers, this is a text")).label("leave it out");
+    }
+    if let Some(order) = row.order.filter(|order| matches!(order.value, Order::Cdab | Order::Dcba)) {
+        let problem = problems.add(order.at, "the words of a text are never reversed");
+        problem.label("expected \"ABCD\", high byte first, or \"BADC\", low byte first");
+    }
+    if point.table.is_bits() {
+        problems.add(row.at, "a text lies in registers").label("expected table = \"holding\" or \"input\"");
+    }
+    if let Some(access) = row.access.filter(|access| access.value != Access::Read) {
+        problems.add(access.at, "a text can only be read").label("expected access = \"r\"");
+    }
+    if let Some(store) = row.store.filter(|store| store.value) {
+        problems.add(store.at, "the history keeps numbers, this is a text").label("leave it out");
     }
 }
 

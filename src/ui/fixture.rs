@@ -162,6 +162,7 @@ impl Fixture {
             Decimals::From(_) => 1,
         });
         Arc::new(Snapshot {
+            texts: Arc::new(vec![None; self.def.tags.len()]),
             evidence: Arc::new(self.evidence.clone()),
             at: now(),
             samples: self.samples.clone(),

@@ -77,7 +77,7 @@ mod tests {
         plant.on_event(Event::Line { at: at(0), line: LineId(0), state: LineState::Connected });
         let values = vec![(PV, 700.0), (DP, 1.0)];
         let reply = Duration::from_millis(12);
-        plant.on_event(Event::Read { at: at(0), device: TIC, values, reply, exchange: None });
+        plant.on_event(Event::Read { at: at(0), device: TIC, values, texts: Vec::new(), reply, exchange: None });
         assert_eq!(plant.snapshot().device(TIC).diagnosis, None);
         let id = OrderId { terminal: 1, number: 1 };
         plant.on_order(Order { id, by: "anna".into(), command: Command::Write { tag: SV, value: 1.0 } }, at(1));

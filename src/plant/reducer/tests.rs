@@ -23,6 +23,7 @@ fn read(second: i64, values: &[(TagId, f64)]) -> Event {
         at: at(second),
         device: TIC,
         values: values.to_vec(),
+        texts: Vec::new(),
         reply: Duration::from_millis(12),
         exchange: None,
     }

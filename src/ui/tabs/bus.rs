@@ -92,6 +92,8 @@ pub enum Action {
     Jump(isize),
     /// Opens what is selected.
     Open,
+    /// Why the values of the selected block are what they are.
+    Why,
     /// Holds the frames still, or lets them run.
     Freeze,
     /// Asks which frames are shown.
@@ -131,6 +133,7 @@ const LINE_KEYS: &[Key<Action>] = &[
 const PLAN_KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::Down), label: "select", help: "a row down", action: Action::Move(1) },
     Key { chord: code(KeyCode::Enter), label: "tags", help: "the tags of the block", action: Action::Open },
+    Key { chord: char('w'), label: "why", help: "why the values of the block are what they are", action: Action::Why },
 ];
 const FRAMES_KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::Down), label: "select", help: "a row down", action: Action::Move(1) },
@@ -201,6 +204,7 @@ impl Bus {
             Action::Screen(by) => self.scroll(cx, &at, by * screen),
             Action::Jump(by) => self.scroll(cx, &at, by * 100_000),
             Action::Open => return self.open(cx, &at),
+            Action::Why => return self.plan.why(cx, &at),
             Action::Freeze => self.frames.toggle(cx, &at),
             Action::Filter => return vec![self.frames.ask_filter()],
             Action::Save => return self.frames.save(cx, &at),

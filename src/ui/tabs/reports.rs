@@ -23,7 +23,7 @@ use crate::{
     ui::{
         Act, Cx, Effect,
         keys::{Key, char, code},
-        modal::{Modal, Prompt},
+        modal::{Modal, Prompt, Why},
     },
 };
 
@@ -52,6 +52,8 @@ pub enum Action {
     Dialect,
     /// Ask the history again.
     Refresh,
+    /// Why the values of the report are what they are now.
+    Why,
 }
 
 /// Keys of this tab.
@@ -67,6 +69,7 @@ pub const KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::PageUp), label: "", help: "a page up", action: Action::PageUp },
     Key { chord: code(KeyCode::PageDown), label: "", help: "a page down", action: Action::PageDown },
     Key { chord: char('u'), label: "", help: "read the figures anew", action: Action::Refresh },
+    Key { chord: char('w'), label: "", help: "why its values are what they are now", action: Action::Why },
 ];
 
 /// How often the figures of a running shift are read anew, and when an answer counts as lost (real time).
@@ -145,6 +148,10 @@ impl Reports {
                 self.export = Export::Not;
             }
             Action::Refresh => self.errand.want(),
+            Action::Why => {
+                let rows = self.report.iter().flat_map(|report| &report.tags);
+                return Why::open(Why::of_all(cx, rows.filter_map(|row| cx.def().tag_named(&row.tag)).collect()));
+            }
         }
         self.ask(cx)
     }

@@ -33,7 +33,7 @@ pub fn show(cx: &Cx, tag: TagId) -> Shown {
     let style = cx.theme.quality(sample.quality);
     let def = cx.def().tag(tag);
     let unit = cx.snapshot.unit(tag).to_owned();
-    let number = def.labels.is_empty() && def.bit_labels.is_empty();
+    let number = def.labels.is_empty() && def.bit_labels.is_empty() && !def.is_text();
     let nothing = |text: &str, note: &str, style| Shown {
         text: text.to_owned(),
         unit: String::new(),
@@ -43,6 +43,7 @@ pub fn show(cx: &Cx, tag: TagId) -> Shown {
     };
     match (sample.quality, words(cx, tag)) {
         _ if def.access == Access::Write => nothing("–", "write only", cx.theme.dim()),
+        (Quality::Good, Some(text)) if text.is_empty() => nothing("\"\"", "empty text", style),
         (Quality::Good, Some(text)) => Shown { text, unit, note: String::new(), number, style },
         (Quality::Uncertain(_), Some(text)) => {
             Shown { text: format!("{text}?"), unit, note: text::age(cx.age(tag)), number, style }
@@ -54,6 +55,9 @@ pub fn show(cx: &Cx, tag: TagId) -> Shown {
 /// The value in words; a status word as the names of its set bits.
 fn words(cx: &Cx, tag: TagId) -> Option<String> {
     let def = cx.def().tag(tag);
+    if def.is_text() {
+        return cx.snapshot.text(tag);
+    }
     let value = cx.snapshot.sample(tag).value?;
     if def.bit_labels.is_empty() {
         return Some(cx.snapshot.format(tag, value));
@@ -98,6 +102,26 @@ pub fn is_on(cx: &Cx, tag: TagId) -> Option<bool> {
 mod tests {
     use super::*;
     use crate::ui::fixture::{Fixture, with_cx};
+
+    #[test]
+    fn a_text_is_shown_with_its_doubt_like_any_value() {
+        let mut fixture = Fixture::normal();
+        let tag = fixture.tag("TIC-1.MV");
+        fixture.def.tags[tag.index()].point.kind = crate::plant::tag::Kind::Text(8);
+        fixture.def.tags[tag.index()].unit.clear();
+        let mut check = |text: Option<&str>, quality, room, expect: &str| {
+            fixture.samples[tag.index()].value = None;
+            fixture.samples[tag.index()].quality = quality;
+            let mut snapshot = (*fixture.snapshot()).clone();
+            std::sync::Arc::make_mut(&mut snapshot.texts)[tag.index()] = text.map(Into::into);
+            with_cx(&snapshot, |cx| assert_eq!(show(cx, tag).within(room), expect));
+        };
+        check(Some("PXR4TAY1"), Quality::Good, 20, "PXR4TAY1");
+        check(Some("PXR4TAY1"), Quality::Good, 5, "PXR4…");
+        check(Some(""), Quality::Good, 20, "\"\" empty text");
+        check(None, Quality::Bad(Cause::Timeout), 30, "---- no answer in time");
+        check(Some("PXR4"), Quality::Uncertain(Cause::Timeout), 5, "PXR4?");
+    }
 
     #[test]
     fn a_number_is_whole_or_not_there() {

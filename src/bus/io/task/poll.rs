@@ -246,15 +246,16 @@ impl Task {
         reply: Duration,
         exchange: Option<Arc<Exchange>>,
     ) -> Result<(), Ended> {
-        let (mut good, mut spoiled) = (Vec::with_capacity(block.tags.len()), Vec::new());
-        for tag in block.tags.iter().copied() {
-            match value_of(self.def.tag(tag), block, values) {
-                Some(value) => good.push((tag, value)),
-                None => spoiled.push(tag),
+        let (mut numbers, mut texts, mut spoiled) = (Vec::with_capacity(block.tags.len()), Vec::new(), Vec::new());
+        for tag in block.tags.iter().map(|tag| self.def.tag(*tag)) {
+            match (value_of(tag, block, values), text_of(tag, block, values)) {
+                (Some(value), _) => numbers.push((tag.id, value)),
+                (None, Some(text)) => texts.push((tag.id, text)),
+                (None, None) => spoiled.push(tag.id),
             }
         }
-        let values = good;
-        self.tell(Event::Read { at, device: block.device, values, reply, exchange: exchange.clone() }).await?;
+        self.tell(Event::Read { at, device: block.device, values: numbers, texts, reply, exchange: exchange.clone() })
+            .await?;
         if !spoiled.is_empty() {
             self.tell_failed(at, block.device, spoiled, Fault::NotANumber, exchange).await?;
         }
@@ -288,6 +289,19 @@ fn parse(block: &Block, answer: Vec<u8>) -> Result<Answer, Fault> {
         }
         // The length was checked byte for byte before; kept so that no later change can turn a shift into a value.
         _ => Err(Fault::WrongLength { got, asked: block.count }),
+    }
+}
+
+/// The text of a tag that holds text.
+fn text_of(tag: &TagDef, block: &Block, values: &Answer) -> Option<Arc<str>> {
+    tag.is_text().then_some(())?;
+    let start = usize::from(tag.point.address.checked_sub(block.address)?);
+    match values {
+        Answer::Bits(_) => None,
+        Answer::Words(words) => {
+            let words = words.get(start..start + usize::from(tag.point.len()))?;
+            codec::decode_text(tag.point, words).map(Into::into)
+        }
     }
 }
 

@@ -49,7 +49,8 @@ impl Task {
                 let (device, values) = (tag.device, vec![(tag.id, raw)]);
                 let exchange = link.last.clone();
                 let reply = exchange.as_ref().and_then(|exchange| exchange.reply).unwrap_or_default();
-                self.tell(Event::Read { at: self.clock.now(), device, values, reply, exchange }).await?;
+                self.tell(Event::Read { at: self.clock.now(), device, values, texts: Vec::new(), reply, exchange })
+                    .await?;
             }
             // What the device holds now is not known until it is read again.
             WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => {

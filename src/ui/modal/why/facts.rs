@@ -22,7 +22,8 @@ pub(super) fn rows(cx: &Cx, tag: TagId, room: u16) -> Vec<Row> {
     let exchange = cx.snapshot.evidence[tag.index()].as_deref();
     let found = exchange.and_then(|exchange| evidence::find(def.point, exchange));
     let mut rows = value::value_rows(cx, def, exchange, found.as_ref());
-    rows.push(row("number", value::number(cx, def, exchange, found.as_ref()), cx.theme.normal()));
+    let label = if def.is_text() { "text" } else { "number" };
+    rows.push(row(label, value::number(cx, def, exchange, found.as_ref()), cx.theme.normal()));
     rows.push(row("where", wire::place(cx, def, device), cx.theme.normal()));
     rows.push(row("", wire::point(def), cx.theme.normal()));
     let told = exchange.map(|exchange| wire::exchange_rows(cx, def, exchange, found.as_ref(), room, &mut rows));

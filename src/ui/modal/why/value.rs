@@ -7,7 +7,10 @@ use super::{
     wire::kind,
 };
 use crate::{
-    bus::evidence::{self, Found},
+    bus::{
+        codec,
+        evidence::{self, Found},
+    },
     plant::{
         def::TagId,
         event::{Fault, LineState},
@@ -111,8 +114,26 @@ fn advice(cx: &Cx, def: &TagDef, cause: Cause, exchange: Option<&Exchange>) -> O
     }
 }
 
+/// `5058 5234 = "PXR4", blanks at the end left out`.
+fn text(cx: &Cx, def: &TagDef, found: Option<&Found>) -> String {
+    let in_answer = found.and_then(|found| codec::decode_text(def.point, &found.words));
+    match (in_answer, found, cx.snapshot.text(def.id)) {
+        (Some(text), Some(found), _) => {
+            let hex: Vec<String> = found.words.iter().map(|word| format!("{word:04X}")).collect();
+            let odd = text.contains(codec::UNPRINTABLE);
+            let note = if odd { ", · stands for a byte that cannot be printed" } else { "" };
+            format!("\"{text}\"{note}, from {}", hex.join(" "))
+        }
+        (_, _, Some(text)) => format!("\"{text}\", earlier answer"),
+        (..) => "none".to_owned(),
+    }
+}
+
 /// `raw 724 (02D4) × 10^-1 = 72.4 °C, decimals from TIC-1.DP`.
 pub(super) fn number(cx: &Cx, def: &TagDef, exchange: Option<&Exchange>, found: Option<&Found>) -> String {
+    if def.is_text() {
+        return text(cx, def, found);
+    }
     let scaling = match def.decimals {
         Decimals::From(_) => cx.snapshot.decimals[def.id.index()],
         Decimals::Fixed(_) => 0,

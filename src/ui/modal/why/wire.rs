@@ -121,13 +121,15 @@ pub(super) fn point(def: &TagDef) -> String {
         (true, _) => "one bit".to_owned(),
         (false, Some((low, 1))) => format!("bit {low} of a word"),
         (false, Some((low, bits))) => format!("bits {low}–{} of a word", low + bits - 1),
-        (false, None) => kind(point.kind).to_owned(),
+        (false, None) => kind(point.kind),
     };
     let order = match (point.table.is_bits(), point.order) {
         (true, _) => "",
         (false, Order::Abcd | Order::Cdab) if point.kind.words() == 1 => "",
+        (false, Order::Abcd) if def.is_text() => " ABCD (high byte first)",
         (false, Order::Abcd) => " ABCD (high word first)",
         (false, Order::Cdab) => " CDAB (low word first)",
+        (false, Order::Badc) if def.is_text() => " BADC (low byte first)",
         (false, Order::Badc) => " BADC (bytes swapped)",
         (false, Order::Dcba) => " DCBA (little-endian)",
     };
@@ -136,8 +138,9 @@ pub(super) fn point(def: &TagDef) -> String {
 }
 
 /// The word of a type in the profiles.
-pub(super) fn kind(kind: Kind) -> &'static str {
-    match kind {
+pub(super) fn kind(kind: Kind) -> String {
+    let word = match kind {
+        Kind::Text(bytes) => return format!("string({bytes})"),
         Kind::Bool => "bool",
         Kind::I16 => "int16",
         Kind::U16 => "uint16",
@@ -149,5 +152,6 @@ pub(super) fn kind(kind: Kind) -> &'static str {
         Kind::F64 => "float64",
         Kind::Bcd16 => "bcd16",
         Kind::Bcd32 => "bcd32",
-    }
+    };
+    word.to_owned()
 }

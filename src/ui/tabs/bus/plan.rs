@@ -17,7 +17,7 @@ use crate::{
     },
     ui::{
         Act, Cx,
-        modal::Modal,
+        modal::{Modal, Why},
         widgets::text::{Canvas, between, fit_words, wrap},
     },
 };
@@ -43,6 +43,12 @@ impl Plan {
         let poll = at.report?.polls.get(self.selected)?;
         let shown = Shown::Block { line: at.id, device: poll.device, table: poll.table, address: poll.address };
         Some(Act::Open(Modal::Bus(Box::new(Window::Sheet(Sheet::new(shown))))))
+    }
+
+    /// Why the values of the selected block are what they are, beginning with one that is not good.
+    pub fn why(&self, cx: &Cx, at: &Place) -> Vec<Act> {
+        let poll = at.report.and_then(|report| report.polls.get(self.selected));
+        Why::open(Why::of_all(cx, poll.map(|poll| poll.tags.to_vec()).unwrap_or_default()))
     }
 
     /// Draws it.

@@ -203,6 +203,15 @@ fn the_tags_of_a_block_are_shown_with_their_values() {
 }
 
 #[test]
+fn why_goes_through_the_values_of_a_block() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "Pw");
+    let first = screen(&mut model, 80, 24);
+    assert!(first.contains("why ") && first.contains(" 1/"), "{first}");
+    type_keys(&mut model, "→");
+    assert!(screen(&mut model, 80, 24).contains(" 2/"), "one value after the other");
+}
+
+#[test]
 fn typed_bytes_are_told_at_once_and_never_act_as_keys() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "Tt");
     assert_eq!(type_keys(&mut model, "01 03 03 EA 00 01"), []);
