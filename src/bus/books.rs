@@ -166,6 +166,7 @@ impl Books {
             tags: block.tags.clone(),
             poll: block.poll,
             cost: plan::cost(block, settings, def.device(block.device)),
+            measured: polls.get(index).and_then(|poll| poll.measured),
             next: polls.get(index).and_then(|poll| poll.next),
             tally: tally.clone(),
         };

@@ -262,6 +262,7 @@ impl Schedule {
             shed: self.is_shed(poll),
             next: poll.wanted(),
             missed: poll.missed,
+            measured: poll.measured(),
         })
     }
 

@@ -81,6 +81,8 @@ pub struct PollReport {
     pub poll: Poll,
     /// Worst time of a good read on the wire.
     pub cost: Duration,
+    /// What its reads have really taken of late, good or not (plant time); `None` before the first.
+    pub measured: Option<Duration>,
     /// What happens to it when the line has too much to do.
     pub class: Class,
     /// It is read each so many periods now; 1 is every period.

@@ -45,6 +45,8 @@ pub struct PollInfo {
     pub next: Option<Timestamp>,
     /// Releases that were skipped because the line had no time.
     pub missed: u64,
+    /// Measured time of a read, smoothed; `None` before the first.
+    pub measured: Option<Duration>,
 }
 
 #[derive(Debug, Clone)]
@@ -143,6 +145,10 @@ impl Pending {
     pub fn spent(&mut self, time: Duration) {
         let spent = time.as_secs_f64();
         self.cost = Some(self.cost.map_or(spent, |cost| cost + (spent - cost) / 8.0));
+    }
+
+    pub fn measured(&self) -> Option<Duration> {
+        self.cost.map(Duration::from_secs_f64)
     }
 
     /// Does it come too late again and again?

@@ -52,6 +52,7 @@ fn fixture() -> Fixture {
             tags: tags.into(),
             poll: Poll::Every(Duration::from_secs(1)),
             cost: Duration::from_millis(64),
+            measured: Some(Duration::from_millis(61)),
             next: Some(fixture::now() + SignedDuration::from_millis(600)),
             class: crate::plant::tag::Class::Soft,
             factor: 1,

@@ -117,7 +117,8 @@ fn cycle(cx: &Cx, report: &LineReport, width: u16) -> Vec<Row> {
     let mut flow = Flow::new("cycle", cx.theme.dim(), width);
     let plan = Planned::of(report);
     flow.add(value(cx, "blocks", &plan.blocks.to_string()));
-    flow.add(value(cx, "one round", &format!("{} on the wire", ms(plan.round))));
+    let measured = plan.measured.map_or("not yet".to_owned(), ms);
+    flow.add(value(cx, "one round at worst", &format!("{}, measured {measured}", ms(plan.round))));
     flow.add(value(cx, "load at worst", &format!("{:.0} %", plan.load * 100.0)));
     flow.add(count(cx, "missed", report.counters.missed, missed_lately(report)));
     flow.rows()
@@ -129,17 +130,20 @@ struct Planned {
     blocks: usize,
     /// All of them once, at worst.
     round: Duration,
+    /// What they have taken of late; `None` until each was read.
+    measured: Option<Duration>,
     /// Share of the line's time at worst.
     load: f64,
 }
 
 impl Planned {
     fn of(report: &LineReport) -> Planned {
-        let mut plan = Planned { blocks: 0, round: Duration::ZERO, load: 0.0 };
+        let mut plan = Planned { blocks: 0, round: Duration::ZERO, measured: Some(Duration::ZERO), load: 0.0 };
         for poll in &report.polls {
             let Poll::Every(period) = poll.poll else { continue };
             plan.blocks += 1;
             plan.round += poll.cost;
+            plan.measured = plan.measured.zip(poll.measured).map(|(sum, one)| sum + one);
             plan.load += poll.cost.as_secs_f64() / period.as_secs_f64();
         }
         plan
