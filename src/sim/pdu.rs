@@ -61,6 +61,10 @@ pub trait Registers: Clone {
     fn word(&self, kind: Words, address: u16) -> Result<u16, Refusal>;
     /// Writes one holding register.
     fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal>;
+    /// Whether it is too busy for this function now: then the request has no answer and no effect.
+    fn holds_back(&self, _function: u8) -> bool {
+        false
+    }
     /// Eight bits of the maker's choice, for function 07.
     fn exception_status(&self) -> u8 {
         0

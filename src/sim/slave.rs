@@ -57,10 +57,14 @@ impl<D: Registers> Slave<D> {
         self.counters.note(RECEIVED_SPOILED);
     }
 
-    /// Answers a request; an empty one has no answer.
+    /// Answers a request; an empty one has no answer, nor one that the device holds back.
     pub fn respond(&mut self, pdu: &[u8]) -> Option<Vec<u8>> {
         let (&function, data) = pdu.split_first()?;
         self.counters.addressed(RECEIVED);
+        if self.device.holds_back(function) {
+            self.counters.count(UNANSWERED);
+            return None;
+        }
         let reply = match function {
             0x08 | 0x0B | 0x0C if D::FUNCTIONS.contains(&function) => {
                 self.counters.serve(function, data).unwrap_or_else(|refusal| pdu::exception(function, refusal.code()))
@@ -75,7 +79,8 @@ impl<D: Registers> Slave<D> {
     pub fn obey(&mut self, pdu: &[u8]) {
         self.counters.addressed(RECEIVED_BROADCAST);
         self.counters.count(UNANSWERED);
-        if let Some(function) = pdu.first().copied().filter(|function| WRITES.contains(function))
+        let heard = |function: &u8| WRITES.contains(function) && !self.device.holds_back(*function);
+        if let Some(function) = pdu.first().copied().filter(heard)
             && let Some(reply) = pdu::serve(&mut self.device, pdu)
         {
             self.counters.answered(function, &reply);

@@ -1,4 +1,6 @@
-//! The control laws: on/off, P, PI, PD, PID, and a simple stand-in for the fuzzy law.
+//! The control laws: on/off, P, PI, PD, PID; the fuzzy law blends PID with its own rules.
+
+use super::fuzzy::Grades;
 
 /// Output at SV when there is no integral part (lumped model of the six experiments).
 const BIAS_PERCENT: f64 = 21.0;
@@ -8,8 +10,6 @@ const INTEGRAL_REACH: f64 = 6.4 / 185.0;
 const INTEGRAL_REACH_OF_BAND: f64 = 0.69;
 /// The derivative is filtered over this share of D.
 const DERIVATIVE_FILTER: f64 = 0.125;
-/// The fuzzy law heats fully until PV, drawn out this far along its slope, meets SV.
-const FUZZY_LOOK_AHEAD_S: f64 = 25.0;
 /// Time over which the fuzzy law sees the slope of PV.
 const SLOPE_FILTER_S: f64 = 5.0;
 
@@ -18,7 +18,7 @@ const SLOPE_FILTER_S: f64 = 5.0;
 pub enum Law {
     /// P, I and D as they are set; on/off when P is 0.
     Pid,
-    /// PID that approaches SV at full power.
+    /// PID that approaches SV with more power, see [`super::fuzzy`].
     Fuzzy,
 }
 
@@ -37,6 +37,8 @@ pub struct Settings {
     pub d_s: f64,
     /// On/off control switches on again this far below SV.
     pub hysteresis_c: f64,
+    /// The output cools (direct action) and does not heat (reverse action).
+    pub cools: bool,
 }
 
 /// What a law remembers between two samples.
@@ -50,16 +52,25 @@ pub struct Control {
 }
 
 impl Control {
-    /// The output, 0–100 %, of a heating controller (reverse action).
+    /// The output, 0–100 %. Cooling is heating with everything upside down.
     pub fn step(&mut self, dt_s: f64, sv_c: f64, pv_c: f64, set: &Settings) -> f64 {
+        let sign = if set.cools { -1.0 } else { 1.0 };
+        let (sv_c, pv_c) = (sign * sv_c, sign * pv_c);
         let change_c = pv_c - self.last_pv_c.replace(pv_c).unwrap_or(pv_c);
         self.rate_c_per_s += (change_c / dt_s - self.rate_c_per_s) * dt_s / (DERIVATIVE_FILTER * set.d_s + dt_s);
         self.slope_c_per_s += (change_c / dt_s - self.slope_c_per_s) * dt_s / (SLOPE_FILTER_S + dt_s);
+        let error_c = sv_c - pv_c;
         if set.p_percent <= 0.0 {
-            return self.on_off(sv_c - pv_c, set.hysteresis_c);
+            return self.on_off(error_c, set.hysteresis_c);
         }
-        let approaching = set.law == Law::Fuzzy && pv_c + self.slope_c_per_s * FUZZY_LOOK_AHEAD_S < sv_c;
-        if approaching && sv_c - pv_c > 1.0 { 100.0 } else { self.pid(dt_s, sv_c - pv_c, set) }
+        let pid = self.pid(dt_s, error_c, set);
+        match set.law {
+            Law::Pid => pid,
+            Law::Fuzzy => {
+                let band_c = set.p_percent / 100.0 * set.span_c;
+                Grades::of(error_c, self.slope_c_per_s, band_c, set.d_s).blend(pid)
+            }
+        }
     }
 
     fn on_off(&mut self, error_c: f64, hysteresis_c: f64) -> f64 {
@@ -91,7 +102,7 @@ mod tests {
     use super::*;
 
     const SET: Settings =
-        Settings { law: Law::Pid, span_c: 185.0, p_percent: 5.0, i_s: 0.0, d_s: 0.0, hysteresis_c: 1.0 };
+        Settings { law: Law::Pid, span_c: 185.0, p_percent: 5.0, i_s: 0.0, d_s: 0.0, hysteresis_c: 1.0, cools: false };
 
     fn check(set: Settings, errors_c: &[f64], expect: f64) {
         let mut control = Control::default();
@@ -114,6 +125,8 @@ mod tests {
         check(Settings { p_percent: 0.0, ..SET }, &[0.5], 0.0);
         check(Settings { p_percent: 0.0, ..SET }, &[1.5, 0.5], 100.0);
         check(Settings { p_percent: 0.0, ..SET }, &[1.5, -0.1, 0.5], 0.0);
+        check(Settings { cools: true, ..SET }, &[-43.0], 100.0);
+        check(Settings { cools: true, ..SET }, &[4.625], 0.0);
         check(Settings { law: Law::Fuzzy, i_s: 240.0, ..SET }, &[5.0], 100.0);
     }
 }

@@ -1,32 +1,51 @@
 //! The temperature controller FUJI PXR4: settings and measurements at their true addresses, control behind them.
+//!
+//! ```text
+//!  sensor ── filter ── PV ──┬── alarms ── 31007                       one sample of 0.5 s
+//!                           ▼
+//!  SV ── ramp/soak ── limits ── standby? fault? ── tuning? ── on/off, PID, fuzzy, self ── MV
+//! ```
 
+mod alarm;
 mod control;
+mod display;
+mod fuzzy;
 mod map;
 mod program;
 mod registers;
+mod selftune;
 mod tuning;
 
 use std::time::Duration;
 
+use alarm::{Alarm, Setup};
 use control::{Control, Law, Settings};
-use program::{Command, Plan, Program, Segment};
+use program::{Command, Mode, Plan, Program, Segment};
+use selftune::{Found, SelfTuner};
 use tuning::{Tuner, Verdict};
 
 /// The controller samples, computes and outputs once in this time (data sheet).
 pub const SAMPLE: Duration = Duration::from_millis(500);
 const SAMPLE_S: f64 = 0.5;
 
-/// Deviation alarm 1: on above SV + 5 °C, off again 1 °C lower. Its registers are not known, so it is fixed here.
-const ALARM_DEVIATION_C: f64 = 5.0;
-const ALARM_HYSTERESIS_C: f64 = 1.0;
+/// What a Pt100 can measure, and the narrowest range, in °C.
+const SENSOR_C: (f64, f64) = (-150.0, 600.0);
+const NARROWEST_K: f64 = 10.0;
 /// Fault word 31008: input open on the upper side, below the range, above it.
 const OPEN_UPPER: u16 = 1 << 1;
 const BELOW_RANGE: u16 = 1 << 2;
 const ABOVE_RANGE: u16 = 1 << 3;
+/// Alarm word 31007: alarms 1 to 3, and the burnt-out heater, whose bit nobody has published: this place is a guess.
+const HEATER_BREAK: u16 = 1 << 3;
+/// A heater is judged only above this output, after so many samples: it needs some seconds to warm up.
+const JUDGED_PERCENT: f64 = 20.0;
+const JUDGED_AFTER: u32 = 60;
 /// PV runs from −5 to 105 % of the range.
 const OVER_RANGE: f64 = 0.05;
 /// Mains voltage, to turn the heater's power into the current of the CT input.
 const MAINS_V: f64 = 220.0;
+/// Saving takes this many samples, 5 s.
+const SAVING_SAMPLES: u32 = 10;
 
 /// What is connected to the sensor terminals.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,45 +62,57 @@ pub struct Pxr {
     settings: [i16; map::COUNT],
     saved: [i16; map::COUNT],
     saves: u32,
+    /// Samples until the settings are saved; 0 while nothing is being saved.
+    saving: u32,
     pv_c: f64,
     sv_c: f64,
     mv_percent: f64,
     heater_a: f64,
     faults: u16,
-    alarm: bool,
+    alarms: [Alarm; 3],
+    weak_heater: u32,
     control: Control,
     tuner: Option<Tuner>,
+    self_tuner: Option<SelfTuner>,
     program: Program,
+    command: Command,
 }
 
 impl Pxr {
     /// As it leaves the workshop of the thesis: SV 70.0 °C, P 5.0 %, I 240 s, D 60 s, running, everything saved.
     pub fn new(start_c: f64) -> Pxr {
-        let settings = map::initial();
+        Pxr::with(map::initial(), start_c)
+    }
+
+    fn with(settings: [i16; map::COUNT], pv_c: f64) -> Pxr {
         Pxr {
             settings,
             saved: settings,
             saves: 0,
-            pv_c: start_c,
+            saving: 0,
+            pv_c,
             sv_c: 70.0,
             mv_percent: 0.0,
             heater_a: 0.0,
             faults: 0,
-            alarm: false,
+            alarms: <[Alarm; 3]>::default(),
+            weak_heater: 0,
             control: Control::default(),
             tuner: None,
+            self_tuner: None,
             program: Program::default(),
+            command: Command::Off,
         }
     }
 
     /// One sample of [`SAMPLE`]: measures, decides, sets the output.
     pub fn sample(&mut self, sensor: Sensor, heater_w: f64) {
         self.heater_a = heater_w / MAINS_V;
+        self.save();
         self.measure(sensor);
         self.sv_c = self.set_value();
         self.mv_percent = self.output();
-        let above_c = self.pv_c - self.sv_c;
-        self.alarm = above_c > ALARM_DEVIATION_C || (self.alarm && above_c > ALARM_DEVIATION_C - ALARM_HYSTERESIS_C);
+        self.judge();
     }
 
     /// Output 1 in percent.
@@ -109,10 +140,35 @@ impl Pxr {
         self.saves
     }
 
-    /// Loses power and comes back: settings are those last saved, tuning and programme are off.
+    /// Loses power and comes back: settings are those last saved (a saving that was under way is lost), tuning is off, and
+    /// the programme too, unless its mode starts it at power-on.
     pub fn power_cycle(&mut self) {
-        let (settings, saves) = (self.saved, self.saves);
-        *self = Pxr { settings, saved: settings, saves, ..Pxr::new(self.pv_c) };
+        let saves = self.saves;
+        *self = Pxr { saves, ..Pxr::with(self.saved, self.pv_c) };
+        if self.mode().start_at_power_on {
+            self.settings[map::PROGRAM] = 1;
+        }
+    }
+
+    fn saving(&self) -> bool {
+        self.saving > 0
+    }
+
+    fn begin_saving(&mut self) {
+        self.saving = SAVING_SAMPLES;
+    }
+
+    /// Carries on with a saving. Commands themselves are not saved.
+    fn save(&mut self) {
+        let was_saving = self.saving();
+        self.saving = self.saving.saturating_sub(1);
+        if was_saving && !self.saving() {
+            self.settings[map::FIX] = 0;
+            self.saved = self.settings;
+            self.saved[map::TUNE] = 0;
+            self.saved[map::PROGRAM] = 0;
+            self.saves = self.saves.saturating_add(1);
+        }
     }
 
     fn measure(&mut self, sensor: Sensor) {
@@ -133,53 +189,63 @@ impl Pxr {
         self.pv_c += (seen_c - self.pv_c) * if self.faults == 0 { SAMPLE_S / (SAMPLE_S + filter_s) } else { 1.0 };
     }
 
+    /// The programme moves SV while it runs; in standby it stands still.
     fn set_value(&mut self) -> f64 {
         let command = match self.settings[map::PROGRAM] {
+            1 if self.standby() => Command::Halt,
             1 => Command::Run,
             2 => Command::Halt,
             3 => Command::End,
             _ => Command::Off,
         };
-        let plan = self.plan();
+        let mode = self.mode();
+        let before = std::mem::replace(&mut self.command, command);
+        let plan = self.plan(mode);
         let moving_c = self.program.step(SAMPLE_S, command, &plan, self.pv_c);
-        if self.program.ended() && command == Command::Run {
+        let ended = self.program.ended() && command == Command::Run;
+        if ended {
             self.settings[map::PROGRAM] = 3;
         }
+        let switched_off = command == Command::Off && before != Command::Off;
+        if ended && mode.standby_at_end || switched_off && mode.standby_at_off {
+            self.settings[map::STANDBY] = 1;
+        }
         // The limits of SV hold for a programme that was written before they were.
-        let sv_c = moving_c.unwrap_or_else(|| self.tenths(map::SV));
-        sv_c.clamp(self.tenths(map::SV_LOW), self.tenths(map::SV_HIGH))
+        let sv_c = moving_c.unwrap_or_else(|| self.temperature_c(map::SV));
+        sv_c.clamp(self.temperature_c(map::SV_LOW), self.temperature_c(map::SV_HIGH))
     }
 
     /// Steps 1–4, 5–8 or 1–8, as register 41083 selects.
-    fn plan(&self) -> Plan {
+    fn plan(&self, mode: Mode) -> Plan {
         let (first, last) = match self.settings[map::PATTERN] {
             0 => (0, 4),
             1 => (4, 8),
             _ => (0, 8),
         };
         let segment = |step: usize| Segment {
-            target_c: self.tenths(map::STEP_SV + step),
+            target_c: self.temperature_c(map::STEP_SV + step),
             ramp_s: f64::from(self.settings[map::STEP_TIMES + 2 * step]) * 60.0,
             soak_s: f64::from(self.settings[map::STEP_TIMES + 2 * step + 1]) * 60.0,
         };
-        Plan { first, segments: (first..last).map(segment).collect() }
+        Plan { first, segments: (first..last).map(segment).collect(), repeat: mode.repeat }
     }
 
     /// Fail-safe and standby come first, then tuning, then the control law.
     fn output(&mut self) -> f64 {
-        let standby = self.settings[map::STANDBY] == 1;
-        if self.faults != 0 || standby {
+        if self.faults != 0 || self.standby() {
             self.stop_tuning();
+            self.self_tuner = None;
             self.control = Control::default();
-            return 0.0;
+            let full = self.settings[map::ACTION] & 1 == 1 && !self.standby();
+            return if full { 100.0 } else { 0.0 };
         }
-        match self.tune() {
-            Some(output) => output,
-            None => {
-                let settings = self.law();
-                self.control.step(SAMPLE_S, self.sv_c, self.pv_c, &settings)
-            }
+        if let Some(output) = self.tune() {
+            return output;
         }
+        let pushing = self.tune_itself();
+        let settings = self.law();
+        let output = self.control.step(SAMPLE_S, self.sv_c, self.pv_c, &settings);
+        if pushing { 100.0 } else { output }
     }
 
     /// The output of the auto-tuning while it runs; at its end P, I and D are written and it is off.
@@ -193,23 +259,83 @@ impl Pxr {
         // The low-PV type tunes 10 % of the range below SV, for processes that must not overshoot.
         let target_c = if command == 2 { sv_c - 0.1 * span_c } else { sv_c };
         match self.tuner.get_or_insert_with(|| Tuner::new(target_c)).step(SAMPLE_S, self.pv_c) {
-            Verdict::Running(output) => return Some(output),
+            Verdict::Running(output) => return Some(if self.cools() { 100.0 - output } else { output }),
             Verdict::Failed => {}
-            Verdict::Done { band_c, i_s, d_s } => {
-                let tenths = |value: f64, max: f64| (value * 10.0).round().clamp(1.0, max) as i16;
-                self.settings[map::P] = tenths(100.0 * band_c / span_c, 9_999.0);
-                self.settings[map::I] = tenths(i_s, 32_000.0);
-                self.settings[map::D] = tenths(d_s, 9_999.0);
-            }
+            Verdict::Done { band_c, i_s, d_s } => self.set_pid(Found { band_k: band_c, i_s, d_s }),
         }
         self.stop_tuning();
         self.control = Control::default();
         None
     }
 
+    /// Self-tuning watches and may set P, I and D; true while it wants full power to watch an approach.
+    fn tune_itself(&mut self) -> bool {
+        if self.settings[map::CONTROL] != 2 || self.cools() {
+            self.self_tuner = None;
+            return false;
+        }
+        let (sv_c, pv_c, span_c) = (self.sv_c, self.pv_c, self.span_c());
+        let band_k = self.tenths(map::P) / 100.0 * span_c;
+        let now = Found { band_k, i_s: self.tenths(map::I), d_s: self.tenths(map::D) };
+        let watcher = self.self_tuner.get_or_insert_default();
+        let found = watcher.step(SAMPLE_S, sv_c, pv_c, span_c, now);
+        let pushing = watcher.pushing();
+        if let Some(found) = found {
+            self.set_pid(found);
+        }
+        pushing
+    }
+
+    fn set_pid(&mut self, found: Found) {
+        let tenths = |value: f64, max: f64| (value * 10.0).round().clamp(1.0, max) as i16;
+        self.settings[map::P] = tenths(100.0 * found.band_k / self.span_c(), 9_999.0);
+        self.settings[map::I] = tenths(found.i_s, 32_000.0);
+        self.settings[map::D] = tenths(found.d_s, 9_999.0);
+    }
+
     fn stop_tuning(&mut self) {
         self.settings[map::TUNE] = 0;
         self.tuner = None;
+    }
+
+    /// Alarms rest in standby; the current of a heater is judged while the output asks for some.
+    fn judge(&mut self) {
+        if self.standby() {
+            self.alarms = <[Alarm; 3]>::default();
+            self.weak_heater = 0;
+            return;
+        }
+        let sv_set_c = self.temperature_c(map::SV);
+        for number in 0..self.alarms.len() {
+            let setup = self.alarm_setup(number);
+            self.alarms[number].step(SAMPLE_S, &setup, self.pv_c, self.sv_c, sv_set_c);
+        }
+        let least_a = self.tenths(map::HEATER_BREAK) * self.mv_percent / 100.0;
+        let weak = self.mv_percent >= JUDGED_PERCENT && self.heater_a < least_a;
+        self.weak_heater = if weak { (self.weak_heater + 1).min(JUDGED_AFTER) } else { 0 };
+    }
+
+    fn alarm_setup(&self, number: usize) -> Setup {
+        let shape = alarm::shape(self.settings[map::ALARM_TYPE + number]);
+        let point = |place: usize, from: Option<alarm::Base>| match from {
+            Some(alarm::Base::Zero) => self.temperature_c(place),
+            Some(alarm::Base::Sv) | None => self.difference_k(place),
+        };
+        let low = map::ALARM_POINT + 2 * number;
+        Setup {
+            shape,
+            low: point(low, shape.and_then(|shape| shape.low)),
+            high: point(low + 1, shape.and_then(|shape| shape.high)),
+            hysteresis_k: self.difference_k(map::ALARM_HYSTERESIS + number),
+            delay_s: f64::from(self.settings[map::ALARM_DELAY + number]),
+            latch: self.settings[map::ALARM_LATCH + number] == 1,
+        }
+    }
+
+    fn alarm_word(&self) -> u16 {
+        let alarms = self.alarms.iter().enumerate();
+        let word = alarms.fold(0, |word, (number, alarm)| word | u16::from(alarm.on()) << number);
+        if self.weak_heater >= JUDGED_AFTER { word | HEATER_BREAK } else { word }
     }
 
     fn law(&self) -> Settings {
@@ -219,17 +345,38 @@ impl Pxr {
             p_percent: self.tenths(map::P),
             i_s: self.tenths(map::I),
             d_s: self.tenths(map::D),
-            hysteresis_c: self.tenths(map::HYSTERESIS),
+            hysteresis_c: self.difference_k(map::HYSTERESIS),
+            cools: self.cools(),
         }
     }
 
-    /// A setting with one decimal: times, percent, and temperatures (P-dP is fixed at 1).
+    fn standby(&self) -> bool {
+        self.settings[map::STANDBY] == 1
+    }
+
+    fn cools(&self) -> bool {
+        self.settings[map::ACTION] & 2 == 2
+    }
+
+    fn mode(&self) -> Mode {
+        Mode::of(self.settings[map::MODE])
+    }
+
+    /// A plain setting with one decimal: times, percent, amperes.
     fn tenths(&self, place: usize) -> f64 {
         f64::from(self.settings[place]) / 10.0
     }
 
+    fn temperature_c(&self, place: usize) -> f64 {
+        self.display().temperature_c(self.settings[place])
+    }
+
+    fn difference_k(&self, place: usize) -> f64 {
+        self.display().difference_k(self.settings[place])
+    }
+
     fn range_c(&self) -> (f64, f64) {
-        (self.tenths(map::RANGE_LOW), self.tenths(map::RANGE_HIGH))
+        (self.temperature_c(map::RANGE_LOW), self.temperature_c(map::RANGE_HIGH))
     }
 
     fn span_c(&self) -> f64 {
@@ -239,102 +386,4 @@ impl Pxr {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sim::pdu::serve;
-
-    fn read(pxr: &mut Pxr, function: u8, address: u16) -> i16 {
-        let [high, low] = address.to_be_bytes();
-        let reply = serve(pxr, &[function, high, low, 0, 1]).expect("a request has an answer");
-        i16::from_be_bytes([reply[2], reply[3]])
-    }
-
-    fn write(pxr: &mut Pxr, address: u16, value: u16) {
-        let [[a, b], [c, d]] = [address.to_be_bytes(), value.to_be_bytes()];
-        assert_eq!(serve(pxr, &[6, a, b, c, d]), Some(vec![6, a, b, c, d]));
-    }
-
-    fn samples(pxr: &mut Pxr, sensor: Sensor, count: usize) {
-        (0..count).for_each(|_| pxr.sample(sensor, 0.0));
-    }
-
-    #[test]
-    fn a_broken_sensor_shows_as_a_fault_and_takes_the_output_away() {
-        let pxr = &mut Pxr::new(27.0);
-        samples(pxr, Sensor::Pt100(30.0), 2);
-        assert_eq!((pxr.mv_percent(), read(pxr, 4, 1007)), (100.0, 0));
-        samples(pxr, Sensor::Open, 1);
-        assert_eq!((pxr.mv_percent(), read(pxr, 4, 1007), read(pxr, 4, 1000)), (0.0, 0b1010, 1943));
-        assert!(!pxr.at_sv());
-        samples(pxr, Sensor::Pt100(70.0), 1);
-        assert_eq!((read(pxr, 4, 1007), read(pxr, 4, 1000)), (0, 700));
-    }
-
-    #[test]
-    fn standby_means_no_output() {
-        let pxr = &mut Pxr::new(27.0);
-        write(pxr, 1003, 1);
-        samples(pxr, Sensor::Pt100(30.0), 1);
-        assert_eq!(read(pxr, 4, 1003), 0);
-        write(pxr, 1003, 0);
-        samples(pxr, Sensor::Pt100(30.0), 1);
-        assert_eq!(read(pxr, 4, 1003), 10_000);
-    }
-
-    #[test]
-    fn only_what_was_saved_survives_a_power_cut() {
-        let pxr = &mut Pxr::new(27.0);
-        write(pxr, 1002, 500);
-        pxr.power_cycle();
-        assert_eq!(read(pxr, 3, 1002), 700);
-        write(pxr, 1002, 500);
-        write(pxr, 1000, 1);
-        assert_eq!(read(pxr, 3, 1000), 0);
-        write(pxr, 1005, 12);
-        pxr.power_cycle();
-        assert_eq!((read(pxr, 3, 1002), read(pxr, 3, 1005), pxr.saves()), (500, 50, 1));
-    }
-
-    #[test]
-    fn the_deviation_alarm_has_a_deadband() {
-        let pxr = &mut Pxr::new(27.0);
-        for (pv_c, alarm) in [(74.9, 0), (75.1, 1), (74.2, 1), (73.9, 0), (74.9, 0)] {
-            samples(pxr, Sensor::Pt100(pv_c), 1);
-            assert_eq!(read(pxr, 4, 1006), alarm, "at {pv_c} °C");
-        }
-    }
-
-    #[test]
-    fn auto_tuning_ends_by_writing_p_i_and_d() {
-        let pxr = &mut Pxr::new(60.0);
-        write(pxr, 1004, 1);
-        // A tank that warms by 0.07 °C/s and cools by 0.02 °C/s, seen 15 s late.
-        let (mut water_c, mut late) = (60.0, std::collections::VecDeque::from(vec![60.0; 30]));
-        let ended = (0..7200).any(|_| {
-            water_c += if pxr.mv_percent() > 50.0 { 0.035 } else { -0.01 };
-            late.push_back(water_c);
-            let seen_c = late.pop_front().expect("the line is never empty");
-            pxr.sample(Sensor::Pt100(seen_c), 0.0);
-            read(pxr, 3, 1004) == 0
-        });
-        assert!(ended, "tuning goes on after an hour");
-        let tuned = [1005, 1006, 1007].map(|address| read(pxr, 3, address));
-        assert!((1..50).contains(&tuned[0]) && (200..2000).contains(&tuned[1]) && tuned[2] < tuned[1], "{tuned:?}");
-    }
-
-    #[test]
-    fn a_programme_moves_the_set_value_in_use_and_ends() {
-        let pxr = &mut Pxr::new(30.0);
-        for (address, value) in [(1056, 500), (1064, 1), (1065, 1), (1081, 1)] {
-            write(pxr, address, value);
-        }
-        // Steps 2 to 4 go down to 0 °C at once.
-        samples(pxr, Sensor::Pt100(30.0), 60);
-        assert_eq!((read(pxr, 4, 1001), read(pxr, 4, 1008), read(pxr, 3, 1002)), (400, 1, 700));
-        samples(pxr, Sensor::Pt100(30.0), 240);
-        assert_eq!((read(pxr, 3, 1081), read(pxr, 4, 1008), read(pxr, 4, 1001)), (3, 17, 0));
-        write(pxr, 1081, 0);
-        samples(pxr, Sensor::Pt100(30.0), 1);
-        assert_eq!((read(pxr, 4, 1001), read(pxr, 4, 1008)), (700, 0));
-    }
-}
+mod tests;

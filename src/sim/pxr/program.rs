@@ -31,6 +31,29 @@ pub struct Plan {
     pub first: usize,
     /// The steps in order.
     pub segments: Vec<Segment>,
+    /// Begin again at the end.
+    pub repeat: bool,
+}
+
+/// What happens at the ends (register 41081; the bits are remembered of the family).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Mode {
+    /// Bit 0: standby when the programme has ended; else the last SV holds.
+    pub standby_at_end: bool,
+    /// Bit 1: standby when the programme is switched off; else the SV of the face holds.
+    pub standby_at_off: bool,
+    /// Bit 2: begin again at the end.
+    pub repeat: bool,
+    /// Bit 3: run from power-on.
+    pub start_at_power_on: bool,
+}
+
+impl Mode {
+    /// From the word of 41081.
+    pub fn of(word: i16) -> Mode {
+        let bit = |number: u8| word >> number & 1 == 1;
+        Mode { standby_at_end: bit(0), standby_at_off: bit(1), repeat: bit(2), start_at_power_on: bit(3) }
+    }
 }
 
 /// Where the programme is.
@@ -70,16 +93,21 @@ impl Program {
         self.position == END
     }
 
-    /// Each pass leaves one ramp or soak behind, so the loop ends after 16 at most.
+    /// Each pass leaves one ramp or soak behind; a repeated programme takes some time, so a sample comes to its end.
     fn advance(&mut self, dt_s: f64, plan: &Plan) {
         self.elapsed_s += dt_s;
         if self.position == 1 && plan.first != 0 {
             self.position = 1 + 2 * plan.first as u16;
         }
+        let lasts = plan.segments.iter().any(|segment| segment.ramp_s + segment.soak_s > 0.0);
         while !self.ended() {
             // Another pattern may have been selected meanwhile; then the step is not in the plan, and that is the end.
             let index = (usize::from(self.position - 1) / 2).checked_sub(plan.first);
             let Some(segment) = index.and_then(|index| plan.segments.get(index)) else {
+                if plan.repeat && lasts {
+                    self.position = 1 + 2 * plan.first as u16;
+                    continue;
+                }
                 self.position = END;
                 return;
             };
@@ -106,7 +134,7 @@ mod tests {
             Segment { target_c: 50.0, ramp_s: 60.0, soak_s: 120.0 },
             Segment { target_c: 80.0, ramp_s: 0.0, soak_s: 60.0 },
         ];
-        let plan = Plan { first, segments };
+        let plan = Plan { first, segments, repeat: false };
         let mut program = Program::default();
         let mut sv_c = None;
         for _ in 0..(at_s / 0.5) as usize {
@@ -128,10 +156,30 @@ mod tests {
 
     #[test]
     fn halt_stands_still_and_off_gives_the_face_back() {
-        let plan = Plan { first: 0, segments: vec![Segment { target_c: 50.0, ramp_s: 60.0, soak_s: 0.0 }] };
+        let plan =
+            Plan { first: 0, segments: vec![Segment { target_c: 50.0, ramp_s: 60.0, soak_s: 0.0 }], repeat: false };
         let mut program = Program::default();
         let running = program.step(0.5, Command::Run, &plan, 20.0);
         assert_eq!(program.step(0.5, Command::Halt, &plan, 20.0), running);
         assert_eq!(program.step(0.5, Command::Off, &plan, 20.0), None);
+    }
+
+    #[test]
+    fn a_repeated_programme_begins_again_and_an_empty_one_ends() {
+        let segment = |minutes| Segment { target_c: 50.0, ramp_s: 60.0 * minutes, soak_s: 60.0 * minutes };
+        let check = |minutes, positions: [u16; 3]| {
+            let plan = Plan { first: 0, segments: vec![segment(minutes)], repeat: true };
+            let mut program = Program::default();
+            let mut seen = [0; 3];
+            for place in &mut seen {
+                for _ in 0..84 {
+                    program.step(0.5, Command::Run, &plan, 20.0);
+                }
+                *place = program.position();
+            }
+            assert_eq!(seen, positions, "{minutes} min");
+        };
+        check(0.5, [2, 1, 1]);
+        check(0.0, [END; 3]);
     }
 }

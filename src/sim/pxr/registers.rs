@@ -1,7 +1,9 @@
 //! The registers of the PXR4: two areas, limits, and what a write sets off.
 
-use super::Pxr;
+use super::alarm;
+use super::display::Display;
 use super::map::{self, Meaning, Row};
+use super::{NARROWEST_K, Pxr, SENSOR_C};
 use crate::sim::pdu::{Bits, Identity, Refusal, Registers, Words};
 
 /// The functions are those that its manual and working drivers name, so it cannot be asked who it is.
@@ -23,56 +25,71 @@ impl Registers for Pxr {
         let (area, place) = area(address)?;
         let (raw, meaning) = match kind {
             Words::Input => self.measurement(place)?,
-            Words::Holding => (self.settings[place], map::row(place).map_or(Meaning::Plain, |row| row.meaning)),
+            Words::Holding => (self.settings[place], self.meaning(place)),
         };
         Ok(if area == Area::Internal { self.to_internal(raw, meaning) } else { raw } as u16)
     }
 
     fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
-        let (row, value) = self.target(address, value)?;
-        let (min, max) = self.limits(row);
+        let (area, place) = area(address)?;
+        let row = map::row(place).ok_or(Refusal::Address)?;
+        let raw = value as i16;
+        let value = if area == Area::Internal { self.to_display(raw, self.meaning(place)) } else { raw };
+        let (min, max) = self.limits(place, row);
         if !(min..=max).contains(&value) {
             return Err(Refusal::Value);
         }
-        let place = usize::from(row.place);
-        self.settings[place] = value;
         match place {
-            map::FIX => self.save(),
-            map::SV_LOW | map::SV_HIGH => {
-                let (low, high) = (self.settings[map::SV_LOW], self.settings[map::SV_HIGH]);
-                self.settings[map::SV] = self.settings[map::SV].clamp(low, high);
-            }
+            map::FIX if value == 1 => self.begin_saving(),
+            map::UNIT => self.show_as(Display::of(value, self.settings[map::DECIMALS]))?,
+            map::DECIMALS => self.show_as(Display::of(self.settings[map::UNIT], value))?,
             _ => {}
         }
+        self.settings[place] = value;
+        self.keep_limits();
         Ok(())
+    }
+
+    /// While settings are being saved a write is held back: it has no answer and no effect, reads go on.
+    fn holds_back(&self, function: u8) -> bool {
+        self.saving() && matches!(function, 0x06 | 0x10)
     }
 }
 
 impl Pxr {
-    /// Carries out a request to save; commands themselves are not saved.
-    fn save(&mut self) {
-        if std::mem::take(&mut self.settings[map::FIX]) == 1 {
-            self.saved = self.settings;
-            self.saved[map::TUNE] = 0;
-            self.saved[map::PROGRAM] = 0;
-            self.saves = self.saves.saturating_add(1);
+    /// How temperatures stand in the registers now.
+    pub(super) fn display(&self) -> Display {
+        Display::of(self.settings[map::UNIT], self.settings[map::DECIMALS])
+    }
+
+    /// The meaning of a setting; that of an alarm point hangs on the type of its alarm.
+    fn meaning(&self, place: usize) -> Meaning {
+        match map::row(place).map_or(Meaning::Plain, |row| row.meaning) {
+            Meaning::AlarmPoint => {
+                let (number, upper) = ((place - map::ALARM_POINT) / 2, (place - map::ALARM_POINT) % 2 == 1);
+                let shape = alarm::shape(self.settings[map::ALARM_TYPE + number]);
+                let from = shape.and_then(|shape| if upper { shape.high } else { shape.low });
+                if from == Some(alarm::Base::Zero) { Meaning::Temperature } else { Meaning::Difference }
+            }
+            meaning => meaning,
         }
     }
 
     /// The measurements 31001–31010 with their meanings, which decide the number in the internal area.
     fn measurement(&self, place: usize) -> Result<(i16, Meaning), Refusal> {
-        let tenths = |value: f64| (value * 10.0).round() as i16;
+        let display = self.display();
+        let (pv, sv) = (display.temperature(self.pv_c), display.temperature(self.sv_c));
         Ok(match place {
-            0 => (tenths(self.pv_c), Meaning::Temperature),
-            1 => (tenths(self.sv_c), Meaning::Temperature),
-            2 => (tenths(self.sv_c) - tenths(self.pv_c), Meaning::Difference),
+            0 => (pv, Meaning::Temperature),
+            1 => (sv, Meaning::Temperature),
+            2 => (sv.saturating_sub(pv), Meaning::Difference),
             3 => ((self.mv_percent * 100.0).round() as i16, Meaning::Plain),
             4 => (0, Meaning::Plain),
             5 => (1, Meaning::Plain),
-            6 => (i16::from(self.alarm), Meaning::Plain),
+            6 => (self.alarm_word() as i16, Meaning::Plain),
             7 => (self.faults as i16, Meaning::Plain),
             8 => (self.program.position() as i16, Meaning::Plain),
-            9 => (tenths(self.heater_a), Meaning::Plain),
+            9 => ((self.heater_a * 10.0).round() as i16, Meaning::Plain),
             _ => return Err(Refusal::Address),
         })
     }
@@ -83,7 +100,7 @@ impl Pxr {
         match meaning {
             Meaning::Temperature => ((f64::from(raw) - low) / span * 10_000.0).round() as i16,
             Meaning::Difference => (f64::from(raw) / span * 10_000.0).round() as i16,
-            Meaning::Plain => raw,
+            Meaning::Plain | Meaning::End | Meaning::AlarmPoint => raw,
         }
     }
 
@@ -92,7 +109,7 @@ impl Pxr {
         match meaning {
             Meaning::Temperature => (f64::from(raw) / 10_000.0 * span + low).round() as i16,
             Meaning::Difference => (f64::from(raw) / 10_000.0 * span).round() as i16,
-            Meaning::Plain => raw,
+            Meaning::Plain | Meaning::End | Meaning::AlarmPoint => raw,
         }
     }
 
@@ -101,22 +118,59 @@ impl Pxr {
         (low, f64::from(self.settings[map::RANGE_HIGH]) - low)
     }
 
-    /// The limits of a row now: those of SV are settings themselves.
-    fn limits(&self, row: &Row) -> (i16, i16) {
-        match usize::from(row.place) {
-            map::SV | map::STEP_SV..map::STEP_TIMES => (self.settings[map::SV_LOW], self.settings[map::SV_HIGH]),
-            map::SV_LOW => (self.settings[map::RANGE_LOW], self.settings[map::SV_HIGH]),
-            map::SV_HIGH => (self.settings[map::SV_LOW], self.settings[map::RANGE_HIGH]),
-            _ => (row.min, row.max),
+    /// The limits of a setting now: those of temperatures are settings themselves.
+    fn limits(&self, place: usize, row: &Row) -> (i16, i16) {
+        let (low, high) = (self.settings[map::RANGE_LOW], self.settings[map::RANGE_HIGH]);
+        let span = high.saturating_sub(low);
+        let narrowest = self.display().difference(NARROWEST_K);
+        match (self.meaning(place), place) {
+            (_, map::SV_LOW) => (low, self.settings[map::SV_HIGH]),
+            (_, map::SV_HIGH) => (self.settings[map::SV_LOW], high),
+            (_, map::RANGE_LOW) => (self.display().temperature(SENSOR_C.0), high.saturating_sub(narrowest)),
+            (_, map::RANGE_HIGH) => (low.saturating_add(narrowest), self.display().temperature(SENSOR_C.1)),
+            (_, map::SV | map::STEP_SV..map::STEP_TIMES) => (self.settings[map::SV_LOW], self.settings[map::SV_HIGH]),
+            (Meaning::Temperature, _) => (low, high),
+            (Meaning::Difference, map::ALARM_POINT..map::HEATER_BREAK) => (span.saturating_neg(), span),
+            (Meaning::Difference, _) => (0, span / 2),
+            (Meaning::Plain | Meaning::End | Meaning::AlarmPoint, _) => (row.min, row.max),
         }
     }
 
-    /// What a write means: the row and the value in display units.
-    fn target(&self, address: u16, value: u16) -> Result<(&'static Row, i16), Refusal> {
-        let (area, place) = area(address)?;
-        let row = map::row(place).ok_or(Refusal::Address)?;
-        let raw = value as i16;
-        Ok((row, if area == Area::Internal { self.to_display(raw, row.meaning) } else { raw }))
+    /// Unit or decimals change: every temperature is written anew, or nothing is if one would not fit into its word.
+    fn show_as(&mut self, to: Display) -> Result<(), Refusal> {
+        let from = self.display();
+        let mut settings = self.settings;
+        for place in map::rows().iter().flat_map(|row| row.places.clone()) {
+            let raw = settings[place];
+            settings[place] = match self.meaning(place) {
+                Meaning::Temperature | Meaning::End => to.temperature(from.temperature_c(raw)),
+                Meaning::Difference => to.difference(from.difference_k(raw)),
+                Meaning::Plain | Meaning::AlarmPoint => raw,
+            };
+            // The range itself is the greatest number there is.
+            if settings[place] == i16::MAX {
+                return Err(Refusal::Value);
+            }
+        }
+        self.settings = settings;
+        Ok(())
+    }
+
+    /// What a new range, new limits or a new alarm type leave outside comes back to the nearest limit.
+    fn keep_limits(&mut self) {
+        let (low, high) = (self.settings[map::RANGE_LOW], self.settings[map::RANGE_HIGH]);
+        for place in [map::SV_LOW, map::SV_HIGH] {
+            self.settings[place] = self.settings[place].clamp(low, high);
+        }
+        for row in map::rows()
+            .iter()
+            .filter(|row| matches!(row.meaning, Meaning::Temperature | Meaning::Difference | Meaning::AlarmPoint))
+        {
+            for place in row.places.clone() {
+                let (min, max) = self.limits(place, row);
+                self.settings[place] = self.settings[place].clamp(min, max);
+            }
+        }
     }
 }
 
@@ -178,9 +232,9 @@ mod tests {
         check(pxr, &[5, 0, 0, 0xFF, 0], &[0x85, 1]);
         check(pxr, &[4, 0x03, 0xF2, 0, 1], &[0x84, 2]);
         check(pxr, &[3, 0x04, 0x3B, 0, 1], &[0x83, 2]);
-        check(pxr, &[6, 0x03, 0xF3, 0, 1], &[0x86, 2]);
+        check(pxr, &[6, 0x03, 0xF6, 0, 1], &[0x86, 2]);
         check(pxr, &[3, 0x03, 0xE8, 0, 61], &[0x83, 3]);
-        check(pxr, &[6, 0x03, 0xFB, 0, 0], &[0x86, 3]);
+        check(pxr, &[6, 0x03, 0xFB, 0, 3], &[0x86, 3]);
         check(pxr, &[6, 0x04, 0x39, 0, 3], &[0x86, 3]);
     }
 
@@ -199,5 +253,47 @@ mod tests {
         check(pxr, &[3, 0x03, 0xED, 0, 2], &[3, 4, 0, 12, 0x02, 0xBC]);
         check(pxr, &[16, 0x03, 0xED, 0, 2, 4, 0, 50, 0xFF, 0xFF], &[0x90, 3]);
         check(pxr, &[3, 0x03, 0xED, 0, 2], &[3, 4, 0, 12, 0x02, 0xBC]);
+    }
+
+    fn read(pxr: &mut Pxr, function: u8, address: u16) -> i16 {
+        let [high, low] = address.to_be_bytes();
+        let reply = serve(pxr, &[function, high, low, 0, 1]).expect("a request has an answer");
+        i16::from_be_bytes([reply[2], reply[3]])
+    }
+
+    fn write(pxr: &mut Pxr, address: u16, value: i16) -> bool {
+        let [[a, b], [c, d]] = [address.to_be_bytes(), value.to_be_bytes()];
+        serve(pxr, &[6, a, b, c, d]).is_some_and(|reply| reply[0] == 6)
+    }
+
+    #[test]
+    fn decimals_and_unit_change_the_numbers_and_not_the_temperatures() {
+        let check = |unit, decimals, sv, sv_high, range_high, hysteresis, pv| {
+            let pxr = &mut Pxr::new(27.0);
+            pxr.sample(super::super::Sensor::Pt100(27.0), 0.0);
+            assert!(write(pxr, 1016, unit) && write(pxr, 1019, decimals));
+            let numbers = [1002, 1031, 1018, 1008].map(|address| read(pxr, 3, address));
+            assert_eq!((numbers, read(pxr, 4, 1000)), ([sv, sv_high, range_high, hysteresis], pv));
+            pxr.sample(super::super::Sensor::Pt100(27.0), 0.0);
+            assert_eq!(pxr.sv_c(), 70.0);
+        };
+        check(0, 0, 70, 120, 185, 1, 27);
+        check(0, 1, 700, 1200, 1850, 10, 270);
+        check(0, 2, 7000, 12_000, 18_500, 100, 2700);
+        check(1, 0, 158, 248, 365, 2, 81);
+        check(1, 1, 1580, 2480, 3650, 18, 806);
+        // 365.00 °F does not fit into a word, so nothing changes.
+        let pxr = &mut Pxr::new(27.0);
+        assert!(write(pxr, 1019, 2) && !write(pxr, 1016, 1));
+        assert_eq!([1002, 1016].map(|address| read(pxr, 3, address)), [7000, 0]);
+    }
+
+    #[test]
+    fn a_narrower_range_takes_everything_inside_with_it() {
+        let pxr = &mut Pxr::new(27.0);
+        assert!(write(pxr, 1056, 1200) && write(pxr, 1018, 500));
+        assert_eq!([1002, 1031, 1056].map(|address| read(pxr, 3, address)), [500; 3]);
+        assert!(write(pxr, 1017, 400) && !write(pxr, 1017, 401));
+        assert_eq!([1002, 1030, 1057].map(|address| read(pxr, 3, address)), [500, 400, 400]);
     }
 }
