@@ -2,6 +2,7 @@
 
 mod check;
 mod demo;
+mod experiments;
 mod frame;
 mod log;
 mod paths;
@@ -50,6 +51,8 @@ enum Command {
     Run(run::Args),
     /// Serves the simulated devices of a plant to other masters, over a pseudo-terminal or TCP
     Sim(sim::Args),
+    /// Runs the six control experiments of the thesis on the simulated rig and prints them beside its measurements
+    Experiments(experiments::Args),
     /// Checks a plant or device file: every error at once, or the read plan of each line
     Check(check::Args),
     /// Lists the known profiles, or prints one
@@ -125,6 +128,7 @@ pub fn main() -> ExitCode {
         Some(Command::Demo(args)) => demo::main(args),
         Some(Command::Run(args)) => run::main(args),
         Some(Command::Sim(args)) => sim::main(args),
+        Some(Command::Experiments(args)) => experiments::main(args),
         Some(Command::Check(args)) => check::main(args),
         Some(Command::Profiles(args)) => profiles::main(args),
         Some(Command::Report(args)) => report::main(args),

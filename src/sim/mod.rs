@@ -14,6 +14,7 @@ pub mod slave;
 pub mod pxr;
 pub mod dl06;
 pub mod rig;
+pub mod experiment;
 pub mod faults;
 pub mod ascii;
 pub mod wire;

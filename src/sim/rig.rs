@@ -69,7 +69,8 @@ impl Rig {
         rig
     }
 
-    fn filled(control_l: f64) -> Rig {
+    /// At rest, with so many litres in TK-1 already.
+    pub fn filled(control_l: f64) -> Rig {
         let (pxr, plc) = (Slave::new(Pxr::new(AMBIENT_C)), Slave::new(Dl06::new()));
         Rig { tank: Tank::new(control_l, AMBIENT_C), pxr, plc, sensor_open: false, owed: Duration::ZERO, steps: 0 }
     }

@@ -13,6 +13,7 @@ mod fuzzy;
 mod map;
 mod program;
 mod registers;
+mod rule;
 mod selftune;
 mod tuning;
 
@@ -21,7 +22,8 @@ use std::time::Duration;
 use alarm::{Alarm, Setup};
 use control::{Control, Law, Settings};
 use program::{Command, Mode, Plan, Program, Segment};
-use selftune::{Found, SelfTuner};
+use rule::Found;
+use selftune::SelfTuner;
 use tuning::{Tuner, Verdict};
 
 /// The controller samples, computes and outputs once in this time (data sheet).
@@ -258,10 +260,10 @@ impl Pxr {
         let (sv_c, span_c) = (self.sv_c, self.span_c());
         // The low-PV type tunes 10 % of the range below SV, for processes that must not overshoot.
         let target_c = if command == 2 { sv_c - 0.1 * span_c } else { sv_c };
-        match self.tuner.get_or_insert_with(|| Tuner::new(target_c)).step(SAMPLE_S, self.pv_c) {
+        match self.tuner.get_or_insert_with(|| Tuner::new(target_c, span_c)).step(SAMPLE_S, self.pv_c) {
             Verdict::Running(output) => return Some(if self.cools() { 100.0 - output } else { output }),
             Verdict::Failed => {}
-            Verdict::Done { band_c, i_s, d_s } => self.set_pid(Found { band_k: band_c, i_s, d_s }),
+            Verdict::Done(found) => self.set_pid(found),
         }
         self.stop_tuning();
         self.control = Control::default();

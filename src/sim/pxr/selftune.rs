@@ -1,14 +1,15 @@
 //! Self-tuning: P, I and D from what the controller sees while it works, without swings made on purpose.
 //!
 //! 1. **Approach.** After power-on, and after SV moved by more than 3 % of the range, PV far below SV and at rest: the
-//!    output is full until a quarter of the way is done. Steepest slope `R` and delay `L` of that step response give
-//!    P, I and D by the rule of Chien, Hrones and Reswick (1952; disturbances, no overshoot): band `R·L/0.95`, `2.4·L`,
-//!    `0.42·L`.
+//!    output is full until a quarter of the way is done. Steepest slope and delay of that step response give P, I and D
+//!    by the rule that auto-tuning uses too.
 //! 2. **Swings.** Two swings around SV in a row, each larger than 0.3 % of the range from top to bottom and the second at
 //!    least half as large as the first, are a loop that does not calm down: the band becomes a quarter wider and I at
 //!    least half a period.
 //!
 //! The maker does not publish his rule; these two are ours.
+
+use super::rule::{self, Found};
 
 /// SV must have moved this far, as a share of the range, or PV be this far from it at power-on.
 const MOVED: f64 = 0.03;
@@ -24,17 +25,6 @@ const LONGEST_S: f64 = 3600.0;
 const SWING: f64 = 0.003;
 const KEPT: f64 = 0.5;
 const WIDER: f64 = 1.25;
-
-/// New settings.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
-    /// Width of the proportional band in K.
-    pub band_k: f64,
-    /// Integral time.
-    pub i_s: f64,
-    /// Derivative time.
-    pub d_s: f64,
-}
 
 /// What self-tuning has seen so far.
 #[derive(Debug, Clone, Default)]
@@ -112,7 +102,7 @@ impl Approach {
         let slope = self.steepest_k_per_s;
         let delay_s = self.elapsed_s - risen_k / slope;
         let good = slope > 0.0 && delay_s > dt_s;
-        Some(good.then(|| Found { band_k: slope * delay_s / 0.95, i_s: 2.4 * delay_s, d_s: 0.42 * delay_s }))
+        Some(good.then(|| rule::settings(slope, delay_s)))
     }
 }
 

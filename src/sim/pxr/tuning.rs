@@ -1,24 +1,41 @@
-//! Auto-tuning: swings around SV at full and no power, and turns two such swings into P, I and D.
+//! Auto-tuning: swings around SV at full and no power, and turns two whole swings into P, I and D.
+//!
+//! ```text
+//!        ╭─╮         ╭─╮          height H = 2·h + R·L
+//!   ────╱───╲───────╱───╲── +h    full power rises with H/on, none falls with H/off,
+//!      ╱     ╲     ╱     ╲        so full power alone makes the slope R = H/on + H/off
+//!   ──╱───────╲───╱───────╲ −h    and the delay is L = (H − 2·h)/R
+//!    ╯  on  off╰─╯
+//! ```
+//!
+//! `on` and `off` are the times with full and without power, ±h the hysteresis that keeps eddies at the probe from
+//! switching. Slope and delay do not depend on how fast the process cools, so both types of tuning find the same.
 
-use std::f64::consts::PI;
+use super::rule::{self, Found};
 
 /// Tuning gives up after this time, as nothing may wait for ever.
 const LONGEST_S: f64 = 4.0 * 3600.0;
-/// Crossings of SV on the way up that two whole swings need.
-const CROSSINGS: usize = 3;
-/// From the critical gain and period of the swings to P, I and D. The maker's rule is not public: these shares give on the
-/// tank about what the controller of the thesis found there, P 1.2 %, I 70 s, D 13.5 s.
-const GAIN_SHARE: f64 = 0.5;
-const I_SHARE: f64 = 0.263;
-const D_SHARE: f64 = 0.051;
+/// Whole swings that are measured.
+const SWINGS: usize = 2;
+/// The output switches this far above and below the target, as a share of the range.
+const HYSTERESIS: f64 = 0.002;
 
 /// One run of the auto-tuning.
 #[derive(Debug, Clone)]
 pub struct Tuner {
     target_c: f64,
+    hysteresis_k: f64,
     elapsed_s: f64,
     heating: bool,
-    crossings_s: Vec<f64>,
+    swing: Option<Swing>,
+    measured: Vec<(f64, f64)>,
+}
+
+/// From switching on to switching on again.
+#[derive(Debug, Clone)]
+struct Swing {
+    on_s: f64,
+    off_s: f64,
     highest_c: f64,
     lowest_c: f64,
 }
@@ -28,30 +45,23 @@ pub struct Tuner {
 pub enum Verdict {
     /// Still swinging, with this output in percent.
     Running(f64),
-    /// The new proportional band in °C, integral and derivative time in seconds.
-    Done {
-        /// Proportional band.
-        band_c: f64,
-        /// Integral time.
-        i_s: f64,
-        /// Derivative time.
-        d_s: f64,
-    },
+    /// The new settings.
+    Done(Found),
     /// No two swings within the longest time.
     Failed,
 }
 
 impl Tuner {
-    /// Begins to swing around `target_c`.
-    pub fn new(target_c: f64) -> Tuner {
-        let (highest_c, lowest_c) = (target_c, target_c);
+    /// Begins to swing around `target_c` in a range of `span_c`.
+    pub fn new(target_c: f64, span_c: f64) -> Tuner {
+        let hysteresis_k = HYSTERESIS * span_c;
         Tuner {
             target_c,
+            hysteresis_k,
             elapsed_s: 0.0,
             heating: true,
-            crossings_s: Vec::with_capacity(CROSSINGS),
-            highest_c,
-            lowest_c,
+            swing: None,
+            measured: Vec::with_capacity(SWINGS),
         }
     }
 
@@ -61,31 +71,31 @@ impl Tuner {
         if self.elapsed_s > LONGEST_S {
             return Verdict::Failed;
         }
-        if !self.crossings_s.is_empty() {
-            self.highest_c = self.highest_c.max(pv_c);
-            self.lowest_c = self.lowest_c.min(pv_c);
+        let above_k = pv_c - self.target_c;
+        let was_heating = self.heating;
+        self.heating = above_k < if was_heating { self.hysteresis_k } else { -self.hysteresis_k };
+        if self.heating && !was_heating {
+            let ended = self.swing.replace(Swing { on_s: 0.0, off_s: 0.0, highest_c: pv_c, lowest_c: pv_c });
+            self.measured.extend(ended.map(|swing| swing.slope_and_delay(2.0 * self.hysteresis_k)));
         }
-        let was_heating = std::mem::replace(&mut self.heating, pv_c < self.target_c);
-        if was_heating && !self.heating {
-            self.crossings_s.push(self.elapsed_s);
+        if let Some(swing) = &mut self.swing {
+            swing.highest_c = swing.highest_c.max(pv_c);
+            swing.lowest_c = swing.lowest_c.min(pv_c);
+            *(if self.heating { &mut swing.on_s } else { &mut swing.off_s }) += dt_s;
         }
-        if self.crossings_s.len() == CROSSINGS { self.result() } else { Verdict::Running(self.output()) }
+        if self.measured.len() == SWINGS {
+            let mean = |part: fn(&(f64, f64)) -> f64| self.measured.iter().map(part).sum::<f64>() / SWINGS as f64;
+            return Verdict::Done(rule::settings(mean(|swing| swing.0), mean(|swing| swing.1)));
+        }
+        Verdict::Running(if self.heating { 100.0 } else { 0.0 })
     }
+}
 
-    fn output(&self) -> f64 {
-        if self.heating { 100.0 } else { 0.0 }
-    }
-
-    /// The relay's describing function: critical gain 4·50 %/(π·amplitude).
-    fn result(&self) -> Verdict {
-        let period_s = (self.crossings_s[CROSSINGS - 1] - self.crossings_s[0]) / (CROSSINGS - 1) as f64;
-        let amplitude_c = (self.highest_c - self.lowest_c) / 2.0;
-        let critical_percent_per_c = 4.0 * 50.0 / (PI * amplitude_c.max(0.01));
-        Verdict::Done {
-            band_c: 100.0 / (GAIN_SHARE * critical_percent_per_c),
-            i_s: I_SHARE * period_s,
-            d_s: D_SHARE * period_s,
-        }
+impl Swing {
+    fn slope_and_delay(&self, dead_band_k: f64) -> (f64, f64) {
+        let height_k = self.highest_c - self.lowest_c;
+        let slope_k_per_s = height_k / self.on_s + height_k / self.off_s;
+        (slope_k_per_s, ((height_k - dead_band_k) / slope_k_per_s).max(0.0))
     }
 }
 
@@ -93,27 +103,38 @@ impl Tuner {
 mod tests {
     use super::*;
 
+    /// A process that rises by `up` and falls by `down`, seen `late` samples late, tuned around 70 °C.
+    fn tuned(up: f64, down: f64, late: usize) -> Verdict {
+        let mut tuner = Tuner::new(70.0, 185.0);
+        let (mut c, mut line, mut output) = (65.0, std::collections::VecDeque::from(vec![65.0; late]), 100.0);
+        (0..28_802)
+            .find_map(|_| {
+                c += 0.5 * if output > 50.0 { up } else { -down };
+                line.push_back(c);
+                match tuner.step(0.5, line.pop_front().unwrap_or(c)) {
+                    Verdict::Running(percent) => {
+                        output = percent;
+                        None
+                    }
+                    verdict => Some(verdict),
+                }
+            })
+            .unwrap_or(Verdict::Failed)
+    }
+
     #[test]
-    fn two_swings_of_a_known_wave_give_its_gain_and_period() {
-        let mut tuner = Tuner::new(70.0);
-        // A sine of 2 °C and 200 s, which starts below SV.
-        let done = (1..=4000).find_map(|sample| {
-            let time_s = f64::from(sample) * 0.5;
-            match tuner.step(0.5, 70.0 - 2.0 * (2.0 * PI * time_s / 200.0).sin()) {
-                Verdict::Running(_) => None,
-                verdict => Some(verdict),
+    fn slope_and_delay_of_a_known_process_are_found_however_it_cools() {
+        for down in [0.003, 0.006, 0.03] {
+            let Verdict::Done(found) = tuned(0.07 - down, down, 60) else { panic!("tuning did not end at {down} K/s") };
+            let expect = rule::settings(0.07, 30.0);
+            for (found, expect) in [(found.band_k, expect.band_k), (found.i_s, expect.i_s), (found.d_s, expect.d_s)] {
+                assert!((found / expect - 1.0).abs() < 0.06, "{found} instead of {expect} at {down} K/s");
             }
-        });
-        let Some(Verdict::Done { band_c, i_s, d_s }) = done else { panic!("tuning did not end: {done:?}") };
-        assert!((band_c - 100.0 / (GAIN_SHARE * 100.0 / PI)).abs() < 0.05, "band {band_c}");
-        assert!((i_s - I_SHARE * 200.0).abs() < 0.5 && (d_s - D_SHARE * 200.0).abs() < 0.5, "I {i_s} D {d_s}");
+        }
     }
 
     #[test]
     fn tuning_of_a_dead_process_gives_up() {
-        let mut tuner = Tuner::new(70.0);
-        let verdicts: Vec<Verdict> = (0..28_801).map(|_| tuner.step(0.5, 27.0)).collect();
-        assert_eq!(verdicts.first(), Some(&Verdict::Running(100.0)));
-        assert_eq!(verdicts.last(), Some(&Verdict::Failed));
+        assert_eq!(tuned(0.0, 0.0, 1), Verdict::Failed);
     }
 }

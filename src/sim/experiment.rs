@@ -1,0 +1,127 @@
+//! The six experiments of the thesis, repeated on the simulated rig in virtual time: one rig, one controller, six settings.
+//!
+//! 5 l of water at 27 °C, agitator on, SV 70 °C, an hour recorded, one value a second, as the display shows it: rounded
+//! to 1 °C.
+
+use std::time::Duration;
+
+use super::rig::{DL06_UNIT, PXR_UNIT, Rig};
+
+/// Set value of all experiments, in °C.
+pub const SV_C: i32 = 70;
+/// Length of each recording.
+pub const RECORDING: Duration = Duration::from_secs(3600);
+const FILL_L: f64 = 5.0;
+
+/// Settings of the controller.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Control {
+    /// Name of the kind of control.
+    pub name: &'static str,
+    /// Proportional band in percent of the range.
+    pub p_percent: f64,
+    /// Integral time in seconds; 0 is none.
+    pub i_s: f64,
+    /// Derivative time in seconds; 0 is none.
+    pub d_s: f64,
+    /// Whether register 41002 selects the fuzzy law.
+    pub fuzzy: bool,
+}
+
+/// What a recording shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Outcome {
+    /// When the rounded PV was first at SV, in seconds from the start.
+    pub first_at_sv_s: Option<u32>,
+    /// From when the rounded PV stayed at SV until the end of the recording; `None` is never.
+    pub steady_from_s: Option<u32>,
+    /// The greatest rounded PV above SV.
+    pub overshoot_c: i32,
+}
+
+/// One experiment with what the thesis measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Experiment {
+    /// The settings.
+    pub control: Control,
+    /// Measured on the real rig: to compare with, never to compute from.
+    pub thesis: Outcome,
+}
+
+const fn experiment(control: Control, first_at_sv_s: u32, steady_from_s: Option<u32>, overshoot_c: i32) -> Experiment {
+    Experiment { control, thesis: Outcome { first_at_sv_s: Some(first_at_sv_s), steady_from_s, overshoot_c } }
+}
+
+const fn control(name: &'static str, p_percent: f64, i_s: f64, d_s: f64, fuzzy: bool) -> Control {
+    Control { name, p_percent, i_s, d_s, fuzzy }
+}
+
+/// KMITL thesis, 2008, chapter 4.
+pub const THESIS: [Experiment; 6] = [
+    experiment(control("P", 5.0, 0.0, 0.0, false), 12 * 60 + 45, None, 0),
+    experiment(control("PI", 5.0, 240.0, 0.0, false), 13 * 60 + 27, Some(17 * 60 + 46), 0),
+    experiment(control("PD", 5.0, 0.0, 60.0, false), 12 * 60 + 57, None, 0),
+    experiment(control("PID", 5.0, 240.0, 60.0, false), 13 * 60 + 3, Some(22 * 60 + 35), 1),
+    experiment(control("auto-tuned", 1.2, 70.0, 13.5, false), 10 * 60 + 44, Some(19 * 60 + 21), 2),
+    experiment(control("fuzzy", 5.0, 240.0, 60.0, true), 9 * 60 + 47, Some(16 * 60 + 51), 2),
+];
+
+/// Runs one experiment from the start.
+pub fn run(control: &Control) -> Outcome {
+    let mut rig = Rig::filled(FILL_L);
+    let tenths = |value: f64| (value * 10.0).round() as u16;
+    let settings = [
+        (1001, u16::from(control.fuzzy)),
+        (1005, tenths(control.p_percent)),
+        (1006, tenths(control.i_s)),
+        (1007, tenths(control.d_s)),
+    ];
+    for (address, value) in settings {
+        let [[a, b], [c, d]] = [u16::to_be_bytes(address), value.to_be_bytes()];
+        rig.respond(PXR_UNIT, &[6, a, b, c, d]);
+    }
+    // Running, in manual, agitator and heater on.
+    rig.respond(DL06_UNIT, &[15, 0x0C, 0, 0, 7, 1, 0b100_1001]);
+    measure((0..=RECORDING.as_secs() as u32).map(|second| {
+        let pv_c = rig.truth().pv_c;
+        rig.advance(Duration::from_secs(1));
+        (second, pv_c)
+    }))
+}
+
+/// What a recording of seconds and PV shows on a display without decimals.
+pub fn measure(recording: impl Iterator<Item = (u32, f64)>) -> Outcome {
+    let mut outcome = Outcome { first_at_sv_s: None, steady_from_s: None, overshoot_c: 0 };
+    for (second, pv_c) in recording {
+        let shown_c = pv_c.round() as i32;
+        outcome.overshoot_c = outcome.overshoot_c.max(shown_c - SV_C);
+        if shown_c != SV_C {
+            outcome.steady_from_s = None;
+            continue;
+        }
+        outcome.first_at_sv_s.get_or_insert(second);
+        outcome.steady_from_s.get_or_insert(second);
+    }
+    outcome
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_is_judged_as_the_display_shows_it() {
+        let check = |recording: &[f64], first_at_sv_s, steady_from_s, overshoot_c| {
+            let seconds = (0..).zip(recording.iter().copied());
+            let expect = Outcome { first_at_sv_s, steady_from_s, overshoot_c };
+            assert_eq!(measure(seconds), expect, "{recording:?}");
+        };
+        check(&[27.0, 69.4, 69.5, 70.4, 70.0], Some(2), Some(2), 0);
+        check(&[27.0, 69.5, 69.4, 69.6], Some(1), Some(3), 0);
+        check(&[27.0, 69.5, 70.5, 72.4, 70.0], Some(1), Some(4), 2);
+        check(&[27.0, 69.5, 70.6], Some(1), None, 1);
+        check(&[27.0, 69.4], None, None, 0);
+        // What jumps over SV was not at it.
+        check(&[27.0, 71.0, 70.0], Some(2), Some(2), 1);
+    }
+}
