@@ -248,6 +248,11 @@ fn share(dt_s: f64, lag_s: f64) -> f64 {
     1.0 - (-dt_s / lag_s).exp()
 }
 
+/// Level in TK-1 with so many litres.
+pub fn control_level_cm(litres: f64) -> f64 {
+    level_cm(litres, CONTROL_DIAMETER_CM)
+}
+
 fn level_cm(litres: f64, diameter_cm: f64) -> f64 {
     litres * 1000.0 / (PI * (diameter_cm / 2.0).powi(2))
 }

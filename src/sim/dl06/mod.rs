@@ -9,15 +9,16 @@ use memory::Memory;
 use sequence::{Conditions, Sequence, Step};
 
 use super::pdu::{Bits, Identity, Refusal, Registers, Words};
-use super::tank::{Actuators, Readings};
+use super::tank::{Actuators, Readings, control_level_cm};
 
 /// Time of one scan.
 pub const SCAN: Duration = Duration::from_millis(100);
 
 /// No heating below this level of TK-1, in cm.
 const HEAT_MIN_CM: f64 = 5.0;
-/// No filling above this level of TK-1, in cm.
+/// No filling above this level of TK-1, in cm; a batch that is larger than this moves the limit to just above itself.
 const FILL_MAX_CM: f64 = 28.0;
+const FILL_MARGIN_CM: f64 = 0.3;
 
 /// Panel switch X0–X3 and the controller's signal X4.
 const X_AT_SV: u16 = 4;
@@ -32,6 +33,12 @@ const C_HEATER: u16 = 6;
 const C_FAULT: u16 = 7;
 /// V2000 step, V2001 seconds left in a timed step, V2002 batches done: BCD, as ladder programs keep numbers.
 const V_STEP: u16 = 0o2000;
+/// V2003: what the interlocks block now, wanted or not, one bit each (see [`Blocked`]).
+const V_BLOCKED: u16 = 0o2003;
+/// V2004: litres of the next fill in tenths, BCD. A master may write it; the programme corrects what is out of bounds.
+const V_FILL: u16 = 0o2004;
+/// Least, usual and greatest fill in tenths of a litre: three litres cover the heater, twenty are all the water there is.
+const FILL_DL: (u16, u16, u16) = (30, 50, 200);
 /// V2010 and on: measurements that the real rig lacks, as plain binary words.
 const V_SIGNALS: u16 = 0o2010;
 
@@ -68,18 +75,40 @@ pub struct Outputs {
     pub heater: bool,
 }
 
+/// What the interlocks block, from the levels alone: an operator can read why before he asks for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Blocked {
+    /// Bit 0: no heating, the water of TK-1 does not cover the heater.
+    pub heating: bool,
+    /// Bit 1: no filling, TK-1 is full.
+    pub filling: bool,
+    /// Bit 2: no pumping, TK-2 is full.
+    pub pumping: bool,
+}
+
+impl Blocked {
+    /// The word in V2003.
+    pub fn word(self) -> u16 {
+        u16::from(self.heating) | u16::from(self.filling) << 1 | u16::from(self.pumping) << 2
+    }
+}
+
 /// The PLC with its memory and its programme.
 #[derive(Debug, Clone)]
 pub struct Dl06 {
     memory: Memory,
     sequence: Sequence,
     driving: bool,
+    /// Litres of a fill, in tenths, as last understood.
+    fill_dl: u16,
 }
 
 impl Dl06 {
     /// Stopped, in manual, everything off.
     pub fn new() -> Dl06 {
-        Dl06 { memory: Memory::new(), sequence: Sequence::default(), driving: false }
+        let mut memory = Memory::new();
+        memory.set_block(V_FILL, &[bcd(FILL_DL.1)]);
+        Dl06 { memory, sequence: Sequence::default(), driving: false, fill_dl: FILL_DL.1 }
     }
 
     /// Sets RUN and AUTO, as an operator would.
@@ -98,16 +127,18 @@ impl Dl06 {
     /// One scan: reads inputs, runs the programme, writes outputs and V memory. While stopped, outputs stay as written.
     pub fn scan(&mut self, at_sv: bool, readings: &Readings) {
         self.memory.x.set(X_AT_SV, at_sv);
+        self.take_fill();
+        let fill_cm = self.fill_cm();
         let c = |relay| self.memory.c.get(relay);
         let (run, auto) = (c(C_RUN), c(C_AUTO));
         if run && auto {
-            self.sequence.advance(SCAN, &Conditions { at_sv, readings });
+            self.sequence.advance(SCAN, &Conditions { at_sv, fill_cm, readings });
         } else if !run {
             self.sequence.stop();
         }
         if run {
             let wanted = if auto { self.sequence.outputs() } else { self.manual() };
-            self.set_outputs(permit(wanted, readings));
+            self.set_outputs(permit(wanted, self.blocked(readings)));
         } else if self.driving {
             self.set_outputs(Outputs::default());
         }
@@ -118,7 +149,7 @@ impl Dl06 {
 
     /// What reaches the plant. The interlocks are wired behind the outputs: they hold even where lamps were forced on.
     pub fn actuators(&self, readings: &Readings, mv_percent: f64) -> Actuators {
-        let outputs = permit(self.outputs(), readings);
+        let outputs = permit(self.outputs(), self.blocked(readings));
         Actuators {
             pump: outputs.pump,
             agitator: outputs.agitator,
@@ -142,6 +173,27 @@ impl Dl06 {
     /// Whether the sequence stands because a step took too long.
     pub fn fault(&self) -> bool {
         self.sequence.fault()
+    }
+
+    /// What the interlocks block at these levels.
+    pub fn blocked(&self, readings: &Readings) -> Blocked {
+        Blocked {
+            heating: readings.level_cm < HEAT_MIN_CM,
+            filling: readings.level_cm > FILL_MAX_CM.max(self.fill_cm() + FILL_MARGIN_CM),
+            pumping: readings.cold_full,
+        }
+    }
+
+    /// Takes V2004 over, within its bounds; what is no number there is put right again.
+    fn take_fill(&mut self) {
+        let written = self.memory.word(V_FILL).ok().and_then(from_bcd);
+        self.fill_dl = written.unwrap_or(self.fill_dl).clamp(FILL_DL.0, FILL_DL.2);
+        self.memory.set_block(V_FILL, &[bcd(self.fill_dl)]);
+    }
+
+    /// The level that a batch is filled to.
+    fn fill_cm(&self) -> f64 {
+        control_level_cm(f64::from(self.fill_dl) / 10.0)
     }
 
     /// Each output follows its panel switch or its relay.
@@ -177,6 +229,7 @@ impl Dl06 {
             word(readings.heater_w, 1.0),
         ];
         self.memory.set_block(V_STEP, &bcd_words);
+        self.memory.set_block(V_BLOCKED, &[self.blocked(readings).word()]);
         self.memory.set_block(V_SIGNALS, &signals);
     }
 }
@@ -188,11 +241,11 @@ impl Default for Dl06 {
 }
 
 /// The interlocks: no heating with too little water, no filling of a full TK-1, no pumping into a full TK-2.
-pub fn permit(outputs: Outputs, readings: &Readings) -> Outputs {
+fn permit(outputs: Outputs, blocked: Blocked) -> Outputs {
     Outputs {
-        heater: outputs.heater && readings.level_cm >= HEAT_MIN_CM,
-        fill_valve: outputs.fill_valve && readings.level_cm <= FILL_MAX_CM,
-        pump: outputs.pump && !readings.cold_full,
+        heater: outputs.heater && !blocked.heating,
+        fill_valve: outputs.fill_valve && !blocked.filling,
+        pump: outputs.pump && !blocked.pumping,
         ..outputs
     }
 }
@@ -201,6 +254,14 @@ pub fn permit(outputs: Outputs, readings: &Readings) -> Outputs {
 fn bcd(value: u16) -> u16 {
     let digit = |weight: u16| value.min(9999) / weight % 10;
     digit(1000) << 12 | digit(100) << 8 | digit(10) << 4 | digit(1)
+}
+
+/// The number in four decimal digits, unless one of them is none.
+fn from_bcd(word: u16) -> Option<u16> {
+    [12, 8, 4, 0].iter().try_fold(0, |number, shift| {
+        let digit = word >> shift & 0xF;
+        (digit <= 9).then_some(number * 10 + digit)
+    })
 }
 
 /// The PLC's manual names 01–06, 0F and 10; ours knows all others too, so that tools for diagnosis find somebody to talk to.
@@ -326,6 +387,49 @@ mod tests {
     }
 
     #[test]
+    fn the_word_of_the_interlocks_tells_what_is_blocked_before_it_is_wanted() {
+        let check = |readings: Readings, expect: u8| {
+            let mut plc = Dl06::new();
+            plc.scan(false, &readings);
+            ask(&mut plc, &[3, 4, 3, 0, 1], &[3, 2, 0, expect]);
+        };
+        check(HALF_FULL, 0b000);
+        check(Readings { level_cm: 4.9, ..HALF_FULL }, 0b001);
+        check(Readings { level_cm: 28.1, ..HALF_FULL }, 0b010);
+        check(Readings { level_cm: 0.0, cold_full: true, ..HALF_FULL }, 0b101);
+    }
+
+    #[test]
+    fn the_fill_of_a_batch_can_be_set_within_its_bounds() {
+        let check = |written: u16, expect: u16| {
+            let mut plc = Dl06::new();
+            let [[high, low], answer] = [written.to_be_bytes(), expect.to_be_bytes()];
+            ask(&mut plc, &[6, 4, 4, high, low], &[6, 4, 4, high, low]);
+            plc.scan(false, &HALF_FULL);
+            ask(&mut plc, &[3, 4, 4, 0, 1], &[3, 2, answer[0], answer[1]]);
+        };
+        check(0x0050, 0x0050);
+        check(0x0200, 0x0200);
+        check(0x0201, 0x0200);
+        check(0x0000, 0x0030);
+        check(0x9999, 0x0200);
+        check(0x00A0, 0x0050);
+    }
+
+    #[test]
+    fn a_large_batch_is_not_stopped_by_the_level_of_a_full_tank() {
+        let plc = &mut Dl06::new();
+        ask(plc, &[6, 4, 4, 2, 0], &[6, 4, 4, 2, 0]);
+        plc.start();
+        let half_way = Readings { level_cm: 30.0, ..HALF_FULL };
+        plc.scan(false, &half_way);
+        plc.scan(false, &half_way);
+        assert!(plc.step() == Step::Fill && plc.outputs().fill_valve && !plc.blocked(&half_way).filling);
+        plc.scan(false, &Readings { cold_l: 0.0, ..half_way });
+        assert_eq!(plc.step(), Step::Heat, "TK-2 is empty, so this is all that there is");
+    }
+
+    #[test]
     fn panel_switches_drive_in_manual() {
         let plc = &mut Dl06::new();
         ask(plc, &[5, 0x0C, 0, 0xFF, 0], &[5, 0x0C, 0, 0xFF, 0]);
@@ -344,6 +448,7 @@ mod tests {
         ask(plc, &[3, 0x41, 0, 0, 2], &[3, 4, 0, 0b1_0000, 0, 0]);
         for (value, expect) in [(0, 0), (7, 7), (180, 0x180), (1234, 0x1234), (10_000, 0x9999)] {
             assert_eq!(bcd(value), expect);
+            assert_eq!(from_bcd(expect), Some(value.min(9999)));
         }
     }
 }

@@ -5,8 +5,6 @@ use std::time::Duration;
 use super::Outputs;
 use crate::sim::tank::Readings;
 
-/// Level of TK-1 that a batch is filled to: 5 l, in cm.
-const FILL_CM: f64 = 10.19;
 /// A tank counts as empty below this volume, in litres.
 const EMPTY_L: f64 = 0.05;
 /// The same for TK-1, as a level in cm.
@@ -64,10 +62,10 @@ impl Step {
     fn longest(self) -> Duration {
         match self {
             Step::Idle | Step::Hold | Step::Cool => Duration::MAX,
-            Step::Fill | Step::Return => Duration::from_mins(20),
+            Step::Return => Duration::from_mins(20),
+            // Twenty litres take four times as long as five.
+            Step::Fill | Step::Drain => Duration::from_mins(40),
             Step::Heat => Duration::from_mins(90),
-            // A batch from a full glass takes longer to drain.
-            Step::Drain => Duration::from_mins(40),
         }
     }
 }
@@ -77,6 +75,8 @@ impl Step {
 pub struct Conditions<'a> {
     /// The controller's signal.
     pub at_sv: bool,
+    /// The level of TK-1 that the batch is filled to, in cm.
+    pub fill_cm: f64,
     /// The instruments.
     pub readings: &'a Readings,
 }
@@ -154,7 +154,8 @@ impl Sequence {
         let readings = conditions.readings;
         match self.step {
             Step::Idle => true,
-            Step::Fill => readings.level_cm >= FILL_CM,
+            // Within a tenth of a millimetre; and a batch can have no more water than there is.
+            Step::Fill => readings.level_cm >= conditions.fill_cm - 0.01 || readings.cold_l <= EMPTY_L,
             Step::Heat => conditions.at_sv,
             Step::Hold => self.in_step >= HOLD,
             Step::Drain => readings.level_cm <= EMPTY_CM,
@@ -181,7 +182,7 @@ mod tests {
 
     fn wait(sequence: &mut Sequence, seconds: f64, at_sv: bool, readings: Readings) -> Step {
         for _ in 0..(seconds / 0.1).round() as usize {
-            sequence.advance(Duration::from_millis(100), &Conditions { at_sv, readings: &readings });
+            sequence.advance(Duration::from_millis(100), &Conditions { at_sv, fill_cm: 10.19, readings: &readings });
         }
         sequence.step()
     }
@@ -209,7 +210,7 @@ mod tests {
     fn a_step_that_never_ends_is_a_fault_until_stopped() {
         let batch = &mut Sequence::default();
         let empty = Readings { level_cm: 1.0, ..HALF_FULL };
-        assert_eq!(wait(batch, 1201.0, false, empty), Step::Fill);
+        assert_eq!(wait(batch, 2401.0, false, empty), Step::Fill);
         assert!(batch.fault());
         assert_eq!(batch.outputs(), Outputs::default());
         assert_eq!(wait(batch, 10.0, false, HALF_FULL), Step::Fill);
