@@ -10,10 +10,9 @@ use crate::{
     plant::{
         def::{MimicCommand, MimicItem, Place},
         snapshot::Snapshot,
-        tag::Kind,
     },
     ui::{
-        Act, Cx,
+        Act, Cx, guard,
         keys::{self, Hint, Key, char, code},
         modal::{Choice, Confirm, Faceplate, Modal, Notice, Why},
         widgets::{
@@ -219,18 +218,15 @@ fn intent(cx: &Cx, command: &MimicCommand) -> Option<Modal> {
     if let Some(value) = command.value {
         return Some(Modal::Confirm(Confirm::write(cx, tag, value)));
     }
-    let states: Vec<f64> = match (def.labels.as_slice(), def.point.kind) {
-        ([one, other], _) => vec![one.0 as f64, other.0 as f64],
-        ([], Kind::Bool) => vec![0.0, 1.0],
-        _ => Vec::new(),
-    };
-    let now = cx.snapshot.sample(tag).trusted();
-    match (states.as_slice(), now) {
-        ([one, other], Some(now)) if now == *one || now == *other => {
-            let new = if now == *one { *other } else { *one };
-            Some(Modal::Confirm(Confirm::write(cx, tag, new)))
-        }
-        ([_, _], _) if !def.labels.is_empty() => Some(Modal::Choice(Choice::values(cx, tag))),
+    if let Some(new) = guard::other_state(cx, tag) {
+        return Some(Modal::Confirm(Confirm::write(cx, tag, new)));
+    }
+    // Nobody knows whether it runs: what is asked is the stop, which never takes more than two keys.
+    if cx.def().guards.sequences.iter().any(|sequence| sequence.run == tag) {
+        return Some(Modal::Confirm(Confirm::write(cx, tag, 0.0)));
+    }
+    match def.labels.as_slice() {
+        [_, _] => Some(Modal::Choice(Choice::values(cx, tag))),
         _ => Modal::write(cx, tag),
     }
 }
