@@ -6,6 +6,7 @@ use ratatui::style::Style;
 
 use super::{
     Cx,
+    modal::Notice,
     widgets::{text::age, value},
 };
 use crate::plant::{
@@ -46,8 +47,10 @@ pub fn is_refused(cx: &Cx, tag: TagId, value: f64) -> bool {
 
 /// All there is to say before a value is written, with its look.
 pub fn before_write(cx: &Cx, tag: TagId, value: f64) -> Vec<(String, Style)> {
-    let mut rows: Vec<(String, Style)> =
-        cx.def().guards.interlocks_of(tag, value).filter_map(|lock| interlock_words(cx, lock)).collect();
+    let gone = Notice::why_unreachable(cx, cx.def().tag(tag).device);
+    let gone = gone.map(|why| (format!("! Nothing can be written now. {why}"), cx.theme.trouble()));
+    let locks = cx.def().guards.interlocks_of(tag, value).filter_map(|lock| interlock_words(cx, lock));
+    let mut rows: Vec<(String, Style)> = gone.into_iter().chain(locks).collect();
     if is_refused(cx, tag, value) {
         rows.push(("This is not sent: it would have no effect.".to_owned(), cx.theme.strong()));
     }

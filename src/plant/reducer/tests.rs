@@ -223,7 +223,7 @@ fn what_an_interlock_blocks_is_refused_with_its_reason_and_a_stop_never() {
     let lock = InterlockDef { tag: fixture::RUN, value: 1.0, of: PV, when: Blocking::Above(60.0), text, refuse: true };
     def.guards = Guards { interlocks: vec![lock], ..Guards::default() };
     let mut plant = Plant::new(std::sync::Arc::new(def), at(0), 1.0);
-    let mut order = |plant: &mut Plant, number: u32, value: f64, second: i64| {
+    let order = |plant: &mut Plant, number: u32, value: f64, second: i64| {
         let id = OrderId { terminal: 1, number };
         let command = Command::Write { tag: fixture::RUN, value };
         let effects = plant.on_order(Order { id, by: "op".into(), command }, at(second));

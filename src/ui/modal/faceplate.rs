@@ -41,15 +41,16 @@ impl Faceplate {
         if self.tags.len() > 1 {
             hints.push(hint("↑↓", "select"));
         }
-        if let Some(tag) = command_tag(cx, self.tag()) {
-            let manual = tag != self.tag();
-            hints.push(hint(
-                "⏎",
-                &if manual { format!("write {}", cx.def().tag(tag).short) } else { "write".to_owned() },
-            ));
-        }
-        if let Some((tag, value)) = self.toggle(cx) {
-            hints.insert(0, hint("t", &format!("{} {}", cx.snapshot.format(tag, value), cx.def().tag(tag).short)));
+        match (self.toggle(cx), command_tag(cx, self.tag())) {
+            (Some((tag, value)), _) => {
+                let words = format!("{} {}", cx.snapshot.format(tag, value), cx.def().tag(self.tag()).short);
+                hints.insert(0, hint("t", &words));
+            }
+            (None, Some(tag)) if tag != self.tag() => {
+                hints.push(hint("⏎", &format!("write {}", cx.def().tag(tag).short)));
+            }
+            (None, Some(_)) => hints.push(hint("⏎", "write")),
+            (None, None) => {}
         }
         hints.push(hint("w", "why"));
         hints.push(hint("Esc", "close"));
@@ -124,7 +125,11 @@ impl Faceplate {
             let room = canvas.width().saturating_sub(x + 2);
             let x = canvas.text(x + 2, y, &shown.within(room), shown.style);
             let left = canvas.width().saturating_sub(x + 2);
-            canvas.text(x + 2, y, &fit(&def.label, left), cx.theme.dim());
+            let x = canvas.text(x + 2, y, &fit(&def.label, left), cx.theme.dim());
+            if let Some((words, style)) = guard::mark(cx, *tag).filter(|_| 1 < self.tags.len()) {
+                let left = canvas.width().saturating_sub(x + 2);
+                canvas.text(x + 2, y, &fit(&words, left), style);
+            }
         }
         for (y, (label, text, style)) in details.iter().enumerate() {
             let y = list + 1 + y as u16;

@@ -31,6 +31,8 @@ pub enum Action {
     Open,
     /// Say why a value of the selected item is what it is.
     Why,
+    /// Open all actuators in one window.
+    Actuators,
     /// Stop or start the motion of agitators and arrows.
     Motion,
 }
@@ -47,6 +49,12 @@ pub const KEYS: &[Key<Action>] = &[
         label: "why",
         help: "why the value is what it is: quality, scaling, bytes",
         action: Action::Why,
+    },
+    Key {
+        chord: char('C'),
+        label: "commands",
+        help: "all valves, pumps and heaters with their commands",
+        action: Action::Actuators,
     },
     Key { chord: char('M'), label: "", help: "motion of agitators and arrows off and on", action: Action::Motion },
 ];
@@ -81,6 +89,11 @@ impl Mimic {
         match action {
             Action::Move(dx, dy) => self.selected = neighbour(items, self.selected, (dx, dy)),
             Action::Motion => self.motion = !self.motion,
+            Action::Actuators => {
+                let outputs = cx.def().guards.actuators.iter().map(|actuator| actuator.output).collect();
+                let plate = Faceplate::new("commands", outputs);
+                return plate.map(|plate| Act::Open(Modal::Faceplate(plate))).into_iter().collect();
+            }
             Action::Why => {
                 self.selected = self.selected.or_else(|| neighbour(items, None, (1, 0)));
                 let item = self.selected.and_then(|n| items.get(n));

@@ -125,7 +125,7 @@ fn a_pump_is_switched_by_its_manual_command() {
         fixture.set("PLC-1.AUTO", auto);
         let mut model = plate(&fixture, "PLC-1.P-1");
         let shown = screen(&mut model, 80, 24);
-        assert!(shown.contains("t ON MAN.P-1") && shown.contains("⏎ write MAN.P-1"), "{shown}");
+        assert!(shown.contains("t ON P-1"), "{shown}");
         assert_eq!(shown.contains("acts in MANUAL only, and PLC-1.AUTO is AUTO"), told, "{shown}");
         assert_eq!(order_of(&type_keys(&mut model, "⏎↓⏎")), None, "asks first");
         let shown = screen(&mut model, 80, 24);
@@ -171,6 +171,30 @@ fn a_mode_that_is_changed_under_the_question_is_told_in_it() {
     fixture.set("PLC-1.AUTO", 1.0);
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     assert!(screen(&mut model, 80, 24).contains("! acts in MANUAL only, and PLC-1.AUTO is AUTO"));
+}
+
+#[test]
+fn a_line_that_goes_down_under_the_question_is_told_in_it() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 0.0);
+    let mut model = plate(&fixture, "PLC-1.P-1");
+    type_keys(&mut model, "t");
+    update(&mut model, Msg::Snapshot(Fixture::line_down().snapshot()));
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("! Nothing can be written now. Line L1 is not connected"), "{shown}");
+    // Asked while it is down, there is nothing to confirm.
+    let mut model = plate(&Fixture::line_down(), "PLC-1.P-1");
+    type_keys(&mut model, "t");
+    assert!(matches!(model.modal, Some(Modal::Notice(_))));
+    assert_eq!(order_of(&type_keys(&mut model, "⏎⏎t⏎")), None);
+}
+
+#[test]
+fn all_actuators_are_in_one_window() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    type_keys(&mut model, "C");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("─ commands ─") && shown.contains("command  PLC-1.MAN.P-1 OFF"), "{shown}");
 }
 
 #[test]
