@@ -18,7 +18,7 @@ use crate::plant::{
 };
 
 /// How long the end of a command is marked in the picture, in seconds of the operator.
-const DONE_S: f64 = 10.0;
+const DONE_S: f64 = 5.0;
 /// The same for one that did not end well.
 const FAILED_S: f64 = 60.0;
 
@@ -100,9 +100,15 @@ pub fn unmet_words(cx: &Cx, tag: TagId) -> Option<String> {
 
 /// What starting or stopping a sequence does.
 fn sequence_words(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
-    let Some(sequence) = cx.def().guards.sequences.iter().find(|sequence| sequence.run == tag) else {
-        return Vec::new();
-    };
+    let sequences = &cx.def().guards.sequences;
+    if let Some(sequence) = sequences.iter().find(|sequence| sequence.auto == Some((tag, value))) {
+        return vec![match (value::is_on(cx, sequence.run), cx.snapshot.text(sequence.step)) {
+            (Some(true), Some(step)) => format!("The sequence goes on with {step} and works the outputs."),
+            (Some(false), _) => "The sequence works the outputs once it is started.".to_owned(),
+            (Some(true) | None, _) => "The sequence works the outputs; where it is, is not known.".to_owned(),
+        }];
+    }
+    let Some(sequence) = sequences.iter().find(|sequence| sequence.run == tag) else { return Vec::new() };
     let step = |number: f64| cx.snapshot.format(sequence.step, number);
     if value == 0.0 {
         let now = cx.snapshot.sample(sequence.step).trusted();
@@ -211,13 +217,22 @@ pub fn mark(cx: &Cx, output: TagId) -> Option<(String, Style)> {
             let word = words.split(':').next().unwrap_or_default();
             return Some((format!("{} {word}", theme.pick("✗", "x")), theme.trouble()));
         }
-        Some((_, Some(true))) => return Some((theme.pick("✓ done", "ok done").to_owned(), theme.normal())),
-        None => {}
+        // Only while the output is as commanded: another mode may have taken over since.
+        Some((_, Some(true))) if obeys(cx, actuator) => {
+            return Some((theme.pick("✓ done", "ok done").to_owned(), theme.normal()));
+        }
+        Some((_, Some(true))) | None => {}
     }
     let blocks = |lock: &&InterlockDef| lock.tag == actuator.command && lock.value != 0.0;
     let mut standings = guards.interlocks.iter().filter(blocks).map(|lock| lock.standing(cx.snapshot.sample(lock.of)));
     let blocked = standings.any(|standing| standing == Standing::Blocked);
     blocked.then(|| (theme.pick("⊘ blocked", "(/) blocked").to_owned(), theme.dim()))
+}
+
+/// Is the output certainly as commanded? One that need not follow its command counts as such.
+fn obeys(cx: &Cx, actuator: &ActuatorDef) -> bool {
+    let on = |tag| value::is_on(cx, tag);
+    actuator.travel.is_none() || on(actuator.command).is_some_and(|command| on(actuator.output) == Some(command))
 }
 
 /// What a faceplate says of an actuator: (label, words, look).

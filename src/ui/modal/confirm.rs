@@ -13,6 +13,7 @@ use crate::{
     },
     ui::{
         Cx, guard, keys,
+        tabs::mimic,
         widgets::{
             text::{width, wrap},
             value,
@@ -150,7 +151,9 @@ impl Confirm {
                 None => Next::Close,
             }
         } else {
-            Next::Stay(Modal::Confirm(self))
+            let write = matches!(self.intent, Intent::Order(Command::Write { .. }));
+            let other = mimic::command_of(cx, event).filter(|_| write);
+            Next::Stay(other.unwrap_or(Modal::Confirm(self)))
         }
     }
 

@@ -14,6 +14,7 @@ use crate::{
     ui::{
         Cx, guard, keys,
         keys::Hint,
+        tabs::mimic,
         widgets::{
             text::{age, clock, fit, fit_words, pad, width, wrap},
             value,
@@ -75,7 +76,7 @@ impl Faceplate {
             KeyCode::Char('q') => return Next::Close,
             _ => {}
         }
-        Next::Stay(Modal::Faceplate(self))
+        Next::Stay(mimic::command_of(cx, event).unwrap_or(Modal::Faceplate(self)))
     }
 
     /// The other state of the selected actuator: its command, and the value.

@@ -110,8 +110,7 @@ impl Mimic {
 
     /// A key that the plant file defines: a window with the finished intent.
     pub fn on_command_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
-        let command = cx.def().mimic.commands.iter().find(|command| char(command.key).is(event));
-        command.and_then(|command| intent(cx, command)).map(Act::Open).into_iter().collect()
+        command_of(cx, event).map(Act::Open).into_iter().collect()
     }
 
     /// The plant's keys first: they are what the tab is for.
@@ -218,6 +217,12 @@ impl Mimic {
 
 fn stretch(cx: &Cx, area: Rect) -> Stretch {
     Stretch::new(cx.def().mimic.size, (area.width, area.height))
+}
+
+/// The window of the plant's command on this key. Other windows ask too, so that a stop never waits for one to close.
+pub fn command_of(cx: &Cx, event: KeyEvent) -> Option<Modal> {
+    let command = cx.def().mimic.commands.iter().find(|command| char(command.key).is(event))?;
+    intent(cx, command)
 }
 
 /// The window of a plant command, or why it cannot be given: a fixed value or the other of two states is asked at once; a toggle of a state that

@@ -241,6 +241,32 @@ fn a_stop_takes_two_keys_and_says_what_it_switches_off() {
 }
 
 #[test]
+fn a_stop_need_not_wait_for_a_window_to_close() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 0.0);
+    let stop = Command::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 };
+    for before in ["", "t"] {
+        let mut model = plate(&fixture, "PLC-1.P-1");
+        type_keys(&mut model, before);
+        assert_eq!(order_of(&type_keys(&mut model, "r")), None, "it asks all the same");
+        assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&stop));
+    }
+}
+
+#[test]
+fn the_sequence_says_where_it_goes_on() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 0.0);
+    for (run, words) in [(1.0, "goes on with HEAT"), (0.0, "once it is started")] {
+        fixture.set("PLC-1.RUN", run);
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, "m");
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains("MANUAL  →  new AUTO") && shown.contains(words), "{shown}");
+    }
+}
+
+#[test]
 fn a_start_says_what_it_begins_with() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.RUN", 0.0);
@@ -276,9 +302,9 @@ fn the_picture_tells_how_a_command_went() {
         assert!(shown.contains(expect), "{expect}:\n{shown}");
     };
     check(&fixture, Some(Outcome::Pending), false, "… sent");
-    check(&fixture, Some(Outcome::Verified), false, "✓ done");
     check(&fixture, Some(Outcome::Failed(Fault::Timeout)), false, "✗ failed");
     check(&fixture, Some(Outcome::Refused(Refusal::ReadOnly)), false, "✗ refused");
+    check(&fixture, Some(Outcome::Verified), false, "✓ done");
     fixture.set("PLC-1.MAN.P-1", 1.0);
     check(&fixture, None, true, "≠ not ON");
     fixture.set("PLC-1.MAN.P-1", 0.0);
