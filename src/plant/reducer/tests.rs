@@ -235,3 +235,22 @@ fn what_an_interlock_blocks_is_refused_with_its_reason_and_a_stop_never() {
     assert_eq!(order(&mut plant, 1, 1.0, 1), (0, refused));
     assert_eq!(order(&mut plant, 2, 0.0, 1), (1, Outcome::Pending), "a stop goes out");
 }
+
+#[test]
+fn an_actuator_that_does_not_obey_is_in_the_snapshot() {
+    use crate::plant::guard::{ActuatorDef, Guards};
+    let mut def = fixture::plant();
+    let travel = Some(Duration::from_secs(5));
+    let actuator = ActuatorDef { output: FAULT, command: fixture::RUN, needs: Vec::new(), travel };
+    def.guards = Guards { actuators: vec![actuator], ..Guards::default() };
+    let mut plant = Plant::new(std::sync::Arc::new(def), at(0), 1.0);
+    let late = |plant: &Plant, second: i64| {
+        let snapshot = plant.snapshot();
+        snapshot.watch.disobeys(&snapshot.def.guards, 0, at(second)).map(|span| span.as_secs())
+    };
+    plant.on_event(read(0, &[(fixture::RUN, 1.0), (FAULT, 0.0)]));
+    plant.on_event(read(3, &[(fixture::RUN, 1.0), (FAULT, 0.0)]));
+    assert_eq!((late(&plant, 4), late(&plant, 6)), (None, Some(6)));
+    plant.on_event(read(7, &[(fixture::RUN, 1.0), (FAULT, 1.0)]));
+    assert_eq!(late(&plant, 20), None, "it has obeyed");
+}
