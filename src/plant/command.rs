@@ -142,6 +142,9 @@ pub enum Refusal {
     /// Another write to this tag is still under way.
     #[error("a write to this tag is under way")]
     UnderWay,
+    /// The plant file knows that it would have no effect now.
+    #[error("interlock: {0}")]
+    Interlock(String),
     /// The settings could not be written into the plant file.
     #[error("not saved: {0}")]
     NotSaved(String),

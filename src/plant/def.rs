@@ -7,6 +7,7 @@ use jiff::{civil::Time, tz::TimeZone};
 use super::tag::{Table, TagDef};
 
 pub use super::{
+    guard::Guards,
     id::{AlarmId, DeviceId, LineId, TagId},
     line::{Framing, LineDef, Parity, Rs485, Serial, Transport},
 };
@@ -28,6 +29,8 @@ pub struct PlantDef {
     pub tags: Vec<TagDef>,
     /// Alarms, by [`AlarmId`].
     pub alarms: Vec<AlarmDef>,
+    /// What stands between commands and their effect.
+    pub guards: Guards,
     /// The picture of the process.
     pub mimic: MimicDef,
     /// Groups of pens for the trends tab; at least one.

@@ -105,6 +105,7 @@ pub fn plant() -> PlantDef {
             ),
             alarm(SILENT, Subject::Device(TIC), Condition::NotAnswering, Duration::ZERO),
         ],
+        guards: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),
         shifts: Vec::new(),

@@ -23,6 +23,7 @@ pub mod line_minute;
 pub mod tool;
 pub mod command;
 pub mod record;
+pub mod guard;
 pub mod alarm;
 pub mod ne107;
 pub mod snapshot;

@@ -180,6 +180,9 @@ impl Desk {
         if !def.labels.is_empty() && def.label_of(value).is_none() {
             return refuse(Refusal::NotAChoice);
         }
+        if let Some(lock) = self.def.guards.refusal(tag, value, |tag| board.sample(tag)) {
+            return refuse(Refusal::Interlock(lock.text.clone()));
+        }
         let bound = |bound: Option<super::tag::Bound>| bound.map(|bound| board.bound(bound)).transpose();
         let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
         let (min, max) = (bound(def.min).map_err(unknown)?, bound(def.max).map_err(unknown)?);

@@ -15,6 +15,7 @@ use super::{
     command::{BusRequest, Command, Order, OrderId, Outcome, Refusal, WriteId},
     def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, Subject, TagId},
     event::{Event, Fault, LineState, WriteResult},
+    guard::Watch,
     line_minute::LineWatch,
     orders::Desk,
     record::{ActionRecord, AlarmRecord, Record},
@@ -42,6 +43,7 @@ pub struct Plant {
     board: Board,
     book: Book,
     desk: Desk,
+    watch: Watch,
     lines: Vec<LineStatus>,
     /// Earlier reports, by [`LineId`].
     watches: Vec<LineWatch>,
@@ -59,6 +61,7 @@ impl Plant {
             board: Board::new(def.clone(), at),
             book: Book::new(def.clone()),
             desk: Desk::new(def.clone()),
+            watch: Watch::default(),
             lines: vec![LineStatus::default(); def.lines.len()],
             watches: vec![LineWatch::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); def.devices.len()],
@@ -197,6 +200,7 @@ impl Plant {
             devices: self.diagnosed(),
             alarms: self.book.active(),
             orders: self.desk.shown(),
+            watch: self.watch.clone(),
             history: self.history.clone(),
             speed: self.speed,
         }
@@ -303,6 +307,7 @@ impl Plant {
     fn settle(&mut self, at: Timestamp) -> Effects {
         self.at = self.at.max(at);
         let (def, board, devices) = (&self.def, &self.board, &self.devices);
+        self.watch.look(&def.guards, |tag| board.sample(tag), self.at);
         let steps = self.book.judge(self.at, |alarm| facts(def, board, devices, alarm));
         let mut records = self.board.records(self.at);
         records.extend(steps.into_iter().map(Record::Alarm));

@@ -9,6 +9,7 @@ use super::{
     command::OrderStatus,
     def::{AlarmId, DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Fault, LineCounters, LineState},
+    guard::Watch,
     line_report::LineReport,
     ne107,
     sample::Sample,
@@ -39,6 +40,8 @@ pub struct Snapshot {
     pub alarms: Vec<ActiveAlarm>,
     /// The latest orders, newest first, at most 32.
     pub orders: Vec<OrderStatus>,
+    /// Since when actuators have not obeyed.
+    pub watch: Watch,
     /// The history store.
     pub history: HistoryStatus,
     /// Plant seconds per real second; 1 except in demonstrations.

@@ -15,6 +15,7 @@ mod alarm;
 mod device;
 mod diagnostic;
 mod edit;
+mod guard;
 mod io;
 pub mod line;
 mod names;

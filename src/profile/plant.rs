@@ -7,7 +7,7 @@ use jiff::tz::TimeZone;
 use super::{
     alarm, device,
     diagnostic::{Errors, Problems},
-    line,
+    guard, line,
     names::{Defs, Names, Unique, check_name},
     picture, reader,
     reader::{At, text},
@@ -57,6 +57,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let alarms = alarm::alarms(&file.alarms, &defs, problems);
     let mimic =
         file.mimic.as_ref().map_or_else(MimicDef::default, |mimic| picture::mimic(&mimic.value, &defs, problems));
+    let guards = guard::guards(file, &defs, problems);
     let trends = picture::trends(&file.trends, &defs, problems);
     let shifts = report::shifts(&file.shifts, problems);
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, problems);
@@ -68,6 +69,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         time_zone: time_zone(&file.time_zone, problems),
         lines,
         alarms,
+        guards,
         mimic,
         trends,
         shifts,

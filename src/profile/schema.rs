@@ -22,6 +22,9 @@ table!(
         list "line" lines: Raw,
         list "device" devices: DeviceTable,
         list "alarm" alarms: AlarmTable,
+        list "interlock" interlocks: InterlockTable,
+        list "actuator" actuators: ActuatorTable,
+        list "sequence" sequences: SequenceTable,
         opt "mimic" mimic: MimicTable,
         list "trend" trends: TrendTable,
         list "shift" shifts: ShiftTable,
@@ -208,6 +211,49 @@ table!(
         opt "effect" effect: String,
         opt "action" action: String,
         opt "respond" respond: Duration,
+    }
+);
+
+table!(
+    /// An `[[interlock]]`.
+    InterlockTable, "an interlock" {
+        need "tag" tag: String,
+        need "value" value: Choice,
+        need "of" of: String,
+        opt "below" below: f64,
+        opt "above" above: f64,
+        opt "is" is: Choice,
+        opt "bit" bit: u8,
+        need "text" text: String,
+        opt "refuse" refuse: bool,
+    }
+);
+
+table!(
+    /// An `[[actuator]]`.
+    ActuatorTable, "an actuator" {
+        need "output" output: String,
+        need "command" command: String,
+        list "needs" needs: NeedTable,
+        opt "travel" travel: Duration,
+    }
+);
+
+table!(
+    /// A state that another tag must be in.
+    NeedTable, "a needed state" {
+        need "tag" tag: String,
+        need "is" is: Choice,
+    }
+);
+
+table!(
+    /// A `[[sequence]]`.
+    SequenceTable, "a sequence" {
+        need "run" run: String,
+        opt "auto" auto: NeedTable,
+        need "step" step: String,
+        need "first" first: Choice,
     }
 );
 

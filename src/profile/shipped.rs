@@ -89,8 +89,8 @@ fn outputs_and_sensors_cannot_be_written_and_only_what_the_plant_needs_is_polled
     let plant = tank();
     let plc = plant.devices[1].id;
     let writable: Vec<&str> = plant.tags_of(plc).filter(|tag| tag.writable()).map(|tag| tag.short.as_str()).collect();
-    assert_eq!(writable, ["RUN", "AUTO", "MAN.P-1", "MAN.M-1", "MAN.SV-1", "MAN.SV-2", "MAN.HEATER"]);
-    assert_eq!(plant.tags_of(plc).filter(|tag| tag.poll != Poll::Never).count(), 23);
+    assert_eq!(writable, ["RUN", "AUTO", "MAN.P-1", "MAN.M-1", "MAN.SV-1", "MAN.SV-2", "MAN.HEATER", "FILL"]);
+    assert_eq!(plant.tags_of(plc).filter(|tag| tag.poll != Poll::Never).count(), 25);
     let fix = plant.tag(plant.tag_named("TIC-1.FIX").unwrap());
     assert_eq!((fix.access, fix.poll), (Access::Write, Poll::Never));
 }

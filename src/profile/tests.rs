@@ -9,6 +9,7 @@ use super::{
 };
 use crate::plant::{
     def::{Condition, PlantDef},
+    guard::Blocking,
     tag::{Bound, Class, Kind},
 };
 
@@ -336,6 +337,46 @@ fn nothing_counts_with_a_text() {
     let scaled = meter.replace("decimals_from = \"DP\"", "decimals_from = \"MODEL\"");
     let text = load(PLANT.as_bytes(), &scaled, PLC).expect_err("no decimals").to_string();
     assert!(text.contains("D1.MODEL is a text"), "{text}");
+}
+
+/// The small plant with more tables before its picture.
+fn guarded(tables: &str) -> Result<PlantDef, Errors> {
+    load(PLANT.replace("[mimic]", &format!("{tables}\n[mimic]")).as_bytes(), METER, PLC)
+}
+
+#[test]
+fn an_interlock_says_what_blocks_which_value() {
+    let lock = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"too hot\"\n";
+    let plant = guarded(lock).unwrap();
+    let found = &plant.guards.interlocks[0];
+    assert_eq!((found.value, found.when, found.refuse), (1.0, Blocking::Above(80.0), true));
+    let off = guarded(&lock.replace("\"on\"", "\"off\"")).unwrap();
+    assert!(!off.guards.interlocks[0].refuse, "switching off is told, never refused");
+    for (from, to, expect) in [
+        ("value = \"on\"", "value = \"off\"\nrefuse = true", "switching off is never refused"),
+        ("value = \"on\"", "value = \"full\"", "`full` is not a state of D1.MODE"),
+        ("above = 80", "", "an interlock needs a condition"),
+        ("above = 80", "above = 80\nbelow = 3", "an interlock has one condition"),
+        ("above = 80", "bit = 16", "D1.T has no bit 16"),
+        ("of = \"D1.T\"", "of = \"D1.X\"", "unknown tag `D1.X`"),
+        ("tag = \"D1.MODE\"", "tag = \"D1.T\"", "D1.T cannot be commanded"),
+        ("text = \"too hot\"", "", "an interlock needs `text`"),
+    ] {
+        let text = guarded(&lock.replace(from, to)).expect_err(to).to_string();
+        assert!(text.contains(expect), "{to}: {text}");
+    }
+}
+
+#[test]
+fn an_actuator_has_one_command_and_one_output() {
+    let table = "[[actuator]]\noutput = \"PLC.OUT\"\ncommand = \"D1.MODE\"\nneeds = [{ tag = \"PLC.STEP\", is = 1 }]\n";
+    let plant = guarded(table).unwrap();
+    assert_eq!(plant.guards.actuators[0].needs, [(plant.tag_named("PLC.STEP").unwrap(), 1.0)]);
+    assert_eq!(plant.guards.actuators[0].travel, None);
+    let text = guarded(&format!("{table}{table}")).expect_err("twice").to_string();
+    assert!(text.contains("PLC.OUT belongs to another actuator"), "{text}");
+    let text = guarded(&table.replace("D1.MODE", "D1.T")).expect_err("read only").to_string();
+    assert!(text.contains("D1.T cannot be commanded"), "{text}");
 }
 
 #[test]

@@ -162,6 +162,7 @@ impl Fixture {
             Decimals::From(_) => 1,
         });
         Arc::new(Snapshot {
+            watch: crate::plant::guard::Watch::default(),
             texts: Arc::new(vec![None; self.def.tags.len()]),
             evidence: Arc::new(self.evidence.clone()),
             at: now(),

@@ -3,6 +3,7 @@
 pub mod chrome;
 pub mod edge;
 pub mod io;
+pub mod guard;
 pub mod keys;
 pub mod modal;
 pub mod tabs;

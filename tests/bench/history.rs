@@ -36,6 +36,7 @@ fn tank() -> Arc<PlantDef> {
         devices: Vec::new(),
         tags: (0..TAGS).map(tag).collect(),
         alarms: Vec::new(),
+        guards: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),
         shifts: Vec::new(),

@@ -75,6 +75,7 @@ fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
         devices: (0..devices).map(device).collect(),
         tags,
         alarms: Vec::new(),
+        guards: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),
         shifts: Vec::new(),

@@ -230,6 +230,29 @@ fn a_faulty_answer_over_tcp_is_never_shown_as_a_value() {
     check(&said, &[("SPOILED.N", "---- bad: device not answering"), ("SILENT.N", "---- bad: device not answering")]);
 }
 
+/// Its registers hold their address, so the ones from 16706 (0x4142) on read as `ABAC…`, two characters each.
+#[test]
+fn text_in_registers_is_read() {
+    let Some(python) = python() else { return };
+    let port = free_port();
+    let _slave = slave(&python, "tcp", &port.to_string());
+    let text = |name: &str, kind: &str, order: &str| {
+        format!(
+            "[[device.tag]]\nname = \"{name}\"\ntable = \"holding\"\naddress = 16706\npoll = \"fast\"\n\
+             type = \"{kind}\"\norder = \"{order}\"\n"
+        )
+    };
+    let plant_of = |tags: String| {
+        let folder = folder();
+        let file = folder.path().join("text.toml");
+        fs::write(&file, plant_with(&[WELL], "tcp") + &tags).unwrap();
+        fs::copy(plant("number.toml"), folder.path().join("number.toml")).unwrap();
+        station(&file, &format!("127.0.0.1:{port}"), "3s")
+    };
+    check(&plant_of(text("TEXT", "string(5)", "ABCD")), &[("WELL.TEXT", "ABACA good"), ("WELL.N", "10 good")]);
+    check(&plant_of(text("TEXT", "string(4)", "BADC")), &[("WELL.TEXT", "BACA good")]);
+}
+
 /// Over TCP half an answer puts the whole stream out of step.
 #[test]
 fn half_an_answer_over_tcp_is_never_shown_as_a_value() {

@@ -211,3 +211,46 @@ fn a_full_queue_is_told_to_the_operator() {
     plant.on_undeliverable(effects.bus[0].0, &effects.bus[0].1);
     assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Busy));
 }
+
+#[test]
+fn what_an_interlock_blocks_is_refused_with_its_reason_and_a_stop_never() {
+    use crate::plant::{
+        command::{Command, Order, OrderId, Outcome, Refusal},
+        guard::{Blocking, Guards, InterlockDef},
+    };
+    let mut def = fixture::plant();
+    let text = "not above 60 °C".to_owned();
+    let lock = InterlockDef { tag: fixture::RUN, value: 1.0, of: PV, when: Blocking::Above(60.0), text, refuse: true };
+    def.guards = Guards { interlocks: vec![lock], ..Guards::default() };
+    let mut plant = Plant::new(std::sync::Arc::new(def), at(0), 1.0);
+    let order = |plant: &mut Plant, number: u32, value: f64, second: i64| {
+        let id = OrderId { terminal: 1, number };
+        let command = Command::Write { tag: fixture::RUN, value };
+        let effects = plant.on_order(Order { id, by: "op".into(), command }, at(second));
+        let outcome = plant.snapshot().orders[0].outcome.clone();
+        (effects.bus.len(), outcome)
+    };
+    plant.on_event(read(0, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
+    let refused = Outcome::Refused(Refusal::Interlock("not above 60 °C".to_owned()));
+    assert_eq!(order(&mut plant, 1, 1.0, 1), (0, refused));
+    assert_eq!(order(&mut plant, 2, 0.0, 1), (1, Outcome::Pending), "a stop goes out");
+}
+
+#[test]
+fn an_actuator_that_does_not_obey_is_in_the_snapshot() {
+    use crate::plant::guard::{ActuatorDef, Guards};
+    let mut def = fixture::plant();
+    let travel = Some(Duration::from_secs(5));
+    let actuator = ActuatorDef { output: FAULT, command: fixture::RUN, needs: Vec::new(), travel };
+    def.guards = Guards { actuators: vec![actuator], ..Guards::default() };
+    let mut plant = Plant::new(std::sync::Arc::new(def), at(0), 1.0);
+    let late = |plant: &Plant, second: i64| {
+        let snapshot = plant.snapshot();
+        snapshot.watch.disobeys(&snapshot.def.guards, 0, at(second)).map(|span| span.as_secs())
+    };
+    plant.on_event(read(0, &[(fixture::RUN, 1.0), (FAULT, 0.0)]));
+    plant.on_event(read(3, &[(fixture::RUN, 1.0), (FAULT, 0.0)]));
+    assert_eq!((late(&plant, 4), late(&plant, 6)), (None, Some(6)));
+    plant.on_event(read(7, &[(fixture::RUN, 1.0), (FAULT, 1.0)]));
+    assert_eq!(late(&plant, 20), None, "it has obeyed");
+}

@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
-use super::{Modal, Next, faceplate::manual_note, window};
+use super::{Faceplate, Modal, Next, window};
 use crate::{
     plant::{
         command::Command,
@@ -12,7 +12,8 @@ use crate::{
         tool::Tool,
     },
     ui::{
-        Cx, keys,
+        Cx, guard, keys,
+        tabs::mimic,
         widgets::{
             text::{width, wrap},
             value,
@@ -26,6 +27,8 @@ pub struct Confirm {
     intent: Intent,
     title: String,
     notes: Vec<String>,
+    /// Where it was asked from, and where it leads back to.
+    back: Option<Faceplate>,
 }
 
 /// What a confirmed window does.
@@ -41,7 +44,7 @@ impl Confirm {
     /// Leave?
     pub fn quit() -> Confirm {
         let notes = ["Quit?", "Polling and alarms stop too: the station runs in this terminal."];
-        Confirm { intent: Intent::Quit, title: "quit".to_owned(), notes: notes.map(str::to_owned).to_vec() }
+        Confirm { intent: Intent::Quit, title: "quit".to_owned(), notes: notes.map(str::to_owned).to_vec(), back: None }
     }
 
     /// Is it the question whether to leave?
@@ -67,15 +70,21 @@ impl Confirm {
             notes.push(format!("… and {} more", waiting.len() - 6));
         }
         let intent = Intent::Order(Command::AcknowledgeAll);
-        Some(Confirm { intent, title: "acknowledge all".to_owned(), notes })
+        Some(Confirm { intent, title: "acknowledge all".to_owned(), notes, back: None })
     }
 
     /// Write this value? Old and new value are drawn from the intent, so they cannot differ from what is sent.
     pub fn write(cx: &Cx, tag: TagId, value: f64) -> Confirm {
         let def = cx.def().tag(tag);
         let intent = Intent::Order(Command::Write { tag, value });
-        let notes = manual_note(cx, tag).map(|note| format!("! {note}")).into_iter().chain(write_notes(def)).collect();
-        Confirm { intent, title: format!("write {}", def.name), notes }
+        Confirm { intent, title: format!("write {}", def.name), notes: write_notes(def), back: None }
+    }
+
+    /// The same, asked from a faceplate, with words of its own above all others.
+    pub fn from_faceplate(cx: &Cx, tag: TagId, value: f64, words: Option<String>, back: Faceplate) -> Confirm {
+        let confirm = Confirm::write(cx, tag, value);
+        let notes = words.into_iter().chain(confirm.notes).collect();
+        Confirm { notes, back: Some(back), ..confirm }
     }
 
     /// A write with words of its own (an action of a device).
@@ -87,7 +96,7 @@ impl Confirm {
 
     /// Open or close a line, or any other order, with words of its own.
     pub fn order(title: impl Into<String>, words: impl Into<String>, command: Command) -> Confirm {
-        Confirm { intent: Intent::Order(command), title: title.into(), notes: vec![words.into()] }
+        Confirm { intent: Intent::Order(command), title: title.into(), notes: vec![words.into()], back: None }
     }
 
     /// What Enter does.
@@ -117,14 +126,34 @@ impl Confirm {
         if self.is_quit() { "stay" } else { "leave it as it is" }
     }
 
-    pub(super) fn on_key(self, event: KeyEvent) -> Next {
+    /// Is it certainly without effect now?
+    fn is_refused(&self, cx: &Cx) -> bool {
+        match &self.intent {
+            Intent::Order(Command::Write { tag, value }) => guard::is_refused(cx, *tag, *value),
+            Intent::Order(_) | Intent::Quit => false,
+        }
+    }
+
+    pub(super) fn on_key(self, cx: &Cx, event: KeyEvent) -> Next {
         let enter = keys::code(KeyCode::Enter).is(event) && !self.wants_y();
         if enter || keys::char('y').is(event) {
-            Next::Do(vec![self.intent.act()])
+            if self.is_refused(cx) {
+                return Next::Stay(Modal::Confirm(self));
+            }
+            let acts = vec![self.intent.act()];
+            match self.back {
+                Some(back) => Next::Both(Modal::Faceplate(back), acts),
+                None => Next::Do(acts),
+            }
         } else if keys::char('n').is(event) || keys::char('q').is(event) {
-            Next::Close
+            match self.back {
+                Some(back) => Next::Stay(Modal::Faceplate(back)),
+                None => Next::Close,
+            }
         } else {
-            Next::Stay(Modal::Confirm(self))
+            let write = matches!(self.intent, Intent::Order(Command::Write { .. }));
+            let other = mimic::command_of(cx, event).filter(|_| write);
+            Next::Stay(other.unwrap_or(Modal::Confirm(self)))
         }
     }
 
@@ -138,8 +167,16 @@ impl Confirm {
             rows.push((wire_words(cx.def().tag(*tag)), cx.theme.dim()));
         }
         rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));
+        if let Intent::Order(Command::Write { tag, value }) = &self.intent {
+            // As it stands now: what was true when the window opened may have changed under it.
+            let told = guard::before_write(cx, *tag, *value).into_iter();
+            rows.extend(told.flat_map(|(note, style)| wrap(&note, room).into_iter().map(move |line| (line, style))));
+        }
         let yes = if self.wants_y() { "y" } else { "⏎" };
-        let keys = format!("{yes} {}   Esc {}", self.verb(), self.escape());
+        let keys = match self.is_refused(cx) {
+            true => format!("Esc {}", self.escape()),
+            false => format!("{yes} {}   Esc {}", self.verb(), self.escape()),
+        };
         let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&keys));
         let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + 2));
         for (y, (text, style)) in rows.iter().enumerate() {

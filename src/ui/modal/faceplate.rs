@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
-use super::{Modal, Next, Why, confirm::wire_words, entry::range_words, window};
+use super::{Confirm, Modal, Next, Notice, Why, confirm::wire_words, entry::range_words, window};
 use crate::{
     plant::{
         def::TagId,
@@ -12,10 +12,11 @@ use crate::{
         tag::{Access, Poll},
     },
     ui::{
-        Cx, keys,
+        Cx, guard, keys,
         keys::Hint,
+        tabs::mimic,
         widgets::{
-            text::{age, clock, fit, pad, width, wrap},
+            text::{age, clock, fit, fit_words, pad, width, wrap},
             value,
         },
     },
@@ -41,12 +42,16 @@ impl Faceplate {
         if self.tags.len() > 1 {
             hints.push(hint("↑↓", "select"));
         }
-        if let Some(tag) = command_tag(cx, self.tag()) {
-            let manual = tag != self.tag();
-            hints.push(hint(
-                "⏎",
-                &if manual { format!("write {}", cx.def().tag(tag).short) } else { "write".to_owned() },
-            ));
+        match (self.toggle(cx), command_tag(cx, self.tag())) {
+            (Some((tag, value)), _) => {
+                let words = format!("{} {}", cx.snapshot.format(tag, value), cx.def().tag(self.tag()).short);
+                hints.insert(0, hint("t", &words));
+            }
+            (None, Some(tag)) if tag != self.tag() => {
+                hints.push(hint("⏎", &format!("write {}", cx.def().tag(tag).short)));
+            }
+            (None, Some(_)) => hints.push(hint("⏎", "write")),
+            (None, None) => {}
         }
         hints.push(hint("w", "why"));
         hints.push(hint("Esc", "close"));
@@ -65,16 +70,51 @@ impl Faceplate {
                 let why = Why::new(self.tags.clone(), self.selected.min(self.tags.len() - 1));
                 return Next::Stay(why.map_or(Modal::Faceplate(self), Modal::Why));
             }
+            KeyCode::Char('t') if keys::char('t').is(event) => {
+                return Next::Stay(self.clone().asked(cx).unwrap_or(Modal::Faceplate(self)));
+            }
             KeyCode::Char('q') => return Next::Close,
             _ => {}
         }
-        Next::Stay(Modal::Faceplate(self))
+        Next::Stay(mimic::command_of(cx, event).unwrap_or(Modal::Faceplate(self)))
+    }
+
+    /// The other state of the selected actuator: its command, and the value.
+    fn toggle(&self, cx: &Cx) -> Option<(TagId, f64)> {
+        let command = cx.def().guards.actuator(self.tag())?.1.command;
+        Some((command, guard::other_state(cx, command)?))
+    }
+
+    /// The question for the other state; where the command would have no effect, the question for the state that it needs
+    /// comes first, as a step of its own.
+    fn asked(self, cx: &Cx) -> Option<Modal> {
+        let (_, actuator) = cx.def().guards.actuator(self.tag())?;
+        if let Some(notice) = Notice::unreachable(cx, cx.def().tag(actuator.command).device) {
+            return Some(Modal::Notice(notice));
+        }
+        let Some((command, value)) = self.toggle(cx) else { return Modal::write(cx, actuator.command) };
+        let refused = guard::is_refused(cx, command, value);
+        let missing = guard::unmet(cx, actuator).filter(|(need, _)| {
+            // A state that nobody knows is no reason to change it.
+            cx.def().tag(*need).writable() && cx.snapshot.sample(*need).trusted().is_some() && !refused
+        });
+        let confirm = match missing {
+            Some((need, state)) => {
+                let words = format!(
+                    "{} has no effect now. This comes first; then t again for the command itself.",
+                    cx.def().tag(command).name
+                );
+                Confirm::from_faceplate(cx, need, state, Some(words), self)
+            }
+            None => Confirm::from_faceplate(cx, command, value, None, self),
+        };
+        Some(Modal::Confirm(confirm))
     }
 
     pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
         let names = self.tags.iter().map(|tag| width(&cx.def().tag(*tag).name)).max().unwrap_or(0);
         let room = body.width.saturating_sub(8).min(64);
-        let details = details(cx, self.tag(), room);
+        let details = wrapped(details(cx, self.tag(), room), room.saturating_sub(9));
         let list = self.tags.len() as u16;
         let mut canvas = window(cx, frame, body, &self.title, (room, list + 1 + details.len() as u16));
         for (y, tag) in self.tags.iter().enumerate() {
@@ -86,18 +126,31 @@ impl Faceplate {
             let room = canvas.width().saturating_sub(x + 2);
             let x = canvas.text(x + 2, y, &shown.within(room), shown.style);
             let left = canvas.width().saturating_sub(x + 2);
-            canvas.text(x + 2, y, &fit(&def.label, left), cx.theme.dim());
+            let x = canvas.text(x + 2, y, &fit(&def.label, left), cx.theme.dim());
+            if let Some((words, style)) = guard::mark(cx, *tag).filter(|_| 1 < self.tags.len()) {
+                let left = canvas.width().saturating_sub(x + 2);
+                canvas.text(x + 2, y, &fit(&words, left), style);
+            }
         }
         for (y, (label, text, style)) in details.iter().enumerate() {
             let y = list + 1 + y as u16;
             canvas.text(0, y, label, cx.theme.dim());
-            canvas.text(9, y, text, *style);
+            canvas.text(9, y, &fit_words(text, canvas.width().saturating_sub(9)), *style);
         }
     }
 
     fn tag(&self) -> TagId {
         self.tags[self.selected.min(self.tags.len() - 1)]
     }
+}
+
+/// Words that are too long go on in the next row.
+fn wrapped(rows: Vec<(&'static str, String, Style)>, room: u16) -> Vec<(&'static str, String, Style)> {
+    let parts = |(label, text, style): (&'static str, String, Style)| {
+        let lines = if width(&text) <= room { vec![text] } else { wrap(&text, room) };
+        lines.into_iter().enumerate().map(move |(n, line)| (if n == 0 { label } else { "" }, line, style))
+    };
+    rows.into_iter().flat_map(parts).collect()
 }
 
 /// What is known about one tag: (label, words, style).
@@ -126,7 +179,9 @@ fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)>
         Access::Write => "write only",
     };
     let device = cx.def().device(def.device);
-    let mut rows = vec![
+    // What can be done comes first, what there is to know about the tag behind it.
+    let mut rows = guard::facts(cx, tag);
+    rows.extend([
         ("quality", quality, theme.quality(sample.quality)),
         ("read", format!("{read} ({poll})"), theme.normal()),
         ("range", range_words(cx, tag).trim_start_matches("range ").to_owned(), theme.normal()),
@@ -143,11 +198,7 @@ fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)>
             ),
             theme.normal(),
         ),
-    ];
-    if let Some(manual) = manual_tag(cx, tag) {
-        rows.push(("manual", format!("⏎ writes {}", cx.def().tag(manual).name), theme.strong()));
-        rows.extend(manual_note(cx, manual).map(|note| ("", note, theme.strong())));
-    }
+    ]);
     for alarm in cx.snapshot.alarms_of(tag) {
         let def = cx.def().alarm(alarm.id);
         let text = format!("{} {} {}", theme.priority_mark(def.priority), def.text, alarm.state.word());
@@ -160,31 +211,15 @@ fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)>
     rows
 }
 
-/// What Enter writes for a tag: itself, or the manual command of an output that is only read.
+/// What Enter writes for a tag: itself, or the command of an output that is only read.
 fn command_tag(cx: &Cx, tag: TagId) -> Option<TagId> {
-    if cx.def().tag(tag).writable() { Some(tag) } else { manual_tag(cx, tag) }
+    if cx.def().tag(tag).writable() { Some(tag) } else { command_of(cx, tag) }
 }
 
-/// The manual command of an output that is only read: `MAN.P-1` for `P-1`, on the same device.
-fn manual_tag(cx: &Cx, tag: TagId) -> Option<TagId> {
-    let def = cx.def().tag(tag);
-    let mut others = cx.def().tags_of(def.device);
-    let manual = others.find(|other| other.short.strip_prefix("MAN.") == Some(def.short.as_str()) && other.writable());
-    manual.filter(|_| !def.writable()).map(|manual| manual.id)
-}
-
-/// Said of a manual command while its device's `AUTO` is on, or while nobody knows.
-pub(super) fn manual_note(cx: &Cx, tag: TagId) -> Option<String> {
-    let def = cx.def().tag(tag);
-    let auto = cx.def().tags_of(def.device).find(|other| other.short == "AUTO")?;
-    if !def.short.starts_with("MAN.") {
-        return None;
-    }
-    match value::is_on(cx, auto.id) {
-        Some(false) => None,
-        Some(true) => Some(format!("acts in MANUAL only, and {} is on", auto.name)),
-        None => Some(format!("acts in MANUAL only, and {} is not known", auto.name)),
-    }
+/// The command of an output that is only read.
+fn command_of(cx: &Cx, tag: TagId) -> Option<TagId> {
+    let (_, actuator) = cx.def().guards.actuator(tag)?;
+    (actuator.output == tag).then_some(actuator.command)
 }
 
 /// How a device stands, in words.

@@ -92,7 +92,7 @@ impl Modal {
         }
         let next = match self {
             Modal::Help(row) => help::on_key(row, event),
-            Modal::Confirm(confirm) => confirm.on_key(event),
+            Modal::Confirm(confirm) => confirm.on_key(cx, event),
             Modal::Entry(entry) => entry.on_key(cx, event),
             Modal::Choice(choice) => choice.on_key(cx, event),
             Modal::Prompt(prompt) => prompt.on_key(cx, tabs, event),

@@ -23,6 +23,14 @@ impl Notice {
     /// Why nothing can be written to this device now; `None` if it can be tried.
     pub fn unreachable(cx: &Cx, device: DeviceId) -> Option<Notice> {
         let def = cx.def().device(device);
+        let why = Notice::why_unreachable(cx, device)?;
+        let words = vec![format!("{} is not answering", def.name), why, "Nothing can be written now.".to_owned()];
+        Some(Notice { title: def.name.clone(), words })
+    }
+
+    /// The same as one sentence.
+    pub fn why_unreachable(cx: &Cx, device: DeviceId) -> Option<String> {
+        let def = cx.def().device(device);
         let line = &cx.def().line(def.line).name;
         let why = match (&cx.snapshot.line(def.line).state, cx.snapshot.device(device).state) {
             (LineState::Disconnected, _) => format!("Line {line} was disconnected by an operator."),
@@ -36,8 +44,7 @@ impl Notice {
                 return None;
             }
         };
-        let words = vec![format!("{} is not answering", def.name), why, "Nothing can be written now.".to_owned()];
-        Some(Notice { title: def.name.clone(), words })
+        Some(why)
     }
 
     pub(super) fn on_key(self, event: KeyEvent) -> Next {

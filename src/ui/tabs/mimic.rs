@@ -10,10 +10,9 @@ use crate::{
     plant::{
         def::{MimicCommand, MimicItem, Place},
         snapshot::Snapshot,
-        tag::Kind,
     },
     ui::{
-        Act, Cx,
+        Act, Cx, guard,
         keys::{self, Hint, Key, char, code},
         modal::{Choice, Confirm, Faceplate, Modal, Notice, Why},
         widgets::{
@@ -32,6 +31,8 @@ pub enum Action {
     Open,
     /// Say why a value of the selected item is what it is.
     Why,
+    /// Open all actuators in one window.
+    Actuators,
     /// Stop or start the motion of agitators and arrows.
     Motion,
 }
@@ -48,6 +49,12 @@ pub const KEYS: &[Key<Action>] = &[
         label: "why",
         help: "why the value is what it is: quality, scaling, bytes",
         action: Action::Why,
+    },
+    Key {
+        chord: char('C'),
+        label: "commands",
+        help: "all valves, pumps and heaters with their commands",
+        action: Action::Actuators,
     },
     Key { chord: char('M'), label: "", help: "motion of agitators and arrows off and on", action: Action::Motion },
 ];
@@ -82,6 +89,11 @@ impl Mimic {
         match action {
             Action::Move(dx, dy) => self.selected = neighbour(items, self.selected, (dx, dy)),
             Action::Motion => self.motion = !self.motion,
+            Action::Actuators => {
+                let outputs = cx.def().guards.actuators.iter().map(|actuator| actuator.output).collect();
+                let plate = Faceplate::new("commands", outputs);
+                return plate.map(|plate| Act::Open(Modal::Faceplate(plate))).into_iter().collect();
+            }
             Action::Why => {
                 self.selected = self.selected.or_else(|| neighbour(items, None, (1, 0)));
                 let item = self.selected.and_then(|n| items.get(n));
@@ -98,8 +110,7 @@ impl Mimic {
 
     /// A key that the plant file defines: a window with the finished intent.
     pub fn on_command_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
-        let command = cx.def().mimic.commands.iter().find(|command| char(command.key).is(event));
-        command.and_then(|command| intent(cx, command)).map(Act::Open).into_iter().collect()
+        command_of(cx, event).map(Act::Open).into_iter().collect()
     }
 
     /// The plant's keys first: they are what the tab is for.
@@ -208,6 +219,12 @@ fn stretch(cx: &Cx, area: Rect) -> Stretch {
     Stretch::new(cx.def().mimic.size, (area.width, area.height))
 }
 
+/// The window of the plant's command on this key. Other windows ask too, so that a stop never waits for one to close.
+pub fn command_of(cx: &Cx, event: KeyEvent) -> Option<Modal> {
+    let command = cx.def().mimic.commands.iter().find(|command| char(command.key).is(event))?;
+    intent(cx, command)
+}
+
 /// The window of a plant command, or why it cannot be given: a fixed value or the other of two states is asked at once; a toggle of a state that
 /// nobody knows becomes a list, and anything else is entered.
 fn intent(cx: &Cx, command: &MimicCommand) -> Option<Modal> {
@@ -219,18 +236,15 @@ fn intent(cx: &Cx, command: &MimicCommand) -> Option<Modal> {
     if let Some(value) = command.value {
         return Some(Modal::Confirm(Confirm::write(cx, tag, value)));
     }
-    let states: Vec<f64> = match (def.labels.as_slice(), def.point.kind) {
-        ([one, other], _) => vec![one.0 as f64, other.0 as f64],
-        ([], Kind::Bool) => vec![0.0, 1.0],
-        _ => Vec::new(),
-    };
-    let now = cx.snapshot.sample(tag).trusted();
-    match (states.as_slice(), now) {
-        ([one, other], Some(now)) if now == *one || now == *other => {
-            let new = if now == *one { *other } else { *one };
-            Some(Modal::Confirm(Confirm::write(cx, tag, new)))
-        }
-        ([_, _], _) if !def.labels.is_empty() => Some(Modal::Choice(Choice::values(cx, tag))),
+    if let Some(new) = guard::other_state(cx, tag) {
+        return Some(Modal::Confirm(Confirm::write(cx, tag, new)));
+    }
+    // Nobody knows whether it runs: what is asked is the stop, which never takes more than two keys.
+    if cx.def().guards.sequences.iter().any(|sequence| sequence.run == tag) {
+        return Some(Modal::Confirm(Confirm::write(cx, tag, 0.0)));
+    }
+    match def.labels.as_slice() {
+        [_, _] => Some(Modal::Choice(Choice::values(cx, tag))),
         _ => Modal::write(cx, tag),
     }
 }

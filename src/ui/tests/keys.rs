@@ -3,12 +3,13 @@
 use std::{sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use jiff::SignedDuration;
 
 use super::{model, order_of, screen, type_keys};
 use crate::{
     history::{Answer, HistoryError, Question},
     plant::{
-        command::{Command, NotConfirmed, OrderStatus, Outcome, Refusal},
+        command::{Command, NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
         def::{AlarmId, Priority},
         event::{Fault, LineState},
         record::{ActionRecord, AlarmRecord, AlarmStep},
@@ -16,7 +17,7 @@ use crate::{
         snapshot::DeviceState,
     },
     ui::{
-        Effect, Msg,
+        Effect, Model, Msg,
         fixture::{self, Fixture},
         modal::{Faceplate, Modal},
         tabs::Tab,
@@ -111,27 +112,204 @@ fn a_screen_too_small_to_see_takes_no_orders() {
     assert_eq!(type_keys(&mut model, "q⏎"), [Effect::Quit]);
 }
 
+fn plate(fixture: &Fixture, tag: &str) -> Model {
+    let mut model = model(fixture, Theme::FULL);
+    model.modal = Faceplate::new("it", vec![fixture.tag(tag)]).map(Modal::Faceplate);
+    model
+}
+
 #[test]
 fn a_pump_is_switched_by_its_manual_command() {
     let mut fixture = Fixture::normal();
     for (auto, told) in [(1.0, true), (0.0, false)] {
         fixture.set("PLC-1.AUTO", auto);
-        let mut model = model(&fixture, Theme::FULL);
-        model.modal = Faceplate::new("P-1", vec![fixture.tag("PLC-1.P-1")]).map(Modal::Faceplate);
+        let mut model = plate(&fixture, "PLC-1.P-1");
         let shown = screen(&mut model, 80, 24);
-        assert!(shown.contains("⏎ writes PLC-1.MAN.P-1") && shown.contains("⏎ write MAN.P-1"), "{shown}");
-        assert_eq!(shown.contains("acts in MANUAL only, and PLC-1.AUTO is on"), told, "{shown}");
+        assert!(shown.contains("t ON P-1"), "{shown}");
+        assert_eq!(shown.contains("acts in MANUAL only, and PLC-1.AUTO is AUTO"), told, "{shown}");
         assert_eq!(order_of(&type_keys(&mut model, "⏎↓⏎")), None, "asks first");
         let shown = screen(&mut model, 80, 24);
-        assert_eq!(shown.contains("! acts in MANUAL only, and PLC-1.AUTO is on"), told, "{shown}");
+        assert_eq!(shown.contains("! acts in MANUAL only, and PLC-1.AUTO is AUTO"), told, "{shown}");
         let order = Command::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
         assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
     }
     // One without such a command has nothing to write.
-    let mut model = model(&fixture, Theme::FULL);
-    model.modal = Faceplate::new("SV-1", vec![fixture.tag("PLC-1.SV-1")]).map(Modal::Faceplate);
-    type_keys(&mut model, "⏎");
+    let mut model = plate(&fixture, "PLC-1.SV-1");
+    type_keys(&mut model, "⏎t");
     assert!(matches!(model.modal, Some(Modal::Faceplate(_))));
+}
+
+#[test]
+fn in_auto_the_change_to_manual_is_a_step_of_its_own() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 1.0);
+    let mut model = plate(&fixture, "PLC-1.P-1");
+    type_keys(&mut model, "t");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("old AUTO  →  new MANUAL"), "{shown}");
+    assert!(shown.contains("PLC-1.MAN.P-1 has no effect now"), "{shown}");
+    assert!(shown.contains("The commands by hand take over; no output changes."), "{shown}");
+    let order = Command::Write { tag: fixture.tag("PLC-1.AUTO"), value: 0.0 };
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
+    assert!(matches!(model.modal, Some(Modal::Faceplate(_))), "back where it was asked from");
+    assert_eq!(order_of(&type_keys(&mut model, "⏎⏎")), None, "further Enters send nothing that was not asked");
+    // In MANUAL the same key asks for the command itself, and only the Enter after it sends it.
+    fixture.set("PLC-1.AUTO", 0.0);
+    let mut model = plate(&fixture, "PLC-1.P-1");
+    assert_eq!(order_of(&type_keys(&mut model, "tt")), None, "a key pressed twice sends nothing");
+    let order = Command::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
+}
+
+#[test]
+fn a_mode_that_is_changed_under_the_question_is_told_in_it() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 0.0);
+    let mut model = plate(&fixture, "PLC-1.P-1");
+    type_keys(&mut model, "t");
+    assert!(!screen(&mut model, 80, 24).contains("acts in MANUAL only"));
+    fixture.set("PLC-1.AUTO", 1.0);
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    assert!(screen(&mut model, 80, 24).contains("! acts in MANUAL only, and PLC-1.AUTO is AUTO"));
+}
+
+#[test]
+fn a_line_that_goes_down_under_the_question_is_told_in_it() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 0.0);
+    let mut model = plate(&fixture, "PLC-1.P-1");
+    type_keys(&mut model, "t");
+    update(&mut model, Msg::Snapshot(Fixture::line_down().snapshot()));
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("! Nothing can be written now. Line L1 is not connected"), "{shown}");
+    // Asked while it is down, there is nothing to confirm.
+    let mut model = plate(&Fixture::line_down(), "PLC-1.P-1");
+    type_keys(&mut model, "t");
+    assert!(matches!(model.modal, Some(Modal::Notice(_))));
+    assert_eq!(order_of(&type_keys(&mut model, "⏎⏎t⏎")), None);
+}
+
+#[test]
+fn all_actuators_are_in_one_window() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    type_keys(&mut model, "C");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("─ commands ─") && shown.contains("command  PLC-1.MAN.P-1 OFF"), "{shown}");
+}
+
+#[test]
+fn what_an_interlock_blocks_is_told_and_not_sent() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 0.0);
+    fixture.set("PLC-1.TK-2", 19.5);
+    let mut model = plate(&fixture, "PLC-1.P-1");
+    let reason = "⊘ no pumping into a full tank: PLC-1.TK-2 is 19.5 l";
+    assert!(screen(&mut model, 80, 24).contains(reason));
+    type_keys(&mut model, "t");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains(reason) && shown.contains("This is not sent"), "{shown}");
+    assert_eq!(order_of(&type_keys(&mut model, "⏎y")), None);
+    // The tank is emptied while the question stands: then it may be sent.
+    fixture.set("PLC-1.TK-2", 12.0);
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    assert!(order_of(&type_keys(&mut model, "⏎")).is_some());
+    // What nobody can tell is told, and left to the PLC.
+    let level = fixture.tag("PLC-1.TK-2");
+    fixture.samples[level.index()] = Sample::bad(Cause::Timeout, fixture::now());
+    let mut model = plate(&fixture, "PLC-1.P-1");
+    type_keys(&mut model, "t");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("? cannot be told: PLC-1.TK-2 is not good"), "{shown}");
+    assert!(order_of(&type_keys(&mut model, "⏎")).is_some());
+}
+
+#[test]
+fn a_stop_takes_two_keys_and_says_what_it_switches_off() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.P-1", 1.0);
+    let stop = Command::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 };
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "r");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("The sequence stops in HEAT.") && shown.contains("Off go: P-1 RUN."), "{shown}");
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&stop));
+    // Also while nobody knows whether it runs.
+    let run = fixture.tag("PLC-1.RUN");
+    fixture.samples[run.index()] = Sample::bad(Cause::NotRead, fixture::now());
+    let mut model = self::model(&fixture, Theme::FULL);
+    assert_eq!(order_of(&type_keys(&mut model, "r⏎")), Some(&stop));
+}
+
+#[test]
+fn a_stop_need_not_wait_for_a_window_to_close() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 0.0);
+    let stop = Command::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 };
+    for before in ["", "t"] {
+        let mut model = plate(&fixture, "PLC-1.P-1");
+        type_keys(&mut model, before);
+        assert_eq!(order_of(&type_keys(&mut model, "r")), None, "it asks all the same");
+        assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&stop));
+    }
+}
+
+#[test]
+fn the_sequence_says_where_it_goes_on() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 0.0);
+    for (run, words) in [(1.0, "goes on with HEAT"), (0.0, "once it is started")] {
+        fixture.set("PLC-1.RUN", run);
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, "m");
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains("MANUAL  →  new AUTO") && shown.contains(words), "{shown}");
+    }
+}
+
+#[test]
+fn a_start_says_what_it_begins_with() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.RUN", 0.0);
+    for (auto, words) in [(1.0, "The sequence starts with FILL."), (0.0, "In manual no step starts")] {
+        fixture.set("PLC-1.AUTO", auto);
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, "r");
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains(words), "{shown}");
+    }
+}
+
+#[test]
+fn the_picture_tells_how_a_command_went() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 0.0);
+    let tag = fixture.tag("PLC-1.MAN.P-1");
+    let id = OrderId { terminal: 9, number: 1 };
+    let check = |fixture: &Fixture, outcome: Option<Outcome>, disobeys: bool, expect: &str| {
+        let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
+        let command = Command::Write { tag, value: 1.0 };
+        let at = snapshot.at;
+        let status = |outcome| OrderStatus { id, by: Arc::from("b"), command, at, old: Some(0.0), outcome };
+        snapshot.orders = outcome.map(status).into_iter().collect();
+        if disobeys {
+            let samples = snapshot.samples.clone();
+            let since = at - SignedDuration::from_secs(8);
+            snapshot.watch.look(&snapshot.def.guards, |tag| samples[tag.index()], since);
+        }
+        let mut model = model(fixture, Theme::FULL);
+        update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains(expect), "{expect}:\n{shown}");
+    };
+    check(&fixture, Some(Outcome::Pending), false, "… sent");
+    check(&fixture, Some(Outcome::Failed(Fault::Timeout)), false, "✗ failed");
+    check(&fixture, Some(Outcome::Refused(Refusal::ReadOnly)), false, "✗ refused");
+    check(&fixture, Some(Outcome::Verified), false, "✓ done");
+    fixture.set("PLC-1.MAN.P-1", 1.0);
+    check(&fixture, None, true, "≠ not ON");
+    fixture.set("PLC-1.MAN.P-1", 0.0);
+    fixture.set("PLC-1.TK-2", 19.5);
+    check(&fixture, None, false, "⊘ blocked");
 }
 
 #[test]
@@ -161,10 +339,10 @@ fn a_toggle_is_asked_and_does_what_it_said() {
 #[test]
 fn a_toggle_of_the_unknown_becomes_a_choice() {
     let mut fixture = Fixture::normal();
-    let run = fixture.tag("PLC-1.RUN");
-    fixture.samples[run.index()] = Sample::bad(Cause::NotRead, fixture::now());
+    let auto = fixture.tag("PLC-1.AUTO");
+    fixture.samples[auto.index()] = Sample::bad(Cause::NotRead, fixture::now());
     let mut model = model(&fixture, Theme::FULL);
-    type_keys(&mut model, "r");
+    type_keys(&mut model, "m");
     assert!(matches!(model.modal, Some(Modal::Choice(_))));
 }
 

@@ -2,6 +2,7 @@
 
 use std::{collections::HashSet, sync::Arc, time::Duration};
 
+use jiff::SignedDuration;
 use ratatui::buffer::Buffer;
 
 use super::{draw, model, screen, text, type_keys};
@@ -10,8 +11,10 @@ use crate::{
         alarm::AlarmState,
         def::Priority,
         event::LineState,
+        guard::ActuatorDef,
         ne107::Reason,
         sample::{Cause, Quality, Sample},
+        snapshot::Snapshot,
     },
     ui::{
         Model, Msg, edge,
@@ -56,6 +59,43 @@ fn windows_on_top() {
         type_keys(&mut model, keys);
         insta::assert_snapshot!(format!("window_{name}"), screen(&mut model, 80, 24));
     }
+}
+
+/// In MANUAL, with TK-2 full, one actuator more than the fixture has, and an order that failed.
+fn commanded() -> Snapshot {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 0.0);
+    fixture.set("PLC-1.TK-2", 19.5);
+    fixture.set("PLC-1.SV-2", 1.0);
+    let pump = fixture.def.guards.actuators[0].clone();
+    // The fixture has no commands for the valves: the pump's stands in, which is OFF.
+    for output in ["PLC-1.SV-2", "PLC-1.SV-1"] {
+        fixture.def.guards.actuators.push(ActuatorDef { output: fixture.tag(output), ..pump.clone() });
+    }
+    let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
+    let samples = snapshot.samples.clone();
+    let since = snapshot.at - SignedDuration::from_secs(8);
+    snapshot.watch.look(&snapshot.def.guards, |tag| samples[tag.index()], since);
+    snapshot
+}
+
+#[test]
+fn the_picture_with_commands() {
+    for (name, theme, width, height) in
+        [("80x24", Theme::FULL, 80, 24), ("120x40", Theme::FULL, 120, 40), ("ascii", Theme::PLAIN, 80, 24)]
+    {
+        let mut model = model(&Fixture::normal(), theme);
+        update(&mut model, Msg::Snapshot(Arc::new(commanded())));
+        let shown = screen(&mut model, width, height);
+        assert!(theme != Theme::PLAIN || shown.is_ascii());
+        insta::assert_snapshot!(format!("mimic_commands_{name}"), shown);
+        type_keys(&mut model, "C↓");
+        insta::assert_snapshot!(format!("window_commands_{name}"), screen(&mut model, width, height));
+    }
+    let console = Theme { colours: Colours::Sixteen, glyphs: Glyphs::Block, motion: true };
+    let mut model = model(&Fixture::normal(), console);
+    update(&mut model, Msg::Snapshot(Arc::new(commanded())));
+    assert!(screen(&mut model, 80, 24).contains("! not OFF"));
 }
 
 #[test]

@@ -113,16 +113,23 @@ impl Registers {
         let wanted = self.count.saturating_add(pair + 4);
         let mut canvas = window(cx, screen, body, &title, (74.min(body.width), wanted));
         let (width, height) = (canvas.width(), canvas.height());
+        // On a small screen the registers themselves come first: without their bits, and without the pairs.
+        let bits = BITS_WIDTH <= width;
+        let (pair, too_low) = if height < pair + 3 + ROWS_MIN { (0, 0 < pair) } else { (pair, false) };
         let (state, ill) = self.problem.clone().map_or((state, ill), |why| (why, true));
         canvas.text(0, 0, &fit_words(&state, width), if ill { theme.trouble() } else { theme.normal() });
-        let heading = if self.table.is_bits() { "bit" } else { "hex       unsigned   signed  bits" };
+        let heading = match (self.table.is_bits(), bits) {
+            (true, _) => "bit",
+            (false, true) => "hex       unsigned   signed  bits",
+            (false, false) => "hex       unsigned   signed",
+        };
         canvas.text(0, 1, &format!("  {:18} {heading}", "register / wire"), theme.dim());
         let room = usize::from(height.saturating_sub(pair + 3)).max(1);
         let first = first_for(usize::from(self.selected), usize::from(self.count), room);
         for (y, n) in (first..usize::from(self.count)).take(room).enumerate() {
             let address = self.address.wrapping_add(n as u16);
             let style = if n == usize::from(self.selected) { theme.focus() } else { theme.normal() };
-            canvas.text(0, y as u16 + 2, &self.row(address, words.get(&address)), style);
+            canvas.text(0, y as u16 + 2, &self.row(address, words.get(&address), bits), style);
         }
         let below = usize::from(self.count).saturating_sub(first + room);
         if 0 < below {
@@ -132,18 +139,31 @@ impl Registers {
             let y = (2 + room.min(usize::from(self.count)) as u16).min(height.saturating_sub(pair + 1));
             self.pair(cx, &words, &mut canvas.part(0, y, width, pair));
         }
-        canvas.text(0, height.saturating_sub(1), "↑↓ move   r read again   Esc close", theme.strong());
+        let keys = "↑↓ move   r read again   Esc close";
+        let x = canvas.text(0, height.saturating_sub(1), keys, theme.strong());
+        if too_low {
+            canvas.text(
+                x + 2,
+                height.saturating_sub(1),
+                &fit_words("enlarge for more", width.saturating_sub(x + 2)),
+                theme.dim(),
+            );
+        }
     }
 
     /// `41003 / 0x03EA     02BC         700      700  0000 0010 1011 1100`.
-    fn row(&self, address: u16, word: Option<&u16>) -> String {
+    fn row(&self, address: u16, word: Option<&u16>, bits: bool) -> String {
         let place = format!("{} / 0x{address:04X}", self.table.modicon(address));
         let value = match word {
             None => "----".to_owned(),
             Some(bit) if self.table.is_bits() => bit.to_string(),
             Some(word) => {
+                let number = format!("{word:04X}  {word:>12} {:>8}", word.cast_signed());
+                if !bits {
+                    return format!("  {place:18} {number}");
+                }
                 let bits = [word >> 12, word >> 8 & 15, word >> 4 & 15, word & 15].map(|four| format!("{four:04b}"));
-                format!("{word:04X}  {word:>12} {:>8}  {}", word.cast_signed(), bits.join(" "))
+                format!("{number}  {}", bits.join(" "))
             }
         };
         format!("  {place:18} {value}")
@@ -165,6 +185,11 @@ impl Registers {
         }
     }
 }
+
+/// Columns of a row with its bits.
+const BITS_WIDTH: u16 = 69;
+/// Fewer registers than this at once are no list.
+const ROWS_MIN: u16 = 4;
 
 const ORDERS: [(&str, Order); 4] =
     [("ABCD", Order::Abcd), ("CDAB", Order::Cdab), ("BADC", Order::Badc), ("DCBA", Order::Dcba)];

@@ -263,8 +263,12 @@ impl Form {
         );
         let rows = self.fields.len() as u16;
         let mut canvas = window(cx, screen, body, self.title(), (room, rows + told.len() as u16 + 3));
-        for (n, field) in self.fields.iter().enumerate() {
-            let y = n as u16;
+        // On a small screen the chosen field is always seen, and what is told below is cut with a word.
+        let last = canvas.height().saturating_sub(1);
+        let shown = rows.min(last).max(1);
+        let first = (self.at + 1).saturating_sub(usize::from(shown));
+        for (n, field) in self.fields.iter().enumerate().skip(first).take(usize::from(shown)) {
+            let y = (n - first) as u16;
             let mark = if n == self.at { "▸ " } else { "  " };
             let x = canvas.text(0, y, mark, theme.strong());
             let x = canvas.text(x, y, &pad(field.label, 10), theme.dim());
@@ -281,10 +285,15 @@ impl Form {
                 }
             }
         }
-        for (n, (line, style)) in told.iter().enumerate() {
-            canvas.text(0, rows + 1 + n as u16, line, *style);
+        let room = usize::from(last.saturating_sub(shown + 1));
+        let cut = room < told.len();
+        for (n, (line, style)) in told.iter().take(room).enumerate() {
+            canvas.text(0, shown + 1 + n as u16, line, *style);
         }
-        let last = canvas.height().saturating_sub(1);
+        if cut {
+            let more = format!(" {} more lines: enlarge the screen", told.len() - room);
+            canvas.text_right(canvas.width(), last.saturating_sub(1), &more, theme.strong());
+        }
         let keys = "↑↓ field   ←→ choose   ⏎ start   Esc close";
         canvas.text(0, last, &pad(keys, width(keys)), theme.strong());
     }

@@ -330,6 +330,14 @@ impl Send {
         };
         let problem = self.problem.clone().or_else(|| closed(&at));
         let room = height.saturating_sub(2 + u16::from(problem.is_some()));
+        if usize::from(room) < rows.len() {
+            canvas.text_right(
+                width,
+                0,
+                &format!(" {} more lines: enlarge", rows.len() - usize::from(room)),
+                theme.strong(),
+            );
+        }
         for (y, row) in rows.iter().take(usize::from(room)).enumerate() {
             let mut x = 0;
             for (text, style) in row {

@@ -391,6 +391,20 @@ fn no_size_breaks_a_page_or_a_window() {
 }
 
 #[test]
+fn on_the_smallest_screen_windows_show_what_matters_and_say_what_is_cut() {
+    let mut fixture = Fixture::traffic();
+    fixture.line.test = Some(read_of_three());
+    let clear = "\u{8}".repeat(6);
+    let registers = format!("Tb↓↓{clear}41003↓{clear}3⏎");
+    for (name, keys) in
+        [("registers", registers.as_str()), ("request", "Tf"), ("scan", "Ts"), ("send", "Tt01 03 03 EA 00 01")]
+    {
+        let mut model = bus(&fixture, Theme::FULL, keys);
+        insta::assert_snapshot!(format!("small_{name}"), screen(&mut model, 60, 16));
+    }
+}
+
+#[test]
 fn backspace_is_a_key_of_the_entries() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "Tt01 03x");
     update(&mut model, Msg::Key(KeyEvent::new(KeyCode::Backspace, KeyModifiers::NONE)));

@@ -4,7 +4,7 @@ use super::{Bounds, label_style, put_value};
 use crate::{
     plant::def::TagId,
     ui::{
-        Cx,
+        Cx, guard,
         widgets::{
             text::{Canvas, fit, width},
             value,
@@ -33,13 +33,15 @@ pub fn valve(
     let words = if on.is_some() { style } else { theme.quality(cx.snapshot.sample(tag).quality) };
     if vertical {
         canvas.text(x, y, shape, style);
-        let x = canvas.text(x + 3, y, label, label_style(cx, selected));
-        canvas.text(x + 1, y, &word, words);
+        let name = canvas.text(x + 3, y, label, label_style(cx, selected));
+        canvas.text(name + 1, y, &word, words);
+        mark(cx, canvas, (x + 3, y + 1), tag);
     } else {
         canvas.text(x, y, shape, style);
         let above = x.saturating_sub(width(label) / 2);
         let name = canvas.text(above, y.saturating_sub(1), label, label_style(cx, selected));
-        canvas.text(name + 1, y.saturating_sub(1), &word, words);
+        let end = canvas.text(name + 1, y.saturating_sub(1), &word, words);
+        mark(cx, canvas, (end + 1, y.saturating_sub(1)), tag);
     }
 }
 
@@ -63,6 +65,14 @@ pub fn pump(cx: &Cx, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagId, s
         canvas.text(x, y, close, style);
         canvas.text(at.x + width(open) + 2, y.saturating_sub(1), &word, style);
     }
+    mark(cx, canvas, (at.x, y + 1), tag);
+}
+
+/// What there is to say of an actuator beyond its state: blocked, sent, failed, not obeying.
+fn mark(cx: &Cx, canvas: &mut Canvas, (x, y): (u16, u16), tag: TagId) {
+    if let Some((words, style)) = guard::mark(cx, tag) {
+        canvas.text(x, y, &words, style);
+    }
 }
 
 /// A label and its value.
@@ -71,6 +81,14 @@ pub fn labelled(cx: &Cx, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagI
     let x = if label.is_empty() { at.x } else { canvas.text(at.x, at.y, &fit(label, at.width / 2), style) + 1 };
     let room = at.width.saturating_sub(x.saturating_sub(at.x));
     let end = put_value(cx, canvas, x, at.y, tag, room);
+    if let Some((words, style)) = guard::mark(cx, tag) {
+        let room = (at.x + at.width).saturating_sub(end + 1);
+        let shape = words.split(' ').next().unwrap_or_default().to_owned();
+        // The shape alone where there is no room for its word; the faceplate has the words.
+        if let Some(fits) = [&words, &shape].into_iter().find(|words| width(words) <= room) {
+            canvas.text(end + 1, at.y, fits, style);
+        }
+    }
     if label.is_empty() && selected {
         canvas.paint(at.x, at.y, end.saturating_sub(at.x), 1, cx.theme.focus());
     }

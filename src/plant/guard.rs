@@ -1,0 +1,255 @@
+//! What stands between a command and its effect: interlocks, the mode in which an actuator listens, and whether it obeys.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+
+use super::{
+    id::TagId,
+    sample::{Cause, Sample},
+};
+
+/// What the plant file says about commands.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Guards {
+    /// What keeps a command from acting.
+    pub interlocks: Vec<InterlockDef>,
+    /// What is commanded, and how it tells that it obeys.
+    pub actuators: Vec<ActuatorDef>,
+    /// Sequences that are started and stopped.
+    pub sequences: Vec<SequenceDef>,
+}
+
+/// A reason for which a command has no effect. The device is the guard; this tells the operator before it is tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InterlockDef {
+    /// The command.
+    pub tag: TagId,
+    /// The value of it that is blocked.
+    pub value: f64,
+    /// The tag that decides.
+    pub of: TagId,
+    /// When it blocks.
+    pub when: Blocking,
+    /// `no heating below 5 cm of water`.
+    pub text: String,
+    /// The station refuses the command while it is certainly blocked; else the operator is only told.
+    pub refuse: bool,
+}
+
+/// When an interlock blocks; limits are in the unit of the tag that decides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Blocking {
+    /// Below this.
+    Below(f64),
+    /// Above this.
+    Above(f64),
+    /// While it is this.
+    Is(f64),
+    /// While this bit of a status word is set.
+    Bit(u8),
+}
+
+/// How an interlock stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// It does not block.
+    Free,
+    /// It blocks.
+    Blocked,
+    /// Nobody can tell: the tag that decides is not good.
+    Unknown(Cause),
+}
+
+impl InterlockDef {
+    /// How it stands with this sample of the tag that decides.
+    pub fn standing(&self, sample: Sample) -> Standing {
+        let Some(value) = sample.trusted() else {
+            return Standing::Unknown(sample.quality.cause().unwrap_or(Cause::NotRead));
+        };
+        let blocked = match self.when {
+            Blocking::Below(limit) => value < limit,
+            Blocking::Above(limit) => limit < value,
+            Blocking::Is(state) => value == state,
+            Blocking::Bit(bit) => 0.0 <= value && (value as u64).checked_shr(u32::from(bit)).unwrap_or(0) & 1 == 1,
+        };
+        if blocked { Standing::Blocked } else { Standing::Free }
+    }
+}
+
+/// A valve, pump, agitator or heater: its command, and the output that tells what it does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActuatorDef {
+    /// What tells its state. Zero is off.
+    pub output: TagId,
+    /// What commands it by hand. Zero is off.
+    pub command: TagId,
+    /// States without which the command has no effect, the first to be changed first.
+    pub needs: Vec<(TagId, f64)>,
+    /// The output follows the command within this time; `None` if it need not (a heater that a controller cycles).
+    pub travel: Option<Duration>,
+}
+
+/// A sequence in a PLC.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SequenceDef {
+    /// Starts it, and stops it with zero.
+    pub run: TagId,
+    /// The tag and the state in which it works by itself.
+    pub auto: Option<(TagId, f64)>,
+    /// Its step.
+    pub step: TagId,
+    /// The step that it starts with.
+    pub first: f64,
+}
+
+impl Guards {
+    /// The interlocks of one value of a command.
+    pub fn interlocks_of(&self, tag: TagId, value: f64) -> impl Iterator<Item = &InterlockDef> {
+        self.interlocks.iter().filter(move |lock| lock.tag == tag && lock.value == value)
+    }
+
+    /// The interlock for which this command is certainly without effect and is not to be sent.
+    pub fn refusal(&self, tag: TagId, value: f64, sample: impl Fn(TagId) -> Sample) -> Option<&InterlockDef> {
+        let blocks = |lock: &&InterlockDef| lock.refuse && lock.standing(sample(lock.of)) == Standing::Blocked;
+        self.interlocks_of(tag, value).find(blocks)
+    }
+
+    /// The actuator that a tag is the output or the command of.
+    pub fn actuator(&self, tag: TagId) -> Option<(usize, &ActuatorDef)> {
+        self.actuators.iter().enumerate().find(|(_, actuator)| actuator.output == tag || actuator.command == tag)
+    }
+
+    /// Is the actuator in this place certainly not doing what it is certainly told to do?
+    fn differs(&self, actuator: &ActuatorDef, sample: &impl Fn(TagId) -> Sample) -> bool {
+        let (Some(command), Some(output)) = (sample(actuator.command).trusted(), sample(actuator.output).trusted())
+        else {
+            return false;
+        };
+        let listens = actuator.needs.iter().all(|(tag, state)| sample(*tag).trusted() == Some(*state));
+        let mut locks = self.interlocks_of(actuator.command, command);
+        let blocked = locks.any(|lock| lock.standing(sample(lock.of)) == Standing::Blocked);
+        actuator.travel.is_some() && listens && !blocked && (command != 0.0) != (output != 0.0)
+    }
+}
+
+/// Since when each actuator has not obeyed, by its place in [`Guards::actuators`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Watch {
+    since: Vec<Option<Timestamp>>,
+}
+
+impl Watch {
+    /// Looks again at `at`.
+    pub fn look(&mut self, guards: &Guards, sample: impl Fn(TagId) -> Sample, at: Timestamp) {
+        self.since.resize(guards.actuators.len(), None);
+        for (actuator, since) in guards.actuators.iter().zip(&mut self.since) {
+            *since = guards.differs(actuator, &sample).then(|| since.unwrap_or(at));
+        }
+    }
+
+    /// How long the actuator in this place has not obeyed, once that is longer than its travel takes.
+    pub fn disobeys(&self, guards: &Guards, place: usize, at: Timestamp) -> Option<Duration> {
+        let since = (*self.since.get(place)?)?;
+        let travel = guards.actuators.get(place)?.travel?;
+        let lasts = Duration::try_from(at.duration_since(since)).unwrap_or_default();
+        (travel <= lasts).then_some(lasts)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AUTO: TagId = TagId(0);
+    const COMMAND: TagId = TagId(1);
+    const OUTPUT: TagId = TagId(2);
+    const LEVEL: TagId = TagId(3);
+
+    fn at(second: i64) -> Timestamp {
+        Timestamp::from_second(second).expect("a small number")
+    }
+
+    fn good(value: f64) -> Sample {
+        Sample::good(value, at(0))
+    }
+
+    fn bad() -> Sample {
+        Sample::bad(Cause::Timeout, at(0))
+    }
+
+    fn guards(refuse: bool) -> Guards {
+        let text = "no heating below 5 cm".to_owned();
+        let lock = InterlockDef { tag: COMMAND, value: 1.0, of: LEVEL, when: Blocking::Below(5.0), text, refuse };
+        let travel = Some(Duration::from_secs(5));
+        let actuator = ActuatorDef { output: OUTPUT, command: COMMAND, needs: vec![(AUTO, 0.0)], travel };
+        Guards { interlocks: vec![lock], actuators: vec![actuator], sequences: Vec::new() }
+    }
+
+    #[test]
+    fn an_interlock_blocks_what_it_says_and_nothing_else() {
+        use Standing::{Blocked, Free, Unknown};
+        for (when, sample, expect) in [
+            (Blocking::Below(5.0), good(4.9), Blocked),
+            (Blocking::Below(5.0), good(5.0), Free),
+            (Blocking::Above(20.0), good(20.1), Blocked),
+            (Blocking::Above(20.0), good(20.0), Free),
+            (Blocking::Is(1.0), good(1.0), Blocked),
+            (Blocking::Is(1.0), good(0.0), Free),
+            (Blocking::Bit(2), good(4.0), Blocked),
+            (Blocking::Bit(2), good(3.0), Free),
+            (Blocking::Bit(0), good(-1.0), Free),
+            (Blocking::Bit(200), good(4.0), Free),
+            (Blocking::Below(5.0), bad(), Unknown(Cause::Timeout)),
+            (Blocking::Below(5.0), good(1.0).doubted(Cause::Stale), Unknown(Cause::Stale)),
+        ] {
+            let lock = InterlockDef { when, ..guards(true).interlocks[0].clone() };
+            assert_eq!(lock.standing(sample), expect, "{when:?} {sample:?}");
+        }
+    }
+
+    #[test]
+    fn only_what_is_certainly_blocked_is_refused() {
+        let check = |refuse, value, level: Sample, refused: bool| {
+            let guards = guards(refuse);
+            assert_eq!(guards.refusal(COMMAND, value, |_| level).is_some(), refused, "{value} at {level:?}");
+        };
+        check(true, 1.0, good(4.0), true);
+        check(true, 1.0, good(6.0), false);
+        check(true, 0.0, good(4.0), false);
+        check(true, 1.0, bad(), false);
+        check(false, 1.0, good(4.0), false);
+    }
+
+    #[test]
+    fn an_actuator_that_does_not_obey_is_told_after_its_travel() {
+        let check = |auto: Sample, command: Sample, output: Sample, level: Sample, expect: Option<u64>| {
+            let (guards, mut watch) = (guards(true), Watch::default());
+            let sample = |tag: TagId| [auto, command, output, level][tag.index()];
+            watch.look(&guards, sample, at(10));
+            assert_eq!(watch.disobeys(&guards, 0, at(14)), None, "it may still travel");
+            watch.look(&guards, sample, at(15));
+            assert_eq!(watch.disobeys(&guards, 0, at(15)).map(|span| span.as_secs()), expect);
+        };
+        let (on, off, high) = (good(1.0), good(0.0), good(9.0));
+        check(off, on, off, high, Some(5));
+        check(off, off, on, high, Some(5));
+        check(off, on, on, high, None);
+        check(on, on, off, high, None);
+        check(bad(), on, off, high, None);
+        check(off, bad(), off, high, None);
+        check(off, on, bad(), high, None);
+        check(off, on, off, good(1.0), None);
+        check(off, on, off, bad(), Some(5));
+    }
+
+    #[test]
+    fn an_actuator_that_obeys_again_starts_anew() {
+        let (guards, mut watch) = (guards(true), Watch::default());
+        for (second, output, expect) in [(0, 0.0, None), (5, 0.0, Some(5)), (6, 1.0, None), (7, 0.0, None)] {
+            let sample = |tag: TagId| [good(0.0), good(1.0), good(output), good(9.0)][tag.index()];
+            watch.look(&guards, sample, at(second));
+            assert_eq!(watch.disobeys(&guards, 0, at(second)).map(|span| span.as_secs()), expect, "at {second} s");
+        }
+    }
+}

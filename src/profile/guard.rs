@@ -1,0 +1,98 @@
+//! Interlocks, actuators and sequences: what the plant file says about commands.
+
+use super::{
+    diagnostic::Problems,
+    names::{Defs, Unique, number_of},
+    reader::{At, text},
+    schema::{ActuatorTable, InterlockTable, NeedTable, PlantFile, SequenceTable},
+};
+use crate::plant::{
+    guard::{ActuatorDef, Blocking, Guards, InterlockDef, SequenceDef},
+    tag::{Access, TagDef},
+};
+
+/// All that the plant file says about commands.
+pub(super) fn guards(file: &PlantFile, defs: &Defs, problems: &mut Problems) -> Guards {
+    let interlocks = file.interlocks.iter().filter_map(|table| interlock(&table.value, defs, problems)).collect();
+    let mut seen = Unique::default();
+    let actuators = file.actuators.iter().filter_map(|table| actuator(&table.value, &mut seen, defs, problems));
+    let actuators = actuators.collect();
+    let sequences = file.sequences.iter().filter_map(|table| sequence(&table.value, defs, problems)).collect();
+    Guards { interlocks, actuators, sequences }
+}
+
+fn interlock(table: &InterlockTable, defs: &Defs, problems: &mut Problems) -> Option<InterlockDef> {
+    let tag = commanded(table.tag.as_ref()?, defs, problems)?;
+    let of = defs.tag(table.of.as_ref()?, problems)?;
+    let value = number_of(table.value.as_ref()?, tag, problems)?;
+    let when = blocking(table, of, problems)?;
+    let off = value == 0.0;
+    if let Some(refuse) = table.refuse.filter(|refuse| refuse.value && off) {
+        let problem = problems.add(refuse.at, "switching off is never refused");
+        problem
+            .label("expected refuse = false")
+            .help("a stop must always be possible; the operator is told all the same");
+    }
+    let refuse = table.refuse.map_or(!off, |refuse| refuse.value);
+    Some(InterlockDef { tag: tag.id, value, of: of.id, when, text: text(&table.text), refuse })
+}
+
+/// Exactly one of the four conditions.
+fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Option<Blocking> {
+    let mut found = Vec::new();
+    found.extend(table.below.map(|limit| (limit.at, Some(Blocking::Below(limit.value)))));
+    found.extend(table.above.map(|limit| (limit.at, Some(Blocking::Above(limit.value)))));
+    found.extend(table.is.as_ref().map(|is| (is.at, number_of(is, of, problems).map(Blocking::Is))));
+    found.extend(table.bit.map(|bit| (bit.at, Some(Blocking::Bit(bit.value)))));
+    if let Some(bit) = table.bit {
+        let bits = of.point.len() * 16;
+        if u16::from(bit.value) >= bits || of.scale != 1.0 || of.offset != 0.0 || of.point.table.is_bits() {
+            let problem = problems.add(bit.at, format!("{} has no bit {}", of.name, bit.value));
+            problem.label(format!("expected 0 to {} of a whole number that is not scaled", bits - 1));
+        }
+    }
+    match found.as_slice() {
+        [(_, one)] => *one,
+        [] => {
+            problems.add(table.at, "an interlock needs a condition").label("expected `below`, `above`, `is` or `bit`");
+            None
+        }
+        [_, (second, _), ..] => {
+            problems.add(*second, "an interlock has one condition").label("expected an [[interlock]] of its own");
+            None
+        }
+    }
+}
+
+fn actuator(table: &ActuatorTable, seen: &mut Unique, defs: &Defs, problems: &mut Problems) -> Option<ActuatorDef> {
+    let (output, command) = (table.output.as_ref()?, table.command.as_ref()?);
+    for name in [output, command] {
+        let twice = format!("{} belongs to another actuator", name.value);
+        seen.insert(&name.value, name.at, twice, problems);
+    }
+    let (output, command) = (defs.tag(output, problems)?, commanded(command, defs, problems)?);
+    let needs = table.needs.iter().filter_map(|need| state(&need.value, defs, problems)).collect();
+    Some(ActuatorDef { output: output.id, command: command.id, needs, travel: table.travel.map(|travel| travel.value) })
+}
+
+fn sequence(table: &SequenceTable, defs: &Defs, problems: &mut Problems) -> Option<SequenceDef> {
+    let run = commanded(table.run.as_ref()?, defs, problems)?;
+    let step = defs.tag(table.step.as_ref()?, problems)?;
+    let first = number_of(table.first.as_ref()?, step, problems)?;
+    let auto = table.auto.as_ref().and_then(|auto| state(&auto.value, defs, problems));
+    Some(SequenceDef { run: run.id, auto, step: step.id, first })
+}
+
+fn state(need: &NeedTable, defs: &Defs, problems: &mut Problems) -> Option<(crate::plant::def::TagId, f64)> {
+    let tag = defs.tag(need.tag.as_ref()?, problems)?;
+    Some((tag.id, number_of(need.is.as_ref()?, tag, problems)?))
+}
+
+/// A tag that is written and read back: what is commanded must be known too.
+fn commanded<'a>(name: &At<String>, defs: &'a Defs, problems: &mut Problems) -> Option<&'a TagDef> {
+    let tag = defs.tag(name, problems)?;
+    if tag.access != Access::ReadWrite {
+        problems.add(name.at, format!("{} cannot be commanded", tag.name)).label("expected a tag with access = \"rw\"");
+    }
+    Some(tag)
+}

@@ -1,0 +1,269 @@
+//! What an operator is told before and after a command: what blocks it, when it acts, what it will change, how it went.
+
+use std::time::Duration;
+
+use ratatui::style::Style;
+
+use super::{
+    Cx,
+    modal::Notice,
+    widgets::{text::age, value},
+};
+use crate::plant::{
+    command::{OrderStatus, Outcome},
+    def::TagId,
+    guard::{ActuatorDef, Blocking, InterlockDef, Standing},
+    orders::outcome_words,
+    tag::{Kind, TagDef},
+};
+
+/// How long the end of a command is marked in the picture, in seconds of the operator.
+const DONE_S: f64 = 5.0;
+/// The same for one that did not end well.
+const FAILED_S: f64 = 60.0;
+
+/// The other of two states, if the tag has two and is in one of them for certain.
+pub fn other_state(cx: &Cx, tag: TagId) -> Option<f64> {
+    let (one, other) = two_states(cx.def().tag(tag))?;
+    match cx.snapshot.sample(tag).trusted()? {
+        now if now == one => Some(other),
+        now if now == other => Some(one),
+        _ => None,
+    }
+}
+
+fn two_states(def: &TagDef) -> Option<(f64, f64)> {
+    match (def.labels.as_slice(), def.point.kind) {
+        ([one, other], _) => Some((one.0 as f64, other.0 as f64)),
+        ([], Kind::Bool) => Some((0.0, 1.0)),
+        _ => None,
+    }
+}
+
+/// Is this value of a tag certainly without effect, so that it is not to be sent?
+pub fn is_refused(cx: &Cx, tag: TagId, value: f64) -> bool {
+    cx.def().guards.refusal(tag, value, |tag| cx.snapshot.sample(tag)).is_some()
+}
+
+/// All there is to say before a value is written, with its look.
+pub fn before_write(cx: &Cx, tag: TagId, value: f64) -> Vec<(String, Style)> {
+    let gone = Notice::why_unreachable(cx, cx.def().tag(tag).device);
+    let gone = gone.map(|why| (format!("! Nothing can be written now. {why}"), cx.theme.trouble()));
+    let locks = cx.def().guards.interlocks_of(tag, value).filter_map(|lock| interlock_words(cx, lock));
+    let mut rows: Vec<(String, Style)> = gone.into_iter().chain(locks).collect();
+    if is_refused(cx, tag, value) {
+        rows.push(("This is not sent: it would have no effect.".to_owned(), cx.theme.strong()));
+    }
+    if let Some(words) = unmet_words(cx, tag) {
+        rows.push((format!("! {words}"), cx.theme.strong()));
+    }
+    rows.extend(sequence_words(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
+    rows.extend(taken_over(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
+    rows
+}
+
+/// `⊘ no heating below 5 cm of water: PLC-1.LT-1 is 3.2 cm`; `None` while it does not block.
+pub fn interlock_words(cx: &Cx, lock: &InterlockDef) -> Option<(String, Style)> {
+    let mark = cx.theme.pick("⊘", "(/)");
+    let name = &cx.def().tag(lock.of).name;
+    match (lock.standing(cx.snapshot.sample(lock.of)), lock.when) {
+        (Standing::Free, _) => None,
+        (Standing::Blocked, Blocking::Bit(_)) => {
+            Some((format!("{mark} {}: {name} says so", lock.text), cx.theme.strong()))
+        }
+        (Standing::Blocked, Blocking::Below(_) | Blocking::Above(_) | Blocking::Is(_)) => {
+            let now = value::show(cx, lock.of).with_unit();
+            Some((format!("{mark} {}: {name} is {now}", lock.text), cx.theme.strong()))
+        }
+        (Standing::Unknown(cause), _) => {
+            let words = format!("? cannot be told: {name} is not good ({}): {}", cause.words(), lock.text);
+            Some((words, cx.theme.trouble()))
+        }
+    }
+}
+
+/// The first state that a command needs and that is not there: the tag, and the state.
+pub fn unmet(cx: &Cx, actuator: &ActuatorDef) -> Option<(TagId, f64)> {
+    actuator.needs.iter().find(|(tag, state)| cx.snapshot.sample(*tag).trusted() != Some(*state)).copied()
+}
+
+/// `acts in MANUAL only, and PLC-1.AUTO is AUTO`, for the command of an actuator.
+pub fn unmet_words(cx: &Cx, tag: TagId) -> Option<String> {
+    let actuator = &cx.def().guards.actuators.iter().find(|actuator| actuator.command == tag)?;
+    let (need, state) = unmet(cx, actuator)?;
+    let now = match cx.snapshot.sample(need).trusted() {
+        Some(now) => format!("is {}", cx.snapshot.format(need, now)),
+        None => "is not known".to_owned(),
+    };
+    Some(format!("acts in {} only, and {} {now}", cx.snapshot.format(need, state), cx.def().tag(need).name))
+}
+
+/// What starting or stopping a sequence does.
+fn sequence_words(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
+    let sequences = &cx.def().guards.sequences;
+    if let Some(sequence) = sequences.iter().find(|sequence| sequence.auto == Some((tag, value))) {
+        return vec![match (value::is_on(cx, sequence.run), cx.snapshot.text(sequence.step)) {
+            (Some(true), Some(step)) => format!("The sequence goes on with {step} and works the outputs."),
+            (Some(false), _) => "The sequence works the outputs once it is started.".to_owned(),
+            (Some(true) | None, _) => "The sequence works the outputs; where it is, is not known.".to_owned(),
+        }];
+    }
+    let Some(sequence) = sequences.iter().find(|sequence| sequence.run == tag) else { return Vec::new() };
+    let step = |number: f64| cx.snapshot.format(sequence.step, number);
+    if value == 0.0 {
+        let now = cx.snapshot.sample(sequence.step).trusted();
+        let at =
+            now.map_or_else(|| "The sequence stops.".to_owned(), |now| format!("The sequence stops in {}.", step(now)));
+        return vec![at, switched_off(cx)];
+    }
+    let by_itself = sequence.auto.map(|(auto, state)| (cx.snapshot.sample(auto).trusted(), state, auto));
+    match by_itself {
+        Some((Some(now), state, _)) if now != state => {
+            vec!["In manual no step starts: the commands by hand act from now on.".to_owned()]
+        }
+        Some((None, _, auto)) => {
+            vec![format!("Whether steps start is not known: {} is not known.", cx.def().tag(auto).name)]
+        }
+        Some(_) | None => vec![format!("The sequence starts with {}.", step(sequence.first))],
+    }
+}
+
+/// `Off go: pump RUN, fill valve OPEN.`
+fn switched_off(cx: &Cx) -> String {
+    let outputs = cx.def().guards.actuators.iter().map(|actuator| actuator.output);
+    let (mut on, mut unknown) = (Vec::new(), Vec::new());
+    for output in outputs {
+        let def = cx.def().tag(output);
+        match value::is_on(cx, output) {
+            Some(true) => on.push(format!("{} {}", def.short, value::show(cx, output).with_unit())),
+            Some(false) => {}
+            None => unknown.push(def.short.clone()),
+        }
+    }
+    let mut words = if on.is_empty() { "No output is on.".to_owned() } else { format!("Off go: {}.", on.join(", ")) };
+    if !unknown.is_empty() {
+        words = format!(
+            "{} Not known: {}.",
+            words.replace("No output is on.", "No output is known to be on."),
+            unknown.join(", ")
+        );
+    }
+    words
+}
+
+/// What the commands by hand will change at once when this value lets them act.
+fn taken_over(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
+    let sample = |tag: TagId| cx.snapshot.sample(tag).trusted();
+    let acts = |actuator: &&ActuatorDef| {
+        let needs =
+            |(need, state): &(TagId, f64)| if *need == tag { value == *state } else { sample(*need) == Some(*state) };
+        actuator.needs.iter().any(|(need, _)| *need == tag) && actuator.needs.iter().all(needs)
+    };
+    let acting: Vec<&ActuatorDef> = cx.def().guards.actuators.iter().filter(acts).collect();
+    if acting.is_empty() {
+        return Vec::new();
+    }
+    let mut changes = Vec::new();
+    for actuator in acting {
+        let name = &cx.def().tag(actuator.output).short;
+        match (sample(actuator.command), sample(actuator.output)) {
+            (Some(command), Some(output)) if (command != 0.0) != (output != 0.0) => {
+                let arrow = cx.theme.pick("→", "->");
+                let new = cx.snapshot.format(actuator.command, command);
+                changes.push(format!("{name} {} {arrow} {new}", value::show(cx, actuator.output).with_unit()));
+            }
+            (Some(_), Some(_)) => {}
+            (None, _) | (_, None) => changes.push(format!("{name} ?")),
+        }
+    }
+    vec![if changes.is_empty() {
+        "The commands by hand take over; no output changes.".to_owned()
+    } else {
+        format!("The commands by hand take over: {}.", changes.join(", "))
+    }]
+}
+
+/// The latest order for a command.
+fn last_order<'a>(cx: &Cx<'a>, command: TagId) -> Option<&'a OrderStatus> {
+    let of_command = |status: &&OrderStatus| status.command.written().is_some_and(|(tag, _)| tag == command);
+    cx.snapshot.orders.iter().find(of_command)
+}
+
+/// How the latest order for a command ended, while that is news: words, and whether it went well.
+fn news(cx: &Cx, command: TagId) -> Option<(String, Option<bool>)> {
+    let status = last_order(cx, command)?;
+    let real = Duration::try_from(cx.now.duration_since(status.at)).unwrap_or_default().as_secs_f64();
+    let passed = real / cx.snapshot.speed.clamp(0.01, 1e6);
+    let (well, lasts) = match status.outcome {
+        Outcome::Pending => (None, f64::MAX),
+        Outcome::Verified | Outcome::Unchanged => (Some(true), DONE_S),
+        Outcome::Refused(_) | Outcome::NotConfirmed(_) | Outcome::Failed(_) => (Some(false), FAILED_S),
+    };
+    (passed <= lasts).then(|| (outcome_words(&status.outcome), well))
+}
+
+/// The mark of an actuator in the picture, by its output: what does not obey, how the last command went, what is blocked.
+pub fn mark(cx: &Cx, output: TagId) -> Option<(String, Style)> {
+    let theme = cx.theme;
+    let guards = &cx.def().guards;
+    let (place, actuator) = guards.actuator(output).filter(|(_, actuator)| actuator.output == output)?;
+    if cx.snapshot.watch.disobeys(guards, place, cx.snapshot.at).is_some() {
+        let commanded = cx.snapshot.text(actuator.command).unwrap_or_default();
+        return Some((format!("{} not {commanded}", theme.pick("≠", "!=")), theme.trouble()));
+    }
+    match news(cx, actuator.command) {
+        Some((_, None)) => return Some((theme.pick("… sent", ".. sent").to_owned(), theme.strong())),
+        Some((words, Some(false))) => {
+            let word = words.split(':').next().unwrap_or_default();
+            return Some((format!("{} {word}", theme.pick("✗", "x")), theme.trouble()));
+        }
+        // Only while the output is as commanded: another mode may have taken over since.
+        Some((_, Some(true))) if obeys(cx, actuator) => {
+            return Some((theme.pick("✓ done", "ok done").to_owned(), theme.normal()));
+        }
+        Some((_, Some(true))) | None => {}
+    }
+    let blocks = |lock: &&InterlockDef| lock.tag == actuator.command && lock.value != 0.0;
+    let mut standings = guards.interlocks.iter().filter(blocks).map(|lock| lock.standing(cx.snapshot.sample(lock.of)));
+    let blocked = standings.any(|standing| standing == Standing::Blocked);
+    blocked.then(|| (theme.pick("⊘ blocked", "(/) blocked").to_owned(), theme.dim()))
+}
+
+/// Is the output certainly as commanded? One that need not follow its command counts as such.
+fn obeys(cx: &Cx, actuator: &ActuatorDef) -> bool {
+    let on = |tag| value::is_on(cx, tag);
+    actuator.travel.is_none() || on(actuator.command).is_some_and(|command| on(actuator.output) == Some(command))
+}
+
+/// What a faceplate says of an actuator: (label, words, look).
+pub fn facts(cx: &Cx, tag: TagId) -> Vec<(&'static str, String, Style)> {
+    let theme = cx.theme;
+    let guards = &cx.def().guards;
+    let Some((place, actuator)) = guards.actuator(tag) else { return Vec::new() };
+    let command = cx.def().tag(actuator.command);
+    let told = value::show(cx, actuator.command);
+    let mut rows = vec![("command", format!("{} {}", command.name, told.whole()), told.style)];
+    let modes: Vec<String> = actuator.needs.iter().map(|(need, _)| value::show(cx, *need).whole()).collect();
+    let mode = modes.join(", ");
+    match unmet_words(cx, actuator.command) {
+        Some(words) => rows.push(("mode", format!("{mode}: {words}"), theme.strong())),
+        None if modes.is_empty() => {}
+        None => rows.push(("mode", format!("{mode}: the command acts"), theme.normal())),
+    }
+    let locks = guards.interlocks.iter().filter(|lock| lock.tag == actuator.command);
+    rows.extend(locks.filter_map(|lock| interlock_words(cx, lock)).map(|(words, style)| ("blocked", words, style)));
+    if let Some(lasts) = guards_disobeyed(cx, place) {
+        let (wanted, is) = (told.text, value::show(cx, actuator.output).with_unit());
+        let words = format!("{} commanded {wanted}, still {is} after {}", theme.pick("≠", "!="), age(lasts));
+        rows.push(("differs", words, theme.trouble()));
+    }
+    if let Some((words, well)) = news(cx, actuator.command) {
+        let style = if well == Some(false) { theme.trouble() } else { theme.strong() };
+        rows.push(("last", words, style));
+    }
+    rows
+}
+
+fn guards_disobeyed(cx: &Cx, place: usize) -> Option<Duration> {
+    cx.snapshot.watch.disobeys(&cx.def().guards, place, cx.snapshot.at)
+}
