@@ -14,6 +14,8 @@ pub mod slave;
 pub mod pxr;
 pub mod dl06;
 pub mod rig;
+pub mod model;
+pub mod world;
 pub mod faults;
 pub mod ascii;
 pub mod wire;
