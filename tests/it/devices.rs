@@ -45,8 +45,9 @@ const FAULTS: [(&str, Fault); 5] = [
 
 /// A fault is in force this long, which is longer than the slowest poll of any shipped file and its doubt.
 const FAULTY: Duration = Duration::from_secs(120);
-/// All is well again within this time of its end.
-const CURED_MAX: Duration = Duration::from_secs(180);
+/// All is well again within this time of its end. A unit without loopback (function 08) that was late rests for up to ten
+/// minutes, until no late answer can be taken for another one.
+const CURED_MAX: Duration = Duration::from_secs(900);
 
 fn shipped(kind: Kind) -> Vec<(String, PlantDef)> {
     let names = profile::list(&Search::shipped()).into_iter().filter(|listed| listed.kind == kind);
@@ -179,9 +180,10 @@ impl Plant {
         let snapshot = self.snapshot();
         for (tag, (low, high)) in &self.truth {
             let def = self.def.tag(*tag);
-            // Noise between two looks, and the grain of a 32-bit float.
+            // What noise, of this tag or of those that it is made of, did between two looks.
             let noise = def.simulate.as_ref().map_or(0.0, |how| 2.0 * how.noise);
-            let slack = noise + (high - low) * 0.05 + 1e-5 * high.abs().max(low.abs());
+            let moves = def.simulate.as_ref().is_some_and(|how| how.motion.is_some());
+            let slack = noise + if moves { 0.05 * (high - low) + 0.01 * high.abs().max(low.abs()) } else { 1e-6 };
             if let Some(value) = snapshot.sample(*tag).trusted() {
                 let held = (low - slack..=high + slack).contains(&value);
                 assert!(held, "{what}: {} shows {value}, the device held {low} to {high}", def.name);
@@ -309,10 +311,15 @@ async fn the_requests_are_those_of_the_manuals_and_recorded_frames() {
     .await;
     check(Golden {
         profile: "fuji_pxr",
-        polled: &[
-            "CTRL", "SV", "STBY", "AT", "P", "I", "D", "HYS", "COOL", "DB", "P-N2", "P-F", "P-SL", "P-SU", "P-DP",
-        ],
-        frames: &["01 03 03 E9 00 0A 14 7D", "01 03 03 F7 00 05 34 7F"],
+        polled: &["CTRL", "STBY", "AT", "P", "I", "D", "COOL", "DB"],
+        frames: &["01 03 03 E9 00 0A 14 7D"],
+        ..plain
+    })
+    .await;
+    check(Golden {
+        profile: "fuji_pxr",
+        polled: &["P-N2", "P-F", "P-SL", "P-SU", "P-DP"],
+        frames: &["01 03 03 F7 00 05 34 7F"],
         ..plain
     })
     .await;
