@@ -1,4 +1,4 @@
-//! `sightglass demo`: a simulated plant on a real pseudo-terminal line, station and terminal in one process.
+//! `sightglass demo`: a simulated plant on real pseudo-terminals and TCP ports, station and terminal in one process.
 
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
@@ -8,7 +8,7 @@ use tokio::sync::oneshot;
 use crate::{
     bus::io::{clock::Clock, transport::Connector},
     history::{Answer, HistoryError, Question, io::Query},
-    plant::{PlantDef, Snapshot, def::Transport},
+    plant::Snapshot,
     report::{Period, ShiftReport, csv},
     sim,
     station::{Session, io as station},
@@ -20,7 +20,7 @@ use super::{CliError, StationArgs, load, log, paths, run, runtime, say, span, sp
 /// Arguments of `demo`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A plant with a simulation
+    /// The plant to simulate
     #[arg(default_value = "tank")]
     plant: String,
     /// Run the plant, its line and its clock so many times faster
@@ -50,16 +50,17 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let scratch = Scratch::new(&args.station)?;
     runtime()?.block_on(async {
         let clock = Clock::starting_at(Timestamp::now(), args.speed);
-        let simulated = sim::io::start_pty(&def, clock, sim::io::Mode::of(&def), sim::io::serial_of(&def))
-            .map_err(|error| simulation_error(&args.plant, error))?;
-        plug_into(&mut def, simulated.path());
+        let services: Vec<_> = def.lines.iter().map(sim::io::Service::of).collect();
+        let simulated = sim::io::serve(&def, clock, &services).await.map_err(simulation_error)?;
+        simulated.plug_into(&mut def);
         let def = Arc::new(def);
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
         let history = scratch.history.clone();
         let mut station =
             station::start(station::Options { def: def.clone(), clock, history, connectors, file: None })?;
         let result = if args.headless {
-            say(&format!("{}: simulated on {}", def.title, simulated.path().display()));
+            let places: Vec<_> = simulated.places().iter().map(ToString::to_string).collect();
+            say(&format!("{}: simulated on {}", def.title, places.join(", ")));
             headless(station.session("demo"), clock, &args).await
         } else {
             let session = station.session(&paths::operator());
@@ -72,15 +73,6 @@ pub fn main(args: Args) -> Result<(), CliError> {
         drop(simulated);
         result
     })
-}
-
-/// Puts every line of the plant on the simulated one.
-fn plug_into(def: &mut PlantDef, path: &std::path::Path) {
-    for line in &mut def.lines {
-        if let Transport::Serial { port, .. } = &mut line.transport {
-            *port = path.display().to_string();
-        }
-    }
 }
 
 /// Tells what happens until the time is over, then sums up and writes the report.
@@ -171,9 +163,9 @@ impl Drop for Scratch {
     }
 }
 
-pub(super) fn simulation_error(plant: &str, error: sim::io::SimError) -> CliError {
+pub(super) fn simulation_error(error: sim::io::SimError) -> CliError {
     match error {
-        sim::io::SimError::NoSimulation => CliError::Usage(format!("plant `{plant}` has no simulation, try `tank`")),
+        sim::io::SimError::Unknown(error) => CliError::Usage(error.to_string()),
         sim::io::SimError::Io(error) => CliError::Io { what: "cannot serve the simulated plant".into(), error },
     }
 }

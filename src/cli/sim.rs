@@ -1,14 +1,11 @@
 //! `sightglass sim`: serves the simulated devices of a plant to other masters.
 
-use std::{
-    net::{Ipv4Addr, SocketAddr},
-    path::PathBuf,
-};
+use std::{net::SocketAddr, path::PathBuf};
 
 use crate::{
     bus::io::clock::Clock,
-    plant::def::Serial,
-    sim::io::{Mode, serial_of, start_pty, start_tcp},
+    plant::{PlantDef, def::LineId},
+    sim::io::{Mode, Place, Service, serve},
 };
 
 use super::{CliError, StationArgs, demo::simulation_error, load, log, run, runtime, say, speed};
@@ -16,10 +13,10 @@ use super::{CliError, StationArgs, demo::simulation_error, load, log, run, runti
 /// Arguments of `sim`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A plant with a simulation
+    /// The plant to simulate; every line is served, and the options below are for its first one
     #[arg(default_value = "tank")]
     plant: String,
-    /// How to serve it; as the first line of the plant says if this is not given, Modbus TCP if only an address is
+    /// How to serve it; as the plant says if this is not given, Modbus TCP if only an address is
     #[arg(long, value_enum)]
     mode: Option<ModeArg>,
     /// Data bits of the serial line instead of those in the plant file: 7 for ASCII as the standard has it, or 8
@@ -65,36 +62,41 @@ impl From<ModeArg> for Mode {
 /// Serves until it is told to stop.
 pub fn main(args: Args) -> Result<(), CliError> {
     let def = load(&args.plant, &StationArgs::default())?;
-    let given = args.mode.map(Mode::from).or(args.tcp.map(|_| Mode::Tcp));
-    let mode = given.unwrap_or_else(|| Mode::of(&def));
-    let mut serial = serial_of(&def);
-    serial.data_bits = args.data_bits.unwrap_or(serial.data_bits);
-    check(mode, serial, &args)?;
+    let services = services(&def, &args)?;
     let _log = log::start(args.log.as_deref())?;
     runtime()?.block_on(async {
         let clock = Clock::starting_at(jiff::Timestamp::now(), args.speed);
-        let failed = |error| simulation_error(&args.plant, error);
-        if mode.is_tcp() {
-            let address = args.tcp.unwrap_or_else(|| (Ipv4Addr::LOCALHOST, 0).into());
-            let serving = start_tcp(&def, clock, address, mode).await.map_err(failed)?;
-            say(&format!("{} serves {mode} on {}", def.title, serving.address()));
-            run::signalled().await;
-            return Ok(());
+        let serving = serve(&def, clock, &services).await.map_err(simulation_error)?;
+        let port = serving.places().first().and_then(Place::path);
+        let link = args.link.zip(port).map(|(link, port)| Link::make(link, port)).transpose()?;
+        for ((line, service), place) in def.lines.iter().zip(&services).zip(serving.places()) {
+            let linked = link.as_ref().filter(|_| line.id == LineId(0)).map(|link| link.0.display().to_string());
+            let which = if def.lines.len() == 1 { String::new() } else { format!(", line {},", line.name) };
+            let place = linked.unwrap_or_else(|| place.to_string());
+            say(&format!("{}{which} serves {} on {place}", def.title, service.mode));
         }
-        let serving = start_pty(&def, clock, mode, serial).map_err(failed)?;
-        let link = args.link.map(|link| Link::make(link, serving.path())).transpose()?;
-        let path = link.as_ref().map_or(serving.path(), |link| link.0.as_path());
-        say(&format!("{} serves {mode} on {}", def.title, path.display()));
         run::signalled().await;
         Ok(())
     })
 }
 
+/// Every line as the plant says, the first one as the arguments say.
+fn services(def: &PlantDef, args: &Args) -> Result<Vec<Service>, CliError> {
+    let mut services: Vec<Service> = def.lines.iter().map(Service::of).collect();
+    if let Some(first) = services.first_mut() {
+        first.mode = args.mode.map(Mode::from).or(args.tcp.map(|_| Mode::Tcp)).unwrap_or(first.mode);
+        first.serial.data_bits = args.data_bits.unwrap_or(first.serial.data_bits);
+        first.address = args.tcp.unwrap_or(first.address);
+        check(*first, args)?;
+    }
+    Ok(services)
+}
+
 /// Refuses what does not go together.
-fn check(mode: Mode, serial: Serial, args: &Args) -> Result<(), CliError> {
+fn check(service: Service, args: &Args) -> Result<(), CliError> {
     let refuse = |why: &str| Err(CliError::Usage(why.to_owned()));
-    match mode {
-        Mode::Rtu if serial.data_bits == 7 => refuse("Modbus RTU needs 8 data bits"),
+    match service.mode {
+        Mode::Rtu if service.serial.data_bits == 7 => refuse("Modbus RTU needs 8 data bits"),
         Mode::Rtu | Mode::Ascii if args.tcp.is_some() => refuse("`--tcp` is for the modes tcp and rtu-over-tcp"),
         Mode::Tcp | Mode::RtuOverTcp if args.link.is_some() => refuse("`--link` is for the modes rtu and ascii"),
         Mode::Tcp | Mode::RtuOverTcp if args.data_bits.is_some() => {

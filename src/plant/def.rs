@@ -89,6 +89,8 @@ pub struct DeviceDef {
     pub model: String,
     /// What one request may hold.
     pub limits: Limits,
+    /// The function codes that it knows; empty if its profile does not list them.
+    pub functions: Vec<u8>,
     /// Least silence between two requests to this device (the PXR wants 10 ms).
     pub gap: Duration,
     /// Quiet time after a write before the next request.

@@ -48,6 +48,7 @@ pub fn plant() -> PlantDef {
             gap_words_max: 8,
             ..Limits::STANDARD
         },
+        functions: Vec::new(),
         gap: Duration::ZERO,
         write_gap: Duration::ZERO,
         faceplate: None,

@@ -12,6 +12,7 @@ pub mod sample;
 pub mod line;
 pub mod traffic;
 pub mod def;
+pub mod simulate;
 pub mod tag;
 pub mod class;
 pub mod scale;

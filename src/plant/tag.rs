@@ -1,8 +1,11 @@
 //! A tag: where a value lives in its device, what it means and what may be done with it.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
-use super::id::{DeviceId, TagId};
+use super::{
+    id::{DeviceId, TagId},
+    simulate::Simulate,
+};
 
 /// Definition of a tag.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,6 +68,8 @@ pub struct TagDef {
     pub confidence: Confidence,
     /// Where the row comes from (manual, clause).
     pub source: String,
+    /// How a simulated device fills it; `None` holds what is written.
+    pub simulate: Option<Arc<Simulate>>,
 }
 
 impl TagDef {
@@ -101,6 +106,7 @@ impl TagDef {
             store: true,
             confidence: Confidence::Proven,
             source: String::new(),
+            simulate: None,
         }
     }
     /// The tags without which its value cannot be shown or judged.
@@ -124,6 +130,15 @@ impl TagDef {
     /// Does it hold words instead of a number?
     pub fn is_text(&self) -> bool {
         matches!(self.point.kind, Kind::Text(_))
+    }
+    /// The function code that it is written with: the profile's, else 5 or 6 for one bit or word, 16 for more.
+    pub fn write_function(&self) -> Option<u8> {
+        let usual = match (self.point.table.is_bits(), self.point.len()) {
+            (true, _) => 5,
+            (false, 1) => 6,
+            (false, _) => 16,
+        };
+        self.writable().then(|| self.write_fc.unwrap_or(usual))
     }
     /// The text of an enumeration's number.
     pub fn label_of(&self, value: f64) -> Option<&str> {

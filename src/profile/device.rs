@@ -7,6 +7,7 @@ use super::{
     names::{Names, Unique, number_of},
     reader::{At, Node, Raw, text},
     schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile},
+    simulate::{Scope, simulate},
     tag::Defined,
     units,
 };
@@ -90,6 +91,19 @@ pub(super) fn limits(
     (limits, millis(table.gap_ms), millis(table.write_gap_ms))
 }
 
+/// The function codes that the profile lists, against those that its tags need.
+pub(super) fn functions(profile: &ProfileFile, tags: &[Defined], problems: &mut Problems) -> Vec<u8> {
+    let listed: Vec<u8> = profile.functions.iter().map(|function| function.value).collect();
+    for (tag, at) in tags.iter().filter(|_| !listed.is_empty()).filter_map(|d| Some((&d.tag, d.address_at?))) {
+        let read = (tag.access != Access::Write).then(|| tag.point.table.read_fc());
+        for function in read.into_iter().chain(tag.write_function()).filter(|needed| !listed.contains(needed)) {
+            let problem = problems.add(at, format!("{} needs function {function}, which `functions` lacks", tag.name));
+            problem.label(format!("the device knows {listed:?}"));
+        }
+    }
+    listed
+}
+
 /// Reports tags of one device that see the same registers with different eyes.
 /// The same place with the same type is fine, and so are fields of one word.
 pub(super) fn check_overlaps(tags: &[Defined], problems: &mut Problems) {
@@ -128,7 +142,7 @@ fn extent(point: Point) -> String {
 }
 
 /// Finishes what needs other tags: names of units, unlock values, and that a needed tag is read at all.
-pub(super) fn link(defined: Vec<Defined>, problems: &mut Problems) -> Vec<TagDef> {
+pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems) -> Vec<TagDef> {
     let all: Vec<TagDef> = defined.iter().map(|defined| defined.tag.clone()).collect();
     let finish = |defined: Defined| {
         let mut tag = defined.tag;
@@ -160,6 +174,11 @@ pub(super) fn link(defined: Vec<Defined>, problems: &mut Problems) -> Vec<TagDef
         if let Some((target, choice)) = &defined.unlock {
             let value = number_of(choice, &all[target.index()], problems);
             tag.write_unlock = value.map(|value| (*target, value));
+        }
+        if let Some(table) = &defined.simulate {
+            // A name of a device has no dot.
+            let device = tag.name.split_once('.').map_or("", |(device, _)| device);
+            tag.simulate = simulate(table, &tag, &Scope { names, tags: &all, device }, problems);
         }
         tag
     };

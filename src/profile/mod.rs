@@ -24,6 +24,7 @@ mod plant;
 mod reader;
 mod report;
 mod schema;
+mod simulate;
 mod tag;
 mod units;
 

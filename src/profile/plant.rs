@@ -132,16 +132,17 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     }
     let (mut devices, mut defined) = (Vec::new(), Vec::new());
     for (device, rows) in known.iter().zip(rows) {
-        let (def, around) = define_device(DeviceId(devices.len() as u16), device, lines, &names, problems);
+        let (mut def, around) = define_device(DeviceId(devices.len() as u16), device, lines, &names, problems);
         let first = defined.len();
         for row in rows {
             defined.push(tag::define(TagId(defined.len() as u16), row.layers, &around, problems));
         }
         device::check_overlaps(&defined[first..], problems);
+        def.functions = device::functions(&device.profile, &defined[first..], problems);
         devices.push(def);
     }
     let classes = defined.iter().map(|defined| defined.class).collect();
-    let tags = device::link(defined, problems);
+    let tags = device::link(defined, &names, problems);
     check_broadcasts(&devices, &known, lines, &tags, problems);
     for (def, device) in devices.iter_mut().zip(&known) {
         let face = device.profile.faceplate.as_ref().map(|face| &face.value);
@@ -212,6 +213,7 @@ fn define_device<'a>(
         profile: text(&table.profile),
         model: format!("{} {}", text(&profile.vendor), text(&profile.model)),
         limits,
+        functions: Vec::new(),
         gap,
         write_gap,
         faceplate: None,

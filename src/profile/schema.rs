@@ -7,6 +7,7 @@ use jiff::civil::Time;
 use super::{
     address::{Location, Modicon},
     reader::{Choice, Numbered, Raw, table, words},
+    simulate::Choices,
 };
 use crate::plant::{
     def::{Parity, Priority, Rs485},
@@ -94,6 +95,8 @@ table!(
         /// Always 0; written down so that nobody has to ask.
         opt "address_base" address_base: u8,
         opt "scheme" scheme: Scheme,
+        /// The function codes that the device knows.
+        list "functions" functions: u8,
         opt "limits" limits: Raw,
         /// Keys that every tag has unless it says otherwise.
         opt "default" default: Raw,
@@ -156,6 +159,56 @@ table!(
         opt "store" store: bool,
         opt "confidence" confidence: Confidence,
         opt "source" source: String,
+        opt "simulate" simulate: SimulateTable,
+    }
+);
+
+table!(
+    /// How a simulated device fills a tag.
+    SimulateTable, "simulate" {
+        opt "start" start: Choice,
+        list "case" cases: CaseTable,
+        opt "range" range: [f64; 2],
+        opt "noise" noise: f64,
+        opt "pulse" pulse: Duration,
+        opt "wander" wander: [f64; 2],
+        opt "period" period: Duration,
+        opt "follow" follow: String,
+        list "sum" sum: String,
+        list "mean" mean: String,
+        list "product" product: String,
+        list "difference" difference: String,
+        list "quotient" quotient: String,
+        list "leg" leg: String,
+        opt "angle" angle: String,
+        opt "integrate" integrate: String,
+        opt "per" per: Duration,
+        opt "rate" rate: f64,
+        opt "lag" lag: Duration,
+        opt "gain" gain: f64,
+        opt "offset" offset: f64,
+        opt "when" when: CheckTable,
+        opt "idle" idle: f64,
+    }
+);
+
+table!(
+    /// A question to another tag; without `is`, `above` and `below`: is it not 0?
+    CheckTable, "when" {
+        need "tag" tag: String,
+        opt "field" field: Choice,
+        opt "is" is: Choices,
+        opt "above" above: f64,
+        opt "below" below: f64,
+        list "and" and: CheckTable,
+    }
+);
+
+table!(
+    /// A value for when something is so.
+    CaseTable, "a case" {
+        need "when" when: CheckTable,
+        need "value" value: Choice,
     }
 );
 

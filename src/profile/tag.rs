@@ -7,7 +7,7 @@ use super::{
     diagnostic::{Problems, Span},
     names::{Names, check_name},
     reader::{At, Choice, Numbered, Raw, either, supersede, text},
-    schema::{PollWord, Scheme, TagTable},
+    schema::{PollWord, Scheme, SimulateTable, TagTable},
     units,
 };
 use crate::plant::{
@@ -37,6 +37,8 @@ pub(super) struct Defined {
     pub needs: Vec<(At<TagId>, &'static str)>,
     /// Where the unlock value stands, which is resolved when the other tag is known.
     pub unlock: Option<(TagId, At<Choice>)>,
+    /// How it is simulated, which may ask any tag of the plant.
+    pub simulate: Option<SimulateTable>,
 }
 
 /// Builds a tag from its layers. Where something is wrong a placeholder stands, and the problems keep it from getting out.
@@ -102,10 +104,13 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
             && row.store.map_or(access != Access::Write && matches!(poll, Poll::Every(_)), |store| store.value),
         confidence: row.confidence.map_or(Confidence::Medium, |confidence| confidence.value),
         source: text(&row.source),
+        // Needs all tags of the plant.
+        simulate: None,
     };
     let address_at = point.and(row.address.map(|address| address.at));
     let class = row.class.map(|class| class.value);
-    Defined { tag, class, address_at, needs: links.needs, unlock: links.unlock }
+    let simulate = row.simulate.map(|simulate| simulate.value);
+    Defined { tag, class, address_at, needs: links.needs, unlock: links.unlock, simulate }
 }
 
 /// Stands in for an address that is wrong; it never leaves the loader.
@@ -241,6 +246,11 @@ fn bit_field(field: &At<Choice>, kind: Kind, table: Table, problems: &mut Proble
     valid.map(|(high, low)| (low, high - low + 1))
 }
 
+/// Bits inside the word of another tag.
+pub(super) fn field_of(field: &At<Choice>, point: Point, problems: &mut Problems) -> Option<(u8, u8)> {
+    bit_field(field, point.kind, point.table, problems)
+}
+
 /// Decimals to show if the row does not say: as many as the scale has, two for floats.
 fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {
     if let Some(decimals) = row.decimals {
@@ -363,7 +373,9 @@ fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Acce
     let access = row.access.map_or(Access::Read, |access| access.value);
     let Some(point) = point.filter(|_| access != Access::Read) else { return access };
     let at = row.access.map_or(row.at, |access| access.at);
-    if matches!(point.table, Table::Discrete | Table::Input) {
+    // A few devices read a bit with function 02 and write it with 05 all the same (Delta DTB 0810H); they say so.
+    let bit = point.table == Table::Discrete && row.write_fc.is_some();
+    if matches!(point.table, Table::Discrete | Table::Input) && !bit {
         problems.add(at, format!("a {} can only be read", point.table.word())).label("expected access = \"r\"");
     }
     if point.field.is_some() && row.write_fc.is_none() {

@@ -14,7 +14,7 @@ use crate::plant::{
 };
 
 /// A small plant that is right. Each case changes some words of it.
-const PLANT: &str = r#"title = "Small"
+pub(super) const PLANT: &str = r#"title = "Small"
 time_zone = "Asia/Bangkok"
 
 [[line]]
@@ -50,7 +50,7 @@ item = [
 ]
 "#;
 
-const METER: &str = r#"vendor = "ACME"
+pub(super) const METER: &str = r#"vendor = "ACME"
 model = "M1"
 status = "manual"
 source = "manual"
@@ -91,7 +91,7 @@ value = "on"
 confirm = "Start?"
 "#;
 
-const PLC: &str = r#"vendor = "KOYO"
+pub(super) const PLC: &str = r#"vendor = "KOYO"
 model = "DL06"
 status = "manual"
 source = "manual"
@@ -107,7 +107,7 @@ name = "OUT"
 address = "Y17"
 "#;
 
-fn load(plant: &[u8], meter: &str, plc: &str) -> Result<PlantDef, Errors> {
+pub(super) fn load(plant: &[u8], meter: &str, plc: &str) -> Result<PlantDef, Errors> {
     let find = |name: &str| {
         let text = match name {
             "meter" => meter,
@@ -122,7 +122,7 @@ fn load(plant: &[u8], meter: &str, plc: &str) -> Result<PlantDef, Errors> {
 
 /// Replaces `from` by `to` in whichever of the three texts has it; the rendering must then contain all of `expect`,
 /// and hold exactly one problem.
-fn check(from: &str, to: &str, expect: &[&str]) {
+pub(super) fn check(from: &str, to: &str, expect: &[&str]) {
     let errors = changed(&[(from, to)]);
     let text = errors.to_string();
     for piece in expect {
@@ -471,7 +471,7 @@ fn a_missing_file_names_the_plants_there_are() {
         assert!(errors.to_string().contains(expect), "{errors}");
     };
     check("nowhere.toml", "the plant file nowhere.toml does not exist");
-    check("nowhere.toml", "known plants: tank");
+    check("nowhere.toml", "known plants: inverter, lab, tank");
     check("tnk", "did you mean `tank`?");
     check("/", "the plant file / is not a file");
 }

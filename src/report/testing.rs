@@ -48,6 +48,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
                 alignment: 1,
                 in_flight_max: 1,
             },
+            functions: Vec::new(),
             gap: Duration::ZERO,
             write_gap: Duration::ZERO,
             faceplate: Some(Faceplate {

@@ -5,7 +5,8 @@
 
 use std::time::Duration;
 
-use super::rig::{DL06_UNIT, PXR_UNIT, Rig};
+use super::rig::Rig;
+use super::slave::Unit;
 
 /// Set value of all experiments, in °C.
 pub const SV_C: i32 = 70;
@@ -78,10 +79,10 @@ pub fn run(control: &Control) -> Outcome {
     ];
     for (address, value) in settings {
         let [[a, b], [c, d]] = [u16::to_be_bytes(address), value.to_be_bytes()];
-        rig.respond(PXR_UNIT, &[6, a, b, c, d]);
+        rig.controller().respond(&[6, a, b, c, d]);
     }
     // Running, in manual, agitator and heater on.
-    rig.respond(DL06_UNIT, &[15, 0x0C, 0, 0, 7, 1, 0b100_1001]);
+    rig.plc().respond(&[15, 0x0C, 0, 0, 7, 1, 0b100_1001]);
     measure((0..=RECORDING.as_secs() as u32).map(|second| {
         let pv_c = rig.truth().pv_c;
         rig.advance(Duration::from_secs(1));

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use super::ascii;
-use super::rig::{BROADCAST, Rig, reply_delay};
-use crate::bus::frame::with_crc;
+use super::world::World;
+use crate::{bus::frame::with_crc, plant::def::LineId};
 
 /// What is wrong with a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -27,7 +27,7 @@ pub enum Fault {
 
 /// The faults of all units.
 #[derive(Debug, Clone, Default)]
-pub struct Faults(BTreeMap<u8, Fault>);
+pub struct Faults(BTreeMap<(LineId, u8), Fault>);
 
 /// What leaves a device.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,38 +48,40 @@ enum Damage {
 
 impl Faults {
     /// Sets what is wrong with a unit.
-    pub fn set(&mut self, unit: u8, fault: Fault) {
-        self.0.insert(unit, fault);
+    pub fn set(&mut self, line: LineId, unit: u8, fault: Fault) {
+        self.0.insert((line, unit), fault);
     }
 
     /// What is wrong with a unit.
-    pub fn of(&self, unit: u8) -> Fault {
-        self.0.get(&unit).copied().unwrap_or_default()
+    pub fn of(&self, line: LineId, unit: u8) -> Fault {
+        self.0.get(&(line, unit)).copied().unwrap_or_default()
     }
 
-    /// Lets the rig answer a request, or the fault in its place. `None`: nothing comes back.
-    pub fn answer(&self, rig: &mut Rig, unit: u8, request: &[u8]) -> Option<Answer> {
-        let plain = |pdu| Answer { unit, pdu, damage: Damage::None, delay: reply_delay(unit) };
-        if unit == BROADCAST {
-            rig.broadcast(request, |unit| !matches!(self.of(unit), Fault::Silent | Fault::Exception(_)));
+    /// Lets the world answer a request, or the fault in its place. `None`: nothing comes back.
+    pub fn answer(&self, world: &mut World, line: LineId, unit: u8, request: &[u8]) -> Option<Answer> {
+        let delay = world.reply_delay(line, unit);
+        let plain = |pdu| Answer { unit, pdu, damage: Damage::None, delay };
+        if world.is_broadcast(line, unit) {
+            world.broadcast(line, request, |unit| !matches!(self.of(line, unit), Fault::Silent | Fault::Exception(_)));
             return None;
         }
-        match self.of(unit) {
-            Fault::None => rig.respond(unit, request).map(plain),
+        match self.of(line, unit) {
+            Fault::None => world.respond(line, unit, request).map(plain),
             Fault::Silent => {
-                rig.overhear(unit);
+                world.overhear(line, unit);
                 None
             }
-            Fault::Late(by) => {
-                rig.respond(unit, request).map(plain).map(|answer| Answer { delay: answer.delay + by, ..answer })
-            }
+            Fault::Late(by) => world
+                .respond(line, unit, request)
+                .map(plain)
+                .map(|answer| Answer { delay: answer.delay + by, ..answer }),
             Fault::BadCrc => {
-                rig.respond(unit, request).map(plain).map(|answer| Answer { damage: Damage::Check, ..answer })
+                world.respond(line, unit, request).map(plain).map(|answer| Answer { damage: Damage::Check, ..answer })
             }
             Fault::Truncated => {
-                rig.respond(unit, request).map(plain).map(|answer| Answer { damage: Damage::Cut, ..answer })
+                world.respond(line, unit, request).map(plain).map(|answer| Answer { damage: Damage::Cut, ..answer })
             }
-            Fault::Exception(code) => rig.refuse(unit, request, code).map(plain),
+            Fault::Exception(code) => world.refuse(line, unit, request, code).map(plain),
         }
     }
 }
@@ -137,21 +139,23 @@ impl Answer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bus::frame::crc16;
+    use crate::{bus::frame::crc16, sim::rig::Rig};
+
+    const L1: LineId = LineId(0);
 
     const READ_SV: [u8; 5] = [3, 0x03, 0xEA, 0, 1];
     const WRITE_SV: [u8; 5] = [6, 0x03, 0xEA, 0x01, 0xF4];
 
     fn check(fault: Fault, expect: Option<(usize, bool)>, written: bool) {
-        let (mut rig, mut faults) = (Rig::new(), Faults::default());
-        faults.set(1, fault);
-        let answer = faults.answer(&mut rig, 1, &READ_SV);
+        let (mut world, mut faults) = (World::tank(Rig::new()), Faults::default());
+        faults.set(L1, 1, fault);
+        let answer = faults.answer(&mut world, L1, 1, &READ_SV);
         let seen = answer.map(|answer| answer.rtu()).map(|frame| (frame.len(), crc16(&frame) == 0));
         assert_eq!(seen, expect, "{fault:?}: length and check");
-        let answered = faults.answer(&mut rig, 1, &WRITE_SV).is_some();
+        let answered = faults.answer(&mut world, L1, 1, &WRITE_SV).is_some();
         assert_eq!(answered, expect.is_some());
-        assert_eq!(rig.respond(1, &READ_SV) == Some(vec![3, 2, 0x01, 0xF4]), written, "{fault:?}");
-        assert!(faults.answer(&mut rig, 2, &[1, 8, 0, 0, 1]).is_some(), "{fault:?} of another unit");
+        assert_eq!(world.respond(L1, 1, &READ_SV) == Some(vec![3, 2, 0x01, 0xF4]), written, "{fault:?}");
+        assert!(faults.answer(&mut world, L1, 2, &[1, 8, 0, 0, 1]).is_some(), "{fault:?} of another unit");
     }
 
     #[test]
@@ -166,39 +170,42 @@ mod tests {
 
     #[test]
     fn the_same_answer_in_ascii() {
-        let (mut rig, mut faults) = (Rig::new(), Faults::default());
-        let frame = |faults: &Faults, rig: &mut Rig| faults.answer(rig, 1, &READ_SV).map(|answer| answer.ascii());
-        assert_eq!(frame(&faults, &mut rig).as_deref(), Some(&b":01030202BC3C\r\n"[..]));
-        faults.set(1, Fault::BadCrc);
-        assert_eq!(frame(&faults, &mut rig).as_deref(), Some(&b":01030202BC30\r\n"[..]));
-        faults.set(1, Fault::Truncated);
-        assert_eq!(frame(&faults, &mut rig).as_deref(), Some(&b":010302"[..]));
+        let (mut world, mut faults) = (World::tank(Rig::new()), Faults::default());
+        let frame =
+            |faults: &Faults, world: &mut World| faults.answer(world, L1, 1, &READ_SV).map(|answer| answer.ascii());
+        assert_eq!(frame(&faults, &mut world).as_deref(), Some(&b":01030202BC3C\r\n"[..]));
+        faults.set(L1, 1, Fault::BadCrc);
+        assert_eq!(frame(&faults, &mut world).as_deref(), Some(&b":01030202BC30\r\n"[..]));
+        faults.set(L1, 1, Fault::Truncated);
+        assert_eq!(frame(&faults, &mut world).as_deref(), Some(&b":010302"[..]));
     }
 
     #[test]
     fn a_broadcast_passes_by_a_silent_unit() {
-        let (mut rig, mut faults) = (Rig::new(), Faults::default());
-        faults.set(1, Fault::Silent);
-        assert_eq!(faults.answer(&mut rig, 0, &WRITE_SV), None);
-        assert_eq!(rig.respond(1, &READ_SV), Some(vec![3, 2, 0x02, 0xBC]));
-        assert_eq!(rig.respond(2, &READ_SV), Some(vec![3, 2, 0x01, 0xF4]));
+        let (mut world, mut faults) = (World::tank(Rig::new()), Faults::default());
+        faults.set(L1, 1, Fault::Silent);
+        assert_eq!(faults.answer(&mut world, L1, 0, &WRITE_SV), None);
+        assert_eq!(world.respond(L1, 1, &READ_SV), Some(vec![3, 2, 0x02, 0xBC]));
+        assert_eq!(world.respond(L1, 2, &READ_SV), Some(vec![3, 2, 0x01, 0xF4]));
     }
 
     #[test]
     fn a_late_answer_says_how_late() {
-        let (mut rig, mut faults) = (Rig::new(), Faults::default());
-        let delay = |faults: &Faults, rig: &mut Rig| faults.answer(rig, 1, &READ_SV).map(|answer| answer.delay);
-        assert_eq!(delay(&faults, &mut rig), Some(Duration::from_millis(5)));
-        faults.set(1, Fault::Late(Duration::from_millis(700)));
-        assert_eq!(delay(&faults, &mut rig), Some(Duration::from_millis(705)));
+        let (mut world, mut faults) = (World::tank(Rig::new()), Faults::default());
+        let delay =
+            |faults: &Faults, world: &mut World| faults.answer(world, L1, 1, &READ_SV).map(|answer| answer.delay);
+        assert_eq!(delay(&faults, &mut world), Some(Duration::from_millis(5)));
+        faults.set(L1, 1, Fault::Late(Duration::from_millis(700)));
+        assert_eq!(delay(&faults, &mut world), Some(Duration::from_millis(705)));
     }
 
     #[test]
     fn the_same_answer_on_tcp() {
-        let (mut rig, mut faults) = (Rig::new(), Faults::default());
-        let frame = |faults: &Faults, rig: &mut Rig| faults.answer(rig, 1, &READ_SV).map(|answer| answer.tcp(0x1234));
-        assert_eq!(frame(&faults, &mut rig), Some(vec![0x12, 0x34, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]));
-        faults.set(1, Fault::BadCrc);
-        assert_eq!(frame(&faults, &mut rig).map(|frame| frame[..2].to_vec()), Some(vec![0xED, 0x34]));
+        let (mut world, mut faults) = (World::tank(Rig::new()), Faults::default());
+        let frame =
+            |faults: &Faults, world: &mut World| faults.answer(world, L1, 1, &READ_SV).map(|answer| answer.tcp(0x1234));
+        assert_eq!(frame(&faults, &mut world), Some(vec![0x12, 0x34, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]));
+        faults.set(L1, 1, Fault::BadCrc);
+        assert_eq!(frame(&faults, &mut world).map(|frame| frame[..2].to_vec()), Some(vec![0xED, 0x34]));
     }
 }

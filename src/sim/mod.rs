@@ -15,6 +15,8 @@ pub mod pxr;
 pub mod dl06;
 pub mod rig;
 pub mod experiment;
+pub mod model;
+pub mod world;
 pub mod faults;
 pub mod ascii;
 pub mod wire;

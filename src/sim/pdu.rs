@@ -4,6 +4,8 @@ mod identity;
 
 pub use identity::Identity;
 
+use crate::plant::def::Limits;
+
 /// Why a device refuses (Modbus application protocol V1.1b3, 7).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
@@ -47,11 +49,13 @@ pub enum Words {
 /// What a device has behind its addresses. A write of several is tried on a copy, so one bad value refuses the whole block.
 pub trait Registers: Clone {
     /// The functions it knows.
-    const FUNCTIONS: &'static [u8];
-    /// Words that one request may read or write.
-    const WORDS_MAX: u16;
+    fn functions(&self) -> &[u8];
+    /// What one request may hold. An odd address or count is refused by a device with an alignment of two.
+    fn limits(&self) -> Limits;
     /// What it says of itself, for the functions 11 and 2B.
-    const IDENTITY: Identity;
+    fn identity(&self) -> Identity {
+        Identity { server_id: 0, objects: &[] }
+    }
 
     /// One bit.
     fn bit(&self, kind: Bits, address: u16) -> Result<bool, Refusal>;
@@ -64,6 +68,10 @@ pub trait Registers: Clone {
     /// Whether it is too busy for this function now: then the request has no answer and no effect.
     fn holds_back(&self, _function: u8) -> bool {
         false
+    }
+    /// Writes holding registers that came in one request: all of them, on a copy that is thrown away if one is refused.
+    fn write_block(&mut self, address: u16, values: &[u16]) -> Result<(), Refusal> {
+        (address..=u16::MAX).zip(values).try_for_each(|(at, value)| self.write_word(at, *value))
     }
     /// Eight bits of the maker's choice, for function 07.
     fn exception_status(&self) -> u8 {
@@ -96,7 +104,7 @@ const QUEUE_MAX: u16 = 31;
 
 /// A request of a wrong length is refused with 03, which the standard gives to "the implied length is incorrect".
 fn answer<D: Registers>(device: &mut D, function: u8, data: &[u8]) -> Result<Vec<u8>, Refusal> {
-    if !D::FUNCTIONS.contains(&function) {
+    if !device.functions().contains(&function) {
         return Err(Refusal::Function);
     }
     let word = |high: u8, low: u8| u16::from_be_bytes([high, low]);
@@ -108,11 +116,11 @@ fn answer<D: Registers>(device: &mut D, function: u8, data: &[u8]) -> Result<Vec
             Ok(echo(function, &data[..4]))
         }
         (0x10, &[a, b, c, d, ref block @ ..]) => {
-            let values = block_of_words(word(c, d), D::WORDS_MAX.min(WRITE_WORDS_MAX), block)?;
+            let values = block_of_words(word(c, d), device.limits().write_words_max.min(WRITE_WORDS_MAX), block)?;
             write_words(device, word(a, b), &values)?;
             Ok(echo(function, &data[..4]))
         }
-        (0x11, []) => Ok(identity::report(&D::IDENTITY, device.running())),
+        (0x11, []) => Ok(identity::report(&device.identity(), device.running())),
         (0x16, &[a, b, and_high, and_low, or_high, or_low]) => {
             let (address, and, or) = (word(a, b), word(and_high, and_low), word(or_high, or_low));
             let value = device.word(Words::Holding, address)? & and | or & !and;
@@ -120,7 +128,7 @@ fn answer<D: Registers>(device: &mut D, function: u8, data: &[u8]) -> Result<Vec
             Ok(echo(function, data))
         }
         (0x17, &[a, b, c, d, e, f, g, h, ref block @ ..]) => {
-            let values = block_of_words(word(g, h), D::WORDS_MAX.min(EXCHANGE_WRITE_MAX), block)?;
+            let values = block_of_words(word(g, h), device.limits().write_words_max.min(EXCHANGE_WRITE_MAX), block)?;
             let mut trial = device.clone();
             write_words(&mut trial, word(e, f), &values)?;
             let reply = read_words(&trial, function, Words::Holding, word(a, b), word(c, d))?;
@@ -128,7 +136,7 @@ fn answer<D: Registers>(device: &mut D, function: u8, data: &[u8]) -> Result<Vec
             Ok(reply)
         }
         (0x18, &[a, b]) => read_queue(device, function, word(a, b)),
-        (0x2B, &[identity::MEI_TYPE, code, object]) => identity::read(&D::IDENTITY, code, object),
+        (0x2B, &[identity::MEI_TYPE, code, object]) => identity::read(&device.identity(), code, object),
         (0x2B, &[other, ..]) if other != identity::MEI_TYPE => Err(Refusal::Function),
         _ => Err(Refusal::Value),
     }
@@ -148,7 +156,7 @@ fn plain<D: Registers>(device: &mut D, function: u8, address: u16, operand: u16)
 }
 
 fn read_bits<D: Registers>(device: &D, function: u8, kind: Bits, address: u16, count: u16) -> Result<Vec<u8>, Refusal> {
-    let addresses = span(address, count, READ_BITS_MAX)?;
+    let addresses = span(address, count, READ_BITS_MAX.min(device.limits().read_bits_max))?;
     let mut reply = vec![function, count.div_ceil(8) as u8];
     reply.resize(2 + usize::from(count.div_ceil(8)), 0);
     for (place, at) in addresses.enumerate() {
@@ -164,8 +172,16 @@ fn read_words<D: Registers>(
     address: u16,
     count: u16,
 ) -> Result<Vec<u8>, Refusal> {
-    let mut reply = vec![function, (count.min(D::WORDS_MAX) * 2) as u8];
-    for at in span(address, count, D::WORDS_MAX)? {
+    let Limits { read_words_max, alignment, .. } = device.limits();
+    let mut reply = vec![function, (count.min(read_words_max) * 2) as u8];
+    let addresses = span(address, count, read_words_max)?;
+    if !address.is_multiple_of(alignment) {
+        return Err(Refusal::Address);
+    }
+    if !count.is_multiple_of(alignment) {
+        return Err(Refusal::Value);
+    }
+    for at in addresses {
         reply.extend_from_slice(&device.word(kind, at)?.to_be_bytes());
     }
     Ok(reply)
@@ -204,9 +220,9 @@ fn block_of_words(count: u16, max: u16, rest: &[u8]) -> Result<Vec<u16>, Refusal
 }
 
 fn write_words<D: Registers>(device: &mut D, address: u16, values: &[u16]) -> Result<(), Refusal> {
-    let addresses = span(address, values.len() as u16, WRITE_WORDS_MAX)?;
+    span(address, values.len() as u16, WRITE_WORDS_MAX)?;
     let mut trial = device.clone();
-    addresses.zip(values).try_for_each(|(at, value)| trial.write_word(at, *value))?;
+    trial.write_block(address, values)?;
     *device = trial;
     Ok(())
 }
@@ -256,9 +272,12 @@ mod tests {
     }
 
     impl Registers for Small {
-        const FUNCTIONS: &'static [u8] = &[1, 3, 5, 6, 7, 15, 16, 0x16, 0x17, 0x18];
-        const WORDS_MAX: u16 = 6;
-        const IDENTITY: Identity = Identity { server_id: 1, objects: &[] };
+        fn functions(&self) -> &[u8] {
+            &[1, 3, 5, 6, 7, 15, 16, 0x16, 0x17, 0x18]
+        }
+        fn limits(&self) -> Limits {
+            Limits { read_words_max: 6, write_words_max: 6, ..Limits::STANDARD }
+        }
 
         fn bit(&self, _: Bits, address: u16) -> Result<bool, Refusal> {
             Ok(self.bits[place(address)?])

@@ -8,16 +8,9 @@ use super::pxr::{Pxr, SAMPLE, Sensor};
 use super::slave::Slave;
 use super::tank::{AMBIENT_C, Readings, Tank};
 
-/// The address that means every unit of a serial line.
-pub const BROADCAST: u8 = 0;
-/// Unit address of the PXR4.
-pub const PXR_UNIT: u8 = 1;
-/// Unit address of the DL06.
-pub const DL06_UNIT: u8 = 2;
-
 /// Time that a device takes between a request and its answer.
-const PXR_DELAY: Duration = Duration::from_millis(5);
-const DL06_DELAY: Duration = Duration::from_millis(3);
+pub(super) const PXR_DELAY: Duration = Duration::from_millis(5);
+pub(super) const DL06_DELAY: Duration = Duration::from_millis(3);
 
 /// Scans of the PLC, which are the inner steps, per sample of the controller.
 const SCANS_PER_SAMPLE: u32 = (SAMPLE.as_millis() / SCAN.as_millis()) as u32;
@@ -84,54 +77,14 @@ impl Rig {
         }
     }
 
-    /// Answers a request, or `None`: no such unit, a broadcast (which all obey), an empty request.
-    pub fn respond(&mut self, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
-        if unit == BROADCAST {
-            self.broadcast(pdu, |_| true);
-            return None;
-        }
-        self.overhear(unit);
-        match unit {
-            PXR_UNIT => self.pxr.respond(pdu),
-            DL06_UNIT => self.plc.respond(pdu),
-            _ => None,
-        }
+    /// The controller as a unit of its line.
+    pub fn controller(&mut self) -> &mut Slave<Pxr> {
+        &mut self.pxr
     }
 
-    /// Every unit that hears does what a broadcast says. Nobody answers.
-    pub fn broadcast(&mut self, pdu: &[u8], hears: impl Fn(u8) -> bool) {
-        if hears(PXR_UNIT) {
-            self.pxr.obey(pdu);
-        }
-        if hears(DL06_UNIT) {
-            self.plc.obey(pdu);
-        }
-    }
-
-    /// A unit refuses a request with this code, whatever it says.
-    pub fn refuse(&mut self, unit: u8, pdu: &[u8], code: u8) -> Option<Vec<u8>> {
-        self.overhear(unit);
-        match unit {
-            PXR_UNIT => self.pxr.refuse(pdu, code),
-            DL06_UNIT => self.plc.refuse(pdu, code),
-            _ => None,
-        }
-    }
-
-    /// The units other than this one count a message that is not theirs.
-    pub fn overhear(&mut self, unit: u8) {
-        if unit != PXR_UNIT {
-            self.pxr.hear();
-        }
-        if unit != DL06_UNIT {
-            self.plc.hear();
-        }
-    }
-
-    /// Something passed on the line that no unit could read.
-    pub fn spoiled(&mut self) {
-        self.pxr.hear_spoiled();
-        self.plc.hear_spoiled();
+    /// The PLC as a unit of its line.
+    pub fn plc(&mut self) -> &mut Slave<Dl06> {
+        &mut self.plc
     }
 
     /// Breaks or repairs the wire of the temperature sensor.
@@ -184,17 +137,26 @@ impl Default for Rig {
     }
 }
 
-/// The time that a unit takes between a request and its answer.
-pub fn reply_delay(unit: u8) -> Duration {
-    if unit == PXR_UNIT { PXR_DELAY } else { DL06_DELAY }
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::bus::frame::with_crc;
+    use crate::{bus::frame::with_crc, sim::slave::Unit};
+
+    /// The units of the thesis.
+    const PXR_UNIT: u8 = 1;
+    const DL06_UNIT: u8 = 2;
+
+    impl Rig {
+        fn respond(&mut self, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
+            match unit {
+                PXR_UNIT => self.pxr.respond(pdu),
+                DL06_UNIT => self.plc.respond(pdu),
+                _ => None,
+            }
+        }
+    }
 
     fn bytes(hex: &str) -> Vec<u8> {
         hex.split(' ').map(|byte| u8::from_str_radix(byte, 16).expect("two hex digits")).collect()
@@ -246,40 +208,6 @@ mod tests {
         rig.advance(Duration::from_secs(2));
         assert_eq!(rig.truth().sv_c, 5.0);
         assert_eq!(rig.respond(2, &[1, 8, 0, 0, 16]), Some(vec![1, 2, 0xFF, 0xFF]));
-    }
-
-    #[test]
-    fn a_stranger_and_a_broadcast_get_no_answer() {
-        let mut rig = Rig::new();
-        for unit in [0, 3, 247] {
-            assert_eq!(rig.respond(unit, &[3, 0, 0, 0, 1]), None);
-        }
-    }
-
-    /// 41003 is SV of the controller and plain V memory of the PLC.
-    #[test]
-    fn a_broadcast_is_obeyed_by_every_unit() {
-        let mut rig = Rig::new();
-        assert_eq!(rig.respond(0, &[16, 0x03, 0xEA, 0, 1, 2, 0x01, 0xF4]), None);
-        for unit in [PXR_UNIT, DL06_UNIT] {
-            assert_eq!(rig.respond(unit, &[3, 0x03, 0xEA, 0, 1]), Some(vec![3, 2, 0x01, 0xF4]));
-        }
-    }
-
-    #[test]
-    fn a_unit_counts_what_passes_on_its_line() {
-        let mut rig = Rig::new();
-        let counter = |rig: &mut Rig, which: u8| rig.respond(2, &[8, 0, which, 0, 0]).map(|reply| reply[4]);
-        for unit in [1, 2, 9, 0] {
-            rig.respond(unit, &[3, 0x03, 0xEA, 0, 1]);
-        }
-        rig.spoiled();
-        // All four messages and this question; one that was spoiled; unit 2, the broadcast and the three questions.
-        assert_eq!(counter(&mut rig, 0x0B), Some(5));
-        assert_eq!(counter(&mut rig, 0x0C), Some(1));
-        assert_eq!(counter(&mut rig, 0x0E), Some(5));
-        rig.power_cycle();
-        assert_eq!(counter(&mut rig, 0x0B), Some(1));
     }
 
     /// Advances second by second until the sequence has left a step; says how long that took.

@@ -40,25 +40,38 @@ const RECEIVED_SPOILED: u8 = RECEIVED | 1 << 1;
 const RECEIVED_BROADCAST: u8 = RECEIVED | 1 << 6;
 const SENT: u8 = 1 << 6;
 
-impl<D: Registers> Slave<D> {
+/// A unit as its line sees it, whatever device it is.
+pub trait Unit {
+    /// Answers a request; an empty one has no answer, nor one that the device holds back.
+    fn respond(&mut self, pdu: &[u8]) -> Option<Vec<u8>>;
+    /// Does what a broadcast says; nobody hears whether it could.
+    fn obey(&mut self, pdu: &[u8]);
+    /// Refuses a request with a code of somebody's choice.
+    fn refuse(&mut self, pdu: &[u8], code: u8) -> Option<Vec<u8>>;
+    /// A message for another unit passed on the line.
+    fn hear(&mut self);
+    /// A message passed that nobody could read.
+    fn hear_spoiled(&mut self);
+}
+
+impl<D> Slave<D> {
     /// All counters at zero.
     pub fn new(device: D) -> Slave<D> {
         Slave { device, counters: Counters::default() }
     }
+}
 
-    /// A message for another unit passed on the line.
-    pub fn hear(&mut self) {
+impl<D: Registers> Unit for Slave<D> {
+    fn hear(&mut self) {
         self.counters.count(HEARD);
     }
 
-    /// A message passed that nobody could read.
-    pub fn hear_spoiled(&mut self) {
+    fn hear_spoiled(&mut self) {
         self.counters.count(SPOILED);
         self.counters.note(RECEIVED_SPOILED);
     }
 
-    /// Answers a request; an empty one has no answer, nor one that the device holds back.
-    pub fn respond(&mut self, pdu: &[u8]) -> Option<Vec<u8>> {
+    fn respond(&mut self, pdu: &[u8]) -> Option<Vec<u8>> {
         let (&function, data) = pdu.split_first()?;
         self.counters.addressed(RECEIVED);
         if self.device.holds_back(function) {
@@ -66,7 +79,7 @@ impl<D: Registers> Slave<D> {
             return None;
         }
         let reply = match function {
-            0x08 | 0x0B | 0x0C if D::FUNCTIONS.contains(&function) => {
+            0x08 | 0x0B | 0x0C if self.device.functions().contains(&function) => {
                 self.counters.serve(function, data).unwrap_or_else(|refusal| pdu::exception(function, refusal.code()))
             }
             _ => pdu::serve(&mut self.device, pdu)?,
@@ -75,8 +88,7 @@ impl<D: Registers> Slave<D> {
         Some(reply)
     }
 
-    /// Does what a broadcast says; nobody hears whether it could.
-    pub fn obey(&mut self, pdu: &[u8]) {
+    fn obey(&mut self, pdu: &[u8]) {
         self.counters.addressed(RECEIVED_BROADCAST);
         self.counters.count(UNANSWERED);
         let heard = |function: &u8| WRITES.contains(function) && !self.device.holds_back(*function);
@@ -87,8 +99,7 @@ impl<D: Registers> Slave<D> {
         }
     }
 
-    /// Refuses a request with a code of somebody's choice.
-    pub fn refuse(&mut self, pdu: &[u8], code: u8) -> Option<Vec<u8>> {
+    fn refuse(&mut self, pdu: &[u8], code: u8) -> Option<Vec<u8>> {
         let reply = pdu::exception(*pdu.first()?, code);
         self.counters.addressed(RECEIVED);
         self.counters.answered(pdu[0], &reply);

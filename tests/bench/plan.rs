@@ -41,6 +41,7 @@ fn device(id: u16) -> DeviceDef {
         profile: String::new(),
         model: String::new(),
         limits: Limits { gap_words_max: 16, ..Limits::STANDARD },
+        functions: Vec::new(),
         gap: Duration::ZERO,
         write_gap: Duration::ZERO,
         faceplate: None,

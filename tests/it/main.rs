@@ -9,6 +9,7 @@
 //! | `masters` | our simulated slaves, and those of the benches, against masters that we did not write: mbpoll, pymodbus, minimalmodbus |
 //! | `capture` | saved traffic, opened by Wireshark's own reader |
 //! | `shift` | a whole shift in virtual time, and its report read by an independent reader |
+//! | `devices` | every shipped profile and plant against its simulated devices: a minute, every fault, golden frames |
 //! | `settings` | settings of a line: tried out, saved into the plant file |
 //! | `durability` | killed, unplugged, locked, damaged |
 //! | `support` | what the others share: processes with deadlines, peers and their installation |
@@ -17,6 +18,7 @@
 mod architecture;
 mod capture;
 mod commands;
+mod devices;
 mod durability;
 mod masters;
 mod peers;

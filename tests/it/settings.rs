@@ -13,8 +13,9 @@ use sightglass::{
     },
     profile::{self, PlantFile, Search},
     sim::{
-        io::{RigHandle, Wire, serve_line},
+        io::{Wire, WorldHandle, serve_line},
         rig::Rig,
+        world::World,
     },
     station::{self, Session},
 };
@@ -28,12 +29,12 @@ const L1: LineId = LineId(0);
 fn start(def: &Arc<PlantDef>, file: Option<PlantFile>, history: &Path) -> station::io::Station {
     let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
     let (ports, streams) = mpsc::channel(3);
-    let rig = RigHandle::spawn(Rig::demo(), clock);
+    let world = WorldHandle::spawn(World::tank(Rig::demo()), clock);
     for _ in 0..3 {
         let (ours, theirs) = tokio::io::duplex(1024);
         ports.try_send(ours).unwrap();
         let wire = Wire { serial: Serial::USUAL, ascii: false };
-        tokio::spawn(serve_line(theirs, rig.clone(), wire, Duration::from_secs(86_400)));
+        tokio::spawn(serve_line(theirs, world.line(L1), wire, Duration::from_secs(86_400)));
     }
     let options = station::io::Options {
         def: def.clone(),

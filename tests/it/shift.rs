@@ -13,13 +13,14 @@ use sightglass::{
     plant::{
         PlantDef,
         command::{Command as Wish, Order, OrderId, Outcome},
-        def::CsvDialect,
+        def::{CsvDialect, LineId},
     },
     profile::{self, Search},
     report::{ask, csv},
     sim::{
-        io::{RigHandle, Wire, serve_line},
+        io::{Wire, WorldHandle, serve_line},
         rig::Rig,
+        world::World,
     },
     station::{self, Session},
 };
@@ -113,8 +114,8 @@ fn start_on_simulation(def: &Arc<PlantDef>, clock: Clock, history: &Path) -> sta
     let (ports, streams) = mpsc::channel(1);
     ports.try_send(ours).unwrap();
     let Some(serial) = def.lines[0].transport.serial() else { panic!("the tank has a serial line") };
-    let (rig, wire) = (RigHandle::spawn(Rig::demo(), clock), Wire { serial, ascii: false });
-    tokio::spawn(serve_line(theirs, rig, wire, Duration::from_secs(86_400)));
+    let (world, wire) = (WorldHandle::spawn(World::tank(Rig::demo()), clock), Wire { serial, ascii: false });
+    tokio::spawn(serve_line(theirs, world.line(LineId(0)), wire, Duration::from_secs(86_400)));
     let connectors = vec![Connector::Memory(streams)];
     station::io::start(station::io::Options {
         def: def.clone(),

@@ -10,6 +10,7 @@ use sequence::{Conditions, Sequence, Step};
 
 use super::pdu::{Bits, Identity, Refusal, Registers, Words};
 use super::tank::{Actuators, Readings, control_level_cm};
+use crate::plant::def::Limits;
 
 /// Time of one scan.
 pub const SCAN: Duration = Duration::from_millis(100);
@@ -266,10 +267,17 @@ fn from_bcd(word: u16) -> Option<u16> {
 
 /// The PLC's manual names 01–06, 0F and 10; ours knows all others too, so that tools for diagnosis find somebody to talk to.
 impl Registers for Dl06 {
-    const FUNCTIONS: &'static [u8] =
-        &[0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x08, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x16, 0x17, 0x18, 0x2B];
-    const WORDS_MAX: u16 = 125;
-    const IDENTITY: Identity = IDENTITY;
+    fn functions(&self) -> &[u8] {
+        &[0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x08, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x16, 0x17, 0x18, 0x2B]
+    }
+
+    fn limits(&self) -> Limits {
+        Limits::STANDARD
+    }
+
+    fn identity(&self) -> Identity {
+        IDENTITY
+    }
 
     fn bit(&self, kind: Bits, address: u16) -> Result<bool, Refusal> {
         self.memory.bit(kind, address)

@@ -1,4 +1,4 @@
-//! Serves the rig as slaves on a line that takes the time of a real one: RTU or ASCII, on any stream of bytes.
+//! Serves the units of a line that takes the time of a real one: RTU or ASCII, on any stream of bytes.
 //!
 //! ```text
 //!  request arrives     its last byte        slave knows       answer begins      last byte of answer: written here
@@ -12,7 +12,7 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::time::{Instant, sleep_until, timeout};
 
-use super::RigHandle;
+use super::LineHandle;
 use crate::bus::io::clock::Clock;
 use crate::plant::def::Serial;
 use crate::sim::faults::Answer;
@@ -50,12 +50,12 @@ impl Wire {
 }
 
 /// Serves until the stream ends, fails, or brings nothing for longer than `idle_max`. Everything on the wire runs in the
-/// plant time of the rig's clock.
-pub async fn serve_line<S>(mut stream: S, rig: RigHandle, wire: Wire, idle_max: Duration) -> io::Result<()>
+/// plant time of the world's clock.
+pub async fn serve_line<S>(mut stream: S, units: LineHandle, wire: Wire, idle_max: Duration) -> io::Result<()>
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
-    let mut line = Line::new(rig.clock(), wire);
+    let mut line = Line::new(units.clock(), wire);
     let mut bytes = [0; 256];
     loop {
         tokio::select! {
@@ -65,7 +65,7 @@ where
             },
             () = sleep_until(line.next()), if line.waits() => match line.due(Instant::now()) {
                 Due::Nothing => {}
-                Due::Execute { at, request } => line.execute(at, &request, &rig).await,
+                Due::Execute { at, request } => line.execute(at, &request, &units).await,
                 Due::Send(frame) => match timeout(WRITE_MAX, stream.write_all(&frame)).await {
                     Ok(written) => written?,
                     Err(_nobody_takes_it) => {}
@@ -74,7 +74,7 @@ where
             () = sleep_until(line.latest + idle_max) => return Ok(()),
         }
         for _ in 0..std::mem::take(&mut line.spoiled) {
-            rig.spoiled().await;
+            units.spoiled().await;
         }
     }
 }
@@ -84,7 +84,7 @@ struct Line {
     clock: Clock,
     wire: Wire,
     ears: Ears,
-    /// Frames that could not be read since the rig was told.
+    /// Frames that could not be read since the units were told.
     spoiled: usize,
     /// Since when the request that is arriving has been on the wire, and when its latest bytes came.
     began: Instant,
@@ -193,9 +193,9 @@ impl Line {
     }
 
     /// The device acts now, and its answer is over after its delay and its time on the wire.
-    async fn execute(&mut self, at: Instant, request: &[u8], rig: &RigHandle) {
+    async fn execute(&mut self, at: Instant, request: &[u8], units: &LineHandle) {
         let [unit, pdu @ ..] = request else { return };
-        if let Some(answer) = rig.ask(*unit, pdu).await {
+        if let Some(answer) = units.ask(*unit, pdu).await {
             let frame = self.wire.spell(&answer);
             let at = at + self.clock.real_span(answer.delay) + self.time_of(frame.len());
             self.jobs.push(Job { at, what: What::Send(frame) });
@@ -216,23 +216,27 @@ mod tests {
 
     use super::*;
     use crate::bus::frame::with_crc;
+    use crate::plant::def::LineId;
     use crate::plant::def::Parity;
     use crate::sim::faults::Fault;
+    use crate::sim::io::WorldHandle;
     use crate::sim::rig::Rig;
+    use crate::sim::world::World;
 
     const FOR_EVER: Duration = Duration::from_secs(86_400 * 365);
+    const L1: LineId = LineId(0);
     const READ_TEN: &[u8] = &[1, 4, 0x03, 0xE8, 0, 10];
     const READ_STEP: &[u8] = &[2, 3, 4, 0, 0, 1];
 
-    fn line(baud: u32, parity: Parity, speed: f64) -> (DuplexStream, RigHandle) {
+    fn line(baud: u32, parity: Parity, speed: f64) -> (DuplexStream, WorldHandle) {
         serve(Serial { baud, data_bits: 8, parity, stop_bits: 1 }, false, speed)
     }
 
-    fn serve(serial: Serial, ascii: bool, speed: f64) -> (DuplexStream, RigHandle) {
-        let rig = RigHandle::spawn(Rig::demo(), Clock::starting_at(Timestamp::UNIX_EPOCH, speed));
+    fn serve(serial: Serial, ascii: bool, speed: f64) -> (DuplexStream, WorldHandle) {
+        let world = WorldHandle::spawn(World::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, speed));
         let (master, slave) = duplex(1024);
-        tokio::spawn(serve_line(slave, rig.clone(), Wire { serial, ascii }, FOR_EVER));
-        (master, rig)
+        tokio::spawn(serve_line(slave, world.line(L1), Wire { serial, ascii }, FOR_EVER));
+        (master, world)
     }
 
     /// What arrives until nothing has come for two seconds, and when its last byte came.
@@ -255,7 +259,7 @@ mod tests {
     }
 
     async fn check(baud: u32, parity: Parity, speed: f64, expect_ms: f64) {
-        let (mut master, _rig) = line(baud, parity, speed);
+        let (mut master, _world) = line(baud, parity, speed);
         let (frame, took) = ask(&mut master, READ_TEN).await;
         assert_eq!(frame.len(), 25);
         let took_ms = took.as_secs_f64() * 1e3;
@@ -274,7 +278,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn the_grain_of_the_timers_does_not_add_up() {
-        let (mut master, _rig) = line(115_200, Parity::None, 1.0);
+        let (mut master, _world) = line(115_200, Parity::None, 1.0);
         let (began, mut reply, rounds) = (Instant::now(), [0; 25], 200);
         for _ in 0..rounds {
             master.write_all(&with_crc(READ_TEN)).await.expect("the line takes requests");
@@ -287,7 +291,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_request_in_pieces_and_one_after_noise_are_understood() {
-        let (mut master, _rig) = line(9600, Parity::None, 1.0);
+        let (mut master, _world) = line(9600, Parity::None, 1.0);
         let request = with_crc(READ_STEP);
         master.write_all(&request[..3]).await.expect("the line takes bytes");
         tokio::time::advance(Duration::from_millis(5)).await;
@@ -301,21 +305,21 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn faults_look_as_they_do_on_a_line() {
-        let (mut master, rig) = line(9600, Parity::None, 1.0);
-        rig.set_fault(1, Fault::Silent).await;
+        let (mut master, world) = line(9600, Parity::None, 1.0);
+        world.set_fault(L1, 1, Fault::Silent).await;
         assert_eq!(ask(&mut master, READ_TEN).await.0, Vec::<u8>::new());
         assert_eq!(ask(&mut master, READ_STEP).await.0.len(), 7);
-        rig.set_fault(1, Fault::Truncated).await;
+        world.set_fault(L1, 1, Fault::Truncated).await;
         assert_eq!(ask(&mut master, READ_TEN).await.0.len(), 12);
-        rig.set_fault(1, Fault::Late(Duration::from_millis(700))).await;
+        world.set_fault(L1, 1, Fault::Late(Duration::from_millis(700))).await;
         let (frame, took) = ask(&mut master, READ_TEN).await;
         assert!(frame.len() == 25 && took > Duration::from_millis(743), "{took:?}");
     }
 
     #[tokio::test(start_paused = true)]
     async fn another_unit_answers_while_one_is_late() {
-        let (mut master, rig) = line(9600, Parity::None, 1.0);
-        rig.set_fault(1, Fault::Late(Duration::from_millis(500))).await;
+        let (mut master, world) = line(9600, Parity::None, 1.0);
+        world.set_fault(L1, 1, Fault::Late(Duration::from_millis(500))).await;
         master.write_all(&with_crc(READ_TEN)).await.expect("the line takes requests");
         tokio::time::advance(Duration::from_millis(100)).await;
         let (frames, _) = ask(&mut master, READ_STEP).await;
@@ -324,7 +328,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_broadcast_is_obeyed_but_not_answered_nor_is_a_stranger() {
-        let (mut master, _rig) = line(9600, Parity::None, 1.0);
+        let (mut master, _world) = line(9600, Parity::None, 1.0);
         assert_eq!(ask(&mut master, &[0, 6, 0x03, 0xEA, 0, 1]).await.0, Vec::<u8>::new());
         assert_eq!(ask(&mut master, &[9, 3, 0, 0, 0, 1]).await.0, Vec::<u8>::new());
         for unit in [1, 2] {
@@ -335,7 +339,7 @@ mod tests {
     /// The counter of bus communication errors (08/0C) of unit 2.
     #[tokio::test(start_paused = true)]
     async fn a_slave_counts_the_frames_that_it_could_not_read() {
-        let (mut master, _rig) = line(9600, Parity::None, 1.0);
+        let (mut master, _world) = line(9600, Parity::None, 1.0);
         for spoiled in [&[1, 3, 0, 0, 0, 1, 0, 0][..], &[0xFF], &[2; 300]] {
             master.write_all(spoiled).await.expect("the line takes bytes");
             assert_eq!(gather(&mut master).await.0, Vec::<u8>::new());
@@ -355,7 +359,7 @@ mod tests {
     /// 17 characters there, 15 back, 5 ms of the device, no silence between.
     #[tokio::test(start_paused = true)]
     async fn ascii_takes_its_own_time() {
-        let (mut master, _rig) = serve(SEVEN_BITS, true, 1.0);
+        let (mut master, _world) = serve(SEVEN_BITS, true, 1.0);
         let (answer, took) = ask_ascii(&mut master, ":010303EA00010E\r\n").await;
         assert_eq!(answer, ":01030202BC3C\r\n");
         let (took_ms, wire_ms) = (took.as_secs_f64() * 1e3, 320.0 / 9.6 + 5.0);
@@ -364,7 +368,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn ascii_waits_a_second_for_a_character_and_begins_anew_with_a_colon() {
-        let (mut master, rig) = serve(SEVEN_BITS, true, 1.0);
+        let (mut master, world) = serve(SEVEN_BITS, true, 1.0);
         master.write_all(b":010303EA").await.expect("the line takes bytes");
         tokio::time::advance(Duration::from_millis(900)).await;
         assert_eq!(ask_ascii(&mut master, "00010E\r\n").await.0, ":01030202BC3C\r\n");
@@ -374,7 +378,7 @@ mod tests {
         assert_eq!(ask_ascii(&mut master, ":0103:010303EA00010E\r\n").await.0, ":01030202BC3C\r\n");
         assert_eq!(ask_ascii(&mut master, ":010303EA00010F\r\n").await.0, "");
         assert_eq!(ask_ascii(&mut master, ":0208000C0000EA\r\n").await.0, ":0208000C0003E7\r\n");
-        rig.set_fault(1, Fault::BadCrc).await;
+        world.set_fault(L1, 1, Fault::BadCrc).await;
         assert_eq!(ask_ascii(&mut master, ":010303EA00010E\r\n").await.0, ":01030202BC30\r\n");
     }
 }

@@ -1,4 +1,4 @@
-//! The edge of the simulated plant: its clock, its serial lines, its TCP port.
+//! The edge of the simulated world: the task that owns it, its serial lines, its TCP ports.
 
 mod line;
 mod owner;
@@ -7,7 +7,7 @@ mod serving;
 mod tcp;
 
 pub use line::{Wire, serve_line};
-pub use owner::RigHandle;
+pub use owner::{LineHandle, WorldHandle};
 pub use pty::{Pty, open_pty};
-pub use serving::{Mode, Serving, SimError, serial_of, start_pty, start_tcp};
-pub use tcp::{Speech, serve_tcp};
+pub use serving::{Mode, Place, Service, Serving, SimError, serve};
+pub use tcp::{Speech, serve_stream, serve_tcp};

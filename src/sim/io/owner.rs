@@ -1,79 +1,105 @@
-//! The task that owns the rig, and the handle that lines, tests and pages talk to it through.
+//! The task that owns the world, and the handle that lines, tests and pages talk to it through.
 
-use std::time::Duration;
+use std::{collections::BTreeSet, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use tokio::sync::{mpsc, oneshot};
 
-use crate::bus::io::clock::Clock;
-use crate::sim::faults::{Answer, Fault, Faults};
-use crate::sim::rig::{Rig, Truth};
+use crate::{
+    bus::io::clock::Clock,
+    plant::def::{LineId, TagId},
+    sim::{
+        faults::{Answer, Fault, Faults},
+        rig::{Rig, Truth},
+        world::World,
+    },
+};
 
 /// Orders that may wait; a full queue makes the sender wait, and the task always drains it.
 const ORDERS_MAX: usize = 64;
-/// The rig is brought up to date this often when nobody asks (plant time), but not oftener than the real interval.
+/// The world is brought up to date this often when nobody asks (plant time), but not oftener than the real interval.
 const IDLE: Duration = Duration::from_secs(1);
 const IDLE_REAL_MIN: Duration = Duration::from_millis(50);
 /// The most plant time made up for at once, after the machine was asleep or overloaded; the rest is not simulated.
 const CATCH_UP_MAX: Duration = Duration::from_secs(3600);
 
-/// Speaks to the task that owns the rig. The task ends when the last handle is gone.
+/// Speaks to the task that owns the world. The task ends when the last handle is gone.
 #[derive(Debug, Clone)]
-pub struct RigHandle {
+pub struct WorldHandle {
     orders: mpsc::Sender<Order>,
     clock: Clock,
+    units: Arc<BTreeSet<(LineId, u8)>>,
 }
 
-/// What a task waits for when it asks the rig; if the task is gone, nothing comes back.
+/// Speaks to the units of one line.
+#[derive(Debug, Clone)]
+pub struct LineHandle {
+    world: WorldHandle,
+    line: LineId,
+}
+
+/// What a task waits for when it asks the world; if the task is gone, nothing comes back.
 type Reply<T> = oneshot::Sender<T>;
 
 #[derive(Debug)]
 enum Order {
-    Ask { unit: u8, pdu: Vec<u8>, reply: Reply<Option<Answer>> },
+    Ask { line: LineId, unit: u8, pdu: Vec<u8>, reply: Reply<Option<Answer>> },
     Tell(Told, Reply<()>),
-    Truth(Reply<Truth>),
+    Truth(Reply<Option<Truth>>),
+    Value(TagId, Reply<Option<f64>>),
+    SetValue(TagId, f64, Reply<bool>),
 }
 
 #[derive(Debug)]
 enum Told {
-    Fault(u8, Fault),
+    Fault(LineId, u8, Fault),
     SensorOpen(bool),
     Switch(u16, bool),
     PowerCycle,
-    Spoiled,
+    Spoiled(LineId),
 }
 
-impl RigHandle {
-    /// Starts the task. The rig lives in the plant time of `clock`.
-    pub fn spawn(rig: Rig, clock: Clock) -> RigHandle {
+impl WorldHandle {
+    /// Starts the task. The world lives in the plant time of `clock`.
+    pub fn spawn(world: World, clock: Clock) -> WorldHandle {
         let (orders, inbox) = mpsc::channel(ORDERS_MAX);
-        tokio::spawn(run(rig, clock, clock.now(), inbox));
-        RigHandle { orders, clock }
+        let units = Arc::new(world.addresses().collect());
+        tokio::spawn(run(world, clock, clock.now(), inbox));
+        WorldHandle { orders, clock, units }
     }
 
-    /// The clock of the rig.
+    /// The clock of the world.
     pub fn clock(&self) -> Clock {
         self.clock
     }
 
-    /// Puts a request to a unit. `None`: nothing comes back, now or ever.
-    pub async fn ask(&self, unit: u8, pdu: &[u8]) -> Option<Answer> {
-        let (reply, answer) = oneshot::channel();
-        self.orders.send(Order::Ask { unit, pdu: pdu.to_vec(), reply }).await.ok()?;
-        answer.await.ok().flatten()
+    /// The units of one line, to serve them.
+    pub fn line(&self, line: LineId) -> LineHandle {
+        LineHandle { world: self.clone(), line }
     }
 
-    /// Makes a unit faulty, or well again.
-    pub async fn set_fault(&self, unit: u8, fault: Fault) {
-        self.tell(Told::Fault(unit, fault)).await;
+    /// Every unit of the world, by its line.
+    pub fn units(&self) -> impl Iterator<Item = (LineId, u8)> + '_ {
+        self.units.iter().copied()
     }
 
-    /// Breaks or repairs the wire of the temperature sensor.
+    /// Puts a request to a unit of a line. `None`: nothing comes back, now or ever.
+    pub async fn ask(&self, line: LineId, unit: u8, pdu: &[u8]) -> Option<Answer> {
+        let pdu = pdu.to_vec();
+        self.put(|reply| Order::Ask { line, unit, pdu, reply }).await.flatten()
+    }
+
+    /// Makes a unit of a line faulty, or well again.
+    pub async fn set_fault(&self, line: LineId, unit: u8, fault: Fault) {
+        self.tell(Told::Fault(line, unit, fault)).await;
+    }
+
+    /// Breaks or repairs the wire of the temperature sensor in the tank rig.
     pub async fn set_sensor_open(&self, open: bool) {
         self.tell(Told::SensorOpen(open)).await;
     }
 
-    /// Turns a panel switch X0–X3 of the PLC.
+    /// Turns a panel switch X0–X3 of the rig's PLC.
     pub async fn set_switch(&self, switch: u16, on: bool) {
         self.tell(Told::Switch(switch, on)).await;
     }
@@ -83,29 +109,58 @@ impl RigHandle {
         self.tell(Told::PowerCycle).await;
     }
 
-    /// Something passed on the line that no unit could read.
-    pub async fn spoiled(&self) {
-        self.tell(Told::Spoiled).await;
+    /// What is really so in the tank rig now; `None` if the world has no rig, or once its task has ended.
+    pub async fn truth(&self) -> Option<Truth> {
+        self.put(Order::Truth).await.flatten()
     }
 
-    /// What is really so in the rig now; `None` once its task has ended.
-    pub async fn truth(&self) -> Option<Truth> {
-        let (reply, truth) = oneshot::channel();
-        self.orders.send(Order::Truth(reply)).await.ok()?;
-        truth.await.ok()
+    /// What a modelled device holds for a tag now, in the tag's unit; `None` for a tag of the rig.
+    pub async fn value(&self, tag: TagId) -> Option<f64> {
+        self.put(|reply| Order::Value(tag, reply)).await.flatten()
+    }
+
+    /// Puts a value into the registers of a modelled device, as if the device had found it so: a fault code, a reading.
+    /// `false` if it cannot hold it.
+    pub async fn set_value(&self, tag: TagId, value: f64) -> bool {
+        self.put(|reply| Order::SetValue(tag, value, reply)).await.unwrap_or(false)
     }
 
     /// Returns when it is in force. The task lives as long as this handle, except while its runtime shuts down; then
     /// there is nobody to tell.
     async fn tell(&self, told: Told) {
-        let (reply, done) = oneshot::channel();
-        if self.orders.send(Order::Tell(told, reply)).await.is_ok() {
-            done.await.ok();
-        }
+        self.put(|reply| Order::Tell(told, reply)).await;
+    }
+
+    async fn put<T>(&self, order: impl FnOnce(Reply<T>) -> Order) -> Option<T> {
+        let (reply, answer) = oneshot::channel();
+        self.orders.send(order(reply)).await.ok()?;
+        answer.await.ok()
     }
 }
 
-async fn run(mut rig: Rig, clock: Clock, mut reached: Timestamp, mut inbox: mpsc::Receiver<Order>) {
+impl LineHandle {
+    /// The clock of the world.
+    pub fn clock(&self) -> Clock {
+        self.world.clock
+    }
+
+    /// Whether a unit has this address.
+    pub fn has(&self, unit: u8) -> bool {
+        self.world.units.contains(&(self.line, unit))
+    }
+
+    /// Puts a request to a unit. `None`: nothing comes back, now or ever.
+    pub async fn ask(&self, unit: u8, pdu: &[u8]) -> Option<Answer> {
+        self.world.ask(self.line, unit, pdu).await
+    }
+
+    /// Something passed on the line that no unit could read.
+    pub async fn spoiled(&self) {
+        self.world.tell(Told::Spoiled(self.line)).await;
+    }
+}
+
+async fn run(mut world: World, clock: Clock, mut reached: Timestamp, mut inbox: mpsc::Receiver<Order>) {
     let mut faults = Faults::default();
     let idle = IDLE.max(IDLE_REAL_MIN.mul_f64(clock.speed()));
     loop {
@@ -117,33 +172,48 @@ async fn run(mut rig: Rig, clock: Clock, mut reached: Timestamp, mut inbox: mpsc
             () = clock.sleep(idle) => None,
         };
         let now = clock.now();
-        rig.advance(Duration::try_from(now.duration_since(reached)).unwrap_or_default().min(CATCH_UP_MAX));
+        world.advance(Duration::try_from(now.duration_since(reached)).unwrap_or_default().min(CATCH_UP_MAX));
         reached = now;
         if let Some(order) = order {
-            obey(&mut rig, &mut faults, order);
+            obey(&mut world, &mut faults, order);
         }
     }
 }
 
 /// Who asked may have gone meanwhile; an answer that nobody waits for is dropped.
-fn obey(rig: &mut Rig, faults: &mut Faults, order: Order) {
+fn obey(world: &mut World, faults: &mut Faults, order: Order) {
     match order {
-        Order::Ask { unit, pdu, reply } => {
-            reply.send(faults.answer(rig, unit, &pdu)).ok();
+        Order::Ask { line, unit, pdu, reply } => {
+            reply.send(faults.answer(world, line, unit, &pdu)).ok();
         }
         Order::Truth(reply) => {
-            reply.send(rig.truth()).ok();
+            reply.send(world.rig().map(Rig::truth)).ok();
+        }
+        Order::Value(tag, reply) => {
+            reply.send(world.value(tag)).ok();
+        }
+        Order::SetValue(tag, value, reply) => {
+            reply.send(world.set_value(tag, value)).ok();
         }
         Order::Tell(told, done) => {
-            match told {
-                Told::Fault(unit, fault) => faults.set(unit, fault),
-                Told::SensorOpen(open) => rig.set_sensor_open(open),
-                Told::Switch(switch, on) => rig.set_switch(switch, on),
-                Told::PowerCycle => rig.power_cycle(),
-                Told::Spoiled => rig.spoiled(),
-            }
+            follow(world, faults, told);
             done.send(()).ok();
         }
+    }
+}
+
+/// What concerns the rig is lost on a world that has none.
+fn follow(world: &mut World, faults: &mut Faults, told: Told) {
+    match told {
+        Told::Fault(line, unit, fault) => faults.set(line, unit, fault),
+        Told::SensorOpen(open) => {
+            world.rig_mut().map(|rig| rig.set_sensor_open(open));
+        }
+        Told::Switch(switch, on) => {
+            world.rig_mut().map(|rig| rig.set_switch(switch, on));
+        }
+        Told::PowerCycle => world.power_cycle(),
+        Told::Spoiled(line) => world.spoiled(line),
     }
 }
 
@@ -154,26 +224,26 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn the_rig_lives_in_plant_time() {
-        let rig = RigHandle::spawn(Rig::demo(), Clock::starting_at(Timestamp::UNIX_EPOCH, 60.0));
+        let world = WorldHandle::spawn(World::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, 60.0));
         tokio::time::advance(Duration::from_secs(5)).await;
-        let truth = rig.truth().await.expect("the task runs");
+        let truth = world.truth().await.expect("the task runs");
         // Five real seconds are five minutes of plant: filled, and about 270 s of heating done.
         assert_eq!(truth.step, Step::Heat);
         assert!((40.0..50.0).contains(&truth.probe_c), "{truth:?}");
     }
 
     #[tokio::test(start_paused = true)]
-    async fn faults_reach_the_rig() {
-        let rig = RigHandle::spawn(Rig::demo(), Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0));
-        rig.set_fault(1, Fault::Silent).await;
-        assert_eq!(rig.ask(1, &[3, 3, 0xEA, 0, 1]).await, None);
-        assert!(rig.ask(2, &[3, 4, 0, 0, 1]).await.is_some());
-        rig.set_sensor_open(true).await;
+    async fn faults_reach_the_units() {
+        let world = WorldHandle::spawn(World::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0));
+        world.set_fault(LineId(0), 1, Fault::Silent).await;
+        assert_eq!(world.ask(LineId(0), 1, &[3, 3, 0xEA, 0, 1]).await, None);
+        assert!(world.ask(LineId(0), 2, &[3, 4, 0, 0, 1]).await.is_some());
+        world.set_sensor_open(true).await;
         tokio::time::advance(Duration::from_secs(1)).await;
-        let truth = rig.truth().await.expect("the task runs");
+        let truth = world.truth().await.expect("the task runs");
         assert!(truth.pv_c > 190.0 && truth.mv_percent == 0.0, "{truth:?}");
-        rig.power_cycle().await;
+        world.power_cycle().await;
         tokio::time::advance(Duration::from_secs(1)).await;
-        assert_eq!(rig.truth().await.map(|truth| truth.step), Some(Step::Idle));
+        assert_eq!(world.truth().await.map(|truth| truth.step), Some(Step::Idle));
     }
 }

@@ -1,22 +1,22 @@
-//! Serves the simulation that a plant names, on a pseudo-terminal or over TCP.
+//! Serves every line of a simulated plant at a place of its own: a pseudo-terminal, or a TCP port.
 
 use std::{
     io,
-    net::SocketAddr,
+    net::{Ipv4Addr, SocketAddr},
     path::{Path, PathBuf},
     time::Duration,
 };
 
 use tokio::{net::TcpListener, task::JoinHandle};
 
-use super::{RigHandle, Speech, Wire, open_pty, serve_line, serve_tcp};
+use super::{LineHandle, Speech, Wire, WorldHandle, open_pty, serve_line, serve_tcp};
 use crate::{
     bus::io::clock::Clock,
     plant::{
         PlantDef,
-        def::{Framing, Serial, Transport},
+        def::{Framing, LineDef, LineId, Serial, Transport},
     },
-    sim::rig::Rig,
+    sim::world::{UnknownSimulation, World},
 };
 
 /// A pseudo-terminal waits for its client as long as it takes.
@@ -25,44 +25,80 @@ const FOR_EVER: Duration = Duration::from_secs(86_400 * 365);
 /// Why a plant cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimError {
-    /// The plant names no simulation, or one that this program does not have.
-    #[error("the plant has no simulation that this program knows")]
-    NoSimulation,
+    /// The plant names a process that this program does not have.
+    #[error(transparent)]
+    Unknown(#[from] UnknownSimulation),
     /// No pseudo-terminal, or the TCP port is taken.
     #[error(transparent)]
     Io(#[from] io::Error),
 }
 
-/// A simulated line that is being served; it ends when this is dropped.
+/// A simulated plant that is being served; it ends when this is dropped.
 #[derive(Debug)]
-pub struct Serving<Place> {
-    place: Place,
-    /// The rig behind it, for faults on demand.
-    pub rig: RigHandle,
-    task: JoinHandle<io::Result<()>>,
+pub struct Serving {
+    /// The world behind it, for faults on demand.
+    pub world: WorldHandle,
+    places: Vec<Place>,
+    tasks: Vec<JoinHandle<io::Result<()>>>,
 }
 
-impl Serving<PathBuf> {
-    /// The port for a master to open.
-    pub fn path(&self) -> &Path {
-        &self.place
+/// Where a master finds a line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// The port to open.
+    Port(PathBuf),
+    /// The address to connect to.
+    Address(SocketAddr),
+}
+
+impl Place {
+    /// The port, if it is one.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Place::Port(path) => Some(path),
+            Place::Address(_) => None,
+        }
     }
 }
 
-impl Serving<SocketAddr> {
-    /// The address for a master to connect to.
-    pub fn address(&self) -> SocketAddr {
-        self.place
+/// `/dev/pts/3` or `127.0.0.1:40001`.
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Place::Port(path) => path.display().fmt(f),
+            Place::Address(address) => address.fmt(f),
+        }
     }
 }
 
-impl<Place> Drop for Serving<Place> {
+impl Serving {
+    /// The place of each line, in the order of the plant.
+    pub fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    /// Puts every line of the plant that is served onto its simulated place.
+    pub fn plug_into(&self, def: &mut PlantDef) {
+        for (line, place) in def.lines.iter_mut().zip(&self.places) {
+            match (&mut line.transport, place) {
+                (Transport::Serial { port, .. }, Place::Port(path)) => *port = path.display().to_string(),
+                (Transport::Tcp { host, port, .. }, Place::Address(address)) => {
+                    (*host, *port) = (address.ip().to_string(), address.port());
+                }
+                // Served otherwise than the plant says, which is for masters of other makers.
+                (Transport::Serial { .. }, Place::Address(_)) | (Transport::Tcp { .. }, Place::Port(_)) => {}
+            }
+        }
+    }
+}
+
+impl Drop for Serving {
     fn drop(&mut self) {
-        self.task.abort();
+        self.tasks.iter().for_each(JoinHandle::abort);
     }
 }
 
-/// How the simulated devices can be spoken to.
+/// How the simulated devices of a line can be spoken to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
     /// RTU on a serial line.
@@ -76,13 +112,13 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// What the plant's first line speaks.
-    pub fn of(def: &PlantDef) -> Mode {
-        match def.lines.first().map(|line| &line.transport) {
-            Some(Transport::Serial { framing: Framing::Ascii, .. }) => Mode::Ascii,
-            Some(Transport::Serial { .. }) | None => Mode::Rtu,
-            Some(Transport::Tcp { framing: Framing::Mbap, .. }) => Mode::Tcp,
-            Some(Transport::Tcp { .. }) => Mode::RtuOverTcp,
+    /// What a line speaks.
+    fn of(line: &LineDef) -> Mode {
+        match &line.transport {
+            Transport::Serial { framing: Framing::Ascii, .. } => Mode::Ascii,
+            Transport::Serial { .. } => Mode::Rtu,
+            Transport::Tcp { framing: Framing::Mbap, .. } => Mode::Tcp,
+            Transport::Tcp { .. } => Mode::RtuOverTcp,
         }
     }
 
@@ -104,42 +140,54 @@ impl std::fmt::Display for Mode {
     }
 }
 
-/// The plant's first serial line, for its pace; 9600 8N1 if it has none.
-pub fn serial_of(def: &PlantDef) -> Serial {
-    def.lines.iter().find_map(|line| line.transport.serial()).unwrap_or(Serial::USUAL)
+/// How one line is served.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Service {
+    /// What is spoken.
+    pub mode: Mode,
+    /// The pace of the serial line; the one behind a serial server, for RTU over TCP.
+    pub serial: Serial,
+    /// Where TCP is served; port 0 picks a free one.
+    pub address: SocketAddr,
 }
 
-/// Serves on a new pseudo-terminal at the pace of a serial line: ASCII in that mode, RTU in any other.
-pub fn start_pty(def: &PlantDef, clock: Clock, mode: Mode, serial: Serial) -> Result<Serving<PathBuf>, SimError> {
-    let rig = RigHandle::spawn(rig_of(def)?, clock);
-    let (pty, place) = open_pty()?;
-    let wire = Wire { serial, ascii: mode == Mode::Ascii };
-    let task = tokio::spawn(serve_line(pty, rig.clone(), wire, FOR_EVER));
-    Ok(Serving { place, rig, task })
+impl Service {
+    /// As the plant says: at the pace of the line (9600 8N1 where it names none), on a free port of this machine.
+    pub fn of(line: &LineDef) -> Service {
+        let serial = line.transport.serial().unwrap_or(Serial::USUAL);
+        Service { mode: Mode::of(line), serial, address: (Ipv4Addr::LOCALHOST, 0).into() }
+    }
+
+    /// What is spoken on any stream of bytes that stands for the line.
+    pub fn speech(&self) -> Speech {
+        let wire = Wire { serial: self.serial, ascii: self.mode == Mode::Ascii };
+        if self.mode == Mode::Tcp { Speech::Mbap } else { Speech::Line(wire) }
+    }
 }
 
-/// Serves over TCP; port 0 picks a free one. RTU over TCP, in that mode, keeps the pace of the serial line behind it; any
-/// other mode means Modbus TCP.
-pub async fn start_tcp(
-    def: &PlantDef,
-    clock: Clock,
-    address: SocketAddr,
-    mode: Mode,
-) -> Result<Serving<SocketAddr>, SimError> {
-    let rig = RigHandle::spawn(rig_of(def)?, clock);
-    let listener = TcpListener::bind(address).await?;
-    let place = listener.local_addr()?;
-    let speech = match mode {
-        Mode::RtuOverTcp => Speech::Line(Wire { serial: serial_of(def), ascii: false }),
-        Mode::Tcp | Mode::Rtu | Mode::Ascii => Speech::Mbap,
-    };
-    let task = tokio::spawn(serve_tcp(listener, rig.clone(), speech));
-    Ok(Serving { place, rig, task })
+/// Serves every line of a plant; `services` tells how, by [`LineId`].
+pub async fn serve(def: &PlantDef, clock: Clock, services: &[Service]) -> Result<Serving, SimError> {
+    let world = WorldHandle::spawn(World::of(def)?, clock);
+    // What has started is ended by dropping this if a later line cannot be served.
+    let mut serving = Serving { world, places: Vec::new(), tasks: Vec::new() };
+    for (line, service) in services.iter().enumerate() {
+        let (place, task) = start(serving.world.line(LineId(line as u16)), *service).await?;
+        serving.places.push(place);
+        serving.tasks.push(task);
+    }
+    Ok(serving)
 }
 
-fn rig_of(def: &PlantDef) -> Result<Rig, SimError> {
-    match def.simulation.as_deref() {
-        Some("tank") => Ok(Rig::demo()),
-        Some(_) | None => Err(SimError::NoSimulation),
+async fn start(units: LineHandle, service: Service) -> io::Result<(Place, JoinHandle<io::Result<()>>)> {
+    match service.speech() {
+        Speech::Line(wire) if !service.mode.is_tcp() => {
+            let (pty, path) = open_pty()?;
+            Ok((Place::Port(path), tokio::spawn(serve_line(pty, units, wire, FOR_EVER))))
+        }
+        speech => {
+            let listener = TcpListener::bind(service.address).await?;
+            let place = Place::Address(listener.local_addr()?);
+            Ok((place, tokio::spawn(serve_tcp(listener, units, speech))))
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Serves the rig over TCP to several clients at once: Modbus TCP, or the frames of a serial line.
+//! Serves the units of a line over TCP to several clients at once: Modbus TCP, or the frames of a serial line.
 
 use std::io;
 use std::time::Duration;
@@ -8,8 +8,7 @@ use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio::time::timeout;
 
-use super::{RigHandle, Wire, serve_line};
-use crate::sim::rig::BROADCAST;
+use super::{LineHandle, Wire, serve_line};
 
 /// Clients at once; one more is turned away by closing its connection.
 const CLIENTS_MAX: usize = 16;
@@ -28,7 +27,7 @@ pub enum Speech {
 }
 
 /// Serves until the listener fails. Clients are cut off when this future is dropped.
-pub async fn serve_tcp(listener: TcpListener, rig: RigHandle, speech: Speech) -> io::Result<()> {
+pub async fn serve_tcp(listener: TcpListener, units: LineHandle, speech: Speech) -> io::Result<()> {
     let mut clients = JoinSet::new();
     loop {
         tokio::select! {
@@ -36,13 +35,8 @@ pub async fn serve_tcp(listener: TcpListener, rig: RigHandle, speech: Speech) ->
                 Ok((stream, _)) if clients.len() < CLIENTS_MAX => {
                     // Without this small answers wait for the client's acknowledgement; if it fails they are just slower.
                     stream.set_nodelay(true).ok();
-                    let rig = rig.clone();
-                    clients.spawn(async move {
-                        match speech {
-                            Speech::Mbap => serve_client(stream, rig).await,
-                            Speech::Line(wire) => serve_line(stream, rig, wire, IDLE_MAX).await,
-                        }
-                    });
+                    let units = units.clone();
+                    clients.spawn(serve_stream(stream, units, speech));
                 }
                 Ok(_turned_away) => {}
                 Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => {}
@@ -53,15 +47,26 @@ pub async fn serve_tcp(listener: TcpListener, rig: RigHandle, speech: Speech) ->
     }
 }
 
+/// Serves one client, over any stream of bytes.
+pub async fn serve_stream<S>(stream: S, units: LineHandle, speech: Speech) -> io::Result<()>
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
+    match speech {
+        Speech::Mbap => serve_client(stream, units).await,
+        Speech::Line(wire) => serve_line(stream, units, wire, IDLE_MAX).await,
+    }
+}
+
 /// Serves one client in the order of its requests until it leaves, falls silent or breaks the protocol. TCP knows no
-/// broadcast: unit 0 is a stranger.
-async fn serve_client<S: AsyncRead + AsyncWrite + Unpin>(mut stream: S, rig: RigHandle) -> io::Result<()> {
+/// broadcast: who asks for a unit that is not there, 0 too, hears nothing.
+async fn serve_client<S: AsyncRead + AsyncWrite + Unpin>(mut stream: S, units: LineHandle) -> io::Result<()> {
     while let Some((transaction, unit, pdu)) = timeout(IDLE_MAX, receive(&mut stream)).await?? {
-        if unit == BROADCAST {
+        if !units.has(unit) {
             continue;
         }
-        if let Some(answer) = rig.ask(unit, &pdu).await {
-            rig.clock().sleep(answer.delay).await;
+        if let Some(answer) = units.ask(unit, &pdu).await {
+            units.clock().sleep(answer.delay).await;
             timeout(IDLE_MAX, stream.write_all(&answer.tcp(transaction))).await??;
         }
     }
@@ -92,8 +97,8 @@ mod tests {
     use super::*;
     use crate::bus::frame::with_crc;
     use crate::bus::io::clock::Clock;
-    use crate::plant::def::Serial;
-    use crate::sim::rig::Rig;
+    use crate::plant::def::{LineId, Serial};
+    use crate::sim::{io::WorldHandle, rig::Rig, world::World};
 
     async fn exchange(client: &mut TcpStream, request: &[u8], expect: &[u8]) {
         client.write_all(request).await.expect("the server takes requests");
@@ -107,8 +112,8 @@ mod tests {
     async fn serve(speech: Speech) -> SocketAddr {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port is free");
         let address = listener.local_addr().expect("a bound listener has an address");
-        let rig = RigHandle::spawn(Rig::new(), Clock::starting_at(Timestamp::UNIX_EPOCH, 10.0));
-        tokio::spawn(serve_tcp(listener, rig, speech));
+        let world = WorldHandle::spawn(World::tank(Rig::new()), Clock::starting_at(Timestamp::UNIX_EPOCH, 10.0));
+        tokio::spawn(serve_tcp(listener, world.line(LineId(0)), speech));
         address
     }
 
@@ -118,7 +123,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn several_clients_share_one_rig() {
+    async fn several_clients_share_one_world() {
         let address = serve(Speech::Mbap).await;
         let connect = || async { TcpStream::connect(address).await.expect("the server accepts") };
         let (mut one, mut two) = (connect().await, connect().await);

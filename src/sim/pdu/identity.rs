@@ -77,7 +77,8 @@ mod tests {
         let (mut rest, mut seen) = (objects, Vec::new());
         while let [id, length, tail @ ..] = rest {
             let (text, tail) = tail.split_at(usize::from(*length));
-            let known = Dl06::IDENTITY.objects.iter().find(|(known, _)| known == id).map(|(_, text)| text.as_bytes());
+            let known =
+                Dl06::new().identity().objects.iter().find(|(known, _)| known == id).map(|(_, text)| text.as_bytes());
             assert_eq!(known, Some(text));
             seen.push(*id);
             rest = tail;

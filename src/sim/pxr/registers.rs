@@ -4,13 +4,20 @@ use super::alarm;
 use super::display::Display;
 use super::map::{self, Meaning, Row};
 use super::{NARROWEST_K, Pxr, SENSOR_C};
-use crate::sim::pdu::{Bits, Identity, Refusal, Registers, Words};
+use crate::{
+    plant::def::Limits,
+    sim::pdu::{Bits, Refusal, Registers, Words},
+};
 
 /// The functions are those that its manual and working drivers name, so it cannot be asked who it is.
 impl Registers for Pxr {
-    const FUNCTIONS: &'static [u8] = &[0x03, 0x04, 0x06, 0x10];
-    const WORDS_MAX: u16 = 60;
-    const IDENTITY: Identity = Identity { server_id: 0, objects: &[] };
+    fn functions(&self) -> &[u8] {
+        &[0x03, 0x04, 0x06, 0x10]
+    }
+
+    fn limits(&self) -> Limits {
+        Limits { read_words_max: 60, write_words_max: 60, ..Limits::STANDARD }
+    }
 
     fn bit(&self, _: Bits, _: u16) -> Result<bool, Refusal> {
         Err(Refusal::Function)

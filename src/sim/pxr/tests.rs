@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::sim::pdu::serve;
+use crate::sim::{pdu::serve, slave::Unit};
 
 fn read(pxr: &mut Pxr, function: u8, address: u16) -> i16 {
     let [high, low] = address.to_be_bytes();

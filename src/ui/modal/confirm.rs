@@ -8,7 +8,7 @@ use crate::{
     plant::{
         command::Command,
         def::TagId,
-        tag::{Access, Confidence, Table, TagDef},
+        tag::{Access, Confidence, TagDef},
         tool::Tool,
     },
     ui::{
@@ -198,17 +198,9 @@ pub(super) fn old_and_new(cx: &Cx, tag: TagId, new: f64) -> String {
 
 /// Where a write goes (a read, for a tag that is read-only), in both forms that manuals use: `41007 / 0x03EE, FC 06 / 0x06`.
 pub fn wire_words(def: &TagDef) -> String {
-    let fc = if !def.writable() { def.point.table.read_fc() } else { write_fc(def) };
+    let fc = def.write_function().unwrap_or(def.point.table.read_fc());
     let address = def.point.address;
     format!("{} / 0x{address:04X}, FC {fc:02} / 0x{fc:02X}", def.point.table.modicon(address))
-}
-
-fn write_fc(def: &TagDef) -> u8 {
-    def.write_fc.unwrap_or(match (def.point.table, def.point.len()) {
-        (Table::Coil | Table::Discrete, _) => 5,
-        (Table::Input | Table::Holding, 1) => 6,
-        (Table::Input | Table::Holding, _) => 16,
-    })
 }
 
 /// What the profile wants said before a write.

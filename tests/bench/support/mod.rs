@@ -7,16 +7,23 @@ mod tcp;
 pub use paced::PacedSlave;
 pub use tcp::TcpSlave;
 
-use sightglass::sim::pdu::{self, Bits, Identity, Refusal, Registers, Words};
+use sightglass::{
+    plant::def::Limits,
+    sim::pdu::{self, Bits, Refusal, Registers, Words},
+};
 
 /// Every register holds its address, odd coils are on; what is written is acknowledged and forgotten.
 #[derive(Clone)]
 struct Numbers;
 
 impl Registers for Numbers {
-    const FUNCTIONS: &'static [u8] = &[0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F, 0x10];
-    const WORDS_MAX: u16 = 125;
-    const IDENTITY: Identity = Identity { server_id: 0, objects: &[] };
+    fn functions(&self) -> &[u8] {
+        &[0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F, 0x10]
+    }
+
+    fn limits(&self) -> Limits {
+        Limits::STANDARD
+    }
 
     fn bit(&self, _: Bits, address: u16) -> Result<bool, Refusal> {
         Ok(address % 2 == 1)

@@ -151,7 +151,9 @@ impl Task {
 fn write_request(tag: &TagDef, raw: f64) -> Option<Request<'static>> {
     let address = tag.point.address;
     match tag.point.table {
-        Table::Coil => Some(match tag.write_fc {
+        // A discrete input is written only where the profile names the function for it.
+        Table::Discrete if tag.write_fc.is_none() => None,
+        Table::Coil | Table::Discrete => Some(match tag.write_fc {
             Some(15) => Request::WriteMultipleCoils(address, Cow::Owned(vec![raw != 0.0])),
             Some(_) | None => Request::WriteSingleCoil(address, raw != 0.0),
         }),
@@ -169,7 +171,7 @@ fn write_request(tag: &TagDef, raw: f64) -> Option<Request<'static>> {
                 _ => Request::WriteMultipleRegisters(address, Cow::Owned(words)),
             })
         }
-        Table::Discrete | Table::Input => None,
+        Table::Input => None,
     }
 }
 
@@ -210,7 +212,9 @@ mod tests {
         assert_eq!(write_request(&coil, 1.0), Some(Request::WriteSingleCoil(5, true)));
         let fifteen = TagDef { write_fc: Some(15), ..coil };
         assert_eq!(write_request(&fifteen, 0.0), Some(Request::WriteMultipleCoils(5, Cow::Owned(vec![false]))));
-        let input = TagDef { point: Point { table: Table::Discrete, ..point }, ..fifteen };
+        let input = TagDef { point: Point { table: Table::Discrete, ..point }, write_fc: None, ..fifteen };
         assert_eq!(write_request(&input, 1.0), None);
+        let five = TagDef { write_fc: Some(5), ..input };
+        assert_eq!(write_request(&five, 1.0), Some(Request::WriteSingleCoil(5, true)));
     }
 }

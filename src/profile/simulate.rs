@@ -1,0 +1,257 @@
+//! The words of `simulate`: how a simulated device fills a tag.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::{
+    diagnostic::{Problems, Span},
+    names::{Names, number_of},
+    reader::{At, Choice, Value},
+    schema::{CheckTable, SimulateTable},
+    tag::field_of,
+};
+use crate::plant::{
+    def::TagId,
+    simulate::{Case, Check, Motion, Operation, Pace, Simulate, Source, Test},
+    tag::TagDef,
+};
+
+/// A number or a word, or several of them in an array.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Choices(pub Vec<At<Choice>>);
+
+impl Value for Choices {
+    fn read(value: &super::reader::Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let one = |value: &super::reader::Node, at: Span, problems: &mut Problems| {
+            Choice::read(value, at, problems).map(|value| At { value, at })
+        };
+        match value {
+            super::reader::Node::Array(array) => {
+                Some(Choices(array.iter().filter_map(|item| one(&item.value, item.at, problems)).collect()))
+            }
+            _ => one(value, at, problems).map(|choice| Choices(vec![choice])),
+        }
+    }
+}
+
+/// What a `simulate` table may refer to.
+pub(super) struct Scope<'a> {
+    pub names: &'a Names,
+    pub tags: &'a [TagDef],
+    pub device: &'a str,
+}
+
+/// The simulation of a tag.
+pub(super) fn simulate(
+    table: &SimulateTable,
+    tag: &TagDef,
+    scope: &Scope,
+    problems: &mut Problems,
+) -> Option<Arc<Simulate>> {
+    let mut cases = Vec::new();
+    for case in table.cases.iter().map(|case| &case.value) {
+        let when = case.when.as_ref().and_then(|when| checks(std::slice::from_ref(&when.value), scope, problems));
+        let value = case.value.as_ref().and_then(|value| number_of(value, tag, problems));
+        cases.extend(when.zip(value).map(|(when, value)| Case { when, value }));
+    }
+    let start = table.start.as_ref().and_then(|start| number_of(start, tag, problems));
+    let range = table.range.and_then(|range| rising(range, "range", problems));
+    if let Some(noise) = table.noise.filter(|noise| noise.value < 0.0) {
+        problems.add(noise.at, "noise cannot be negative").label("expected 0 or more");
+    }
+    let noise = table.noise.map_or(0.0, |noise| noise.value);
+    let pulse = table.pulse.and_then(|pulse| lasting(pulse, "pulse", problems));
+    let motion = motion(table, scope, problems);
+    Some(Arc::new(Simulate { start, cases, motion, range, noise, pulse }))
+}
+
+/// The one word that says where a value goes, and what goes with it.
+fn motion(table: &SimulateTable, scope: &Scope, problems: &mut Problems) -> Option<Motion> {
+    let lists = [
+        (&table.sum, Operation::Sum),
+        (&table.mean, Operation::Mean),
+        (&table.product, Operation::Product),
+        (&table.difference, Operation::Difference),
+        (&table.quotient, Operation::Quotient),
+        (&table.leg, Operation::Leg),
+    ];
+    let mut sources: Vec<(Span, Option<Source>)> = Vec::new();
+    for (list, operation) in lists.into_iter().filter(|(list, _)| !list.is_empty()) {
+        let tags: Vec<TagId> = list.iter().filter_map(|name| scope.names.near(name, scope.device, problems)).collect();
+        sources.push((list[0].at, Some(Source::Of(operation, tags))));
+    }
+    for (name, operation) in [(&table.follow, Operation::Sum), (&table.angle, Operation::Angle)] {
+        let Some(name) = name else { continue };
+        let tag = scope.names.near(name, scope.device, problems);
+        sources.push((name.at, tag.map(|tag| Source::Of(operation, vec![tag]))));
+    }
+    if let Some(name) = &table.integrate {
+        let per = table.per.and_then(|per| lasting(per, "per", problems)).unwrap_or(Duration::from_secs(1));
+        let of = scope.names.near(name, scope.device, problems);
+        sources.push((name.at, of.map(|of| Source::Integral { of, per })));
+    }
+    if let Some(wander) = table.wander {
+        let period = table.period.and_then(|period| lasting(period, "period", problems));
+        let period = period.unwrap_or(Duration::from_secs(60));
+        let range = rising(wander, "wander", problems);
+        sources.push((wander.at, range.map(|range| Source::Wander { range, period })));
+    }
+    stray(table, !sources.is_empty(), problems);
+    if let [(first, _), (second, _), ..] = sources[..] {
+        problems.add(second, "a value can go one way only").label("keep one of them").also(first, "the other");
+    }
+    let (_, source) = sources.into_iter().next()?;
+    let when =
+        table.when.as_ref().map_or(Some(Vec::new()), |when| checks(std::slice::from_ref(&when.value), scope, problems));
+    Some(Motion {
+        source: source?,
+        gain: table.gain.map_or(1.0, |gain| gain.value),
+        offset: table.offset.map_or(0.0, |offset| offset.value),
+        pace: pace(table, problems),
+        when: when?,
+        idle: table.idle.map(|idle| idle.value),
+    })
+}
+
+/// Words that say nothing without another one.
+fn stray(table: &SimulateTable, moves: bool, problems: &mut Problems) {
+    let mut needs = |at: Option<Span>, word: &str, other: &str, there: bool| {
+        if let Some(at) = at.filter(|_| !there) {
+            problems.add(at, format!("`{word}` says nothing without {other}")).label("not used");
+        }
+    };
+    needs(table.period.map(|at| at.at), "period", "`wander`", table.wander.is_some());
+    needs(table.per.map(|at| at.at), "per", "`integrate`", table.integrate.is_some());
+    for (word, at) in [("gain", table.gain), ("offset", table.offset), ("rate", table.rate), ("idle", table.idle)] {
+        needs(at.map(|at| at.at), word, "a source such as `follow` or `wander`", moves);
+    }
+    needs(table.lag.map(|at| at.at), "lag", "a source such as `follow` or `wander`", moves);
+    needs(table.when.as_ref().map(|at| at.at), "when", "a source such as `follow` or `wander`", moves);
+}
+
+fn pace(table: &SimulateTable, problems: &mut Problems) -> Pace {
+    match (table.rate, table.lag) {
+        (Some(rate), Some(lag)) => {
+            problems
+                .add(lag.at, "`rate` and `lag` exclude each other")
+                .label("keep one of them")
+                .also(rate.at, "the other");
+            Pace::AtOnce
+        }
+        (Some(rate), None) if rate.value <= 0.0 => {
+            problems.add(rate.at, "a rate is how much a second, above 0").label("expected more than 0");
+            Pace::AtOnce
+        }
+        (Some(rate), None) => Pace::Rate(rate.value),
+        (None, Some(lag)) => lasting(lag, "lag", problems).map_or(Pace::AtOnce, Pace::Lag),
+        (None, None) => Pace::AtOnce,
+    }
+}
+
+/// A question and what must be so besides; `None` if something is wrong with one.
+fn checks(tables: &[CheckTable], scope: &Scope, problems: &mut Problems) -> Option<Vec<Check>> {
+    let mut found = Vec::new();
+    for table in tables {
+        found.push(check(table, scope, problems)?);
+        for more in &table.and {
+            found.extend(checks(std::slice::from_ref(&more.value), scope, problems)?);
+        }
+    }
+    Some(found)
+}
+
+fn check(table: &CheckTable, scope: &Scope, problems: &mut Problems) -> Option<Check> {
+    let name = table.tag.as_ref()?;
+    let tag = scope.names.near(name, scope.device, problems)?;
+    let target = &scope.tags[tag.index()];
+    let field = match &table.field {
+        Some(field) => Some(field_of(field, target.point, problems)?),
+        None => None,
+    };
+    let mut tests = Vec::new();
+    if let Some(is) = &table.is {
+        // Bits of a word have no names of their own.
+        let number = |choice: &At<Choice>, problems: &mut Problems| match (&choice.value, field) {
+            (Choice::Number(number), Some(_)) => Some(*number),
+            _ => number_of(choice, target, problems),
+        };
+        let wanted: Vec<f64> = is.value.0.iter().filter_map(|choice| number(choice, problems)).collect();
+        tests.push((is.at, Test::Is(wanted)));
+    }
+    tests.extend(table.above.map(|above| (above.at, Test::Above(above.value))));
+    tests.extend(table.below.map(|below| (below.at, Test::Below(below.value))));
+    if let [(first, _), (second, _), ..] = tests[..] {
+        problems.add(second, "one question at a time").label("put it into `and`").also(first, "the other");
+    }
+    let test = tests.into_iter().next().map_or(Test::On, |(_, test)| test);
+    Some(Check { tag, field, test })
+}
+
+fn rising(range: At<[f64; 2]>, word: &str, problems: &mut Problems) -> Option<[f64; 2]> {
+    let [low, high] = range.value;
+    if low >= high {
+        problems.add(range.at, format!("{word} from {low} to {high} has no room")).label("expected [lowest, highest]");
+    }
+    (low < high).then_some(range.value)
+}
+
+fn lasting(time: At<Duration>, word: &str, problems: &mut Problems) -> Option<Duration> {
+    if time.value.is_zero() {
+        problems.add(time.at, format!("{word} takes some time")).label("expected more than 0");
+    }
+    Some(time.value).filter(|time| !time.is_zero())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::profile::tests::{METER, PLANT, PLC, check, load};
+
+    /// The row of the temperature, which each case simulates in its own way.
+    const ROW: &str = "modicon = 41003";
+
+    fn wrong(words: &str, expect: &[&str]) {
+        check(ROW, &format!("{ROW}\nsimulate = {{ {words} }}"), expect);
+    }
+
+    #[test]
+    fn a_word_that_cannot_be_is_named() {
+        wrong("folow = 'DP'", &["unknown key `folow` in simulate", "did you mean `follow`", "[meter.toml:15:14]"]);
+        wrong("follow = 'DQ'", &["unknown tag `DQ` in D1", "did you mean `DP`"]);
+        wrong("wander = [5, 1]", &["wander from 5 to 1 has no room", "expected [lowest, highest]"]);
+        wrong("follow = 'DP', rate = 0", &["a rate is how much a second, above 0"]);
+        wrong("follow = 'DP', rate = 1, lag = '5s'", &["`rate` and `lag` exclude each other"]);
+        wrong("follow = 'DP', wander = [0, 1]", &["a value can go one way only"]);
+        wrong("gain = 2", &["`gain` says nothing without a source such as `follow`"]);
+        wrong("start = 3, period = '1min'", &["`period` says nothing without `wander`"]);
+        wrong("pulse = '0s'", &["pulse takes some time"]);
+        wrong("noise = -1", &["noise cannot be negative"]);
+        wrong("start = 'hot'", &["`hot` is not a state of D1.T", "expected a number"]);
+        wrong(
+            "case = [{ when = { tag = 'MODE', is = 'onn' }, value = 1 }]",
+            &["`onn` is not a state of D1.MODE", "on"],
+        );
+        wrong("case = [{ when = { tag = 'MODE' } }]", &["a case needs `value`"]);
+        wrong("follow = 'DP', when = { tag = 'MODE', is = 1, above = 3 }", &["one question at a time", "`and`"]);
+        wrong("follow = 'DP', when = { tag = 'MODE', field = '3-9', is = 1 }", &["this is not a field of bits"]);
+    }
+
+    #[test]
+    fn the_functions_of_a_device_are_held_against_its_tags() {
+        let listed = "source = \"manual\"\nfunctions = [3]\n\n[limits]";
+        check("source = \"manual\"\n\n[limits]", listed, &["D1.MODE needs function 6, which `functions` lacks", "[3]"]);
+    }
+
+    #[test]
+    fn a_tag_may_follow_one_of_another_device() {
+        let meter = METER
+            .replace(ROW, &format!("{ROW}\nsimulate = {{ start = 20, follow = 'PLC.STEP', lag = '10s', gain = 2 }}"));
+        let plant = load(PLANT.as_bytes(), &meter, PLC).unwrap_or_else(|errors| panic!("{errors}"));
+        let how = plant.tags[0].simulate.clone().expect("it is simulated");
+        let step = plant.tag_named("PLC.STEP").expect("it is in the plant");
+        assert_eq!(how.start, Some(20.0));
+        let motion = how.motion.clone().expect("it moves");
+        assert_eq!(motion.source, Source::Of(Operation::Sum, vec![step]));
+        assert_eq!((motion.pace, motion.gain), (Pace::Lag(Duration::from_secs(10)), 2.0));
+    }
+}

@@ -1,0 +1,241 @@
+//! The registers of a modelled device: what is at an address, what a write must keep to, and why it is refused.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
+
+use crate::{
+    bus::codec,
+    plant::{
+        def::{DeviceDef, Limits, TagId},
+        scale,
+        tag::{Access, Bound, Decimals, Table, TagDef},
+    },
+    sim::pdu::{Bits, Refusal, Registers, Words},
+};
+
+/// What a profile says of a device; never changes.
+#[derive(Debug, Clone)]
+pub struct Chart {
+    limits: Limits,
+    functions: Vec<u8>,
+    tags: Vec<TagDef>,
+    cells: [BTreeSet<u16>; 4],
+}
+
+/// A device with what is in its registers now.
+#[derive(Debug, Clone)]
+pub struct Model {
+    chart: Arc<Chart>,
+    /// Words, and bits as 0 or 1, by table and address.
+    cells: [BTreeMap<u16, u16>; 4],
+}
+
+impl Chart {
+    /// The chart of a device and its tags.
+    pub fn new<'a>(device: &DeviceDef, tags: impl Iterator<Item = &'a TagDef>) -> Chart {
+        let tags: Vec<TagDef> = tags.cloned().collect();
+        let cells = [Table::Coil, Table::Discrete, Table::Input, Table::Holding]
+            .map(|table| cells(tags.iter().filter(|tag| tag.point.table == table), device.limits));
+        let functions = if device.functions.is_empty() { functions(&tags) } else { device.functions.clone() };
+        Chart { limits: device.limits, functions, tags, cells }
+    }
+
+    fn tag(&self, id: TagId) -> Option<&TagDef> {
+        // The tags of a device follow each other.
+        let first = self.tags.first()?.id;
+        self.tags.get(id.index().checked_sub(first.index())?)
+    }
+}
+
+/// The addresses that answer: those of tags, and what lies between two of them where the profile allows reading over it.
+fn cells<'a>(tags: impl Iterator<Item = &'a TagDef>, limits: Limits) -> BTreeSet<u16> {
+    let mut cells: BTreeSet<u16> = BTreeSet::new();
+    for tag in tags {
+        cells.extend((tag.point.address..).take(usize::from(tag.point.len())));
+    }
+    let taken: Vec<u16> = cells.iter().copied().collect();
+    for pair in taken.windows(2) {
+        if pair[1] - pair[0] - 1 <= limits.gap_words_max {
+            cells.extend(pair[0] + 1..pair[1]);
+        }
+    }
+    cells
+}
+
+/// The functions of a device whose profile does not list them: what reading and writing its tags takes.
+fn functions(tags: &[TagDef]) -> Vec<u8> {
+    let mut functions = BTreeSet::new();
+    for tag in tags {
+        if tag.access != Access::Write {
+            functions.insert(tag.point.table.read_fc());
+        }
+        match (tag.writable(), tag.write_fc, tag.point.table.is_bits()) {
+            (true, Some(function), _) => functions.extend([function]),
+            (true, None, true) => functions.extend([5, 15]),
+            (true, None, false) => functions.extend([6, 16]),
+            (false, ..) => {}
+        }
+    }
+    functions.into_iter().collect()
+}
+
+impl Model {
+    /// As it is switched on: each tag at 0, or at the bound or state nearest to it.
+    pub fn new(chart: Arc<Chart>) -> Model {
+        let cells = chart.cells.each_ref().map(|cells| cells.iter().map(|address| (*address, 0)).collect());
+        let mut model = Model { chart: chart.clone(), cells };
+        // Twice: the place of a decimal point may be told by a tag that comes later.
+        for tag in chart.tags.iter().chain(&chart.tags) {
+            let start = tag.simulate.as_ref().and_then(|simulate| simulate.start);
+            model.set(tag, start.unwrap_or_else(|| at_rest(tag)));
+        }
+        model
+    }
+
+    /// The same device switched off and on.
+    pub fn restarted(&self) -> Model {
+        Model::new(self.chart.clone())
+    }
+
+    /// What the registers hold for a tag, in its unit; `None` for a tag of another device or what is no number.
+    pub fn value(&self, tag: TagId) -> Option<f64> {
+        let tag = self.chart.tag(tag)?;
+        let raw = codec::decode(tag.point, &self.words(tag)?)?;
+        Some(scale::to_value(tag, raw, self.decimals(tag)))
+    }
+
+    /// Puts a value into the registers; `false` if they cannot hold it.
+    pub fn set_value(&mut self, tag: TagId, value: f64) -> bool {
+        let chart = self.chart.clone();
+        chart.tag(tag).is_some_and(|tag| self.set(tag, value))
+    }
+
+    fn set(&mut self, tag: &TagDef, value: f64) -> bool {
+        let Some(raw) = scale::to_raw(tag, value, self.decimals(tag)) else { return false };
+        let words = match codec::field_masks(tag.point, raw) {
+            Some((and, or)) => self.words(tag).map(|words| words.iter().map(|word| word & and | or & !and).collect()),
+            None => codec::encode(tag.point, raw),
+        };
+        let Some(words) = words else { return false };
+        self.cells[place(tag.point.table)].extend((tag.point.address..).zip(words));
+        true
+    }
+
+    fn words(&self, tag: &TagDef) -> Option<Vec<u16>> {
+        let cells = &self.cells[place(tag.point.table)];
+        (tag.point.address..).take(usize::from(tag.point.len())).map(|address| cells.get(&address).copied()).collect()
+    }
+
+    fn decimals(&self, tag: &TagDef) -> u8 {
+        match tag.decimals {
+            Decimals::From(from) => self.value(from).map_or(0, |decimals| decimals as u8),
+            Decimals::Fixed(_) => 0,
+        }
+    }
+
+    fn bound(&self, bound: Option<Bound>) -> Option<f64> {
+        match bound? {
+            Bound::Fixed(value) => Some(value),
+            Bound::From(tag) => self.value(tag),
+        }
+    }
+
+    /// Writes cells of a table from a request, or refuses: nothing there takes a write, a value is cut in two, is out of
+    /// its bounds, is no state of its tag, or the device is locked.
+    fn take(&mut self, table: Table, address: u16, values: &[u16]) -> Result<(), Refusal> {
+        let chart = self.chart.clone();
+        let span = u32::from(address)..u32::from(address) + values.len() as u32;
+        let extent =
+            |tag: &TagDef| u32::from(tag.point.address)..u32::from(tag.point.address) + u32::from(tag.point.len());
+        let touched: Vec<&TagDef> = chart
+            .tags
+            .iter()
+            .filter(|tag| tag.point.table == table && tag.writable())
+            .filter(|tag| extent(tag).start < span.end && span.start < extent(tag).end)
+            .collect();
+        let taken = |at: u32| touched.iter().any(|tag| extent(tag).contains(&at));
+        let cut = |tag: &&TagDef| extent(tag).start < span.start || span.end < extent(tag).end;
+        if !span.clone().all(taken) || touched.iter().any(cut) {
+            return Err(Refusal::Address);
+        }
+        let locked = |tag: &&TagDef| tag.write_unlock.is_some_and(|(key, value)| self.value(key) != Some(value));
+        if touched.iter().any(locked) {
+            return Err(Refusal::Address);
+        }
+        self.cells[place(table)].extend((address..=u16::MAX).zip(values.iter().copied()));
+        if touched.iter().all(|tag| self.admits(tag)) { Ok(()) } else { Err(Refusal::Value) }
+    }
+
+    /// Whether a tag may hold what has just been written.
+    fn admits(&self, tag: &TagDef) -> bool {
+        let Some(value) = self.value(tag.id) else { return false };
+        let above = self.bound(tag.min).is_none_or(|min| min <= value);
+        let below = self.bound(tag.max).is_none_or(|max| value <= max);
+        above && below && (tag.labels.is_empty() || tag.label_of(value).is_some())
+    }
+}
+
+/// 0, or what is nearest to it of the values that the tag may have.
+fn at_rest(tag: &TagDef) -> f64 {
+    let fixed = |bound: Option<Bound>| match bound {
+        Some(Bound::Fixed(value)) => Some(value),
+        Some(Bound::From(_)) | None => None,
+    };
+    match tag.labels.first() {
+        Some((first, _)) if tag.label_of(0.0).is_none() => *first as f64,
+        _ => 0f64.min(fixed(tag.max).unwrap_or(0.0)).max(fixed(tag.min).unwrap_or(0.0)),
+    }
+}
+
+fn place(table: Table) -> usize {
+    match table {
+        Table::Coil => 0,
+        Table::Discrete => 1,
+        Table::Input => 2,
+        Table::Holding => 3,
+    }
+}
+
+impl Registers for Model {
+    fn functions(&self) -> &[u8] {
+        &self.chart.functions
+    }
+
+    fn limits(&self) -> Limits {
+        self.chart.limits
+    }
+
+    fn bit(&self, kind: Bits, address: u16) -> Result<bool, Refusal> {
+        let table = match kind {
+            Bits::Coils => Table::Coil,
+            Bits::Discretes => Table::Discrete,
+        };
+        self.cells[place(table)].get(&address).map(|bit| *bit != 0).ok_or(Refusal::Address)
+    }
+
+    fn write_bit(&mut self, address: u16, on: bool) -> Result<(), Refusal> {
+        // A few devices write the bits that they call discrete inputs.
+        let discrete =
+            |tag: &TagDef| tag.writable() && tag.point.table == Table::Discrete && tag.point.address == address;
+        let table = if self.chart.tags.iter().any(discrete) { Table::Discrete } else { Table::Coil };
+        self.take(table, address, &[u16::from(on)])
+    }
+
+    fn word(&self, kind: Words, address: u16) -> Result<u16, Refusal> {
+        let table = match kind {
+            Words::Holding => Table::Holding,
+            Words::Input => Table::Input,
+        };
+        self.cells[place(table)].get(&address).copied().ok_or(Refusal::Address)
+    }
+
+    fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
+        self.write_block(address, &[value])
+    }
+
+    fn write_block(&mut self, address: u16, values: &[u16]) -> Result<(), Refusal> {
+        self.take(Table::Holding, address, values)
+    }
+}

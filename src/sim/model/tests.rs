@@ -1,0 +1,126 @@
+//! Tests of modelled devices: what a master gets from a device that exists only as a profile.
+
+use std::sync::Arc;
+
+use super::*;
+use crate::{
+    plant::{PlantDef, def::LineId},
+    profile::{self, Search},
+    sim::world::World,
+};
+
+const L1: LineId = LineId(0);
+
+/// A plant around one device profile, unit 1.
+fn plant(profile: &str) -> Arc<PlantDef> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("device.toml");
+    let head = "vendor = 'A'\nmodel = 'B'\nstatus = 'manual'\nsource = 'C'\n";
+    std::fs::write(&path, format!("{head}{profile}")).expect("the folder takes a file");
+    profile::check(&path, &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}"))
+}
+
+const OVEN: &str = r#"
+limits = { read_words_max = 8, write_words_max = 4, gap_words_max = 2 }
+tag = [
+    { name = "SV", table = "holding", address = 10, type = "int16", scale = 0.1, access = "rw", min = -20, max_from = "SV-H" },
+    { name = "SV-H", table = "holding", address = 11, type = "int16", scale = 0.1, access = "rw", max = 500 },
+    { name = "MODE", table = "holding", address = 14, type = "uint16", access = "rw", enum = { 1 = "PID", 2 = "ON-OFF" } },
+    { name = "GAIN", table = "holding", address = 20, type = "float32", access = "rw", min = 0.5, max = 2 },
+    { name = "PV", table = "input", address = 0, type = "int16", scale = 0.1 },
+    { name = "KEY", table = "coil", address = 5, access = "rw" },
+    { name = "P", table = "holding", address = 30, type = "uint16", access = "rw", write_unlock = { tag = "KEY", value = 1 } },
+    { name = "LAMP", table = "discrete", address = 7 },
+    { name = "HIGH", table = "holding", address = 40, type = "uint16", field = "15-8" },
+    { name = "LOW", table = "holding", address = 40, type = "uint16", field = "7-0" },
+]
+"#;
+
+/// Puts requests to one oven one after another.
+fn check(exchanges: &[(&[u8], &[u8])]) {
+    let mut world = World::of(&plant(OVEN)).expect("no rig is named");
+    let sv_h = plant(OVEN).tag_named("D-1.SV-H").expect("it is in the profile");
+    assert!(world.set_value(sv_h, 200.0));
+    for (request, expect) in exchanges {
+        assert_eq!(world.respond(L1, 1, request).as_deref(), Some(*expect), "request {request:02X?}");
+    }
+}
+
+#[test]
+fn what_is_written_is_read_back() {
+    check(&[(&[6, 0, 10, 0x05, 0xDC], &[6, 0, 10, 0x05, 0xDC]), (&[3, 0, 10, 0, 1], &[3, 2, 0x05, 0xDC])]);
+    check(&[(&[5, 0, 5, 0xFF, 0], &[5, 0, 5, 0xFF, 0]), (&[1, 0, 5, 0, 1], &[1, 1, 1])]);
+    let gain: &[u8] = &[16, 0, 20, 0, 2, 4, 0x3F, 0x80, 0, 0];
+    check(&[(gain, &[16, 0, 20, 0, 2]), (&[3, 0, 20, 0, 2], &[3, 4, 0x3F, 0x80, 0, 0])]);
+}
+
+#[test]
+fn each_value_starts_where_its_bounds_and_states_allow() {
+    // 1 is the first state of MODE; 0.5 the least GAIN; the gap of two words before MODE may be read over.
+    check(&[(&[3, 0, 10, 0, 5], &[3, 10, 0, 0, 0x07, 0xD0, 0, 0, 0, 0, 0, 1])]);
+    check(&[(&[3, 0, 20, 0, 2], &[3, 4, 0x3F, 0, 0, 0]), (&[2, 0, 7, 0, 1], &[2, 1, 0])]);
+}
+
+#[test]
+fn a_model_refuses_what_its_profile_does_not_allow() {
+    // Below the lowest SV; above SV-H; no state; a float out of its bounds; then all is as it was.
+    check(&[(&[6, 0, 10, 0xFF, 0x37], &[0x86, 3]), (&[6, 0, 10, 0x07, 0xD1], &[0x86, 3])]);
+    check(&[(&[6, 0, 14, 0, 3], &[0x86, 3]), (&[3, 0, 14, 0, 1], &[3, 2, 0, 1])]);
+    check(&[(&[16, 0, 20, 0, 2, 4, 0x40, 0x80, 0, 0], &[0x90, 3]), (&[3, 0, 20, 0, 2], &[3, 4, 0x3F, 0, 0, 0])]);
+    // Half a float; a gap, which may only be read; beyond the gap; read only tables and functions nobody needs.
+    check(&[(&[6, 0, 20, 0x3F, 0x80], &[0x86, 2]), (&[6, 0, 12, 0, 1], &[0x86, 2])]);
+    check(&[(&[3, 0, 15, 0, 1], &[0x83, 2]), (&[4, 0, 1, 0, 1], &[0x84, 2]), (&[3, 0, 40, 0, 1], &[3, 2, 0, 0])]);
+    check(&[(&[6, 0, 40, 0, 1], &[0x86, 2]), (&[22, 0, 10, 0, 0, 0, 0], &[0x96, 1]), (&[8, 0, 0, 0, 0], &[0x88, 1])]);
+    // More words than one request may hold.
+    check(&[(&[3, 0, 10, 0, 9], &[0x83, 3])]);
+}
+
+#[test]
+fn a_locked_value_takes_a_write_only_after_its_key() {
+    check(&[
+        (&[6, 0, 30, 0, 7], &[0x86, 2]),
+        (&[5, 0, 5, 0xFF, 0], &[5, 0, 5, 0xFF, 0]),
+        (&[6, 0, 30, 0, 7], &[6, 0, 30, 0, 7]),
+        (&[3, 0, 30, 0, 1], &[3, 2, 0, 7]),
+    ]);
+}
+
+#[test]
+fn fields_of_one_word_do_not_disturb_each_other() {
+    let plant = plant(OVEN);
+    let mut world = World::of(&plant).expect("no rig is named");
+    let id = |name: &str| plant.tag_named(name).expect("it is in the profile");
+    assert!(world.set_value(id("D-1.HIGH"), 18.0) && world.set_value(id("D-1.LOW"), 52.0));
+    assert_eq!(world.respond(L1, 1, &[3, 0, 40, 0, 1]), Some(vec![3, 2, 0x12, 0x34]));
+    assert_eq!(world.value(id("D-1.HIGH")), Some(18.0));
+    assert!(!world.set_value(id("D-1.HIGH"), 256.0), "a byte holds no 256");
+}
+
+/// A meter that wants even addresses and counts.
+#[test]
+fn a_device_with_an_alignment_refuses_odd_requests() {
+    let meter = plant(
+        "limits = { alignment = 2 }\ntag = [{ name = 'V1', table = 'input', address = 0, type = 'float32' }, { name = 'V2', table = 'input', address = 2, type = 'float32' }]",
+    );
+    let mut world = World::of(&meter).expect("no rig is named");
+    assert_eq!(world.respond(L1, 1, &[4, 0, 0, 0, 4]), Some(vec![4, 8, 0, 0, 0, 0, 0, 0, 0, 0]));
+    assert_eq!(world.respond(L1, 1, &[4, 0, 1, 0, 2]), Some(vec![0x84, 2]));
+    assert_eq!(world.respond(L1, 1, &[4, 0, 0, 0, 3]), Some(vec![0x84, 3]));
+}
+
+#[test]
+fn the_second_controller_of_a_tank_plant_is_a_model() {
+    let tank = profile::load("tank".as_ref(), &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}"));
+    let mut def = (*tank).clone();
+    let mut second = def.devices[0].clone();
+    (second.id, second.unit) = (DeviceId(2), 3);
+    def.devices.push(second);
+    let mut world = World::of(&def).expect("the tank is known");
+    assert_eq!(world.respond(L1, 1, &[3, 0x03, 0xEA, 0, 1]), Some(vec![3, 2, 0x02, 0xBC]), "the rig's own");
+    assert_eq!(world.respond(L1, 3, &[3, 0x03, 0xEA, 0, 1]), Some(vec![0x83, 1]), "a model without tags");
+    def.simulation = Some("tanc".into());
+    assert!(
+        World::of(&def)
+            .is_err_and(|error| error.to_string().contains("`tank`") || error.to_string().contains("\"tank\""))
+    );
+}

@@ -1,0 +1,244 @@
+//! The world: every simulated unit of a plant at its line and unit address, and the time that passes for all of them.
+//!
+//! ```text
+//!  (L1, 1) ── controller ─┐ rig: the tank of `simulation = "tank"`
+//!  (L1, 2) ── PLC ────────┘
+//!  (L2, 1) ── model ──────┐ models: each device that is no part of the rig, made from its profile
+//!  (L2, 2) ── model ──────┘
+//! ```
+
+use std::{collections::BTreeMap, time::Duration};
+
+use super::{
+    model::{Model, Models},
+    rig::{self, Rig},
+    slave::{Slave, Unit},
+};
+use crate::plant::{
+    PlantDef,
+    def::{DeviceDef, Framing, LineId, TagId},
+};
+
+/// The address that means every unit of a serial line.
+pub const BROADCAST: u8 = 0;
+
+/// Profiles of the devices that the tank rig brings with it: the first device with such a profile is the rig's.
+const CONTROLLER: &str = "fuji_pxr";
+const PLC: &str = "koyo_dl06";
+
+/// All simulated units of a plant.
+#[derive(Debug, Clone, Default)]
+pub struct World {
+    rig: Option<Rig>,
+    models: Models,
+    places: BTreeMap<(LineId, u8), Place>,
+}
+
+/// What answers at an address.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Controller,
+    Plc,
+    Model(usize),
+}
+
+/// The plant names a simulated process that this program does not have.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("simulation = \"{0}\" is not known, expected \"tank\" or none")]
+pub struct UnknownSimulation(pub String);
+
+impl World {
+    /// The world of a plant: the rig that it names, and for every other device a model made from its profile.
+    pub fn of(def: &PlantDef) -> Result<World, UnknownSimulation> {
+        let rig = match def.simulation.as_deref() {
+            Some("tank") => Some(Rig::demo()),
+            Some(other) => return Err(UnknownSimulation(other.to_owned())),
+            None => None,
+        };
+        let first = |profile: &str| {
+            def.devices.iter().find(|device| rig.is_some() && device.profile == profile).map(|device| device.id)
+        };
+        let (controller, plc) = (first(CONTROLLER), first(PLC));
+        let (mut modelled, mut places) = (Vec::new(), BTreeMap::new());
+        // A device at the broadcast address of a line is everybody, and nobody by itself.
+        let everybody = |device: &&DeviceDef| {
+            device.unit == BROADCAST && def.line(device.line).transport.framing() != Framing::Mbap
+        };
+        for device in def.devices.iter().filter(|device| !everybody(device)) {
+            let place = if Some(device.id) == controller {
+                Place::Controller
+            } else if Some(device.id) == plc {
+                Place::Plc
+            } else {
+                modelled.push(device.id);
+                Place::Model(modelled.len() - 1)
+            };
+            places.insert((device.line, device.unit), place);
+        }
+        Ok(World { rig, models: Models::new(def, &modelled), places })
+    }
+
+    /// A tank rig alone, at the addresses of the thesis: controller 1 and PLC 2 of the first line.
+    pub fn tank(rig: Rig) -> World {
+        let places = BTreeMap::from([((LineId(0), 1), Place::Controller), ((LineId(0), 2), Place::Plc)]);
+        World { rig: Some(rig), models: Models::default(), places }
+    }
+
+    /// Lets plant time pass for everything.
+    pub fn advance(&mut self, dt: Duration) {
+        if let Some(rig) = &mut self.rig {
+            rig.advance(dt);
+        }
+        self.models.advance(dt);
+    }
+
+    /// Every unit by its line.
+    pub fn addresses(&self) -> impl Iterator<Item = (LineId, u8)> + '_ {
+        self.places.keys().copied()
+    }
+
+    /// The units of a line.
+    pub fn units(&self, line: LineId) -> Vec<u8> {
+        self.places.range((line, u8::MIN)..=(line, u8::MAX)).map(|((_, unit), _)| *unit).collect()
+    }
+
+    /// Answers a request. `None`: no such unit, a broadcast (which all units of the line obey), an empty request.
+    pub fn respond(&mut self, line: LineId, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
+        if self.is_broadcast(line, unit) {
+            self.broadcast(line, pdu, |_| true);
+            return None;
+        }
+        self.overhear(line, unit);
+        self.unit(line, unit)?.respond(pdu)
+    }
+
+    /// Whether the address means every unit of the line: 0, unless a device of Modbus TCP has it for its own.
+    pub fn is_broadcast(&self, line: LineId, unit: u8) -> bool {
+        unit == BROADCAST && !self.places.contains_key(&(line, unit))
+    }
+
+    /// Every unit of a line that hears does what a broadcast says. Nobody answers.
+    pub fn broadcast(&mut self, line: LineId, pdu: &[u8], hears: impl Fn(u8) -> bool) {
+        for unit in self.units(line).into_iter().filter(|unit| hears(*unit)) {
+            if let Some(unit) = self.unit(line, unit) {
+                unit.obey(pdu);
+            }
+        }
+    }
+
+    /// A unit refuses a request with this code, whatever it says.
+    pub fn refuse(&mut self, line: LineId, unit: u8, pdu: &[u8], code: u8) -> Option<Vec<u8>> {
+        self.overhear(line, unit);
+        self.unit(line, unit)?.refuse(pdu, code)
+    }
+
+    /// The other units of the line count a message that is not theirs.
+    pub fn overhear(&mut self, line: LineId, unit: u8) {
+        for other in self.units(line).into_iter().filter(|other| *other != unit) {
+            if let Some(other) = self.unit(line, other) {
+                other.hear();
+            }
+        }
+    }
+
+    /// Something passed on a line that no unit could read.
+    pub fn spoiled(&mut self, line: LineId) {
+        for unit in self.units(line) {
+            if let Some(unit) = self.unit(line, unit) {
+                unit.hear_spoiled();
+            }
+        }
+    }
+
+    /// The time that a unit takes between a request and its answer.
+    pub fn reply_delay(&self, line: LineId, unit: u8) -> Duration {
+        match self.places.get(&(line, unit)) {
+            Some(Place::Controller) => rig::PXR_DELAY,
+            Some(Place::Plc) => rig::DL06_DELAY,
+            Some(Place::Model(place)) => self.models.reply_delay(*place),
+            None => Duration::ZERO,
+        }
+    }
+
+    /// The tank rig, if the plant has one.
+    pub fn rig(&self) -> Option<&Rig> {
+        self.rig.as_ref()
+    }
+
+    /// The tank rig, to break its sensor or turn its switches.
+    pub fn rig_mut(&mut self) -> Option<&mut Rig> {
+        self.rig.as_mut()
+    }
+
+    /// What a modelled device has in its registers for a tag, in the tag's unit; `None` for a tag of the rig.
+    pub fn value(&self, tag: TagId) -> Option<f64> {
+        self.models.value(tag)
+    }
+
+    /// Puts a value into the registers of a modelled device, as if the device itself had found it so. `false` if the tag
+    /// is not of a model or cannot hold it.
+    pub fn set_value(&mut self, tag: TagId, value: f64) -> bool {
+        self.models.set_value(tag, value)
+    }
+
+    /// Takes the power from all devices and gives it back: they start as they were switched on first.
+    pub fn power_cycle(&mut self) {
+        if let Some(rig) = &mut self.rig {
+            rig.power_cycle();
+        }
+        self.models.power_cycle();
+    }
+
+    fn unit(&mut self, line: LineId, unit: u8) -> Option<&mut dyn Unit> {
+        match self.places.get(&(line, unit))? {
+            Place::Controller => self.rig.as_mut().map(|rig| rig.controller() as &mut dyn Unit),
+            Place::Plc => self.rig.as_mut().map(|rig| rig.plc() as &mut dyn Unit),
+            Place::Model(place) => self.models.unit(*place).map(|slave: &mut Slave<Model>| slave as &mut dyn Unit),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const L1: LineId = LineId(0);
+
+    #[test]
+    fn a_stranger_and_a_broadcast_get_no_answer() {
+        let mut world = World::tank(Rig::new());
+        for unit in [0, 3, 247] {
+            assert_eq!(world.respond(L1, unit, &[3, 0, 0, 0, 1]), None);
+        }
+        assert_eq!(world.respond(LineId(1), 1, &[3, 0x03, 0xEA, 0, 1]), None, "the same unit of another line");
+    }
+
+    /// 41003 is SV of the controller and plain V memory of the PLC.
+    #[test]
+    fn a_broadcast_is_obeyed_by_every_unit_of_its_line() {
+        let mut world = World::tank(Rig::new());
+        assert_eq!(world.respond(LineId(1), 0, &[16, 0x03, 0xEA, 0, 1, 2, 0x00, 0x09]), None);
+        assert_eq!(world.respond(L1, 0, &[16, 0x03, 0xEA, 0, 1, 2, 0x01, 0xF4]), None);
+        for unit in [1, 2] {
+            assert_eq!(world.respond(L1, unit, &[3, 0x03, 0xEA, 0, 1]), Some(vec![3, 2, 0x01, 0xF4]));
+        }
+    }
+
+    #[test]
+    fn a_unit_counts_what_passes_on_its_line() {
+        let mut world = World::tank(Rig::new());
+        let counter = |world: &mut World, which: u8| world.respond(L1, 2, &[8, 0, which, 0, 0]).map(|reply| reply[4]);
+        for unit in [1, 2, 9, 0] {
+            world.respond(L1, unit, &[3, 0x03, 0xEA, 0, 1]);
+            world.respond(LineId(1), unit, &[3, 0x03, 0xEA, 0, 1]);
+        }
+        world.spoiled(L1);
+        world.spoiled(LineId(1));
+        // All four messages and this question; one that was spoiled; unit 2, the broadcast and the three questions.
+        assert_eq!(counter(&mut world, 0x0B), Some(5));
+        assert_eq!(counter(&mut world, 0x0C), Some(1));
+        assert_eq!(counter(&mut world, 0x0E), Some(5));
+        world.power_cycle();
+        assert_eq!(counter(&mut world, 0x0B), Some(1));
+    }
+}
