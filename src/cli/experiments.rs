@@ -10,7 +10,7 @@ physical parameters and one controller for all six; P in % of the measuring rang
 
 PV is what the display shows, rounded to 1 °C.
   first at SV  when PV was first equal to SV
-  steady from  when PV became equal to SV for the rest of the recording
+  steady from  when PV became equal to SV for the rest of the recording, five minutes at least
   overshoot    the greatest PV less SV";
 
 /// Arguments of `experiments`.
@@ -126,8 +126,12 @@ fn verdict(rows: &[Row]) -> Vec<String> {
     lines
 }
 
-/// What the model leaves out, for whoever compares.
+/// What does not fit and why, for whoever compares.
 const LIMITS: &str = "\
+Fuzzy and auto-tuned heat fully until SV and reach it in the same second. In the thesis auto-tuned took 57 s longer; no lag,
+loss or band that we found explains that together with its overshoot of 2 °C.
+P, PI and PD come to rest near 69.5 °C, where the display changes: there the eddies at the probe decide the second. Their
+phase is fitted as the other constants are; with another phase these times move by up to a minute, and steady from by more.
 The thesis gives one run of each; mains, room and cold water of the day are not in it, and are constant here.";
 
 fn order(rows: &[Row], outcome: impl Fn(&Row) -> Outcome) -> Vec<&str> {

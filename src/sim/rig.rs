@@ -257,19 +257,29 @@ mod tests {
         assert_eq!(whole.truth(), pieces.truth());
     }
 
+    /// The controller of the thesis found P 1.2 %, I 70 s and D 13.5 s.
     #[test]
-    fn auto_tuning_on_the_tank_ends_with_usable_values() {
-        let rig = &mut Rig::filled(5.0);
-        // Manual, running, agitator and heater on.
-        assert!(rig.respond(2, &[15, 0x0C, 0, 0, 7, 1, 0b100_1001]).is_some());
-        assert!(rig.respond(1, &[6, 0x03, 0xEC, 0, 1]).is_some());
-        rig.advance(Duration::from_secs(3 * 3600));
-        let reply = rig.respond(1, &[3, 0x03, 0xEC, 0, 4]).expect("the controller answers");
-        let [tune, p, i, d] = [2, 4, 6, 8].map(|at| u16::from_be_bytes([reply[at], reply[at + 1]]));
-        assert_eq!(tune, 0);
-        assert!((8..20).contains(&p) && (500..1000).contains(&i) && (90..200).contains(&d), "P {p} I {i} D {d}");
-        rig.advance(Duration::from_secs(3600));
-        assert!((rig.truth().pv_c - 70.0).abs() < 1.0, "{:?}", rig.truth());
+    fn auto_tuning_of_both_types_ends_near_the_values_of_the_thesis_and_holds_sv() {
+        for kind in [1, 2] {
+            let rig = &mut Rig::filled(5.0);
+            // Manual, running, agitator and heater on.
+            assert!(rig.respond(2, &[15, 0x0C, 0, 0, 7, 1, 0b100_1001]).is_some());
+            assert!(rig.respond(1, &[6, 0x03, 0xEC, 0, kind]).is_some());
+            rig.advance(Duration::from_secs(90 * 60));
+            let reply = rig.respond(1, &[3, 0x03, 0xEC, 0, 4]).expect("the controller answers");
+            let [tune, tuned @ ..] = [2, 4, 6, 8].map(|at| u16::from_be_bytes([reply[at], reply[at + 1]]));
+            assert_eq!(tune, 0, "type {kind} is still tuning");
+            for (tuned, thesis) in tuned.into_iter().zip([12.0, 700.0, 135.0]) {
+                assert!(
+                    (f64::from(tuned) / thesis - 1.0).abs() < 0.15,
+                    "type {kind}: {tuned}, thesis {thesis} (tenths)"
+                );
+            }
+            for _ in 0..1800 {
+                rig.advance(Duration::from_secs(1));
+                assert!((rig.truth().pv_c - 70.0).abs() < 0.8, "type {kind}: {:?}", rig.truth());
+            }
+        }
     }
 
     #[test]
@@ -278,7 +288,7 @@ mod tests {
         rig.advance(Duration::from_secs(300));
         assert!(rig.truth().readings.heater_w > 1500.0);
         rig.set_sensor_open(true);
-        rig.advance(Duration::from_secs(30));
+        rig.advance(Duration::from_secs(60));
         assert!(rig.truth().readings.heater_w < 1.0);
         rig.advance(Duration::from_secs(2 * 3600));
         assert!(rig.truth().fault);

@@ -14,12 +14,15 @@ pub const AMBIENT_C: f64 = 27.0;
 /// Water in the whole rig, in litres.
 pub const TOTAL_L: f64 = 20.0;
 
+// Fitted: found by a search over all six experiments of the thesis at once (`sim::experiment`), each within what such a
+// rig can have. The rest is from data sheets and the thesis, or ours where it says so.
+
 /// Heat capacity of a litre of water.
 const WATER_J_PER_L_K: f64 = 4184.0;
-/// TK-1 without water, so that 5 l in it make the 22.0 kJ/K of the lumped model.
-const WALL_J_PER_K: f64 = 1080.0;
-/// TK-1 to the room, of the lumped model.
-const CONTROL_LOSS_W_PER_K: f64 = 2.9;
+/// TK-1 without water, fitted: about 2.3 kg of steel.
+const WALL_J_PER_K: f64 = 1138.4;
+/// TK-1 to the room, fitted: an open tank without insulation.
+const CONTROL_LOSS_W_PER_K: f64 = 3.276;
 /// TK-2 and TK-3 have cooling coils, or the cold water would warm up from batch to batch. Ours: the thesis is silent.
 const COIL_LOSS_W_PER_K: f64 = 60.0;
 const CONTROL_DIAMETER_CM: f64 = 25.0;
@@ -30,19 +33,23 @@ const VALVE_KV: f64 = 0.174;
 const PIPE_HEAD_M: f64 = 0.6;
 const BAR_PER_M: f64 = 0.0981;
 const PUMP_L_PER_S: f64 = 4.0 / 60.0;
-/// Lag of the heating element.
-const HEATER_LAG_S: f64 = 2.0;
-/// Transport from the heater to the probe.
-const DEAD_TIME_S: f64 = 15.0;
-/// Lag of the probe in stirred water, and in still water, where layers form.
-const STIRRED_LAG_S: f64 = 3.0;
+/// Lag of the heating element, fitted.
+const HEATER_LAG_S: f64 = 5.14;
+/// Transport from the heater to the probe, fitted.
+const DEAD_TIME_S: f64 = 14.3;
+/// Lag of the probe in stirred water, fitted, and in still water, where layers form (ours).
+const STIRRED_LAG_S: f64 = 5.30;
 const STILL_LAG_S: f64 = 40.0;
-/// Eddies of warmer and colder water pass the probe: half their height where the water is 43 °C above the room, as in the
-/// experiments, and their periods. Sines of times that do not fit into each other look like chance and can be repeated.
-const EDDY_K: f64 = 0.15;
+/// Eddies of warmer and colder water pass the probe: half their height before the probe's lag where the water is 43 °C above
+/// the room, as in the experiments, fitted; where they begin, fitted; their periods and shares, ours. Sines of times that do
+/// not fit into each other look like chance and can be repeated. Without them P control would come to rest, and the
+/// thesis's never did although it did not overshoot.
+const EDDY_K: f64 = 0.344;
 const EDDY_AT_K: f64 = 43.0;
+const EDDIES_BEGIN_S: f64 = 26.7;
 const EDDIES: [(f64, f64); 3] = [(13.7, 0.5), (31.3, 0.6), (71.9, 0.6)];
-/// The cut-out thermostat in series with the heater: opens here, closes again 4 K below.
+/// The cut-out thermostat in series with the heater, set to 95 °C (ours) of its 0–120 °C: it opens here, and closes again
+/// 4 K below (data sheet: 4 ± 2 K).
 const CUT_OUT_C: f64 = 95.0;
 const CUT_OUT_HYSTERESIS_K: f64 = 4.0;
 /// One place of the delay line.
@@ -140,7 +147,7 @@ impl Tank {
             probe_c: temperature_c,
             delay: VecDeque::from(vec![temperature_c; SLOTS]),
             since_slot_s: 0.0,
-            elapsed_s: 0.0,
+            elapsed_s: EDDIES_BEGIN_S,
             flow_in: 0.0,
             flow_out: 0.0,
             flow_pump: 0.0,
@@ -329,8 +336,9 @@ mod tests {
             tank.step(0.1, &full);
             seconds += 0.1;
         }
-        // 22.0 kJ/K against 1600 W and 2.9 W/K: −C/U · ln(1 − U·43/1600) plus the lag of the heater.
-        let expected = -22_000.0 / 2.9 * (1.0 - 2.9 * 43.0 / 1600.0_f64).ln() + HEATER_LAG_S;
+        // Water and wall against full power and loss: −C/U · ln(1 − U·43/1600) plus the lag of the heater.
+        let (c, u) = (5.0 * WATER_J_PER_L_K + WALL_J_PER_K, CONTROL_LOSS_W_PER_K);
+        let expected = -c / u * (1.0 - u * 43.0 / HEATER_W).ln() + HEATER_LAG_S;
         assert!((seconds - expected).abs() < 1.0, "{seconds} s, expected {expected} s");
     }
 
@@ -367,7 +375,7 @@ mod tests {
             most_c - least_c
         };
         assert!(spread(AMBIENT_C) < 1e-9);
-        assert!((0.05..0.6).contains(&spread(70.0)), "{} K", spread(70.0));
+        assert!((0.3..1.0).contains(&spread(70.0)), "{} K", spread(70.0));
     }
 
     #[test]

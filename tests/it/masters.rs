@@ -91,7 +91,7 @@ fn the_recorded_exchanges_of_the_thesis() {
 }
 
 /// What `peers/master.py` understands of the simulated plant, whatever the master and the mode.
-const EVERY_MASTER: [&str; 12] = [
+const EVERY_MASTER: [&str; 23] = [
     "SV [700]",
     "P I D [50, 2400, 600]",
     "SV in use [700]",
@@ -104,6 +104,17 @@ const EVERY_MASTER: [&str; 12] = [
     "no such address exception 2",
     "no such function exception 1",
     "SV above its limit exception 3",
+    "measured 10",
+    "input, unit, range, decimals [1, 0, 0, 1850, 1]",
+    "SV in 0.01 % of the range [3541]",
+    "standby [1]",
+    "targets of the programme [500, 600, 650, 0]",
+    "END cannot be written exception 3",
+    "interlocks [0]",
+    "fill ['65']",
+    "no such V memory exception 2",
+    "inputs, outputs, relays as words [2, 2, 2]",
+    "a relay in its word 13",
 ];
 
 /// What pymodbus understands beyond that, in every mode.

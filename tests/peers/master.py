@@ -114,6 +114,21 @@ def ask_what_every_master_can(master):
     print("no such address", master.holding(PXR, 9000, 1))
     print("no such function", master.coils(PXR, 0, 1))
     print("SV above its limit", master.write_one(PXR, 1002, 9999))
+    print("measured", len(master.inputs(PXR, 1000, 10)))
+    print("input, unit, range, decimals", master.holding(PXR, 1015, 5))
+    print("SV in 0.01 % of the range", master.holding(PXR, 2, 1))
+    master.write_one(PXR, 1003, 1)
+    print("standby", master.holding(PXR, 1003, 1))
+    master.write_one(PXR, 1003, 0)
+    master.write_many(PXR, 1056, [500, 600, 650])
+    print("targets of the programme", master.holding(PXR, 1056, 4))
+    print("END cannot be written", master.write_one(PXR, 1081, 3))
+    print("interlocks", master.holding(DL06, 0o2003, 1))
+    master.write_one(DL06, 0o2004, 0x0065)
+    print("fill", [f"{word:x}" for word in master.holding(DL06, 0o2004, 1)])
+    print("no such V memory", master.holding(DL06, 0o7655, 1))
+    print("inputs, outputs, relays as words", [len(master.holding(DL06, first, 2)) for first in (0o40400, 0o40500, 0o40600)])
+    print("a relay in its word", master.holding(DL06, 0o40602, 1)[0] & 0b11111)
 
 
 def ask_what_only_pymodbus_can(master, mode):

@@ -11,10 +11,10 @@
 //! The maker does not publish his law: this one has its shape (full power longer than PID, settings of PID at SV).
 
 /// PV is drawn out along its slope over this share of D.
-const LOOK_AHEAD: f64 = 0.05;
+const LOOK_AHEAD: f64 = 0.0222;
 /// "Far below" holds fully at this share of the band, "far above" at that one.
-const FAR_BELOW: f64 = 0.2;
-const FAR_ABOVE: f64 = 0.1;
+const FAR_BELOW: f64 = 0.1292;
+const FAR_ABOVE: f64 = 0.6447;
 
 /// How much each rule holds; together 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
