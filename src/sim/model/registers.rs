@@ -173,7 +173,7 @@ impl Model {
 
     /// Whether a tag may hold what has just been written.
     fn admits(&self, tag: &TagDef) -> bool {
-        let Some(value) = self.value(tag.id) else { return false };
+        let Some(value) = self.value(tag.id) else { return tag.is_text() };
         let above = self.bound(tag.min).is_none_or(|min| min <= value);
         let below = self.bound(tag.max).is_none_or(|max| value <= max);
         above && below && (tag.labels.is_empty() || tag.label_of(value).is_some())
