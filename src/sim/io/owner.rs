@@ -207,10 +207,14 @@ fn follow(world: &mut World, faults: &mut Faults, told: Told) {
     match told {
         Told::Fault(line, unit, fault) => faults.set(line, unit, fault),
         Told::SensorOpen(open) => {
-            world.rig_mut().map(|rig| rig.set_sensor_open(open));
+            if let Some(rig) = world.rig_mut() {
+                rig.set_sensor_open(open);
+            }
         }
         Told::Switch(switch, on) => {
-            world.rig_mut().map(|rig| rig.set_switch(switch, on));
+            if let Some(rig) = world.rig_mut() {
+                rig.set_switch(switch, on);
+            }
         }
         Told::PowerCycle => world.power_cycle(),
         Told::Spoiled(line) => world.spoiled(line),

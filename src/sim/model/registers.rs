@@ -52,12 +52,15 @@ impl Chart {
 /// The addresses that answer: those of tags, and what lies between two of them where the profile allows reading over it.
 fn cells<'a>(tags: impl Iterator<Item = &'a TagDef>, limits: Limits) -> BTreeSet<u16> {
     let mut cells: BTreeSet<u16> = BTreeSet::new();
+    let mut gap_max = u32::from(limits.gap_words_max);
     for tag in tags {
+        // The profile counts gaps in words, of bits too.
+        gap_max = u32::from(limits.gap_words_max) * if tag.point.table.is_bits() { 16 } else { 1 };
         cells.extend((tag.point.address..).take(usize::from(tag.point.len())));
     }
     let taken: Vec<u16> = cells.iter().copied().collect();
     for pair in taken.windows(2) {
-        if pair[1] - pair[0] - 1 <= limits.gap_words_max {
+        if u32::from(pair[1] - pair[0] - 1) <= gap_max {
             cells.extend(pair[0] + 1..pair[1]);
         }
     }
@@ -170,7 +173,7 @@ impl Model {
 
     /// Whether a tag may hold what has just been written.
     fn admits(&self, tag: &TagDef) -> bool {
-        let Some(value) = self.value(tag.id) else { return false };
+        let Some(value) = self.value(tag.id) else { return tag.is_text() };
         let above = self.bound(tag.min).is_none_or(|min| min <= value);
         let below = self.bound(tag.max).is_none_or(|max| value <= max);
         above && below && (tag.labels.is_empty() || tag.label_of(value).is_some())
