@@ -170,7 +170,10 @@ fn taken_over(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
             (Some(command), Some(output)) if (command != 0.0) != (output != 0.0) => {
                 let arrow = cx.theme.pick("→", "->");
                 let new = cx.snapshot.format(actuator.command, command);
-                changes.push(format!("{name} {} {arrow} {new}", value::show(cx, actuator.output).with_unit()));
+                let mut locks = cx.def().guards.interlocks_of(actuator.command, command);
+                let blocked = locks.any(|lock| lock.standing(cx.snapshot.sample(lock.of)) == Standing::Blocked);
+                let but = if blocked { ", blocked" } else { "" };
+                changes.push(format!("{name} {} {arrow} {new}{but}", value::show(cx, actuator.output).with_unit()));
             }
             (Some(_), Some(_)) => {}
             (None, _) | (_, None) => changes.push(format!("{name} ?")),

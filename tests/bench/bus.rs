@@ -105,7 +105,7 @@ fn tcp(libmodbus: Option<&Path>) {
     if let Some((rate, cpu)) = theirs {
         println!("  libmodbus loop        {rate:9.0} /s  {:5.1} µs CPU each", cpu * 1e6);
     }
-    for in_flight in [1] {
+    for in_flight in [1, 16] {
         let (rate, cpu) = median(|| line_task(in_flight));
         let ratio = theirs.map_or("–".into(), |(base, _)| format!("{:.2}", rate / base));
         println!(

@@ -99,6 +99,11 @@ impl Confirm {
         Confirm { intent: Intent::Order(command), title: title.into(), notes: vec![words.into()], back: None }
     }
 
+    /// The faceplate that it was asked from.
+    pub(super) fn back(self) -> Option<Faceplate> {
+        self.back
+    }
+
     /// What Enter does.
     pub fn verb(&self) -> &'static str {
         match &self.intent {
@@ -127,7 +132,7 @@ impl Confirm {
     }
 
     /// Is it certainly without effect now?
-    fn is_refused(&self, cx: &Cx) -> bool {
+    pub(super) fn is_refused(&self, cx: &Cx) -> bool {
         match &self.intent {
             Intent::Order(Command::Write { tag, value }) => guard::is_refused(cx, *tag, *value),
             Intent::Order(_) | Intent::Quit => false,

@@ -85,7 +85,11 @@ impl Modal {
     /// A key: what is left of the window, and what is to be done.
     pub fn on_key(self, cx: &Cx, tabs: &mut Tabs, event: KeyEvent) -> (Option<Modal>, Vec<Act>) {
         if keys::code(KeyCode::Esc).is(event) {
-            return (None, Vec::new());
+            let back = match self {
+                Modal::Confirm(confirm) => confirm.back().map(Modal::Faceplate),
+                _ => None,
+            };
+            return (back, Vec::new());
         }
         if keys::ctrl('c').is(event) {
             return (Some(Modal::Confirm(Confirm::quit())), Vec::new());
@@ -136,6 +140,7 @@ impl Modal {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         match self {
             Modal::Help(_) => vec![hint("↑↓", "scroll"), hint("Esc", "close")],
+            Modal::Confirm(confirm) if confirm.is_refused(cx) => vec![hint("Esc", confirm.escape())],
             Modal::Confirm(confirm) => vec![hint("⏎", confirm.verb()), hint("Esc", confirm.escape())],
             Modal::Entry(_) => vec![hint("⏎", "write and verify"), hint("Esc", "leave unchanged")],
             Modal::Choice(_) => vec![hint("↑↓", "select"), hint("⏎", "next"), hint("Esc", "leave unchanged")],

@@ -153,12 +153,31 @@ fn in_auto_the_change_to_manual_is_a_step_of_its_own() {
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
     assert!(matches!(model.modal, Some(Modal::Faceplate(_))), "back where it was asked from");
     assert_eq!(order_of(&type_keys(&mut model, "⏎⏎")), None, "further Enters send nothing that was not asked");
+    let mut model = plate(&fixture, "PLC-1.P-1");
+    type_keys(&mut model, "t⎋");
+    assert!(matches!(model.modal, Some(Modal::Faceplate(_))), "Esc takes one step back");
+    type_keys(&mut model, "⎋");
+    assert_eq!(model.modal, None);
     // In MANUAL the same key asks for the command itself, and only the Enter after it sends it.
     fixture.set("PLC-1.AUTO", 0.0);
     let mut model = plate(&fixture, "PLC-1.P-1");
     assert_eq!(order_of(&type_keys(&mut model, "tt")), None, "a key pressed twice sends nothing");
     let order = Command::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
+}
+
+#[test]
+fn what_manual_changes_at_once_is_told_before() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 1.0);
+    fixture.set("PLC-1.MAN.P-1", 1.0);
+    for (level, words) in [(12.0, "take over: P-1 STOP → ON."), (19.5, "take over: P-1 STOP → ON, blocked.")] {
+        fixture.set("PLC-1.TK-2", level);
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, "m");
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains(words), "{shown}");
+    }
 }
 
 #[test]
@@ -208,6 +227,7 @@ fn what_an_interlock_blocks_is_told_and_not_sent() {
     type_keys(&mut model, "t");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains(reason) && shown.contains("This is not sent"), "{shown}");
+    assert!(!shown.contains("write and verify"), "no key is offered that does nothing");
     assert_eq!(order_of(&type_keys(&mut model, "⏎y")), None);
     // The tank is emptied while the question stands: then it may be sent.
     fixture.set("PLC-1.TK-2", 12.0);

@@ -6,7 +6,7 @@ use super::{Bounds, alarm_mark, label_style, put_value};
 use crate::{
     plant::def::TagId,
     ui::{
-        Cx,
+        Cx, guard,
         theme::Colours,
         widgets::{
             text::{Canvas, fit, width},
@@ -86,10 +86,12 @@ impl Tank<'_> {
             match value::is_on(cx, heater) {
                 Some(true) => {
                     let x = canvas.text(1, y, theme.pick("≋≋≋ ", "^^^ "), theme.running());
-                    put_value(cx, canvas, x, y, heater, 11);
+                    let x = put_value(cx, canvas, x, y, heater, 11);
+                    shape_of_mark(cx, canvas, x + 1, y, heater);
                 }
                 Some(false) => {
-                    canvas.text(1, y, theme.pick("─── off", "--- heater off"), theme.dim());
+                    let x = canvas.text(1, y, theme.pick("─── off", "--- heater off"), theme.dim());
+                    shape_of_mark(cx, canvas, x + 1, y, heater);
                 }
                 None => {
                     canvas.text(1, y, "heater ?", theme.trouble());
@@ -110,7 +112,8 @@ impl Tank<'_> {
             let x = centre.saturating_sub(5);
             canvas.run(x.saturating_sub(1), y, width(picture) + width(&shown.text) + 3, ' ', theme.normal());
             let x = canvas.text(x, y, picture, style);
-            canvas.text(x + 1, y, &shown.text, if on == Some(true) { theme.running() } else { shown.style });
+            let x = canvas.text(x + 1, y, &shown.text, if on == Some(true) { theme.running() } else { shown.style });
+            shape_of_mark(cx, canvas, x + 1, y, agitator);
         }
     }
 
@@ -167,5 +170,12 @@ fn liquid(cx: &Cx, canvas: &mut Canvas, eighths: u32) {
     if rest > 0 && full < height {
         let surface = if plain { SHALLOW } else { SURFACE[rest - 1] };
         canvas.run(0, height - full - 1, width, surface, cx.theme.liquid());
+    }
+}
+
+/// The mark of an actuator inside the vessel: its shape alone, the faceplate has the words.
+fn shape_of_mark(cx: &Cx, canvas: &mut Canvas, x: u16, y: u16, output: TagId) {
+    if let Some((words, style)) = guard::mark(cx, output) {
+        canvas.text(x, y, words.split(' ').next().unwrap_or_default(), style);
     }
 }
