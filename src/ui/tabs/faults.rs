@@ -17,7 +17,7 @@ use crate::{
     },
     ui::{
         Act, Cx, Effect,
-        keys::{Key, char, code},
+        keys::{self, Hint, Key, char, code},
     },
 };
 
@@ -65,7 +65,12 @@ pub const KEYS: &[Key<Action>] = &[
     },
     Key { chord: code(KeyCode::Enter), label: "on/off", help: "let it go wrong, or mend it", action: Action::Toggle },
     Key { chord: code(KeyCode::Left), label: "", help: "less of it, where it has a number", action: Action::Less },
-    Key { chord: code(KeyCode::Right), label: "number", help: "more of it, where it has a number", action: Action::More },
+    Key {
+        chord: code(KeyCode::Right),
+        label: "number",
+        help: "more of it, where it has a number",
+        action: Action::More,
+    },
     Key { chord: char('w'), label: "all well", help: "mend everything", action: Action::AllWell },
     Key { chord: char('v'), label: "points", help: "how the drill stands, or the fault told", action: Action::Verdict },
 ];
@@ -84,7 +89,8 @@ impl Faults {
             Action::Up => self.selected = self.selected.min(rows.len()).saturating_sub(1),
             Action::Down => self.selected = (self.selected + 1).min(rows.len() - 1),
             Action::NextPlace => {
-                self.selected = rows.iter().skip(self.selected).position(|row| row.0 != place).map_or(0, |by| self.selected + by);
+                self.selected =
+                    rows.iter().skip(self.selected).position(|row| row.0 != place).map_or(0, |by| self.selected + by);
             }
             Action::Toggle if in_force => return wish(Order::Clear(place, fault)),
             Action::Toggle => return wish(Order::Set(place, fault)),
@@ -108,6 +114,13 @@ impl Faults {
             Some(in_force) => in_force.fault,
             None => self.numbers.get(&(place, offered.word())).copied().unwrap_or(offered),
         }
+    }
+
+    /// Its keys; points are there only in a drill.
+    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+        let drill = cx.drill.is_some_and(|status| status.scenario.is_some());
+        let there = KEYS.iter().filter(|key| drill || key.action != Action::Verdict).copied();
+        keys::hints(&there.collect::<Vec<_>>())
     }
 
     /// Draws.

@@ -87,8 +87,8 @@ fn list(tab: &Faults, cx: &Cx, status: &Status, canvas: &mut Canvas) {
     for (y, (name, state, style, selected)) in lines.iter().skip(first).take(height).enumerate() {
         let y = y as u16;
         let x = canvas.text(0, y, if *selected { cx.theme.pick("▸", ">") } else { " " }, cx.theme.strong());
-        canvas.text(x, y, &pad(name, LIST - 11), *style);
-        canvas.text_right(LIST - 1, y, state, if state == "off" { cx.theme.dim() } else { *style });
+        canvas.text(x, y, &pad(name, LIST - 12), *style);
+        canvas.text_right(LIST - 2, y, state, if state == "off" { cx.theme.dim() } else { *style });
         if *selected {
             canvas.paint(0, y, LIST, 1, cx.theme.focus());
         }
@@ -130,7 +130,8 @@ fn told(cx: &Cx, status: &Status, place: Place, fault: Fault, canvas: &mut Canva
     for (y, (line, style)) in lines.iter().take(usize::from(above)).enumerate() {
         // The last row that fits says that there is more.
         let cut = y as u16 + 1 == above && lines.len() > usize::from(above);
-        let line = if cut { fit_words(&format!("{line} {}", "x".repeat(usize::from(room))), room) } else { line.clone() };
+        let line =
+            if cut { fit_words(&format!("{line} {}", "x".repeat(usize::from(room))), room) } else { line.clone() };
         canvas.text(0, y as u16, &line, *style);
     }
     comparison(cx, &truth, &mut canvas.part(0, above, room, below));
@@ -195,8 +196,7 @@ fn comparison(cx: &Cx, rows: &[Compared], canvas: &mut Canvas) {
         return;
     }
     let names = rows.iter().map(|row| width(&cx.def().tag(row.tag).name)).max().unwrap_or(0).clamp(10, 16);
-    canvas.text(0, 0, &pad("really", names + 2), cx.theme.dim());
-    canvas.text(names + 2, 0, "so", cx.theme.dim());
+    canvas.text(names + 2, 0, "really so", cx.theme.dim());
     canvas.text(names + 15, 0, "shown", cx.theme.dim());
     for (y, row) in rows.iter().enumerate() {
         let y = y as u16 + 1;
@@ -237,4 +237,3 @@ fn verdict(cx: &Cx, progress: &Progress, canvas: &mut Canvas) {
         canvas.text(11, y + 3 + n as u16, &line, theme.dim());
     }
 }
-
