@@ -2,6 +2,7 @@
 
 mod check;
 mod demo;
+mod drill;
 mod frame;
 mod log;
 mod paths;
@@ -48,6 +49,8 @@ enum Command {
     Demo(demo::Args),
     /// The station alone: polls, judges alarms, keeps the history; no terminal
     Run(run::Args),
+    /// Runs a scenario in virtual time and judges it; without a name lists the scenarios
+    Drill(drill::Args),
     /// Serves the simulated devices of a plant to other masters, over a pseudo-terminal or TCP
     Sim(sim::Args),
     /// Checks a plant or device file: every error at once, or the read plan of each line
@@ -124,6 +127,7 @@ pub fn main() -> ExitCode {
         None => run::with_terminal(&args.plant.unwrap_or_default(), &args.station),
         Some(Command::Demo(args)) => demo::main(args),
         Some(Command::Run(args)) => run::main(args),
+        Some(Command::Drill(args)) => drill::main(args),
         Some(Command::Sim(args)) => sim::main(args),
         Some(Command::Check(args)) => check::main(args),
         Some(Command::Profiles(args)) => profiles::main(args),
