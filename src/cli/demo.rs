@@ -3,7 +3,7 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use tokio::sync::oneshot;
+use tokio::sync::{mpsc, oneshot};
 
 use crate::{
     bus::io::{clock::Clock, transport::Connector},
@@ -15,7 +15,7 @@ use crate::{
     ui,
 };
 
-use super::{CliError, StationArgs, load, log, paths, run, runtime, say, span, speed};
+use super::{CliError, StationArgs, drill, load, log, paths, run, runtime, say, span, speed};
 
 /// Arguments of `demo`.
 #[derive(Debug, clap::Args)]
@@ -29,6 +29,12 @@ pub struct Args {
     /// Without a terminal: do the whole job and print what was done
     #[arg(long)]
     headless: bool,
+    /// A drill: a scenario file, or the name of a shipped scenario; its plant is simulated
+    #[arg(long, value_name = "FILE", conflicts_with = "plant")]
+    scenario: Option<PathBuf>,
+    /// Tell nothing of the faults before the drill is over
+    #[arg(long, requires = "scenario", conflicts_with = "headless")]
+    exam: bool,
     /// End after this plant time
     #[arg(long = "for", value_name = "TIME", value_parser = span)]
     duration: Option<Duration>,
@@ -41,7 +47,13 @@ pub struct Args {
 
 /// Runs the demonstration.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let mut def = load(&args.plant, &args.station)?;
+    let (scenario, mut def) = match &args.scenario {
+        Some(path) => {
+            let (scenario, def) = drill::load(path)?;
+            (Some(Arc::new(scenario)), Arc::unwrap_or_clone(def))
+        }
+        None => (None, load(&args.plant, &args.station)?),
+    };
     if !args.headless {
         ui::io::require_terminal()?;
     }
@@ -51,19 +63,35 @@ pub fn main(args: Args) -> Result<(), CliError> {
     runtime()?.block_on(async {
         let clock = Clock::starting_at(Timestamp::now(), args.speed);
         let services: Vec<_> = def.lines.iter().map(sim::io::Service::of).collect();
-        let simulated = sim::io::serve(&def, clock, &services).await.map_err(simulation_error)?;
+        let simulated = drill::world(&def, scenario.as_deref())?;
+        let simulated = sim::io::serve_world(&def, simulated, clock, &services).await.map_err(simulation_error)?;
         simulated.plug_into(&mut def);
         let def = Arc::new(def);
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
         let history = scratch.history.clone();
-        let mut station =
-            station::start(station::Options { def: def.clone(), clock, history, connectors, file: None })?;
+        let options = station::Options { def: def.clone(), clock, history, connectors, file: None };
+        let (listener, journal) = mpsc::channel(sim::io::RECORDS_MAX);
+        let mut station = station::start_told(options, Some(listener))?;
+        let mut session = station.session(&if args.headless { "demo".to_owned() } else { paths::operator() });
+        let trainer = sim::io::Trainer {
+            def: def.clone(),
+            world: simulated.world.clone(),
+            snapshots: session.snapshots.clone(),
+            journal,
+            // Without a terminal nobody else is there to act.
+            operator: (args.headless && scenario.is_some()).then(|| session.orders.clone()),
+            scenario: scenario.clone(),
+            exam: args.exam,
+        };
+        let (port, _judging) = trainer.spawn();
+        let drilled = port.status.clone();
+        session.drill = Some(port);
         let result = if args.headless {
             let places: Vec<_> = simulated.places().iter().map(ToString::to_string).collect();
             say(&format!("{}: simulated on {}", def.title, places.join(", ")));
-            headless(station.session("demo"), clock, &args).await
+            let drill = scenario.as_ref().map(|scenario| scenario.duration);
+            headless(session, clock, args.duration.or(drill), &args).await
         } else {
-            let session = station.session(&paths::operator());
             tokio::select! {
                 result = ui::io::run(session, ui::io::Options::default()) => result.map_err(CliError::from),
                 () = run::over(clock, args.duration) => Ok(()),
@@ -71,15 +99,24 @@ pub fn main(args: Args) -> Result<(), CliError> {
         };
         station.stop().await;
         drop(simulated);
-        result
+        let verdict = drilled.borrow().scenario.as_ref().map(|progress| progress.verdict.clone());
+        if let Some(verdict) = &verdict {
+            drill::say_verdict(verdict);
+        }
+        match (result, verdict) {
+            (Ok(()), Some(verdict)) if args.headless && !(verdict.over && verdict.passed()) => {
+                Err(CliError::Failed("the drill was not passed".into()))
+            }
+            (result, _) => result,
+        }
     })
 }
 
 /// Tells what happens until the time is over, then sums up and writes the report.
-async fn headless(session: Session, clock: Clock, args: &Args) -> Result<(), CliError> {
+async fn headless(session: Session, clock: Clock, duration: Option<Duration>, args: &Args) -> Result<(), CliError> {
     let from = clock.now();
     let queries = session.queries.clone();
-    let last = run::follow(session, clock, args.duration).await?;
+    let last = run::follow(session, clock, duration).await?;
     let period = Period { name: "demo".into(), from, to: clock.now() };
     let report = ask_report(&queries, period).await?;
     for line in summary(&last, &report) {

@@ -2,6 +2,7 @@
 
 mod check;
 mod demo;
+mod drill;
 mod experiments;
 mod frame;
 mod log;
@@ -49,6 +50,8 @@ enum Command {
     Demo(demo::Args),
     /// The station alone: polls, judges alarms, keeps the history; no terminal
     Run(run::Args),
+    /// Runs a scenario in virtual time and judges it; without a name lists the scenarios
+    Drill(drill::Args),
     /// Serves the simulated devices of a plant to other masters, over a pseudo-terminal or TCP
     Sim(sim::Args),
     /// Runs the six control experiments of the thesis on the simulated rig and prints them beside its measurements
@@ -127,6 +130,7 @@ pub fn main() -> ExitCode {
         None => run::with_terminal(&args.plant.unwrap_or_default(), &args.station),
         Some(Command::Demo(args)) => demo::main(args),
         Some(Command::Run(args)) => run::main(args),
+        Some(Command::Drill(args)) => drill::main(args),
         Some(Command::Sim(args)) => sim::main(args),
         Some(Command::Experiments(args)) => experiments::main(args),
         Some(Command::Check(args)) => check::main(args),

@@ -19,9 +19,10 @@ pub fn main(args: Args) -> Result<(), CliError> {
             let kind = match listed.kind {
                 Kind::Plant => "plant",
                 Kind::Device => "device",
+                Kind::Scenario => "scenario",
             };
             let from = listed.from.map_or_else(|| "shipped".into(), |path| path.display().to_string());
-            say(&format!("{kind:6}  {:24}  {from}", listed.name));
+            say(&format!("{kind:8}  {:24}  {from}", listed.name));
         }
         return Ok(());
     };

@@ -39,7 +39,7 @@ pub fn render(errors: &Errors, color: bool) -> String {
 
 impl Errors {
     /// A failure before any text could be looked at, such as a missing file.
-    pub(super) fn unreadable(message: String, help: String) -> Errors {
+    pub(crate) fn unreadable(message: String, help: String) -> Errors {
         Errors {
             sources: Vec::new(),
             list: vec![Problem { message, help: Some(help), at: None, label: String::new(), also: None }],
@@ -72,7 +72,7 @@ impl std::error::Error for Errors {}
 
 /// A text that was read, by the name the user knows it under.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Source {
+pub(crate) struct Source {
     pub file: String,
     pub text: String,
 }
@@ -88,7 +88,7 @@ impl Source {
 
 /// A piece of one of the texts, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) struct Span {
+pub(crate) struct Span {
     pub source: usize,
     pub start: usize,
     pub end: usize,
@@ -104,7 +104,7 @@ impl Span {
 
 /// One problem.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Problem {
+pub(crate) struct Problem {
     at: Option<Span>,
     message: String,
     label: String,
@@ -154,7 +154,7 @@ impl Problem {
 
 /// Collects the problems while files are read, so that all of them come out at once.
 #[derive(Debug, Default)]
-pub(super) struct Problems {
+pub(crate) struct Problems {
     sources: Vec<Source>,
     list: Vec<Problem>,
 }

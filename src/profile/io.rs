@@ -75,9 +75,24 @@ impl Found {
 
 /// Reads the plant file that an argument means: a path, or the name of a plant.
 pub(super) fn plant(argument: &Path, search: &Search) -> Result<Found, Errors> {
+    find(PLANT, argument, search)
+}
+
+/// Reads the scenario that an argument means: a path, or the name of a scenario. Gives its name and text.
+pub(super) fn scenario(argument: &Path, search: &Search) -> Result<(String, Text), Errors> {
+    find(SCENARIO, argument, search).map(|found| (found.name, found.text))
+}
+
+/// What is found by path or name: its kind, its folder, its word.
+type Sort = (Kind, &'static str, &'static str);
+const PLANT: Sort = (Kind::Plant, "plants", "plant");
+const SCENARIO: Sort = (Kind::Scenario, "scenarios", "scenario");
+
+fn find(sort: Sort, argument: &Path, search: &Search) -> Result<Found, Errors> {
+    let folder = sort.1;
     let name = argument.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let by_name = argument.to_str().filter(|name| plain(name)).map(|name| format!("{name}.toml"));
-    let in_folders = by_name.iter().flat_map(|file| search.folders.iter().map(move |f| f.join("plants").join(file)));
+    let in_folders = by_name.iter().flat_map(|file| search.folders.iter().map(move |f| f.join(folder).join(file)));
     let path = std::iter::once(argument.to_path_buf()).chain(in_folders).find(|path| path.is_file());
     if let Some(path) = path {
         let file = path.display().to_string();
@@ -86,24 +101,24 @@ pub(super) fn plant(argument: &Path, search: &Search) -> Result<Found, Errors> {
         return Ok(Found { name, text: Text { file, bytes }, path: Some(path) });
     }
     let inside = match &by_name {
-        Some(file) => SHIPPED.get_file(format!("plants/{file}")),
+        Some(file) => SHIPPED.get_file(format!("{folder}/{file}")),
         None => argument.strip_prefix("profiles").ok().and_then(|inside| SHIPPED.get_file(inside)),
     };
     match inside {
         Some(file) => Ok(Found { name, text: shipped_text(file), path: None }),
-        None => Err(missing(argument, &name, search)),
+        None => Err(missing(sort, argument, &name, search)),
     }
 }
 
-fn missing(argument: &Path, name: &str, search: &Search) -> Errors {
+fn missing((kind, _, word): Sort, argument: &Path, name: &str, search: &Search) -> Errors {
     let what = if argument.exists() { "is not a file" } else { "does not exist" };
-    let plants: Vec<String> = list(search).into_iter().filter(|l| l.kind == Kind::Plant).map(|l| l.name).collect();
-    let near = plants.iter().find(|plant| strsim::damerau_levenshtein(plant, name) <= 1);
+    let known: Vec<String> = list(search).into_iter().filter(|l| l.kind == kind).map(|l| l.name).collect();
+    let near = known.iter().find(|known| strsim::damerau_levenshtein(known, name) <= 1);
     let help = match near {
         Some(near) => format!("did you mean `{near}`?"),
-        None => format!("give the path of a plant file, or one of the known plants: {}", plants.join(", ")),
+        None => format!("give the path of a {word} file, or one of the known {word}s: {}", known.join(", ")),
     };
-    Errors::unreadable(format!("the plant file {} {what}", argument.display()), help)
+    Errors::unreadable(format!("the {word} file {} {what}", argument.display()), help)
 }
 
 /// Reads the device profile of a name: the first folder that has it wins, the shipped one comes last.
@@ -135,10 +150,10 @@ pub(super) fn device_file(argument: &Path, search: &Search) -> Option<(String, T
     is_device.then(|| (stem, Text { file: argument.display().to_string(), bytes }))
 }
 
-/// The names of all plants and device profiles, with where each comes from.
+/// The names of all plants, device profiles and scenarios, with where each comes from.
 pub(super) fn list(search: &Search) -> Vec<Listed> {
     let mut all = Vec::new();
-    for (kind, folder) in [(Kind::Plant, "plants"), (Kind::Device, "devices")] {
+    for (kind, folder) in [(Kind::Plant, "plants"), (Kind::Device, "devices"), (Kind::Scenario, "scenarios")] {
         let shipped = SHIPPED.get_dir(folder).into_iter().flat_map(Dir::files).filter_map(|file| stem(file.path()));
         let entries = search.folders.iter().filter_map(|path| path.join(folder).read_dir().ok()).flatten().flatten();
         let mut names: Vec<String> = entries.filter_map(|entry| stem(&entry.path())).chain(shipped).collect();
@@ -151,8 +166,9 @@ pub(super) fn list(search: &Search) -> Vec<Listed> {
 
 /// The text of a plant or profile by its name.
 pub(super) fn text_of(name: &str, search: &Search) -> Option<String> {
-    let plant = || plant(Path::new(name), search).ok().map(|found| found.text);
-    let text = device(name, search).ok().flatten().or_else(|| plain(name).then(plant).flatten())?;
+    let named = |sort| find(sort, Path::new(name), search).ok().map(|found| found.text);
+    let other = || plain(name).then(|| named(PLANT).or_else(|| named(SCENARIO))).flatten();
+    let text = device(name, search).ok().flatten().or_else(other)?;
     Some(String::from_utf8_lossy(&text.bytes).into_owned())
 }
 

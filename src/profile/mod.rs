@@ -13,15 +13,15 @@
 mod address;
 mod alarm;
 mod device;
-mod diagnostic;
+pub(crate) mod diagnostic;
 mod edit;
 mod guard;
 mod io;
 pub mod line;
-mod names;
+pub(crate) mod names;
 mod picture;
 mod plant;
-mod reader;
+pub(crate) mod reader;
 mod report;
 mod schema;
 mod simulate;
@@ -89,21 +89,28 @@ pub struct Listed {
     pub from: Option<PathBuf>,
 }
 
-/// The two kinds of profile.
+/// The kinds of profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// A whole plant.
     Plant,
     /// A device.
     Device,
+    /// A drill on a simulated plant.
+    Scenario,
 }
 
-/// All plants, then all devices, each by name: what `sightglass profiles` shows.
+/// All plants, all devices, all scenarios, each by name: what `sightglass profiles` shows.
 pub fn list(search: &Search) -> Vec<Listed> {
     io::list(search)
 }
 
-/// The text of a device profile or plant, to read or to copy and change.
+/// The text of a scenario: of a file, or of a name in a configuration folder or in the program.
+pub(crate) fn scenario(argument: &Path, search: &Search) -> Result<(String, plant::Text), Errors> {
+    io::scenario(argument, search)
+}
+
+/// The text of a device profile, plant or scenario, to read or to copy and change.
 pub fn text_of(name: &str, search: &Search) -> Option<String> {
     io::text_of(name, search)
 }

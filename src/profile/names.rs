@@ -114,7 +114,7 @@ impl Unique {
 }
 
 /// The number that a choice means for a tag: a label of its enumeration, or a number that the tag can hold.
-pub(super) fn number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Problems) -> Option<f64> {
+pub(crate) fn number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Problems) -> Option<f64> {
     let labels = || tag.labels.iter().map(|(_, text)| text.as_str());
     let known = match &choice.value {
         Choice::Word(word) => tag.labels.iter().find(|(_, text)| text == word).map(|(number, _)| *number as f64),

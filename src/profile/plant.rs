@@ -23,7 +23,7 @@ use crate::plant::{
 
 /// A text and the name the user knows it by.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Text {
+pub(crate) struct Text {
     pub file: String,
     pub bytes: Vec<u8>,
 }

@@ -15,14 +15,14 @@ use super::diagnostic::{Problems, Span};
 
 /// A value and where it stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct At<T> {
+pub(crate) struct At<T> {
     pub value: T,
     pub at: Span,
 }
 
 /// A TOML value with the places of all that is in it.
 #[derive(Debug, Clone)]
-pub(super) enum Node {
+pub(crate) enum Node {
     Text(String),
     /// As written: what range is right depends on the key.
     Whole(i128),
@@ -34,22 +34,22 @@ pub(super) enum Node {
 }
 
 /// The keys of a table, each with the place of the key and its value.
-pub(super) type Table = BTreeMap<String, (Span, At<Node>)>;
+pub(crate) type Table = BTreeMap<String, (Span, At<Node>)>;
 
 /// A table as it was written.
 #[derive(Debug, Clone)]
-pub(super) struct Raw {
+pub(crate) struct Raw {
     pub at: Span,
     pub table: Table,
 }
 
 /// A type that a TOML value can become. `None` after the problem was added.
-pub(super) trait Value: Sized {
+pub(crate) trait Value: Sized {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self>;
 }
 
 /// Parses a file. `None` if it is not UTF-8, not TOML or says nothing; the problems say which.
-pub(super) fn parse(file: &str, bytes: &[u8], problems: &mut Problems) -> Option<Raw> {
+pub(crate) fn parse(file: &str, bytes: &[u8], problems: &mut Problems) -> Option<Raw> {
     let source = problems.source(file, String::from_utf8_lossy(bytes).into_owned());
     if let Err(error) = std::str::from_utf8(bytes) {
         // Up to here the lossy text equals the file; the replacement character that follows has three bytes.
@@ -108,7 +108,7 @@ fn place<T>(spanned: &Spanned<T>, source: usize) -> Span {
 }
 
 /// The fields of a table that is being read, topmost layer first.
-pub(super) struct Fields<'a> {
+pub(crate) struct Fields<'a> {
     layers: &'a [Raw],
     what: &'static str,
 }
@@ -162,7 +162,7 @@ impl<'a> Fields<'a> {
 
 /// Keeps of two keys that exclude each other (`min` and `min_from`) the one in the upper layer.
 /// Two in the same layer are a contradiction.
-pub(super) fn either(layers: &mut [Raw], first: &str, second: &str, problems: &mut Problems) {
+pub(crate) fn either(layers: &mut [Raw], first: &str, second: &str, problems: &mut Problems) {
     let Some(top) = layers.iter().position(|l| l.table.contains_key(first) || l.table.contains_key(second)) else {
         return;
     };
@@ -188,7 +188,7 @@ macro_rules! table {
         $(#[$doc])*
         #[derive(Debug, Clone)]
         #[allow(dead_code, reason = "some keys are only checked, and not every table is reported as a whole")]
-        pub(super) struct $name {
+        pub(crate) struct $name {
             /// Where the table stands.
             pub at: $crate::profile::diagnostic::Span,
             /// Nothing in it was wrong by itself. If something was, what seems missing is better not asked for.
@@ -215,7 +215,7 @@ macro_rules! table {
         }
     };
 }
-pub(super) use table;
+pub(crate) use table;
 
 /// Lets a type of the vocabulary be written as one of a few words.
 macro_rules! words {
@@ -240,7 +240,7 @@ macro_rules! words {
         }
     };
 }
-pub(super) use words;
+pub(crate) use words;
 
 impl Value for Raw {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
@@ -347,7 +347,7 @@ impl<T: Value + Copy> Value for [T; 2] {
 
 /// A table with numbers for keys: `{ 0 = "STOP", 1 = "RUN" }`.
 #[derive(Debug, Clone)]
-pub(super) struct Numbered(pub Vec<(At<i64>, String)>);
+pub(crate) struct Numbered(pub Vec<(At<i64>, String)>);
 
 impl Value for Numbered {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
@@ -372,7 +372,7 @@ impl Value for Numbered {
 
 /// A number, or a word that stands for one: `value = "RUN"`.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Choice {
+pub(crate) enum Choice {
     Number(f64),
     Word(String),
 }
@@ -389,12 +389,12 @@ impl Value for Choice {
 }
 
 /// The words of an optional string; empty if it is not there.
-pub(super) fn text(value: &Option<At<String>>) -> String {
+pub(crate) fn text(value: &Option<At<String>>) -> String {
     value.as_ref().map(|text| text.value.clone()).unwrap_or_default()
 }
 
 /// If a layer has `key`, takes `stale` out of the layers below: it belonged to their `key`.
-pub(super) fn supersede(layers: &mut [Raw], key: &str, stale: &str) {
+pub(crate) fn supersede(layers: &mut [Raw], key: &str, stale: &str) {
     if let Some(top) = layers.iter().position(|layer| layer.table.contains_key(key)) {
         for below in &mut layers[top + 1..] {
             below.table.remove(stale);

@@ -1,33 +1,52 @@
-//! Faults on demand: what a unit does wrong with a request, and the answer as it then leaves the device.
+//! Faults on demand: which are in force where, and what leaves a device because of them.
 
-use std::collections::BTreeMap;
-use std::time::Duration;
+pub mod place;
+pub mod process;
+pub mod story;
+pub mod values;
+pub mod word;
 
-use super::ascii;
-use super::world::World;
-use crate::{bus::frame::with_crc, plant::def::LineId};
+use std::{collections::BTreeMap, time::Duration};
 
-/// What is wrong with a unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Fault {
-    /// Nothing.
-    #[default]
-    None,
-    /// It hears nothing and does nothing.
-    Silent,
-    /// It does what it is told and answers this much late (plant time).
-    Late(Duration),
-    /// It does what it is told; the answer arrives with a wrong check.
-    BadCrc,
-    /// It does what it is told; the answer breaks off in the middle.
-    Truncated,
-    /// It does nothing and answers with this exception code.
-    Exception(u8),
+use jiff::Timestamp;
+
+pub use self::{
+    place::{Offer, Place, offers, refusal},
+    story::Story,
+    word::{Fault, Position, Target, Valve},
+};
+use super::{ascii, world::World};
+use crate::{
+    bus::frame::with_crc,
+    plant::{
+        PlantDef,
+        def::{LineId, TagId},
+    },
+};
+use process::Troubles;
+use values::{Memory, Values};
+
+/// The faults in force.
+#[derive(Debug, Clone, Default)]
+pub struct Faults {
+    list: Vec<InForce>,
+    units: BTreeMap<(LineId, u8), Values>,
+    tags: BTreeMap<TagId, ((LineId, u8), Values)>,
+    memories: BTreeMap<Place, Memory>,
+    /// Messages on noisy lines so far: the same drill has the same noise.
+    dice: u64,
 }
 
-/// The faults of all units.
-#[derive(Debug, Clone, Default)]
-pub struct Faults(BTreeMap<(LineId, u8), Fault>);
+/// A fault that is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InForce {
+    /// Where.
+    pub place: Place,
+    /// What.
+    pub fault: Fault,
+    /// Since when.
+    pub since: Timestamp,
+}
 
 /// What leaves a device.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,46 +63,149 @@ enum Damage {
     None,
     Check,
     Cut,
+    /// One bit, chosen by this number.
+    Bit(u64),
 }
 
 impl Faults {
-    /// Sets what is wrong with a unit.
-    pub fn set(&mut self, line: LineId, unit: u8, fault: Fault) {
-        self.0.insert((line, unit), fault);
+    /// None yet, in a plant whose values are known.
+    pub fn of(def: &PlantDef) -> Faults {
+        let address = |device: &crate::plant::def::DeviceDef| (device.line, device.unit);
+        let units = def.devices.iter().map(|device| (address(device), Values::of(def, device))).collect();
+        let tags = def
+            .tags
+            .iter()
+            .map(|tag| (tag.id, (address(def.device(tag.device)), Values::of_tags(std::iter::once(tag)))));
+        Faults { units, tags: tags.collect(), ..Faults::default() }
     }
 
-    /// What is wrong with a unit.
-    pub fn of(&self, line: LineId, unit: u8) -> Fault {
-        self.0.get(&(line, unit)).copied().unwrap_or_default()
+    /// Puts a fault in force; one that it excludes ends.
+    pub fn set(&mut self, world: &mut World, place: Place, fault: Fault, since: Timestamp) {
+        // The same fault with another number goes on: what is stuck stays.
+        let since = self.find(place, fault).map_or(since, |old| old.since);
+        self.list.retain(|old| old.place != place || !old.fault.excludes(fault));
+        self.list.push(InForce { place, fault, since });
+        self.list.sort_by_key(|in_force| in_force.place);
+        self.arrange(world, place, fault, true);
+    }
+
+    /// Ends a fault, whatever its number.
+    pub fn clear(&mut self, world: &mut World, place: Place, fault: Fault) {
+        self.list.retain(|old| old.place != place || old.fault.word() != fault.word());
+        self.arrange(world, place, fault, false);
+    }
+
+    /// All is well again.
+    pub fn clear_all(&mut self, world: &mut World) {
+        for InForce { place, fault, .. } in std::mem::take(&mut self.list) {
+            self.arrange(world, place, fault, false);
+        }
+    }
+
+    /// All that are in force, by place.
+    pub fn list(&self) -> &[InForce] {
+        &self.list
+    }
+
+    fn find(&self, place: Place, fault: Fault) -> Option<&InForce> {
+        self.list.iter().find(|in_force| in_force.place == place && in_force.fault.word() == fault.word())
+    }
+
+    fn at(&self, place: Place, target: Target) -> impl Iterator<Item = Fault> {
+        self.list.iter().filter(move |f| f.place == place && f.fault.target() == target).map(|f| f.fault)
+    }
+
+    /// Carries a change into the process, and forgets what is no longer stuck.
+    fn arrange(&mut self, world: &mut World, place: Place, fault: Fault, begins: bool) {
+        match (place, fault) {
+            (_, Fault::Stuck) if !begins => {
+                self.memories.entry(place).or_default().let_go();
+            }
+            (Place::Unit(line, unit), Fault::SensorBurnout) if world.is_controller(line, unit) => {
+                if let Some(rig) = world.rig_mut() {
+                    rig.set_sensor_open(begins);
+                }
+            }
+            (Place::Process, _) => {
+                let troubles = Troubles::of(self.at(Place::Process, Target::Process));
+                if let Some(rig) = world.rig_mut() {
+                    rig.set_troubles(troubles);
+                }
+            }
+            _ => {}
+        }
     }
 
     /// Lets the world answer a request, or the fault in its place. `None`: nothing comes back.
-    pub fn answer(&self, world: &mut World, line: LineId, unit: u8, request: &[u8]) -> Option<Answer> {
-        let delay = world.reply_delay(line, unit);
-        let plain = |pdu| Answer { unit, pdu, damage: Damage::None, delay };
-        if world.is_broadcast(line, unit) {
-            world.broadcast(line, request, |unit| !matches!(self.of(line, unit), Fault::Silent | Fault::Exception(_)));
+    pub fn answer(&mut self, world: &mut World, line: LineId, unit: u8, request: &[u8]) -> Option<Answer> {
+        if self.hit(line).is_some() {
+            world.spoiled(line);
             return None;
         }
-        match self.of(line, unit) {
-            Fault::None => world.respond(line, unit, request).map(plain),
-            Fault::Silent => {
-                world.overhear(line, unit);
-                None
-            }
-            Fault::Late(by) => world
-                .respond(line, unit, request)
-                .map(plain)
-                .map(|answer| Answer { delay: answer.delay + by, ..answer }),
-            Fault::BadCrc => {
-                world.respond(line, unit, request).map(plain).map(|answer| Answer { damage: Damage::Check, ..answer })
-            }
-            Fault::Truncated => {
-                world.respond(line, unit, request).map(plain).map(|answer| Answer { damage: Damage::Cut, ..answer })
-            }
-            Fault::Exception(code) => world.refuse(line, unit, request, code).map(plain),
+        if world.is_broadcast(line, unit) {
+            let deaf = |unit| matches!(self.on_the_line(line, unit), Some(Fault::Silent | Fault::Exception(_)));
+            world.broadcast(line, request, |unit| !deaf(unit));
+            return None;
         }
+        let late = world.reply_delay(line, unit);
+        let answer = |pdu, damage, delay| Answer { unit, pdu, damage, delay };
+        let mut answer = match self.on_the_line(line, unit) {
+            Some(Fault::Silent) => {
+                world.overhear(line, unit);
+                return None;
+            }
+            Some(Fault::Exception(code)) => {
+                return world.refuse(line, unit, request, code).map(|pdu| answer(pdu, Damage::None, late));
+            }
+            Some(Fault::Late(by)) => answer(world.respond(line, unit, request)?, Damage::None, late + by),
+            Some(Fault::BadCrc) => answer(world.respond(line, unit, request)?, Damage::Check, late),
+            Some(Fault::Cut) => answer(world.respond(line, unit, request)?, Damage::Cut, late),
+            Some(_) | None => answer(world.respond(line, unit, request)?, Damage::None, late),
+        };
+        answer.pdu = self.spoil_values(line, unit, request, answer.pdu);
+        if let Some(bit) = self.hit(line) {
+            answer.damage = Damage::Bit(bit);
+        }
+        Some(answer)
     }
+
+    fn on_the_line(&self, line: LineId, unit: u8) -> Option<Fault> {
+        self.at(Place::Unit(line, unit), Target::Unit).next()
+    }
+
+    fn spoil_values(&mut self, line: LineId, unit: u8, request: &[u8], mut pdu: Vec<u8>) -> Vec<u8> {
+        let places: Vec<Place> = self.list.iter().map(|in_force| in_force.place).collect();
+        let mut places = places;
+        places.dedup();
+        for place in places {
+            let values = match place {
+                Place::Unit(on, asked) if (on, asked) == (line, unit) => self.units.get(&(on, asked)),
+                Place::Tag(tag) => self.tags.get(&tag).filter(|(at, _)| *at == (line, unit)).map(|(_, values)| values),
+                Place::Unit(..) | Place::Line(_) | Place::Process => None,
+            };
+            let faults: Vec<Fault> = self.at(place, Target::Value).collect();
+            if let (Some(values), false) = (values, faults.is_empty()) {
+                pdu = values.spoil(&faults, self.memories.entry(place).or_default(), request, pdu);
+            }
+        }
+        pdu
+    }
+
+    /// Whether noise hits the next message on a line; the number says which bit.
+    fn hit(&mut self, line: LineId) -> Option<u64> {
+        let Some(Fault::Noise(percent)) = self.at(Place::Line(line), Target::Line).next() else { return None };
+        self.dice += 1;
+        let number = scatter(self.dice);
+        (number % 100 < u64::from(percent)).then_some(number / 100)
+    }
+}
+
+/// A number that looks like chance and is always the same (the finaliser of SplitMix64).
+fn scatter(count: u64) -> u64 {
+    let mut mixed = count.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    mixed ^ (mixed >> 31)
 }
 
 impl Answer {
@@ -98,6 +220,7 @@ impl Answer {
                 }
             }
             Damage::Cut => frame.truncate(frame.len() / 2),
+            Damage::Bit(which) => flip(&mut frame, which, 8),
         }
         frame
     }
@@ -113,6 +236,8 @@ impl Answer {
                 frame[digit] = if frame[digit] == b'0' { b'1' } else { b'0' };
             }
             Damage::Cut => frame.truncate(frame.len() / 2),
+            // ASCII has seven bits on many lines; the eighth is not there to be wrong.
+            Damage::Bit(which) => flip(&mut frame, which, 7),
         }
         frame
     }
@@ -136,76 +261,12 @@ impl Answer {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{bus::frame::crc16, sim::rig::Rig};
-
-    const L1: LineId = LineId(0);
-
-    const READ_SV: [u8; 5] = [3, 0x03, 0xEA, 0, 1];
-    const WRITE_SV: [u8; 5] = [6, 0x03, 0xEA, 0x01, 0xF4];
-
-    fn check(fault: Fault, expect: Option<(usize, bool)>, written: bool) {
-        let (mut world, mut faults) = (World::tank(Rig::new()), Faults::default());
-        faults.set(L1, 1, fault);
-        let answer = faults.answer(&mut world, L1, 1, &READ_SV);
-        let seen = answer.map(|answer| answer.rtu()).map(|frame| (frame.len(), crc16(&frame) == 0));
-        assert_eq!(seen, expect, "{fault:?}: length and check");
-        let answered = faults.answer(&mut world, L1, 1, &WRITE_SV).is_some();
-        assert_eq!(answered, expect.is_some());
-        assert_eq!(world.respond(L1, 1, &READ_SV) == Some(vec![3, 2, 0x01, 0xF4]), written, "{fault:?}");
-        assert!(faults.answer(&mut world, L1, 2, &[1, 8, 0, 0, 1]).is_some(), "{fault:?} of another unit");
-    }
-
-    #[test]
-    fn each_fault_looks_as_it_does_on_the_line() {
-        check(Fault::None, Some((7, true)), true);
-        check(Fault::Silent, None, false);
-        check(Fault::Late(Duration::from_secs(1)), Some((7, true)), true);
-        check(Fault::BadCrc, Some((7, false)), true);
-        check(Fault::Truncated, Some((3, false)), true);
-        check(Fault::Exception(4), Some((5, true)), false);
-    }
-
-    #[test]
-    fn the_same_answer_in_ascii() {
-        let (mut world, mut faults) = (World::tank(Rig::new()), Faults::default());
-        let frame =
-            |faults: &Faults, world: &mut World| faults.answer(world, L1, 1, &READ_SV).map(|answer| answer.ascii());
-        assert_eq!(frame(&faults, &mut world).as_deref(), Some(&b":01030202BC3C\r\n"[..]));
-        faults.set(L1, 1, Fault::BadCrc);
-        assert_eq!(frame(&faults, &mut world).as_deref(), Some(&b":01030202BC30\r\n"[..]));
-        faults.set(L1, 1, Fault::Truncated);
-        assert_eq!(frame(&faults, &mut world).as_deref(), Some(&b":010302"[..]));
-    }
-
-    #[test]
-    fn a_broadcast_passes_by_a_silent_unit() {
-        let (mut world, mut faults) = (World::tank(Rig::new()), Faults::default());
-        faults.set(L1, 1, Fault::Silent);
-        assert_eq!(faults.answer(&mut world, L1, 0, &WRITE_SV), None);
-        assert_eq!(world.respond(L1, 1, &READ_SV), Some(vec![3, 2, 0x02, 0xBC]));
-        assert_eq!(world.respond(L1, 2, &READ_SV), Some(vec![3, 2, 0x01, 0xF4]));
-    }
-
-    #[test]
-    fn a_late_answer_says_how_late() {
-        let (mut world, mut faults) = (World::tank(Rig::new()), Faults::default());
-        let delay =
-            |faults: &Faults, world: &mut World| faults.answer(world, L1, 1, &READ_SV).map(|answer| answer.delay);
-        assert_eq!(delay(&faults, &mut world), Some(Duration::from_millis(5)));
-        faults.set(L1, 1, Fault::Late(Duration::from_millis(700)));
-        assert_eq!(delay(&faults, &mut world), Some(Duration::from_millis(705)));
-    }
-
-    #[test]
-    fn the_same_answer_on_tcp() {
-        let (mut world, mut faults) = (World::tank(Rig::new()), Faults::default());
-        let frame =
-            |faults: &Faults, world: &mut World| faults.answer(world, L1, 1, &READ_SV).map(|answer| answer.tcp(0x1234));
-        assert_eq!(frame(&faults, &mut world), Some(vec![0x12, 0x34, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]));
-        faults.set(L1, 1, Fault::BadCrc);
-        assert_eq!(frame(&faults, &mut world).map(|frame| frame[..2].to_vec()), Some(vec![0xED, 0x34]));
+fn flip(frame: &mut [u8], which: u64, bits: u64) {
+    let place = (which / bits) as usize % frame.len().max(1);
+    if let Some(byte) = frame.get_mut(place) {
+        *byte ^= 1 << (which % bits);
     }
 }
+
+#[cfg(test)]
+mod tests;

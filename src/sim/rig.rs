@@ -4,9 +4,10 @@ use std::time::Duration;
 
 use super::dl06::sequence::Step;
 use super::dl06::{Dl06, Outputs, SCAN};
+use super::faults::process::Troubles;
 use super::pxr::{Pxr, SAMPLE, Sensor};
 use super::slave::Slave;
-use super::tank::{AMBIENT_C, Readings, Tank};
+use super::tank::{AMBIENT_C, Actuators, Readings, Tank};
 
 /// Time that a device takes between a request and its answer.
 pub(super) const PXR_DELAY: Duration = Duration::from_millis(5);
@@ -22,6 +23,8 @@ pub struct Rig {
     pxr: Slave<Pxr>,
     plc: Slave<Dl06>,
     sensor_open: bool,
+    troubles: Troubles,
+    moving: Actuators,
     owed: Duration,
     steps: u32,
 }
@@ -47,6 +50,8 @@ pub struct Truth {
     pub fault: bool,
     /// How often the controller saved its settings.
     pub saves: u32,
+    /// What really moves, whatever the outputs say.
+    pub moving: Actuators,
 }
 
 impl Rig {
@@ -65,7 +70,16 @@ impl Rig {
     /// At rest, with so many litres in TK-1 already.
     pub fn filled(control_l: f64) -> Rig {
         let (pxr, plc) = (Slave::new(Pxr::new(AMBIENT_C)), Slave::new(Dl06::new()));
-        Rig { tank: Tank::new(control_l, AMBIENT_C), pxr, plc, sensor_open: false, owed: Duration::ZERO, steps: 0 }
+        Rig {
+            tank: Tank::new(control_l, AMBIENT_C),
+            pxr,
+            plc,
+            sensor_open: false,
+            troubles: Troubles::default(),
+            moving: Actuators::default(),
+            owed: Duration::ZERO,
+            steps: 0,
+        }
     }
 
     /// Lets plant time pass. What is left over below one step is kept for the next call.
@@ -92,6 +106,11 @@ impl Rig {
         self.sensor_open = open;
     }
 
+    /// Breaks parts of the process, and repairs all others.
+    pub fn set_troubles(&mut self, troubles: Troubles) {
+        self.troubles = troubles;
+    }
+
     /// Turns a panel switch X0–X3 of the PLC.
     pub fn set_switch(&mut self, switch: u16, on: bool) {
         self.plc.device.set_switch(switch, on);
@@ -116,6 +135,7 @@ impl Rig {
             step: self.plc.device.step(),
             fault: self.plc.device.fault(),
             saves: self.pxr.device.saves(),
+            moving: self.moving,
         }
     }
 
@@ -126,7 +146,10 @@ impl Rig {
             self.pxr.device.sample(sensor, readings.heater_w);
         }
         self.plc.device.scan(self.pxr.device.at_sv(), &readings);
-        self.tank.step(SCAN.as_secs_f64(), &self.plc.device.actuators(&readings, self.pxr.device.mv_percent()));
+        let wanted = self.plc.device.actuators(&readings, self.pxr.device.mv_percent());
+        self.moving = self.troubles.bend(wanted);
+        self.tank.step(SCAN.as_secs_f64(), &self.moving);
+        self.tank.spill(SCAN.as_secs_f64(), self.troubles.leak_l_per_min());
         self.steps = self.steps.wrapping_add(1);
     }
 }

@@ -162,6 +162,12 @@ impl Tank {
         heat
     }
 
+    /// Water that TK-1 loses to the floor in `dt_s` seconds, with its heat.
+    pub fn spill(&mut self, dt_s: f64, l_per_min: f64) {
+        let volume_l = &mut self.control.volume_l;
+        *volume_l = (*volume_l - l_per_min / 60.0 * dt_s).max(0.0);
+    }
+
     /// Temperature at the probe in °C, behind its dead time and lag.
     pub fn probe_c(&self) -> f64 {
         self.probe_c

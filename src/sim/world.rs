@@ -160,6 +160,16 @@ impl World {
         }
     }
 
+    /// The same with its process at rest; otherwise it is in the middle of work.
+    pub fn at_rest(self) -> World {
+        World { rig: self.rig.map(|_| Rig::new()), ..self }
+    }
+
+    /// Whether a unit is the controller of the tank rig.
+    pub fn is_controller(&self, line: LineId, unit: u8) -> bool {
+        self.places.get(&(line, unit)) == Some(&Place::Controller)
+    }
+
     /// The tank rig, if the plant has one.
     pub fn rig(&self) -> Option<&Rig> {
         self.rig.as_ref()

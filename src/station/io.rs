@@ -11,13 +11,17 @@ use tokio::{
 
 use crate::{
     bus::io::{clock::Clock, task, transport::Connector},
-    history::{HistoryError, io::thread as history},
+    history::{
+        HistoryError,
+        io::{Query, thread as history},
+    },
     plant::{
         Effects, Plant, PlantDef, Snapshot,
         command::{BusRequest, Order, OrderId},
         def::{LineDef, LineId},
         event::{Event, LineState},
         record::Record,
+        snapshot::HistoryStatus,
     },
     profile::PlantFile,
 };
@@ -55,7 +59,9 @@ pub struct Options {
 pub struct Station {
     snapshots: watch::Receiver<Arc<Snapshot>>,
     orders: mpsc::Sender<Order>,
-    history: history::Handle,
+    queries: mpsc::Sender<Query>,
+    /// `None` for a rehearsal, which keeps nothing.
+    history: Option<history::Handle>,
     stop: watch::Sender<bool>,
     tasks: Vec<JoinHandle<()>>,
     terminals: u32,
@@ -63,8 +69,51 @@ pub struct Station {
 
 /// Starts history, links and plant, in this order: a store that cannot be opened stops the start.
 pub fn start(options: Options) -> Result<Station, HistoryError> {
+    start_told(options, None)
+}
+
+/// The same, where the steps of alarms are also told to a listener.
+pub fn start_told(options: Options, listener: Option<mpsc::Sender<Vec<Record>>>) -> Result<Station, HistoryError> {
     let Options { def, clock, history, connectors, file } = options;
     let history = history::start(&history, def.clone(), clock)?;
+    let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
+    plant.restore(&history.restored);
+    let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
+    let keeping = Keeping { records: Some(records), store, listener };
+    Ok(assemble(def, clock, connectors, plant, file, keeping, (queries, Some(history))))
+}
+
+/// A station that keeps nothing, for drills in virtual time, where no other thread may take part. Questions to the history
+/// are refused.
+pub fn rehearse(
+    def: Arc<PlantDef>,
+    clock: Clock,
+    connectors: Vec<Connector>,
+    listener: mpsc::Sender<Vec<Record>>,
+) -> Station {
+    let plant = Plant::new(def.clone(), clock.now(), clock.speed());
+    let (_, store) = watch::channel(HistoryStatus::default());
+    let (queries, _) = mpsc::channel(1);
+    let keeping = Keeping { records: None, store, listener: Some(listener) };
+    assemble(def, clock, connectors, plant, None, keeping, (queries, None))
+}
+
+/// Where the journal goes.
+struct Keeping {
+    records: Option<mpsc::Sender<Vec<Record>>>,
+    store: watch::Receiver<HistoryStatus>,
+    listener: Option<mpsc::Sender<Vec<Record>>>,
+}
+
+fn assemble(
+    def: Arc<PlantDef>,
+    clock: Clock,
+    connectors: Vec<Connector>,
+    plant: Plant,
+    file: Option<PlantFile>,
+    keeping: Keeping,
+    (queries, history): (mpsc::Sender<Query>, Option<history::Handle>),
+) -> Station {
     let (stop, stopped) = watch::channel(false);
     let (events, event_queue) = mpsc::channel(EVENTS);
     let (orders, order_queue) = mpsc::channel(ORDERS);
@@ -76,22 +125,10 @@ pub fn start(options: Options) -> Result<Station, HistoryError> {
         let link = task::run(def.clone(), line.id, clock, connector, events.clone(), request_queue, stopped.clone());
         tasks.push(tokio::spawn(supervise(tokio::spawn(link), line.id, clock, events.clone(), stopped.clone())));
     }
-    let mut plant = Plant::new(def, clock.now(), clock.speed());
-    plant.restore(&history.restored);
     let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
-    let desk = PlantTask {
-        plant,
-        clock,
-        links,
-        file,
-        saving: None,
-        records: history.records.clone(),
-        store: history.status.clone(),
-        lost: 0,
-        publish,
-    };
+    let desk = PlantTask { plant, clock, links, file, saving: None, keeping, lost: 0, publish };
     tasks.push(tokio::spawn(desk.run(event_queue, order_queue)));
-    Ok(Station { snapshots, orders, history, stop, tasks, terminals: 0 })
+    Station { snapshots, orders, queries, history, stop, tasks, terminals: 0 }
 }
 
 /// Waits for the end of a link. One that ends before the station does takes its values with it, visibly.
@@ -120,24 +157,26 @@ impl Station {
         Session {
             snapshots: self.snapshots.clone(),
             orders: self.orders.clone(),
-            queries: self.history.queries.clone(),
+            queries: self.queries.clone(),
             terminal: self.terminals,
             operator: operator.into(),
+            drill: None,
         }
     }
 
     /// Stops downstream and waits until the last record is on disk.
     pub async fn stop(self) {
-        let Station { snapshots: _, orders, history, stop, tasks, terminals: _ } = self;
+        let Station { snapshots: _, orders, queries, history, stop, tasks, terminals: _ } = self;
         // Links may have ended already; then nobody listens, which is fine.
         let _ = stop.send(true);
-        drop(orders);
+        drop((orders, queries));
         for task in tasks {
             if let Err(error) = task.await {
                 tracing::error!(%error, "a task of the station ended badly");
             }
         }
         // The last records are on their way; the thread ends when it has stored them.
+        let Some(history) = history else { return };
         if let Err(error) = tokio::task::spawn_blocking(move || history.stop()).await {
             tracing::error!(%error, "the history did not end well");
         }
@@ -174,8 +213,7 @@ struct PlantTask {
     /// The plant file, unless it is just being written.
     file: Option<PlantFile>,
     saving: Option<Saving>,
-    records: mpsc::Sender<Vec<Record>>,
-    store: watch::Receiver<crate::plant::snapshot::HistoryStatus>,
+    keeping: Keeping,
     /// Records that the queue to the store had no room for.
     lost: u64,
     publish: watch::Sender<Arc<Snapshot>>,
@@ -204,7 +242,7 @@ impl PlantTask {
                     self.take_saved(saved);
                     changed = true;
                 }
-                Ok(()) = self.store.changed() => {
+                Ok(()) = self.keeping.store.changed() => {
                     self.hear_store();
                     changed = true;
                 }
@@ -287,14 +325,23 @@ impl PlantTask {
         if records.is_empty() {
             return;
         }
-        if let Err(refused) = self.records.try_send(records) {
+        if let Some(listener) = &self.keeping.listener {
+            let steps = records.iter().filter(|record| matches!(record, Record::Alarm(_)));
+            let steps: Vec<Record> = steps.cloned().collect();
+            // A listener that has gone needs nothing; one that is slower than alarms come has missed some.
+            if let (false, Err(mpsc::error::TrySendError::Full(_))) = (steps.is_empty(), listener.try_send(steps)) {
+                tracing::error!("steps of alarms were not judged: too many at once");
+            }
+        }
+        let Some(store) = &self.keeping.records else { return };
+        if let Err(refused) = store.try_send(records) {
             self.lost += refused.into_inner().len() as u64;
             self.hear_store();
         }
     }
 
     fn hear_store(&mut self) {
-        let mut status = self.store.borrow_and_update().clone();
+        let mut status = self.keeping.store.borrow_and_update().clone();
         status.lost += self.lost;
         self.plant.on_history(status);
     }

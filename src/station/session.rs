@@ -7,6 +7,7 @@ use tokio::sync::{mpsc, watch};
 use crate::{
     history::io::Query,
     plant::{Snapshot, command::Order},
+    sim::io::Port,
 };
 
 /// One attached terminal. Dropping it stops nothing.
@@ -25,4 +26,6 @@ pub struct Session {
     pub terminal: u32,
     /// Who sits there.
     pub operator: Arc<str>,
+    /// The simulation behind the plant; a real plant has none.
+    pub drill: Option<Port>,
 }

@@ -16,6 +16,7 @@ use crate::plant::{
     event::LineState,
     snapshot::{ActiveAlarm, DeviceState},
 };
+use crate::sim::drill::{Progress, Status};
 
 /// Least size in which the tabs make sense; 80x24 shows everything.
 const SIZE_MIN: (u16, u16) = (60, 16);
@@ -139,6 +140,10 @@ fn header_parts(model: &Model, cx: &Cx) -> Vec<(usize, String, Style)> {
         (0, clock(cx.now, &cx.def().time_zone), theme.normal())
     };
     let mut parts = vec![time, (9, fit(&model.operator, 12), theme.dim())];
+    if let Some(status) = cx.drill {
+        parts.push(demo_words(cx, status));
+        parts.extend(over_words(cx, status));
+    }
     if cx.snapshot.speed != 1.0 {
         parts.push((8, format!("speed ×{}", cx.snapshot.speed), theme.strong()));
     }
@@ -155,6 +160,30 @@ fn header_parts(model: &Model, cx: &Cx) -> Vec<(usize, String, Style)> {
         parts.push((if connected { 10 + line.id.index() } else { 3 }, text, style));
     }
     parts
+}
+
+/// That nothing here is real, and how much of it is wrong on purpose; an exam does not tell.
+fn demo_words(cx: &Cx, status: &Status) -> (usize, String, Style) {
+    match (status.is_open(), status.in_force.len()) {
+        (false, _) => {
+            let left = |progress: &Progress| running(progress.duration.saturating_sub(progress.elapsed));
+            let left = status.scenario.as_ref().map_or(String::new(), |progress| format!(" {} left", left(progress)));
+            (4, format!("EXAM{left}"), cx.theme.strong())
+        }
+        (true, 0) => (4, "DEMO".to_owned(), cx.theme.strong()),
+        (true, 1) => (4, "DEMO 1 FAULT".to_owned(), cx.theme.trouble()),
+        (true, count) => (4, format!("DEMO {count} FAULTS"), cx.theme.trouble()),
+    }
+}
+
+/// How the drill ended, once it has.
+fn over_words(cx: &Cx, status: &Status) -> Option<(usize, String, Style)> {
+    let verdict = status.scenario.as_ref().map(|progress| &progress.verdict).filter(|verdict| verdict.over)?;
+    Some(if verdict.passed() {
+        (5, "drill PASSED: see 7".to_owned(), cx.theme.strong())
+    } else {
+        (5, "drill FAILED: see 7".to_owned(), cx.theme.trouble())
+    })
 }
 
 /// A line in the header: `L1 ▪ tx rx 62 %`, or why it is not connected and when it is tried again.
@@ -184,7 +213,7 @@ fn line_words(cx: &Cx, line: &LineDef) -> (String, Style) {
 
 fn tab_bar(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     let mut x = 0;
-    for (n, tab) in Tab::ALL.into_iter().enumerate() {
+    for (n, tab) in Tab::offered(cx).iter().copied().enumerate() {
         if n > 0 {
             x = canvas.text(x, 0, "│", cx.theme.dim());
         }

@@ -23,6 +23,7 @@ use super::{AskId, Effect, Model, Msg, tabs::Tab, theme::Theme, update, view};
 use crate::{
     history::{HistoryError, Question, io::Query},
     plant::command::Order,
+    sim::{drill, io::Port},
     station::session::Session,
 };
 use screen::{Screen, own};
@@ -76,7 +77,8 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     let (outbox, inbox) = mpsc::channel(INBOX);
     let mut session = session;
     let snapshot = session.snapshots.borrow_and_update().clone();
-    let model = Model::new(snapshot, options.theme, session.terminal, Arc::clone(&session.operator));
+    let mut model = Model::new(snapshot, options.theme, session.terminal, Arc::clone(&session.operator));
+    model.drill = session.drill.as_mut().map(|port| port.status.borrow_and_update().clone());
     let screen = Screen::raise()?;
     Loop { session, model, screen, outbox, redraw_at: None, drawn_at: None, heard_at: Instant::now() }.run(inbox).await
 }
@@ -126,6 +128,7 @@ impl Loop {
                     let snapshot = self.session.snapshots.borrow_and_update().clone();
                     self.take(Msg::Snapshot(snapshot), FRAME)?
                 }
+                Some(status) = drilled(&mut self.session.drill) => self.take(Msg::Drill(status), FRAME)?,
                 Some(msg) = inbox.recv() => self.take(msg, FRAME)?,
                 _ = ticks.tick() => {
                     let silent = self.heard_at.elapsed();
@@ -168,6 +171,12 @@ impl Loop {
                     own(|| update(&mut self.model, Msg::Undelivered(id, why)));
                 }
                 Effect::Ask(id, question) => self.ask(id, question),
+                Effect::Drill(order) => {
+                    if let Some(port) = &self.session.drill {
+                        // What is in force is seen in the next status; a wish that was lost changes nothing there.
+                        let _ = port.orders.try_send(order);
+                    }
+                }
                 Effect::SaveReport { tab, path, bytes } => self.save(tab, path, bytes),
                 Effect::Redraw => self.screen.renew()?,
                 Effect::Quit => return Ok(true),
@@ -204,6 +213,15 @@ impl Loop {
         self.drawn_at = Some(Instant::now());
         Ok(())
     }
+}
+
+/// News of the simulation; never without one.
+async fn drilled(port: &mut Option<Port>) -> Option<Arc<drill::Status>> {
+    let Some(Port { status, .. }) = port else { return std::future::pending().await };
+    if status.changed().await.is_err() {
+        return std::future::pending().await;
+    }
+    Some(status.borrow_and_update().clone())
 }
 
 /// Writes beside and renames, so that a half-written report never has the name of a whole one.

@@ -127,6 +127,7 @@ pub const GLOBAL: &[Key<Global>] = &[
     Key { chord: char('4'), label: "", help: "controllers", action: Global::Show(3) },
     Key { chord: char('5'), label: "", help: "reports", action: Global::Show(4) },
     Key { chord: char('6'), label: "", help: "bus: lines, frames, tests", action: Global::Show(5) },
+    Key { chord: char('7'), label: "", help: "faults: of a simulated plant only", action: Global::Show(6) },
     Key { chord: code(KeyCode::Tab), label: "", help: "next tab", action: Global::Next },
     Key { chord: code(KeyCode::BackTab), label: "", help: "previous tab", action: Global::Previous },
     Key {
@@ -156,7 +157,7 @@ pub const GLOBAL: &[Key<Global>] = &[
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ui::tabs::{alarms, bus, controllers, mimic, reports, trends};
+    use crate::ui::tabs::{alarms, bus, controllers, faults, mimic, reports, trends};
 
     fn no_clash(name: &str, chords: Vec<Chord>) {
         let global = GLOBAL.iter().map(|key| key.chord);
@@ -177,6 +178,7 @@ mod tests {
         no_clash("alarms", chords(alarms::KEYS));
         no_clash("controllers", chords(controllers::KEYS));
         no_clash("reports", chords(reports::KEYS));
+        no_clash("faults", chords(faults::KEYS));
         for (page, chords) in bus::all_chords() {
             no_clash(page, chords);
         }

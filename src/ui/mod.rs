@@ -29,6 +29,7 @@ use crate::{
         sample::Cause,
         snapshot::Snapshot,
     },
+    sim::drill,
 };
 use keys::Global;
 use modal::{Confirm, Intent, Modal};
@@ -64,6 +65,8 @@ pub struct Model {
     pub operator: Arc<str>,
     /// Orders given so far.
     pub ordered: u32,
+    /// The simulation behind the plant; `None` at a real one.
+    pub drill: Option<Arc<drill::Status>>,
 }
 
 /// The terminal's sense of time, fed by ticks.
@@ -101,6 +104,8 @@ pub enum Msg {
     Resize(u16, u16),
     /// News of the plant.
     Snapshot(Arc<Snapshot>),
+    /// News of the simulation.
+    Drill(Arc<drill::Status>),
     /// The history answered.
     Answer(AskId, Result<Answer, HistoryError>),
     /// A file of this tab was written, or why not.
@@ -121,6 +126,8 @@ pub enum Effect {
     Order(OrderId, Command),
     /// Ask the history.
     Ask(AskId, Question),
+    /// Let something go wrong in the simulation, or mend it.
+    Drill(drill::Order),
     /// Write a report or a capture; answered by [`Msg::Saved`].
     SaveReport {
         /// The tab that wants it.
@@ -180,6 +187,8 @@ pub struct Cx<'a> {
     pub phase: u32,
     /// Where the shown tab draws, for questions that depend on its width.
     pub area: Rect,
+    /// The simulation behind the plant; `None` at a real one.
+    pub drill: Option<&'a drill::Status>,
 }
 
 impl<'a> Cx<'a> {
@@ -212,12 +221,13 @@ impl Model {
             terminal,
             operator,
             ordered: 0,
+            drill: None,
         }
     }
 
     /// What the parts of the terminal may read.
     pub fn cx(&self) -> Cx<'_> {
-        context(&self.snapshot, &self.theme, self.clock, self.screen)
+        context(&self.snapshot, &self.theme, self.clock, self.screen, &self.drill)
     }
 
     /// Is the screen too small for more than the banner?
@@ -256,6 +266,10 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
         }
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
+        Msg::Drill(status) => {
+            model.drill = Some(status);
+            Vec::new()
+        }
         Msg::Answer(id, answer) => with_tabs(model, |tabs, cx| tabs.on_answer(cx, id, answer)),
         Msg::Saved(tab, result) => with_tabs(model, |tabs, cx| tabs.on_saved(cx, tab, result)),
         Msg::Undelivered(id, why) => {
@@ -271,26 +285,32 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
 
 /// Draws the terminal as it stands.
 pub fn view(model: &Model, frame: &mut Frame) {
-    let cx = context(&model.snapshot, &model.theme, model.clock, frame.area());
+    let cx = context(&model.snapshot, &model.theme, model.clock, frame.area(), &model.drill);
     chrome::view(model, &cx, frame);
     edge::finish(frame.buffer_mut(), &model.theme);
 }
 
-fn context<'a>(snapshot: &'a Snapshot, theme: &'a Theme, clock: Clock, screen: Rect) -> Cx<'a> {
+fn context<'a>(
+    snapshot: &'a Snapshot,
+    theme: &'a Theme,
+    clock: Clock,
+    screen: Rect,
+    drill: &'a Option<Arc<drill::Status>>,
+) -> Cx<'a> {
     let ahead = jiff::SignedDuration::from_secs_f64(clock.silent.as_secs_f64() * snapshot.speed.clamp(0.0, 1e6));
     let now = snapshot.at.checked_add(ahead).unwrap_or(snapshot.at);
-    Cx { snapshot, theme, now, phase: clock.phase, area: chrome::layout(screen).body }
+    Cx { snapshot, theme, now, phase: clock.phase, area: chrome::layout(screen).body, drill: drill.as_deref() }
 }
 
 /// Lets the tabs change while they read the rest of the model.
 fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &Cx) -> Vec<Act>) -> Vec<Act> {
-    let cx = context(&model.snapshot, &model.theme, model.clock, model.screen);
+    let cx = context(&model.snapshot, &model.theme, model.clock, model.screen, &model.drill);
     change(&mut model.tabs, &cx)
 }
 
 fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
     if let Some(modal) = model.modal.take() {
-        let cx = context(&model.snapshot, &model.theme, model.clock, model.screen);
+        let cx = context(&model.snapshot, &model.theme, model.clock, model.screen, &model.drill);
         let (rest, acts) = modal.on_key(&cx, &mut model.tabs, event);
         model.modal = rest;
         return acts;
@@ -306,9 +326,9 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
 
 fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
     match global {
-        Global::Show(n) => Tab::ALL.get(n).map(|tab| Act::Show(*tab)).into_iter().collect(),
-        Global::Next => vec![Act::Show(model.tabs.shown.step(1))],
-        Global::Previous => vec![Act::Show(model.tabs.shown.step(-1))],
+        Global::Show(n) => Tab::offered(&model.cx()).get(n).map(|tab| Act::Show(*tab)).into_iter().collect(),
+        Global::Next => vec![Act::Show(model.tabs.shown.step(Tab::offered(&model.cx()), 1))],
+        Global::Previous => vec![Act::Show(model.tabs.shown.step(Tab::offered(&model.cx()), -1))],
         Global::Help => vec![Act::Open(Modal::Help(0))],
         Global::Quit => vec![Act::Open(Modal::Confirm(Confirm::quit()))],
         Global::Acknowledge => match model.alarm_to_acknowledge() {

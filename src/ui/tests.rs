@@ -53,6 +53,6 @@ pub fn type_keys(model: &mut Model, keys: &str) -> Vec<Effect> {
 pub fn order_of(effects: &[Effect]) -> Option<&Command> {
     effects.iter().find_map(|effect| match effect {
         Effect::Order(_, command) => Some(command),
-        Effect::Ask(..) | Effect::SaveReport { .. } | Effect::Redraw | Effect::Quit => None,
+        Effect::Ask(..) | Effect::Drill(_) | Effect::SaveReport { .. } | Effect::Redraw | Effect::Quit => None,
     })
 }

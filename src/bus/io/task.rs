@@ -288,6 +288,8 @@ impl Task {
     /// Nothing is due: drops what comes unasked until something is.
     async fn listen(&mut self, link: &mut Link, schedule: &mut Schedule, until: Timestamp) -> Turn {
         let request = tokio::select! {
+            // What comes at one moment is taken in this order, so that a rehearsal ends as the one before.
+            biased;
             _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
             request = self.requests.recv() => request.ok_or(Ended)?,
             why = link.idle() => return Ok(Err(Leave::Lost(why))),

@@ -59,6 +59,8 @@ where
     let mut bytes = [0; 256];
     loop {
         tokio::select! {
+            // A replay must come to the same end.
+            biased;
             read = stream.read(&mut bytes) => match read? {
                 0 => return Ok(()),
                 count => line.heard(Instant::now(), &bytes[..count]),
@@ -309,7 +311,7 @@ mod tests {
         world.set_fault(L1, 1, Fault::Silent).await;
         assert_eq!(ask(&mut master, READ_TEN).await.0, Vec::<u8>::new());
         assert_eq!(ask(&mut master, READ_STEP).await.0.len(), 7);
-        world.set_fault(L1, 1, Fault::Truncated).await;
+        world.set_fault(L1, 1, Fault::Cut).await;
         assert_eq!(ask(&mut master, READ_TEN).await.0.len(), 12);
         world.set_fault(L1, 1, Fault::Late(Duration::from_millis(700))).await;
         let (frame, took) = ask(&mut master, READ_TEN).await;

@@ -1,13 +1,17 @@
 //! The edge of the simulated world: the task that owns it, its serial lines, its TCP ports.
 
+mod drill;
 mod line;
+mod memory;
 mod owner;
 mod pty;
 mod serving;
 mod tcp;
 
+pub use drill::{Port, RECORDS_MAX, Trainer};
 pub use line::{Wire, serve_line};
-pub use owner::{LineHandle, WorldHandle};
+pub use memory::in_memory;
+pub use owner::{LineHandle, Report, WorldHandle};
 pub use pty::{Pty, open_pty};
-pub use serving::{Mode, Place, Service, Serving, SimError, serve};
+pub use serving::{Mode, Place, Service, Serving, SimError, serve, serve_world};
 pub use tcp::{Speech, serve_stream, serve_tcp};

@@ -7,10 +7,15 @@ use tokio::sync::{mpsc, oneshot};
 
 use crate::{
     bus::io::clock::Clock,
-    plant::def::{LineId, TagId},
+    plant::{
+        PlantDef,
+        def::{LineId, TagId},
+    },
     sim::{
-        faults::{Answer, Fault, Faults},
+        faults::{Answer, Fault, Faults, InForce, Place},
         rig::{Rig, Truth},
+        scenario::judge::Truths,
+        truth::Lens,
         world::World,
     },
 };
@@ -38,6 +43,15 @@ pub struct LineHandle {
     line: LineId,
 }
 
+/// What is wrong in a world, and what is really so.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// The faults in force.
+    pub in_force: Vec<InForce>,
+    /// By tag.
+    pub truths: Truths,
+}
+
 /// What a task waits for when it asks the world; if the task is gone, nothing comes back.
 type Reply<T> = oneshot::Sender<T>;
 
@@ -48,11 +62,14 @@ enum Order {
     Truth(Reply<Option<Truth>>),
     Value(TagId, Reply<Option<f64>>),
     SetValue(TagId, f64, Reply<bool>),
+    Report(Reply<Report>),
 }
 
 #[derive(Debug)]
 enum Told {
-    Fault(LineId, u8, Fault),
+    Fault(Place, Fault),
+    Mended(Place, Fault),
+    AllWell,
     SensorOpen(bool),
     Switch(u16, bool),
     PowerCycle,
@@ -60,11 +77,20 @@ enum Told {
 }
 
 impl WorldHandle {
-    /// Starts the task. The world lives in the plant time of `clock`.
+    /// Starts the task. The world lives in the plant time of `clock`; of its values nothing is known.
     pub fn spawn(world: World, clock: Clock) -> WorldHandle {
+        WorldHandle::start(world, clock, Faults::default(), Lens::default())
+    }
+
+    /// The same for a plant whose values are known: they can be faulty, and what is really so can be told.
+    pub fn spawn_for(def: &PlantDef, world: World, clock: Clock) -> WorldHandle {
+        WorldHandle::start(world, clock, Faults::of(def), Lens::of(def))
+    }
+
+    fn start(world: World, clock: Clock, faults: Faults, lens: Lens) -> WorldHandle {
         let (orders, inbox) = mpsc::channel(ORDERS_MAX);
         let units = Arc::new(world.addresses().collect());
-        tokio::spawn(run(world, clock, clock.now(), inbox));
+        tokio::spawn(run(world, clock, (faults, lens), clock.now(), inbox));
         WorldHandle { orders, clock, units }
     }
 
@@ -89,9 +115,29 @@ impl WorldHandle {
         self.put(|reply| Order::Ask { line, unit, pdu, reply }).await.flatten()
     }
 
-    /// Makes a unit of a line faulty, or well again.
+    /// Makes a unit of a line faulty.
     pub async fn set_fault(&self, line: LineId, unit: u8, fault: Fault) {
-        self.tell(Told::Fault(line, unit, fault)).await;
+        self.set(Place::Unit(line, unit), fault).await;
+    }
+
+    /// Lets something go wrong; a fault that it excludes ends.
+    pub async fn set(&self, place: Place, fault: Fault) {
+        self.tell(Told::Fault(place, fault)).await;
+    }
+
+    /// Ends a fault, whatever its number.
+    pub async fn clear(&self, place: Place, fault: Fault) {
+        self.tell(Told::Mended(place, fault)).await;
+    }
+
+    /// Ends every fault.
+    pub async fn all_well(&self) {
+        self.tell(Told::AllWell).await;
+    }
+
+    /// What is wrong and what is really so now; `None` once the task has ended.
+    pub async fn report(&self) -> Option<Report> {
+        self.put(Order::Report).await
     }
 
     /// Breaks or repairs the wire of the temperature sensor in the tank rig.
@@ -160,11 +206,18 @@ impl LineHandle {
     }
 }
 
-async fn run(mut world: World, clock: Clock, mut reached: Timestamp, mut inbox: mpsc::Receiver<Order>) {
-    let mut faults = Faults::default();
+async fn run(
+    mut world: World,
+    clock: Clock,
+    (mut faults, lens): (Faults, Lens),
+    mut reached: Timestamp,
+    mut inbox: mpsc::Receiver<Order>,
+) {
     let idle = IDLE.max(IDLE_REAL_MIN.mul_f64(clock.speed()));
     loop {
         let order = tokio::select! {
+            // A replay must come to the same end.
+            biased;
             order = inbox.recv() => match order {
                 Some(order) => Some(order),
                 None => return,
@@ -175,13 +228,13 @@ async fn run(mut world: World, clock: Clock, mut reached: Timestamp, mut inbox: 
         world.advance(Duration::try_from(now.duration_since(reached)).unwrap_or_default().min(CATCH_UP_MAX));
         reached = now;
         if let Some(order) = order {
-            obey(&mut world, &mut faults, order);
+            obey(&mut world, &mut faults, &lens, now, order);
         }
     }
 }
 
 /// Who asked may have gone meanwhile; an answer that nobody waits for is dropped.
-fn obey(world: &mut World, faults: &mut Faults, order: Order) {
+fn obey(world: &mut World, faults: &mut Faults, lens: &Lens, now: Timestamp, order: Order) {
     match order {
         Order::Ask { line, unit, pdu, reply } => {
             reply.send(faults.answer(world, line, unit, &pdu)).ok();
@@ -195,17 +248,22 @@ fn obey(world: &mut World, faults: &mut Faults, order: Order) {
         Order::SetValue(tag, value, reply) => {
             reply.send(world.set_value(tag, value)).ok();
         }
+        Order::Report(reply) => {
+            reply.send(Report { in_force: faults.list().to_vec(), truths: lens.look(world) }).ok();
+        }
         Order::Tell(told, done) => {
-            follow(world, faults, told);
+            follow(world, faults, now, told);
             done.send(()).ok();
         }
     }
 }
 
 /// What concerns the rig is lost on a world that has none.
-fn follow(world: &mut World, faults: &mut Faults, told: Told) {
+fn follow(world: &mut World, faults: &mut Faults, now: Timestamp, told: Told) {
     match told {
-        Told::Fault(line, unit, fault) => faults.set(line, unit, fault),
+        Told::Fault(place, fault) => faults.set(world, place, fault, now),
+        Told::Mended(place, fault) => faults.clear(world, place, fault),
+        Told::AllWell => faults.clear_all(world),
         Told::SensorOpen(open) => {
             if let Some(rig) = world.rig_mut() {
                 rig.set_sensor_open(open);

@@ -167,7 +167,17 @@ impl Service {
 
 /// Serves every line of a plant; `services` tells how, by [`LineId`].
 pub async fn serve(def: &PlantDef, clock: Clock, services: &[Service]) -> Result<Serving, SimError> {
-    let world = WorldHandle::spawn(World::of(def)?, clock);
+    serve_world(def, World::of(def)?, clock, services).await
+}
+
+/// The same with a world that has a past.
+pub async fn serve_world(
+    def: &PlantDef,
+    world: World,
+    clock: Clock,
+    services: &[Service],
+) -> Result<Serving, SimError> {
+    let world = WorldHandle::spawn_for(def, world, clock);
     // What has started is ended by dropping this if a later line cannot be served.
     let mut serving = Serving { world, places: Vec::new(), tasks: Vec::new() };
     for (line, service) in services.iter().enumerate() {

@@ -43,7 +43,7 @@ fn on_the_pty() {
                 publish.send_replace(Arc::new(snapshot));
             }
         });
-        let session = Session { snapshots, orders, queries, terminal: 1, operator: Arc::from("tech1") };
+        let session = Session { snapshots, orders, queries, terminal: 1, operator: Arc::from("tech1"), drill: None };
         run(session, Options { theme: Theme::FULL }).await.expect("left by its operator or a signal");
     });
 }

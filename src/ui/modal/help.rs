@@ -6,8 +6,8 @@ use ratatui::{Frame, layout::Rect};
 use super::{Modal, Next, window};
 use crate::ui::{
     Cx, keys,
-    keys::Hint,
-    tabs::Tabs,
+    keys::{Global, Hint},
+    tabs::{Tab, Tabs},
     widgets::text::{pad, width},
 };
 
@@ -24,7 +24,9 @@ pub(super) fn on_key(row: u16, event: KeyEvent) -> Next {
 
 pub(super) fn view(row: u16, cx: &Cx, tabs: &Tabs, frame: &mut Frame, body: Rect) {
     let own = tabs.hints(cx);
-    let global = keys::hints(keys::GLOBAL);
+    let offered = Tab::offered(cx).len();
+    let there = keys::GLOBAL.iter().filter(|key| !matches!(key.action, Global::Show(n) if n >= offered)).copied();
+    let global = keys::hints(&there.collect::<Vec<_>>());
     let heading = |text: &str| Hint::new("", text, "");
     let own = own.into_iter().filter(|hint| !hint.help.is_empty());
     let rows: Vec<Hint> = [heading(tabs.shown.title())]

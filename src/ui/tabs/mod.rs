@@ -7,6 +7,7 @@ pub mod alarms;
 pub mod bus;
 pub mod controllers;
 mod errand;
+pub mod faults;
 pub mod mimic;
 pub mod reports;
 pub mod trends;
@@ -40,11 +41,20 @@ pub enum Tab {
     Reports,
     /// Lines, their plan, frames and tests.
     Bus,
+    /// Faults of a simulated plant.
+    Faults,
 }
 
 impl Tab {
     /// Every tab, in the order of its number key.
-    pub const ALL: [Tab; 6] = [Tab::Mimic, Tab::Trends, Tab::Alarms, Tab::Controllers, Tab::Reports, Tab::Bus];
+    pub const ALL: [Tab; 7] =
+        [Tab::Mimic, Tab::Trends, Tab::Alarms, Tab::Controllers, Tab::Reports, Tab::Bus, Tab::Faults];
+
+    /// Those that there are here: faults only where the plant is simulated, and not in an exam.
+    pub fn offered(cx: &Cx) -> &'static [Tab] {
+        let simulated = cx.drill.is_some_and(|status| status.is_open());
+        if simulated { &Tab::ALL } else { &Tab::ALL[..Tab::ALL.len() - 1] }
+    }
 
     /// Its heading.
     pub fn title(self) -> &'static str {
@@ -55,12 +65,13 @@ impl Tab {
             Tab::Controllers => "Controllers",
             Tab::Reports => "Reports",
             Tab::Bus => "Bus",
+            Tab::Faults => "Faults",
         }
     }
-    /// The tab so many further on, around the end.
-    pub fn step(self, by: isize) -> Tab {
-        let place = Tab::ALL.iter().position(|tab| *tab == self).unwrap_or(0) as isize;
-        Tab::ALL[(place + by).rem_euclid(Tab::ALL.len() as isize) as usize]
+    /// The tab so many further on among those that are offered, around the end.
+    pub fn step(self, offered: &[Tab], by: isize) -> Tab {
+        let place = offered.iter().position(|tab| *tab == self).unwrap_or(0) as isize;
+        offered[(place + by).rem_euclid(offered.len() as isize) as usize]
     }
 }
 
@@ -81,6 +92,8 @@ pub struct Tabs {
     pub reports: reports::Reports,
     /// Tab 6.
     pub bus: bus::Bus,
+    /// Tab 7, of simulated plants.
+    pub faults: faults::Faults,
 }
 
 impl Tabs {
@@ -94,6 +107,7 @@ impl Tabs {
             controllers: controllers::Controllers::new(snapshot),
             reports: reports::Reports::new(snapshot),
             bus: bus::Bus::new(snapshot),
+            faults: faults::Faults::default(),
         }
     }
 
@@ -112,6 +126,7 @@ impl Tabs {
             Tab::Controllers => act(controllers::KEYS, event, |action| self.controllers.on_key(cx, action)),
             Tab::Reports => act(reports::KEYS, event, |action| self.reports.on_key(cx, action)),
             Tab::Bus => self.bus.on_key(cx, event),
+            Tab::Faults => act(faults::KEYS, event, |action| self.faults.on_key(cx, action)),
         }
     }
 
@@ -129,6 +144,7 @@ impl Tabs {
             Tab::Controllers => keys::hints(controllers::KEYS),
             Tab::Reports => keys::hints(reports::KEYS),
             Tab::Bus => self.bus.hints(cx),
+            Tab::Faults => self.faults.hints(cx),
         }
     }
 
@@ -141,6 +157,7 @@ impl Tabs {
             Tab::Controllers => self.controllers.on_snapshot(cx),
             Tab::Reports => self.reports.on_snapshot(cx),
             Tab::Bus => self.bus.on_snapshot(cx),
+            Tab::Faults => Vec::new(),
         }
     }
 
@@ -150,7 +167,7 @@ impl Tabs {
             Tab::Mimic => self.mimic.on_answer(cx, id.number, answer),
             Tab::Trends => self.trends.on_answer(cx, id.number, answer),
             Tab::Alarms => self.alarms.on_answer(cx, id.number, answer),
-            Tab::Controllers => Vec::new(),
+            Tab::Controllers | Tab::Faults => Vec::new(),
             Tab::Bus => {
                 self.bus.on_answer(id.number, answer);
                 Vec::new()
@@ -165,7 +182,7 @@ impl Tabs {
             Tab::Trends => self.trends.on_text(cx, text),
             Tab::Reports => self.reports.on_text(cx, text),
             Tab::Bus => self.bus.on_text(cx, text),
-            Tab::Mimic | Tab::Alarms | Tab::Controllers => Ok(Vec::new()),
+            Tab::Mimic | Tab::Alarms | Tab::Controllers | Tab::Faults => Ok(Vec::new()),
         }
     }
 
@@ -174,7 +191,7 @@ impl Tabs {
         match tab {
             Tab::Reports => return self.reports.on_saved(cx, result),
             Tab::Bus => self.bus.on_saved(result),
-            Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Controllers => {}
+            Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Controllers | Tab::Faults => {}
         }
         Vec::new()
     }
@@ -188,6 +205,7 @@ impl Tabs {
             Tab::Controllers => self.controllers.view(cx, frame, area),
             Tab::Reports => self.reports.view(cx, frame, area),
             Tab::Bus => self.bus.view(cx, frame, area),
+            Tab::Faults => self.faults.view(cx, frame, area),
         }
     }
 }

@@ -38,7 +38,7 @@ impl Stand {
             match effect {
                 Effect::Ask(id, question) if id.tab == Tab::Reports => self.asked.push((id, question)),
                 Effect::SaveReport { path, bytes, .. } => self.saved.push((path, bytes)),
-                Effect::Ask(..) | Effect::Order(..) | Effect::Redraw | Effect::Quit => {}
+                Effect::Ask(..) | Effect::Order(..) | Effect::Drill(_) | Effect::Redraw | Effect::Quit => {}
             }
         }
     }

@@ -1,0 +1,255 @@
+//! `sightglass drill`: a scenario in virtual time, with the operator of the scenario, and its verdict.
+
+use std::{path::Path, path::PathBuf, sync::Arc, time::Duration};
+
+use jiff::{Timestamp, civil::date};
+use tokio::sync::mpsc;
+
+use crate::{
+    bus::io::clock::Clock,
+    plant::{PlantDef, Snapshot},
+    profile::{self, Kind, Search},
+    sim::{
+        io::{RECORDS_MAX, Trainer, WorldHandle, in_memory},
+        scenario::{
+            Scenario, Start,
+            judge::{Verdict, clock},
+            read,
+        },
+        world::World,
+    },
+    station::{io as station, teller},
+};
+
+use super::{CliError, demo::simulation_error, log, render, say};
+
+/// Arguments of `drill`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A scenario file, or the name of a shipped scenario; without it they are listed
+    scenario: Option<PathBuf>,
+    /// Nobody acts: what comes of it when the operator of the scenario does nothing
+    #[arg(long)]
+    no_operator: bool,
+    /// Only the verdict, not what happens on the way
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Runs a scenario as fast as the machine can; an error if it is not passed.
+pub fn main(args: Args) -> Result<(), CliError> {
+    let Some(path) = &args.scenario else { return list() };
+    let (scenario, def) = load(path)?;
+    let _log = log::start(None)?;
+    let scenario = Arc::new(scenario);
+    let tell = |line: &str| {
+        if !args.quiet {
+            say(line);
+        }
+    };
+    let verdict = rehearse(scenario.clone(), def, !args.no_operator, tell)?;
+    say_verdict(&verdict);
+    if verdict.passed() { Ok(()) } else { Err(CliError::Failed(format!("{}: not passed", scenario.name))) }
+}
+
+/// Reads a scenario and its plant.
+pub fn load(path: &Path) -> Result<(Scenario, Arc<PlantDef>), CliError> {
+    read::load(path, &Search::usual()).map_err(|errors| CliError::Profile(render(&errors)))
+}
+
+/// The world of a scenario at its start.
+pub fn world(def: &PlantDef, scenario: Option<&Scenario>) -> Result<World, CliError> {
+    let mut world = World::of(def).map_err(|error| simulation_error(error.into()))?;
+    if let Some(scenario) = scenario {
+        if scenario.start == Start::Rest {
+            world = world.at_rest();
+        }
+        world.advance(scenario.ahead);
+    }
+    Ok(world)
+}
+
+/// Prints a table of what was expected and what came of it.
+pub fn say_verdict(verdict: &Verdict) {
+    say("");
+    say(&verdict.title);
+    verdict.lines().iter().for_each(|line| say(line));
+}
+
+fn list() -> Result<(), CliError> {
+    let search = Search::usual();
+    for listed in profile::list(&search).iter().filter(|listed| listed.kind == Kind::Scenario) {
+        let title = match read::load(Path::new(&listed.name), &search) {
+            Ok((scenario, _)) => format!("{}  {}", clock(scenario.duration), scenario.title),
+            Err(errors) => format!("{} problems", errors.count()),
+        };
+        say(&format!("{:24}  {title}", listed.name));
+    }
+    Ok(())
+}
+
+/// A drill from its start to its verdict, in virtual time: one thread, no port, no file, no real clock.
+fn rehearse(
+    scenario: Arc<Scenario>,
+    def: Arc<PlantDef>,
+    with_operator: bool,
+    tell: impl Fn(&str),
+) -> Result<Verdict, CliError> {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_time()
+        .start_paused(true)
+        .build()
+        .map_err(|error| CliError::Io { what: "cannot start".into(), error })?;
+    runtime.block_on(async {
+        let time = Clock::starting_at(morning(&def), 1.0);
+        let world = WorldHandle::spawn_for(&def, world(&def, Some(&scenario))?, time);
+        let (listener, journal) = mpsc::channel(RECORDS_MAX);
+        let mut station = station::rehearse(def.clone(), time, in_memory(&def, &world), listener);
+        let session = station.session("drill");
+        // Without an operator his orders lead nowhere.
+        let orders = if with_operator { session.orders.clone() } else { mpsc::channel(1).0 };
+        let trainer = Trainer {
+            def,
+            world,
+            snapshots: session.snapshots.clone(),
+            journal,
+            scenario: Some(scenario),
+            operator: Some(orders),
+            exam: false,
+        };
+        let (_port, mut work) = trainer.spawn();
+        let began = time.now();
+        let mut snapshots = session.snapshots.clone();
+        let mut before = snapshots.borrow_and_update().clone();
+        let verdict = loop {
+            tokio::select! {
+                biased;
+                Ok(()) = snapshots.changed() => {
+                    let after = snapshots.borrow_and_update().clone();
+                    changes(began, &before, &after).iter().for_each(|line| tell(line));
+                    before = after;
+                }
+                ended = &mut work => break ended.ok().flatten(),
+            }
+        };
+        drop((session, snapshots));
+        station.stop().await;
+        verdict.ok_or(CliError::StationGone)
+    })
+}
+
+fn changes(began: Timestamp, before: &Snapshot, after: &Snapshot) -> Vec<String> {
+    let at = clock(Duration::try_from(after.at.duration_since(began)).unwrap_or_default());
+    teller::changes(before, after).into_iter().map(|line| format!("{at} {line}")).collect()
+}
+
+/// Every drill begins at the same moment, so that replays are alike to the last digit.
+fn morning(def: &PlantDef) -> Timestamp {
+    let eight = date(2026, 1, 5).at(8, 0, 0, 0).to_zoned(def.time_zone.clone());
+    eight.map_or(Timestamp::UNIX_EPOCH, |eight| eight.timestamp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::faults::{Fault, Place, offers};
+
+    fn drill(name: &str, with_operator: bool) -> (Verdict, Vec<String>) {
+        let told = std::cell::RefCell::new(Vec::new());
+        let (scenario, def) = read::load(Path::new(name), &Search::shipped()).expect("a shipped scenario");
+        let verdict = rehearse(Arc::new(scenario), def, with_operator, |line| told.borrow_mut().push(line.to_owned()));
+        (verdict.expect("the drill comes to its end"), told.into_inner())
+    }
+
+    fn shipped() -> Vec<String> {
+        let all = profile::list(&Search::shipped()).into_iter();
+        all.filter(|listed| listed.kind == Kind::Scenario).map(|listed| listed.name).collect()
+    }
+
+    #[test]
+    fn every_shipped_scenario_is_passed_by_its_operator_and_failed_by_nobody() {
+        let names = shipped();
+        assert!(names.len() >= 4, "{names:?}");
+        for name in names {
+            let (verdict, told) = drill(&name, true);
+            assert!(verdict.over && verdict.passed(), "{name}:\n{}\n{}", told.join("\n"), verdict.lines().join("\n"));
+            let (alone, _) = drill(&name, false);
+            assert!(!alone.passed(), "{name} needs no operator:\n{}", alone.lines().join("\n"));
+        }
+    }
+
+    /// A drill of this fault in this place from 0:40 to 2:40, with more to expect.
+    fn drill_of(place: &str, fault: &str, more: &str) -> (Verdict, Vec<String>) {
+        let text = format!(
+            "title = 't'\nplant = 'tank'\nduration = '4m'\n[[event]]\nat = '40s'\nfor = '2m'\nfault = '{fault}'\n{place}\n{more}"
+        );
+        let find = |plant: &str| profile::load(Path::new(plant), &Search::shipped());
+        let (scenario, def) =
+            read::read("s", "s.toml", text.as_bytes(), &find).unwrap_or_else(|errors| panic!("{errors}"));
+        let told = std::cell::RefCell::new(Vec::new());
+        let verdict = rehearse(Arc::new(scenario), def, true, |line| told.borrow_mut().push(line.to_owned()));
+        (verdict.expect("the drill comes to its end"), told.into_inner())
+    }
+
+    /// No value is shown as good and is not so, and in the end all is well again.
+    const HONEST: &str = "[[expect]]\nshown_true = 'TIC-1.PV'\ngive = 4.0\n\
+        [[expect]]\nshown_true = 'PLC-1.LT-1'\ngive = 0.6\n[[expect]]\nshown_true = 'PLC-1.HEATER'\ngive = 200\n\
+        [[expect]]\ngood = 'TIC-1.PV'\nafter = '3m 45s'\n[[expect]]\ngood = 'PLC-1.LT-1'\nafter = '3m 45s'\n";
+
+    /// What the operator sees of a fault in a device: a value that is bad, and an alarm that comes and goes.
+    fn seen(device: &str, fault: Fault) -> String {
+        let value = if device == "TIC-1" { "TIC-1.PV" } else { "PLC-1.LT-1" };
+        let bad = format!("[[expect]]\nnot_good = '{value}'\nafter = '40s'\nwithin = '10s'\n");
+        let alarm = |of: &str| {
+            let step = |step: &str, after: &str| {
+                format!("[[expect]]\nalarm = '{of}'\nstep = '{step}'\nafter = '{after}'\nwithin = '50s'\n")
+            };
+            step("raised", "40s") + &step("returned", "2m 40s")
+        };
+        match fault {
+            Fault::Silent | Fault::Late(_) | Fault::BadCrc | Fault::Cut => bad + &alarm(device),
+            // A device that refuses is there: the value is bad with the refusal, and nobody is told that it is silent.
+            Fault::Exception(_) => bad + &format!("[[expect]]\nalarm = '{device}'\nnever = true\n"),
+            Fault::SensorBurnout => bad + &alarm("TIC-1.FAULT"),
+            _ => String::new(),
+        }
+    }
+
+    #[test]
+    fn what_an_operator_sees_of_each_fault_is_never_a_wrong_value() {
+        let tank = profile::load(Path::new("tank"), &Search::shipped()).expect("the tank");
+        let mut tried = 0;
+        for offer in offers(&tank) {
+            let name = offer.place.name(&tank);
+            let (place, device) = match offer.place {
+                Place::Line(_) => (format!("line = '{name}'"), ""),
+                Place::Unit(..) => (format!("device = '{name}'"), name.as_str()),
+                Place::Tag(_) | Place::Process => (String::new(), ""),
+            };
+            // What is stuck no master can know; the next test says so.
+            for fault in offer.faults.into_iter().filter(|fault| *fault != Fault::Stuck) {
+                let (verdict, told) = drill_of(&place, &fault.to_string(), &(seen(device, fault) + HONEST));
+                let all = format!("{name} {fault}\n{}\n{}", told.join("\n"), verdict.lines().join("\n"));
+                assert!(verdict.over && verdict.passed(), "{all}");
+                tried += 1;
+            }
+        }
+        assert!(tried >= 20, "{tried} faults");
+    }
+
+    #[test]
+    fn a_stuck_value_is_shown_as_good_and_only_a_comparison_tells() {
+        let (verdict, told) = drill_of("device = 'TIC-1'", "stuck value", HONEST);
+        let missed = verdict.lines()[0].contains("TIC-1.PV never shown wrong") && verdict.lines()[0].contains("MISSED");
+        assert!(missed, "{}", verdict.lines().join("\n"));
+        assert!(told.iter().all(|line| !line.contains("RAISED")), "{told:?}");
+    }
+
+    #[test]
+    fn a_replay_is_the_same_to_the_last_line() {
+        let (first, second) = (drill("line_noise", true), drill("line_noise", true));
+        assert_eq!(first.0, second.0);
+        assert_eq!(first.1, second.1);
+        assert!(first.1.len() > 3, "something was told: {:?}", first.1);
+    }
+}

@@ -1,0 +1,59 @@
+//! What a terminal may know and wish of a simulated plant: faults on offer and in force, what is really so, the drill at work.
+
+use std::{sync::Arc, time::Duration};
+
+use super::{
+    faults::{Fault, InForce, Offer, Place},
+    scenario::judge::{Truths, Verdict},
+};
+
+/// A wish about faults.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// This goes wrong, or goes wrong in another measure.
+    Set(Place, Fault),
+    /// This is mended, whatever its measure.
+    Clear(Place, Fault),
+    /// All is well again.
+    AllWell,
+}
+
+/// The simulation as it stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Status {
+    /// What can go wrong, by place.
+    pub offers: Arc<[Offer]>,
+    /// What is wrong.
+    pub in_force: Vec<InForce>,
+    /// What is really so.
+    pub truths: Truths,
+    /// Nothing of all this may be told before the drill is over.
+    pub exam: bool,
+    /// The drill at work, or the one that is over.
+    pub scenario: Option<Progress>,
+}
+
+/// How a drill stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Progress {
+    /// What the trainer should know.
+    pub about: String,
+    /// Time since its start.
+    pub elapsed: Duration,
+    /// How long it takes.
+    pub duration: Duration,
+    /// Points by now.
+    pub verdict: Verdict,
+}
+
+impl Status {
+    /// Whether faults may be told and changed: always but in an exam that is not over.
+    pub fn is_open(&self) -> bool {
+        !self.exam || self.scenario.as_ref().is_some_and(|progress| progress.verdict.over)
+    }
+
+    /// The fault of this name that is in force in a place.
+    pub fn find(&self, place: Place, fault: Fault) -> Option<&InForce> {
+        self.in_force.iter().find(|in_force| in_force.place == place && in_force.fault.word() == fault.word())
+    }
+}

@@ -1,0 +1,76 @@
+//! What faults of the process do between the outputs of PLC and controller and the water.
+
+use super::word::{Fault, Position, Valve};
+use crate::sim::tank::Actuators;
+
+/// The faults of the tank that are in force.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Troubles {
+    heater: bool,
+    pump: bool,
+    agitator: bool,
+    drain: Option<Position>,
+    fill: Option<Position>,
+    leak_l_per_min: f64,
+}
+
+impl Troubles {
+    /// Those among some faults; the others are of lines and units.
+    pub fn of(faults: impl Iterator<Item = Fault>) -> Troubles {
+        let mut troubles = Troubles::default();
+        for fault in faults {
+            match fault {
+                Fault::HeaterBurnout => troubles.heater = true,
+                Fault::PumpFailed => troubles.pump = true,
+                Fault::AgitatorFailed => troubles.agitator = true,
+                Fault::ValveStuck(Valve::Drain, position) => troubles.drain = Some(position),
+                Fault::ValveStuck(Valve::Fill, position) => troubles.fill = Some(position),
+                Fault::Leak(ml_per_min) => troubles.leak_l_per_min = f64::from(ml_per_min) / 1e3,
+                _ => {}
+            }
+        }
+        troubles
+    }
+
+    /// What really moves when these are the outputs.
+    pub fn bend(&self, wanted: Actuators) -> Actuators {
+        let valve = |stuck: Option<Position>, wanted| stuck.map_or(wanted, |position| position == Position::Open);
+        Actuators {
+            pump: wanted.pump && !self.pump,
+            agitator: wanted.agitator && !self.agitator,
+            drain_valve: valve(self.drain, wanted.drain_valve),
+            fill_valve: valve(self.fill, wanted.fill_valve),
+            heater_percent: if self.heater { 0.0 } else { wanted.heater_percent },
+        }
+    }
+
+    /// Water that TK-1 loses to the floor, in l/min.
+    pub fn leak_l_per_min(&self) -> f64 {
+        self.leak_l_per_min
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL_ON: Actuators =
+        Actuators { pump: true, agitator: true, drain_valve: true, fill_valve: true, heater_percent: 80.0 };
+
+    fn check(faults: &[&str], wanted: Actuators, expect: Actuators) {
+        let faults = faults.iter().map(|text| text.parse().expect("a fault"));
+        assert_eq!(Troubles::of(faults).bend(wanted), expect);
+    }
+
+    #[test]
+    fn what_is_broken_does_not_follow_the_outputs() {
+        let off = Actuators::default();
+        check(&[], ALL_ON, ALL_ON);
+        check(&["silent", "leak 2"], ALL_ON, ALL_ON);
+        check(&["heater burnout"], ALL_ON, Actuators { heater_percent: 0.0, ..ALL_ON });
+        check(&["pump failed", "agitator failed"], ALL_ON, Actuators { pump: false, agitator: false, ..ALL_ON });
+        check(&["SV-1 stuck shut"], ALL_ON, Actuators { drain_valve: false, ..ALL_ON });
+        check(&["SV-1 stuck open", "SV-2 stuck open"], off, Actuators { drain_valve: true, fill_valve: true, ..off });
+        check(&["SV-2 stuck shut"], ALL_ON, Actuators { fill_valve: false, ..ALL_ON });
+    }
+}

@@ -1,0 +1,119 @@
+//! What each fault looks like on the line, and what it leaves alone.
+
+use super::*;
+use crate::{bus::frame::crc16, sim::rig::Rig};
+
+const L1: LineId = LineId(0);
+const TIC: Place = Place::Unit(L1, 1);
+const READ_SV: [u8; 5] = [3, 0x03, 0xEA, 0, 1];
+const WRITE_SV: [u8; 5] = [6, 0x03, 0xEA, 0x01, 0xF4];
+const SINCE: Timestamp = Timestamp::UNIX_EPOCH;
+
+fn world() -> (World, Faults) {
+    (World::tank(Rig::new()), Faults::default())
+}
+
+fn check(fault: Option<Fault>, expect: Option<(usize, bool)>, written: bool) {
+    let (mut world, mut faults) = world();
+    if let Some(fault) = fault {
+        faults.set(&mut world, TIC, fault, SINCE);
+    }
+    let answer = faults.answer(&mut world, L1, 1, &READ_SV);
+    let seen = answer.map(|answer| answer.rtu()).map(|frame| (frame.len(), crc16(&frame) == 0));
+    assert_eq!(seen, expect, "{fault:?}: length and check");
+    let answered = faults.answer(&mut world, L1, 1, &WRITE_SV).is_some();
+    assert_eq!(answered, expect.is_some());
+    assert_eq!(world.respond(L1, 1, &READ_SV) == Some(vec![3, 2, 0x01, 0xF4]), written, "{fault:?}");
+    assert!(faults.answer(&mut world, L1, 2, &[1, 8, 0, 0, 1]).is_some(), "{fault:?} of another unit");
+    faults.clear_all(&mut world);
+    let well = faults.answer(&mut world, L1, 1, &READ_SV).expect("an answer");
+    assert_eq!((well.rtu().len(), well.delay), (7, Duration::from_millis(5)), "well again after {fault:?}");
+}
+
+#[test]
+fn each_fault_looks_as_it_does_on_the_line() {
+    check(None, Some((7, true)), true);
+    check(Some(Fault::Silent), None, false);
+    check(Some(Fault::Late(Duration::from_secs(1))), Some((7, true)), true);
+    check(Some(Fault::BadCrc), Some((7, false)), true);
+    check(Some(Fault::Cut), Some((3, false)), true);
+    check(Some(Fault::Exception(4)), Some((5, true)), false);
+    check(Some(Fault::SensorBurnout), Some((7, true)), true);
+}
+
+#[test]
+fn the_same_answer_in_ascii() {
+    let (mut world, mut faults) = world();
+    let mut frame = |fault: Option<Fault>| {
+        faults.clear_all(&mut world);
+        fault.into_iter().for_each(|fault| faults.set(&mut world, TIC, fault, SINCE));
+        faults.answer(&mut world, L1, 1, &READ_SV).map(|answer| answer.ascii())
+    };
+    assert_eq!(frame(None).as_deref(), Some(&b":01030202BC3C\r\n"[..]));
+    assert_eq!(frame(Some(Fault::BadCrc)).as_deref(), Some(&b":01030202BC30\r\n"[..]));
+    assert_eq!(frame(Some(Fault::Cut)).as_deref(), Some(&b":010302"[..]));
+}
+
+#[test]
+fn a_broadcast_passes_by_a_silent_unit() {
+    let (mut world, mut faults) = world();
+    faults.set(&mut world, TIC, Fault::Silent, SINCE);
+    assert_eq!(faults.answer(&mut world, L1, 0, &WRITE_SV), None);
+    assert_eq!(world.respond(L1, 1, &READ_SV), Some(vec![3, 2, 0x02, 0xBC]));
+    assert_eq!(world.respond(L1, 2, &READ_SV), Some(vec![3, 2, 0x01, 0xF4]));
+}
+
+#[test]
+fn a_late_answer_says_how_late() {
+    let (mut world, mut faults) = world();
+    faults.set(&mut world, TIC, Fault::Late(Duration::from_millis(700)), SINCE);
+    let delay = faults.answer(&mut world, L1, 1, &READ_SV).map(|answer| answer.delay);
+    assert_eq!(delay, Some(Duration::from_millis(705)));
+}
+
+#[test]
+fn the_same_answer_on_tcp() {
+    let (mut world, mut faults) = world();
+    let frame = |answer: Option<Answer>| answer.map(|answer| answer.tcp(0x1234));
+    let well = frame(faults.answer(&mut world, L1, 1, &READ_SV));
+    assert_eq!(well, Some(vec![0x12, 0x34, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]));
+    faults.set(&mut world, TIC, Fault::BadCrc, SINCE);
+    let wrong = frame(faults.answer(&mut world, L1, 1, &READ_SV));
+    assert_eq!(wrong.map(|frame| frame[..2].to_vec()), Some(vec![0xED, 0x34]));
+}
+
+#[test]
+fn noise_spoils_about_as_many_messages_as_it_says_and_always_the_same() {
+    let spoiled = |percent| {
+        let (mut world, mut faults) = world();
+        faults.set(&mut world, Place::Line(L1), Fault::Noise(percent), SINCE);
+        let ask = |_| faults.answer(&mut world, L1, 1, &READ_SV).map(|answer| (answer.rtu(), answer.ascii()));
+        (0..1_000).map(ask).collect::<Vec<_>>()
+    };
+    let answers = spoiled(20);
+    assert_eq!(answers, spoiled(20), "a replay has the same noise");
+    let good = |frame: &[u8]| crc16(frame) == 0;
+    let whole = answers.iter().flatten().filter(|(rtu, _)| good(rtu)).count();
+    // A question and its answer both come through in 0.8 × 0.8 of all cases.
+    assert!((590..690).contains(&whole), "{whole} of 1000");
+    for (rtu, characters) in answers.iter().flatten().filter(|(rtu, _)| !good(rtu)) {
+        assert_eq!(rtu.len(), 7);
+        assert_ne!(characters.as_slice(), b":01030202BC3C\r\n");
+    }
+}
+
+#[test]
+fn a_later_fault_takes_the_place_of_one_that_it_excludes() {
+    let (mut world, mut faults) = world();
+    let list = |faults: &Faults| faults.list().iter().map(|f| f.fault.to_string()).collect::<Vec<_>>();
+    for fault in [Fault::Silent, Fault::BadCrc, Fault::Stuck] {
+        faults.set(&mut world, TIC, fault, SINCE);
+    }
+    assert_eq!(list(&faults), ["bad crc", "stuck value"]);
+    faults.set(&mut world, Place::Process, Fault::Leak(500), SINCE);
+    faults.set(&mut world, Place::Process, Fault::Leak(2_000), SINCE + jiff::SignedDuration::from_secs(9));
+    assert_eq!(list(&faults), ["bad crc", "stuck value", "leak 2 l/min"]);
+    assert_eq!(faults.list()[2].since, SINCE, "it is the same leak");
+    faults.clear(&mut world, Place::Process, Fault::Leak(1));
+    assert_eq!(list(&faults), ["bad crc", "stuck value"]);
+}

@@ -1,0 +1,359 @@
+//! The words for what can go wrong: the same in a scenario file, on screen and here.
+
+use std::{fmt, str::FromStr, time::Duration};
+
+/// What is wrong with a line, a unit on it, its values, or the process behind it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Fault {
+    /// So many of 100 messages on the line have a wrong bit.
+    Noise(u8),
+    /// The unit hears nothing and does nothing.
+    Silent,
+    /// The unit does what it is told and answers this much late (plant time).
+    Late(Duration),
+    /// The unit does what it is told; the answer arrives with a wrong check.
+    BadCrc,
+    /// The unit does what it is told; the answer breaks off in the middle.
+    Cut,
+    /// The unit does nothing and answers with this exception code.
+    Exception(u8),
+    /// What the unit measures stays as it was; everything else goes on.
+    Stuck,
+    /// The two words of each 32-bit value are of different instants.
+    Torn,
+    /// The words of each 32-bit value come in the wrong order.
+    WordOrder,
+    /// The wire of the sensor is broken.
+    SensorBurnout,
+    /// The heating element is broken.
+    HeaterBurnout,
+    /// A valve does not move any more.
+    ValveStuck(Valve, Position),
+    /// TK-1 leaks, so many millilitres a minute.
+    Leak(u32),
+    /// Pump P-1 does not turn.
+    PumpFailed,
+    /// Agitator M-1 does not turn.
+    AgitatorFailed,
+}
+
+/// A valve of the tank.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Valve {
+    /// SV-1 empties TK-1.
+    Drain,
+    /// SV-2 fills TK-1.
+    Fill,
+}
+
+/// Where a valve is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Position {
+    /// Water runs.
+    Open,
+    /// No water runs.
+    Shut,
+}
+
+/// What a fault is a fault of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Target {
+    /// A serial line.
+    Line,
+    /// A unit on a line: what comes back, or does not.
+    Unit,
+    /// Values inside good answers of a unit.
+    Value,
+    /// The simulated process.
+    Process,
+}
+
+/// The number that a fault has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// Its unit; empty for none.
+    pub unit: &'static str,
+    /// Least that makes sense.
+    pub min: f64,
+    /// Most that makes sense.
+    pub max: f64,
+    /// What a key steps through.
+    pub steps: &'static [f64],
+}
+
+/// Why a text is no fault.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum WordError {
+    /// No fault has this name.
+    #[error("unknown fault `{0}`")]
+    Unknown(String),
+    /// It has no number behind its name where one is needed, one where none is, or one that cannot be.
+    #[error("found `{found}`, expected {expected}")]
+    Number {
+        /// The text.
+        found: String,
+        /// `late and a time from 50ms to 60s`.
+        expected: String,
+    },
+}
+
+impl Fault {
+    /// Every fault, with its usual number, in the order of the page.
+    pub const ALL: [Fault; 18] = [
+        Fault::Noise(10),
+        Fault::Silent,
+        Fault::Late(Duration::from_secs(2)),
+        Fault::BadCrc,
+        Fault::Cut,
+        Fault::Exception(4),
+        Fault::Stuck,
+        Fault::Torn,
+        Fault::WordOrder,
+        Fault::SensorBurnout,
+        Fault::HeaterBurnout,
+        Fault::ValveStuck(Valve::Drain, Position::Open),
+        Fault::ValveStuck(Valve::Drain, Position::Shut),
+        Fault::ValveStuck(Valve::Fill, Position::Open),
+        Fault::ValveStuck(Valve::Fill, Position::Shut),
+        Fault::Leak(2_000),
+        Fault::PumpFailed,
+        Fault::AgitatorFailed,
+    ];
+
+    /// Its name, without its number.
+    pub fn word(self) -> &'static str {
+        match self {
+            Fault::Noise(_) => "noise",
+            Fault::Silent => "silent",
+            Fault::Late(_) => "late",
+            Fault::BadCrc => "bad crc",
+            Fault::Cut => "cut",
+            Fault::Exception(_) => "exception",
+            Fault::Stuck => "stuck value",
+            Fault::Torn => "torn value",
+            Fault::WordOrder => "word order",
+            Fault::SensorBurnout => "sensor burnout",
+            Fault::HeaterBurnout => "heater burnout",
+            Fault::ValveStuck(Valve::Drain, Position::Open) => "SV-1 stuck open",
+            Fault::ValveStuck(Valve::Drain, Position::Shut) => "SV-1 stuck shut",
+            Fault::ValveStuck(Valve::Fill, Position::Open) => "SV-2 stuck open",
+            Fault::ValveStuck(Valve::Fill, Position::Shut) => "SV-2 stuck shut",
+            Fault::Leak(_) => "leak",
+            Fault::PumpFailed => "pump failed",
+            Fault::AgitatorFailed => "agitator failed",
+        }
+    }
+
+    /// What it is a fault of.
+    pub fn target(self) -> Target {
+        match self {
+            Fault::Noise(_) => Target::Line,
+            Fault::Silent | Fault::Late(_) | Fault::BadCrc | Fault::Cut | Fault::Exception(_) => Target::Unit,
+            Fault::Stuck | Fault::Torn | Fault::WordOrder | Fault::SensorBurnout => Target::Value,
+            Fault::HeaterBurnout
+            | Fault::ValveStuck(..)
+            | Fault::Leak(_)
+            | Fault::PumpFailed
+            | Fault::AgitatorFailed => Target::Process,
+        }
+    }
+
+    /// Whether two faults of the same thing cannot both be: the later one takes the place of the earlier.
+    pub fn excludes(self, other: Fault) -> bool {
+        match (self, other) {
+            (Fault::ValveStuck(one, _), Fault::ValveStuck(two, _)) => one == two,
+            _ => self.word() == other.word() || (self.target() == Target::Unit && other.target() == Target::Unit),
+        }
+    }
+
+    /// What its number may be, if it has one.
+    pub fn parameter(self) -> Option<Parameter> {
+        match self {
+            Fault::Noise(_) => {
+                Some(Parameter { unit: "%", min: 1.0, max: 100.0, steps: &[1.0, 5.0, 10.0, 20.0, 50.0] })
+            }
+            Fault::Late(_) => Some(Parameter { unit: "s", min: 0.05, max: 60.0, steps: &[0.2, 0.5, 1.0, 2.0, 5.0] }),
+            Fault::Exception(_) => Some(Parameter {
+                unit: "",
+                min: 1.0,
+                max: 255.0,
+                steps: &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 11.0],
+            }),
+            Fault::Leak(_) => {
+                Some(Parameter { unit: "l/min", min: 0.01, max: 20.0, steps: &[0.2, 0.5, 1.0, 2.0, 5.0] })
+            }
+            Fault::Silent
+            | Fault::BadCrc
+            | Fault::Cut
+            | Fault::Stuck
+            | Fault::Torn
+            | Fault::WordOrder
+            | Fault::SensorBurnout
+            | Fault::HeaterBurnout
+            | Fault::ValveStuck(..)
+            | Fault::PumpFailed
+            | Fault::AgitatorFailed => None,
+        }
+    }
+
+    /// Its number, in the unit of [`Fault::parameter`].
+    pub fn number(self) -> Option<f64> {
+        match self {
+            Fault::Noise(percent) => Some(f64::from(percent)),
+            Fault::Late(by) => Some(by.as_secs_f64()),
+            Fault::Exception(code) => Some(f64::from(code)),
+            Fault::Leak(ml_per_min) => Some(f64::from(ml_per_min) / 1e3),
+            Fault::Silent
+            | Fault::BadCrc
+            | Fault::Cut
+            | Fault::Stuck
+            | Fault::Torn
+            | Fault::WordOrder
+            | Fault::SensorBurnout
+            | Fault::HeaterBurnout
+            | Fault::ValveStuck(..)
+            | Fault::PumpFailed
+            | Fault::AgitatorFailed => None,
+        }
+    }
+
+    /// The same fault with another number; `None` if it has none or this one cannot be.
+    pub fn with(self, number: f64) -> Option<Fault> {
+        let parameter = self.parameter().filter(|parameter| (parameter.min..=parameter.max).contains(&number))?;
+        let whole = number.fract() == 0.0 || matches!(parameter.unit, "s" | "l/min");
+        whole.then_some(match self {
+            Fault::Noise(_) => Fault::Noise(number as u8),
+            Fault::Late(_) => Fault::Late(Duration::from_millis((number * 1e3).round() as u64)),
+            Fault::Exception(_) => Fault::Exception(number as u8),
+            Fault::Leak(_) => Fault::Leak((number * 1e3).round() as u32),
+            other => other,
+        })
+    }
+
+    /// The same fault with the next greater or smaller of its usual numbers; itself at the end or without a number.
+    pub fn step(self, greater: bool) -> Fault {
+        let (Some(parameter), Some(number)) = (self.parameter(), self.number()) else { return self };
+        let next = if greater {
+            parameter.steps.iter().find(|step| **step > number)
+        } else {
+            parameter.steps.iter().rev().find(|step| **step < number)
+        };
+        next.and_then(|next| self.with(*next)).unwrap_or(self)
+    }
+}
+
+/// `silent`, `late 2s`, `leak 0.5 l/min`: what a scenario file has and a screen shows.
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())?;
+        match self {
+            Fault::Late(by) if by.subsec_millis() == 0 => write!(f, " {}s", by.as_secs()),
+            Fault::Late(by) => write!(f, " {}ms", by.as_millis()),
+            Fault::Exception(code) => write!(f, " {code}"),
+            Fault::Noise(percent) => write!(f, " {percent} %"),
+            Fault::Leak(ml_per_min) => write!(f, " {} l/min", f64::from(*ml_per_min) / 1e3),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl FromStr for Fault {
+    type Err = WordError;
+
+    /// A fault as [`Fault`] is displayed; a number that is left out is the usual one. Units may be left out but for a time.
+    fn from_str(text: &str) -> Result<Fault, WordError> {
+        let text = text.trim();
+        // The longest name first: `SV-1 stuck open` before any that it might begin with.
+        let named = |fault: &&Fault| {
+            text.strip_prefix(fault.word()).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
+        };
+        let fault = Fault::ALL.iter().filter(named).max_by_key(|fault| fault.word().len());
+        let Some(fault) = fault.copied() else { return Err(WordError::Unknown(text.to_owned())) };
+        let rest = text[fault.word().len()..].trim();
+        if rest.is_empty() {
+            return Ok(fault);
+        }
+        let number = match fault {
+            Fault::Late(_) => rest.parse::<jiff::SignedDuration>().ok().map(|span| span.as_secs_f64()),
+            _ => {
+                let unit = fault.parameter().map_or("", |parameter| parameter.unit);
+                rest.strip_suffix(unit).unwrap_or(rest).trim().parse().ok()
+            }
+        };
+        number
+            .and_then(|number| fault.with(number))
+            .ok_or_else(|| WordError::Number { found: text.to_owned(), expected: fault.expected() })
+    }
+}
+
+impl Fault {
+    fn expected(self) -> String {
+        let word = self.word();
+        match (self, self.parameter()) {
+            (_, None) => format!("only `{word}`: it has no number"),
+            (Fault::Late(_), Some(_)) => "a time from 50ms to 60s, such as `late 2s`".to_owned(),
+            (_, Some(Parameter { unit, min, max, .. })) => {
+                let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+                format!(
+                    "a number from {min} to {max}, such as `{self}`",
+                    self = format!("{word} {}{unit}", self.number().unwrap_or(min))
+                )
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_fault_is_written_as_it_is_shown() {
+        for fault in Fault::ALL {
+            assert_eq!(fault.to_string().parse(), Ok(fault));
+            assert_eq!(fault.word().parse(), Ok(fault), "its usual number may be left out");
+            assert!(fault.excludes(fault), "{fault} twice is once");
+            for step in [fault.step(true), fault.step(false)] {
+                assert_eq!(step.word(), fault.word());
+                assert_eq!(step.to_string().parse(), Ok(step), "{step}");
+            }
+            assert_eq!(fault.parameter().is_some(), fault.number().is_some());
+        }
+    }
+
+    #[test]
+    fn a_number_may_be_written_in_several_ways_and_is_checked() {
+        let check = |text: &str, expect: Result<Fault, &str>| {
+            let found = text.parse::<Fault>().map_err(|error| error.to_string());
+            assert_eq!(found, expect.map_err(str::to_owned), "{text}");
+        };
+        check("late 1.5s", Ok(Fault::Late(Duration::from_millis(1500))));
+        check("late 700 ms", Ok(Fault::Late(Duration::from_millis(700))));
+        check("exception 11", Ok(Fault::Exception(11)));
+        check("leak 0.5 l/min", Ok(Fault::Leak(500)));
+        check("leak 0.5", Ok(Fault::Leak(500)));
+        check("noise 20%", Ok(Fault::Noise(20)));
+        check("SV-1 stuck shut", Ok(Fault::ValveStuck(Valve::Drain, Position::Shut)));
+        check("late 5", Err("found `late 5`, expected a time from 50ms to 60s, such as `late 2s`"));
+        check("noise 101 %", Err("found `noise 101 %`, expected a number from 1 to 100, such as `noise 10 %`"));
+        check("exception 2.5", Err("found `exception 2.5`, expected a number from 1 to 255, such as `exception 4`"));
+        check("silent 3", Err("found `silent 3`, expected only `silent`: it has no number"));
+        check("latency 2s", Err("unknown fault `latency 2s`"));
+    }
+
+    #[test]
+    fn one_unit_has_one_fault_on_the_line_and_one_valve_one_place() {
+        let check = |one: &str, other: &str, expect: bool| {
+            let fault = |text: &str| text.parse::<Fault>().expect("a fault");
+            assert_eq!(fault(one).excludes(fault(other)), expect, "{one} and {other}");
+        };
+        check("silent", "late 2s", true);
+        check("late 1s", "late 2s", true);
+        check("silent", "stuck value", false);
+        check("stuck value", "torn value", false);
+        check("SV-1 stuck open", "SV-1 stuck shut", true);
+        check("SV-1 stuck open", "SV-2 stuck shut", false);
+        check("leak 1", "leak 2", true);
+        check("leak", "pump failed", false);
+    }
+}

@@ -1,0 +1,172 @@
+//! The task of a trainer: lets things go wrong when somebody wishes or a scenario says so, watches, and judges.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use tokio::sync::{mpsc, watch};
+
+use super::WorldHandle;
+use crate::{
+    plant::{
+        PlantDef, Snapshot,
+        command::{self, OrderId},
+        record::Record,
+    },
+    sim::{
+        drill::{Order, Progress, Status},
+        faults::{Offer, offers},
+        scenario::{
+            Cue, Event, Scenario,
+            judge::{Judge, Verdict},
+        },
+    },
+};
+
+/// Wishes that may wait; more are not heard, and what is in force tells so.
+const ORDERS_MAX: usize = 32;
+/// Records that may wait for the judge.
+pub const RECORDS_MAX: usize = 4096;
+/// The number of the terminal by which the operator of a scenario gives orders; real terminals count from 1.
+const OPERATOR: u32 = u32::MAX;
+
+/// What a terminal holds of a simulation.
+#[derive(Debug, Clone)]
+pub struct Port {
+    /// Wishes about faults.
+    pub orders: mpsc::Sender<Order>,
+    /// The simulation as it stands.
+    pub status: watch::Receiver<Arc<Status>>,
+}
+
+/// What a trainer works with.
+#[derive(Debug)]
+pub struct Trainer {
+    /// The plant.
+    pub def: Arc<PlantDef>,
+    /// The simulation.
+    pub world: WorldHandle,
+    /// What is shown.
+    pub snapshots: watch::Receiver<Arc<Snapshot>>,
+    /// Steps of alarms.
+    pub journal: mpsc::Receiver<Vec<Record>>,
+    /// The drill, if there is one.
+    pub scenario: Option<Arc<Scenario>>,
+    /// Where the operator of the scenario gives his orders; `None` where a person sits.
+    pub operator: Option<mpsc::Sender<command::Order>>,
+    /// Nothing is told before the drill is over.
+    pub exam: bool,
+}
+
+impl Trainer {
+    /// Starts the task. It ends when the station does, or in a drill without a person when the drill is over.
+    pub fn spawn(self) -> (Port, tokio::task::JoinHandle<Option<Verdict>>) {
+        let (orders, inbox) = mpsc::channel(ORDERS_MAX);
+        let began = self.world.clock().now();
+        let judge = self.scenario.clone().map(|scenario| Judge::new(scenario, self.def.clone(), began));
+        let cues = self.scenario.as_ref().map(|scenario| scenario.cues(self.operator.is_some())).unwrap_or_default();
+        let offers: Arc<[Offer]> = offers(&self.def).into();
+        let task = Task { cues: cues.into(), judge, began, offers, trainer: self, ordered: 0 };
+        let (publish, status) = watch::channel(Arc::new(task.status(Vec::new(), Default::default(), began)));
+        let work = tokio::spawn(task.run(inbox, publish));
+        (Port { orders, status }, work)
+    }
+}
+
+struct Task {
+    trainer: Trainer,
+    cues: std::collections::VecDeque<Cue>,
+    judge: Option<Judge>,
+    began: Timestamp,
+    offers: Arc<[Offer]>,
+    ordered: u32,
+}
+
+impl Task {
+    async fn run(mut self, mut inbox: mpsc::Receiver<Order>, publish: watch::Sender<Arc<Status>>) -> Option<Verdict> {
+        let clock = self.trainer.world.clock();
+        loop {
+            let cue =
+                self.cues.front().map(|cue| self.began + jiff::SignedDuration::try_from(cue.at()).unwrap_or_default());
+            tokio::select! {
+                // A replay must come to the same end: what is due at one moment happens in this order.
+                biased;
+                () = clock.sleep_until(cue.unwrap_or(self.began)), if cue.is_some() => {
+                    if let Some(cue) = self.cues.pop_front() {
+                        self.perform(cue).await;
+                    }
+                }
+                Some(order) = inbox.recv() => {
+                    if publish.borrow().is_open() {
+                        self.obey(order).await;
+                    }
+                }
+                Some(records) = self.trainer.journal.recv() => {
+                    if let Some(judge) = self.running() {
+                        judge.on_records(&records);
+                    }
+                    continue;
+                }
+                changed = self.trainer.snapshots.changed() => {
+                    if changed.is_err() {
+                        break;
+                    }
+                }
+            }
+            let Some(report) = self.trainer.world.report().await else { break };
+            let snapshot = self.trainer.snapshots.borrow_and_update().clone();
+            if let Some(judge) = self.running() {
+                judge.on_values(&snapshot, &report.truths);
+            }
+            let status = self.status(report.in_force, report.truths, clock.now());
+            let over = status.scenario.as_ref().is_some_and(|progress| progress.verdict.over);
+            publish.send_replace(Arc::new(status));
+            if over && self.trainer.operator.is_some() {
+                break;
+            }
+        }
+        self.judge.map(|judge| judge.verdict())
+    }
+
+    /// The judge while the drill goes on; what comes later changes nothing.
+    fn running(&mut self) -> Option<&mut Judge> {
+        self.judge.as_mut().filter(|judge| !judge.is_over())
+    }
+
+    async fn perform(&mut self, cue: Cue) {
+        match cue {
+            Cue::Event(Event { place, fault, begins: true, .. }) => self.trainer.world.set(place, fault).await,
+            Cue::Event(Event { place, fault, begins: false, .. }) => self.trainer.world.clear(place, fault).await,
+            Cue::Deed(deed) => {
+                let Some(orders) = &self.trainer.operator else { return };
+                self.ordered += 1;
+                let id = OrderId { terminal: OPERATOR, number: self.ordered };
+                let order = command::Order { id, by: "operator of the drill".into(), command: deed.command };
+                if orders.try_send(order).is_err() {
+                    tracing::error!("the station has not taken an order of the drill");
+                }
+            }
+        }
+    }
+
+    async fn obey(&self, order: Order) {
+        match order {
+            Order::Set(place, fault) => self.trainer.world.set(place, fault).await,
+            Order::Clear(place, fault) => self.trainer.world.clear(place, fault).await,
+            Order::AllWell => self.trainer.world.all_well().await,
+        }
+    }
+
+    fn status(
+        &self,
+        in_force: Vec<crate::sim::faults::InForce>,
+        truths: crate::sim::scenario::judge::Truths,
+        now: Timestamp,
+    ) -> Status {
+        let scenario = self.judge.as_ref().map(|judge| {
+            let elapsed = Duration::try_from(now.duration_since(self.began)).unwrap_or_default();
+            let Scenario { about, duration, .. } = &**judge.scenario();
+            Progress { about: about.clone(), elapsed, duration: *duration, verdict: judge.verdict() }
+        });
+        Status { offers: self.offers.clone(), in_force, truths, exam: self.trainer.exam, scenario }
+    }
+}

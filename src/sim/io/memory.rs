@@ -1,0 +1,45 @@
+//! The lines of a simulated plant without ports: streams in memory, for drills in virtual time.
+
+use std::time::Duration;
+
+use tokio::{io::duplex, sync::mpsc};
+
+use super::{
+    LineHandle, Wire, WorldHandle, serve_line,
+    serving::{Mode, Service},
+    tcp::{Speech, serve_stream},
+};
+use crate::{bus::io::transport::Connector, plant::PlantDef};
+
+/// A line may be opened so often: an operator closes and opens it, a master gives a silent connection up.
+const OPENINGS: usize = 16;
+/// Bytes under way in one direction: more than any frame.
+const BYTES: usize = 4096;
+const FOR_EVER: Duration = Duration::from_secs(86_400 * 365);
+
+/// Serves every line of a plant as it speaks; gives what a station opens its lines with, by
+/// [`LineId`](crate::plant::def::LineId).
+pub fn in_memory(def: &PlantDef, world: &WorldHandle) -> Vec<Connector> {
+    let line = |line: &crate::plant::def::LineDef| {
+        let (streams, opened) = mpsc::channel(OPENINGS);
+        for _ in 0..OPENINGS {
+            let (master, slave) = duplex(BYTES);
+            tokio::spawn(serve(slave, world.line(line.id), Service::of(line)));
+            // The channel has room for all of them.
+            let _ = streams.try_send(master);
+        }
+        Connector::Memory(opened)
+    };
+    def.lines.iter().map(line).collect()
+}
+
+async fn serve(stream: tokio::io::DuplexStream, units: LineHandle, service: Service) {
+    let wire = Wire { serial: service.serial, ascii: service.mode == Mode::Ascii };
+    let ended = match service.mode {
+        Mode::Tcp => serve_stream(stream, units, Speech::Mbap).await,
+        Mode::Rtu | Mode::Ascii | Mode::RtuOverTcp => serve_line(stream, units, wire, FOR_EVER).await,
+    };
+    if let Err(error) = ended {
+        tracing::debug!(%error, "a line in memory has ended");
+    }
+}

@@ -1,0 +1,153 @@
+//! A drill on a simulated plant: faults at their times, and what is expected of alarms and operator. Plain data.
+//!
+//! ```text
+//!  scenario file ── read ──> Scenario ──> cues: break, mend, (headless) what a good operator does
+//!                                │
+//!  journal, snapshots, truth ────┴─ judge ──> Verdict
+//! ```
+
+pub mod judge;
+pub mod read;
+
+use std::time::Duration;
+
+use super::faults::{Fault, Place};
+use crate::plant::{
+    command::Command,
+    def::{AlarmId, TagId},
+    record::AlarmStep,
+};
+
+/// A drill. Times count from its start, in plant time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    /// The stem of its file: `sensor_burnout`.
+    pub name: String,
+    /// What the screens show.
+    pub title: String,
+    /// What the trainer should know.
+    pub about: String,
+    /// The plant it is for, as the file names it.
+    pub plant: String,
+    /// How the process stands at the start.
+    pub start: Start,
+    /// The process runs so long before anybody looks at it.
+    pub ahead: Duration,
+    /// How long it takes.
+    pub duration: Duration,
+    /// Points of 100 that are needed to pass.
+    pub pass_percent: u32,
+    /// What goes wrong, in order of time.
+    pub events: Vec<Event>,
+    /// What a good operator does, in order of time.
+    pub operator: Vec<Deed>,
+    /// What is expected.
+    pub expect: Vec<Expect>,
+}
+
+/// How the process stands at the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Start {
+    /// In the middle of work.
+    #[default]
+    Running,
+    /// At rest.
+    Rest,
+}
+
+/// Something goes wrong, or well again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Event {
+    /// When.
+    pub at: Duration,
+    /// Where.
+    pub place: Place,
+    /// What.
+    pub fault: Fault,
+    /// `false`: it is mended.
+    pub begins: bool,
+}
+
+/// What a good operator does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Deed {
+    /// When.
+    pub at: Duration,
+    /// What.
+    pub command: Command,
+}
+
+/// One thing that is expected, and what it is worth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expect {
+    /// In words for the trainee.
+    pub text: String,
+    /// What it is worth.
+    pub points: u32,
+    /// From when.
+    pub from: Duration,
+    /// Until when.
+    pub until: Duration,
+    /// What.
+    pub wish: Wish,
+}
+
+/// What can be expected between two times.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Wish {
+    /// This alarm makes this step.
+    Alarm(AlarmId, AlarmStep),
+    /// This alarm is never raised.
+    NoAlarm(AlarmId),
+    /// An operator writes this value, and it is verified.
+    Written(TagId, f64),
+    /// The value is shown as not good.
+    NotGood(TagId),
+    /// The value is shown as good.
+    Good(TagId),
+    /// The process stays inside these bounds, whatever is shown.
+    Within {
+        /// What is measured there.
+        tag: TagId,
+        /// Never below, in the tag's unit.
+        low: f64,
+        /// Never above.
+        high: f64,
+    },
+    /// What is shown as good is so, give or take this much.
+    True(TagId, f64),
+}
+
+/// What happens at a moment.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cue {
+    /// A fault begins or ends.
+    Event(Event),
+    /// A good operator acts.
+    Deed(Deed),
+}
+
+impl Cue {
+    /// When.
+    pub fn at(&self) -> Duration {
+        match self {
+            Cue::Event(event) => event.at,
+            Cue::Deed(deed) => deed.at,
+        }
+    }
+}
+
+impl Scenario {
+    /// Everything that happens, in order of time; with the deeds of a good operator, or without where a person sits.
+    pub fn cues(&self, with_operator: bool) -> Vec<Cue> {
+        let deeds = self.operator.iter().filter(|_| with_operator).cloned().map(Cue::Deed);
+        let mut cues: Vec<Cue> = self.events.iter().copied().map(Cue::Event).chain(deeds).collect();
+        cues.sort_by_key(Cue::at);
+        cues
+    }
+
+    /// All points that there are.
+    pub fn points(&self) -> u32 {
+        self.expect.iter().map(|expect| expect.points).sum()
+    }
+}

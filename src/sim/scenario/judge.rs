@@ -1,0 +1,290 @@
+//! Judges a drill by what became true: steps of alarms, orders of operators, values shown and values that are really so.
+
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use super::{Scenario, Wish};
+use crate::plant::{
+    Snapshot,
+    command::{Command, OrderStatus, Outcome},
+    def::{AlarmId, PlantDef, Subject, TagId},
+    record::{AlarmRecord, AlarmStep, Record},
+};
+
+/// What is really so in the simulated plant, in the units of the tags.
+pub type Truths = BTreeMap<TagId, f64>;
+
+/// A shown value may differ from the truth for so long: it was read a moment ago.
+const GRACE: Duration = Duration::from_secs(5);
+
+/// Takes in what happens and says at any time how the drill stands.
+#[derive(Debug, Clone)]
+pub struct Judge {
+    scenario: Arc<Scenario>,
+    def: Arc<PlantDef>,
+    began: Timestamp,
+    now: Duration,
+    marks: Vec<Mark>,
+}
+
+/// What is known of one expectation.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Mark {
+    met: Option<Duration>,
+    /// When and by which value it was violated.
+    broken: Option<(Duration, Option<f64>)>,
+    /// Whether there was anything to judge by.
+    seen: bool,
+    /// Since when what is shown differs from the truth.
+    differs: Option<Duration>,
+}
+
+/// How one expectation stands.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Standing {
+    /// Its time has not come, or is not over.
+    Open,
+    /// Fulfilled, at this time.
+    Met(Duration),
+    /// Not fulfilled, and why.
+    Missed(String),
+}
+
+/// One row of a verdict.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// What was expected.
+    pub text: String,
+    /// What it is worth.
+    pub points: u32,
+    /// How it stands.
+    pub standing: Standing,
+}
+
+/// How a drill stands or ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verdict {
+    /// Title of the scenario.
+    pub title: String,
+    /// One for each expectation.
+    pub rows: Vec<Row>,
+    /// Points by now.
+    pub points: u32,
+    /// Points that there are.
+    pub of: u32,
+    /// Points of 100 that are needed.
+    pub pass_percent: u32,
+    /// Whether its time is over.
+    pub over: bool,
+}
+
+impl Judge {
+    /// Begins now.
+    pub fn new(scenario: Arc<Scenario>, def: Arc<PlantDef>, began: Timestamp) -> Judge {
+        let marks = vec![Mark::default(); scenario.expect.len()];
+        Judge { scenario, def, began, now: Duration::ZERO, marks }
+    }
+
+    /// The scenario.
+    pub fn scenario(&self) -> &Arc<Scenario> {
+        &self.scenario
+    }
+
+    /// Whether the time of the scenario has passed.
+    pub fn is_over(&self) -> bool {
+        self.now >= self.scenario.duration
+    }
+
+    /// Takes lines of the journal.
+    pub fn on_records(&mut self, records: &[Record]) {
+        for record in records {
+            if let Record::Alarm(step) = record {
+                self.on_step(step);
+            }
+        }
+    }
+
+    /// Takes what is shown now, and what is really so.
+    pub fn on_values(&mut self, snapshot: &Snapshot, truths: &Truths) {
+        let Some(at) = self.elapsed(snapshot.at) else { return };
+        self.now = self.now.max(at);
+        for order in snapshot.orders.iter().rev() {
+            self.on_order(order);
+        }
+        for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
+            if expect.from <= at && at <= expect.until {
+                mark.take(at, expect.wish, snapshot, truths);
+            }
+        }
+    }
+
+    /// Time since the start; `None` for what was before.
+    fn elapsed(&self, at: Timestamp) -> Option<Duration> {
+        Duration::try_from(at.duration_since(self.began)).ok()
+    }
+
+    fn on_step(&mut self, step: &AlarmRecord) {
+        let Some(at) = self.elapsed(step.at) else { return };
+        for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
+            let inside = expect.from <= at && at <= expect.until;
+            match expect.wish {
+                Wish::Alarm(alarm, wanted) if inside && wanted == step.step && is(&self.def, alarm, step) => {
+                    mark.met.get_or_insert(at);
+                }
+                Wish::NoAlarm(alarm) if inside && step.step == AlarmStep::Raised && is(&self.def, alarm, step) => {
+                    mark.broken.get_or_insert((at, step.value));
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn on_order(&mut self, order: &OrderStatus) {
+        let (Some(at), Command::Write { tag, value }) = (self.elapsed(order.at), &order.command) else { return };
+        let done = matches!(order.outcome, Outcome::Verified | Outcome::Unchanged);
+        for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
+            let Wish::Written(wanted, number) = expect.wish else { continue };
+            if done && wanted == *tag && number == *value && expect.from <= at && at <= expect.until {
+                mark.met.get_or_insert(at);
+            }
+        }
+    }
+
+    /// How it stands; `over` once the time of the scenario has passed.
+    pub fn verdict(&self) -> Verdict {
+        let over = self.is_over();
+        let rows: Vec<Row> = self
+            .scenario
+            .expect
+            .iter()
+            .zip(&self.marks)
+            .map(|(expect, mark)| Row {
+                text: expect.text.clone(),
+                points: expect.points,
+                standing: mark.standing(expect.wish, over || self.now > expect.until, self.now.min(expect.until)),
+            })
+            .collect();
+        let met = rows.iter().filter(|row| matches!(row.standing, Standing::Met(_)));
+        Verdict {
+            title: self.scenario.title.clone(),
+            points: met.map(|row| row.points).sum(),
+            of: self.scenario.points(),
+            pass_percent: self.scenario.pass_percent,
+            over,
+            rows,
+        }
+    }
+}
+
+/// Whether a step of the journal is of an alarm: the journal has names, not numbers.
+fn is(def: &PlantDef, alarm: AlarmId, step: &AlarmRecord) -> bool {
+    let alarm = def.alarm(alarm);
+    let subject = match alarm.subject {
+        Subject::Tag(tag) => &def.tag(tag).name,
+        Subject::Device(device) => &def.device(device).name,
+    };
+    **subject == *step.subject && *alarm.text == *step.text
+}
+
+impl Mark {
+    fn take(&mut self, at: Duration, wish: Wish, snapshot: &Snapshot, truths: &Truths) {
+        match wish {
+            Wish::NotGood(tag) if !snapshot.sample(tag).quality.is_good() => {
+                self.met.get_or_insert(at);
+            }
+            Wish::Good(tag) if snapshot.sample(tag).quality.is_good() => {
+                self.met.get_or_insert(at);
+            }
+            Wish::Within { tag, low, high } => {
+                if let Some(value) = truths.get(&tag).copied() {
+                    self.seen = true;
+                    if value < low || high < value {
+                        self.broken.get_or_insert((at, Some(value)));
+                    }
+                }
+            }
+            Wish::True(tag, allowed) => {
+                let (shown, truth) = (snapshot.sample(tag).trusted(), truths.get(&tag).copied());
+                self.seen |= truth.is_some();
+                match (shown, truth) {
+                    (Some(shown), Some(truth)) if (shown - truth).abs() > allowed => {
+                        let since = *self.differs.get_or_insert(at);
+                        if at - since > GRACE {
+                            self.broken.get_or_insert((since, Some(shown)));
+                        }
+                    }
+                    _ => self.differs = None,
+                }
+            }
+            Wish::Alarm(..) | Wish::NoAlarm(_) | Wish::Written(..) | Wish::NotGood(_) | Wish::Good(_) => {}
+        }
+    }
+
+    fn standing(&self, wish: Wish, over: bool, now: Duration) -> Standing {
+        let value = |value: Option<f64>| value.map_or(String::new(), |value| format!(": {value:.1}"));
+        match (wish, self.met, self.broken) {
+            (Wish::Alarm(..) | Wish::Written(..) | Wish::NotGood(_) | Wish::Good(_), Some(at), _) => Standing::Met(at),
+            (Wish::Alarm(..) | Wish::Written(..) | Wish::NotGood(_) | Wish::Good(_), None, _) if over => {
+                Standing::Missed("did not happen in time".to_owned())
+            }
+            (Wish::NoAlarm(_), _, Some((at, number))) => {
+                Standing::Missed(format!("raised at {}{}", clock(at), value(number)))
+            }
+            (Wish::Within { .. }, _, Some((at, number))) => {
+                Standing::Missed(format!("left at {}{}", clock(at), value(number)))
+            }
+            (Wish::True(..), _, Some((at, number))) => {
+                Standing::Missed(format!("shown as good and wrong from {}{}", clock(at), value(number)))
+            }
+            (Wish::Within { .. } | Wish::True(..), _, None) if over && !self.seen => {
+                Standing::Missed("could not be judged: the simulation does not know it".to_owned())
+            }
+            (Wish::NoAlarm(_) | Wish::Within { .. } | Wish::True(..), _, None) if over => Standing::Met(now),
+            _ => Standing::Open,
+        }
+    }
+}
+
+impl Verdict {
+    /// Whether the points suffice by now.
+    pub fn passed(&self) -> bool {
+        self.points * 100 >= self.pass_percent * self.of
+    }
+
+    /// `PASSED 90 of 100 points`, `FAILED …`, or how many there are by now.
+    pub fn summary(&self) -> String {
+        let points = format!("{} of {} points, {} % needed", self.points, self.of, self.pass_percent);
+        match (self.over, self.passed()) {
+            (false, _) => format!("so far {points}"),
+            (true, true) => format!("PASSED  {points}"),
+            (true, false) => format!("FAILED  {points}"),
+        }
+    }
+
+    /// A table: one line for each expectation, then the sum.
+    pub fn lines(&self) -> Vec<String> {
+        let width = self.rows.iter().map(|row| row.text.chars().count()).max().unwrap_or(0);
+        let row = |row: &Row| {
+            let (word, points, rest) = match &row.standing {
+                Standing::Open => ("open", 0, String::new()),
+                Standing::Met(at) => ("met", row.points, clock(*at)),
+                Standing::Missed(why) => ("MISSED", 0, why.clone()),
+            };
+            format!("{word:<6}  {points:>3}/{:<3}  {:<width$}  {rest}", row.points, row.text).trim_end().to_owned()
+        };
+        self.rows.iter().map(row).chain([self.summary()]).collect()
+    }
+}
+
+/// Time since the start: `02:05`, `1:02:05`.
+pub fn clock(time: Duration) -> String {
+    let s = time.as_secs();
+    match s / 3600 {
+        0 => format!("{:02}:{:02}", s / 60, s % 60),
+        hours => format!("{hours}:{:02}:{:02}", s / 60 % 60, s % 60),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,168 @@
+//! What is met and what is missed, by plain facts at plain times.
+
+use jiff::SignedDuration;
+
+use super::*;
+use crate::{
+    plant::{
+        Plant,
+        command::{OrderId, Refusal},
+        def::Priority,
+        fixture::{self, HIGH, PV, SV},
+        sample::{Cause, Sample},
+    },
+    sim::scenario::Expect,
+};
+
+const BEGAN: Timestamp = Timestamp::UNIX_EPOCH;
+
+fn at(second: u64) -> Timestamp {
+    BEGAN + SignedDuration::from_secs(second as i64)
+}
+
+/// A drill of 100 s with one wish from 10 to 20 s.
+fn judge(wish: Wish) -> Judge {
+    let s = Duration::from_secs;
+    let expect = Expect { text: "it".to_owned(), points: 10, from: s(10), until: s(20), wish };
+    let scenario = Scenario {
+        name: String::new(),
+        title: "drill".to_owned(),
+        about: String::new(),
+        plant: String::new(),
+        start: Default::default(),
+        ahead: Duration::ZERO,
+        duration: s(100),
+        pass_percent: 100,
+        events: Vec::new(),
+        operator: Vec::new(),
+        expect: vec![expect],
+    };
+    Judge::new(Arc::new(scenario), fixture::shared(), BEGAN)
+}
+
+/// What the screens show at a second: PV as given, and the orders.
+fn shown(second: u64, pv: Sample, orders: Vec<OrderStatus>) -> Snapshot {
+    let mut snapshot = Plant::new(fixture::shared(), at(second), 1.0).snapshot();
+    snapshot.samples[PV.index()] = pv;
+    snapshot.orders = orders;
+    snapshot
+}
+
+fn good(value: f64) -> Sample {
+    Sample::good(value, BEGAN)
+}
+
+fn standing(judge: &Judge) -> Standing {
+    judge.verdict().rows[0].standing.clone()
+}
+
+fn is_over(judge: &mut Judge) -> Standing {
+    judge.on_values(&shown(100, good(0.0), Vec::new()), &Truths::new());
+    standing(judge)
+}
+
+fn met(second: u64) -> Standing {
+    Standing::Met(Duration::from_secs(second))
+}
+
+fn late() -> Standing {
+    Standing::Missed("did not happen in time".to_owned())
+}
+
+#[test]
+fn an_alarm_counts_in_its_time_and_in_its_step_only() {
+    let check = |wish: Wish, steps: &[(u64, AlarmStep, &str)], expect: Standing| {
+        let mut judge = judge(wish);
+        let text = judge.def.alarm(HIGH).text.clone();
+        let subject: Arc<str> = judge.def.tag(PV).name.as_str().into();
+        for (second, step, by_text) in steps {
+            let text = if by_text.is_empty() { text.as_str() } else { by_text };
+            judge.on_records(&[Record::Alarm(AlarmRecord {
+                at: at(*second),
+                subject: subject.clone(),
+                text: text.into(),
+                priority: Priority::High,
+                step: *step,
+                value: Some(76.0),
+                limit: None,
+                by: None,
+            })]);
+        }
+        assert_eq!(is_over(&mut judge), expect, "{wish:?} {steps:?}");
+    };
+    let raised = Wish::Alarm(HIGH, AlarmStep::Raised);
+    check(raised, &[(12, AlarmStep::Raised, "")], met(12));
+    check(raised, &[(9, AlarmStep::Raised, ""), (21, AlarmStep::Raised, "")], late());
+    check(raised, &[(12, AlarmStep::Returned, "")], late());
+    check(raised, &[(12, AlarmStep::Raised, "another alarm of this tag")], late());
+    check(Wish::Alarm(HIGH, AlarmStep::Acknowledged), &[(20, AlarmStep::Acknowledged, "")], met(20));
+    check(Wish::NoAlarm(HIGH), &[], met(20));
+    check(Wish::NoAlarm(HIGH), &[(12, AlarmStep::Raised, "")], Standing::Missed("raised at 00:12: 76.0".to_owned()));
+}
+
+#[test]
+fn only_a_verified_write_of_the_right_value_counts() {
+    let check = |second: u64, value: f64, outcome: Outcome, expect: Standing| {
+        let mut judge = judge(Wish::Written(SV, 60.0));
+        let order = OrderStatus {
+            id: OrderId { terminal: 1, number: 1 },
+            by: "tech1".into(),
+            command: Command::Write { tag: SV, value },
+            at: at(second),
+            old: None,
+            outcome,
+        };
+        judge.on_values(&shown(50, good(50.0), vec![order]), &Truths::new());
+        assert_eq!(is_over(&mut judge), expect);
+    };
+    check(15, 60.0, Outcome::Verified, met(15));
+    check(15, 60.0, Outcome::Unchanged, met(15));
+    check(15, 60.5, Outcome::Verified, late());
+    check(25, 60.0, Outcome::Verified, late());
+    check(15, 60.0, Outcome::Refused(Refusal::ReadOnly), late());
+}
+
+#[test]
+fn a_value_is_judged_by_what_is_shown_and_by_what_is_so() {
+    let check = |wish: Wish, seconds: &[(u64, Sample, f64)], expect: Standing| {
+        let mut judge = judge(wish);
+        for (second, sample, truth) in seconds {
+            judge.on_values(&shown(*second, *sample, Vec::new()), &Truths::from([(PV, *truth)]));
+        }
+        assert_eq!(is_over(&mut judge), expect, "{wish:?}");
+    };
+    let bad = Sample::bad(Cause::SensorFault, BEGAN);
+    let within = Wish::Within { tag: PV, low: 0.0, high: 90.0 };
+    check(Wish::NotGood(PV), &[(9, bad, 50.0), (12, good(50.0), 50.0), (14, bad, 50.0)], met(14));
+    check(Wish::NotGood(PV), &[(12, good(50.0), 50.0)], late());
+    check(Wish::Good(PV), &[(12, bad, 50.0), (13, good(50.0), 50.0)], met(13));
+    check(within, &[(12, bad, 89.0)], met(20));
+    check(within, &[(12, good(70.0), 91.0)], Standing::Missed("left at 00:12: 91.0".to_owned()));
+    let unknown = Standing::Missed("could not be judged: the simulation does not know it".to_owned());
+    check(within, &[], unknown);
+    // A moment's difference is the way from probe to screen; a lasting one is a wrong value shown as a right one.
+    let wrong = |second| (second, good(50.0), 60.0);
+    check(Wish::True(PV, 2.0), &[wrong(10), wrong(14), (15, good(60.0), 60.0), wrong(16), wrong(20)], met(20));
+    check(
+        Wish::True(PV, 2.0),
+        &[wrong(11), wrong(14), wrong(18)],
+        Standing::Missed("shown as good and wrong from 00:11: 50.0".to_owned()),
+    );
+    check(Wish::True(PV, 2.0), &[(11, bad, 60.0), (18, bad, 60.0)], met(20));
+}
+
+#[test]
+fn a_verdict_is_open_until_its_time_is_over_and_then_a_sum() {
+    let mut judge = judge(Wish::NotGood(PV));
+    judge.on_values(&shown(15, good(50.0), Vec::new()), &Truths::new());
+    assert_eq!(standing(&judge), Standing::Open);
+    assert_eq!(judge.verdict().summary(), "so far 0 of 10 points, 100 % needed");
+    judge.on_values(&shown(21, good(50.0), Vec::new()), &Truths::new());
+    assert_eq!(standing(&judge), late());
+    assert!(!judge.verdict().over);
+    assert_eq!(is_over(&mut judge), late());
+    assert_eq!(
+        judge.verdict().lines(),
+        ["MISSED    0/10   it  did not happen in time", "FAILED  0 of 10 points, 100 % needed"]
+    );
+}

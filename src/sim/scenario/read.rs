@@ -1,0 +1,261 @@
+//! Reads a scenario file: every mistake at once, with file, line, what was found and what was expected.
+
+mod expect;
+mod names;
+#[cfg(test)]
+mod tests;
+
+use std::{path::Path, sync::Arc, time::Duration};
+
+use self::names::{alarm, tag, unknown, value};
+use super::{Deed, Event, Expect, Scenario, Start, judge::clock};
+use crate::{
+    plant::{PlantDef, command::Command, record::AlarmStep},
+    profile::{
+        self, Errors, Search,
+        diagnostic::{Problems, Span},
+        reader::{self, At, Choice, Node, Value, table, text, words},
+    },
+    sim::faults::{Fault, Place, refusal},
+};
+
+table!(
+    /// A scenario file.
+    ScenarioTable, "the scenario" {
+        need "title" title: String,
+        opt "about" about: String,
+        need "plant" plant: String,
+        opt "start" start: Start,
+        opt "ahead" ahead: Duration,
+        need "duration" duration: Duration,
+        opt "pass_percent" pass_percent: u8,
+        list "event" events: EventTable,
+        list "operator" operator: DeedTable,
+        list "expect" expect: ExpectTable,
+    }
+);
+
+table!(
+    /// An `[[event]]`.
+    EventTable, "an event" {
+        need "at" at_time: Duration,
+        need "fault" fault: Fault,
+        opt "line" line: String,
+        opt "device" device: String,
+        opt "tag" tag: String,
+        /// It is mended after this time.
+        opt "for" lasts: Duration,
+        /// It is mended now.
+        opt "mended" mended: bool,
+    }
+);
+
+table!(
+    /// An `[[operator]]`: what a good operator does.
+    DeedTable, "a deed of the operator" {
+        need "at" at_time: Duration,
+        opt "acknowledge" acknowledge: String,
+        opt "text" text: String,
+        opt "write" write: String,
+        opt "value" value: Choice,
+    }
+);
+
+table!(
+    /// An `[[expect]]`.
+    ExpectTable, "an expectation" {
+        opt "what" what: String,
+        opt "points" points: u16,
+        /// From when, from the start if left out.
+        opt "after" after: Duration,
+        /// How long after that, until the end if left out.
+        opt "within" within: Duration,
+        opt "alarm" alarm: String,
+        opt "text" text: String,
+        opt "step" step: AlarmStep,
+        opt "never" never: bool,
+        opt "written" written: String,
+        opt "value" value: Choice,
+        opt "not_good" not_good: String,
+        opt "good" good: String,
+        opt "process" process: String,
+        opt "never_above" never_above: f64,
+        opt "never_below" never_below: f64,
+        opt "shown_true" shown_true: String,
+        opt "give" give: f64,
+    }
+);
+
+words!(Start, "start" {
+    "running" => Start::Running,
+    "rest" => Start::Rest,
+});
+
+words!(AlarmStep, "step of an alarm" {
+    "raised" => AlarmStep::Raised,
+    "acknowledged" => AlarmStep::Acknowledged,
+    "returned" => AlarmStep::Returned,
+});
+
+impl Value for Fault {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Fault> {
+        let word = String::read(value, at, problems)?;
+        match word.parse() {
+            Ok(fault) => Some(fault),
+            Err(error) => {
+                let mut known: Vec<&str> = Fault::ALL.iter().map(|fault| fault.word()).collect();
+                known.dedup();
+                let problem = problems.add(at, format!("{error}"));
+                problem.label("not a fault").suggest(&word, known.iter().copied());
+                None
+            }
+        }
+    }
+}
+
+/// Reads the scenario that an argument means, a path or a name, with its plant: a name, or a path beside the scenario.
+pub fn load(argument: &Path, search: &Search) -> Result<(Scenario, Arc<PlantDef>), Errors> {
+    let (name, found) = profile::scenario(argument, search)?;
+    let find = |plant: &str| {
+        let beside = argument.parent().map(|folder| folder.join(plant)).filter(|_| plant.ends_with(".toml"));
+        profile::load(&beside.unwrap_or_else(|| plant.into()), search)
+    };
+    read(&name, &found.file, &found.bytes, &find)
+}
+
+/// How the plant of a scenario is found, by the name that the file gives.
+pub type FindPlant<'a> = &'a dyn Fn(&str) -> Result<Arc<PlantDef>, Errors>;
+
+/// Reads the scenario `name` out of the text of a file, and loads its plant.
+pub fn read(name: &str, file: &str, bytes: &[u8], find: FindPlant) -> Result<(Scenario, Arc<PlantDef>), Errors> {
+    let mut problems = Problems::default();
+    let table = reader::parse(file, bytes, &mut problems).map(|raw| ScenarioTable::of(&[raw], &mut problems));
+    let plant = match table.as_ref().and_then(|table| table.plant.as_ref()) {
+        Some(plant) => find(&plant.value).map(Some),
+        None => Ok(None),
+    };
+    let plant = match plant {
+        Ok(plant) => plant,
+        // The mistakes of the file itself come first; those of the plant are of another file.
+        Err(errors) => {
+            problems.finish(())?;
+            return Err(errors);
+        }
+    };
+    let built = table.zip(plant).map(|(table, plant)| (scenario(name, &table, &plant, &mut problems), plant));
+    match problems.finish(built)? {
+        Some(built) => Ok(built),
+        None => Err(Errors::unreadable(format!("{file} is not a scenario"), String::new())),
+    }
+}
+
+fn scenario(name: &str, table: &ScenarioTable, def: &PlantDef, problems: &mut Problems) -> Scenario {
+    let duration = table.duration.map_or(Duration::ZERO, |duration| duration.value);
+    let mut events: Vec<Event> =
+        table.events.iter().flat_map(|event| events(&event.value, duration, def, problems)).collect();
+    events.sort_by_key(|event| event.at);
+    let mut operator: Vec<Deed> =
+        table.operator.iter().filter_map(|deed| self::deed(&deed.value, duration, def, problems)).collect();
+    operator.sort_by_key(|deed| deed.at);
+    let expect: Vec<Expect> =
+        table.expect.iter().filter_map(|expect| expect::expectation(&expect.value, duration, def, problems)).collect();
+    if table.expect.is_empty() {
+        problems.add(table.at, "a scenario needs at least one [[expect]]").label("there is nothing to judge");
+    }
+    if let Some(percent) = table.pass_percent.filter(|percent| percent.value > 100) {
+        problems.add(percent.at, format!("found {} %", percent.value)).label("expected 0 to 100");
+    }
+    Scenario {
+        name: name.to_owned(),
+        title: text(&table.title),
+        about: text(&table.about),
+        plant: text(&table.plant),
+        start: table.start.map(|start| start.value).unwrap_or_default(),
+        ahead: table.ahead.map_or(Duration::ZERO, |ahead| ahead.value),
+        duration,
+        pass_percent: table.pass_percent.map_or(100, |percent| u32::from(percent.value)),
+        events,
+        operator,
+        expect,
+    }
+}
+
+/// The beginning of a fault and, if it lasts for a time, its end.
+fn events(table: &EventTable, duration: Duration, def: &PlantDef, problems: &mut Problems) -> Vec<Event> {
+    let place = place(table, def, problems);
+    let (Some(at), Some(fault), Some(place)) = (in_time(table.at_time, duration, problems), table.fault, place) else {
+        return Vec::new();
+    };
+    if let Some(why) = refusal(def, place, fault.value) {
+        problems.add(fault.at, why).label("cannot be there");
+        return Vec::new();
+    }
+    let begins = !table.mended.is_some_and(|mended| mended.value);
+    if let (false, Some(lasts)) = (begins, table.lasts) {
+        problems.add(lasts.at, "what is mended does not last").label("leave out `for` or `mended`");
+    }
+    let first = Event { at, place, fault: fault.value, begins };
+    let end = table.lasts.map(|lasts| Event { at: at + lasts.value, begins: false, ..first });
+    [Some(first), end].into_iter().flatten().collect()
+}
+
+fn place(table: &EventTable, def: &PlantDef, problems: &mut Problems) -> Option<Place> {
+    match (&table.line, &table.device, &table.tag) {
+        (Some(name), None, None) => {
+            let line = def.lines.iter().find(|line| line.name == name.value);
+            let known = def.lines.iter().map(|line| line.name.as_str());
+            unknown(line.map(|line| Place::Line(line.id)), "line", name, known, problems)
+        }
+        (None, Some(name), None) => {
+            let device = def.devices.iter().find(|device| device.name == name.value);
+            let known = def.devices.iter().map(|device| device.name.as_str());
+            unknown(device.map(Place::of), "device", name, known, problems)
+        }
+        (None, None, Some(name)) => tag(name, def, problems).map(Place::Tag),
+        (None, None, None) => match table.fault {
+            Some(fault) if Place::Process.takes(fault.value) => Some(Place::Process),
+            Some(fault) => {
+                let problem = problems.add(table.at, format!("where is `{}`?", fault.value));
+                problem.label("expected `line`, `device` or `tag`");
+                None
+            }
+            None => None,
+        },
+        (_, second, third) => {
+            let at = third.as_ref().or(second.as_ref()).map_or(table.at, |name| name.at);
+            problems.add(at, "a fault is in one place").label("keep one of `line`, `device`, `tag`");
+            None
+        }
+    }
+}
+
+fn deed(table: &DeedTable, duration: Duration, def: &PlantDef, problems: &mut Problems) -> Option<Deed> {
+    let at = in_time(table.at_time, duration, problems);
+    let command = match (&table.acknowledge, &table.write) {
+        (Some(all), None) if all.value == "all" => Command::AcknowledgeAll,
+        (Some(subject), None) => Command::Acknowledge(alarm(subject, &table.text, def, problems)?),
+        (None, Some(name)) => {
+            let tag = tag(name, def, problems)?;
+            let value = value(&table.value, name, tag, def, problems)?;
+            Command::Write { tag, value }
+        }
+        (Some(_), Some(write)) => {
+            problems.add(write.at, "one deed at a time").label("needs an [[operator]] of its own");
+            return None;
+        }
+        (None, None) => {
+            problems.add(table.at, "what does the operator do?").label("expected `acknowledge` or `write`");
+            return None;
+        }
+    };
+    Some(Deed { at: at?, command })
+}
+
+fn in_time(at: Option<At<Duration>>, duration: Duration, problems: &mut Problems) -> Option<Duration> {
+    let at = at?;
+    if duration < at.value && !duration.is_zero() {
+        let problem = problems.add(at.at, format!("the scenario is over at {}", clock(duration)));
+        problem.label(format!("this is at {}", clock(at.value)));
+    }
+    Some(at.value)
+}

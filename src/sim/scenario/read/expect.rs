@@ -1,0 +1,111 @@
+//! Reads an `[[expect]]`: what is wished, when, and words for it.
+
+use std::time::Duration;
+
+use super::{
+    super::{Expect, Wish, judge::clock},
+    ExpectTable,
+    names::{alarm, tag, value},
+};
+use crate::{
+    plant::{PlantDef, def::TagId, record::AlarmStep},
+    profile::{
+        diagnostic::Problems,
+        reader::{At, text},
+    },
+};
+
+/// What is expected, with its words and its time.
+pub(super) fn expectation(
+    table: &ExpectTable,
+    duration: Duration,
+    def: &PlantDef,
+    problems: &mut Problems,
+) -> Option<Expect> {
+    let (wish, words) = wish(table, def, problems)?;
+    let from = table.after.map_or(Duration::ZERO, |after| after.value);
+    let until = table.within.map_or(duration, |within| from + within.value);
+    if let Some(late) = table.within.or(table.after).filter(|_| until > duration || from > duration) {
+        let problem = problems.add(late.at, format!("the scenario is over at {}", clock(duration)));
+        problem.label(format!("this ends at {}", clock(until.max(from))));
+    }
+    let given = text(&table.what);
+    let window = match (table.after, table.within) {
+        (None, None) => String::new(),
+        (_, Some(_)) => format!(" by {}", clock(until)),
+        (Some(_), None) => format!(" after {}", clock(from)),
+    };
+    let text = if given.is_empty() { format!("{words}{window}") } else { format!("{given}{window}") };
+    let points = table.points.map_or(10, |points| u32::from(points.value));
+    Some(Expect { text, points, from, until, wish })
+}
+
+/// What is expected, with words for it.
+fn wish(table: &ExpectTable, def: &PlantDef, problems: &mut Problems) -> Option<(Wish, String)> {
+    let keys = [
+        ("alarm", &table.alarm),
+        ("written", &table.written),
+        ("not_good", &table.not_good),
+        ("good", &table.good),
+        ("process", &table.process),
+        ("shown_true", &table.shown_true),
+    ];
+    let mut found = keys.iter().filter_map(|(key, name)| name.as_ref().map(|name| (*key, name)));
+    let Some((key, name)) = found.next() else {
+        let words = keys.map(|(key, _)| format!("`{key}`")).join(", ");
+        problems.add(table.at, "what is expected?").label(format!("expected one of {words}"));
+        return None;
+    };
+    if let Some((second, name)) = found.next() {
+        let problem = problems.add(name.at, format!("`{key}` and `{second}` are two expectations"));
+        problem.label("needs an [[expect]] of its own");
+        return None;
+    }
+    if key == "alarm" {
+        let alarm = alarm(name, &table.text, def, problems)?;
+        let words = &def.alarm(alarm).text;
+        if table.never.is_some_and(|never| never.value) {
+            return Some((Wish::NoAlarm(alarm), format!("no alarm {} {words}", name.value)));
+        }
+        let step = table.step.map_or(AlarmStep::Raised, |step| step.value);
+        return Some((Wish::Alarm(alarm, step), format!("alarm {} {words} {}", name.value, step.word())));
+    }
+    let tag = tag(name, def, problems)?;
+    let unit = &def.tag(tag).unit;
+    match key {
+        "written" => {
+            let value = value(&table.value, name, tag, def, problems)?;
+            let shown = def.tag(tag).label_of(value).map_or_else(|| format!("{value} {unit}"), str::to_owned);
+            Some((Wish::Written(tag, value), format!("{} set to {}", name.value, shown.trim_end())))
+        }
+        "not_good" => Some((Wish::NotGood(tag), format!("{} shown as not good", name.value))),
+        "good" => Some((Wish::Good(tag), format!("{} shown as good", name.value))),
+        "shown_true" => {
+            let give = table.give.map_or(0.0, |give| give.value);
+            Some((Wish::True(tag, give), format!("{} never shown wrong by more than {give} {unit}", name.value)))
+        }
+        _ => within(table, name, tag, def, problems),
+    }
+}
+
+fn within(
+    table: &ExpectTable,
+    name: &At<String>,
+    tag: TagId,
+    def: &PlantDef,
+    problems: &mut Problems,
+) -> Option<(Wish, String)> {
+    let unit = &def.tag(tag).unit;
+    let (low, high) = (table.never_below.map(|low| low.value), table.never_above.map(|high| high.value));
+    let words = match (low, high) {
+        (None, None) => {
+            problems.add(name.at, "which bounds?").label("expected `never_above` or `never_below`");
+            return None;
+        }
+        (None, Some(high)) => format!("really never above {high} {unit}"),
+        (Some(low), None) => format!("really never below {low} {unit}"),
+        (Some(low), Some(high)) => format!("really between {low} and {high} {unit}"),
+    };
+    let wish = Wish::Within { tag, low: low.unwrap_or(f64::NEG_INFINITY), high: high.unwrap_or(f64::INFINITY) };
+    Some((wish, format!("{} {words}", name.value)))
+}

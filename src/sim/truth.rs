@@ -1,0 +1,69 @@
+//! What is really so, by tag: the process behind the instruments of the tank, the registers of modelled devices.
+
+use super::{faults::place::is_controller, rig::Truth, scenario::judge::Truths, world::World};
+use crate::plant::{
+    PlantDef,
+    def::TagId,
+    tag::{Table, TagDef},
+};
+
+/// Which tags of a plant have a truth, and which.
+#[derive(Debug, Clone, Default)]
+pub struct Lens {
+    rig: Vec<(TagId, fn(&Truth) -> f64)>,
+    others: Vec<TagId>,
+}
+
+impl Lens {
+    /// Looks at a plant.
+    pub fn of(def: &PlantDef) -> Lens {
+        let mut lens = Lens::default();
+        for tag in &def.tags {
+            match of_rig(def, tag) {
+                Some(look) => lens.rig.push((tag.id, look)),
+                None => lens.others.push(tag.id),
+            }
+        }
+        lens
+    }
+
+    /// What is so now, in the units of the tags.
+    pub fn look(&self, world: &World) -> Truths {
+        let truth = world.rig().map(|rig| rig.truth());
+        let rig = self.rig.iter().filter_map(|(tag, look)| Some((*tag, look(truth.as_ref()?))));
+        let others = self.others.iter().filter_map(|tag| Some((*tag, world.value(*tag)?)));
+        rig.chain(others).collect()
+    }
+}
+
+/// What a tag of the thesis's controller or PLC measures, by its address in their profiles.
+fn of_rig(def: &PlantDef, tag: &TagDef) -> Option<fn(&Truth) -> f64> {
+    let device = def.device(tag.device);
+    if def.simulation.as_deref() != Some("tank") {
+        return None;
+    }
+    let plc = || def.devices.iter().find(|other| other.profile == "koyo_dl06").is_some_and(|plc| plc.id == device.id);
+    let point = (tag.point.table, tag.point.address);
+    if is_controller(def, device.line, device.unit) {
+        return match point {
+            (Table::Input, 0x03E8) => Some(|truth| truth.probe_c),
+            (Table::Input, 0x03EB) => Some(|truth| truth.mv_percent),
+            _ => None,
+        };
+    }
+    match point {
+        _ if !plc() => None,
+        (Table::Input, 1032) => Some(|truth| truth.readings.level_cm),
+        (Table::Input, 1033) => Some(|truth| truth.readings.cold_l),
+        (Table::Input, 1034) => Some(|truth| truth.readings.hot_l),
+        (Table::Input, 1035) => Some(|truth| truth.readings.flow_in),
+        (Table::Input, 1036) => Some(|truth| truth.readings.flow_out),
+        (Table::Input, 1037) => Some(|truth| truth.readings.flow_pump),
+        (Table::Input, 1038) => Some(|truth| truth.readings.heater_w),
+        (Table::Coil, 2048) => Some(|truth| f64::from(u8::from(truth.moving.pump))),
+        (Table::Coil, 2049) => Some(|truth| f64::from(u8::from(truth.moving.agitator))),
+        (Table::Coil, 2050) => Some(|truth| f64::from(u8::from(truth.moving.drain_valve))),
+        (Table::Coil, 2051) => Some(|truth| f64::from(u8::from(truth.moving.fill_valve))),
+        _ => None,
+    }
+}

@@ -1,0 +1,143 @@
+//! Tab 7, in demonstrations only: what can go wrong, what is wrong, and what is really so beside what the screens show.
+
+mod view;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+
+use crossterm::event::KeyCode;
+use ratatui::{Frame, layout::Rect};
+
+use crate::{
+    sim::{
+        drill::{Order, Status},
+        faults::{Fault, Place},
+    },
+    ui::{
+        Act, Cx, Effect,
+        keys::{self, Hint, Key, char, code},
+    },
+};
+
+/// State of the tab.
+#[derive(Debug, Default)]
+pub struct Faults {
+    /// Which row is selected; headings are not counted.
+    selected: usize,
+    /// Numbers chosen for faults that are not in force.
+    numbers: BTreeMap<(Place, &'static str), Fault>,
+    /// The points of the drill are shown instead of the fault told.
+    verdict: bool,
+}
+
+/// What a key does here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Select the row above.
+    Up,
+    /// Select the row below.
+    Down,
+    /// Select the first row of the next place.
+    NextPlace,
+    /// Let it go wrong, or mend it.
+    Toggle,
+    /// Less of it.
+    Less,
+    /// More of it.
+    More,
+    /// Mend everything.
+    AllWell,
+    /// Points or fault.
+    Verdict,
+}
+
+/// Keys of this tab.
+pub const KEYS: &[Key<Action>] = &[
+    Key { chord: code(KeyCode::Up), label: "", help: "select the fault above", action: Action::Up },
+    Key { chord: code(KeyCode::Down), label: "select", help: "select the fault below", action: Action::Down },
+    Key {
+        chord: code(KeyCode::PageDown),
+        label: "",
+        help: "select the next line, unit or the process",
+        action: Action::NextPlace,
+    },
+    Key { chord: code(KeyCode::Enter), label: "on/off", help: "let it go wrong, or mend it", action: Action::Toggle },
+    Key { chord: code(KeyCode::Left), label: "", help: "less of it, where it has a number", action: Action::Less },
+    Key {
+        chord: code(KeyCode::Right),
+        label: "number",
+        help: "more of it, where it has a number",
+        action: Action::More,
+    },
+    Key { chord: char('w'), label: "all well", help: "mend everything", action: Action::AllWell },
+    Key { chord: char('v'), label: "points", help: "how the drill stands, or the fault told", action: Action::Verdict },
+];
+
+impl Faults {
+    /// A key.
+    pub fn on_key(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+        let Some(status) = open(cx) else { return Vec::new() };
+        let rows = rows(status);
+        let Some((place, offered)) = rows.get(self.selected.min(rows.len().saturating_sub(1))).copied() else {
+            return Vec::new();
+        };
+        let fault = self.number(status, place, offered);
+        let in_force = status.find(place, fault).is_some();
+        match action {
+            Action::Up => self.selected = self.selected.min(rows.len()).saturating_sub(1),
+            Action::Down => self.selected = (self.selected + 1).min(rows.len() - 1),
+            Action::NextPlace => {
+                self.selected =
+                    rows.iter().skip(self.selected).position(|row| row.0 != place).map_or(0, |by| self.selected + by);
+            }
+            Action::Toggle if in_force => return wish(Order::Clear(place, fault)),
+            Action::Toggle => return wish(Order::Set(place, fault)),
+            Action::Less | Action::More => {
+                let other = fault.step(action == Action::More);
+                self.numbers.insert((place, fault.word()), other);
+                // What is in force changes at once.
+                if in_force && other != fault {
+                    return wish(Order::Set(place, other));
+                }
+            }
+            Action::AllWell => return wish(Order::AllWell),
+            Action::Verdict => self.verdict = !self.verdict && status.scenario.is_some(),
+        }
+        Vec::new()
+    }
+
+    /// The fault with the number it has, or would have.
+    fn number(&self, status: &Status, place: Place, offered: Fault) -> Fault {
+        match status.find(place, offered) {
+            Some(in_force) => in_force.fault,
+            None => self.numbers.get(&(place, offered.word())).copied().unwrap_or(offered),
+        }
+    }
+
+    /// Its keys; points are there only in a drill.
+    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+        let drill = cx.drill.is_some_and(|status| status.scenario.is_some());
+        let there = KEYS.iter().filter(|key| drill || key.action != Action::Verdict).copied();
+        keys::hints(&there.collect::<Vec<_>>())
+    }
+
+    /// Draws.
+    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+        view::view(self, cx, frame, area);
+    }
+}
+
+/// What may be told of the simulation, if anything may.
+fn open<'a>(cx: &Cx<'a>) -> Option<&'a Status> {
+    cx.drill.filter(|status| status.is_open())
+}
+
+fn rows(status: &Status) -> Vec<(Place, Fault)> {
+    status.offers.iter().flat_map(|offer| offer.faults.iter().map(|fault| (offer.place, *fault))).collect()
+}
+
+fn wish(order: Order) -> Vec<Act> {
+    vec![Act::Do(Effect::Drill(order))]
+}

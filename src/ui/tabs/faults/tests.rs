@@ -1,0 +1,155 @@
+//! The tab as a trainer uses it: what a key sends, what stands on the screen, and where the tab is not.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::SignedDuration;
+
+use crate::{
+    plant::def::LineId,
+    sim::{
+        drill::{Order, Progress, Status},
+        faults::{Fault, InForce, Offer, Place, Target},
+        scenario::judge::{Row, Standing, Verdict},
+    },
+    ui::{
+        Effect, Model, Msg,
+        fixture::{self, Fixture},
+        tabs::Tab,
+        tests::{model, screen, type_keys},
+        theme::Theme,
+        update,
+    },
+};
+
+const L1: LineId = LineId(0);
+const TIC: Place = Place::Unit(L1, 1);
+
+/// TIC-1 is silent and TK-1 leaks; the screen does not know yet that the valve is open.
+fn status(fixture: &Fixture) -> Status {
+    let of = |place: Place| {
+        let faults = Fault::ALL.into_iter().filter(|fault| place.takes(*fault)).collect();
+        Offer { place, faults }
+    };
+    let since = fixture::now() - SignedDuration::from_secs(42);
+    let truths = [("TIC-1.PV", 68.0), ("PLC-1.LT-1", 22.0), ("PLC-1.SV-2", 1.0), ("PLC-1.POWER", 670.0)];
+    Status {
+        offers: [Place::Line(L1), TIC, Place::Unit(L1, 2), Place::Process].map(of).into(),
+        in_force: vec![
+            InForce { place: TIC, fault: Fault::Silent, since },
+            InForce { place: Place::Process, fault: Fault::Leak(500), since },
+        ],
+        truths: truths.into_iter().map(|(name, value)| (fixture.tag(name), value)).collect(),
+        exam: false,
+        scenario: None,
+    }
+}
+
+fn drill(over: bool) -> Progress {
+    let row = |text: &str, standing| Row { text: text.to_owned(), points: 20, standing };
+    let rows = vec![
+        row("TIC-1.PV shown as not good by 02:05", Standing::Met(Duration::from_secs(121))),
+        row(
+            "alarm TIC-1.FAULT sensor or controller fault acknowledged by 03:00",
+            Standing::Missed("did not happen in time".to_owned()),
+        ),
+        row(
+            "TIC-1.PV really never above 90 °C",
+            if over { Standing::Met(Duration::from_secs(480)) } else { Standing::Open },
+        ),
+    ];
+    let points = if over { 40 } else { 20 };
+    let verdict =
+        Verdict { title: "Sensor burnout while heating".to_owned(), rows, points, of: 60, pass_percent: 100, over };
+    let elapsed = Duration::from_secs(if over { 480 } else { 185 });
+    Progress {
+        about: "The controller knows that its sensor is broken.".to_owned(),
+        elapsed,
+        duration: Duration::from_secs(480),
+        verdict,
+    }
+}
+
+fn with(fixture: &Fixture, status: Status, theme: Theme) -> Model {
+    let mut model = model(fixture, theme);
+    update(&mut model, Msg::Drill(Arc::new(status)));
+    screen(&mut model, 80, 24);
+    model.tabs.shown = Tab::Faults;
+    model
+}
+
+fn press(model: &mut Model, keys: &str) -> Vec<Order> {
+    let order = |effect| match effect {
+        Effect::Drill(order) => Some(order),
+        _ => None,
+    };
+    type_keys(model, keys).into_iter().filter_map(order).collect()
+}
+
+#[test]
+fn faults_go_on_and_off_by_enter_with_their_numbers() {
+    let fixture = Fixture::normal();
+    let mut model = with(&fixture, status(&fixture), Theme::FULL);
+    assert_eq!(press(&mut model, "⏎"), [Order::Set(Place::Line(L1), Fault::Noise(10))]);
+    assert_eq!(press(&mut model, "→→⏎"), [Order::Set(Place::Line(L1), Fault::Noise(50))]);
+    assert_eq!(press(&mut model, "↓⏎"), [Order::Clear(TIC, Fault::Silent)], "what is on goes off");
+    let late = Fault::Late(Duration::from_secs(1));
+    assert_eq!(press(&mut model, "↓←⏎"), [Order::Set(TIC, late)], "a number is set before it is on");
+    assert_eq!(press(&mut model, "w"), [Order::AllWell]);
+    assert_eq!(press(&mut model, "↑↑↑↑↑"), []);
+    assert_eq!(press(&mut model, "⏎"), [Order::Set(Place::Line(L1), Fault::Noise(50))]);
+}
+
+#[test]
+fn the_number_of_a_fault_in_force_changes_at_once() {
+    let fixture = Fixture::normal();
+    let mut model = with(&fixture, status(&fixture), Theme::FULL);
+    let leak = Fault::ALL.into_iter().position(|fault| matches!(fault, Fault::Leak(_))).expect("a leak");
+    let process =
+        Fault::ALL.into_iter().position(|fault| fault.target() == Target::Process).expect("faults of the process");
+    let units = 2 * (process - 1);
+    press(&mut model, &"↓".repeat(1 + units + leak - process));
+    assert_eq!(press(&mut model, "→"), [Order::Set(Place::Process, Fault::Leak(1_000))]);
+    assert_eq!(press(&mut model, "←"), [Order::Set(Place::Process, Fault::Leak(200))]);
+}
+
+#[test]
+fn the_tab_is_only_where_a_plant_is_simulated() {
+    let fixture = Fixture::normal();
+    let mut real = model(&fixture, Theme::FULL);
+    press(&mut real, "7");
+    let shown = screen(&mut real, 80, 24);
+    assert!(!shown.contains("Faults") && !shown.contains("DEMO"), "{shown}");
+    assert_eq!(real.tabs.shown, Tab::Mimic);
+    let exam = Status { exam: true, scenario: Some(drill(false)), ..status(&fixture) };
+    let mut trainee = with(&fixture, exam.clone(), Theme::FULL);
+    trainee.tabs.shown = Tab::Mimic;
+    press(&mut trainee, "7");
+    let shown = screen(&mut trainee, 80, 24);
+    assert!(shown.contains("EXAM") && !shown.to_lowercase().contains("fault"), "{shown}");
+    update(&mut trainee, Msg::Drill(Arc::new(Status { scenario: Some(drill(true)), ..exam })));
+    press(&mut trainee, "7");
+    let shown = screen(&mut trainee, 80, 24);
+    assert!(shown.contains("DEMO 2 FAULTS") && shown.contains("FAILED"), "{shown}");
+}
+
+#[test]
+fn faults_and_truth_at_every_size() {
+    let fixture = Fixture::normal();
+    for (name, size, theme, keys) in [
+        ("faults_80x24", (80, 24), Theme::FULL, "↓↓"),
+        ("faults_120x40", (120, 40), Theme::FULL, "↓"),
+        ("faults_end_80x24", (80, 24), Theme::FULL, &*"↓".repeat(99)),
+        ("faults_ascii", (80, 24), Theme::PLAIN, "↓"),
+    ] {
+        let mut model = with(&fixture, status(&fixture), theme);
+        press(&mut model, keys);
+        let shown = screen(&mut model, size.0, size.1);
+        assert!(theme != Theme::PLAIN || shown.is_ascii(), "{shown}");
+        insta::assert_snapshot!(name, shown);
+    }
+    let with_drill = Status { scenario: Some(drill(true)), ..status(&fixture) };
+    let mut model = with(&fixture, with_drill, Theme::FULL);
+    insta::assert_snapshot!("faults_drill_80x24", screen(&mut model, 80, 24));
+    press(&mut model, "v");
+    insta::assert_snapshot!("faults_verdict_80x24", screen(&mut model, 80, 24));
+}

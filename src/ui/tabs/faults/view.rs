@@ -1,0 +1,239 @@
+//! Draws the faults: a list by place, the selected one told, and truth beside what is shown.
+
+use ratatui::{Frame, layout::Rect, style::Style};
+
+use super::{Faults, open, rows};
+use crate::{
+    plant::{def::TagId, tag::Poll},
+    sim::{
+        drill::{Progress, Status},
+        faults::{Fault, Place, place::device_at},
+        scenario::judge::Standing,
+    },
+    ui::{
+        Cx,
+        widgets::{
+            text::{Canvas, between, fit, fit_words, pad, running, width, wrap},
+            value::show,
+        },
+    },
+};
+
+/// Columns of the list.
+const LIST: u16 = 31;
+/// Rows that the comparison with the truth has at the least.
+const TRUTH_MIN: u16 = 5;
+
+pub(super) fn view(tab: &Faults, cx: &Cx, frame: &mut Frame, area: Rect) {
+    let mut canvas = Canvas::new(frame.buffer_mut(), area);
+    let Some(status) = open(cx) else {
+        canvas.text(1, 1, "nothing is simulated here", cx.theme.dim());
+        return;
+    };
+    let mut top = 0;
+    if let Some(progress) = &status.scenario {
+        heading(cx, progress, &mut canvas.part(0, 0, area.width, 1));
+        top = 1;
+    }
+    let height = area.height.saturating_sub(top);
+    if let (true, Some(progress)) = (tab.verdict, &status.scenario) {
+        return verdict(cx, progress, &mut canvas.part(1, top, area.width.saturating_sub(2), height));
+    }
+    list(tab, cx, status, &mut canvas.part(0, top, LIST, height));
+    for y in 0..height {
+        canvas.glyph(LIST, top + y, '│', cx.theme.dim());
+    }
+    let mut side = canvas.part(LIST + 2, top, area.width.saturating_sub(LIST + 3), height);
+    let all = rows(status);
+    if let Some((place, offered)) = all.get(tab.selected.min(all.len().saturating_sub(1))) {
+        told(cx, status, *place, tab.number(status, *place, *offered), &mut side);
+    }
+}
+
+fn heading(cx: &Cx, progress: &Progress, canvas: &mut Canvas) {
+    let Progress { elapsed, duration, verdict, .. } = progress;
+    let time = format!("{} of {}", running((*elapsed).min(*duration)), running(*duration));
+    let right = format!("{time}   {}", verdict.summary());
+    let room = canvas.width().saturating_sub(width(&right) + 4);
+    canvas.text(1, 0, &fit(&verdict.title, room), cx.theme.strong());
+    let style = if verdict.over && !verdict.passed() { cx.theme.trouble() } else { cx.theme.normal() };
+    canvas.text_right(canvas.width().saturating_sub(1), 0, &right, style);
+}
+
+/// All faults by place; the selected row is always in sight.
+fn list(tab: &Faults, cx: &Cx, status: &Status, canvas: &mut Canvas) {
+    let mut lines: Vec<(String, String, Style, bool)> = Vec::new();
+    let (mut number, mut selected_line) = (0, 0);
+    let last = rows(status).len().saturating_sub(1);
+    for offer in status.offers.iter() {
+        lines.push((place_words(cx, offer.place), String::new(), cx.theme.dim(), false));
+        for fault in &offer.faults {
+            let selected = number == tab.selected.min(last);
+            if selected {
+                selected_line = lines.len();
+            }
+            let in_force = status.find(offer.place, *fault);
+            let name = tab.number(status, offer.place, *fault).to_string();
+            let (state, style) = match in_force {
+                Some(in_force) => (format!("ON {}", running(between(in_force.since, cx.now))), cx.theme.trouble()),
+                None => ("off".to_owned(), cx.theme.normal()),
+            };
+            lines.push((format!("  {name}"), state, style, selected));
+            number += 1;
+        }
+    }
+    let height = usize::from(canvas.height());
+    let first = (selected_line + 3).saturating_sub(height).min(lines.len().saturating_sub(height));
+    for (y, (name, state, style, selected)) in lines.iter().skip(first).take(height).enumerate() {
+        let y = y as u16;
+        let x = canvas.text(0, y, if *selected { cx.theme.pick("▸", ">") } else { " " }, cx.theme.strong());
+        canvas.text(x, y, &pad(name, LIST - 12), *style);
+        canvas.text_right(LIST - 2, y, state, if state == "off" { cx.theme.dim() } else { *style });
+        if *selected {
+            canvas.paint(0, y, LIST, 1, cx.theme.focus());
+        }
+    }
+    if first > 0 {
+        canvas.text_right(LIST - 1, 0, cx.theme.pick("↑", "^"), cx.theme.dim());
+    }
+    if first + height < lines.len() {
+        canvas.text(LIST - 1, canvas.height().saturating_sub(1), cx.theme.pick("↓", "v"), cx.theme.dim());
+    }
+}
+
+fn place_words(cx: &Cx, place: Place) -> String {
+    let name = place.name(cx.def());
+    match place {
+        Place::Line(_) => format!("{name} line"),
+        Place::Unit(line, unit) => format!("{name} unit {unit} on {}", cx.def().line(line).name),
+        Place::Tag(_) => name,
+        Place::Process => "process".to_owned(),
+    }
+}
+
+/// The selected fault told, above what is really so.
+fn told(cx: &Cx, status: &Status, place: Place, fault: Fault, canvas: &mut Canvas) {
+    let (theme, room) = (cx.theme, canvas.width());
+    let story = fault.story();
+    let mut lines = vec![(format!("{}: {fault}", place.name(cx.def())), theme.strong())];
+    let mut paragraph = |head: &str, text: &str| {
+        lines.extend(wrap(&format!("{head}{text}"), room).into_iter().map(|line| (line, theme.normal())));
+    };
+    paragraph("", story.what);
+    paragraph("Seen: ", story.seen);
+    paragraph("Do: ", story.act);
+
+    let truth = compare(cx, status, place);
+    let wanted = (truth.len() as u16 + 1).min(canvas.height().saturating_sub(lines.len() as u16 + 1));
+    let below = wanted.max(TRUTH_MIN + 1).min(truth.len() as u16 + 1).min(canvas.height() / 2);
+    let above = canvas.height().saturating_sub(below);
+    for (y, (line, style)) in lines.iter().take(usize::from(above)).enumerate() {
+        // The last row that fits says that there is more.
+        let cut = y as u16 + 1 == above && lines.len() > usize::from(above);
+        let line =
+            if cut { fit_words(&format!("{line} {}", "x".repeat(usize::from(room))), room) } else { line.clone() };
+        canvas.text(0, y as u16, &line, *style);
+    }
+    comparison(cx, &truth, &mut canvas.part(0, above, room, below));
+}
+
+/// A tag whose truth is known.
+struct Compared {
+    tag: TagId,
+    truth: String,
+    standing: Likeness,
+}
+
+/// How what is shown and what is so go together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Likeness {
+    /// Shown as good, and wrong.
+    Wrong,
+    /// Not shown as good.
+    Unknown,
+    /// As it is.
+    Same,
+}
+
+/// The tags of a place with their truth, the most dangerous first.
+fn compare(cx: &Cx, status: &Status, place: Place) -> Vec<Compared> {
+    let device = match place {
+        Place::Unit(line, unit) => device_at(cx.def(), line, unit).map(|device| device.id),
+        Place::Tag(tag) => Some(cx.def().tag(tag).device),
+        Place::Line(_) | Place::Process => None,
+    };
+    let of_place = |tag: TagId| {
+        let def = cx.def().tag(tag);
+        def.poll != Poll::Never && device.is_none_or(|device| device == def.device)
+    };
+    let mut rows: Vec<Compared> = status
+        .truths
+        .iter()
+        .filter(|(tag, _)| of_place(**tag))
+        .map(|(tag, truth)| {
+            let standing = match cx.snapshot.sample(*tag).trusted() {
+                None => Likeness::Unknown,
+                Some(shown) if (shown - truth).abs() > allowed(cx, *tag) => Likeness::Wrong,
+                Some(_) => Likeness::Same,
+            };
+            let text = format!("{} {}", cx.snapshot.format(*tag, *truth), cx.snapshot.unit(*tag));
+            Compared { tag: *tag, truth: text.trim_end().to_owned(), standing }
+        })
+        .collect();
+    rows.sort_by_key(|row| (row.standing, row.tag));
+    rows
+}
+
+/// What a value may change between two readings: two hundredths of its range; a state not at all.
+fn allowed(cx: &Cx, tag: TagId) -> f64 {
+    let span = cx.snapshot.range(tag).map_or(0.0, |(low, high)| high - low);
+    if cx.def().tag(tag).labels.is_empty() { (0.02 * span).max(0.5) } else { 0.0 }
+}
+
+fn comparison(cx: &Cx, rows: &[Compared], canvas: &mut Canvas) {
+    if rows.is_empty() {
+        canvas.text(0, 0, "what is really so is not known here", cx.theme.dim());
+        return;
+    }
+    let names = rows.iter().map(|row| width(&cx.def().tag(row.tag).name)).max().unwrap_or(0).clamp(10, 16);
+    canvas.text(names + 2, 0, "really so", cx.theme.dim());
+    canvas.text(names + 15, 0, "shown", cx.theme.dim());
+    for (y, row) in rows.iter().enumerate() {
+        let y = y as u16 + 1;
+        canvas.text(0, y, &pad(&cx.def().tag(row.tag).name, names), cx.theme.normal());
+        canvas.text(names + 2, y, &fit(&row.truth, 10), cx.theme.strong());
+        let shown = show(cx, row.tag);
+        let (mark, style) = match row.standing {
+            Likeness::Wrong => (cx.theme.pick("≠", "#"), cx.theme.trouble()),
+            Likeness::Unknown => ("?", cx.theme.trouble()),
+            Likeness::Same => ("=", cx.theme.dim()),
+        };
+        canvas.text(names + 13, y, mark, style);
+        let room = canvas.width().saturating_sub(names + 15);
+        canvas.text(names + 15, y, &fit(&shown.whole(), room), shown.style);
+    }
+}
+
+/// Every expectation of the drill and how it stands.
+fn verdict(cx: &Cx, progress: &Progress, canvas: &mut Canvas) {
+    let (theme, room) = (cx.theme, canvas.width());
+    let mut y = 1;
+    for row in &progress.verdict.rows {
+        let (mark, points, note, style) = match &row.standing {
+            Standing::Open => (theme.pick("○", "o"), 0, "open".to_owned(), theme.dim()),
+            Standing::Met(at) => (theme.pick("●", "+"), row.points, format!("met {}", running(*at)), theme.normal()),
+            Standing::Missed(why) => (theme.pick("✗", "x"), 0, format!("MISSED {why}"), theme.trouble()),
+        };
+        canvas.text(0, y, mark, style);
+        canvas.text(2, y, &format!("{points:>3}/{:<3}", row.points), theme.normal());
+        let lines = wrap(&format!("{}: {note}", row.text), room.saturating_sub(11));
+        for line in lines {
+            canvas.text(11, y, &line, style);
+            y += 1;
+        }
+    }
+    canvas.text(11, y + 1, &progress.verdict.summary(), theme.strong());
+    for (n, line) in wrap(&progress.about, room.saturating_sub(11)).into_iter().enumerate() {
+        canvas.text(11, y + 3 + n as u16, &line, theme.dim());
+    }
+}
