@@ -13,7 +13,7 @@ use crate::{
     bus::io::{clock::Clock, task, transport::Connector},
     history::{HistoryError, io::thread as history},
     plant::{
-        Effects, Plant, PlantDef, Snapshot,
+        Effects, Plant, PlantDef, SetWork, Snapshot,
         command::{BusRequest, Order, OrderId},
         def::{LineDef, LineId},
         event::{Event, LineState},
@@ -22,7 +22,7 @@ use crate::{
     profile::PlantFile,
 };
 
-use super::Session;
+use super::{Session, sets};
 
 /// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
 const EVENTS: usize = 256;
@@ -64,6 +64,7 @@ pub struct Station {
 /// Starts history, links and plant, in this order: a store that cannot be opened stops the start.
 pub fn start(options: Options) -> Result<Station, HistoryError> {
     let Options { def, clock, history, connectors, file } = options;
+    let sets = sets::folder(&history, &def.name);
     let history = history::start(&history, def.clone(), clock)?;
     let (stop, stopped) = watch::channel(false);
     let (events, event_queue) = mpsc::channel(EVENTS);
@@ -85,6 +86,8 @@ pub fn start(options: Options) -> Result<Station, HistoryError> {
         links,
         file,
         saving: None,
+        sets,
+        filing: None,
         records: history.records.clone(),
         store: history.status.clone(),
         lost: 0,
@@ -166,6 +169,14 @@ async fn saved(saving: &mut Option<Saving>) -> Saved {
     saved
 }
 
+/// Waits for the end of the work with the sets; for ever without any.
+async fn filed(filing: &mut Option<JoinHandle<sets::Done>>) -> Result<sets::Done, tokio::task::JoinError> {
+    let Some(work) = filing else { return std::future::pending().await };
+    let done = work.await;
+    *filing = None;
+    done
+}
+
 /// The loop around the reducer: sole owner of the plant.
 struct PlantTask {
     plant: Plant,
@@ -174,6 +185,9 @@ struct PlantTask {
     /// The plant file, unless it is just being written.
     file: Option<PlantFile>,
     saving: Option<Saving>,
+    /// The folder of parameter sets, and the work with it.
+    sets: PathBuf,
+    filing: Option<JoinHandle<sets::Done>>,
     records: mpsc::Sender<Vec<Record>>,
     store: watch::Receiver<crate::plant::snapshot::HistoryStatus>,
     /// Records that the queue to the store had no room for.
@@ -184,6 +198,7 @@ struct PlantTask {
 impl PlantTask {
     async fn run(mut self, mut events: mpsc::Receiver<Event>, mut orders: mpsc::Receiver<Order>) {
         let tick_every = self.clock.real_span(Duration::from_secs(1)).max(TICK_MIN);
+        self.file_sets(SetWork::Read);
         let mut tick = tokio::time::interval(tick_every);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
         // Changed since the last snapshot, and when the next one may go out.
@@ -202,6 +217,10 @@ impl PlantTask {
                 }
                 saved = saved(&mut self.saving) => {
                     self.take_saved(saved);
+                    changed = true;
+                }
+                done = filed(&mut self.filing) => {
+                    self.take_filed(done);
                     changed = true;
                 }
                 Ok(()) = self.store.changed() => {
@@ -228,6 +247,10 @@ impl PlantTask {
             let saved = saved(&mut self.saving).await;
             self.take_saved(saved);
         }
+        if self.filing.is_some() {
+            let done = filed(&mut self.filing).await;
+            self.take_filed(done);
+        }
         self.publish.send_replace(Arc::new(self.plant.snapshot()));
     }
 
@@ -238,6 +261,37 @@ impl PlantTask {
         self.keep(effects.records);
         if let Some((order, settings)) = effects.save {
             self.save(order, settings);
+        }
+        if let Some(work) = effects.sets {
+            self.file_sets(work);
+        }
+    }
+
+    /// Has the folder of parameter sets worked on beside the loop, one work at a time.
+    fn file_sets(&mut self, work: SetWork) {
+        if self.filing.is_none() {
+            let (folder, def) = (self.sets.clone(), self.plant.def().clone());
+            self.filing = Some(tokio::task::spawn_blocking(move || sets::work(&folder, &def, work)));
+            return;
+        }
+        // What is being done ends with the folder read, so a wish to read is granted already.
+        if let SetWork::Write { order, .. } = work {
+            let refused = Err("another set is just being saved, try again".to_owned());
+            let effects = self.plant.on_set_written(order, refused);
+            self.keep(effects.records);
+        }
+    }
+
+    fn take_filed(&mut self, done: Result<sets::Done, tokio::task::JoinError>) {
+        let (written, sets) = match done {
+            Ok(done) => done,
+            // Whoever has ordered it hears of it when his order is given up.
+            Err(error) => return tracing::error!(%error, "the work with the sets ended badly"),
+        };
+        self.plant.on_sets(sets);
+        if let Some((order, result)) = written {
+            let effects = self.plant.on_set_written(order, result);
+            self.keep(effects.records);
         }
     }
 
