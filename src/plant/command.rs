@@ -8,6 +8,7 @@ pub use super::id::WriteId;
 use super::{
     def::{AlarmId, DeviceId, LineDef, LineId, TagId},
     event::{ExceptionCode, Fault},
+    restore::RestoreWish,
     tool::Tool,
 };
 
@@ -57,6 +58,21 @@ pub enum Command {
     Test(LineId, Tool),
     /// Stop the test of a line.
     StopTest(LineId),
+    /// Read the folder of parameter sets anew.
+    ReadSets,
+    /// Save what a device holds as a parameter set.
+    SaveSet {
+        /// Of which device.
+        device: DeviceId,
+        /// Under which name.
+        name: Arc<str>,
+        /// A set of this name may be there already.
+        replace: bool,
+    },
+    /// Write a parameter set to a device: what differs, one verified write after the other.
+    Restore(Box<RestoreWish>),
+    /// Stop the restore of a device after the write under way.
+    StopRestore(DeviceId),
 }
 
 impl Command {
@@ -71,7 +87,11 @@ impl Command {
             | Command::Configure(_)
             | Command::SaveSettings(_)
             | Command::Test(..)
-            | Command::StopTest(_) => None,
+            | Command::StopTest(_)
+            | Command::ReadSets
+            | Command::SaveSet { .. }
+            | Command::Restore(_)
+            | Command::StopRestore(_) => None,
         }
     }
 }
@@ -145,7 +165,16 @@ pub enum Refusal {
     /// The plant file knows that it would have no effect now.
     #[error("interlock: {0}")]
     Interlock(String),
-    /// The settings could not be written into the plant file.
+    /// A parameter set cannot be written to this device.
+    #[error("{0}")]
+    NotFit(String),
+    /// What was confirmed is not what would be written now.
+    #[error("the device has changed since you looked; look again")]
+    Changed,
+    /// Stopped by an operator before anything was written.
+    #[error("stopped before anything was written")]
+    Stopped,
+    /// The settings could not be written into the plant file, or a parameter set into its folder.
     #[error("not saved: {0}")]
     NotSaved(String),
     /// No line has this name and place, or no port can have such settings.
@@ -165,6 +194,9 @@ pub enum NotConfirmed {
     /// Could not be read back.
     #[error("not read back: {0}")]
     NotRead(Fault),
+    /// Of several writes only some are done.
+    #[error("{0}")]
+    Partly(String),
     /// The profile wants no read-back.
     #[error("accepted, not read back")]
     NoReadBack,

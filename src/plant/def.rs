@@ -10,6 +10,7 @@ pub use super::{
     guard::Guards,
     id::{AlarmId, DeviceId, LineId, TagId},
     line::{Framing, LineDef, Parity, Rs485, Serial, Transport},
+    program::{ProgramDef, ProgramStep},
 };
 
 /// Everything that a plant file says, checked.
@@ -99,6 +100,8 @@ pub struct DeviceDef {
     pub faceplate: Option<Faceplate>,
     /// Actions that are more than a write (save to non-volatile memory).
     pub actions: Vec<ActionDef>,
+    /// Its ramp/soak program, if it has one.
+    pub program: Option<ProgramDef>,
 }
 
 /// What one request to a device may hold, and how blocks are cut.
@@ -150,6 +153,8 @@ pub struct Faceplate {
     pub mode: Option<TagId>,
     /// Auto-tuning command and state.
     pub tune: Option<TagId>,
+    /// The parameters that auto-tuning finds: P, I, D.
+    pub tunes: Vec<TagId>,
 }
 
 /// An action on a device: a write that needs its own words, confirmation and quiet time.

@@ -53,6 +53,7 @@ pub fn plant() -> PlantDef {
         write_gap: Duration::ZERO,
         faceplate: None,
         actions: Vec::new(),
+        program: None,
     };
     let alarm = |id: AlarmId, subject, condition, on_delay| AlarmDef {
         id,

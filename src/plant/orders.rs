@@ -88,6 +88,11 @@ impl Desk {
         self.close(id, Outcome::Verified, board)
     }
 
+    /// How an order stands, unless it is forgotten.
+    pub fn outcome_of(&self, id: OrderId) -> Option<&Outcome> {
+        self.orders.iter().find(|status| status.id == id).map(|status| &status.outcome)
+    }
+
     /// The tag that a write under way writes.
     pub fn tag_of(&self, id: WriteId) -> Option<TagId> {
         self.writes.iter().find(|write| write.0 == id).map(|write| write.2)
@@ -147,7 +152,11 @@ impl Desk {
                     | Command::AcknowledgeAll
                     | Command::Refresh(_)
                     | Command::Connect(..)
-                    | Command::SaveSettings(_) => false,
+                    | Command::SaveSettings(_)
+                    | Command::ReadSets
+                    | Command::SaveSet { .. }
+                    | Command::Restore(_)
+                    | Command::StopRestore(_) => false,
                 };
                 self.orders.iter_mut().find(|status| of_line(&status.command))?.outcome = busy;
                 None
@@ -159,6 +168,8 @@ impl Desk {
     pub fn expire(&mut self, at: Timestamp, speed: f64, board: &Board) -> Vec<ActionRecord> {
         let late = |status: &OrderStatus| {
             status.outcome == Outcome::Pending
+                // Its writes are given up one by one.
+                && !matches!(status.command, Command::Restore(_))
                 && PENDING_MAX.mul_f64(speed) < Duration::try_from(at.duration_since(status.at)).unwrap_or_default()
         };
         let ids: Vec<OrderId> = self.orders.iter().filter(|status| late(status)).map(|status| status.id).collect();
@@ -257,6 +268,13 @@ fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
         Command::SaveSettings(line) => ("save settings", def.line(*line).name.clone(), None),
         Command::Test(line, tool) => ("test", def.line(*line).name.clone(), Some(tool.to_string())),
         Command::StopTest(line) => ("stop test", def.line(*line).name.clone(), None),
+        Command::ReadSets => ("read sets", "parameter sets".into(), None),
+        Command::SaveSet { device, name, .. } => ("save set", def.device(*device).name.clone(), Some(name.to_string())),
+        Command::Restore(wish) => {
+            let new = format!("{}: {} changes", wish.from, wish.changes.len());
+            ("restore set", def.device(wish.device).name.clone(), Some(new))
+        }
+        Command::StopRestore(device) => ("stop restore", def.device(*device).name.clone(), None),
     };
     let old = status.old.zip(status.command.written());
     let old = old.map(|(old, (tag, _))| value_words(board, def.tag(tag), old));

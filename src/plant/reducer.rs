@@ -1,6 +1,7 @@
 //! The reducer of facts: event, order or tick in, effects out. The only place where the plant changes.
 
 mod health;
+mod restore;
 mod service;
 #[cfg(test)]
 mod tests;
@@ -18,11 +19,17 @@ use super::{
     guard::Watch,
     line_minute::LineWatch,
     orders::Desk,
+    parameter_set::StoredSet,
+    program::ProgramWatch,
     record::{ActionRecord, AlarmRecord, Record},
+    restore::Restore,
     sample::Cause,
     snapshot::{DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
     traffic::Exchange,
+    tuning::TuningWatch,
 };
+
+pub use restore::SetWork;
 
 /// What must happen outside because of what became true inside.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -33,6 +40,8 @@ pub struct Effects {
     pub records: Vec<Record>,
     /// Settings of a line for the plant file, and the order that wishes it.
     pub save: Option<(OrderId, LineDef)>,
+    /// Work with the folder of parameter sets.
+    pub sets: Option<SetWork>,
 }
 
 /// All that is true. Owned by the plant task, seen by everyone else as [`Snapshot`]s.
@@ -52,6 +61,15 @@ pub struct Plant {
     evidence: Arc<Vec<Option<Arc<Exchange>>>>,
     history: HistoryStatus,
     speed: f64,
+    /// What lies in the folder of parameter sets.
+    sets: Arc<Vec<StoredSet>>,
+    /// The latest restore of each device that had one.
+    restores: Vec<Arc<Restore>>,
+    /// Writes that the plant itself has ordered for its restores.
+    numbers: u32,
+    /// Auto-tuning and program of each device, by [`DeviceId`].
+    tunings: Vec<TuningWatch>,
+    programs: Vec<ProgramWatch>,
 }
 
 impl Plant {
@@ -67,10 +85,20 @@ impl Plant {
             devices: vec![DeviceStatus::default(); def.devices.len()],
             evidence: Arc::new(vec![None; def.tags.len()]),
             history: HistoryStatus::default(),
+            sets: Arc::default(),
+            restores: Vec::new(),
+            numbers: 0,
+            tunings: vec![TuningWatch::default(); def.devices.len()],
+            programs: vec![ProgramWatch::default(); def.devices.len()],
             def,
             at,
             speed,
         }
+    }
+
+    /// What never changes.
+    pub fn def(&self) -> &Arc<PlantDef> {
+        &self.def
     }
 
     /// Takes up the alarms that the journal remembers from before a restart, oldest step first.
@@ -113,6 +141,7 @@ impl Plant {
         };
         let mut effects = self.settle(at);
         effects.records.extend(action.map(Record::Action));
+        self.carry_on(at, &mut effects);
         effects
     }
 
@@ -159,8 +188,12 @@ impl Plant {
             Command::Configure(_) | Command::SaveSettings(_) | Command::Test(..) | Command::StopTest(_) => {
                 self.line_order(&order, at, &mut effects)
             }
+            Command::ReadSets | Command::SaveSet { .. } | Command::Restore(_) | Command::StopRestore(_) => {
+                self.set_order(&order, at, &mut effects)
+            }
         };
         effects.records.extend(action.map(Record::Action));
+        self.carry_on(at, &mut effects);
         self.at = self.at.max(at);
         effects
     }
@@ -168,7 +201,9 @@ impl Plant {
     /// The queue to a line was full: the request was not sent.
     pub fn on_undeliverable(&mut self, line: LineId, request: &BusRequest) -> Effects {
         let action = self.desk.undeliverable(line, request, &self.board);
-        Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
+        let mut effects = Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() };
+        self.carry_on(self.at, &mut effects);
+        effects
     }
 
     /// The store says how it stands.
@@ -184,6 +219,7 @@ impl Plant {
         let mut effects = self.settle(at);
         effects.records.extend(minutes);
         effects.records.extend(expired.into_iter().map(Record::Action));
+        self.carry_on(at, &mut effects);
         effects
     }
 
@@ -202,6 +238,10 @@ impl Plant {
             orders: self.desk.shown(),
             watch: self.watch.clone(),
             history: self.history.clone(),
+            sets: self.sets.clone(),
+            restores: self.restores.clone(),
+            tunings: self.tunings.iter().map(|watch| watch.tuning.clone()).collect(),
+            programs: self.programs.iter().map(ProgramWatch::elapsed).collect(),
             speed: self.speed,
         }
     }
@@ -306,12 +346,13 @@ impl Plant {
     /// Judges the alarms and gathers what must be stored.
     fn settle(&mut self, at: Timestamp) -> Effects {
         self.at = self.at.max(at);
+        let asked = self.watch_controllers();
         let (def, board, devices) = (&self.def, &self.board, &self.devices);
         self.watch.look(&def.guards, |tag| board.sample(tag), self.at);
         let steps = self.book.judge(self.at, |alarm| facts(def, board, devices, alarm));
         let mut records = self.board.records(self.at);
         records.extend(steps.into_iter().map(Record::Alarm));
-        Effects { records, ..Effects::default() }
+        Effects { bus: asked, records, ..Effects::default() }
     }
 }
 

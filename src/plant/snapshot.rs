@@ -12,9 +12,12 @@ use super::{
     guard::Watch,
     line_report::LineReport,
     ne107,
+    parameter_set::StoredSet,
+    restore::Restore,
     sample::Sample,
     tool::ToolRun,
     traffic::Exchange,
+    tuning::Tuning,
 };
 
 /// The plant at one instant. Losing an intermediate snapshot is harmless.
@@ -44,6 +47,14 @@ pub struct Snapshot {
     pub watch: Watch,
     /// The history store.
     pub history: HistoryStatus,
+    /// The parameter sets that the station keeps, by name.
+    pub sets: Arc<Vec<StoredSet>>,
+    /// The latest restore of each device that had one.
+    pub restores: Vec<Arc<Restore>>,
+    /// The latest auto-tuning of each device, by [`DeviceId`]; `None` if none was seen.
+    pub tunings: Vec<Option<Arc<Tuning>>>,
+    /// How long the program of each device has been where it is, by [`DeviceId`], and whether its beginning was seen.
+    pub programs: Vec<Option<(Duration, bool)>>,
     /// Plant seconds per real second; 1 except in demonstrations.
     pub speed: f64,
 }
@@ -102,6 +113,14 @@ impl Snapshot {
     /// The state of a device.
     pub fn device(&self, id: DeviceId) -> &DeviceStatus {
         &self.devices[id.index()]
+    }
+    /// The restore of a device, at work or the last one.
+    pub fn restore(&self, id: DeviceId) -> Option<&Restore> {
+        self.restores.iter().find(|run| run.device == id).map(Arc::as_ref)
+    }
+    /// The auto-tuning of a device, at work or the last one.
+    pub fn tuning(&self, id: DeviceId) -> Option<&Tuning> {
+        self.tunings.get(id.index())?.as_deref()
     }
     /// The alarms of a tag, most urgent first.
     pub fn alarms_of(&self, tag: TagId) -> impl Iterator<Item = &ActiveAlarm> {

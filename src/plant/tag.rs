@@ -70,6 +70,10 @@ pub struct TagDef {
     pub source: String,
     /// How a simulated device fills it; `None` holds what is written.
     pub simulate: Option<Arc<Simulate>>,
+    /// What the maker sets it to before delivery, in the tag's unit; `None` where nobody says.
+    pub default: Option<f64>,
+    /// Part of a parameter set: a setting, not a command and not a measurement.
+    pub in_sets: bool,
 }
 
 impl TagDef {
@@ -107,6 +111,8 @@ impl TagDef {
             confidence: Confidence::Proven,
             source: String::new(),
             simulate: None,
+            default: None,
+            in_sets: false,
         }
     }
     /// The tags without which its value cannot be shown or judged.

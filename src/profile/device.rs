@@ -209,7 +209,8 @@ pub(super) fn faceplate(
             .add(name.at, format!("the set value {} cannot be written", tags[sv.index()].name))
             .label("expected access = \"rw\"");
     }
-    Some(Faceplate { pv, sv, mv, run, mode, tune })
+    let tunes = table.tunes.iter().filter_map(|name| names.near(name, device, problems)).collect();
+    Some(Faceplate { pv, sv, mv, run, mode, tune, tunes })
 }
 
 /// The actions of a device.

@@ -60,6 +60,14 @@ impl Errors {
             None => problem.message.clone(),
         })
     }
+    /// The same with what was expected and what may have been meant, for places where the text itself is not shown.
+    pub fn full_lines(&self) -> impl Iterator<Item = String> {
+        self.lines().zip(&self.list).map(|(line, problem)| {
+            let more = [problem.label.as_str(), problem.help.as_deref().unwrap_or("")];
+            let more: Vec<&str> = more.into_iter().filter(|words| !words.is_empty()).collect();
+            if more.is_empty() { line } else { format!("{line} ({})", more.join("; ")) }
+        })
+    }
 }
 
 impl fmt::Display for Errors {

@@ -21,10 +21,13 @@ pub mod line;
 pub(crate) mod names;
 mod picture;
 mod plant;
+mod program;
 pub(crate) mod reader;
 mod report;
 mod schema;
 mod simulate;
+mod set_file;
+mod sets;
 mod tag;
 mod units;
 
@@ -42,6 +45,7 @@ pub use self::{
     diagnostic::{Errors, render},
     io::{PlantFile, Search},
     line::BAUDS,
+    set_file::{read_set, text_of_set},
 };
 use crate::plant::def::PlantDef;
 

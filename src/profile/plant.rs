@@ -9,10 +9,11 @@ use super::{
     diagnostic::{Errors, Problems},
     guard, line,
     names::{Defs, Names, Unique, check_name},
-    picture, reader,
+    picture, program, reader,
     reader::{At, text},
     report,
     schema::{DeviceTable, PlantFile, ProfileFile},
+    sets,
     tag::{self, Surroundings},
 };
 use crate::plant::{
@@ -142,13 +143,17 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         devices.push(def);
     }
     let classes = defined.iter().map(|defined| defined.class).collect();
-    let tags = device::link(defined, &names, problems);
+    let written = defined.iter().map(|defined| defined.in_sets).collect::<Vec<_>>();
+    let mut tags = device::link(defined, &names, problems);
     check_broadcasts(&devices, &known, lines, &tags, problems);
     for (def, device) in devices.iter_mut().zip(&known) {
         let face = device.profile.faceplate.as_ref().map(|face| &face.value);
         def.faceplate = face.and_then(|face| device::faceplate(face, device.name, &names, &tags, problems));
         def.actions = device::actions(&device.profile.actions, device.name, &names, &tags, problems);
+        let program = device.profile.program.as_ref().map(|program| &program.value);
+        def.program = program.and_then(|table| program::program(table, device.name, &names, &tags, problems));
     }
+    sets::mark(&devices, &mut tags, &written, problems);
     Devices { devices, tags, names, classes }
 }
 
@@ -218,6 +223,7 @@ fn define_device<'a>(
         write_gap,
         faceplate: None,
         actions: Vec::new(),
+        program: None,
     };
     let around = Surroundings {
         device: id,

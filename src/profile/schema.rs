@@ -103,6 +103,7 @@ table!(
         list "tag" tags: Raw,
         list "action" actions: ActionTable,
         opt "faceplate" faceplate: FaceplateTable,
+        opt "program" program: ProgramTable,
     }
 );
 
@@ -160,6 +161,10 @@ table!(
         opt "confidence" confidence: Confidence,
         opt "source" source: String,
         opt "simulate" simulate: SimulateTable,
+        /// What the maker delivers it with.
+        opt "default" default: Choice,
+        /// Part of parameter sets, or not.
+        opt "set" in_sets: bool,
     }
 );
 
@@ -240,6 +245,32 @@ table!(
         opt "run" run: String,
         opt "mode" mode: String,
         opt "tune" tune: String,
+        list "tunes" tunes: String,
+    }
+);
+
+table!(
+    /// The ramp/soak program of a controller.
+    ProgramTable, "the program" {
+        need "position" position: String,
+        need "command" command: String,
+        need "run" run: Choice,
+        opt "halt" halt: Choice,
+        need "off" off: Choice,
+        opt "pattern" pattern: String,
+        /// First and last step of each pattern, from 1, in the order of the pattern's values.
+        list "patterns" patterns: [u16; 2],
+        opt "mode" mode: String,
+        list "steps" steps: StepTable,
+    }
+);
+
+table!(
+    /// A step of a program.
+    StepTable, "a step of the program" {
+        need "sv" sv: String,
+        need "ramp" ramp: String,
+        need "soak" soak: String,
     }
 );
 

@@ -39,6 +39,22 @@ fn every_shipped_device_loads_without_a_problem() {
 }
 
 #[test]
+fn a_set_of_the_controller_holds_its_settings_and_none_of_its_commands() {
+    let plant = tank();
+    let in_sets = |name: &str| plant.tag(plant.tag_named(name).unwrap()).in_sets;
+    for setting in ["SV", "P", "I", "D", "CTRL", "SV-L", "SV-H", "PTN", "SV-8", "TM8S"] {
+        assert!(in_sets(&format!("TIC-1.{setting}")), "{setting}");
+    }
+    for other in ["FIX", "AT", "STBY", "PROG", "PV", "MV", "P-N2"] {
+        assert!(!in_sets(&format!("TIC-1.{other}")), "{other}");
+    }
+    let coils = plant.tags.iter().filter(|tag| tag.point.table.is_bits() && tag.in_sets);
+    assert_eq!(coils.count(), 0, "a coil of the PLC is a command");
+    let program = plant.devices[0].program.as_ref().unwrap();
+    assert_eq!((program.steps.len(), program.steps_of(Some(1.0))), (8, Some((4, 7))));
+}
+
+#[test]
 fn the_addresses_are_those_of_the_recorded_frames_and_manuals() {
     let plant = tank();
     let check = |name: &str, table: Table, address: u16, kind: Raw| {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{
     address::{check_modicon, locate},
     diagnostic::{Problems, Span},
-    names::{Names, check_name},
+    names::{Names, check_name, number_of},
     reader::{At, Choice, Numbered, Raw, either, supersede, text},
     schema::{PollWord, Scheme, SimulateTable, TagTable},
     units,
@@ -31,6 +31,8 @@ pub(super) struct Defined {
     pub tag: TagDef,
     /// The class, if it is written.
     pub class: Option<Class>,
+    /// Whether it is part of parameter sets, if that is written.
+    pub in_sets: Option<At<bool>>,
     /// Where its address stands; `None` if it has no valid point.
     pub address_at: Option<Span>,
     /// Tags that this one needs to be shown right.
@@ -106,11 +108,15 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
         source: text(&row.source),
         // Needs all tags of the plant.
         simulate: None,
+        default: None,
+        in_sets: false,
     };
+    let default = row.default.as_ref().and_then(|default| number_of(default, &tag, problems));
+    let tag = TagDef { default, ..tag };
     let address_at = point.and(row.address.map(|address| address.at));
     let class = row.class.map(|class| class.value);
     let simulate = row.simulate.map(|simulate| simulate.value);
-    Defined { tag, class, address_at, needs: links.needs, unlock: links.unlock, simulate }
+    Defined { tag, class, in_sets: row.in_sets, address_at, needs: links.needs, unlock: links.unlock, simulate }
 }
 
 /// Stands in for an address that is wrong; it never leaves the loader.

@@ -441,6 +441,32 @@ fn an_action_asks_before_it_acts() {
 }
 
 #[test]
+fn a_program_names_tags_that_can_be_told_what_to_do() {
+    let with = |program: &str| {
+        let text = format!("status = \"manual\"\nsource = \"manual\"\n\n[program]\n{program}\n\n[limits]");
+        move |expect: &[&str]| check("status = \"manual\"\nsource = \"manual\"\n\n[limits]", &text, expect)
+    };
+    let whole = "position = \"DP\"\ncommand = \"MODE\"\nrun = \"on\"\noff = \"off\"\n";
+    let step = "steps = [{ sv = \"MODE\", ramp = \"MODE\", soak = \"MODE\" }]\n";
+    with(&format!("{whole}steps = []"))(&["a program needs `steps`"]);
+    with(&format!("{step}{}", whole.replace("\"on\"", "\"go\"")))(&["`go` is not a state of D1.MODE"]);
+    with(&format!("{step}{}", whole.replace("MODE", "MOD")))(&["unknown tag `MOD` in D1", "did you mean `MODE`?"]);
+    with(&format!("{whole}steps = [{{ sv = \"T\", ramp = \"MODE\", soak = \"MODE\" }}]"))(&["D1.T cannot be written"]);
+    with(&format!("{whole}{step}patterns = [[1, 2]]"))(&["from step 1 to step 2", "within 1 to 1"]);
+}
+
+#[test]
+fn a_setting_can_be_written_and_a_default_be_held() {
+    check("min = 0\nmax = 100\n", "min = 0\nmax = 100\nset = true\n", &["D1.T cannot be part of a parameter set"]);
+    let enumeration = "enum = { 0 = \"off\", 1 = \"on\" }\n";
+    check(
+        enumeration,
+        &format!("{enumeration}default = \"of\"\n"),
+        &["`of` is not a state of D1.MODE", "did you mean"],
+    );
+}
+
+#[test]
 fn a_file_that_is_no_toml_is_told_from_one_that_is_wrong() {
     let check = |bytes: &[u8], expect: &[&str]| {
         let text = load(bytes, METER, PLC).expect_err("it is no plant").to_string();

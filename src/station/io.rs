@@ -16,7 +16,7 @@ use crate::{
         io::{Query, thread as history},
     },
     plant::{
-        Effects, Plant, PlantDef, Snapshot,
+        Effects, Plant, PlantDef, SetWork, Snapshot,
         command::{BusRequest, Order, OrderId},
         def::{LineDef, LineId},
         event::{Event, LineState},
@@ -26,7 +26,7 @@ use crate::{
     profile::PlantFile,
 };
 
-use super::Session;
+use super::{Session, sets};
 
 /// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
 const EVENTS: usize = 256;
@@ -75,11 +75,12 @@ pub fn start(options: Options) -> Result<Station, HistoryError> {
 /// The same, where the steps of alarms are also told to a listener.
 pub fn start_told(options: Options, listener: Option<mpsc::Sender<Vec<Record>>>) -> Result<Station, HistoryError> {
     let Options { def, clock, history, connectors, file } = options;
+    let sets = sets::folder(&history, &def.name);
     let history = history::start(&history, def.clone(), clock)?;
     let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
     plant.restore(&history.restored);
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
-    let keeping = Keeping { records: Some(records), store, listener };
+    let keeping = Keeping { records: Some(records), store, sets: Some(sets), listener };
     Ok(assemble(def, clock, connectors, plant, file, keeping, (queries, Some(history))))
 }
 
@@ -94,14 +95,16 @@ pub fn rehearse(
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
-    let keeping = Keeping { records: None, store, listener: Some(listener) };
+    let keeping = Keeping { records: None, store, sets: None, listener: Some(listener) };
     assemble(def, clock, connectors, plant, None, keeping, (queries, None))
 }
 
-/// Where the journal goes.
+/// Where the journal and the parameter sets go.
 struct Keeping {
     records: Option<mpsc::Sender<Vec<Record>>>,
     store: watch::Receiver<HistoryStatus>,
+    /// The folder of parameter sets.
+    sets: Option<PathBuf>,
     listener: Option<mpsc::Sender<Vec<Record>>>,
 }
 
@@ -126,7 +129,7 @@ fn assemble(
         tasks.push(tokio::spawn(supervise(tokio::spawn(link), line.id, clock, events.clone(), stopped.clone())));
     }
     let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
-    let desk = PlantTask { plant, clock, links, file, saving: None, keeping, lost: 0, publish };
+    let desk = PlantTask { plant, clock, links, file, saving: None, filing: None, keeping, lost: 0, publish };
     tasks.push(tokio::spawn(desk.run(event_queue, order_queue)));
     Station { snapshots, orders, queries, history, stop, tasks, terminals: 0 }
 }
@@ -205,6 +208,14 @@ async fn saved(saving: &mut Option<Saving>) -> Saved {
     saved
 }
 
+/// Waits for the end of the work with the sets; for ever without any.
+async fn filed(filing: &mut Option<JoinHandle<sets::Done>>) -> Result<sets::Done, tokio::task::JoinError> {
+    let Some(work) = filing else { return std::future::pending().await };
+    let done = work.await;
+    *filing = None;
+    done
+}
+
 /// The loop around the reducer: sole owner of the plant.
 struct PlantTask {
     plant: Plant,
@@ -213,6 +224,8 @@ struct PlantTask {
     /// The plant file, unless it is just being written.
     file: Option<PlantFile>,
     saving: Option<Saving>,
+    /// The work with the parameter sets.
+    filing: Option<JoinHandle<sets::Done>>,
     keeping: Keeping,
     /// Records that the queue to the store had no room for.
     lost: u64,
@@ -222,6 +235,7 @@ struct PlantTask {
 impl PlantTask {
     async fn run(mut self, mut events: mpsc::Receiver<Event>, mut orders: mpsc::Receiver<Order>) {
         let tick_every = self.clock.real_span(Duration::from_secs(1)).max(TICK_MIN);
+        self.file_sets(SetWork::Read);
         let mut tick = tokio::time::interval(tick_every);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
         // Changed since the last snapshot, and when the next one may go out.
@@ -240,6 +254,10 @@ impl PlantTask {
                 }
                 saved = saved(&mut self.saving) => {
                     self.take_saved(saved);
+                    changed = true;
+                }
+                done = filed(&mut self.filing) => {
+                    self.take_filed(done);
                     changed = true;
                 }
                 Ok(()) = self.keeping.store.changed() => {
@@ -266,6 +284,10 @@ impl PlantTask {
             let saved = saved(&mut self.saving).await;
             self.take_saved(saved);
         }
+        if self.filing.is_some() {
+            let done = filed(&mut self.filing).await;
+            self.take_filed(done);
+        }
         self.publish.send_replace(Arc::new(self.plant.snapshot()));
     }
 
@@ -276,6 +298,40 @@ impl PlantTask {
         self.keep(effects.records);
         if let Some((order, settings)) = effects.save {
             self.save(order, settings);
+        }
+        if let Some(work) = effects.sets {
+            self.file_sets(work);
+        }
+    }
+
+    /// Has the folder of parameter sets worked on beside the loop, one work at a time.
+    fn file_sets(&mut self, work: SetWork) {
+        let refused = match (&self.keeping.sets, &self.filing) {
+            (Some(folder), None) => {
+                let (folder, def) = (folder.clone(), self.plant.def().clone());
+                self.filing = Some(tokio::task::spawn_blocking(move || sets::work(&folder, &def, work)));
+                return;
+            }
+            (Some(_), Some(_)) => "another set is just being saved, try again",
+            (None, _) => "this station keeps nothing",
+        };
+        // What is being done ends with the folder read, so a wish to read is granted already.
+        if let SetWork::Write { order, .. } = work {
+            let effects = self.plant.on_set_written(order, Err(refused.to_owned()));
+            self.keep(effects.records);
+        }
+    }
+
+    fn take_filed(&mut self, done: Result<sets::Done, tokio::task::JoinError>) {
+        let (written, sets) = match done {
+            Ok(done) => done,
+            // Whoever has ordered it hears of it when his order is given up.
+            Err(error) => return tracing::error!(%error, "the work with the sets ended badly"),
+        };
+        self.plant.on_sets(sets);
+        if let Some((order, result)) = written {
+            let effects = self.plant.on_set_written(order, result);
+            self.keep(effects.records);
         }
     }
 

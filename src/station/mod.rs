@@ -5,6 +5,7 @@
 //! thread drains, flushes and ends.
 
 pub mod session;
+mod sets;
 pub mod teller;
 pub mod io;
 

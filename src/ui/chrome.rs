@@ -348,6 +348,7 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
         Outcome::Unchanged => ("unchanged, nothing written".to_owned(), false),
         Outcome::Refused(why) => (format!("REFUSED: {why}"), true),
         Outcome::NotConfirmed(NotConfirmed::NoReadBack) => ("accepted (cannot be read back)".to_owned(), false),
+        Outcome::NotConfirmed(NotConfirmed::Partly(how)) => (format!("STOPPED: {how}"), true),
         Outcome::NotConfirmed(why @ (NotConfirmed::Different(_) | NotConfirmed::NotRead(_))) => {
             (format!("NOT CONFIRMED: {why}"), true)
         }
@@ -377,6 +378,12 @@ pub fn order_words(cx: &Cx, command: &Command, old: Option<f64>) -> String {
         Command::SaveSettings(line) => format!("save settings of {}", cx.def().line(*line).name),
         Command::Test(line, tool) => format!("{} {tool}", cx.def().line(*line).name),
         Command::StopTest(line) => format!("stop test of {}", cx.def().line(*line).name),
+        Command::ReadSets => "read parameter sets".to_owned(),
+        Command::SaveSet { device, name, .. } => format!("save set {name} of {}", cx.def().device(*device).name),
+        Command::Restore(wish) => {
+            format!("{} to {}, {} changes", wish.from, cx.def().device(wish.device).name, wish.changes.len())
+        }
+        Command::StopRestore(device) => format!("stop restore of {}", cx.def().device(*device).name),
     }
 }
 

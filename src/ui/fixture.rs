@@ -1,5 +1,6 @@
 //! A small but complete tank plant for tests of the screens, in three moods: normal, alarm, line down.
 
+pub mod controllers;
 mod plant;
 mod traffic;
 
@@ -14,10 +15,13 @@ use crate::plant::{
     alarm::AlarmState,
     def::*,
     event::{Fault, LineCounters, LineState},
+    parameter_set::StoredSet,
+    restore::Restore,
     sample::{Cause, Sample},
     snapshot::{ActiveAlarm, DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
     tag::*,
     traffic::Exchange,
+    tuning::Tuning,
 };
 
 /// The instant of every fixture: 2026-11-21 14:02:31 in Bangkok.
@@ -40,6 +44,14 @@ pub struct Fixture {
     pub devices: Vec<DeviceStatus>,
     /// The last request for each tag.
     pub evidence: Vec<Option<Arc<Exchange>>>,
+    /// Sets in the station's folder.
+    pub sets: Vec<StoredSet>,
+    /// Restores, one a device.
+    pub restores: Vec<Restore>,
+    /// Auto-tunings, by device.
+    pub tunings: Vec<Option<Tuning>>,
+    /// How long every program has been where it is.
+    pub into: Option<(Duration, bool)>,
 }
 
 impl Fixture {
@@ -65,6 +77,10 @@ impl Fixture {
         let devices = vec![answering; def.devices.len()];
         Fixture {
             evidence: vec![None; def.tags.len()],
+            sets: Vec::new(),
+            restores: Vec::new(),
+            tunings: vec![None; def.devices.len()],
+            into: None,
             def,
             samples,
             alarms: Vec::new(),
@@ -172,6 +188,10 @@ impl Fixture {
             devices: self.devices.clone(),
             alarms: self.alarms.clone(),
             orders: Vec::new(),
+            sets: Arc::new(self.sets.clone()),
+            restores: self.restores.iter().cloned().map(Arc::new).collect(),
+            tunings: self.tunings.iter().cloned().map(|tuning| tuning.map(Arc::new)).collect(),
+            programs: vec![self.into; self.def.devices.len()],
             history: HistoryStatus { rows: 5_000, committed_at: Some(now()), ..HistoryStatus::default() },
             speed: 1.0,
             def: Arc::new(self.def.clone()),

@@ -140,7 +140,7 @@ pub const GLOBAL: &[Key<Global>] = &[
     Key {
         chord: code(KeyCode::Esc),
         label: "",
-        help: "close a window; take the last outcome off the screen",
+        help: "close a window; take a failure off the screen; a page back",
         action: Global::Dismiss,
     },
     Key { chord: ctrl('l'), label: "", help: "draw everything anew", action: Global::Redraw },
@@ -176,10 +176,9 @@ mod tests {
         no_clash("mimic", chords(mimic::KEYS));
         no_clash("trends", chords(trends::KEYS));
         no_clash("alarms", chords(alarms::KEYS));
-        no_clash("controllers", chords(controllers::KEYS));
         no_clash("reports", chords(reports::KEYS));
         no_clash("faults", chords(faults::KEYS));
-        for (page, chords) in bus::all_chords() {
+        for (page, chords) in bus::all_chords().into_iter().chain(controllers::all_chords()) {
             no_clash(page, chords);
         }
     }

@@ -341,7 +341,14 @@ fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
             .collect(),
         Global::Redraw => vec![Act::Do(Effect::Redraw)],
         Global::Dismiss => {
-            model.watch = None;
+            // A failure that is being read is dismissed first; everything else does not hold up the way back.
+            let failed = model.watch.take().is_some_and(|watch| watch.is_trouble());
+            if !failed {
+                with_tabs(model, |tabs, cx| {
+                    tabs.back(cx);
+                    Vec::new()
+                });
+            }
             Vec::new()
         }
     }
@@ -410,6 +417,12 @@ fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
 }
 
 impl Watch {
+    /// Has it ended in a way that its operator must read?
+    fn is_trouble(&self) -> bool {
+        let outcome = self.status.as_ref().map(|status| &status.outcome);
+        self.undelivered.is_some() || outcome.is_some_and(|outcome| chrome::outcome_words(outcome).1)
+    }
+
     /// Has it ended as wished? Such an outcome leaves the screen by itself; trouble stays, with its time, until it is
     /// dismissed.
     fn is_done(&self) -> bool {

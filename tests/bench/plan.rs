@@ -46,6 +46,7 @@ fn device(id: u16) -> DeviceDef {
         write_gap: Duration::ZERO,
         faceplate: None,
         actions: Vec::new(),
+        program: None,
     }
 }
 

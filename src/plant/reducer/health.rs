@@ -6,11 +6,13 @@ use jiff::Timestamp;
 
 use super::Plant;
 use crate::plant::{
-    command::{Command, Outcome},
-    def::DeviceId,
+    command::{BusRequest, Command, Outcome},
+    def::{DeviceId, LineId, TagId},
     ne107::{self, Evidence},
     record::Record,
     snapshot::DeviceStatus,
+    tag::Bound,
+    tuning::Noticed,
 };
 
 impl Plant {
@@ -19,6 +21,26 @@ impl Plant {
         let lines = self.def.lines.iter().zip(&self.lines).zip(&mut self.watches);
         let minutes = lines.filter_map(|((def, line), watch)| watch.tick(at, &def.name, line.report.as_ref()?));
         minutes.map(Record::Line).collect()
+    }
+
+    /// Follows auto-tunings and programs; what a tuning has found is asked for as soon as it has ended.
+    pub(super) fn watch_controllers(&mut self) -> Vec<(LineId, BusRequest)> {
+        let (board, at) = (&self.board, self.at);
+        let sample = |tag: TagId| board.sample(tag);
+        let mut asked = Vec::new();
+        for device in &self.def.devices {
+            let pv = device.faceplate.as_ref().map(|plate| self.def.tag(plate.pv));
+            let bound = |bound: Option<Bound>| board.bound(bound?).ok();
+            let span = pv.and_then(|pv| Some(bound(pv.max)? - bound(pv.min)?));
+            if self.tunings[device.id.index()].take(device, &sample, span, at) == Noticed::Ended {
+                asked.push((device.line, BusRequest::Refresh(device.id)));
+            }
+            if let Some(program) = &device.program {
+                let (position, command) = (sample(program.position).trusted(), sample(program.command).trusted());
+                self.programs[device.id.index()].take(program, position, command, at);
+            }
+        }
+        asked
     }
 
     /// Every device with what is wrong with it.

@@ -38,7 +38,11 @@ impl Plant {
             | Command::Acknowledge(_)
             | Command::AcknowledgeAll
             | Command::Refresh(_)
-            | Command::Connect(..) => return None,
+            | Command::Connect(..)
+            | Command::ReadSets
+            | Command::SaveSet { .. }
+            | Command::Restore(_)
+            | Command::StopRestore(_) => return None,
         }
         self.desk.note(order, Outcome::Verified, &self.board, at)
     }

@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
-use super::{Faceplate, Modal, Next, window};
+use super::{Faceplate, Modal, Next, seen::Seen, window};
 use crate::{
     plant::{
         command::Command,
@@ -29,6 +29,8 @@ pub struct Confirm {
     notes: Vec<String>,
     /// Where it was asked from, and where it leads back to.
     back: Option<Faceplate>,
+    /// What its reader saw, where a value is written.
+    seen: Option<Seen>,
 }
 
 /// What a confirmed window does.
@@ -44,7 +46,13 @@ impl Confirm {
     /// Leave?
     pub fn quit() -> Confirm {
         let notes = ["Quit?", "Polling and alarms stop too: the station runs in this terminal."];
-        Confirm { intent: Intent::Quit, title: "quit".to_owned(), notes: notes.map(str::to_owned).to_vec(), back: None }
+        Confirm {
+            intent: Intent::Quit,
+            title: "quit".to_owned(),
+            notes: notes.map(str::to_owned).to_vec(),
+            back: None,
+            seen: None,
+        }
     }
 
     /// Is it the question whether to leave?
@@ -70,14 +78,20 @@ impl Confirm {
             notes.push(format!("… and {} more", waiting.len() - 6));
         }
         let intent = Intent::Order(Command::AcknowledgeAll);
-        Some(Confirm { intent, title: "acknowledge all".to_owned(), notes, back: None })
+        Some(Confirm { intent, title: "acknowledge all".to_owned(), notes, back: None, seen: None })
     }
 
     /// Write this value? Old and new value are drawn from the intent, so they cannot differ from what is sent.
     pub fn write(cx: &Cx, tag: TagId, value: f64) -> Confirm {
         let def = cx.def().tag(tag);
         let intent = Intent::Order(Command::Write { tag, value });
-        Confirm { intent, title: format!("write {}", def.name), notes: write_notes(def), back: None }
+        Confirm {
+            intent,
+            title: format!("write {}", def.name),
+            notes: write_notes(def),
+            back: None,
+            seen: Some(Seen::new(cx, tag)),
+        }
     }
 
     /// The same, asked from a faceplate, with words of its own above all others.
@@ -96,12 +110,24 @@ impl Confirm {
 
     /// Open or close a line, or any other order, with words of its own.
     pub fn order(title: impl Into<String>, words: impl Into<String>, command: Command) -> Confirm {
-        Confirm { intent: Intent::Order(command), title: title.into(), notes: vec![words.into()], back: None }
+        Confirm {
+            intent: Intent::Order(command),
+            title: title.into(),
+            notes: vec![words.into()],
+            back: None,
+            seen: None,
+        }
     }
 
     /// The faceplate that it was asked from.
     pub(super) fn back(self) -> Option<Faceplate> {
         self.back
+    }
+
+    /// The same with more to read.
+    pub fn with_notes(mut self, notes: impl IntoIterator<Item = String>) -> Confirm {
+        self.notes.extend(notes);
+        self
     }
 
     /// What Enter does.
@@ -117,7 +143,11 @@ impl Confirm {
             Intent::Order(Command::SaveSettings(_)) => "save",
             Intent::Order(Command::Test(_, Tool::Scan(_))) => "scan",
             Intent::Order(Command::Test(..)) => "send",
-            Intent::Order(Command::StopTest(_)) => "stop",
+            Intent::Order(Command::StopTest(_) | Command::StopRestore(_)) => "stop",
+            Intent::Order(Command::ReadSets) => "read",
+            Intent::Order(Command::SaveSet { replace: true, .. }) => "replace it",
+            Intent::Order(Command::SaveSet { replace: false, .. }) => "save",
+            Intent::Order(Command::Restore(_)) => "write and verify",
         }
     }
 
@@ -139,10 +169,15 @@ impl Confirm {
         }
     }
 
-    pub(super) fn on_key(self, cx: &Cx, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
         let enter = keys::code(KeyCode::Enter).is(event) && !self.wants_y();
         if enter || keys::char('y').is(event) {
             if self.is_refused(cx) {
+                return Next::Stay(Modal::Confirm(self));
+            }
+            if let Some(seen) = &mut self.seen
+                && seen.changed(cx)
+            {
                 return Next::Stay(Modal::Confirm(self));
             }
             let acts = vec![self.intent.act()];
@@ -176,6 +211,9 @@ impl Confirm {
             // As it stands now: what was true when the window opened may have changed under it.
             let told = guard::before_write(cx, *tag, *value).into_iter();
             rows.extend(told.flat_map(|(note, style)| wrap(&note, room).into_iter().map(move |line| (line, style))));
+        }
+        if let Some(seen) = self.seen.as_ref().filter(|seen| seen.has_asked()) {
+            rows.extend(wrap(&seen.words(cx), room).into_iter().map(|line| (line, cx.theme.trouble())));
         }
         let yes = if self.wants_y() { "y" } else { "⏎" };
         let keys = match self.is_refused(cx) {

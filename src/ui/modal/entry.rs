@@ -7,6 +7,7 @@ use super::{
     Confirm, Modal, Next,
     confirm::{wire_words, write_notes},
     line::Line,
+    seen::Seen,
     window,
 };
 use crate::{
@@ -29,12 +30,14 @@ pub struct Entry {
     pub line: Line,
     /// Why the last Enter was not taken.
     pub problem: Option<String>,
+    /// What its author saw.
+    seen: Seen,
 }
 
 impl Entry {
     /// An empty entry.
-    pub fn new(tag: TagId) -> Entry {
-        Entry { tag, line: Line::default(), problem: None }
+    pub fn new(cx: &Cx, tag: TagId) -> Entry {
+        Entry { tag, line: Line::default(), problem: None, seen: Seen::new(cx, tag) }
     }
 
     pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
@@ -44,6 +47,7 @@ impl Entry {
                 false => check(cx, self.tag, &self.line.text()),
             };
             match checked {
+                Ok(_) if self.seen.changed(cx) => self.problem = Some(self.seen.words(cx)),
                 Ok(value) if cx.def().tag(self.tag).confirm.is_some() => {
                     return Next::Stay(Modal::Confirm(Confirm::write(cx, self.tag, value)));
                 }

@@ -8,6 +8,7 @@ pub mod help;
 pub mod line;
 pub mod notice;
 pub mod prompt;
+pub mod seen;
 pub mod settings;
 pub mod why;
 
@@ -77,7 +78,7 @@ impl Modal {
         match (def.writable(), Notice::unreachable(cx, def.device), def.labels.is_empty()) {
             (false, ..) => None,
             (true, Some(notice), _) => Some(Modal::Notice(notice)),
-            (true, None, true) => Some(Modal::Entry(Entry::new(tag))),
+            (true, None, true) => Some(Modal::Entry(Entry::new(cx, tag))),
             (true, None, false) => Some(Modal::Choice(Choice::values(cx, tag))),
         }
     }

@@ -47,6 +47,11 @@ impl Notice {
         Some(why)
     }
 
+    /// Words to be read, the first line as the worry.
+    pub fn new(title: impl Into<String>, words: Vec<String>) -> Notice {
+        Notice { title: title.into(), words }
+    }
+
     pub(super) fn on_key(self, event: KeyEvent) -> Next {
         match event.code {
             KeyCode::Enter | KeyCode::Char('q') => Next::Close,

@@ -1,277 +1,453 @@
-//! The controllers tab: every parameter of a device with unit, range and meaning, and the way to change it.
+//! Tab 4: every device in a list; one as faceplate and parameter table; its program, its parameter sets, and a guide.
 
-use crossterm::event::KeyCode;
+mod compare;
+mod device;
+mod guide;
+mod keys;
+mod list;
+mod plate;
+mod program;
+mod sets;
+mod table;
+
+#[cfg(test)]
+mod tests;
+
+use crossterm::event::KeyEvent;
+use jiff::SignedDuration;
 use ratatui::{Frame, layout::Rect};
 
+pub use device::signal_mark;
+pub use keys::{Action, all_chords};
+
+use self::{compare::Compare, keys::page_keys, program::Cell, sets::Source, table::Table};
+use super::{Tab, errand::Errand};
 use crate::{
+    history::{Answer, HistoryError, Question, Series},
     plant::{
         command::Command,
-        def::{DeviceDef, DeviceId, LineId, TagId},
+        def::{DeviceDef, DeviceId, LineId, ProgramDef, TagId},
         event::LineState,
-        ne107::Signal,
-        snapshot::{DeviceState, Snapshot},
-        tag::{Access, Poll, TagDef},
+        parameter_set,
+        snapshot::Snapshot,
     },
     ui::{
         Act, Cx,
-        chrome::{order_words, outcome_words},
-        keys::{Key, char, code},
-        modal::{
-            Choice, Confirm, Faceplate, Modal, Notice, Settings, Why, entry::range_words, faceplate::device_words,
-        },
-        widgets::{
-            text::{Canvas, age, clock, fit, fit_words, pad, pad_left, whole, width},
-            value,
-        },
+        keys::{Hint, find, hints},
+        modal::{Choice, Confirm, Faceplate, Modal, Notice, Prompt, Settings, Why},
+        widgets::text::Canvas,
     },
 };
 
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Show the device so many further on.
-    Device(isize),
-    /// Select so many rows further on.
-    Move(isize),
-    /// Edit the selected parameter, or look at it if it is read-only.
-    Edit,
-    /// Say why the selected value is what it is.
-    Why,
-    /// Read everything now.
-    Refresh,
-    /// Pick one of the device's actions.
-    Actions,
-    /// Start or stop auto-tuning.
-    Tune,
-    /// Run or standby.
-    Run,
-    /// Close the device's line, or open it again.
-    Line,
-    /// Look at the communication settings of the device's line, and change them.
-    Settings,
+/// The small trend is asked for again after this time.
+const TREND_EVERY: SignedDuration = SignedDuration::from_secs(10);
+const PATIENCE: SignedDuration = SignedDuration::from_secs(30);
+/// Columns of the small trend to ask for: two dots a cell, and some to spare.
+const TREND_BUCKETS: usize = 80;
+/// What is shown.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Page {
+    /// All devices.
+    List,
+    /// One device.
+    Device,
+    /// Its ramp/soak program.
+    Program,
+    /// Its parameter sets.
+    Sets,
+    /// A set against it.
+    Compare(Compare),
+    /// Words to read, and the page to go back to.
+    Guide(usize, Box<Page>),
 }
 
-/// Keys of this tab.
-pub const KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Left), label: "", help: "previous device", action: Action::Device(-1) },
-    Key { chord: code(KeyCode::Right), label: "device", help: "next device", action: Action::Device(1) },
-    Key { chord: code(KeyCode::Up), label: "", help: "select the parameter above", action: Action::Move(-1) },
-    Key { chord: code(KeyCode::Down), label: "select", help: "select the parameter below", action: Action::Move(1) },
-    Key { chord: code(KeyCode::PageUp), label: "", help: "ten parameters up", action: Action::Move(-10) },
-    Key { chord: code(KeyCode::PageDown), label: "", help: "ten parameters down", action: Action::Move(10) },
-    Key { chord: code(KeyCode::Home), label: "", help: "first parameter", action: Action::Move(-9_999) },
-    Key { chord: code(KeyCode::End), label: "", help: "last parameter", action: Action::Move(9_999) },
-    Key {
-        chord: code(KeyCode::Enter),
-        label: "edit",
-        help: "change the parameter, or look at a read-only one",
-        action: Action::Edit,
-    },
-    Key {
-        chord: char('w'),
-        label: "why",
-        help: "why the value is what it is: quality, scaling, bytes",
-        action: Action::Why,
-    },
-    Key { chord: char('u'), label: "refresh", help: "read all parameters of the device now", action: Action::Refresh },
-    Key { chord: char('f'), label: "actions", help: "actions of the device (save to memory)", action: Action::Actions },
-    Key { chord: char('T'), label: "tune", help: "auto-tuning, if the device has it", action: Action::Tune },
-    Key { chord: char('S'), label: "standby", help: "run or standby, if the device has it", action: Action::Run },
-    Key {
-        chord: char('L'),
-        label: "line",
-        help: "disconnect the device's line, or connect it again (asks first)",
-        action: Action::Line,
-    },
-    Key {
-        chord: char('c'),
-        label: "settings",
-        help: "communication settings of the device's line: baud rate, parity, timeout …",
-        action: Action::Settings,
-    },
-];
+/// What the text is for that is being typed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Asked {
+    Filter,
+    SetName,
+}
 
 /// State of this tab.
 #[derive(Debug)]
 pub struct Controllers {
-    /// The device that is shown.
+    page: Page,
+    /// The device that is shown or selected.
     device: DeviceId,
-    /// The selected parameter, by its place among the device's tags.
-    selected: usize,
+    table: Table,
+    cell: Cell,
+    /// The selected row of the sets.
+    set: usize,
+    asked_for: Asked,
+    /// The small trend, of which tag, and the question for it.
+    trend: Option<Series>,
+    errand: Errand,
+    asked: u32,
 }
 
 impl Controllers {
-    /// Starts with the first device that has a faceplate.
+    /// The list; the device itself if there is no other.
     pub fn new(snapshot: &Snapshot) -> Controllers {
-        let devices = &snapshot.def.devices;
-        let first = devices.iter().find(|device| device.faceplate.is_some()).or(devices.first());
-        Controllers { device: first.map_or(DeviceId(0), |device| device.id), selected: 0 }
+        let page = if snapshot.def.devices.len() == 1 { Page::Device } else { Page::List };
+        Controllers {
+            page,
+            device: DeviceId(0),
+            table: Table::default(),
+            cell: Cell::default(),
+            set: 0,
+            asked_for: Asked::Filter,
+            trend: None,
+            errand: Errand::default(),
+            asked: 0,
+        }
     }
 
     /// Shows a device.
     pub fn show(&mut self, device: DeviceId) {
-        *self = Controllers { device, selected: 0 };
+        let defaults = self.table.defaults;
+        *self = Controllers {
+            page: Page::Device,
+            device,
+            table: Table { defaults, ..Table::default() },
+            cell: Cell::default(),
+            set: 0,
+            asked_for: Asked::Filter,
+            trend: None,
+            errand: Errand::default(),
+            asked: self.asked,
+        };
     }
 
-    /// A key of [`KEYS`].
-    pub fn on_key(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
-        let Some(device) = self.device(cx) else { return Vec::new() };
-        let write = |tag: Option<TagId>| tag.and_then(|tag| Modal::write(cx, tag)).map(Act::Open).into_iter().collect();
+    /// Esc: a step back, `false` where there is none.
+    pub fn back(&mut self, cx: &Cx) -> bool {
+        let page = std::mem::replace(&mut self.page, Page::List);
+        let alone = cx.def().devices.len() <= 1;
+        self.page = match page {
+            Page::Device if !self.table.filter.is_empty() => {
+                (self.table.filter, self.table.selected) = (String::new(), 0);
+                Page::Device
+            }
+            Page::Device if !alone => {
+                self.table = Table { defaults: self.table.defaults, ..Table::default() };
+                Page::List
+            }
+            Page::Program | Page::Sets => Page::Device,
+            Page::Compare(_) => Page::Sets,
+            Page::Guide(_, before) => *before,
+            page @ (Page::List | Page::Device) => {
+                self.page = page;
+                return false;
+            }
+        };
+        true
+    }
+
+    /// A key of the page.
+    pub fn on_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+        let Some(action) = find(page_keys(&self.page), event) else { return Vec::new() };
+        let Some(device) = cx.def().devices.get(self.device.index()) else { return Vec::new() };
         match action {
-            Action::Device(by) => {
-                let count = cx.def().devices.len() as isize;
-                let next = (self.device.0 as isize + by).rem_euclid(count);
-                self.show(DeviceId(next as u16));
+            Action::Guide => {
+                let before = std::mem::replace(&mut self.page, Page::List);
+                self.page = Page::Guide(0, Box::new(before));
                 Vec::new()
             }
-            Action::Move(by) => {
-                let last = cx.def().tags_of(self.device).count().saturating_sub(1);
-                self.selected = self.selected.saturating_add_signed(by).min(last);
+            Action::Turn(by) => {
+                if let Page::Guide(page, _) = &mut self.page {
+                    *page = page.saturating_add_signed(by).min(guide::PAGES.len() - 1);
+                }
                 Vec::new()
             }
-            Action::Edit => match self.selected(cx) {
-                Some(tag) if tag.writable() => write(Some(tag.id)),
+            Action::Device(by) => self.step_device(cx, by),
+            Action::Move(by) => self.move_by(cx, device, by),
+            Action::Column(by) => {
+                if let Some(program) = &device.program {
+                    self.cell.move_by(program, by, 0);
+                }
+                Vec::new()
+            }
+            Action::Open => self.open(cx, device),
+            Action::Program => {
+                if device.program.is_none() {
+                    return notice(device, "this device has no ramp/soak program");
+                }
+                self.page = Page::Program;
+                Vec::new()
+            }
+            Action::Sets => {
+                (self.page, self.set) = (Page::Sets, 0);
+                Vec::new()
+            }
+            Action::Find => {
+                self.asked_for = Asked::Filter;
+                let hint = "words in name or meaning; empty shows all";
+                vec![Act::Open(Modal::Prompt(Prompt::new("find a parameter", hint, &self.table.filter)))]
+            }
+            Action::Defaults => {
+                self.table.defaults = !self.table.defaults;
+                Vec::new()
+            }
+            Action::Save => {
+                self.asked_for = Asked::SetName;
+                let title = format!("save the settings of {} as a set", device.name);
+                vec![Act::Open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")))]
+            }
+            Action::All | Action::Turnaround => self.in_compare(cx, action),
+            Action::Stop => vec![Act::Order(Command::StopRestore(device.id))],
+            Action::ReadSets => vec![Act::Order(Command::ReadSets)],
+            Action::Command(which) => device.program.as_ref().map_or(Vec::new(), |program| {
+                let value = match which {
+                    keys::Wish::Run => Some(program.run),
+                    keys::Wish::Hold => program.halt,
+                    keys::Wish::Off => Some(program.off),
+                };
+                value.map_or_else(
+                    || notice(device, "this program cannot be held"),
+                    |value| confirm(cx, program.command, value),
+                )
+            }),
+            Action::Mode | Action::Pattern => {
+                let of = |program: &ProgramDef| if action == Action::Mode { program.mode } else { program.pattern };
+                write(cx, device.program.as_ref().and_then(of))
+            }
+            Action::Why
+            | Action::Refresh
+            | Action::Actions
+            | Action::Tune
+            | Action::Run
+            | Action::Line
+            | Action::Settings => self.on_device(cx, device, action),
+        }
+    }
+
+    /// What can be done with a device on any of its pages.
+    fn on_device(&mut self, cx: &Cx, device: &DeviceDef, action: Action) -> Vec<Act> {
+        match action {
+            Action::Why if matches!(self.page, Page::Program) => {
+                let tag = device.program.as_ref().and_then(|program| self.cell.tag(program));
+                Why::open(Why::new(tag.into_iter().collect(), 0))
+            }
+            Action::Why => {
+                let tags = self.table.rows(cx, device.id).into_iter().map(|tag| tag.id).collect();
+                Why::open(Why::new(tags, self.table.selected))
+            }
+            Action::Refresh => vec![Act::Order(Command::Refresh(device.id))],
+            Action::Actions => {
+                let actions = Choice::actions(cx, device.id).map(Modal::Choice);
+                let window = actions.map(|list| Notice::unreachable(cx, device.id).map_or(list, Modal::Notice));
+                window.map_or_else(|| notice(device, "this device has no actions"), |window| vec![Act::Open(window)])
+            }
+            Action::Tune => tune(cx, device),
+            Action::Run => match device.faceplate.as_ref().and_then(|plate| plate.run) {
+                Some(run) => write(cx, Some(run)),
+                None => notice(device, "this device cannot be put in standby from here"),
+            },
+            Action::Settings => vec![Act::Open(Modal::Settings(Box::new(Settings::new(cx, device.line))))],
+            Action::Line => vec![Act::Open(Modal::Confirm(connect(cx, device.line)))],
+            _ => Vec::new(),
+        }
+    }
+
+    fn step_device(&mut self, cx: &Cx, by: isize) -> Vec<Act> {
+        let count = cx.def().devices.len() as isize;
+        let next = DeviceId((self.device.0 as isize + by).rem_euclid(count) as u16);
+        self.show(next);
+        self.on_snapshot(cx)
+    }
+
+    fn move_by(&mut self, cx: &Cx, device: &DeviceDef, by: isize) -> Vec<Act> {
+        match &mut self.page {
+            Page::List => {
+                let last = cx.def().devices.len().saturating_sub(1);
+                self.device = DeviceId(usize::from(self.device.0).saturating_add_signed(by).min(last) as u16);
+            }
+            Page::Device => self.table.move_by(cx, device.id, by),
+            Page::Program => {
+                if let Some(program) = &device.program {
+                    self.cell.move_by(program, 0, by);
+                }
+            }
+            Page::Sets => {
+                let last = sets::sources(cx, device).len().saturating_sub(1);
+                self.set = self.set.saturating_add_signed(by).min(last);
+            }
+            Page::Compare(compare) => compare.move_by(cx, device, by),
+            Page::Guide(page, _) => *page = page.saturating_add_signed(by.signum()).min(guide::PAGES.len() - 1),
+        }
+        Vec::new()
+    }
+
+    /// Enter: what is selected is opened, edited or written.
+    fn open(&mut self, cx: &Cx, device: &DeviceDef) -> Vec<Act> {
+        match &self.page {
+            Page::List => {
+                self.show(device.id);
+                self.on_snapshot(cx)
+            }
+            Page::Device => match self.table.tag(cx, device.id) {
+                Some(tag) if tag.writable() => write(cx, Some(tag.id)),
                 Some(tag) => Faceplate::new(tag.label.clone(), vec![tag.id])
                     .map(|plate| Act::Open(Modal::Faceplate(plate)))
                     .into_iter()
                     .collect(),
                 None => Vec::new(),
             },
-            Action::Why => {
-                let tags = in_groups(cx, self.device).into_iter().map(|tag| tag.id).collect();
-                Why::open(Why::new(tags, self.selected))
+            Page::Program => write(cx, device.program.as_ref().and_then(|program| self.cell.tag(program))),
+            Page::Sets => {
+                let Some(source) = sets::sources(cx, device).into_iter().nth(self.set) else { return Vec::new() };
+                if let Some(notice) = sets::problems(cx, &source) {
+                    return vec![Act::Open(Modal::Notice(notice))];
+                }
+                self.page = Page::Compare(Compare::new(source));
+                Vec::new()
             }
-            Action::Refresh => vec![Act::Order(Command::Refresh(self.device))],
-            Action::Actions => {
-                let actions = Choice::actions(cx, self.device).map(Modal::Choice);
-                let window = actions.map(|list| Notice::unreachable(cx, self.device).map_or(list, Modal::Notice));
-                window.map(Act::Open).into_iter().collect()
+            Page::Compare(compare) => {
+                let window = compare.restore(cx, device).map_or_else(Modal::Notice, Modal::Confirm);
+                vec![Act::Open(window)]
             }
-            Action::Tune => write(device.faceplate.as_ref().and_then(|plate| plate.tune)),
-            Action::Run => write(device.faceplate.as_ref().and_then(|plate| plate.run)),
-            Action::Settings => vec![Act::Open(Modal::Settings(Box::new(Settings::new(cx, device.line))))],
-            Action::Line => vec![Act::Open(Modal::Confirm(connect(cx, device.line)))],
+            Page::Guide(..) => Vec::new(),
         }
     }
 
-    /// Nothing is due here: all that is shown comes with the snapshot.
-    pub fn on_snapshot(&mut self, _cx: &Cx) -> Vec<Act> {
+    fn in_compare(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+        let Page::Compare(compare) = &mut self.page else { return Vec::new() };
+        match (action, &compare.source) {
+            (Action::All, _) => compare.all = !compare.all,
+            // A copy the other way round: the target is chosen by standing on its page.
+            (_, Source::Device(other)) => {
+                let (other, here) = (*other, self.device);
+                self.show(other);
+                self.page = Page::Compare(Compare::new(Source::Device(here)));
+            }
+            (_, Source::Set(_)) => {
+                let device = cx.def().device(self.device);
+                return notice(device, "only a copy between two controllers can be turned around");
+            }
+        }
         Vec::new()
+    }
+
+    /// The keys of the moment.
+    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+        let mut hints = hints(page_keys(&self.page));
+        let device = cx.def().devices.get(self.device.index());
+        let lacks = |label: &str| {
+            device.is_some_and(|device| match label {
+                "tune" => device.faceplate.as_ref().is_none_or(|plate| plate.tune.is_none()),
+                "standby" => device.faceplate.as_ref().is_none_or(|plate| plate.run.is_none()),
+                "program" => device.program.is_none(),
+                "actions" => device.actions.is_empty(),
+                "defaults" => cx.def().tags_of(device.id).all(|tag| tag.default.is_none()),
+                "hold" => device.program.as_ref().is_none_or(|program| program.halt.is_none()),
+                "stop" => {
+                    cx.snapshot.restore(device.id).is_none_or(|run| run.state != crate::plant::restore::State::Running)
+                }
+                "turn" => !matches!(&self.page, Page::Compare(Compare { source: Source::Device(_), .. })),
+                _ => false,
+            })
+        };
+        // On the page of a device there is no room left for what everybody tries anyway.
+        if !matches!(self.page, Page::List | Page::Device) {
+            let place = hints.iter().position(|hint| hint.key == "⏎").map_or(hints.len(), |enter| enter + 1);
+            hints.insert(place, Hint::new("Esc", "back", "a page back"));
+        }
+        // What the device cannot do is not offered; the help has it all the same.
+        for hint in hints.iter_mut().filter(|hint| lacks(&hint.label)) {
+            hint.label.clear();
+        }
+        hints
+    }
+
+    /// News, or time has passed: the small trend is asked for now and then.
+    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+        let plate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
+        let Some(plate) = plate.filter(|_| self.page == Page::Device) else { return Vec::new() };
+        if !self.errand.due(cx.now, TREND_EVERY, PATIENCE) {
+            return Vec::new();
+        }
+        self.asked = self.asked.wrapping_add(1);
+        self.errand.asked(self.asked, cx.now);
+        let from = cx.now.checked_sub(plate::WINDOW).unwrap_or(cx.now);
+        let question = Question::Series { tags: vec![plate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
+        vec![Act::ask(Tab::Controllers, self.asked, question)]
+    }
+
+    /// The history has answered.
+    pub fn on_answer(&mut self, number: u32, answer: Result<Answer, HistoryError>) {
+        if let (Some(_), Ok(Answer::Series(series))) = (self.errand.answered(number), answer) {
+            self.trend = series.into_iter().next();
+        }
+    }
+
+    /// Words to find, or the name of a set.
+    pub fn on_text(&mut self, cx: &Cx, text: &str) -> Result<Vec<Act>, String> {
+        let text = text.trim();
+        match self.asked_for {
+            Asked::Filter => {
+                let filter = text.to_owned();
+                let table = Table { selected: 0, filter, ..self.table.clone() };
+                if table.rows(cx, self.device).is_empty() {
+                    return Err(format!("no parameter has \"{text}\" in its name or meaning"));
+                }
+                self.table = table;
+                Ok(Vec::new())
+            }
+            Asked::SetName => {
+                parameter_set::check_name(text)?;
+                let there = cx.snapshot.sets.iter().any(|stored| stored.name == text);
+                let command = Command::SaveSet { device: self.device, name: text.into(), replace: there };
+                if !there {
+                    return Ok(vec![Act::Order(command)]);
+                }
+                let words = format!("There is a set {text} already. Replace it?");
+                Ok(vec![Act::Open(Modal::Confirm(Confirm::order(format!("save set {text}"), words, command)))])
+            }
+        }
     }
 
     /// Draws it.
     pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
-        let Some(device) = self.device(cx) else {
+        let Some(device) = cx.def().devices.get(self.device.index()) else {
             canvas.text(1, 1, "this plant has no devices", cx.theme.normal());
             return;
         };
-        self.heading(cx, device, &mut canvas);
-        faceplate_row(cx, device, &mut canvas);
-        let (width, height) = (canvas.width(), canvas.height());
-        let below = self.table(cx, &mut canvas.part(0, 2, width, height.saturating_sub(4)));
-        let (end, bottom) = (width.saturating_sub(1), height.saturating_sub(1));
-        if let Some(tag) = self.selected(cx) {
-            let words = if tag.meaning.is_empty() { &tag.label } else { &tag.meaning };
-            let x = canvas.text(1, bottom.saturating_sub(1), &tag.name, cx.theme.strong());
-            canvas.text(x + 2, bottom.saturating_sub(1), &fit(words, end.saturating_sub(x + 2)), cx.theme.normal());
-        }
-        if let Some((words, trouble)) = last_write(cx, self.device) {
-            canvas.text(
-                1,
-                bottom,
-                &fit_words(&words, end.saturating_sub(12)),
-                if trouble { cx.theme.trouble() } else { cx.theme.dim() },
-            );
-        }
-        if below > 0 {
-            canvas.text_right(end, bottom, &format!("{below} more ▼"), cx.theme.normal());
-        }
-    }
-
-    fn device<'a>(&self, cx: &Cx<'a>) -> Option<&'a DeviceDef> {
-        cx.def().devices.get(self.device.index())
-    }
-
-    fn selected<'a>(&self, cx: &Cx<'a>) -> Option<&'a TagDef> {
-        in_groups(cx, self.device).into_iter().nth(self.selected)
-    }
-
-    fn heading(&self, cx: &Cx, device: &DeviceDef, canvas: &mut Canvas) {
-        let theme = cx.theme;
-        let count = cx.def().devices.len();
-        let x = canvas.text(1, 0, &format!("‹ {} ›", device.name), theme.focus());
-        let line = &cx.def().line(device.line).name;
-        // On a narrow screen whether it answers counts for more than what it is for.
-        let status = cx.snapshot.device(device.id);
-        let least = if status.diagnosis.is_some() { 100 } else { 80 };
-        let title = if canvas.width() < least { String::new() } else { format!("{}  ", device.title) };
-        let words = format!("{}  {title}unit {}  {line}", device.model, device.unit);
-        let x = canvas.text(x + 2, 0, &words, theme.normal());
-        let (mark, style) = match (status.diagnosis, status.state) {
-            (Some(reason), _) => (signal_mark(reason.signal()), theme.trouble()),
-            (None, DeviceState::Answering) => ("✓".to_owned(), theme.normal()),
-            (None, DeviceState::Unknown) => ("?".to_owned(), theme.dim()),
-            (None, DeviceState::Failing(_) | DeviceState::Down { .. }) => ("✗".to_owned(), theme.trouble()),
-        };
-        let words = match status.diagnosis {
-            Some(reason) => format!("{}: {reason}", reason.signal().word()),
-            None => device_words(cx, device.id),
-        };
-        let (end, place) = (canvas.width().saturating_sub(1), format!("{}/{count}", self.device.0 + 1));
-        let room = end.saturating_sub(x + 2 + width(&place) + 1);
-        canvas.text(x + 2, 0, &fit_words(&format!("{mark} {words}"), room), style);
-        canvas.text_right(end, 0, &place, theme.dim());
-    }
-
-    /// Parameters under the names of their groups, the selected one in sight; returns how many rows are out of sight below.
-    fn table(&self, cx: &Cx, canvas: &mut Canvas) -> usize {
-        let theme = cx.theme;
-        let columns = Columns::of(cx, self.device, canvas.width());
-        canvas.text(1, 0, &columns.row(["", "parameter", "value", "", "range", "age", "meaning"]), theme.dim());
-        let mut rows: Vec<Option<(usize, &TagDef)>> = Vec::new();
-        let mut groups: Vec<(usize, &str)> = Vec::new();
-        for (n, tag) in in_groups(cx, self.device).into_iter().enumerate() {
-            if groups.last().is_none_or(|(_, group)| *group != tag.group) {
-                groups.push((rows.len(), &tag.group));
-                rows.push(None);
+        match (&self.page, &device.program) {
+            (Page::List, _) => list::view(cx, &mut canvas, self.device.index()),
+            (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
+            (Page::Device | Page::Program, _) => {
+                device::view(cx, &mut canvas, device, &self.table, self.trend.as_ref())
             }
-            rows.push(Some((n, tag)));
+            (Page::Sets, _) => sets::view(cx, &mut canvas, device, self.set),
+            (Page::Compare(compare), _) => compare.view(cx, &mut canvas, device),
+            (Page::Guide(page, _), _) => guide::view(cx, &mut canvas, *page),
         }
-        let place = rows.iter().position(|row| row.is_some_and(|(n, _)| n == self.selected)).unwrap_or(0);
-        let room = usize::from(canvas.height().saturating_sub(1)).max(1);
-        let first = place.saturating_sub(room / 2).min(rows.len().saturating_sub(room));
-        for (y, (n, row)) in rows.iter().enumerate().skip(first).take(room).enumerate() {
-            let y = y as u16 + 1;
-            match row {
-                Some((place, tag)) => parameter(cx, canvas, y, &columns, tag, *place == self.selected),
-                None => {
-                    let group = groups.iter().find(|(row, _)| *row == n).map_or("", |(_, group)| group);
-                    canvas.text(1, y, group, theme.strong());
-                }
-            }
-        }
-        rows.len().saturating_sub(first + room)
     }
 }
 
-/// The letter of NE 107 with a shape of its own.
-pub fn signal_mark(signal: Signal) -> String {
-    let shape = match signal {
-        Signal::Failure => '✗',
-        Signal::FunctionCheck => '▼',
-        Signal::OutOfSpecification => '?',
-        Signal::Maintenance => '◆',
+/// The window that writes a tag.
+fn write(cx: &Cx, tag: Option<TagId>) -> Vec<Act> {
+    tag.and_then(|tag| Modal::write(cx, tag)).map(Act::Open).into_iter().collect()
+}
+
+/// The question whether to write this value, unless nothing can be written now.
+fn confirm(cx: &Cx, tag: TagId, value: f64) -> Vec<Act> {
+    let device = cx.def().tag(tag).device;
+    let question = || Modal::Confirm(Confirm::write(cx, tag, value));
+    vec![Act::Open(Notice::unreachable(cx, device).map_or_else(question, Modal::Notice))]
+}
+
+/// Auto-tuning at work is stopped, else the window asks which kind is wanted.
+fn tune(cx: &Cx, device: &DeviceDef) -> Vec<Act> {
+    let Some(tune) = device.faceplate.as_ref().and_then(|plate| plate.tune) else {
+        return notice(device, "this device has no auto-tuning");
     };
-    format!("{shape}{}", signal.letter())
+    let on = cx.snapshot.sample(tune).trusted().is_some_and(|value| value != 0.0);
+    if on { confirm(cx, tune, 0.0) } else { write(cx, Some(tune)) }
 }
 
-/// The tags of a device, those of one group together, in the order of the profile.
-fn in_groups<'a>(cx: &Cx<'a>, device: DeviceId) -> Vec<&'a TagDef> {
-    let tags: Vec<&TagDef> = cx.def().tags_of(device).collect();
-    let mut sorted = tags.clone();
-    sorted.sort_by_key(|tag| tags.iter().position(|first| first.group == tag.group));
-    sorted
+fn notice(device: &DeviceDef, words: &str) -> Vec<Act> {
+    vec![Act::Open(Modal::Notice(Notice::new(device.name.clone(), vec![words.to_owned()])))]
 }
 
 /// Closing a line is asked with what it means for everything on it.
@@ -289,102 +465,4 @@ fn connect(cx: &Cx, line: LineId) -> Confirm {
     let words =
         format!("Close line {name}? {} will be read no more, and their alarms cannot be seen.", devices.join(", "));
     Confirm::order(format!("disconnect {name}"), words, Command::Connect(line, false))
-}
-
-fn parameter(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagDef, selected: bool) {
-    let theme = cx.theme;
-    let shown = value::show(cx, tag.id);
-    let text = shown.bare(Columns::VALUE);
-    let old = matches!(tag.poll, Poll::Every(_))
-        && cx.age(tag.id).as_secs() < 60
-        && cx.snapshot.sample(tag.id).quality.is_good();
-    let read = if old || tag.access == Access::Write { String::new() } else { age(cx.age(tag.id)) };
-    let range = range_words(cx, tag.id);
-    // What is only read needs no range; what can be written says that its range is not known.
-    let none = !tag.writable() && tag.labels.is_empty() && cx.snapshot.range(tag.id).is_none();
-    let range = if none { "–".to_owned() } else { range };
-    let range = range.trim_start_matches("range ").trim_end_matches(&shown.unit).trim_end().to_owned();
-    let pen = if tag.writable() { theme.pick("✎", "w") } else { " " };
-    let meaning =
-        if shown.note.is_empty() || cx.snapshot.sample(tag.id).value.is_some() { &tag.meaning } else { &shown.note };
-    let name = format!("{} {}", pad(&tag.short, columns.short), tag.label);
-    let row = columns.row([pen, &name, &text, &shown.unit, &whole(&range, Columns::RANGE), &read, meaning]);
-    canvas.text(1, y, &row, if selected { theme.focus() } else { theme.normal() });
-    if !selected && tag.access != Access::Write && !cx.snapshot.sample(tag.id).quality.is_good() {
-        canvas.text(1 + columns.value_at(), y, &pad_left(&text, Columns::VALUE), shown.style);
-    }
-}
-
-/// `PV 72.4 °C │ SV 70.0 °C │ MV 12.0 % │ PID │ AT off │ RUN`, for devices that have these.
-fn faceplate_row(cx: &Cx, device: &DeviceDef, canvas: &mut Canvas) {
-    let Some(plate) = &device.faceplate else { return };
-    let parts = [
-        ("PV", Some(plate.pv)),
-        ("SV", Some(plate.sv)),
-        ("MV", plate.mv),
-        ("", plate.mode),
-        ("AT", plate.tune),
-        ("", plate.run),
-    ];
-    let mut x = 1;
-    for (name, tag) in parts.into_iter().filter_map(|(name, tag)| Some((name, tag?))) {
-        if x > 1 {
-            x = canvas.text(x, 1, " │ ", cx.theme.dim());
-        }
-        if !name.is_empty() {
-            x = canvas.text(x, 1, name, cx.theme.dim()) + 1;
-        }
-        let shown = value::show(cx, tag);
-        let room = canvas.width().saturating_sub(x);
-        let text = if width(&shown.with_unit()) <= room { shown.with_unit() } else { shown.bare(room) };
-        x = canvas.text(x, 1, &text, shown.style);
-    }
-}
-
-/// The latest write to this device and its outcome, and whether that is a worry.
-fn last_write(cx: &Cx, device: DeviceId) -> Option<(String, bool)> {
-    let to_device = |tag| cx.def().tag(tag).device == device;
-    let order =
-        cx.snapshot.orders.iter().find(|order| order.command.written().is_some_and(|(tag, _)| to_device(tag)))?;
-    let (words, trouble) = outcome_words(&order.outcome);
-    let what = order_words(cx, &order.command, order.old);
-    Some((format!("last: {what}  {words} {} by {}", clock(order.at, &cx.def().time_zone), order.by), trouble))
-}
-
-/// Widths of the columns that depend on device and screen.
-struct Columns {
-    short: u16,
-    name: u16,
-    meaning: u16,
-}
-
-impl Columns {
-    const VALUE: u16 = 10;
-    const UNIT: u16 = 6;
-    const RANGE: u16 = 16;
-    const AGE: u16 = 6;
-
-    fn of(cx: &Cx, device: DeviceId, width: u16) -> Columns {
-        let short = cx.def().tags_of(device).map(|tag| tag.short.chars().count()).max().unwrap_or(0).min(10) as u16;
-        let label = cx.def().tags_of(device).map(|tag| tag.label.chars().count()).max().unwrap_or(0) as u16;
-        let free = width.saturating_sub(3 + Columns::VALUE + Columns::UNIT + Columns::RANGE + Columns::AGE + 5);
-        let name = (short + 1 + label).min(free);
-        Columns { short, name, meaning: free.saturating_sub(name) }
-    }
-    fn value_at(&self) -> u16 {
-        2 + self.name + 1
-    }
-    fn row(&self, [pen, name, value, unit, range, age, meaning]: [&str; 7]) -> String {
-        // The line below the table has the selected meaning in full: a stump of it in the table helps nobody.
-        let meaning = if self.meaning < 12 { "" } else { meaning };
-        format!(
-            "{pen:1} {} {} {} {} {} {}",
-            pad(name, self.name),
-            pad_left(value, Columns::VALUE),
-            pad(unit, Columns::UNIT),
-            pad(range, Columns::RANGE),
-            pad_left(age, Columns::AGE),
-            pad(meaning, self.meaning)
-        )
-    }
 }

@@ -123,7 +123,7 @@ impl Tabs {
             },
             Tab::Trends => act(trends::KEYS, event, |action| self.trends.on_key(cx, action)),
             Tab::Alarms => act(alarms::KEYS, event, |action| self.alarms.on_key(cx, action)),
-            Tab::Controllers => act(controllers::KEYS, event, |action| self.controllers.on_key(cx, action)),
+            Tab::Controllers => self.controllers.on_key(cx, event),
             Tab::Reports => act(reports::KEYS, event, |action| self.reports.on_key(cx, action)),
             Tab::Bus => self.bus.on_key(cx, event),
             Tab::Faults => act(faults::KEYS, event, |action| self.faults.on_key(cx, action)),
@@ -141,11 +141,16 @@ impl Tabs {
                 let all = Hint::new("A", "all", "acknowledge all alarms (asks first)");
                 [ack, all].into_iter().chain(keys::hints(alarms::KEYS)).collect()
             }
-            Tab::Controllers => keys::hints(controllers::KEYS),
+            Tab::Controllers => self.controllers.hints(cx),
             Tab::Reports => keys::hints(reports::KEYS),
             Tab::Bus => self.bus.hints(cx),
             Tab::Faults => self.faults.hints(cx),
         }
+    }
+
+    /// Esc on the shown tab: a step back, `false` where there is none.
+    pub fn back(&mut self, cx: &Cx) -> bool {
+        self.shown == Tab::Controllers && self.controllers.back(cx)
     }
 
     /// News, or time has passed, or the tab was just shown.
@@ -167,7 +172,11 @@ impl Tabs {
             Tab::Mimic => self.mimic.on_answer(cx, id.number, answer),
             Tab::Trends => self.trends.on_answer(cx, id.number, answer),
             Tab::Alarms => self.alarms.on_answer(cx, id.number, answer),
-            Tab::Controllers | Tab::Faults => Vec::new(),
+            Tab::Faults => Vec::new(),
+            Tab::Controllers => {
+                self.controllers.on_answer(id.number, answer);
+                Vec::new()
+            }
             Tab::Bus => {
                 self.bus.on_answer(id.number, answer);
                 Vec::new()
@@ -182,7 +191,8 @@ impl Tabs {
             Tab::Trends => self.trends.on_text(cx, text),
             Tab::Reports => self.reports.on_text(cx, text),
             Tab::Bus => self.bus.on_text(cx, text),
-            Tab::Mimic | Tab::Alarms | Tab::Controllers | Tab::Faults => Ok(Vec::new()),
+            Tab::Controllers => self.controllers.on_text(cx, text),
+            Tab::Mimic | Tab::Alarms | Tab::Faults => Ok(Vec::new()),
         }
     }
 

@@ -71,7 +71,7 @@ fn a_device_that_does_not_answer_is_said_so_before_anything_is_typed() {
     };
     let mut silent = Fixture::normal();
     silent.devices[0].state = DeviceState::Down { since: fixture::now() };
-    for keys in ["s", "4↓⏎", "4f", "4T", "4S"] {
+    for keys in ["s", "4⏎↓⏎", "4⏎f", "4⏎T", "4⏎S"] {
         check(&silent, keys, "TIC-1 is not answering");
     }
     check(&Fixture::line_down(), "r", "PLC-1 is not answering");
@@ -89,13 +89,13 @@ fn a_screen_too_small_to_see_takes_no_orders() {
         screen(&mut model, 50, 10);
         model
     };
-    for keys in ["s65⏎", "r⏎", "m⏎", "A⏎", "4T↓⏎⏎", "4u", "4L⏎", "?", "5w⏎"] {
+    for keys in ["s65⏎", "r⏎", "m⏎", "A⏎", "4⏎T↓⏎⏎", "4u", "4L⏎", "?", "5w⏎"] {
         let mut model = small("");
         let shown = model.tabs.shown;
         assert_eq!(type_keys(&mut model, keys), [], "{keys}");
         assert_eq!((&model.modal, model.tabs.shown), (&None, shown), "{keys}");
     }
-    for keys in ["s65", "r", "A", "4T↓⏎", "?", "→⏎"] {
+    for keys in ["s65", "r", "A", "4⏎T↓⏎", "?", "→⏎"] {
         let mut model = small(keys);
         assert_eq!(model.modal, None, "{keys}: a window that nobody sees is closed");
         assert_eq!(type_keys(&mut model, "⏎"), [], "{keys}");
@@ -334,7 +334,8 @@ fn the_picture_tells_how_a_command_went() {
 
 #[test]
 fn escape_changes_nothing() {
-    for keys in ["s65⎋", "r⎋", "m⎋", "A⎋", "q⎋", "4⏎⎋", "4T↓⏎⎋", "4f⏎⎋", "⎋⎋⎋"] {
+    for keys in ["s65⎋", "r⎋", "m⎋", "A⎋", "q⎋", "4⏎↓⏎⎋", "4⏎T↓⏎⎋", "4⏎f⏎⎋", "⎋⎋⎋"]
+    {
         let mut model = model(&Fixture::alarm(), Theme::FULL);
         let effects = type_keys(&mut model, keys);
         assert!(effects.iter().all(|effect| matches!(effect, Effect::Ask(..))), "{keys}: {effects:?}");
@@ -348,10 +349,13 @@ fn a_toggle_is_asked_and_does_what_it_said() {
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "r");
     assert!(screen(&mut model, 80, 24).contains("old RUN  →  new STOP"));
-    // Meanwhile someone else stops it: the window still writes STOP, not the opposite of what is now.
+    // Meanwhile someone else stops it: the window says so and asks again, and still writes STOP, not the opposite of
+    // what is now.
     let mut later = fixture.clone();
     later.set("PLC-1.RUN", 0.0);
     update(&mut model, Msg::Snapshot(later.snapshot()));
+    assert_eq!(type_keys(&mut model, "⏎"), []);
+    assert!(screen(&mut model, 80, 24).contains("changed meanwhile from RUN to STOP"));
     let effects = type_keys(&mut model, "⏎");
     assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 }));
 }
@@ -369,7 +373,7 @@ fn a_toggle_of_the_unknown_becomes_a_choice() {
 #[test]
 fn a_paste_never_acts() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
-    for window in ["", "r", "?", "q", "4⏎"] {
+    for window in ["", "r", "?", "q", "4⏎⏎"] {
         model.modal = None;
         type_keys(&mut model, window);
         let effects = update(&mut model, Msg::Paste("q\ry\r\n1".to_owned()));

@@ -48,10 +48,10 @@ fn windows_on_top() {
         ("enter_sv", "s6"),
         ("toggle_run", "r"),
         ("faceplate", "→↓⏎"),
-        ("choose_mode", "4↓↓↓↓⏎"),
-        ("confirm_tuning", "4T↓⏎"),
-        ("not_verified", "4↓↓↓↓↓↓↓⏎"),
-        ("actions", "4f⏎"),
+        ("choose_mode", "4⏎↓↓↓↓⏎"),
+        ("confirm_tuning", "4⏎T↓⏎"),
+        ("not_verified", "4⏎↓↓↓↓↓↓↓⏎"),
+        ("actions", "4⏎f⏎"),
         ("acknowledge_all", "A"),
     ] {
         let mut model = model(&Fixture::alarm(), Theme::FULL);
@@ -132,7 +132,9 @@ fn no_size_is_too_small_to_survive() {
                 screen(&mut model, width, height);
             }
         }
-        for keys in ["?", "q", "s", "r", "→⏎", "4⏎", "4f", "4T", "A", "w", "4w", "4c"] {
+        for keys in
+            ["?", "q", "s", "r", "→⏎", "4⏎", "4⏎⏎", "4⏎f", "4⏎T", "A", "w", "4w", "4c", "4⏎s", "4⏎sn", "4⏎g", "4h"]
+        {
             model.modal = None;
             screen(&mut model, 80, 24);
             type_keys(&mut model, keys);
@@ -207,7 +209,7 @@ fn no_screen_is_so_narrow_that_a_number_is_cut() {
 #[test]
 fn what_is_too_narrow_for_all_words_overlaps_none() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
-    model.tabs.shown = Tab::Controllers;
+    type_keys(&mut model, "4⏎");
     let shown = screen(&mut model, 60, 16);
     let heading = shown.lines().nth(4).unwrap_or_default();
     assert!(heading.ends_with(" 1/2") && heading.contains("✓ answering"), "{heading}");
@@ -225,7 +227,7 @@ fn a_device_tells_its_letter_beside_its_name() {
         let mut fixture = Fixture::normal();
         fixture.devices[0].diagnosis = diagnosis;
         let mut model = model(&fixture, Theme::FULL);
-        model.tabs.shown = Tab::Controllers;
+        type_keys(&mut model, "4⏎");
         let shown = screen(&mut model, 120, 40);
         let heading = shown.lines().nth(4).unwrap_or_default();
         assert!(heading.contains(expect), "{heading}");
@@ -244,7 +246,7 @@ fn the_alarms_tab_tells_its_most_important_key() {
 #[test]
 fn what_cannot_be_read_does_not_wait_to_be_read() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
-    type_keys(&mut model, "4f");
+    type_keys(&mut model, "4⏎f");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("now – write only") && !shown.contains("not read"), "{shown}");
 }

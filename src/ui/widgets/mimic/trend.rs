@@ -53,7 +53,7 @@ pub fn view(
 }
 
 /// Two dots a cell across and four down in braille; else one bar a cell in eighths.
-fn curve(canvas: &mut Canvas, series: &Series, (low, high): (f64, f64), glyphs: Glyphs, style: Style) {
+pub fn curve(canvas: &mut Canvas, series: &Series, (low, high): (f64, f64), glyphs: Glyphs, style: Style) {
     let (across, down) = match glyphs {
         Glyphs::Braille => (2, 4),
         Glyphs::Block | Glyphs::Ascii => (1, 8),

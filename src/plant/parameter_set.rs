@@ -1,0 +1,172 @@
+//! Named values of a device's settings: taken from a device, compared with one, and brought into an order of writes.
+
+mod plan;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+
+use super::{
+    def::{DeviceId, PlantDef, TagId},
+    scale,
+    tag::{Bound, Decimals, TagDef},
+};
+
+pub use plan::{Change, Problem, plan};
+
+/// The settings of a device under a name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterSet {
+    /// `winter`; the stem of its file.
+    pub name: String,
+    /// The device that it was taken from.
+    pub device: String,
+    /// The profile of that device: a set fits devices of this profile only.
+    pub profile: String,
+    /// When it was taken.
+    pub saved: Timestamp,
+    /// By whom.
+    pub by: Arc<str>,
+    /// What the values rest on and must be the same in a device that is to take them: tags that choose units.
+    pub given: Vec<SetValue>,
+    /// The settings, in the order of the profile.
+    pub values: Vec<SetValue>,
+    /// Settings that could not be read when it was taken, by short name.
+    pub missing: Vec<String>,
+}
+
+/// A value of a tag, by the tag's short name, in its unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SetValue {
+    /// `SV`.
+    pub tag: String,
+    /// In the tag's unit; the number of an enumeration.
+    pub value: f64,
+}
+
+/// A set as it lies in the station's folder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredSet {
+    /// Its name.
+    pub name: String,
+    /// The set, or what is wrong with its file: one line a problem, with file, line, what was found, what was expected.
+    pub set: Result<Arc<ParameterSet>, Vec<String>>,
+}
+
+/// The values that are trusted now, by tag: a snapshot's or the board's.
+pub type Trusted<'a> = &'a dyn Fn(TagId) -> Option<f64>;
+
+/// Most characters of a name.
+pub const NAME_MAX: usize = 32;
+
+/// A name that can be a file's everywhere: letters, digits, blank, `-` and `_`, not blank at its ends. `Err` says what
+/// is expected.
+pub fn check_name(name: &str) -> Result<(), String> {
+    let plain = |c: char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_');
+    if name.is_empty() {
+        return Err("type a name".to_owned());
+    }
+    if NAME_MAX < name.chars().count() {
+        return Err(format!("at most {NAME_MAX} characters"));
+    }
+    if name.trim() != name || !name.chars().all(plain) {
+        return Err("letters, digits, blanks inside, - and _ only".to_owned());
+    }
+    Ok(())
+}
+
+/// What a device holds now, as a set. Settings that are not known are missing from it, and said to be.
+pub fn take(
+    def: &PlantDef,
+    device: DeviceId,
+    name: &str,
+    by: Arc<str>,
+    at: Timestamp,
+    trusted: Trusted,
+) -> ParameterSet {
+    let (mut values, mut missing, mut given) = (Vec::new(), Vec::new(), Vec::<SetValue>::new());
+    for tag in def.tags_of(device).filter(|tag| tag.in_sets) {
+        let unit = tag.unit_from.as_ref().map(|(from, _)| (def.tag(*from), trusted(*from)));
+        // A number that the profile has no word for cannot be checked when it comes back.
+        let known = |value: &f64| tag.labels.is_empty() || tag.label_of(*value).is_some();
+        match (trusted(tag.id).filter(known), unit) {
+            // A number without its unit is another number.
+            (None, _) | (_, Some((_, None))) => missing.push(tag.short.clone()),
+            (Some(value), unit) => {
+                values.push(SetValue { tag: tag.short.clone(), value });
+                let unit = unit.and_then(|(from, unit)| Some(SetValue { tag: from.short.clone(), value: unit? }));
+                given.extend(unit.filter(|unit| !given.contains(unit)));
+            }
+        }
+    }
+    let device = def.device(device);
+    ParameterSet {
+        name: name.to_owned(),
+        device: device.name.clone(),
+        profile: device.profile.clone(),
+        saved: at,
+        by,
+        given,
+        values,
+        missing,
+    }
+}
+
+/// How a setting of a set stands against a device.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Compared {
+    /// Its short name.
+    pub short: String,
+    /// The tag of the device; `None` where it has none of this name.
+    pub tag: Option<TagId>,
+    /// In the set; `None` where the set has nothing to say.
+    pub set: Option<f64>,
+    /// In the device; `None` where it is not known.
+    pub device: Option<f64>,
+    /// The device would hold the same raw number.
+    pub same: bool,
+}
+
+/// Every setting of the set or the device, in the order of the profile; names that the device does not have stand last.
+pub fn compare(def: &PlantDef, device: DeviceId, set: &ParameterSet, trusted: Trusted) -> Vec<Compared> {
+    let in_set = |short: &str| set.values.iter().find(|value| value.tag == short).map(|value| value.value);
+    let held = def.tags_of(device).filter(|tag| tag.in_sets || in_set(&tag.short).is_some()).map(|tag| {
+        let (wanted, now) = (in_set(&tag.short), trusted(tag.id));
+        let same = wanted.zip(now).is_some_and(|(wanted, now)| same(tag, wanted, now, trusted));
+        Compared { short: tag.short.clone(), tag: Some(tag.id), set: wanted, device: now, same }
+    });
+    let foreign = set.values.iter().filter(|value| def.tags_of(device).all(|tag| tag.short != value.tag));
+    let foreign = foreign.map(|value| Compared {
+        short: value.tag.clone(),
+        tag: None,
+        set: Some(value.value),
+        device: None,
+        same: false,
+    });
+    held.chain(foreign).collect()
+}
+
+/// Would the device hold the same raw number for both?
+fn same(tag: &TagDef, one: f64, other: f64, trusted: Trusted) -> bool {
+    let raw = |value| decimals(tag, trusted).and_then(|decimals| scale::to_raw(tag, value, decimals));
+    raw(one).zip(raw(other)).map_or(one == other, |(one, other)| scale::same_raw(tag.point.kind, one, other))
+}
+
+/// Decimals that the device announces for a tag, as they scale its raw number.
+fn decimals(tag: &TagDef, trusted: Trusted) -> Option<u8> {
+    match tag.decimals {
+        Decimals::Fixed(_) => Some(0),
+        Decimals::From(from) => trusted(from).filter(|n| n.fract() == 0.0 && (0.0..=6.0).contains(n)).map(|n| n as u8),
+    }
+}
+
+/// A bound as a number; `Err` names the tag that is not known.
+fn bound(bound: Option<Bound>, value: impl Fn(TagId) -> Option<f64>) -> Result<Option<f64>, TagId> {
+    match bound {
+        None => Ok(None),
+        Some(Bound::Fixed(value)) => Ok(Some(value)),
+        Some(Bound::From(from)) => value(from).map(Some).ok_or(from),
+    }
+}

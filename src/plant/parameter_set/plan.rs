@@ -1,0 +1,197 @@
+//! The writes that bring a device to a set: only what differs, all limits checked before the first, limits that widen
+//! before the values that need them.
+
+use std::collections::BTreeMap;
+
+use super::{ParameterSet, Trusted, bound, compare, decimals, same};
+use crate::plant::{
+    def::{DeviceId, PlantDef, TagId},
+    scale,
+    tag::{Decimals, TagDef},
+};
+
+/// One write of a plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// What.
+    pub tag: TagId,
+    /// In the device when the plan was made.
+    pub old: f64,
+    /// From the set.
+    pub new: f64,
+}
+
+/// Why a set cannot be written to a device. Nothing is written while there is one.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Problem {
+    /// It was taken from another kind of device.
+    #[error("the set is for {set}, this device is {device}")]
+    OtherProfile {
+        /// The set's profile.
+        set: String,
+        /// The device's.
+        device: String,
+    },
+    /// The device has no such setting.
+    #[error("{0} is no setting of this device")]
+    NoSetting(String),
+    /// What the set rests on is otherwise in the device.
+    #[error("{tag} is {device} in the device, {set} in the set: the values mean something else")]
+    OtherGround {
+        /// Which tag.
+        tag: String,
+        /// In the set.
+        set: String,
+        /// In the device, or `not known`.
+        device: String,
+    },
+    /// A value that must be known is not.
+    #[error("{0} is not known now")]
+    Unknown(String),
+    /// It would change how other values are scaled or what they are measured in.
+    #[error("{0} differs, and other values rest on it: set it by hand first")]
+    Ground(String),
+    /// Outside the limits that the device would then have.
+    #[error("{tag} {value} is outside {min} … {max}")]
+    OutOfRange {
+        /// Which tag.
+        tag: String,
+        /// The value of the set.
+        value: f64,
+        /// `−∞` if none.
+        min: String,
+        /// `∞` if none.
+        max: String,
+    },
+    /// Not one of the values of an enumeration.
+    #[error("{tag} has no value {value}")]
+    NotAChoice {
+        /// Which tag.
+        tag: String,
+        /// The value of the set.
+        value: f64,
+    },
+    /// The limits forbid every order.
+    #[error("{0}: no order of writes keeps within the limits")]
+    NoOrder(String),
+}
+
+/// The writes that bring the device to the set, in an order in which each is within the limits of its moment; or every
+/// reason why not. A setting that is the same is not written; one that is missing in the set stays as it is.
+pub fn plan(
+    def: &PlantDef,
+    device: DeviceId,
+    set: &ParameterSet,
+    trusted: Trusted,
+) -> Result<Vec<Change>, Vec<Problem>> {
+    let own = &def.device(device).profile;
+    if *own != set.profile {
+        return Err(vec![Problem::OtherProfile { set: set.profile.clone(), device: own.clone() }]);
+    }
+    let mut problems = other_ground(def, device, set, trusted);
+    let mut changes = Vec::new();
+    for row in compare(def, device, set, trusted) {
+        let Some(new) = row.set else { continue };
+        let tag = row.tag.map(|tag| def.tag(tag)).filter(|tag| tag.in_sets);
+        match (tag, row.device) {
+            (None, _) => problems.push(Problem::NoSetting(row.short)),
+            (Some(_), _) if row.same => {}
+            // Without the old value nobody can say what is about to change.
+            (Some(_), None) => problems.push(Problem::Unknown(row.short)),
+            (Some(tag), Some(_)) if carries(def, device, tag.id) => problems.push(Problem::Ground(tag.short.clone())),
+            (Some(tag), Some(old)) => changes.push(Change { tag: tag.id, old, new }),
+        }
+    }
+    let after: BTreeMap<TagId, f64> = changes.iter().map(|change| (change.tag, change.new)).collect();
+    let then = |tag: TagId| after.get(&tag).copied().or_else(|| trusted(tag));
+    problems.extend(changes.iter().filter_map(|change| unfit(def, change, &then, trusted)));
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    in_order(def, device, changes, trusted)
+        .map_err(|stuck| stuck.iter().map(|change| Problem::NoOrder(def.tag(change.tag).short.clone())).collect())
+}
+
+/// What the set rests on and the device has otherwise.
+fn other_ground(def: &PlantDef, device: DeviceId, set: &ParameterSet, trusted: Trusted) -> Vec<Problem> {
+    let words = |tag: &TagDef, value: f64| tag.label_of(value).map_or_else(|| value.to_string(), str::to_owned);
+    let wrong = set.given.iter().filter_map(|given| {
+        let Some(tag) = def.tags_of(device).find(|tag| tag.short == given.tag) else {
+            return Some(Problem::NoSetting(given.tag.clone()));
+        };
+        let now = trusted(tag.id);
+        if now.is_some_and(|now| same(tag, given.value, now, trusted)) {
+            return None;
+        }
+        let device = now.map_or_else(|| "not known".to_owned(), |now| words(tag, now));
+        Some(Problem::OtherGround { tag: given.tag.clone(), set: words(tag, given.value), device })
+    });
+    wrong.collect()
+}
+
+/// Do other values get their decimals or their unit from this tag?
+fn carries(def: &PlantDef, device: DeviceId, tag: TagId) -> bool {
+    def.tags_of(device).any(|other| {
+        other.decimals == Decimals::From(tag) || other.unit_from.as_ref().is_some_and(|(from, _)| *from == tag)
+    })
+}
+
+/// Why a value cannot be in the device when all is written.
+fn unfit(def: &PlantDef, change: &Change, then: &dyn Fn(TagId) -> Option<f64>, trusted: Trusted) -> Option<Problem> {
+    let tag = def.tag(change.tag);
+    if !tag.labels.is_empty() && tag.label_of(change.new).is_none() {
+        return Some(Problem::NotAChoice { tag: tag.short.clone(), value: change.new });
+    }
+    let (min, max) = match (bound(tag.min, then), bound(tag.max, then)) {
+        (Ok(min), Ok(max)) => (min, max),
+        (Err(from), _) | (_, Err(from)) => return Some(Problem::Unknown(def.tag(from).short.clone())),
+    };
+    let Some(decimals) = decimals(tag, trusted) else {
+        return Some(Problem::Unknown(format!("the decimals of {}", tag.short)));
+    };
+    let inside = min.is_none_or(|min| min <= change.new) && max.is_none_or(|max| change.new <= max);
+    if inside && scale::to_raw(tag, change.new, decimals).is_some() {
+        return None;
+    }
+    let text = |bound: Option<f64>, none: &str| bound.map_or(none.to_owned(), |bound| bound.to_string());
+    let (min, max) = (text(min, "−∞"), text(max, "∞"));
+    Some(Problem::OutOfRange { tag: tag.short.clone(), value: change.new, min, max })
+}
+
+/// Picks again and again the first change that is possible now. Values that move up wait for the upper limits that move
+/// up before them, and so on: while limits do not bound each other in a ring, one is always possible.
+fn in_order(
+    def: &PlantDef,
+    device: DeviceId,
+    mut left: Vec<Change>,
+    trusted: Trusted,
+) -> Result<Vec<Change>, Vec<Change>> {
+    let mut now: BTreeMap<TagId, f64> = BTreeMap::new();
+    let mut order = Vec::with_capacity(left.len());
+    while !left.is_empty() {
+        let value = |tag: TagId| now.get(&tag).copied().or_else(|| trusted(tag));
+        let own = |change: &Change| inside(def.tag(change.tag), change.new, &value);
+        let kind = |change: &Change| {
+            let then = |tag: TagId| if tag == change.tag { Some(change.new) } else { value(tag) };
+            def.tags_of(device).all(|tag| match trusted(tag.id).and(value(tag.id)) {
+                // A value that was outside before is not this change's doing.
+                Some(held) if tag.id != change.tag => inside(tag, held, &then) || !inside(tag, held, &value),
+                Some(_) | None => true,
+            })
+        };
+        let next = left.iter().position(|change| own(change) && kind(change)).or_else(|| left.iter().position(own));
+        let Some(next) = next else { return Err(left) };
+        let change = left.remove(next);
+        now.insert(change.tag, change.new);
+        order.push(change);
+    }
+    Ok(order)
+}
+
+/// Is the value within the limits as these tags stand? Limits that are not known forbid it.
+fn inside(tag: &TagDef, held: f64, value: &dyn Fn(TagId) -> Option<f64>) -> bool {
+    match (bound(tag.min, value), bound(tag.max, value)) {
+        (Ok(min), Ok(max)) => min.is_none_or(|min| min <= held) && max.is_none_or(|max| held <= max),
+        (Err(_), _) | (_, Err(_)) => false,
+    }
+}

@@ -1,0 +1,145 @@
+//! Sets against a controller whose SV is bounded by limits that are settings themselves.
+
+use jiff::Timestamp;
+use proptest::prelude::*;
+
+use super::*;
+use crate::plant::{
+    fixture,
+    tag::{Access, Kind, Order, Point, Table},
+};
+
+const LOW: TagId = TagId(0);
+const HIGH: TagId = TagId(1);
+const SV: TagId = TagId(2);
+const MODE: TagId = TagId(3);
+const UNIT: TagId = TagId(4);
+const RUN: TagId = TagId(5);
+const TIC: DeviceId = fixture::TIC;
+
+fn def() -> PlantDef {
+    let tag = |id: TagId, short: &str| TagDef {
+        access: Access::ReadWrite,
+        in_sets: true,
+        ..TagDef::new(
+            id,
+            TIC,
+            &format!("TIC-1.{short}"),
+            Point { table: Table::Holding, address: id.0, kind: Kind::I16, order: Order::Abcd, field: None },
+        )
+    };
+    let unit = Some((UNIT, vec![(0, "°C".to_owned()), (1, "°F".to_owned())]));
+    let (low, high) = (Some(Bound::From(LOW)), Some(Bound::From(HIGH)));
+    let tags = vec![
+        TagDef { min: Some(Bound::Fixed(0.0)), max: high, unit_from: unit.clone(), ..tag(LOW, "SV-L") },
+        TagDef { min: low, max: Some(Bound::Fixed(500.0)), ..tag(HIGH, "SV-H") },
+        TagDef { min: low, max: high, ..tag(SV, "SV") },
+        TagDef { labels: vec![(0, "PID".into()), (1, "FUZZY".into())], ..tag(MODE, "CTRL") },
+        TagDef {
+            access: Access::Read,
+            in_sets: false,
+            labels: vec![(0, "°C".into()), (1, "°F".into())],
+            ..tag(UNIT, "P-F")
+        },
+        TagDef { in_sets: false, ..tag(RUN, "RUN") },
+    ];
+    PlantDef { tags, ..fixture::plant() }
+}
+
+/// SV-L, SV-H, SV, CTRL of a device in °C that runs.
+fn device(values: [f64; 4]) -> impl Fn(TagId) -> Option<f64> {
+    move |tag| values.get(tag.index()).copied().or((tag == UNIT || tag == RUN).then_some(0.0))
+}
+
+fn set(values: [f64; 4]) -> ParameterSet {
+    take(&def(), TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &device(values))
+}
+
+fn planned(from: [f64; 4], to: &ParameterSet) -> Result<Vec<(TagId, f64)>, Vec<String>> {
+    let plan = plan(&def(), TIC, to, &device(from));
+    plan.map(|changes| changes.iter().map(|change| (change.tag, change.new)).collect())
+        .map_err(|problems| problems.iter().map(Problem::to_string).collect())
+}
+
+#[test]
+fn limits_that_widen_come_first_and_limits_that_narrow_last() {
+    let check = |from, to, expect: &[(TagId, f64)]| assert_eq!(planned(from, &set(to)), Ok(expect.to_vec()), "{to:?}");
+    check([0., 100., 50., 0.], [0., 100., 50., 0.], &[]);
+    check([0., 100., 50., 0.], [0., 200., 150., 0.], &[(HIGH, 200.), (SV, 150.)]);
+    check([0., 200., 150., 0.], [0., 100., 50., 0.], &[(SV, 50.), (HIGH, 100.)]);
+    check([0., 10., 5., 0.], [200., 300., 250., 1.], &[(HIGH, 300.), (SV, 250.), (LOW, 200.), (MODE, 1.)]);
+    check([200., 300., 250., 1.], [0., 10., 5., 1.], &[(LOW, 0.), (SV, 5.), (HIGH, 10.)]);
+}
+
+#[test]
+fn what_cannot_be_written_is_told_before_anything_is() {
+    let check = |set: &ParameterSet, expect: &[&str]| {
+        let expect: Vec<String> = expect.iter().map(|words| (*words).to_owned()).collect();
+        assert_eq!(planned([0., 100., 50., 0.], set), Err(expect));
+    };
+    let good = set([0., 100., 60., 0.]);
+    let with = |tag: &str, value| {
+        let mut set = good.clone();
+        set.values.retain(|held| held.tag != tag);
+        set.values.push(SetValue { tag: tag.to_owned(), value });
+        set
+    };
+    check(&with("SV", 101.), &["SV 101 is outside 0 … 100"]);
+    check(&with("SV-H", 600.), &["SV-H 600 is outside 0 … 500"]);
+    check(&with("CTRL", 7.), &["CTRL has no value 7"]);
+    check(&with("RUN", 1.), &["RUN is no setting of this device"]);
+    check(&with("NOPE", 1.), &["NOPE is no setting of this device"]);
+    let fahrenheit = ParameterSet { given: vec![SetValue { tag: "P-F".into(), value: 1.0 }], ..good.clone() };
+    check(&fahrenheit, &["P-F is °C in the device, °F in the set: the values mean something else"]);
+    let foreign = ParameterSet { profile: "other".into(), ..good.clone() };
+    check(&foreign, &["the set is for other, this device is fixture"]);
+    // A limit that is not known cannot be kept.
+    let blind = |tag: TagId| device([0., 100., 50., 0.])(tag).filter(|_| tag != HIGH);
+    let problems = plan(&def(), TIC, &ParameterSet { values: vec![good.values[2].clone()], ..good }, &blind);
+    assert_eq!(problems, Err(vec![Problem::Unknown("SV-H".into())]));
+}
+
+#[test]
+fn a_set_holds_what_is_known_and_names_what_is_not() {
+    let trusted = |tag: TagId| device([0., 100., 50., 0.])(tag).filter(|_| tag != SV);
+    let set = take(&def(), TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &trusted);
+    let names: Vec<&str> = set.values.iter().map(|value| value.tag.as_str()).collect();
+    assert_eq!((names, set.missing), (vec!["SV-L", "SV-H", "CTRL"], vec!["SV".to_owned()]));
+    // Without the unit a number means nothing: only what has no such unit is kept.
+    let trusted = |tag: TagId| device([0., 100., 50., 0.])(tag).filter(|_| tag != UNIT);
+    let set = take(&def(), TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &trusted);
+    assert_eq!((set.missing, set.given), (vec!["SV-L".to_owned()], Vec::new()));
+}
+
+#[test]
+fn a_name_can_be_a_file() {
+    for good in ["winter", "Winter 2", "a-b_c", "ฤดูหนาว"] {
+        assert_eq!(check_name(good), Ok(()), "{good}");
+    }
+    for bad in ["", " x", "x ", "../x", "a/b", "a.b", "a\nb", &"x".repeat(33)] {
+        assert!(check_name(bad).is_err(), "{bad}");
+    }
+}
+
+fn held() -> impl Strategy<Value = [f64; 4]> {
+    (0..=500i32, 0..=500i32, 0..=500i32, 0..2i32).prop_map(|(a, b, c, mode)| {
+        let mut sorted = [a, b, c];
+        sorted.sort_unstable();
+        [sorted[0], sorted[2], sorted[1], mode].map(f64::from)
+    })
+}
+
+proptest! {
+    #[test]
+    fn every_step_of_a_plan_keeps_within_the_limits_of_its_moment(from in held(), to in held()) {
+        let plan = plan(&def(), TIC, &set(to), &device(from)).map_err(|problems| TestCaseError::fail(format!("{problems:?}")))?;
+        let mut now = from;
+        for change in &plan {
+            prop_assert_eq!(now[change.tag.index()], change.old);
+            prop_assert_ne!(change.old, change.new);
+            now[change.tag.index()] = change.new;
+            prop_assert!(now[0] <= now[2] && now[2] <= now[1], "{:?} after {:?}", now, change);
+        }
+        prop_assert_eq!(now, to);
+    }
+}

@@ -1,0 +1,177 @@
+//! Parameter sets of devices: taken, kept by the station, written back one verified write at a time.
+
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+
+use super::{Effects, Plant};
+use crate::plant::{
+    board::Board,
+    command::{Command, Order, OrderId, Outcome, Refusal},
+    def::TagId,
+    parameter_set::{self, Problem, StoredSet},
+    record::{ActionRecord, Record},
+    restore::{Restore, RestoreWish, State},
+};
+
+/// The terminal number of writes that the plant itself orders for somebody; terminals count from 1.
+const PLANT: u32 = 0;
+
+/// What the station is asked to do with the folder of sets. Whatever it was, the folder is read anew.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SetWork {
+    /// Nothing else.
+    Read,
+    /// Write a set; answered by [`Plant::on_set_written`].
+    Write {
+        /// For whom.
+        order: OrderId,
+        /// What.
+        set: Box<parameter_set::ParameterSet>,
+        /// A set of this name may be there already.
+        replace: bool,
+    },
+}
+
+impl Plant {
+    /// Takes an order about sets; others are not for this place.
+    pub(super) fn set_order(&mut self, order: &Order, at: Timestamp, effects: &mut Effects) -> Option<ActionRecord> {
+        match &order.command {
+            Command::ReadSets => {
+                effects.sets = Some(SetWork::Read);
+                // Looking is not a deed.
+                let _ = self.desk.note(order, Outcome::Verified, &self.board, at);
+                None
+            }
+            Command::SaveSet { device, name, replace } => {
+                let trusted = trusted(&self.board);
+                let set = parameter_set::take(&self.def, *device, name, order.by.clone(), at, &trusted);
+                let problem = match parameter_set::check_name(name) {
+                    Err(why) => Some(why),
+                    Ok(()) if set.values.is_empty() => Some("no setting of the device is known now".to_owned()),
+                    Ok(()) => None,
+                };
+                if let Some(why) = problem {
+                    return self.desk.note(order, Outcome::Refused(Refusal::NotSaved(why)), &self.board, at);
+                }
+                self.desk.take(order, at);
+                effects.sets = Some(SetWork::Write { order: order.id, set: Box::new(set), replace: *replace });
+                None
+            }
+            Command::Restore(wish) => self.begin_restore(order, wish, at),
+            Command::StopRestore(device) => {
+                let running = self.restores.iter_mut().find(|run| run.device == *device && run.state == State::Running);
+                let outcome = match running {
+                    Some(run) => {
+                        Arc::make_mut(run).stopping = true;
+                        Outcome::Verified
+                    }
+                    None => Outcome::Unchanged,
+                };
+                self.desk.note(order, outcome, &self.board, at)
+            }
+            _ => None,
+        }
+    }
+
+    /// What lies in the folder of sets.
+    pub fn on_sets(&mut self, sets: Vec<StoredSet>) {
+        self.sets = Arc::new(sets);
+    }
+
+    /// A set was written into the folder, or not, with the reason.
+    pub fn on_set_written(&mut self, order: OrderId, result: Result<(), String>) -> Effects {
+        let outcome = match result {
+            Ok(()) => Outcome::Verified,
+            Err(why) => Outcome::Refused(Refusal::NotSaved(why)),
+        };
+        let action = self.desk.end(order, outcome, &self.board);
+        Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
+    }
+
+    fn begin_restore(&mut self, order: &Order, wish: &RestoreWish, at: Timestamp) -> Option<ActionRecord> {
+        let plan = parameter_set::plan(&self.def, wish.device, &wish.set, &trusted(&self.board));
+        let running = self.restores.iter().any(|run| run.device == wish.device && run.state == State::Running);
+        let refusal = match plan {
+            _ if running => Some(Refusal::UnderWay),
+            Err(problems) => Some(Refusal::NotFit(first_of(&problems))),
+            Ok(changes) if changes != wish.changes => Some(Refusal::Changed),
+            Ok(changes) if changes.is_empty() => {
+                return self.desk.note(order, Outcome::Unchanged, &self.board, at);
+            }
+            Ok(_) => None,
+        };
+        if let Some(refusal) = refusal {
+            return self.desk.note(order, Outcome::Refused(refusal), &self.board, at);
+        }
+        self.desk.take(order, at);
+        self.restores.retain(|run| run.device != wish.device);
+        self.restores.push(Arc::new(Restore::new(order.id, order.by.clone(), wish, at)));
+        None
+    }
+
+    /// Lets every restore go on: takes the end of its write, orders the next, or ends it.
+    pub(super) fn carry_on(&mut self, at: Timestamp, effects: &mut Effects) {
+        for place in 0..self.restores.len() {
+            if self.restores[place].state == State::Running {
+                let mut run = (*self.restores[place]).clone();
+                self.go_on(&mut run, at, effects);
+                if run != *self.restores[place] {
+                    self.restores[place] = Arc::new(run);
+                }
+            }
+        }
+    }
+
+    /// Each turn of the loop ends a write, begins one, or leaves; a restore has a finite number of writes.
+    fn go_on(&mut self, run: &mut Restore, at: Timestamp, effects: &mut Effects) {
+        loop {
+            if let Some(order) = run.current() {
+                match self.desk.outcome_of(order) {
+                    Some(Outcome::Pending) => return,
+                    Some(ended) => run.take(ended.clone()),
+                    // It cannot be followed any more, so nobody can say that it was written.
+                    None => run.take(Outcome::Failed(crate::plant::event::Fault::Timeout)),
+                }
+            }
+            let (by, numbers) = (run.by.clone(), &mut self.numbers);
+            let Some(step) = run.begin_next() else { break };
+            *numbers = numbers.wrapping_add(1);
+            let id = OrderId { terminal: PLANT, number: *numbers };
+            step.order = Some(id);
+            let (tag, value) = (step.change.tag, step.change.new);
+            let order = Order { id, by, command: Command::Write { tag, value } };
+            match self.desk.write(&self.board, &order, tag, value, at) {
+                Ok(request) => effects.bus.push((self.line_of(tag), request)),
+                Err(action) => effects.records.extend(action.map(Record::Action)),
+            }
+        }
+        if let Some(outcome) = run.outcome(&self.def) {
+            let action = self.desk.end(run.id, outcome, &self.board);
+            effects.records.extend(action.map(Record::Action));
+        }
+    }
+
+    /// The restore of a device, at work or the last one.
+    #[cfg(test)]
+    fn restore_of(&self, device: crate::plant::def::DeviceId) -> Option<&Restore> {
+        self.restores.iter().find(|run| run.device == device).map(Arc::as_ref)
+    }
+}
+
+/// What is trusted now.
+fn trusted(board: &Board) -> impl Fn(TagId) -> Option<f64> + '_ {
+    |tag| board.sample(tag).trusted()
+}
+
+/// The first reason in words, and how many more there are.
+fn first_of(problems: &[Problem]) -> String {
+    let first = problems.first().map_or(String::new(), Problem::to_string);
+    match problems.len() {
+        0 | 1 => first,
+        count => format!("{first}, and {} more", count - 1),
+    }
+}

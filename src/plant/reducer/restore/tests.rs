@@ -1,0 +1,208 @@
+//! Restores as an operator sees them: in order, stopped by the first failure, and never over another's head.
+
+use super::*;
+use crate::plant::{
+    command::BusRequest,
+    def::{DeviceId, PlantDef},
+    event::{Event, Fault, WriteResult},
+    fixture::{self, DP, FAULT, SV, TIC},
+    parameter_set::{ParameterSet, SetValue, plan},
+    tag::{Access, Bound, Kind, Order as Bytes, Point, Table, TagDef},
+};
+
+const HIGH: TagId = TagId(5);
+
+fn at(second: i64) -> Timestamp {
+    Timestamp::from_second(second).expect("a small number")
+}
+
+fn def() -> PlantDef {
+    let mut def = fixture::plant();
+    let point = Point { table: Table::Holding, address: 1030, kind: Kind::I16, order: Bytes::Abcd, field: None };
+    def.tags.push(TagDef {
+        access: Access::ReadWrite,
+        in_sets: true,
+        max: Some(Bound::Fixed(500.0)),
+        ..TagDef::new(HIGH, TIC, "TIC-1.SV-H", point)
+    });
+    let sv = &mut def.tags[SV.index()];
+    (sv.in_sets, sv.max) = (true, Some(Bound::From(HIGH)));
+    def
+}
+
+/// SV 50.0 °C, at most 100.
+fn plant() -> Plant {
+    let mut plant = Plant::new(Arc::new(def()), at(0), 1.0);
+    read(&mut plant, 500.0, 100.0);
+    plant
+}
+
+fn read(plant: &mut Plant, sv: f64, high: f64) {
+    let values = vec![(SV, sv), (DP, 1.0), (FAULT, 0.0), (HIGH, high)];
+    let reply = std::time::Duration::from_millis(12);
+    plant.on_event(Event::Read { at: at(0), device: TIC, values, texts: Vec::new(), reply, exchange: None });
+}
+
+fn set(sv: f64, high: f64) -> Arc<ParameterSet> {
+    let value = |tag: &str, value| SetValue { tag: tag.to_owned(), value };
+    Arc::new(ParameterSet {
+        name: "winter".into(),
+        device: "TIC-1".into(),
+        profile: "fixture".into(),
+        saved: at(0),
+        by: "anna".into(),
+        given: Vec::new(),
+        values: vec![value("SV", sv), value("SV-H", high)],
+        missing: Vec::new(),
+    })
+}
+
+fn wish(plant: &Plant, set: Arc<ParameterSet>) -> RestoreWish {
+    let changes = plan(&plant.def, TIC, &set, &trusted(&plant.board)).expect("a set that fits");
+    RestoreWish { device: TIC, from: "winter".into(), set, changes }
+}
+
+fn order(plant: &mut Plant, number: u32, command: Command) -> Effects {
+    plant.on_order(Order { id: OrderId { terminal: 1, number }, by: "anna".into(), command }, at(1))
+}
+
+fn outcome(plant: &Plant, number: u32) -> Option<Outcome> {
+    plant.desk.outcome_of(OrderId { terminal: 1, number }).cloned()
+}
+
+/// The tags and raw numbers that went to the bus.
+fn written(effects: &Effects) -> Vec<(TagId, f64)> {
+    let write = |(_, request): &(_, BusRequest)| match request {
+        BusRequest::Write { tag, raw, .. } => Some((*tag, *raw)),
+        _ => None,
+    };
+    effects.bus.iter().filter_map(write).collect()
+}
+
+/// The write under way ends; what follows from it. As on the bus, what was read back is told before the end.
+fn end(plant: &mut Plant, effects: &Effects, result: fn(f64) -> WriteResult) -> Effects {
+    let (id, tag, raw) = effects
+        .bus
+        .iter()
+        .find_map(|(_, request)| match request {
+            BusRequest::Write { id, tag, raw, .. } => Some((*id, *tag, *raw)),
+            _ => None,
+        })
+        .expect("a write is under way");
+    if let WriteResult::ReadBack(back) = result(raw) {
+        let reply = std::time::Duration::from_millis(12);
+        plant.on_event(Event::Read {
+            at: at(2),
+            device: TIC,
+            values: vec![(tag, back)],
+            texts: Vec::new(),
+            reply,
+            exchange: None,
+        });
+    }
+    plant.on_event(Event::Wrote { at: at(2), id, result: result(raw) })
+}
+
+fn deeds(effects: &Effects) -> Vec<String> {
+    let deed = |record: &Record| match record {
+        Record::Action(deed) => Some(format!("{} {} {} {}", deed.by, deed.action, deed.target, deed.outcome)),
+        Record::Sample(..) | Record::Alarm(_) | Record::Line(_) => None,
+    };
+    effects.records.iter().filter_map(deed).collect()
+}
+
+#[test]
+fn one_write_after_the_other_each_on_record_and_then_the_whole() {
+    let mut plant = plant();
+    let wish = wish(&plant, set(150.0, 200.0));
+    let first = order(&mut plant, 1, Command::Restore(Box::new(wish)));
+    assert_eq!(written(&first), [(HIGH, 200.0)], "the limit first, and nothing else yet");
+    let second = end(&mut plant, &first, WriteResult::ReadBack);
+    assert_eq!(deeds(&second), ["anna write TIC-1.SV-H verified"]);
+    assert_eq!(written(&second), [(SV, 1500.0)]);
+    assert_eq!(outcome(&plant, 1), Some(Outcome::Pending));
+    let last = end(&mut plant, &second, WriteResult::ReadBack);
+    assert_eq!(deeds(&last), ["anna write TIC-1.SV verified", "anna restore set TIC-1 verified"]);
+    assert_eq!(plant.restore_of(TIC).map(|run| (run.state, run.done())), Some((State::Done, 2)));
+}
+
+#[test]
+fn the_first_failure_stops_it_and_says_what_was_written() {
+    let mut plant = plant();
+    let wish = wish(&plant, set(40.0, 80.0));
+    let first = order(&mut plant, 1, Command::Restore(Box::new(wish)));
+    assert_eq!(written(&first), [(SV, 400.0)]);
+    let second = end(&mut plant, &first, WriteResult::ReadBack);
+    assert_eq!(written(&second), [(HIGH, 80.0)]);
+    let last = end(&mut plant, &second, |_| WriteResult::Lost(Fault::Timeout));
+    assert_eq!(
+        outcome(&plant, 1).map(|o| crate::plant::orders::outcome_words(&o)).as_deref(),
+        Some("not confirmed: 1 of 2 written, then SV-H failed")
+    );
+    assert_eq!(deeds(&last).len(), 2, "the write and the whole: {:?}", deeds(&last));
+    assert_eq!(plant.restore_of(TIC).map(|run| run.state), Some(State::Failed));
+}
+
+#[test]
+fn a_device_that_has_changed_since_is_not_written() {
+    let mut plant = plant();
+    let wish = wish(&plant, set(40.0, 80.0));
+    read(&mut plant, 610.0, 100.0);
+    let effects = order(&mut plant, 1, Command::Restore(Box::new(wish)));
+    assert_eq!((written(&effects), outcome(&plant, 1)), (vec![], Some(Outcome::Refused(Refusal::Changed))));
+}
+
+#[test]
+fn limits_are_checked_in_the_station_whatever_a_terminal_sends() {
+    let mut plant = plant();
+    let wish = RestoreWish { changes: Vec::new(), ..wish(&plant, set(50.0, 100.0)) };
+    let too_high = RestoreWish { set: set(600.0, 100.0), ..wish.clone() };
+    let effects = order(&mut plant, 1, Command::Restore(Box::new(too_high)));
+    let why = "SV 600 is outside −∞ … 100";
+    let refused = |why: &str| Some(Outcome::Refused(Refusal::NotFit(why.to_owned())));
+    let min = plant.def.tag(SV).min;
+    assert_eq!(min, Some(Bound::Fixed(0.0)));
+    assert_eq!((written(&effects), outcome(&plant, 1)), (vec![], refused(&why.replace("−∞", "0"))));
+    order(&mut plant, 2, Command::Restore(Box::new(wish)));
+    assert_eq!(outcome(&plant, 2), Some(Outcome::Unchanged));
+}
+
+#[test]
+fn an_operator_stops_it_between_two_writes_and_two_never_run_at_once() {
+    let mut plant = plant();
+    let wish = wish(&plant, set(40.0, 80.0));
+    let first = order(&mut plant, 1, Command::Restore(Box::new(wish.clone())));
+    order(&mut plant, 2, Command::Restore(Box::new(wish)));
+    assert_eq!(outcome(&plant, 2), Some(Outcome::Refused(Refusal::UnderWay)));
+    order(&mut plant, 3, Command::StopRestore(TIC));
+    let rest = end(&mut plant, &first, WriteResult::ReadBack);
+    assert_eq!(written(&rest), []);
+    assert_eq!(plant.restore_of(TIC).map(|run| (run.state, run.done())), Some((State::Stopped, 1)));
+    order(&mut plant, 4, Command::StopRestore(TIC));
+    assert_eq!(outcome(&plant, 4), Some(Outcome::Unchanged));
+}
+
+#[test]
+fn a_line_too_busy_ends_it_without_effect() {
+    let mut plant = plant();
+    let wish = wish(&plant, set(40.0, 100.0));
+    let first = order(&mut plant, 1, Command::Restore(Box::new(wish)));
+    let (line, request) = first.bus.into_iter().next().expect("a write");
+    plant.on_undeliverable(line, &request);
+    assert_eq!(outcome(&plant, 1), Some(Outcome::Refused(Refusal::Busy)));
+}
+
+#[test]
+fn a_set_is_taken_with_what_is_known_and_saving_it_is_on_record() {
+    let mut plant = plant();
+    let name: Arc<str> = "winter".into();
+    let save = Command::SaveSet { device: DeviceId(0), name, replace: false };
+    let effects = order(&mut plant, 1, save);
+    let Some(SetWork::Write { set, replace: false, .. }) = effects.sets else { panic!("{:?}", effects.sets) };
+    assert_eq!((set.values.len(), set.missing.len()), (2, 0));
+    let id = OrderId { terminal: 1, number: 1 };
+    let done = plant.on_set_written(id, Err("the disk is full".into()));
+    assert_eq!(deeds(&done), ["anna save set TIC-1 refused: not saved: the disk is full"]);
+    let bad = Command::SaveSet { device: DeviceId(0), name: "../x".into(), replace: false };
+    assert_eq!(order(&mut plant, 2, bad).sets, None, "no path leaves the folder");
+}

@@ -1,0 +1,190 @@
+//! The file of a parameter set: written to be read by people, and checked like a profile when it is read.
+
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+
+use super::{
+    diagnostic::Problems,
+    names::number_of,
+    reader::{self, At, Choice, Node, Raw, Value, table, text},
+};
+use crate::plant::{
+    def::PlantDef,
+    parameter_set::{ParameterSet, SetValue},
+    tag::TagDef,
+};
+
+table!(
+    /// The file of a parameter set.
+    SetTable, "the parameter set" {
+        need "device" device: String,
+        need "profile" profile: String,
+        need "saved" saved: Moment,
+        need "by" by: String,
+        list "missing" missing: String,
+        opt "given" given: Raw,
+        need "values" values: Raw,
+    }
+);
+
+/// An instant, as TOML or RFC 3339 writes it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moment(Timestamp);
+
+impl Value for Moment {
+    fn read(value: &Node, at: super::diagnostic::Span, problems: &mut Problems) -> Option<Self> {
+        let parsed = match value {
+            Node::Text(text) | Node::Time(text) => text.parse().ok(),
+            Node::Whole(_) | Node::Number(_) | Node::Flag(_) | Node::Array(_) | Node::Table(_) => None,
+        };
+        if parsed.is_none() {
+            problems.add(at, "this is not an instant").label("expected 2026-11-21T07:02:31Z");
+        }
+        parsed.map(Moment)
+    }
+}
+
+/// The text of a set. Units and labels stand beside the values as comments.
+pub fn text_of_set(set: &ParameterSet, def: &PlantDef) -> String {
+    let tags = tags_of(def, &set.profile);
+    let find = |short: &str| tags.iter().find(|tag| tag.short == short).copied();
+    let mut out =
+        String::from("# A parameter set of sightglass. Values are in the units of the comments beside them.\n");
+    let rows = [("device", &set.device), ("profile", &set.profile)];
+    out.extend(rows.map(|(key, words)| format!("{key} = {}\n", quoted(words))));
+    out.push_str(&format!("saved = {}\nby = {}\n", set.saved, quoted(&set.by)));
+    if !set.missing.is_empty() {
+        let names: Vec<String> = set.missing.iter().map(|name| quoted(name)).collect();
+        out.push_str("# Could not be read when the set was saved, and is left alone when it is restored.\n");
+        out.push_str(&format!("missing = [{}]\n", names.join(", ")));
+    }
+    if !set.given.is_empty() {
+        out.push_str(
+            "\n# Must be the same in a device that takes this set, else the values mean something else.\n[given]\n",
+        );
+        out.extend(set.given.iter().map(|value| row(value, find(&value.tag), "")));
+    }
+    out.push_str("\n[values]\n");
+    for value in &set.values {
+        let tag = find(&value.tag);
+        let unit = tag.map_or(String::new(), |tag| unit_of(tag, set, &tags));
+        out.push_str(&row(value, tag, &unit));
+    }
+    out
+}
+
+/// Reads a set that is called `name`. `Err` has one line a problem: file, line, column, what was found, what was
+/// expected.
+pub fn read_set(name: &str, file: &str, bytes: &[u8], def: &PlantDef) -> Result<ParameterSet, Vec<String>> {
+    let mut problems = Problems::default();
+    let read = reader::parse(file, bytes, &mut problems)
+        .map(|raw| SetTable::of(&[raw], &mut problems))
+        .and_then(|table| set_of(name, &table, def, &mut problems));
+    match problems.finish(read) {
+        Ok(Some(set)) => Ok(set),
+        Ok(None) => Err(vec![format!("{file} holds no set")]),
+        Err(errors) => Err(errors.full_lines().collect()),
+    }
+}
+
+fn set_of(name: &str, table: &SetTable, def: &PlantDef, problems: &mut Problems) -> Option<ParameterSet> {
+    let profile = table.profile.as_ref()?;
+    let tags = tags_of(def, &profile.value);
+    if tags.is_empty() {
+        let known = def.devices.iter().map(|device| device.profile.as_str());
+        let problem = problems.add(profile.at, format!("no device of this plant has the profile `{}`", profile.value));
+        problem.label("expected the profile of a device").suggest(&profile.value, known);
+        return None;
+    }
+    let values = values(table.values.as_ref()?, &tags, true, problems);
+    let given = table.given.as_ref().map_or(Vec::new(), |given| values_of_given(given, &tags, problems));
+    Some(ParameterSet {
+        name: name.to_owned(),
+        device: text(&table.device),
+        profile: profile.value.clone(),
+        saved: table.saved?.value.0,
+        by: Arc::from(text(&table.by)),
+        given,
+        values,
+        missing: table.missing.iter().map(|name| name.value.clone()).collect(),
+    })
+}
+
+fn values_of_given(given: &At<Raw>, tags: &[&TagDef], problems: &mut Problems) -> Vec<SetValue> {
+    values(given, tags, false, problems)
+}
+
+/// The rows of a table of values, in the order of the profile.
+fn values(table: &At<Raw>, tags: &[&TagDef], settings: bool, problems: &mut Problems) -> Vec<SetValue> {
+    let mut found = Vec::new();
+    for (short, (at, node)) in &table.value.table {
+        let Some(place) = tags.iter().position(|tag| tag.short == *short) else {
+            let problem = problems.add(*at, format!("unknown setting `{short}`"));
+            problem.label("expected a setting of the device").suggest(short, tags.iter().map(|tag| tag.short.as_str()));
+            continue;
+        };
+        if settings && !tags[place].in_sets {
+            let problem = problems.add(*at, format!("`{short}` is no setting"));
+            problem.label("expected a setting, not a command or a measurement: leave it out");
+            continue;
+        }
+        let Some(value) = Choice::read(&node.value, node.at, problems) else { continue };
+        let value = number_of(&At { value, at: node.at }, tags[place], problems);
+        found.extend(value.map(|value| (place, SetValue { tag: short.clone(), value })));
+    }
+    found.sort_by_key(|(place, _)| *place);
+    found.into_iter().map(|(_, value)| value).collect()
+}
+
+/// The tags of the first device of a profile: all devices of a profile have the same names.
+fn tags_of<'a>(def: &'a PlantDef, profile: &str) -> Vec<&'a TagDef> {
+    let device = def.devices.iter().find(|device| device.profile == profile);
+    device.map_or(Vec::new(), |device| def.tags_of(device.id).collect())
+}
+
+/// The unit that the set's own ground gives a tag.
+fn unit_of(tag: &TagDef, set: &ParameterSet, tags: &[&TagDef]) -> String {
+    let Some((from, units)) = &tag.unit_from else { return tag.unit.clone() };
+    let from = tags.iter().find(|tag| tag.id == *from);
+    let given = from.and_then(|from| set.given.iter().find(|given| given.tag == from.short));
+    let unit = given.and_then(|given| units.iter().find(|(number, _)| *number as f64 == given.value));
+    unit.map_or(String::new(), |(_, unit)| unit.clone())
+}
+
+/// `SV = 70   # °C, set value`.
+fn row(value: &SetValue, tag: Option<&TagDef>, unit: &str) -> String {
+    let label = tag.and_then(|tag| tag.label_of(value.value));
+    // A label that two numbers share would come back as the first of them.
+    let label =
+        label.filter(|label| tag.is_some_and(|tag| tag.labels.iter().filter(|(_, other)| other == label).count() == 1));
+    let written = label.map_or_else(|| number(value.value), quoted);
+    let bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    let key = if value.tag.chars().all(bare) && !value.tag.is_empty() { value.tag.clone() } else { quoted(&value.tag) };
+    let words = tag.map_or("", |tag| tag.label.as_str());
+    let note = [unit, words].into_iter().filter(|words| !words.is_empty()).collect::<Vec<_>>().join(", ");
+    let note: String = note.chars().filter(|c| !c.is_control()).collect();
+    format!("{:<24}# {note}", format!("{key} = {written}")).trim_end_matches("# ").trim_end().to_owned() + "\n"
+}
+
+/// A number that TOML reads back as the same one.
+fn number(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < 1e15 { format!("{value:.0}") } else { format!("{value:?}") }
+}
+
+/// A TOML string.
+fn quoted(text: &str) -> String {
+    let mut out = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => out.extend(['\\', c]),
+            c if c.is_control() => out.push_str(&format!("\\u{:04X}", u32::from(c))),
+            c => out.push(c),
+        }
+    }
+    out.push('"');
+    out
+}

@@ -1,0 +1,98 @@
+//! Set files: what is written is read back, and what a person has spoiled is told with its place.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::{
+    plant::parameter_set,
+    profile::{Search, load},
+};
+
+fn tank() -> Arc<PlantDef> {
+    load(std::path::Path::new("tank"), &Search::shipped()).expect("the shipped plant loads")
+}
+
+fn winter(def: &PlantDef) -> ParameterSet {
+    let device = def.devices.iter().find(|device| device.profile == "fuji_pxr").expect("the tank has a PXR");
+    let value = |tag: crate::plant::def::TagId| match def.tag(tag).short.as_str() {
+        "P" => None,
+        "SV" => Some(70.5),
+        "CTRL" => Some(1.0),
+        "P-F" | "P-DP" | "PTN" => Some(0.0),
+        _ => Some(12.0),
+    };
+    parameter_set::take(def, device.id, "winter", "anna \"boss\" \\".into(), Timestamp::UNIX_EPOCH, &value)
+}
+
+#[test]
+fn a_set_is_readable_and_comes_back_as_it_was() {
+    let def = tank();
+    let set = winter(&def);
+    let text = text_of_set(&set, &def);
+    for line in [
+        "device = \"TIC-1\"",
+        "saved = 1970-01-01T00:00:00Z",
+        "missing = [\"P\"]",
+        "P-F = \"°C\"",
+        "SV = 70.5",
+        "CTRL = \"FUZZY\"",
+        "I = 12                  # s, integral time",
+    ] {
+        assert!(text.contains(line), "{line} in\n{text}");
+    }
+    for command in ["FIX", "AT =", "STBY", "PROG ="] {
+        assert!(!text.contains(command), "{command} is a command, no setting:\n{text}");
+    }
+    assert_eq!(read_set("winter", "winter.toml", text.as_bytes(), &def), Ok(set));
+}
+
+#[test]
+fn a_spoiled_file_tells_line_found_and_expected() {
+    let def = tank();
+    let head = "device = \"TIC-1\"\nprofile = \"fuji_pxr\"\nsaved = 1970-01-01T00:00:00Z\nby = \"anna\"\n[values]\n";
+    let check = |text: &str, expect: &[&str]| {
+        let problems = read_set("winter", "winter.toml", text.as_bytes(), &def).expect_err(text);
+        for words in expect {
+            assert!(problems.iter().any(|problem| problem.contains(words)), "{words} in {problems:#?}");
+        }
+    };
+    check(
+        &format!("{head}SV = \"hot\"\n"),
+        &["winter.toml:6:6: `hot` is not a state of TIC-1.SV", "expected a number"],
+    );
+    check(&format!("{head}SW = 70\n"), &["winter.toml:6:1: unknown setting `SW`", "did you mean `SV`?"]);
+    check(
+        &format!("{head}FIX = 1\nAT = 1\n"),
+        &["winter.toml:6:1: `FIX` is no setting", "winter.toml:7:1: `AT` is no setting"],
+    );
+    check(&format!("{head}CTRL = \"FUZY\"\n"), &["winter.toml:6:8: `FUZY` is not a state", "did you mean `FUZZY`?"]);
+    check(&format!("{head}SV = 7O\n"), &["winter.toml:6:", "here the TOML breaks"]);
+    check(&format!("{head}SV = true\nP = [1]\n"), &["winter.toml:7:5: found an array, expected a number or a word"]);
+    check(
+        &head.replace("fuji_pxr", "fuji_pxg"),
+        &["winter.toml:2:11: no device of this plant has the profile", "fuji_pxr"],
+    );
+    check(&head.replace("1970-01-01T", "yesterday "), &["winter.toml:3:"]);
+    check("", &["winter.toml is empty"]);
+    check("\u{0}", &["winter.toml:1:"]);
+}
+
+proptest! {
+    #[test]
+    fn no_file_makes_the_reader_fail_without_words(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+        let def = tank();
+        if let Err(problems) = read_set("x", "x.toml", &bytes, &def) {
+            prop_assert!(!problems.is_empty() && problems.iter().all(|problem| problem.contains("x.toml")));
+        }
+    }
+
+    #[test]
+    fn every_number_comes_back(value in prop_oneof![-1e9f64..1e9, (-100_000i32..100_000).prop_map(|n| f64::from(n) / 10.0)]) {
+        let def = tank();
+        let mut set = winter(&def);
+        set.values.retain(|held| held.tag == "SV");
+        set.values[0].value = value;
+        let text = text_of_set(&set, &def);
+        prop_assert_eq!(read_set("winter", "winter.toml", text.as_bytes(), &def), Ok(set));
+    }
+}

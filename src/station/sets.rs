@@ -1,0 +1,159 @@
+//! The folder of parameter sets: one readable file a set, beside the history of the plant.
+
+use std::{
+    fs::{self, File},
+    io::{Read, Write},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use crate::{
+    plant::{
+        PlantDef, SetWork,
+        command::OrderId,
+        parameter_set::{ParameterSet, StoredSet, check_name},
+    },
+    profile::{read_set, text_of_set},
+};
+
+/// Most sets that are read; an operator can choose among some dozens at most.
+const SETS_MAX: usize = 200;
+/// A set is some kilobytes; whatever is larger than this is something else.
+const BYTES_MAX: u64 = 256 << 10;
+
+/// What was written for whom, and all sets that lie in the folder.
+pub type Done = (Option<(OrderId, Result<(), String>)>, Vec<StoredSet>);
+
+/// `DIR/sets/PLANT` beside the history file.
+pub fn folder(history: &Path, plant: &str) -> PathBuf {
+    history.parent().unwrap_or(Path::new("")).join("sets").join(plant)
+}
+
+/// Does the work and reads the folder. Blocks while the disk works.
+pub fn work(folder: &Path, def: &PlantDef, work: SetWork) -> Done {
+    let written = match work {
+        SetWork::Read => None,
+        SetWork::Write { order, set, replace } => Some((order, write(folder, def, &set, replace))),
+    };
+    (written, read_all(folder, def))
+}
+
+/// Writes a set: whole or not at all. `Err` says why in words for the operator.
+fn write(folder: &Path, def: &PlantDef, set: &ParameterSet, replace: bool) -> Result<(), String> {
+    check_name(&set.name)?;
+    let path = folder.join(format!("{}.toml", set.name));
+    let failed = |error: std::io::Error| format!("{} cannot be written: {error}", path.display());
+    fs::create_dir_all(folder).map_err(failed)?;
+    let beside = folder.join(format!(".{}.new-{}", set.name, std::process::id()));
+    let text = text_of_set(set, def);
+    let written = write_whole(&beside, text.as_bytes()).and_then(|()| {
+        if replace {
+            return fs::rename(&beside, &path);
+        }
+        // A link fails where the name is taken, so nobody's set is lost between a look and a write.
+        fs::hard_link(&beside, &path)
+    });
+    // After a rename there is nothing left to remove.
+    let _ = fs::remove_file(&beside);
+    match written {
+        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+            Err(format!("there is a set {} already", set.name))
+        }
+        written => written.map_err(failed),
+    }
+}
+
+fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+        Ok(()) | Err(_) => {}
+    }
+    let mut file = File::create_new(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
+/// Every set of the folder, by name; a file that is no set is told with what is wrong with it.
+fn read_all(folder: &Path, def: &PlantDef) -> Vec<StoredSet> {
+    // Before the first set is saved there is no folder.
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| {
+        let path = entry.path();
+        let toml = path.extension().is_some_and(|extension| extension == "toml");
+        let stem = path.file_stem()?.to_str()?.to_owned();
+        (toml && !stem.starts_with('.')).then_some((stem, path))
+    });
+    let mut names: Vec<(String, PathBuf)> = names.collect();
+    names.sort();
+    names.truncate(SETS_MAX);
+    names.into_iter().map(|(name, path)| StoredSet { set: read(&name, &path, def).map(Arc::new), name }).collect()
+}
+
+fn read(name: &str, path: &Path, def: &PlantDef) -> Result<ParameterSet, Vec<String>> {
+    let file = format!("{name}.toml");
+    let unreadable = |error: std::io::Error| vec![format!("{file} cannot be read: {error}")];
+    let mut bytes = Vec::new();
+    File::open(path).and_then(|file| file.take(BYTES_MAX + 1).read_to_end(&mut bytes)).map_err(unreadable)?;
+    if BYTES_MAX < bytes.len() as u64 {
+        return Err(vec![format!("{file} is larger than {} KiB, expected a parameter set", BYTES_MAX >> 10)]);
+    }
+    read_set(name, &file, &bytes, def)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use jiff::Timestamp;
+
+    use super::*;
+    use crate::profile::{Search, load};
+
+    const ORDER: OrderId = OrderId { terminal: 1, number: 1 };
+
+    fn winter(sv: f64) -> ParameterSet {
+        let value = crate::plant::parameter_set::SetValue { tag: "SV".into(), value: sv };
+        ParameterSet {
+            name: "winter".into(),
+            device: "TIC-1".into(),
+            profile: "fuji_pxr".into(),
+            saved: Timestamp::UNIX_EPOCH,
+            by: "anna".into(),
+            given: Vec::new(),
+            values: vec![value],
+            missing: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_set_outlives_the_station_and_is_not_written_over_by_chance() {
+        let def = load(Path::new("tank"), &Search::shipped()).unwrap();
+        let home = tempfile::tempdir().unwrap();
+        let folder = folder(&home.path().join("tank.duckdb"), "tank");
+        assert_eq!(work(&folder, &def, SetWork::Read), (None, Vec::new()));
+        let save = |sv, replace| {
+            let work_to_do = SetWork::Write { order: ORDER, set: Box::new(winter(sv)), replace };
+            let (written, sets) = work(&folder, &def, work_to_do);
+            let held = sets.first().and_then(|stored| stored.set.as_ref().ok()).map(|set| set.values[0].value);
+            (written.unwrap().1, held, fs::read_dir(&folder).unwrap().count())
+        };
+        assert_eq!(save(70.0, false), (Ok(()), Some(70.0), 1));
+        assert_eq!(save(75.0, false), (Err("there is a set winter already".into()), Some(70.0), 1));
+        assert_eq!(save(75.0, true), (Ok(()), Some(75.0), 1));
+    }
+
+    #[test]
+    fn a_file_that_is_no_set_is_told_and_hides_no_other() {
+        let def = load(Path::new("tank"), &Search::shipped()).unwrap();
+        let home = tempfile::tempdir().unwrap();
+        fs::write(home.path().join("a.toml"), "SV = 70").unwrap();
+        fs::write(home.path().join("big.toml"), vec![b'#'; BYTES_MAX as usize + 2]).unwrap();
+        fs::write(home.path().join("notes.txt"), "not for us").unwrap();
+        fs::create_dir(home.path().join("folder.toml")).unwrap();
+        fs::write(home.path().join("winter.toml"), text_of_set(&winter(70.0), &def)).unwrap();
+        let (_, sets) = work(home.path(), &def, SetWork::Read);
+        let good: Vec<(&str, bool)> = sets.iter().map(|stored| (stored.name.as_str(), stored.set.is_ok())).collect();
+        assert_eq!(good, [("a", false), ("big", false), ("folder", false), ("winter", true)]);
+        let problems = sets[0].set.as_ref().unwrap_err();
+        assert!(problems.iter().any(|words| words.contains("a.toml:1:1") && words.contains("SV")), "{problems:?}");
+    }
+}

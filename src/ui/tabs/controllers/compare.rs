@@ -1,0 +1,226 @@
+//! A set against a device: what differs, why it cannot be written, and how a restore of it goes.
+
+use std::sync::Arc;
+
+use super::sets::{Source, shown, some_lines, trusted};
+use crate::{
+    plant::{
+        command::Command,
+        def::DeviceDef,
+        parameter_set::{self, Change, Compared, Problem},
+        restore::{Restore, RestoreWish, State},
+    },
+    ui::{
+        Cx,
+        chrome::outcome_words,
+        modal::{Confirm, Notice},
+        widgets::text::{Canvas, clock, fit, fit_words, pad, pad_left},
+    },
+};
+
+/// The page.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Compare {
+    /// What is compared with the device.
+    pub source: Source,
+    /// The first row shown.
+    pub first: usize,
+    /// Rows that are the same are shown too.
+    pub all: bool,
+}
+
+/// What can be written, or why not.
+type Plan = Result<Vec<Change>, Vec<Problem>>;
+
+impl Compare {
+    /// A source against the device.
+    pub fn new(source: Source) -> Compare {
+        Compare { source, first: 0, all: false }
+    }
+
+    fn rows(&self, cx: &Cx, device: &DeviceDef) -> Vec<Compared> {
+        let Some(set) = self.source.set(cx) else { return Vec::new() };
+        let rows = parameter_set::compare(cx.def(), device.id, &set, &trusted(cx));
+        let run = self.run(cx, device);
+        let written =
+            |row: &Compared| run.is_some_and(|run| run.steps.iter().any(|step| Some(step.change.tag) == row.tag));
+        rows.into_iter().filter(|row| self.all || (row.set.is_some() && !row.same) || written(row)).collect()
+    }
+
+    /// The restore of this source to this device, at work or the last one.
+    fn run<'a>(&self, cx: &Cx<'a>, device: &DeviceDef) -> Option<&'a Restore> {
+        let from = self.source.words(cx);
+        cx.snapshot.restore(device.id).filter(|run| *run.from == *from)
+    }
+
+    fn plan(&self, cx: &Cx, device: &DeviceDef) -> Option<Plan> {
+        let set = self.source.set(cx)?;
+        Some(parameter_set::plan(cx.def(), device.id, &set, &trusted(cx)))
+    }
+
+    /// Scrolls.
+    pub fn move_by(&mut self, cx: &Cx, device: &DeviceDef, by: isize) {
+        let last = self.rows(cx, device).len().saturating_sub(1);
+        self.first = self.first.saturating_add_signed(by).min(last);
+    }
+
+    /// The question whether to write the differences, or why they cannot be written.
+    pub fn restore(&self, cx: &Cx, device: &DeviceDef) -> Result<Confirm, Notice> {
+        let words = |words: Vec<String>| Err(Notice::new(device.name.clone(), words));
+        if let Some(notice) = Notice::unreachable(cx, device.id) {
+            return Err(notice);
+        }
+        let Some((set, plan)) = self.source.set(cx).zip(self.plan(cx, device)) else {
+            return words(vec![format!("{} is not there any more", self.source.words(cx))]);
+        };
+        let changes = match plan {
+            Ok(changes) if changes.is_empty() => return words(vec!["nothing differs: nothing to write".to_owned()]),
+            Ok(changes) => changes,
+            Err(problems) => {
+                let mut lines = vec![format!("{} cannot be written to {}", self.source.words(cx), device.name)];
+                lines.extend(problems.iter().take(8).map(Problem::to_string));
+                return words(lines);
+            }
+        };
+        let from: Arc<str> = self.source.words(cx).into();
+        let count = if changes.len() == 1 { "1 value".to_owned() } else { format!("{} values", changes.len()) };
+        let question = format!(
+            "Write {count} to {}, one after the other, each read back? The first failure stops it.",
+            device.name
+        );
+        let shown = changes.iter().take(6).map(|change| {
+            let text = |value| cx.snapshot.format(change.tag, value);
+            let line = format!(
+                "{}  {} → {} {}",
+                cx.def().tag(change.tag).short,
+                text(change.old),
+                text(change.new),
+                cx.snapshot.unit(change.tag)
+            );
+            line.trim_end().to_owned()
+        });
+        let mut notes: Vec<String> = shown.collect();
+        if changes.len() > 6 {
+            notes.push(format!("… and {} more, as listed", changes.len() - 6));
+        }
+        if !set.missing.is_empty() {
+            notes.push(format!("not in the set, stay as they are: {}", fit_words(&set.missing.join(" "), 60)));
+        }
+        let wish = RestoreWish { device: device.id, from: from.clone(), set, changes };
+        let title = format!("{from} → {}", device.name);
+        Ok(Confirm::order(title, question, Command::Restore(Box::new(wish))).with_notes(notes))
+    }
+
+    /// Draws the page.
+    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, device: &DeviceDef) {
+        let theme = cx.theme;
+        let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
+        let x = canvas.text(1, 0, &format!("{} → {}", self.source.words(cx), device.name), theme.focus());
+        let Some(plan) = self.plan(cx, device) else {
+            canvas.text(1, 2, "it is not there any more", theme.trouble());
+            return;
+        };
+        let run = self.run(cx, device);
+        let rows = self.rows(cx, device);
+        canvas.text(x + 2, 0, &fit_words(&self.summary(cx, device, &rows), end.saturating_sub(x + 2)), theme.normal());
+        let mut top = 1;
+        if let (Err(problems), None) = (&plan, run.filter(|run| run.state == State::Running)) {
+            let words: Vec<String> = problems.iter().map(|problem| format!("cannot be written: {problem}")).collect();
+            for line in some_lines(&words, end, 3) {
+                canvas.text(1, top, &line, theme.trouble());
+                top += 1;
+            }
+        }
+        let device_column = if run.is_some() { "before" } else { "in the device" };
+        let names = ["parameter", "", "in the set", device_column, ""];
+        canvas.text(1, top + 1, &columns(names, end), theme.dim());
+        let room = usize::from(bottom.saturating_sub(top + 3)).max(1);
+        let first = self.first.min(rows.len().saturating_sub(room));
+        for (y, row) in rows.iter().skip(first).take(room).enumerate() {
+            self.row(cx, canvas, top + 2 + y as u16, row, run);
+        }
+        if rows.is_empty() {
+            canvas.text(1, top + 2, "nothing differs", theme.normal());
+        }
+        let below = rows.len().saturating_sub(first + room);
+        if below > 0 {
+            canvas.text_right(end, bottom.saturating_sub(1), &format!("{below} more ▼"), theme.normal());
+        }
+        if let Some(run) = run {
+            let (words, trouble) = run_words(cx, device, run);
+            canvas.text(1, bottom, &fit_words(&words, end), if trouble { theme.trouble() } else { theme.strong() });
+        }
+    }
+
+    fn summary(&self, cx: &Cx, device: &DeviceDef, shown: &[Compared]) -> String {
+        let Some(set) = self.source.set(cx) else { return String::new() };
+        let rows = parameter_set::compare(cx.def(), device.id, &set, &trusted(cx));
+        let same = rows.iter().filter(|row| row.same).count();
+        let differ = rows.iter().filter(|row| row.set.is_some() && !row.same).count();
+        let silent = rows.iter().filter(|row| row.set.is_none()).count();
+        let silent = if silent > 0 { format!(", {silent} not in the set") } else { String::new() };
+        let hidden = if shown.len() < rows.len() { " (= shows all)" } else { "" };
+        format!("{differ} differ, {same} the same{silent}{hidden}")
+    }
+
+    fn row(&self, cx: &Cx, canvas: &mut Canvas, y: u16, row: &Compared, run: Option<&Restore>) {
+        let theme = cx.theme;
+        let step = run.and_then(|run| run.steps.iter().find(|step| Some(step.change.tag) == row.tag));
+        let label = row.tag.map_or("no such setting", |tag| cx.def().tag(tag).label.as_str());
+        let (note, trouble) = match (step, run) {
+            (Some(step), Some(run)) => match (&step.outcome, step.order) {
+                (Some(outcome), _) => outcome_words(outcome),
+                (None, Some(_)) => ("writing …".to_owned(), false),
+                (None, None) if run.state == State::Running => ("waits".to_owned(), false),
+                (None, None) => ("not written".to_owned(), true),
+            },
+            _ if row.set.is_none() => ("not in the set".to_owned(), false),
+            _ if row.device.is_none() => ("not known now".to_owned(), true),
+            _ if row.same => ("same".to_owned(), false),
+            _ => ("differs".to_owned(), false),
+        };
+        // While it runs the device column keeps what was there before, so that old and new stay side by side.
+        let device = step.map_or(row.device, |step| Some(step.change.old));
+        let cells = [row.short.as_str(), label, &shown(cx, row, row.set), &shown(cx, row, device), &note];
+        let style = match (trouble, row.same && step.is_none()) {
+            (true, _) => theme.trouble(),
+            (false, true) => theme.dim(),
+            (false, false) => theme.normal(),
+        };
+        canvas.text(1, y, &columns(cells, canvas.width().saturating_sub(1)), style);
+    }
+}
+
+fn columns([short, label, set, device, note]: [&str; 5], end: u16) -> String {
+    let room = end.saturating_sub(9 + 19 + 14 + 14 + 6);
+    format!(
+        "{} {} {} {}  {}",
+        pad(short, 9),
+        pad(label, 19),
+        pad_left(set, 14),
+        pad_left(device, 14),
+        fit(note, room.max(10))
+    )
+}
+
+/// How a restore goes, or how it ended.
+fn run_words(cx: &Cx, device: &DeviceDef, run: &Restore) -> (String, bool) {
+    let (done, all) = (run.done(), run.steps.len());
+    let (at, by) = (clock(run.at, &cx.def().time_zone), &run.by);
+    match run.state {
+        State::Running if run.stopping => (format!("stopping: {done} of {all} written"), true),
+        State::Running => (format!("writing: {done} of {all} written and verified   x stops it"), false),
+        State::Done => {
+            let fix = device.actions.first().map_or(String::new(), |action| format!("   f {} keeps them", action.name));
+            (format!("{all} of {all} written and verified, begun {at} by {by}{fix}"), false)
+        }
+        State::Failed => {
+            let failed = run.steps.iter().rev().find_map(|step| Some((step.change.tag, step.outcome.as_ref()?)));
+            let why = failed.map_or(String::new(), |(tag, outcome)| {
+                format!("{}: {}", cx.def().tag(tag).short, outcome_words(outcome).0)
+            });
+            (format!("STOPPED, {done} of {all} written and verified; {why}"), true)
+        }
+        State::Stopped => (format!("STOPPED by an operator: {done} of {all} written and verified, begun {at}"), true),
+    }
+}

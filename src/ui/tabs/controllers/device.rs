@@ -1,0 +1,138 @@
+//! The page of one device: heading, faceplate, parameter table, what the selected parameter means, the last write.
+
+use ratatui::style::Style;
+
+use super::{
+    plate,
+    table::{Table, default_words, differs},
+};
+use crate::{
+    history::Series,
+    plant::{
+        def::{DeviceDef, DeviceId},
+        ne107::Signal,
+        snapshot::DeviceState,
+    },
+    ui::{
+        Cx,
+        chrome::{order_words, outcome_words},
+        modal::faceplate::device_words,
+        widgets::text::{Canvas, clock, fit_words, width, wrap},
+    },
+};
+
+/// From this size on faceplate and table stand side by side.
+const WIDE: (u16, u16) = (110, 30);
+/// Columns of the faceplate beside the table.
+const PANEL: u16 = 36;
+
+/// Draws the page.
+pub fn view(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, table: &Table, trend: Option<&Series>) {
+    heading(cx, device, canvas);
+    let (wide, high) = (canvas.width(), canvas.height());
+    if device.faceplate.is_some() && wide >= WIDE.0 && high + 6 >= WIDE.1 {
+        plate::panel(cx, &mut canvas.part(1, 2, PANEL, high.saturating_sub(2)), device, trend);
+        let left = PANEL + 3;
+        below(cx, &mut canvas.part(left, 1, wide.saturating_sub(left), high.saturating_sub(1)), device, table);
+    } else {
+        let strip = plate::strip_height(cx, device);
+        plate::strip(cx, &mut canvas.part(0, 1, wide, strip), device, trend);
+        let top = 1 + strip;
+        below(cx, &mut canvas.part(0, top, wide, high.saturating_sub(top)), device, table);
+    }
+}
+
+/// The table, what the selected parameter means, and the last write.
+fn below(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, table: &Table) {
+    let (wide, high) = (canvas.width(), canvas.height());
+    let (end, bottom) = (wide.saturating_sub(1), high.saturating_sub(1));
+    let words = if high > 16 { 2 } else { 1 };
+    let hidden = table.view(cx, &mut canvas.part(0, 0, wide, bottom.saturating_sub(words)), device.id);
+    if let Some(tag) = table.tag(cx, device.id) {
+        let y = bottom.saturating_sub(words);
+        let meaning = if tag.meaning.is_empty() { &tag.label } else { &tag.meaning };
+        // The default first: it must not be what a narrow screen cuts off.
+        let default = default_words(cx, tag).map_or(String::new(), |default| format!("default {default}; "));
+        let x = canvas.text(1, y, &tag.name, cx.theme.strong()) + 2;
+        let text = format!("{default}{meaning}");
+        let lines = wrap(&text, end.saturating_sub(x));
+        for (n, line) in lines.iter().enumerate().take(usize::from(words)) {
+            let cut = n + 1 == usize::from(words) && lines.len() > n + 1;
+            let line = if cut { format!("{line} …") } else { line.clone() };
+            canvas.text(x, y + n as u16, &fit_words(&line, end.saturating_sub(x)), cx.theme.normal());
+        }
+    }
+    let more = match (hidden, table.filter.as_str()) {
+        (0, "") => String::new(),
+        (n, "") => format!("{n} more ▼"),
+        (0, filter) => format!("only \"{filter}\", Esc shows all"),
+        (n, filter) => format!("only \"{filter}\", {n} more ▼"),
+    };
+    let differ = cx.def().tags_of(device.id).filter(|tag| differs(cx, tag)).count();
+    let more = if table.defaults {
+        let mark = cx.theme.pick("≠", "#");
+        format!("{mark} {differ} differ from default  {more}").trim_end().to_owned()
+    } else {
+        more
+    };
+    canvas.text_right(end, bottom, &more, cx.theme.normal());
+    if let Some((words, trouble)) = last_write(cx, device.id) {
+        let room = end.saturating_sub(width(&more) + 3);
+        let style = if trouble { cx.theme.trouble() } else { cx.theme.dim() };
+        canvas.text(1, bottom, &fit_words(&words, room), style);
+    }
+}
+
+fn heading(cx: &Cx, device: &DeviceDef, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let count = cx.def().devices.len();
+    let x = canvas.text(1, 0, &format!("‹ {} ›", device.name), theme.focus());
+    let line = &cx.def().line(device.line).name;
+    // On a narrow screen whether it answers counts for more than what it is for.
+    let least = if cx.snapshot.device(device.id).diagnosis.is_some() { 100 } else { 80 };
+    let title = if canvas.width() < least { String::new() } else { format!("{}  ", device.title) };
+    let words = format!("{}  {title}unit {}  {line}", device.model, device.unit);
+    let x = canvas.text(x + 2, 0, &words, theme.normal());
+    let (words, style) = status_words(cx, device.id);
+    let (end, place) = (canvas.width().saturating_sub(1), format!("{}/{count}", device.id.0 + 1));
+    let room = end.saturating_sub(x + 2 + width(&place) + 1);
+    canvas.text(x + 2, 0, &fit_words(&words, room), style);
+    canvas.text_right(end, 0, &place, theme.dim());
+}
+
+/// How a device stands: mark of NE 107, its word and its reason.
+pub fn status_words(cx: &Cx, device: DeviceId) -> (String, Style) {
+    let (theme, status) = (cx.theme, cx.snapshot.device(device));
+    match (status.diagnosis, status.state) {
+        (Some(reason), _) => {
+            let signal = reason.signal();
+            (format!("{} {}: {reason}", signal_mark(signal), signal.word()), theme.trouble())
+        }
+        (None, DeviceState::Answering) => (format!("✓ {}", device_words(cx, device)), theme.normal()),
+        (None, DeviceState::Unknown) => (format!("? {}", device_words(cx, device)), theme.dim()),
+        (None, DeviceState::Failing(_) | DeviceState::Down { .. }) => {
+            (format!("✗ {}", device_words(cx, device)), theme.trouble())
+        }
+    }
+}
+
+/// The letter of NE 107 with a shape of its own.
+pub fn signal_mark(signal: Signal) -> String {
+    let shape = match signal {
+        Signal::Failure => '✗',
+        Signal::FunctionCheck => '▼',
+        Signal::OutOfSpecification => '?',
+        Signal::Maintenance => '◆',
+    };
+    format!("{shape}{}", signal.letter())
+}
+
+/// The latest write to this device and its outcome, and whether that is a worry.
+fn last_write(cx: &Cx, device: DeviceId) -> Option<(String, bool)> {
+    let to_device = |tag| cx.def().tag(tag).device == device;
+    let order =
+        cx.snapshot.orders.iter().find(|order| order.command.written().is_some_and(|(tag, _)| to_device(tag)))?;
+    let (words, trouble) = outcome_words(&order.outcome);
+    let what = order_words(cx, &order.command, order.old);
+    Some((format!("last: {what}  {words} {} by {}", clock(order.at, &cx.def().time_zone), order.by), trouble))
+}

@@ -1,0 +1,208 @@
+//! The keys of the controllers tab, page by page: footer, help and the check for clashes read these rows.
+
+use crossterm::event::KeyCode;
+
+use super::Page;
+use crate::ui::keys::{Chord, Key, char, code};
+
+/// What a key means here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Show the device so many further on.
+    Device(isize),
+    /// Select so many rows further on.
+    Move(isize),
+    /// Select so many columns further on.
+    Column(isize),
+    /// Open, edit or write what is selected.
+    Open,
+    /// Say why the selected value is what it is.
+    Why,
+    /// Read everything now.
+    Refresh,
+    /// Pick one of the device's actions.
+    Actions,
+    /// Start or stop auto-tuning.
+    Tune,
+    /// Run or standby.
+    Run,
+    /// Close the device's line, or open it again.
+    Line,
+    /// Look at the communication settings of the device's line, and change them.
+    Settings,
+    /// The ramp/soak program.
+    Program,
+    /// The parameter sets.
+    Sets,
+    /// Only parameters with some words.
+    Find,
+    /// Mark what differs from the maker's default.
+    Defaults,
+    /// Words to read about control.
+    Guide,
+    /// So many pages of them on.
+    Turn(isize),
+    /// Run, hold or stop the program.
+    Command(Wish),
+    /// What the program does at its end.
+    Mode,
+    /// Which steps it runs.
+    Pattern,
+    /// Save the settings as a set.
+    Save,
+    /// Read the folder of sets anew.
+    ReadSets,
+    /// Show what is the same too, or hide it.
+    All,
+    /// Copy the other way round.
+    Turnaround,
+    /// Stop the restore at work.
+    Stop,
+}
+
+/// What a program is told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wish {
+    /// From the beginning, or on from a halt.
+    Run,
+    /// Stand still.
+    Hold,
+    /// Back to the fixed set value.
+    Off,
+}
+
+/// A row of a table; the tables are long, and their rows short.
+const fn key(chord: Chord, label: &'static str, help: &'static str, action: Action) -> Key<Action> {
+    Key { chord, label, help, action }
+}
+
+const UP: Key<Action> = key(code(KeyCode::Up), "", "a row up", Action::Move(-1));
+const DOWN: Key<Action> = key(code(KeyCode::Down), "select", "a row down", Action::Move(1));
+const PAGE_UP: Key<Action> = key(code(KeyCode::PageUp), "", "ten rows up", Action::Move(-10));
+const PAGE_DOWN: Key<Action> = key(code(KeyCode::PageDown), "", "ten rows down", Action::Move(10));
+const HOME: Key<Action> = key(code(KeyCode::Home), "", "first row", Action::Move(-9_999));
+const END: Key<Action> = key(code(KeyCode::End), "", "last row", Action::Move(9_999));
+const GUIDE: Key<Action> =
+    key(char('h'), "guide", "what P, I, D, fuzzy and tuning do, and what to change", Action::Guide);
+const REFRESH: Key<Action> = key(char('u'), "refresh", "read all parameters of the device now", Action::Refresh);
+const WHY: Key<Action> = key(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why);
+const ACTIONS: Key<Action> = key(char('f'), "actions", "actions of the device (save to memory)", Action::Actions);
+const LINE: Key<Action> =
+    key(char('L'), "line", "disconnect the device's line, or connect it again (asks first)", Action::Line);
+const SETTINGS: Key<Action> = key(
+    char('c'),
+    "settings",
+    "communication settings of the device's line: baud rate, parity, timeout …",
+    Action::Settings,
+);
+
+const LIST: &[Key<Action>] = &[
+    UP,
+    DOWN,
+    key(code(KeyCode::Enter), "open", "faceplate and parameters of the device", Action::Open),
+    PAGE_UP,
+    PAGE_DOWN,
+    HOME,
+    END,
+    REFRESH,
+    GUIDE,
+    WHY,
+    SETTINGS,
+    LINE,
+];
+const DEVICE: &[Key<Action>] = &[
+    key(code(KeyCode::Left), "", "previous device", Action::Device(-1)),
+    key(code(KeyCode::Right), "device", "next device", Action::Device(1)),
+    UP,
+    DOWN,
+    PAGE_UP,
+    PAGE_DOWN,
+    HOME,
+    END,
+    key(code(KeyCode::Enter), "edit", "change the parameter, or look at a read-only one", Action::Open),
+    key(char('g'), "program", "the ramp/soak program, if the device has one", Action::Program),
+    key(char('s'), "sets", "parameter sets: save, compare, restore, copy", Action::Sets),
+    GUIDE,
+    key(char('T'), "tune", "auto-tuning on, or off while it is on", Action::Tune),
+    ACTIONS,
+    WHY,
+    REFRESH,
+    key(char('/'), "find", "show only parameters with some words in name or meaning", Action::Find),
+    key(char('d'), "defaults", "mark what differs from the maker's default", Action::Defaults),
+    key(char('S'), "standby", "run or standby, if the device has it", Action::Run),
+    LINE,
+    SETTINGS,
+];
+const PROGRAM: &[Key<Action>] = &[
+    key(code(KeyCode::Left), "", "the cell to the left", Action::Column(-1)),
+    key(code(KeyCode::Right), "cell", "the cell to the right", Action::Column(1)),
+    UP,
+    DOWN,
+    key(code(KeyCode::Enter), "edit", "change the target or time", Action::Open),
+    key(char('r'), "run", "run the program, or go on after a hold (asks first)", Action::Command(Wish::Run)),
+    key(char('p'), "hold", "hold the program where it is (asks first)", Action::Command(Wish::Hold)),
+    key(char('o'), "off", "stop the program (asks first)", Action::Command(Wish::Off)),
+    key(char('t'), "pattern", "which steps are run", Action::Pattern),
+    key(char('m'), "mode", "what happens at the end and at power-on", Action::Mode),
+    REFRESH,
+    GUIDE,
+    WHY,
+];
+const SETS: &[Key<Action>] = &[
+    UP,
+    DOWN,
+    key(code(KeyCode::Enter), "compare", "what differs between the set and the device", Action::Open),
+    key(char('n'), "new", "save the settings of the device as a set", Action::Save),
+    key(char('u'), "read", "read the folder of sets anew", Action::ReadSets),
+    PAGE_UP,
+    PAGE_DOWN,
+    HOME,
+    END,
+    GUIDE,
+];
+const COMPARE: &[Key<Action>] = &[
+    UP,
+    key(code(KeyCode::Down), "scroll", "a row down", Action::Move(1)),
+    key(code(KeyCode::Enter), "restore", "write what differs to the device (asks first)", Action::Open),
+    key(char('x'), "stop", "stop after the write under way", Action::Stop),
+    key(char('='), "all", "show what is the same too, or hide it", Action::All),
+    key(char('t'), "turn", "copy the other way round", Action::Turnaround),
+    ACTIONS,
+    REFRESH,
+    PAGE_UP,
+    PAGE_DOWN,
+    HOME,
+    END,
+    GUIDE,
+];
+const READ: &[Key<Action>] = &[
+    key(code(KeyCode::Left), "", "the page before", Action::Turn(-1)),
+    key(code(KeyCode::Right), "page", "the next page", Action::Turn(1)),
+    key(code(KeyCode::Up), "", "the page before", Action::Turn(-1)),
+    key(code(KeyCode::Down), "", "the next page", Action::Turn(1)),
+];
+
+/// The keys of a page.
+pub fn page_keys(page: &Page) -> &'static [Key<Action>] {
+    match page {
+        Page::List => LIST,
+        Page::Device => DEVICE,
+        Page::Program => PROGRAM,
+        Page::Sets => SETS,
+        Page::Compare(_) => COMPARE,
+        Page::Guide(..) => READ,
+    }
+}
+
+/// The chords of every page, for the check that none means two things.
+pub fn all_chords() -> Vec<(&'static str, Vec<Chord>)> {
+    let pages = [
+        ("controllers", LIST),
+        ("controllers, device", DEVICE),
+        ("controllers, program", PROGRAM),
+        ("controllers, sets", SETS),
+        ("controllers, compare", COMPARE),
+        ("controllers, guide", READ),
+    ];
+    pages.into_iter().map(|(name, table)| (name, table.iter().map(|key| key.chord).collect())).collect()
+}

@@ -1,0 +1,232 @@
+//! The first page: every device in one row, with how it stands and what it controls.
+
+use ratatui::style::Style;
+
+use super::device::{signal_mark, status_words};
+use crate::{
+    plant::{
+        def::{DeviceDef, DeviceId, Subject},
+        snapshot::{ActiveAlarm, DeviceState},
+        tag::{Access, Poll},
+    },
+    ui::{
+        Cx,
+        widgets::{
+            text::{Canvas, fit, fit_words, pad_left, width},
+            value,
+        },
+    },
+};
+
+/// Widths that depend on the plant and the screen.
+struct Columns {
+    name: u16,
+    model: u16,
+    line: u16,
+    state: u16,
+}
+
+impl Columns {
+    const VALUE: u16 = 8;
+    const MODE: u16 = 8;
+    const ALARM: u16 = 6;
+    const REPLY: u16 = 6;
+
+    fn of(cx: &Cx, screen: u16) -> Columns {
+        let devices = &cx.def().devices;
+        let widest = |text: &dyn Fn(&DeviceDef) -> String, least: u16, most: u16| {
+            devices.iter().map(|device| width(&text(device))).max().unwrap_or(0).clamp(least, most)
+        };
+        let name = widest(&|device| device.name.clone(), 6, 10);
+        let line = widest(&|device| place(cx, device), 4, 10);
+        let fixed = 3 + Columns::VALUE * 3 + Columns::MODE + Columns::ALARM + Columns::REPLY + 9;
+        let free = screen.saturating_sub(fixed + name + line + 2);
+        let model = widest(&|device| device.model.clone(), 5, free.clamp(5, 20));
+        // The mark alone, and words where there is room for some.
+        let state = match free.saturating_sub(model) {
+            room @ 12.. => 3 + room.min(30),
+            _ => 2,
+        };
+        Columns { name, model, line, state }
+    }
+}
+
+/// Draws the list with this row selected.
+pub fn view(cx: &Cx, canvas: &mut Canvas, selected: usize) {
+    let (theme, devices) = (cx.theme, &cx.def().devices);
+    let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
+    canvas.text(1, 0, &fit_words(&summary(cx), end), theme.normal());
+    let columns = Columns::of(cx, canvas.width());
+    put(canvas, 1, heading(&columns, theme.dim()));
+    let room = usize::from(bottom.saturating_sub(3)).max(1);
+    let first = selected.saturating_sub(room / 2).min(devices.len().saturating_sub(room));
+    for (y, (n, device)) in devices.iter().enumerate().skip(first).take(room).enumerate() {
+        row(cx, canvas, y as u16 + 2, &columns, device, n == selected);
+    }
+    let below = devices.len().saturating_sub(first + room);
+    if below > 0 {
+        canvas.text_right(end, bottom.saturating_sub(1), &format!("{below} more ▼"), theme.normal());
+    }
+    if let Some(device) = devices.get(selected) {
+        let x = canvas.text(1, bottom, &device.name, theme.strong());
+        let (words, style) = status_words(cx, device.id);
+        let title = if device.title.is_empty() { String::new() } else { format!("{}  ", device.title) };
+        let x = canvas.text(x + 2, bottom, &fit_words(&title, end.saturating_sub(x + 4)), theme.normal());
+        canvas.text(x, bottom, &fit_words(&words, end.saturating_sub(x)), style);
+    }
+}
+
+/// `31 devices   2 not answering   1 with alarms`.
+fn summary(cx: &Cx) -> String {
+    let devices = &cx.def().devices;
+    let down = devices.iter().filter(|device| {
+        let status = cx.snapshot.device(device.id);
+        matches!(status.state, DeviceState::Down { .. } | DeviceState::Unknown)
+    });
+    let alarmed = devices.iter().filter(|device| alarms(cx, device.id).next().is_some()).count();
+    let mut words = match devices.len() {
+        1 => "1 device".to_owned(),
+        n => format!("{n} devices"),
+    };
+    for (count, what) in [(down.count(), "not answering"), (alarmed, "with alarms")] {
+        if count > 0 {
+            words.push_str(&format!("   {count} {what}"));
+        }
+    }
+    words
+}
+
+/// The cells of a row from the left: text, width, style. What does not fit as a whole is left out, the last first.
+type Cells = Vec<(String, u16, Style)>;
+
+fn put(canvas: &mut Canvas, y: u16, cells: Cells) {
+    let mut x = 3;
+    for (text, wide, style) in cells {
+        if x + wide <= canvas.width() {
+            canvas.text(x, y, &fit(&text, wide), style);
+        }
+        x += wide + 1;
+    }
+}
+
+fn heading(columns: &Columns, style: Style) -> Cells {
+    let value = |name| (pad_left(name, Columns::VALUE), Columns::VALUE, style);
+    vec![
+        ("device".to_owned(), columns.name, style),
+        ("model".to_owned(), columns.model, style),
+        ("unit".to_owned(), columns.line, style),
+        (if columns.state > 3 { "state" } else { "" }.to_owned(), columns.state, style),
+        ("alarm".to_owned(), Columns::ALARM, style),
+        value("PV"),
+        value("SV"),
+        value("MV"),
+        ("mode".to_owned(), Columns::MODE, style),
+        (pad_left("answer", Columns::REPLY), Columns::REPLY, style),
+    ]
+}
+
+/// `L1/1`.
+fn place(cx: &Cx, device: &DeviceDef) -> String {
+    format!("{}/{}", cx.def().line(device.line).name, device.unit)
+}
+
+fn row(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, device: &DeviceDef, selected: bool) {
+    let theme = cx.theme;
+    let mut cells = cells(cx, columns, device);
+    if selected {
+        // A selected row is reversed as a whole; the marks keep their shapes.
+        cells.iter_mut().for_each(|(_, _, style)| *style = theme.focus());
+        canvas.run(1, y, canvas.width().saturating_sub(2), ' ', theme.focus());
+        canvas.text(1, y, theme.pick("▸", ">"), theme.focus());
+    }
+    put(canvas, y, cells);
+}
+
+fn cells(cx: &Cx, columns: &Columns, device: &DeviceDef) -> Cells {
+    let theme = cx.theme;
+    let (mark, words, style) = state(cx, device.id);
+    let mut cells = vec![
+        (device.name.clone(), columns.name, theme.strong()),
+        (device.model.clone(), columns.model, theme.normal()),
+        (place(cx, device), columns.line, theme.normal()),
+        (if columns.state > 3 { format!("{mark} {words}") } else { mark }, columns.state, style),
+    ];
+    let (text, style) = alarm(cx, device.id);
+    cells.push((text, Columns::ALARM, style));
+    match &device.faceplate {
+        Some(plate) => {
+            for tag in [Some(plate.pv), Some(plate.sv), plate.mv] {
+                let shown = tag.map(|tag| value::show(cx, tag));
+                let text = shown.as_ref().map_or(String::new(), |shown| {
+                    let whole = shown.with_unit();
+                    if width(&whole) <= Columns::VALUE { whole } else { shown.bare(Columns::VALUE) }
+                });
+                let style = shown.map_or(theme.dim(), |shown| shown.style);
+                cells.push((pad_left(&text, Columns::VALUE), Columns::VALUE, style));
+            }
+            cells.push((mode(cx, device), Columns::MODE, theme.normal()));
+        }
+        None => {
+            // What is never read by itself says nothing about the device.
+            let tags = cx.def().tags_of(device.id);
+            let tags = tags.filter(|tag| tag.access != Access::Write && tag.poll != Poll::Never);
+            let (good, all) = tags.fold((0, 0), |(good, all), tag| {
+                (good + usize::from(cx.snapshot.sample(tag.id).quality.is_good()), all + 1)
+            });
+            let style = if good == all { theme.dim() } else { theme.trouble() };
+            cells.push((format!("{good} of {all} values good"), Columns::VALUE * 3 + 2, style));
+            cells.push((String::new(), Columns::MODE, style));
+        }
+    }
+    let reply = cx.snapshot.device(device.id).reply.filter(|_| answers(cx, device.id));
+    let reply = reply.map_or(String::new(), |reply| format!("{} ms", reply.as_millis()));
+    cells.push((pad_left(&reply, Columns::REPLY), Columns::REPLY, theme.dim()));
+    cells
+}
+
+/// The most urgent alarm of a device, and how many there are.
+fn alarm(cx: &Cx, device: DeviceId) -> (String, Style) {
+    let all: Vec<&ActiveAlarm> = alarms(cx, device).collect();
+    let Some(alarm) = all.iter().min_by_key(|alarm| cx.def().alarm(alarm.id).priority) else {
+        return (String::new(), cx.theme.dim());
+    };
+    let priority = cx.def().alarm(alarm.id).priority;
+    let more = if all.len() > 1 { format!("×{}", all.len()) } else { String::new() };
+    let style = cx.theme.alarm(priority, alarm.state, cx.flash());
+    (format!("{}{more}", cx.theme.priority_tag(priority)), style)
+}
+
+/// AT while it is on, standby, else the control method.
+fn mode(cx: &Cx, device: &DeviceDef) -> String {
+    let Some(plate) = &device.faceplate else { return String::new() };
+    let on = |tag: Option<_>| tag.is_some_and(|tag| value::is_on(cx, tag) == Some(true));
+    if on(plate.tune) {
+        return "AT".to_owned();
+    }
+    let shown = plate.run.filter(|_| on(plate.run)).or(plate.mode);
+    shown.map_or(String::new(), |tag| value::show(cx, tag).bare(Columns::MODE))
+}
+
+fn answers(cx: &Cx, device: DeviceId) -> bool {
+    matches!(cx.snapshot.device(device).state, DeviceState::Answering | DeviceState::Failing(_))
+}
+
+/// The mark of NE 107 and its words; a device that is well has a tick.
+fn state(cx: &Cx, device: DeviceId) -> (String, String, Style) {
+    let status = cx.snapshot.device(device);
+    match (status.diagnosis, status.state) {
+        (Some(reason), _) => (signal_mark(reason.signal()), reason.to_string(), cx.theme.trouble()),
+        (None, DeviceState::Answering) => ("✓".to_owned(), "good".to_owned(), cx.theme.dim()),
+        (None, DeviceState::Unknown) => ("?".to_owned(), "not asked yet".to_owned(), cx.theme.dim()),
+        (None, DeviceState::Failing(n)) => ("✗".to_owned(), format!("failing, {n} in a row"), cx.theme.trouble()),
+        (None, DeviceState::Down { .. }) => ("✗".to_owned(), "not answering".to_owned(), cx.theme.trouble()),
+    }
+}
+
+/// The alarms of a device and of its tags.
+pub fn alarms<'a>(cx: &'a Cx, device: DeviceId) -> impl Iterator<Item = &'a ActiveAlarm> {
+    cx.snapshot.alarms.iter().filter(move |alarm| match cx.def().alarm(alarm.id).subject {
+        Subject::Device(of) => of == device,
+        Subject::Tag(tag) => cx.def().tag(tag).device == device,
+    })
+}

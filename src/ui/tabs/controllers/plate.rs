@@ -1,0 +1,231 @@
+//! The faceplate of a controller: PV, SV and MV as bars on their ranges, its states, its alarms and a small trend.
+
+use ratatui::style::Modifier;
+
+use super::list;
+use crate::{
+    history::Series,
+    plant::{
+        def::{Condition, DeviceDef, Faceplate, Subject, TagId},
+        tuning::Tuning,
+    },
+    ui::{
+        Cx,
+        widgets::{
+            mimic::{Bounds, trend},
+            text::{Canvas, clock, fit_words, pad, running, width},
+            value,
+        },
+    },
+};
+
+/// How far back the small trend goes.
+pub const WINDOW: std::time::Duration = std::time::Duration::from_secs(1_800);
+/// Columns of the small trend beside the bars.
+const TREND: u16 = 22;
+
+/// Rows that [`strip`] takes.
+pub fn strip_height(cx: &Cx, device: &DeviceDef) -> u16 {
+    let Some(plate) = &device.faceplate else { return 0 };
+    3 + u16::from(plate.mv.is_some()) + u16::from(tuning_of(cx, device).is_some())
+}
+
+/// Three bars over each other, with their ranges, the trend beside them, and a row of states and alarms.
+pub fn strip(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, series: Option<&Series>) {
+    let Some(plate) = &device.faceplate else { return };
+    let wide = canvas.width();
+    let rows = 2 + u16::from(plate.mv.is_some());
+    let bars = wide.saturating_sub(TREND + 2);
+    self::bars(cx, &mut canvas.part(0, 0, bars, rows), plate, false);
+    let at = Bounds { x: bars + 1, y: 0, width: TREND, height: rows };
+    trend::view(cx, canvas, at, plate.pv, WINDOW, series, false);
+    states(cx, &mut canvas.part(0, rows, wide, 1), device, plate);
+    if let Some(tuning) = tuning_of(cx, device) {
+        tuning_row(cx, &mut canvas.part(0, rows + 1, wide, 1), plate, tuning);
+    }
+}
+
+/// The same in a column of its own: more room, no other content.
+pub fn panel(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, series: Option<&Series>) {
+    let Some(plate) = &device.faceplate else { return };
+    let (wide, high) = (canvas.width(), canvas.height());
+    let rows = 3 * (2 + u16::from(plate.mv.is_some()));
+    bars(cx, &mut canvas.part(0, 0, wide, rows), plate, true);
+    states(cx, &mut canvas.part(0, rows, wide, 1), device, plate);
+    let mut y = rows + 2;
+    for alarm in list::alarms(cx, device.id).take(4) {
+        let def = cx.def().alarm(alarm.id);
+        let style = cx.theme.alarm(def.priority, alarm.state, cx.flash());
+        let x = canvas.text(0, y, cx.theme.priority_mark(def.priority), style) + 1;
+        let words = format!("{} {}", def.text, alarm.state.word());
+        canvas.text(x, y, &fit_words(&words, wide.saturating_sub(x)), style);
+        y += 1;
+    }
+    if y == rows + 2 {
+        canvas.text(0, y, "no alarm", cx.theme.dim());
+        y += 1;
+    }
+    y += 1;
+    if let Some(tuning) = tuning_of(cx, device) {
+        for (n, words) in tuning_words(cx, plate, tuning).into_iter().enumerate() {
+            let style = if n == 0 { cx.theme.strong() } else { cx.theme.normal() };
+            for line in crate::ui::widgets::text::wrap(&words, wide) {
+                canvas.text(0, y, &line, style);
+                y += 1;
+            }
+        }
+        y += 1;
+    }
+    let at = Bounds { x: 0, y, width: wide, height: high.saturating_sub(y).min(12) };
+    if at.height > 3 {
+        trend::view(cx, canvas, at, plate.pv, WINDOW, series, false);
+    }
+}
+
+/// The tuning worth a word: at work, or ended and not older than the plant's memory of it.
+fn tuning_of<'a>(cx: &Cx<'a>, device: &DeviceDef) -> Option<&'a Tuning> {
+    cx.snapshot.tuning(device.id)
+}
+
+/// A row a bar (`tall`: three, with value, bar and ends of the scale).
+fn bars(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tall: bool) {
+    let rows = [("PV", Some(plate.pv)), ("SV", Some(plate.sv)), ("MV", plate.mv)];
+    let rows: Vec<(&str, TagId)> = rows.into_iter().filter_map(|(name, tag)| Some((name, tag?))).collect();
+    // All bars start in one column, so that they can be compared.
+    let values = rows.iter().map(|(_, tag)| width(&value::show(cx, *tag).with_unit())).max().unwrap_or(0).clamp(9, 14);
+    for (n, (name, tag)) in rows.into_iter().enumerate() {
+        let y = n as u16 * if tall { 3 } else { 1 };
+        let shown = value::show(cx, tag);
+        canvas.text(if tall { 0 } else { 1 }, y, name, cx.theme.dim());
+        let room = if tall { canvas.width().saturating_sub(4) } else { values };
+        canvas.text(4, y, &shown.within(room), shown.style);
+        // PV and SV share the scale of PV, so that their distance is seen.
+        let scale = if tag == plate.sv { plate.pv } else { tag };
+        let ends = ends(cx, scale);
+        let (x, y, wide) = if tall {
+            if let Some((low, high)) = &ends {
+                canvas.text(0, y + 2, low, cx.theme.dim());
+                canvas.text_right(canvas.width(), y + 2, high, cx.theme.dim());
+            }
+            (0, y + 1, canvas.width())
+        } else {
+            // The words are of the tag's own range: that is what may be set.
+            let words = self::ends(cx, tag).or(ends);
+            let words = words.map_or("range not known".to_owned(), |(low, high)| format!("{low} … {high}"));
+            let wide = canvas.width().saturating_sub(5 + values + 1 + 18);
+            canvas.text(5 + values + wide + 1, y, &words, cx.theme.dim());
+            (5 + values, y, wide)
+        };
+        bar(cx, &mut canvas.part(x, y, wide, 1), plate, tag, scale);
+    }
+}
+
+/// The ends of a tag's range: `0.0`, `120.0 °C`.
+fn ends(cx: &Cx, tag: TagId) -> Option<(String, String)> {
+    let (min, max) = cx.snapshot.range(tag)?;
+    let text = |value| cx.snapshot.format(tag, value);
+    Some((text(min), format!("{} {}", text(max), cx.snapshot.unit(tag)).trim_end().to_owned()))
+}
+
+/// `├███████──▼──┃──┤`: filled up to the value; the set value as a triangle, alarm limits as bars; of SV only the
+/// triangle, on a track that is dotted where it may not be set. Without a good value there is no filling.
+fn bar(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tag: TagId, scale: TagId) {
+    let theme = cx.theme;
+    let inner = canvas.width().saturating_sub(2);
+    canvas.run(0, 0, inner + 2, '─', theme.dim());
+    canvas.glyph(0, 0, '├', theme.dim());
+    canvas.glyph(inner + 1, 0, '┤', theme.dim());
+    let Some((min, max)) = cx.snapshot.range(scale) else { return };
+    let column = |value: f64| {
+        let share = (value - min) / (max - min);
+        share.is_finite().then(|| 1 + (share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round() as u16)
+    };
+    let now = cx.snapshot.sample(tag).trusted();
+    if tag == plate.sv {
+        if let Some((low, high)) = cx.snapshot.range(tag).and_then(|(low, high)| Some((column(low)?, column(high)?))) {
+            canvas.run(1, 0, low.saturating_sub(1), '·', theme.dim());
+            canvas.run(high + 1, 0, (inner + 1).saturating_sub(high + 1), '·', theme.dim());
+        }
+    } else if let Some(end) = now.and_then(column) {
+        let alarm = cx.snapshot.alarms_of(tag).next();
+        // Never reversed: a reversed full block is an empty one.
+        let style = alarm.map_or(theme.normal(), |alarm| {
+            let priority = cx.def().alarm(alarm.id).priority;
+            theme.alarm(priority, alarm.state, false).remove_modifier(Modifier::REVERSED)
+        });
+        canvas.run(1, 0, end, '█', style);
+    }
+    for limit in limits(cx, tag) {
+        if let Some(x) = column(limit) {
+            canvas.glyph(x, 0, '┃', theme.strong());
+        }
+    }
+    if scale == plate.pv
+        && let Some(x) = cx.snapshot.sample(plate.sv).trusted().and_then(column)
+    {
+        canvas.glyph(x, 0, '▼', theme.set_value());
+    }
+}
+
+/// The limits of a tag's alarms.
+fn limits(cx: &Cx, tag: TagId) -> impl Iterator<Item = f64> {
+    cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag)).filter_map(|alarm| {
+        match alarm.condition {
+            Condition::Limit { limit, .. } => Some(limit),
+            Condition::Deviation { .. } | Condition::State { .. } | Condition::NotAnswering => None,
+        }
+    })
+}
+
+/// `PID   AT off   RUN   ‹2›! temperature high UNACK`.
+fn states(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, plate: &Faceplate) {
+    let mut x = 1;
+    for (name, tag) in [("", plate.mode), ("AT", plate.tune), ("", plate.run)] {
+        let Some(tag) = tag else { continue };
+        if !name.is_empty() {
+            x = canvas.text(x, 0, name, cx.theme.dim()) + 1;
+        }
+        let shown = value::show(cx, tag);
+        x = canvas.text(x, 0, &shown.bare(12), shown.style) + 3;
+    }
+    let alarms: Vec<_> = list::alarms(cx, device.id).collect();
+    let Some(alarm) = alarms.first() else { return };
+    let def = cx.def().alarm(alarm.id);
+    let more = if alarms.len() > 1 { format!(", {} more", alarms.len() - 1) } else { String::new() };
+    let words = format!("{} {} {}{more}", cx.theme.priority_tag(def.priority), def.text, alarm.state.word());
+    let room = canvas.width().saturating_sub(x);
+    canvas.text(x, 0, &fit_words(&words, room), cx.theme.alarm(def.priority, alarm.state, cx.flash()));
+}
+
+fn tuning_row(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tuning: &Tuning) {
+    let words = tuning_words(cx, plate, tuning).join("  ");
+    let room = canvas.width().saturating_sub(2);
+    let style = if tuning.ended.is_none() { cx.theme.strong() } else { cx.theme.normal() };
+    canvas.text(1, 0, &pad(&fit_words(&words, room), room), style);
+}
+
+/// How a tuning goes, or what it has found.
+pub fn tuning_words(cx: &Cx, plate: &Faceplate, tuning: &Tuning) -> Vec<String> {
+    let elapsed = running(tuning.elapsed(cx.now));
+    let least = if tuning.seen { "" } else { "more than " };
+    let number = |value: f64| cx.snapshot.format(plate.pv, value);
+    let Some(ended) = tuning.ended else {
+        let around = tuning.sv.map_or(String::new(), |sv| format!(" around {}", number(sv)));
+        let turns = tuning.turns.iter().rev().take(4).rev();
+        let arrow = |high| if high { cx.theme.pick("↑", "^") } else { cx.theme.pick("↓", "v") };
+        let turns: Vec<String> = turns.map(|turn| format!("{}{}", arrow(turn.high), number(turn.pv))).collect();
+        let swings = if turns.is_empty() { "no swing yet".to_owned() } else { format!("swings {}", turns.join(" ")) };
+        let period = tuning.period().map_or(String::new(), |period| format!(", {} s each", period.as_secs()));
+        return vec![format!("AUTO-TUNING {least}{elapsed}{around} (T stops)"), format!("{swings}{period}")];
+    };
+    let found = tuning.found.iter().map(|found| {
+        let text = |value: Option<f64>| value.map_or("?".to_owned(), |value| cx.snapshot.format(found.tag, value));
+        let unit = cx.snapshot.unit(found.tag);
+        format!("{} {} → {} {unit}", cx.def().tag(found.tag).short, text(found.old), text(found.new))
+            .trim_end()
+            .to_owned()
+    });
+    let at = clock(ended, &cx.def().time_zone);
+    let found: Vec<String> = found.collect();
+    vec![format!("tuned {at} in {least}{elapsed}"), found.join("  ")]
+}

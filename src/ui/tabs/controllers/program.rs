@@ -1,0 +1,255 @@
+//! The ramp/soak program as a table and as a picture, with the place where it is now.
+
+use std::time::Duration;
+
+use super::device::signal_mark;
+use crate::{
+    history::{Bucket, Series},
+    plant::{
+        def::{DeviceDef, ProgramDef, TagId},
+        program::Place,
+    },
+    ui::{
+        Cx,
+        widgets::{
+            mimic::trend,
+            text::{Canvas, fit_words, pad, pad_left, running, width},
+            value,
+        },
+    },
+};
+
+/// The selected cell.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Cell {
+    /// Step, from 0.
+    pub row: usize,
+    /// Target, ramp, soak.
+    pub column: usize,
+}
+
+/// Columns of a cell of the table.
+const CELL: u16 = 12;
+
+impl Cell {
+    /// The tag of the cell.
+    pub fn tag(self, program: &ProgramDef) -> Option<TagId> {
+        let step = program.steps.get(self.row)?;
+        [step.sv, step.ramp, step.soak].get(self.column).copied()
+    }
+    /// Moves the selection.
+    pub fn move_by(&mut self, program: &ProgramDef, columns: isize, rows: isize) {
+        self.column = self.column.saturating_add_signed(columns).min(2);
+        self.row = self.row.saturating_add_signed(rows).min(program.steps.len().saturating_sub(1));
+    }
+}
+
+/// Draws the page.
+pub fn view(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef, cell: Cell) {
+    let (wide, high) = (canvas.width(), canvas.height());
+    heading(cx, canvas, device, program);
+    let rows = program.steps.len() as u16;
+    // The table and what it says of the present; the picture below takes the rest.
+    table(cx, &mut canvas.part(0, 2, 54, rows + 1), program, cell);
+    facts(cx, &mut canvas.part(56, 2, wide.saturating_sub(57), rows + 1), device, program);
+    let top = rows + 4;
+    picture(cx, &mut canvas.part(1, top, wide.saturating_sub(2), high.saturating_sub(top)), device, program);
+}
+
+fn heading(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
+    let theme = cx.theme;
+    let x = canvas.text(1, 0, &device.name, theme.focus());
+    let x = canvas.text(x + 2, 0, "ramp/soak program", theme.normal());
+    let (words, style) = match cx.snapshot.device(device.id).diagnosis {
+        Some(reason) => (format!("{} {reason}", signal_mark(reason.signal())), theme.trouble()),
+        None => (now_words(cx, device, program), theme.strong()),
+    };
+    canvas.text(x + 3, 0, &fit_words(&words, canvas.width().saturating_sub(x + 4)), style);
+}
+
+/// `RUN, ramp 2, 03:12 of 10 min`.
+fn now_words(cx: &Cx, device: &DeviceDef, program: &ProgramDef) -> String {
+    let command = value::show(cx, program.command).text;
+    let Some(place) = place(cx, program) else { return format!("{command}, position not known") };
+    let (what, length) = match place {
+        Place::Off => return command,
+        Place::Ended => return format!("{command}, ended"),
+        Place::Ramp(step) => (format!("ramp {}", step + 1), program.steps[step].ramp),
+        Place::Soak(step) => (format!("soak {}", step + 1), program.steps[step].soak),
+    };
+    let into = cx.snapshot.programs.get(device.id.index()).copied().flatten();
+    let into = match into {
+        Some((into, true)) => running(into),
+        // Its beginning was not seen.
+        Some((into, false)) => format!("more than {}", running(into)),
+        None => "?".to_owned(),
+    };
+    format!("{command}, {what}, {into} of {}", value::show(cx, length).with_unit())
+}
+
+fn place(cx: &Cx, program: &ProgramDef) -> Option<Place> {
+    cx.snapshot.sample(program.position).trusted().map(|position| program.place(position))
+}
+
+/// The steps that the pattern runs, from 0.
+fn chosen(cx: &Cx, program: &ProgramDef) -> Option<(usize, usize)> {
+    program.steps_of(program.pattern.and_then(|pattern| cx.snapshot.sample(pattern).trusted()))
+}
+
+fn table(cx: &Cx, canvas: &mut Canvas, program: &ProgramDef, cell: Cell) {
+    let theme = cx.theme;
+    let names = ["target", "ramp", "soak"].map(|name| pad_left(name, CELL));
+    canvas.text(1, 0, &format!("{} {}", pad("step", 6), names.join(" ")), theme.dim());
+    let (now, chosen) = (place(cx, program), chosen(cx, program));
+    for (row, step) in program.steps.iter().enumerate() {
+        let y = row as u16 + 1;
+        let runs = chosen.is_none_or(|(first, last)| (first..=last).contains(&row));
+        let style = if runs { theme.normal() } else { theme.dim() };
+        let here = matches!(now, Some(Place::Ramp(at) | Place::Soak(at)) if at == row);
+        let mark = if here { theme.pick("▸", ">") } else { " " };
+        canvas.text(1, y, &format!("{mark} {}", row + 1), if here { theme.strong() } else { style });
+        for (column, tag) in [step.sv, step.ramp, step.soak].into_iter().enumerate() {
+            let shown = value::show(cx, tag);
+            let x = 8 + column as u16 * (CELL + 1);
+            let at = (now == Some(Place::Ramp(row)) && column == 1) || (now == Some(Place::Soak(row)) && column == 2);
+            let text = format!("{}{}", if at { theme.pick("▸", ">") } else { "" }, shown.within(CELL - 1));
+            let style = match (cell == Cell { row, column }, at) {
+                (true, _) => theme.focus(),
+                (false, true) => theme.strong(),
+                (false, false) if cx.snapshot.sample(tag).quality.is_good() => style,
+                (false, false) => shown.style,
+            };
+            canvas.text(x, y, &pad_left(&text, CELL), style);
+        }
+        if !runs {
+            canvas.text(8 + 3 * (CELL + 1), y, "not run", theme.dim());
+        }
+    }
+}
+
+/// What the program does besides its steps.
+fn facts(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
+    let sv = device.faceplate.as_ref().map(|plate| plate.sv);
+    let pv = device.faceplate.as_ref().map(|plate| plate.pv);
+    let rows = [
+        ("command", Some(program.command)),
+        ("pattern", program.pattern),
+        ("mode", program.mode),
+        ("PV", pv),
+        ("SV", sv),
+    ];
+    for (y, (name, tag)) in rows.into_iter().filter_map(|(name, tag)| Some((name, tag?))).enumerate() {
+        let shown = value::show(cx, tag);
+        canvas.text(0, y as u16, &pad(name, 8), cx.theme.dim());
+        let room = canvas.width().saturating_sub(9);
+        canvas.text(9, y as u16, &shown.within(room), shown.style);
+    }
+    canvas.text(0, 6, "r run   p hold   o off", cx.theme.strong());
+}
+
+/// One straight piece of the picture: how long, from where (`None`: nobody remembers), to where, and which place it is.
+struct Leg {
+    minutes: f64,
+    from: Option<f64>,
+    to: f64,
+    place: Place,
+}
+
+/// The way of the set value, from PV as it is now; `None` while a part of it is not known.
+fn legs(cx: &Cx, device: &DeviceDef, program: &ProgramDef) -> Option<Vec<Leg>> {
+    let (first, last) = chosen(cx, program)?;
+    let trusted = |tag: TagId| cx.snapshot.sample(tag).trusted();
+    // A ramp begins where the step before has ended; the first at PV as it is at the start. Once it runs that is past,
+    // and the device does not tell it: the first ramp is a gap then.
+    let resting = matches!(place(cx, program), Some(Place::Off | Place::Ended));
+    let mut from = device.faceplate.as_ref().and_then(|plate| trusted(plate.pv)).filter(|_| resting);
+    let mut legs = Vec::new();
+    for (n, step) in program.steps.iter().enumerate().take(last + 1).skip(first) {
+        let (to, ramp, soak) = (trusted(step.sv)?, trusted(step.ramp)?, trusted(step.soak)?);
+        legs.push(Leg { minutes: ramp.max(0.0), from, to, place: Place::Ramp(n) });
+        legs.push(Leg { minutes: soak.max(0.0), from: Some(to), to, place: Place::Soak(n) });
+        from = Some(to);
+    }
+    Some(legs)
+}
+
+fn picture(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
+    let theme = cx.theme;
+    let Some(legs) = legs(cx, device, program) else {
+        canvas.text(0, 0, "no picture: a target or time of the program is not known", theme.dim());
+        return;
+    };
+    let total: f64 = legs.iter().map(|leg| leg.minutes).sum();
+    if total <= 0.0 {
+        canvas.text(0, 0, "no picture: all times of the chosen steps are 0", theme.dim());
+        return;
+    }
+    let (low, high) = legs
+        .iter()
+        .flat_map(|leg| leg.from.into_iter().chain([leg.to]))
+        .fold((f64::MAX, f64::MIN), |(low, high), sv| (low.min(sv), high.max(sv)));
+    let step = program.steps[0];
+    let label = |value: f64| cx.snapshot.format(step.sv, value);
+    let gutter = width(&label(low)).max(width(&label(high))) + 1;
+    let (wide, high_rows) = (canvas.width().saturating_sub(gutter), canvas.height().saturating_sub(1));
+    if wide < 10 || high_rows < 2 {
+        return;
+    }
+    canvas.text(0, 0, &pad_left(&label(high), gutter - 1), theme.dim());
+    canvas.text(0, high_rows - 1, &pad_left(&label(low), gutter - 1), theme.dim());
+    let dots = usize::from(wide) * 2;
+    let series = way(step.sv, &legs, total, dots, cx);
+    let mut plot = canvas.part(gutter, 0, wide, high_rows);
+    trend::curve(&mut plot, &series, (low, high.max(low + 0.1)), theme.glyphs, theme.set_value());
+    axis(cx, &mut canvas.part(gutter, high_rows, wide, 1), device, program, &legs, total);
+}
+
+/// The way as a curve of so many columns.
+fn way(tag: TagId, legs: &[Leg], total: f64, dots: usize, cx: &Cx) -> Series {
+    let at = |minute: f64| {
+        let mut left = minute;
+        for leg in legs {
+            if left <= leg.minutes && leg.minutes > 0.0 {
+                return leg.from.map(|from| from + (leg.to - from) * left / leg.minutes);
+            }
+            left -= leg.minutes;
+        }
+        legs.last().map(|leg| leg.to)
+    };
+    let each = total / dots as f64;
+    let bucket = |n: usize| {
+        let (a, b) = (at(n as f64 * each)?, at((n + 1) as f64 * each)?);
+        Some(Bucket { min: a.min(b), max: a.max(b), mean: (a + b) / 2.0, last: b })
+    };
+    let buckets = (0..dots).map(bucket).collect();
+    Series { tag, from: cx.now, step: Duration::from_secs_f64(each * 60.0), buckets, summary: None, good: 1.0 }
+}
+
+/// Time below the picture, with a mark where the program is.
+fn axis(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef, legs: &[Leg], total: f64) {
+    let theme = cx.theme;
+    let unit = cx.snapshot.unit(program.steps[0].ramp).to_owned();
+    canvas.run(0, 0, canvas.width(), '─', theme.dim());
+    canvas.text(0, 0, "0", theme.dim());
+    let end = canvas.width();
+    canvas.text_right(end, 0, &format!(" {total} {unit}"), theme.dim());
+    let Some(now) = place(cx, program) else { return };
+    let Some(leg) = legs.iter().position(|leg| leg.place == now) else { return };
+    let before: f64 = legs[..leg].iter().map(|leg| leg.minutes).sum();
+    let into = cx.snapshot.programs.get(device.id.index()).copied().flatten().map_or(0.0, |(into, _)| {
+        // Times are in the unit of the device; minutes unless it says seconds.
+        into.as_secs_f64() / seconds_of(&unit)
+    });
+    let share = (before + into.min(legs[leg].minutes)) / total;
+    let x = (share.clamp(0.0, 1.0) * f64::from(canvas.width().saturating_sub(1))).round() as u16;
+    canvas.glyph(x, 0, '▲', theme.strong());
+    canvas.text(if x + 6 < end { x + 1 } else { x.saturating_sub(4) }, 0, " now", theme.strong());
+}
+
+fn seconds_of(unit: &str) -> f64 {
+    match unit {
+        "s" => 1.0,
+        "h" => 3_600.0,
+        _ => 60.0,
+    }
+}

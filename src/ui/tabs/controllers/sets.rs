@@ -1,0 +1,189 @@
+//! Parameter sets of a device: those that the station keeps, and the other controllers of the same kind to copy from.
+
+use std::sync::Arc;
+
+use crate::{
+    plant::{
+        def::{DeviceDef, DeviceId, TagId},
+        parameter_set::{self, Compared, ParameterSet, StoredSet},
+    },
+    ui::{
+        Cx,
+        modal::Notice,
+        widgets::text::{Canvas, fit, fit_words, moment, pad, pad_left, width, wrap},
+    },
+};
+
+/// Where the values to compare with come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Source {
+    /// A set of the station.
+    Set(String),
+    /// Another device, as it is now.
+    Device(DeviceId),
+}
+
+impl Source {
+    /// In words: `set winter`, `copy of TIC-2`.
+    pub fn words(&self, cx: &Cx) -> String {
+        match self {
+            Source::Set(name) => format!("set {name}"),
+            Source::Device(device) => format!("copy of {}", cx.def().device(*device).name),
+        }
+    }
+    /// Its values as they are now; `None` if it has gone or cannot be used.
+    pub fn set(&self, cx: &Cx) -> Option<Arc<ParameterSet>> {
+        match self {
+            Source::Set(name) => {
+                let stored = cx.snapshot.sets.iter().find(|stored| stored.name == *name)?;
+                stored.set.as_ref().ok().cloned()
+            }
+            Source::Device(device) => {
+                let name = &cx.def().device(*device).name;
+                let by: Arc<str> = "".into();
+                Some(Arc::new(parameter_set::take(cx.def(), *device, name, by, cx.now, &trusted(cx))))
+            }
+        }
+    }
+}
+
+/// What is trusted now.
+pub fn trusted<'a>(cx: &'a Cx) -> impl Fn(TagId) -> Option<f64> + 'a {
+    |tag| cx.snapshot.sample(tag).trusted()
+}
+
+/// Every source that can be compared with a device: its sets, files that cannot be used, other devices of its profile.
+pub fn sources(cx: &Cx, device: &DeviceDef) -> Vec<Source> {
+    let fits = |stored: &&StoredSet| stored.set.as_ref().map_or(true, |set| set.profile == device.profile);
+    let sets = cx.snapshot.sets.iter().filter(fits).map(|stored| Source::Set(stored.name.clone()));
+    let twins = cx.def().devices.iter().filter(|other| other.profile == device.profile && other.id != device.id);
+    let has = cx.def().tags_of(device.id).any(|tag| tag.in_sets);
+    sets.chain(twins.map(|other| Source::Device(other.id)).filter(|_| has)).collect()
+}
+
+/// What is wrong with the file of a set, as a window.
+pub fn problems(cx: &Cx, source: &Source) -> Option<Notice> {
+    let Source::Set(name) = source else { return None };
+    let stored = cx.snapshot.sets.iter().find(|stored| stored.name == *name)?;
+    let problems = stored.set.as_ref().err()?;
+    let mut words = vec![format!("{name}.toml cannot be used")];
+    words.extend(problems.iter().take(8).cloned());
+    if problems.len() > 8 {
+        words.push(format!("and {} more", problems.len() - 8));
+    }
+    Some(Notice::new(format!("set {name}"), words))
+}
+
+/// Draws the list of sources.
+pub fn view(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, selected: usize) {
+    let theme = cx.theme;
+    let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
+    let x = canvas.text(1, 0, &device.name, theme.focus());
+    let settings = cx.def().tags_of(device.id).filter(|tag| tag.in_sets).count();
+    let words = format!("parameter sets of {}, {settings} settings", device.model);
+    canvas.text(x + 2, 0, &fit_words(&words, end.saturating_sub(x + 2)), theme.normal());
+    let all = sources(cx, device);
+    canvas.text(1, 2, &columns(["", "set or controller", "from", "saved", "by", "values", "differ"]), theme.dim());
+    if all.is_empty() {
+        let words = match settings {
+            0 => "this device has no settings that a set could hold",
+            _ => "no set yet: n saves what the device holds now",
+        };
+        canvas.text(1, 4, words, theme.normal());
+    }
+    let room = usize::from(bottom.saturating_sub(4)).max(1);
+    let first = selected.saturating_sub(room / 2).min(all.len().saturating_sub(room));
+    for (y, (n, source)) in all.iter().enumerate().skip(first).take(room).enumerate() {
+        let here = n == selected;
+        let (text, trouble) = row(cx, device, source, here);
+        let style = match (here, trouble) {
+            (true, _) => theme.focus(),
+            (false, true) => theme.trouble(),
+            (false, false) => theme.normal(),
+        };
+        canvas.text(1, y as u16 + 3, &fit(&text, end), style);
+    }
+    let words = "Sets are files of the station, in the folder sets beside its history; u reads them anew.";
+    canvas.text(1, bottom, &fit_words(words, end), theme.dim());
+}
+
+fn columns([mark, name, from, saved, by, values, differ]: [&str; 7]) -> String {
+    format!(
+        "{} {} {} {} {} {} {}",
+        pad(mark, 2),
+        pad(name, 24),
+        pad(from, 10),
+        pad(saved, 10),
+        pad(by, 10),
+        pad_left(values, 6),
+        pad_left(differ, 8)
+    )
+}
+
+fn row(cx: &Cx, device: &DeviceDef, source: &Source, selected: bool) -> (String, bool) {
+    let mark = if selected { cx.theme.pick("▸", ">") } else { "" };
+    let counts = |set: &ParameterSet| {
+        let rows = parameter_set::compare(cx.def(), device.id, set, &trusted(cx));
+        let differ = rows.iter().filter(|row| row.set.is_some() && !row.same).count();
+        (set.values.len().to_string(), if differ == 0 { "same".to_owned() } else { differ.to_string() })
+    };
+    match source {
+        Source::Set(name) => {
+            match cx.snapshot.sets.iter().find(|stored| stored.name == *name).map(|stored| &stored.set) {
+                Some(Ok(set)) => {
+                    let saved = moment(set.saved, cx.now, &cx.def().time_zone);
+                    let (values, differ) = counts(set);
+                    (columns([mark, name, &set.device, &saved, &set.by, &values, &differ]), false)
+                }
+                Some(Err(problems)) => {
+                    let why = problems.first().map_or("", String::as_str);
+                    (format!("{} {} {} {why}", pad(mark, 2), pad(name, 24), cx.theme.pick("✗", "x")), true)
+                }
+                None => (String::new(), false),
+            }
+        }
+        Source::Device(other) => {
+            let Some(set) = source.set(cx) else { return (String::new(), false) };
+            let (values, differ) = counts(&set);
+            let name = &cx.def().device(*other).name;
+            (columns([mark, &format!("{name} as it is now"), name, "", "", &values, &differ]), false)
+        }
+    }
+}
+
+/// What a set would hold that was taken now, for the question for its name.
+pub fn save_hint(cx: &Cx, device: DeviceId) -> String {
+    let set = parameter_set::take(cx.def(), device, "", "".into(), cx.now, &trusted(cx));
+    match set.missing.as_slice() {
+        [] => format!("all {} settings, for example: winter", set.values.len()),
+        missing => {
+            let names = fit_words(&missing.join(" "), 40);
+            format!("{} settings; not known now, so left out: {names}", set.values.len())
+        }
+    }
+}
+
+/// A value of a comparison, as the device would show it.
+pub fn shown(cx: &Cx, row: &Compared, value: Option<f64>) -> String {
+    match (row.tag, value) {
+        (_, None) => "–".to_owned(),
+        (Some(tag), Some(value)) => {
+            format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)).trim_end().to_owned()
+        }
+        (None, Some(value)) => value.to_string(),
+    }
+}
+
+/// Lines of at most this width, the first ones of a long text.
+pub fn some_lines(words: &[String], room: u16, most: usize) -> Vec<String> {
+    let lines: Vec<String> = words.iter().flat_map(|words| wrap(words, room)).collect();
+    let more = lines.len().saturating_sub(most);
+    let mut lines: Vec<String> = lines.into_iter().take(most).collect();
+    if more > 0
+        && let Some(last) = lines.last_mut()
+    {
+        let tail = format!(" … {more} more lines");
+        *last = fit(last, room.saturating_sub(width(&tail))) + &tail;
+    }
+    lines
+}

@@ -1,0 +1,175 @@
+//! The parameter table of a device: grouped as the maker groups them, with value, range, default, age and meaning.
+
+use crate::{
+    plant::{
+        def::DeviceId,
+        tag::{Access, Poll, TagDef},
+    },
+    ui::{
+        Cx,
+        modal::entry::range_words,
+        widgets::{
+            text::{Canvas, age, pad, pad_left, whole, width},
+            value,
+        },
+    },
+};
+
+/// What is shown of the table, and what is selected in it.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Table {
+    /// The selected parameter, by its place among those shown.
+    pub selected: usize,
+    /// Only parameters with these words in name or meaning; empty shows all.
+    pub filter: String,
+    /// Rows that differ from the maker's default are marked.
+    pub defaults: bool,
+}
+
+impl Table {
+    /// The tags that are shown, those of one group together, in the order of the profile.
+    pub fn rows<'a>(&self, cx: &Cx<'a>, device: DeviceId) -> Vec<&'a TagDef> {
+        let tags: Vec<&TagDef> = cx.def().tags_of(device).filter(|tag| self.fits(tag)).collect();
+        let mut sorted = tags.clone();
+        sorted.sort_by_key(|tag| tags.iter().position(|first| first.group == tag.group));
+        sorted
+    }
+
+    /// The selected tag.
+    pub fn tag<'a>(&self, cx: &Cx<'a>, device: DeviceId) -> Option<&'a TagDef> {
+        self.rows(cx, device).into_iter().nth(self.selected)
+    }
+
+    /// Selects so many rows further on.
+    pub fn move_by(&mut self, cx: &Cx, device: DeviceId, by: isize) {
+        let last = self.rows(cx, device).len().saturating_sub(1);
+        self.selected = self.selected.saturating_add_signed(by).min(last);
+    }
+
+    fn fits(&self, tag: &TagDef) -> bool {
+        let text = format!("{} {} {} {}", tag.short, tag.label, tag.meaning, tag.group).to_lowercase();
+        self.filter.to_lowercase().split_whitespace().all(|word| text.contains(word))
+    }
+
+    /// Parameters under the names of their groups, the selected one in sight; returns how many rows are out of sight
+    /// below.
+    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, device: DeviceId) -> usize {
+        let theme = cx.theme;
+        let tags = self.rows(cx, device);
+        let columns = Columns::of(cx, device, canvas.width());
+        let names = ["", "parameter", "value", "", "range", "default", "age", "meaning"];
+        canvas.text(1, 0, &columns.row(names), theme.dim());
+        if tags.is_empty() {
+            let words = if self.filter.is_empty() { "this device has no values" } else { "no parameter fits" };
+            canvas.text(1, 1, words, theme.dim());
+            return 0;
+        }
+        let mut rows: Vec<Result<(usize, &TagDef), &str>> = Vec::new();
+        for (n, tag) in tags.iter().enumerate() {
+            if n == 0 || tags[n - 1].group != tag.group {
+                rows.push(Err(&tag.group));
+            }
+            rows.push(Ok((n, tag)));
+        }
+        let place = rows.iter().position(|row| row.is_ok_and(|(n, _)| n == self.selected)).unwrap_or(0);
+        let room = usize::from(canvas.height().saturating_sub(1)).max(1);
+        let first = place.saturating_sub(room / 2).min(rows.len().saturating_sub(room));
+        for (y, row) in rows.iter().skip(first).take(room).enumerate() {
+            let y = y as u16 + 1;
+            match row {
+                Ok((place, tag)) => self.parameter(cx, canvas, y, &columns, tag, *place == self.selected),
+                Err(group) => {
+                    canvas.text(1, y, group, theme.strong());
+                }
+            }
+        }
+        rows.len().saturating_sub(first + room)
+    }
+
+    fn parameter(&self, cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagDef, selected: bool) {
+        let theme = cx.theme;
+        let shown = value::show(cx, tag.id);
+        let text = shown.bare(Columns::VALUE);
+        let now = matches!(tag.poll, Poll::Every(_))
+            && cx.age(tag.id).as_secs() < 60
+            && cx.snapshot.sample(tag.id).quality.is_good();
+        let read = if now || tag.access == Access::Write { String::new() } else { age(cx.age(tag.id)) };
+        let range = range_words(cx, tag.id);
+        // What is only read needs no range; what can be written says that its range is not known.
+        let none = !tag.writable() && tag.labels.is_empty() && cx.snapshot.range(tag.id).is_none();
+        let range = if none { "–".to_owned() } else { range };
+        let range = range.trim_start_matches("range ").trim_end_matches(&shown.unit).trim_end().to_owned();
+        let pen = match (self.defaults && differs(cx, tag), tag.writable()) {
+            (true, _) => theme.pick("≠", "#"),
+            (false, true) => theme.pick("✎", "w"),
+            (false, false) => " ",
+        };
+        let known = shown.note.is_empty() || cx.snapshot.sample(tag.id).value.is_some();
+        let meaning = if known { &tag.meaning } else { &shown.note };
+        let name = format!("{} {}", pad(&tag.short, columns.short), tag.label);
+        let default = default_words(cx, tag).unwrap_or_default();
+        let range = whole(&range, Columns::RANGE);
+        let row = columns.row([pen, &name, &text, &shown.unit, &range, &default, &read, meaning]);
+        canvas.text(1, y, &row, if selected { theme.focus() } else { theme.normal() });
+        if !selected && tag.access != Access::Write && !cx.snapshot.sample(tag.id).quality.is_good() {
+            canvas.text(1 + columns.value_at(), y, &pad_left(&text, Columns::VALUE), shown.style);
+        }
+    }
+}
+
+/// Is the value known, and another than the maker delivers?
+pub fn differs(cx: &Cx, tag: &TagDef) -> bool {
+    let now = cx.snapshot.sample(tag.id).trusted();
+    // Half of the last digit shown: what looks the same is the same.
+    let least = 0.5 * 10f64.powi(-i32::from(cx.snapshot.decimals[tag.id.index()]));
+    tag.default.zip(now).is_some_and(|(default, now)| least <= (default - now).abs())
+}
+
+/// The default as the value is written.
+pub fn default_words(cx: &Cx, tag: &TagDef) -> Option<String> {
+    tag.default.map(|default| cx.snapshot.format(tag.id, default))
+}
+
+/// Widths of the columns that depend on device and screen.
+struct Columns {
+    short: u16,
+    name: u16,
+    default: u16,
+    meaning: u16,
+}
+
+impl Columns {
+    const VALUE: u16 = 10;
+    const UNIT: u16 = 6;
+    const RANGE: u16 = 16;
+    const AGE: u16 = 6;
+
+    fn of(cx: &Cx, device: DeviceId, wide: u16) -> Columns {
+        let tags = || cx.def().tags_of(device);
+        let short = tags().map(|tag| width(&tag.short)).max().unwrap_or(0).min(10);
+        let label = tags().map(|tag| width(&tag.label)).max().unwrap_or(0);
+        let free = wide.saturating_sub(3 + Columns::VALUE + Columns::UNIT + Columns::RANGE + Columns::AGE + 5);
+        let name = (short + 1 + label).min(free);
+        let left = free - name;
+        let any = tags().any(|tag| tag.default.is_some());
+        let default = if any && left >= 8 { 7 } else { 0 };
+        Columns { short, name, default, meaning: left.saturating_sub(default + 1) }
+    }
+    fn value_at(&self) -> u16 {
+        2 + self.name + 1
+    }
+    fn row(&self, [pen, name, value, unit, range, default, age, meaning]: [&str; 8]) -> String {
+        // The line below the table has the selected meaning in full: a stump of it in the table helps nobody.
+        let meaning = if self.meaning < 12 { "" } else { meaning };
+        let default = if self.default == 0 { String::new() } else { format!("{} ", pad_left(default, self.default)) };
+        format!(
+            "{pen:1} {} {} {} {} {default}{} {}",
+            pad(name, self.name),
+            pad_left(value, Columns::VALUE),
+            pad(unit, Columns::UNIT),
+            pad(range, Columns::RANGE),
+            pad_left(age, Columns::AGE),
+            pad(meaning, self.meaning)
+        )
+    }
+}

@@ -1,0 +1,322 @@
+//! The controllers tab as an operator sees it and works with it.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::SignedDuration;
+
+use crate::{
+    plant::{
+        alarm::AlarmState,
+        command::{Command, OrderId, OrderStatus, Outcome, Refusal},
+        def::{AlarmId, DeviceId},
+        ne107::Reason,
+        parameter_set::StoredSet,
+        restore::{Restore, RestoreWish, State},
+        sample::{Cause, Sample},
+        snapshot::{ActiveAlarm, DeviceState},
+        tuning::{Found, Tuning},
+    },
+    ui::{
+        Effect, Model, Msg,
+        fixture::{
+            self, Fixture,
+            controllers::{many, set},
+        },
+        tests::{model, order_of, screen, type_keys},
+        theme::Theme,
+        update,
+    },
+};
+
+const SIZES: [(u16, u16); 2] = [(80, 24), (120, 40)];
+
+/// One of everything that is wrong: an alarm, a device that is gone, one that is asked too often.
+fn trouble(count: u16) -> Fixture {
+    let mut fixture = many(count);
+    fixture.set("TIC-1.PV", 72.4);
+    let raised_at = fixture::now() - SignedDuration::from_secs(41);
+    fixture.alarms = vec![ActiveAlarm {
+        id: AlarmId(0),
+        state: AlarmState::Unacknowledged,
+        raised_at,
+        returned_at: None,
+        value: Some(72.1),
+    }];
+    if let Some(device) = fixture.devices.get_mut(1) {
+        (device.state, device.diagnosis) = (DeviceState::Down { since: raised_at }, Some(Reason::Down));
+        for tag in fixture.def.tags.iter().filter(|tag| tag.device == DeviceId(1)) {
+            fixture.samples[tag.id.index()] = Sample::bad(Cause::DeviceDown, raised_at);
+        }
+    }
+    fixture
+}
+
+/// What is wrong with a set that a person has edited.
+fn spoiled() -> StoredSet {
+    let why = "summer.toml:6:1: unknown setting `SW` (expected a setting of the device; did you mean `SV`?)";
+    StoredSet { name: "summer".into(), set: Err(vec![why.into()]) }
+}
+
+fn with_sets() -> Fixture {
+    let mut fixture = many(2);
+    fixture.sets = vec![spoiled(), set(&fixture, "winter", &[("SV", 150.0), ("SV-H", 200.0), ("P", 5.0)])];
+    fixture
+}
+
+/// The screen after some keys in both sizes.
+fn seen(name: &str, fixture: &Fixture, theme: Theme, keys: &str) {
+    for (width, height) in SIZES {
+        let mut model = model(fixture, theme);
+        type_keys(&mut model, keys);
+        insta::assert_snapshot!(format!("{name}_{width}x{height}"), screen(&mut model, width, height));
+    }
+}
+
+fn tuning(fixture: &Fixture, ended: bool) -> Tuning {
+    use crate::plant::tuning::TuningWatch;
+    let mut watch = TuningWatch::default();
+    let device = &fixture.def.devices[0];
+    let plate = device.faceplate.as_ref().expect("a controller");
+    let began = fixture::now() - SignedDuration::from_secs(754);
+    let swings = [64.0, 72.4, 68.1, 73.0, 68.0, 70.0];
+    let last = swings.len() - 1;
+    for (n, pv) in std::iter::once(60.0).chain(swings).enumerate() {
+        let at = began + SignedDuration::from_secs(n as i64 * 120);
+        let sample = |tag| match tag {
+            tag if tag == plate.pv => Sample::good(pv, at),
+            tag if Some(tag) == plate.tune => Sample::good(f64::from(u8::from(n > 0)), at),
+            tag => Sample { at, ..fixture.samples[crate::plant::def::TagId::index(tag)] },
+        };
+        watch.take(device, &sample, Some(120.0), at);
+        assert!(n <= last + 1);
+    }
+    let mut tuning = watch.tuning.expect("it is on").as_ref().clone();
+    if ended {
+        tuning.ended = Some(fixture::now() - SignedDuration::from_secs(4));
+        let new = [1.2, 70.0, 13.5];
+        tuning.found = tuning.found.iter().zip(new).map(|(found, new)| Found { new: Some(new), ..*found }).collect();
+    }
+    tuning
+}
+
+#[test]
+fn every_page_in_every_mood() {
+    seen("list_one_trouble", &trouble(2), Theme::FULL, "4");
+    seen("list_of_31", &trouble(31), Theme::FULL, "4");
+    seen("device_normal", &many(2), Theme::FULL, "4⏎");
+    seen("device_alarm", &trouble(2), Theme::FULL, "4⏎d");
+    seen("device_down", &trouble(2), Theme::FULL, "4⏎→");
+    seen("device_plc", &Fixture::normal(), Theme::FULL, "4↓⏎");
+    seen("device_ascii", &trouble(2), Theme::PLAIN, "4⏎");
+    let mut running = many(1);
+    running.into = Some((Duration::from_secs(192), true));
+    seen("program_running", &running, Theme::FULL, "4g");
+    seen("program_ascii", &running, Theme::PLAIN, "4g");
+    seen("program_down", &trouble(2), Theme::FULL, "4↓⏎g");
+    seen("sets", &with_sets(), Theme::FULL, "4⏎s");
+    seen("sets_none", &many(1), Theme::FULL, "4s");
+    seen("sets_spoiled", &with_sets(), Theme::FULL, "4⏎s⏎");
+    seen("compare", &with_sets(), Theme::FULL, "4⏎s↓⏎");
+    seen("compare_ascii", &with_sets(), Theme::PLAIN, "4⏎s↓⏎=");
+    seen("restore_asked", &with_sets(), Theme::FULL, "4⏎s↓⏎⏎");
+    seen("guide", &many(1), Theme::FULL, "4h→→→");
+}
+
+#[test]
+fn a_tuning_shows_how_it_goes_and_what_it_has_found() {
+    let mut fixture = many(2);
+    fixture.set("TIC-1.AT", 1.0);
+    fixture.tunings[0] = Some(tuning(&fixture, false));
+    seen("tuning", &fixture, Theme::FULL, "4⏎");
+    fixture.set("TIC-1.AT", 0.0);
+    fixture.tunings[0] = Some(tuning(&fixture, true));
+    seen("tuned", &fixture, Theme::FULL, "4⏎");
+}
+
+#[test]
+fn a_tuning_at_work_is_stopped_by_the_key_that_starts_one() {
+    let mut fixture = many(1);
+    let mut stopped = model(&fixture, Theme::FULL);
+    fixture.set("TIC-1.AT", 1.0);
+    update(&mut stopped, Msg::Snapshot(fixture.snapshot()));
+    let effects = type_keys(&mut stopped, "4T⏎");
+    assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("TIC-1.AT"), value: 0.0 }));
+}
+
+/// A restore of two changes whose first is done.
+fn half_done(fixture: &Fixture, state: State) -> Restore {
+    let set = fixture.sets[1].set.clone().expect("a good set");
+    let trusted = |tag: crate::plant::def::TagId| fixture.samples[tag.index()].trusted();
+    let changes = crate::plant::parameter_set::plan(&fixture.def, DeviceId(0), &set, &trusted).expect("it fits");
+    let wish = RestoreWish { device: DeviceId(0), from: "set winter".into(), set, changes };
+    let id = OrderId { terminal: 1, number: 9 };
+    let mut run = Restore::new(id, "anna".into(), &wish, fixture::now());
+    run.steps[0].order = Some(id);
+    run.steps[0].outcome = Some(Outcome::Verified);
+    run.steps[1].order = Some(id);
+    if state == State::Failed {
+        run.take(Outcome::Refused(Refusal::NotSent(crate::plant::event::Fault::Resting)));
+    }
+    run
+}
+
+#[test]
+fn a_restore_shows_each_write_and_where_it_stopped() {
+    let mut fixture = with_sets();
+    fixture.restores = vec![half_done(&fixture, State::Running)];
+    seen("restore_running", &fixture, Theme::FULL, "4⏎s↓⏎");
+    fixture.restores = vec![half_done(&fixture, State::Failed)];
+    seen("restore_failed", &fixture, Theme::FULL, "4⏎s↓⏎");
+}
+
+/// The restore that these keys order.
+fn restored(model: &mut Model, keys: &str) -> Option<RestoreWish> {
+    match order_of(&type_keys(model, keys)) {
+        Some(Command::Restore(wish)) => Some((**wish).clone()),
+        Some(_) | None => None,
+    }
+}
+
+#[test]
+fn a_set_is_written_only_after_its_differences_were_shown_and_confirmed() {
+    let fixture = with_sets();
+    let mut model = model(&fixture, Theme::FULL);
+    assert_eq!(restored(&mut model, "4⏎s↓⏎⏎"), None);
+    let wish = restored(&mut model, "⏎").expect("it was confirmed");
+    let names = wish.changes.iter().map(|change| fixture.def.tag(change.tag).short.clone());
+    assert_eq!(names.collect::<Vec<_>>(), ["P", "SV-H", "SV"], "the limit before the value that needs it");
+}
+
+#[test]
+fn a_copy_goes_from_one_controller_to_the_other_and_can_be_turned_around() {
+    let mut fixture = many(2);
+    fixture.set("TIC-2.P", 9.0);
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "4⏎s⏎");
+    assert!(screen(&mut model, 80, 24).contains("copy of TIC-2 → TIC-1"));
+    type_keys(&mut model, "t");
+    assert!(screen(&mut model, 80, 24).contains("copy of TIC-1 → TIC-2"));
+    let wish = restored(&mut model, "⏎⏎").expect("it was confirmed");
+    let written: Vec<_> = wish.changes.iter().map(|change| (change.tag, change.old, change.new)).collect();
+    assert_eq!((wish.device, written), (DeviceId(1), vec![(fixture.tag("TIC-2.P"), 9.0, 1.2)]));
+}
+
+#[test]
+fn what_does_not_fit_is_told_and_cannot_be_written() {
+    let mut fixture = many(1);
+    fixture.sets = vec![set(&fixture, "winter", &[("SV", 150.0)])];
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "4s⏎");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("cannot be written: SV 150 is outside 0 … 120"), "{shown}");
+    assert_eq!(restored(&mut model, "⏎⏎"), None);
+}
+
+#[test]
+fn nothing_is_restored_to_a_device_that_does_not_answer() {
+    let mut fixture = trouble(2);
+    fixture.sets = vec![set(&fixture, "winter", &[("SV", 80.0)])];
+    let mut model = model(&fixture, Theme::FULL);
+    assert_eq!(restored(&mut model, "4↓⏎s⏎⏎⏎"), None);
+    type_keys(&mut model, "⎋⎋⎋⎋");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("2 devices   1 not answering   1 with alarms"), "{shown}");
+}
+
+#[test]
+fn a_name_is_asked_before_a_set_is_saved_and_again_before_one_is_replaced() {
+    let fixture = with_sets();
+    let saved = |keys: &str| {
+        let mut model = model(&fixture, Theme::FULL);
+        let effects = type_keys(&mut model, &format!("4⏎sn{keys}"));
+        let orders = effects.into_iter().filter_map(|effect| match effect {
+            Effect::Order(_, Command::SaveSet { name, replace, .. }) => Some((name.to_string(), replace)),
+            _ => None,
+        });
+        (orders.collect::<Vec<_>>(), screen(&mut model, 80, 24))
+    };
+    assert_eq!(saved("autumn⏎").0, [("autumn".to_owned(), false)]);
+    assert_eq!(saved("winter⏎").0, []);
+    assert_eq!(saved("winter⏎⏎").0, [("winter".to_owned(), true)]);
+    let (orders, shown) = saved("../x⏎");
+    assert!(orders.is_empty() && shown.contains("letters, digits, blanks inside, - and _ only"), "{shown}");
+}
+
+#[test]
+fn a_cell_of_the_program_is_written_and_the_program_commanded() {
+    let fixture = many(1);
+    let check = |keys: &str, tag: &str, value: f64| {
+        let mut model = model(&fixture, Theme::FULL);
+        let effects = type_keys(&mut model, &format!("4g{keys}"));
+        assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag(tag), value }), "{keys}");
+    };
+    check("↓→⏎25⏎", "TIC-1.TM2R", 25.0);
+    check("⏎80⏎", "TIC-1.SV-1", 80.0);
+    check("p⏎", "TIC-1.PROG", 2.0);
+    check("o⏎", "TIC-1.PROG", 0.0);
+    check("t↓⏎⏎", "TIC-1.PTN", 1.0);
+}
+
+#[test]
+fn a_value_that_another_has_changed_meanwhile_is_asked_again() {
+    let fixture = many(1);
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "4↓↓↓↓↓⏎7.5");
+    assert!(screen(&mut model, 80, 24).contains("write TIC-1.P"), "{}", screen(&mut model, 80, 24));
+    let mut later = fixture.clone();
+    later.set("TIC-1.P", 3.0);
+    let mut snapshot = later.snapshot();
+    Arc::make_mut(&mut snapshot).orders = vec![OrderStatus {
+        id: OrderId { terminal: 2, number: 1 },
+        by: "boris".into(),
+        command: Command::Write { tag: fixture.tag("TIC-1.P"), value: 3.0 },
+        at: fixture::now(),
+        old: Some(1.2),
+        outcome: Outcome::Verified,
+    }];
+    update(&mut model, Msg::Snapshot(snapshot));
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), None);
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("changed meanwhile from 1.2 to 3.0 % by boris"), "{shown}");
+    let effects = type_keys(&mut model, "⏎");
+    assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("TIC-1.P"), value: 7.5 }));
+}
+
+#[test]
+fn escape_leads_back_step_by_step_and_never_out() {
+    let mut model = model(&with_sets(), Theme::FULL);
+    let title = |model: &mut Model| screen(model, 80, 24).lines().nth(4).unwrap_or_default().to_owned();
+    type_keys(&mut model, "4⏎s↓⏎h");
+    for expect in ["P, I and D", "set winter → TIC-1", "parameter sets of", "‹ TIC-1 ›", "2 devices", "2 devices"]
+    {
+        let shown = title(&mut model);
+        assert!(shown.contains(expect), "{expect}: {shown}");
+        type_keys(&mut model, "⎋");
+    }
+}
+
+#[test]
+fn a_filter_finds_by_name_and_meaning_and_escape_takes_it_away() {
+    let mut model = model(&many(1), Theme::FULL);
+    type_keys(&mut model, "4/highest⏎");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("SV-H") && !shown.contains("integral") && shown.contains("only \"highest\""), "{shown}");
+    type_keys(&mut model, "⎋");
+    assert!(screen(&mut model, 80, 24).contains("integral"));
+    type_keys(&mut model, "/xyz⏎");
+    assert!(screen(&mut model, 80, 24).contains("no parameter has \"xyz\""));
+}
+
+#[test]
+fn thirty_one_devices_can_all_be_reached() {
+    let mut model = model(&many(31), Theme::FULL);
+    let code = |code| Msg::Key(crossterm::event::KeyEvent::new(code, crossterm::event::KeyModifiers::NONE));
+    type_keys(&mut model, "4");
+    assert!(screen(&mut model, 80, 24).contains("more ▼"));
+    update(&mut model, code(crossterm::event::KeyCode::End));
+    assert!(screen(&mut model, 80, 24).contains("TIC-31"));
+    type_keys(&mut model, "⏎");
+    assert!(screen(&mut model, 80, 24).contains("‹ TIC-31 ›"));
+    type_keys(&mut model, "→");
+    assert!(screen(&mut model, 80, 24).contains("‹ TIC-1 ›"), "around the end");
+}
