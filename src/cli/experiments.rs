@@ -130,8 +130,9 @@ fn verdict(rows: &[Row]) -> Vec<String> {
 const LIMITS: &str = "\
 Fuzzy and auto-tuned heat fully until SV and reach it in the same second. In the thesis auto-tuned took 57 s longer; no lag,
 loss or band that we found explains that together with its overshoot of 2 °C.
-P, PI and PD come to rest near 69.5 °C, where the display changes: there the eddies at the probe decide the second. Their
-phase is fitted as the other constants are; with another phase these times move by up to a minute, and steady from by more.
+P and PD come to rest near 69.5 °C, where the display changes, and PI and fuzzy creep there: the eddies at the probe decide
+the second. Their phase is fitted as the other constants are; with another one these times at SV move by a minute or so,
+and steady from, of fuzzy most of all, by minutes: that those fit is partly luck.
 The thesis gives one run of each; mains, room and cold water of the day are not in it, and are constant here.";
 
 fn order(rows: &[Row], outcome: impl Fn(&Row) -> Outcome) -> Vec<&str> {

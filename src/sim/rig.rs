@@ -264,6 +264,23 @@ mod tests {
     }
 
     #[test]
+    fn a_batch_of_twenty_litres_is_filled_and_heated_too() {
+        let rig = &mut Rig::new();
+        assert!(rig.respond(2, &[6, 4, 4, 2, 0]).is_some());
+        rig.plc.device.start();
+        rig.advance(Duration::from_secs(1));
+        until_left(rig, Step::Fill, 2400);
+        let Truth { readings, step, .. } = rig.truth();
+        assert!((39.0..40.1).contains(&readings.level_cm) && step == Step::Heat, "{:?}", rig.truth());
+        // 20 l by 43 °C at 1600 W are 37 minutes and a half, without loss.
+        let heating_s = until_left(rig, Step::Heat, 5000);
+        assert!((38 * 60..60 * 60).contains(&heating_s), "heating took {heating_s} s");
+        until_left(rig, Step::Hold, 200);
+        until_left(rig, Step::Drain, 2400);
+        assert!(!rig.truth().fault);
+    }
+
+    #[test]
     fn many_batches_do_not_warm_up_the_cold_water() {
         let mut rig = Rig::demo();
         rig.advance(Duration::from_secs(24 * 3600));

@@ -25,7 +25,8 @@ const WALL_J_PER_K: f64 = 1138.4;
 const CONTROL_LOSS_W_PER_K: f64 = 3.276;
 /// TK-2 and TK-3 have cooling coils, or the cold water would warm up from batch to batch. Ours: the thesis is silent.
 const COIL_LOSS_W_PER_K: f64 = 60.0;
-const CONTROL_DIAMETER_CM: f64 = 25.0;
+/// The thesis says 25 cm, 40 cm high, 20 l, which do not quite agree: with this diameter 20 l are 40 cm.
+const CONTROL_DIAMETER_CM: f64 = 25.25;
 const COLD_DIAMETER_CM: f64 = 30.0;
 /// Flow factor of the solenoid valves (Parker VE131.4 FV) in m³/h at 1 bar.
 const VALVE_KV: f64 = 0.174;
@@ -386,7 +387,7 @@ mod tests {
 
     #[test]
     fn the_sight_glass_shows_ten_centimetres_at_five_litres() {
-        assert!((Tank::new(5.0, 27.0).readings().level_cm - 10.2).abs() < 0.05);
+        assert!((Tank::new(5.0, 27.0).readings().level_cm - 10.0).abs() < 0.05);
     }
 
     #[test]
