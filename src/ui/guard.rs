@@ -167,7 +167,7 @@ fn taken_over(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
     for actuator in acting {
         let name = &cx.def().tag(actuator.output).short;
         match (sample(actuator.command), sample(actuator.output)) {
-            (Some(command), Some(output)) if (command != 0.0) != (output != 0.0) => {
+            (Some(command), Some(output)) if (command != actuator.off) != (output != 0.0) => {
                 let arrow = cx.theme.pick("→", "->");
                 let new = cx.snapshot.format(actuator.command, command);
                 let mut locks = cx.def().guards.interlocks_of(actuator.command, command);
@@ -226,7 +226,7 @@ pub fn mark(cx: &Cx, output: TagId) -> Option<(String, Style)> {
         }
         Some((_, Some(true))) | None => {}
     }
-    let blocks = |lock: &&InterlockDef| lock.tag == actuator.command && lock.value != 0.0;
+    let blocks = |lock: &&InterlockDef| lock.tag == actuator.command && lock.value != actuator.off;
     let mut standings = guards.interlocks.iter().filter(blocks).map(|lock| lock.standing(cx.snapshot.sample(lock.of)));
     let blocked = standings.any(|standing| standing == Standing::Blocked);
     blocked.then(|| (theme.pick("⊘ blocked", "(/) blocked").to_owned(), theme.dim()))
@@ -234,8 +234,8 @@ pub fn mark(cx: &Cx, output: TagId) -> Option<(String, Style)> {
 
 /// Is the output certainly as commanded? One that need not follow its command counts as such.
 fn obeys(cx: &Cx, actuator: &ActuatorDef) -> bool {
-    let on = |tag| value::is_on(cx, tag);
-    actuator.travel.is_none() || on(actuator.command).is_some_and(|command| on(actuator.output) == Some(command))
+    let command = cx.snapshot.sample(actuator.command).trusted().map(|command| command != actuator.off);
+    actuator.travel.is_none() || (command.is_some() && value::is_on(cx, actuator.output) == command)
 }
 
 /// What a faceplate says of an actuator: (label, words, look).
