@@ -10,7 +10,7 @@ use super::{
     widgets::{text::age, value},
 };
 use crate::plant::{
-    command::{OrderStatus, Outcome},
+    command::{NotConfirmed, OrderStatus, Outcome},
     def::TagId,
     guard::{ActuatorDef, Blocking, InterlockDef, Standing},
     orders::outcome_words,
@@ -199,7 +199,9 @@ fn news(cx: &Cx, command: TagId) -> Option<(String, Option<bool>)> {
     let passed = real / cx.snapshot.speed.clamp(0.01, 1e6);
     let (well, lasts) = match status.outcome {
         Outcome::Pending => (None, f64::MAX),
-        Outcome::Verified | Outcome::Unchanged => (Some(true), DONE_S),
+        Outcome::Verified | Outcome::Unchanged | Outcome::NotConfirmed(NotConfirmed::NoReadBack) => {
+            (Some(true), DONE_S)
+        }
         Outcome::Refused(_) | Outcome::NotConfirmed(_) | Outcome::Failed(_) => (Some(false), FAILED_S),
     };
     (passed <= lasts).then(|| (outcome_words(&status.outcome), well))
