@@ -223,8 +223,10 @@ pub fn mark(cx: &Cx, output: TagId) -> Option<(String, Style)> {
             return Some((format!("{} {word}", theme.pick("✗", "x")), theme.trouble()));
         }
         // Only while the output is as commanded: another mode may have taken over since.
-        Some((_, Some(true))) if obeys(cx, actuator) => {
-            return Some((theme.pick("✓ done", "ok done").to_owned(), theme.normal()));
+        Some((words, Some(true))) if obeys(cx, actuator) => {
+            // A command that cannot be read back was taken, which is not yet done.
+            let word = if words.starts_with("not confirmed") { "accepted" } else { "done" };
+            return Some((format!("{} {word}", theme.pick("✓", "ok")), theme.normal()));
         }
         Some((_, Some(true))) | None => {}
     }
