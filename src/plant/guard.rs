@@ -82,8 +82,10 @@ impl InterlockDef {
 pub struct ActuatorDef {
     /// What tells its state. Zero is off.
     pub output: TagId,
-    /// What commands it by hand. Zero is off.
+    /// What commands it by hand.
     pub command: TagId,
+    /// The value of the command that switches off.
+    pub off: f64,
     /// States without which the command has no effect, the first to be changed first.
     pub needs: Vec<(TagId, f64)>,
     /// The output follows the command within this time; `None` if it need not (a heater that a controller cycles).
@@ -129,7 +131,7 @@ impl Guards {
         let listens = actuator.needs.iter().all(|(tag, state)| sample(*tag).trusted() == Some(*state));
         let mut locks = self.interlocks_of(actuator.command, command);
         let blocked = locks.any(|lock| lock.standing(sample(lock.of)) == Standing::Blocked);
-        actuator.travel.is_some() && listens && !blocked && (command != 0.0) != (output != 0.0)
+        actuator.travel.is_some() && listens && !blocked && (command != actuator.off) != (output != 0.0)
     }
 }
 
@@ -182,7 +184,7 @@ mod tests {
         let text = "no heating below 5 cm".to_owned();
         let lock = InterlockDef { tag: COMMAND, value: 1.0, of: LEVEL, when: Blocking::Below(5.0), text, refuse };
         let travel = Some(Duration::from_secs(5));
-        let actuator = ActuatorDef { output: OUTPUT, command: COMMAND, needs: vec![(AUTO, 0.0)], travel };
+        let actuator = ActuatorDef { output: OUTPUT, command: COMMAND, off: 0.0, needs: vec![(AUTO, 0.0)], travel };
         Guards { interlocks: vec![lock], actuators: vec![actuator], sequences: Vec::new() }
     }
 

@@ -13,20 +13,27 @@ use crate::plant::{
 
 /// All that the plant file says about commands.
 pub(super) fn guards(file: &PlantFile, defs: &Defs, problems: &mut Problems) -> Guards {
-    let interlocks = file.interlocks.iter().filter_map(|table| interlock(&table.value, defs, problems)).collect();
     let mut seen = Unique::default();
     let actuators = file.actuators.iter().filter_map(|table| actuator(&table.value, &mut seen, defs, problems));
-    let actuators = actuators.collect();
+    let actuators: Vec<ActuatorDef> = actuators.collect();
+    let interlocks = file.interlocks.iter().filter_map(|table| interlock(&table.value, &actuators, defs, problems));
+    let interlocks = interlocks.collect();
     let sequences = file.sequences.iter().filter_map(|table| sequence(&table.value, defs, problems)).collect();
     Guards { interlocks, actuators, sequences }
 }
 
-fn interlock(table: &InterlockTable, defs: &Defs, problems: &mut Problems) -> Option<InterlockDef> {
+fn interlock(
+    table: &InterlockTable,
+    actuators: &[ActuatorDef],
+    defs: &Defs,
+    problems: &mut Problems,
+) -> Option<InterlockDef> {
     let tag = commanded(table.tag.as_ref()?, defs, problems)?;
     let of = defs.tag(table.of.as_ref()?, problems)?;
     let value = number_of(table.value.as_ref()?, tag, problems)?;
     let when = blocking(table, of, problems)?;
-    let off = value == 0.0;
+    let actuator = actuators.iter().find(|actuator| actuator.command == tag.id);
+    let off = value == actuator.map_or(0.0, |actuator| actuator.off);
     if let Some(refuse) = table.refuse.filter(|refuse| refuse.value && off) {
         let problem = problems.add(refuse.at, "switching off is never refused");
         problem
@@ -71,12 +78,23 @@ fn actuator(table: &ActuatorTable, seen: &mut Unique, defs: &Defs, problems: &mu
         seen.insert(&name.value, name.at, twice, problems);
     }
     let (output, command) = (defs.tag(output, problems)?, commanded(command, defs, problems)?);
+    let off = table.off.as_ref().map_or(Some(0.0), |off| number_of(off, command, problems))?;
     let needs = table.needs.iter().filter_map(|need| state(&need.value, defs, problems)).collect();
-    Some(ActuatorDef { output: output.id, command: command.id, needs, travel: table.travel.map(|travel| travel.value) })
+    Some(ActuatorDef {
+        output: output.id,
+        command: command.id,
+        off,
+        needs,
+        travel: table.travel.map(|travel| travel.value),
+    })
 }
 
 fn sequence(table: &SequenceTable, defs: &Defs, problems: &mut Problems) -> Option<SequenceDef> {
-    let run = commanded(table.run.as_ref()?, defs, problems)?;
+    let name = table.run.as_ref()?;
+    let run = commanded(name, defs, problems)?;
+    if run.access != Access::ReadWrite {
+        problems.add(name.at, format!("whether {} runs is not known", run.name)).label("expected access = \"rw\"");
+    }
     let step = defs.tag(table.step.as_ref()?, problems)?;
     let first = number_of(table.first.as_ref()?, step, problems)?;
     let auto = table.auto.as_ref().and_then(|auto| state(&auto.value, defs, problems));
@@ -88,11 +106,11 @@ fn state(need: &NeedTable, defs: &Defs, problems: &mut Problems) -> Option<(crat
     Some((tag.id, number_of(need.is.as_ref()?, tag, problems)?))
 }
 
-/// A tag that is written and read back: what is commanded must be known too.
+/// A tag that can be written.
 fn commanded<'a>(name: &At<String>, defs: &'a Defs, problems: &mut Problems) -> Option<&'a TagDef> {
     let tag = defs.tag(name, problems)?;
-    if tag.access != Access::ReadWrite {
-        problems.add(name.at, format!("{} cannot be commanded", tag.name)).label("expected a tag with access = \"rw\"");
+    if !tag.writable() {
+        problems.add(name.at, format!("{} cannot be commanded", tag.name)).label("expected access = \"rw\" or \"w\"");
     }
     Some(tag)
 }

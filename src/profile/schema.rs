@@ -318,6 +318,7 @@ table!(
     ActuatorTable, "an actuator" {
         need "output" output: String,
         need "command" command: String,
+        opt "off" off: Choice,
         list "needs" needs: NeedTable,
         opt "travel" travel: Duration,
     }

@@ -373,6 +373,12 @@ fn an_actuator_has_one_command_and_one_output() {
     let plant = guarded(table).unwrap();
     assert_eq!(plant.guards.actuators[0].needs, [(plant.tag_named("PLC.STEP").unwrap(), 1.0)]);
     assert_eq!(plant.guards.actuators[0].travel, None);
+    // Where another value switches off, that one is never refused.
+    let lock =
+        "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"hot\"\nrefuse = true\n";
+    let text = guarded(&format!("{table}off = \"on\"\n{lock}")).expect_err("off is on").to_string();
+    assert!(text.contains("switching off is never refused"), "{text}");
+    assert!(guarded(&format!("{table}{lock}")).is_ok());
     let text = guarded(&format!("{table}{table}")).expect_err("twice").to_string();
     assert!(text.contains("PLC.OUT belongs to another actuator"), "{text}");
     let text = guarded(&table.replace("D1.MODE", "D1.T")).expect_err("read only").to_string();

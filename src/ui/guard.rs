@@ -10,7 +10,7 @@ use super::{
     widgets::{text::age, value},
 };
 use crate::plant::{
-    command::{OrderStatus, Outcome},
+    command::{NotConfirmed, OrderStatus, Outcome},
     def::TagId,
     guard::{ActuatorDef, Blocking, InterlockDef, Standing},
     orders::outcome_words,
@@ -167,7 +167,7 @@ fn taken_over(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
     for actuator in acting {
         let name = &cx.def().tag(actuator.output).short;
         match (sample(actuator.command), sample(actuator.output)) {
-            (Some(command), Some(output)) if (command != 0.0) != (output != 0.0) => {
+            (Some(command), Some(output)) if (command != actuator.off) != (output != 0.0) => {
                 let arrow = cx.theme.pick("→", "->");
                 let new = cx.snapshot.format(actuator.command, command);
                 let mut locks = cx.def().guards.interlocks_of(actuator.command, command);
@@ -199,7 +199,9 @@ fn news(cx: &Cx, command: TagId) -> Option<(String, Option<bool>)> {
     let passed = real / cx.snapshot.speed.clamp(0.01, 1e6);
     let (well, lasts) = match status.outcome {
         Outcome::Pending => (None, f64::MAX),
-        Outcome::Verified | Outcome::Unchanged => (Some(true), DONE_S),
+        Outcome::Verified | Outcome::Unchanged | Outcome::NotConfirmed(NotConfirmed::NoReadBack) => {
+            (Some(true), DONE_S)
+        }
         Outcome::Refused(_) | Outcome::NotConfirmed(_) | Outcome::Failed(_) => (Some(false), FAILED_S),
     };
     (passed <= lasts).then(|| (outcome_words(&status.outcome), well))
@@ -221,12 +223,14 @@ pub fn mark(cx: &Cx, output: TagId) -> Option<(String, Style)> {
             return Some((format!("{} {word}", theme.pick("✗", "x")), theme.trouble()));
         }
         // Only while the output is as commanded: another mode may have taken over since.
-        Some((_, Some(true))) if obeys(cx, actuator) => {
-            return Some((theme.pick("✓ done", "ok done").to_owned(), theme.normal()));
+        Some((words, Some(true))) if obeys(cx, actuator) => {
+            // A command that cannot be read back was taken, which is not yet done.
+            let word = if words.starts_with("not confirmed") { "accepted" } else { "done" };
+            return Some((format!("{} {word}", theme.pick("✓", "ok")), theme.normal()));
         }
         Some((_, Some(true))) | None => {}
     }
-    let blocks = |lock: &&InterlockDef| lock.tag == actuator.command && lock.value != 0.0;
+    let blocks = |lock: &&InterlockDef| lock.tag == actuator.command && lock.value != actuator.off;
     let mut standings = guards.interlocks.iter().filter(blocks).map(|lock| lock.standing(cx.snapshot.sample(lock.of)));
     let blocked = standings.any(|standing| standing == Standing::Blocked);
     blocked.then(|| (theme.pick("⊘ blocked", "(/) blocked").to_owned(), theme.dim()))
@@ -234,8 +238,8 @@ pub fn mark(cx: &Cx, output: TagId) -> Option<(String, Style)> {
 
 /// Is the output certainly as commanded? One that need not follow its command counts as such.
 fn obeys(cx: &Cx, actuator: &ActuatorDef) -> bool {
-    let on = |tag| value::is_on(cx, tag);
-    actuator.travel.is_none() || on(actuator.command).is_some_and(|command| on(actuator.output) == Some(command))
+    let command = cx.snapshot.sample(actuator.command).trusted().map(|command| command != actuator.off);
+    actuator.travel.is_none() || (command.is_some() && value::is_on(cx, actuator.output) == command)
 }
 
 /// What a faceplate says of an actuator: (label, words, look).

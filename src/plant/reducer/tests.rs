@@ -241,7 +241,7 @@ fn an_actuator_that_does_not_obey_is_in_the_snapshot() {
     use crate::plant::guard::{ActuatorDef, Guards};
     let mut def = fixture::plant();
     let travel = Some(Duration::from_secs(5));
-    let actuator = ActuatorDef { output: FAULT, command: fixture::RUN, needs: Vec::new(), travel };
+    let actuator = ActuatorDef { output: FAULT, command: fixture::RUN, off: 0.0, needs: Vec::new(), travel };
     def.guards = Guards { actuators: vec![actuator], ..Guards::default() };
     let mut plant = Plant::new(std::sync::Arc::new(def), at(0), 1.0);
     let late = |plant: &Plant, second: i64| {

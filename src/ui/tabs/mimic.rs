@@ -172,6 +172,29 @@ impl Mimic {
         for (n, item) in items.iter().enumerate() {
             self.item(cx, &mut canvas, item, n, stretch);
         }
+        // When all is drawn it is known where there is room for a mark.
+        for item in items {
+            match item {
+                MimicItem::Valve { place, tag, vertical, .. } => {
+                    let (x, y) = stretch.spot(*place);
+                    let rows =
+                        if *vertical { [y, y + 1, y.saturating_sub(1)] } else { [y.saturating_sub(1), y + 1, y + 2] };
+                    unit::mark(cx, &mut canvas, x + 1, &rows, *tag);
+                }
+                MimicItem::Pump { place, tag, .. } => {
+                    let at = stretch.place(*place);
+                    let y = at.y + at.height / 2;
+                    unit::mark(cx, &mut canvas, at.x, &[y + 1, y.saturating_sub(1), y + 2, y], *tag);
+                }
+                MimicItem::Tank { .. }
+                | MimicItem::Pipe { .. }
+                | MimicItem::Value { .. }
+                | MimicItem::Controller { .. }
+                | MimicItem::Sequence { .. }
+                | MimicItem::Trend { .. }
+                | MimicItem::Text { .. } => {}
+            }
+        }
         if items.is_empty() {
             canvas.text(1, 1, "the plant file draws no picture", cx.theme.dim());
         }

@@ -325,6 +325,7 @@ fn the_picture_tells_how_a_command_went() {
     check(&fixture, Some(Outcome::Failed(Fault::Timeout)), false, "✗ failed");
     check(&fixture, Some(Outcome::Refused(Refusal::ReadOnly)), false, "✗ refused");
     check(&fixture, Some(Outcome::Verified), false, "✓ done");
+    check(&fixture, Some(Outcome::NotConfirmed(NotConfirmed::NoReadBack)), false, "✓ accepted");
     fixture.set("PLC-1.MAN.P-1", 1.0);
     check(&fixture, None, true, "≠ not ON");
     fixture.set("PLC-1.MAN.P-1", 0.0);

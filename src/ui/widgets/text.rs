@@ -99,6 +99,12 @@ impl<'a> Canvas<'a> {
     pub fn symbol(&self, x: u16, y: u16) -> Option<&str> {
         self.buffer.cell((self.area.x + x, self.area.y + y)).map(|cell| cell.symbol())
     }
+    /// Is nothing written in these cells? What would stand outside is never blank, but for one cell behind the last column.
+    pub fn is_blank(&self, x: u16, y: u16, length: u16) -> bool {
+        let end = x.saturating_add(length);
+        let inside = y < self.area.height && end <= self.area.width.saturating_add(1);
+        inside && (x..end.min(self.area.width)).all(|column| self.symbol(column, y) == Some(" "))
+    }
     /// The part of the screen under this canvas.
     pub fn area(&self) -> Rect {
         self.area

@@ -35,13 +35,11 @@ pub fn valve(
         canvas.text(x, y, shape, style);
         let name = canvas.text(x + 3, y, label, label_style(cx, selected));
         canvas.text(name + 1, y, &word, words);
-        mark(cx, canvas, (x + 3, y + 1), tag);
     } else {
         canvas.text(x, y, shape, style);
         let above = x.saturating_sub(width(label) / 2);
         let name = canvas.text(above, y.saturating_sub(1), label, label_style(cx, selected));
-        let end = canvas.text(name + 1, y.saturating_sub(1), &word, words);
-        mark(cx, canvas, (end + 1, y.saturating_sub(1)), tag);
+        canvas.text(name + 1, y.saturating_sub(1), &word, words);
     }
 }
 
@@ -65,13 +63,26 @@ pub fn pump(cx: &Cx, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagId, s
         canvas.text(x, y, close, style);
         canvas.text(at.x + width(open) + 2, y.saturating_sub(1), &word, style);
     }
-    mark(cx, canvas, (at.x, y + 1), tag);
 }
 
-/// What there is to say of an actuator beyond its state: blocked, sent, failed, not obeying.
-fn mark(cx: &Cx, canvas: &mut Canvas, (x, y): (u16, u16), tag: TagId) {
-    if let Some((words, style)) = guard::mark(cx, tag) {
-        canvas.text(x, y, &words, style);
+/// Columns right of a symbol, and left of it, in which room for its mark is looked for.
+const MARK_REACH: (u16, u16) = (14, 6);
+
+/// What there is to say of an actuator beyond its state: blocked, sent, failed, not obeying. It is drawn when all else is,
+/// in the first of these rows that has room for its word, else for its shape: it never hides a number.
+pub fn mark(cx: &Cx, canvas: &mut Canvas, x: u16, rows: &[u16], tag: TagId) {
+    let Some((words, style)) = guard::mark(cx, tag) else { return };
+    let shape = words.split(' ').next().unwrap_or_default().to_owned();
+    for text in [&words, &shape] {
+        let columns = || (x..=x.saturating_add(MARK_REACH.0)).chain((x.saturating_sub(MARK_REACH.1)..x).rev());
+        let mut spots = rows.iter().flat_map(|row| columns().map(move |column| (column, *row)));
+        // A column stays free on both sides.
+        let free = |(column, row): &(u16, u16)| canvas.is_blank(column.saturating_sub(1), *row, width(text) + 2);
+        let found = spots.find(free);
+        if let Some((column, row)) = found {
+            canvas.text(column, row, text, style);
+            return;
+        }
     }
 }
 
