@@ -7,10 +7,13 @@ use crate::plant::{
     tag::{Table, TagDef},
 };
 
+/// Takes one value out of what is so in the rig.
+type Look = fn(&Truth) -> f64;
+
 /// Which tags of a plant have a truth, and which.
 #[derive(Debug, Clone, Default)]
 pub struct Lens {
-    rig: Vec<(TagId, fn(&Truth) -> f64)>,
+    rig: Vec<(TagId, Look)>,
     others: Vec<TagId>,
 }
 
@@ -37,7 +40,7 @@ impl Lens {
 }
 
 /// What a tag of the thesis's controller or PLC measures, by its address in their profiles.
-fn of_rig(def: &PlantDef, tag: &TagDef) -> Option<fn(&Truth) -> f64> {
+fn of_rig(def: &PlantDef, tag: &TagDef) -> Option<Look> {
     let device = def.device(tag.device);
     if def.simulation.as_deref() != Some("tank") {
         return None;

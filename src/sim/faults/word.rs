@@ -294,10 +294,8 @@ impl Fault {
             (Fault::Late(_), Some(_)) => "a time from 50ms to 60s, such as `late 2s`".to_owned(),
             (_, Some(Parameter { unit, min, max, .. })) => {
                 let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-                format!(
-                    "a number from {min} to {max}, such as `{self}`",
-                    self = format!("{word} {}{unit}", self.number().unwrap_or(min))
-                )
+                let usual = self.number().unwrap_or(min);
+                format!("a number from {min} to {max}, such as `{word} {usual}{unit}`")
             }
         }
     }
