@@ -186,9 +186,13 @@ impl Pxr {
             Sensor::Pt100(c) if c < low_c - margin_c => BELOW_RANGE,
             Sensor::Pt100(_) => 0,
         };
-        let seen_c = input_c.clamp(low_c - margin_c, high_c + margin_c);
+        let inside = |c: f64| c.clamp(low_c - margin_c, high_c + margin_c);
+        let seen_c = inside(input_c);
         let filter_s = self.tenths(map::FILTER);
-        self.pv_c += (seen_c - self.pv_c) * if self.faults == 0 { SAMPLE_S / (SAMPLE_S + filter_s) } else { 1.0 };
+        // The range may have become narrower since the last sample; the filter would still be outside.
+        let before_c = inside(self.pv_c);
+        self.pv_c =
+            before_c + (seen_c - before_c) * if self.faults == 0 { SAMPLE_S / (SAMPLE_S + filter_s) } else { 1.0 };
     }
 
     /// The programme moves SV while it runs; in standby it stands still.

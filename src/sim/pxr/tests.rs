@@ -284,6 +284,18 @@ fn self_tuning_calms_a_loop_that_swings() {
     assert!(swing_c < 1.5, "{swing_c} °C");
 }
 
+#[test]
+fn a_narrower_range_holds_for_what_was_filtered_before() {
+    let mut pxr = Pxr::new(27.0);
+    write(&mut pxr, 1023, 5);
+    samples(&mut pxr, Sensor::Pt100(-46.4), 1);
+    write(&mut pxr, 1017, 26);
+    samples(&mut pxr, Sensor::Pt100(-3.9), 1);
+    let (low_c, high_c) = pxr.range_c();
+    assert_eq!(low_c, 2.6);
+    assert!(low_c - OVER_RANGE * (high_c - low_c) <= pxr.pv_c(), "{} °C", pxr.pv_c());
+}
+
 proptest! {
     #[test]
     fn no_write_breaks_the_controller_and_limits_always_hold(
