@@ -10,7 +10,9 @@
 //! |---|---|
 //! | `sightglass run PLANT` | the **station**: polls, alarms, history. No terminal: what an init system starts on a panel PC |
 //! | `sightglass PLANT` | station and **terminal** in one process |
-//! | `sightglass demo` | a simulated plant on a real pseudo-terminal line, station and terminal in one process |
+//! | `sightglass demo` | a simulated plant on real pseudo-terminals and sockets, station and terminal in one process |
+//!
+//! `sightglass drill` is the fourth, without a terminal: station and simulated plant in virtual time, judged by a scenario.
 //!
 //! # How data flows
 //!

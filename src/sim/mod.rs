@@ -1,11 +1,17 @@
-//! A world to test against: the water tank, its controller and its PLC as Modbus slaves. Bytes and time move only in [`io`].
+//! A world to test and to train against: every device of a plant as a Modbus slave. Bytes and time move only in [`io`].
 //!
 //! ```text
-//!  tank  <── actuators ── dl06 <── at SV ── pxr <── probe ── tank        one step of 0.1 s in `rig`
-//!                          │                 │
-//!                        slave ─ pdu::serve ─ slave                       one Modbus server for both devices, which count
+//!  tank  <── actuators ── dl06 <── at SV ── pxr <── probe ── tank        one step of 0.1 s in `rig`: the water tank
+//!  model <── `simulate` of the profile, for every device that is no part of the rig
 //!                                  │
-//!                          faults: silent, late, damaged ── io: RTU or ASCII on a pty, TCP, RTU over TCP
+//!                               slave ─ pdu::serve                       one Modbus server for all, which counts
+//!                                  │
+//!                               world: (line, unit) ─> slave             `faults` spoil what is measured, done or answered
+//!                                  │
+//!                               io: RTU or ASCII on a pty, TCP, RTU over TCP; each line at a place of its own
+//!
+//!  scenario ─> drill: faults at their times, an operator's deeds, and a judge over journal, snapshots and `truth`
+//!  experiment: the six of the thesis, on the rig alone
 //! ```
 
 pub mod tank;
