@@ -49,7 +49,9 @@ fn describe(def: &PlantDef, line: LineId) -> Vec<String> {
     text.extend(blocks.iter().map(|block| block_words(def, line, block)));
     let admission = admission::admit(def, line.id, &blocks);
     let cycle = admission.cycle.as_secs_f64() * 1e3;
-    text.push(format!("  utilisation {:.1} %, one read of everything {cycle:.1} ms", admission.utilisation * 100.0));
+    // The sum of nothing is -0.
+    let utilisation = admission.utilisation.abs() * 100.0;
+    text.push(format!("  utilisation {utilisation:.1} %, one read of everything {cycle:.1} ms"));
     text.extend(verdict_words(&admission));
     text.extend(admission.dead.iter().map(dead_words));
     text.extend(admission.warnings.iter().map(|warning| format!("  warning: {warning}")));

@@ -143,8 +143,10 @@ impl Limits {
 pub struct Faceplate {
     /// Process value.
     pub pv: TagId,
-    /// Set value.
+    /// Set value, as it is written.
     pub sv: TagId,
+    /// The set value in use, where a program or a ramp may move it away from `sv`.
+    pub sv_used: Option<TagId>,
     /// Manipulated value, output in percent.
     pub mv: Option<TagId>,
     /// Run / standby, if it can be switched.
@@ -155,6 +157,13 @@ pub struct Faceplate {
     pub tune: Option<TagId>,
     /// The parameters that auto-tuning finds: P, I, D.
     pub tunes: Vec<TagId>,
+}
+
+impl Faceplate {
+    /// What the controller works towards now: to show, never to write.
+    pub fn aim(&self) -> TagId {
+        self.sv_used.unwrap_or(self.sv)
+    }
 }
 
 /// An action on a device: a write that needs its own words, confirmation and quiet time.

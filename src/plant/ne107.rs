@@ -70,6 +70,8 @@ pub enum Reason {
         /// Of so many.
         of: u32,
     },
+    /// It answers, and none of its latest answers held a value.
+    NoValues,
     /// Reads were left out, because the line had no time for them.
     Missed(u64),
     /// Spoiled or repeated requests.
@@ -89,7 +91,7 @@ impl Reason {
     /// Which signal it gives.
     pub fn signal(self) -> Signal {
         match self {
-            Reason::NotConnected | Reason::Down => Signal::Failure,
+            Reason::NotConnected | Reason::Down | Reason::NoValues => Signal::Failure,
             Reason::LineClosed | Reason::LineTesting | Reason::Settling => Signal::FunctionCheck,
             Reason::Slow { .. } | Reason::Failing { .. } | Reason::Missed(_) => Signal::OutOfSpecification,
             Reason::Spoiled { .. } | Reason::Late(_) | Reason::MemoryParity(_) => Signal::Maintenance,
@@ -109,6 +111,7 @@ impl fmt::Display for Reason {
                 write!(f, "answers take {} of {} ms", p99.as_millis(), timeout.as_millis())
             }
             Reason::Failing { failed, of } => write!(f, "{failed} of {of} requests failed"),
+            Reason::NoValues => f.write_str("answers, but gives no values"),
             Reason::Missed(count) => write!(f, "{count} reads left out, line too busy"),
             Reason::Spoiled { spoiled, of } => write!(f, "{spoiled} of {of} answers spoiled or repeated"),
             Reason::Late(count) => write!(f, "{count} answers came too late"),
@@ -138,6 +141,8 @@ const REQUESTS_MIN: u64 = 20;
 const SLOW_PERCENT: u32 = 80;
 /// Share of the recent requests that may fail, in hundredths.
 const FAILING_PERCENT: u32 = 10;
+/// After so many failures in a row a device is of no use, whatever it answers.
+const NO_VALUES_AFTER: u32 = 12;
 /// Share of requests that may be spoiled or repeated, in hundredths.
 const SPOILED_PERCENT: u64 = 1;
 
@@ -165,6 +170,9 @@ pub fn judge(evidence: Evidence) -> Option<Reason> {
 fn out_of_specification(lately: &Tally, timeout: Duration) -> Option<Reason> {
     let enough = REQUESTS_MIN <= lately.requests;
     let slow = lately.reply.p99().filter(|p99| enough && timeout * SLOW_PERCENT < *p99 * 100);
+    if lately.fails_since(NO_VALUES_AFTER) {
+        return Some(Reason::NoValues);
+    }
     let (failed, of) = lately.recent();
     if let Some(p99) = slow {
         Some(Reason::Slow { p99, timeout })
@@ -244,6 +252,14 @@ mod tests {
         check(&tally(3, 12, &[Fault::Timeout; 3]), "");
         let missed = Tally { missed: 2, ..tally(100, 12, &[]) };
         check(&missed, "S 2 reads left out, line too busy");
+    }
+
+    #[test]
+    fn a_device_that_answers_without_values_has_failed() {
+        let check = |lately: &Tally, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
+        check(&tally(0, 12, &[Fault::Exception(ExceptionCode(4)); 12]), "F answers, but gives no values");
+        check(&tally(100, 12, &[Fault::Exception(ExceptionCode(4)); 12]), "F answers, but gives no values");
+        check(&tally(0, 12, &[Fault::Exception(ExceptionCode(4)); 11]), "");
     }
 
     #[test]

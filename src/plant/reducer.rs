@@ -18,6 +18,7 @@ use super::{
     event::{Event, Fault, LineState, WriteResult},
     guard::Watch,
     line_minute::LineWatch,
+    ne107::Reason,
     orders::Desk,
     parameter_set::StoredSet,
     program::ProgramWatch,
@@ -361,7 +362,7 @@ fn facts(def: &PlantDef, board: &Board, devices: &[DeviceStatus], alarm: AlarmId
     let alarm = def.alarm(alarm);
     let (value, answering) = match alarm.subject {
         Subject::Tag(tag) => (board.sample(tag).trusted(), None),
-        Subject::Device(device) => (None, answers(devices[device.index()].state)),
+        Subject::Device(device) => (None, answers(&devices[device.index()])),
     };
     let reference = match alarm.condition {
         Condition::Deviation { from, .. } => board.sample(from).trusted(),
@@ -370,8 +371,10 @@ fn facts(def: &PlantDef, board: &Board, devices: &[DeviceStatus], alarm: AlarmId
     Facts { value, reference, answering }
 }
 
-fn answers(state: DeviceState) -> Option<bool> {
-    match state {
+/// A device that refuses everything is as good as silent.
+fn answers(status: &DeviceStatus) -> Option<bool> {
+    match status.state {
+        DeviceState::Answering | DeviceState::Failing(_) if status.diagnosis == Some(Reason::NoValues) => Some(false),
         DeviceState::Unknown | DeviceState::Failing(_) => None,
         DeviceState::Answering => Some(true),
         DeviceState::Down { .. } => Some(false),

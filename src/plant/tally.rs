@@ -100,6 +100,11 @@ impl Tally {
         }
     }
 
+    /// Have the latest requests failed, so many of them?
+    pub fn fails_since(&self, count: u32) -> bool {
+        u64::from(count) <= self.requests && count <= self.recent.trailing_ones()
+    }
+
     /// Did the newest request fail?
     pub fn failed_last(&self) -> bool {
         self.recent & 1 == 1

@@ -183,7 +183,16 @@ mod tests {
     const P: TagId = TagId(3);
 
     fn device() -> DeviceDef {
-        let plate = Faceplate { pv: PV, sv: SV, mv: None, run: None, mode: None, tune: Some(AT), tunes: vec![P] };
+        let plate = Faceplate {
+            pv: PV,
+            sv: SV,
+            sv_used: None,
+            mv: None,
+            run: None,
+            mode: None,
+            tune: Some(AT),
+            tunes: vec![P],
+        };
         DeviceDef { faceplate: Some(plate), ..fixture::plant().devices[0].clone() }
     }
 

@@ -75,7 +75,7 @@ fn not_answering(id: AlarmId, device: &DeviceDef) -> AlarmDef {
         // The link has already asked more than once; the delay keeps a single lost frame quiet.
         on_delay: Duration::from_secs(3),
         off_delay: Duration::ZERO,
-        text: "not answering".to_owned(),
+        text: "gives no values".to_owned(),
         guidance: Guidance {
             cause: format!(
                 "{} has no power, its cable is open, or its unit address or serial parameters differ",

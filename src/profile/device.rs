@@ -202,6 +202,7 @@ pub(super) fn faceplate(
         Some(tag.id)
     };
     let (pv, sv) = (find(&table.pv), find(&table.sv));
+    let sv_used = find(&table.sv_used);
     let (mv, run, mode, tune) = (find(&table.mv), find(&table.run), find(&table.mode), find(&table.tune));
     let (pv, sv): (TagId, TagId) = (pv?, sv?);
     if let Some(name) = table.sv.as_ref().filter(|_| !tags[sv.index()].writable()) {
@@ -210,7 +211,7 @@ pub(super) fn faceplate(
             .label("expected access = \"rw\"");
     }
     let tunes = table.tunes.iter().filter_map(|name| names.near(name, device, problems)).collect();
-    Some(Faceplate { pv, sv, mv, run, mode, tune, tunes })
+    Some(Faceplate { pv, sv, sv_used, mv, run, mode, tune, tunes })
 }
 
 /// The actions of a device.

@@ -241,6 +241,8 @@ table!(
     FaceplateTable, "the faceplate" {
         need "pv" pv: String,
         need "sv" sv: String,
+        /// The set value in use, where a program or a ramp may move it.
+        opt "sv_used" sv_used: String,
         opt "mv" mv: String,
         opt "run" run: String,
         opt "mode" mode: String,

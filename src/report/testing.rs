@@ -58,6 +58,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
                 run: None,
                 mode: None,
                 tune: None,
+                sv_used: None,
                 tunes: Vec::new(),
             }),
             actions: Vec::new(),

@@ -5,6 +5,7 @@
 
 use std::time::Duration;
 
+use super::pxr::map;
 use super::rig::Rig;
 use super::slave::Unit;
 
@@ -15,6 +16,8 @@ pub const RECORDING: Duration = Duration::from_secs(3600);
 /// PV that came to SV later than this before the end of the recording is not called steady.
 const STEADY_MIN_S: u32 = 300;
 const FILL_L: f64 = 5.0;
+/// Address of the first setting in display units.
+const ENGINEERING: u16 = 1000;
 
 /// Settings of the controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,17 +77,23 @@ pub fn run(control: &Control) -> Outcome {
     let mut rig = Rig::filled(FILL_L);
     let tenths = |value: f64| (value * 10.0).round() as u16;
     let settings = [
-        (1001, u16::from(control.fuzzy)),
-        (1005, tenths(control.p_percent)),
-        (1006, tenths(control.i_s)),
-        (1007, tenths(control.d_s)),
+        (map::CONTROL, u16::from(control.fuzzy)),
+        (map::P, tenths(control.p_percent)),
+        (map::I, tenths(control.i_s)),
+        (map::D, tenths(control.d_s)),
     ];
-    for (address, value) in settings {
-        let [[a, b], [c, d]] = [u16::to_be_bytes(address), value.to_be_bytes()];
-        rig.controller().respond(&[6, a, b, c, d]);
+    for (place, value) in settings {
+        let [[a, b], [c, d]] = [(ENGINEERING + place as u16).to_be_bytes(), value.to_be_bytes()];
+        let request = [6, a, b, c, d];
+        assert_eq!(
+            rig.controller().respond(&request).as_deref(),
+            Some(&request[..]),
+            "the controller takes {control:?}"
+        );
     }
     // Running, in manual, agitator and heater on.
-    rig.plc().respond(&[15, 0x0C, 0, 0, 7, 1, 0b100_1001]);
+    let taken = rig.plc().respond(&[15, 0x0C, 0, 0, 7, 1, 0b100_1001]);
+    assert_eq!(taken.as_deref(), Some(&[15, 0x0C, 0, 0, 7][..]), "the PLC takes its commands");
     measure((0..=RECORDING.as_secs() as u32).map(|second| {
         let pv_c = rig.truth().pv_c;
         rig.advance(Duration::from_secs(1));

@@ -14,6 +14,7 @@ use crate::plant::{
     command::{Command, NotConfirmed, Outcome},
     def::{LineDef, Priority},
     event::LineState,
+    ne107::Reason,
     snapshot::{ActiveAlarm, DeviceState},
 };
 use crate::sim::drill::{Progress, Status};
@@ -107,7 +108,7 @@ fn too_small(model: &Model, cx: &Cx, frame: &mut Frame) {
         Some(Modal::Confirm(confirm)) if confirm.is_quit() => {
             let y = if area.height > 2 { 2 } else { area.height.saturating_sub(1) };
             canvas.run(0, y, area.width, ' ', cx.theme.normal());
-            canvas.text(0, y, "Quit? ⏎ quit  Esc stay", cx.theme.strong());
+            canvas.text(0, y, &cx.theme.enter("Quit? ⏎ quit  Esc stay"), cx.theme.strong());
         }
         Some(_) | None => {
             canvas.text(0, 2, "q quit", cx.theme.dim());
@@ -245,8 +246,10 @@ fn banner(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     let mark = cx.theme.alarm(def.priority, alarm.state, cx.flash());
     let x = canvas.text(1, 0, cx.theme.priority_mark(def.priority), mark) + 1;
     let (text, room) = (alarm_words(cx, alarm), canvas.width());
-    let text = if x + width(&text) <= room { text } else { fit_words(&text, room.saturating_sub(x)) };
     let ack = if waiting { "a ack " } else { "" };
+    // That it waits for somebody must not be what a long text cuts off.
+    let left = room.saturating_sub(x + if waiting { 2 + width(ack) } else { 0 });
+    let text = if width(&text) <= left { text } else { fit_words(&text, left) };
     // The alarm itself comes first; the counts and the key only where there is room left.
     let tails = [format!("{}   {ack}", counts(cx)), ack.to_owned(), String::new()];
     let fits = |tail: &&String| x + width(&text) + 2 + width(tail) <= room;
@@ -268,6 +271,11 @@ fn blind_words(model: &Model, cx: &Cx) -> Option<String> {
     let devices = cx.def().devices.iter().filter(|device| snapshot.line(device.line).state == LineState::Connected);
     let devices = devices.filter_map(|device| match snapshot.device(device.id).state {
         DeviceState::Down { .. } => Some(format!("{} not answering", device.name)),
+        DeviceState::Answering | DeviceState::Failing(_)
+            if snapshot.device(device.id).diagnosis == Some(Reason::NoValues) =>
+        {
+            Some(format!("{} gives no values", device.name))
+        }
         DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_) => None,
     });
     let blind: Vec<String> = silent.into_iter().chain(lines).chain(devices).collect();
@@ -286,7 +294,8 @@ fn alarm_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
         AlarmState::Returned => alarm.returned_at.unwrap_or(alarm.raised_at),
         AlarmState::Normal | AlarmState::Unacknowledged | AlarmState::Acknowledged => alarm.raised_at,
     };
-    format!("{} {}  {now}  {} {}", subject(cx, alarm.id), def.text, alarm.state.word(), running(between(since, cx.now)))
+    let (state, lasted) = (alarm.state.word(), running(between(since, cx.now)));
+    format!("{} {}  {state} {lasted}  {now}", subject(cx, alarm.id), def.text)
 }
 
 /// How many of each priority: `[1]!1 (3)2`.
@@ -394,6 +403,9 @@ fn footer(cx: &Cx, canvas: &mut Canvas, hints: &[Hint], global: bool) {
     } else {
         Vec::new()
     };
+    // In seven bits the sign of Enter would be a slash, which is another key.
+    let told = |hint: &Hint| Hint { key: cx.theme.enter(&hint.key), ..hint.clone() };
+    let (hints, tail): (Vec<Hint>, Vec<Hint>) = (hints.iter().map(told).collect(), tail.iter().map(told).collect());
     let room = |hint: &Hint| width(&hint.key) + 1 + width(&hint.label) + 2;
     let mut end = canvas.width().saturating_sub(1 + tail.iter().map(room).sum::<u16>());
     let mut x = 1;

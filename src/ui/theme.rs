@@ -193,6 +193,10 @@ impl Theme {
     pub fn pick<T>(&self, unicode: T, ascii: T) -> T {
         if self.glyphs == Glyphs::Ascii { ascii } else { unicode }
     }
+    /// A text with the key Enter by its sign, or by its name where the sign cannot be drawn.
+    pub fn enter(&self, text: &str) -> String {
+        if self.glyphs == Glyphs::Ascii { text.replace('⏎', "Enter") } else { text.to_owned() }
+    }
     /// `…` or `..`.
     pub fn ellipsis(&self) -> &'static str {
         self.pick("…", "..")

@@ -51,7 +51,7 @@ impl Fault {
                 "The unit understands and refuses: no such register, busy, or its own failure.",
                 "Values are bad with the refusal as their cause. The unit counts as answering, so its alarm \"not answering\" \
                  does not come.",
-                "Press Enter on a value and read why it is bad; the code says what the unit objects to.",
+                "Press w on a value and read why it is bad; the code says what the unit objects to.",
             ),
             Fault::Stuck => story(
                 "The measuring part of the unit hangs while its communication goes on: every answer is good and old.",

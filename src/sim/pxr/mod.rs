@@ -10,7 +10,7 @@ mod alarm;
 mod control;
 mod display;
 mod fuzzy;
-mod map;
+pub(super) mod map;
 mod program;
 mod registers;
 mod rule;

@@ -32,12 +32,16 @@ impl Choice {
     /// The values of an enumeration, the present one selected.
     pub fn values(cx: &Cx, tag: TagId) -> Choice {
         let def = cx.def().tag(tag);
-        let rows = def.labels.iter().map(|(number, label)| {
+        // A state that the device only reports is no choice.
+        let range = cx.snapshot.range(tag);
+        let may = |number: f64| range.is_none_or(|(min, max)| (min..=max).contains(&number));
+        let choices = || def.labels.iter().filter(|(number, _)| may(*number as f64));
+        let rows = choices().map(|(number, label)| {
             let next = Confirm::write(cx, tag, *number as f64);
             Row { text: format!("{number}  {label}"), tag, next }
         });
         let now = cx.snapshot.sample(tag).value;
-        let selected = def.labels.iter().position(|(number, _)| Some(*number as f64) == now).unwrap_or(0);
+        let selected = choices().position(|(number, _)| Some(*number as f64) == now).unwrap_or(0);
         Choice { title: format!("write {} {}", def.name, def.label), rows: rows.collect(), selected }
     }
 

@@ -215,7 +215,7 @@ impl Confirm {
         if let Some(seen) = self.seen.as_ref().filter(|seen| seen.has_asked()) {
             rows.extend(wrap(&seen.words(cx), room).into_iter().map(|line| (line, cx.theme.trouble())));
         }
-        let yes = if self.wants_y() { "y" } else { "⏎" };
+        let yes = if self.wants_y() { "y".to_owned() } else { cx.theme.enter("⏎") };
         let keys = match self.is_refused(cx) {
             true => format!("Esc {}", self.escape()),
             false => format!("{yes} {}   Esc {}", self.verb(), self.escape()),

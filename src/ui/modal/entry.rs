@@ -83,7 +83,7 @@ impl Entry {
         }
         let last = canvas.height().saturating_sub(1);
         canvas.text(0, last.saturating_sub(1), &problem, theme.trouble());
-        canvas.text(0, last, "⏎ write and verify   Esc leave unchanged", theme.strong());
+        canvas.text(0, last, &theme.enter("⏎ write and verify   Esc leave unchanged"), theme.strong());
     }
 }
 

@@ -220,7 +220,7 @@ impl Alarms {
         let columns = Columns::of(cx, canvas.width());
         canvas.text(1, 1, &columns.row(["", "time", "tag", "what", "value", "state", "for"]), theme.dim());
         if alarms.is_empty() {
-            canvas.text(6, 3, "Nothing is wrong. j shows what was.", theme.normal());
+            canvas.text(6, 3, "No alarm is active. j shows what was.", theme.normal());
             return;
         }
         let guide = canvas.height().saturating_sub(4).min(6);

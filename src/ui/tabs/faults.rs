@@ -71,7 +71,7 @@ pub const KEYS: &[Key<Action>] = &[
         help: "more of it, where it has a number",
         action: Action::More,
     },
-    Key { chord: char('w'), label: "all well", help: "mend everything", action: Action::AllWell },
+    Key { chord: char('m'), label: "mend all", help: "mend everything", action: Action::AllWell },
     Key { chord: char('v'), label: "points", help: "how the drill stands, or the fault told", action: Action::Verdict },
 ];
 

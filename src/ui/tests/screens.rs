@@ -26,6 +26,24 @@ use crate::{
     },
 };
 
+/// A program, a ramp or another hand at the controller: what it works towards is what counts.
+#[test]
+fn the_set_value_in_use_stands_where_sv_stands_with_what_was_set_beside_it() {
+    let mut fixture = Fixture::normal();
+    let used = fixture.tag("TIC-1.MV");
+    if let Some(plate) = &mut fixture.def.devices[0].faceplate {
+        (plate.sv_used, plate.mv) = (Some(used), None);
+    }
+    for (tab, keys) in [(Tab::Mimic, ""), (Tab::Controllers, "⏎")] {
+        let mut model = model(&fixture, Theme::FULL);
+        model.tabs.shown = tab;
+        type_keys(&mut model, keys);
+        let shown = screen(&mut model, 120, 40);
+        let told = |line: &str| line.contains("SV  42.0") && line.contains("set 70.0");
+        assert!(shown.lines().any(told), "{tab:?}\n{shown}");
+    }
+}
+
 #[test]
 fn screens_in_every_mood() {
     let moods = [("normal", Fixture::normal()), ("alarm", Fixture::alarm()), ("line_down", Fixture::line_down())];

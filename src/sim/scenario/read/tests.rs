@@ -74,6 +74,8 @@ fn a_mistake_is_told_with_its_line_what_was_found_and_what_was_expected() {
         "s.toml:9:9: found `late 2`, expected a time from 50ms to 60s, such as `late 2s`",
     );
     check(&event("fault = 'silent'"), "s.toml:7:1: where is `silent`?");
+    let never_off = "[[expect]]\nshown_true = 'TIC-1.PV'\ngive = -1\n";
+    check(&format!("{HEAD}{never_off}"), "s.toml:6:8: found -1, expected 0 or more");
     check(&event("fault = 'silent'\ndevice = 'TIC-9'"), "s.toml:10:10: unknown device `TIC-9`");
     check(&event("fault = 'silent'\nline = 'L1'"), "s.toml:9:9: `silent` is a fault of a device, not of L1");
     check(&event("fault = 'torn value'\ndevice = 'TIC-1'"), "s.toml:9:9: TIC-1 has no value of 32 bits");

@@ -294,8 +294,8 @@ impl Form {
             let more = format!(" {} more lines: enlarge the screen", told.len() - room);
             canvas.text_right(canvas.width(), last.saturating_sub(1), &more, theme.strong());
         }
-        let keys = "↑↓ field   ←→ choose   ⏎ start   Esc close";
-        canvas.text(0, last, &pad(keys, width(keys)), theme.strong());
+        let keys = theme.enter("↑↓ field   ←→ choose   ⏎ start   Esc close");
+        canvas.text(0, last, &pad(&keys, width(&keys)), theme.strong());
     }
 
     fn title(&self) -> &'static str {

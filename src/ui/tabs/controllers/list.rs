@@ -155,7 +155,7 @@ fn cells(cx: &Cx, columns: &Columns, device: &DeviceDef) -> Cells {
     cells.push((text, Columns::ALARM, style));
     match &device.faceplate {
         Some(plate) => {
-            for tag in [Some(plate.pv), Some(plate.sv), plate.mv] {
+            for tag in [Some(plate.pv), Some(plate.aim()), plate.mv] {
                 let shown = tag.map(|tag| value::show(cx, tag));
                 let text = shown.as_ref().map_or(String::new(), |shown| {
                     let whole = shown.with_unit();

@@ -12,7 +12,7 @@ use crate::{
     ui::{
         Cx,
         widgets::{
-            mimic::{Bounds, trend},
+            mimic::{Bounds, panel::set_apart, trend},
             text::{Canvas, clock, fit_words, pad, running, width},
             value,
         },
@@ -89,7 +89,7 @@ fn tuning_of<'a>(cx: &Cx<'a>, device: &DeviceDef) -> Option<&'a Tuning> {
 
 /// A row a bar (`tall`: three, with value, bar and ends of the scale).
 fn bars(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tall: bool) {
-    let rows = [("PV", Some(plate.pv)), ("SV", Some(plate.sv)), ("MV", plate.mv)];
+    let rows = [("PV", Some(plate.pv)), ("SV", Some(plate.aim())), ("MV", plate.mv)];
     let rows: Vec<(&str, TagId)> = rows.into_iter().filter_map(|(name, tag)| Some((name, tag?))).collect();
     // All bars start in one column, so that they can be compared.
     let values = rows.iter().map(|(_, tag)| width(&value::show(cx, *tag).with_unit())).max().unwrap_or(0).clamp(9, 14);
@@ -98,9 +98,13 @@ fn bars(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tall: bool) {
         let shown = value::show(cx, tag);
         canvas.text(if tall { 0 } else { 1 }, y, name, cx.theme.dim());
         let room = if tall { canvas.width().saturating_sub(4) } else { values };
-        canvas.text(4, y, &shown.within(room), shown.style);
+        let end = canvas.text(4, y, &shown.within(room), shown.style);
+        let apart = set_apart(cx, plate).filter(|_| tag == plate.aim());
+        if let Some(words) = apart.as_ref().filter(|_| tall) {
+            canvas.text(end + 2, y, words, cx.theme.strong());
+        }
         // PV and SV share the scale of PV, so that their distance is seen.
-        let scale = if tag == plate.sv { plate.pv } else { tag };
+        let scale = if tag == plate.aim() { plate.pv } else { tag };
         let ends = ends(cx, scale);
         let (x, y, wide) = if tall {
             if let Some((low, high)) = &ends {
@@ -109,9 +113,8 @@ fn bars(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tall: bool) {
             }
             (0, y + 1, canvas.width())
         } else {
-            // The words are of the tag's own range: that is what may be set.
-            let words = self::ends(cx, tag).or(ends);
-            let words = words.map_or("range not known".to_owned(), |(low, high)| format!("{low} … {high}"));
+            let words = ends.map_or("range not known".to_owned(), |(low, high)| format!("{low} … {high}"));
+            let words = apart.unwrap_or(words);
             let wide = canvas.width().saturating_sub(5 + values + 1 + 18);
             canvas.text(5 + values + wide + 1, y, &words, cx.theme.dim());
             (5 + values, y, wide)
@@ -141,8 +144,10 @@ fn bar(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tag: TagId, scale: TagId
         share.is_finite().then(|| 1 + (share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round() as u16)
     };
     let now = cx.snapshot.sample(tag).trusted();
-    if tag == plate.sv {
-        if let Some((low, high)) = cx.snapshot.range(tag).and_then(|(low, high)| Some((column(low)?, column(high)?))) {
+    if tag == plate.aim() {
+        if let Some((low, high)) =
+            cx.snapshot.range(plate.sv).and_then(|(low, high)| Some((column(low)?, column(high)?)))
+        {
             canvas.run(1, 0, low.saturating_sub(1), '·', theme.dim());
             canvas.run(high + 1, 0, (inner + 1).saturating_sub(high + 1), '·', theme.dim());
         }
@@ -161,7 +166,7 @@ fn bar(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tag: TagId, scale: TagId
         }
     }
     if scale == plate.pv
-        && let Some(x) = cx.snapshot.sample(plate.sv).trusted().and_then(column)
+        && let Some(x) = cx.snapshot.sample(plate.aim()).trusted().and_then(column)
     {
         canvas.glyph(x, 0, '▼', theme.set_value());
     }
@@ -216,7 +221,9 @@ pub fn tuning_words(cx: &Cx, plate: &Faceplate, tuning: &Tuning) -> Vec<String> 
         let turns: Vec<String> = turns.map(|turn| format!("{}{}", arrow(turn.high), number(turn.pv))).collect();
         let swings = if turns.is_empty() { "no swing yet".to_owned() } else { format!("swings {}", turns.join(" ")) };
         let period = tuning.period().map_or(String::new(), |period| format!(", {} s each", period.as_secs()));
-        return vec![format!("AUTO-TUNING {least}{elapsed}{around} (T stops)"), format!("{swings}{period}")];
+        let known = plate.tune.is_some_and(|tune| cx.snapshot.sample(tune).trusted().is_some());
+        let how = if known { "AUTO-TUNING" } else { "not known now; when last heard AUTO-TUNING" };
+        return vec![format!("{how} {least}{elapsed}{around} (T stops)"), format!("{swings}{period}")];
     };
     let found = tuning.found.iter().map(|found| {
         let text = |value: Option<f64>| value.map_or("?".to_owned(), |value| cx.snapshot.format(found.tag, value));
@@ -226,6 +233,9 @@ pub fn tuning_words(cx: &Cx, plate: &Faceplate, tuning: &Tuning) -> Vec<String> 
             .to_owned()
     });
     let at = clock(ended, &cx.def().time_zone);
-    let found: Vec<String> = found.collect();
-    vec![format!("tuned {at} in {least}{elapsed}"), found.join("  ")]
+    let words: Vec<String> = found.collect();
+    // Stopped by hand, given up, ended by a broken sensor: it looks the same from here, and nothing was found.
+    let same = tuning.found.iter().all(|found| found.new.is_some() && found.new == found.old);
+    let how = if same { "tuning ended, nothing changed," } else { "tuned" };
+    vec![format!("{how} {at} in {least}{elapsed}"), words.join("  ")]
 }

@@ -129,7 +129,7 @@ fn table(cx: &Cx, canvas: &mut Canvas, program: &ProgramDef, cell: Cell) {
 
 /// What the program does besides its steps.
 fn facts(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
-    let sv = device.faceplate.as_ref().map(|plate| plate.sv);
+    let sv = device.faceplate.as_ref().map(|plate| plate.aim());
     let pv = device.faceplate.as_ref().map(|plate| plate.pv);
     let rows = [
         ("command", Some(program.command)),

@@ -94,7 +94,7 @@ fn faults_go_on_and_off_by_enter_with_their_numbers() {
     assert_eq!(press(&mut model, "↓⏎"), [Order::Clear(TIC, Fault::Silent)], "what is on goes off");
     let late = Fault::Late(Duration::from_secs(1));
     assert_eq!(press(&mut model, "↓←⏎"), [Order::Set(TIC, late)], "a number is set before it is on");
-    assert_eq!(press(&mut model, "w"), [Order::AllWell]);
+    assert_eq!(press(&mut model, "m"), [Order::AllWell]);
     assert_eq!(press(&mut model, "↑↑↑↑↑"), []);
     assert_eq!(press(&mut model, "⏎"), [Order::Set(Place::Line(L1), Fault::Noise(50))]);
 }

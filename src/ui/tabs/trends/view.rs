@@ -312,7 +312,7 @@ fn resolution(cx: &Cx, tag: TagId) -> f64 {
 fn is_set_value(cx: &Cx, tag: TagId) -> bool {
     let faceplates = cx.def().devices.iter().filter_map(|device| device.faceplate.as_ref());
     let def = cx.def().tag(tag);
-    faceplates.clone().any(|face| face.sv == tag)
+    faceplates.clone().any(|face| face.sv == tag || face.sv_used == Some(tag))
         || def.writable() && !faceplates.clone().any(|face| face.mv == Some(tag))
 }
 

@@ -80,7 +80,7 @@ pub fn tags(cx: &Cx, item: &MimicItem) -> Vec<TagId> {
         | MimicItem::Value { tag, .. }
         | MimicItem::Trend { tag, .. } => vec![*tag],
         MimicItem::Controller { device, .. } => match &cx.def().device(*device).faceplate {
-            Some(plate) => [Some(plate.sv), Some(plate.pv), plate.mv, plate.run, plate.mode, plate.tune]
+            Some(plate) => [Some(plate.sv), plate.sv_used, Some(plate.pv), plate.mv, plate.run, plate.mode, plate.tune]
                 .into_iter()
                 .flatten()
                 .collect(),

@@ -23,10 +23,13 @@ pub fn controller(cx: &Cx, canvas: &mut Canvas, at: Bounds, device: &DeviceDef, 
     canvas.text(x + 2, 0, &fit(&device.model, room), theme.dim());
     let Some(plate) = &device.faceplate else { return };
     let mut y = 1;
-    for (name, tag) in [("PV", Some(plate.pv)), ("SV", Some(plate.sv)), ("MV", plate.mv)] {
+    for (name, tag) in [("PV", Some(plate.pv)), ("SV", Some(plate.aim())), ("MV", plate.mv)] {
         let Some(tag) = tag else { continue };
         canvas.text(0, y, name, theme.dim());
         put_value(cx, &mut canvas, 4, y, tag, at.width.saturating_sub(4));
+        if let Some(words) = set_apart(cx, plate).filter(|_| tag == plate.aim()) {
+            canvas.text_right(at.width, y, &words, theme.strong());
+        }
         y += 1;
     }
     if at.height > 7 {
@@ -45,6 +48,13 @@ pub fn controller(cx: &Cx, canvas: &mut Canvas, at: Bounds, device: &DeviceDef, 
         let room = canvas.width().saturating_sub(x);
         x = canvas.text(x, y + 1, &shown.bare(room), shown.style) + 2;
     }
+}
+
+/// `set 70.0`, where the controller works towards something else: a program or a ramp moves it.
+pub fn set_apart(cx: &Cx, plate: &Faceplate) -> Option<String> {
+    let value = |tag| cx.snapshot.sample(tag).trusted();
+    let set = value(plate.sv).filter(|set| value(plate.aim()) != Some(*set))?;
+    Some(format!("set {}", cx.snapshot.format(plate.sv, set)))
 }
 
 /// The ends of the range above the bar.
@@ -76,7 +86,7 @@ fn bar(cx: &Cx, canvas: &mut Canvas, y: u16, plate: &Faceplate) {
             canvas.glyph(x, y, '┃', theme.normal());
         }
     }
-    if let Some(x) = cx.snapshot.sample(plate.sv).trusted().and_then(column) {
+    if let Some(x) = cx.snapshot.sample(plate.aim()).trusted().and_then(column) {
         canvas.glyph(x, y, '▼', theme.set_value());
     }
     if let Some(x) = cx.snapshot.sample(plate.pv).trusted().and_then(column) {
