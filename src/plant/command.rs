@@ -162,6 +162,9 @@ pub enum Refusal {
     /// Another write to this tag is still under way.
     #[error("a write to this tag is under way")]
     UnderWay,
+    /// It still waited when a stop of the same tag came, and would have undone it.
+    #[error("a stop came before it, nothing was sent")]
+    Overtaken,
     /// The plant file knows that it would have no effect now.
     #[error("interlock: {0}")]
     Interlock(String),
@@ -217,6 +220,8 @@ pub enum BusRequest {
         unlock: Option<(TagId, f64)>,
         /// Read it back afterwards.
         verify: bool,
+        /// It switches something off: it goes before all that waits, see [`super::guard::is_stop`].
+        urgent: bool,
     },
     /// Read every block of a device as soon as possible.
     Refresh(DeviceId),

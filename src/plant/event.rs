@@ -97,6 +97,8 @@ pub enum WriteResult {
     Lost(Fault),
     /// Nothing was sent.
     NotSent(Fault),
+    /// Nothing was sent: it still waited when a stop of the same tag came.
+    Overtaken,
 }
 
 /// Why a request did not end in a valid normal answer.

@@ -5,6 +5,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 
 use super::{
+    def::PlantDef,
     id::TagId,
     sample::{Cause, Sample},
 };
@@ -133,6 +134,16 @@ impl Guards {
         let blocked = locks.any(|lock| lock.standing(sample(lock.of)) == Standing::Blocked);
         actuator.travel.is_some() && listens && !blocked && (command != actuator.off) != (output != 0.0)
     }
+}
+
+/// Does this value of a command switch something off: the `off` of an actuator, the zero of a sequence, an action that is
+/// marked as a stop? `value` is as the device will hold it, [`super::scale::held`].
+pub fn is_stop(def: &PlantDef, tag: TagId, value: f64) -> bool {
+    let actuators = def.guards.actuators.iter().map(|actuator| (actuator.command, actuator.off));
+    let sequences = def.guards.sequences.iter().map(|sequence| (sequence.run, 0.0));
+    let actions = def.device(def.tag(tag).device).actions.iter().filter(|action| action.stop);
+    let actions = actions.map(|action| (action.tag, action.value));
+    actuators.chain(sequences).chain(actions).any(|stop| stop == (tag, value))
 }
 
 /// Since when each actuator has not obeyed, by its place in [`Guards::actuators`].

@@ -238,6 +238,7 @@ pub(super) fn actions(
             value,
             settle: Duration::from_millis(action.settle_ms.map_or(0, |ms| u64::from(ms.value))),
             confirm: text(&action.confirm),
+            stop: action.stop.is_some_and(|stop| stop.value),
         });
     }
     found

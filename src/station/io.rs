@@ -31,7 +31,9 @@ use super::{Session, sets};
 /// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
 const EVENTS: usize = 256;
 /// Requests waiting for one link; a full queue refuses the order.
-const REQUESTS: usize = 16;
+const REQUESTS: usize = 16 + KEPT_FOR_STOPS;
+/// Places of that queue that only a stop may take.
+const KEPT_FOR_STOPS: usize = 4;
 /// Orders waiting for the plant; a full queue refuses the order.
 const ORDERS: usize = 64;
 /// Real time between two snapshots: what a person can follow.
@@ -371,8 +373,15 @@ impl PlantTask {
     }
 
     fn send(&mut self, line: LineId, request: BusRequest) {
-        if let Err(refused) = self.links[line.index()].try_send(request) {
-            let effects = self.plant.on_undeliverable(line, &refused.into_inner());
+        let link = &self.links[line.index()];
+        let is_stop = matches!(request, BusRequest::Write { urgent: true, .. });
+        let refused = if is_stop || KEPT_FOR_STOPS < link.capacity() {
+            link.try_send(request).err().map(mpsc::error::TrySendError::into_inner)
+        } else {
+            Some(request)
+        };
+        if let Some(refused) = refused {
+            let effects = self.plant.on_undeliverable(line, &refused);
             self.keep(effects.records);
         }
     }

@@ -6,6 +6,7 @@ use super::*;
 use crate::plant::{
     alarm::AlarmState,
     command::{NotConfirmed, OrderId},
+    def::ActionDef,
     event::ExceptionCode,
     fixture::{self, DP, FAULT, HIGH, PLC, PV, RUN, SILENT, SV, TIC},
     record::AlarmStep,
@@ -253,4 +254,34 @@ fn an_actuator_that_does_not_obey_is_in_the_snapshot() {
     assert_eq!((late(&plant, 4), late(&plant, 6)), (None, Some(6)));
     plant.on_event(read(7, &[(fixture::RUN, 1.0), (FAULT, 1.0)]));
     assert_eq!(late(&plant, 20), None, "it has obeyed");
+}
+
+/// The plant of the tests, whose PLC is stopped by an action.
+fn with_stop() -> Plant {
+    let mut def = fixture::plant();
+    let (settle, confirm) = (Duration::ZERO, String::new());
+    let stop = ActionDef { name: "STOP".into(), tag: RUN, value: 0.0, settle, confirm, stop: true };
+    def.devices[PLC.index()].actions = vec![stop];
+    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+    plant.on_event(read(0, &[(RUN, 0.0)]));
+    plant
+}
+
+#[test]
+fn a_stop_is_sent_though_a_start_is_under_way() {
+    let mut plant = with_stop();
+    let mut check = |number, value, expect: Option<(f64, bool)>| {
+        let effects = plant.on_order(order(number, Command::Write { tag: RUN, value }), at(1));
+        let sent = effects.bus.first().map(|(_, request)| match request {
+            BusRequest::Write { raw, urgent, .. } => (*raw, *urgent),
+            other => panic!("not a write: {other:?}"),
+        });
+        assert_eq!(sent, expect, "order {number}: {:?}", plant.snapshot().orders[0].outcome);
+    };
+    check(1, 1.0, Some((1.0, false)));
+    // The PLC was read as stopped before the start: that makes the stop no less needed.
+    check(2, 0.0, Some((0.0, true)));
+    check(3, 0.0, None);
+    check(4, 1.0, None);
+    assert_eq!(plant.snapshot().orders[1].outcome, Outcome::Refused(Refusal::UnderWay));
 }

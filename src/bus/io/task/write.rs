@@ -21,20 +21,29 @@ use crate::{
     },
 };
 
+/// What is to be written: a tag, its raw number, and how.
+pub(super) struct Wish<'a> {
+    pub tag: &'a TagDef,
+    pub raw: f64,
+    /// What is written first.
+    pub unlock: Option<(&'a TagDef, f64)>,
+    /// Read it back afterwards.
+    pub verify: bool,
+    /// A stop.
+    pub urgent: bool,
+}
+
 impl Task {
     /// Carries a write and tells how it ended.
-    #[allow(clippy::too_many_arguments)]
     pub(super) async fn write(
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
         id: WriteId,
-        tag: &TagDef,
-        raw: f64,
-        unlock: Option<(&TagDef, f64)>,
-        verify: bool,
+        wish: Wish<'_>,
     ) -> Turn {
-        let result = match self.write_once(link, schedule, tag, raw, unlock, verify).await {
+        let tag = wish.tag;
+        let result = match self.write_once(link, schedule, wish).await {
             Ok(result) => result,
             Err(why) => {
                 // The port went away under the write: it may or may not have arrived.
@@ -56,7 +65,7 @@ impl Task {
             WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => {
                 schedule.refresh(tag.device, self.clock.now());
             }
-            WriteResult::Refused(_) | WriteResult::NotSent(_) => {}
+            WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Overtaken => {}
         }
         self.tell_wrote(id, result).await?;
         if unanswered {
@@ -71,10 +80,7 @@ impl Task {
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
-        tag: &TagDef,
-        raw: f64,
-        unlock: Option<(&TagDef, f64)>,
-        verify: bool,
+        Wish { tag, raw, unlock, verify, urgent }: Wish<'_>,
     ) -> Result<WriteResult, String> {
         let def = self.def.clone();
         let device = def.device(tag.device);
@@ -88,7 +94,8 @@ impl Task {
         for (tag, raw) in unlock.into_iter().chain([(tag, raw)]) {
             // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
             let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
-            let own = self.owes_nothing(link, device).await?;
+            // A stop is not kept waiting for the sake of a clear answer: its refusal may then be told as a loss.
+            let own = (urgent && is_clear(link, device)) || (!urgent && self.owes_nothing(link, device).await?);
             match self.send_write(link, device, request).await {
                 Ok(()) => schedule.answered(tag.device, self.clock.now()),
                 Err(Trouble::Gone(why)) => return Err(why),
@@ -125,8 +132,7 @@ impl Task {
     /// An exception names no address: only from a unit that owes nothing is it certainly the answer to what was sent. `Err`
     /// when the port is gone.
     async fn owes_nothing(&self, link: &mut Link, device: &DeviceDef) -> Result<bool, String> {
-        let broadcast = device.unit == 0;
-        if link.framing() == Framing::Mbap || broadcast || link.debt(device.unit).is_clear() {
+        if is_clear(link, device) {
             return Ok(true);
         }
         match link.loopback(device.unit).await {
@@ -144,6 +150,12 @@ impl Task {
         }
         sent
     }
+}
+
+/// Can no answer that a device still owes be taken for the next one?
+fn is_clear(link: &Link, device: &DeviceDef) -> bool {
+    let broadcast = device.unit == 0;
+    link.framing() == Framing::Mbap || broadcast || link.debt(device.unit).is_clear()
 }
 
 /// The request that writes a raw number: function 5 or 6 for one, 15 or 16 for more or where the profile says so, 22 for a
