@@ -122,7 +122,8 @@ pub enum Outcome {
     Verified,
     /// The device already had this value: nothing was written, memory is spared.
     Unchanged,
-    /// Not done, and certainly without effect.
+    /// Not done, and certainly without effect on what was to be written; a key that was sent before it has a line of its own
+    /// in the journal.
     Refused(Refusal),
     /// The device accepted it but the read-back differs or failed.
     NotConfirmed(NotConfirmed),

@@ -112,6 +112,38 @@ impl Desk {
         self.close(order.id, outcome, board)
     }
 
+    /// The key that a write needs was sent before it, which is a deed of its own.
+    pub fn unlocked(
+        &mut self,
+        id: WriteId,
+        key: TagId,
+        result: &WriteResult,
+        board: &Board,
+        at: Timestamp,
+    ) -> Option<ActionRecord> {
+        let (_, order, tag, _) = self.writes.iter().find(|write| write.0 == id)?;
+        let status = self.orders.iter().find(|status| status.id == *order)?;
+        let (key, tag) = (self.def.tag(key), self.def.tag(*tag));
+        let outcome = match result {
+            WriteResult::Refused(code) => Outcome::Refused(Refusal::Exception(*code)),
+            WriteResult::Lost(fault) => Outcome::Failed(*fault),
+            WriteResult::NotSent(fault) => Outcome::Refused(Refusal::NotSent(*fault)),
+            WriteResult::Overtaken => Outcome::Refused(Refusal::Overtaken),
+            WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::NotRead(_) => {
+                Outcome::NotConfirmed(NotConfirmed::NoReadBack)
+            }
+        };
+        Some(ActionRecord {
+            at,
+            by: status.by.clone(),
+            action: "unlock".into(),
+            target: key.name.as_str().into(),
+            old: board.sample(key.id).value.map(|old| value_words(board, key, old).into()),
+            new: tag.write_unlock.map(|(_, new)| value_words(board, key, new).into()),
+            outcome: format!("{}; for {}", outcome_words(&outcome), tag.name).into(),
+        })
+    }
+
     /// A write came to its end on the wire.
     pub fn wrote(&mut self, id: WriteId, result: WriteResult, board: &Board) -> Option<ActionRecord> {
         let index = self.writes.iter().position(|write| write.0 == id)?;
@@ -228,6 +260,12 @@ impl Desk {
         }
         let raw_of = |key, value| scale::to_raw(self.def.tag(key), value, 0).unwrap_or(value);
         let unlock = def.write_unlock.map(|(key, value)| (key, raw_of(key, value)));
+        // A key that is turned already stays so, unless somebody is just turning it.
+        let unlock = unlock.filter(|(key, turned)| {
+            let moving = self.writes.iter().any(|write| write.2 == *key);
+            let now = board.trusted_raw(*key).filter(|_| !moving);
+            now.is_none_or(|now| !scale::same_raw(self.def.tag(*key).point.kind, now, *turned))
+        });
         Ok(Checked { raw, unlock, urgent })
     }
 

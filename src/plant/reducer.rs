@@ -137,6 +137,12 @@ impl Plant {
                 self.lines[line.index()].test = Some(run);
                 (at, None)
             }
+            Event::Unlocked { at, id, key, result } => {
+                if !matches!(result, WriteResult::Refused(_)) {
+                    self.board.failed(&[key], Fault::Timeout, at);
+                }
+                (at, self.desk.unlocked(id, key, &result, &self.board, at))
+            }
             Event::Wrote { at, id, result } => (at, self.wrote(id, result, at)),
         };
         let mut effects = self.settle(at);

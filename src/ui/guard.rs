@@ -57,9 +57,19 @@ pub fn before_write(cx: &Cx, tag: TagId, value: f64) -> Vec<(String, Style)> {
     if let Some(words) = unmet_words(cx, tag) {
         rows.push((format!("! {words}"), cx.theme.strong()));
     }
+    rows.extend(key_words(cx, tag).into_iter().map(|words| (words, cx.theme.strong())));
     rows.extend(sequence_words(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
     rows.extend(taken_over(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
     rows
+}
+
+/// `First TIC-2.UNLOCK := ON; it stays so.`, where a write needs a key that is not certainly turned.
+pub fn key_words(cx: &Cx, tag: TagId) -> Option<String> {
+    let (key, turned) = cx.def().tag(tag).write_unlock?;
+    if cx.snapshot.sample(key).trusted() == Some(turned) {
+        return None;
+    }
+    Some(format!("First {} := {}; it stays so.", cx.def().tag(key).name, cx.snapshot.format(key, turned)))
 }
 
 /// `⊘ no heating below 5 cm of water: PLC-1.LT-1 is 3.2 cm`; `None` while it does not block.

@@ -539,3 +539,32 @@ async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
     assert!(stop <= before + 1, "{} requests went before the stop: {:?}", stop - before, &heard[before..]);
     assert!(!heard.contains(&vec![1, 6, 0, 20, 0, 1]), "the start is not sent after the stop");
 }
+
+/// A key that was turned stays turned though the value is refused: that is told, and the key is read again.
+#[tokio::test(start_paused = true)]
+async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
+    let def = plant(Mode::Rtu);
+    let (value, key) = (TagId(1), TagId(9));
+    let mut line = line(def.clone());
+    line.plug(Mode::Rtu, |_, message| match message {
+        [1, 6, 0, 11, ..] => Deed::Exception(3),
+        _ => Deed::Answer,
+    });
+    // The key is read once at the start and then only when somebody asks for it.
+    let holds = |event: &Event| match event {
+        Event::Read { values, .. } => values.iter().any(|(tag, _)| *tag == key).then_some(()),
+        _ => None,
+    };
+    line.until(&def, holds).await;
+    let (id, unlock) = (WriteId(1), Some((key, 1.0)));
+    let request = BusRequest::Write { id, tag: value, raw: 7.0, unlock, verify: true, urgent: false };
+    line.requests.send(request).await.expect("the line runs");
+    let told = |event: &Event| match event {
+        Event::Unlocked { key, result, .. } => Some((Some(*key), result.clone())),
+        Event::Wrote { result, .. } => Some((None, result.clone())),
+        _ => None,
+    };
+    assert_eq!(line.until(&def, told).await, (Some(key), WriteResult::Accepted));
+    assert_eq!(line.until(&def, told).await, (None, WriteResult::Refused(ExceptionCode(3))));
+    line.until(&def, holds).await;
+}

@@ -285,3 +285,32 @@ fn a_stop_is_sent_though_a_start_is_under_way() {
     check(4, 1.0, None);
     assert_eq!(plant.snapshot().orders[1].outcome, Outcome::Refused(Refusal::UnderWay));
 }
+
+#[test]
+fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
+    let mut def = fixture::plant();
+    def.tags[SV.index()].write_unlock = Some((FAULT, 1.0));
+    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+    let keyed = |plant: &mut Plant, number, value| {
+        let effects = plant.on_order(order(number, Command::Write { tag: SV, value }), at(1));
+        match &effects.bus[0].1 {
+            BusRequest::Write { id, unlock, .. } => (*id, *unlock),
+            other => panic!("not a write: {other:?}"),
+        }
+    };
+    plant.on_event(read(0, &[(SV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
+    let (id, unlock) = keyed(&mut plant, 1, 71.0);
+    assert_eq!(unlock, Some((FAULT, 1.0)));
+    let effects = plant.on_event(Event::Unlocked { at: at(2), id, key: FAULT, result: WriteResult::Accepted });
+    let Some(Record::Action(deed)) = effects.records.last() else { panic!("no line for the key") };
+    assert_eq!((&*deed.by, &*deed.target, deed.new.as_deref()), ("anna", "TIC-1.FAULT", Some("1 °C")));
+    assert_eq!(&*deed.outcome, "not confirmed: accepted, not read back; for TIC-1.SV");
+    assert!(plant.snapshot().sample(FAULT).trusted().is_none(), "the key is not as it was read before");
+    plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::Refused(ExceptionCode(3)) });
+    // Not read again yet: nobody can tell, so it is sent again.
+    let (id, unlock) = keyed(&mut plant, 2, 71.0);
+    assert_eq!(unlock, Some((FAULT, 1.0)));
+    plant.on_event(Event::Wrote { at: at(3), id, result: WriteResult::ReadBack(710.0) });
+    plant.on_event(read(4, &[(FAULT, 1.0)]));
+    assert_eq!(keyed(&mut plant, 3, 72.0).1, None, "it is turned already");
+}

@@ -244,6 +244,21 @@ fn what_an_interlock_blocks_is_told_and_not_sent() {
 }
 
 #[test]
+fn a_key_that_is_sent_first_is_named_before_it_is() {
+    let mut fixture = Fixture::normal();
+    let (pump, key) = (fixture.tag("PLC-1.MAN.P-1"), fixture.tag("PLC-1.AUTO"));
+    fixture.def.tags[pump.index()].write_unlock = Some((key, 0.0));
+    for (now, told) in [(1.0, true), (0.0, false)] {
+        fixture.set("PLC-1.AUTO", now);
+        let mut model = plate(&fixture, "PLC-1.P-1");
+        type_keys(&mut model, "t");
+        let shown = screen(&mut model, 80, 24);
+        let words = format!("First PLC-1.AUTO := {}; it stays so.", "MANUAL");
+        assert_eq!(shown.contains(&words), told, "{now}: {shown}");
+    }
+}
+
+#[test]
 fn a_stop_takes_two_keys_and_says_what_it_switches_off() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.P-1", 1.0);
