@@ -72,7 +72,8 @@ impl InterlockDef {
             Blocking::Below(limit) => value < limit,
             Blocking::Above(limit) => limit < value,
             Blocking::Is(state) => value == state,
-            Blocking::Bit(bit) => 0.0 <= value && (value as u64).checked_shr(u32::from(bit)).unwrap_or(0) & 1 == 1,
+            // A word with a sign has its highest bit set while it is negative.
+            Blocking::Bit(bit) => (value as i64 as u64).checked_shr(u32::from(bit)).unwrap_or(0) & 1 == 1,
         };
         if blocked { Standing::Blocked } else { Standing::Free }
     }
@@ -211,7 +212,9 @@ mod tests {
             (Blocking::Is(1.0), good(0.0), Free),
             (Blocking::Bit(2), good(4.0), Blocked),
             (Blocking::Bit(2), good(3.0), Free),
-            (Blocking::Bit(0), good(-1.0), Free),
+            (Blocking::Bit(0), good(-1.0), Blocked),
+            (Blocking::Bit(15), good(-32_768.0), Blocked),
+            (Blocking::Bit(14), good(-32_768.0), Free),
             (Blocking::Bit(200), good(4.0), Free),
             (Blocking::Below(5.0), bad(), Unknown(Cause::Timeout)),
             (Blocking::Below(5.0), good(1.0).doubted(Cause::Stale), Unknown(Cause::Stale)),

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::plant::{
     guard::{ActuatorDef, Blocking, Guards, InterlockDef, SequenceDef},
-    tag::{Access, TagDef},
+    tag::{Access, Decimals, Kind, TagDef},
 };
 
 /// All that the plant file says about commands.
@@ -52,10 +52,13 @@ fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Opt
     found.extend(table.is.as_ref().map(|is| (is.at, number_of(is, of, problems).map(Blocking::Is))));
     found.extend(table.bit.map(|bit| (bit.at, Some(Blocking::Bit(bit.value)))));
     if let Some(bit) = table.bit {
-        let bits = of.point.len() * 16;
-        if u16::from(bit.value) >= bits || of.scale != 1.0 || of.offset != 0.0 || of.point.table.is_bits() {
+        let bits = bits_of(of);
+        if u16::from(bit.value) >= bits {
             let problem = problems.add(bit.at, format!("{} has no bit {}", of.name, bit.value));
-            problem.label(format!("expected 0 to {} of a whole number that is not scaled", bits - 1));
+            problem.label(match bits {
+                0 => "expected a tag of a whole binary number that is not scaled".to_owned(),
+                bits => format!("expected 0 to {}", bits - 1),
+            });
         }
     }
     match found.as_slice() {
@@ -68,6 +71,20 @@ fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Opt
             problems.add(*second, "an interlock has one condition").label("expected an [[interlock]] of its own");
             None
         }
+    }
+}
+
+/// The bits that can be told from the value of a tag; none where it is not the raw number, or no binary one.
+fn bits_of(of: &TagDef) -> u16 {
+    let is_raw = of.scale == 1.0 && of.offset == 0.0 && matches!(of.decimals, Decimals::Fixed(_));
+    let is_binary = match of.point.kind {
+        Kind::I16 | Kind::U16 | Kind::I32 | Kind::U32 | Kind::I64 | Kind::U64 => !of.point.table.is_bits(),
+        Kind::Bool | Kind::F32 | Kind::F64 | Kind::Bcd16 | Kind::Bcd32 | Kind::Text(_) => false,
+    };
+    match of.point.field {
+        _ if !is_raw || !is_binary => 0,
+        Some((_, bits)) => u16::from(bits),
+        None => of.point.len() * 16,
     }
 }
 
