@@ -5,7 +5,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 
 use super::{
-    def::PlantDef,
+    def::{ActionDef, PlantDef},
     id::TagId,
     sample::{Cause, Sample},
 };
@@ -26,7 +26,7 @@ pub struct Guards {
 pub struct InterlockDef {
     /// The command.
     pub tag: TagId,
-    /// The value of it that is blocked.
+    /// The value of it that is blocked, as the device holds it.
     pub value: f64,
     /// The tag that decides.
     pub of: TagId,
@@ -108,12 +108,13 @@ pub struct SequenceDef {
 }
 
 impl Guards {
-    /// The interlocks of one value of a command.
+    /// The interlocks of one value of a command, as the device will hold it or does.
     pub fn interlocks_of(&self, tag: TagId, value: f64) -> impl Iterator<Item = &InterlockDef> {
         self.interlocks.iter().filter(move |lock| lock.tag == tag && lock.value == value)
     }
 
-    /// The interlock for which this command is certainly without effect and is not to be sent.
+    /// The interlock for which this command is certainly without effect and is not to be sent. What will be sent decides, not
+    /// what was typed: `value` is as the device will hold it, [`super::scale::held`].
     pub fn refusal(&self, tag: TagId, value: f64, sample: impl Fn(TagId) -> Sample) -> Option<&InterlockDef> {
         let blocks = |lock: &&InterlockDef| lock.refuse && lock.standing(sample(lock.of)) == Standing::Blocked;
         self.interlocks_of(tag, value).find(blocks)
@@ -137,14 +138,18 @@ impl Guards {
     }
 }
 
-/// Does this value of a command switch something off: the `off` of an actuator, the zero of a sequence, an action that is
-/// marked as a stop? `value` is as the device will hold it, [`super::scale::held`].
-pub fn is_stop(def: &PlantDef, tag: TagId, value: f64) -> bool {
-    let actuators = def.guards.actuators.iter().map(|actuator| (actuator.command, actuator.off));
-    let sequences = def.guards.sequences.iter().map(|sequence| (sequence.run, 0.0));
-    let actions = def.device(def.tag(tag).device).actions.iter().filter(|action| action.stop);
-    let actions = actions.map(|action| (action.tag, action.value));
-    actuators.chain(sequences).chain(actions).any(|stop| stop == (tag, value))
+/// The values of a command that switch something off: the `off` of an actuator, the zero of a sequence, the actions of its
+/// device that are marked as a stop.
+pub fn stops<'a>(guards: &'a Guards, actions: &'a [ActionDef], tag: TagId) -> impl Iterator<Item = f64> + 'a {
+    let actuators = guards.actuators.iter().map(|actuator| (actuator.command, actuator.off));
+    let sequences = guards.sequences.iter().map(|sequence| (sequence.run, 0.0));
+    let actions = actions.iter().filter(|action| action.stop).map(|action| (action.tag, action.value));
+    actuators.chain(sequences).chain(actions).filter(move |(command, _)| *command == tag).map(|(_, off)| off)
+}
+
+/// Does this value of a command switch something off? It is as the device will hold it, [`super::scale::held`].
+pub fn is_stop(def: &PlantDef, tag: TagId, held: f64) -> bool {
+    stops(&def.guards, &def.device(def.tag(tag).device).actions, tag).any(|off| off == held)
 }
 
 /// Since when each actuator has not obeyed, by its place in [`Guards::actuators`].

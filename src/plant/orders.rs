@@ -238,7 +238,7 @@ impl Desk {
         if !def.labels.is_empty() && def.label_of(value).is_none() {
             return refuse(Refusal::NotAChoice);
         }
-        if let Some(lock) = self.def.guards.refusal(tag, value, |tag| board.sample(tag)) {
+        if let Some(lock) = self.def.guards.refusal(tag, held.unwrap_or(value), |tag| board.sample(tag)) {
             return refuse(Refusal::Interlock(lock.text.clone()));
         }
         let bound = |bound: Option<super::tag::Bound>| bound.map(|bound| board.bound(bound)).transpose();

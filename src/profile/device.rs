@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{
     diagnostic::{Problems, Span},
-    names::{Names, Unique, number_of},
+    names::{Names, Unique, held_number_of, number_of},
     reader::{At, Node, Raw, text},
     schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile},
     simulate::{Scope, simulate},
@@ -231,7 +231,7 @@ pub(super) fn actions(
                 .add(tag_name.at, format!("{} cannot be written", target.name))
                 .label("expected access = \"w\" or \"rw\"");
         }
-        let Some(value) = number_of(choice, target, problems) else { continue };
+        let Some(value) = held_number_of(choice, target, problems) else { continue };
         found.push(ActionDef {
             name: name.value.clone(),
             tag,

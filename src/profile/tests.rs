@@ -349,7 +349,7 @@ fn an_interlock_says_what_blocks_which_value() {
     let lock = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"too hot\"\n";
     let plant = guarded(lock).unwrap();
     let found = &plant.guards.interlocks[0];
-    assert_eq!((found.value, found.when, found.refuse), (1.0, Blocking::Above(80.0), true));
+    assert_eq!((found.value, found.when, found.refuse), (1.0, Blocking::Above(80.0), false));
     let off = guarded(&lock.replace("\"on\"", "\"off\"")).unwrap();
     assert!(!off.guards.interlocks[0].refuse, "switching off is told, never refused");
     for (from, to, expect) in [
@@ -399,6 +399,16 @@ fn an_actuator_has_one_command_and_one_output() {
     let plant = guarded(table).unwrap();
     assert_eq!(plant.guards.actuators[0].needs, [(plant.tag_named("PLC.STEP").unwrap(), 1.0)]);
     assert_eq!(plant.guards.actuators[0].travel, None);
+    let unsaid = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"hot\"\n";
+    for (tables, refuse) in [
+        (unsaid.to_owned(), false),
+        (format!("{unsaid}refuse = true\n"), true),
+        (format!("{table}{unsaid}"), true),
+        (format!("{table}off = \"on\"\n{unsaid}"), false),
+        (format!("{table}off = \"on\"\n{}", unsaid.replace("\"on\"", "\"off\"")), true),
+    ] {
+        assert_eq!(guarded(&tables).unwrap().guards.interlocks[0].refuse, refuse, "{tables}");
+    }
     // Where another value switches off, that one is never refused.
     let lock =
         "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"hot\"\nrefuse = true\n";

@@ -9,6 +9,7 @@ use crate::plant::{
     def::ActionDef,
     event::ExceptionCode,
     fixture::{self, DP, FAULT, HIGH, PLC, PV, RUN, SILENT, SV, TIC},
+    guard::{Blocking, InterlockDef},
     record::AlarmStep,
     sample::Quality,
 };
@@ -313,4 +314,20 @@ fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
     plant.on_event(Event::Wrote { at: at(3), id, result: WriteResult::ReadBack(710.0) });
     plant.on_event(read(4, &[(FAULT, 1.0)]));
     assert_eq!(keyed(&mut plant, 3, 72.0).1, None, "it is turned already");
+}
+
+#[test]
+fn what_will_be_sent_is_blocked_whatever_was_typed() {
+    let mut def = fixture::plant();
+    def.tags[RUN.index()].labels.clear();
+    let text = "not while it is hot".to_owned();
+    let when = Blocking::Above(60.0);
+    def.guards.interlocks = vec![InterlockDef { tag: RUN, value: 1.0, of: PV, when, text, refuse: true }];
+    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+    plant.on_event(read(0, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
+    for (value, refused) in [(1.0, true), (0.6, true), (0.4, false)] {
+        let effects = plant.on_order(order(1, Command::Write { tag: RUN, value }), at(1));
+        assert_eq!(effects.bus.is_empty(), refused, "{value}: {:?}", plant.snapshot().orders[0].outcome);
+        assert!(!refused || matches!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Interlock(_))));
+    }
 }
