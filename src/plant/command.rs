@@ -225,7 +225,12 @@ pub enum BusRequest {
         urgent: bool,
     },
     /// Read every block of a device as soon as possible.
-    Refresh(DeviceId),
+    Refresh {
+        /// Which.
+        device: DeviceId,
+        /// The order it comes by; `None` for one that the plant itself wishes.
+        order: Option<OrderId>,
+    },
     /// Open or close the port.
     Connect(bool),
     /// Use these settings from now on.

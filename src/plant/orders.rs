@@ -179,9 +179,10 @@ impl Desk {
                 let id = self.orders.iter().find(|status| status.command == wished)?.id;
                 self.close(id, busy, board)
             }
-            BusRequest::Refresh(device) => {
-                let wished = Command::Refresh(*device);
-                self.orders.iter_mut().find(|status| status.command == wished)?.outcome = busy;
+            // One that nobody ordered is nobody's: the device is read again in its turn.
+            BusRequest::Refresh { order, .. } => {
+                let order = (*order)?;
+                self.orders.iter_mut().find(|status| status.id == order)?.outcome = busy;
                 None
             }
             BusRequest::Configure(_) | BusRequest::Test { .. } | BusRequest::StopTest => {

@@ -176,7 +176,7 @@ impl Plant {
                 self.desk.note(&order, outcome, &self.board, at)
             }
             Command::Refresh(device) => {
-                effects.bus.push((self.def.device(device).line, BusRequest::Refresh(device)));
+                effects.bus.push((self.def.device(device).line, BusRequest::Refresh { device, order: Some(order.id) }));
                 // Looking is not a deed: it is shown, but not put on record.
                 let _ = self.desk.note(&order, Outcome::Verified, &self.board, at);
                 None

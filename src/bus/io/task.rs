@@ -186,7 +186,7 @@ impl Task {
             };
             match request {
                 BusRequest::Write { id, .. } => self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?,
-                BusRequest::Refresh(_) | BusRequest::StopTest => {}
+                BusRequest::Refresh { .. } | BusRequest::StopTest => {}
                 BusRequest::Connect(true) => return Ok(()),
                 BusRequest::Connect(false) => {
                     until = None;
@@ -317,7 +317,7 @@ impl Task {
         match request {
             BusRequest::Connect(true) => Ok(Ok(())),
             BusRequest::Connect(false) => Ok(Err(Leave::Closed)),
-            BusRequest::Refresh(device) => {
+            BusRequest::Refresh { device, .. } => {
                 schedule.refresh(device, self.clock.now());
                 Ok(Ok(()))
             }

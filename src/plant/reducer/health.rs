@@ -33,7 +33,7 @@ impl Plant {
             let bound = |bound: Option<Bound>| board.bound(bound?).ok();
             let span = pv.and_then(|pv| Some(bound(pv.max)? - bound(pv.min)?));
             if self.tunings[device.id.index()].take(device, &sample, span, at) == Noticed::Ended {
-                asked.push((device.line, BusRequest::Refresh(device.id)));
+                asked.push((device.line, BusRequest::Refresh { device: device.id, order: None }));
             }
             if let Some(program) = &device.program {
                 let (position, command) = (sample(program.position).trusted(), sample(program.command).trusted());

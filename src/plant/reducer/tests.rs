@@ -331,3 +331,15 @@ fn what_will_be_sent_is_blocked_whatever_was_typed() {
         assert!(!refused || matches!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Interlock(_))));
     }
 }
+
+#[test]
+fn a_lost_refresh_that_nobody_ordered_falsifies_no_order() {
+    let mut plant = running();
+    let effects = plant.on_order(order(1, Command::Refresh(TIC)), at(1));
+    plant.on_undeliverable(L1, &BusRequest::Refresh { device: TIC, order: None });
+    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Verified);
+    plant.on_order(order(2, Command::Refresh(TIC)), at(2));
+    plant.on_undeliverable(L1, &effects.bus[0].1);
+    let outcomes = plant.snapshot().orders.into_iter().map(|status| status.outcome).collect::<Vec<_>>();
+    assert_eq!(outcomes, [Outcome::Verified, Outcome::Refused(Refusal::Busy)], "newest first");
+}
