@@ -24,6 +24,7 @@ use crate::{
         snapshot::HistoryStatus,
     },
     profile::PlantFile,
+    sim::io::Listener,
 };
 
 use super::{Session, sets};
@@ -75,7 +76,7 @@ pub fn start(options: Options) -> Result<Station, HistoryError> {
 }
 
 /// The same, where the steps of alarms are also told to a listener.
-pub fn start_told(options: Options, listener: Option<mpsc::Sender<Vec<Record>>>) -> Result<Station, HistoryError> {
+pub fn start_told(options: Options, listener: Option<Listener>) -> Result<Station, HistoryError> {
     let Options { def, clock, history, connectors, file } = options;
     let sets = sets::folder(&history, &def.name);
     let history = history::start(&history, def.clone(), clock)?;
@@ -88,12 +89,7 @@ pub fn start_told(options: Options, listener: Option<mpsc::Sender<Vec<Record>>>)
 
 /// A station that keeps nothing, for drills in virtual time, where no other thread may take part. Questions to the history
 /// are refused.
-pub fn rehearse(
-    def: Arc<PlantDef>,
-    clock: Clock,
-    connectors: Vec<Connector>,
-    listener: mpsc::Sender<Vec<Record>>,
-) -> Station {
+pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, listener: Listener) -> Station {
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
@@ -107,7 +103,7 @@ struct Keeping {
     store: watch::Receiver<HistoryStatus>,
     /// The folder of parameter sets.
     sets: Option<PathBuf>,
-    listener: Option<mpsc::Sender<Vec<Record>>>,
+    listener: Option<Listener>,
 }
 
 fn assemble(
@@ -391,12 +387,7 @@ impl PlantTask {
             return;
         }
         if let Some(listener) = &self.keeping.listener {
-            let steps = records.iter().filter(|record| matches!(record, Record::Alarm(_)));
-            let steps: Vec<Record> = steps.cloned().collect();
-            // A listener that has gone needs nothing; one that is slower than alarms come has missed some.
-            if let (false, Err(mpsc::error::TrySendError::Full(_))) = (steps.is_empty(), listener.try_send(steps)) {
-                tracing::error!("steps of alarms were not judged: too many at once");
-            }
+            listener.tell(&records);
         }
         let Some(store) = &self.keeping.records else { return };
         if let Err(refused) = store.try_send(records) {
