@@ -3,7 +3,7 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::oneshot;
 
 use crate::{
     bus::io::{clock::Clock, transport::Connector},
@@ -70,7 +70,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
         let history = scratch.history.clone();
         let options = station::Options { def: def.clone(), clock, history, connectors, file: None };
-        let (listener, journal) = mpsc::channel(sim::io::RECORDS_MAX);
+        let (listener, journal) = sim::io::journal();
         let mut station = station::start_told(options, Some(listener))?;
         let mut session = station.session(&if args.headless { "demo".to_owned() } else { paths::operator() });
         let trainer = sim::io::Trainer {

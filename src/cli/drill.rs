@@ -10,7 +10,7 @@ use crate::{
     plant::{PlantDef, Snapshot},
     profile::{self, Kind, Search},
     sim::{
-        io::{RECORDS_MAX, Trainer, WorldHandle, in_memory},
+        io::{Trainer, WorldHandle, in_memory, journal},
         scenario::{
             Scenario, Start,
             judge::{Verdict, clock},
@@ -103,7 +103,7 @@ fn rehearse(
     runtime.block_on(async {
         let time = Clock::starting_at(morning(&def), 1.0);
         let world = WorldHandle::spawn_for(&def, world(&def, Some(&scenario))?, time);
-        let (listener, journal) = mpsc::channel(RECORDS_MAX);
+        let (listener, journal) = journal();
         let mut station = station::rehearse(def.clone(), time, in_memory(&def, &world), listener);
         let session = station.session("drill");
         // Without an operator his orders lead nowhere.

@@ -122,7 +122,8 @@ pub enum Outcome {
     Verified,
     /// The device already had this value: nothing was written, memory is spared.
     Unchanged,
-    /// Not done, and certainly without effect.
+    /// Not done, and certainly without effect on what was to be written; a key that was sent before it has a line of its own
+    /// in the journal.
     Refused(Refusal),
     /// The device accepted it but the read-back differs or failed.
     NotConfirmed(NotConfirmed),
@@ -162,6 +163,9 @@ pub enum Refusal {
     /// Another write to this tag is still under way.
     #[error("a write to this tag is under way")]
     UnderWay,
+    /// It still waited when a stop of the same tag came, and would have undone it.
+    #[error("a stop came before it, nothing was sent")]
+    Overtaken,
     /// The plant file knows that it would have no effect now.
     #[error("interlock: {0}")]
     Interlock(String),
@@ -217,9 +221,16 @@ pub enum BusRequest {
         unlock: Option<(TagId, f64)>,
         /// Read it back afterwards.
         verify: bool,
+        /// It switches something off: it goes before all that waits, see [`super::guard::is_stop`].
+        urgent: bool,
     },
     /// Read every block of a device as soon as possible.
-    Refresh(DeviceId),
+    Refresh {
+        /// Which.
+        device: DeviceId,
+        /// The order it comes by; `None` for one that the plant itself wishes.
+        order: Option<OrderId>,
+    },
     /// Open or close the port.
     Connect(bool),
     /// Use these settings from now on.

@@ -179,6 +179,8 @@ pub struct ActionDef {
     pub settle: Duration,
     /// What the operator is asked.
     pub confirm: String,
+    /// It stops something: it goes before all that waits.
+    pub stop: bool,
 }
 
 /// An alarm: a condition on a tag or device, with what the operator should know and do.

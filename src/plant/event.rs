@@ -71,6 +71,17 @@ pub enum Event {
         /// How it stands.
         run: Arc<ToolRun>,
     },
+    /// The key of a write was sent before it: the device now lets itself be written, also by others.
+    Unlocked {
+        /// When.
+        at: Timestamp,
+        /// The write that needs it.
+        id: WriteId,
+        /// The key.
+        key: TagId,
+        /// What the device said to the key: accepted, refused or lost.
+        result: WriteResult,
+    },
     /// A write came to its end on the wire.
     Wrote {
         /// When.
@@ -97,6 +108,8 @@ pub enum WriteResult {
     Lost(Fault),
     /// Nothing was sent.
     NotSent(Fault),
+    /// Nothing was sent: it still waited when a stop of the same tag came.
+    Overtaken,
 }
 
 /// Why a request did not end in a valid normal answer.

@@ -5,6 +5,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 
 use super::{
+    def::{ActionDef, PlantDef},
     id::TagId,
     sample::{Cause, Sample},
 };
@@ -25,7 +26,7 @@ pub struct Guards {
 pub struct InterlockDef {
     /// The command.
     pub tag: TagId,
-    /// The value of it that is blocked.
+    /// The value of it that is blocked, as the device holds it.
     pub value: f64,
     /// The tag that decides.
     pub of: TagId,
@@ -71,7 +72,8 @@ impl InterlockDef {
             Blocking::Below(limit) => value < limit,
             Blocking::Above(limit) => limit < value,
             Blocking::Is(state) => value == state,
-            Blocking::Bit(bit) => 0.0 <= value && (value as u64).checked_shr(u32::from(bit)).unwrap_or(0) & 1 == 1,
+            // A word with a sign has its highest bit set while it is negative.
+            Blocking::Bit(bit) => (value as i64 as u64).checked_shr(u32::from(bit)).unwrap_or(0) & 1 == 1,
         };
         if blocked { Standing::Blocked } else { Standing::Free }
     }
@@ -106,12 +108,13 @@ pub struct SequenceDef {
 }
 
 impl Guards {
-    /// The interlocks of one value of a command.
+    /// The interlocks of one value of a command, as the device will hold it or does.
     pub fn interlocks_of(&self, tag: TagId, value: f64) -> impl Iterator<Item = &InterlockDef> {
         self.interlocks.iter().filter(move |lock| lock.tag == tag && lock.value == value)
     }
 
-    /// The interlock for which this command is certainly without effect and is not to be sent.
+    /// The interlock for which this command is certainly without effect and is not to be sent. What will be sent decides, not
+    /// what was typed: `value` is as the device will hold it, [`super::scale::held`].
     pub fn refusal(&self, tag: TagId, value: f64, sample: impl Fn(TagId) -> Sample) -> Option<&InterlockDef> {
         let blocks = |lock: &&InterlockDef| lock.refuse && lock.standing(sample(lock.of)) == Standing::Blocked;
         self.interlocks_of(tag, value).find(blocks)
@@ -133,6 +136,20 @@ impl Guards {
         let blocked = locks.any(|lock| lock.standing(sample(lock.of)) == Standing::Blocked);
         actuator.travel.is_some() && listens && !blocked && (command != actuator.off) != (output != 0.0)
     }
+}
+
+/// The values of a command that switch something off: the `off` of an actuator, the zero of a sequence, the actions of its
+/// device that are marked as a stop.
+pub fn stops<'a>(guards: &'a Guards, actions: &'a [ActionDef], tag: TagId) -> impl Iterator<Item = f64> + 'a {
+    let actuators = guards.actuators.iter().map(|actuator| (actuator.command, actuator.off));
+    let sequences = guards.sequences.iter().map(|sequence| (sequence.run, 0.0));
+    let actions = actions.iter().filter(|action| action.stop).map(|action| (action.tag, action.value));
+    actuators.chain(sequences).chain(actions).filter(move |(command, _)| *command == tag).map(|(_, off)| off)
+}
+
+/// Does this value of a command switch something off? It is as the device will hold it, [`super::scale::held`].
+pub fn is_stop(def: &PlantDef, tag: TagId, held: f64) -> bool {
+    stops(&def.guards, &def.device(def.tag(tag).device).actions, tag).any(|off| off == held)
 }
 
 /// Since when each actuator has not obeyed, by its place in [`Guards::actuators`].
@@ -200,7 +217,9 @@ mod tests {
             (Blocking::Is(1.0), good(0.0), Free),
             (Blocking::Bit(2), good(4.0), Blocked),
             (Blocking::Bit(2), good(3.0), Free),
-            (Blocking::Bit(0), good(-1.0), Free),
+            (Blocking::Bit(0), good(-1.0), Blocked),
+            (Blocking::Bit(15), good(-32_768.0), Blocked),
+            (Blocking::Bit(14), good(-32_768.0), Free),
             (Blocking::Bit(200), good(4.0), Free),
             (Blocking::Below(5.0), bad(), Unknown(Cause::Timeout)),
             (Blocking::Below(5.0), good(1.0).doubted(Cause::Stale), Unknown(Cause::Stale)),

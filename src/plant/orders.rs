@@ -9,6 +9,7 @@ use super::{
     command::{BusRequest, Command, NotConfirmed, Order, OrderId, OrderStatus, Outcome, Refusal, WriteId},
     def::{LineId, PlantDef, TagId},
     event::{Fault, WriteResult},
+    guard,
     record::ActionRecord,
     scale,
     tag::TagDef,
@@ -18,6 +19,13 @@ use super::{
 const SHOWN: usize = 32;
 /// A write that has heard nothing for so long is given up: it may or may not have taken effect.
 const PENDING_MAX: Duration = Duration::from_secs(120);
+
+/// A write that may go to the bus: its raw number, what must be written first, and whether it is a stop.
+struct Checked {
+    raw: f64,
+    unlock: Option<(TagId, f64)>,
+    urgent: bool,
+}
 
 /// The desk where orders lie until their outcome is known.
 #[derive(Debug, Clone)]
@@ -60,12 +68,12 @@ impl Desk {
         let checked = self.check(board, tag, value);
         match checked {
             Err(outcome) => Err(self.close(order.id, outcome, board)),
-            Ok((raw, unlock)) => {
+            Ok(Checked { raw, unlock, urgent }) => {
                 self.last_write += 1;
                 let id = WriteId(self.last_write);
                 self.writes.push((id, order.id, tag, raw));
                 let verify = self.def.tag(tag).access != super::tag::Access::Write;
-                Ok(BusRequest::Write { id, tag, raw, unlock, verify })
+                Ok(BusRequest::Write { id, tag, raw, unlock, verify, urgent })
             }
         }
     }
@@ -104,6 +112,38 @@ impl Desk {
         self.close(order.id, outcome, board)
     }
 
+    /// The key that a write needs was sent before it, which is a deed of its own.
+    pub fn unlocked(
+        &mut self,
+        id: WriteId,
+        key: TagId,
+        result: &WriteResult,
+        board: &Board,
+        at: Timestamp,
+    ) -> Option<ActionRecord> {
+        let (_, order, tag, _) = self.writes.iter().find(|write| write.0 == id)?;
+        let status = self.orders.iter().find(|status| status.id == *order)?;
+        let (key, tag) = (self.def.tag(key), self.def.tag(*tag));
+        let outcome = match result {
+            WriteResult::Refused(code) => Outcome::Refused(Refusal::Exception(*code)),
+            WriteResult::Lost(fault) => Outcome::Failed(*fault),
+            WriteResult::NotSent(fault) => Outcome::Refused(Refusal::NotSent(*fault)),
+            WriteResult::Overtaken => Outcome::Refused(Refusal::Overtaken),
+            WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::NotRead(_) => {
+                Outcome::NotConfirmed(NotConfirmed::NoReadBack)
+            }
+        };
+        Some(ActionRecord {
+            at,
+            by: status.by.clone(),
+            action: "unlock".into(),
+            target: key.name.as_str().into(),
+            old: board.sample(key.id).value.map(|old| value_words(board, key, old).into()),
+            new: tag.write_unlock.map(|(_, new)| value_words(board, key, new).into()),
+            outcome: format!("{}; for {}", outcome_words(&outcome), tag.name).into(),
+        })
+    }
+
     /// A write came to its end on the wire.
     pub fn wrote(&mut self, id: WriteId, result: WriteResult, board: &Board) -> Option<ActionRecord> {
         let index = self.writes.iter().position(|write| write.0 == id)?;
@@ -120,6 +160,7 @@ impl Desk {
             WriteResult::Refused(code) => Outcome::Refused(Refusal::Exception(code)),
             WriteResult::Lost(fault) => Outcome::Failed(fault),
             WriteResult::NotSent(fault) => Outcome::Refused(Refusal::NotSent(fault)),
+            WriteResult::Overtaken => Outcome::Refused(Refusal::Overtaken),
         };
         self.close(order, outcome, board)
     }
@@ -138,9 +179,10 @@ impl Desk {
                 let id = self.orders.iter().find(|status| status.command == wished)?.id;
                 self.close(id, busy, board)
             }
-            BusRequest::Refresh(device) => {
-                let wished = Command::Refresh(*device);
-                self.orders.iter_mut().find(|status| status.command == wished)?.outcome = busy;
+            // One that nobody ordered is nobody's: the device is read again in its turn.
+            BusRequest::Refresh { order, .. } => {
+                let order = (*order)?;
+                self.orders.iter_mut().find(|status| status.id == order)?.outcome = busy;
                 None
             }
             BusRequest::Configure(_) | BusRequest::Test { .. } | BusRequest::StopTest => {
@@ -177,27 +219,33 @@ impl Desk {
         ids.into_iter().filter_map(|id| self.close(id, Outcome::Failed(Fault::Timeout), board)).collect()
     }
 
-    /// Checks a write against access, choices, bounds, type and what is under way; gives raw number and unlock.
-    #[allow(clippy::type_complexity)]
-    fn check(&self, board: &Board, tag: TagId, value: f64) -> Result<(f64, Option<(TagId, f64)>), Outcome> {
+    /// Checks a write against access, choices, bounds, type and what is under way.
+    fn check(&self, board: &Board, tag: TagId, value: f64) -> Result<Checked, Outcome> {
         let refuse = |refusal| Err(Outcome::Refused(refusal));
         let def = self.def.tag(tag);
         if !def.writable() {
             return refuse(Refusal::ReadOnly);
         }
-        if self.writes.iter().any(|write| write.2 == tag) {
+        let decimals = board.scaling_decimals(def);
+        let held = decimals.and_then(|decimals| scale::held(def, value, decimals));
+        let urgent = held.is_some_and(|held| guard::is_stop(&self.def, tag, held));
+        let mut under_way = self.writes.iter().filter(|write| write.2 == tag).map(|write| write.3).peekable();
+        let is_busy = under_way.peek().is_some();
+        // A stop need not wait for the start under way; the same stop twice would only take the line's time.
+        let same = |raw| decimals.map(|decimals| scale::to_value(def, raw, decimals)) == held;
+        if is_busy && (!urgent || under_way.any(same)) {
             return refuse(Refusal::UnderWay);
         }
         if !def.labels.is_empty() && def.label_of(value).is_none() {
             return refuse(Refusal::NotAChoice);
         }
-        if let Some(lock) = self.def.guards.refusal(tag, value, |tag| board.sample(tag)) {
+        if let Some(lock) = self.def.guards.refusal(tag, held.unwrap_or(value), |tag| board.sample(tag)) {
             return refuse(Refusal::Interlock(lock.text.clone()));
         }
         let bound = |bound: Option<super::tag::Bound>| bound.map(|bound| board.bound(bound)).transpose();
         let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
         let (min, max) = (bound(def.min).map_err(unknown)?, bound(def.max).map_err(unknown)?);
-        let Some(decimals) = board.scaling_decimals(def) else {
+        let Some(decimals) = decimals else {
             return refuse(Refusal::Unknown("number of decimals".into()));
         };
         let inside = value.is_finite() && min.is_none_or(|min| min <= value) && max.is_none_or(|max| value <= max);
@@ -207,12 +255,19 @@ impl Desk {
             let text = |bound: Option<f64>, none: &str| bound.map_or(none.into(), |bound| format!("{bound:.shown$}"));
             return refuse(Refusal::OutOfRange { min: text(min, "−∞"), max: text(max, "∞") });
         };
-        if board.trusted_raw(tag).is_some_and(|now| scale::same_raw(def.point.kind, now, raw)) {
+        // What was read before the write under way says nothing about the time after it.
+        if !is_busy && board.trusted_raw(tag).is_some_and(|now| scale::same_raw(def.point.kind, now, raw)) {
             return Err(Outcome::Unchanged);
         }
         let raw_of = |key, value| scale::to_raw(self.def.tag(key), value, 0).unwrap_or(value);
         let unlock = def.write_unlock.map(|(key, value)| (key, raw_of(key, value)));
-        Ok((raw, unlock))
+        // A key that is turned already stays so, unless somebody is just turning it.
+        let unlock = unlock.filter(|(key, turned)| {
+            let moving = self.writes.iter().any(|write| write.2 == *key);
+            let now = board.trusted_raw(*key).filter(|_| !moving);
+            now.is_none_or(|now| !scale::same_raw(self.def.tag(*key).point.kind, now, *turned))
+        });
+        Ok(Checked { raw, unlock, urgent })
     }
 
     fn open(&mut self, order: &Order, old: Option<f64>, at: Timestamp) {

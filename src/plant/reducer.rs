@@ -138,6 +138,12 @@ impl Plant {
                 self.lines[line.index()].test = Some(run);
                 (at, None)
             }
+            Event::Unlocked { at, id, key, result } => {
+                if !matches!(result, WriteResult::Refused(_)) {
+                    self.board.failed(&[key], Fault::Timeout, at);
+                }
+                (at, self.desk.unlocked(id, key, &result, &self.board, at))
+            }
             Event::Wrote { at, id, result } => (at, self.wrote(id, result, at)),
         };
         let mut effects = self.settle(at);
@@ -171,7 +177,7 @@ impl Plant {
                 self.desk.note(&order, outcome, &self.board, at)
             }
             Command::Refresh(device) => {
-                effects.bus.push((self.def.device(device).line, BusRequest::Refresh(device)));
+                effects.bus.push((self.def.device(device).line, BusRequest::Refresh { device, order: Some(order.id) }));
                 // Looking is not a deed: it is shown, but not put on record.
                 let _ = self.desk.note(&order, Outcome::Verified, &self.board, at);
                 None
@@ -264,7 +270,9 @@ impl Plant {
     fn wrote(&mut self, id: WriteId, result: WriteResult, at: Timestamp) -> Option<ActionRecord> {
         let in_doubt = match &result {
             WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => self.desk.tag_of(id),
-            WriteResult::ReadBack(_) | WriteResult::Refused(_) | WriteResult::NotSent(_) => None,
+            WriteResult::ReadBack(_) | WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Overtaken => {
+                None
+            }
         };
         if let Some(tag) = in_doubt {
             self.board.failed(&[tag], Fault::Timeout, at);

@@ -30,6 +30,11 @@ pub fn to_raw(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
     (raw.is_finite() && low <= raw && raw <= high).then_some(raw)
 }
 
+/// The value as the device will hold it once it is written: rounded to what the type can hold; `None` if it does not fit.
+pub fn held(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
+    to_raw(tag, value, decimals).map(|raw| to_value(tag, raw, decimals))
+}
+
 /// Do two raw numbers mean the same stored value?
 pub fn same_raw(kind: Kind, one: f64, other: f64) -> bool {
     match kind {

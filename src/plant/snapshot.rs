@@ -15,6 +15,8 @@ use super::{
     parameter_set::StoredSet,
     restore::Restore,
     sample::Sample,
+    scale,
+    tag::Decimals,
     tool::ToolRun,
     traffic::Exchange,
     tuning::Tuning,
@@ -82,6 +84,15 @@ impl Snapshot {
             Some(label) => label.to_owned(),
             None => format!("{value:.*}", usize::from(self.decimals[tag.index()])),
         }
+    }
+    /// A value as the device will hold it once it is written; as it is where it cannot be sent.
+    pub fn held(&self, tag: TagId, value: f64) -> f64 {
+        let def = self.def.tag(tag);
+        let decimals = match def.decimals {
+            Decimals::Fixed(_) => 0,
+            Decimals::From(_) => self.decimals[tag.index()],
+        };
+        scale::held(def, value, decimals).unwrap_or(value)
     }
     /// The unit of a tag, which the device may choose (°C or °F).
     pub fn unit(&self, tag: TagId) -> &str {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{
     diagnostic::{Problems, Span},
-    names::{Names, Unique, number_of},
+    names::{Names, Unique, held_number_of, number_of},
     reader::{At, Node, Raw, text},
     schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile},
     simulate::{Scope, simulate},
@@ -232,13 +232,14 @@ pub(super) fn actions(
                 .add(tag_name.at, format!("{} cannot be written", target.name))
                 .label("expected access = \"w\" or \"rw\"");
         }
-        let Some(value) = number_of(choice, target, problems) else { continue };
+        let Some(value) = held_number_of(choice, target, problems) else { continue };
         found.push(ActionDef {
             name: name.value.clone(),
             tag,
             value,
             settle: Duration::from_millis(action.settle_ms.map_or(0, |ms| u64::from(ms.value))),
             confirm: text(&action.confirm),
+            stop: action.stop.is_some_and(|stop| stop.value),
         });
     }
     found

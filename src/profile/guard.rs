@@ -2,13 +2,13 @@
 
 use super::{
     diagnostic::Problems,
-    names::{Defs, Unique, number_of},
+    names::{Defs, Unique, held_number_of, number_of},
     reader::{At, text},
     schema::{ActuatorTable, InterlockTable, NeedTable, PlantFile, SequenceTable},
 };
 use crate::plant::{
-    guard::{ActuatorDef, Blocking, Guards, InterlockDef, SequenceDef},
-    tag::{Access, TagDef},
+    guard::{ActuatorDef, Blocking, Guards, InterlockDef, SequenceDef, stops},
+    tag::{Access, Decimals, Kind, TagDef},
 };
 
 /// All that the plant file says about commands.
@@ -16,31 +16,28 @@ pub(super) fn guards(file: &PlantFile, defs: &Defs, problems: &mut Problems) -> 
     let mut seen = Unique::default();
     let actuators = file.actuators.iter().filter_map(|table| actuator(&table.value, &mut seen, defs, problems));
     let actuators: Vec<ActuatorDef> = actuators.collect();
-    let interlocks = file.interlocks.iter().filter_map(|table| interlock(&table.value, &actuators, defs, problems));
-    let interlocks = interlocks.collect();
     let sequences = file.sequences.iter().filter_map(|table| sequence(&table.value, defs, problems)).collect();
-    Guards { interlocks, actuators, sequences }
+    let guards = Guards { interlocks: Vec::new(), actuators, sequences };
+    let interlocks = file.interlocks.iter().filter_map(|table| interlock(&table.value, &guards, defs, problems));
+    Guards { interlocks: interlocks.collect(), ..guards.clone() }
 }
 
-fn interlock(
-    table: &InterlockTable,
-    actuators: &[ActuatorDef],
-    defs: &Defs,
-    problems: &mut Problems,
-) -> Option<InterlockDef> {
+fn interlock(table: &InterlockTable, guards: &Guards, defs: &Defs, problems: &mut Problems) -> Option<InterlockDef> {
     let tag = commanded(table.tag.as_ref()?, defs, problems)?;
     let of = defs.tag(table.of.as_ref()?, problems)?;
-    let value = number_of(table.value.as_ref()?, tag, problems)?;
+    let value = held_number_of(table.value.as_ref()?, tag, problems)?;
     let when = blocking(table, of, problems)?;
-    let actuator = actuators.iter().find(|actuator| actuator.command == tag.id);
-    let off = value == actuator.map_or(0.0, |actuator| actuator.off);
+    let device = defs.devices.iter().find(|device| device.id == tag.device)?;
+    let stops: Vec<f64> = stops(guards, &device.actions, tag.id).collect();
+    // Where nothing says which value stops, 0 is taken for it, and another may be it all the same: that one is only told.
+    let off = stops.contains(&value) || (stops.is_empty() && value == 0.0);
     if let Some(refuse) = table.refuse.filter(|refuse| refuse.value && off) {
         let problem = problems.add(refuse.at, "switching off is never refused");
         problem
             .label("expected refuse = false")
             .help("a stop must always be possible; the operator is told all the same");
     }
-    let refuse = table.refuse.map_or(!off, |refuse| refuse.value);
+    let refuse = table.refuse.map_or(!off && !stops.is_empty(), |refuse| refuse.value);
     Some(InterlockDef { tag: tag.id, value, of: of.id, when, text: text(&table.text), refuse })
 }
 
@@ -52,10 +49,13 @@ fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Opt
     found.extend(table.is.as_ref().map(|is| (is.at, number_of(is, of, problems).map(Blocking::Is))));
     found.extend(table.bit.map(|bit| (bit.at, Some(Blocking::Bit(bit.value)))));
     if let Some(bit) = table.bit {
-        let bits = of.point.len() * 16;
-        if u16::from(bit.value) >= bits || of.scale != 1.0 || of.offset != 0.0 || of.point.table.is_bits() {
+        let bits = bits_of(of);
+        if u16::from(bit.value) >= bits {
             let problem = problems.add(bit.at, format!("{} has no bit {}", of.name, bit.value));
-            problem.label(format!("expected 0 to {} of a whole number that is not scaled", bits - 1));
+            problem.label(match bits {
+                0 => "expected a tag of a whole binary number that is not scaled".to_owned(),
+                bits => format!("expected 0 to {}", bits - 1),
+            });
         }
     }
     match found.as_slice() {
@@ -71,6 +71,20 @@ fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Opt
     }
 }
 
+/// The bits that can be told from the value of a tag; none where it is not the raw number, or no binary one.
+fn bits_of(of: &TagDef) -> u16 {
+    let is_raw = of.scale == 1.0 && of.offset == 0.0 && matches!(of.decimals, Decimals::Fixed(_));
+    let is_binary = match of.point.kind {
+        Kind::I16 | Kind::U16 | Kind::I32 | Kind::U32 | Kind::I64 | Kind::U64 => !of.point.table.is_bits(),
+        Kind::Bool | Kind::F32 | Kind::F64 | Kind::Bcd16 | Kind::Bcd32 | Kind::Text(_) => false,
+    };
+    match of.point.field {
+        _ if !is_raw || !is_binary => 0,
+        Some((_, bits)) => u16::from(bits),
+        None => of.point.len() * 16,
+    }
+}
+
 fn actuator(table: &ActuatorTable, seen: &mut Unique, defs: &Defs, problems: &mut Problems) -> Option<ActuatorDef> {
     let (output, command) = (table.output.as_ref()?, table.command.as_ref()?);
     for name in [output, command] {
@@ -78,7 +92,7 @@ fn actuator(table: &ActuatorTable, seen: &mut Unique, defs: &Defs, problems: &mu
         seen.insert(&name.value, name.at, twice, problems);
     }
     let (output, command) = (defs.tag(output, problems)?, commanded(command, defs, problems)?);
-    let off = table.off.as_ref().map_or(Some(0.0), |off| number_of(off, command, problems))?;
+    let off = table.off.as_ref().map_or(Some(0.0), |off| held_number_of(off, command, problems))?;
     let needs = table.needs.iter().filter_map(|need| state(&need.value, defs, problems)).collect();
     Some(ActuatorDef {
         output: output.id,

@@ -8,7 +8,8 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceDef, DeviceId, TagId},
-    tag::TagDef,
+    scale,
+    tag::{Decimals, TagDef},
 };
 
 /// The full names of all tags, known before the tags themselves are, since tags refer to each other.
@@ -133,4 +134,13 @@ pub(crate) fn number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Proble
         }
     }
     known
+}
+
+/// The same, as the device will hold it.
+pub(crate) fn held_number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Problems) -> Option<f64> {
+    let number = number_of(choice, tag, problems)?;
+    match tag.decimals {
+        Decimals::Fixed(_) => Some(scale::held(tag, number, 0).unwrap_or(number)),
+        Decimals::From(_) => Some(number),
+    }
 }

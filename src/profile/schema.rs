@@ -232,6 +232,7 @@ table!(
         need "tag" tag: String,
         need "value" value: Choice,
         opt "settle_ms" settle_ms: u32,
+        opt "stop" stop: bool,
         need "confirm" confirm: String,
     }
 );

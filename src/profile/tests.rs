@@ -349,7 +349,7 @@ fn an_interlock_says_what_blocks_which_value() {
     let lock = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"too hot\"\n";
     let plant = guarded(lock).unwrap();
     let found = &plant.guards.interlocks[0];
-    assert_eq!((found.value, found.when, found.refuse), (1.0, Blocking::Above(80.0), true));
+    assert_eq!((found.value, found.when, found.refuse), (1.0, Blocking::Above(80.0), false));
     let off = guarded(&lock.replace("\"on\"", "\"off\"")).unwrap();
     assert!(!off.guards.interlocks[0].refuse, "switching off is told, never refused");
     for (from, to, expect) in [
@@ -368,11 +368,47 @@ fn an_interlock_says_what_blocks_which_value() {
 }
 
 #[test]
+fn only_a_binary_number_that_is_not_scaled_has_bits() {
+    let lock = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.W\"\nbit = 3\ntext = \"locked\"\n";
+    let plant = PLANT.replace("[mimic]", &format!("{lock}\n[mimic]"));
+    for (kind, fits) in [
+        ("type = \"int16\"", true),
+        ("type = \"uint32\"", true),
+        ("type = \"bcd16\"", false),
+        ("type = \"float32\"", false),
+        ("type = \"string(4)\"", false),
+        ("type = \"uint16\"\nscale = 0.1", false),
+        ("type = \"uint16\"\noffset = 1", false),
+        ("type = \"uint16\"\ndecimals_from = \"DP\"", false),
+        ("type = \"uint16\"\nfield = \"6-4\"", false),
+        ("type = \"uint16\"\nfield = \"7-4\"", true),
+    ] {
+        let tag = format!("\n[[tag]]\nname = \"W\"\ntable = \"holding\"\naddress = 2000\n{kind}\n");
+        match (load(plant.as_bytes(), &format!("{METER}{tag}"), PLC), fits) {
+            (Ok(_), true) => {}
+            (Err(errors), false) => assert!(errors.to_string().contains("D1.W has no bit 3"), "{kind}: {errors}"),
+            (Ok(_), false) => panic!("{kind}: taken"),
+            (Err(errors), true) => panic!("{kind}: {errors}"),
+        }
+    }
+}
+
+#[test]
 fn an_actuator_has_one_command_and_one_output() {
     let table = "[[actuator]]\noutput = \"PLC.OUT\"\ncommand = \"D1.MODE\"\nneeds = [{ tag = \"PLC.STEP\", is = 1 }]\n";
     let plant = guarded(table).unwrap();
     assert_eq!(plant.guards.actuators[0].needs, [(plant.tag_named("PLC.STEP").unwrap(), 1.0)]);
     assert_eq!(plant.guards.actuators[0].travel, None);
+    let unsaid = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"hot\"\n";
+    for (tables, refuse) in [
+        (unsaid.to_owned(), false),
+        (format!("{unsaid}refuse = true\n"), true),
+        (format!("{table}{unsaid}"), true),
+        (format!("{table}off = \"on\"\n{unsaid}"), false),
+        (format!("{table}off = \"on\"\n{}", unsaid.replace("\"on\"", "\"off\"")), true),
+    ] {
+        assert_eq!(guarded(&tables).unwrap().guards.interlocks[0].refuse, refuse, "{tables}");
+    }
     // Where another value switches off, that one is never refused.
     let lock =
         "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"hot\"\nrefuse = true\n";

@@ -24,6 +24,7 @@ use crate::{
         snapshot::HistoryStatus,
     },
     profile::PlantFile,
+    sim::io::Listener,
 };
 
 use super::{Session, sets};
@@ -31,7 +32,9 @@ use super::{Session, sets};
 /// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
 const EVENTS: usize = 256;
 /// Requests waiting for one link; a full queue refuses the order.
-const REQUESTS: usize = 16;
+const REQUESTS: usize = 16 + KEPT_FOR_STOPS;
+/// Places of that queue that only a stop may take.
+const KEPT_FOR_STOPS: usize = 4;
 /// Orders waiting for the plant; a full queue refuses the order.
 const ORDERS: usize = 64;
 /// Real time between two snapshots: what a person can follow.
@@ -73,7 +76,7 @@ pub fn start(options: Options) -> Result<Station, HistoryError> {
 }
 
 /// The same, where the steps of alarms are also told to a listener.
-pub fn start_told(options: Options, listener: Option<mpsc::Sender<Vec<Record>>>) -> Result<Station, HistoryError> {
+pub fn start_told(options: Options, listener: Option<Listener>) -> Result<Station, HistoryError> {
     let Options { def, clock, history, connectors, file } = options;
     let sets = sets::folder(&history, &def.name);
     let history = history::start(&history, def.clone(), clock)?;
@@ -86,12 +89,7 @@ pub fn start_told(options: Options, listener: Option<mpsc::Sender<Vec<Record>>>)
 
 /// A station that keeps nothing, for drills in virtual time, where no other thread may take part. Questions to the history
 /// are refused.
-pub fn rehearse(
-    def: Arc<PlantDef>,
-    clock: Clock,
-    connectors: Vec<Connector>,
-    listener: mpsc::Sender<Vec<Record>>,
-) -> Station {
+pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, listener: Listener) -> Station {
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
@@ -105,7 +103,7 @@ struct Keeping {
     store: watch::Receiver<HistoryStatus>,
     /// The folder of parameter sets.
     sets: Option<PathBuf>,
-    listener: Option<mpsc::Sender<Vec<Record>>>,
+    listener: Option<Listener>,
 }
 
 fn assemble(
@@ -371,8 +369,15 @@ impl PlantTask {
     }
 
     fn send(&mut self, line: LineId, request: BusRequest) {
-        if let Err(refused) = self.links[line.index()].try_send(request) {
-            let effects = self.plant.on_undeliverable(line, &refused.into_inner());
+        let link = &self.links[line.index()];
+        let is_stop = matches!(request, BusRequest::Write { urgent: true, .. });
+        let refused = if is_stop || KEPT_FOR_STOPS < link.capacity() {
+            link.try_send(request).err().map(mpsc::error::TrySendError::into_inner)
+        } else {
+            Some(request)
+        };
+        if let Some(refused) = refused {
+            let effects = self.plant.on_undeliverable(line, &refused);
             self.keep(effects.records);
         }
     }
@@ -382,12 +387,7 @@ impl PlantTask {
             return;
         }
         if let Some(listener) = &self.keeping.listener {
-            let steps = records.iter().filter(|record| matches!(record, Record::Alarm(_)));
-            let steps: Vec<Record> = steps.cloned().collect();
-            // A listener that has gone needs nothing; one that is slower than alarms come has missed some.
-            if let (false, Err(mpsc::error::TrySendError::Full(_))) = (steps.is_empty(), listener.try_send(steps)) {
-                tracing::error!("steps of alarms were not judged: too many at once");
-            }
+            listener.tell(&records);
         }
         let Some(store) = &self.keeping.records else { return };
         if let Err(refused) = store.try_send(records) {

@@ -42,14 +42,15 @@ fn two_states(def: &TagDef) -> Option<(f64, f64)> {
 
 /// Is this value of a tag certainly without effect, so that it is not to be sent?
 pub fn is_refused(cx: &Cx, tag: TagId, value: f64) -> bool {
-    cx.def().guards.refusal(tag, value, |tag| cx.snapshot.sample(tag)).is_some()
+    cx.def().guards.refusal(tag, cx.snapshot.held(tag, value), |tag| cx.snapshot.sample(tag)).is_some()
 }
 
 /// All there is to say before a value is written, with its look.
 pub fn before_write(cx: &Cx, tag: TagId, value: f64) -> Vec<(String, Style)> {
     let gone = Notice::why_unreachable(cx, cx.def().tag(tag).device);
     let gone = gone.map(|why| (format!("! Nothing can be written now. {why}"), cx.theme.trouble()));
-    let locks = cx.def().guards.interlocks_of(tag, value).filter_map(|lock| interlock_words(cx, lock));
+    let locks =
+        cx.def().guards.interlocks_of(tag, cx.snapshot.held(tag, value)).filter_map(|lock| interlock_words(cx, lock));
     let mut rows: Vec<(String, Style)> = gone.into_iter().chain(locks).collect();
     if is_refused(cx, tag, value) {
         rows.push(("This is not sent: it would have no effect.".to_owned(), cx.theme.strong()));
@@ -57,9 +58,19 @@ pub fn before_write(cx: &Cx, tag: TagId, value: f64) -> Vec<(String, Style)> {
     if let Some(words) = unmet_words(cx, tag) {
         rows.push((format!("! {words}"), cx.theme.strong()));
     }
+    rows.extend(key_words(cx, tag).into_iter().map(|words| (words, cx.theme.strong())));
     rows.extend(sequence_words(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
     rows.extend(taken_over(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
     rows
+}
+
+/// `First TIC-2.UNLOCK := ON; it stays so.`, where a write needs a key that is not certainly turned.
+pub fn key_words(cx: &Cx, tag: TagId) -> Option<String> {
+    let (key, turned) = cx.def().tag(tag).write_unlock?;
+    if cx.snapshot.sample(key).trusted() == Some(turned) {
+        return None;
+    }
+    Some(format!("First {} := {}; it stays so.", cx.def().tag(key).name, cx.snapshot.format(key, turned)))
 }
 
 /// `⊘ no heating below 5 cm of water: PLC-1.LT-1 is 3.2 cm`; `None` while it does not block.

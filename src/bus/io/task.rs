@@ -32,8 +32,6 @@ use crate::{
     },
 };
 
-/// Writes that wait for their share of the line; more wait in the queue, which refuses them when it is full.
-const WAITING_MAX: usize = 16;
 /// The books are told once in this plant time.
 const REPORT_EVERY: Duration = Duration::from_secs(1);
 
@@ -104,7 +102,8 @@ struct Task {
     /// What the devices do not have, as far as found.
     holes: Holes,
     hunt: Hunt,
-    /// The share of the line's time that writes may take from polls, and the writes that wait for it.
+    /// The share of the line's time that writes may take from polls, and the writes that wait for it: the plant has no more
+    /// than one under way for a tag.
     budget: WriteBudget,
     waiting: VecDeque<BusRequest>,
     /// Counters and debts, from one opening to the next.
@@ -187,7 +186,7 @@ impl Task {
             };
             match request {
                 BusRequest::Write { id, .. } => self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?,
-                BusRequest::Refresh(_) | BusRequest::StopTest => {}
+                BusRequest::Refresh { .. } | BusRequest::StopTest => {}
                 BusRequest::Connect(true) => return Ok(()),
                 BusRequest::Connect(false) => {
                     until = None;
@@ -258,13 +257,15 @@ impl Task {
         leave
     }
 
-    /// What operators want goes first; writes only within their share of the time while polls are due.
+    /// What operators want goes first; writes only within their share of the time while polls are due. A stop goes before
+    /// all of them: it waits for nothing but the transaction under way.
     fn next_request(&mut self, next: Next, now: Timestamp) -> Result<Option<BusRequest>, Ended> {
         if let Some(request) = self.put_back.take() {
             return Ok(Some(request));
         }
-        while self.waiting.len() < WAITING_MAX {
+        loop {
             match self.requests.try_recv() {
+                Ok(stop @ BusRequest::Write { urgent: true, .. }) => return Ok(Some(stop)),
                 Ok(write @ BusRequest::Write { .. }) => self.waiting.push_back(write),
                 Ok(other) => return Ok(Some(other)),
                 Err(mpsc::error::TryRecvError::Disconnected) => return Err(Ended),
@@ -280,6 +281,20 @@ impl Task {
         for request in std::mem::take(&mut self.waiting) {
             if let BusRequest::Write { id, .. } = request {
                 self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A stop has come: what was ordered before it and still waits for this tag would undo it.
+    async fn refuse_overtaken(&mut self, stopped: TagId) -> Result<(), Ended> {
+        let is_overtaken = |request: &BusRequest| matches!(request, BusRequest::Write { tag, .. } if *tag == stopped);
+        let (overtaken, waiting): (VecDeque<_>, _) =
+            std::mem::take(&mut self.waiting).into_iter().partition(is_overtaken);
+        self.waiting = waiting;
+        for request in overtaken {
+            if let BusRequest::Write { id, .. } = request {
+                self.tell_wrote(id, WriteResult::Overtaken).await?;
             }
         }
         Ok(())
@@ -302,7 +317,7 @@ impl Task {
         match request {
             BusRequest::Connect(true) => Ok(Ok(())),
             BusRequest::Connect(false) => Ok(Err(Leave::Closed)),
-            BusRequest::Refresh(device) => {
+            BusRequest::Refresh { device, .. } => {
                 schedule.refresh(device, self.clock.now());
                 Ok(Ok(()))
             }
@@ -319,11 +334,15 @@ impl Task {
                 self.tell_test().await.map(Ok)
             }
             BusRequest::StopTest => self.stop_test().await.map(Ok),
-            BusRequest::Write { id, tag, raw, unlock, verify } => {
+            BusRequest::Write { id, tag, raw, unlock, verify, urgent } => {
+                if urgent {
+                    self.refuse_overtaken(tag).await?;
+                }
                 let def = self.def.clone();
                 let (tag, unlock) = (def.tag(tag), unlock.map(|(tag, raw)| (def.tag(tag), raw)));
                 let started = self.clock.now();
-                let turn = self.write(link, schedule, id, tag, raw, unlock, verify).await;
+                let wish = write::Wish { tag, raw, unlock, verify, urgent };
+                let turn = self.write(link, schedule, id, wish).await;
                 let now = self.clock.now();
                 self.budget.spent(Duration::try_from(now.duration_since(started)).unwrap_or_default(), now);
                 turn

@@ -284,7 +284,8 @@ async fn write(deed: Deed, read_back: Deed) -> (WriteResult, usize) {
         if message[2..6] == [0, 10, 0, 1] { read_back.clone() } else { Deed::Answer }
     });
     line.read(&def).await;
-    let request = BusRequest::Write { id: WriteId(7), tag: TagId(0), raw: 10.0, unlock: None, verify: true };
+    let request =
+        BusRequest::Write { id: WriteId(7), tag: TagId(0), raw: 10.0, unlock: None, verify: true, urgent: false };
     line.requests.send(request).await.expect("the line runs");
     let result = line
         .until(&def, |event| match event {
@@ -334,7 +335,8 @@ async fn a_broadcast_is_sent_once_and_never_called_verified() {
             Deed::Silent
         });
         line.read(&def).await;
-        let request = BusRequest::Write { id: WriteId(1), tag: TagId(0), raw: 7.0, unlock: None, verify: false };
+        let request =
+            BusRequest::Write { id: WriteId(1), tag: TagId(0), raw: 7.0, unlock: None, verify: false, urgent: false };
         line.requests.send(request).await.expect("the line runs");
         let result = line
             .until(&def, |event| match event {
@@ -387,7 +389,14 @@ async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
     });
     line.read(&def).await;
     for (id, tag) in [(1, 0), (2, 1)] {
-        let request = BusRequest::Write { id: WriteId(id), tag: TagId(tag), raw: 10.0, unlock: None, verify: true };
+        let request = BusRequest::Write {
+            id: WriteId(id),
+            tag: TagId(tag),
+            raw: 10.0,
+            unlock: None,
+            verify: true,
+            urgent: false,
+        };
         line.requests.send(request).await.expect("the line runs");
     }
     for (id, expect) in
@@ -485,4 +494,77 @@ async fn nonsense_is_sent_and_nonsense_is_told() {
             _ => assert!(run.findings.iter().any(told), "{mode:?}: {run:?}"),
         }
     }
+}
+
+/// Writes that got no answer have used up their share of a full line. A stop goes all the same, and what was ordered before
+/// it and still waits does not undo it.
+#[tokio::test(start_paused = true)]
+async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
+    let def = plant(Mode::Rtu);
+    let mut line = line(def.clone());
+    let heard = Arc::new(std::sync::Mutex::new(Vec::new()));
+    let list = heard.clone();
+    line.plug(Mode::Rtu, move |_, message| {
+        list.lock().expect("no panic").push(message[..6].to_vec());
+        let lost = message[1] == 6 && message[3] < 20;
+        if lost { Deed::Silent } else { Deed::Late(200 * MS) }
+    });
+    line.read(&def).await;
+    let write = |id, tag, raw, urgent| BusRequest::Write {
+        id: WriteId(id),
+        tag: TagId(tag),
+        raw,
+        unlock: None,
+        verify: true,
+        urgent,
+    };
+    for tag in 0..4u16 {
+        line.requests.send(write(u64::from(tag), tag, 1.0, false)).await.expect("the line runs");
+    }
+    line.until(&def, |event| matches!(event, Event::Wrote { id: WriteId(3), .. }).then_some(())).await;
+    line.requests.send(write(4, 4, 1.0, false)).await.expect("the line runs");
+    line.requests.send(write(5, 4, 0.0, true)).await.expect("the line runs");
+    let before = heard.lock().expect("no panic").len();
+    let mut results = Vec::new();
+    while results.len() < 2 {
+        let ended = |event: &Event| match event {
+            Event::Wrote { id, result, .. } => Some((id.0, result.clone())),
+            _ => None,
+        };
+        results.push(line.until(&def, ended).await);
+    }
+    assert_eq!(results, [(4, WriteResult::Overtaken), (5, WriteResult::ReadBack(20.0))]);
+    let heard = heard.lock().expect("no panic").clone();
+    let stop = heard.iter().position(|message| *message == [1, 6, 0, 20, 0, 0]).expect("sent");
+    assert!(stop <= before + 1, "{} requests went before the stop: {:?}", stop - before, &heard[before..]);
+    assert!(!heard.contains(&vec![1, 6, 0, 20, 0, 1]), "the start is not sent after the stop");
+}
+
+/// A key that was turned stays turned though the value is refused: that is told, and the key is read again.
+#[tokio::test(start_paused = true)]
+async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
+    let def = plant(Mode::Rtu);
+    let (value, key) = (TagId(1), TagId(9));
+    let mut line = line(def.clone());
+    line.plug(Mode::Rtu, |_, message| match message {
+        [1, 6, 0, 11, ..] => Deed::Exception(3),
+        _ => Deed::Answer,
+    });
+    // The key is read once at the start and then only when somebody asks for it.
+    let holds = |event: &Event| match event {
+        Event::Read { values, .. } => values.iter().any(|(tag, _)| *tag == key).then_some(()),
+        _ => None,
+    };
+    line.until(&def, holds).await;
+    let (id, unlock) = (WriteId(1), Some((key, 1.0)));
+    let request = BusRequest::Write { id, tag: value, raw: 7.0, unlock, verify: true, urgent: false };
+    line.requests.send(request).await.expect("the line runs");
+    let told = |event: &Event| match event {
+        Event::Unlocked { key, result, .. } => Some((Some(*key), result.clone())),
+        Event::Wrote { result, .. } => Some((None, result.clone())),
+        _ => None,
+    };
+    assert_eq!(line.until(&def, told).await, (Some(key), WriteResult::Accepted));
+    assert_eq!(line.until(&def, told).await, (None, WriteResult::Refused(ExceptionCode(3))));
+    line.until(&def, holds).await;
 }

@@ -33,7 +33,7 @@ impl Plant {
             let bound = |bound: Option<Bound>| board.bound(bound?).ok();
             let span = pv.and_then(|pv| Some(bound(pv.max)? - bound(pv.min)?));
             if self.tunings[device.id.index()].take(device, &sample, span, at) == Noticed::Ended {
-                asked.push((device.line, BusRequest::Refresh(device.id)));
+                asked.push((device.line, BusRequest::Refresh { device: device.id, order: None }));
             }
             if let Some(program) = &device.program {
                 let (position, command) = (sample(program.position).trusted(), sample(program.command).trusted());
@@ -94,7 +94,7 @@ mod tests {
         let mut def = fixture::plant();
         let settle = Duration::from_secs(5);
         def.devices[0].actions =
-            vec![ActionDef { name: "FIX".into(), tag: SV, value: 1.0, settle, confirm: String::new() }];
+            vec![ActionDef { name: "FIX".into(), tag: SV, value: 1.0, settle, confirm: String::new(), stop: false }];
         let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
         plant.on_event(Event::Line { at: at(0), line: LineId(0), state: LineState::Connected });
         let values = vec![(PV, 700.0), (DP, 1.0)];

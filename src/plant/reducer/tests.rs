@@ -6,8 +6,10 @@ use super::*;
 use crate::plant::{
     alarm::AlarmState,
     command::{NotConfirmed, OrderId},
+    def::ActionDef,
     event::ExceptionCode,
     fixture::{self, DP, FAULT, HIGH, PLC, PV, RUN, SILENT, SV, TIC},
+    guard::{Blocking, InterlockDef},
     record::AlarmStep,
     sample::Quality,
 };
@@ -253,4 +255,91 @@ fn an_actuator_that_does_not_obey_is_in_the_snapshot() {
     assert_eq!((late(&plant, 4), late(&plant, 6)), (None, Some(6)));
     plant.on_event(read(7, &[(fixture::RUN, 1.0), (FAULT, 1.0)]));
     assert_eq!(late(&plant, 20), None, "it has obeyed");
+}
+
+/// The plant of the tests, whose PLC is stopped by an action.
+fn with_stop() -> Plant {
+    let mut def = fixture::plant();
+    let (settle, confirm) = (Duration::ZERO, String::new());
+    let stop = ActionDef { name: "STOP".into(), tag: RUN, value: 0.0, settle, confirm, stop: true };
+    def.devices[PLC.index()].actions = vec![stop];
+    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+    plant.on_event(read(0, &[(RUN, 0.0)]));
+    plant
+}
+
+#[test]
+fn a_stop_is_sent_though_a_start_is_under_way() {
+    let mut plant = with_stop();
+    let mut check = |number, value, expect: Option<(f64, bool)>| {
+        let effects = plant.on_order(order(number, Command::Write { tag: RUN, value }), at(1));
+        let sent = effects.bus.first().map(|(_, request)| match request {
+            BusRequest::Write { raw, urgent, .. } => (*raw, *urgent),
+            other => panic!("not a write: {other:?}"),
+        });
+        assert_eq!(sent, expect, "order {number}: {:?}", plant.snapshot().orders[0].outcome);
+    };
+    check(1, 1.0, Some((1.0, false)));
+    // The PLC was read as stopped before the start: that makes the stop no less needed.
+    check(2, 0.0, Some((0.0, true)));
+    check(3, 0.0, None);
+    check(4, 1.0, None);
+    assert_eq!(plant.snapshot().orders[1].outcome, Outcome::Refused(Refusal::UnderWay));
+}
+
+#[test]
+fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
+    let mut def = fixture::plant();
+    def.tags[SV.index()].write_unlock = Some((FAULT, 1.0));
+    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+    let keyed = |plant: &mut Plant, number, value| {
+        let effects = plant.on_order(order(number, Command::Write { tag: SV, value }), at(1));
+        match &effects.bus[0].1 {
+            BusRequest::Write { id, unlock, .. } => (*id, *unlock),
+            other => panic!("not a write: {other:?}"),
+        }
+    };
+    plant.on_event(read(0, &[(SV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
+    let (id, unlock) = keyed(&mut plant, 1, 71.0);
+    assert_eq!(unlock, Some((FAULT, 1.0)));
+    let effects = plant.on_event(Event::Unlocked { at: at(2), id, key: FAULT, result: WriteResult::Accepted });
+    let Some(Record::Action(deed)) = effects.records.last() else { panic!("no line for the key") };
+    assert_eq!((&*deed.by, &*deed.target, deed.new.as_deref()), ("anna", "TIC-1.FAULT", Some("1 °C")));
+    assert_eq!(&*deed.outcome, "not confirmed: accepted, not read back; for TIC-1.SV");
+    assert!(plant.snapshot().sample(FAULT).trusted().is_none(), "the key is not as it was read before");
+    plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::Refused(ExceptionCode(3)) });
+    // Not read again yet: nobody can tell, so it is sent again.
+    let (id, unlock) = keyed(&mut plant, 2, 71.0);
+    assert_eq!(unlock, Some((FAULT, 1.0)));
+    plant.on_event(Event::Wrote { at: at(3), id, result: WriteResult::ReadBack(710.0) });
+    plant.on_event(read(4, &[(FAULT, 1.0)]));
+    assert_eq!(keyed(&mut plant, 3, 72.0).1, None, "it is turned already");
+}
+
+#[test]
+fn what_will_be_sent_is_blocked_whatever_was_typed() {
+    let mut def = fixture::plant();
+    def.tags[RUN.index()].labels.clear();
+    let text = "not while it is hot".to_owned();
+    let when = Blocking::Above(60.0);
+    def.guards.interlocks = vec![InterlockDef { tag: RUN, value: 1.0, of: PV, when, text, refuse: true }];
+    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+    plant.on_event(read(0, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
+    for (value, refused) in [(1.0, true), (0.6, true), (0.4, false)] {
+        let effects = plant.on_order(order(1, Command::Write { tag: RUN, value }), at(1));
+        assert_eq!(effects.bus.is_empty(), refused, "{value}: {:?}", plant.snapshot().orders[0].outcome);
+        assert!(!refused || matches!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Interlock(_))));
+    }
+}
+
+#[test]
+fn a_lost_refresh_that_nobody_ordered_falsifies_no_order() {
+    let mut plant = running();
+    let effects = plant.on_order(order(1, Command::Refresh(TIC)), at(1));
+    plant.on_undeliverable(L1, &BusRequest::Refresh { device: TIC, order: None });
+    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Verified);
+    plant.on_order(order(2, Command::Refresh(TIC)), at(2));
+    plant.on_undeliverable(L1, &effects.bus[0].1);
+    let outcomes = plant.snapshot().orders.into_iter().map(|status| status.outcome).collect::<Vec<_>>();
+    assert_eq!(outcomes, [Outcome::Verified, Outcome::Refused(Refusal::Busy)], "newest first");
 }

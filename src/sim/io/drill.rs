@@ -1,6 +1,12 @@
 //! The task of a trainer: lets things go wrong when somebody wishes or a scenario says so, watches, and judges.
 
-use std::{sync::Arc, time::Duration};
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
+};
 
 use jiff::Timestamp;
 use tokio::sync::{mpsc, watch};
@@ -24,10 +30,50 @@ use crate::{
 
 /// Wishes that may wait; more are not heard, and what is in force tells so.
 const ORDERS_MAX: usize = 32;
-/// Records that may wait for the judge.
-pub const RECORDS_MAX: usize = 4096;
+/// Steps that may wait for the judge, counted as they were told.
+const STEPS_MAX: usize = 4096;
 /// The number of the terminal by which the operator of a scenario gives orders; real terminals count from 1.
 const OPERATOR: u32 = u32::MAX;
+
+/// Where a station tells the steps of its alarms to a judge.
+#[derive(Debug, Clone)]
+pub struct Listener {
+    steps: mpsc::Sender<Vec<Record>>,
+    lost: Arc<AtomicU64>,
+}
+
+/// What a judge hears of a station, and how much he has missed.
+#[derive(Debug)]
+pub struct Journal {
+    steps: mpsc::Receiver<Vec<Record>>,
+    lost: Arc<AtomicU64>,
+}
+
+/// The way from a station to its judge.
+pub fn journal() -> (Listener, Journal) {
+    journal_for(STEPS_MAX)
+}
+
+fn journal_for(room: usize) -> (Listener, Journal) {
+    let (sender, receiver) = mpsc::channel(room);
+    let lost = Arc::<AtomicU64>::default();
+    (Listener { steps: sender, lost: lost.clone() }, Journal { steps: receiver, lost })
+}
+
+impl Listener {
+    /// Tells the steps of alarms among some records. A judge who has gone needs nothing; one who is slower than they come
+    /// has missed some, which are counted.
+    pub fn tell(&self, records: &[Record]) {
+        let steps: Vec<Record> = records.iter().filter(|record| matches!(record, Record::Alarm(_))).cloned().collect();
+        if steps.is_empty() {
+            return;
+        }
+        if let Err(mpsc::error::TrySendError::Full(steps)) = self.steps.try_send(steps) {
+            tracing::error!("steps of alarms were not judged: too many at once");
+            self.lost.fetch_add(steps.len() as u64, Ordering::Relaxed);
+        }
+    }
+}
 
 /// What a terminal holds of a simulation.
 #[derive(Debug, Clone)]
@@ -48,7 +94,7 @@ pub struct Trainer {
     /// What is shown.
     pub snapshots: watch::Receiver<Arc<Snapshot>>,
     /// Steps of alarms.
-    pub journal: mpsc::Receiver<Vec<Record>>,
+    pub journal: Journal,
     /// The drill, if there is one.
     pub scenario: Option<Arc<Scenario>>,
     /// Where the operator of the scenario gives his orders; `None` where a person sits.
@@ -100,7 +146,7 @@ impl Task {
                         self.obey(order).await;
                     }
                 }
-                Some(records) = self.trainer.journal.recv() => {
+                Some(records) = self.trainer.journal.steps.recv() => {
                     if let Some(judge) = self.running() {
                         judge.on_records(&records);
                     }
@@ -114,7 +160,9 @@ impl Task {
             }
             let Some(report) = self.trainer.world.report().await else { break };
             let snapshot = self.trainer.snapshots.borrow_and_update().clone();
+            let lost = self.trainer.journal.lost.load(Ordering::Relaxed);
             if let Some(judge) = self.running() {
+                judge.on_lost(lost);
                 judge.on_values(&snapshot, &report.truths);
             }
             let status = self.status(report.in_force, report.truths, clock.now());
@@ -168,5 +216,38 @@ impl Task {
             Progress { about: about.clone(), elapsed, duration: *duration, verdict: judge.verdict() }
         });
         Status { offers: self.offers.clone(), in_force, truths, exam: self.trainer.exam, scenario }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::{
+        event::Fault,
+        fixture::{self, TIC},
+        record::AlarmStep,
+    };
+
+    #[test]
+    fn only_steps_of_alarms_take_room_and_those_without_are_counted() {
+        let (listener, mut journal) = journal_for(1);
+        let mut plant = crate::plant::Plant::new(fixture::shared(), Timestamp::UNIX_EPOCH, 1.0);
+        let tags = vec![fixture::PV];
+        let down = crate::plant::event::Event::Failed {
+            at: Timestamp::UNIX_EPOCH,
+            device: TIC,
+            tags,
+            fault: Fault::Resting,
+            exchange: None,
+        };
+        let raised = plant.on_event(down).records;
+        let is_step = |record: &&Record| matches!(record, Record::Alarm(step) if step.step == AlarmStep::Raised);
+        assert_eq!(raised.iter().filter(is_step).count(), 1, "{raised:?}");
+        listener.tell(&[]);
+        listener.tell(&raised);
+        listener.tell(&raised);
+        assert_eq!(journal.steps.try_recv().map(|steps| steps.len()), Ok(1));
+        assert!(journal.steps.try_recv().is_err(), "nothing empty was sent");
+        assert_eq!(journal.lost.load(Ordering::Relaxed), 1);
     }
 }

@@ -26,6 +26,8 @@ pub struct Judge {
     began: Timestamp,
     now: Duration,
     marks: Vec<Mark>,
+    /// Steps of alarms that never came here.
+    lost: u64,
 }
 
 /// What is known of one expectation.
@@ -77,13 +79,15 @@ pub struct Verdict {
     pub pass_percent: u32,
     /// Whether its time is over.
     pub over: bool,
+    /// Steps of alarms that could not be judged because too many came at once.
+    pub lost: u64,
 }
 
 impl Judge {
     /// Begins now.
     pub fn new(scenario: Arc<Scenario>, def: Arc<PlantDef>, began: Timestamp) -> Judge {
         let marks = vec![Mark::default(); scenario.expect.len()];
-        Judge { scenario, def, began, now: Duration::ZERO, marks }
+        Judge { scenario, def, began, now: Duration::ZERO, marks, lost: 0 }
     }
 
     /// The scenario.
@@ -103,6 +107,11 @@ impl Judge {
                 self.on_step(step);
             }
         }
+    }
+
+    /// So many steps of alarms have been lost by now.
+    pub fn on_lost(&mut self, lost: u64) {
+        self.lost = self.lost.max(lost);
     }
 
     /// Takes what is shown now, and what is really so.
@@ -172,6 +181,7 @@ impl Judge {
             of: self.scenario.points(),
             pass_percent: self.scenario.pass_percent,
             over,
+            lost: self.lost,
             rows,
         }
     }
@@ -247,14 +257,19 @@ impl Mark {
 }
 
 impl Verdict {
-    /// Whether the points suffice by now.
+    /// Whether the points suffice by now. Where steps were lost nobody knows that they do.
     pub fn passed(&self) -> bool {
-        self.points * 100 >= self.pass_percent * self.of
+        self.lost == 0 && self.points * 100 >= self.pass_percent * self.of
     }
 
     /// `PASSED 90 of 100 points`, `FAILED …`, or how many there are by now.
     pub fn summary(&self) -> String {
-        let points = format!("{} of {} points, {} % needed", self.points, self.of, self.pass_percent);
+        let lost = match self.lost {
+            0 => String::new(),
+            1 => "; not judged: 1 step lost".to_owned(),
+            lost => format!("; not judged: {lost} steps lost"),
+        };
+        let points = format!("{} of {} points, {} % needed{lost}", self.points, self.of, self.pass_percent);
         match (self.over, self.passed()) {
             (false, _) => format!("so far {points}"),
             (true, true) => format!("PASSED  {points}"),

@@ -13,7 +13,7 @@ use super::{
 use crate::{
     plant::{command::Command, def::TagId},
     ui::{
-        Act, Cx, keys,
+        Act, Cx, guard, keys,
         widgets::{
             text::{width, wrap},
             value,
@@ -67,6 +67,7 @@ impl Entry {
         let mut rows: Vec<(String, Style)> =
             vec![(range_words(cx, self.tag), theme.normal()), (wire_words(def), theme.dim())];
         let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
+        let notes = notes.chain(guard::key_words(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
         let problem = self.problem.clone().unwrap_or_default();
         let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&problem)).max(46);

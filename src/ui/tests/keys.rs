@@ -244,6 +244,21 @@ fn what_an_interlock_blocks_is_told_and_not_sent() {
 }
 
 #[test]
+fn a_key_that_is_sent_first_is_named_before_it_is() {
+    let mut fixture = Fixture::normal();
+    let (pump, key) = (fixture.tag("PLC-1.MAN.P-1"), fixture.tag("PLC-1.P-1"));
+    fixture.def.tags[pump.index()].write_unlock = Some((key, 1.0));
+    fixture.set("PLC-1.AUTO", 0.0);
+    for (now, told) in [(0.0, true), (1.0, false)] {
+        fixture.set("PLC-1.P-1", now);
+        let mut model = plate(&fixture, "PLC-1.P-1");
+        type_keys(&mut model, "t");
+        let shown = screen(&mut model, 80, 24);
+        assert_eq!(shown.contains("First PLC-1.P-1 := RUN; it stays so."), told, "{now}: {shown}");
+    }
+}
+
+#[test]
 fn a_stop_takes_two_keys_and_says_what_it_switches_off() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.P-1", 1.0);

@@ -107,7 +107,7 @@ impl Task {
                     return Ok(false);
                 }
                 Ok(BusRequest::Configure(settings)) => self.configure(*settings),
-                Ok(BusRequest::Refresh(_)) => {}
+                Ok(BusRequest::Refresh { .. }) => {}
             }
         }
     }

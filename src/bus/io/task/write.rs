@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use tokio_modbus::Request;
 
-use super::{Leave, Task, Turn, poll::value_of};
+use super::{Ended, Leave, Task, Turn, poll::value_of};
 use crate::{
     bus::{
         codec,
@@ -21,29 +21,51 @@ use crate::{
     },
 };
 
+/// What is to be written: a tag, its raw number, and how.
+pub(super) struct Wish<'a> {
+    pub tag: &'a TagDef,
+    pub raw: f64,
+    /// What is written first.
+    pub unlock: Option<(&'a TagDef, f64)>,
+    /// Read it back afterwards.
+    pub verify: bool,
+    /// A stop.
+    pub urgent: bool,
+}
+
 impl Task {
     /// Carries a write and tells how it ended.
-    #[allow(clippy::too_many_arguments)]
     pub(super) async fn write(
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
         id: WriteId,
-        tag: &TagDef,
-        raw: f64,
-        unlock: Option<(&TagDef, f64)>,
-        verify: bool,
+        wish: Wish<'_>,
     ) -> Turn {
-        let result = match self.write_once(link, schedule, tag, raw, unlock, verify).await {
+        let tag = wish.tag;
+        let locked = match wish.unlock {
+            Some(key) => self.unlock(link, schedule, id, key, &wish).await?,
+            None => Ok(None),
+        };
+        let result = match locked {
+            Ok(None) => {
+                self.write_once(link, schedule, &wish).await.map_err(|why| (WriteResult::Lost as fn(Fault) -> _, why))
+            }
+            Ok(Some(result)) => Ok(result),
+            Err(why) => Err((WriteResult::NotSent as fn(Fault) -> _, why)),
+        };
+        let result = match result {
             Ok(result) => result,
-            Err(why) => {
-                // The port went away under the write: it may or may not have arrived.
-                self.tell_wrote(id, WriteResult::Lost(Fault::NotConnected)).await?;
+            Err((told, why)) => {
+                // The port went away: under the write, which may or may not have arrived, or before it.
+                self.tell_wrote(id, told(Fault::NotConnected)).await?;
                 return Ok(Err(Leave::Lost(why)));
             }
         };
         let tcp = self.settings.transport.serial().is_none();
-        let unanswered = tcp && matches!(result, WriteResult::Lost(Fault::Timeout));
+        // The key is lost where its write was not sent for want of an answer.
+        let unanswered =
+            tcp && matches!(result, WriteResult::Lost(Fault::Timeout) | WriteResult::NotSent(Fault::Timeout));
         match result {
             WriteResult::ReadBack(raw) => {
                 let (device, values) = (tag.device, vec![(tag.id, raw)]);
@@ -56,7 +78,9 @@ impl Task {
             WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => {
                 schedule.refresh(tag.device, self.clock.now());
             }
-            WriteResult::Refused(_) | WriteResult::NotSent(_) => {}
+            // Perhaps the key is no longer as it was read.
+            WriteResult::Refused(_) if tag.write_unlock.is_some() => schedule.refresh(tag.device, self.clock.now()),
+            WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Overtaken => {}
         }
         self.tell_wrote(id, result).await?;
         if unanswered {
@@ -66,38 +90,77 @@ impl Task {
         Ok(Ok(()))
     }
 
-    /// Writes once, reads back. `Err` when the port is gone.
-    async fn write_once(
+    /// Writes the key, tells it and has it read again. `Some` is how the write ends that needs it, unless it may now be sent;
+    /// `Err` within when the port is gone.
+    async fn unlock(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        id: WriteId,
+        (key, raw): (&TagDef, f64),
+        wish: &Wish<'_>,
+    ) -> Result<Result<Option<WriteResult>, String>, Ended> {
+        // A key of another device would be written to an address of this one.
+        if key.device != wish.tag.device {
+            return Ok(Ok(Some(WriteResult::NotSent(Fault::NotANumber))));
+        }
+        let sent = self.send_number(link, schedule, key, raw, wish.urgent).await;
+        if let Ok(WriteResult::NotSent(_)) = &sent {
+            return Ok(sent.map(Some));
+        }
+        let result = sent.clone().unwrap_or(WriteResult::Lost(Fault::NotConnected));
+        self.tell(Event::Unlocked { at: self.clock.now(), id, key: key.id, result }).await?;
+        schedule.refresh(key.device, self.clock.now());
+        Ok(sent.map(|result| match result {
+            WriteResult::Accepted => None,
+            // The value itself was never on the wire.
+            WriteResult::Lost(fault) => Some(WriteResult::NotSent(fault)),
+            refused => Some(refused),
+        }))
+    }
+
+    /// Sends one number: accepted, refused, lost or not sent. `Err` when the port is gone.
+    async fn send_number(
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
         tag: &TagDef,
         raw: f64,
-        unlock: Option<(&TagDef, f64)>,
-        verify: bool,
+        urgent: bool,
     ) -> Result<WriteResult, String> {
         let def = self.def.clone();
         let device = def.device(tag.device);
         if schedule.is_down(tag.device) || schedule.is_resting(tag.device, self.clock.now()) {
             return Ok(WriteResult::NotSent(Fault::Resting));
         }
-        // A key of another device would be written to an address of this one.
-        if unlock.is_some_and(|(key, _)| key.device != tag.device) {
-            return Ok(WriteResult::NotSent(Fault::NotANumber));
-        }
-        for (tag, raw) in unlock.into_iter().chain([(tag, raw)]) {
-            // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
-            let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
-            let own = self.owes_nothing(link, device).await?;
-            match self.send_write(link, device, request).await {
-                Ok(()) => schedule.answered(tag.device, self.clock.now()),
-                Err(Trouble::Gone(why)) => return Err(why),
-                Err(Trouble::Fault(Fault::Exception(code))) if own && code.is_refusal() => {
-                    return Ok(WriteResult::Refused(code));
-                }
-                Err(Trouble::Fault(fault)) => return Ok(WriteResult::Lost(fault)),
+        // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
+        let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
+        // A stop is not kept waiting for the sake of a clear answer: its refusal may then be told as a loss.
+        let own = (urgent && is_clear(link, device)) || (!urgent && self.owes_nothing(link, device).await?);
+        match self.send_write(link, device, request).await {
+            Ok(()) => {
+                schedule.answered(tag.device, self.clock.now());
+                Ok(WriteResult::Accepted)
             }
+            Err(Trouble::Gone(why)) => Err(why),
+            Err(Trouble::Fault(Fault::Exception(code))) if own && code.is_refusal() => Ok(WriteResult::Refused(code)),
+            Err(Trouble::Fault(fault)) => Ok(WriteResult::Lost(fault)),
         }
+    }
+
+    /// Writes once, reads back. `Err` when the port is gone.
+    async fn write_once(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        &Wish { tag, raw, verify, urgent, .. }: &Wish<'_>,
+    ) -> Result<WriteResult, String> {
+        match self.send_number(link, schedule, tag, raw, urgent).await? {
+            WriteResult::Accepted => {}
+            ended => return Ok(ended),
+        }
+        let def = self.def.clone();
+        let device = def.device(tag.device);
         // An action such as saving to non-volatile memory wants the device left alone, not the line.
         let is_this = |action: &&ActionDef| action.tag == tag.id && scale::to_raw(tag, action.value, 0) == Some(raw);
         if let Some(action) = device.actions.iter().find(is_this) {
@@ -125,8 +188,7 @@ impl Task {
     /// An exception names no address: only from a unit that owes nothing is it certainly the answer to what was sent. `Err`
     /// when the port is gone.
     async fn owes_nothing(&self, link: &mut Link, device: &DeviceDef) -> Result<bool, String> {
-        let broadcast = device.unit == 0;
-        if link.framing() == Framing::Mbap || broadcast || link.debt(device.unit).is_clear() {
+        if is_clear(link, device) {
             return Ok(true);
         }
         match link.loopback(device.unit).await {
@@ -144,6 +206,12 @@ impl Task {
         }
         sent
     }
+}
+
+/// Can no answer that a device still owes be taken for the next one?
+fn is_clear(link: &Link, device: &DeviceDef) -> bool {
+    let broadcast = device.unit == 0;
+    link.framing() == Framing::Mbap || broadcast || link.debt(device.unit).is_clear()
 }
 
 /// The request that writes a raw number: function 5 or 6 for one, 15 or 16 for more or where the profile says so, 22 for a

@@ -166,3 +166,14 @@ fn a_verdict_is_open_until_its_time_is_over_and_then_a_sum() {
         ["MISSED    0/10   it  did not happen in time", "FAILED  0 of 10 points, 100 % needed"]
     );
 }
+
+#[test]
+fn a_drill_of_which_steps_were_lost_is_not_passed() {
+    let mut judge = judge(Wish::NoAlarm(HIGH));
+    judge.on_values(&shown(100, Sample::good(60.0, at(100)), Vec::new()), &Truths::new());
+    assert!(judge.verdict().passed(), "{:?}", judge.verdict());
+    judge.on_lost(3);
+    let verdict = judge.verdict();
+    assert!(!verdict.passed());
+    assert_eq!(verdict.summary(), "FAILED  10 of 10 points, 100 % needed; not judged: 3 steps lost");
+}
