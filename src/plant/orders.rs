@@ -348,6 +348,9 @@ fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
 fn value_words(board: &Board, tag: &TagDef, value: f64) -> String {
     match tag.label_of(value) {
         Some(label) => label.to_owned(),
-        None => format!("{value:.*} {}", usize::from(board.shown_decimals(tag)), tag.unit).trim_end().to_owned(),
+        None => {
+            let unit = tag.unit_now(|tag| board.sample(tag));
+            format!("{value:.*} {unit}", usize::from(board.shown_decimals(tag))).trim_end().to_owned()
+        }
     }
 }

@@ -96,17 +96,7 @@ impl Snapshot {
     }
     /// The unit of a tag, which the device may choose (°C or °F).
     pub fn unit(&self, tag: TagId) -> &str {
-        let def = self.def.tag(tag);
-        let chosen = def.unit_from.as_ref().and_then(|(from, units)| {
-            let value = self.sample(*from).value?;
-            units.iter().find(|(number, _)| *number as f64 == value).map(|(_, unit)| unit.as_str())
-        });
-        match (&def.unit_from, chosen) {
-            (_, Some(unit)) => unit,
-            // The device has not said whether it counts in °C or °F.
-            (Some(_), None) if self.sample(tag).value.is_some() => "?",
-            (Some(_), None) | (None, None) => &def.unit,
-        }
+        self.def.tag(tag).unit_now(|tag| self.sample(tag))
     }
     /// Lowest and highest permitted value of a tag, where both are known now.
     pub fn range(&self, tag: TagId) -> Option<(f64, f64)> {

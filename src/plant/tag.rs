@@ -4,6 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use super::{
     id::{DeviceId, TagId},
+    sample::Sample,
     simulate::Simulate,
 };
 
@@ -145,6 +146,19 @@ impl TagDef {
             (false, _) => 16,
         };
         self.writable().then(|| self.write_fc.unwrap_or(usual))
+    }
+    /// The unit that it has now, which the device may choose (°C or °F).
+    pub fn unit_now(&self, sample: impl Fn(TagId) -> Sample) -> &str {
+        let chosen = self.unit_from.as_ref().and_then(|(from, units)| {
+            let value = sample(*from).value?;
+            units.iter().find(|(number, _)| *number as f64 == value).map(|(_, unit)| unit.as_str())
+        });
+        match (&self.unit_from, chosen) {
+            (_, Some(unit)) => unit,
+            // The device has not said whether it counts in °C or °F.
+            (Some(_), None) if sample(self.id).value.is_some() => "?",
+            (Some(_), None) | (None, None) => &self.unit,
+        }
     }
     /// The text of an enumeration's number.
     pub fn label_of(&self, value: f64) -> Option<&str> {
@@ -372,5 +386,30 @@ impl Confidence {
             Confidence::Medium => "medium",
             Confidence::Low => "low",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use jiff::Timestamp;
+
+    use super::*;
+    use crate::plant::{
+        fixture::{self, DP, PV},
+        sample::{Cause, Quality},
+    };
+
+    #[test]
+    fn the_unit_is_what_the_device_says_that_it_counts_in() {
+        let tag = fixture::plant().tags[PV.index()].clone();
+        let units = vec![(0, "°F".to_owned()), (1, "°C".to_owned())];
+        let tag = TagDef { unit: "°F".into(), unit_from: Some((DP, units)), ..tag };
+        let good = |value| Sample { value: Some(value), quality: Quality::Good, at: Timestamp::UNIX_EPOCH };
+        let never = Sample::bad(Cause::NotRead, Timestamp::UNIX_EPOCH);
+        let unit = |said: Sample, own: Sample| tag.unit_now(|of| if of == DP { said } else { own }).to_owned();
+        assert_eq!(unit(good(1.0), good(70.0)), "°C");
+        assert_eq!(unit(good(0.0), good(70.0)), "°F");
+        assert_eq!(unit(good(7.0), good(70.0)), "?", "a number that names no unit");
+        assert_eq!(unit(never, good(70.0)), "?", "not said yet");
     }
 }

@@ -107,8 +107,8 @@ impl Fault {
             ),
             Fault::Leak(_) => story(
                 "TK-1 loses water to the floor.",
-                "The level falls while both valves are shut and no flow is shown. There is no alarm for it before the level is \
-                 low: the sum of the three tanks tells earlier.",
+                "The level falls while both valves are shut and no flow is shown. The alarm of a low level waits \
+                 half an hour, because TK-1 is empty between batches: the sum of the three tanks tells earlier.",
                 "Stop heating; look at the tank.",
             ),
             Fault::PumpFailed => story(

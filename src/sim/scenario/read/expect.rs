@@ -82,7 +82,9 @@ fn wish(table: &ExpectTable, def: &PlantDef, problems: &mut Problems) -> Option<
         "good" => Some((Wish::Good(tag), format!("{} shown as good", name.value))),
         "shown_true" => {
             if let Some(give) = table.give.filter(|give| give.value < 0.0) {
-                problems.add(give.at, format!("found {}, expected 0 or more", give.value)).label("how far it may be off");
+                problems
+                    .add(give.at, format!("found {}, expected 0 or more", give.value))
+                    .label("how far it may be off");
                 return None;
             }
             let give = table.give.map_or(0.0, |give| give.value);
