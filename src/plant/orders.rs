@@ -295,13 +295,25 @@ impl Desk {
 
 /// The words of an outcome, the same on screen, in the history and in CSV.
 pub fn outcome_words(outcome: &Outcome) -> String {
+    let word = outcome_word(outcome);
     match outcome {
-        Outcome::Pending => "pending".into(),
-        Outcome::Verified => "verified".into(),
-        Outcome::Unchanged => "unchanged, not written".into(),
-        Outcome::Refused(why) => format!("refused: {why}"),
-        Outcome::NotConfirmed(why) => format!("not confirmed: {why}"),
-        Outcome::Failed(fault) => format!("failed: {fault}"),
+        Outcome::Pending | Outcome::Verified => word.into(),
+        Outcome::Unchanged => format!("{word}, not written"),
+        Outcome::Refused(why) => format!("{word}: {why}"),
+        Outcome::NotConfirmed(why) => format!("{word}: {why}"),
+        Outcome::Failed(fault) => format!("{word}: {fault}"),
+    }
+}
+
+/// The same without the reason.
+pub fn outcome_word(outcome: &Outcome) -> &'static str {
+    match outcome {
+        Outcome::Pending => "pending",
+        Outcome::Verified => "verified",
+        Outcome::Unchanged => "unchanged",
+        Outcome::Refused(_) => "refused",
+        Outcome::NotConfirmed(_) => "not confirmed",
+        Outcome::Failed(_) => "failed",
     }
 }
 

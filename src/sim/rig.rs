@@ -8,10 +8,38 @@ use super::faults::process::Troubles;
 use super::pxr::{Pxr, SAMPLE, Sensor};
 use super::slave::Slave;
 use super::tank::{AMBIENT_C, Actuators, Readings, Tank};
+use crate::plant::{PlantDef, def::DeviceId};
+
+/// The name by which a plant wishes the rig.
+pub const SIMULATION: &str = "tank";
 
 /// Time that a device takes between a request and its answer.
 pub(super) const PXR_DELAY: Duration = Duration::from_millis(5);
 pub(super) const DL06_DELAY: Duration = Duration::from_millis(3);
+
+/// Profiles of the devices that the rig brings with it: the first device with such a profile is the rig's.
+const CONTROLLER: &str = "fuji_pxr";
+const PLC: &str = "koyo_dl06";
+
+/// What a device of the plant is in the rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Its temperature controller.
+    Controller,
+    /// Its PLC.
+    Plc,
+}
+
+/// What a device is in the rig of its plant; `None` for every other device, and where the plant has no rig.
+pub fn part(def: &PlantDef, device: DeviceId) -> Option<Part> {
+    let first = |profile: &str| def.devices.iter().find(|other| other.profile == profile).map(|other| other.id);
+    match Some(device) {
+        _ if def.simulation.as_deref() != Some(SIMULATION) => None,
+        one if one == first(CONTROLLER) => Some(Part::Controller),
+        one if one == first(PLC) => Some(Part::Plc),
+        _ => None,
+    }
+}
 
 /// Scans of the PLC, which are the inner steps, per sample of the controller.
 const SCANS_PER_SAMPLE: u32 = (SAMPLE.as_millis() / SCAN.as_millis()) as u32;
@@ -410,5 +438,28 @@ mod tests {
         rig.power_cycle();
         rig.advance(Duration::from_secs(60));
         assert_eq!((rig.truth().step, rig.truth().outputs), (Step::Idle, Outputs::default()));
+    }
+
+    #[test]
+    fn only_the_first_device_of_a_profile_is_the_rigs_and_only_where_there_is_a_rig() {
+        let check = |simulation: Option<&str>, profiles: [&str; 2], expect: [Option<Part>; 2]| {
+            let mut def = crate::plant::fixture::plant();
+            def.simulation = simulation.map(str::to_owned);
+            for (device, profile) in def.devices.iter_mut().zip(profiles) {
+                device.profile = profile.to_owned();
+            }
+            let parts: Vec<_> = def.devices.iter().map(|device| part(&def, device.id)).collect();
+            assert_eq!(parts, expect, "{simulation:?} {profiles:?}");
+            // The world serves what this says.
+            let Ok(world) = super::super::world::World::of(&def) else { panic!("{simulation:?} is known") };
+            let answers: Vec<_> =
+                def.devices.iter().map(|device| world.is_controller(device.line, device.unit)).collect();
+            assert_eq!(answers, expect.map(|part| part == Some(Part::Controller)));
+        };
+        let (controller, plc) = (Some(Part::Controller), Some(Part::Plc));
+        check(Some("tank"), [CONTROLLER, PLC], [controller, plc]);
+        check(Some("tank"), [CONTROLLER, CONTROLLER], [controller, None]);
+        check(Some("tank"), [PLC, PLC], [plc, None]);
+        check(None, [CONTROLLER, PLC], [None, None]);
     }
 }

@@ -1,6 +1,10 @@
 //! What is really so, by tag: the process behind the instruments of the tank, the registers of modelled devices.
 
-use super::{faults::place::is_controller, rig::Truth, scenario::judge::Truths, world::World};
+use super::{
+    rig::{Part, Truth, part},
+    scenario::judge::Truths,
+    world::World,
+};
 use crate::plant::{
     PlantDef,
     def::TagId,
@@ -41,21 +45,23 @@ impl Lens {
 
 /// What a tag of the thesis's controller or PLC measures, by its address in their profiles.
 fn of_rig(def: &PlantDef, tag: &TagDef) -> Option<Look> {
-    let device = def.device(tag.device);
-    if def.simulation.as_deref() != Some("tank") {
-        return None;
-    }
-    let plc = || def.devices.iter().find(|other| other.profile == "koyo_dl06").is_some_and(|plc| plc.id == device.id);
     let point = (tag.point.table, tag.point.address);
-    if is_controller(def, device.line, device.unit) {
-        return match point {
-            (Table::Input, 0x03E8) => Some(|truth| truth.probe_c),
-            (Table::Input, 0x03EB) => Some(|truth| truth.mv_percent),
-            _ => None,
-        };
+    match part(def, tag.device)? {
+        Part::Controller => of_controller(point),
+        Part::Plc => of_plc(point),
     }
+}
+
+fn of_controller(point: (Table, u16)) -> Option<Look> {
     match point {
-        _ if !plc() => None,
+        (Table::Input, 0x03E8) => Some(|truth| truth.probe_c),
+        (Table::Input, 0x03EB) => Some(|truth| truth.mv_percent),
+        _ => None,
+    }
+}
+
+fn of_plc(point: (Table, u16)) -> Option<Look> {
+    match point {
         (Table::Input, 1032) => Some(|truth| truth.readings.level_cm),
         (Table::Input, 1033) => Some(|truth| truth.readings.cold_l),
         (Table::Input, 1034) => Some(|truth| truth.readings.hot_l),

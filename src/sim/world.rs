@@ -11,7 +11,7 @@ use std::{collections::BTreeMap, time::Duration};
 
 use super::{
     model::{Model, Models},
-    rig::{self, Rig},
+    rig::{self, Part, Rig},
     slave::{Slave, Unit},
 };
 use crate::plant::{
@@ -21,10 +21,6 @@ use crate::plant::{
 
 /// The address that means every unit of a serial line.
 pub const BROADCAST: u8 = 0;
-
-/// Profiles of the devices that the tank rig brings with it: the first device with such a profile is the rig's.
-const CONTROLLER: &str = "fuji_pxr";
-const PLC: &str = "koyo_dl06";
 
 /// All simulated units of a plant.
 #[derive(Debug, Clone, Default)]
@@ -51,27 +47,23 @@ impl World {
     /// The world of a plant: the rig that it names, and for every other device a model made from its profile.
     pub fn of(def: &PlantDef) -> Result<World, UnknownSimulation> {
         let rig = match def.simulation.as_deref() {
-            Some("tank") => Some(Rig::demo()),
+            Some(rig::SIMULATION) => Some(Rig::demo()),
             Some(other) => return Err(UnknownSimulation(other.to_owned())),
             None => None,
         };
-        let first = |profile: &str| {
-            def.devices.iter().find(|device| rig.is_some() && device.profile == profile).map(|device| device.id)
-        };
-        let (controller, plc) = (first(CONTROLLER), first(PLC));
         let (mut modelled, mut places) = (Vec::new(), BTreeMap::new());
         // A device at the broadcast address of a line is everybody, and nobody by itself.
         let everybody = |device: &&DeviceDef| {
             device.unit == BROADCAST && def.line(device.line).transport.framing() != Framing::Mbap
         };
         for device in def.devices.iter().filter(|device| !everybody(device)) {
-            let place = if Some(device.id) == controller {
-                Place::Controller
-            } else if Some(device.id) == plc {
-                Place::Plc
-            } else {
-                modelled.push(device.id);
-                Place::Model(modelled.len() - 1)
+            let place = match rig::part(def, device.id) {
+                Some(Part::Controller) => Place::Controller,
+                Some(Part::Plc) => Place::Plc,
+                None => {
+                    modelled.push(device.id);
+                    Place::Model(modelled.len() - 1)
+                }
             };
             places.insert((device.line, device.unit), place);
         }

@@ -13,7 +13,7 @@ use crate::plant::{
     command::{NotConfirmed, OrderStatus, Outcome},
     def::TagId,
     guard::{ActuatorDef, Blocking, InterlockDef, Standing},
-    orders::outcome_words,
+    orders::{outcome_word, outcome_words},
     tag::{Kind, TagDef},
 };
 
@@ -203,8 +203,8 @@ fn last_order<'a>(cx: &Cx<'a>, command: TagId) -> Option<&'a OrderStatus> {
     cx.snapshot.orders.iter().find(of_command)
 }
 
-/// How the latest order for a command ended, while that is news: words, and whether it went well.
-fn news(cx: &Cx, command: TagId) -> Option<(String, Option<bool>)> {
+/// The latest order for a command, while how it ended is news, and whether it went well.
+fn news<'a>(cx: &Cx<'a>, command: TagId) -> Option<(&'a Outcome, Option<bool>)> {
     let status = last_order(cx, command)?;
     let real = Duration::try_from(cx.now.duration_since(status.at)).unwrap_or_default().as_secs_f64();
     let passed = real / cx.snapshot.speed.clamp(0.01, 1e6);
@@ -215,7 +215,7 @@ fn news(cx: &Cx, command: TagId) -> Option<(String, Option<bool>)> {
         }
         Outcome::Refused(_) | Outcome::NotConfirmed(_) | Outcome::Failed(_) => (Some(false), FAILED_S),
     };
-    (passed <= lasts).then(|| (outcome_words(&status.outcome), well))
+    (passed <= lasts).then_some((&status.outcome, well))
 }
 
 /// The mark of an actuator in the picture, by its output: what does not obey, how the last command went, what is blocked.
@@ -229,14 +229,14 @@ pub fn mark(cx: &Cx, output: TagId) -> Option<(String, Style)> {
     }
     match news(cx, actuator.command) {
         Some((_, None)) => return Some((theme.pick("… sent", ".. sent").to_owned(), theme.strong())),
-        Some((words, Some(false))) => {
-            let word = words.split(':').next().unwrap_or_default();
+        Some((outcome, Some(false))) => {
+            let word = outcome_word(outcome);
             return Some((format!("{} {word}", theme.pick("✗", "x")), theme.trouble()));
         }
         // Only while the output is as commanded: another mode may have taken over since.
-        Some((words, Some(true))) if obeys(cx, actuator) => {
+        Some((outcome, Some(true))) if obeys(cx, actuator) => {
             // A command that cannot be read back was taken, which is not yet done.
-            let word = if words.starts_with("not confirmed") { "accepted" } else { "done" };
+            let word = if matches!(outcome, Outcome::NotConfirmed(_)) { "accepted" } else { "done" };
             return Some((format!("{} {word}", theme.pick("✓", "ok")), theme.normal()));
         }
         Some((_, Some(true))) | None => {}
@@ -275,7 +275,8 @@ pub fn facts(cx: &Cx, tag: TagId) -> Vec<(&'static str, String, Style)> {
         let words = format!("{} commanded {wanted}, still {is} after {}", theme.pick("≠", "!="), age(lasts));
         rows.push(("differs", words, theme.trouble()));
     }
-    if let Some((words, well)) = news(cx, actuator.command) {
+    if let Some((outcome, well)) = news(cx, actuator.command) {
+        let words = outcome_words(outcome);
         let style = if well == Some(false) { theme.trouble() } else { theme.strong() };
         rows.push(("last", words, style));
     }

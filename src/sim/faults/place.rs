@@ -8,6 +8,7 @@ use crate::plant::{
     PlantDef,
     def::{DeviceDef, Framing, LineId, TagId, Transport},
 };
+use crate::sim::rig::{Part, SIMULATION, part};
 
 /// What is faulty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -92,12 +93,13 @@ pub fn refusal(def: &PlantDef, place: Place, fault: Fault) -> Option<String> {
         };
         return Some(format!("`{fault}` is a fault of {belongs}, not of {name}"));
     }
-    let tank = def.simulation.as_deref() == Some("tank");
+    let is_controller =
+        |line, unit| device_at(def, line, unit).is_some_and(|device| part(def, device.id) == Some(Part::Controller));
     let why = match (place, fault) {
         (Place::Line(line), _) if over_mbap(def, line) => "is no serial line: TCP itself repairs what the wire spoils",
-        (Place::Process, _) if !tank => "is not simulated",
-        // The thesis's controller reports a broken sensor in its fault word; it is the first of its profile.
-        (Place::Unit(line, unit), Fault::SensorBurnout) if tank && is_controller(def, line, unit) => return None,
+        (Place::Process, _) if def.simulation.as_deref() != Some(SIMULATION) => "is not simulated",
+        // The thesis's controller reports a broken sensor in its fault word.
+        (Place::Unit(line, unit), Fault::SensorBurnout) if is_controller(line, unit) => return None,
         (Place::Unit(line, unit), Fault::Stuck | Fault::Torn | Fault::WordOrder | Fault::SensorBurnout) => {
             let values = device_at(def, line, unit).map(|device| Values::of(def, device)).unwrap_or_default();
             if values.can_have(fault) {
@@ -113,12 +115,6 @@ pub fn refusal(def: &PlantDef, place: Place, fault: Fault) -> Option<String> {
 
 fn over_mbap(def: &PlantDef, line: LineId) -> bool {
     matches!(def.line(line).transport, Transport::Tcp { framing: Framing::Mbap, .. })
-}
-
-/// Whether a unit is the controller of the tank.
-pub fn is_controller(def: &PlantDef, line: LineId, unit: u8) -> bool {
-    let first = def.devices.iter().find(|device| device.profile == "fuji_pxr");
-    first.is_some_and(|device| (device.line, device.unit) == (line, unit))
 }
 
 fn lack(fault: Fault) -> &'static str {
