@@ -175,6 +175,18 @@ pub enum Refusal {
     /// What was confirmed is not what would be written now.
     #[error("the device has changed since you looked; look again")]
     Changed,
+    /// What a step of a restore would write over is another value than the one that was confirmed.
+    #[error("changed since you confirmed")]
+    ChangedSince,
+    /// What a step of a restore would write over is not known.
+    #[error("not known now")]
+    NotKnownNow,
+    /// The settings of the line were changed while a restore was at work.
+    #[error("the settings of the line were changed meanwhile")]
+    LineChanged,
+    /// The device had to be read before a restore, and was not in time.
+    #[error("the device could not be read within {0} s")]
+    NotRead(u64),
     /// Stopped by an operator before anything was written.
     #[error("stopped before anything was written")]
     Stopped,

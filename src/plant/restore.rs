@@ -1,14 +1,19 @@
-//! A restore: the writes of a set's plan, one at a time, until the first that is not verified.
+//! A restore: the device is read, then the writes of a set's plan go out one at a time, until the first that is not
+//! verified.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
 use super::{
     command::{NotConfirmed, OrderId, Outcome, Refusal},
-    def::{DeviceId, PlantDef},
+    def::{DeviceId, PlantDef, TagId},
     parameter_set::{Change, ParameterSet},
+    sample::Sample,
 };
+
+/// The device must have been read anew after this time, else nothing is written: real time, as the bus works in it.
+pub const READ_MAX: Duration = Duration::from_secs(60);
 
 /// What an operator has confirmed: this set, and the changes that it meant when he looked.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +37,8 @@ pub struct Restore {
     pub by: Arc<str>,
     /// Where the values come from.
     pub from: Arc<str>,
+    /// The very set that is written.
+    pub set: Arc<ParameterSet>,
     /// The device that is written.
     pub device: DeviceId,
     /// When it was begun.
@@ -42,6 +49,10 @@ pub struct Restore {
     pub state: State,
     /// An operator wants it to stop after the write under way.
     pub stopping: bool,
+    /// The settings of the device's line were changed meanwhile: who answers now may be another device.
+    pub line_changed: bool,
+    /// Why it was given up before its first write.
+    pub refused: Option<Refusal>,
 }
 
 /// One write of a restore.
@@ -58,23 +69,61 @@ pub struct Step {
 /// How a restore stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
+    /// The device is read first: nobody knows how old what is on the board is.
+    Reading,
     /// Writing.
     Running,
     /// Every write was verified.
     Done,
-    /// A write was not; those after it were not begun.
+    /// A write was not, or none was begun; those after it were not begun.
     Failed,
     /// An operator has stopped it.
     Stopped,
 }
 
 impl Restore {
-    /// Begins with the first write.
+    /// Begins with reading the device.
     pub fn new(id: OrderId, by: Arc<str>, wish: &RestoreWish, at: Timestamp) -> Restore {
         let step = |change: &Change| Step { change: *change, order: None, outcome: None };
         let steps = wish.changes.iter().map(step).collect();
-        let (from, device) = (wish.from.clone(), wish.device);
-        Restore { id, by, from, device, at, steps, state: State::Running, stopping: false }
+        Restore {
+            id,
+            by,
+            from: wish.from.clone(),
+            set: wish.set.clone(),
+            device: wish.device,
+            at,
+            steps,
+            state: State::Reading,
+            stopping: false,
+            line_changed: false,
+            refused: None,
+        }
+    }
+
+    /// Has it not ended yet?
+    pub fn at_work(&self) -> bool {
+        matches!(self.state, State::Reading | State::Running)
+    }
+
+    /// Has every tag of the set been read since it was ordered, and what the set rests on too?
+    pub fn is_read(&self, def: &PlantDef, sample: impl Fn(TagId) -> Sample) -> bool {
+        let named = |short: &str| self.set.values.iter().chain(&self.set.given).any(|held| held.tag == short);
+        let fresh = |tag: TagId| {
+            let sample = sample(tag);
+            sample.quality.is_good() && self.at <= sample.at
+        };
+        def.tags_of(self.device).filter(|tag| named(&tag.short)).all(|tag| fresh(tag.id))
+    }
+
+    /// What was confirmed is what is needed now: the writes may begin.
+    pub fn begin(&mut self) {
+        self.state = State::Running;
+    }
+
+    /// Gives it up before its first write.
+    pub fn give_up(&mut self, why: Refusal) {
+        (self.state, self.refused) = (State::Failed, Some(why));
     }
 
     /// Writes that are done.
@@ -117,8 +166,9 @@ impl Restore {
         let (done, all) = (self.done(), self.steps.len());
         let failed = self.steps.iter().find(|step| step.outcome.as_ref().is_some_and(|outcome| !is_done(outcome)));
         match self.state {
-            State::Running => None,
+            State::Reading | State::Running => None,
             State::Done => Some(Outcome::Verified),
+            State::Failed if self.refused.is_some() => self.refused.clone().map(Outcome::Refused),
             // Nothing of it has reached the device.
             State::Failed if done == 0 && matches!(self.steps[0].outcome, Some(Outcome::Refused(_))) => {
                 self.steps[0].outcome.clone()

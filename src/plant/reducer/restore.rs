@@ -3,18 +3,18 @@
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
 use super::{Effects, Plant};
 use crate::plant::{
     board::Board,
-    command::{Command, Order, OrderId, Outcome, Refusal},
-    def::TagId,
+    command::{BusRequest, Command, Order, OrderId, Outcome, Refusal},
+    def::{DeviceId, LineId, TagId},
     parameter_set::{self, Problem, StoredSet},
     record::{ActionRecord, Record},
-    restore::{Restore, RestoreWish, State},
+    restore::{READ_MAX, Restore, RestoreWish, State, Step},
 };
 
 /// The terminal number of writes that the plant itself orders for somebody; terminals count from 1.
@@ -61,9 +61,9 @@ impl Plant {
                 effects.sets = Some(SetWork::Write { order: order.id, set: Box::new(set), replace: *replace });
                 None
             }
-            Command::Restore(wish) => self.begin_restore(order, wish, at),
+            Command::Restore(wish) => self.begin_restore(order, wish, at, effects),
             Command::StopRestore(device) => {
-                let running = self.restores.iter_mut().find(|run| run.device == *device && run.state == State::Running);
+                let running = self.restores.iter_mut().find(|run| run.device == *device && run.at_work());
                 let outcome = match running {
                     Some(run) => {
                         Arc::make_mut(run).stopping = true;
@@ -92,31 +92,64 @@ impl Plant {
         Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
     }
 
-    fn begin_restore(&mut self, order: &Order, wish: &RestoreWish, at: Timestamp) -> Option<ActionRecord> {
-        let plan = parameter_set::plan(&self.def, wish.device, &wish.set, &trusted(&self.board));
-        let running = self.restores.iter().any(|run| run.device == wish.device && run.state == State::Running);
-        let refusal = match plan {
-            _ if running => Some(Refusal::UnderWay),
-            Err(problems) => Some(Refusal::NotFit(first_of(&problems))),
-            Ok(changes) if changes != wish.changes => Some(Refusal::Changed),
-            Ok(changes) if changes.is_empty() => {
-                return self.desk.note(order, Outcome::Unchanged, &self.board, at);
-            }
-            Ok(_) => None,
-        };
-        if let Some(refusal) = refusal {
-            return self.desk.note(order, Outcome::Refused(refusal), &self.board, at);
+    /// A restore begins with a look at the device: what is on the board may be hours old where tags are read seldom.
+    fn begin_restore(
+        &mut self,
+        order: &Order,
+        wish: &RestoreWish,
+        at: Timestamp,
+        effects: &mut Effects,
+    ) -> Option<ActionRecord> {
+        if self.restores.iter().any(|run| run.device == wish.device && run.at_work()) {
+            return self.desk.note(order, Outcome::Refused(Refusal::UnderWay), &self.board, at);
+        }
+        if let Some(why) = self.unlike(wish.device, &wish.set, &wish.changes) {
+            return self.desk.note(order, Outcome::Refused(why), &self.board, at);
+        }
+        if wish.changes.is_empty() {
+            return self.desk.note(order, Outcome::Unchanged, &self.board, at);
         }
         self.desk.take(order, at);
         self.restores.retain(|run| run.device != wish.device);
         self.restores.push(Arc::new(Restore::new(order.id, order.by.clone(), wish, at)));
+        effects.bus.push((self.def.device(wish.device).line, BusRequest::Refresh(wish.device)));
         None
     }
 
-    /// Lets every restore go on: takes the end of its write, orders the next, or ends it.
+    /// Why what was confirmed is not to be written as things stand now.
+    fn unlike<'a>(
+        &self,
+        device: DeviceId,
+        set: &parameter_set::ParameterSet,
+        confirmed: impl IntoIterator<Item = &'a parameter_set::Change>,
+    ) -> Option<Refusal> {
+        match parameter_set::plan(&self.def, device, set, &trusted(&self.board)) {
+            Err(problems) => Some(Refusal::NotFit(first_of(&problems))),
+            Ok(changes) => (!changes.iter().eq(confirmed)).then_some(Refusal::Changed),
+        }
+    }
+
+    /// The line is about to work with other settings: no restore goes on over it.
+    pub(super) fn restores_lose_line(&mut self, line: LineId) {
+        let def = &self.def;
+        let here = |run: &&mut Arc<Restore>| run.at_work() && def.device(run.device).line == line;
+        for run in self.restores.iter_mut().filter(here) {
+            Arc::make_mut(run).line_changed = true;
+        }
+    }
+
+    /// The line had no room for the look at the device that a restore begins with.
+    pub(super) fn restore_not_read(&mut self, device: DeviceId) {
+        let reading = |run: &&mut Arc<Restore>| run.device == device && run.state == State::Reading;
+        if let Some(run) = self.restores.iter_mut().find(reading) {
+            Arc::make_mut(run).give_up(Refusal::Busy);
+        }
+    }
+
+    /// Lets every restore go on that nobody was told the end of: takes the end of its write, orders the next, or ends it.
     pub(super) fn carry_on(&mut self, at: Timestamp, effects: &mut Effects) {
         for place in 0..self.restores.len() {
-            if self.restores[place].state == State::Running {
+            if self.desk.outcome_of(self.restores[place].id) == Some(&Outcome::Pending) {
                 let mut run = (*self.restores[place]).clone();
                 self.go_on(&mut run, at, effects);
                 if run != *self.restores[place] {
@@ -128,6 +161,9 @@ impl Plant {
 
     /// Each turn of the loop ends a write, begins one, or leaves; a restore has a finite number of writes.
     fn go_on(&mut self, run: &mut Restore, at: Timestamp, effects: &mut Effects) {
+        if run.state == State::Reading {
+            self.look(run, at);
+        }
         loop {
             if let Some(order) = run.current() {
                 match self.desk.outcome_of(order) {
@@ -137,13 +173,19 @@ impl Plant {
                     None => run.take(Outcome::Failed(crate::plant::event::Fault::Timeout)),
                 }
             }
-            let (by, numbers) = (run.by.clone(), &mut self.numbers);
+            let (by, line_changed, numbers) = (run.by.clone(), run.line_changed, &mut self.numbers);
             let Some(step) = run.begin_next() else { break };
             *numbers = numbers.wrapping_add(1);
             let id = OrderId { terminal: PLANT, number: *numbers };
             step.order = Some(id);
             let (tag, value) = (step.change.tag, step.change.new);
             let order = Order { id, by, command: Command::Write { tag, value } };
+            let refusal = if line_changed { Some(Refusal::LineChanged) } else { overtaken(step, &self.board) };
+            if let Some(why) = refusal {
+                let action = self.desk.note(&order, Outcome::Refused(why), &self.board, at);
+                effects.records.extend(action.map(Record::Action));
+                continue;
+            }
             match self.desk.write(&self.board, &order, tag, value, at) {
                 Ok(request) => effects.bus.push((self.line_of(tag), request)),
                 Err(action) => effects.records.extend(action.map(Record::Action)),
@@ -155,9 +197,26 @@ impl Plant {
         }
     }
 
+    /// Begins to write once the device has been read and needs just what was confirmed.
+    fn look(&self, run: &mut Restore, at: Timestamp) {
+        let waited = Duration::try_from(at.duration_since(run.at)).unwrap_or_default();
+        if run.stopping {
+            run.state = State::Stopped;
+        } else if run.line_changed {
+            run.give_up(Refusal::LineChanged);
+        } else if run.is_read(&self.def, |tag| self.board.sample(tag)) {
+            match self.unlike(run.device, &run.set, run.steps.iter().map(|step| &step.change)) {
+                Some(why) => run.give_up(why),
+                None => run.begin(),
+            }
+        } else if READ_MAX.mul_f64(self.speed) < waited {
+            run.give_up(Refusal::NotRead(READ_MAX.as_secs()));
+        }
+    }
+
     /// The restore of a device, at work or the last one.
     #[cfg(test)]
-    fn restore_of(&self, device: crate::plant::def::DeviceId) -> Option<&Restore> {
+    fn restore_of(&self, device: DeviceId) -> Option<&Restore> {
         self.restores.iter().find(|run| run.device == device).map(Arc::as_ref)
     }
 }
@@ -165,6 +224,15 @@ impl Plant {
 /// What is trusted now.
 fn trusted(board: &Board) -> impl Fn(TagId) -> Option<f64> + '_ {
     |tag| board.sample(tag).trusted()
+}
+
+/// Why a step would write over something else than what was confirmed.
+fn overtaken(step: &Step, board: &Board) -> Option<Refusal> {
+    match board.sample(step.change.tag).trusted() {
+        None => Some(Refusal::NotKnownNow),
+        Some(now) if now != step.change.old => Some(Refusal::ChangedSince),
+        Some(_) => None,
+    }
 }
 
 /// The first reason in words, and how many more there are.

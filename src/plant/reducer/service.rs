@@ -22,6 +22,7 @@ impl Plant {
             }
             Command::Configure(settings) => {
                 self.remember_settings(settings);
+                self.restores_lose_line(settings.id);
                 effects.bus.push((settings.id, BusRequest::Configure(settings.clone())));
             }
             Command::Test(line, tool) => {

@@ -339,9 +339,7 @@ impl Controllers {
                 "actions" => device.actions.is_empty(),
                 "defaults" => cx.def().tags_of(device.id).all(|tag| tag.default.is_none()),
                 "hold" => device.program.as_ref().is_none_or(|program| program.halt.is_none()),
-                "stop" => {
-                    cx.snapshot.restore(device.id).is_none_or(|run| run.state != crate::plant::restore::State::Running)
-                }
+                "stop" => cx.snapshot.restore(device.id).is_none_or(|run| !run.at_work()),
                 "turn" => !matches!(&self.page, Page::Compare(Compare { source: Source::Device(_), .. })),
                 _ => false,
             })

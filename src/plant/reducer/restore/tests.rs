@@ -33,14 +33,21 @@ fn def() -> PlantDef {
 /// SV 50.0 °C, at most 100.
 fn plant() -> Plant {
     let mut plant = Plant::new(Arc::new(def()), at(0), 1.0);
-    read(&mut plant, 500.0, 100.0);
+    read(&mut plant, 0, 500.0, 100.0);
     plant
 }
 
-fn read(plant: &mut Plant, sv: f64, high: f64) {
+fn read(plant: &mut Plant, second: i64, sv: f64, high: f64) -> Effects {
     let values = vec![(SV, sv), (DP, 1.0), (FAULT, 0.0), (HIGH, high)];
     let reply = std::time::Duration::from_millis(12);
-    plant.on_event(Event::Read { at: at(0), device: TIC, values, texts: Vec::new(), reply, exchange: None });
+    plant.on_event(Event::Read { at: at(second), device: TIC, values, texts: Vec::new(), reply, exchange: None })
+}
+
+/// Orders a restore and lets the device be read as it was; the first write follows.
+fn begin(plant: &mut Plant, number: u32, wish: RestoreWish) -> Effects {
+    let asked = order(plant, number, Command::Restore(Box::new(wish)));
+    assert_eq!(asked.bus, [(plant.def.device(TIC).line, BusRequest::Refresh(TIC))], "the device is read first");
+    read(plant, 1, 500.0, 100.0)
 }
 
 fn set(sv: f64, high: f64) -> Arc<ParameterSet> {
@@ -115,7 +122,7 @@ fn deeds(effects: &Effects) -> Vec<String> {
 fn one_write_after_the_other_each_on_record_and_then_the_whole() {
     let mut plant = plant();
     let wish = wish(&plant, set(150.0, 200.0));
-    let first = order(&mut plant, 1, Command::Restore(Box::new(wish)));
+    let first = begin(&mut plant, 1, wish);
     assert_eq!(written(&first), [(HIGH, 200.0)], "the limit first, and nothing else yet");
     let second = end(&mut plant, &first, WriteResult::ReadBack);
     assert_eq!(deeds(&second), ["anna write TIC-1.SV-H verified"]);
@@ -130,7 +137,7 @@ fn one_write_after_the_other_each_on_record_and_then_the_whole() {
 fn the_first_failure_stops_it_and_says_what_was_written() {
     let mut plant = plant();
     let wish = wish(&plant, set(40.0, 80.0));
-    let first = order(&mut plant, 1, Command::Restore(Box::new(wish)));
+    let first = begin(&mut plant, 1, wish);
     assert_eq!(written(&first), [(SV, 400.0)]);
     let second = end(&mut plant, &first, WriteResult::ReadBack);
     assert_eq!(written(&second), [(HIGH, 80.0)]);
@@ -147,9 +154,85 @@ fn the_first_failure_stops_it_and_says_what_was_written() {
 fn a_device_that_has_changed_since_is_not_written() {
     let mut plant = plant();
     let wish = wish(&plant, set(40.0, 80.0));
-    read(&mut plant, 610.0, 100.0);
-    let effects = order(&mut plant, 1, Command::Restore(Box::new(wish)));
-    assert_eq!((written(&effects), outcome(&plant, 1)), (vec![], Some(Outcome::Refused(Refusal::Changed))));
+    order(&mut plant, 1, Command::Restore(Box::new(wish.clone())));
+    // On the board it stood as it was confirmed; the device itself says otherwise.
+    let effects = read(&mut plant, 1, 610.0, 100.0);
+    let changed = Some(Outcome::Refused(Refusal::Changed));
+    assert_eq!((written(&effects), outcome(&plant, 1)), (vec![], changed.clone()));
+    assert_eq!(deeds(&effects), [format!("anna restore set TIC-1 refused: {}", Refusal::Changed)]);
+    let effects = order(&mut plant, 2, Command::Restore(Box::new(wish)));
+    assert_eq!((effects.bus, outcome(&plant, 2)), (vec![], changed));
+}
+
+#[test]
+fn nothing_is_written_before_every_value_of_the_set_was_read_anew() {
+    let mut plant = plant();
+    let wish = wish(&plant, set(40.0, 80.0));
+    order(&mut plant, 1, Command::Restore(Box::new(wish.clone())));
+    let only_sv = |plant: &mut Plant, second| {
+        let (values, reply) = (vec![(SV, 500.0), (DP, 1.0)], std::time::Duration::from_millis(12));
+        plant.on_event(Event::Read { at: at(second), device: TIC, values, texts: Vec::new(), reply, exchange: None })
+    };
+    assert_eq!(written(&only_sv(&mut plant, 2)), [], "SV-H is still of yesterday");
+    assert_eq!(plant.restore_of(TIC).map(|run| run.state), Some(State::Reading));
+    // The device goes on answering for SV alone: in the end it is given up, and said so.
+    plant.on_tick(at(61));
+    assert_eq!(outcome(&plant, 1), Some(Outcome::Pending));
+    let late = plant.on_tick(at(62));
+    assert_eq!(outcome(&plant, 1), Some(Outcome::Refused(Refusal::NotRead(60))));
+    assert_eq!(deeds(&late), ["anna restore set TIC-1 refused: the device could not be read within 60 s"]);
+}
+
+#[test]
+fn a_restore_that_still_reads_can_be_stopped_and_a_full_line_ends_it() {
+    let check = |end: &dyn Fn(&mut Plant), expect: Refusal| {
+        let mut plant = plant();
+        let wish = wish(&plant, set(40.0, 80.0));
+        order(&mut plant, 1, Command::Restore(Box::new(wish)));
+        end(&mut plant);
+        assert_eq!(outcome(&plant, 1), Some(Outcome::Refused(expect)));
+        assert_eq!(written(&read(&mut plant, 2, 500.0, 100.0)), []);
+    };
+    let stop = |plant: &mut Plant| drop(order(plant, 2, Command::StopRestore(TIC)));
+    check(&stop, Refusal::Stopped);
+    let busy = |plant: &mut Plant| drop(plant.on_undeliverable(plant.def.device(TIC).line, &BusRequest::Refresh(TIC)));
+    check(&busy, Refusal::Busy);
+    let configure = |plant: &mut Plant| {
+        let line = plant.def.line(plant.def.device(TIC).line).clone();
+        drop(order(plant, 2, Command::Configure(Box::new(line))));
+    };
+    check(&configure, Refusal::LineChanged);
+}
+
+#[test]
+fn a_value_that_changes_while_a_restore_runs_is_not_written_over() {
+    let check = |meanwhile: &dyn Fn(&mut Plant), expect: &str| {
+        let mut plant = plant();
+        let wish = wish(&plant, set(40.0, 80.0));
+        let first = begin(&mut plant, 1, wish);
+        meanwhile(&mut plant);
+        let last = end(&mut plant, &first, WriteResult::ReadBack);
+        assert_eq!(written(&last), [], "{expect}");
+        let told = [
+            "anna write TIC-1.SV verified",
+            expect,
+            "anna restore set TIC-1 not confirmed: 1 of 2 written, then SV-H failed",
+        ];
+        assert_eq!(deeds(&last), told);
+        assert_eq!(plant.restore_of(TIC).map(|run| (run.state, run.done())), Some((State::Failed, 1)));
+    };
+    let at_the_panel = |plant: &mut Plant| drop(read(plant, 1, 500.0, 120.0));
+    check(&at_the_panel, "anna write TIC-1.SV-H refused: changed since you confirmed");
+    let silent = |plant: &mut Plant| {
+        let (tags, fault) = (vec![HIGH], Fault::Timeout);
+        drop(plant.on_event(Event::Failed { at: at(1), device: TIC, tags, fault, exchange: None }));
+    };
+    check(&silent, "anna write TIC-1.SV-H refused: not known now");
+    let other_line = |plant: &mut Plant| {
+        let line = plant.def.line(plant.def.device(TIC).line).clone();
+        drop(order(plant, 7, Command::Configure(Box::new(line))));
+    };
+    check(&other_line, "anna write TIC-1.SV-H refused: the settings of the line were changed meanwhile");
 }
 
 #[test]
@@ -171,7 +254,7 @@ fn limits_are_checked_in_the_station_whatever_a_terminal_sends() {
 fn an_operator_stops_it_between_two_writes_and_two_never_run_at_once() {
     let mut plant = plant();
     let wish = wish(&plant, set(40.0, 80.0));
-    let first = order(&mut plant, 1, Command::Restore(Box::new(wish.clone())));
+    let first = begin(&mut plant, 1, wish.clone());
     order(&mut plant, 2, Command::Restore(Box::new(wish)));
     assert_eq!(outcome(&plant, 2), Some(Outcome::Refused(Refusal::UnderWay)));
     order(&mut plant, 3, Command::StopRestore(TIC));
@@ -186,7 +269,7 @@ fn an_operator_stops_it_between_two_writes_and_two_never_run_at_once() {
 fn a_line_too_busy_ends_it_without_effect() {
     let mut plant = plant();
     let wish = wish(&plant, set(40.0, 100.0));
-    let first = order(&mut plant, 1, Command::Restore(Box::new(wish)));
+    let first = begin(&mut plant, 1, wish);
     let (line, request) = first.bus.into_iter().next().expect("a write");
     plant.on_undeliverable(line, &request);
     assert_eq!(outcome(&plant, 1), Some(Outcome::Refused(Refusal::Busy)));

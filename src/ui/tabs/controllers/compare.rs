@@ -14,7 +14,7 @@ use crate::{
         Cx,
         chrome::outcome_words,
         modal::{Confirm, Notice},
-        widgets::text::{Canvas, clock, fit, fit_words, pad, pad_left},
+        widgets::text::{Canvas, fit, fit_words, moment, pad, pad_left},
     },
 };
 
@@ -41,16 +41,27 @@ impl Compare {
     fn rows(&self, cx: &Cx, device: &DeviceDef) -> Vec<Compared> {
         let Some(set) = self.source.set(cx) else { return Vec::new() };
         let rows = parameter_set::compare(cx.def(), device.id, &set, &trusted(cx));
-        let run = self.run(cx, device);
+        let run = self.at_work(cx, device);
         let written =
             |row: &Compared| run.is_some_and(|run| run.steps.iter().any(|step| Some(step.change.tag) == row.tag));
         rows.into_iter().filter(|row| self.all || (row.set.is_some() && !row.same) || written(row)).collect()
     }
 
-    /// The restore of this source to this device, at work or the last one.
+    /// The restore of this very source to this device, at work or the last one.
     fn run<'a>(&self, cx: &Cx<'a>, device: &DeviceDef) -> Option<&'a Restore> {
-        let from = self.source.words(cx);
-        cx.snapshot.restore(device.id).filter(|run| *run.from == *from)
+        let run = cx.snapshot.restore(device.id).filter(|run| *run.from == *self.source.words(cx))?;
+        let same = match self.source {
+            // Another set may have got the name since.
+            Source::Set(_) => self.source.set(cx).is_some_and(|set| *set == *run.set),
+            // A copy was taken at the moment of its restore, and is of that moment.
+            Source::Device(_) => true,
+        };
+        same.then_some(run)
+    }
+
+    /// The same while it has not ended. What it has written later may have changed since, so only then its steps are shown.
+    fn at_work<'a>(&self, cx: &Cx<'a>, device: &DeviceDef) -> Option<&'a Restore> {
+        self.run(cx, device).filter(|run| run.at_work())
     }
 
     fn plan(&self, cx: &Cx, device: &DeviceDef) -> Option<Plan> {
@@ -120,19 +131,18 @@ impl Compare {
             canvas.text(1, 2, "it is not there any more", theme.trouble());
             return;
         };
-        let run = self.run(cx, device);
+        let run = self.at_work(cx, device);
         let rows = self.rows(cx, device);
         canvas.text(x + 2, 0, &fit_words(&self.summary(cx, device, &rows), end.saturating_sub(x + 2)), theme.normal());
         let mut top = 1;
-        if let (Err(problems), None) = (&plan, run.filter(|run| run.state == State::Running)) {
+        if let (Err(problems), None) = (&plan, run) {
             let words: Vec<String> = problems.iter().map(|problem| format!("cannot be written: {problem}")).collect();
             for line in some_lines(&words, end, 3) {
                 canvas.text(1, top, &line, theme.trouble());
                 top += 1;
             }
         }
-        let device_column = if run.is_some() { "before" } else { "in the device" };
-        let names = ["parameter", "", "in the set", device_column, ""];
+        let names = ["parameter", "", "in the set", "in the device", ""];
         canvas.text(1, top + 1, &columns(names, end), theme.dim());
         let room = usize::from(bottom.saturating_sub(top + 3)).max(1);
         let first = self.first.min(rows.len().saturating_sub(room));
@@ -146,7 +156,7 @@ impl Compare {
         if below > 0 {
             canvas.text_right(end, bottom.saturating_sub(1), &format!("{below} more ▼"), theme.normal());
         }
-        if let Some(run) = run {
+        if let Some(run) = self.run(cx, device) {
             let (words, trouble) = run_words(cx, device, run);
             canvas.text(1, bottom, &fit_words(&words, end), if trouble { theme.trouble() } else { theme.strong() });
         }
@@ -168,20 +178,17 @@ impl Compare {
         let step = run.and_then(|run| run.steps.iter().find(|step| Some(step.change.tag) == row.tag));
         let label = row.tag.map_or("no such setting", |tag| cx.def().tag(tag).label.as_str());
         let (note, trouble) = match (step, run) {
-            (Some(step), Some(run)) => match (&step.outcome, step.order) {
+            (Some(step), Some(_)) => match (&step.outcome, step.order) {
                 (Some(outcome), _) => outcome_words(outcome),
                 (None, Some(_)) => ("writing …".to_owned(), false),
-                (None, None) if run.state == State::Running => ("waits".to_owned(), false),
-                (None, None) => ("not written".to_owned(), true),
+                (None, None) => ("waits".to_owned(), false),
             },
             _ if row.set.is_none() => ("not in the set".to_owned(), false),
             _ if row.device.is_none() => ("not known now".to_owned(), true),
             _ if row.same => ("same".to_owned(), false),
             _ => ("differs".to_owned(), false),
         };
-        // While it runs the device column keeps what was there before, so that old and new stay side by side.
-        let device = step.map_or(row.device, |step| Some(step.change.old));
-        let cells = [row.short.as_str(), label, &shown(cx, row, row.set), &shown(cx, row, device), &note];
+        let cells = [row.short.as_str(), label, &shown(cx, row, row.set), &shown(cx, row, row.device), &note];
         let style = match (trouble, row.same && step.is_none()) {
             (true, _) => theme.trouble(),
             (false, true) => theme.dim(),
@@ -206,20 +213,26 @@ fn columns([short, label, set, device, note]: [&str; 5], end: u16) -> String {
 /// How a restore goes, or how it ended.
 fn run_words(cx: &Cx, device: &DeviceDef, run: &Restore) -> (String, bool) {
     let (done, all) = (run.done(), run.steps.len());
-    let (at, by) = (clock(run.at, &cx.def().time_zone), &run.by);
+    let (at, by) = (moment(run.at, cx.now, &cx.def().time_zone), &run.by);
     match run.state {
+        State::Reading if run.stopping => ("stopping: nothing is written yet".to_owned(), true),
+        State::Reading => ("reading the device first …   x stops it".to_owned(), false),
         State::Running if run.stopping => (format!("stopping: {done} of {all} written"), true),
         State::Running => (format!("writing: {done} of {all} written and verified   x stops it"), false),
         State::Done => {
             let fix = device.actions.first().map_or(String::new(), |action| format!("   f {} keeps them", action.name));
             (format!("{all} of {all} written and verified, begun {at} by {by}{fix}"), false)
         }
+        State::Failed if run.refused.is_some() => {
+            let why = run.refused.as_ref().map_or(String::new(), ToString::to_string);
+            (format!("NOTHING WRITTEN, asked {at} by {by}: {why}"), true)
+        }
         State::Failed => {
             let failed = run.steps.iter().rev().find_map(|step| Some((step.change.tag, step.outcome.as_ref()?)));
             let why = failed.map_or(String::new(), |(tag, outcome)| {
                 format!("{}: {}", cx.def().tag(tag).short, outcome_words(outcome).0)
             });
-            (format!("STOPPED, {done} of {all} written and verified; {why}"), true)
+            (format!("STOPPED after {done} of {all}, {at}; {why}"), true)
         }
         State::Stopped => (format!("STOPPED by an operator: {done} of {all} written and verified, begun {at}"), true),
     }

@@ -151,6 +151,7 @@ fn half_done(fixture: &Fixture, state: State) -> Restore {
     let wish = RestoreWish { device: DeviceId(0), from: "set winter".into(), set, changes };
     let id = OrderId { terminal: 1, number: 9 };
     let mut run = Restore::new(id, "anna".into(), &wish, fixture::now());
+    run.begin();
     run.steps[0].order = Some(id);
     run.steps[0].outcome = Some(Outcome::Verified);
     run.steps[1].order = Some(id);
@@ -163,10 +164,49 @@ fn half_done(fixture: &Fixture, state: State) -> Restore {
 #[test]
 fn a_restore_shows_each_write_and_where_it_stopped() {
     let mut fixture = with_sets();
-    fixture.restores = vec![half_done(&fixture, State::Running)];
+    let (running, failed) = (half_done(&fixture, State::Running), half_done(&fixture, State::Failed));
+    let mut reading = half_done(&fixture, State::Running);
+    // The first write is done.
+    fixture.set("TIC-1.P", 5.0);
+    fixture.restores = vec![running];
     seen("restore_running", &fixture, Theme::FULL, "4⏎s↓⏎");
-    fixture.restores = vec![half_done(&fixture, State::Failed)];
+    fixture.restores = vec![failed];
     seen("restore_failed", &fixture, Theme::FULL, "4⏎s↓⏎");
+    (reading.state, reading.steps) = (State::Reading, Vec::new());
+    fixture.restores = vec![reading];
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "4⏎s↓⏎");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("reading the device first …   x stops it"), "{shown}");
+}
+
+#[test]
+fn a_restore_of_this_morning_hides_nothing_of_what_the_device_holds_now() {
+    let mut fixture = with_sets();
+    let mut run = half_done(&fixture, State::Running);
+    let id = run.id;
+    for step in &mut run.steps {
+        (step.order, step.outcome) = (Some(id), Some(Outcome::Verified));
+    }
+    run.state = State::Done;
+    // It wrote P 5.0; since then somebody has set it to 7.7 at the panel.
+    fixture.set("TIC-1.P", 7.7);
+    fixture.restores = vec![run];
+    let shown = |fixture: &Fixture| {
+        let mut model = model(fixture, Theme::FULL);
+        type_keys(&mut model, "4⏎s↓⏎");
+        screen(&mut model, 80, 24)
+    };
+    let page = shown(&fixture);
+    let row = page.lines().find(|line| line.starts_with(" P ")).unwrap_or_default().to_owned();
+    assert!(row.contains("5.0 %") && row.contains("7.7 %") && row.contains("differs"), "{page}");
+    assert!(page.contains("in the device") && page.contains("3 of 3 written and verified, begun"), "{page}");
+    // A set of the same name that was saved later is another set: nothing of it was ever written.
+    let later = fixture.sets[1].set.clone().expect("a good set");
+    let saved = fixture::now() + SignedDuration::from_secs(60);
+    let later = crate::plant::parameter_set::ParameterSet { saved, ..(*later).clone() };
+    fixture.sets[1].set = Ok(Arc::new(later));
+    assert!(!shown(&fixture).contains("written and verified"), "{}", shown(&fixture));
 }
 
 /// The restore that these keys order.
