@@ -181,6 +181,8 @@ pub struct ActionDef {
     pub confirm: String,
     /// It stops something: it goes before all that waits.
     pub stop: bool,
+    /// It saves the settings in the device's own memory.
+    pub saves: bool,
 }
 
 /// An alarm: a condition on a tag or device, with what the operator should know and do.

@@ -10,6 +10,7 @@ use super::{
     def::{DeviceId, PlantDef, TagId},
     parameter_set::{Change, ParameterSet},
     sample::Sample,
+    tag::{Poll, TagDef},
 };
 
 /// The device must have been read anew after this time, else nothing is written: real time, as the bus works in it.
@@ -113,7 +114,9 @@ impl Restore {
             let sample = sample(tag);
             sample.quality.is_good() && self.at <= sample.at
         };
-        def.tags_of(self.device).filter(|tag| named(&tag.short)).all(|tag| fresh(tag.id))
+        // What is never read by itself is known from its last write or not at all.
+        let asked = |tag: &&TagDef| named(&tag.short) && tag.poll != Poll::Never;
+        def.tags_of(self.device).filter(asked).all(|tag| fresh(tag.id))
     }
 
     /// What was confirmed is what is needed now: the writes may begin.

@@ -240,6 +240,7 @@ pub(super) fn actions(
             settle: Duration::from_millis(action.settle_ms.map_or(0, |ms| u64::from(ms.value))),
             confirm: text(&action.confirm),
             stop: action.stop.is_some_and(|stop| stop.value),
+            saves: action.saves.is_some_and(|saves| saves.value),
         });
     }
     found

@@ -234,6 +234,7 @@ table!(
         opt "settle_ms" settle_ms: u32,
         opt "stop" stop: bool,
         need "confirm" confirm: String,
+        opt "saves" saves: bool,
     }
 );
 

@@ -109,6 +109,8 @@ fn outputs_and_sensors_cannot_be_written_and_only_what_the_plant_needs_is_polled
     assert_eq!(plant.tags_of(plc).filter(|tag| tag.poll != Poll::Never).count(), 25);
     let fix = plant.tag(plant.tag_named("TIC-1.FIX").unwrap());
     assert_eq!((fix.access, fix.poll), (Access::Write, Poll::Never));
+    let saving = plant.devices.iter().flat_map(|device| &device.actions).filter(|action| action.saves);
+    assert_eq!(saving.map(|action| action.name.as_str()).collect::<Vec<_>>(), ["FIX"]);
 }
 
 #[test]

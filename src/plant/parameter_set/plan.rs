@@ -3,9 +3,12 @@
 
 use std::collections::BTreeMap;
 
+use jiff::Timestamp;
+
 use super::{ParameterSet, Trusted, bound, compare, decimals, same};
 use crate::plant::{
     def::{DeviceId, PlantDef, TagId},
+    sample::{Cause, Sample},
     scale,
     tag::{Decimals, TagDef},
 };
@@ -70,6 +73,14 @@ pub enum Problem {
         tag: String,
         /// The value of the set.
         value: f64,
+    },
+    /// The station would refuse it now.
+    #[error("{tag}: interlock: {text}")]
+    Interlock {
+        /// Which tag.
+        tag: String,
+        /// What the plant file says about it.
+        text: String,
     },
     /// The limits forbid every order.
     #[error("{0}: no order of writes keeps within the limits")]
@@ -142,6 +153,9 @@ fn unfit(def: &PlantDef, change: &Change, then: &dyn Fn(TagId) -> Option<f64>, t
     if !tag.labels.is_empty() && tag.label_of(change.new).is_none() {
         return Some(Problem::NotAChoice { tag: tag.short.clone(), value: change.new });
     }
+    if let Some(lock) = def.guards.refusal(tag.id, change.new, |tag| as_sample(trusted(tag))) {
+        return Some(Problem::Interlock { tag: tag.short.clone(), text: lock.text.clone() });
+    }
     let (min, max) = match (bound(tag.min, then), bound(tag.max, then)) {
         (Ok(min), Ok(max)) => (min, max),
         (Err(from), _) | (_, Err(from)) => return Some(Problem::Unknown(def.tag(from).short.clone())),
@@ -156,6 +170,12 @@ fn unfit(def: &PlantDef, change: &Change, then: &dyn Fn(TagId) -> Option<f64>, t
     let text = |bound: Option<f64>, none: &str| bound.map_or(none.to_owned(), |bound| bound.to_string());
     let (min, max) = (text(min, "−∞"), text(max, "∞"));
     Some(Problem::OutOfRange { tag: tag.short.clone(), value: change.new, min, max })
+}
+
+/// An interlock asks only what is trusted; when it was read does not matter to it.
+fn as_sample(trusted: Option<f64>) -> Sample {
+    let at = Timestamp::UNIX_EPOCH;
+    trusted.map_or(Sample::bad(Cause::NotRead, at), |value| Sample::good(value, at))
 }
 
 /// Picks again and again the first change that is possible now. Values that move up wait for the upper limits that move

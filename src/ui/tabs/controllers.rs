@@ -1,5 +1,6 @@
 //! Tab 4: every device in a list; one as faceplate and parameter table; its program, its parameter sets, and a guide.
 
+mod ask;
 mod compare;
 mod device;
 mod guide;

@@ -1,14 +1,14 @@
 //! A set against a device: what differs, why it cannot be written, and how a restore of it goes.
 
-use std::sync::Arc;
-
-use super::sets::{Source, shown, some_lines, trusted};
+use super::{
+    ask,
+    sets::{Source, shown, some_lines, trusted},
+};
 use crate::{
     plant::{
-        command::Command,
         def::DeviceDef,
         parameter_set::{self, Change, Compared, Problem},
-        restore::{Restore, RestoreWish, State},
+        restore::{Restore, State},
     },
     ui::{
         Cx,
@@ -93,33 +93,7 @@ impl Compare {
                 return words(lines);
             }
         };
-        let from: Arc<str> = self.source.words(cx).into();
-        let count = if changes.len() == 1 { "1 value".to_owned() } else { format!("{} values", changes.len()) };
-        let question = format!(
-            "Write {count} to {}, one after the other, each read back? The first failure stops it.",
-            device.name
-        );
-        let shown = changes.iter().take(6).map(|change| {
-            let text = |value| cx.snapshot.format(change.tag, value);
-            let line = format!(
-                "{}  {} → {} {}",
-                cx.def().tag(change.tag).short,
-                text(change.old),
-                text(change.new),
-                cx.snapshot.unit(change.tag)
-            );
-            line.trim_end().to_owned()
-        });
-        let mut notes: Vec<String> = shown.collect();
-        if changes.len() > 6 {
-            notes.push(format!("… and {} more, as listed", changes.len() - 6));
-        }
-        if !set.missing.is_empty() {
-            notes.push(format!("not in the set, stay as they are: {}", fit_words(&set.missing.join(" "), 60)));
-        }
-        let wish = RestoreWish { device: device.id, from: from.clone(), set, changes };
-        let title = format!("{from} → {}", device.name);
-        Ok(Confirm::order(title, question, Command::Restore(Box::new(wish))).with_notes(notes))
+        Ok(ask::question(cx, device, &self.source, set, changes))
     }
 
     /// Draws the page.
@@ -220,7 +194,8 @@ fn run_words(cx: &Cx, device: &DeviceDef, run: &Restore) -> (String, bool) {
         State::Running if run.stopping => (format!("stopping: {done} of {all} written"), true),
         State::Running => (format!("writing: {done} of {all} written and verified   x stops it"), false),
         State::Done => {
-            let fix = device.actions.first().map_or(String::new(), |action| format!("   f {} keeps them", action.name));
+            let fix = device.actions.iter().find(|action| action.saves);
+            let fix = fix.map_or(String::new(), |action| format!("   f {} keeps them", action.name));
             (format!("{all} of {all} written and verified, begun {at} by {by}{fix}"), false)
         }
         State::Failed if run.refused.is_some() => {

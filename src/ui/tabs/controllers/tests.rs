@@ -8,12 +8,13 @@ use crate::{
     plant::{
         alarm::AlarmState,
         command::{Command, OrderId, OrderStatus, Outcome, Refusal},
-        def::{AlarmId, DeviceId},
+        def::{ActionDef, AlarmId, DeviceId},
         ne107::Reason,
         parameter_set::StoredSet,
         restore::{Restore, RestoreWish, State},
         sample::{Cause, Sample},
         snapshot::{ActiveAlarm, DeviceState},
+        tag::Confidence,
         tuning::{Found, Tuning},
     },
     ui::{
@@ -207,6 +208,55 @@ fn a_restore_of_this_morning_hides_nothing_of_what_the_device_holds_now() {
     let later = crate::plant::parameter_set::ParameterSet { saved, ..(*later).clone() };
     fixture.sets[1].set = Ok(Arc::new(later));
     assert!(!shown(&fixture).contains("written and verified"), "{}", shown(&fixture));
+}
+
+#[test]
+fn only_an_action_that_saves_is_advised_after_a_restore() {
+    let mut fixture = with_sets();
+    let mut run = half_done(&fixture, State::Running);
+    run.take(Outcome::Verified);
+    run.state = State::Done;
+    fixture.restores = vec![run];
+    let fix = fixture.def.devices[0].actions[0].clone();
+    let stop = ActionDef { name: "STOP".into(), saves: false, ..fix.clone() };
+    let mut check = |actions: Vec<ActionDef>, advised: bool| {
+        fixture.def.devices[0].actions = actions;
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, "4⏎s↓⏎");
+        let shown = screen(&mut model, 80, 24);
+        assert_eq!((shown.contains("f FIX keeps them"), shown.contains("STOP")), (advised, false), "{shown}");
+    };
+    check(vec![stop.clone(), fix], true);
+    check(vec![stop], false);
+}
+
+#[test]
+fn a_restore_asks_what_each_of_its_writes_would_have_asked() {
+    let mut fixture = many(1);
+    let words =
+        |n: usize| format!("Wrong values of number {n} can spoil a whole batch, and nobody notices it for long.");
+    let mut shown = |asking: &[&str]| {
+        for tag in &mut fixture.def.tags {
+            tag.confidence = if tag.short.starts_with("TM") { Confidence::Medium } else { Confidence::High };
+            tag.confirm = asking.iter().position(|short| *short == tag.short).map(words);
+        }
+        let names =
+            ["SV", "P", "I", "SV-1", "SV-2", "SV-3", "TM1R", "TM2R", "TM3R", "TM4R", "TM1S", "TM2S", "TM3S", "TM4S"];
+        let changes: Vec<(&str, f64)> = names.into_iter().map(|name| (name, 11.0)).collect();
+        fixture.sets = vec![set(&fixture, "winter", &changes)];
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, "4s⏎⏎");
+        screen(&mut model, 80, 24)
+    };
+    let few = shown(&["P"]);
+    assert!(few.contains("P: Wrong values of number 0 can spoil"), "{few}");
+    assert!(few.contains("! not verified: TM1R TM1S TM2R") && few.contains("write and verify"), "{few}");
+    // However many there are, the keys of the window stay on the screen, and what is left out is said to be.
+    let many = shown(&["SV", "P", "I", "SV-1", "SV-2"]);
+    for words in ["number 0", "number 1", "… and 3 more that ask before a write", "! not verified", "write and verify"]
+    {
+        assert!(many.contains(words), "{words} in {many}");
+    }
 }
 
 /// The restore that these keys order.
