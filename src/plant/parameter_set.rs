@@ -4,7 +4,7 @@ mod plan;
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use jiff::Timestamp;
 
@@ -33,6 +33,9 @@ pub struct ParameterSet {
     pub given: Vec<SetValue>,
     /// The settings, in the order of the profile.
     pub values: Vec<SetValue>,
+    /// What the values are measured in, by short name; a tag that is not here has none, or the set is of before they
+    /// were kept.
+    pub units: BTreeMap<String, String>,
     /// Settings that could not be read when it was taken, by short name.
     pub missing: Vec<String>,
 }
@@ -61,18 +64,24 @@ pub type Trusted<'a> = &'a dyn Fn(TagId) -> Option<f64>;
 /// Most characters of a name.
 pub const NAME_MAX: usize = 32;
 
-/// A name that can be a file's everywhere: letters, digits, blank, `-` and `_`, not blank at its ends. `Err` says what
-/// is expected.
+/// A name that can be a file's everywhere, in any language: no path, nothing hidden, not blank at its ends. `Err` says
+/// what is expected.
 pub fn check_name(name: &str) -> Result<(), String> {
-    let plain = |c: char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_');
+    let barred = |c: char| c.is_control() || "/\\:*?\"<>|".contains(c);
     if name.is_empty() {
         return Err("type a name".to_owned());
     }
     if NAME_MAX < name.chars().count() {
         return Err(format!("at most {NAME_MAX} characters"));
     }
-    if name.trim() != name || !name.chars().all(plain) {
-        return Err("letters, digits, blanks inside, - and _ only".to_owned());
+    if name.trim() != name {
+        return Err("no blank at its beginning or end".to_owned());
+    }
+    if name.starts_with('.') {
+        return Err("no dot at its beginning".to_owned());
+    }
+    if name.contains(barred) {
+        return Err("none of / \\ : * ? \" < > |".to_owned());
     }
     Ok(())
 }
@@ -87,6 +96,7 @@ pub fn take(
     trusted: Trusted,
 ) -> ParameterSet {
     let (mut values, mut missing, mut given) = (Vec::new(), Vec::new(), Vec::<SetValue>::new());
+    let mut units = BTreeMap::new();
     for tag in def.tags_of(device).filter(|tag| tag.in_sets) {
         let unit = tag.unit_from.as_ref().map(|(from, _)| (def.tag(*from), trusted(*from)));
         // A number that the profile has no word for cannot be checked when it comes back.
@@ -96,6 +106,8 @@ pub fn take(
             (None, _) | (_, Some((_, None))) => missing.push(tag.short.clone()),
             (Some(value), unit) => {
                 values.push(SetValue { tag: tag.short.clone(), value });
+                let measured_in = unit_of(tag, trusted).filter(|unit| !unit.is_empty());
+                units.extend(measured_in.map(|unit| (tag.short.clone(), unit.to_owned())));
                 let unit = unit.and_then(|(from, unit)| Some(SetValue { tag: from.short.clone(), value: unit? }));
                 given.extend(unit.filter(|unit| !given.contains(unit)));
             }
@@ -110,8 +122,16 @@ pub fn take(
         by,
         given,
         values,
+        units,
         missing,
     }
+}
+
+/// What the device measures a tag in; `None` while it has not said which of its units that is.
+pub fn unit_of<'a>(tag: &'a TagDef, trusted: Trusted) -> Option<&'a str> {
+    let Some((from, units)) = &tag.unit_from else { return Some(&tag.unit) };
+    let chosen = trusted(*from)?;
+    units.iter().find(|(number, _)| *number as f64 == chosen).map(|(_, unit)| unit.as_str())
 }
 
 /// How a setting of a set stands against a device.
@@ -123,6 +143,8 @@ pub struct Compared {
     pub tag: Option<TagId>,
     /// In the set; `None` where the set has nothing to say.
     pub set: Option<f64>,
+    /// The unit of the value of the set, where the set says one.
+    pub unit: Option<String>,
     /// In the device; `None` where it is not known.
     pub device: Option<f64>,
     /// The device would hold the same raw number.
@@ -134,14 +156,17 @@ pub fn compare(def: &PlantDef, device: DeviceId, set: &ParameterSet, trusted: Tr
     let in_set = |short: &str| set.values.iter().find(|value| value.tag == short).map(|value| value.value);
     let held = def.tags_of(device).filter(|tag| tag.in_sets || in_set(&tag.short).is_some()).map(|tag| {
         let (wanted, now) = (in_set(&tag.short), trusted(tag.id));
-        let same = wanted.zip(now).is_some_and(|(wanted, now)| same(tag, wanted, now, trusted));
-        Compared { short: tag.short.clone(), tag: Some(tag.id), set: wanted, device: now, same }
+        let unit = set.units.get(&tag.short);
+        let measured_alike = unit.is_none_or(|unit| unit_of(tag, trusted) == Some(unit));
+        let same = measured_alike && wanted.zip(now).is_some_and(|(wanted, now)| same(tag, wanted, now, trusted));
+        Compared { short: tag.short.clone(), tag: Some(tag.id), set: wanted, unit: unit.cloned(), device: now, same }
     });
     let foreign = set.values.iter().filter(|value| def.tags_of(device).all(|tag| tag.short != value.tag));
     let foreign = foreign.map(|value| Compared {
         short: value.tag.clone(),
         tag: None,
         set: Some(value.value),
+        unit: set.units.get(&value.tag).cloned(),
         device: None,
         same: false,
     });

@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use jiff::Timestamp;
 
@@ -26,6 +26,7 @@ table!(
         need "saved" saved: Moment,
         need "by" by: String,
         list "missing" missing: String,
+        opt "units" units: Raw,
         opt "given" given: Raw,
         need "values" values: Raw,
     }
@@ -50,10 +51,9 @@ impl Value for Moment {
 
 /// The text of a set. Units and labels stand beside the values as comments.
 pub fn text_of_set(set: &ParameterSet, def: &PlantDef) -> String {
-    let tags = tags_of(def, &set.profile);
+    let tags = tags_of(def, &set.device, &set.profile);
     let find = |short: &str| tags.iter().find(|tag| tag.short == short).copied();
-    let mut out =
-        String::from("# A parameter set of sightglass. Values are in the units of the comments beside them.\n");
+    let mut out = String::from("# A parameter set of sightglass.\n");
     let rows = [("device", &set.device), ("profile", &set.profile)];
     out.extend(rows.map(|(key, words)| format!("{key} = {}\n", quoted(words))));
     out.push_str(&format!("saved = {}\nby = {}\n", set.saved, quoted(&set.by)));
@@ -62,6 +62,7 @@ pub fn text_of_set(set: &ParameterSet, def: &PlantDef) -> String {
         out.push_str("# Could not be read when the set was saved, and is left alone when it is restored.\n");
         out.push_str(&format!("missing = [{}]\n", names.join(", ")));
     }
+    out.push_str(&units_table(set));
     if !set.given.is_empty() {
         out.push_str(
             "\n# Must be the same in a device that takes this set, else the values mean something else.\n[given]\n",
@@ -71,8 +72,7 @@ pub fn text_of_set(set: &ParameterSet, def: &PlantDef) -> String {
     out.push_str("\n[values]\n");
     for value in &set.values {
         let tag = find(&value.tag);
-        let unit = tag.map_or(String::new(), |tag| unit_of(tag, set, &tags));
-        out.push_str(&row(value, tag, &unit));
+        out.push_str(&row(value, tag, set.units.get(&value.tag).map_or("", String::as_str)));
     }
     out
 }
@@ -93,7 +93,7 @@ pub fn read_set(name: &str, file: &str, bytes: &[u8], def: &PlantDef) -> Result<
 
 fn set_of(name: &str, table: &SetTable, def: &PlantDef, problems: &mut Problems) -> Option<ParameterSet> {
     let profile = table.profile.as_ref()?;
-    let tags = tags_of(def, &profile.value);
+    let tags = tags_of(def, &text(&table.device), &profile.value);
     if tags.is_empty() {
         let known = def.devices.iter().map(|device| device.profile.as_str());
         let problem = problems.add(profile.at, format!("no device of this plant has the profile `{}`", profile.value));
@@ -110,6 +110,7 @@ fn set_of(name: &str, table: &SetTable, def: &PlantDef, problems: &mut Problems)
         by: Arc::from(text(&table.by)),
         given,
         values,
+        units: table.units.as_ref().map_or(BTreeMap::new(), |units| units_of(units, &tags, problems)),
         missing: table.missing.iter().map(|name| name.value.clone()).collect(),
     })
 }
@@ -140,19 +141,59 @@ fn values(table: &At<Raw>, tags: &[&TagDef], settings: bool, problems: &mut Prob
     found.into_iter().map(|(_, value)| value).collect()
 }
 
-/// The tags of the first device of a profile: all devices of a profile have the same names.
-fn tags_of<'a>(def: &'a PlantDef, profile: &str) -> Vec<&'a TagDef> {
-    let device = def.devices.iter().find(|device| device.profile == profile);
-    device.map_or(Vec::new(), |device| def.tags_of(device.id).collect())
+/// The tags of the device that a set was taken from; where the plant has no such device, those of all devices of the
+/// profile, each name once: a plant file may add tags to one device of a profile and not to the other.
+fn tags_of<'a>(def: &'a PlantDef, device: &str, profile: &str) -> Vec<&'a TagDef> {
+    let alike = || def.devices.iter().filter(|device| device.profile == profile);
+    let own = alike().find(|other| other.name == device);
+    let mut tags: Vec<&TagDef> = Vec::new();
+    for tag in own.into_iter().chain(alike().filter(|_| own.is_none())).flat_map(|device| def.tags_of(device.id)) {
+        if tags.iter().all(|other| other.short != tag.short) {
+            tags.push(tag);
+        }
+    }
+    tags
 }
 
-/// The unit that the set's own ground gives a tag.
-fn unit_of(tag: &TagDef, set: &ParameterSet, tags: &[&TagDef]) -> String {
-    let Some((from, units)) = &tag.unit_from else { return tag.unit.clone() };
-    let from = tags.iter().find(|tag| tag.id == *from);
-    let given = from.and_then(|from| set.given.iter().find(|given| given.tag == from.short));
-    let unit = given.and_then(|given| units.iter().find(|(number, _)| *number as f64 == given.value));
-    unit.map_or(String::new(), |(_, unit)| unit.clone())
+/// `"°C" = ["SV", "SV-H"]` for each unit.
+fn units_table(set: &ParameterSet) -> String {
+    if set.units.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from(
+        "\n# What the values are measured in. A device that takes this set must measure alike.\n[units]\n",
+    );
+    let mut units: Vec<&String> = set.units.values().collect();
+    units.sort();
+    units.dedup();
+    for unit in units {
+        let named = set.values.iter().filter(|value| set.units.get(&value.tag) == Some(unit));
+        let named: Vec<String> = named.map(|value| quoted(&value.tag)).collect();
+        out.push_str(&format!("{} = [{}]\n", quoted(unit), named.join(", ")));
+    }
+    out
+}
+
+/// The unit of each setting that the table names.
+fn units_of(table: &At<Raw>, tags: &[&TagDef], problems: &mut Problems) -> BTreeMap<String, String> {
+    let mut found = BTreeMap::new();
+    for (unit, (at, node)) in &table.value.table {
+        let Node::Array(names) = &node.value else {
+            problems.add(*at, format!("`{unit}` does not say what is measured in it")).label("expected [\"SV\", …]");
+            continue;
+        };
+        for name in names {
+            let Some(short) = String::read(&name.value, name.at, problems) else { continue };
+            if tags.iter().all(|tag| tag.short != short) {
+                let problem = problems.add(name.at, format!("unknown setting `{short}`"));
+                let known = tags.iter().map(|tag| tag.short.as_str());
+                problem.label("expected a setting of the device").suggest(&short, known);
+            } else if found.insert(short.clone(), unit.clone()).is_some() {
+                problems.add(name.at, format!("`{short}` has two units")).label("expected each setting once");
+            }
+        }
+    }
+    found
 }
 
 /// `SV = 70   # °C, set value`.

@@ -120,6 +120,7 @@ mod tests {
             by: "anna".into(),
             given: Vec::new(),
             values: vec![value],
+            units: Default::default(),
             missing: Vec::new(),
         }
     }

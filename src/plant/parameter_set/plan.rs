@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use jiff::Timestamp;
 
-use super::{ParameterSet, Trusted, bound, compare, decimals, same};
+use super::{ParameterSet, Trusted, bound, compare, decimals, same, unit_of};
 use crate::plant::{
     def::{DeviceId, PlantDef, TagId},
     sample::{Cause, Sample},
@@ -137,7 +137,30 @@ fn other_ground(def: &PlantDef, device: DeviceId, set: &ParameterSet, trusted: T
         let device = now.map_or_else(|| "not known".to_owned(), |now| words(tag, now));
         Some(Problem::OtherGround { tag: given.tag.clone(), set: words(tag, given.value), device })
     });
-    wrong.collect()
+    wrong.chain(other_units(def, device, set, trusted)).collect()
+}
+
+/// Values that the device measures in another unit than the set. What a tag chooses is told of that tag, once.
+fn other_units<'a>(
+    def: &'a PlantDef,
+    device: DeviceId,
+    set: &'a ParameterSet,
+    trusted: Trusted<'a>,
+) -> impl Iterator<Item = Problem> + 'a {
+    let is_given = |from: TagId| set.given.iter().any(|given| given.tag == def.tag(from).short);
+    def.tags_of(device).filter_map(move |tag| {
+        let wanted = set.units.get(&tag.short).filter(|_| set.values.iter().any(|value| value.tag == tag.short))?;
+        let now = unit_of(tag, trusted);
+        if now == Some(wanted) || tag.unit_from.as_ref().is_some_and(|(from, _)| is_given(*from)) {
+            return None;
+        }
+        let device = now.map_or("not known", |unit| if unit.is_empty() { "none" } else { unit });
+        Some(Problem::OtherGround {
+            tag: format!("the unit of {}", tag.short),
+            set: wanted.clone(),
+            device: device.to_owned(),
+        })
+    })
 }
 
 /// Do other values get their decimals or their unit from this tag?

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::plant::{
     fixture,
+    guard::{Blocking, InterlockDef},
     tag::{Access, Kind, Order, Point, Table},
 };
 
@@ -113,12 +114,80 @@ fn a_set_holds_what_is_known_and_names_what_is_not() {
 
 #[test]
 fn a_name_can_be_a_file() {
-    for good in ["winter", "Winter 2", "a-b_c", "ฤดูหนาว"] {
+    for good in ["winter", "Winter 2", "a-b_c", "v1.2", "70 °C (slow)", "ฤดูหนาว", "หน้าร้อน", "ทั้งปี"]
+    {
         assert_eq!(check_name(good), Ok(()), "{good}");
     }
-    for bad in ["", " x", "x ", "../x", "a/b", "a.b", "a\nb", &"x".repeat(33)] {
+    for bad in [
+        "",
+        " ",
+        " x",
+        "x ",
+        "\u{a0}x",
+        ".",
+        "..",
+        "../x",
+        ".x",
+        "a/b",
+        "a\\b",
+        "a:b",
+        "a*",
+        "a?",
+        "a\"b",
+        "<a",
+        "a>",
+        "a|b",
+        "a\nb",
+        "a\0b",
+        "a\u{7f}",
+        &"x".repeat(33),
+    ] {
         assert!(check_name(bad).is_err(), "{bad}");
     }
+}
+
+#[test]
+fn a_value_in_another_unit_is_another_value_whoever_has_chosen_the_unit() {
+    let unit = |unit: &str| {
+        let mut def = def();
+        def.tags[SV.index()].unit = unit.to_owned();
+        def
+    };
+    let values = [0., 100., 70., 0.];
+    let take = |def: &PlantDef| take(def, TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &device(values));
+    let set = take(&unit("°C"));
+    assert_eq!(set.units.get("SV").map(String::as_str), Some("°C"));
+    let told = |def: &PlantDef, set: &ParameterSet| {
+        let rows = compare(def, TIC, set, &device(values));
+        let same = rows.iter().find(|row| row.short == "SV").is_some_and(|row| row.same);
+        let problems = plan(def, TIC, set, &device(values)).err().unwrap_or_default();
+        (same, problems.iter().map(Problem::to_string).collect::<Vec<_>>())
+    };
+    assert_eq!(told(&unit("°C"), &set), (true, vec![]));
+    let other = "the unit of SV is °F in the device, °C in the set: the values mean something else";
+    assert_eq!(told(&unit("°F"), &set), (false, vec![other.to_owned()]));
+    // A set of before units were kept.
+    let old = ParameterSet { units: BTreeMap::new(), ..set };
+    assert_eq!(told(&unit("°F"), &old), (true, vec![]));
+}
+
+#[test]
+fn what_an_interlock_forbids_is_told_before_anything_is_written() {
+    let mut def = def();
+    def.guards.interlocks.push(InterlockDef {
+        tag: MODE,
+        value: 1.0,
+        of: SV,
+        when: Blocking::Above(40.0),
+        text: "no FUZZY above 40".into(),
+        refuse: true,
+    });
+    let set = set([0., 100., 60., 1.]);
+    let planned = |sv| plan(&def, TIC, &set, &device([0., 100., sv, 0.]));
+    let told = Problem::Interlock { tag: "CTRL".into(), text: "no FUZZY above 40".into() };
+    assert_eq!(planned(50.0), Err(vec![told.clone()]));
+    assert_eq!(told.to_string(), "CTRL: interlock: no FUZZY above 40");
+    assert_eq!(planned(30.0).map(|changes| changes.len()), Ok(2));
 }
 
 fn held() -> impl Strategy<Value = [f64; 4]> {

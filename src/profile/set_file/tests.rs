@@ -37,12 +37,48 @@ fn a_set_is_readable_and_comes_back_as_it_was() {
         "SV = 70.5",
         "CTRL = \"FUZZY\"",
         "I = 12                  # s, integral time",
+        "[units]",
     ] {
         assert!(text.contains(line), "{line} in\n{text}");
     }
     for command in ["FIX", "AT =", "STBY", "PROG ="] {
         assert!(!text.contains(command), "{command} is a command, no setting:\n{text}");
     }
+    assert_eq!(read_set("winter", "winter.toml", text.as_bytes(), &def), Ok(set));
+}
+
+#[test]
+fn two_devices_of_a_profile_may_have_tags_of_their_own() {
+    let mut def = (*tank()).clone();
+    let plc = def.devices.iter().find(|device| device.profile == "koyo_dl06").expect("the tank has a PLC").clone();
+    // A second PLC whose plant file gives it another register, and none of the first one's.
+    let second = crate::plant::def::DeviceId(def.devices.len() as u16);
+    let base = def.tags_of(plc.id).find(|tag| tag.labels.is_empty()).expect("a number").clone();
+    def.devices.push(crate::plant::def::DeviceDef { id: second, name: "PLC-2".into(), ..plc.clone() });
+    let id = crate::plant::def::TagId(def.tags.len() as u16);
+    let name = "PLC-2.RECIPE".to_owned();
+    def.tags.push(TagDef { id, device: second, name, short: "RECIPE".into(), in_sets: true, unit: "l".into(), ..base });
+    let all = |_| Some(3.0);
+    let set = parameter_set::take(&def, second, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &all);
+    assert_eq!(set.values.len(), 1);
+    let text = text_of_set(&set, &def);
+    assert!(text.contains("\"l\" = [\"RECIPE\"]\n"), "{text}");
+    assert_eq!(read_set("winter", "winter.toml", text.as_bytes(), &def), Ok(set.clone()));
+    // The device has got another name since: any device of the profile that has the tag will do.
+    let renamed = text.replace("PLC-2", "PLC-9");
+    let expect = ParameterSet { device: "PLC-9".into(), ..set };
+    assert_eq!(read_set("winter", "winter.toml", renamed.as_bytes(), &def), Ok(expect));
+    // The first PLC has no such register.
+    let foreign = read_set("winter", "winter.toml", text.replace("PLC-2", "PLC-1").as_bytes(), &def);
+    assert!(foreign.expect_err("no RECIPE")[0].contains("unknown setting `RECIPE`"));
+}
+
+#[test]
+fn a_set_without_units_is_still_read() {
+    let def = tank();
+    let set = ParameterSet { units: BTreeMap::new(), ..winter(&def) };
+    let text = text_of_set(&set, &def);
+    assert!(!text.contains("[units]"), "{text}");
     assert_eq!(read_set("winter", "winter.toml", text.as_bytes(), &def), Ok(set));
 }
 
@@ -73,6 +109,10 @@ fn a_spoiled_file_tells_line_found_and_expected() {
         &["winter.toml:2:11: no device of this plant has the profile", "fuji_pxr"],
     );
     check(&head.replace("1970-01-01T", "yesterday "), &["winter.toml:3:"]);
+    let units = |line: &str| head.replace("[values]", &format!("[units]\n{line}\n[values]"));
+    check(&units("\"°C\" = \"SV\""), &["winter.toml:6:1: `°C` does not say what is measured in it"]);
+    check(&units("\"°C\" = [\"SW\"]"), &["winter.toml:6:9: unknown setting `SW`", "did you mean `SV`?"]);
+    check(&units("\"°C\" = [\"SV\"]\ns = [\"SV\"]"), &["`SV` has two units"]);
     check("", &["winter.toml is empty"]);
     check("\u{0}", &["winter.toml:1:"]);
 }
@@ -92,6 +132,7 @@ proptest! {
         let mut set = winter(&def);
         set.values.retain(|held| held.tag == "SV");
         set.values[0].value = value;
+        set.units.retain(|short, _| short == "SV");
         let text = text_of_set(&set, &def);
         prop_assert_eq!(read_set("winter", "winter.toml", text.as_bytes(), &def), Ok(set));
     }

@@ -60,6 +60,7 @@ fn set(sv: f64, high: f64) -> Arc<ParameterSet> {
         by: "anna".into(),
         given: Vec::new(),
         values: vec![value("SV", sv), value("SV-H", high)],
+        units: Default::default(),
         missing: Vec::new(),
     })
 }

@@ -2,7 +2,7 @@
 
 use super::{
     ask,
-    sets::{Source, shown, some_lines, trusted},
+    sets::{Source, shown, shown_of_set, some_lines, trusted},
 };
 use crate::{
     plant::{
@@ -162,7 +162,7 @@ impl Compare {
             _ if row.same => ("same".to_owned(), false),
             _ => ("differs".to_owned(), false),
         };
-        let cells = [row.short.as_str(), label, &shown(cx, row, row.set), &shown(cx, row, row.device), &note];
+        let cells = [row.short.as_str(), label, &shown_of_set(cx, row), &shown(cx, row, row.device), &note];
         let style = match (trouble, row.same && step.is_none()) {
             (true, _) => theme.trouble(),
             (false, true) => theme.dim(),

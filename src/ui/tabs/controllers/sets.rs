@@ -66,7 +66,7 @@ pub fn problems(cx: &Cx, source: &Source) -> Option<Notice> {
     let Source::Set(name) = source else { return None };
     let stored = cx.snapshot.sets.iter().find(|stored| stored.name == *name)?;
     let problems = stored.set.as_ref().err()?;
-    let mut words = vec![format!("{name}.toml cannot be used")];
+    let mut words = vec![format!("{name} cannot be used")];
     words.extend(problems.iter().take(8).cloned());
     if problems.len() > 8 {
         words.push(format!("and {} more", problems.len() - 8));
@@ -160,6 +160,14 @@ pub fn save_hint(cx: &Cx, device: DeviceId) -> String {
             let names = fit_words(&missing.join(" "), 40);
             format!("{} settings; not known now, so left out: {names}", set.values.len())
         }
+    }
+}
+
+/// What the set says, in the set's own unit.
+pub fn shown_of_set(cx: &Cx, row: &Compared) -> String {
+    match (row.tag, row.set, &row.unit) {
+        (Some(tag), Some(value), Some(unit)) => format!("{} {unit}", cx.snapshot.format(tag, value)),
+        _ => shown(cx, row, row.set),
     }
 }
 
