@@ -393,12 +393,10 @@ impl Controllers {
             }
             Asked::SetName => {
                 parameter_set::check_name(text)?;
-                let there = cx.snapshot.sets.iter().any(|stored| stored.name == text);
-                let command = Command::SaveSet { device: self.device, name: text.into(), replace: there };
-                if !there {
-                    return Ok(vec![Act::Order(command)]);
-                }
-                let words = format!("There is a set {text} already. Replace it?");
+                let there = cx.snapshot.sets.iter().find(|stored| stored.name == text);
+                let command = Command::SaveSet { device: self.device, name: text.into(), replace: there.is_some() };
+                let Some(there) = there else { return Ok(vec![Act::Order(command)]) };
+                let words = sets::replace_words(cx, there);
                 Ok(vec![Act::Open(Modal::Confirm(Confirm::order(format!("save set {text}"), words, command)))])
             }
         }

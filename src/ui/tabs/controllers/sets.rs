@@ -163,6 +163,19 @@ pub fn save_hint(cx: &Cx, device: DeviceId) -> String {
     }
 }
 
+/// The question before a set is written over: whose it is, for it may be of another kind of device.
+pub fn replace_words(cx: &Cx, there: &StoredSet) -> String {
+    let name = &there.name;
+    match &there.set {
+        Ok(set) => {
+            let saved = set.saved.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M");
+            let (device, profile, by) = (&set.device, &set.profile, &set.by);
+            format!("There is a set {name} already: of {device}, profile {profile}, saved {saved} by {by}. Replace it?")
+        }
+        Err(_) => format!("There is a file {name}.toml already that is no usable set. Replace it?"),
+    }
+}
+
 /// What the set says, in the set's own unit.
 pub fn shown_of_set(cx: &Cx, row: &Compared) -> String {
     match (row.tag, row.set, &row.unit) {

@@ -326,7 +326,15 @@ fn a_name_is_asked_before_a_set_is_saved_and_again_before_one_is_replaced() {
         (orders.collect::<Vec<_>>(), screen(&mut model, 80, 24))
     };
     assert_eq!(saved("autumn⏎").0, [("autumn".to_owned(), false)]);
-    assert_eq!(saved("winter⏎").0, []);
+    let (orders, shown) = saved("winter⏎");
+    assert_eq!(orders, []);
+    for words in
+        ["There is a set winter already: of TIC-1, profile fixture, saved", "2026-11-21 14:02 by anna. Replace it?"]
+    {
+        assert!(shown.contains(words), "{words} in {shown}");
+    }
+    let (orders, shown) = saved("summer⏎");
+    assert!(orders.is_empty() && shown.contains("summer.toml already that is no usable set"), "{shown}");
     assert_eq!(saved("winter⏎⏎").0, [("winter".to_owned(), true)]);
     let (orders, shown) = saved("../x⏎");
     assert!(orders.is_empty() && shown.contains("no dot at its beginning"), "{shown}");
