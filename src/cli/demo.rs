@@ -15,7 +15,7 @@ use crate::{
     ui,
 };
 
-use super::{CliError, StationArgs, drill, load, log, paths, run, runtime, say, span, speed};
+use super::{CliError, StationArgs, drill, in_runtime, load, log, paths, run, say, span, speed};
 
 /// Arguments of `demo`.
 #[derive(Debug, clap::Args)]
@@ -60,7 +60,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let _log = log::start(args.station.log.as_deref())?;
     // A history of its own, gone with the demonstration, unless the user wants to keep one.
     let scratch = Scratch::new(&args.station)?;
-    runtime()?.block_on(async {
+    in_runtime(async {
         let clock = Clock::starting_at(Timestamp::now(), args.speed);
         let services: Vec<_> = def.lines.iter().map(sim::io::Service::of).collect();
         let simulated = drill::world(&def, scenario.as_deref())?;

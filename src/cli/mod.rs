@@ -172,6 +172,14 @@ fn runtime() -> Result<tokio::runtime::Runtime, CliError> {
         .map_err(|error| CliError::Io { what: "cannot start".into(), error })
 }
 
+/// Does the work in a runtime of its own. What a hung disk still holds up when it is done is left behind.
+fn in_runtime<T>(work: impl Future<Output = Result<T, CliError>>) -> Result<T, CliError> {
+    let runtime = runtime()?;
+    let done = runtime.block_on(work);
+    runtime.shutdown_timeout(std::time::Duration::from_secs(2));
+    done
+}
+
 /// A span as people write it: `10m`, `1h 30m`, `500ms`.
 fn span(text: &str) -> Result<std::time::Duration, String> {
     let span: jiff::SignedDuration =

@@ -12,7 +12,7 @@ use crate::{
     ui,
 };
 
-use super::{CliError, StationArgs, load_with_file, log, paths, runtime, say, span};
+use super::{CliError, StationArgs, in_runtime, load_with_file, log, paths, say, span};
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
@@ -34,7 +34,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let (def, file) = load_with_file(&args.plant, &args.station)?;
     let def = Arc::new(def);
     let _log = log::start(args.station.log.as_deref())?;
-    runtime()?.block_on(async {
+    in_runtime(async {
         let clock = Clock::real();
         let mut station = start(&def, clock, history_file(&def, &args.station), file)?;
         say(&format!("{}: {} tags on {} lines", def.title, def.tags.len(), def.lines.len()));
@@ -57,7 +57,7 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
     let def = Arc::new(def);
     ui::io::require_terminal()?;
     let _log = log::start(args.log.as_deref())?;
-    runtime()?.block_on(async {
+    in_runtime(async {
         let mut station = start(&def, Clock::real(), history_file(&def, args), file)?;
         let session = station.session(&paths::operator());
         let result = ui::io::run(session, ui::io::Options::default()).await;

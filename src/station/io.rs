@@ -39,6 +39,8 @@ const KEPT_FOR_STOPS: usize = 4;
 const ORDERS: usize = 64;
 /// Real time between two snapshots: what a person can follow.
 const SNAPSHOT_EVERY: Duration = Duration::from_millis(100);
+/// At the end the folder of parameter sets is waited for so long.
+const FILING_MAX: Duration = Duration::from_secs(2);
 /// Real time between two ticks at the least; one second of plant time otherwise.
 const TICK_MIN: Duration = Duration::from_millis(20);
 
@@ -283,8 +285,11 @@ impl PlantTask {
             self.take_saved(saved);
         }
         if self.filing.is_some() {
-            let done = filed(&mut self.filing).await;
-            self.take_filed(done);
+            // A disk that hangs keeps nobody from leaving.
+            match tokio::time::timeout(FILING_MAX, filed(&mut self.filing)).await {
+                Ok(done) => self.take_filed(done),
+                Err(_) => tracing::error!("the folder of the parameter sets does not answer: left behind"),
+            }
         }
         self.publish.send_replace(Arc::new(self.plant.snapshot()));
     }

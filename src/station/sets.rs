@@ -73,25 +73,52 @@ fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     file.sync_all()
 }
 
-/// Every set of the folder, by name; a file that is no set is told with what is wrong with it.
+/// Every set of the folder, by name; a file that is no set is told with what is wrong with it, and so is a folder that
+/// cannot be read, and how many sets are left out.
 fn read_all(folder: &Path, def: &PlantDef) -> Vec<StoredSet> {
-    // Before the first set is saved there is no folder.
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let names = entries.filter_map(|entry| {
-        let path = entry.path();
-        let toml = path.extension().is_some_and(|extension| extension == "toml");
-        let stem = path.file_stem()?.to_str()?.to_owned();
-        (toml && !stem.starts_with('.')).then_some((stem, path))
-    });
-    let mut names: Vec<(String, PathBuf)> = names.collect();
+    let mut names = match names(folder) {
+        Ok(names) => names,
+        Err(error) => return vec![untold("the folder", format!("{} cannot be read: {error}", folder.display()))],
+    };
     names.sort();
+    let more = names.len().saturating_sub(SETS_MAX);
     names.truncate(SETS_MAX);
-    names.into_iter().map(|(name, path)| StoredSet { set: read(&name, &path, def).map(Arc::new), name }).collect()
+    let read = names.into_iter().map(|(name, path)| StoredSet { set: read(&name, &path, def).map(Arc::new), name });
+    let left_out = format!("at most {SETS_MAX} sets are read, by name: move old ones out of {}", folder.display());
+    read.chain((more > 0).then(|| untold(&format!("… {more} more not read"), left_out))).collect()
+}
+
+/// A row in the list that is no set, and why it is there.
+fn untold(name: &str, why: String) -> StoredSet {
+    StoredSet { name: name.to_owned(), set: Err(vec![why]) }
+}
+
+/// The files of the folder that may be sets, with the names of these.
+fn names(folder: &Path) -> std::io::Result<Vec<(String, PathBuf)>> {
+    let entries = match fs::read_dir(folder) {
+        // Before the first set is saved there is no folder.
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries?,
+    };
+    let mut names = Vec::new();
+    for entry in entries {
+        let path = entry?.path();
+        let toml = path.extension().is_some_and(|extension| extension == "toml");
+        let Some(stem) = path.file_stem().and_then(|stem| stem.to_str()) else { continue };
+        if toml && !stem.starts_with('.') {
+            names.push((stem.to_owned(), path));
+        }
+    }
+    Ok(names)
 }
 
 fn read(name: &str, path: &Path, def: &PlantDef) -> Result<ParameterSet, Vec<String>> {
     let file = format!("{name}.toml");
     let unreadable = |error: std::io::Error| vec![format!("{file} cannot be read: {error}")];
+    // Opening a pipe would wait for somebody to write into it.
+    if !fs::metadata(path).map_err(unreadable)?.is_file() {
+        return Err(vec![format!("{file} is no file, expected a parameter set")]);
+    }
     let mut bytes = Vec::new();
     File::open(path).and_then(|file| file.take(BYTES_MAX + 1).read_to_end(&mut bytes)).map_err(unreadable)?;
     if BYTES_MAX < bytes.len() as u64 {
@@ -140,6 +167,34 @@ mod tests {
         assert_eq!(save(70.0, false), (Ok(()), Some(70.0), 1));
         assert_eq!(save(75.0, false), (Err("there is a set winter already".into()), Some(70.0), 1));
         assert_eq!(save(75.0, true), (Ok(()), Some(75.0), 1));
+    }
+
+    #[test]
+    fn a_pipe_in_the_folder_holds_nobody_up() {
+        let def = load(Path::new("tank"), &Search::shipped()).unwrap();
+        let home = tempfile::tempdir().unwrap();
+        let pipe = home.path().join("pipe.toml");
+        rustix::fs::mkfifoat(rustix::fs::CWD, pipe, rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR).unwrap();
+        let (_, sets) = work(home.path(), &def, SetWork::Read);
+        assert_eq!(sets, [untold("pipe", "pipe.toml is no file, expected a parameter set".into())]);
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_told() {
+        let def = load(Path::new("tank"), &Search::shipped()).unwrap();
+        let home = tempfile::tempdir().unwrap();
+        let file = home.path().join("sets");
+        fs::write(&file, "a file where the folder should be").unwrap();
+        let (_, sets) = work(&file, &def, SetWork::Read);
+        assert_eq!((sets.len(), sets[0].name.as_str()), (1, "the folder"));
+        let why = &sets[0].set.as_ref().unwrap_err()[0];
+        assert!(why.starts_with(&format!("{} cannot be read: ", file.display())), "{why}");
+        for n in 0..SETS_MAX + 37 {
+            fs::write(home.path().join(format!("s{n:03}.toml")), "").unwrap();
+        }
+        let (_, sets) = work(home.path(), &def, SetWork::Read);
+        let last = sets.last().map(|stored| stored.name.as_str());
+        assert_eq!((sets.len(), last), (SETS_MAX + 1, Some("… 37 more not read")));
     }
 
     #[test]
