@@ -2,6 +2,7 @@
 
 mod ask;
 mod compare;
+mod deeds;
 mod device;
 mod guide;
 mod keys;
@@ -21,21 +22,27 @@ use ratatui::{Frame, layout::Rect};
 pub use device::signal_mark;
 pub use keys::{Action, all_chords};
 
-use self::{compare::Compare, keys::page_keys, program::Cell, sets::Source, table::Table};
+use self::{
+    compare::Compare,
+    deeds::{confirm, notice, write},
+    keys::page_keys,
+    program::Cell,
+    sets::Source,
+    table::Table,
+};
 use super::{Tab, errand::Errand};
 use crate::{
     history::{Answer, HistoryError, Question, Series},
     plant::{
         command::Command,
-        def::{DeviceDef, DeviceId, LineId, ProgramDef, TagId},
-        event::LineState,
+        def::{DeviceDef, DeviceId, ProgramDef},
         parameter_set,
         snapshot::Snapshot,
     },
     ui::{
         Act, Cx,
         keys::{Hint, find, hints},
-        modal::{Choice, Confirm, Faceplate, Modal, Notice, Prompt, Settings, Why},
+        modal::{Confirm, Faceplate, Modal, Prompt},
         widgets::text::Canvas,
     },
 };
@@ -221,34 +228,6 @@ impl Controllers {
         }
     }
 
-    /// What can be done with a device on any of its pages.
-    fn on_device(&mut self, cx: &Cx, device: &DeviceDef, action: Action) -> Vec<Act> {
-        match action {
-            Action::Why if matches!(self.page, Page::Program) => {
-                let tag = device.program.as_ref().and_then(|program| self.cell.tag(program));
-                Why::open(Why::new(tag.into_iter().collect(), 0))
-            }
-            Action::Why => {
-                let tags = self.table.rows(cx, device.id).into_iter().map(|tag| tag.id).collect();
-                Why::open(Why::new(tags, self.table.selected))
-            }
-            Action::Refresh => vec![Act::Order(Command::Refresh(device.id))],
-            Action::Actions => {
-                let actions = Choice::actions(cx, device.id).map(Modal::Choice);
-                let window = actions.map(|list| Notice::unreachable(cx, device.id).map_or(list, Modal::Notice));
-                window.map_or_else(|| notice(device, "this device has no actions"), |window| vec![Act::Open(window)])
-            }
-            Action::Tune => tune(cx, device),
-            Action::Run => match device.faceplate.as_ref().and_then(|plate| plate.run) {
-                Some(run) => write(cx, Some(run)),
-                None => notice(device, "this device cannot be put in standby from here"),
-            },
-            Action::Settings => vec![Act::Open(Modal::Settings(Box::new(Settings::new(cx, device.line))))],
-            Action::Line => vec![Act::Open(Modal::Confirm(connect(cx, device.line)))],
-            _ => Vec::new(),
-        }
-    }
-
     fn step_device(&mut self, cx: &Cx, by: isize) -> Vec<Act> {
         let count = cx.def().devices.len() as isize;
         let next = DeviceId((self.device.0 as isize + by).rem_euclid(count) as u16);
@@ -420,46 +399,4 @@ impl Controllers {
             (Page::Guide(page, _), _) => guide::view(cx, &mut canvas, *page),
         }
     }
-}
-
-/// The window that writes a tag.
-fn write(cx: &Cx, tag: Option<TagId>) -> Vec<Act> {
-    tag.and_then(|tag| Modal::write(cx, tag)).map(Act::Open).into_iter().collect()
-}
-
-/// The question whether to write this value, unless nothing can be written now.
-fn confirm(cx: &Cx, tag: TagId, value: f64) -> Vec<Act> {
-    let device = cx.def().tag(tag).device;
-    let question = || Modal::Confirm(Confirm::write(cx, tag, value));
-    vec![Act::Open(Notice::unreachable(cx, device).map_or_else(question, Modal::Notice))]
-}
-
-/// Auto-tuning at work is stopped, else the window asks which kind is wanted.
-fn tune(cx: &Cx, device: &DeviceDef) -> Vec<Act> {
-    let Some(tune) = device.faceplate.as_ref().and_then(|plate| plate.tune) else {
-        return notice(device, "this device has no auto-tuning");
-    };
-    let on = cx.snapshot.sample(tune).trusted().is_some_and(|value| value != 0.0);
-    if on { confirm(cx, tune, 0.0) } else { write(cx, Some(tune)) }
-}
-
-fn notice(device: &DeviceDef, words: &str) -> Vec<Act> {
-    vec![Act::Open(Modal::Notice(Notice::new(device.name.clone(), vec![words.to_owned()])))]
-}
-
-/// Closing a line is asked with what it means for everything on it.
-fn connect(cx: &Cx, line: LineId) -> Confirm {
-    let name = &cx.def().line(line).name;
-    if cx.snapshot.line(line).state == LineState::Disconnected {
-        return Confirm::order(
-            format!("connect {name}"),
-            format!("Open line {name} and read its devices again?"),
-            Command::Connect(line, true),
-        );
-    }
-    let devices: Vec<&str> =
-        cx.def().devices.iter().filter(|device| device.line == line).map(|device| device.name.as_str()).collect();
-    let words =
-        format!("Close line {name}? {} will be read no more, and their alarms cannot be seen.", devices.join(", "));
-    Confirm::order(format!("disconnect {name}"), words, Command::Connect(line, false))
 }
