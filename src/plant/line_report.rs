@@ -38,6 +38,11 @@ pub struct LineReport {
 }
 
 impl LineReport {
+    /// Was none of the latest answers of a device a value, as [`super::ne107::Reason::NoValues`] has it?
+    pub fn gives_no_values(&self, device: DeviceId) -> bool {
+        self.devices.iter().any(|(id, tally)| *id == device && tally.fails_since(super::ne107::NO_VALUES_AFTER))
+    }
+
     /// Nothing has gone over the line yet.
     pub fn new(settings: LineDef) -> LineReport {
         LineReport {

@@ -142,7 +142,7 @@ const SLOW_PERCENT: u32 = 80;
 /// Share of the recent requests that may fail, in hundredths.
 const FAILING_PERCENT: u32 = 10;
 /// After so many failures in a row a device is of no use, whatever it answers.
-const NO_VALUES_AFTER: u32 = 12;
+pub const NO_VALUES_AFTER: u32 = 12;
 /// Share of requests that may be spoiled or repeated, in hundredths.
 const SPOILED_PERCENT: u64 = 1;
 

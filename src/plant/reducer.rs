@@ -18,7 +18,6 @@ use super::{
     event::{Event, Fault, LineState, WriteResult},
     guard::Watch,
     line_minute::LineWatch,
-    ne107::Reason,
     orders::Desk,
     parameter_set::StoredSet,
     program::ProgramWatch,
@@ -209,7 +208,7 @@ impl Plant {
     pub fn on_undeliverable(&mut self, line: LineId, request: &BusRequest) -> Effects {
         let action = self.desk.undeliverable(line, request, &self.board);
         let mut effects = Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() };
-        if let BusRequest::Refresh(device) = request {
+        if let BusRequest::Refresh { device, .. } = request {
             self.restore_not_read(*device);
         }
         self.carry_on(self.at, &mut effects);
@@ -359,9 +358,13 @@ impl Plant {
     fn settle(&mut self, at: Timestamp) -> Effects {
         self.at = self.at.max(at);
         let asked = self.watch_controllers();
-        let (def, board, devices) = (&self.def, &self.board, &self.devices);
+        let (def, board) = (&self.def, &self.board);
+        let answering = |device: DeviceId| {
+            let report = self.lines[def.device(device).line.index()].report.as_deref();
+            answers(self.devices[device.index()].state, report.is_some_and(|report| report.gives_no_values(device)))
+        };
         self.watch.look(&def.guards, |tag| board.sample(tag), self.at);
-        let steps = self.book.judge(self.at, |alarm| facts(def, board, devices, alarm));
+        let steps = self.book.judge(self.at, |alarm| facts(def, board, answering, alarm));
         let mut records = self.board.records(self.at);
         records.extend(steps.into_iter().map(Record::Alarm));
         Effects { bus: asked, records, ..Effects::default() }
@@ -369,11 +372,11 @@ impl Plant {
 }
 
 /// What is known for an alarm. Only good values count: an uncertain one neither raises nor clears.
-fn facts(def: &PlantDef, board: &Board, devices: &[DeviceStatus], alarm: AlarmId) -> Facts {
+fn facts(def: &PlantDef, board: &Board, answers: impl Fn(DeviceId) -> Option<bool>, alarm: AlarmId) -> Facts {
     let alarm = def.alarm(alarm);
     let (value, answering) = match alarm.subject {
         Subject::Tag(tag) => (board.sample(tag).trusted(), None),
-        Subject::Device(device) => (None, answers(&devices[device.index()])),
+        Subject::Device(device) => (None, answers(device)),
     };
     let reference = match alarm.condition {
         Condition::Deviation { from, .. } => board.sample(from).trusted(),
@@ -383,9 +386,9 @@ fn facts(def: &PlantDef, board: &Board, devices: &[DeviceStatus], alarm: AlarmId
 }
 
 /// A device that refuses everything is as good as silent.
-fn answers(status: &DeviceStatus) -> Option<bool> {
-    match status.state {
-        DeviceState::Answering | DeviceState::Failing(_) if status.diagnosis == Some(Reason::NoValues) => Some(false),
+fn answers(state: DeviceState, no_values: bool) -> Option<bool> {
+    match state {
+        DeviceState::Answering | DeviceState::Failing(_) if no_values => Some(false),
         DeviceState::Unknown | DeviceState::Failing(_) => None,
         DeviceState::Answering => Some(true),
         DeviceState::Down { .. } => Some(false),

@@ -112,7 +112,7 @@ impl Plant {
         self.desk.take(order, at);
         self.restores.retain(|run| run.device != wish.device);
         self.restores.push(Arc::new(Restore::new(order.id, order.by.clone(), wish, at)));
-        effects.bus.push((self.def.device(wish.device).line, BusRequest::Refresh(wish.device)));
+        effects.bus.push((self.def.device(wish.device).line, BusRequest::Refresh { device: wish.device, order: None }));
         None
     }
 

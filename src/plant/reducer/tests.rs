@@ -10,6 +10,7 @@ use crate::plant::{
     event::ExceptionCode,
     fixture::{self, DP, FAULT, HIGH, PLC, PV, RUN, SILENT, SV, TIC},
     guard::{Blocking, InterlockDef},
+    line_report::LineReport,
     record::AlarmStep,
     sample::Quality,
 };
@@ -191,6 +192,23 @@ fn an_unplugged_line_takes_all_values_and_a_closed_one_raises_no_alarm() {
 }
 
 #[test]
+fn a_device_that_refuses_everything_raises_the_alarm_of_a_silent_one() {
+    let mut plant = running();
+    let says = |plant: &mut Plant, second: i64, outcome: Result<(), Fault>| {
+        let mut tally = crate::plant::tally::Tally::default();
+        (0..20).for_each(|_| tally.count(Ok(()), None));
+        (0..12).for_each(|_| tally.count(outcome, None));
+        let report = LineReport { devices: vec![(TIC, tally)], ..LineReport::new(plant.def().line(L1).clone()) };
+        plant.on_event(Event::Report { at: at(second), line: L1, report: Arc::new(report) });
+        plant.on_tick(at(second + 10));
+        plant.snapshot().alarms.iter().any(|alarm| alarm.id == SILENT && alarm.state == AlarmState::Unacknowledged)
+    };
+    assert!(!says(&mut plant, 1, Ok(())));
+    assert!(says(&mut plant, 20, Err(Fault::Exception(ExceptionCode(4)))));
+    assert!(!says(&mut plant, 40, Ok(())));
+}
+
+#[test]
 fn an_alarm_is_raised_acknowledged_by_name_and_returns() {
     let mut plant = running();
     plant.on_event(read(1, &[(PV, 760.0)]));
@@ -261,7 +279,7 @@ fn an_actuator_that_does_not_obey_is_in_the_snapshot() {
 fn with_stop() -> Plant {
     let mut def = fixture::plant();
     let (settle, confirm) = (Duration::ZERO, String::new());
-    let stop = ActionDef { name: "STOP".into(), tag: RUN, value: 0.0, settle, confirm, stop: true };
+    let stop = ActionDef { name: "STOP".into(), tag: RUN, value: 0.0, settle, confirm, stop: true, saves: false };
     def.devices[PLC.index()].actions = vec![stop];
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
     plant.on_event(read(0, &[(RUN, 0.0)]));
