@@ -93,8 +93,15 @@ mod tests {
     fn a_device_that_saves_its_settings_is_not_broken() {
         let mut def = fixture::plant();
         let settle = Duration::from_secs(5);
-        def.devices[0].actions =
-            vec![ActionDef { name: "FIX".into(), tag: SV, value: 1.0, settle, confirm: String::new(), stop: false, saves: true }];
+        def.devices[0].actions = vec![ActionDef {
+            name: "FIX".into(),
+            tag: SV,
+            value: 1.0,
+            settle,
+            confirm: String::new(),
+            stop: false,
+            saves: true,
+        }];
         let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
         plant.on_event(Event::Line { at: at(0), line: LineId(0), state: LineState::Connected });
         let values = vec![(PV, 700.0), (DP, 1.0)];

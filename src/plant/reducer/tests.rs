@@ -261,7 +261,7 @@ fn an_actuator_that_does_not_obey_is_in_the_snapshot() {
 fn with_stop() -> Plant {
     let mut def = fixture::plant();
     let (settle, confirm) = (Duration::ZERO, String::new());
-    let stop = ActionDef { name: "STOP".into(), tag: RUN, value: 0.0, settle, confirm, stop: true };
+    let stop = ActionDef { name: "STOP".into(), tag: RUN, value: 0.0, settle, confirm, stop: true, saves: false };
     def.devices[PLC.index()].actions = vec![stop];
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
     plant.on_event(read(0, &[(RUN, 0.0)]));
