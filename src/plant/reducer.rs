@@ -206,11 +206,11 @@ impl Plant {
 
     /// The queue to a line was full: the request was not sent.
     pub fn on_undeliverable(&mut self, line: LineId, request: &BusRequest) -> Effects {
-        let action = self.desk.undeliverable(line, request, &self.board);
+        let action = match self.restore_not_read(request) {
+            true => None,
+            false => self.desk.undeliverable(line, request, &self.board),
+        };
         let mut effects = Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() };
-        if let BusRequest::Refresh { device, .. } = request {
-            self.restore_not_read(*device);
-        }
         self.carry_on(self.at, &mut effects);
         effects
     }

@@ -112,7 +112,8 @@ impl Plant {
         self.desk.take(order, at);
         self.restores.retain(|run| run.device != wish.device);
         self.restores.push(Arc::new(Restore::new(order.id, order.by.clone(), wish, at)));
-        effects.bus.push((self.def.device(wish.device).line, BusRequest::Refresh { device: wish.device, order: None }));
+        let look = BusRequest::Refresh { device: wish.device, order: Some(order.id) };
+        effects.bus.push((self.def.device(wish.device).line, look));
         None
     }
 
@@ -138,12 +139,13 @@ impl Plant {
         }
     }
 
-    /// The line had no room for the look at the device that a restore begins with.
-    pub(super) fn restore_not_read(&mut self, device: DeviceId) {
-        let reading = |run: &&mut Arc<Restore>| run.device == device && run.state == State::Reading;
-        if let Some(run) = self.restores.iter_mut().find(reading) {
-            Arc::make_mut(run).give_up(Refusal::Busy);
-        }
+    /// The line had no room for a request. Was it the look at the device that a restore begins with?
+    pub(super) fn restore_not_read(&mut self, request: &BusRequest) -> bool {
+        let BusRequest::Refresh { order: Some(id), .. } = request else { return false };
+        let reading = |run: &&mut Arc<Restore>| run.id == *id && run.state == State::Reading;
+        let Some(run) = self.restores.iter_mut().find(reading) else { return false };
+        Arc::make_mut(run).give_up(Refusal::Busy);
+        true
     }
 
     /// Lets every restore go on that nobody was told the end of: takes the end of its write, orders the next, or ends it.

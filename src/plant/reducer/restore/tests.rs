@@ -43,14 +43,15 @@ fn read(plant: &mut Plant, second: i64, sv: f64, high: f64) -> Effects {
     plant.on_event(Event::Read { at: at(second), device: TIC, values, texts: Vec::new(), reply, exchange: None })
 }
 
+/// The look at the device that a restore begins with.
+fn look(number: u32) -> BusRequest {
+    BusRequest::Refresh { device: TIC, order: Some(OrderId { terminal: 1, number }) }
+}
+
 /// Orders a restore and lets the device be read as it was; the first write follows.
 fn begin(plant: &mut Plant, number: u32, wish: RestoreWish) -> Effects {
     let asked = order(plant, number, Command::Restore(Box::new(wish)));
-    assert_eq!(
-        asked.bus,
-        [(plant.def.device(TIC).line, BusRequest::Refresh { device: TIC, order: None })],
-        "the device is read first"
-    );
+    assert_eq!(asked.bus, [(plant.def.device(TIC).line, look(number))], "the device is read first");
     read(plant, 1, 500.0, 100.0)
 }
 
@@ -200,9 +201,7 @@ fn a_restore_that_still_reads_can_be_stopped_and_a_full_line_ends_it() {
     };
     let stop = |plant: &mut Plant| drop(order(plant, 2, Command::StopRestore(TIC)));
     check(&stop, Refusal::Stopped);
-    let busy = |plant: &mut Plant| {
-        drop(plant.on_undeliverable(plant.def.device(TIC).line, &BusRequest::Refresh { device: TIC, order: None }))
-    };
+    let busy = |plant: &mut Plant| drop(plant.on_undeliverable(plant.def.device(TIC).line, &look(1)));
     check(&busy, Refusal::Busy);
     let configure = |plant: &mut Plant| {
         let line = plant.def.line(plant.def.device(TIC).line).clone();
