@@ -227,23 +227,28 @@ pub fn mark(cx: &Cx, output: TagId) -> Option<(String, Style)> {
         let commanded = cx.snapshot.text(actuator.command).unwrap_or_default();
         return Some((format!("{} not {commanded}", theme.pick("≠", "!=")), theme.trouble()));
     }
+    let blocks = |lock: &&InterlockDef| lock.tag == actuator.command && lock.value != actuator.off;
+    let mut standings = guards.interlocks.iter().filter(blocks).map(|lock| lock.standing(cx.snapshot.sample(lock.of)));
+    let blocked = standings.any(|standing| standing == Standing::Blocked);
     match news(cx, actuator.command) {
         Some((_, None)) => return Some((theme.pick("… sent", ".. sent").to_owned(), theme.strong())),
         Some((outcome, Some(false))) => {
             let word = outcome_word(outcome);
             return Some((format!("{} {word}", theme.pick("✗", "x")), theme.trouble()));
         }
+        // A command that cannot be read back was taken, which says nothing while it is blocked.
+        Some((Outcome::NotConfirmed(_), Some(true))) if blocked => {}
         // Only while the output is as commanded: another mode may have taken over since.
         Some((outcome, Some(true))) if obeys(cx, actuator) => {
-            // A command that cannot be read back was taken, which is not yet done.
-            let word = if matches!(outcome, Outcome::NotConfirmed(_)) { "accepted" } else { "done" };
+            let word = match outcome {
+                Outcome::NotConfirmed(_) => "accepted",
+                Outcome::Unchanged => "as it was",
+                _ => "done",
+            };
             return Some((format!("{} {word}", theme.pick("✓", "ok")), theme.normal()));
         }
         Some((_, Some(true))) | None => {}
     }
-    let blocks = |lock: &&InterlockDef| lock.tag == actuator.command && lock.value != actuator.off;
-    let mut standings = guards.interlocks.iter().filter(blocks).map(|lock| lock.standing(cx.snapshot.sample(lock.of)));
-    let blocked = standings.any(|standing| standing == Standing::Blocked);
     blocked.then(|| (theme.pick("⊘ blocked", "(/) blocked").to_owned(), theme.dim()))
 }
 
