@@ -50,11 +50,11 @@ impl Stretch {
     }
     /// The column in the middle of a nominal one.
     pub fn middle_column(self, x: u16) -> u16 {
-        ((f64::from(x) + 0.5) * self.x) as u16
+        middle(self.column(x), self.column(x.saturating_add(1)))
     }
     /// The row in the middle of a nominal one.
     pub fn middle_row(self, y: u16) -> u16 {
-        ((f64::from(y) + 0.5) * self.y) as u16
+        middle(self.row(y), self.row(y.saturating_add(1)))
     }
     /// A nominal rectangle.
     pub fn place(self, place: Place) -> Bounds {
@@ -67,6 +67,11 @@ impl Stretch {
     pub fn spot(self, place: Place) -> (u16, u16) {
         (self.middle_column(place.x), self.middle_row(place.y))
     }
+}
+
+/// The cell in the middle: of a row of pipe and of what stands in it the same, however the edges were rounded.
+fn middle(near: u16, far: u16) -> u16 {
+    near + far.saturating_sub(near) / 2
 }
 
 /// The tags of an item, the most telling first; none for pipes and words.
@@ -170,6 +175,17 @@ mod tests {
             assert_eq!(tank.y + tank.height, below.y, "{room:?}");
             assert_eq!(tank.x + tank.width, stretch.column(30), "{room:?}");
             assert!(stretch.middle_column(14) >= tank.x && stretch.middle_column(29) < tank.x + tank.width);
+        }
+    }
+
+    #[test]
+    fn a_pump_stands_in_its_pipe_at_every_size() {
+        for rows in 18..80 {
+            let stretch = Stretch::new((80, 18), (80, rows));
+            for y in 0..18 {
+                let pump = stretch.place(Place { x: 15, y, width: 15, height: 1 });
+                assert_eq!(stretch.middle_row(y), pump.y + pump.height / 2, "row {y} of {rows}");
+            }
         }
     }
 
