@@ -232,7 +232,7 @@ impl Mimic {
             }
             MimicItem::Text { place, text } => {
                 let at = stretch.place(*place);
-                canvas.text(at.x, at.y, &fit(text, at.width.max(1)), cx.theme.dim());
+                canvas.text(at.x, at.y + at.height / 2, &fit(text, at.width.max(1)), cx.theme.dim());
             }
         }
     }

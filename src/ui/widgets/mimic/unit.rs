@@ -88,6 +88,8 @@ pub fn mark(cx: &Cx, canvas: &mut Canvas, x: u16, rows: &[u16], tag: TagId) {
 
 /// A label and its value.
 pub fn labelled(cx: &Cx, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagId, selected: bool) {
+    // In the row of the valve or pump beside it.
+    let at = Bounds { y: at.y + at.height / 2, ..at };
     let style = if selected { cx.theme.focus() } else { cx.theme.dim() };
     let x = if label.is_empty() { at.x } else { canvas.text(at.x, at.y, &fit(label, at.width / 2), style) + 1 };
     let room = at.width.saturating_sub(x.saturating_sub(at.x));
