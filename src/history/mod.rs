@@ -6,6 +6,7 @@ pub mod io;
 use std::time::Duration;
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     plant::{
@@ -17,7 +18,7 @@ use crate::{
 };
 
 /// What can be asked. Spans include `from` and exclude `to`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Question {
     /// Curves of some tags, reduced to at most `buckets` columns; one series a tag, in the order asked.
     Series {
@@ -67,7 +68,7 @@ pub enum Question {
 }
 
 /// The answer to the question of the same name.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Answer {
     /// One series a tag.
     Series(Vec<Series>),
@@ -82,7 +83,7 @@ pub enum Answer {
 }
 
 /// A curve reduced to columns of equal width.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Series {
     /// Which tag.
     pub tag: TagId,
@@ -99,7 +100,7 @@ pub struct Series {
 }
 
 /// One column of a curve: good values only.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Bucket {
     /// Least.
     pub min: f64,
@@ -112,7 +113,7 @@ pub struct Bucket {
 }
 
 /// What can go wrong with the store.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
 pub enum HistoryError {
     /// Another process has the file.
     #[error("history {path} is in use by {by}")]

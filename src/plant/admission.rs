@@ -2,10 +2,12 @@
 
 use std::{fmt, time::Duration};
 
+use serde::{Deserialize, Serialize};
+
 use super::id::{DeviceId, LineId};
 
 /// What the admission test says about a line.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Admission {
     /// Which line.
     pub line: LineId,
@@ -48,7 +50,7 @@ impl Admission {
 }
 
 /// Can the polls of a line meet their periods?
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Verdict {
     /// Each of them, always.
     Fits,
@@ -72,7 +74,7 @@ impl Verdict {
 }
 
 /// A span of time in which a line would have to carry more than goes into it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Witness {
     /// How long the span is.
     pub span: Duration,
@@ -87,7 +89,7 @@ pub struct Witness {
 }
 
 /// A poll as an engineer knows it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PollWords {
     /// `TIC-1 input 1000–1007`.
     pub name: String,
@@ -98,7 +100,7 @@ pub struct PollWords {
 }
 
 /// A device that does not answer: it is probed each 30 s, and each probe takes the line until its timeout.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DeadDevice {
     /// Which.
     pub device: DeviceId,
@@ -113,7 +115,7 @@ pub struct DeadDevice {
 }
 
 /// Something that works, or seems to, and is better otherwise.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Warning {
     /// A character without parity has two stop bits by the standard (Modbus over serial line V1.02, 2.5.1).
     NoParityOneStopBit,

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 pub use super::id::WriteId;
 use super::{
@@ -13,7 +14,7 @@ use super::{
 };
 
 /// One wish of one operator.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Order {
     /// Chosen by the terminal, so that it finds the outcome in a later snapshot.
     pub id: OrderId,
@@ -24,7 +25,7 @@ pub struct Order {
 }
 
 /// Identifies an order: the terminal's number and its running count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct OrderId {
     /// Which terminal.
     pub terminal: u32,
@@ -33,7 +34,7 @@ pub struct OrderId {
 }
 
 /// What an operator can wish for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Command {
     /// Write a value, in the tag's unit, and verify it.
     Write {
@@ -97,7 +98,7 @@ impl Command {
 }
 
 /// How an order stands.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OrderStatus {
     /// Which.
     pub id: OrderId,
@@ -114,7 +115,7 @@ pub struct OrderStatus {
 }
 
 /// The outcome of an order. A write is never retried by itself.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
     /// Under way.
     Pending,
@@ -132,7 +133,7 @@ pub enum Outcome {
 }
 
 /// Why an order was refused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum Refusal {
     /// The profile says read-only.
     #[error("read only")]
@@ -202,7 +203,7 @@ pub enum Refusal {
 }
 
 /// Why a write that the device accepted is not confirmed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum NotConfirmed {
     /// Read back, and different.
     #[error("read back {0}")]
@@ -219,7 +220,7 @@ pub enum NotConfirmed {
 }
 
 /// What the plant asks of a link task.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum BusRequest {
     /// Write one tag once, then read it back.
     Write {

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use jiff::{civil::Time, tz::TimeZone};
+use serde::{Deserialize, Serialize};
 
 use super::tag::{Table, TagDef};
 
@@ -14,13 +15,14 @@ pub use super::{
 };
 
 /// Everything that a plant file says, checked.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct PlantDef {
     /// Short name, the stem of the file: `tank`.
     pub name: String,
     /// What the screens show: `Water tank`.
     pub title: String,
     /// Local time of the plant, for display, shifts and reports.
+    #[serde(with = "jiff::fmt::serde::tz::required")]
     pub time_zone: TimeZone,
     /// Lines, by [`LineId`].
     pub lines: Vec<LineDef>,
@@ -72,7 +74,7 @@ impl PlantDef {
 }
 
 /// One device on a line.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DeviceDef {
     /// Its place.
     pub id: DeviceId,
@@ -105,7 +107,7 @@ pub struct DeviceDef {
 }
 
 /// What one request to a device may hold, and how blocks are cut.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Limits {
     /// Registers a read may ask for, at most 125.
     pub read_words_max: u16,
@@ -139,7 +141,7 @@ impl Limits {
 }
 
 /// The tags that a controller is operated by.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Faceplate {
     /// Process value.
     pub pv: TagId,
@@ -167,7 +169,7 @@ impl Faceplate {
 }
 
 /// An action on a device: a write that needs its own words, confirmation and quiet time.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionDef {
     /// `FIX`.
     pub name: String,
@@ -186,7 +188,7 @@ pub struct ActionDef {
 }
 
 /// An alarm: a condition on a tag or device, with what the operator should know and do.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AlarmDef {
     /// Its place.
     pub id: AlarmId,
@@ -207,7 +209,7 @@ pub struct AlarmDef {
 }
 
 /// What an alarm watches.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Subject {
     /// A tag.
     Tag(TagId),
@@ -216,7 +218,7 @@ pub enum Subject {
 }
 
 /// When an alarm is active. Limits and deadbands are in the tag's unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Condition {
     /// A fixed limit; it returns when the value is back by the deadband.
     Limit {
@@ -246,7 +248,7 @@ pub enum Condition {
 }
 
 /// The four levels of a limit alarm.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Level {
     /// Above the high-high limit.
     HighHigh,
@@ -259,7 +261,7 @@ pub enum Level {
 }
 
 /// Priority of an alarm, the most urgent first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Priority {
     /// `[1]!`
     Critical,
@@ -293,7 +295,7 @@ impl Priority {
 }
 
 /// What an operator should know about an alarm. Empty strings where the profile is silent.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Guidance {
     /// Likely causes.
     pub cause: String,
@@ -306,7 +308,7 @@ pub struct Guidance {
 }
 
 /// The picture of the process, on a canvas of nominal cells that is stretched to the screen.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct MimicDef {
     /// Nominal size, columns and rows; 80 by 18 fits a terminal of 80 by 24.
     pub size: (u16, u16),
@@ -317,7 +319,7 @@ pub struct MimicDef {
 }
 
 /// A rectangle on the nominal canvas.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Place {
     /// Column of the left edge.
     pub x: u16,
@@ -330,7 +332,7 @@ pub struct Place {
 }
 
 /// One element of the picture.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum MimicItem {
     /// A vessel with liquid that follows a level tag.
     Tank {
@@ -422,7 +424,7 @@ pub enum MimicItem {
 }
 
 /// A command on the mimic tab: one key, one tag, one value or a toggle.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MimicCommand {
     /// The key: one lower-case letter.
     pub key: char,
@@ -435,7 +437,7 @@ pub struct MimicCommand {
 }
 
 /// A group of pens of the trends tab.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrendGroup {
     /// `TIC-1`.
     pub name: String,
@@ -444,7 +446,7 @@ pub struct TrendGroup {
 }
 
 /// One curve: its tag and the scale it is drawn on.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pen {
     /// What.
     pub tag: TagId,
@@ -453,7 +455,7 @@ pub struct Pen {
 }
 
 /// A shift of the day.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ShiftDef {
     /// `morning`.
     pub name: String,
@@ -462,7 +464,7 @@ pub struct ShiftDef {
 }
 
 /// What reports contain and how their CSV is written.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReportDef {
     /// Where reports are written, relative to the working folder.
     pub folder: std::path::PathBuf,
@@ -475,7 +477,7 @@ pub struct ReportDef {
 }
 
 /// How CSV is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CsvDialect {
     /// `,` or `;`.
     pub separator: char,

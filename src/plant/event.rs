@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use std::sync::Arc;
 
@@ -14,7 +15,7 @@ use super::{
 };
 
 /// One fact from the bus. Every event carries the time at which it became true.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Event {
     /// A block was read: raw numbers (typed and ordered, not scaled) of its tags.
     Read {
@@ -94,7 +95,7 @@ pub enum Event {
 }
 
 /// How a write ended on the wire. The plant compares and names the outcome.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum WriteResult {
     /// The device accepted it; then it was read back: this raw number.
     ReadBack(f64),
@@ -113,7 +114,7 @@ pub enum WriteResult {
 }
 
 /// Why a request did not end in a valid normal answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
 pub enum Fault {
     /// No answer at all, or not a whole one, before the deadline.
     #[error("no answer in time")]
@@ -204,7 +205,7 @@ impl Fault {
 }
 
 /// Exception code of an answer (Modbus application protocol V1.1b3, section 7).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error, Serialize, Deserialize)]
 #[error("exception {0:02X}, {words}", words = self.words())]
 pub struct ExceptionCode(pub u8);
 
@@ -238,7 +239,7 @@ impl ExceptionCode {
 }
 
 /// State of a line. A wait names its end, so that a screen can count down.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum LineState {
     /// The port or connection is being opened.
     #[default]
@@ -259,7 +260,7 @@ pub enum LineState {
 }
 
 /// Errors that the driver of a serial port has counted since the port was opened.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct UartCounters {
     /// Characters whose parity bit did not fit.
     pub parity: u32,
@@ -272,7 +273,7 @@ pub struct UartCounters {
 }
 
 /// Counters of a line since the start of the station.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct LineCounters {
     /// Requests sent.
     pub requests: u64,

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{
     def::{ActionDef, PlantDef},
@@ -11,7 +12,7 @@ use super::{
 };
 
 /// What the plant file says about commands.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Guards {
     /// What keeps a command from acting.
     pub interlocks: Vec<InterlockDef>,
@@ -22,7 +23,7 @@ pub struct Guards {
 }
 
 /// A reason for which a command has no effect. The device is the guard; this tells the operator before it is tried.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InterlockDef {
     /// The command.
     pub tag: TagId,
@@ -39,7 +40,7 @@ pub struct InterlockDef {
 }
 
 /// When an interlock blocks; limits are in the unit of the tag that decides.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Blocking {
     /// Below this.
     Below(f64),
@@ -52,7 +53,7 @@ pub enum Blocking {
 }
 
 /// How an interlock stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Standing {
     /// It does not block.
     Free,
@@ -80,7 +81,7 @@ impl InterlockDef {
 }
 
 /// A valve, pump, agitator or heater: its command, and the output that tells what it does.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActuatorDef {
     /// What tells its state. Zero is off.
     pub output: TagId,
@@ -95,7 +96,7 @@ pub struct ActuatorDef {
 }
 
 /// A sequence in a PLC.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SequenceDef {
     /// Starts it, and stops it with zero.
     pub run: TagId,
@@ -153,7 +154,7 @@ pub fn is_stop(def: &PlantDef, tag: TagId, held: f64) -> bool {
 }
 
 /// Since when each actuator has not obeyed, by its place in [`Guards::actuators`].
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Watch {
     since: Vec<Option<Timestamp>>,
 }

@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use super::id::LineId;
 
 /// One serial line or TCP endpoint. Serial parameters, mode and timeouts belong to the line, never to a device.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LineDef {
     /// Its place.
     pub id: LineId,
@@ -40,7 +42,7 @@ impl LineDef {
 }
 
 /// How the bytes of a line travel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Transport {
     /// A serial port.
     Serial {
@@ -113,7 +115,7 @@ impl std::fmt::Display for Transport {
 }
 
 /// How frames are delimited and checked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Framing {
     /// Binary, ended by silence, CRC-16.
     Rtu,
@@ -124,7 +126,7 @@ pub enum Framing {
 }
 
 /// Serial parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Serial {
     /// Bits a second.
     pub baud: u32,
@@ -162,7 +164,7 @@ impl std::fmt::Display for Serial {
 }
 
 /// Parity of a serial character.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Parity {
     /// No parity bit.
     None,
@@ -184,7 +186,7 @@ impl Parity {
 }
 
 /// Who switches the direction of an RS-485 driver on a serial port.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Rs485 {
     /// Nobody needs to: RS-232, or an adapter that does it itself.
     #[default]

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{id::DeviceId, line_report::LineReport, tally::Tally};
 
 /// What a line counted in one minute.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LineMinute {
     /// The end of the minute.
     pub at: Timestamp,
@@ -93,7 +94,7 @@ fn since(tally: &Tally, before: Option<&Tally>) -> Tally {
 }
 
 /// Earlier reports of a line, to tell what was counted since.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct LineWatch {
     /// The running minute, and the totals at its beginning.
     minute: Option<(i64, Arc<LineReport>)>,

@@ -3,6 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{
     admission::Admission,
@@ -15,7 +16,7 @@ use super::{
 };
 
 /// One line, as its task sees it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LineReport {
     /// Settings in use; they differ from the plant file's while a technician tries others.
     pub settings: LineDef,
@@ -70,7 +71,7 @@ impl LineReport {
 }
 
 /// One block of the read plan.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PollReport {
     /// Who is asked.
     pub device: DeviceId,

@@ -2,6 +2,8 @@
 
 use std::{fmt, time::Duration};
 
+use serde::{Deserialize, Serialize};
+
 use super::{
     event::{ExceptionCode, LineState},
     snapshot::DeviceState,
@@ -9,7 +11,7 @@ use super::{
 };
 
 /// The four status signals of NE 107. A device that is well has none.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Signal {
     /// Its values are not valid.
     Failure,
@@ -44,7 +46,7 @@ impl Signal {
 }
 
 /// Why a device has a signal. Its text is for the operator.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reason {
     /// An operator has closed the line.
     LineClosed,

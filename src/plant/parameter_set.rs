@@ -7,6 +7,7 @@ mod tests;
 use std::{collections::BTreeMap, sync::Arc};
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{
     def::{DeviceId, PlantDef, TagId},
@@ -17,7 +18,7 @@ use super::{
 pub use plan::{Change, Problem, plan};
 
 /// The settings of a device under a name.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterSet {
     /// `winter`; the stem of its file.
     pub name: String,
@@ -41,7 +42,7 @@ pub struct ParameterSet {
 }
 
 /// A value of a tag, by the tag's short name, in its unit.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SetValue {
     /// `SV`.
     pub tag: String,
@@ -50,7 +51,7 @@ pub struct SetValue {
 }
 
 /// A set as it lies in the station's folder.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StoredSet {
     /// Its name.
     pub name: String,
@@ -135,7 +136,7 @@ pub fn unit_of<'a>(tag: &'a TagDef, trusted: Trusted) -> Option<&'a str> {
 }
 
 /// How a setting of a set stands against a device.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Compared {
     /// Its short name.
     pub short: String,

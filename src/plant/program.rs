@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::id::TagId;
 
 /// The tags of a controller's ramp/soak program.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ProgramDef {
     /// Where it is: 0 off, 1 ramp 1, 2 soak 1, 3 ramp 2 …, and beyond the last soak: ended (PXR 31009).
     pub position: TagId,
@@ -30,7 +31,7 @@ pub struct ProgramDef {
 }
 
 /// A step: to a target in a time, then staying there for a time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ProgramStep {
     /// The target.
     pub sv: TagId,
@@ -41,7 +42,7 @@ pub struct ProgramStep {
 }
 
 /// Where a program is, in words of its definition.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Place {
     /// Not running.
     Off,
@@ -74,7 +75,7 @@ impl ProgramDef {
 }
 
 /// How long a program has been where it is. The device does not tell: it is counted here, without the time in halt.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ProgramWatch {
     position: Option<f64>,
     /// Time in this position; at least so long if its beginning was not seen.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{
     def::{Priority, TagId},
@@ -11,7 +12,7 @@ use super::{
 };
 
 /// One line of the history.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Record {
     /// A stored sample.
     Sample(TagId, Sample),
@@ -24,7 +25,7 @@ pub enum Record {
 }
 
 /// A step in the life of an alarm. Names, not ids: a journal outlives the plant file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AlarmRecord {
     /// When.
     pub at: Timestamp,
@@ -45,7 +46,7 @@ pub struct AlarmRecord {
 }
 
 /// The steps in the life of an alarm. The words are what the history and CSV hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AlarmStep {
     /// It became active.
     Raised,
@@ -73,7 +74,7 @@ impl AlarmStep {
 }
 
 /// A deed of an operator, written when its outcome is known.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionRecord {
     /// When the order was taken.
     pub at: Timestamp,

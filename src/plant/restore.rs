@@ -4,6 +4,7 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{
     command::{NotConfirmed, OrderId, Outcome, Refusal},
@@ -17,7 +18,7 @@ use super::{
 pub const READ_MAX: Duration = Duration::from_secs(60);
 
 /// What an operator has confirmed: this set, and the changes that it meant when he looked.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RestoreWish {
     /// The device that is written.
     pub device: DeviceId,
@@ -30,7 +31,7 @@ pub struct RestoreWish {
 }
 
 /// A restore as it stands.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Restore {
     /// The order that it carries out.
     pub id: OrderId,
@@ -57,7 +58,7 @@ pub struct Restore {
 }
 
 /// One write of a restore.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Step {
     /// What.
     pub change: Change,
@@ -68,7 +69,7 @@ pub struct Step {
 }
 
 /// How a restore stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum State {
     /// The device is read first: nobody knows how old what is on the board is.
     Reading,

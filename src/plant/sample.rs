@@ -1,9 +1,10 @@
 //! A value never travels alone: number, quality and time are one thing.
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 /// How far a value can be trusted. Ordered: `Good < Uncertain < Bad`, so `max` is "the worst of".
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Quality {
     /// Read in time, in shape and in range.
     Good,
@@ -14,7 +15,7 @@ pub enum Quality {
 }
 
 /// Why a value is not good. The discriminant is what the history stores: never renumber.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Cause {
     /// Nothing has been read since the station started.
@@ -117,7 +118,7 @@ impl Quality {
 }
 
 /// A value with its quality and the instant at which the device said it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
     /// In the tag's unit; bits are 0 or 1, enumerations their number. `None` exactly when the quality is bad; a tag that
     /// holds text never has a number, its text stands in the snapshot.

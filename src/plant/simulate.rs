@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use super::id::TagId;
 
 /// How the simulated value of a tag comes about. All numbers are in the tag's unit, times are plant time.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Simulate {
     /// The value when the device is switched on; without it 0, or what is nearest to 0 of what the tag may be.
     pub start: Option<f64>,
@@ -22,7 +24,7 @@ pub struct Simulate {
 }
 
 /// A value for when something is so.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Case {
     /// All of them must be so.
     pub when: Vec<Check>,
@@ -31,7 +33,7 @@ pub struct Case {
 }
 
 /// A question to another tag.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Check {
     /// The tag that is asked.
     pub tag: TagId,
@@ -42,7 +44,7 @@ pub struct Check {
 }
 
 /// What a value is compared with.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Test {
     /// It is not 0.
     On,
@@ -55,7 +57,7 @@ pub enum Test {
 }
 
 /// A value that moves.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
     /// Where it goes.
     pub source: Source,
@@ -72,7 +74,7 @@ pub struct Motion {
 }
 
 /// Where a moving value goes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Source {
     /// Slowly to and fro between two values, the same in every run.
     Wander {
@@ -93,7 +95,7 @@ pub enum Source {
 }
 
 /// What is made of other tags.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Operation {
     /// All added.
     Sum,
@@ -112,7 +114,7 @@ pub enum Operation {
 }
 
 /// How fast a value follows.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Pace {
     /// At once.
     AtOnce,

@@ -3,6 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{
     alarm::AlarmState,
@@ -23,7 +24,7 @@ use super::{
 };
 
 /// The plant at one instant. Losing an intermediate snapshot is harmless.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Snapshot {
     /// The instant.
     pub at: Timestamp,
@@ -131,7 +132,7 @@ impl Snapshot {
 }
 
 /// A line as it stands.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct LineStatus {
     /// Connected, waiting, closed.
     pub state: LineState,
@@ -150,7 +151,7 @@ pub struct LineStatus {
 }
 
 /// A device as it stands.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct DeviceStatus {
     /// Answering or not.
     pub state: DeviceState,
@@ -169,7 +170,7 @@ pub struct DeviceStatus {
 }
 
 /// Whether a device answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum DeviceState {
     /// Not asked yet.
     #[default]
@@ -186,7 +187,7 @@ pub enum DeviceState {
 }
 
 /// An alarm that an operator should see.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActiveAlarm {
     /// Which.
     pub id: AlarmId,
@@ -201,7 +202,7 @@ pub struct ActiveAlarm {
 }
 
 /// The history store as it stands.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct HistoryStatus {
     /// Rows committed since the start.
     pub rows: u64,

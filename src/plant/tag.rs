@@ -2,6 +2,8 @@
 
 use std::{sync::Arc, time::Duration};
 
+use serde::{Deserialize, Serialize};
+
 use super::{
     id::{DeviceId, TagId},
     sample::Sample,
@@ -9,7 +11,7 @@ use super::{
 };
 
 /// Definition of a tag.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TagDef {
     /// Its place.
     pub id: TagId,
@@ -167,7 +169,7 @@ impl TagDef {
 }
 
 /// Where a value lives in its device: wire address, 0-based.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Point {
     /// Which of the four tables.
     pub table: Table,
@@ -193,7 +195,7 @@ impl Point {
 }
 
 /// The four tables of Modbus.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Table {
     /// Read-write bits, FC 01 / 05 / 15.
     Coil,
@@ -245,7 +247,7 @@ impl Table {
 }
 
 /// Type of a raw value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Kind {
     /// One bit of a bit table, or a whole word not zero.
     Bool,
@@ -288,7 +290,7 @@ impl Kind {
 }
 
 /// Order of the bytes A B C D (A most significant) on the wire.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub enum Order {
     /// Big-endian, the default of the Modbus world.
     #[default]
@@ -302,7 +304,7 @@ pub enum Order {
 }
 
 /// Decimals of a value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Decimals {
     /// Always so many; they do not scale.
     Fixed(u8),
@@ -311,7 +313,7 @@ pub enum Decimals {
 }
 
 /// A bound of a value.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Bound {
     /// A number in the tag's unit.
     Fixed(f64),
@@ -320,7 +322,7 @@ pub enum Bound {
 }
 
 /// What may be done with a tag.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Access {
     /// Read only.
     Read,
@@ -331,7 +333,7 @@ pub enum Access {
 }
 
 /// How often a tag is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Poll {
     /// On an absolute grid with this period.
     Every(Duration),
@@ -343,7 +345,7 @@ pub enum Poll {
 
 /// How important it is that a tag is read in time, the most important first. On a line with too much to do idle polls are
 /// shed, then the periods of soft polls are stretched; hard polls keep theirs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Class {
     /// An alarm is judged by it.
     Hard,
@@ -365,7 +367,7 @@ impl Class {
 }
 
 /// How sure a row of a register map is (see the profile's sources).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Confidence {
     /// Recorded on a real device or read in the maker's manual.
     Proven,

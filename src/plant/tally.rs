@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use super::event::{ExceptionCode, Fault};
 
 /// How requests ended.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Tally {
     /// Requests sent, retries included.
     pub requests: u64,
@@ -116,12 +118,13 @@ const BUCKETS: usize = 64;
 const LEAST_S: f64 = 1e-4;
 
 /// Durations: the last, the greatest, the mean, and percentiles to about a fifth of their value.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     last: Duration,
     max: Duration,
     sum: Duration,
     count: u64,
+    #[serde(with = "serde_big_array::BigArray")]
     buckets: [u32; BUCKETS],
 }
 

@@ -3,6 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{command::OrderId, event::Fault, line::Serial, tag::Table, traffic::Exchange};
 
@@ -10,7 +11,7 @@ use super::{command::OrderId, event::Fault, line::Serial, tag::Table, traffic::E
 pub const FINDINGS_MAX: usize = 1_000;
 
 /// A test of a line.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Tool {
     /// Sends these bytes as they are, check included, and gathers whatever comes back.
     Send(Vec<u8>),
@@ -65,7 +66,7 @@ impl std::fmt::Display for Tool {
 }
 
 /// Where to look for units: one request each, any answer counts.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scan {
     /// First unit address.
     pub first: u8,
@@ -78,7 +79,7 @@ pub struct Scan {
 }
 
 /// A tool at work, or done.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ToolRun {
     /// The order it came by.
     pub id: OrderId,
@@ -101,7 +102,7 @@ pub struct ToolRun {
 }
 
 /// How a tool stands.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ToolState {
     /// At work.
     Running,
@@ -114,7 +115,7 @@ pub enum ToolState {
 }
 
 /// What a tool has found.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Finding {
     /// A request with its answer.
     Exchange(Arc<Exchange>),

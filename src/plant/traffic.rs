@@ -3,6 +3,7 @@
 use std::{borrow::Cow, collections::VecDeque, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{event::Fault, line::Framing};
 
@@ -10,7 +11,7 @@ use super::{event::Fault, line::Framing};
 pub const FRAMES_MAX: usize = 1_000;
 
 /// One frame or run of bytes as it went over a line.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Frame {
     /// When.
     pub at: Timestamp,
@@ -29,7 +30,7 @@ pub struct Frame {
 }
 
 /// The latest frames of a line, oldest first. Cheap to clone: a snapshot carries it.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Frames {
     chunks: VecDeque<Arc<[Frame]>>,
     count: usize,
@@ -66,7 +67,7 @@ impl Frames {
 }
 
 /// A request and what came back: why a value is what it is.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Exchange {
     /// When the request was sent.
     pub at: Timestamp,

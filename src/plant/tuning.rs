@@ -3,6 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{
     def::{DeviceDef, Faceplate, TagId},
@@ -15,7 +16,7 @@ const TURNS_MAX: usize = 24;
 const TURN_SHARE: f64 = 0.002;
 
 /// An auto-tuning, at work or ended.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Tuning {
     /// When it was first seen on.
     pub began: Timestamp,
@@ -37,7 +38,7 @@ pub struct Tuning {
 }
 
 /// A parameter that auto-tuning finds.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Found {
     /// Which.
     pub tag: TagId,
@@ -48,7 +49,7 @@ pub struct Found {
 }
 
 /// A place where PV has turned.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Turn {
     /// When.
     pub at: Timestamp,
@@ -76,7 +77,7 @@ impl Tuning {
 }
 
 /// Watches one device for auto-tuning.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct TuningWatch {
     on: Option<bool>,
     /// The latest one.
@@ -84,7 +85,7 @@ pub struct TuningWatch {
 }
 
 /// What the watch has noticed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Noticed {
     /// Nothing that anybody must act on.
     Nothing,

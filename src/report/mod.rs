@@ -12,6 +12,7 @@ pub(crate) mod testing;
 use std::time::Duration;
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use crate::plant::record::{ActionRecord, AlarmRecord};
 
@@ -19,7 +20,7 @@ use crate::plant::record::{ActionRecord, AlarmRecord};
 pub const DECIMALS_UNKNOWN: u8 = 2;
 
 /// A span of time with a name: a shift, or a free period.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Period {
     /// Name of the shift and its local date (`morning 2026-11-21`), or `period`.
     pub name: String,
@@ -30,7 +31,7 @@ pub struct Period {
 }
 
 /// The figures of a period.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShiftReport {
     /// Which period.
     pub period: Period,
@@ -49,7 +50,7 @@ pub struct ShiftReport {
 }
 
 /// Figures of one tag over a period; `None` where there was no good value.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TagFigures {
     /// `TIC-1.PV`.
     pub tag: String,
@@ -72,7 +73,7 @@ pub struct TagFigures {
 }
 
 /// One row of the thesis's record: `er = sv − pv`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RecordRow {
     /// When.
     pub at: Timestamp,

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{ParameterSet, Trusted, bound, compare, decimals, same, unit_of};
 use crate::plant::{
@@ -14,7 +15,7 @@ use crate::plant::{
 };
 
 /// One write of a plan.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Change {
     /// What.
     pub tag: TagId,
@@ -25,7 +26,7 @@ pub struct Change {
 }
 
 /// Why a set cannot be written to a device. Nothing is written while there is one.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum Problem {
     /// It was taken from another kind of device.
     #[error("the set is for {set}, this device is {device}")]
