@@ -65,6 +65,7 @@ pub mod bus;
 pub mod sim;
 pub mod report;
 pub mod history;
+pub mod access;
 pub mod station;
 pub mod ui;
 pub mod cli;

@@ -71,7 +71,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let history = scratch.history.clone();
         let options = station::Options { def: def.clone(), clock, history, connectors, file: None };
         let (listener, journal) = sim::io::journal();
-        let mut station = station::start_told(options, Some(listener))?;
+        let station = station::start_told(options, Some(listener))?;
         let mut session = station.session(&if args.headless { "demo".to_owned() } else { paths::operator() });
         let trainer = sim::io::Trainer {
             def: def.clone(),
@@ -79,7 +79,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
             snapshots: session.snapshots.clone(),
             journal,
             // Without a terminal nobody else is there to act.
-            operator: (args.headless && scenario.is_some()).then(|| session.orders.clone()),
+            operator: (args.headless && scenario.is_some()).then(|| station.orders.clone()),
             scenario: scenario.clone(),
             exam: args.exam,
         };
@@ -115,10 +115,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
 /// Tells what happens until the time is over, then sums up and writes the report.
 async fn headless(session: Session, clock: Clock, duration: Option<Duration>, args: &Args) -> Result<(), CliError> {
     let from = clock.now();
-    let queries = session.queries.clone();
-    let last = run::follow(session, clock, duration).await?;
+    let last = run::follow(session.clone(), clock, duration).await?;
     let period = Period { name: "demo".into(), from, to: clock.now() };
-    let report = ask_report(&queries, period).await?;
+    let report = ask_report(&session, period).await?;
     for line in summary(&last, &report) {
         say(&line);
     }
@@ -131,13 +130,10 @@ async fn headless(session: Session, clock: Clock, duration: Option<Duration>, ar
     Ok(())
 }
 
-async fn ask_report(
-    queries: &tokio::sync::mpsc::Sender<Query>,
-    period: Period,
-) -> Result<Box<ShiftReport>, HistoryError> {
+async fn ask_report(session: &Session, period: Period) -> Result<Box<ShiftReport>, HistoryError> {
     let (reply, answer) = oneshot::channel();
     let gone = || HistoryError::Engine("the store has stopped".into());
-    queries.send(Query { question: Question::Report { period }, reply }).await.map_err(|_| gone())?;
+    session.ask(Query { question: Question::Report { period }, reply }).map_err(|_| gone())?;
     match answer.await.map_err(|_| gone())?? {
         Answer::Report(report) => Ok(report),
         Answer::Series(_) | Answer::Journal(_) | Answer::Actions(_) | Answer::LineMinutes(_) => {

@@ -104,10 +104,10 @@ fn rehearse(
         let time = Clock::starting_at(morning(&def), 1.0);
         let world = WorldHandle::spawn_for(&def, world(&def, Some(&scenario))?, time);
         let (listener, journal) = journal();
-        let mut station = station::rehearse(def.clone(), time, in_memory(&def, &world), listener);
+        let station = station::rehearse(def.clone(), time, in_memory(&def, &world), listener);
         let session = station.session("drill");
         // Without an operator his orders lead nowhere.
-        let orders = if with_operator { session.orders.clone() } else { mpsc::channel(1).0 };
+        let orders = if with_operator { station.orders.clone() } else { mpsc::channel(1).0 };
         let trainer = Trainer {
             def,
             world,

@@ -36,7 +36,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let _log = log::start(args.station.log.as_deref())?;
     in_runtime(async {
         let clock = Clock::real();
-        let mut station = start(&def, clock, history_file(&def, &args.station), file)?;
+        let station = start(&def, clock, history_file(&def, &args.station), file)?;
         say(&format!("{}: {} tags on {} lines", def.title, def.tags.len(), def.lines.len()));
         let session = station.session("station");
         let last = follow(session, clock, args.duration).await;
@@ -58,7 +58,7 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
     ui::io::require_terminal()?;
     let _log = log::start(args.log.as_deref())?;
     in_runtime(async {
-        let mut station = start(&def, Clock::real(), history_file(&def, args), file)?;
+        let station = start(&def, Clock::real(), history_file(&def, args), file)?;
         let session = station.session(&paths::operator());
         let result = ui::io::run(session, ui::io::Options::default()).await;
         station.stop().await;

@@ -20,8 +20,23 @@ pub struct Order {
     pub id: OrderId,
     /// Who wishes.
     pub by: Arc<str>,
+    /// From where: `pts/3 from 10.0.0.5, user panel`; empty for the station itself.
+    pub from: Arc<str>,
     /// What.
     pub command: Command,
+    /// The value of the tag to be written that he saw when he confirmed.
+    pub seen: Option<f64>,
+    /// Why, in his words.
+    pub note: Option<Arc<str>>,
+    /// Why he may not: it is only put on record.
+    pub refused: Option<Refusal>,
+}
+
+impl Order {
+    /// An order that may be carried out, without note.
+    pub fn new(id: OrderId, by: impl Into<Arc<str>>, command: Command) -> Order {
+        Order { id, by: by.into(), from: "".into(), command, seen: None, note: None, refused: None }
+    }
 }
 
 /// Identifies an order: the terminal's number and its running count.
@@ -104,6 +119,10 @@ pub struct OrderStatus {
     pub id: OrderId,
     /// Who.
     pub by: Arc<str>,
+    /// From where.
+    pub from: Arc<str>,
+    /// Why, in his words.
+    pub note: Option<Arc<str>>,
     /// What was wished.
     pub command: Command,
     /// When it was taken.
@@ -135,6 +154,15 @@ pub enum Outcome {
 /// Why an order was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum Refusal {
+    /// His role does not permit it, or nobody is logged in.
+    #[error("{0}")]
+    NotPermitted(String),
+    /// The tag asks for a password or a second person, which was not given or is wrong.
+    #[error("{0}")]
+    NotSigned(String),
+    /// Somebody or something has changed the value since the operator looked; this is what it is now.
+    #[error("it was changed to {0} since you looked")]
+    ChangedTo(String),
     /// The profile says read-only.
     #[error("read only")]
     ReadOnly,

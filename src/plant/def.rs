@@ -12,6 +12,7 @@ pub use super::{
     id::{AlarmId, DeviceId, LineId, TagId},
     line::{Framing, LineDef, Parity, Rs485, Serial, Transport},
     program::{ProgramDef, ProgramStep},
+    role::{AccessDef, Role, Sign},
 };
 
 /// Everything that a plant file says, checked.
@@ -32,6 +33,8 @@ pub struct PlantDef {
     pub tags: Vec<TagDef>,
     /// Alarms, by [`AlarmId`].
     pub alarms: Vec<AlarmDef>,
+    /// The rules for logging in.
+    pub access: AccessDef,
     /// What stands between commands and their effect.
     pub guards: Guards,
     /// The picture of the process.

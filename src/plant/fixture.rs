@@ -66,6 +66,7 @@ pub fn plant() -> PlantDef {
         guidance: Guidance::default(),
     };
     PlantDef {
+        access: Default::default(),
         name: "fixture".into(),
         title: "Fixture".into(),
         time_zone: TimeZone::UTC,

@@ -8,6 +8,7 @@
 //! ```
 
 pub mod id;
+pub mod role;
 pub mod sample;
 pub mod line;
 pub mod program;

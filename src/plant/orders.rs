@@ -65,7 +65,7 @@ impl Desk {
     ) -> Result<BusRequest, Option<ActionRecord>> {
         let old = board.sample(tag).value;
         self.open(order, old, at);
-        let checked = self.check(board, tag, value);
+        let checked = self.not_overtaken(board, order, tag, value).and_then(|()| self.check(board, tag, value));
         match checked {
             Err(outcome) => Err(self.close(order.id, outcome, board)),
             Ok(Checked { raw, unlock, urgent }) => {
@@ -136,11 +136,14 @@ impl Desk {
         Some(ActionRecord {
             at,
             by: status.by.clone(),
+            from: status.from.clone(),
             action: "unlock".into(),
             target: key.name.as_str().into(),
             old: board.sample(key.id).value.map(|old| value_words(board, key, old).into()),
             new: tag.write_unlock.map(|(_, new)| value_words(board, key, new).into()),
             outcome: format!("{}; for {}", outcome_words(&outcome), tag.name).into(),
+            note: None,
+            seal: None,
         })
     }
 
@@ -219,6 +222,24 @@ impl Desk {
         ids.into_iter().filter_map(|id| self.close(id, Outcome::Failed(Fault::Timeout), board)).collect()
     }
 
+    /// Refuses a write over a value that its operator has not seen. A stop is right whatever stood there.
+    fn not_overtaken(&self, board: &Board, order: &Order, tag: TagId, value: f64) -> Result<(), Outcome> {
+        let def = self.def.tag(tag);
+        let (Some(seen), Some(decimals)) = (order.seen, board.scaling_decimals(def)) else { return Ok(()) };
+        let held = scale::held(def, value, decimals);
+        if held.is_some_and(|held| guard::is_stop(&self.def, tag, held)) {
+            return Ok(());
+        }
+        let raw = scale::to_raw(def, seen, decimals);
+        match (board.trusted_raw(tag), raw) {
+            (Some(now), Some(raw)) if !scale::same_raw(def.point.kind, now, raw) => {
+                let now = scale::to_value(def, now, decimals);
+                Err(Outcome::Refused(Refusal::ChangedTo(value_words(board, def, now))))
+            }
+            (Some(_) | None, _) => Ok(()),
+        }
+    }
+
     /// Checks a write against access, choices, bounds, type and what is under way.
     fn check(&self, board: &Board, tag: TagId, value: f64) -> Result<Checked, Outcome> {
         let refuse = |refusal| Err(Outcome::Refused(refusal));
@@ -274,6 +295,8 @@ impl Desk {
         self.orders.push_front(OrderStatus {
             id: order.id,
             by: order.by.clone(),
+            from: order.from.clone(),
+            note: order.note.clone(),
             command: order.command.clone(),
             at,
             old,
@@ -348,11 +371,14 @@ fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
     ActionRecord {
         at: status.at,
         by: status.by.clone(),
+        from: status.from.clone(),
         action: action.into(),
         target: target.into(),
         old: old.map(Into::into),
         new: new.map(Into::into),
         outcome: outcome_words(&status.outcome).into(),
+        note: status.note.clone(),
+        seal: None,
     }
 }
 

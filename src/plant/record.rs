@@ -80,6 +80,8 @@ pub struct ActionRecord {
     pub at: Timestamp,
     /// Who.
     pub by: Arc<str>,
+    /// From where: `pts/3 from 10.0.0.5, user panel`; empty for the station itself.
+    pub from: Arc<str>,
     /// `write`, `acknowledge`, `connect`, …
     pub action: Arc<str>,
     /// Tag, alarm, line or device by name.
@@ -90,4 +92,17 @@ pub struct ActionRecord {
     pub new: Option<Arc<str>>,
     /// `verified`, `refused: …`, `not confirmed: …`, `failed: …`.
     pub outcome: Arc<str>,
+    /// Why, in his words.
+    pub note: Option<Arc<str>>,
+    /// Its place in the chained book; `None` until it is there.
+    pub seal: Option<Seal>,
+}
+
+/// The place of a deed in the chained book.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Seal {
+    /// Running number, from 1.
+    pub number: u64,
+    /// SHA-256 over the line and the seal before it.
+    pub hash: [u8; 32],
 }

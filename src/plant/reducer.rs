@@ -154,6 +154,12 @@ impl Plant {
     /// Takes a wish of an operator.
     pub fn on_order(&mut self, order: Order, at: Timestamp) -> Effects {
         let mut effects = Effects::default();
+        if let Some(why) = &order.refused {
+            let action = self.desk.note(&order, Outcome::Refused(why.clone()), &self.board, at);
+            effects.records.extend(action.map(Record::Action));
+            self.at = self.at.max(at);
+            return effects;
+        }
         let action = match order.command.clone() {
             Command::Write { tag, value } => match self.desk.write(&self.board, &order, tag, value, at) {
                 Ok(request) => {

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     id::{DeviceId, TagId},
+    role::Sign,
     sample::Sample,
     simulate::Simulate,
 };
@@ -45,6 +46,8 @@ pub struct TagDef {
     pub access: Access,
     /// Asked before a write, beyond old and new value.
     pub confirm: Option<String>,
+    /// What must be given again to write it.
+    pub sign: Option<Sign>,
     /// Names of the numbers of an enumeration; empty for a quantity.
     pub labels: Vec<(i64, String)>,
     /// Names of the bits of a status word.
@@ -100,6 +103,7 @@ impl TagDef {
             max: None,
             access: Access::Read,
             confirm: None,
+            sign: None,
             labels: Vec::new(),
             bit_labels: Vec::new(),
             bad_if: Vec::new(),

@@ -10,6 +10,7 @@
 //!
 //! Only `io` touches files; everything else works on texts.
 
+mod access;
 mod address;
 mod alarm;
 mod device;

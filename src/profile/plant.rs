@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, rc::Rc, time::Duration};
 use jiff::tz::TimeZone;
 
 use super::{
-    alarm, device,
+    access, alarm, device,
     diagnostic::{Errors, Problems},
     guard, line,
     names::{Defs, Names, Unique, check_name},
@@ -58,6 +58,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let alarms = alarm::alarms(&file.alarms, &defs, problems);
     let mimic =
         file.mimic.as_ref().map_or_else(MimicDef::default, |mimic| picture::mimic(&mimic.value, &defs, problems));
+    let access = access::access(file.access.as_ref().map(|table| &table.value), problems);
     let guards = guard::guards(file, &defs, problems);
     let trends = picture::trends(&file.trends, &defs, problems);
     let shifts = report::shifts(&file.shifts, problems);
@@ -70,6 +71,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         time_zone: time_zone(&file.time_zone, problems),
         lines,
         alarms,
+        access,
         guards,
         mimic,
         trends,

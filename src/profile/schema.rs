@@ -10,7 +10,7 @@ use super::{
     simulate::Choices,
 };
 use crate::plant::{
-    def::{Parity, Priority, Rs485},
+    def::{Parity, Priority, Role, Rs485, Sign},
     tag::{Access, Class, Confidence, Kind, Order, Table},
 };
 
@@ -22,6 +22,7 @@ table!(
         opt "simulation" simulation: String,
         list "line" lines: Raw,
         list "device" devices: DeviceTable,
+        opt "access" access: AccessTable,
         list "alarm" alarms: AlarmTable,
         list "interlock" interlocks: InterlockTable,
         list "actuator" actuators: ActuatorTable,
@@ -146,6 +147,8 @@ table!(
         opt "access" access: Access,
         opt "verify" verify: bool,
         opt "confirm" confirm: String,
+        /// What must be given again to write it.
+        opt "sign" sign: Sign,
         opt "enum" labels: Numbered,
         opt "bits" bits: Numbered,
         list "bad_if" bad_if: i64,
@@ -390,6 +393,28 @@ table!(
 );
 
 table!(
+    /// The rules for logging in.
+    AccessTable, "access" {
+        opt "notice" notice: String,
+        opt "view" view: bool,
+        opt "password_chars_min" password_chars_min: u16,
+        opt "tries_max" tries_max: u16,
+        opt "lock_out" lock_out: Duration,
+        opt "idle_lock" idle_lock: Duration,
+        opt "sessions_max" sessions_max: u16,
+        list "trusted" trusted: TrustedTable,
+    }
+);
+
+table!(
+    /// A user of the operating system who needs no password.
+    TrustedTable, "a trusted user" {
+        need "user" user: String,
+        need "role" role: Role,
+    }
+);
+
+table!(
     /// What reports contain.
     ReportTable, "the report" {
         opt "folder" folder: String,
@@ -433,6 +458,12 @@ words!(Access, "access" { "r" => Access::Read, "rw" => Access::ReadWrite, "w" =>
 words!(Confidence, "confidence" {
     "proven" => Confidence::Proven, "high" => Confidence::High, "medium" => Confidence::Medium, "low" => Confidence::Low,
 });
+
+words!(Role, "role" {
+    "viewer" => Role::Viewer, "technician" => Role::Technician, "supervisor" => Role::Supervisor,
+});
+
+words!(Sign, "sign" { "password" => Sign::Password, "second person" => Sign::SecondPerson, });
 
 words!(Class, "class" { "hard" => Class::Hard, "soft" => Class::Soft, "idle" => Class::Idle, });
 

@@ -277,6 +277,9 @@ mod tests {
                 old: Some("-70.0 °C".into()),
                 new: Some("60.0 °C".into()),
                 outcome: "verified".into(),
+                from: "".into(),
+                note: None,
+                seal: None,
             }],
             record: vec![
                 RecordRow { at: from, sv: Some(70.0), pv: Some(72.5), er: Some(-2.5) },

@@ -28,6 +28,7 @@ pub fn zone(name: &str) -> TimeZone {
 pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
     let device = DeviceId(0);
     PlantDef {
+        access: Default::default(),
         name: "tank".into(),
         title: "Water tank".into(),
         time_zone: zone(zone_name),

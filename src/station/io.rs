@@ -10,6 +10,7 @@ use tokio::{
 };
 
 use crate::{
+    access::{Gate, Peer},
     bus::io::{clock::Clock, task, transport::Connector},
     history::{
         HistoryError,
@@ -20,14 +21,18 @@ use crate::{
         command::{BusRequest, Order, OrderId},
         def::{LineDef, LineId},
         event::{Event, LineState},
-        record::Record,
+        record::{ActionRecord, Record},
         snapshot::HistoryStatus,
     },
     profile::PlantFile,
     sim::io::Listener,
 };
 
-use super::{Session, sets};
+use super::{
+    door::{self, Door, Entrance, Ways},
+    session::Session,
+    sets,
+};
 
 /// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
 const EVENTS: usize = 256;
@@ -62,14 +67,15 @@ pub struct Options {
 /// A running station.
 #[derive(Debug)]
 pub struct Station {
-    snapshots: watch::Receiver<Arc<Snapshot>>,
-    orders: mpsc::Sender<Order>,
-    queries: mpsc::Sender<Query>,
+    entrance: Entrance,
+    /// Past the gate: for the operator of a drill, who is part of the program.
+    pub orders: mpsc::Sender<Order>,
+    /// What terminals wish of the station as a whole.
+    pub commands: mpsc::Receiver<door::Command>,
     /// `None` for a rehearsal, which keeps nothing.
     history: Option<history::Handle>,
     stop: watch::Sender<bool>,
     tasks: Vec<JoinHandle<()>>,
-    terminals: u32,
 }
 
 /// Starts history, links and plant, in this order: a store that cannot be opened stops the start.
@@ -130,8 +136,14 @@ fn assemble(
     }
     let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
     let desk = PlantTask { plant, clock, links, file, saving: None, filing: None, keeping, lost: 0, publish };
-    tasks.push(tokio::spawn(desk.run(event_queue, order_queue)));
-    Station { snapshots, orders, queries, history, stop, tasks, terminals: 0 }
+    let (deeds, deed_queue) = mpsc::channel(ORDERS);
+    tasks.push(tokio::spawn(desk.run(event_queue, order_queue, deed_queue)));
+    let (command, commands) = mpsc::channel(door::COMMANDS);
+    let ways = Ways { orders: orders.clone(), queries, deeds, commands: command };
+    let (entrance, knocks, requests) = Entrance::new(snapshots);
+    let door = Door::new(Gate::new(def), clock, ways);
+    tasks.push(tokio::spawn(door.run(knocks, requests, stopped)));
+    Station { entrance, orders, commands, history, stop, tasks }
 }
 
 /// Waits for the end of a link. One that ends before the station does takes its values with it, visibly.
@@ -154,25 +166,22 @@ async fn supervise(
 }
 
 impl Station {
-    /// Attaches a terminal.
-    pub fn session(&mut self, operator: &str) -> Session {
-        self.terminals += 1;
-        Session {
-            snapshots: self.snapshots.clone(),
-            orders: self.orders.clone(),
-            queries: self.queries.clone(),
-            terminal: self.terminals,
-            operator: operator.into(),
-            drill: None,
-        }
+    /// Where terminals come in.
+    pub fn entrance(&self) -> &Entrance {
+        &self.entrance
+    }
+
+    /// Attaches a terminal of this very process.
+    pub fn session(&self, operator: &str) -> Session {
+        self.entrance.attach(Peer { from: "this process".into(), unix_user: Some(operator.into()) })
     }
 
     /// Stops downstream and waits until the last record is on disk.
     pub async fn stop(self) {
-        let Station { snapshots: _, orders, queries, history, stop, tasks, terminals: _ } = self;
+        let Station { entrance, orders, commands, history, stop, tasks } = self;
         // Links may have ended already; then nobody listens, which is fine.
         let _ = stop.send(true);
-        drop((orders, queries));
+        drop((entrance, orders, commands));
         for task in tasks {
             if let Err(error) = task.await {
                 tracing::error!(%error, "a task of the station ended badly");
@@ -233,7 +242,12 @@ struct PlantTask {
 }
 
 impl PlantTask {
-    async fn run(mut self, mut events: mpsc::Receiver<Event>, mut orders: mpsc::Receiver<Order>) {
+    async fn run(
+        mut self,
+        mut events: mpsc::Receiver<Event>,
+        mut orders: mpsc::Receiver<Order>,
+        mut deeds: mpsc::Receiver<ActionRecord>,
+    ) {
         let tick_every = self.clock.real_span(Duration::from_secs(1)).max(TICK_MIN);
         self.file_sets(SetWork::Read);
         let mut tick = tokio::time::interval(tick_every);
@@ -252,6 +266,7 @@ impl PlantTask {
                     self.carry_out(effects);
                     (changed, next) = (true, Instant::now());
                 }
+                Some(deed) = deeds.recv() => self.keep(vec![Record::Action(deed)]),
                 saved = saved(&mut self.saving) => {
                     self.take_saved(saved);
                     changed = true;

@@ -5,8 +5,10 @@
 //! thread drains, flushes and ends.
 
 pub mod session;
+mod door;
 mod sets;
 pub mod teller;
 pub mod io;
 
-pub use session::Session;
+pub use door::{Command, Entrance};
+pub use session::{Request, Session};

@@ -1,12 +1,16 @@
-//! What one terminal holds of a station: facts coming in, orders and questions going out.
+//! What one terminal holds of a station: facts coming in, requests going out. The same in one process and over the socket.
 
 use std::sync::Arc;
 
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::{
+    access::{OrderRequest, Standing, Wish},
     history::io::Query,
-    plant::{Snapshot, command::Order},
+    plant::{
+        Snapshot,
+        command::{Command, OrderId},
+    },
     sim::io::Port,
 };
 
@@ -18,14 +22,52 @@ use crate::{
 pub struct Session {
     /// The latest snapshot only.
     pub snapshots: watch::Receiver<Arc<Snapshot>>,
-    /// Orders; a full queue is a refusal.
-    pub orders: mpsc::Sender<Order>,
-    /// Questions to the history; a full queue is a refusal.
-    pub queries: mpsc::Sender<Query>,
+    /// Who sits here and what he may.
+    pub standing: watch::Receiver<Arc<Standing>>,
+    /// Requests; a full queue is a refusal.
+    pub requests: mpsc::Sender<(u32, Request)>,
     /// Number of this terminal, the first part of its order ids.
     pub terminal: u32,
-    /// Who sits there.
-    pub operator: Arc<str>,
     /// The simulation behind the plant; a real plant has none.
     pub drill: Option<Port>,
+}
+
+/// What a terminal asks of its station.
+#[derive(Debug)]
+pub enum Request {
+    /// An order to the plant. Its outcome is seen in a later snapshot, also that it was not permitted.
+    Order(OrderRequest),
+    /// A question to the history.
+    Ask(Query),
+    /// A wish about people or the station.
+    Wish(Wish, oneshot::Sender<Result<(), String>>),
+}
+
+impl Session {
+    /// Hands a request to the station; `Err` says why not.
+    pub fn send(&self, request: Request) -> Result<(), &'static str> {
+        self.requests.try_send((self.terminal, request)).map_err(|error| match error {
+            mpsc::error::TrySendError::Full(_) => "station too busy",
+            mpsc::error::TrySendError::Closed(_) => "station has ended",
+        })
+    }
+
+    /// Gives an order without note and signature; its outcome is seen in a later snapshot.
+    pub fn order(&self, number: u32, command: Command) -> Result<OrderId, &'static str> {
+        let id = OrderId { terminal: self.terminal, number };
+        self.send(Request::Order(OrderRequest::new(id, command)))?;
+        Ok(id)
+    }
+
+    /// Asks the history.
+    pub fn ask(&self, query: Query) -> Result<(), &'static str> {
+        self.send(Request::Ask(query))
+    }
+
+    /// Wishes, and waits for the answer.
+    pub async fn wish(&self, wish: Wish) -> Result<(), String> {
+        let (reply, answer) = oneshot::channel();
+        self.send(Request::Wish(wish, reply))?;
+        answer.await.unwrap_or_else(|_| Err("the station has ended".to_owned()))
+    }
 }

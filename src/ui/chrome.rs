@@ -140,7 +140,8 @@ fn header_parts(model: &Model, cx: &Cx) -> Vec<(usize, String, Style)> {
     } else {
         (0, clock(cx.now, &cx.def().time_zone), theme.normal())
     };
-    let mut parts = vec![time, (9, fit(&model.operator, 12), theme.dim())];
+    let who = model.standing.who.as_ref().map_or("not logged in", |who| &who.user);
+    let mut parts = vec![time, (9, fit(who, 12), theme.dim())];
     if let Some(status) = cx.drill {
         parts.push(demo_words(cx, status));
         parts.extend(over_words(cx, status));

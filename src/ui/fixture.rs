@@ -224,3 +224,13 @@ fn start(tag: &str) -> f64 {
         _ => 0.0,
     }
 }
+
+/// `tech1`, who may do everything.
+pub fn standing() -> Arc<crate::access::Standing> {
+    use crate::{
+        access::{Standing, Who},
+        plant::role::Role,
+    };
+    let who = Who { user: "tech1".into(), role: Role::Supervisor, must_change: false };
+    Arc::new(Standing { who: Some(who), view: true, password_chars_min: 15, ..Standing::default() })
+}

@@ -21,10 +21,10 @@ use tokio::{
 
 use super::{AskId, Effect, Model, Msg, tabs::Tab, theme::Theme, update, view};
 use crate::{
+    access::Wish,
     history::{HistoryError, Question, io::Query},
-    plant::command::Order,
     sim::{drill, io::Port},
-    station::session::Session,
+    station::{Request, Session},
 };
 use screen::{Screen, own};
 
@@ -77,7 +77,8 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     let (outbox, inbox) = mpsc::channel(INBOX);
     let mut session = session;
     let snapshot = session.snapshots.borrow_and_update().clone();
-    let mut model = Model::new(snapshot, options.theme, session.terminal, Arc::clone(&session.operator));
+    let standing = session.standing.borrow_and_update().clone();
+    let mut model = Model::new(snapshot, options.theme, session.terminal, standing);
     model.drill = session.drill.as_mut().map(|port| port.status.borrow_and_update().clone());
     let screen = Screen::raise()?;
     Loop { session, model, screen, outbox, redraw_at: None, drawn_at: None, heard_at: Instant::now() }.run(inbox).await
@@ -128,6 +129,10 @@ impl Loop {
                     let snapshot = self.session.snapshots.borrow_and_update().clone();
                     self.take(Msg::Snapshot(snapshot), FRAME)?
                 }
+                Ok(()) = self.session.standing.changed() => {
+                    let standing = self.session.standing.borrow_and_update().clone();
+                    self.take(Msg::Standing(standing), ECHO)?
+                }
                 Some(status) = drilled(&mut self.session.drill) => self.take(Msg::Drill(status), FRAME)?,
                 Some(msg) = inbox.recv() => self.take(msg, FRAME)?,
                 _ = ticks.tick() => {
@@ -161,15 +166,13 @@ impl Loop {
         self.redraw_at = Some(self.redraw_at.map_or(due, |planned| planned.min(due)));
         for effect in effects {
             match effect {
-                Effect::Order(id, command) => {
-                    let order = Order { id, by: Arc::clone(&self.session.operator), command };
-                    let why = match self.session.orders.try_send(order) {
-                        Ok(()) => continue,
-                        Err(mpsc::error::TrySendError::Full(_)) => "station too busy",
-                        Err(mpsc::error::TrySendError::Closed(_)) => "station has ended",
-                    };
-                    own(|| update(&mut self.model, Msg::Undelivered(id, why)));
+                Effect::Order(order) => {
+                    let id = order.id;
+                    if let Err(why) = self.session.send(Request::Order(order)) {
+                        own(|| update(&mut self.model, Msg::Undelivered(id, why)));
+                    }
                 }
+                Effect::Wish(id, wish) => self.wish(id, wish),
                 Effect::Ask(id, question) => self.ask(id, question),
                 Effect::Drill(order) => {
                     if let Some(port) = &self.session.drill {
@@ -187,7 +190,7 @@ impl Loop {
 
     fn ask(&self, id: AskId, question: Question) {
         let (reply, answer) = oneshot::channel();
-        let sent = self.session.queries.try_send(Query { question, reply });
+        let sent = self.session.ask(Query { question, reply });
         let outbox = self.outbox.clone();
         tokio::spawn(async move {
             let answer = match sent {
@@ -196,6 +199,15 @@ impl Loop {
             };
             // A terminal that has left needs no answer.
             let _ = outbox.send(Msg::Answer(id, answer)).await;
+        });
+    }
+
+    fn wish(&self, id: AskId, wish: Wish) {
+        let (session, outbox) = (self.session.clone(), self.outbox.clone());
+        tokio::spawn(async move {
+            let answer = session.wish(wish).await;
+            // A terminal that has left needs no answer.
+            let _ = outbox.send(Msg::Granted(id, answer)).await;
         });
     }
 

@@ -22,6 +22,7 @@ use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
 use crate::{
+    access::{OrderRequest, Standing, Wish},
     history::{Answer, HistoryError, Question},
     plant::{
         command::{Command, OrderId, OrderStatus, Outcome},
@@ -61,8 +62,8 @@ pub struct Model {
     pub watch: Option<Watch>,
     /// Number of this terminal.
     pub terminal: u32,
-    /// Who sits here.
-    pub operator: Arc<str>,
+    /// Who sits here and what he may.
+    pub standing: Arc<Standing>,
     /// Orders given so far.
     pub ordered: u32,
     /// The simulation behind the plant; `None` at a real one.
@@ -104,6 +105,10 @@ pub enum Msg {
     Resize(u16, u16),
     /// News of the plant.
     Snapshot(Arc<Snapshot>),
+    /// News of who sits here.
+    Standing(Arc<Standing>),
+    /// A wish was granted, or why not.
+    Granted(AskId, Result<(), String>),
     /// News of the simulation.
     Drill(Arc<drill::Status>),
     /// The history answered.
@@ -123,7 +128,9 @@ pub enum Msg {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
     /// Give the station an order.
-    Order(OrderId, Command),
+    Order(OrderRequest),
+    /// Wish something of the station; answered by [`Msg::Granted`].
+    Wish(AskId, Wish),
     /// Ask the history.
     Ask(AskId, Question),
     /// Let something go wrong in the simulation, or mend it.
@@ -208,7 +215,7 @@ impl<'a> Cx<'a> {
 
 impl Model {
     /// A terminal that has just attached.
-    pub fn new(snapshot: Arc<Snapshot>, theme: Theme, terminal: u32, operator: Arc<str>) -> Model {
+    pub fn new(snapshot: Arc<Snapshot>, theme: Theme, terminal: u32, standing: Arc<Standing>) -> Model {
         let tabs = Tabs::new(&snapshot);
         Model {
             snapshot,
@@ -219,7 +226,7 @@ impl Model {
             clock: Clock::default(),
             watch: None,
             terminal,
-            operator,
+            standing,
             ordered: 0,
             drill: None,
         }
@@ -266,6 +273,11 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
         }
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
+        Msg::Standing(standing) => {
+            model.standing = standing;
+            Vec::new()
+        }
+        Msg::Granted(id, answer) => with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer)),
         Msg::Drill(status) => {
             model.drill = Some(status);
             Vec::new()
@@ -397,7 +409,7 @@ fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
                 let id = OrderId { terminal: model.terminal, number: model.ordered };
                 let changed_at = model.clock.phase;
                 model.watch = Some(Watch { id, command: command.clone(), status: None, changed_at, undelivered: None });
-                effects.push(Effect::Order(id, command));
+                effects.push(Effect::Order(OrderRequest::new(id, command)));
             }
             Act::Do(effect) => effects.push(effect),
         }

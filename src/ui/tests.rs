@@ -3,8 +3,6 @@
 mod keys;
 mod screens;
 
-use std::sync::Arc;
-
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::{Terminal, backend::TestBackend, buffer::Buffer};
 
@@ -12,7 +10,7 @@ use super::{Effect, Model, Msg, fixture::Fixture, theme::Theme, update, view};
 use crate::plant::command::Command;
 
 pub fn model(fixture: &Fixture, theme: Theme) -> Model {
-    let mut model = Model::new(fixture.snapshot(), theme, 1, Arc::from("tech1"));
+    let mut model = Model::new(fixture.snapshot(), theme, 1, crate::ui::fixture::standing());
     update(&mut model, Msg::Resize(80, 24));
     model
 }
@@ -52,7 +50,8 @@ pub fn type_keys(model: &mut Model, keys: &str) -> Vec<Effect> {
 
 pub fn order_of(effects: &[Effect]) -> Option<&Command> {
     effects.iter().find_map(|effect| match effect {
-        Effect::Order(_, command) => Some(command),
+        Effect::Order(order) => Some(&order.command),
+        Effect::Wish(..) => None,
         Effect::Ask(..) | Effect::Drill(_) | Effect::SaveReport { .. } | Effect::Redraw | Effect::Quit => None,
     })
 }

@@ -191,7 +191,7 @@ fn measured_station<T>(def: Arc<PlantDef>, over: Duration, look: impl Fn() -> T)
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
         let history = folder.path().join("bench.duckdb");
         let options = station::Options { def, clock: Clock::real(), history, connectors, file: None };
-        let mut running = station::start(options).unwrap();
+        let running = station::start(options).unwrap();
         let mut session = running.session("bench");
         // The first second opens ports and files.
         tokio::time::sleep(Duration::from_secs(1)).await;

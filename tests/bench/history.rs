@@ -29,6 +29,7 @@ fn tag(id: u16) -> TagDef {
 
 fn tank() -> Arc<PlantDef> {
     Arc::new(PlantDef {
+        access: Default::default(),
         name: "tank".into(),
         title: "Water tank".into(),
         time_zone: TimeZone::UTC,

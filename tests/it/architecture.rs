@@ -6,7 +6,8 @@ use std::{
 };
 
 /// Modules in reading order; a module may use only what stands before it.
-const LINE: [&str; 9] = ["plant", "profile", "bus", "sim", "report", "history", "station", "ui", "cli"];
+const LINE: [&str; 9] =
+    ["plant", "profile", "bus", "sim", "report", "history", "access", "station", "attach", "ui", "cli"];
 
 fn sources() -> Vec<(PathBuf, String)> {
     fn walk(folder: &Path, found: &mut Vec<(PathBuf, String)>) {

@@ -9,13 +9,14 @@ use std::{
 
 use jiff::Timestamp;
 use sightglass::{
+    access::OrderRequest,
     bus::{
         frame::with_crc,
         io::{clock::Clock, transport::Connector},
     },
     plant::{
         PlantDef, Snapshot,
-        command::{Command, Order, OrderId},
+        command::{Command, OrderId},
         def::{LineDef, LineId, TagId},
         tag::{Access, Poll},
     },
@@ -25,7 +26,7 @@ use sightglass::{
         io::{Service, WorldHandle, serve_stream},
         world::World,
     },
-    station::{self, Session},
+    station::{self, Request, Session},
 };
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
@@ -114,7 +115,7 @@ impl Plant {
         let connectors = def.lines.iter().map(|line| plug(&world, line)).collect();
         let options =
             station::io::Options { def: def.clone(), clock, history: history.to_owned(), connectors, file: None };
-        let mut station = station::io::start(options).unwrap();
+        let station = station::io::start(options).unwrap();
         let every = def.tags.iter().filter(|tag| matches!(tag.poll, Poll::Every(_))).map(|tag| tag.id).collect();
         let session = station.session("test");
         Plant { def: def.clone(), world, session, polled: every, truth: BTreeMap::new(), _station: station }
@@ -251,14 +252,14 @@ async fn check(golden: Golden<'_>) {
         connectors: vec![Connector::Memory(streams)],
         file: None,
     };
-    let mut station = station::io::start(options).unwrap();
+    let station = station::io::start(options).unwrap();
     let session = station.session("test");
     tokio::time::sleep(Duration::from_secs(5)).await;
     for (number, (short, value)) in golden.writes.iter().enumerate() {
         let tag = def.tag_named(&full(short)).unwrap();
         let id = OrderId { terminal: session.terminal, number: number as u32 };
         let command = Command::Write { tag, value: *value };
-        session.orders.try_send(Order { id, by: session.operator.clone(), command }).unwrap();
+        session.send(Request::Order(OrderRequest::new(id, command))).unwrap();
         tokio::time::sleep(Duration::from_secs(10)).await;
     }
     let asked: Vec<Vec<u8>> = asked.lock().unwrap().clone();

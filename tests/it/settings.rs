@@ -4,10 +4,11 @@ use std::{fs, path::Path, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use sightglass::{
+    access::OrderRequest,
     bus::io::{clock::Clock, transport::Connector},
     plant::{
         PlantDef, Snapshot,
-        command::{Command, Order, OrderId, Outcome, Refusal},
+        command::{Command, OrderId, Outcome, Refusal},
         def::{LineDef, LineId, Serial, Transport},
         snapshot::DeviceState,
     },
@@ -17,7 +18,7 @@ use sightglass::{
         rig::Rig,
         world::World,
     },
-    station::{self, Session},
+    station::{self, Request, Session},
 };
 use tokio::sync::mpsc;
 
@@ -55,7 +56,7 @@ async fn until(session: &mut Session, what: &str, so: impl Fn(&Snapshot) -> bool
 
 async fn order(session: &mut Session, number: u32, command: Command) -> Outcome {
     let id = OrderId { terminal: session.terminal, number };
-    session.orders.try_send(Order { id, by: session.operator.clone(), command }).unwrap();
+    session.send(Request::Order(OrderRequest::new(id, command))).unwrap();
     let of = move |snapshot: &Snapshot| snapshot.orders.iter().find(|order| order.id == id).cloned();
     until(session, "the order has ended", |snapshot| {
         of(snapshot).is_some_and(|order| order.outcome != Outcome::Pending)
@@ -82,7 +83,7 @@ async fn settings_that_were_tried_out_are_in_the_plant_file_after_they_were_save
     let text = profile::text_of("tank", &Search::shipped()).unwrap();
     fs::write(&path, &text).unwrap();
     let (def, file) = profile::load_with_file(&path, &Search::shipped()).unwrap();
-    let mut station = start(&def, file, &folder.path().join("tank.duckdb"));
+    let station = start(&def, file, &folder.path().join("tank.duckdb"));
     let mut session = station.session("anna");
     until(&mut session, "all answer", all_answer).await;
 
@@ -115,7 +116,7 @@ async fn settings_that_were_tried_out_are_in_the_plant_file_after_they_were_save
 async fn a_plant_without_a_file_says_that_nothing_can_be_saved() {
     let folder = folder();
     let (def, file) = profile::load_with_file(Path::new("tank"), &Search::shipped()).unwrap();
-    let mut station = start(&def, file, &folder.path().join("tank.duckdb"));
+    let station = start(&def, file, &folder.path().join("tank.duckdb"));
     let mut session = station.session("anna");
     let outcome = order(&mut session, 1, Command::SaveSettings(L1)).await;
     let Outcome::Refused(Refusal::NotSaved(why)) = outcome else { panic!("{outcome:?}") };

@@ -5,6 +5,7 @@ use std::{path::Path, process::Command, sync::Arc, time::Duration};
 
 use jiff::{Timestamp, civil::date, tz::TimeZone};
 use sightglass::{
+    access::OrderRequest,
     bus::io::{clock::Clock, transport::Connector},
     history::{
         Answer, Question,
@@ -12,7 +13,7 @@ use sightglass::{
     },
     plant::{
         PlantDef,
-        command::{Command as Wish, Order, OrderId, Outcome},
+        command::{Command as Wish, OrderId, Outcome},
         def::{CsvDialect, LineId},
     },
     profile::{self, Search},
@@ -22,7 +23,7 @@ use sightglass::{
         rig::Rig,
         world::World,
     },
-    station::{self, Session},
+    station::{self, Request, Session},
 };
 use tokio::sync::{mpsc, oneshot};
 
@@ -53,7 +54,7 @@ async fn a_shift_of_eight_hours_is_reported_truly() {
     let start = date(2026, 3, 2).at(5, 58, 0, 0).to_zoned(zone).unwrap().timestamp();
     let clock = Clock::starting_at(start, 1.0);
 
-    let mut station = start_on_simulation(&def, clock, &history);
+    let station = start_on_simulation(&def, clock, &history);
     let session = station.session("anna");
     wait(&session, clock, 2 * 3600).await;
     write(&session, &def, "TIC-1.SV", 80.0, 1).await;
@@ -134,7 +135,7 @@ async fn wait(session: &Session, clock: Clock, seconds: u64) {
         clock.sleep(Duration::from_secs(60)).await;
         let (reply, answer) = oneshot::channel();
         let question = Question::Journal { from: Timestamp::UNIX_EPOCH, to: Timestamp::MAX, limit: 1 };
-        session.queries.try_send(Query { question, reply }).unwrap();
+        session.ask(Query { question, reply }).unwrap();
         let (done, taken_in) = std::sync::mpsc::channel();
         std::thread::spawn(move || done.send(answer.blocking_recv().is_ok()));
         assert!(taken_in.recv().unwrap(), "the history answers");
@@ -148,7 +149,7 @@ async fn write(session: &Session, def: &PlantDef, tag: &str, value: f64, number:
 /// Sends an order and waits for its good end.
 async fn order(session: &Session, command: Wish, number: u32) {
     let id = OrderId { terminal: session.terminal, number };
-    session.orders.try_send(Order { id, by: session.operator.clone(), command }).unwrap();
+    session.send(Request::Order(OrderRequest::new(id, command))).unwrap();
     let mut snapshots = session.snapshots.clone();
     let outcome = loop {
         let status = snapshots.borrow_and_update().orders.iter().find(|order| order.id == id).cloned();

@@ -14,7 +14,7 @@ use crate::{
     plant::{
         def::{DeviceId, Priority, TagId},
         line_minute::LineMinute,
-        record::{ActionRecord, AlarmRecord, AlarmStep},
+        record::{ActionRecord, AlarmRecord, AlarmStep, Seal},
         sample::{Cause, Quality, Sample},
         tag::Decimals,
     },
@@ -313,7 +313,15 @@ fn action(row: &Row) -> duckdb::Result<ActionRecord> {
         old: maybe_shared(row, 4)?,
         new: maybe_shared(row, 5)?,
         outcome: shared(row, 6)?,
+        from: maybe_shared(row, 7)?.unwrap_or_default(),
+        note: maybe_shared(row, 8)?,
+        seal: seal(row.get(9)?, row.get(10)?),
     })
+}
+
+/// The seal of a deed; `None` for one that never came into the book.
+fn seal(number: Option<u64>, hash: Option<Vec<u8>>) -> Option<Seal> {
+    Some(Seal { number: number?, hash: hash?.try_into().ok()? })
 }
 
 fn line_minute(row: &Row) -> duckdb::Result<LineMinute> {

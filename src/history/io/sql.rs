@@ -8,7 +8,7 @@
 /// `value` is a DOUBLE because a FLOAT would turn 123456.7 into 123456.703. `quality` is `Quality::code`.
 ///
 /// `utc` of `line_minute` is the end of the minute; a line goes by its name, as everything that outlives the plant file.
-pub const MIGRATIONS: [&str; 2] = [
+pub const MIGRATIONS: [&str; 3] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -25,6 +25,12 @@ CREATE TABLE line_minute (
     timeouts UINTEGER NOT NULL, corrupt UINTEGER NOT NULL, exceptions UINTEGER NOT NULL, retries UINTEGER NOT NULL,
     late UINTEGER NOT NULL, missed UINTEGER NOT NULL, sent_bytes UINTEGER NOT NULL, received_bytes UINTEGER NOT NULL,
     utilisation FLOAT NOT NULL, reply_p99_ms FLOAT, reply_max_ms FLOAT);
+",
+    "
+ALTER TABLE operator_action ADD COLUMN from_where VARCHAR;
+ALTER TABLE operator_action ADD COLUMN note VARCHAR;
+ALTER TABLE operator_action ADD COLUMN number UBIGINT;
+ALTER TABLE operator_action ADD COLUMN hash BLOB;
 ",
 ];
 
@@ -96,7 +102,7 @@ pub fn restore() -> String {
 }
 
 /// Deeds in a span.
-const DEED: &str = "utc, by_whom, action, target, old_value, new_value, outcome";
+const DEED: &str = "utc, by_whom, action, target, old_value, new_value, outcome, from_where, note, number, hash";
 
 /// Deeds of operators in a span, newest first.
 pub fn actions_newest() -> String {

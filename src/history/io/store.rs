@@ -290,8 +290,10 @@ impl Store {
         });
         let Some(first) = rows.next() else { return Ok(()) };
         let mut appender = self.db.appender("operator_action")?;
-        for ActionRecord { at, by, action, target, old, new, outcome } in std::iter::once(first).chain(rows) {
-            appender.append_row((utc(*at), by, action, target, old, new, outcome))?;
+        for deed in std::iter::once(first).chain(rows) {
+            let ActionRecord { at, by, from, action, target, old, new, outcome, note, seal } = deed;
+            let (number, hash) = (seal.map(|seal| seal.number), seal.map(|seal| seal.hash.to_vec()));
+            appender.append_row(params![utc(*at), by, action, target, old, new, outcome, from, note, number, hash])?;
         }
         appender.flush()
     }

@@ -109,7 +109,7 @@ mod tests {
         plant.on_event(Event::Read { at: at(0), device: TIC, values, texts: Vec::new(), reply, exchange: None });
         assert_eq!(plant.snapshot().device(TIC).diagnosis, None);
         let id = OrderId { terminal: 1, number: 1 };
-        plant.on_order(Order { id, by: "anna".into(), command: Command::Write { tag: SV, value: 1.0 } }, at(1));
+        plant.on_order(Order::new(id, "anna", Command::Write { tag: SV, value: 1.0 }), at(1));
         plant.on_event(Event::Wrote { at: at(1), id: WriteId(1), result: WriteResult::ReadBack(10.0) });
         assert_eq!(plant.snapshot().device(TIC).diagnosis, Some(Reason::Settling));
         assert_eq!(plant.snapshot().device(PLC).diagnosis, None);

@@ -110,7 +110,7 @@ mod tests {
 
     fn order(plant: &mut Plant, number: u32, command: Command) -> Effects {
         let id = OrderId { terminal: 1, number };
-        plant.on_order(Order { id, by: "anna".into(), command }, at(i64::from(number)))
+        plant.on_order(Order::new(id, "anna", command), at(i64::from(number)))
     }
 
     /// Orders other settings and lets the line take them.

@@ -44,7 +44,7 @@ fn running() -> Plant {
 }
 
 fn order(number: u32, command: Command) -> Order {
-    Order { id: OrderId { terminal: 1, number }, by: "anna".into(), command }
+    Order::new(OrderId { terminal: 1, number }, "anna", command)
 }
 
 /// Orders `SV := value`, answers with `result`, and gives the outcome and the raw number that was sent.
@@ -246,7 +246,7 @@ fn what_an_interlock_blocks_is_refused_with_its_reason_and_a_stop_never() {
     let order = |plant: &mut Plant, number: u32, value: f64, second: i64| {
         let id = OrderId { terminal: 1, number };
         let command = Command::Write { tag: fixture::RUN, value };
-        let effects = plant.on_order(Order { id, by: "op".into(), command }, at(second));
+        let effects = plant.on_order(Order::new(id, "op", command), at(second));
         let outcome = plant.snapshot().orders[0].outcome.clone();
         (effects.bus.len(), outcome)
     };

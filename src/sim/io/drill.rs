@@ -188,7 +188,7 @@ impl Task {
                 let Some(orders) = &self.trainer.operator else { return };
                 self.ordered += 1;
                 let id = OrderId { terminal: OPERATOR, number: self.ordered };
-                let order = command::Order { id, by: "operator of the drill".into(), command: deed.command };
+                let order = command::Order::new(id, "operator of the drill", deed.command);
                 if orders.try_send(order).is_err() {
                     tracing::error!("the station has not taken an order of the drill");
                 }

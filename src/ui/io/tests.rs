@@ -10,7 +10,9 @@ use rustix::process::{Pid, Signal, kill_process};
 use tokio::sync::watch;
 
 use super::*;
+use crate::access::{OrderRequest, Standing, Who};
 use crate::{plant::command::Command, ui::fixture::Fixture};
+use crate::{plant::role::Role, station::Request};
 
 /// Set for the process on the pty.
 const CHILD: &str = "SIGHTGLASS_UI_CHILD";
@@ -27,10 +29,13 @@ fn on_the_pty() {
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     runtime.block_on(async {
         let (publish, snapshots) = watch::channel(Fixture::alarm().snapshot());
-        let (orders, mut taken) = mpsc::channel(8);
-        let (queries, _unanswered) = mpsc::channel(8);
+        let (requests, mut taken) = mpsc::channel(8);
+        let who = Who { user: "tech1".into(), role: Role::Supervisor, must_change: false };
+        let (_told, standing) =
+            watch::channel(Arc::new(Standing { who: Some(who), view: true, ..Standing::default() }));
         tokio::spawn(async move {
-            while let Some(Order { command, .. }) = taken.recv().await {
+            while let Some((_, request)) = taken.recv().await {
+                let Request::Order(OrderRequest { command, .. }) = request else { continue };
                 let mut snapshot = Arc::unwrap_or_clone(Fixture::alarm().snapshot());
                 match command {
                     Command::Acknowledge(_) => {
@@ -43,7 +48,7 @@ fn on_the_pty() {
                 publish.send_replace(Arc::new(snapshot));
             }
         });
-        let session = Session { snapshots, orders, queries, terminal: 1, operator: Arc::from("tech1"), drill: None };
+        let session = Session { snapshots, standing, requests, terminal: 1, drill: None };
         run(session, Options { theme: Theme::FULL }).await.expect("left by its operator or a signal");
     });
 }

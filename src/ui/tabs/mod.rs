@@ -185,6 +185,11 @@ impl Tabs {
         }
     }
 
+    /// A wish goes to the tab that wished, shown or not.
+    pub fn on_granted(&mut self, _cx: &Cx, _id: AskId, _answer: Result<(), String>) -> Vec<Act> {
+        Vec::new()
+    }
+
     /// The text that was entered in a window which the shown tab had opened; `Err` keeps the window open and says why.
     pub fn on_text(&mut self, cx: &Cx, text: &str) -> Result<Vec<Act>, String> {
         match self.shown {

@@ -7,6 +7,7 @@ use jiff::SignedDuration;
 
 use super::{model, order_of, screen, type_keys};
 use crate::{
+    access::OrderRequest,
     history::{Answer, HistoryError, Question},
     plant::{
         command::{Command, NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
@@ -324,7 +325,16 @@ fn the_picture_tells_how_a_command_went() {
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
         let command = Command::Write { tag, value: 1.0 };
         let at = snapshot.at;
-        let status = |outcome| OrderStatus { id, by: Arc::from("b"), command, at, old: Some(0.0), outcome };
+        let status = |outcome| OrderStatus {
+            from: "".into(),
+            note: None,
+            id,
+            by: Arc::from("b"),
+            command,
+            at,
+            old: Some(0.0),
+            outcome,
+        };
         snapshot.orders = outcome.map(status).into_iter().collect();
         if disobeys {
             let samples = snapshot.samples.clone();
@@ -450,6 +460,9 @@ fn the_journal_tells_alarms_and_deeds_in_one_order() {
         old: Some("60.0 °C".into()),
         new: Some("70.0 °C".into()),
         outcome: "verified".into(),
+        from: "".into(),
+        note: None,
+        seal: None,
     };
     for effect in effects {
         let Effect::Ask(id, question) = effect else { continue };
@@ -513,10 +526,20 @@ fn the_outcome_of_an_order_is_told_until_it_is_dismissed() {
     let check = |outcome: Outcome, expect: &str| {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, "s60⏎");
-        let Some(Effect::Order(id, command)) = effects.first().cloned() else { panic!("{effects:?}") };
+        let Some(Effect::Order(OrderRequest { id, command, .. })) = effects.first().cloned() else {
+            panic!("{effects:?}")
+        };
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
-        snapshot.orders =
-            vec![OrderStatus { id, by: Arc::from("tech1"), command, at: snapshot.at, old: Some(70.0), outcome }];
+        snapshot.orders = vec![OrderStatus {
+            from: "".into(),
+            note: None,
+            id,
+            by: Arc::from("tech1"),
+            command,
+            at: snapshot.at,
+            old: Some(70.0),
+            outcome,
+        }];
         update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
         // The station forgets old orders; the terminal still knows its own.
         update(&mut model, Msg::Snapshot(fixture.snapshot()));
@@ -540,9 +563,20 @@ fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
     let check = |outcome: Outcome, stays: bool| {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, "s60⏎");
-        let Some(Effect::Order(id, command)) = effects.first().cloned() else { panic!("{effects:?}") };
+        let Some(Effect::Order(OrderRequest { id, command, .. })) = effects.first().cloned() else {
+            panic!("{effects:?}")
+        };
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
-        let status = OrderStatus { id, by: Arc::from("tech1"), command, at: snapshot.at, old: Some(70.0), outcome };
+        let status = OrderStatus {
+            from: "".into(),
+            note: None,
+            id,
+            by: Arc::from("tech1"),
+            command,
+            at: snapshot.at,
+            old: Some(70.0),
+            outcome,
+        };
         snapshot.orders = vec![status];
         update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
         let mut after = |ticks: usize| {
@@ -561,7 +595,7 @@ fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
 fn an_order_that_never_left_is_told() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
     let effects = type_keys(&mut model, "s60⏎");
-    let Some(Effect::Order(id, _)) = effects.first() else { panic!("{effects:?}") };
+    let Some(Effect::Order(OrderRequest { id, .. })) = effects.first() else { panic!("{effects:?}") };
     update(&mut model, Msg::Undelivered(*id, "station too busy"));
     assert!(screen(&mut model, 80, 24).contains("NOT SENT: station too busy"));
 }

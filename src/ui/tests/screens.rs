@@ -363,7 +363,7 @@ fn trouble_of_the_store_is_in_the_header() {
     snapshot.history.lost = 12;
     snapshot.history.trouble = Some("disk full".to_owned());
     snapshot.speed = 60.0;
-    let mut model = Model::new(Arc::new(snapshot), Theme::FULL, 1, Arc::from("tech1"));
+    let mut model = Model::new(Arc::new(snapshot), Theme::FULL, 1, crate::ui::fixture::standing());
     let shown = screen(&mut model, 120, 40);
     let header = shown.lines().next().unwrap_or_default();
     for words in ["history: see 3", "12 records lost", "speed ×60"] {
@@ -372,7 +372,7 @@ fn trouble_of_the_store_is_in_the_header() {
     assert!(shown.lines().nth(2).is_some_and(|banner| banner.contains("history: disk full")), "{shown}");
     let mut alarm = Arc::unwrap_or_clone(Fixture::alarm().snapshot());
     alarm.history.trouble = Some("the disk is full and nothing has been written since 13:10, ".repeat(2));
-    let mut model = Model::new(Arc::new(alarm), Theme::FULL, 1, Arc::from("tech1"));
+    let mut model = Model::new(Arc::new(alarm), Theme::FULL, 1, crate::ui::fixture::standing());
     model.tabs.shown = Tab::Alarms;
     let shown = screen(&mut model, 80, 24);
     assert!(shown.lines().nth(2).is_some_and(|banner| banner.contains("temperature high")), "the alarm first: {shown}");

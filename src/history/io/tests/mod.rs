@@ -72,6 +72,9 @@ fn deed(at: i64) -> ActionRecord {
         old: Some("70.0 °C".into()),
         new: None,
         outcome: "verified".into(),
+        from: "".into(),
+        note: None,
+        seal: None,
     }
 }
 

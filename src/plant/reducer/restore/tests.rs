@@ -76,7 +76,7 @@ fn wish(plant: &Plant, set: Arc<ParameterSet>) -> RestoreWish {
 }
 
 fn order(plant: &mut Plant, number: u32, command: Command) -> Effects {
-    plant.on_order(Order { id: OrderId { terminal: 1, number }, by: "anna".into(), command }, at(1))
+    plant.on_order(Order::new(OrderId { terminal: 1, number }, "anna", command), at(1))
 }
 
 fn outcome(plant: &Plant, number: u32) -> Option<Outcome> {

@@ -105,6 +105,8 @@ fn only_a_verified_write_of_the_right_value_counts() {
     let check = |second: u64, value: f64, outcome: Outcome, expect: Standing| {
         let mut judge = judge(Wish::Written(SV, 60.0));
         let order = OrderStatus {
+            from: "".into(),
+            note: None,
             id: OrderId { terminal: 1, number: 1 },
             by: "tech1".into(),
             command: Command::Write { tag: SV, value },

@@ -179,7 +179,12 @@ fn frames_are_saved_as_text_and_for_wireshark() {
         .into_iter()
         .filter_map(|effect| match effect {
             Effect::SaveReport { tab, path, bytes } => Some((tab, path, bytes)),
-            Effect::Order(..) | Effect::Ask(..) | Effect::Drill(_) | Effect::Redraw | Effect::Quit => None,
+            Effect::Order(..)
+            | Effect::Wish(..)
+            | Effect::Ask(..)
+            | Effect::Drill(_)
+            | Effect::Redraw
+            | Effect::Quit => None,
         })
         .collect();
     let names: Vec<String> = saved.iter().map(|(_, path, _)| path.display().to_string()).collect();

@@ -5,6 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::SignedDuration;
 
 use crate::{
+    access::OrderRequest,
     plant::{
         alarm::AlarmState,
         command::{Command, OrderId, OrderStatus, Outcome, Refusal},
@@ -320,7 +321,9 @@ fn a_name_is_asked_before_a_set_is_saved_and_again_before_one_is_replaced() {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, &format!("4⏎sn{keys}"));
         let orders = effects.into_iter().filter_map(|effect| match effect {
-            Effect::Order(_, Command::SaveSet { name, replace, .. }) => Some((name.to_string(), replace)),
+            Effect::Order(OrderRequest { command: Command::SaveSet { name, replace, .. }, .. }) => {
+                Some((name.to_string(), replace))
+            }
             _ => None,
         });
         (orders.collect::<Vec<_>>(), screen(&mut model, 80, 24))
@@ -365,6 +368,8 @@ fn a_value_that_another_has_changed_meanwhile_is_asked_again() {
     later.set("TIC-1.P", 3.0);
     let mut snapshot = later.snapshot();
     Arc::make_mut(&mut snapshot).orders = vec![OrderStatus {
+        from: "".into(),
+        note: None,
         id: OrderId { terminal: 2, number: 1 },
         by: "boris".into(),
         command: Command::Write { tag: fixture.tag("TIC-1.P"), value: 3.0 },

@@ -26,7 +26,7 @@ struct Stand {
 
 impl Stand {
     fn new(theme: Theme, width: u16, height: u16) -> Stand {
-        let model = Model::new(Fixture::normal().snapshot(), theme, 1, "tech1".into());
+        let model = Model::new(Fixture::normal().snapshot(), theme, 1, crate::ui::fixture::standing());
         let mut stand = Stand { model, asked: Vec::new(), saved: Vec::new() };
         stand.send(Msg::Resize(width, height));
         stand.press("5");
@@ -38,7 +38,12 @@ impl Stand {
             match effect {
                 Effect::Ask(id, question) if id.tab == Tab::Reports => self.asked.push((id, question)),
                 Effect::SaveReport { path, bytes, .. } => self.saved.push((path, bytes)),
-                Effect::Ask(..) | Effect::Order(..) | Effect::Drill(_) | Effect::Redraw | Effect::Quit => {}
+                Effect::Ask(..)
+                | Effect::Order(..)
+                | Effect::Wish(..)
+                | Effect::Drill(_)
+                | Effect::Redraw
+                | Effect::Quit => {}
             }
         }
     }
@@ -117,6 +122,9 @@ fn report(period: Period, full: bool) -> ShiftReport {
         old: Some("60.0 °C".into()),
         new: Some("70.0 °C".into()),
         outcome: "verified".into(),
+        from: "".into(),
+        note: None,
+        seal: None,
     };
     ShiftReport {
         period,

@@ -1,0 +1,208 @@
+//! What a terminal can wish about people and the station, and how it stands there.
+
+use std::{fmt, sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+
+use crate::plant::{
+    command::{Command, OrderId},
+    role::Role,
+};
+
+/// A password on its way: never shown, not even in a log.
+#[derive(Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Secret(pub String);
+
+impl fmt::Debug for Secret {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Secret")
+    }
+}
+
+impl From<&str> for Secret {
+    fn from(text: &str) -> Secret {
+        Secret(text.to_owned())
+    }
+}
+
+/// A wish that is not about the plant. Each is answered: done, or why not in words for the operator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Wish {
+    /// Somebody sits down here.
+    Login {
+        /// His name.
+        user: String,
+        /// His password.
+        password: Secret,
+    },
+    /// He leaves.
+    Logout,
+    /// He goes away for a while; alarms stay to be seen.
+    Lock,
+    /// He is back.
+    Unlock(Secret),
+    /// A key was pressed: the terminal is not idle. Sent twice a minute at most.
+    Active,
+    /// There are no users yet: this is the first.
+    FirstSupervisor {
+        /// His name.
+        user: String,
+        /// His password.
+        password: Secret,
+    },
+    /// Another password for oneself.
+    ChangePassword {
+        /// The present one.
+        old: Secret,
+        /// The new one.
+        new: Secret,
+    },
+    /// Somebody new. He must change the password when he first logs in.
+    AddUser {
+        /// His name.
+        user: String,
+        /// His role.
+        role: Role,
+        /// His first password.
+        password: Secret,
+    },
+    /// Another role.
+    SetRole {
+        /// Whose.
+        user: String,
+        /// Which.
+        role: Role,
+    },
+    /// Shut somebody out, or let him in again; also ends a lock-out.
+    Disable {
+        /// Whom.
+        user: String,
+        /// Out or in.
+        disabled: bool,
+    },
+    /// Remove somebody. What he did stays in the book.
+    DeleteUser {
+        /// Whom.
+        user: String,
+    },
+    /// A new first password for somebody.
+    ResetPassword {
+        /// Whose.
+        user: String,
+        /// The password.
+        password: Secret,
+    },
+    /// A terminal has written a file out of what the station holds.
+    Exported {
+        /// Its name.
+        file: String,
+        /// Its SHA-256, hexadecimal.
+        sha256: String,
+    },
+    /// End the station.
+    Stop,
+    /// Take up the plant file anew.
+    Reload,
+}
+
+/// What is given again for a tag that asks for it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Signature {
+    /// The second person; `None` for the one who writes.
+    pub user: Option<String>,
+    /// The password of that person.
+    pub password: Secret,
+}
+
+/// An order as a terminal gives it: who gives it, the station knows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OrderRequest {
+    /// Chosen by the terminal.
+    pub id: OrderId,
+    /// What.
+    pub command: Command,
+    /// The value of the tag that the operator saw when he confirmed.
+    pub seen: Option<f64>,
+    /// Why, in his words.
+    pub note: Option<Arc<str>>,
+    /// What the tag asks for again.
+    pub sign: Option<Signature>,
+}
+
+impl OrderRequest {
+    /// An order without note and signature.
+    pub fn new(id: OrderId, command: Command) -> OrderRequest {
+        OrderRequest { id, command, seen: None, note: None, sign: None }
+    }
+}
+
+/// Somebody who is logged in.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Who {
+    /// His name.
+    pub user: Arc<str>,
+    /// What he may.
+    pub role: Role,
+    /// He must choose a password of his own before anything else.
+    pub must_change: bool,
+}
+
+/// How a terminal stands with its station. All that a login or users page draws.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Standing {
+    /// Who sits here; `None` before a login.
+    pub who: Option<Who>,
+    /// Locked: only looking, until the password is given.
+    pub locked: bool,
+    /// The process may be seen.
+    pub view: bool,
+    /// There are no users yet: the first Supervisor is asked for.
+    pub first: bool,
+    /// Shown before a login.
+    pub notice: Option<Arc<str>>,
+    /// Fewest characters of a password.
+    pub password_chars_min: u16,
+    /// After so long without a key the terminal is locked; `None` for never.
+    pub idle_lock: Option<Duration>,
+    /// When it will be, if that is near; plant time is not real time, so this is what is left.
+    pub locks_in: Option<Duration>,
+    /// Everybody; only for a Supervisor.
+    pub users: Arc<Vec<UserRow>>,
+    /// Who is attached; only for a Supervisor.
+    pub sessions: Arc<Vec<SessionRow>>,
+    /// The station has gone, and why; set by the terminal's own end of the socket.
+    pub gone: Option<Arc<str>>,
+}
+
+/// A row of the list of users.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct UserRow {
+    /// His name.
+    pub user: Arc<str>,
+    /// What he may.
+    pub role: Role,
+    /// Shut out by a Supervisor.
+    pub disabled: bool,
+    /// Shut out by wrong passwords until then.
+    pub locked_until: Option<Timestamp>,
+    /// He must change his password.
+    pub must_change: bool,
+    /// When he last logged in.
+    pub last_login: Option<Timestamp>,
+}
+
+/// A row of the list of terminals.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SessionRow {
+    /// Its number.
+    pub terminal: u32,
+    /// Who sits there.
+    pub user: Option<Arc<str>>,
+    /// `pts/3 from 10.0.0.5, user panel`.
+    pub from: Arc<str>,
+    /// Since when.
+    pub since: Timestamp,
+    /// It is locked.
+    pub locked: bool,
+}

@@ -1,0 +1,79 @@
+//! Who may do what, as the plant file says it: the levels of people, and the rules for logging in.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+/// The level of a person. Each may do what those before it may.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Looks.
+    Viewer,
+    /// Controls the process and acknowledges alarms.
+    Technician,
+    /// Everything.
+    Supervisor,
+}
+
+impl Role {
+    /// Every role, the least first.
+    pub const ALL: [Role; 3] = [Role::Viewer, Role::Technician, Role::Supervisor];
+    /// The word in TOML, SQL, CSV and on screen.
+    pub fn word(self) -> &'static str {
+        match self {
+            Role::Viewer => "viewer",
+            Role::Technician => "technician",
+            Role::Supervisor => "supervisor",
+        }
+    }
+    /// The role of a word.
+    pub fn from_word(word: &str) -> Option<Role> {
+        Role::ALL.into_iter().find(|role| role.word() == word)
+    }
+}
+
+/// What must be given again to write a tag.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Sign {
+    /// The password of the one who writes.
+    Password,
+    /// Name and password of a second person who may write too.
+    SecondPerson,
+}
+
+/// The rules for logging in: the table `[access]` of a plant file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AccessDef {
+    /// Shown before anybody logs in (IEC 62443-4-2 CR 1.12).
+    pub notice: Option<String>,
+    /// The process may be seen without logging in; alarms always can.
+    pub view: bool,
+    /// Fewest characters of a password (NIST SP 800-63B rev 4: 15 where it stands alone).
+    pub password_chars_min: u16,
+    /// Wrong tries in a row that lock an account out.
+    pub tries_max: u16,
+    /// For how long.
+    pub lock_out: Duration,
+    /// A terminal whose keys rest for so long is locked; zero for never.
+    pub idle_lock: Duration,
+    /// Terminals that may be attached at once.
+    pub sessions_max: u16,
+    /// Users of the operating system who need no password here, and what they may: the socket tells who they are.
+    pub trusted: Vec<(String, Role)>,
+}
+
+impl Default for AccessDef {
+    fn default() -> AccessDef {
+        AccessDef {
+            notice: None,
+            view: false,
+            password_chars_min: 15,
+            tries_max: 5,
+            lock_out: Duration::from_secs(300),
+            idle_lock: Duration::from_secs(900),
+            sessions_max: 32,
+            trusted: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! The task between terminals and plant: lets through what the gate permits, and tells every terminal how it stands.
+
+use std::{
+    collections::BTreeMap,
+    sync::{
+        Arc,
+        atomic::{AtomicU32, Ordering},
+    },
+    time::Duration,
+};
+
+use tokio::{
+    sync::{mpsc, oneshot, watch},
+    time::MissedTickBehavior,
+};
+
+use super::session::{Request, Session};
+use crate::{
+    access::{Effect, Gate, Peer, Standing},
+    bus::io::clock::Clock,
+    history::{HistoryError, io::Query},
+    plant::{Snapshot, command::Order, record::ActionRecord},
+};
+
+/// Requests of all terminals that may wait; more are refused.
+const REQUESTS: usize = 256;
+/// Terminals that may come at once.
+const KNOCKS: usize = 16;
+/// Wishes for the station as a whole that may wait.
+pub const COMMANDS: usize = 4;
+/// Real time between two looks at the clock: idle terminals, ends of lock-outs, terminals that have gone.
+const TICK: Duration = Duration::from_millis(500);
+
+/// A terminal comes.
+#[derive(Debug)]
+pub struct Knock {
+    /// Its number.
+    pub terminal: u32,
+    /// Where it is.
+    pub peer: Peer,
+    /// Where it hears how it stands. When nobody listens there any more it has gone.
+    pub standing: watch::Sender<Arc<Standing>>,
+}
+
+/// What a terminal has wished of the station as a whole.
+#[derive(Debug)]
+pub enum Command {
+    /// To end.
+    Stop,
+    /// To take up the plant file anew, and where the outcome is told.
+    Reload(oneshot::Sender<Result<(), String>>),
+}
+
+/// The ways out of the door.
+#[derive(Debug)]
+pub struct Ways {
+    /// To the plant.
+    pub orders: mpsc::Sender<Order>,
+    /// To the history.
+    pub queries: mpsc::Sender<Query>,
+    /// To the book of deeds.
+    pub deeds: mpsc::Sender<ActionRecord>,
+    /// To whoever has started the station.
+    pub commands: mpsc::Sender<Command>,
+}
+
+/// Where terminals come in: cheap to clone, for whoever listens for them.
+#[derive(Debug, Clone)]
+pub struct Entrance {
+    /// The latest snapshot only.
+    pub snapshots: watch::Receiver<Arc<Snapshot>>,
+    knocks: mpsc::Sender<Knock>,
+    requests: mpsc::Sender<(u32, Request)>,
+    terminals: Arc<AtomicU32>,
+}
+
+impl Entrance {
+    /// The entrance, and what comes in by it.
+    pub fn new(
+        snapshots: watch::Receiver<Arc<Snapshot>>,
+    ) -> (Entrance, mpsc::Receiver<Knock>, mpsc::Receiver<(u32, Request)>) {
+        let (knocks, knocked) = mpsc::channel(KNOCKS);
+        let (requests, requested) = mpsc::channel(REQUESTS);
+        (Entrance { snapshots, knocks, requests, terminals: Arc::default() }, knocked, requested)
+    }
+
+    /// Attaches a terminal. Until it hears how it stands it may nothing; where too many come at once it never will.
+    pub fn attach(&self, peer: Peer) -> Session {
+        let terminal = self.terminals.fetch_add(1, Ordering::Relaxed) + 1;
+        let (told, standing) = watch::channel(Arc::new(Standing::default()));
+        if let Err(error) = self.knocks.try_send(Knock { terminal, peer, standing: told }) {
+            tracing::error!(%error, "a terminal was not let in");
+        }
+        let (snapshots, requests) = (self.snapshots.clone(), self.requests.clone());
+        Session { snapshots, standing, requests, terminal, drill: None }
+    }
+}
+
+/// Sole owner of the gate.
+pub struct Door {
+    gate: Gate,
+    clock: Clock,
+    ways: Ways,
+    terminals: BTreeMap<u32, watch::Sender<Arc<Standing>>>,
+    tickets: BTreeMap<u64, oneshot::Sender<Result<(), String>>>,
+    last_ticket: u64,
+}
+
+impl Door {
+    /// A door that nobody has come to.
+    pub fn new(gate: Gate, clock: Clock, ways: Ways) -> Door {
+        Door { gate, clock, ways, terminals: BTreeMap::new(), tickets: BTreeMap::new(), last_ticket: 0 }
+    }
+
+    /// Runs until the station stops.
+    pub async fn run(
+        mut self,
+        mut knocks: mpsc::Receiver<Knock>,
+        mut requests: mpsc::Receiver<(u32, Request)>,
+        mut stopped: watch::Receiver<bool>,
+    ) {
+        let mut tick = tokio::time::interval(TICK);
+        tick.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        loop {
+            tokio::select! {
+                biased;
+                _ = stopped.wait_for(|stopped| *stopped) => break,
+                Some(knock) = knocks.recv() => {
+                    self.terminals.insert(knock.terminal, knock.standing);
+                    let effects = self.gate.open(knock.terminal, knock.peer, self.clock.now());
+                    self.carry_out(effects);
+                }
+                Some((terminal, request)) = requests.recv() => self.take(terminal, request),
+                _ = tick.tick() => {
+                    let gone: Vec<u32> =
+                        self.terminals.iter().filter(|(_, end)| end.is_closed()).map(|(id, _)| *id).collect();
+                    for terminal in gone {
+                        self.terminals.remove(&terminal);
+                        let effects = self.gate.close(terminal, self.clock.now());
+                        self.carry_out(effects);
+                    }
+                    let effects = self.gate.tick(self.clock.now());
+                    self.carry_out(effects);
+                }
+            }
+        }
+    }
+
+    fn take(&mut self, terminal: u32, request: Request) {
+        let now = self.clock.now();
+        match request {
+            Request::Order(order) => {
+                let effects = self.gate.order(terminal, order, now);
+                self.carry_out(effects);
+            }
+            Request::Ask(query) => match self.gate.may_ask(terminal, &query.question) {
+                Ok(()) => {
+                    if let Err(error) = self.ways.queries.try_send(query) {
+                        let (mpsc::error::TrySendError::Full(query) | mpsc::error::TrySendError::Closed(query)) = error;
+                        let _ = query.reply.send(Err(HistoryError::Engine("too busy, ask again".to_owned())));
+                    }
+                }
+                // A terminal that has left needs no answer.
+                Err(why) => drop(query.reply.send(Err(HistoryError::Engine(why)))),
+            },
+            Request::Wish(wish, reply) => {
+                self.last_ticket += 1;
+                self.tickets.insert(self.last_ticket, reply);
+                let effects = self.gate.wish(terminal, self.last_ticket, wish, now);
+                self.carry_out(effects);
+            }
+        }
+    }
+
+    fn carry_out(&mut self, effects: Vec<Effect>) {
+        for effect in effects {
+            match effect {
+                Effect::Order(order) => {
+                    if let Err(error) = self.ways.orders.try_send(order) {
+                        // The terminal sees that its order has no outcome.
+                        tracing::error!(%error, "an order did not reach the plant");
+                    }
+                }
+                Effect::Record(deed) => {
+                    if let Err(error) = self.ways.deeds.try_send(deed) {
+                        tracing::error!(%error, "a deed did not reach the book");
+                    }
+                }
+                Effect::Reply(ticket, answer) => self.reply(ticket, answer),
+                Effect::Standing(terminal) => {
+                    if let Some(end) = self.terminals.get(&terminal) {
+                        end.send_replace(Arc::new(self.gate.standing(terminal, self.clock.now())));
+                    }
+                }
+                Effect::Stop => self.command(Command::Stop),
+                Effect::Reload(ticket) => {
+                    if let Some(reply) = self.tickets.remove(&ticket) {
+                        self.command(Command::Reload(reply));
+                    }
+                }
+                Effect::HangUp(terminal, why) => {
+                    tracing::warn!(terminal, why, "a terminal was sent away");
+                    self.terminals.remove(&terminal);
+                }
+            }
+        }
+    }
+
+    fn reply(&mut self, ticket: u64, answer: Result<(), String>) {
+        if let Some(reply) = self.tickets.remove(&ticket) {
+            // A terminal that has left needs no answer.
+            let _ = reply.send(answer);
+        }
+    }
+
+    fn command(&mut self, command: Command) {
+        if let Err(error) = self.ways.commands.try_send(command) {
+            tracing::error!(%error, "nobody carries out the wish for the station");
+        }
+    }
+}
