@@ -266,14 +266,17 @@ fn what_a_line_counted_comes_back_minute_by_minute() {
 #[test]
 fn a_history_of_an_older_program_gets_the_new_table_and_keeps_its_rows() {
     let (_folder, db) = folder();
-    let store = open(&db, 0);
-    store.append(&[good(PV, 0, 27.0)]).unwrap();
-    store.db.execute_batch("DROP TABLE line_minute; DELETE FROM schema_version WHERE version = 2").unwrap();
-    drop(store);
+    let old = duckdb::Connection::open(&db).unwrap();
+    old.execute_batch(sql::CREATE_VERSION).unwrap();
+    old.execute_batch(sql::MIGRATIONS[0]).unwrap();
+    old.execute(sql::SET_VERSION, [1]).unwrap();
+    old.execute_batch("INSERT INTO tag VALUES (0, 'TIC-1.PV', '°C'); INSERT INTO sample VALUES ('1970-01-01', 0, 27.0, 0)")
+        .unwrap();
+    drop(old);
     let store = open(&db, 10);
-    store.append(&[Record::Line(minute("L1", 60, 60))]).unwrap();
-    // The value, the end of its curve, the minute.
-    assert_eq!(store.count_rows().unwrap(), 3);
+    store.append(&[Record::Line(minute("L1", 60, 60)), Record::Action(deed(5))]).unwrap();
+    // The value, the end of its curve, the minute, the deed.
+    assert_eq!(store.count_rows().unwrap(), 4);
 }
 
 #[test]
