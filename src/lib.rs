@@ -67,5 +67,6 @@ pub mod report;
 pub mod history;
 pub mod access;
 pub mod station;
+pub mod attach;
 pub mod ui;
 pub mod cli;

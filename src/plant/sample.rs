@@ -40,11 +40,13 @@ pub enum Cause {
     OutOfRange = 10,
     /// The station was not running.
     StationOff = 11,
+    /// There is a value, but nobody who may see it is logged in here. Never stored.
+    Withheld = 12,
 }
 
 impl Cause {
     /// Every cause, in the order of its number.
-    pub const ALL: [Cause; 11] = [
+    pub const ALL: [Cause; 12] = [
         Cause::NotRead,
         Cause::Timeout,
         Cause::Corrupt,
@@ -56,6 +58,7 @@ impl Cause {
         Cause::Unscaled,
         Cause::OutOfRange,
         Cause::StationOff,
+        Cause::Withheld,
     ];
 
     /// A few words for the operator.
@@ -72,6 +75,7 @@ impl Cause {
             Cause::Unscaled => "scale not known",
             Cause::OutOfRange => "out of range",
             Cause::StationOff => "station was off",
+            Cause::Withheld => "shown after login",
         }
     }
 }

@@ -15,7 +15,7 @@ use super::{
     ne107,
     parameter_set::StoredSet,
     restore::Restore,
-    sample::Sample,
+    sample::{Cause, Sample},
     scale,
     tag::Decimals,
     tool::ToolRun,
@@ -63,6 +63,29 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
+    /// A plant of which nothing is known yet.
+    pub fn blank(def: Arc<PlantDef>) -> Snapshot {
+        let (tags, devices) = (def.tags.len(), def.devices.len());
+        Snapshot {
+            at: Timestamp::UNIX_EPOCH,
+            samples: vec![Sample::bad(Cause::NotRead, Timestamp::UNIX_EPOCH); tags],
+            texts: Arc::new(vec![None; tags]),
+            decimals: vec![0; tags],
+            evidence: Arc::new(vec![None; tags]),
+            lines: vec![LineStatus::default(); def.lines.len()],
+            devices: vec![DeviceStatus::default(); devices],
+            alarms: Vec::new(),
+            orders: Vec::new(),
+            watch: Watch::default(),
+            history: HistoryStatus::default(),
+            sets: Arc::default(),
+            restores: Vec::new(),
+            tunings: vec![None; devices],
+            programs: vec![None; devices],
+            speed: 1.0,
+            def,
+        }
+    }
     /// The sample of a tag.
     pub fn sample(&self, tag: TagId) -> Sample {
         self.samples[tag.index()]

@@ -30,7 +30,8 @@ pub struct Frame {
 }
 
 /// The latest frames of a line, oldest first. Cheap to clone: a snapshot carries it.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(from = "Vec<Frame>", into = "Vec<Frame>")]
 pub struct Frames {
     chunks: VecDeque<Arc<[Frame]>>,
     count: usize,
@@ -50,6 +51,30 @@ impl Frames {
         }
     }
 
+    /// Lets go of all frames before this number and appends newer ones, as the line itself has done it elsewhere.
+    pub fn follow(&mut self, number: u64, newer: Vec<Frame>) {
+        self.forget_before(number);
+        if !newer.is_empty() {
+            self.count += newer.len();
+            self.chunks.push_back(newer.into());
+        }
+    }
+
+    fn forget_before(&mut self, number: u64) {
+        while let Some(oldest) = self.chunks.pop_front() {
+            self.count -= oldest.len();
+            let kept: Arc<[Frame]> = match oldest.first() {
+                Some(first) if number <= first.number => oldest,
+                _ => oldest.iter().filter(|frame| number <= frame.number).cloned().collect(),
+            };
+            if !kept.is_empty() {
+                self.count += kept.len();
+                self.chunks.push_front(kept);
+                break;
+            }
+        }
+    }
+
     /// All of them, oldest first.
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = &Frame> {
         self.chunks.iter().flat_map(|chunk| chunk.iter())
@@ -63,6 +88,27 @@ impl Frames {
     /// Has nothing gone over the line yet?
     pub fn is_empty(&self) -> bool {
         self.count == 0
+    }
+}
+
+/// How they are kept in pieces is nobody's business.
+impl PartialEq for Frames {
+    fn eq(&self, other: &Frames) -> bool {
+        self.count == other.count && self.iter().eq(other.iter())
+    }
+}
+
+impl From<Vec<Frame>> for Frames {
+    fn from(frames: Vec<Frame>) -> Frames {
+        let mut all = Frames::default();
+        all.extend(frames);
+        all
+    }
+}
+
+impl From<Frames> for Vec<Frame> {
+    fn from(frames: Frames) -> Vec<Frame> {
+        frames.iter().cloned().collect()
     }
 }
 
@@ -110,5 +156,10 @@ mod tests {
             assert!(frames.len() < FRAMES_MAX + 30);
         }
         assert!(FRAMES_MAX <= frames.len());
+        frames.follow(1_017, vec![frame(1_500)]);
+        let numbers: Vec<u64> = frames.iter().map(|frame| frame.number).collect();
+        assert_eq!((numbers.first(), numbers.last(), numbers.len()), (Some(&1_017), Some(&1_500), frames.len()));
+        frames.follow(2_000, Vec::new());
+        assert!(frames.is_empty());
     }
 }

@@ -46,6 +46,9 @@ pub enum Request {
 impl Session {
     /// Hands a request to the station; `Err` says why not.
     pub fn send(&self, request: Request) -> Result<(), &'static str> {
+        if self.standing.borrow().gone.is_some() {
+            return Err("station has gone");
+        }
         self.requests.try_send((self.terminal, request)).map_err(|error| match error {
             mpsc::error::TrySendError::Full(_) => "station too busy",
             mpsc::error::TrySendError::Closed(_) => "station has ended",

@@ -1,0 +1,148 @@
+//! What has changed from one snapshot to a later one: what travels to a terminal, four times a second at most.
+//!
+//! The first delta is from [`Snapshot::blank`], so there is no second kind of message.
+
+mod line;
+mod list;
+mod readings;
+#[cfg(test)]
+mod tests;
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+
+use crate::plant::{
+    Snapshot,
+    command::OrderStatus,
+    guard::Watch,
+    parameter_set::StoredSet,
+    restore::Restore,
+    snapshot::{ActiveAlarm, DeviceStatus, HistoryStatus},
+    tuning::Tuning,
+};
+use line::LineDelta;
+use list::List;
+use readings::{Evidence, Readings};
+
+/// What has changed between two snapshots of one plant definition.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Delta {
+    at: Timestamp,
+    samples: Vec<Readings>,
+    texts: List<Option<Arc<str>>>,
+    decimals: List<u8>,
+    evidence: Vec<Evidence>,
+    /// Lines that have changed, by place.
+    lines: Vec<(u16, LineDelta)>,
+    devices: List<DeviceStatus>,
+    alarms: List<ActiveAlarm>,
+    orders: List<OrderStatus>,
+    watch: Option<Watch>,
+    history: Option<HistoryStatus>,
+    sets: List<StoredSet>,
+    restores: List<Arc<Restore>>,
+    tunings: List<Option<Arc<Tuning>>>,
+    programs: List<Option<(Duration, bool)>>,
+    speed: Option<f64>,
+}
+
+/// A delta does not belong to the snapshot that it was applied to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("what came does not fit what was there before")]
+pub struct Unfit;
+
+impl Delta {
+    /// What makes `new` of `old`, which has the same definition.
+    pub fn between(old: &Snapshot, new: &Snapshot) -> Delta {
+        // Taken apart, so that nobody adds a field and forgets it here.
+        let Snapshot {
+            at,
+            def,
+            samples,
+            texts,
+            decimals,
+            evidence,
+            lines,
+            devices,
+            alarms,
+            orders,
+            watch,
+            history,
+            sets,
+            restores,
+            tunings,
+            programs,
+            speed,
+        } = new;
+        let lines = def.lines.iter().zip(old.lines.iter().zip(lines)).enumerate();
+        let lines =
+            lines.filter_map(|(place, (def, (old, new)))| Some((place as u16, LineDelta::between(def, old, new)?)));
+        Delta {
+            at: *at,
+            samples: readings::between(&old.samples, samples),
+            texts: shared(&old.texts, texts),
+            decimals: List::between(&old.decimals, decimals),
+            evidence: readings::evidence_between(&old.evidence, evidence),
+            lines: lines.collect(),
+            devices: List::between(&old.devices, devices),
+            alarms: List::between(&old.alarms, alarms),
+            orders: List::between(&old.orders, orders),
+            watch: (old.watch != *watch).then(|| watch.clone()),
+            history: (old.history != *history).then(|| history.clone()),
+            sets: shared(&old.sets, sets),
+            restores: List::between(&old.restores, restores),
+            tunings: List::between(&old.tunings, tunings),
+            programs: List::between(&old.programs, programs),
+            speed: (old.speed != *speed).then_some(*speed),
+        }
+    }
+
+    /// Makes the old snapshot the new one. After an error the snapshot is good for nothing.
+    pub fn apply(self, snapshot: &mut Snapshot) -> Result<(), Unfit> {
+        snapshot.at = self.at;
+        readings::apply(self.samples, &mut snapshot.samples)?;
+        if let Some(texts) = self.texts.made_of(&snapshot.texts)? {
+            snapshot.texts = Arc::new(texts);
+        }
+        self.decimals.apply(&mut snapshot.decimals)?;
+        if !self.evidence.is_empty() {
+            let evidence: &mut Vec<_> = Arc::make_mut(&mut snapshot.evidence);
+            readings::apply_evidence(self.evidence, evidence)?;
+        }
+        for (place, delta) in self.lines {
+            let place = usize::from(place);
+            let line = snapshot.lines.get_mut(place).ok_or(Unfit)?;
+            delta.apply(snapshot.def.lines.get(place).ok_or(Unfit)?, line)?;
+        }
+        self.devices.apply(&mut snapshot.devices)?;
+        self.alarms.apply(&mut snapshot.alarms)?;
+        self.orders.apply(&mut snapshot.orders)?;
+        if let Some(watch) = self.watch {
+            snapshot.watch = watch;
+        }
+        if let Some(history) = self.history {
+            snapshot.history = history;
+        }
+        if let Some(sets) = self.sets.made_of(&snapshot.sets)? {
+            snapshot.sets = Arc::new(sets);
+        }
+        self.restores.apply(&mut snapshot.restores)?;
+        self.tunings.apply(&mut snapshot.tunings)?;
+        self.programs.apply(&mut snapshot.programs)?;
+        if let Some(speed) = self.speed {
+            snapshot.speed = speed;
+        }
+        let def = &snapshot.def;
+        let fits = snapshot.texts.len() == def.tags.len()
+            && snapshot.decimals.len() == def.tags.len()
+            && snapshot.devices.len() == def.devices.len();
+        if fits { Ok(()) } else { Err(Unfit) }
+    }
+}
+
+/// As [`List::between`], at once where both are the same memory.
+fn shared<T: Clone + PartialEq>(old: &Arc<Vec<T>>, new: &Arc<Vec<T>>) -> List<T> {
+    if Arc::ptr_eq(old, new) { List::same() } else { List::between(old, new) }
+}

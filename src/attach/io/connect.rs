@@ -1,0 +1,130 @@
+//! The terminal's end of the socket: a session like that of the same process, which outlives its station.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
+
+use tokio::{
+    net::{
+        UnixStream,
+        unix::{OwnedReadHalf, OwnedWriteHalf},
+    },
+    sync::{mpsc, watch},
+    time::timeout,
+};
+
+use super::{
+    pump::Pump,
+    wire::{self, WireError},
+};
+use crate::{
+    access::Standing,
+    attach::{
+        delta::{Delta, Unfit},
+        own::Own,
+        protocol::{self, Greeting, HELLO_BYTES_MAX, NEWS_BYTES_MAX, Place, Told, Welcome},
+    },
+    plant::Snapshot,
+    station::Session,
+};
+
+/// The station answers a hello within this time, or is taken for stuck.
+pub const WELCOME_MAX: Duration = Duration::from_secs(5);
+/// Requests that may wait for the socket; more are refused.
+pub const REQUESTS: usize = 32;
+
+/// Why there is no session.
+#[derive(Debug, thiserror::Error)]
+pub enum AttachError {
+    /// Nobody listens there.
+    #[error("no station at {}: {error}", .path.display())]
+    NoStation {
+        /// Where.
+        path: PathBuf,
+        /// In the words of the system.
+        error: io::Error,
+    },
+    /// The station sends this terminal away.
+    #[error("{0}")]
+    Refused(String),
+    /// It listens, but says nothing.
+    #[error("the station says nothing for {} s", WELCOME_MAX.as_secs())]
+    Silent,
+    /// What it says is no welcome, or it has closed.
+    #[error("the station is not understood: {0}")]
+    Wire(#[from] WireError),
+    /// What it says first does not fit together.
+    #[error("the station is not understood: {0}")]
+    Unfit(#[from] Unfit),
+}
+
+/// A connection that was welcomed.
+pub(super) struct Line {
+    pub read: OwnedReadHalf,
+    pub write: OwnedWriteHalf,
+    pub welcome: Welcome,
+}
+
+/// Attaches to the station that listens at this path. The session feeds itself from now on: when the station goes, the
+/// standing says so at once, and it is sought again for as long as somebody holds the session.
+pub async fn connect(path: &Path) -> Result<Session, AttachError> {
+    let place = here();
+    let mut line = open(path, &place).await?;
+    let (standing, snapshot) = timeout(WELCOME_MAX, first(&mut line)).await.unwrap_or(Err(AttachError::Silent))?;
+    let Welcome { run, terminal, .. } = line.welcome;
+    let (publish, snapshots) = watch::channel(snapshot);
+    let (stand, standing) = watch::channel(Arc::new(standing));
+    let (requests, requested) = mpsc::channel(REQUESTS);
+    let own = Own::new(run, terminal);
+    tokio::spawn(Pump::new(path.to_owned(), place, own, publish, stand).run(line, requested));
+    Ok(Session { snapshots, standing, requests, terminal, drill: None })
+}
+
+/// Says hello and waits for the welcome.
+pub(super) async fn open(path: &Path, place: &Place) -> Result<Line, AttachError> {
+    let no_station = |error| AttachError::NoStation { path: path.to_owned(), error };
+    let opened = async {
+        let (mut read, mut write) = UnixStream::connect(path).await.map_err(no_station)?.into_split();
+        let hello = protocol::encode_first(&Greeting::own(), Some(place), HELLO_BYTES_MAX);
+        wire::write(&mut write, &hello.map_err(WireError::from)?).await?;
+        let bytes = wire::read(&mut read, NEWS_BYTES_MAX).await?;
+        let welcome = protocol::welcome(&bytes).map_err(WireError::from)?.map_err(AttachError::Refused)?;
+        Ok(Line { read, write, welcome })
+    };
+    timeout(WELCOME_MAX, opened).await.unwrap_or(Err(AttachError::Silent))
+}
+
+/// Standing and snapshot, with which a session begins.
+async fn first(line: &mut Line) -> Result<(Standing, Arc<Snapshot>), AttachError> {
+    let mut standing = Standing::default();
+    loop {
+        match next(&mut line.read).await? {
+            Told::Standing(told) => standing = *told,
+            Told::Delta(delta) => {
+                let mut snapshot = Snapshot::blank(line.welcome.def.clone());
+                Delta::apply(*delta, &mut snapshot)?;
+                return Ok((standing, Arc::new(snapshot)));
+            }
+            // Nothing was asked yet.
+            Told::Answer { .. } | Told::Granted { .. } | Told::Undelivered { .. } => {}
+        }
+    }
+}
+
+/// The next message of the station.
+pub(super) async fn next(read: &mut OwnedReadHalf) -> Result<Told, WireError> {
+    let bytes = wire::read(read, NEWS_BYTES_MAX).await?;
+    Ok(protocol::decode(&bytes, "message of a station")?)
+}
+
+/// Where this terminal is.
+fn here() -> Place {
+    let tty = rustix::termios::ttyname(io::stdin(), Vec::new()).ok();
+    let tty = tty.map(|name| name.to_string_lossy().trim_start_matches("/dev/").to_owned());
+    let variable = |name: &str| std::env::var(name).ok();
+    let ssh = variable("SSH_CONNECTION").and_then(|words| words.split(' ').next().map(str::to_owned));
+    Place { tty, ssh, term: variable("TERM") }.short()
+}

@@ -1,0 +1,9 @@
+//! The socket itself: listening, connecting, and where sockets live.
+
+pub mod connect;
+pub mod find;
+mod pace;
+mod pump;
+mod seat;
+pub mod serve;
+mod wire;

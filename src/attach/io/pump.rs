@@ -1,0 +1,293 @@
+//! Feeds a session from the socket, and seeks the station again when it goes.
+
+use std::{collections::HashMap, path::PathBuf, sync::Arc, time::Duration};
+
+use tokio::{
+    net::unix::{OwnedReadHalf, OwnedWriteHalf},
+    sync::{mpsc, oneshot, watch},
+    time::{Instant, sleep_until},
+};
+
+use super::{
+    connect::{self, AttachError, Line},
+    wire::{self, WireError},
+};
+use crate::{
+    access::Standing,
+    attach::{
+        own::{GONE, Own},
+        protocol::{self, Asked, NEWS_BYTES_MAX, Place, REQUEST_BYTES_MAX, Told, Welcome},
+    },
+    history::{Answer, HistoryError, io::Query},
+    plant::{PlantDef, Snapshot},
+    station::Request,
+};
+
+/// First pause before the station is sought again; doubled each time.
+const PAUSE_MIN: Duration = Duration::from_millis(200);
+/// Longest pause.
+const PAUSE_MAX: Duration = Duration::from_secs(2);
+/// Messages that may wait to be written; more are refused.
+const OUT: usize = 64;
+/// Messages that may wait to be taken in; more wait in the socket.
+const IN: usize = 4;
+
+/// A question or wish that waits for its answer.
+enum Waiting {
+    Ask(oneshot::Sender<Result<Answer, HistoryError>>),
+    Wish(oneshot::Sender<Result<(), String>>),
+}
+
+impl Waiting {
+    /// It will not be answered any more. Whoever has left needs no answer.
+    fn refuse(self, why: &str) {
+        match self {
+            Waiting::Ask(reply) => drop(reply.send(Err(HistoryError::Engine(why.to_owned())))),
+            Waiting::Wish(reply) => drop(reply.send(Err(why.to_owned()))),
+        }
+    }
+}
+
+/// Sole owner of the socket of a terminal.
+pub struct Pump {
+    path: PathBuf,
+    place: Place,
+    own: Own,
+    /// The latest snapshot as the station has it; what is published may differ by own orders.
+    latest: Arc<Snapshot>,
+    publish: watch::Sender<Arc<Snapshot>>,
+    stand: watch::Sender<Arc<Standing>>,
+    waiting: HashMap<u64, Waiting>,
+    last_ticket: u64,
+}
+
+/// Why a connection ended.
+enum Over {
+    /// Nobody holds the session any more.
+    Left,
+    /// The station has gone, in words.
+    Gone(String),
+}
+
+impl Pump {
+    /// A pump that has published the first snapshot.
+    pub fn new(
+        path: PathBuf,
+        place: Place,
+        own: Own,
+        publish: watch::Sender<Arc<Snapshot>>,
+        stand: watch::Sender<Arc<Standing>>,
+    ) -> Pump {
+        let latest = publish.borrow().clone();
+        Pump { path, place, own, latest, publish, stand, waiting: HashMap::new(), last_ticket: 0 }
+    }
+
+    /// Runs for as long as somebody holds the session.
+    pub async fn run(mut self, line: Line, mut requests: mpsc::Receiver<(u32, Request)>) {
+        let mut line = Some(line);
+        loop {
+            let over = match line.take() {
+                Some(Line { read, write, .. }) => self.attend(read, write, &mut requests).await,
+                None => Over::Left,
+            };
+            let Over::Gone(why) = over else { return };
+            tracing::warn!(why, "the station has gone");
+            self.stand.send_modify(|standing| {
+                *standing = Arc::new(Standing { gone: Some(why.into()), ..Standing::clone(standing) });
+            });
+            for (_, waiting) in self.waiting.drain() {
+                waiting.refuse(GONE);
+            }
+            self.own.gone();
+            self.show();
+            line = self.seek(&mut requests).await;
+        }
+    }
+
+    /// Serves one connection to its end.
+    async fn attend(
+        &mut self,
+        read: OwnedReadHalf,
+        write: OwnedWriteHalf,
+        requests: &mut mpsc::Receiver<(u32, Request)>,
+    ) -> Over {
+        let (come, mut told) = mpsc::channel(IN);
+        let (out, go) = mpsc::channel(OUT);
+        let conversation = async {
+            loop {
+                tokio::select! {
+                    Some(told) = told.recv() => if let Err(why) = self.take(told) { break Over::Gone(why) },
+                    request = requests.recv() => match request {
+                        Some((_, request)) => self.send(request, &out),
+                        None => break Over::Left,
+                    },
+                }
+            }
+        };
+        tokio::select! {
+            over = conversation => over,
+            error = listen(read, come) => Over::Gone(error.to_string()),
+            error = speak(write, go) => Over::Gone(error.to_string()),
+        }
+    }
+
+    /// Takes in what the station says.
+    fn take(&mut self, told: Told) -> Result<(), String> {
+        match told {
+            Told::Delta(delta) => {
+                delta.apply(Arc::make_mut(&mut self.latest)).map_err(|error| error.to_string())?;
+                self.show();
+            }
+            Told::Standing(standing) => drop(self.stand.send_replace(Arc::new(*standing))),
+            Told::Answer { ticket, answer } => {
+                if let Some(Waiting::Ask(reply)) = self.waiting.remove(&ticket) {
+                    // Whoever has left needs no answer.
+                    let _ = reply.send(answer);
+                }
+            }
+            Told::Granted { ticket, answer } => {
+                if let Some(Waiting::Wish(reply)) = self.waiting.remove(&ticket) {
+                    // Whoever has left needs no answer.
+                    let _ = reply.send(answer);
+                }
+            }
+            Told::Undelivered { id, why } => {
+                self.own.undelivered(id, why);
+                self.show();
+            }
+        }
+        Ok(())
+    }
+
+    /// Publishes the latest snapshot, with what became of own orders.
+    fn show(&mut self) {
+        let seen = self.own.see(&self.latest);
+        self.publish.send_replace(seen);
+    }
+
+    /// Sends a request on its way, or refuses it.
+    fn send(&mut self, request: Request, out: &mpsc::Sender<Vec<u8>>) {
+        match request {
+            Request::Order(order) => {
+                let (by, at) = (self.by(), self.latest.at);
+                let order = self.own.send(order, by, at);
+                let id = order.id;
+                if let Err(why) = hand_over(&Asked::Order(Box::new(order)), out) {
+                    self.own.undelivered(id, why);
+                    self.show();
+                }
+            }
+            Request::Ask(Query { question, reply }) => {
+                let ticket = self.ticket();
+                self.await_answer(ticket, Waiting::Ask(reply), &Asked::Ask { ticket, question }, out);
+            }
+            Request::Wish(wish, reply) => {
+                let ticket = self.ticket();
+                self.await_answer(ticket, Waiting::Wish(reply), &Asked::Wish { ticket, wish }, out);
+            }
+        }
+    }
+
+    fn await_answer(&mut self, ticket: u64, waiting: Waiting, asked: &Asked, out: &mpsc::Sender<Vec<u8>>) {
+        match hand_over(asked, out) {
+            Ok(()) => drop(self.waiting.insert(ticket, waiting)),
+            Err(why) => waiting.refuse(&why),
+        }
+    }
+
+    fn ticket(&mut self) -> u64 {
+        self.last_ticket += 1;
+        self.last_ticket
+    }
+
+    fn by(&self) -> Arc<str> {
+        self.stand.borrow().who.as_ref().map_or_else(|| "".into(), |who| who.user.clone())
+    }
+
+    /// Seeks the station until it is there again; `None` when nobody holds the session any more.
+    async fn seek(&mut self, requests: &mut mpsc::Receiver<(u32, Request)>) -> Option<Line> {
+        let mut pause = PAUSE_MIN;
+        loop {
+            let at = Instant::now() + pause;
+            pause = (pause * 2).min(PAUSE_MAX);
+            let (path, place) = (self.path.clone(), self.place.clone());
+            let try_again = async {
+                sleep_until(at).await;
+                connect::open(&path, &place).await
+            };
+            tokio::pin!(try_again);
+            let opened = loop {
+                tokio::select! {
+                    opened = &mut try_again => break opened,
+                    request = requests.recv() => self.refuse(request?.1),
+                }
+            };
+            match opened {
+                Ok(line) => {
+                    self.begin_anew(&line.welcome);
+                    return Some(line);
+                }
+                Err(AttachError::NoStation { .. }) => {}
+                // It is there, but does not want this terminal: its operator should know why.
+                Err(error) => self.stand.send_modify(|standing| {
+                    let gone = Some(error.to_string().into());
+                    *standing = Arc::new(Standing { gone, ..Standing::clone(standing) });
+                }),
+            }
+        }
+    }
+
+    fn refuse(&mut self, request: Request) {
+        match request {
+            Request::Order(order) => {
+                let (by, at) = (self.by(), self.latest.at);
+                self.own.refuse(&order, by, at, GONE);
+                self.show();
+            }
+            Request::Ask(query) => Waiting::Ask(query.reply).refuse(GONE),
+            Request::Wish(_, reply) => Waiting::Wish(reply).refuse(GONE),
+        }
+    }
+
+    /// The next delta is from nothing, of this definition; one that is equal stays the very same.
+    fn begin_anew(&mut self, welcome: &Welcome) {
+        self.own.welcomed(welcome.run, welcome.terminal);
+        let def = &self.latest.def;
+        let def = if is_equal(def, &welcome.def) { def.clone() } else { welcome.def.clone() };
+        self.latest = Arc::new(Snapshot::blank(def));
+    }
+}
+
+fn is_equal(one: &PlantDef, other: &PlantDef) -> bool {
+    protocol::encode(one, NEWS_BYTES_MAX) == protocol::encode(other, NEWS_BYTES_MAX)
+}
+
+fn hand_over(asked: &Asked, out: &mpsc::Sender<Vec<u8>>) -> Result<(), String> {
+    let bytes = protocol::encode(asked, REQUEST_BYTES_MAX).map_err(|error| error.to_string())?;
+    out.try_send(bytes).map_err(|error| match error {
+        mpsc::error::TrySendError::Full(_) => "station too busy".to_owned(),
+        mpsc::error::TrySendError::Closed(_) => GONE.to_owned(),
+    })
+}
+
+/// Reads to the end of the connection, which may be at any moment.
+async fn listen(mut read: OwnedReadHalf, come: mpsc::Sender<Told>) -> WireError {
+    loop {
+        let told = match connect::next(&mut read).await {
+            Ok(told) => told,
+            Err(error) => return error,
+        };
+        if come.send(told).await.is_err() {
+            return WireError::Closed;
+        }
+    }
+}
+
+async fn speak(mut write: OwnedWriteHalf, mut go: mpsc::Receiver<Vec<u8>>) -> WireError {
+    while let Some(bytes) = go.recv().await {
+        if let Err(error) = wire::write(&mut write, &bytes).await {
+            return error;
+        }
+    }
+    WireError::Closed
+}

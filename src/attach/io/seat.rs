@@ -1,0 +1,237 @@
+//! One attached terminal: what it asks goes in, what it may see goes out, and neither waits for the other.
+
+use std::{sync::Arc, time::Duration};
+
+use tokio::{
+    io::{AsyncRead, AsyncWrite},
+    sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot},
+    time::{Instant, sleep_until, timeout},
+};
+
+use super::{
+    pace::Pace,
+    wire::{self, WireError},
+};
+use crate::{
+    access::{OrderRequest, Standing, Wish},
+    attach::{
+        check,
+        delta::Delta,
+        protocol::{self, Asked, Greeting, NEWS_BYTES_MAX, ProtocolError, REQUEST_BYTES_MAX, Told, Welcome},
+        sight,
+    },
+    history::{HistoryError, Question, io::Query},
+    plant::{PlantDef, Snapshot, command::Outcome},
+    station::{Request, Session},
+};
+
+/// Real time between two snapshots to one terminal.
+pub const SNAPSHOT_EVERY: Duration = Duration::from_millis(250);
+/// A terminal that takes nothing for so long is let go.
+pub const STUCK_MAX: Duration = Duration::from_secs(300);
+/// Questions and wishes of one terminal that may wait for their answers.
+const IN_FLIGHT_MAX: usize = 16;
+/// So long a newcomer may wait to hear how it stands.
+const STANDING_MAX: Duration = Duration::from_secs(2);
+
+/// Nobody ends well: there is always a reason.
+type Never = std::convert::Infallible;
+
+/// An answer on its way to the terminal. It gives its place in flight back only when it has left.
+type Reply = (Told, Option<OwnedSemaphorePermit>);
+
+/// Serves a terminal until either side ends; says why it ended.
+pub async fn serve<R, W>(read: R, write: W, session: Session, run: u64) -> Ended
+where
+    R: AsyncRead + Unpin,
+    W: AsyncWrite + Unpin,
+{
+    let def = session.snapshots.borrow().def.clone();
+    let (replies, answered) = mpsc::channel(IN_FLIGHT_MAX);
+    let in_flight = Arc::new(Semaphore::new(IN_FLIGHT_MAX));
+    let asking = Asking { session: session.clone(), def: def.clone(), replies, in_flight };
+    let telling = Telling { write, session, def };
+    tokio::select! {
+        Err(ended) = asking.run(read) => ended,
+        Err(ended) = telling.run(run, answered) => ended,
+        else => Ended::StationEnded,
+    }
+}
+
+/// Why a terminal is no longer served.
+#[derive(Debug, thiserror::Error)]
+pub enum Ended {
+    /// It closed, or broke the rules.
+    #[error("{0}")]
+    Wire(#[from] WireError),
+    /// It does not read.
+    #[error("has taken nothing for {} s", STUCK_MAX.as_secs())]
+    Stuck,
+    /// It may not stay, or the station has ended.
+    #[error("sent away by the station")]
+    SentAway,
+    /// The station has ended.
+    #[error("the station has ended")]
+    StationEnded,
+    /// The station has another plant now.
+    #[error("the plant file was taken up anew")]
+    OtherPlant,
+}
+
+/// The half that listens.
+struct Asking {
+    session: Session,
+    def: Arc<PlantDef>,
+    replies: mpsc::Sender<Reply>,
+    in_flight: Arc<Semaphore>,
+}
+
+impl Asking {
+    /// Takes one message after the other, no faster than a person asks. What waits, waits in the terminal.
+    async fn run(self, mut read: impl AsyncRead + Unpin) -> Result<Never, Ended> {
+        let mut pace = Pace::new();
+        loop {
+            let bytes = wire::read(&mut read, REQUEST_BYTES_MAX).await?;
+            let asked = protocol::decode(&bytes, "message of a terminal").map_err(WireError::from)?;
+            pace.step().await;
+            match asked {
+                Asked::Order(order) => self.order(*order).await,
+                Asked::Ask { ticket, question } => self.ask(ticket, question).await,
+                Asked::Wish { ticket, wish } => self.wish(ticket, wish).await,
+            }
+        }
+    }
+
+    async fn order(&self, order: OrderRequest) {
+        let id = order.id;
+        let sent = if id.terminal == self.session.terminal {
+            check::command(&self.def, &order.command)
+        } else {
+            Err(format!("an order of terminal {}, this is terminal {}", id.terminal, self.session.terminal))
+        };
+        let sent = sent.and_then(|()| self.session.send(Request::Order(order)).map_err(str::to_owned));
+        if let Err(why) = sent {
+            // Only a terminal that has ended does not hear it.
+            let _ = self.replies.send((Told::Undelivered { id, why }, None)).await;
+        }
+    }
+
+    async fn ask(&self, ticket: u64, question: Question) {
+        let Ok(place) = self.in_flight.clone().acquire_owned().await else { return };
+        let sent = check::question(&self.def, &question);
+        let (reply, answer) = oneshot::channel();
+        let query = Query { question, reply };
+        let sent = sent.and_then(|()| self.session.ask(query).map_err(str::to_owned));
+        let replies = self.replies.clone();
+        tokio::spawn(async move {
+            let answer = match sent {
+                Ok(()) => answer.await.unwrap_or_else(|_| Err(HistoryError::Engine("the store has gone".to_owned()))),
+                Err(why) => Err(HistoryError::Engine(why)),
+            };
+            // Only a terminal that has ended does not hear it.
+            let _ = replies.send((Told::Answer { ticket, answer }, Some(place))).await;
+        });
+    }
+
+    async fn wish(&self, ticket: u64, wish: Wish) {
+        let Ok(place) = self.in_flight.clone().acquire_owned().await else { return };
+        let (reply, answer) = oneshot::channel();
+        let sent = self.session.send(Request::Wish(wish, reply)).map_err(str::to_owned);
+        let replies = self.replies.clone();
+        tokio::spawn(async move {
+            let answer = match sent {
+                Ok(()) => answer.await.unwrap_or_else(|_| Err("the station has ended".to_owned())),
+                Err(why) => Err(why),
+            };
+            // Only a terminal that has ended does not hear it.
+            let _ = replies.send((Told::Granted { ticket, answer }, Some(place))).await;
+        });
+    }
+}
+
+/// The half that speaks.
+struct Telling<W> {
+    write: W,
+    session: Session,
+    def: Arc<PlantDef>,
+}
+
+impl<W: AsyncWrite + Unpin> Telling<W> {
+    /// Welcome, standing, and then the latest snapshot again and again, but never faster than the terminal reads.
+    async fn run(mut self, run: u64, mut answered: mpsc::Receiver<Reply>) -> Result<Never, Ended> {
+        match timeout(STANDING_MAX, self.session.standing.changed()).await {
+            Ok(Ok(())) => {}
+            Ok(Err(_)) => return Err(Ended::SentAway),
+            Err(_) => tracing::warn!(terminal = self.session.terminal, "a terminal does not hear how it stands"),
+        }
+        let welcome = Welcome { run, terminal: self.session.terminal, def: self.def.clone() };
+        let welcome = protocol::encode_first(&Greeting::own(), Some(&welcome), NEWS_BYTES_MAX);
+        self.write(&welcome.map_err(WireError::from)?).await?;
+        self.tell_standing().await?;
+        let mut sent = Arc::new(Snapshot::blank(self.def.clone()));
+        let (mut due, mut next) = (Some(Instant::now()), Instant::now());
+        loop {
+            tokio::select! {
+                biased;
+                Some((told, _place)) = answered.recv() => self.tell(&told).await?,
+                changed = self.session.standing.changed() => {
+                    changed.map_err(|_| Ended::SentAway)?;
+                    self.tell_standing().await?;
+                    due = Some(Instant::now());
+                }
+                changed = self.session.snapshots.changed() => {
+                    changed.map_err(|_| Ended::StationEnded)?;
+                    let snapshot = self.session.snapshots.borrow_and_update().clone();
+                    due = Some(if self.has_news_of_own(&sent, &snapshot) { Instant::now() } else { next });
+                }
+                () = sleep_until(due.unwrap_or(next)), if due.is_some() => {
+                    sent = self.tell_snapshot(&sent).await?;
+                    (due, next) = (None, Instant::now() + SNAPSHOT_EVERY);
+                }
+            }
+        }
+    }
+
+    /// What the terminal has ordered itself is told at once.
+    fn has_news_of_own(&self, sent: &Snapshot, snapshot: &Snapshot) -> bool {
+        let terminal = self.session.terminal;
+        let own = |snapshot: &'_ Snapshot| -> Vec<(u32, Outcome)> {
+            let own = snapshot.orders.iter().filter(|order| order.id.terminal == terminal);
+            own.map(|order| (order.id.number, order.outcome.clone())).collect()
+        };
+        self.session.standing.borrow().view && own(sent) != own(snapshot)
+    }
+
+    /// Tells the latest snapshot, as far as the terminal may see it; gives it back as what was sent.
+    async fn tell_snapshot(&mut self, sent: &Snapshot) -> Result<Arc<Snapshot>, Ended> {
+        let snapshot = self.session.snapshots.borrow_and_update().clone();
+        if !Arc::ptr_eq(&snapshot.def, &self.def) {
+            return Err(Ended::OtherPlant);
+        }
+        let view = self.session.standing.borrow().view;
+        let seen = if view { snapshot } else { Arc::new(sight::alarms_only(&snapshot)) };
+        self.tell(&Told::Delta(Box::new(Delta::between(sent, &seen)))).await?;
+        Ok(seen)
+    }
+
+    async fn tell_standing(&mut self) -> Result<(), Ended> {
+        let standing: Standing = self.session.standing.borrow_and_update().as_ref().clone();
+        self.tell(&Told::Standing(Box::new(standing))).await
+    }
+
+    async fn tell(&mut self, told: &Told) -> Result<(), Ended> {
+        let bytes = match (protocol::encode(told, NEWS_BYTES_MAX), told) {
+            (Err(error @ ProtocolError::TooLong { .. }), Told::Answer { ticket, .. }) => {
+                let answer = Err(HistoryError::Engine(format!("{error}; choose a shorter period")));
+                protocol::encode(&Told::Answer { ticket: *ticket, answer }, NEWS_BYTES_MAX)
+            }
+            (bytes, _) => bytes,
+        };
+        self.write(&bytes.map_err(WireError::from)?).await
+    }
+
+    async fn write(&mut self, bytes: &[u8]) -> Result<(), Ended> {
+        timeout(STUCK_MAX, wire::write(&mut self.write, bytes)).await.map_err(|_| Ended::Stuck)??;
+        Ok(())
+    }
+}

@@ -1,0 +1,270 @@
+//! What terminal and station say to each other, as bytes: a u32 little-endian length, then a message in postcard.
+//!
+//! Both begin with a [`Greeting`], which never changes its shape, so that a terminal and a station of different versions
+//! can still tell each other so.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use super::delta::Delta;
+use crate::{
+    access::{OrderRequest, Standing, Wish},
+    history::{Answer, HistoryError, Question},
+    plant::{PlantDef, command::OrderId},
+};
+
+/// The number of this protocol; goes up with every change of a message.
+pub const PROTOCOL: u32 = 1;
+/// The version of this program.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// Longest hello, bytes.
+pub const HELLO_BYTES_MAX: usize = 4 * 1024;
+/// Longest message of a terminal, bytes.
+pub const REQUEST_BYTES_MAX: usize = 64 * 1024;
+/// Longest message to a terminal, bytes.
+pub const NEWS_BYTES_MAX: usize = 32 * 1024 * 1024;
+/// Bytes of the length before each message.
+pub const LENGTH_BYTES: usize = 4;
+/// Longest word that a terminal says of itself, characters.
+const WORD_CHARS_MAX: usize = 64;
+
+/// The beginning of the first message of both sides. Its shape stays the same for ever.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Greeting {
+    /// Tells this socket from any other.
+    pub magic: [u8; 4],
+    /// The protocol that it speaks.
+    pub protocol: u32,
+    /// The version of its program.
+    pub version: String,
+    /// Of a station: why the terminal cannot stay, in words for its operator. Nothing follows then.
+    pub sorry: Option<String>,
+}
+
+/// Where a terminal is, as it says itself; it follows the greeting of a terminal.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Place {
+    /// `pts/3`; `None` for a script.
+    pub tty: Option<String>,
+    /// The address that its SSH connection comes from.
+    pub ssh: Option<String>,
+    /// `xterm-256color`.
+    pub term: Option<String>,
+}
+
+/// What the station tells a terminal that may stay; it follows the greeting of the station.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Welcome {
+    /// Which run of the station this is: another one counts terminals anew.
+    pub run: u64,
+    /// The number of this terminal.
+    pub terminal: u32,
+    /// The plant. Every delta is of this definition.
+    pub def: Arc<PlantDef>,
+}
+
+/// What a terminal says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Asked {
+    /// An order to the plant.
+    Order(Box<OrderRequest>),
+    /// A question to the history.
+    Ask {
+        /// Comes back with the answer.
+        ticket: u64,
+        /// The question.
+        question: Question,
+    },
+    /// A wish about people or the station.
+    Wish {
+        /// Comes back with the answer.
+        ticket: u64,
+        /// The wish.
+        wish: Wish,
+    },
+}
+
+/// What a station says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Told {
+    /// The plant has changed.
+    Delta(Box<Delta>),
+    /// How the terminal stands.
+    Standing(Box<Standing>),
+    /// What the history says.
+    Answer {
+        /// Of the question.
+        ticket: u64,
+        /// The answer.
+        answer: Result<Answer, HistoryError>,
+    },
+    /// What became of a wish.
+    Granted {
+        /// Of the wish.
+        ticket: u64,
+        /// Done, or why not.
+        answer: Result<(), String>,
+    },
+    /// An order did not reach the plant.
+    Undelivered {
+        /// Which.
+        id: OrderId,
+        /// Why.
+        why: String,
+    },
+}
+
+/// Bytes that are no message.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ProtocolError {
+    /// The message is longer than is permitted.
+    #[error("a message of {bytes} bytes, expected at most {max}")]
+    TooLong {
+        /// Its length.
+        bytes: usize,
+        /// What is permitted.
+        max: usize,
+    },
+    /// Nothing that this protocol knows.
+    #[error("{bytes} bytes that are no {expected}")]
+    Garbled {
+        /// How many there were.
+        bytes: usize,
+        /// What was expected.
+        expected: &'static str,
+    },
+    /// Whoever is at the other end is of another version.
+    #[error("{0}")]
+    OtherVersion(String),
+}
+
+impl Greeting {
+    /// Of this program.
+    pub fn own() -> Greeting {
+        Greeting { magic: *b"sgls", protocol: PROTOCOL, version: VERSION.to_owned(), sorry: None }
+    }
+
+    /// Of a station that sends a terminal away.
+    pub fn sorry(why: impl Into<String>) -> Greeting {
+        Greeting { sorry: Some(why.into()), ..Greeting::own() }
+    }
+}
+
+/// A message with its length before it.
+pub fn encode<T: Serialize>(message: &T, max: usize) -> Result<Vec<u8>, ProtocolError> {
+    let bytes = postcard::to_extend(message, vec![0; LENGTH_BYTES]).expect("our messages are plain data");
+    with_length(bytes, max)
+}
+
+/// The first message of either side: a greeting, and what follows it.
+pub fn encode_first<T: Serialize>(greeting: &Greeting, rest: Option<&T>, max: usize) -> Result<Vec<u8>, ProtocolError> {
+    let mut bytes = postcard::to_extend(greeting, vec![0; LENGTH_BYTES]).expect("our messages are plain data");
+    if let Some(rest) = rest {
+        bytes = postcard::to_extend(rest, bytes).expect("our messages are plain data");
+    }
+    with_length(bytes, max)
+}
+
+fn with_length(mut bytes: Vec<u8>, max: usize) -> Result<Vec<u8>, ProtocolError> {
+    let length = bytes.len() - LENGTH_BYTES;
+    if max < length {
+        return Err(ProtocolError::TooLong { bytes: length, max });
+    }
+    bytes[..LENGTH_BYTES].copy_from_slice(&(length as u32).to_le_bytes());
+    Ok(bytes)
+}
+
+/// The length of the message that follows.
+pub fn length(bytes: [u8; LENGTH_BYTES], max: usize) -> Result<usize, ProtocolError> {
+    let length = u32::from_le_bytes(bytes) as usize;
+    if length <= max { Ok(length) } else { Err(ProtocolError::TooLong { bytes: length, max }) }
+}
+
+/// The message in these bytes, which are all of it.
+pub fn decode<T: DeserializeOwned>(bytes: &[u8], expected: &'static str) -> Result<T, ProtocolError> {
+    match postcard::take_from_bytes(bytes) {
+        Ok((message, [])) => Ok(message),
+        Ok(_) | Err(_) => Err(ProtocolError::Garbled { bytes: bytes.len(), expected }),
+    }
+}
+
+/// Where the terminal is that has sent this first message.
+pub fn hello(bytes: &[u8]) -> Result<Place, ProtocolError> {
+    let (greeting, rest) = greeted(bytes, "hello of a terminal")?;
+    if let Some(why) = other_version((&greeting.version, greeting.protocol), (VERSION, PROTOCOL)) {
+        return Err(ProtocolError::OtherVersion(why));
+    }
+    decode(rest, "hello of a terminal")
+}
+
+/// What the station says first: welcome, or why not.
+pub fn welcome(bytes: &[u8]) -> Result<Result<Welcome, String>, ProtocolError> {
+    let (greeting, rest) = greeted(bytes, "welcome of a station")?;
+    if let Some(why) = greeting.sorry {
+        return Ok(Err(one_line(&why, 4 * WORD_CHARS_MAX)));
+    }
+    if let Some(why) = other_version((VERSION, PROTOCOL), (&greeting.version, greeting.protocol)) {
+        return Err(ProtocolError::OtherVersion(why));
+    }
+    Ok(Ok(decode(rest, "welcome of a station")?))
+}
+
+fn greeted<'a>(bytes: &'a [u8], expected: &'static str) -> Result<(Greeting, &'a [u8]), ProtocolError> {
+    match postcard::take_from_bytes::<Greeting>(bytes) {
+        Ok((greeting, rest)) if greeting.magic == Greeting::own().magic => Ok((greeting, rest)),
+        Ok(_) | Err(_) => Err(ProtocolError::Garbled { bytes: bytes.len(), expected }),
+    }
+}
+
+/// Two versions of the program do not talk: what one of them calls a value might be another to the other.
+fn other_version(terminal: (&str, u32), station: (&str, u32)) -> Option<String> {
+    (terminal != station).then(|| {
+        let (version, protocol) = (one_line(terminal.0, WORD_CHARS_MAX), terminal.1);
+        let (stations, speaks) = (one_line(station.0, WORD_CHARS_MAX), station.1);
+        format!(
+            "this terminal is version {version} (protocol {protocol}), the station is version {stations} (protocol \
+             {speaks}): log in again after the update"
+        )
+    })
+}
+
+impl Place {
+    /// With no word longer than a station takes.
+    pub fn short(self) -> Place {
+        let short = |word: Option<String>| word.map(|word| one_line(&word, WORD_CHARS_MAX));
+        Place { tty: short(self.tty), ssh: short(self.ssh), term: short(self.term) }
+    }
+
+    /// `pts/3 from 10.0.0.5, user panel, process 123`: what the terminal says, without what could disturb a screen, and
+    /// what the system says.
+    pub fn words(&self, unix_user: Option<&str>, process: Option<u32>) -> String {
+        let said = |word: &Option<String>| {
+            let word = one_line(word.as_deref().unwrap_or_default(), WORD_CHARS_MAX);
+            (!word.is_empty()).then_some(word)
+        };
+        let mut words = said(&self.tty).unwrap_or_else(|| "no terminal".to_owned());
+        if let Some(ssh) = said(&self.ssh) {
+            words += &format!(" from {ssh}");
+        }
+        if let Some(user) = unix_user {
+            words += &format!(", user {}", one_line(user, WORD_CHARS_MAX));
+        }
+        if let Some(process) = process {
+            words += &format!(", process {process}");
+        }
+        words
+    }
+}
+
+/// Text of somebody else on one line: only what is seen, and not too much of it.
+fn one_line(text: &str, chars_max: usize) -> String {
+    let is_seen = |letter: &char| !letter.is_control() && !is_invisible(*letter);
+    // What says where it is must not be able to say who it is.
+    text.chars().filter(is_seen).map(|letter| if letter == ',' { '.' } else { letter }).take(chars_max).collect()
+}
+
+/// Turns the direction of writing, or joins what should not be joined.
+fn is_invisible(letter: char) -> bool {
+    matches!(letter, '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2060}'..='\u{206F}' | '\u{FEFF}')
+}

@@ -1,0 +1,46 @@
+//! What a terminal may see while nobody who may look at the process is logged in: that it is a station, and its alarms.
+
+use std::sync::Arc;
+
+use crate::plant::{
+    Snapshot,
+    guard::Watch,
+    sample::{Cause, Sample},
+    snapshot::{ActiveAlarm, DeviceStatus, LineStatus},
+};
+
+/// Alarms, clock, trouble of the history, and which lines and devices are reached; no value of the process, no text, no
+/// bytes, no order. What is left out is absent, not hidden: it does not leave the station.
+pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
+    let Snapshot { at, def, decimals, lines, devices, alarms, history, speed, .. } = snapshot;
+    let reached = |line: &LineStatus| LineStatus {
+        state: line.state.clone(),
+        since: line.since,
+        lost_since: line.lost_since,
+        ..LineStatus::default()
+    };
+    let answering = |device: &DeviceStatus| DeviceStatus {
+        state: device.state,
+        diagnosis: device.diagnosis,
+        ..DeviceStatus::default()
+    };
+    Snapshot {
+        at: *at,
+        samples: vec![Sample::bad(Cause::Withheld, *at); def.tags.len()],
+        texts: Arc::new(vec![None; def.tags.len()]),
+        decimals: decimals.clone(),
+        evidence: Arc::new(vec![None; def.tags.len()]),
+        lines: lines.iter().map(reached).collect(),
+        devices: devices.iter().map(answering).collect(),
+        alarms: alarms.iter().map(|alarm| ActiveAlarm { value: None, ..alarm.clone() }).collect(),
+        orders: Vec::new(),
+        watch: Watch::default(),
+        history: history.clone(),
+        sets: Arc::default(),
+        restores: Vec::new(),
+        tunings: vec![None; def.devices.len()],
+        programs: vec![None; def.devices.len()],
+        speed: *speed,
+        def: def.clone(),
+    }
+}
