@@ -1,17 +1,26 @@
 //! The command line: one file a subcommand, one place for exit codes.
 
+mod act;
+mod attach;
 mod check;
+mod client;
+mod control;
 mod demo;
 mod drill;
 mod experiments;
+mod export;
 mod frame;
+mod init;
 mod log;
 mod paths;
 mod profiles;
 mod report;
 mod run;
 mod sim;
+mod source;
+mod status;
 mod tools;
+mod unit;
 
 use std::{
     io::IsTerminal,
@@ -21,23 +30,25 @@ use std::{
 
 use clap::{Parser, Subcommand};
 
-use crate::{history::HistoryError, profile, ui};
+use crate::{attach::io::serve, history::HistoryError, profile, ui};
 
 const EXIT_CODES: &str = "\
 Exit codes:
   0  done, or left by the operator
   1  failed while running (the message says why)
   2  wrong arguments, errors in a profile, or bytes that cannot be read
-  3  the history is in use by another process";
+  3  the history is in use by another process
+  4  no station runs here";
 
 /// The control room of a small plant in a terminal: process mimic, trends, alarms, controllers and shift reports over
 /// Modbus RTU and TCP.
 #[derive(Debug, Parser)]
-#[command(version, after_help = EXIT_CODES, args_conflicts_with_subcommands = true, arg_required_else_help = true)]
+#[command(version, after_help = EXIT_CODES, args_conflicts_with_subcommands = true)]
 struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    /// A plant file, or the name of a shipped plant: station and terminal in one process
+    /// A plant file, or the name of a shipped plant: station and terminal in one process, or a terminal at its station if
+    /// that runs. Without it: a terminal at the station that runs here
     #[arg(value_name = "PLANT")]
     plant: Option<String>,
     #[command(flatten)]
@@ -50,6 +61,20 @@ enum Command {
     Demo(demo::Args),
     /// The station alone: polls, judges alarms, keeps the history; no terminal
     Run(run::Args),
+    /// A terminal at a running station; leaving it stops nothing
+    Attach(attach::Args),
+    /// How the running station and its plant stand, for people or as JSON
+    Status(status::Args),
+    /// Acknowledges alarms at the running station
+    Ack(act::AckArgs),
+    /// Writes a tag at the running station and waits until it is verified
+    Write(act::WriteArgs),
+    /// Ends the running station
+    Stop(control::Args),
+    /// Has the running station take up its plant file anew; a file with errors changes nothing
+    Reload(control::Args),
+    /// Prints the systemd unit that runs stations on a panel PC
+    Unit,
     /// Runs a scenario in virtual time and judges it; without a name lists the scenarios
     Drill(drill::Args),
     /// Serves the simulated devices of a plant to other masters, over a pseudo-terminal or TCP
@@ -60,8 +85,10 @@ enum Command {
     Check(check::Args),
     /// Lists the known profiles, or prints one
     Profiles(profiles::Args),
-    /// Writes the report of a shift or period from the history as CSV, while no station has the history open
+    /// Writes the report of a shift or period from the history as CSV, through the station while it runs
     Report(report::Args),
+    /// Writes stored values of tags at a fixed interval as CSV
+    Export(export::Args),
     /// Tells a Modbus frame in words: every byte, CRC and LRC, what is wrong with it
     Frame(frame::Args),
     /// Looks for units on a line: addresses, baud rates, parities
@@ -97,12 +124,16 @@ enum CliError {
     Usage(String),
     #[error(transparent)]
     History(#[from] HistoryError),
-    #[error("{0}\nask it: 5, then e, in the terminal of that station writes the report; or stop it first")]
+    #[error("{0}\nthat is no station of this user that can be asked; stop it first")]
     InUse(HistoryError),
+    #[error(transparent)]
+    Listen(#[from] serve::ListenError),
     #[error(transparent)]
     Ui(#[from] ui::io::UiError),
     #[error("{0}")]
     Failed(String),
+    #[error("{0}\nstart one: `sightglass run PLANT`; or try it out: `sightglass demo`")]
+    NotRunning(String),
     #[error("the station has ended by itself, see the log")]
     StationGone,
     #[error("{what}: {error}")]
@@ -114,7 +145,10 @@ impl CliError {
         match self {
             CliError::Profile(_) | CliError::Usage(_) | CliError::History(HistoryError::Foreign { .. }) => 2,
             CliError::History(HistoryError::Locked { .. }) | CliError::InUse(_) => 3,
+            CliError::Listen(serve::ListenError::Running { .. }) => 3,
+            CliError::NotRunning(_) => 4,
             CliError::History(_)
+            | CliError::Listen(_)
             | CliError::Ui(_)
             | CliError::StationGone
             | CliError::Failed(_)
@@ -127,15 +161,26 @@ impl CliError {
 pub fn main() -> ExitCode {
     let args = Args::parse();
     let result = match args.command {
-        None => run::with_terminal(&args.plant.unwrap_or_default(), &args.station),
+        None => match args.plant {
+            Some(plant) => run::with_terminal(&plant, &args.station),
+            None => attach::main(attach::Args { plant: None }),
+        },
         Some(Command::Demo(args)) => demo::main(args),
         Some(Command::Run(args)) => run::main(args),
+        Some(Command::Attach(args)) => attach::main(args),
+        Some(Command::Status(args)) => status::main(args),
+        Some(Command::Ack(args)) => act::ack(args),
+        Some(Command::Write(args)) => act::write(args),
+        Some(Command::Stop(args)) => control::stop(args),
+        Some(Command::Reload(args)) => control::reload(args),
+        Some(Command::Unit) => unit::main(),
         Some(Command::Drill(args)) => drill::main(args),
         Some(Command::Sim(args)) => sim::main(args),
         Some(Command::Experiments(args)) => experiments::main(args),
         Some(Command::Check(args)) => check::main(args),
         Some(Command::Profiles(args)) => profiles::main(args),
         Some(Command::Report(args)) => report::main(args),
+        Some(Command::Export(args)) => export::main(args),
         Some(Command::Frame(args)) => frame::main(args),
         Some(Command::Scan(args)) => tools::scan::main(args),
         Some(Command::Probe(args)) => tools::probe::main(args),

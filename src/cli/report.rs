@@ -1,14 +1,14 @@
-//! `sightglass report`: the report of a shift or period from the history as CSV, while no station has it open.
+//! `sightglass report`: the report of a shift or period from the history as CSV, through the station while it runs.
 
 use std::{io::Write, path::PathBuf, sync::Arc};
 
 use crate::{
-    history::{HistoryError, io::store::Store},
-    plant::def::CsvDialect,
-    report::{ask, csv},
+    history::{Answer, HistoryError, Question},
+    plant::{PlantDef, def::CsvDialect},
+    report::{Period, ask, csv},
 };
 
-use super::{CliError, StationArgs, load, run, say};
+use super::{CliError, StationArgs, client, in_runtime, load, say, source::Source};
 
 /// Arguments of `report`.
 #[derive(Debug, clap::Args)]
@@ -37,22 +37,25 @@ pub struct Args {
     #[arg(long)]
     record: bool,
     #[command(flatten)]
+    login: client::Login,
+    #[command(flatten)]
     station: StationArgs,
 }
 
-/// Reads the store and writes the report.
+/// Asks for the report and writes it.
 pub fn main(args: Args) -> Result<(), CliError> {
     let def = Arc::new(load(&args.plant, &args.station)?);
     let now = jiff::Timestamp::now();
     let period = ask::period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref(), now)
         .map_err(|error| CliError::Usage(error.to_string()))?;
-    let store = Store::open_read_only(&run::history_file(&def, &args.station), &def).map_err(|error| match error {
-        error @ HistoryError::Locked { .. } => CliError::InUse(error),
-        other => CliError::History(other),
-    })?;
-    // A demonstration that ran faster than time has stored what is yet to come.
-    let until = store.extent().map_or(now, |(_, last)| last.max(now));
-    let report = store.report(&period, until)?;
+    in_runtime(write(def, period, args))
+}
+
+async fn write(def: Arc<PlantDef>, period: Period, args: Args) -> Result<(), CliError> {
+    let source = Source::open(&def, &args.station, &args.login).await?;
+    let Answer::Report(report) = source.ask(Question::Report { period }).await? else {
+        return Err(CliError::History(HistoryError::Engine("answered another question".into())));
+    };
     let dialect = dialect(def.report.csv, args.separator.as_deref(), args.bom);
     let bytes = match args.record {
         true => csv::record_csv(&report, &def, dialect),
@@ -66,12 +69,13 @@ pub fn main(args: Args) -> Result<(), CliError> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(failed)?;
     }
-    std::fs::write(&path, bytes).map_err(failed)?;
+    std::fs::write(&path, &bytes).map_err(failed)?;
+    source.exported(&path.display().to_string(), &bytes).await?;
     say(&path.display().to_string());
     Ok(())
 }
 
-fn dialect(plant: CsvDialect, separator: Option<&str>, bom: bool) -> CsvDialect {
+pub(super) fn dialect(plant: CsvDialect, separator: Option<&str>, bom: bool) -> CsvDialect {
     let (separator, decimal) = match separator {
         Some(";") => (';', ','),
         Some(_) => (',', '.'),

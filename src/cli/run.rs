@@ -2,17 +2,24 @@
 
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::{
+    signal::unix::{SignalKind, signal},
+    task::JoinHandle,
+};
 
 use crate::{
+    attach::io::{find, serve},
     bus::io::{clock::Clock, transport::Connector},
-    plant::{PlantDef, Snapshot, sample::Quality},
+    plant::{PlantDef, Snapshot},
     profile::PlantFile,
-    station::{Session, io as station, teller},
+    station::{Command, Session, io as station, teller},
     ui,
 };
 
-use super::{CliError, StationArgs, in_runtime, load_with_file, log, paths, say, span};
+use super::{CliError, StationArgs, attach, client, in_runtime, init, load_with_file, log, paths, say, span, status};
+
+/// A plant that is checked, and the file that its settings can be saved into.
+type Plant = (PlantDef, Option<PlantFile>);
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
@@ -31,55 +38,125 @@ pub struct Args {
 
 /// Runs the station until it is told to stop; says on standard output what changes.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let (def, file) = load_with_file(&args.plant, &args.station)?;
-    let def = Arc::new(def);
+    let plant = load_with_file(&args.plant, &args.station)?;
     let _log = log::start(args.station.log.as_deref())?;
     in_runtime(async {
         let clock = Clock::real();
-        let station = start(&def, clock, history_file(&def, &args.station), file)?;
-        say(&format!("{}: {} tags on {} lines", def.title, def.tags.len(), def.lines.len()));
-        let session = station.session("station");
-        let last = follow(session, clock, args.duration).await;
-        if args.print
-            && let Ok(last) = &last
-        {
-            values(last).iter().for_each(|line| say(line));
+        let over = over(clock, args.duration);
+        tokio::pin!(over);
+        let mut plant = plant;
+        let mut listener = listen(&plant.0)?;
+        loop {
+            let def = Arc::new(plant.0);
+            let station = start(&def, clock, history_file(&def, &args.station), plant.1)?;
+            let mut serving = Serving::new(listener, station);
+            say(&format!("{}: {} tags on {} lines", def.title, def.tags.len(), def.lines.len()));
+            let session = serving.station.session("station");
+            init::ready(&def.title);
+            let ended = tokio::select! {
+                ended = follow(session.clone(), clock, None) => ended.map(|_| None),
+                () = &mut over => Ok(None),
+                next = serving.told(|| load_with_file(&args.plant, &args.station)) => Ok(next),
+            };
+            let last = session.snapshots.borrow().clone();
+            drop(session);
+            match &ended {
+                Ok(Some(_)) => init::reloading(),
+                Ok(None) | Err(_) => init::stopping(),
+            }
+            let socket = serving.stop().await?;
+            match ended? {
+                Some(next) => {
+                    say("the plant file is taken up anew");
+                    // A plant of another name has another socket.
+                    listener = if next.0.name == def.name { socket } else { listen(&next.0)? };
+                    plant = next;
+                }
+                None => {
+                    if args.print {
+                        status::tag_lines(&last).iter().for_each(|line| say(line));
+                    }
+                    say("stopped");
+                    return Ok(());
+                }
+            }
         }
-        station.stop().await;
-        say("stopped");
-        last.map(drop)
     })
 }
 
-/// Station and terminal in one process.
+/// Station and terminal in one process; at the station of this plant, if it runs already.
 pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
     let (def, file) = load_with_file(plant, args)?;
     let def = Arc::new(def);
     ui::io::require_terminal()?;
-    let _log = log::start(args.log.as_deref())?;
     in_runtime(async {
+        if args.history.is_none()
+            && let Ok(place) = client::place(Some(&def.name)).await
+        {
+            return attach::at(&place).await;
+        }
+        let _log = log::start(args.log.as_deref())?;
+        let listener = listen(&def)?;
         let station = start(&def, Clock::real(), history_file(&def, args), file)?;
-        let session = station.session(&paths::operator());
-        let result = ui::io::run(session, ui::io::Options::default()).await;
-        station.stop().await;
+        let mut serving = Serving::new(listener, station);
+        let session = serving.station.session(&paths::operator());
+        let result = tokio::select! {
+            result = ui::io::run(session, ui::io::Options::default()) => result,
+            _ = serving.told(|| Err(CliError::Usage("leave this terminal and start it again".to_owned()))) => Ok(()),
+        };
+        serving.stop().await?;
         Ok(result?)
     })
 }
 
-/// One line a tag: name, value with unit, quality, age.
-fn values(snapshot: &Snapshot) -> Vec<String> {
-    let row = |tag: &crate::plant::tag::TagDef| {
-        let sample = snapshot.sample(tag.id);
-        let value =
-            snapshot.text(tag.id).map_or_else(|| "----".into(), |text| format!("{text} {}", snapshot.unit(tag.id)));
-        let quality = match sample.quality {
-            Quality::Good => "good".to_owned(),
-            Quality::Uncertain(cause) => format!("uncertain: {}", cause.words()),
-            Quality::Bad(cause) => format!("bad: {}", cause.words()),
-        };
-        format!("{:20} {:>14}  {quality}  {:.1} s", tag.name, value.trim_end(), snapshot.age(tag.id).as_secs_f64())
-    };
-    snapshot.def.tags.iter().map(row).collect()
+/// The socket of a plant, before anything else: it also keeps a second station of the plant away.
+fn listen(def: &PlantDef) -> Result<serve::Listener, CliError> {
+    let path = find::Places::here()
+        .socket(&def.name)
+        .map_err(|error| CliError::Io { what: "cannot make a socket".into(), error })?;
+    serve::listen(&path).map_err(CliError::from)
+}
+
+/// A station and its socket.
+struct Serving {
+    station: station::Station,
+    /// Gives the socket back when the station has ended.
+    socket: JoinHandle<serve::Listener>,
+}
+
+impl Serving {
+    fn new(listener: serve::Listener, station: station::Station) -> Serving {
+        let entrance = station.entrance().clone();
+        let socket = tokio::spawn(async move {
+            listener.serve(&entrance).await;
+            listener
+        });
+        Serving { station, socket }
+    }
+
+    /// Waits until a terminal has it stopped (`None`) or the plant file taken up anew (`Some`, already checked). A file
+    /// with errors is refused, and everything goes on as it is.
+    async fn told(&mut self, load: impl Fn() -> Result<Plant, CliError>) -> Option<Plant> {
+        loop {
+            match self.station.commands.recv().await {
+                Some(Command::Stop) | None => return None,
+                Some(Command::Reload(reply)) => match load() {
+                    Ok(plant) => {
+                        // A terminal that has left needs no answer.
+                        let _ = reply.send(Ok(()));
+                        return Some(plant);
+                    }
+                    Err(error) => drop(reply.send(Err(error.to_string()))),
+                },
+            }
+        }
+    }
+
+    /// Ends the station; its terminals hear of it by its silence. Gives the socket back.
+    async fn stop(self) -> Result<serve::Listener, CliError> {
+        self.station.stop().await;
+        self.socket.await.map_err(|error| CliError::Failed(format!("the socket ended badly: {error}")))
+    }
 }
 
 /// The history file that the arguments name, or the plant's own.
@@ -102,9 +179,11 @@ fn start(
     Ok(station::start(station::Options { def: def.clone(), clock, history, connectors, file })?)
 }
 
-/// Tells what changes until the time is over, a signal comes, or the station ends; gives the last snapshot.
+/// Tells what changes until the time is over, a signal comes, or the station ends; gives the last snapshot. Feeds the
+/// watchdog of the init system, if there is one, for as long as the lines are polled.
 pub async fn follow(mut session: Session, clock: Clock, duration: Option<Duration>) -> Result<Arc<Snapshot>, CliError> {
     let mut before = session.snapshots.borrow_and_update().clone();
+    let mut watchdog = init::Watchdog::new();
     let end = over(clock, duration);
     tokio::pin!(end);
     let told_to_stop = signalled();
@@ -118,6 +197,7 @@ pub async fn follow(mut session: Session, clock: Clock, duration: Option<Duratio
                     return Err(CliError::StationGone);
                 }
                 let after = session.snapshots.borrow_and_update().clone();
+                watchdog.see(&after);
                 let time = after.at.to_zoned(after.def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S");
                 for line in teller::changes(&before, &after) {
                     say(&format!("{time} {line}"));

@@ -139,7 +139,7 @@ fn record_decimals(report: &ShiftReport, def: &PlantDef) -> u8 {
 
 /// Rows of cells, made equally wide when written.
 #[derive(Default)]
-struct Table(Vec<Vec<String>>);
+pub(super) struct Table(Vec<Vec<String>>);
 
 impl Table {
     fn section(&mut self, title: &str, header: &[&str]) {
@@ -150,11 +150,11 @@ impl Table {
         self.0.push(header.iter().map(|word| plain(*word)).collect());
     }
 
-    fn row(&mut self, cells: Vec<String>) {
+    pub(super) fn row(&mut self, cells: Vec<String>) {
         self.0.push(cells);
     }
 
-    fn write(mut self, dialect: CsvDialect) -> Vec<u8> {
+    pub(super) fn write(mut self, dialect: CsvDialect) -> Vec<u8> {
         let width = self.0.iter().map(Vec::len).max().unwrap_or(0);
         let mut bytes = if dialect.bom { "\u{feff}".as_bytes().to_vec() } else { Vec::new() };
         let mut writer = csv::WriterBuilder::new()
@@ -173,7 +173,7 @@ impl Table {
 
 /// A cell of text from outside. A spreadsheet runs a cell that begins with one of these as a formula: an apostrophe
 /// before it keeps it text.
-fn text(cell: &str) -> String {
+pub(super) fn text(cell: &str) -> String {
     match cell.chars().next() {
         Some('=' | '+' | '-' | '@' | '\t' | '\r') => format!("'{cell}"),
         _ => cell.to_owned(),
@@ -181,12 +181,12 @@ fn text(cell: &str) -> String {
 }
 
 /// A cell of our own making: a number, a time, a word.
-fn plain(cell: impl Into<String>) -> String {
+pub(super) fn plain(cell: impl Into<String>) -> String {
     cell.into()
 }
 
 /// A number with fixed decimals; empty if there is none.
-fn number(value: Option<f64>, decimals: u8, dialect: CsvDialect) -> String {
+pub(super) fn number(value: Option<f64>, decimals: u8, dialect: CsvDialect) -> String {
     let Some(value) = value.filter(|value| value.is_finite()) else { return String::new() };
     let digits = format!("{value:.*}", usize::from(decimals));
     // A value that rounds to nothing has no sign.
@@ -215,7 +215,7 @@ pub(super) fn iso(zone: &TimeZone, at: Timestamp) -> String {
     at.to_zoned(zone.clone()).strftime("%Y-%m-%dT%H:%M:%S%:z").to_string()
 }
 
-fn iso_millis(zone: &TimeZone, at: Timestamp) -> String {
+pub(super) fn iso_millis(zone: &TimeZone, at: Timestamp) -> String {
     at.to_zoned(zone.clone()).strftime("%Y-%m-%dT%H:%M:%S%.3f%:z").to_string()
 }
 

@@ -5,6 +5,7 @@ pub mod ask;
 pub mod hold;
 pub mod figures;
 pub mod csv;
+pub mod export;
 pub mod text;
 #[cfg(test)]
 pub(crate) mod testing;

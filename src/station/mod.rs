@@ -6,6 +6,7 @@
 
 pub mod session;
 mod door;
+pub mod pulse;
 mod sets;
 pub mod teller;
 pub mod io;

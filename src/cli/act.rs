@@ -1,0 +1,129 @@
+//! `sightglass write` and `sightglass ack`: deeds at a running station, with rights, checks and records as on the screen.
+
+use std::sync::Arc;
+
+use crate::plant::{
+    Snapshot,
+    alarm::book::subject_name,
+    command::{Command, Outcome},
+    def::{AlarmId, TagId},
+    orders::outcome_words,
+};
+
+use super::{CliError, client, in_runtime, say};
+
+/// Arguments of `write`.
+#[derive(Debug, clap::Args)]
+pub struct WriteArgs {
+    /// The tag: TIC-1.SV
+    tag: String,
+    /// The new value in the tag's unit, or one of its words
+    #[arg(allow_negative_numbers = true)]
+    value: String,
+    /// The plant, if stations of more than one run here
+    #[arg(long, value_name = "PLANT")]
+    plant: Option<String>,
+    /// Why: goes into the record
+    #[arg(long, value_name = "TEXT")]
+    note: Option<String>,
+    #[command(flatten)]
+    login: client::Login,
+}
+
+/// Arguments of `ack`.
+#[derive(Debug, clap::Args)]
+pub struct AckArgs {
+    /// Tags or devices whose alarms are acknowledged: TIC-1.PV
+    #[arg(required_unless_present = "all")]
+    subjects: Vec<String>,
+    /// Every alarm that waits for it now
+    #[arg(long, conflicts_with = "subjects")]
+    all: bool,
+    /// The plant, if stations of more than one run here
+    #[arg(long, value_name = "PLANT")]
+    plant: Option<String>,
+    /// Why: goes into the record
+    #[arg(long, value_name = "TEXT")]
+    note: Option<String>,
+    #[command(flatten)]
+    login: client::Login,
+}
+
+/// Writes, and tells the outcome; anything but verified is a failure.
+pub fn write(args: WriteArgs) -> Result<(), CliError> {
+    in_runtime(async {
+        let mut session = client::attach(args.plant.as_deref(), &args.login).await?;
+        let snapshot = session.snapshots.borrow().clone();
+        let tag = snapshot
+            .def
+            .tag_named(&args.tag)
+            .ok_or_else(|| CliError::Usage(format!("no tag `{}` in {}", args.tag, snapshot.def.name)))?;
+        let value = value(&snapshot, tag, &args.value).map_err(CliError::Usage)?;
+        let command = Command::Write { tag, value };
+        let status = client::ordered(&mut session, 1, command, None, args.note.as_deref()).await?;
+        let words = |value: Option<f64>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
+        let (old, new, unit) = (words(status.old), words(Some(value)), snapshot.unit(tag));
+        let line = format!("{} {old} → {new} {unit}: {}", args.tag, outcome_words(&status.outcome));
+        match status.outcome {
+            Outcome::Verified | Outcome::Unchanged => {
+                say(&line);
+                Ok(())
+            }
+            Outcome::Pending | Outcome::Refused(_) | Outcome::NotConfirmed(_) | Outcome::Failed(_) => {
+                Err(CliError::Failed(line))
+            }
+        }
+    })
+}
+
+/// Acknowledges alarm after alarm; the first refusal ends it.
+pub fn ack(args: AckArgs) -> Result<(), CliError> {
+    in_runtime(async {
+        let mut session = client::attach(args.plant.as_deref(), &args.login).await?;
+        let snapshot: Arc<Snapshot> = session.snapshots.borrow().clone();
+        let known =
+            |name: &str| snapshot.def.alarms.iter().any(|alarm| subject_name(&snapshot.def, alarm.subject) == name);
+        if let Some(unknown) = args.subjects.iter().find(|name| !known(name)) {
+            return Err(CliError::Usage(format!("nothing called `{unknown}` has an alarm in {}", snapshot.def.name)));
+        }
+        let waiting: Vec<AlarmId> = snapshot
+            .alarms
+            .iter()
+            .filter(|alarm| alarm.state.needs_acknowledgement())
+            .filter(|alarm| {
+                let subject = subject_name(&snapshot.def, snapshot.def.alarm(alarm.id).subject);
+                args.all || args.subjects.iter().any(|name| name == subject)
+            })
+            .map(|alarm| alarm.id)
+            .collect();
+        for (number, id) in (1..).zip(&waiting) {
+            let alarm = snapshot.def.alarm(*id);
+            let command = Command::Acknowledge(*id);
+            let status = client::ordered(&mut session, number, command, None, args.note.as_deref()).await?;
+            let line = format!("{} {}: ", subject_name(&snapshot.def, alarm.subject), alarm.text);
+            if status.outcome != Outcome::Verified {
+                return Err(CliError::Failed(line + &outcome_words(&status.outcome)));
+            }
+            say(&(line + "acknowledged"));
+        }
+        if waiting.is_empty() {
+            say("nothing to acknowledge");
+        }
+        Ok(())
+    })
+}
+
+/// A word of the tag, or a number. The station checks range and decimals.
+fn value(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<f64, String> {
+    let def = snapshot.def.tag(tag);
+    let word = def.labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(text));
+    if let Some((value, _)) = word {
+        return Ok(*value as f64);
+    }
+    let labels: Vec<&str> = def.labels.iter().map(|(_, label)| label.as_str()).collect();
+    let expected = if labels.is_empty() { "a number".to_owned() } else { format!("one of {}", labels.join(", ")) };
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(_) | Err(_) => Err(format!("{}: found `{text}`, expected {expected}", def.name)),
+    }
+}

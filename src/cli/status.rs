@@ -1,0 +1,174 @@
+//! `sightglass status`: how the station and its plant stand, for people and for scripts.
+
+use serde_json::{Value, json};
+
+use crate::plant::{
+    Snapshot,
+    alarm::book::subject_name,
+    event::LineState,
+    sample::{Quality, Sample},
+    snapshot::{ActiveAlarm, DeviceState},
+};
+
+use super::{CliError, client, in_runtime, say};
+
+/// Arguments of `status`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The plant, if stations of more than one run here
+    plant: Option<String>,
+    /// For scripts: everything, as JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    login: client::Login,
+}
+
+/// Asks the running station and prints.
+pub fn main(args: Args) -> Result<(), CliError> {
+    in_runtime(async {
+        let session = client::attach(args.plant.as_deref(), &args.login).await?;
+        let snapshot = session.snapshots.borrow().clone();
+        match args.json {
+            true => say(&format!("{:#}", in_json(&snapshot))),
+            false => in_words(&snapshot).iter().for_each(|line| say(line)),
+        }
+        Ok(())
+    })
+}
+
+/// One fact a line: plant, lines, devices, alarms, history, tags.
+fn in_words(snapshot: &Snapshot) -> Vec<String> {
+    let def = &snapshot.def;
+    let time = snapshot.at.to_zoned(def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S");
+    let mut lines = vec![format!("plant    {} ({}) at {time}", def.title, def.name)];
+    for (line, status) in def.lines.iter().zip(&snapshot.lines) {
+        lines.push(format!("line     {:12} {}", line.name, line_words(&status.state)));
+    }
+    for (device, status) in def.devices.iter().zip(&snapshot.devices) {
+        let why = status.diagnosis.map(|reason| format!(": {}", reason.to_string())).unwrap_or_default();
+        lines.push(format!("device   {:12} {}{why}", device.name, device_word(status.state)));
+    }
+    lines.extend(snapshot.alarms.iter().map(|alarm| format!("alarm    {}", alarm_words(snapshot, alarm))));
+    if snapshot.alarms.is_empty() {
+        lines.push("alarm    none".to_owned());
+    }
+    let trouble = snapshot.history.trouble.as_deref().unwrap_or("good");
+    lines.push(format!("history  {trouble}, {} rows, {} lost", snapshot.history.rows, snapshot.history.lost));
+    lines.extend(tag_lines(snapshot).into_iter().map(|line| format!("tag      {line}")));
+    lines
+}
+
+/// One line a tag: name, value with unit, quality, age.
+pub fn tag_lines(snapshot: &Snapshot) -> Vec<String> {
+    let row = |tag: &crate::plant::tag::TagDef| {
+        let sample = snapshot.sample(tag.id);
+        let value =
+            snapshot.text(tag.id).map_or_else(|| "----".into(), |text| format!("{text} {}", snapshot.unit(tag.id)));
+        let quality = match sample.quality {
+            Quality::Good => "good".to_owned(),
+            Quality::Uncertain(cause) => format!("uncertain: {}", cause.words()),
+            Quality::Bad(cause) => format!("bad: {}", cause.words()),
+        };
+        format!("{:20} {:>14}  {quality}  {:.1} s", tag.name, value.trim_end(), snapshot.age(tag.id).as_secs_f64())
+    };
+    snapshot.def.tags.iter().map(row).collect()
+}
+
+fn alarm_words(snapshot: &Snapshot, alarm: &ActiveAlarm) -> String {
+    let def = snapshot.def.alarm(alarm.id);
+    let since = alarm.raised_at.to_zoned(snapshot.def.time_zone.clone()).strftime("%m-%d %H:%M:%S");
+    let subject = subject_name(&snapshot.def, def.subject);
+    format!("{} {:10} {subject} {} since {since}", def.priority.number(), alarm.state.word(), def.text)
+}
+
+fn line_words(state: &LineState) -> String {
+    match state {
+        LineState::Connecting => "connecting".to_owned(),
+        LineState::Connected => "connected".to_owned(),
+        LineState::Disconnected => "closed by an operator".to_owned(),
+        LineState::Testing => "given to a test".to_owned(),
+        LineState::Waiting { why, .. } => format!("not connected: {why}"),
+    }
+}
+
+fn device_word(state: DeviceState) -> &'static str {
+    match state {
+        DeviceState::Unknown => "not asked yet",
+        DeviceState::Answering => "answers",
+        DeviceState::Failing(_) => "fails",
+        DeviceState::Down { .. } => "does not answer",
+    }
+}
+
+/// The same and more: times are UTC, numbers are in the tag's unit, `null` is "not known".
+fn in_json(snapshot: &Snapshot) -> Value {
+    let def = &snapshot.def;
+    let lines = def.lines.iter().zip(&snapshot.lines).map(|(line, status)| {
+        let connected = status.state == LineState::Connected;
+        let counters = &status.counters;
+        json!({
+            "name": line.name, "connected": connected, "state": line_words(&status.state),
+            "requests": counters.requests, "ok": counters.ok, "timeouts": counters.timeouts,
+            "corrupt": counters.corrupt, "exceptions": counters.exceptions,
+        })
+    });
+    let devices = def.devices.iter().zip(&snapshot.devices).map(|(device, status)| {
+        json!({
+            "name": device.name, "unit": device.unit, "state": device_word(status.state),
+            "answering": status.state == DeviceState::Answering,
+            "ne107": status.diagnosis.map(|reason| reason.to_string()),
+            "reply_ms": status.reply.map(|reply| reply.as_secs_f64() * 1e3),
+            "ok": status.ok, "failed": status.failed,
+        })
+    });
+    let alarms = snapshot.alarms.iter().map(|alarm| {
+        let found = def.alarm(alarm.id);
+        json!({
+            "subject": subject_name(def, found.subject), "text": found.text, "priority": found.priority.number(),
+            "state": alarm.state.word(), "raised_at": alarm.raised_at.to_string(),
+            "returned_at": alarm.returned_at.map(|at| at.to_string()), "value": alarm.value,
+        })
+    });
+    let tags = def.tags.iter().map(|tag| {
+        let Sample { value, quality, at } = snapshot.sample(tag.id);
+        let (word, cause) = match quality {
+            Quality::Good => ("good", None),
+            Quality::Uncertain(cause) => ("uncertain", Some(cause.words())),
+            Quality::Bad(cause) => ("bad", Some(cause.words())),
+        };
+        json!({
+            "name": tag.name, "value": value, "text": snapshot.text(tag.id), "unit": snapshot.unit(tag.id),
+            "quality": word, "cause": cause, "at": at.to_string(), "age_s": snapshot.age(tag.id).as_secs_f64(),
+        })
+    });
+    json!({
+        "plant": def.name, "title": def.title, "at": snapshot.at.to_string(), "speed": snapshot.speed,
+        "lines": lines.collect::<Vec<_>>(), "devices": devices.collect::<Vec<_>>(),
+        "alarms": alarms.collect::<Vec<_>>(), "tags": tags.collect::<Vec<_>>(),
+        "history": {
+            "rows": snapshot.history.rows, "lost": snapshot.history.lost, "trouble": snapshot.history.trouble,
+            "committed_at": snapshot.history.committed_at.map(|at| at.to_string()),
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use jiff::Timestamp;
+
+    use super::*;
+    use crate::plant::{Plant, fixture};
+
+    #[test]
+    fn a_value_that_is_not_known_is_null_and_said_so() {
+        let snapshot = Plant::new(fixture::shared(), Timestamp::UNIX_EPOCH, 1.0).snapshot();
+        let found = in_json(&snapshot);
+        let pv = found["tags"].as_array().and_then(|tags| tags.iter().find(|tag| tag["name"] == "TIC-1.PV"));
+        let pv = pv.expect("the tag is there");
+        assert_eq!((&pv["value"], &pv["quality"]), (&Value::Null, &json!("bad")));
+        let words = in_words(&snapshot);
+        assert!(words.iter().any(|line| line.starts_with("tag      TIC-1.PV") && line.contains("----")), "{words:?}");
+        assert!(words.contains(&"alarm    none".to_owned()));
+    }
+}

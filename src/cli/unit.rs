@@ -1,0 +1,33 @@
+//! `sightglass unit`: the systemd unit that runs stations on a panel PC.
+
+use super::{CliError, say};
+
+/// The unit, with a place for the path of this program.
+const UNIT: &str = include_str!("sightglass@.service");
+
+/// Prints the unit for this very program.
+pub fn main() -> Result<(), CliError> {
+    let exe = std::env::current_exe()
+        .map_err(|error| CliError::Io { what: "cannot tell where this program is".into(), error })?;
+    say(unit(&exe.to_string_lossy()).trim_end());
+    Ok(())
+}
+
+fn unit(exe: &str) -> String {
+    // A space or a per cent sign in a path would be read as something else.
+    let exe = exe.replace('%', "%%");
+    let exe = if exe.contains(' ') { format!("\"{exe}\"") } else { exe };
+    UNIT.replace("@EXE@", &exe)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_unit_names_this_program() {
+        let text = unit("/opt/sight glass/100%");
+        assert!(text.contains("ExecStart=\"/opt/sight glass/100%%\" run /etc/sightglass/%i.toml"), "{text}");
+        assert!(!text.contains("@EXE@"));
+    }
+}

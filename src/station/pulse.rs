@@ -1,0 +1,66 @@
+//! Is the station alive? Judged by what it polls, so that a watchdog is fed by the work and not by a timer.
+
+use std::{sync::Arc, time::Duration};
+
+use crate::plant::{Snapshot, event::LineState, line_report::LineReport};
+
+/// A connected line that has reported nothing for so long (real time) hangs; it reports about once a second.
+const LINE_MAX: Duration = Duration::from_secs(15);
+
+/// What was last heard of each line, and when.
+#[derive(Debug, Default)]
+pub struct Pulse {
+    lines: Vec<(Option<Arc<LineReport>>, Duration)>,
+}
+
+impl Pulse {
+    /// Does every line that is connected still report? `now` is real time since any fixed instant.
+    pub fn beats(&mut self, snapshot: &Snapshot, now: Duration) -> bool {
+        self.lines.resize_with(snapshot.lines.len(), || (None, now));
+        let heard = snapshot.lines.iter().zip(&mut self.lines).map(|(line, (last, since))| {
+            let same = match (&line.report, &*last) {
+                (Some(new), Some(old)) => Arc::ptr_eq(new, old),
+                (None, None) => true,
+                (Some(_), None) | (None, Some(_)) => false,
+            };
+            // Nothing is polled on a line that is closed, waits, or is given to a test.
+            if !same || line.state != LineState::Connected {
+                (*last, *since) = (line.report.clone(), now);
+            }
+            now.saturating_sub(*since) < LINE_MAX
+        });
+        // Every line is looked at: a fold that stops early would forget the others.
+        heard.fold(true, |all, one| all && one)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use jiff::Timestamp;
+
+    use super::*;
+    use crate::plant::{Plant, def::LineId, event::Event, fixture};
+
+    #[test]
+    fn a_connected_line_that_falls_silent_stops_the_heart() {
+        let at = Timestamp::UNIX_EPOCH;
+        let mut plant = Plant::new(fixture::shared(), at, 1.0);
+        let mut pulse = Pulse::default();
+        let mut beats = |plant: &Plant, second| pulse.beats(&plant.snapshot(), Duration::from_secs(second));
+        assert!(beats(&plant, 0) && beats(&plant, 100), "a line that is not connected yet");
+        plant.on_event(Event::Line { at, line: LineId(0), state: LineState::Connected });
+        assert!(beats(&plant, 101));
+        let report = |plant: &mut Plant| {
+            let report = Arc::new(LineReport::new(fixture::plant().lines[0].clone()));
+            plant.on_event(Event::Report { at, line: LineId(0), report });
+        };
+        for second in (102..140).step_by(10) {
+            report(&mut plant);
+            assert!(beats(&plant, second));
+        }
+        assert!(beats(&plant, 146));
+        assert!(!beats(&plant, 147), "15 s after the last report");
+        plant.on_event(Event::Line { at, line: LineId(0), state: LineState::Testing });
+        assert!(beats(&plant, 148));
+    }
+}
