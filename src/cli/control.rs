@@ -1,8 +1,18 @@
 //! `sightglass stop` and `sightglass reload`: wishes for a running station as a whole.
 
-use crate::access::Wish;
+use std::time::Duration;
+
+use crate::{
+    access::Wish,
+    attach::io::find::{self, Found},
+};
 
 use super::{CliError, client, in_runtime, say};
+
+/// A station ends within this time, whatever its disk does.
+const END_MAX: Duration = Duration::from_secs(30);
+/// Time between two looks whether it has.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// Arguments of both.
 #[derive(Debug, clap::Args)]
@@ -16,17 +26,32 @@ pub struct Args {
 /// Ends the station: what is stored is stored, the socket is gone.
 pub fn stop(args: Args) -> Result<(), CliError> {
     in_runtime(async {
-        let mut session = client::attach(args.plant.as_deref(), &args.login).await?;
+        let place = client::place(args.plant.as_deref()).await?;
+        let mut session = client::attach(Some(&place.name), &args.login).await?;
         let granted = session.wish(Wish::Stop).await;
         // It tells that it goes by going, sometimes before its answer has left.
         if granted.is_ok() || session.standing.borrow().gone.is_some() {
             let _ = session.standing.wait_for(|standing| standing.gone.is_some()).await;
+            drop(session);
+            gone(&place).await?;
         } else {
             granted.map_err(CliError::Failed)?;
         }
         say("stopped");
         Ok(())
     })
+}
+
+/// Waits until nobody listens at this place any more: then the last record is on disk.
+async fn gone(place: &Found) -> Result<(), CliError> {
+    let end = tokio::time::Instant::now() + END_MAX;
+    while find::Places::here().living().await.contains(place) {
+        if end < tokio::time::Instant::now() {
+            return Err(CliError::Failed(format!("it still stores what it has after {} s", END_MAX.as_secs())));
+        }
+        tokio::time::sleep(LOOK_EVERY).await;
+    }
+    Ok(())
 }
 
 /// Has the station take up its plant file anew; a bad file changes nothing.
