@@ -8,6 +8,7 @@ pub mod session;
 mod door;
 mod sets;
 pub mod teller;
+mod toil;
 pub mod io;
 
 pub use door::{Command, Entrance};
