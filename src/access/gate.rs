@@ -1,14 +1,49 @@
 //! The reducer of people: what a terminal asks comes in, what is permitted goes out. The only place where rights are decided.
 
-use std::{collections::BTreeMap, sync::Arc};
+mod login;
+mod people;
+mod seat;
+mod sign;
+#[cfg(test)]
+mod tests;
+mod work;
+
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{OrderRequest, Standing, Who, Wish};
+use self::{
+    people::Saving,
+    seat::{Refusals, Seat},
+    work::Errand,
+};
+use super::{
+    OrderRequest, SessionRow, Standing, UserRow, Who, Wish, right,
+    tries::Tries,
+    user::{self, Users},
+};
 use crate::{
     history::Question,
-    plant::{PlantDef, command::Order, record::ActionRecord, role::Role},
+    plant::{
+        PlantDef,
+        command::{Order, Refusal},
+        record::ActionRecord,
+        role::Role,
+    },
 };
+
+pub use work::{Job, Outcome, Work};
+
+/// Most characters of what somebody may put on record in his own words.
+const WORDS_MAX: usize = 500;
+/// Places whose refusals are counted apart; what more there are share one count.
+const ORIGINS_MAX: usize = 512;
+/// What was refused too often to be told each time is told so often.
+const TOLD_EVERY: Duration = Duration::from_secs(60);
+/// A lock for want of keys is announced so long before.
+const LOCK_NEAR: Duration = Duration::from_secs(60);
+/// Said where a terminal asks more than it may.
+const TOO_MANY: &str = "too many requests from this terminal, wait a moment";
 
 /// Where a terminal is.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,6 +52,8 @@ pub struct Peer {
     pub from: Arc<str>,
     /// The user of the operating system, as the system says.
     pub unix_user: Option<Arc<str>>,
+    /// It belongs to the station's own process: whoever has started the station sits there.
+    pub own: bool,
 }
 
 /// What must happen because of what was asked.
@@ -30,6 +67,10 @@ pub enum Effect {
     Reply(u64, Result<(), String>),
     /// The standing of this terminal has changed.
     Standing(u32),
+    /// Do this beside, and tell [`Gate::done`]. At most [`work::JOBS_MAX`] are under way or wait.
+    Work(Job, Work),
+    /// Write the people down, and tell [`Gate::saved`]. Never two at a time.
+    Save(Users),
     /// End the station.
     Stop,
     /// Take up the plant file anew; the wish is answered when that is done.
@@ -42,60 +83,422 @@ pub enum Effect {
 #[derive(Debug)]
 pub struct Gate {
     def: Arc<PlantDef>,
-    sessions: BTreeMap<u32, Peer>,
+    /// `None` where nobody is asked who he is: in a demonstration.
+    people: Option<Users>,
+    /// The user of the operating system that the station runs as.
+    host: Option<Arc<str>>,
+    seats: BTreeMap<u32, Seat>,
+    tries: Tries,
+    refusals: BTreeMap<Arc<str>, Refusals>,
+    errands: BTreeMap<Job, Errand>,
+    last_job: Job,
+    saving: Option<Saving>,
+    /// Somebody's last login is not written down yet.
+    unsaved: bool,
 }
 
 impl Gate {
-    /// Nobody is here yet.
+    /// A gate that asks nobody: whoever sits at a terminal of the station's own process may everything.
     pub fn new(def: Arc<PlantDef>) -> Gate {
-        Gate { def, sessions: BTreeMap::new() }
-    }
-
-    /// A terminal has attached.
-    pub fn open(&mut self, terminal: u32, peer: Peer, _at: Timestamp) -> Vec<Effect> {
-        self.sessions.insert(terminal, peer);
-        vec![Effect::Standing(terminal)]
-    }
-
-    /// A terminal has gone.
-    pub fn close(&mut self, terminal: u32, _at: Timestamp) -> Vec<Effect> {
-        self.sessions.remove(&terminal);
-        Vec::new()
-    }
-
-    /// A terminal gives an order.
-    pub fn order(&mut self, terminal: u32, request: OrderRequest, _at: Timestamp) -> Vec<Effect> {
-        let Some(peer) = self.sessions.get(&terminal) else { return Vec::new() };
-        let by = peer.unix_user.clone().unwrap_or_else(|| "operator".into());
-        let OrderRequest { id, command, seen, note, sign: _ } = request;
-        vec![Effect::Order(Order { id, by, from: peer.from.clone(), command, seen, note, refused: None })]
-    }
-
-    /// May this terminal ask this of the history? `Err` says why not.
-    pub fn may_ask(&self, _terminal: u32, _question: &Question) -> Result<(), String> {
-        Ok(())
-    }
-
-    /// A terminal wishes; the answer goes to the ticket.
-    pub fn wish(&mut self, _terminal: u32, ticket: u64, wish: Wish, _at: Timestamp) -> Vec<Effect> {
-        match wish {
-            Wish::Stop => vec![Effect::Reply(ticket, Ok(())), Effect::Stop],
-            Wish::Reload => vec![Effect::Reload(ticket)],
-            Wish::Active => vec![Effect::Reply(ticket, Ok(()))],
-            _ => vec![Effect::Reply(ticket, Err("not yet".to_owned()))],
+        Gate {
+            def,
+            people: None,
+            host: None,
+            seats: BTreeMap::new(),
+            tries: Tries::default(),
+            refusals: BTreeMap::new(),
+            errands: BTreeMap::new(),
+            last_job: 0,
+            saving: None,
+            unsaved: false,
         }
     }
 
+    /// A gate that lets these people in. `host` is the user of the operating system that the station runs as.
+    pub fn with_people(def: Arc<PlantDef>, people: Users, host: Option<Arc<str>>) -> Gate {
+        Gate { people: Some(people), host, ..Gate::new(def) }
+    }
+
+    /// A terminal has attached.
+    pub fn open(&mut self, terminal: u32, peer: Peer, at: Timestamp) -> Vec<Effect> {
+        let peer = Peer { from: clean(&peer.from).into(), ..peer };
+        let (own, mut seat) = (peer.own, Seat::new(peer, at));
+        let others = self.seats.values().filter(|seat| !seat.peer.own).count();
+        if !own && usize::from(self.def.access.sessions_max) <= others {
+            let why = format!("{others} terminals are attached, no more may be");
+            let mut effects = self.refused(&seat, "attach", "", &why, at);
+            effects.push(Effect::HangUp(terminal, why));
+            return effects;
+        }
+        seat.who = self.known(&seat.peer);
+        seat.trusted = seat.who.is_some();
+        let mut effects = Vec::new();
+        if !own && self.may_record(&seat.origin.clone(), at) {
+            effects.push(deed(&seat, "attach", "", "done", at));
+        }
+        if let Some(who) = &seat.who
+            && self.people.is_some()
+        {
+            effects.push(deed(&seat, "login", &who.user, "done: known to the operating system", at));
+        }
+        self.seats.insert(terminal, seat);
+        self.tell(terminal, &mut effects);
+        effects
+    }
+
+    /// Who is known without a password.
+    fn known(&self, peer: &Peer) -> Option<Who> {
+        let user = peer.unix_user.clone();
+        let role = match (&self.people, &user) {
+            (None, _) if peer.own => Some(Role::Supervisor),
+            (_, Some(name)) => {
+                self.def.access.trusted.iter().find(|(trusted, _)| trusted.as_str() == &**name).map(|(_, role)| *role)
+            }
+            (_, None) => None,
+        };
+        let user = user.unwrap_or_else(|| "operator".into());
+        role.map(|role| Who { user, role, must_change: false })
+    }
+
+    /// A terminal has gone.
+    pub fn close(&mut self, terminal: u32, at: Timestamp) -> Vec<Effect> {
+        let mut effects = self.sent_out(terminal, "done: the terminal has gone", at);
+        let Some(seat) = self.seats.remove(&terminal) else { return effects };
+        if !seat.peer.own && self.may_record(&seat.origin, at) {
+            effects.push(deed(&seat, "detach", "", "done", at));
+        }
+        self.tell(terminal, &mut effects);
+        effects
+    }
+
+    /// A terminal gives an order.
+    pub fn order(&mut self, terminal: u32, mut request: OrderRequest, at: Timestamp) -> Vec<Effect> {
+        // A terminal speaks for itself only.
+        request.id.terminal = terminal;
+        request.note = request.note.map(|note| clean(&note).into());
+        if !self.heard(terminal, at) {
+            return Vec::new();
+        }
+        let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
+        if !seat.locked {
+            seat.active = at;
+        }
+        match self.may(terminal, Some(right::needs(&request.command))) {
+            Err(why) => self.refuse_order(terminal, request, Refusal::NotPermitted(why), at),
+            Ok(_) => self.signed(terminal, request, at),
+        }
+    }
+
+    /// The role is enough, and so is the signature.
+    fn let_through(&self, terminal: u32, request: OrderRequest, signer: Option<&str>) -> Vec<Effect> {
+        let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
+        let note = match (request.note, signer) {
+            (note, None) => note,
+            (None, Some(signer)) => Some(format!("signed by {signer}").into()),
+            (Some(note), Some(signer)) => Some(format!("{note}; signed by {signer}").into()),
+        };
+        let OrderRequest { id, command, seen, .. } = request;
+        let (by, from) = (seat_name(seat), seat.peer.from.clone());
+        vec![Effect::Order(Order { id, by, from, command, seen, note, refused: None })]
+    }
+
+    /// The plant puts it on record and into the snapshot, so that whoever gave the order sees what became of it.
+    fn refuse_order(&mut self, terminal: u32, request: OrderRequest, why: Refusal, at: Timestamp) -> Vec<Effect> {
+        let Some(origin) = self.seats.get(&terminal).map(|seat| seat.origin.clone()) else { return Vec::new() };
+        if !self.may_record(&origin, at) {
+            return Vec::new();
+        }
+        let mut effects = self.let_through(terminal, request, None);
+        for effect in &mut effects {
+            if let Effect::Order(order) = effect {
+                order.refused = Some(why.clone());
+            }
+        }
+        effects
+    }
+
+    /// May this terminal ask this of the history? `Err` says why not.
+    pub fn may_ask(&mut self, terminal: u32, question: &Question, at: Timestamp) -> Result<(), String> {
+        if !self.heard(terminal, at) {
+            return Err(TOO_MANY.to_owned());
+        }
+        let Some(seat) = self.seats.get(&terminal) else { return Err("this terminal is not attached".to_owned()) };
+        let role = match &seat.who {
+            // Locked or not: the picture stays, and so does what lies behind it.
+            Some(who) if who.must_change => return Err(CHANGE_FIRST.to_owned()),
+            Some(who) => who.role,
+            None if self.def.access.view => Role::Viewer,
+            None => return Err(LOG_IN_FIRST.to_owned()),
+        };
+        enough(role, right::needs_for_question(question))
+    }
+
+    /// A terminal wishes; the answer goes to the ticket.
+    pub fn wish(&mut self, terminal: u32, ticket: u64, wish: Wish, at: Timestamp) -> Vec<Effect> {
+        if !self.heard(terminal, at) {
+            return vec![Effect::Reply(ticket, Err(TOO_MANY.to_owned()))];
+        }
+        let needed = right::needs_for_wish(&wish);
+        if let (Some(_), Err(why)) = (needed, self.may(terminal, needed)) {
+            return self.refuse_wish(terminal, ticket, &wish, why, at);
+        }
+        if let Some(seat) = self.seats.get_mut(&terminal).filter(|seat| !seat.locked) {
+            seat.active = at;
+        }
+        match wish {
+            Wish::Login { user, password } => self.login(terminal, ticket, &user, password, at),
+            Wish::Logout => self.logout(terminal, ticket, at),
+            Wish::Lock => self.lock(terminal, ticket, at),
+            Wish::Unlock(password) => self.unlock(terminal, ticket, password, at),
+            Wish::Active => {
+                let mut effects = vec![Effect::Reply(ticket, Ok(()))];
+                self.tell(terminal, &mut effects);
+                effects
+            }
+            Wish::Exported { file, sha256 } => {
+                let file: Arc<str> = clean(&file).into();
+                let new = Some(clean(&sha256).into());
+                self.done_now(terminal, ticket, "export", &file, new, at)
+            }
+            Wish::Stop => {
+                let mut effects = self.done_now(terminal, ticket, "stop station", &self.plant_name(), None, at);
+                effects.push(Effect::Stop);
+                effects
+            }
+            Wish::Reload => {
+                let mut effects = self.done_now(terminal, ticket, "reload", &self.plant_name(), None, at);
+                effects.retain(|effect| !matches!(effect, Effect::Reply(..)));
+                effects.push(Effect::Reload(ticket));
+                effects
+            }
+            wish @ (Wish::FirstSupervisor { .. }
+            | Wish::ChangePassword { .. }
+            | Wish::AddUser { .. }
+            | Wish::SetRole { .. }
+            | Wish::Disable { .. }
+            | Wish::DeleteUser { .. }
+            | Wish::ResetPassword { .. }) => self.wish_of_people(terminal, ticket, wish, at),
+        }
+    }
+
+    fn plant_name(&self) -> Arc<str> {
+        self.def.name.as_str().into()
+    }
+
+    /// Granted, on record, answered.
+    fn done_now(
+        &self,
+        terminal: u32,
+        ticket: u64,
+        action: &str,
+        target: &str,
+        new: Option<Arc<str>>,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
+        let record = ActionRecord { new, ..record(seat, action, target, "done", at) };
+        vec![Effect::Record(record), Effect::Reply(ticket, Ok(()))]
+    }
+
+    fn refuse_wish(&mut self, terminal: u32, ticket: u64, wish: &Wish, why: String, at: Timestamp) -> Vec<Effect> {
+        let Some(seat) = self.seats.remove(&terminal) else { return vec![Effect::Reply(ticket, Err(why))] };
+        let (action, target) = words(wish);
+        let mut effects = self.refused(&seat, action, &target, &why, at);
+        self.seats.insert(terminal, seat);
+        effects.push(Effect::Reply(ticket, Err(why)));
+        effects
+    }
+
     /// Time passes.
-    pub fn tick(&mut self, _at: Timestamp) -> Vec<Effect> {
-        Vec::new()
+    pub fn tick(&mut self, at: Timestamp) -> Vec<Effect> {
+        let mut effects = self.lock_idle(at);
+        for (origin, refusals) in &mut self.refusals {
+            if refusals.untold > 0 && passed(refusals.told, at) >= TOLD_EVERY {
+                let outcome = format!("refused: {} requests", refusals.untold);
+                effects.push(Effect::Record(ActionRecord {
+                    at,
+                    by: "not logged in".into(),
+                    from: origin.clone(),
+                    action: "too many requests".into(),
+                    target: "".into(),
+                    old: None,
+                    new: None,
+                    outcome: outcome.into(),
+                    note: None,
+                    seal: None,
+                }));
+                (refusals.untold, refusals.told) = (0, at);
+            }
+        }
+        if self.unsaved && self.saving.is_none() {
+            effects.extend(self.save_logins());
+        }
+        effects
     }
 
     /// How a terminal stands.
-    pub fn standing(&self, terminal: u32, _at: Timestamp) -> Standing {
-        let user = self.sessions.get(&terminal).and_then(|peer| peer.unix_user.clone());
-        let who = user.map(|user| Who { user, role: Role::Supervisor, must_change: false });
-        let notice = self.def.access.notice.as_deref().map(Arc::from);
-        Standing { who, view: true, notice, ..Standing::default() }
+    pub fn standing(&self, terminal: u32, at: Timestamp) -> Standing {
+        let rules = &self.def.access;
+        let notice = rules.notice.as_deref().map(Arc::from);
+        let Some(seat) = self.seats.get(&terminal) else { return Standing { notice, ..Standing::default() } };
+        let supervisor = seat.acting().is_some_and(|who| who.role == Role::Supervisor && !who.must_change);
+        let idle_lock = self.idle_lock(seat);
+        let left = idle_lock.map(|span| span.saturating_sub(passed(seat.active, at)));
+        Standing {
+            who: seat.who.clone(),
+            locked: seat.locked,
+            view: rules.view || seat.who.is_some(),
+            first: self.people.as_ref().is_some_and(Users::is_empty) && self.may_be_first(&seat.peer),
+            notice,
+            password_chars_min: rules.password_chars_min,
+            idle_lock,
+            locks_in: left.filter(|left| *left <= LOCK_NEAR && seat.acting().is_some()),
+            users: Arc::new(if supervisor { self.user_rows(at) } else { Vec::new() }),
+            sessions: Arc::new(if supervisor { self.session_rows() } else { Vec::new() }),
+            gone: None,
+        }
     }
+
+    fn user_rows(&self, at: Timestamp) -> Vec<UserRow> {
+        let rows = self.people.iter().flat_map(Users::iter).map(|user| UserRow {
+            user: user.name.clone(),
+            role: user.role,
+            disabled: user.disabled,
+            locked_until: self.tries.locked_until(&user::key(&user.name), at),
+            must_change: user.must_change,
+            last_login: user.last_login,
+        });
+        rows.collect()
+    }
+
+    fn session_rows(&self) -> Vec<SessionRow> {
+        let rows = self.seats.iter().map(|(terminal, seat)| SessionRow {
+            terminal: *terminal,
+            user: seat.who.as_ref().map(|who| who.user.clone()),
+            from: seat.peer.from.clone(),
+            since: seat.since,
+            locked: seat.locked,
+        });
+        rows.collect()
+    }
+
+    /// This terminal and all that see the lists hear how they stand.
+    fn tell(&self, terminal: u32, effects: &mut Vec<Effect>) {
+        let sees = |seat: &Seat| seat.acting().is_some_and(|who| who.role == Role::Supervisor);
+        let others = self.seats.iter().filter(|(id, seat)| **id != terminal && sees(seat)).map(|(id, _)| *id);
+        let own = self.seats.contains_key(&terminal).then_some(terminal);
+        effects.extend(own.into_iter().chain(others).map(Effect::Standing));
+    }
+
+    /// Who sits here, if he may do what needs this role. `Err` says in words for him why not.
+    fn may(&self, terminal: u32, needed: Option<Role>) -> Result<&Who, String> {
+        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
+        let who = seat.who.as_ref().ok_or(LOG_IN_FIRST)?;
+        if seat.locked {
+            return Err("this terminal is locked".to_owned());
+        }
+        if who.must_change {
+            return Err(CHANGE_FIRST.to_owned());
+        }
+        enough(who.role, needed.unwrap_or(Role::Viewer))?;
+        Ok(who)
+    }
+
+    /// Is a request of this terminal listened to?
+    fn heard(&mut self, terminal: u32, at: Timestamp) -> bool {
+        let Some(seat) = self.seats.get_mut(&terminal) else { return false };
+        // The station's own process shares its fate anyway.
+        if seat.peer.own || seat.requests.take(at) {
+            return true;
+        }
+        let origin = seat.origin.clone();
+        self.refusals_of(&origin, at).untold += 1;
+        false
+    }
+
+    /// May one more refusal, or coming and going, of this place be on record by itself?
+    fn may_record(&mut self, origin: &Arc<str>, at: Timestamp) -> bool {
+        self.refusals_of(origin, at).one(at)
+    }
+
+    fn refusals_of(&mut self, origin: &Arc<str>, at: Timestamp) -> &mut Refusals {
+        if ORIGINS_MAX <= self.refusals.len() && !self.refusals.contains_key(origin) {
+            self.refusals.retain(|_, refusals| refusals.untold > 0 || passed(refusals.told, at) < TOLD_EVERY);
+        }
+        let full = ORIGINS_MAX <= self.refusals.len() && !self.refusals.contains_key(origin);
+        let origin = if full { "many places".into() } else { origin.clone() };
+        self.refusals.entry(origin).or_insert_with(|| Refusals::new(at))
+    }
+
+    /// The record of a refusal, unless there are too many of them.
+    fn refused(&mut self, seat: &Seat, action: &str, target: &str, why: &str, at: Timestamp) -> Vec<Effect> {
+        let told = self.may_record(&seat.origin, at);
+        told.then(|| deed(seat, action, target, &format!("refused: {why}"), at)).into_iter().collect()
+    }
+}
+
+const LOG_IN_FIRST: &str = "log in first";
+const CHANGE_FIRST: &str = "choose a password of your own first";
+
+fn enough(role: Role, needed: Role) -> Result<(), String> {
+    if needed <= role {
+        return Ok(());
+    }
+    Err(format!("this is for a {}, you are {}", needed.word(), role.word()))
+}
+
+/// What a wish is called on record, and whom or what it is about.
+fn words(wish: &Wish) -> (&'static str, Arc<str>) {
+    // What is typed in the wrong field may be a password.
+    let name = |user: &str| if user::check_name(user).is_ok() { user.into() } else { "unknown user".into() };
+    match wish {
+        Wish::Login { .. } => ("login", "unknown user".into()),
+        Wish::Logout => ("logout", "".into()),
+        Wish::Lock => ("lock", "".into()),
+        Wish::Unlock(_) => ("unlock", "".into()),
+        Wish::Active => ("active", "".into()),
+        Wish::FirstSupervisor { user, .. } => ("add user", name(user)),
+        Wish::ChangePassword { .. } => ("change password", "".into()),
+        Wish::AddUser { user, .. } => ("add user", name(user)),
+        Wish::SetRole { user, .. } => ("set role", name(user)),
+        Wish::Disable { user, disabled: true } => ("disable user", name(user)),
+        Wish::Disable { user, disabled: false } => ("enable user", name(user)),
+        Wish::DeleteUser { user } => ("delete user", name(user)),
+        Wish::ResetPassword { user, .. } => ("reset password", name(user)),
+        Wish::Exported { file, .. } => ("export", clean(file).into()),
+        Wish::Stop => ("stop station", "".into()),
+        Wish::Reload => ("reload", "".into()),
+    }
+}
+
+fn seat_name(seat: &Seat) -> Arc<str> {
+    seat.who.as_ref().map_or_else(|| "not logged in".into(), |who| who.user.clone())
+}
+
+fn record(seat: &Seat, action: &str, target: &str, outcome: &str, at: Timestamp) -> ActionRecord {
+    ActionRecord {
+        at,
+        by: seat_name(seat),
+        from: seat.peer.from.clone(),
+        action: action.into(),
+        target: target.into(),
+        old: None,
+        new: None,
+        outcome: outcome.into(),
+        note: None,
+        seal: None,
+    }
+}
+
+fn deed(seat: &Seat, action: &str, target: &str, outcome: &str, at: Timestamp) -> Effect {
+    Effect::Record(record(seat, action, target, outcome, at))
+}
+
+/// Words of a terminal as they may stand on record: not endless, and nothing that moves a cursor.
+fn clean(words: &str) -> String {
+    words.chars().take(WORDS_MAX).map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
+}
+
+fn passed(from: Timestamp, to: Timestamp) -> Duration {
+    Duration::try_from(to.duration_since(from)).unwrap_or_default()
 }

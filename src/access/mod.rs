@@ -1,7 +1,13 @@
 //! Who may: users and their passwords, sessions, rights, lock-out, and the chained book of all that was done.
 
-pub mod gate;
+pub mod right;
 pub mod wish;
+pub mod password;
+pub mod user;
+pub mod tries;
+pub mod gate;
+pub mod io;
 
 pub use gate::{Effect, Gate, Peer};
-pub use wish::{OrderRequest, Signature, Standing, Who, Wish};
+pub use user::Users;
+pub use wish::{OrderRequest, Secret, SessionRow, Signature, Standing, UserRow, Who, Wish};

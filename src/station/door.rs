@@ -2,6 +2,7 @@
 
 use std::{
     collections::BTreeMap,
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicU32, Ordering},
@@ -14,7 +15,10 @@ use tokio::{
     time::MissedTickBehavior,
 };
 
-use super::session::{Request, Session};
+use super::{
+    session::{Request, Session},
+    toil::{Done, Toil},
+};
 use crate::{
     access::{Effect, Gate, Peer, Standing},
     bus::io::clock::Clock,
@@ -104,12 +108,14 @@ pub struct Door {
     terminals: BTreeMap<u32, watch::Sender<Arc<Standing>>>,
     tickets: BTreeMap<u64, oneshot::Sender<Result<(), String>>>,
     last_ticket: u64,
+    toil: Toil,
 }
 
 impl Door {
-    /// A door that nobody has come to.
-    pub fn new(gate: Gate, clock: Clock, ways: Ways) -> Door {
-        Door { gate, clock, ways, terminals: BTreeMap::new(), tickets: BTreeMap::new(), last_ticket: 0 }
+    /// A door that nobody has come to. `users` is the file that they are kept in.
+    pub fn new(gate: Gate, clock: Clock, ways: Ways, users: Option<PathBuf>) -> Door {
+        let (terminals, tickets) = (BTreeMap::new(), BTreeMap::new());
+        Door { gate, clock, ways, terminals, tickets, last_ticket: 0, toil: Toil::new(users) }
     }
 
     /// Runs until the station stops.
@@ -130,6 +136,13 @@ impl Door {
                     let effects = self.gate.open(knock.terminal, knock.peer, self.clock.now());
                     self.carry_out(effects);
                 }
+                done = self.toil.next() => {
+                    let effects = match done {
+                        Done::Work(job, outcome) => self.gate.done(job, outcome, self.clock.now()),
+                        Done::Saved(result) => self.gate.saved(result, self.clock.now()),
+                    };
+                    self.carry_out(effects);
+                }
                 Some((terminal, request)) = requests.recv() => self.take(terminal, request),
                 _ = tick.tick() => {
                     let gone: Vec<u32> =
@@ -139,11 +152,14 @@ impl Door {
                         let effects = self.gate.close(terminal, self.clock.now());
                         self.carry_out(effects);
                     }
+                    // Who has left waits for no answer any more.
+                    self.tickets.retain(|_, reply| !reply.is_closed());
                     let effects = self.gate.tick(self.clock.now());
                     self.carry_out(effects);
                 }
             }
         }
+        self.toil.end().await;
     }
 
     fn take(&mut self, terminal: u32, request: Request) {
@@ -153,7 +169,7 @@ impl Door {
                 let effects = self.gate.order(terminal, order, now);
                 self.carry_out(effects);
             }
-            Request::Ask(query) => match self.gate.may_ask(terminal, &query.question) {
+            Request::Ask(query) => match self.gate.may_ask(terminal, &query.question, now) {
                 Ok(()) => {
                     if let Err(error) = self.ways.queries.try_send(query) {
                         let (mpsc::error::TrySendError::Full(query) | mpsc::error::TrySendError::Closed(query)) = error;
@@ -192,6 +208,8 @@ impl Door {
                         end.send_replace(Arc::new(self.gate.standing(terminal, self.clock.now())));
                     }
                 }
+                Effect::Work(job, work) => self.toil.put(job, work),
+                Effect::Save(users) => self.toil.save(users),
                 Effect::Stop => self.command(Command::Stop),
                 Effect::Reload(ticket) => {
                     if let Some(reply) = self.tickets.remove(&ticket) {
@@ -200,7 +218,9 @@ impl Door {
                 }
                 Effect::HangUp(terminal, why) => {
                     tracing::warn!(terminal, why, "a terminal was sent away");
-                    self.terminals.remove(&terminal);
+                    if let Some(end) = self.terminals.remove(&terminal) {
+                        end.send_replace(Arc::new(Standing { gone: Some(why.into()), ..Standing::default() }));
+                    }
                 }
             }
         }

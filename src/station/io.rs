@@ -141,7 +141,7 @@ fn assemble(
     let (command, commands) = mpsc::channel(door::COMMANDS);
     let ways = Ways { orders: orders.clone(), queries, deeds, commands: command };
     let (entrance, knocks, requests) = Entrance::new(snapshots);
-    let door = Door::new(Gate::new(def), clock, ways);
+    let door = Door::new(Gate::new(def), clock, ways, None);
     tasks.push(tokio::spawn(door.run(knocks, requests, stopped)));
     Station { entrance, orders, commands, history, stop, tasks }
 }
@@ -173,7 +173,7 @@ impl Station {
 
     /// Attaches a terminal of this very process.
     pub fn session(&self, operator: &str) -> Session {
-        self.entrance.attach(Peer { from: "this process".into(), unix_user: Some(operator.into()) })
+        self.entrance.attach(Peer { from: "this process".into(), unix_user: Some(operator.into()), own: true })
     }
 
     /// Stops downstream and waits until the last record is on disk.

@@ -9,6 +9,7 @@ mod door;
 pub mod pulse;
 mod sets;
 pub mod teller;
+mod toil;
 pub mod io;
 
 pub use door::{Command, Entrance};

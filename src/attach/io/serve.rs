@@ -204,7 +204,7 @@ async fn greet(stream: UnixStream) -> Option<Guest> {
     let user = user.map(|user| user.name().to_string_lossy().into_owned());
     let process = credentials.pid().and_then(|process| u32::try_from(process).ok());
     let from = place.words(user.as_deref(), process).into();
-    Some(Guest { read, write, peer: Peer { from, unix_user: user.map(Into::into) } })
+    Some(Guest { read, write, peer: Peer { from, unix_user: user.map(Into::into), own: false } })
 }
 
 async fn hello(read: &mut OwnedReadHalf) -> Result<Place, WireError> {

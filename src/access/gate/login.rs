@@ -1,0 +1,200 @@
+//! Sitting down at a terminal, leaving it, and locking it for a while. Alarms stay to be seen through all of it.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use super::{Effect, Gate, LOG_IN_FIRST, Seat, deed, passed, work::What};
+use crate::access::{Secret, Who, user};
+
+/// Said where nobody is asked who he is.
+const NOBODY_ASKED: &str = "this station asks nobody for a password";
+/// Said where one is known without a password.
+const NO_PASSWORD: &str = "the operating system says who you are here, there is no password to ask for";
+
+impl Gate {
+    pub(super) fn login(
+        &mut self,
+        terminal: u32,
+        ticket: u64,
+        user: &str,
+        password: Secret,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        let Some(people) = &self.people else { return reply(ticket, NOBODY_ASKED) };
+        if people.is_empty() {
+            return reply(ticket, "there are no users yet: whoever has started the station makes the first supervisor");
+        }
+        let user = people.get(user).map(|user| user.name.clone());
+        let looked_at = self.look_at(terminal, password, What::Login { ticket, user }, at);
+        looked_at.unwrap_or_else(|why| reply(ticket, &why))
+    }
+
+    pub(super) fn login_done(
+        &mut self,
+        terminal: u32,
+        ticket: u64,
+        user: Option<Arc<str>>,
+        why: Option<&str>,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        if let Some(why) = why {
+            return self.failed(terminal, ticket, "login failed", user.as_deref(), why, at);
+        }
+        let Some(user) = user.and_then(|user| self.people.as_ref()?.get(&user).cloned()) else { return Vec::new() };
+        if !self.seats.contains_key(&terminal) {
+            return Vec::new();
+        }
+        let mut effects = self.sent_out(terminal, "done: somebody else logs in", at);
+        let who = Who { user: user.name.clone(), role: user.role, must_change: user.must_change };
+        effects.extend(self.sit_down(terminal, who, at));
+        effects.push(Effect::Reply(ticket, Ok(())));
+        effects
+    }
+
+    /// Somebody sits down here.
+    pub(super) fn sit_down(&mut self, terminal: u32, who: Who, at: Timestamp) -> Vec<Effect> {
+        let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
+        let name = who.user.clone();
+        (seat.who, seat.locked, seat.trusted, seat.active) = (Some(who), false, false, at);
+        let mut effects = vec![deed(seat, "login", &name, "done", at)];
+        if let Some(people) = &mut self.people {
+            people.logged_in(&name, at);
+            self.unsaved = true;
+        }
+        self.tell(terminal, &mut effects);
+        effects
+    }
+
+    /// A wrong attempt: on record with what was wrong, answered without it.
+    pub(super) fn failed(
+        &mut self,
+        terminal: u32,
+        ticket: u64,
+        action: &str,
+        user: Option<&str>,
+        why: &str,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        let mut effects = Vec::new();
+        if let Some(seat) = self.seats.get(&terminal) {
+            effects.push(deed(seat, action, user.unwrap_or("unknown user"), &format!("refused: {why}"), at));
+        }
+        effects.push(Effect::Reply(ticket, Err(self.wrong(terminal, at))));
+        effects
+    }
+
+    pub(super) fn logout(&mut self, terminal: u32, ticket: u64, at: Timestamp) -> Vec<Effect> {
+        let mut effects = self.sent_out(terminal, "done", at);
+        if effects.is_empty() {
+            return reply(ticket, "nobody is logged in here");
+        }
+        effects.push(Effect::Reply(ticket, Ok(())));
+        self.tell(terminal, &mut effects);
+        effects
+    }
+
+    /// Whoever sits there leaves; nothing where nobody does.
+    pub(super) fn sent_out(&mut self, terminal: u32, outcome: &str, at: Timestamp) -> Vec<Effect> {
+        let asked = self.people.is_some();
+        let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
+        let Some(who) = &seat.who else { return Vec::new() };
+        let effects = if asked { vec![deed(seat, "logout", &who.user, outcome, at)] } else { Vec::new() };
+        seat.leave();
+        effects
+    }
+
+    pub(super) fn lock(&mut self, terminal: u32, ticket: u64, at: Timestamp) -> Vec<Effect> {
+        match self.seats.get_mut(&terminal) {
+            Some(seat) if seat.acting().is_some() && seat.trusted => reply(ticket, NO_PASSWORD),
+            Some(seat) if seat.acting().is_some() => {
+                seat.locked = true;
+                let target = seat.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
+                let mut effects = vec![deed(seat, "lock", &target, "done", at), Effect::Reply(ticket, Ok(()))];
+                self.tell(terminal, &mut effects);
+                effects
+            }
+            Some(seat) if seat.locked => reply(ticket, "this terminal is locked already"),
+            Some(_) | None => reply(ticket, LOG_IN_FIRST),
+        }
+    }
+
+    pub(super) fn unlock(&mut self, terminal: u32, ticket: u64, password: Secret, at: Timestamp) -> Vec<Effect> {
+        let seat = self.seats.get(&terminal).filter(|seat| seat.locked);
+        let Some(user) = seat.and_then(|seat| seat.who.as_ref()).map(|who| who.user.clone()) else {
+            return reply(ticket, "this terminal is not locked");
+        };
+        let looked_at = self.look_at(terminal, password, What::Unlock { ticket, user }, at);
+        looked_at.unwrap_or_else(|why| reply(ticket, &why))
+    }
+
+    pub(super) fn unlock_done(
+        &mut self,
+        terminal: u32,
+        ticket: u64,
+        user: Arc<str>,
+        why: Option<&str>,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        if let Some(why) = why {
+            return self.failed(terminal, ticket, "unlock failed", Some(&user), why, at);
+        }
+        // Meanwhile somebody else may have sat down, or a Supervisor may have sent him out.
+        let still = |seat: &&mut Seat| seat.who.as_ref().is_some_and(|who| who.user == user);
+        let Some(seat) = self.seats.get_mut(&terminal).filter(still) else { return reply(ticket, LOG_IN_FIRST) };
+        (seat.locked, seat.active) = (false, at);
+        let mut effects = vec![deed(seat, "unlock", &user, "done", at), Effect::Reply(ticket, Ok(()))];
+        self.tell(terminal, &mut effects);
+        effects
+    }
+
+    /// After how long without a key this terminal is locked; never where there is no password to unlock it with.
+    pub(super) fn idle_lock(&self, seat: &Seat) -> Option<Duration> {
+        let span = self.def.access.idle_lock;
+        (!span.is_zero() && self.people.is_some() && !seat.trusted).then_some(span)
+    }
+
+    /// Locks terminals that nobody has touched for long, and tells those of which this is near.
+    pub(super) fn lock_idle(&mut self, at: Timestamp) -> Vec<Effect> {
+        let mut effects = Vec::new();
+        let idle = |gate: &Gate, seat: &Seat| {
+            let left = gate.idle_lock(seat)?.saturating_sub(passed(seat.active, at));
+            (seat.acting().is_some() && left <= super::LOCK_NEAR).then_some(left)
+        };
+        let near: Vec<_> = self.seats.iter().filter_map(|(id, seat)| Some((*id, idle(self, seat)?))).collect();
+        for (terminal, left) in near {
+            if let Some(seat) = self.seats.get_mut(&terminal).filter(|_| left.is_zero()) {
+                seat.locked = true;
+                let name = seat.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
+                effects.push(deed(seat, "lock", &name, "done: nobody has touched it", at));
+                self.tell(terminal, &mut effects);
+            } else {
+                effects.push(Effect::Standing(terminal));
+            }
+        }
+        effects
+    }
+
+    /// Everybody of this name is sent out, except from one terminal.
+    pub(super) fn send_out_everywhere(
+        &mut self,
+        name: &str,
+        except: Option<u32>,
+        why: &str,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        let key = user::key(name);
+        let here = |seat: &Seat| !seat.trusted && seat.who.as_ref().is_some_and(|who| user::key(&who.user) == key);
+        let seats: Vec<u32> = self.seats.iter().filter(|(_, seat)| here(seat)).map(|(id, _)| *id).collect();
+        let mut effects = Vec::new();
+        for terminal in seats.into_iter().filter(|terminal| Some(*terminal) != except) {
+            effects.extend(self.sent_out(terminal, why, at));
+            effects.push(Effect::Standing(terminal));
+        }
+        effects
+    }
+}
+
+pub(super) fn reply(ticket: u64, why: &str) -> Vec<Effect> {
+    vec![Effect::Reply(ticket, Err(why.to_owned()))]
+}

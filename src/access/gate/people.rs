@@ -1,0 +1,314 @@
+//! Changes of who may what: checked, written down, and only then true.
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+
+use super::{Effect, Gate, Peer, deed, enough, login::reply, record, right, work::What};
+use crate::{
+    access::{
+        Secret, Who, Wish, password,
+        user::{self, Change},
+    },
+    plant::{record::ActionRecord, role::Role},
+};
+
+/// Whose new password is being hashed.
+#[derive(Debug)]
+pub(super) enum Hashing {
+    First(Arc<str>),
+    Add(Arc<str>, Role),
+    Own(Arc<str>),
+    Reset(Arc<str>),
+}
+
+/// A change on its way to the disk.
+#[derive(Debug)]
+pub(super) struct Saving {
+    terminal: u32,
+    /// `None` where only last logins are written.
+    wish: Option<(u64, Change, Box<ActionRecord>)>,
+}
+
+impl Gate {
+    pub(super) fn wish_of_people(&mut self, terminal: u32, ticket: u64, wish: Wish, at: Timestamp) -> Vec<Effect> {
+        if self.people.is_none() {
+            return reply(ticket, "this station keeps no users");
+        }
+        let (action, target) = super::words(&wish);
+        let result = match wish {
+            Wish::FirstSupervisor { user, password } => self.first(terminal, ticket, user.into(), password),
+            Wish::ChangePassword { old, new } => self.change_own(terminal, ticket, old, new, at),
+            Wish::AddUser { user, role, password } => {
+                let user: Arc<str> = user.into();
+                self.new_password(terminal, ticket, password, Hashing::Add(user, role))
+            }
+            Wish::ResetPassword { user, password } => {
+                let user: Arc<str> = user.into();
+                self.new_password(terminal, ticket, password, Hashing::Reset(user))
+            }
+            Wish::SetRole { user, role } => self.change(terminal, ticket, Change::Role(user.into(), role), at),
+            Wish::Disable { user, disabled } => {
+                self.change(terminal, ticket, Change::Disable(user.into(), disabled), at)
+            }
+            Wish::DeleteUser { user } => self.change(terminal, ticket, Change::Delete(user.into()), at),
+            Wish::Login { .. }
+            | Wish::Logout
+            | Wish::Lock
+            | Wish::Unlock(_)
+            | Wish::Active
+            | Wish::Exported { .. }
+            | Wish::Stop
+            | Wish::Reload => return Vec::new(),
+        };
+        result.unwrap_or_else(|why| self.not_changed(terminal, ticket, action, &target, &why, at))
+    }
+
+    fn not_changed(
+        &mut self,
+        terminal: u32,
+        ticket: u64,
+        action: &str,
+        target: &str,
+        why: &str,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        let mut effects = reply(ticket, why);
+        let Some(seat) = self.seats.get(&terminal) else { return effects };
+        let record = deed(seat, action, target, &format!("refused: {why}"), at);
+        let origin = seat.origin.clone();
+        if self.may_record(&origin, at) {
+            effects.push(record);
+        }
+        effects
+    }
+
+    /// Only whoever has started the station, or could, makes the first Supervisor.
+    pub(super) fn may_be_first(&self, peer: &Peer) -> bool {
+        let user = peer.unix_user.as_deref();
+        peer.own || user == Some("root") || (user.is_some() && user == self.host.as_deref())
+    }
+
+    fn first(&mut self, terminal: u32, ticket: u64, user: Arc<str>, password: Secret) -> Result<Vec<Effect>, String> {
+        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
+        if !self.may_be_first(&seat.peer) {
+            return Err("only whoever has started the station makes the first supervisor".to_owned());
+        }
+        if self.people.as_ref().is_none_or(|people| !people.is_empty()) {
+            return Err("there are users already".to_owned());
+        }
+        self.new_password(terminal, ticket, password, Hashing::First(user))
+    }
+
+    fn change_own(
+        &mut self,
+        terminal: u32,
+        ticket: u64,
+        old: Secret,
+        new: Secret,
+        at: Timestamp,
+    ) -> Result<Vec<Effect>, String> {
+        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
+        if seat.trusted {
+            return Err("the operating system says who you are here, there is no password to change".to_owned());
+        }
+        let user = seat.acting().ok_or("log in, or unlock this terminal, first")?.user.clone();
+        password::check(&new.0, &user, self.def.access.password_chars_min)?;
+        if password::one_form(&new.0) == password::one_form(&old.0) {
+            return Err("this is the present password, choose another one".to_owned());
+        }
+        self.look_at(terminal, old, What::Change { ticket, user, new }, at)
+    }
+
+    pub(super) fn old_password_done(
+        &mut self,
+        terminal: u32,
+        ticket: u64,
+        user: Arc<str>,
+        new: Secret,
+        why: Option<&str>,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        if let Some(why) = why {
+            return self.failed(terminal, ticket, "change password", Some(&user), why, at);
+        }
+        self.new_password(terminal, ticket, new, Hashing::Own(user)).unwrap_or_else(|why| reply(ticket, &why))
+    }
+
+    /// Checks a new password and has it hashed.
+    fn new_password(
+        &mut self,
+        terminal: u32,
+        ticket: u64,
+        password: Secret,
+        hashing: Hashing,
+    ) -> Result<Vec<Effect>, String> {
+        // What can be refused is refused before the work; it is looked at again when the work is done.
+        self.check_change(&hashing.change("".into()))?;
+        password::check(&password.0, hashing.user(), self.def.access.password_chars_min)?;
+        self.hash(terminal, ticket, password, hashing)
+    }
+
+    fn check_change(&self, change: &Change) -> Result<crate::access::Users, String> {
+        let people = self.people.as_ref().ok_or("this station keeps no users")?;
+        let name = user::key(change.user());
+        if let Change::Add { .. } | Change::First { .. } = change
+            && self.def.access.trusted.iter().any(|(trusted, _)| user::key(trusted) == name)
+        {
+            return Err(format!("{} is a user of the operating system who needs no password here", change.user()));
+        }
+        people.with(change)
+    }
+
+    pub(super) fn hashed(
+        &mut self,
+        terminal: u32,
+        ticket: u64,
+        by: Option<Arc<str>>,
+        hashing: Hashing,
+        hash: Result<String, String>,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        let still = self.seats.get(&terminal).is_some_and(|seat| seat.who.as_ref().map(|who| &who.user) == by.as_ref());
+        if !still {
+            return reply(ticket, super::LOG_IN_FIRST);
+        }
+        let name = hashing.user().clone();
+        let result = hash.and_then(|hash| self.change(terminal, ticket, hashing.change(hash.into()), at));
+        result.unwrap_or_else(|why| self.not_changed(terminal, ticket, hashing.action(), &name, &why, at))
+    }
+
+    /// Begins a change: it is true when it is on disk. Rights are looked at once more, as a hash has taken its time.
+    fn change(&mut self, terminal: u32, ticket: u64, change: Change, at: Timestamp) -> Result<Vec<Effect>, String> {
+        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
+        match &change {
+            Change::First { .. } | Change::Password { must_change: false, .. } => {}
+            Change::Add { .. }
+            | Change::Role(..)
+            | Change::Disable(..)
+            | Change::Delete(_)
+            | Change::Password { must_change: true, .. } => {
+                let who = seat.acting().ok_or(super::LOG_IN_FIRST)?;
+                enough(who.role, right::Right::People.role())?;
+            }
+        }
+        if self.saving.is_some() {
+            return Err("another change is just being written down, try again".to_owned());
+        }
+        let after = self.check_change(&change)?;
+        let (action, old, new) = self.told(&change);
+        let name = self.people.as_ref().and_then(|people| people.get(change.user())).map(|user| user.name.clone());
+        let target = name.unwrap_or_else(|| change.user().clone());
+        let record = ActionRecord { old, new, ..record(seat, action, &target, "done", at) };
+        self.saving = Some(Saving { terminal, wish: Some((ticket, change, Box::new(record))) });
+        Ok(vec![Effect::Save(after)])
+    }
+
+    /// What a change is called on record, and what it changes from and to.
+    fn told(&self, change: &Change) -> (&'static str, Option<Arc<str>>, Option<Arc<str>>) {
+        let before = self.people.as_ref().and_then(|people| people.get(change.user()));
+        let role = before.map(|user| user.role.word().into());
+        let can = |disabled| if disabled { "disabled" } else { "enabled" };
+        match change {
+            Change::First { .. } => ("add user", None, Some(Role::Supervisor.word().into())),
+            Change::Add { role: new, .. } => ("add user", None, Some(new.word().into())),
+            Change::Role(_, new) => ("set role", role, Some(new.word().into())),
+            Change::Disable(_, disabled) => {
+                let action = if *disabled { "disable user" } else { "enable user" };
+                (action, before.map(|user| can(user.disabled).into()), Some(can(*disabled).into()))
+            }
+            Change::Delete(_) => ("delete user", role, None),
+            Change::Password { must_change: true, .. } => ("reset password", None, None),
+            Change::Password { must_change: false, .. } => ("change password", None, None),
+        }
+    }
+
+    /// Writes down who has logged in when.
+    pub(super) fn save_logins(&mut self) -> Option<Effect> {
+        self.unsaved = false;
+        let people = self.people.clone()?;
+        self.saving = Some(Saving { terminal: 0, wish: None });
+        Some(Effect::Save(people))
+    }
+
+    /// The people were written down, or not: `Err` says why.
+    pub fn saved(&mut self, result: Result<(), String>, at: Timestamp) -> Vec<Effect> {
+        let Some(Saving { terminal, wish: Some((ticket, change, record)) }) = self.saving.take() else {
+            return Vec::new();
+        };
+        let after = result.and_then(|()| self.check_change(&change));
+        let people = match after {
+            Ok(people) => people,
+            Err(why) => {
+                let outcome = format!("refused: {why}").into();
+                return vec![Effect::Record(ActionRecord { outcome, ..*record }), Effect::Reply(ticket, Err(why))];
+            }
+        };
+        self.people = Some(people);
+        let mut effects = vec![Effect::Record(*record), Effect::Reply(ticket, Ok(()))];
+        effects.extend(self.followed(terminal, &change, at));
+        self.tell(terminal, &mut effects);
+        effects
+    }
+
+    /// What a change means for those who are in.
+    fn followed(&mut self, terminal: u32, change: &Change, at: Timestamp) -> Vec<Effect> {
+        let name = change.user().clone();
+        let mut out = |why: &str, except| self.send_out_everywhere(&name, except, why, at);
+        match change {
+            Change::First { user, .. } => {
+                let who = Who { user: user.clone(), role: Role::Supervisor, must_change: false };
+                self.sit_down(terminal, who, at)
+            }
+            Change::Add { .. } => Vec::new(),
+            Change::Role(..) => out("done: has another role now", None),
+            Change::Disable(_, true) => out("done: was disabled", None),
+            Change::Delete(_) => {
+                let effects = out("done: was deleted", None);
+                self.tries.pardon(&user::key(&name));
+                effects
+            }
+            Change::Disable(_, false) => {
+                self.tries.pardon(&user::key(&name));
+                Vec::new()
+            }
+            Change::Password { must_change: true, .. } => {
+                let effects = out("done: has another password now", None);
+                self.tries.pardon(&user::key(&name));
+                effects
+            }
+            Change::Password { must_change: false, .. } => {
+                let effects = out("done: has another password now", Some(terminal));
+                if let Some(who) = self.seats.get_mut(&terminal).and_then(|seat| seat.who.as_mut()) {
+                    who.must_change = false;
+                }
+                effects
+            }
+        }
+    }
+}
+
+impl Hashing {
+    fn user(&self) -> &Arc<str> {
+        match self {
+            Hashing::First(user) | Hashing::Add(user, _) | Hashing::Own(user) | Hashing::Reset(user) => user,
+        }
+    }
+
+    fn action(&self) -> &'static str {
+        match self {
+            Hashing::First(_) | Hashing::Add(..) => "add user",
+            Hashing::Own(_) => "change password",
+            Hashing::Reset(_) => "reset password",
+        }
+    }
+
+    fn change(&self, hash: Arc<str>) -> Change {
+        match self {
+            Hashing::First(user) => Change::First { user: user.clone(), hash },
+            Hashing::Add(user, role) => Change::Add { user: user.clone(), role: *role, hash },
+            Hashing::Own(user) => Change::Password { user: user.clone(), hash, must_change: false },
+            Hashing::Reset(user) => Change::Password { user: user.clone(), hash, must_change: true },
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! One terminal as the gate knows it, and how much it may ask for.
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+
+use super::Peer;
+use crate::access::Who;
+
+/// Requests a second of one terminal that are answered in the long run, and so many at once.
+const REQUESTS: (f64, f64) = (20.0, 40.0);
+/// Refusals a second of one place that are put on record each by itself, and so many at once.
+const REFUSALS: (f64, f64) = (0.5, 20.0);
+
+/// A terminal.
+#[derive(Debug)]
+pub struct Seat {
+    /// Where it is.
+    pub peer: Peer,
+    /// Whose wrong passwords and refusals count together: the host it came from, not the terminal, of which anybody can
+    /// open another.
+    pub origin: Arc<str>,
+    /// Since when.
+    pub since: Timestamp,
+    /// Who sits there.
+    pub who: Option<Who>,
+    /// He is known without a password, so none can be asked of him.
+    pub trusted: bool,
+    /// Only looking until the password is given.
+    pub locked: bool,
+    /// When a key was last pressed.
+    pub active: Timestamp,
+    /// What it may still ask.
+    pub requests: Bucket,
+}
+
+impl Seat {
+    /// A terminal that has just come.
+    pub fn new(peer: Peer, at: Timestamp) -> Seat {
+        let origin = origin(&peer);
+        let requests = Bucket::full(REQUESTS, at);
+        Seat { peer, origin, since: at, who: None, trusted: false, locked: false, active: at, requests }
+    }
+
+    /// Who sits there, unless the terminal is locked.
+    pub fn acting(&self) -> Option<&Who> {
+        self.who.as_ref().filter(|_| !self.locked)
+    }
+
+    /// Nobody sits there any more.
+    pub fn leave(&mut self) -> Option<Who> {
+        (self.locked, self.trusted) = (false, false);
+        self.who.take()
+    }
+}
+
+/// The user of the operating system and the host: `pts/3 from 10.0.0.5, user panel` comes from `panel from 10.0.0.5`.
+fn origin(peer: &Peer) -> Arc<str> {
+    let host = peer.from.split_once(" from ").map(|(_, host)| host.split([',', ' ']).next().unwrap_or(host));
+    format!("{} from {}", peer.unix_user.as_deref().unwrap_or("?"), host.unwrap_or("here")).into()
+}
+
+/// So much a second, and so much at once.
+#[derive(Debug, Clone, Copy)]
+pub struct Bucket {
+    rate: f64,
+    size: f64,
+    left: f64,
+    at: Timestamp,
+}
+
+impl Bucket {
+    fn full((rate, size): (f64, f64), at: Timestamp) -> Bucket {
+        Bucket { rate, size, left: size, at }
+    }
+
+    /// Takes one out; `false` when it is empty.
+    pub fn take(&mut self, at: Timestamp) -> bool {
+        let since = at.duration_since(self.at).as_secs_f64().max(0.0);
+        self.left = (self.left + since * self.rate).min(self.size);
+        self.at = self.at.max(at);
+        let some = 1.0 <= self.left;
+        if some {
+            self.left -= 1.0;
+        }
+        some
+    }
+}
+
+/// What a place was refused: the first times each on record, then only counted.
+#[derive(Debug)]
+pub struct Refusals {
+    bucket: Bucket,
+    /// Not on record yet.
+    pub untold: u64,
+    /// When it was last told.
+    pub told: Timestamp,
+}
+
+impl Refusals {
+    /// Nothing was refused yet.
+    pub fn new(at: Timestamp) -> Refusals {
+        Refusals { bucket: Bucket::full(REFUSALS, at), untold: 0, told: at }
+    }
+
+    /// One more. `true` if it may be on record by itself; otherwise it is counted.
+    pub fn one(&mut self, at: Timestamp) -> bool {
+        let some = self.bucket.take(at);
+        if !some {
+            self.untold += 1;
+        }
+        some
+    }
+}

@@ -1,0 +1,132 @@
+//! Signatures: what a tag asks for again before it is written.
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+
+use super::{Effect, Gate, right, work::What};
+use crate::{
+    access::{OrderRequest, Signature, user},
+    plant::{
+        PlantDef,
+        command::{Command, Refusal},
+        def::{Sign, TagId},
+        guard,
+    },
+};
+
+impl Gate {
+    /// Lets an order through whose role is enough, once it is signed as its tag asks.
+    pub(super) fn signed(&mut self, terminal: u32, mut request: OrderRequest, at: Timestamp) -> Vec<Effect> {
+        let needed = needed(&self.def, &request.command).filter(|_| self.people.is_some());
+        let sign = request.sign.take();
+        let (Some(needed), Some(seat)) = (needed, self.seats.get(&terminal)) else {
+            return self.let_through(terminal, request, None);
+        };
+        let Some(by) = seat.who.as_ref().map(|who| who.user.clone()) else { return Vec::new() };
+        let own = |name: &str| user::key(name) == user::key(&by);
+        let why = match (needed, &sign) {
+            (Sign::Password, None) => Some("this tag asks for your password again"),
+            (Sign::Password, Some(Signature { user: Some(user), .. })) if !own(user) => {
+                Some("this tag asks for your own password")
+            }
+            (Sign::Password, Some(_)) if seat.trusted => Some("this tag asks for a password, and you have none here"),
+            (Sign::SecondPerson, None | Some(Signature { user: None, .. })) => {
+                Some("this tag asks for a second person")
+            }
+            (Sign::SecondPerson, Some(Signature { user: Some(user), .. })) if own(user) => {
+                Some("the second person must be another one")
+            }
+            (Sign::Password | Sign::SecondPerson, Some(_)) => None,
+        };
+        let (None, Some(Signature { user, password })) = (why, sign) else {
+            return self.not_signed(terminal, request, why.unwrap_or_default().to_owned(), at);
+        };
+        let name = user.as_deref().unwrap_or(&by);
+        let signer = self.people.as_ref().and_then(|people| people.get(name)).map(|user| user.name.clone());
+        let (copy, request) = (request.clone(), Box::new(request));
+        match self.look_at(terminal, password, What::Sign { by, signer, request }, at) {
+            Ok(effects) => effects,
+            Err(why) => self.not_signed(terminal, copy, why, at),
+        }
+    }
+
+    pub(super) fn sign_done(
+        &mut self,
+        terminal: u32,
+        by: Arc<str>,
+        signer: Option<Arc<str>>,
+        request: OrderRequest,
+        why: Option<&str>,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        if let Some(why) = why {
+            let told = self.wrong(terminal, at);
+            let mut effects = Vec::new();
+            if let Some(seat) = self.seats.get(&terminal) {
+                let signer = signer.as_deref().unwrap_or("unknown user");
+                effects.push(super::deed(seat, "signature failed", signer, &format!("refused: {why}"), at));
+            }
+            effects.extend(self.not_signed(terminal, request, told, at));
+            return effects;
+        }
+        let needed = right::needs(&request.command);
+        // Meanwhile he may have left, or been sent out.
+        match self.may(terminal, Some(needed)) {
+            Ok(who) if who.user == by => {}
+            Ok(_) => return Vec::new(),
+            Err(why) => return self.refuse_order(terminal, request, Refusal::NotPermitted(why), at),
+        }
+        let other = signer.as_ref().filter(|signer| **signer != by);
+        let other = other.and_then(|signer| self.people.as_ref()?.get(signer));
+        match other {
+            Some(other) if other.must_change => {
+                let why = format!("{} must first choose a password of his own", other.name);
+                self.not_signed(terminal, request, why, at)
+            }
+            Some(other) if other.role < needed => {
+                let why = format!("{} may not sign this: it is for a {}", other.name, needed.word());
+                self.not_signed(terminal, request, why, at)
+            }
+            Some(_) | None => self.let_through(terminal, request, signer.as_deref()),
+        }
+    }
+
+    pub(super) fn not_signed(
+        &mut self,
+        terminal: u32,
+        request: OrderRequest,
+        why: String,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        self.refuse_order(terminal, request, Refusal::NotSigned(why), at)
+    }
+}
+
+/// What a command must be signed with. A stop never waits for a signature.
+fn needed(def: &PlantDef, command: &Command) -> Option<Sign> {
+    let asks = |tag: TagId, value: f64| {
+        let sign = def.tags.get(tag.index())?.sign?;
+        (!guard::is_stop(def, tag, value)).then_some(sign)
+    };
+    let strictest = |one: Option<Sign>, other: Option<Sign>| match (one, other) {
+        (Some(Sign::SecondPerson), _) | (_, Some(Sign::SecondPerson)) => Some(Sign::SecondPerson),
+        (Some(Sign::Password), _) | (_, Some(Sign::Password)) => Some(Sign::Password),
+        (None, None) => None,
+    };
+    match command {
+        Command::Write { tag, value } => asks(*tag, *value),
+        Command::Restore(wish) => wish.changes.iter().map(|change| asks(change.tag, change.new)).fold(None, strictest),
+        Command::Acknowledge(_)
+        | Command::AcknowledgeAll
+        | Command::Refresh(_)
+        | Command::Connect(..)
+        | Command::Configure(_)
+        | Command::SaveSettings(_)
+        | Command::Test(..)
+        | Command::StopTest(_)
+        | Command::ReadSets
+        | Command::SaveSet { .. }
+        | Command::StopRestore(_) => None,
+    }
+}

@@ -1,0 +1,462 @@
+//! What somebody at a terminal sees of the gate: logins, lock-outs, locks, roles, signatures, in plain time.
+#![allow(clippy::unwrap_used)]
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::{
+    access::{Signature, user::Change},
+    plant::{
+        command::{Command, OrderId},
+        def::Sign,
+        fixture,
+        role::AccessDef,
+    },
+};
+
+const BOSS: &str = "boss is a wet horse";
+const TECH: &str = "tech is a wet horse";
+const VIEW: &str = "view is a wet horse";
+
+/// A gate whose work is done at once, with a hash that is the password itself.
+struct Bench {
+    gate: Gate,
+    now: Timestamp,
+    last_ticket: u64,
+    /// What was kept by the last save.
+    kept: Option<Users>,
+    disk_full: bool,
+    records: Vec<(String, String, String)>,
+}
+
+impl Bench {
+    fn new(rules: AccessDef) -> Bench {
+        let mut def = fixture::plant();
+        def.access = rules;
+        def.tags[fixture::SV.index()].sign = Some(Sign::SecondPerson);
+        let people = Users::default().with(&Change::First { user: "boss".into(), hash: BOSS.into() }).unwrap();
+        let add = |people: Users, user: &str, role, hash: &str| {
+            let people = people.with(&Change::Add { user: user.into(), role, hash: hash.into() }).unwrap();
+            people.with(&Change::Password { user: user.into(), hash: hash.into(), must_change: false }).unwrap()
+        };
+        let people = add(people, "tech", Role::Technician, TECH);
+        let people = add(people, "view", Role::Viewer, VIEW);
+        Bench::of(Gate::with_people(Arc::new(def), people, Some("sight".into())))
+    }
+
+    fn of(gate: Gate) -> Bench {
+        let now = Timestamp::from_second(1_000_000).unwrap();
+        Bench { gate, now, last_ticket: 0, kept: None, disk_full: false, records: Vec::new() }
+    }
+
+    fn open(&mut self, terminal: u32, host: &str) -> Vec<Effect> {
+        let peer = Peer {
+            from: format!("pts/{terminal} from {host}, user panel").into(),
+            unix_user: Some("panel".into()),
+            own: false,
+        };
+        let effects = self.gate.open(terminal, peer, self.now);
+        self.work(effects)
+    }
+
+    fn later(&mut self, seconds: i64) -> Vec<Effect> {
+        self.now += jiff::SignedDuration::from_secs(seconds);
+        let effects = self.gate.tick(self.now);
+        self.work(effects)
+    }
+
+    /// Does what is wished beside, and gives what is left.
+    fn work(&mut self, effects: Vec<Effect>) -> Vec<Effect> {
+        let (mut left, mut to_do) = (Vec::new(), effects);
+        while !to_do.is_empty() {
+            for effect in std::mem::take(&mut to_do) {
+                match effect {
+                    Effect::Work(job, Work::Verify { password, hash }) => {
+                        to_do.extend(self.gate.done(job, Outcome::Verified(*password.0 == *hash), self.now));
+                    }
+                    Effect::Work(job, Work::Hash(password)) => {
+                        to_do.extend(self.gate.done(job, Outcome::Hashed(Ok(password.0)), self.now));
+                    }
+                    Effect::Save(users) => {
+                        let result = if self.disk_full { Err("disk full".to_owned()) } else { Ok(()) };
+                        self.kept = Some(users).filter(|_| result.is_ok());
+                        to_do.extend(self.gate.saved(result, self.now));
+                    }
+                    Effect::Record(record) => {
+                        let ActionRecord { by, action, target, outcome, .. } = &record;
+                        self.records.push((format!("{by} {action}"), target.to_string(), outcome.to_string()));
+                        left.push(Effect::Record(record));
+                    }
+                    other => left.push(other),
+                }
+            }
+        }
+        left
+    }
+
+    fn wish(&mut self, terminal: u32, wish: Wish) -> Result<(), String> {
+        self.last_ticket += 1;
+        let effects = self.gate.wish(terminal, self.last_ticket, wish, self.now);
+        let effects = self.work(effects);
+        let answers = effects.into_iter().filter_map(|effect| match effect {
+            Effect::Reply(ticket, answer) if ticket == self.last_ticket => Some(answer),
+            _ => None,
+        });
+        let answers: Vec<_> = answers.collect();
+        assert_eq!(answers.len(), 1, "each wish is answered once");
+        answers.into_iter().next().unwrap()
+    }
+
+    fn login(&mut self, terminal: u32, user: &str, password: &str) -> Result<(), String> {
+        self.wish(terminal, Wish::Login { user: user.into(), password: password.into() })
+    }
+
+    /// `None`: nothing reached the plant. `Some(None)`: permitted.
+    fn order(&mut self, terminal: u32, command: Command, sign: Option<Signature>) -> Option<(Order, Option<Refusal>)> {
+        let id = OrderId { terminal, number: 1 };
+        let request = OrderRequest { sign, note: Some("why".into()), ..OrderRequest::new(id, command) };
+        let effects = self.gate.order(terminal, request, self.now);
+        let effects = self.work(effects);
+        let order = effects.into_iter().find_map(|effect| match effect {
+            Effect::Order(order) => Some(order),
+            _ => None,
+        })?;
+        let refused = order.refused.clone();
+        Some((order, refused))
+    }
+
+    fn who(&self, terminal: u32) -> Option<String> {
+        self.gate.standing(terminal, self.now).who.map(|who| who.user.to_string())
+    }
+
+    fn last(&self) -> (&str, &str, &str) {
+        let (by, target, outcome) = self.records.last().unwrap();
+        (by, target, outcome)
+    }
+}
+
+const RUN: Command = Command::Write { tag: fixture::RUN, value: 1.0 };
+const SV: Command = Command::Write { tag: fixture::SV, value: 50.0 };
+
+#[test]
+fn wrong_user_wrong_password_and_locked_out_look_the_same_and_the_book_knows_which() {
+    let mut bench = Bench::new(AccessDef::default());
+    for (terminal, (user, password)) in [("nobody", BOSS), ("boss", "guess"), ("tech", "guess")].into_iter().enumerate()
+    {
+        let terminal = terminal as u32 + 1;
+        bench.open(terminal, &format!("10.0.0.{terminal}"));
+        let told = bench.login(terminal, user, password).unwrap_err();
+        assert_eq!(told, "wrong name or password, or locked out; try again later; wait 1 s at this terminal");
+    }
+    bench.wish(2, Wish::Logout).unwrap_err();
+    let why: Vec<_> =
+        bench.records.iter().filter(|record| record.0.ends_with("failed")).map(|r| (&*r.1, &*r.2)).collect();
+    assert_eq!(
+        why,
+        [
+            ("unknown user", "refused: unknown user"),
+            ("boss", "refused: wrong password"),
+            ("tech", "refused: wrong password")
+        ]
+    );
+    assert!(bench.records.iter().all(|record| !format!("{record:?}").contains("nobody")), "it may be a password");
+}
+
+#[test]
+fn five_wrong_passwords_lock_the_account_and_the_terminal_out_and_who_is_in_stays_in() {
+    let mut bench = Bench::new(AccessDef { view: true, ..AccessDef::default() });
+    bench.open(1, "10.0.0.1");
+    bench.open(2, "10.0.0.2");
+    bench.open(3, "10.0.0.3");
+    bench.login(2, "tech", TECH).unwrap();
+    for _ in 0..5 {
+        bench.login(1, "tech", "guess").unwrap_err();
+        bench.later(16);
+    }
+    let told = bench.login(1, "tech", TECH).unwrap_err();
+    assert!(told.ends_with("wait 284 s at this terminal"), "{told}");
+    assert!(bench.login(3, "TECH", TECH).is_err(), "the right password elsewhere does not help");
+    assert!(bench.gate.standing(1, bench.now).view, "alarms and process stay to be seen");
+    assert_eq!(bench.who(2).as_deref(), Some("tech"));
+    assert_eq!(bench.order(2, RUN, None).unwrap().1, None, "who is in goes on working");
+    bench.wish(2, Wish::Lock).unwrap();
+    bench.wish(2, Wish::Unlock(TECH.into())).unwrap();
+    bench.later(300);
+    bench.login(1, "tech", TECH).unwrap();
+}
+
+#[test]
+fn a_supervisor_ends_a_lock_out() {
+    let mut bench = Bench::new(AccessDef { tries_max: 1, ..AccessDef::default() });
+    bench.open(1, "10.0.0.1");
+    bench.open(2, "10.0.0.2");
+    bench.open(3, "10.0.0.3");
+    bench.login(2, "boss", BOSS).unwrap();
+    bench.login(1, "tech", "guess").unwrap_err();
+    let rows = bench.gate.standing(2, bench.now).users;
+    assert!(rows.iter().any(|row| &*row.user == "tech" && row.locked_until.is_some()));
+    bench.wish(2, Wish::Disable { user: "tech".into(), disabled: false }).unwrap();
+    bench.login(3, "tech", TECH).unwrap();
+}
+
+#[test]
+fn each_role_may_what_is_its_own_and_refused_orders_go_to_the_plant_as_refused() {
+    let roles = [
+        (None, Role::Viewer, true),
+        (Some(("view", VIEW)), Role::Viewer, true),
+        (Some(("tech", TECH)), Role::Technician, false),
+    ];
+    for (login, _, refused) in roles {
+        let mut bench = Bench::new(AccessDef::default());
+        bench.open(1, "10.0.0.1");
+        if let Some((user, password)) = login {
+            bench.login(1, user, password).unwrap();
+        }
+        let (order, why) = bench.order(1, RUN, None).unwrap();
+        assert_eq!(why.is_some(), refused, "{login:?} {why:?}");
+        assert_eq!(&*order.by, login.map_or("not logged in", |login| login.0));
+        assert_eq!(&*order.from, "pts/1 from 10.0.0.1, user panel");
+        let stop = bench.wish(1, Wish::Stop);
+        assert!(stop.is_err());
+        assert!(bench.last().0.ends_with("stop station") && bench.last().2.starts_with("refused: "));
+    }
+}
+
+#[test]
+fn without_a_login_the_history_is_answered_only_where_the_plant_may_be_seen() {
+    let question = Question::Journal { from: Timestamp::MIN, to: Timestamp::MAX, limit: 1 };
+    for view in [false, true] {
+        let mut bench = Bench::new(AccessDef { view, ..AccessDef::default() });
+        bench.open(1, "here");
+        assert_eq!(bench.gate.may_ask(1, &question, bench.now).is_ok(), view);
+        bench.login(1, "view", VIEW).unwrap();
+        assert_eq!(bench.gate.may_ask(1, &question, bench.now), Ok(()));
+    }
+}
+
+#[test]
+fn an_untouched_terminal_is_locked_shows_it_and_may_only_look_until_the_password_is_given() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "here");
+    bench.login(1, "tech", TECH).unwrap();
+    bench.later(850);
+    let standing = bench.gate.standing(1, bench.now);
+    assert_eq!((standing.locked, standing.locks_in), (false, Some(Duration::from_secs(50))));
+    bench.order(1, RUN, None).unwrap();
+    bench.later(899);
+    assert!(!bench.gate.standing(1, bench.now).locked, "an order is a sign of life");
+    bench.later(1);
+    let standing = bench.gate.standing(1, bench.now);
+    assert!(standing.locked && standing.view);
+    assert!(bench.order(1, RUN, None).unwrap().1.is_some());
+    assert!(bench.wish(1, Wish::Unlock("guess".into())).is_err());
+    bench.later(1);
+    bench.wish(1, Wish::Unlock(TECH.into())).unwrap();
+    assert_eq!(bench.order(1, RUN, None).unwrap().1, None);
+    bench.wish(1, Wish::Lock).unwrap();
+    bench.login(1, "boss", BOSS).unwrap();
+    assert_eq!(bench.who(1).as_deref(), Some("boss"), "somebody else may sit down at a locked terminal");
+}
+
+#[test]
+fn the_first_supervisor_is_made_once_and_only_by_whoever_could_start_the_station() {
+    let mut bench = Bench::of(Gate::with_people(Arc::new(fixture::plant()), Users::default(), Some("sight".into())));
+    let first = || Wish::FirstSupervisor { user: "anna".into(), password: "a horse in a tank of water".into() };
+    bench.open(1, "10.0.0.1");
+    assert!(!bench.gate.standing(1, bench.now).first);
+    bench.wish(1, first()).unwrap_err();
+    bench.login(1, "anna", "").unwrap_err();
+    let peer = Peer { from: "pts/0".into(), unix_user: Some("sight".into()), own: false };
+    bench.gate.open(2, peer, bench.now);
+    assert!(bench.gate.standing(2, bench.now).first);
+    assert!(bench.wish(2, Wish::FirstSupervisor { user: "anna".into(), password: "short".into() }).is_err());
+    bench.wish(2, first()).unwrap();
+    assert_eq!(bench.who(2).as_deref(), Some("anna"));
+    assert!(
+        bench
+            .wish(2, Wish::FirstSupervisor { user: "bert".into(), password: "a horse in a tank of water".into() })
+            .is_err()
+    );
+    assert!(!bench.gate.standing(2, bench.now).first);
+}
+
+#[test]
+fn whoever_got_a_password_from_somebody_must_first_choose_his_own() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "10.0.0.1");
+    bench.open(2, "10.0.0.2");
+    bench.login(1, "boss", BOSS).unwrap();
+    let (given, own) = ("given by the boss", "chosen by dora herself");
+    bench.wish(1, Wish::AddUser { user: "dora".into(), role: Role::Supervisor, password: given.into() }).unwrap();
+    bench.login(2, "dora", given).unwrap();
+    assert!(bench.order(2, RUN, None).unwrap().1.is_some());
+    assert!(bench.wish(2, Wish::Stop).is_err());
+    bench.wish(2, Wish::ChangePassword { old: given.into(), new: given.into() }).unwrap_err();
+    bench.wish(2, Wish::ChangePassword { old: given.into(), new: own.into() }).unwrap();
+    assert_eq!(bench.order(2, RUN, None).unwrap().1, None);
+    assert_eq!(&*bench.kept.as_ref().unwrap().get("dora").unwrap().hash, own);
+}
+
+#[test]
+fn a_change_acts_on_those_who_are_in_at_once_and_one_that_was_not_saved_is_none() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "10.0.0.1");
+    bench.login(1, "boss", BOSS).unwrap();
+    let changes = [
+        Wish::SetRole { user: "tech".into(), role: Role::Viewer },
+        Wish::SetRole { user: "tech".into(), role: Role::Technician },
+        Wish::Disable { user: "tech".into(), disabled: true },
+        Wish::Disable { user: "tech".into(), disabled: false },
+        Wish::DeleteUser { user: "tech".into() },
+    ];
+    for (terminal, change) in changes.into_iter().enumerate() {
+        let terminal = terminal as u32 + 2;
+        bench.open(terminal, &format!("10.0.0.{terminal}"));
+        let came_in = bench.login(terminal, "tech", TECH).is_ok();
+        bench.disk_full = true;
+        assert!(bench.wish(1, change.clone()).is_err());
+        assert_eq!(bench.who(terminal).is_some(), came_in, "nothing was changed");
+        bench.disk_full = false;
+        bench.wish(1, change).unwrap();
+        assert_eq!(bench.who(terminal), None);
+    }
+    assert!(bench.wish(1, Wish::DeleteUser { user: "boss".into() }).is_err(), "the last supervisor remains");
+    assert_eq!(
+        bench.last(),
+        ("boss delete user", "boss", "refused: at least one supervisor who is not disabled must remain")
+    );
+}
+
+#[test]
+fn a_tag_that_asks_for_a_second_person_is_written_only_with_one() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "10.0.0.1");
+    bench.login(1, "tech", TECH).unwrap();
+    let sign = |user: Option<&str>, password: &str| {
+        Some(Signature { user: user.map(str::to_owned), password: password.into() })
+    };
+    let wrong = "wrong name or password, or locked out; try again later; wait 1 s at this terminal";
+    let refused = [
+        (None, "this tag asks for a second person"),
+        (sign(None, TECH), "this tag asks for a second person"),
+        (sign(Some("Tech"), TECH), "the second person must be another one"),
+        (sign(Some("view"), VIEW), "view may not sign this: it is for a technician"),
+        (sign(Some("boss"), "guess"), wrong),
+        (
+            sign(Some("nobody"), BOSS),
+            "wrong name or password, or locked out; try again later; wait 2 s at this terminal",
+        ),
+    ];
+    for (sign, why) in refused {
+        let (_, refused) = bench.order(1, SV, sign).unwrap();
+        assert_eq!(refused, Some(Refusal::NotSigned(why.into())));
+        bench.later(2);
+    }
+    let (order, refused) = bench.order(1, SV, sign(Some("BOSS"), BOSS)).unwrap();
+    assert_eq!((refused, order.note.as_deref()), (None, Some("why; signed by boss")));
+}
+
+#[test]
+fn a_user_whom_the_operating_system_knows_is_in_without_a_password() {
+    let trusted = vec![("panel".to_owned(), Role::Technician)];
+    let mut bench = Bench::new(AccessDef { trusted, ..AccessDef::default() });
+    bench.open(1, "10.0.0.1");
+    assert_eq!(bench.who(1).as_deref(), Some("panel"));
+    assert_eq!(bench.order(1, RUN, None).unwrap().1, None);
+    bench.later(5000);
+    assert!(!bench.gate.standing(1, bench.now).locked, "he would have no password to unlock it with");
+    assert!(bench.wish(1, Wish::Lock).is_err());
+}
+
+#[test]
+fn no_more_terminals_come_in_than_permitted_but_the_stations_own_always_does() {
+    let mut bench = Bench::new(AccessDef { sessions_max: 2, ..AccessDef::default() });
+    bench.open(1, "a");
+    bench.open(2, "b");
+    let sent_away = bench.open(3, "c");
+    assert!(matches!(sent_away.last(), Some(Effect::HangUp(3, why)) if why.contains("2 terminals")));
+    let own = Peer { from: "this process".into(), unix_user: None, own: true };
+    assert!(bench.gate.open(4, own, bench.now).iter().all(|effect| !matches!(effect, Effect::HangUp(..))));
+    bench.gate.close(1, bench.now);
+    assert!(bench.open(5, "c").iter().all(|effect| !matches!(effect, Effect::HangUp(..))));
+}
+
+#[test]
+fn a_hostile_terminal_can_neither_flood_the_plant_nor_fill_the_book() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "evil");
+    let mut orders = 0;
+    for _ in 0..600 {
+        for _ in 0..100 {
+            orders += usize::from(bench.order(1, RUN, None).is_some());
+        }
+        bench.later(1);
+    }
+    // Ten minutes, 60,000 orders.
+    assert!((20..=330).contains(&orders), "{orders}");
+    let told = bench.records.iter().filter(|record| record.0.ends_with("too many requests")).count();
+    assert!((9..=10).contains(&told), "{told}");
+    let mut coming = 0;
+    for terminal in 10..2000 {
+        coming += bench.open(terminal, "evil").iter().filter(|effect| matches!(effect, Effect::Record(_))).count();
+        bench.gate.close(terminal, bench.now);
+    }
+    assert!(coming <= 20, "{coming}");
+}
+
+#[test]
+fn a_terminal_that_hangs_up_before_the_answer_has_had_its_try() {
+    let mut bench = Bench::new(AccessDef { tries_max: 2, ..AccessDef::default() });
+    for terminal in 1..=2 {
+        bench.open(terminal, "evil");
+        let wish = Wish::Login { user: "tech".into(), password: "guess".into() };
+        let effects = bench.gate.wish(terminal, 1, wish, bench.now);
+        bench.gate.close(terminal, bench.now);
+        bench.work(effects);
+        bench.later(2);
+    }
+    bench.open(3, "other");
+    assert!(bench.login(3, "tech", TECH).is_err());
+}
+
+#[test]
+fn a_demonstration_asks_nobody() {
+    let mut bench = Bench::of(Gate::new(Arc::new(fixture::plant())));
+    let own = Peer { from: "this process".into(), unix_user: Some("anna".into()), own: true };
+    bench.gate.open(1, own, bench.now);
+    assert_eq!(bench.who(1).as_deref(), Some("anna"));
+    assert_eq!(bench.order(1, RUN, None).unwrap().1, None);
+    bench.open(2, "10.0.0.1");
+    assert!(bench.order(2, RUN, None).unwrap().1.is_some(), "only at its own terminal");
+}
+
+proptest! {
+    #[test]
+    fn nobody_comes_in_while_he_is_locked_out(
+        steps in prop::collection::vec((0u32..4, any::<bool>(), 0i64..60), 1..80), tries_max in 1u16..4
+    ) {
+        let mut bench = Bench::new(AccessDef { tries_max, ..AccessDef::default() });
+        for terminal in 0..4 {
+            bench.open(terminal, &format!("10.0.0.{terminal}"));
+        }
+        // Wrong passwords in a row that were looked at, over all terminals, and since when he is locked out.
+        let (mut wrong, mut locked_at) = (0, None::<Timestamp>);
+        for (terminal, right, later) in steps {
+            bench.later(later);
+            if locked_at.is_some_and(|from| passed(from, bench.now) >= Duration::from_secs(300)) {
+                (wrong, locked_at) = (0, None);
+            }
+            let looked_at = bench.gate.tries.wait(&bench.gate.seats[&terminal].origin, bench.now).is_none();
+            let came_in = bench.login(terminal, "tech", if right { TECH } else { "guess" }).is_ok();
+            prop_assert_eq!(came_in, right && looked_at && locked_at.is_none());
+            if came_in {
+                wrong = 0;
+            } else if looked_at && locked_at.is_none() {
+                wrong += 1;
+                if wrong == tries_max {
+                    locked_at = Some(bench.now);
+                }
+            }
+        }
+    }
+}

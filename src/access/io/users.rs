@@ -1,0 +1,224 @@
+//! The file of users, beside the history: written whole or not at all, and never taken for empty when it is damaged.
+
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{Read, Write},
+    os::unix::fs::OpenOptionsExt,
+    path::{Path, PathBuf},
+};
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::{
+    access::{
+        password,
+        user::{self, User, Users},
+    },
+    plant::role::Role,
+};
+
+/// Some hundred users are some ten kilobytes; whatever is larger than this is something else.
+const BYTES_MAX: u64 = 256 << 10;
+/// The first words of the file.
+const HEAD: &str = "# The users of this plant. Written by the station: change it there, in the tab Users.\n";
+
+/// Why the users are not known. The station does not start then: it must not take a damaged file for nobody.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum UsersError {
+    /// It is there, and cannot be read.
+    #[error("the users in {path} cannot be read: {why}")]
+    Unreadable {
+        /// The file.
+        path: String,
+        /// Why.
+        why: String,
+    },
+    /// It says something that cannot be.
+    #[error("{path}:{line}:{column}: {why}; nobody can log in until the file is mended or brought back from a copy")]
+    Wrong {
+        /// The file.
+        path: String,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What was found and what was expected.
+        why: String,
+    },
+}
+
+/// Reads the users; where there is no file there is nobody yet.
+pub fn read(path: &Path) -> Result<Users, UsersError> {
+    let unreadable = |why: String| UsersError::Unreadable { path: path.display().to_string(), why };
+    let file = match File::open(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Users::default()),
+        file => file.map_err(|error| unreadable(error.to_string()))?,
+    };
+    if !file.metadata().map_err(|error| unreadable(error.to_string()))?.is_file() {
+        return Err(unreadable("it is no file".to_owned()));
+    }
+    let mut bytes = Vec::new();
+    file.take(BYTES_MAX + 1).read_to_end(&mut bytes).map_err(|error| unreadable(error.to_string()))?;
+    if BYTES_MAX < bytes.len() as u64 {
+        return Err(unreadable(format!("it is larger than {} KiB", BYTES_MAX >> 10)));
+    }
+    let text = String::from_utf8(bytes).map_err(|_| unreadable("it is not UTF-8".to_owned()))?;
+    parse(&text).map_err(|(offset, why)| {
+        let before = text.get(..offset).unwrap_or(&text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.chars().rev().take_while(|letter| *letter != '\n').count() + 1;
+        UsersError::Wrong { path: path.display().to_string(), line, column, why }
+    })
+}
+
+/// Writes the users: who loses power now finds the old file or the new one. `Err` says why, in words for the operator.
+/// Blocks while the disk works.
+pub fn write(path: &Path, users: &Users) -> Result<(), String> {
+    let failed = |error: std::io::Error| format!("{} cannot be written: {error}", path.display());
+    let mut beside = path.to_owned().into_os_string();
+    beside.push(format!(".new-{}", std::process::id()));
+    let beside = PathBuf::from(beside);
+    let written = write_whole(&beside, text(users).as_bytes()).and_then(|()| fs::rename(&beside, path));
+    if written.is_err() {
+        // What was begun is of no use to anybody.
+        let _ = fs::remove_file(&beside);
+    }
+    written.map_err(failed)?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    File::open(folder).and_then(|folder| folder.sync_all()).map_err(failed)
+}
+
+fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    // Never through a link that somebody has put there; what an earlier try has left is of no use.
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+        Ok(()) | Err(_) => {}
+    }
+    let mut file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    #[serde(default)]
+    user: Vec<Spanned<Row>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    name: Spanned<String>,
+    role: Role,
+    password: Spanned<String>,
+    #[serde(default)]
+    disabled: bool,
+    #[serde(default)]
+    must_change: bool,
+    last_login: Option<Spanned<String>>,
+}
+
+/// The users of a text, or where it is wrong (as an offset in bytes) and why.
+fn parse(text: &str) -> Result<Users, (usize, String)> {
+    let table: Table = toml::from_str(text).map_err(|error| {
+        // Never the line itself: it may hold a hash.
+        (error.span().map_or(0, |span| span.start), error.message().to_owned())
+    })?;
+    if table.user.is_empty() {
+        return Err((0, "no user found, expected [[user]]".to_owned()));
+    }
+    let places: Vec<usize> = table.user.iter().map(|row| row.span().start).collect();
+    let mut users = Vec::new();
+    for row in table.user {
+        let row = row.into_inner();
+        user::check_name(row.name.get_ref()).map_err(|why| (row.name.span().start, why))?;
+        let checked = password::check_hash(row.password.get_ref());
+        checked.map_err(|expected| (row.password.span().start, format!("this is no hash, {expected}")))?;
+        let last_login = row.last_login.map(|time| {
+            let wrong = (time.span().start, "found no time, expected one as 2026-05-01T12:00:00Z".to_owned());
+            time.get_ref().parse().map_err(|_| wrong)
+        });
+        users.push(User {
+            name: row.name.into_inner().into(),
+            role: row.role,
+            hash: row.password.into_inner().into(),
+            disabled: row.disabled,
+            must_change: row.must_change,
+            last_login: last_login.transpose()?,
+        });
+    }
+    Users::new(users).map_err(|(place, why)| (places[place], why))
+}
+
+fn text(users: &Users) -> String {
+    let mut text = HEAD.to_owned();
+    for User { name, role, hash, disabled, must_change, last_login } in users.iter() {
+        // Names and hashes hold nothing that a quoted text would have to escape.
+        text += &format!("\n[[user]]\nname = \"{name}\"\nrole = \"{}\"\npassword = \"{hash}\"\n", role.word());
+        text += if *disabled { "disabled = true\n" } else { "" };
+        text += if *must_change { "must_change = true\n" } else { "" };
+        if let Some(at) = last_login {
+            text += &format!("last_login = \"{at}\"\n");
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::{os::unix::fs::PermissionsExt, sync::Arc};
+
+    use super::*;
+    use crate::access::user::Change;
+
+    fn two() -> Users {
+        let hash: Arc<str> = password::DUMMY.into();
+        let users = Users::default().with(&Change::First { user: "anna".into(), hash: hash.clone() }).unwrap();
+        let mut users = users.with(&Change::Add { user: "สมชาย".into(), role: Role::Viewer, hash }).unwrap();
+        users.logged_in("anna", "2026-05-01T12:00:00.25Z".parse().unwrap());
+        users
+    }
+
+    #[test]
+    fn users_come_back_as_they_were_and_nobody_else_can_read_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tank.users.toml");
+        assert!(read(&path).unwrap().is_empty(), "nobody yet");
+        write(&path, &two()).unwrap();
+        write(&path, &two()).unwrap();
+        assert_eq!(read(&path).unwrap(), two());
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside");
+        assert!(write(&folder.path().join("gone/x.toml"), &two()).unwrap_err().contains("cannot be written"));
+    }
+
+    #[test]
+    fn a_damaged_file_stops_the_start_and_is_never_taken_for_nobody() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tank.users.toml");
+        let good = text(&two());
+        let damaged = [
+            (String::new(), (1, 1), "no user found"),
+            (HEAD.to_owned(), (1, 1), "no user found"),
+            (good[..good.len() / 2].to_owned(), (6, 101), "expected"),
+            (good.replace("\"supervisor\"", "\"boss\""), (5, 8), "boss"),
+            (good.replace("\"supervisor\"", "\"viewer\""), (3, 1), "at least one supervisor"),
+            (good.replace("สมชาย", "ANNA"), (9, 1), "there is a user ANNA already"),
+            (good.replacen("argon2id", "md5", 1), (6, 12), "this is no hash"),
+            (good.replacen("must_change", "must_chance", 1), (13, 1), "must_chance"),
+        ];
+        for (text, place, expected) in damaged {
+            fs::write(&path, &text).unwrap();
+            let UsersError::Wrong { line, column, why, .. } = read(&path).unwrap_err() else { panic!("{text}") };
+            assert!(why.contains(expected), "{why}");
+            assert_eq!((line, column), place, "{why}\n{text}");
+            assert!(!why.contains("argon2id$"), "{why}");
+        }
+        fs::remove_file(&path).unwrap();
+        fs::create_dir(&path).unwrap();
+        assert!(matches!(read(&path), Err(UsersError::Unreadable { .. })));
+    }
+}

@@ -1,0 +1,174 @@
+//! Passwords: which are good enough, and the Argon2id hash that is kept of them.
+
+use argon2::{
+    Algorithm, Argon2, Params, Version,
+    password_hash::{PasswordHasher, PasswordVerifier, phc::PasswordHash},
+};
+use unicode_normalization::UnicodeNormalization;
+
+/// Most characters of a password: a passphrase has room, a hostile terminal keeps nobody busy.
+pub const CHARS_MAX: usize = 128;
+/// Bytes of a salt.
+pub const SALT_BYTES: usize = 16;
+/// 19 MiB, twice, one lane: what OWASP recommends for Argon2id.
+const COST: (u32, u32, u32) = (19 * 1024, 2, 1);
+/// What a hash in a file may cost at the most, so that nobody stalls the station through it: KiB and rounds.
+const COST_MAX: (u32, u32) = (64 * 1024, 10);
+/// What everybody tries first. Compared without case, without what is no letter or digit, and as a repetition.
+const COMMON: [&str; 16] = [
+    "password",
+    "passphrase",
+    "passwort",
+    "letmein",
+    "welcome",
+    "sightglass",
+    "operator",
+    "supervisor",
+    "technician",
+    "administrator",
+    "admin",
+    "changeme",
+    "qwerty",
+    "qwertyuiop",
+    "1234567890",
+    "abcdefghijklmnopqrstuvwxyz",
+];
+/// The hash of nothing that anybody knows: an unknown name costs the same work as a known one.
+pub const DUMMY: &str = "$argon2id$v=19$m=19456,t=2,p=1$c2lnaHRnbGFzc25vYm9keQ$\
+     AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA";
+
+/// The one form of a text: the same letters may be typed in several ways (a letter with an accent, or the letter and then
+/// the accent; a Thai tone before or after a vowel), depending on the keyboard. NFC joins these and nothing else: other
+/// forms would make different letters equal.
+pub fn one_form(text: &str) -> String {
+    text.nfc().collect()
+}
+
+/// Checks a new password of `user`. `Err` says what is expected.
+pub fn check(password: &str, user: &str, chars_min: u16) -> Result<(), String> {
+    let password = one_form(password);
+    let chars = password.chars().count();
+    if chars < usize::from(chars_min) {
+        return Err(format!(
+            "the password has {chars} characters, at least {chars_min} are needed; several words are best"
+        ));
+    }
+    if CHARS_MAX < chars {
+        return Err(format!("the password has {chars} characters, at most {CHARS_MAX} can be"));
+    }
+    if password.chars().any(char::is_control) {
+        return Err("the password holds a character that cannot be typed".to_owned());
+    }
+    let plain = plain(&password);
+    let name = self::plain(user);
+    if !name.is_empty() && made_of(&plain, &name) {
+        return Err("the password must not be the name of the user".to_owned());
+    }
+    let letters: Vec<char> = plain.chars().collect();
+    let short = |count: usize| letters.chunks(count).all(|part| letters.starts_with(part));
+    if letters.is_empty() || (1..=3).any(short) || COMMON.iter().any(|common| made_of(&plain, common)) {
+        return Err("this password is among the first that everybody tries".to_owned());
+    }
+    Ok(())
+}
+
+/// Is it this word, once or several times, cut anywhere, with at most two more characters?
+fn made_of(plain: &str, word: &str) -> bool {
+    let mut rest = plain;
+    let mut times = 0;
+    while let Some(after) = rest.strip_prefix(word) {
+        rest = after;
+        times += 1;
+    }
+    times > 0 && (rest.chars().count() <= 2 || word.starts_with(rest) || rest.chars().all(|c| c.is_ascii_digit()))
+}
+
+/// Without case, and without what is no letter, mark or digit of any script.
+fn plain(text: &str) -> String {
+    one_form(text)
+        .chars()
+        .filter(|letter| !letter.is_whitespace() && !letter.is_ascii_punctuation())
+        .collect::<String>()
+        .to_lowercase()
+}
+
+/// Hashes a password, about 20 ms of work. `Err` only where memory is short.
+pub fn hash(password: &str, salt: [u8; SALT_BYTES]) -> Result<String, String> {
+    let hashed: Result<PasswordHash, _> = argon2().hash_password_with_salt(one_form(password).as_bytes(), &salt);
+    hashed.map(|hash| hash.to_string()).map_err(|error| format!("the password could not be hashed: {error}"))
+}
+
+/// Is it the password of this hash? The same work for every hash of ours, right or wrong.
+pub fn is(password: &str, hash: &str) -> bool {
+    let Ok(hash) = PasswordHash::new(hash) else { return false };
+    // Never more work than for the longest that can be.
+    let password: String = one_form(password).chars().take(CHARS_MAX + 1).collect();
+    argon2().verify_password(password.as_bytes(), &hash).is_ok()
+}
+
+/// Is this a hash that [`is`] can compare with, at a cost that can be borne?
+pub fn check_hash(text: &str) -> Result<(), &'static str> {
+    let expected = "expected an Argon2id hash, as the station writes it";
+    let hash = PasswordHash::new(text).map_err(|_| expected)?;
+    let params = Params::try_from(&hash).map_err(|_| expected)?;
+    let complete = hash.algorithm.as_str() == "argon2id" && hash.salt.is_some() && hash.hash.is_some();
+    if !complete || COST_MAX.0 < params.m_cost() || COST_MAX.1 < params.t_cost() || 4 < params.p_cost() {
+        return Err(expected);
+    }
+    Ok(())
+}
+
+fn argon2() -> Argon2<'static> {
+    let (memory, times, lanes) = COST;
+    let params = Params::new(memory, times, lanes, None).expect("these numbers are within the limits of Argon2");
+    Argon2::new(Algorithm::Argon2id, Version::V0x13, params)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_passphrase_in_any_language_is_welcome_and_what_everybody_tries_is_not() {
+        let good =
+            ["four wet horses in a tank", "ปั๊มน้ำเสียทุกวันจันทร์", "grüße aus dem kesselhaus", "passwordless entry is fine"];
+        for password in good {
+            assert_eq!(check(password, "anna", 15), Ok(()), "{password}");
+        }
+        let bad = [
+            "short",
+            "anna anna anna anna",
+            "Password Password 1",
+            "password123456789",
+            "aaaaaaaaaaaaaaaaaaa",
+            "1212121212121212",
+            "12345678901234567890",
+            "qwertyuiopqwertyuiop",
+            "                    ",
+            "with a bell \u{7} in the middle",
+        ];
+        for password in bad {
+            assert!(check(password, "anna", 15).is_err(), "{password}");
+        }
+        assert!(check(&"wet horses ".repeat(12), "anna", 15).is_err(), "too long");
+    }
+
+    #[test]
+    fn a_password_typed_on_another_keyboard_is_the_same() {
+        let hash = hash("caf\u{e9} im kesselhaus", [7; SALT_BYTES]).unwrap();
+        assert_eq!(check_hash(&hash), Ok(()));
+        assert!(is("cafe\u{301} im kesselhaus", &hash));
+        assert!(!is("cafe im kesselhaus", &hash));
+        assert!(!is("", &hash) && !is("caf\u{e9} im kesselhaus ", &hash));
+        assert!(hash.starts_with("$argon2id$v=19$m=19456,t=2,p=1$"), "{hash}");
+    }
+
+    #[test]
+    fn a_hash_that_would_stall_the_station_is_not_taken() {
+        assert_eq!(check_hash(DUMMY), Ok(()), "an unknown name costs the same work");
+        assert!(check_hash(&DUMMY.replace("m=19456", "m=4000000")).is_err());
+        assert!(check_hash(&DUMMY.replace("argon2id", "argon2i")).is_err());
+        assert!(check_hash("secret").is_err() && check_hash("").is_err());
+    }
+}

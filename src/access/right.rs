@@ -1,0 +1,186 @@
+//! The table of rights: what may be asked of a station, and the least role that may ask it.
+
+use super::Wish;
+use crate::{
+    history::Question,
+    plant::{command::Command, role::Role, tool::Tool},
+};
+
+/// What a person may do. A role has the rights of those before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Right {
+    /// See the process, curves, journals and reports.
+    Look,
+    /// Control the process: write, acknowledge, open and close lines, use parameter sets, read-only tests of a line.
+    Operate,
+    /// Take what the station holds away as a file.
+    Export,
+    /// Change how a line works, or send bytes to it that may do anything.
+    Engineer,
+    /// Say who may what.
+    People,
+    /// End the station, or give it another plant file.
+    Station,
+}
+
+impl Right {
+    /// Every right.
+    pub const ALL: [Right; 6] =
+        [Right::Look, Right::Operate, Right::Export, Right::Engineer, Right::People, Right::Station];
+
+    /// The least role that has it.
+    pub fn role(self) -> Role {
+        match self {
+            Right::Look => Role::Viewer,
+            Right::Operate | Right::Export => Role::Technician,
+            Right::Engineer | Right::People | Right::Station => Role::Supervisor,
+        }
+    }
+}
+
+/// The right that a command needs.
+pub fn of_command(command: &Command) -> Right {
+    match command {
+        Command::Write { .. }
+        | Command::Acknowledge(_)
+        | Command::AcknowledgeAll
+        | Command::Refresh(_)
+        | Command::Connect(..)
+        | Command::StopTest(_)
+        | Command::ReadSets
+        | Command::SaveSet { .. }
+        | Command::Restore(_)
+        | Command::StopRestore(_) => Right::Operate,
+        Command::Configure(_) | Command::SaveSettings(_) => Right::Engineer,
+        Command::Test(_, tool) => of_tool(tool),
+    }
+}
+
+/// The right that a test of a line needs.
+fn of_tool(tool: &Tool) -> Right {
+    match tool {
+        // Raw bytes may be a write.
+        Tool::Send(_) => Right::Engineer,
+        // While other settings are tried the line polls nobody.
+        Tool::Scan(scan) if !scan.serials.is_empty() => Right::Engineer,
+        Tool::Scan(_) | Tool::Loopback { .. } | Tool::Identify { .. } | Tool::Read { .. } => Right::Operate,
+    }
+}
+
+/// The least role that may give a command.
+pub fn needs(command: &Command) -> Role {
+    of_command(command).role()
+}
+
+/// The least role that may ask a question.
+pub fn needs_for_question(question: &Question) -> Role {
+    let right = match question {
+        Question::Series { .. }
+        | Question::Journal { .. }
+        | Question::Actions { .. }
+        | Question::LineMinutes { .. }
+        | Question::Report { .. } => Right::Look,
+    };
+    right.role()
+}
+
+/// The least role that may have a wish; `None` where it is about oneself, so that the gate decides by who one is.
+pub fn needs_for_wish(wish: &Wish) -> Option<Role> {
+    let right = match wish {
+        Wish::Login { .. }
+        | Wish::Logout
+        | Wish::Lock
+        | Wish::Unlock(_)
+        | Wish::Active
+        | Wish::FirstSupervisor { .. }
+        | Wish::ChangePassword { .. } => return None,
+        Wish::AddUser { .. }
+        | Wish::SetRole { .. }
+        | Wish::Disable { .. }
+        | Wish::DeleteUser { .. }
+        | Wish::ResetPassword { .. } => Right::People,
+        Wish::Exported { .. } => Right::Export,
+        Wish::Stop | Wish::Reload => Right::Station,
+    };
+    Some(right.role())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::plant::{
+        def::{AlarmId, DeviceId, LineId, TagId},
+        fixture,
+        tag::Table,
+        tool::Scan,
+    };
+
+    #[test]
+    fn each_command_is_for_the_role_that_the_manual_names() {
+        let line = fixture::plant().lines[0].clone();
+        let scan =
+            |serials| Tool::Scan(Scan { first: 1, last: 9, serials, timeout: std::time::Duration::from_secs(1) });
+        let serial = crate::plant::def::Serial::USUAL;
+        let technician = [
+            Command::Write { tag: TagId(1), value: 1.0 },
+            Command::Acknowledge(AlarmId(0)),
+            Command::AcknowledgeAll,
+            Command::Refresh(DeviceId(0)),
+            Command::Connect(LineId(0), true),
+            Command::StopTest(LineId(0)),
+            Command::ReadSets,
+            Command::SaveSet { device: DeviceId(0), name: Arc::from("winter"), replace: true },
+            Command::StopRestore(DeviceId(0)),
+            Command::Test(LineId(0), Tool::Loopback { unit: 1, data: 7, count: 1 }),
+            Command::Test(LineId(0), Tool::Identify { unit: 1 }),
+            Command::Test(LineId(0), Tool::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
+            Command::Test(LineId(0), scan(Vec::new())),
+        ];
+        let supervisor = [
+            Command::Configure(Box::new(line)),
+            Command::SaveSettings(LineId(0)),
+            Command::Test(LineId(0), Tool::Send(vec![1])),
+            Command::Test(LineId(0), scan(vec![serial])),
+        ];
+        for (commands, role) in [(&technician[..], Role::Technician), (&supervisor[..], Role::Supervisor)] {
+            for command in commands {
+                assert_eq!(needs(command), role, "{command:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn each_wish_is_for_the_role_that_the_manual_names() {
+        let (user, password) = (String::new(), super::super::Secret::default());
+        let own = [
+            Wish::Login { user: user.clone(), password: password.clone() },
+            Wish::Logout,
+            Wish::Lock,
+            Wish::Unlock(password.clone()),
+            Wish::Active,
+            Wish::FirstSupervisor { user: user.clone(), password: password.clone() },
+            Wish::ChangePassword { old: password.clone(), new: password.clone() },
+        ];
+        let supervisor = [
+            Wish::AddUser { user: user.clone(), role: Role::Viewer, password: password.clone() },
+            Wish::SetRole { user: user.clone(), role: Role::Viewer },
+            Wish::Disable { user: user.clone(), disabled: true },
+            Wish::DeleteUser { user: user.clone() },
+            Wish::ResetPassword { user: user.clone(), password },
+            Wish::Stop,
+            Wish::Reload,
+        ];
+        let exported = Wish::Exported { file: user.clone(), sha256: user };
+        assert!(own.iter().all(|wish| needs_for_wish(wish).is_none()));
+        assert!(supervisor.iter().all(|wish| needs_for_wish(wish) == Some(Role::Supervisor)));
+        assert_eq!(needs_for_wish(&exported), Some(Role::Technician));
+    }
+
+    #[test]
+    fn a_role_has_every_right_of_the_role_below_it() {
+        let rights = |role| Right::ALL.into_iter().filter(move |right| right.role() <= role).count();
+        assert_eq!([Role::Viewer, Role::Technician, Role::Supervisor].map(rights), [1, 3, 6]);
+    }
+}

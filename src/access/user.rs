@@ -1,0 +1,268 @@
+//! The people of a plant: who there is, what they may, and how that may change. At least one Supervisor always remains.
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+
+use super::password::one_form;
+use crate::plant::role::Role;
+
+/// Most people of a plant.
+pub const USERS_MAX: usize = 200;
+/// Most characters of a name.
+pub const NAME_MAX: usize = 32;
+
+/// Somebody who can log in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct User {
+    /// His name.
+    pub name: Arc<str>,
+    /// What he may.
+    pub role: Role,
+    /// Argon2id, as [`super::password::hash`] makes it.
+    pub hash: Arc<str>,
+    /// Shut out by a Supervisor.
+    pub disabled: bool,
+    /// He must choose a password of his own before anything else.
+    pub must_change: bool,
+    /// When he last logged in.
+    pub last_login: Option<Timestamp>,
+}
+
+/// Everybody, in the order they came.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Users {
+    list: Vec<User>,
+}
+
+/// A change of who may what.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Change {
+    /// The very first: a Supervisor, only while there is nobody.
+    First {
+        /// Name.
+        user: Arc<str>,
+        /// Of his password.
+        hash: Arc<str>,
+    },
+    /// Somebody new, who must change his password.
+    Add {
+        /// Name.
+        user: Arc<str>,
+        /// What he may.
+        role: Role,
+        /// Of his first password.
+        hash: Arc<str>,
+    },
+    /// Another role.
+    Role(Arc<str>, Role),
+    /// Shut out, or let in again.
+    Disable(Arc<str>, bool),
+    /// Removed.
+    Delete(Arc<str>),
+    /// Another password.
+    Password {
+        /// Whose.
+        user: Arc<str>,
+        /// The hash.
+        hash: Arc<str>,
+        /// He did not choose it himself.
+        must_change: bool,
+    },
+}
+
+impl Change {
+    /// Whom it is about.
+    pub fn user(&self) -> &Arc<str> {
+        match self {
+            Change::First { user, .. }
+            | Change::Add { user, .. }
+            | Change::Role(user, _)
+            | Change::Disable(user, _)
+            | Change::Delete(user)
+            | Change::Password { user, .. } => user,
+        }
+    }
+}
+
+impl Users {
+    /// These people. `Err` says what is wrong with which of them, by its place.
+    pub fn new(list: Vec<User>) -> Result<Users, (usize, String)> {
+        let mut users = Users::default();
+        for (place, user) in list.into_iter().enumerate() {
+            users.check_new(&user.name).map_err(|why| (place, why))?;
+            users.list.push(user);
+        }
+        if !users.list.is_empty() && !users.has_supervisor() {
+            return Err((0, NO_SUPERVISOR.to_owned()));
+        }
+        Ok(users)
+    }
+
+    /// Nobody yet.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// Everybody.
+    pub fn iter(&self) -> impl Iterator<Item = &User> {
+        self.list.iter()
+    }
+
+    /// Somebody by name, however its letters are written.
+    pub fn get(&self, name: &str) -> Option<&User> {
+        let key = key(name);
+        self.list.iter().find(|user| self::key(&user.name) == key)
+    }
+
+    /// Somebody has logged in.
+    pub fn logged_in(&mut self, name: &str, at: Timestamp) {
+        if let Some(user) = self.place(name).map(|place| &mut self.list[place]) {
+            user.last_login = Some(at);
+        }
+    }
+
+    /// Everybody as it will be after a change. `Err` says in words for the operator why it may not be.
+    pub fn with(&self, change: &Change) -> Result<Users, String> {
+        let mut users = self.clone();
+        users.change(change)?;
+        if users.has_supervisor() { Ok(users) } else { Err(NO_SUPERVISOR.to_owned()) }
+    }
+
+    fn change(&mut self, change: &Change) -> Result<(), String> {
+        let new = |user: &Arc<str>, role, hash: &Arc<str>, must_change| User {
+            name: one_form(user).into(),
+            role,
+            hash: hash.clone(),
+            disabled: false,
+            must_change,
+            last_login: None,
+        };
+        if let Change::First { .. } | Change::Add { .. } = change {
+            self.check_new(change.user())?;
+        }
+        let place = self.place(change.user());
+        let place = place.ok_or_else(|| format!("there is no user {}", change.user()));
+        match change {
+            Change::First { .. } if !self.list.is_empty() => return Err("there are users already".to_owned()),
+            Change::First { user, hash } => self.list.push(new(user, Role::Supervisor, hash, false)),
+            Change::Add { user, role, hash } => self.list.push(new(user, *role, hash, true)),
+            Change::Role(_, role) => self.list[place?].role = *role,
+            Change::Disable(_, disabled) => self.list[place?].disabled = *disabled,
+            Change::Delete(_) => drop(self.list.remove(place?)),
+            Change::Password { hash, must_change, .. } => {
+                let user = &mut self.list[place?];
+                (user.hash, user.must_change) = (hash.clone(), *must_change);
+            }
+        }
+        Ok(())
+    }
+
+    fn check_new(&self, name: &str) -> Result<(), String> {
+        check_name(name)?;
+        if self.get(name).is_some() {
+            return Err(format!("there is a user {name} already"));
+        }
+        if USERS_MAX <= self.list.len() {
+            return Err(format!("there are {USERS_MAX} users, no more can be"));
+        }
+        Ok(())
+    }
+
+    fn place(&self, name: &str) -> Option<usize> {
+        let key = key(name);
+        self.list.iter().position(|user| self::key(&user.name) == key)
+    }
+
+    fn has_supervisor(&self) -> bool {
+        self.list.iter().any(|user| user.role == Role::Supervisor && !user.disabled)
+    }
+}
+
+const NO_SUPERVISOR: &str = "at least one supervisor who is not disabled must remain";
+
+/// The form in which names are compared: however the letters are written.
+pub fn key(name: &str) -> String {
+    one_form(&name.to_lowercase())
+}
+
+/// Checks a name: letters of any script, digits, `.`, `_` and `-`.
+pub fn check_name(name: &str) -> Result<(), String> {
+    let chars = one_form(name).chars().count();
+    if !(1..=NAME_MAX).contains(&chars) {
+        return Err(format!("a name has 1 to {NAME_MAX} characters, this has {chars}"));
+    }
+    let permitted = |letter: char| letter.is_alphanumeric() || is_mark(letter) || "._-".contains(letter);
+    match one_form(name).chars().find(|letter| !permitted(*letter)) {
+        Some(letter) => Err(format!("a name has letters, digits, `.`, `_` and `-`, found {letter:?}")),
+        None => Ok(()),
+    }
+}
+
+/// Vowels and tones that stand above or below a letter belong to a name in Thai and many other scripts.
+fn is_mark(letter: char) -> bool {
+    unicode_normalization::char::is_combining_mark(letter)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn first() -> Users {
+        Users::default().with(&Change::First { user: "anna".into(), hash: "h".into() }).unwrap()
+    }
+
+    #[test]
+    fn names_may_be_in_any_script_and_differ_by_more_than_case() {
+        for name in ["anna", "ÉRIC", "สมชาย", "น้ำ", "a.b_c-9", &"x".repeat(32)] {
+            assert_eq!(check_name(name), Ok(()), "{name}");
+        }
+        for name in ["", " ", "a b", "a/b", "a\n", "a\u{202e}b", &"x".repeat(33)] {
+            assert!(check_name(name).is_err(), "{name:?}");
+        }
+        let again = first().with(&Change::Add { user: "ANNA".into(), role: Role::Viewer, hash: "h".into() });
+        assert_eq!(again.unwrap_err(), "there is a user ANNA already");
+    }
+
+    #[test]
+    fn the_last_supervisor_can_be_neither_deleted_disabled_nor_lowered() {
+        let anna: Arc<str> = "anna".into();
+        for change in
+            [Change::Delete(anna.clone()), Change::Disable(anna.clone(), true), Change::Role(anna, Role::Technician)]
+        {
+            assert_eq!(first().with(&change).unwrap_err(), NO_SUPERVISOR, "{change:?}");
+        }
+        assert!(first().with(&Change::First { user: "bert".into(), hash: "h".into() }).is_err());
+    }
+
+    fn change() -> impl Strategy<Value = Change> {
+        let user = prop::sample::select(vec!["anna", "bert", "cleo", "dora"]).prop_map(Arc::<str>::from);
+        let role = prop::sample::select(Role::ALL.to_vec());
+        let hash: Arc<str> = "h".into();
+        let other = hash.clone();
+        prop_oneof![
+            (user.clone(), role.clone()).prop_map(move |(user, role)| Change::Add { user, role, hash: hash.clone() }),
+            (user.clone(), role).prop_map(|(user, role)| Change::Role(user, role)),
+            (user.clone(), any::<bool>()).prop_map(|(user, disabled)| Change::Disable(user, disabled)),
+            user.clone().prop_map(Change::Delete),
+            user.prop_map(move |user| Change::Password { user, hash: other.clone(), must_change: true }),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn a_plant_is_never_without_a_supervisor(changes in prop::collection::vec(change(), 0..40)) {
+            let mut users = first();
+            for change in changes {
+                if let Ok(after) = users.with(&change) {
+                    users = after;
+                }
+                prop_assert!(users.iter().any(|user| user.role == Role::Supervisor && !user.disabled));
+                prop_assert!(Users::new(users.list.clone()).is_ok(), "what is kept can be read again");
+            }
+        }
+    }
+}

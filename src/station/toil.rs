@@ -1,0 +1,114 @@
+//! What takes too long for the door: hashes of passwords and the file of users, done on threads beside it.
+
+use std::{collections::VecDeque, path::PathBuf, time::Duration};
+
+use tokio::task::{JoinHandle, JoinSet};
+
+use crate::access::{
+    Users,
+    gate::{Job, Outcome, Work},
+    io::{salt, users},
+};
+
+/// Passwords that are hashed at the same time, 19 MiB each; the gate bounds those that wait.
+const AT_ONCE: usize = 2;
+/// At the end the file of users is waited for so long.
+const SAVING_MAX: Duration = Duration::from_secs(2);
+
+/// Something is done.
+#[derive(Debug)]
+pub enum Done {
+    /// A hash.
+    Work(Job, Outcome),
+    /// The file of users.
+    Saved(Result<(), String>),
+}
+
+/// Everything that is being done.
+#[derive(Debug)]
+pub struct Toil {
+    path: Option<PathBuf>,
+    waiting: VecDeque<(Job, Work)>,
+    working: JoinSet<(Job, Outcome)>,
+    /// The jobs that are being worked on: one that panics must be told as well.
+    jobs: Vec<(tokio::task::Id, Job)>,
+    saving: Option<JoinHandle<Result<(), String>>>,
+}
+
+impl Toil {
+    /// Nothing to do. `path` is the file of users.
+    pub fn new(path: Option<PathBuf>) -> Toil {
+        Toil { path, waiting: VecDeque::new(), working: JoinSet::new(), jobs: Vec::new(), saving: None }
+    }
+
+    /// One more hash.
+    pub fn put(&mut self, job: Job, work: Work) {
+        self.waiting.push_back((job, work));
+        self.begin();
+    }
+
+    /// Writes the users down. The gate never wishes it while it is being done.
+    pub fn save(&mut self, people: Users) {
+        let path = self.path.clone();
+        self.saving = Some(tokio::task::spawn_blocking(move || match path {
+            Some(path) => users::write(&path, &people),
+            None => Err("this station keeps no users".to_owned()),
+        }));
+    }
+
+    fn begin(&mut self) {
+        while self.working.len() < AT_ONCE
+            && let Some((job, work)) = self.waiting.pop_front()
+        {
+            let begun = self.working.spawn_blocking(move || {
+                let outcome = salt().map_or_else(Outcome::Failed, |salt| work.done(salt));
+                (job, outcome)
+            });
+            self.jobs.push((begun.id(), job));
+        }
+    }
+
+    /// Waits for whatever is done next; for ever where nothing is being done. Safe to give up at any time.
+    pub async fn next(&mut self) -> Done {
+        let done = tokio::select! {
+            Some(done) = self.working.join_next_with_id() => Ok(done),
+            saved = saved(&mut self.saving) => Err(saved),
+            else => std::future::pending().await,
+        };
+        match done {
+            Err(result) => Done::Saved(result),
+            Ok(done) => {
+                let id = done.as_ref().map_or_else(tokio::task::JoinError::id, |(id, _)| *id);
+                let place = self.jobs.iter().position(|(at_work, _)| *at_work == id);
+                let job = place.map(|place| self.jobs.swap_remove(place).1);
+                self.begin();
+                match done {
+                    Ok((_, (job, outcome))) => Done::Work(job, outcome),
+                    Err(error) => {
+                        tracing::error!(%error, "looking at a password ended badly");
+                        let job = job.expect("every piece of work that is begun is noted");
+                        Done::Work(job, Outcome::Failed("internal error, see the log".to_owned()))
+                    }
+                }
+            }
+        }
+    }
+
+    /// What is being written is written to its end, unless the disk hangs.
+    pub async fn end(&mut self) {
+        if self.saving.is_some() && tokio::time::timeout(SAVING_MAX, saved(&mut self.saving)).await.is_err() {
+            tracing::error!("the disk does not take the users: left behind");
+        }
+    }
+}
+
+/// Waits for the end of a save; for ever without one.
+async fn saved(saving: &mut Option<JoinHandle<Result<(), String>>>) -> Result<(), String> {
+    let Some(work) = saving else { return std::future::pending().await };
+    let result = work.await;
+    *saving = None;
+    result.unwrap_or_else(|error| {
+        tracing::error!(%error, "writing the users down ended badly");
+        Err("internal error, see the log".to_owned())
+    })
+}
