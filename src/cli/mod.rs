@@ -1,5 +1,6 @@
 //! The command line: one file a subcommand, one place for exit codes.
 
+mod alarms;
 mod check;
 mod demo;
 mod drill;
@@ -62,6 +63,8 @@ enum Command {
     Profiles(profiles::Args),
     /// Writes the report of a shift or period from the history as CSV, while no station has the history open
     Report(report::Args),
+    /// Tells how good the alarm system was in a shift or period: rates, floods, chattering, stale, against their targets
+    Alarms(alarms::Args),
     /// Tells a Modbus frame in words: every byte, CRC and LRC, what is wrong with it
     Frame(frame::Args),
     /// Looks for units on a line: addresses, baud rates, parities
@@ -136,6 +139,7 @@ pub fn main() -> ExitCode {
         Some(Command::Check(args)) => check::main(args),
         Some(Command::Profiles(args)) => profiles::main(args),
         Some(Command::Report(args)) => report::main(args),
+        Some(Command::Alarms(args)) => alarms::main(args),
         Some(Command::Frame(args)) => frame::main(args),
         Some(Command::Scan(args)) => tools::scan::main(args),
         Some(Command::Probe(args)) => tools::probe::main(args),

@@ -35,6 +35,8 @@ const STALE_S: i64 = 86_400;
 /// What happened so long before a period is looked at too, to know whether a flood was under way; longer floods begin
 /// at the period.
 pub const LEAD: Duration = Duration::from_secs(86_400);
+/// What a meter that starts again must be told of the time before: the hours of the running figures.
+pub const RUNNING: Duration = Duration::from_secs((HOURS * HOUR_S) as u64);
 /// The running figures are formed anew after so many seconds.
 const REFRESH_S: i64 = 10;
 

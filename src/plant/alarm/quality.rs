@@ -155,17 +155,17 @@ pub const GOALS: [Goal; 14] = {
         goal(PerDay, "alarms a day", AtMost(150.0), Some(AtMost(300.0))),
         goal(PerHour, "alarms an hour", AtMost(6.0), Some(AtMost(12.0))),
         goal(PerWindow, "alarms in 10 min", AtMost(1.0), Some(AtMost(2.0))),
-        goal(WindowsOver, "10-min windows above 10, %", Below(1.0), None),
+        goal(WindowsOver, "10-min windows above 10 (%)", Below(1.0), None),
         goal(Most, "most in a 10-min window", AtMost(10.0), None),
-        goal(Flood, "time in flood, %", Below(1.0), None),
-        goal(Top, "share of the ten most frequent, %", AtMost(5.0), None),
+        goal(Flood, "time in flood (%)", Below(1.0), None),
+        goal(Top, "share of the ten most frequent (%)", AtMost(5.0), None),
         goal(Chattering, "chattering alarms", AtMost(0.0), None),
         goal(Fleeting, "fleeting alarms", AtMost(0.0), None),
-        goal(Stale, "active over 24 h, most at once", Below(5.0), None),
-        goal(Share(Priority::Critical), "priority critical, %", Below(1.0), None),
-        goal(Share(Priority::High), "priority high, %", AtMost(5.0), None),
-        goal(Share(Priority::Medium), "priority medium, %", AtMost(15.0), None),
-        goal(Share(Priority::Low), "priority low, %", AtLeast(80.0), None),
+        goal(Stale, "active over 24 h (most at once)", Below(5.0), None),
+        goal(Share(Priority::Critical), "priority critical (%)", Below(1.0), None),
+        goal(Share(Priority::High), "priority high (%)", AtMost(5.0), None),
+        goal(Share(Priority::Medium), "priority medium (%)", AtMost(15.0), None),
+        goal(Share(Priority::Low), "priority low (%)", AtLeast(80.0), None),
     ]
 };
 
@@ -208,9 +208,9 @@ impl Bound {
 impl std::fmt::Display for Bound {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Bound::AtMost(bound) => write!(f, "≤ {bound}"),
-            Bound::Below(bound) => write!(f, "< {bound}"),
-            Bound::AtLeast(bound) => write!(f, "≥ {bound}"),
+            Bound::AtMost(bound) => write!(f, "at most {bound}"),
+            Bound::Below(bound) => write!(f, "below {bound}"),
+            Bound::AtLeast(bound) => write!(f, "at least {bound}"),
         }
     }
 }
