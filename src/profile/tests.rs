@@ -436,6 +436,12 @@ fn an_alarm_that_could_never_come_or_never_go_is_refused() {
 }
 
 #[test]
+fn two_alarms_of_one_name_would_share_their_state_and_are_refused() {
+    let second = "[[alarm]]\ntag = \"D1.T\"\nlow = 5.0\ndeadband = 1.0\npriority = \"low\"\ntext = \"hot\"\n[mimic]";
+    check("[mimic]", second, &["[small.toml:36:8]", "duplicate alarm `hot` of D1.T", "first here"]);
+}
+
+#[test]
 fn limits_of_one_tag_stand_in_order() {
     let second = "[[alarm]]\ntag = \"D1.T\"\nhigh_high = 70.0\ndeadband = 1.0\npriority = \"critical\"\ntext = \"very hot\"\n[mimic]";
     check("[mimic]", second, &["[small.toml:26:8]", "high 80 is not below high_high 70 of D1.T"]);

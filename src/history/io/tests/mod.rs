@@ -271,8 +271,10 @@ fn a_history_of_an_older_program_gets_the_new_table_and_keeps_its_rows() {
     old.execute_batch(sql::CREATE_VERSION).unwrap();
     old.execute_batch(sql::MIGRATIONS[0]).unwrap();
     old.execute(sql::SET_VERSION, [1]).unwrap();
-    old.execute_batch("INSERT INTO tag VALUES (0, 'TIC-1.PV', '°C'); INSERT INTO sample VALUES ('1970-01-01', 0, 27.0, 0)")
-        .unwrap();
+    old.execute_batch(
+        "INSERT INTO tag VALUES (0, 'TIC-1.PV', '°C'); INSERT INTO sample VALUES ('1970-01-01', 0, 27.0, 0)",
+    )
+    .unwrap();
     drop(old);
     let store = open(&db, 10);
     store.append(&[Record::Line(minute("L1", 60, 60)), Record::Action(deed(5))]).unwrap();
