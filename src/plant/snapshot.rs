@@ -77,6 +77,7 @@ impl Snapshot {
             lines: vec![LineStatus::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); devices],
             alarms: Vec::new(),
+            alarm_quality: AlarmQuality::default(),
             orders: Vec::new(),
             watch: Watch::default(),
             history: HistoryStatus::default(),

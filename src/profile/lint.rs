@@ -124,7 +124,7 @@ fn place(table: &AlarmTable) -> Span {
 #[cfg(test)]
 mod tests {
     use super::super::{
-        plant::{Library, Text, build_warned},
+        plant::{Library, Text, build},
         tests::{METER, PLANT, PLC},
     };
 
@@ -145,7 +145,7 @@ mod tests {
             Ok(Some(Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() }))
         };
         let library = Library { find: &find, names: Vec::new() };
-        let built = build_warned("small", &Text { file: "small.toml".into(), bytes: text.into_bytes() }, &library);
+        let built = build("small", &Text { file: "small.toml".into(), bytes: text.into_bytes() }, &library);
         let (_, warnings) = built.unwrap_or_else(|errors| panic!("{errors}"));
         warnings.full_lines().collect()
     }

@@ -71,7 +71,7 @@ fn load_warned(plant: &Path, search: &Search) -> Result<(Checked, Option<PlantFi
     let search = search.beside(&found);
     let names = io::list(&search).into_iter().filter(|listed| listed.kind == Kind::Device).map(|listed| listed.name);
     let library = plant::Library { find: &|name| io::device(name, &search), names: names.collect() };
-    plant::build_warned(&found.name, &found.text, &library)
+    plant::build(&found.name, &found.text, &library)
         .map(|(def, warnings)| (Checked { plant: Arc::new(def), warnings }, file))
 }
 
@@ -97,7 +97,7 @@ pub fn check(file: &Path, search: &Search) -> Result<Checked, Errors> {
     let plant = plant::Text { file: format!("a plant around {}", text.file), bytes: around.into_bytes() };
     let (file, bytes) = (text.file, text.bytes);
     let find = |_: &str| Ok(Some(plant::Text { file: file.clone(), bytes: bytes.clone() }));
-    plant::build_warned(&stem, &plant, &plant::Library { find: &find, names: vec![stem.clone()] })
+    plant::build(&stem, &plant, &plant::Library { find: &find, names: vec![stem.clone()] })
         .map(|(def, warnings)| Checked { plant: Arc::new(def), warnings })
 }
 

@@ -37,13 +37,8 @@ pub(super) struct Library<'a> {
     pub names: Vec<String>,
 }
 
-/// Builds the plant called `name`, or tells everything that is wrong with its texts.
-pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<PlantDef, Errors> {
-    build_warned(name, plant, library).map(|(def, _)| def)
-}
-
-/// The same, with what could be better.
-pub(super) fn build_warned(name: &str, plant: &Text, library: &Library) -> Result<(PlantDef, Errors), Errors> {
+/// Builds the plant called `name` and tells what could be better in its texts, or tells everything that is wrong with them.
+pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<(PlantDef, Errors), Errors> {
     let mut problems = Problems::default();
     let built = reader::parse(&plant.file, &plant.bytes, &mut problems).map(|raw| {
         let file = PlantFile::of(&[raw], &mut problems);

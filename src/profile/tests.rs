@@ -117,7 +117,7 @@ pub(super) fn load(plant: &[u8], meter: &str, plc: &str) -> Result<PlantDef, Err
         Ok(Some(Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() }))
     };
     let library = Library { find: &find, names: vec!["meter".to_owned(), "plc".to_owned()] };
-    build("small", &Text { file: "small.toml".to_owned(), bytes: plant.to_vec() }, &library)
+    build("small", &Text { file: "small.toml".to_owned(), bytes: plant.to_vec() }, &library).map(|(def, _)| def)
 }
 
 /// Replaces `from` by `to` in whichever of the three texts has it; the rendering must then contain all of `expect`,

@@ -4,7 +4,7 @@ use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
-    read::{CHUNK, ROWS_MAX, alarm, check_span},
+    read::{CHUNK, ROWS_MAX, alarm, check_span, within},
     sql,
     store::{Store, utc},
 };
@@ -18,6 +18,9 @@ use crate::{
         record::AlarmRecord,
     },
 };
+
+/// Steps of alarms behind the figures of one answer: years of a plant that is run well.
+const STEPS_MAX: u64 = 2_000_000;
 
 /// What the meter of a plant that starts again must know.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -38,11 +41,14 @@ impl Store {
         let mut meter = Meter::of_period(from, until);
         self.active_at(known)?.iter().for_each(|step| meter.already(step));
         let (first, last) = self.extent().unwrap_or((until, known));
-        let mut next = known.max(first);
+        let (mut next, mut rows) = (known.max(first), 0);
         let end = until.min(last.checked_add(std::time::Duration::from_micros(1)).unwrap_or(last));
         while next < end {
             let to = next.checked_add(CHUNK).unwrap_or(end).min(end);
-            self.steps(next, to)?.iter().for_each(|step| meter.take(step));
+            let steps = self.steps(next, to)?;
+            rows += steps.len() as u64;
+            within(rows, STEPS_MAX)?;
+            steps.iter().for_each(|step| meter.take(step));
             next = to;
         }
         Ok(meter.figures())

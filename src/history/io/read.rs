@@ -269,7 +269,7 @@ pub(super) fn check_span(from: Timestamp, to: Timestamp) -> Result<(), HistoryEr
     if from < to { Ok(()) } else { Err(HistoryError::EmptyPeriod) }
 }
 
-fn within(rows: u64, max: u64) -> Result<(), HistoryError> {
+pub(super) fn within(rows: u64, max: u64) -> Result<(), HistoryError> {
     if rows <= max { Ok(()) } else { Err(HistoryError::TooManyRows { rows, max }) }
 }
 
