@@ -79,6 +79,7 @@ pub fn needs_for_question(question: &Question) -> Role {
         | Question::Journal { .. }
         | Question::Actions { .. }
         | Question::LineMinutes { .. }
+        | Question::AlarmQuality { .. }
         | Question::Report { .. } => Right::Look,
     };
     right.role()

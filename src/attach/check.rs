@@ -45,7 +45,10 @@ pub fn question(def: &PlantDef, question: &Question) -> Result<(), String> {
             tags.iter().try_for_each(|id| tag(def, *id))
         }
         Question::LineMinutes { line: id, .. } => line(def, *id),
-        Question::Journal { .. } | Question::Actions { .. } | Question::Report { .. } => Ok(()),
+        Question::Journal { .. }
+        | Question::Actions { .. }
+        | Question::Report { .. }
+        | Question::AlarmQuality { .. } => Ok(()),
     }
 }
 

@@ -12,7 +12,7 @@ use crate::plant::{
 /// Alarms, clock, trouble of the history, and which lines and devices are reached; no value of the process, no text, no
 /// bytes, no order. What is left out is absent, not hidden: it does not leave the station.
 pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
-    let Snapshot { at, def, decimals, lines, devices, alarms, history, speed, .. } = snapshot;
+    let Snapshot { at, def, decimals, lines, devices, alarms, alarm_quality, history, speed, .. } = snapshot;
     let reached = |line: &LineStatus| LineStatus {
         state: line.state.clone(),
         since: line.since,
@@ -33,6 +33,7 @@ pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
         lines: lines.iter().map(reached).collect(),
         devices: devices.iter().map(answering).collect(),
         alarms: alarms.iter().map(|alarm| ActiveAlarm { value: None, ..alarm.clone() }).collect(),
+        alarm_quality: alarm_quality.clone(),
         orders: Vec::new(),
         watch: Watch::default(),
         history: history.clone(),

@@ -1,4 +1,4 @@
-//! `sightglass check`: every error of a file at once, or the read plan of each line and whether the line can carry it.
+//! `sightglass check`: every error of a file at once, or what could be better in it, the read plan of each line and whether the line can carry it.
 
 use std::path::PathBuf;
 
@@ -16,22 +16,32 @@ use crate::{
     profile::{self, Search},
 };
 
-use super::{CliError, render, say};
+use super::{CliError, render, say, say_error};
 
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A plant file or device profile, or the name of a shipped one
     file: PathBuf,
+    /// Refuse a plant with warnings: every alarm must be complete and of use
+    #[arg(long)]
+    strict: bool,
 }
 
 /// Checks; on success prints what would be read, how busy each line would be, and whether every poll can meet its period.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let def = profile::check(&args.file, &Search::usual()).map_err(|errors| CliError::Profile(render(&errors)))?;
+    let checked = profile::check(&args.file, &Search::usual()).map_err(|errors| CliError::Profile(render(&errors)))?;
+    let (def, warnings) = (checked.plant, checked.warnings);
+    if warnings.count() > 0 && args.strict {
+        return Err(CliError::Profile(render(&warnings.strictly())));
+    }
     let (tags, alarms) = (def.tags.len(), def.alarms.len());
     say(&format!("{}: {} is good: {tags} tags, {alarms} alarms", args.file.display(), def.title));
     for line in &def.lines {
         describe(&def, line.id).iter().for_each(|text| say(text));
+    }
+    if warnings.count() > 0 {
+        say_error(&render(&warnings));
     }
     Ok(())
 }

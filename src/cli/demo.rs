@@ -136,9 +136,11 @@ async fn ask_report(session: &Session, period: Period) -> Result<Box<ShiftReport
     session.ask(Query { question: Question::Report { period }, reply }).map_err(|_| gone())?;
     match answer.await.map_err(|_| gone())?? {
         Answer::Report(report) => Ok(report),
-        Answer::Series(_) | Answer::Journal(_) | Answer::Actions(_) | Answer::LineMinutes(_) => {
-            Err(HistoryError::Engine("answered another question".into()))
-        }
+        Answer::Series(_)
+        | Answer::Journal(_)
+        | Answer::Actions(_)
+        | Answer::LineMinutes(_)
+        | Answer::AlarmQuality(_) => Err(HistoryError::Engine("answered another question".into())),
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod act;
 mod attach;
+mod alarms;
 mod check;
 mod client;
 mod control;
@@ -89,6 +90,8 @@ enum Command {
     Report(report::Args),
     /// Writes stored values of tags at a fixed interval as CSV
     Export(export::Args),
+    /// Tells how good the alarm system was in a shift or period: rates, floods, chattering, stale, against their targets
+    Alarms(alarms::Args),
     /// Tells a Modbus frame in words: every byte, CRC and LRC, what is wrong with it
     Frame(frame::Args),
     /// Looks for units on a line: addresses, baud rates, parities
@@ -181,6 +184,7 @@ pub fn main() -> ExitCode {
         Some(Command::Profiles(args)) => profiles::main(args),
         Some(Command::Report(args)) => report::main(args),
         Some(Command::Export(args)) => export::main(args),
+        Some(Command::Alarms(args)) => alarms::main(args),
         Some(Command::Frame(args)) => frame::main(args),
         Some(Command::Scan(args)) => tools::scan::main(args),
         Some(Command::Probe(args)) => tools::probe::main(args),

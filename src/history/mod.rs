@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     plant::{
+        alarm::Figures,
         def::{LineId, TagId},
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord},
@@ -65,6 +66,13 @@ pub enum Question {
         /// Which period.
         period: Period,
     },
+    /// How good the alarm system was, up to now at the latest.
+    AlarmQuality {
+        /// From.
+        from: Timestamp,
+        /// To.
+        to: Timestamp,
+    },
 }
 
 /// The answer to the question of the same name.
@@ -80,6 +88,8 @@ pub enum Answer {
     LineMinutes(Vec<LineMinute>),
     /// The report.
     Report(Box<ShiftReport>),
+    /// The figures of the alarm system.
+    AlarmQuality(Box<Figures>),
 }
 
 /// A curve reduced to columns of equal width.

@@ -1,6 +1,7 @@
 //! The reducer of facts: event, order or tick in, effects out. The only place where the plant changes.
 
 mod health;
+mod measure;
 mod restore;
 mod service;
 #[cfg(test)]
@@ -11,7 +12,7 @@ use std::{mem::discriminant, sync::Arc};
 use jiff::Timestamp;
 
 use super::{
-    alarm::{Book, condition::Facts},
+    alarm::{AlarmQuality, Book, Meter, condition::Facts},
     board::Board,
     command::{BusRequest, Command, Order, OrderId, Outcome, Refusal, WriteId},
     def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, Subject, TagId},
@@ -51,6 +52,9 @@ pub struct Plant {
     at: Timestamp,
     board: Board,
     book: Book,
+    /// Counts the steps of alarms; `quality` is what it said last.
+    meter: Meter,
+    quality: AlarmQuality,
     desk: Desk,
     watch: Watch,
     lines: Vec<LineStatus>,
@@ -78,6 +82,8 @@ impl Plant {
         Plant {
             board: Board::new(def.clone(), at),
             book: Book::new(def.clone()),
+            meter: Meter::running(at),
+            quality: AlarmQuality::default(),
             desk: Desk::new(def.clone()),
             watch: Watch::default(),
             lines: vec![LineStatus::default(); def.lines.len()],
@@ -148,6 +154,7 @@ impl Plant {
         let mut effects = self.settle(at);
         effects.records.extend(action.map(Record::Action));
         self.carry_on(at, &mut effects);
+        self.measure(&effects.records);
         effects
     }
 
@@ -207,6 +214,7 @@ impl Plant {
         effects.records.extend(action.map(Record::Action));
         self.carry_on(at, &mut effects);
         self.at = self.at.max(at);
+        self.measure(&effects.records);
         effects
     }
 
@@ -235,6 +243,7 @@ impl Plant {
         effects.records.extend(minutes);
         effects.records.extend(expired.into_iter().map(Record::Action));
         self.carry_on(at, &mut effects);
+        self.measure(&effects.records);
         effects
     }
 
@@ -250,6 +259,7 @@ impl Plant {
             lines: self.lines.clone(),
             devices: self.diagnosed(),
             alarms: self.book.active(),
+            alarm_quality: self.quality.clone(),
             orders: self.desk.shown(),
             watch: self.watch.clone(),
             history: self.history.clone(),

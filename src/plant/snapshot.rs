@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    alarm::AlarmState,
+    alarm::{AlarmQuality, AlarmState},
     command::OrderStatus,
     def::{AlarmId, DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Fault, LineCounters, LineState},
@@ -44,6 +44,8 @@ pub struct Snapshot {
     pub devices: Vec<DeviceStatus>,
     /// Alarms that are active or unacknowledged: most urgent first, then latest first.
     pub alarms: Vec<ActiveAlarm>,
+    /// How good the alarm system is: the rates of this moment, and the figures of the last 24 hours.
+    pub alarm_quality: AlarmQuality,
     /// The latest orders, newest first, at most 32.
     pub orders: Vec<OrderStatus>,
     /// Since when actuators have not obeyed.
@@ -75,6 +77,7 @@ impl Snapshot {
             lines: vec![LineStatus::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); devices],
             alarms: Vec::new(),
+            alarm_quality: AlarmQuality::default(),
             orders: Vec::new(),
             watch: Watch::default(),
             history: HistoryStatus::default(),

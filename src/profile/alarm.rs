@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{
     diagnostic::Problems,
-    names::{Defs, number_of},
+    names::{Defs, Unique, number_of},
     reader::{At, text},
     schema::AlarmTable,
     tag::range_of,
@@ -37,6 +37,7 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
             },
         });
     }
+    check_names(tables, problems);
     check_order(tables, problems);
     for device in defs.devices {
         let own = |alarm: &AlarmDef| alarm.subject == Subject::Device(device.id);
@@ -45,6 +46,16 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
         }
     }
     alarms
+}
+
+/// Two alarms of one name would be one in the journal, and each would take up the other's state after a restart.
+fn check_names(tables: &[At<AlarmTable>], problems: &mut Problems) {
+    let mut seen = Unique::default();
+    for table in tables.iter().map(|table| &table.value) {
+        let (Some(subject), Some(text)) = (table.tag.as_ref().or(table.device.as_ref()), &table.text) else { continue };
+        let message = format!("duplicate alarm `{}` of {}", text.value, subject.value);
+        seen.insert(&format!("{}\n{}", subject.value, text.value), text.at, message, problems);
+    }
 }
 
 /// Limits of one tag that stand in the wrong order, such as a high above the high-high.
@@ -118,7 +129,7 @@ fn subject(table: &AlarmTable, defs: &Defs, problems: &mut Problems) -> Option<(
 }
 
 /// The conditions that an alarm table has; exactly one is right.
-fn conditions_of(table: &AlarmTable) -> Vec<(super::diagnostic::Span, &'static str)> {
+pub(super) fn conditions_of(table: &AlarmTable) -> Vec<(super::diagnostic::Span, &'static str)> {
     let numbers = [
         (table.high_high, "high_high"),
         (table.high, "high"),

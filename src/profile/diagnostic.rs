@@ -1,17 +1,19 @@
-//! Every problem of a profile: where it stands, what was found, what was expected, and what was probably meant.
+//! Every problem of a profile, and every warning: where it stands, what was found, what was expected, and what was probably meant.
 
 use std::fmt;
 
-use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
+use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report, Severity};
 
 /// Most problems that are drawn at once; the rest are counted.
 const SHOWN_MAX: usize = 40;
 
-/// Everything that is wrong with a plant file and its profiles, in the order of the files.
+/// Everything that is wrong with a plant file and its profiles, or everything that could be better, in the order of the
+/// files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Errors {
     sources: Vec<Source>,
     list: Vec<Problem>,
+    severity: Severity,
 }
 
 /// Draws the errors with file, line, column, the text in question and a caret.
@@ -21,7 +23,7 @@ pub fn render(errors: &Errors, color: bool) -> String {
     let handler = GraphicalReportHandler::new_themed(theme).with_links(false).with_width(110);
     let mut out = String::new();
     for problem in errors.list.iter().take(SHOWN_MAX) {
-        let report = problem.report(&errors.sources);
+        let report = problem.report(&errors.sources, errors.severity);
         // Writing into a string does not fail; should it ever, the plain message still gets out.
         if handler.render_report(&mut out, report.as_ref()).is_err() {
             out.push_str(&problem.message);
@@ -30,10 +32,10 @@ pub fn render(errors: &Errors, color: bool) -> String {
     }
     let hidden = errors.list.len().saturating_sub(SHOWN_MAX);
     if hidden > 0 {
-        out.push_str(&format!("and {hidden} more problems\n"));
+        out.push_str(&format!("and {hidden} more {}s\n", errors.word()));
     }
     let count = errors.list.len();
-    out.push_str(&format!("{count} problem{}\n", if count == 1 { "" } else { "s" }));
+    out.push_str(&format!("{count} {}{}\n", errors.word(), if count == 1 { "" } else { "s" }));
     out
 }
 
@@ -43,11 +45,22 @@ impl Errors {
         Errors {
             sources: Vec::new(),
             list: vec![Problem { message, help: Some(help), at: None, label: String::new(), also: None }],
+            severity: Severity::Error,
         }
     }
     /// How many problems there are.
     pub fn count(&self) -> usize {
         self.list.len()
+    }
+    /// The same warnings, where they are not tolerated.
+    pub fn strictly(self) -> Errors {
+        Errors { severity: Severity::Error, ..self }
+    }
+    fn word(&self) -> &'static str {
+        match self.severity {
+            Severity::Error => "problem",
+            Severity::Warning | Severity::Advice => "warning",
+        }
     }
     /// One line for each problem: `tank.toml:12:8: unknown line `L2``.
     pub fn lines(&self) -> impl Iterator<Item = String> {
@@ -145,8 +158,8 @@ impl Problem {
             None => self.help(format!("known: {}", known.join(", "))),
         }
     }
-    fn report(&self, sources: &[Source]) -> Report {
-        let mut diagnostic = MietteDiagnostic::new(self.message.clone());
+    fn report(&self, sources: &[Source], severity: Severity) -> Report {
+        let mut diagnostic = MietteDiagnostic::new(self.message.clone()).with_severity(severity);
         diagnostic.help = self.help.clone();
         let Some(at) = self.at else { return Report::new(diagnostic) };
         let second = self.also.iter().filter(|(span, _)| span.source == at.source);
@@ -165,6 +178,7 @@ impl Problem {
 pub(crate) struct Problems {
     sources: Vec<Source>,
     list: Vec<Problem>,
+    warnings: Vec<Problem>,
 }
 
 impl Problems {
@@ -179,9 +193,11 @@ impl Problems {
     }
     /// Adds a problem at a place.
     pub fn add(&mut self, at: Span, message: impl Into<String>) -> &mut Problem {
-        let at = Some(at);
-        self.list.push(Problem { at, message: message.into(), label: String::new(), also: None, help: None });
-        self.list.last_mut().expect("it was pushed one line above")
+        push(&mut self.list, at, message.into())
+    }
+    /// Adds a warning at a place: the file can be used, but it could be better.
+    pub fn warn(&mut self, at: Span, message: impl Into<String>) -> &mut Problem {
+        push(&mut self.warnings, at, message.into())
     }
     /// How many there are by now.
     pub fn count(&self) -> usize {
@@ -189,14 +205,23 @@ impl Problems {
     }
     /// The result, if there were no problems; else all problems in the order of the files.
     /// A profile that two devices use is read twice but complains once.
-    pub fn finish<T>(mut self, value: T) -> Result<T, Errors> {
-        if self.list.is_empty() {
-            return Ok(value);
-        }
-        self.list.sort_by(|a, b| (a.at, &a.message).cmp(&(b.at, &b.message)));
-        self.list.dedup();
-        Err(Errors { sources: self.sources, list: self.list })
+    pub fn finish<T>(self, value: T) -> Result<T, Errors> {
+        self.finish_warned(value).map(|(value, _)| value)
     }
+    /// The same, with the warnings.
+    pub fn finish_warned<T>(self, value: T) -> Result<(T, Errors), Errors> {
+        let good = self.list.is_empty();
+        let (mut list, severity) = if good { (self.warnings, Severity::Warning) } else { (self.list, Severity::Error) };
+        list.sort_by(|a, b| (a.at, &a.message).cmp(&(b.at, &b.message)));
+        list.dedup();
+        let told = Errors { sources: self.sources, list, severity };
+        if good { Ok((value, told)) } else { Err(told) }
+    }
+}
+
+fn push(list: &mut Vec<Problem>, at: Span, message: String) -> &mut Problem {
+    list.push(Problem { at: Some(at), message, label: String::new(), also: None, help: None });
+    list.last_mut().expect("it was pushed one line above")
 }
 
 /// The known word that was probably meant: at most one edit in three letters away.

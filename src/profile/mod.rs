@@ -3,7 +3,7 @@
 //! ```text
 //!  plant file ─┐                      ┌─ tag ─── address, units
 //!              ├─ reader ── schema ── plant ─ line, device
-//!  profiles  ──┘  (layers,  (words)   ├─ alarm
+//!  profiles  ──┘  (layers,  (words)   ├─ alarm, lint
 //!                 spans)              ├─ picture, report
 //!                                     └─ Arc<PlantDef>   or   diagnostic::Errors
 //! ```
@@ -19,6 +19,7 @@ mod edit;
 mod guard;
 mod io;
 pub mod line;
+mod lint;
 pub(crate) mod names;
 mod picture;
 mod plant;
@@ -61,18 +62,34 @@ pub fn load(plant: &Path, search: &Search) -> Result<Arc<PlantDef>, Errors> {
 
 /// The same, with the file that it was loaded from, to save settings into; `None` for a plant of the program.
 pub fn load_with_file(plant: &Path, search: &Search) -> Result<(Arc<PlantDef>, Option<PlantFile>), Errors> {
+    load_warned(plant, search).map(|(checked, file)| (checked.plant, file))
+}
+
+fn load_warned(plant: &Path, search: &Search) -> Result<(Checked, Option<PlantFile>), Errors> {
     let found = io::plant(plant, search)?;
     let file = found.file();
     let search = search.beside(&found);
     let names = io::list(&search).into_iter().filter(|listed| listed.kind == Kind::Device).map(|listed| listed.name);
     let library = plant::Library { find: &|name| io::device(name, &search), names: names.collect() };
-    plant::build(&found.name, &found.text, &library).map(|def| (Arc::new(def), file))
+    plant::build(&found.name, &found.text, &library)
+        .map(|(def, warnings)| (Checked { plant: Arc::new(def), warnings }, file))
+}
+
+/// A plant that can be used, and what could be better in its file.
+#[derive(Debug)]
+pub struct Checked {
+    /// The plant.
+    pub plant: Arc<PlantDef>,
+    /// What the lint found; often nothing.
+    pub warnings: Errors,
 }
 
 /// Checks a plant file or a device profile, by path or name. A device is checked as the only one of a plant of its own,
 /// unit 1 on a serial line of 9600 baud, so that its read plan can be told.
-pub fn check(file: &Path, search: &Search) -> Result<Arc<PlantDef>, Errors> {
-    let Some((stem, text)) = io::device_file(file, search) else { return load(file, search) };
+pub fn check(file: &Path, search: &Search) -> Result<Checked, Errors> {
+    let Some((stem, text)) = io::device_file(file, search) else {
+        return load_warned(file, search).map(|(checked, _)| checked);
+    };
     let around = format!(
         "title = \"{stem}\"\ntime_zone = \"UTC\"\n[[line]]\nname = \"L1\"\nmode = \"rtu\"\nport = \"/dev/ttyUSB0\"\nbaud = 9600\nparity = \"N\"\n\
          [[device]]\nname = \"D-1\"\nprofile = \"{stem}\"\nline = \"L1\"\nunit = 1\n"
@@ -80,7 +97,8 @@ pub fn check(file: &Path, search: &Search) -> Result<Arc<PlantDef>, Errors> {
     let plant = plant::Text { file: format!("a plant around {}", text.file), bytes: around.into_bytes() };
     let (file, bytes) = (text.file, text.bytes);
     let find = |_: &str| Ok(Some(plant::Text { file: file.clone(), bytes: bytes.clone() }));
-    plant::build(&stem, &plant, &plant::Library { find: &find, names: vec![stem.clone()] }).map(Arc::new)
+    plant::build(&stem, &plant, &plant::Library { find: &find, names: vec![stem.clone()] })
+        .map(|(def, warnings)| Checked { plant: Arc::new(def), warnings })
 }
 
 /// A plant or device profile that could be loaded by its name.

@@ -7,7 +7,7 @@ use jiff::tz::TimeZone;
 use super::{
     access, alarm, device,
     diagnostic::{Errors, Problems},
-    guard, line,
+    guard, line, lint,
     names::{Defs, Names, Unique, check_name},
     picture, program, reader,
     reader::{At, text},
@@ -37,17 +37,17 @@ pub(super) struct Library<'a> {
     pub names: Vec<String>,
 }
 
-/// Builds the plant called `name`, or tells everything that is wrong with its texts.
-pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<PlantDef, Errors> {
+/// Builds the plant called `name` and tells what could be better in its texts, or tells everything that is wrong with them.
+pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<(PlantDef, Errors), Errors> {
     let mut problems = Problems::default();
     let built = reader::parse(&plant.file, &plant.bytes, &mut problems).map(|raw| {
         let file = PlantFile::of(&[raw], &mut problems);
         assemble(name, &file, library, &mut problems)
     });
-    match problems.finish(built)? {
-        Some(plant) => Ok(plant),
+    match problems.finish_warned(built)? {
+        (Some(plant), warnings) => Ok((plant, warnings)),
         // A text that gave no plant always gave a problem; this keeps the promise without a panic.
-        None => Err(Errors::unreadable(format!("{} is not a plant file", plant.file), String::new())),
+        (None, _) => Err(Errors::unreadable(format!("{} is not a plant file", plant.file), String::new())),
     }
 }
 
@@ -56,6 +56,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let Devices { devices, mut tags, names, classes } = devices(file, &lines, library, problems);
     let defs = Defs { names: &names, devices: &devices, tags: &tags };
     let alarms = alarm::alarms(&file.alarms, &defs, problems);
+    lint::lint(&file.alarms, problems);
     let mimic =
         file.mimic.as_ref().map_or_else(MimicDef::default, |mimic| picture::mimic(&mimic.value, &defs, problems));
     let access = access::access(file.access.as_ref().map(|table| &table.value), problems);

@@ -23,6 +23,14 @@ fn every_shipped_plant_loads_without_a_problem() {
 }
 
 #[test]
+fn the_alarms_of_every_shipped_plant_are_complete_and_of_use() {
+    for plant in list(&Search::shipped()).iter().filter(|listed| listed.kind == Kind::Plant) {
+        let checked = check(Path::new(&plant.name), &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}"));
+        assert_eq!(checked.warnings.count(), 0, "{}:\n{}", plant.name, checked.warnings);
+    }
+}
+
+#[test]
 fn every_shipped_device_loads_without_a_problem() {
     let folder = tempfile::tempdir().unwrap();
     for device in list(&Search::shipped()).iter().filter(|listed| listed.kind == Kind::Device) {

@@ -117,7 +117,7 @@ pub(super) fn load(plant: &[u8], meter: &str, plc: &str) -> Result<PlantDef, Err
         Ok(Some(Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() }))
     };
     let library = Library { find: &find, names: vec!["meter".to_owned(), "plc".to_owned()] };
-    build("small", &Text { file: "small.toml".to_owned(), bytes: plant.to_vec() }, &library)
+    build("small", &Text { file: "small.toml".to_owned(), bytes: plant.to_vec() }, &library).map(|(def, _)| def)
 }
 
 /// Replaces `from` by `to` in whichever of the three texts has it; the rendering must then contain all of `expect`,
@@ -433,6 +433,12 @@ fn an_alarm_that_could_never_come_or_never_go_is_refused() {
     check("high = 80.0\n", "", &["an alarm needs a condition"]);
     check("decimals_from", "poll = \"fast\"\nquality_from = \"Q\"\ndecimals_from", &["unknown tag `Q`"]);
     check("address = 1004", "address = 1004\npoll = \"never\"", &["D1.DP is never read, so D1.T can never be shown"]);
+}
+
+#[test]
+fn two_alarms_of_one_name_would_share_their_state_and_are_refused() {
+    let second = "[[alarm]]\ntag = \"D1.T\"\nlow = 5.0\ndeadband = 1.0\npriority = \"low\"\ntext = \"hot\"\n[mimic]";
+    check("[mimic]", second, &["[small.toml:36:8]", "duplicate alarm `hot` of D1.T", "first here"]);
 }
 
 #[test]

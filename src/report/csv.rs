@@ -2,14 +2,17 @@
 
 use jiff::{Timestamp, tz::TimeZone};
 
-use super::{Period, RecordRow, ShiftReport, TagFigures};
+use super::{
+    Period, RecordRow, ShiftReport, TagFigures,
+    alarm_quality::{self, Culprit, Row},
+};
 use crate::plant::{
     def::{CsvDialect, PlantDef, Priority},
     record::{ActionRecord, AlarmRecord, AlarmStep},
     tag::Decimals,
 };
 
-/// The whole report: facts, tags, alarm counts, alarm list, operator actions, raw record. Every section has a title row,
+/// The whole report: facts, tags, alarm counts, alarm quality, alarm list, operator actions, raw record. Every section has a title row,
 /// a header row and its rows; every row has as many columns as the widest. The same report gives the same bytes.
 pub fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u8> {
     let zone = &def.time_zone;
@@ -29,6 +32,10 @@ pub fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> V
     for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
         table.row(vec![plain(priority.word()), plain(raised(&report.alarms, priority).to_string())]);
     }
+    table.section("alarm quality", &["measure", "figure", "target", "limit", "verdict"]);
+    alarm_quality::rows(&report.quality).iter().for_each(|row| table.row(quality_row(row, dialect)));
+    table.section("alarms to look into", &["kind", "subject", "alarm", "raised"]);
+    alarm_quality::culprits(&report.quality).iter().for_each(|alarm| table.row(culprit_row(alarm)));
     table.section("alarms", &["time", "priority", "subject", "alarm", "step", "value", "limit", "by"]);
     report.alarms.iter().for_each(|alarm| table.row(alarm_row(alarm, zone, dialect)));
     table.section("operator actions", &["time", "by", "action", "target", "old", "new", "outcome"]);
@@ -87,6 +94,21 @@ fn tag_row(tag: &TagFigures, dialect: CsvDialect) -> Vec<String> {
         number(Some(tag.in_alarm.as_secs_f64() / 60.0), 1, dialect),
         number(Some(floor_percent(tag.good)), 1, dialect),
     ]
+}
+
+fn quality_row(row: &Row, dialect: CsvDialect) -> Vec<String> {
+    vec![
+        plain(row.measure),
+        number(row.value, row.decimals, dialect),
+        plain(&row.target),
+        plain(&row.limit),
+        plain(row.verdict),
+    ]
+}
+
+fn culprit_row(alarm: &Culprit) -> Vec<String> {
+    let raised = alarm.raised.map(|raised| raised.to_string()).unwrap_or_default();
+    vec![plain(alarm.kind), text(&alarm.subject), text(&alarm.alarm), plain(raised)]
 }
 
 fn alarm_row(alarm: &AlarmRecord, zone: &TimeZone, dialect: CsvDialect) -> Vec<String> {
@@ -269,6 +291,7 @@ mod tests {
                 limit: Some(85.0),
                 by: None,
             }],
+            quality: alarm_quality::tests::figures(),
             actions: vec![ActionRecord {
                 at: at("2026-11-21T06:13+07"),
                 by: "=cmd|' /C calc'!A0".into(),
@@ -313,6 +336,29 @@ critical,0,,,,,,
 high,1,,,,,,
 medium,0,,,,,,
 low,0,,,,,,
+,,,,,,,
+alarm quality,,,,,,,
+measure,figure,target,limit,verdict,,,
+alarms a day,72.0,at most 150,at most 300,good,,,
+alarms an hour,3.0,at most 6,at most 12,good,,,
+alarms in 10 min,0.5,at most 1,at most 2,good,,,
+10-min windows above 10 (%),2.1,below 1,,beyond target,,,
+most in a 10-min window,12,at most 10,,beyond target,,,
+time in flood (%),2.1,below 1,,beyond target,,,
+share of the ten most frequent (%),100.0,at most 5,,beyond target,,,
+chattering alarms,1,at most 0,,beyond target,,,
+fleeting alarms,0,at most 0,,good,,,
+active over 24 h (most at once),0,below 5,,good,,,
+priority critical (%),0.0,below 1,,good,,,
+priority high (%),25.0,at most 5,,beyond target,,,
+priority medium (%),12.5,at most 15,,good,,,
+priority low (%),62.5,at least 80,,beyond target,,,
+,,,,,,,
+alarms to look into,,,,,,,
+kind,subject,alarm,raised,,,,
+frequent,'=PLC-1,gives no values,18,,,,
+frequent,TIC-1.PV,temperature high,6,,,,
+chattering,TIC-1.PV,temperature high,,,,,
 ,,,,,,,
 alarms,,,,,,,
 time,priority,subject,alarm,step,value,limit,by

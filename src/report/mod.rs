@@ -4,6 +4,7 @@ pub mod shift;
 pub mod ask;
 pub mod hold;
 pub mod figures;
+pub mod alarm_quality;
 pub mod csv;
 pub mod export;
 pub mod text;
@@ -15,7 +16,10 @@ use std::time::Duration;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::plant::record::{ActionRecord, AlarmRecord};
+use crate::plant::{
+    alarm::Figures,
+    record::{ActionRecord, AlarmRecord},
+};
 
 /// Decimals to print where the device has not said how many there are.
 pub const DECIMALS_UNKNOWN: u8 = 2;
@@ -42,6 +46,8 @@ pub struct ShiftReport {
     pub tags: Vec<TagFigures>,
     /// Steps of alarms in the period, oldest first.
     pub alarms: Vec<AlarmRecord>,
+    /// How good the alarm system was in the period.
+    pub quality: Figures,
     /// Deeds of operators in the period, oldest first.
     pub actions: Vec<ActionRecord>,
     /// The thesis's raw record at a fixed interval.

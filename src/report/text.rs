@@ -81,6 +81,7 @@ mod tests {
                 good: 0.5,
             }],
             alarms: Vec::new(),
+            quality: crate::plant::alarm::Figures::default(),
             actions: Vec::new(),
             record: Vec::new(),
             record_of: None,

@@ -90,6 +90,7 @@ pub fn start_told(options: Options, listener: Option<Listener>) -> Result<Statio
     let history = history::start(&history, def.clone(), clock)?;
     let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
     plant.restore(&history.restored);
+    plant.remeasure(&history.recent.active, &history.recent.steps, clock.now());
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
     let keeping = Keeping { records: Some(records), store, sets: Some(sets), listener };
     Ok(assemble(def, clock, connectors, plant, file, keeping, (queries, Some(history))))

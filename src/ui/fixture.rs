@@ -187,6 +187,7 @@ impl Fixture {
             lines: vec![self.line.clone()],
             devices: self.devices.clone(),
             alarms: self.alarms.clone(),
+            alarm_quality: crate::plant::alarm::AlarmQuality::default(),
             orders: Vec::new(),
             sets: Arc::new(self.sets.clone()),
             restores: self.restores.iter().cloned().map(Arc::new).collect(),

@@ -2,6 +2,15 @@
 
 use std::{fs, path::Path, process::Output};
 
+use sightglass::{
+    history::io::store::Store,
+    plant::{
+        def::Priority,
+        record::{AlarmRecord, AlarmStep, Record},
+    },
+    profile::{self, Search},
+};
+
 use crate::support::{Process, folder, sightglass};
 
 fn run(args: &[&str]) -> (Option<i32>, String, String) {
@@ -13,7 +22,7 @@ fn run(args: &[&str]) -> (Option<i32>, String, String) {
 fn help_names_every_command_and_the_exit_codes() {
     let (code, out, _) = run(&["--help"]);
     assert_eq!(code, Some(0));
-    for word in ["demo", "run", "sim", "check", "profiles", "report", "frame", "Exit codes:"] {
+    for word in ["demo", "run", "sim", "check", "profiles", "report", "alarms", "frame", "Exit codes:"] {
         assert!(out.contains(word), "no `{word}` in:\n{out}");
     }
     let (code, out, _) = run(&["--version"]);
@@ -58,6 +67,66 @@ fn check_prints_the_read_plan_or_every_error() {
     for word in ["bad.toml:9", "bad.toml:13", "fuji_prx", "fuji_pxr"] {
         assert!(err.contains(word), "no `{word}` in:\n{err}");
     }
+}
+
+#[test]
+fn an_alarm_that_would_not_help_is_a_warning_and_strictly_a_refusal() {
+    let folder = folder();
+    let file = folder.path().join("plant.toml");
+    let (_, text, _) = run(&["profiles", "tank"]);
+    let changed = text.replacen("respond = \"2min\"\n", "", 1);
+    assert_ne!(changed, text);
+    fs::write(&file, changed).unwrap();
+    let file = file.to_str().unwrap();
+    let (code, out, err) = run(&["check", file]);
+    assert_eq!(code, Some(0), "{err}");
+    assert!(out.contains("is good") && err.contains("has no `respond`") && err.contains("1 warning"), "{out}{err}");
+    let (code, out, err) = run(&["check", "--strict", file]);
+    assert_eq!((code, out.as_str()), (Some(2), ""), "{err}");
+    assert!(err.contains("has no `respond`") && err.contains("plant.toml:") && err.contains("1 problem"), "{err}");
+    for plant in ["tank", "inverter", "lab"] {
+        assert_eq!(run(&["check", "--strict", plant]).0, Some(0), "{plant}");
+    }
+}
+
+#[test]
+fn the_quality_of_the_alarms_is_told_in_lines_and_in_json() {
+    let folder = folder();
+    let path = folder.path().join("tank.duckdb");
+    let history = path.to_str().unwrap();
+    let (code, _, err) = run(&["alarms", "tank", "--stats", "--history", history]);
+    assert!(code == Some(1) && err.contains("no history at"), "{err}");
+    assert_eq!(run(&["alarms", "tank"]).0, Some(2));
+    let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
+    let at = |second: i64| {
+        "2026-03-02T06:00:00+07:00".parse::<jiff::Timestamp>().unwrap() + jiff::SignedDuration::from_secs(second)
+    };
+    let raised = |second: i64| {
+        Record::Alarm(AlarmRecord {
+            at: at(second),
+            subject: "TIC-1.PV".into(),
+            text: "temperature high".into(),
+            priority: Priority::High,
+            step: AlarmStep::Raised,
+            value: Some(76.0),
+            limit: Some(75.0),
+            by: None,
+        })
+    };
+    let store = Store::open(&path, &def, at(0)).unwrap().store;
+    store.append(&[raised(60), raised(70), raised(80)]).unwrap();
+    drop(store);
+    let shift = ["alarms", "tank", "--stats", "--history", history, "--shift", "morning@2026-03-02"];
+    let (code, out, err) = run(&shift);
+    assert_eq!(code, Some(0), "{err}");
+    for words in ["3 alarms", "alarms a day", "at most 150", "chattering", "temperature high", "too few"] {
+        assert!(out.contains(words), "no `{words}` in:\n{out}");
+    }
+    let (code, out, err) = run(&[&shift[..], &["--json"]].concat());
+    assert_eq!(code, Some(0), "{err}");
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((&json["raised"], &json["from"]), (&3.into(), &"2026-03-02T06:00:00+07:00".into()));
+    assert_eq!(json["figures"][0]["value"], 9.0, "three in eight hours are nine a day");
 }
 
 #[test]

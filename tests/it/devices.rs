@@ -52,7 +52,7 @@ fn shipped(kind: Kind) -> Vec<(String, PlantDef)> {
     let names = profile::list(&Search::shipped()).into_iter().filter(|listed| listed.kind == kind);
     let load = |name: String| {
         let plant = profile::check(Path::new(&name), &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}"));
-        (name, (*plant).clone())
+        (name, (*plant.plant).clone())
     };
     names.map(|listed| load(listed.name)).collect()
 }
@@ -228,7 +228,7 @@ fn bytes(hex: &str) -> Vec<u8> {
 async fn check(golden: Golden<'_>) {
     let name = golden.profile;
     let loaded = profile::check(Path::new(name), &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}"));
-    let mut def = (*loaded).clone();
+    let mut def = (*loaded.plant).clone();
     def.devices[0].unit = golden.unit;
     let full = |short: &str| format!("D-1.{short}");
     for tag in &mut def.tags {

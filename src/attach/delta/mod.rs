@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::plant::{
     Snapshot,
+    alarm::{AlarmQuality, Figures},
     command::OrderStatus,
     guard::Watch,
     parameter_set::StoredSet,
@@ -38,6 +39,9 @@ pub struct Delta {
     lines: Vec<(u16, LineDelta)>,
     devices: List<DeviceStatus>,
     alarms: List<ActiveAlarm>,
+    rates: Option<AlarmRates>,
+    /// The figures of the day: they change less often than the rates.
+    day: Option<Arc<Figures>>,
     orders: List<OrderStatus>,
     watch: Option<Watch>,
     history: Option<HistoryStatus>,
@@ -47,6 +51,9 @@ pub struct Delta {
     programs: List<Option<(Duration, bool)>>,
     speed: Option<f64>,
 }
+
+/// How many alarms come: in 10 minutes, in an hour, and since when it is a flood.
+type AlarmRates = (u32, u32, Option<Timestamp>);
 
 /// A delta does not belong to the snapshot that it was applied to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -67,6 +74,7 @@ impl Delta {
             lines,
             devices,
             alarms,
+            alarm_quality,
             orders,
             watch,
             history,
@@ -88,6 +96,8 @@ impl Delta {
             lines: lines.collect(),
             devices: List::between(&old.devices, devices),
             alarms: List::between(&old.alarms, alarms),
+            rates: (rates(&old.alarm_quality) != rates(alarm_quality)).then(|| rates(alarm_quality)),
+            day: (old.alarm_quality.day != alarm_quality.day).then(|| alarm_quality.day.clone()),
             orders: List::between(&old.orders, orders),
             watch: (old.watch != *watch).then(|| watch.clone()),
             history: (old.history != *history).then(|| history.clone()),
@@ -118,6 +128,13 @@ impl Delta {
         }
         self.devices.apply(&mut snapshot.devices)?;
         self.alarms.apply(&mut snapshot.alarms)?;
+        let quality = &mut snapshot.alarm_quality;
+        if let Some((last_10_min, last_hour, flood_since)) = self.rates {
+            (quality.last_10_min, quality.last_hour, quality.flood_since) = (last_10_min, last_hour, flood_since);
+        }
+        if let Some(day) = self.day {
+            quality.day = day;
+        }
         self.orders.apply(&mut snapshot.orders)?;
         if let Some(watch) = self.watch {
             snapshot.watch = watch;
@@ -140,6 +157,11 @@ impl Delta {
             && snapshot.devices.len() == def.devices.len();
         if fits { Ok(()) } else { Err(Unfit) }
     }
+}
+
+fn rates(quality: &AlarmQuality) -> AlarmRates {
+    let AlarmQuality { last_10_min, last_hour, flood_since, day: _ } = quality;
+    (*last_10_min, *last_hour, *flood_since)
 }
 
 /// As [`List::between`], at once where both are the same memory.

@@ -18,6 +18,7 @@ pub mod sql;
 pub mod files;
 pub mod store;
 pub mod read;
+pub mod quality;
 pub mod writer;
 pub mod thread;
 #[cfg(test)]

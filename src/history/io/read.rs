@@ -31,7 +31,7 @@ pub const ROWS_MAX: u64 = 200_000;
 /// in which no commit is made).
 pub const SAMPLES_MAX: u64 = 10_000_000;
 /// Stored samples in memory at a time: those of one tag in this span.
-const CHUNK: Duration = Duration::from_secs(86_400);
+pub(super) const CHUNK: Duration = Duration::from_secs(86_400);
 
 impl Store {
     /// Answers a question; nothing after `now` is known.
@@ -57,6 +57,9 @@ impl Store {
                     .map(Answer::LineMinutes)
             }
             Question::Report { period } => self.report(period, now).map(|report| Answer::Report(Box::new(report))),
+            Question::AlarmQuality { from, to } => {
+                self.alarm_quality(*from, *to, now).map(|figures| Answer::AlarmQuality(Box::new(figures)))
+            }
         }
     }
 
@@ -84,9 +87,9 @@ impl Store {
     pub fn report(&self, period: &Period, now: Timestamp) -> Result<ShiftReport, HistoryError> {
         let (from, until) = (period.from, period.to.min(now));
         check_span(from, until)?;
-        let active = self.whole_list(&sql::active_at(), params![utc(from), ROWS_MAX + 1], alarm)?;
+        let active = self.active_at(from)?;
         let span = params![utc(from), utc(until), ROWS_MAX + 1];
-        let alarms = self.whole_list(&sql::journal_oldest(), span, alarm)?;
+        let alarms = self.steps(from, until)?;
         let actions = self.whole_list(&sql::actions_oldest(), span, action)?;
         let mut tags = Vec::new();
         for tag in self.reported_tags() {
@@ -99,7 +102,8 @@ impl Store {
             Some((device, interval)) => self.record(device, interval, from, until)?,
             None => (Vec::new(), None),
         };
-        Ok(ShiftReport { period: period.clone(), until, tags, alarms, actions, record, record_of })
+        let quality = self.alarm_quality(from, until, now)?;
+        Ok(ShiftReport { period: period.clone(), until, tags, alarms, quality, actions, record, record_of })
     }
 
     /// The tags that the plant file asks for, or every stored tag with a unit.
@@ -187,7 +191,7 @@ impl Store {
     }
 
     /// A list that must not be cut; its SQL asks for one row more than is permitted.
-    fn whole_list<T>(
+    pub(super) fn whole_list<T>(
         &self,
         sql: &str,
         params: &[&dyn duckdb::ToSql],
@@ -261,11 +265,11 @@ fn sound<T, R>(
     failed.into_inner().map_or(Ok(result), Err)
 }
 
-fn check_span(from: Timestamp, to: Timestamp) -> Result<(), HistoryError> {
+pub(super) fn check_span(from: Timestamp, to: Timestamp) -> Result<(), HistoryError> {
     if from < to { Ok(()) } else { Err(HistoryError::EmptyPeriod) }
 }
 
-fn within(rows: u64, max: u64) -> Result<(), HistoryError> {
+pub(super) fn within(rows: u64, max: u64) -> Result<(), HistoryError> {
     if rows <= max { Ok(()) } else { Err(HistoryError::TooManyRows { rows, max }) }
 }
 
@@ -285,7 +289,7 @@ fn sample(row: &Row) -> duckdb::Result<Sample> {
     })
 }
 
-fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {
+pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {
     Ok(AlarmRecord {
         at: time(row)?,
         subject: shared(row, 1)?,

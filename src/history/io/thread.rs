@@ -7,8 +7,7 @@ use tokio::{
     time::MissedTickBehavior,
 };
 
-use super::Query;
-use super::writer::Writer;
+use super::{Query, quality::Recent, writer::Writer};
 use crate::{
     bus::io::clock::Clock,
     history::HistoryError,
@@ -37,6 +36,8 @@ pub struct Handle {
     pub status: watch::Receiver<HistoryStatus>,
     /// The alarm steps that the plant restores at its start.
     pub restored: Vec<AlarmRecord>,
+    /// What the quality meter of the alarms must know of the last day.
+    pub recent: Recent,
     /// The thread.
     pub join: JoinHandle<()>,
 }
@@ -44,7 +45,7 @@ pub struct Handle {
 impl Handle {
     /// Drops this end and waits until everything is stored. Blocks for as long as other senders of records exist.
     pub fn stop(self) {
-        let Handle { records, queries, status, restored: _, join } = self;
+        let Handle { records, queries, status, restored: _, recent: _, join } = self;
         drop((records, queries, status));
         // A panic of the thread has already been reported by the panic hook.
         let _ = join.join();
@@ -55,6 +56,11 @@ impl Handle {
 pub fn start(path: &Path, def: Arc<PlantDef>, clock: Clock) -> Result<Handle, HistoryError> {
     let writer = Writer::open(path.to_owned(), def, clock.now())?;
     let restored = writer.restore()?;
+    // A plant must start even if its journal is too long to be measured.
+    let recent = writer.recent(clock.now()).unwrap_or_else(|error| {
+        tracing::warn!(%error, "the quality meter of the alarms begins anew");
+        Recent::default()
+    });
     let (records, records_in) = mpsc::channel(RECORDS_MAX);
     let (queries, queries_in) = mpsc::channel(QUERIES_MAX);
     let (status_out, status) = watch::channel(writer.status().clone());
@@ -63,7 +69,7 @@ pub fn start(path: &Path, def: Arc<PlantDef>, clock: Clock) -> Result<Handle, Hi
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().map_err(trouble)?;
     let work = move || runtime.block_on(run(writer, clock, records_in, queries_in, status_out));
     let join = std::thread::Builder::new().name("history".into()).spawn(work).map_err(trouble)?;
-    Ok(Handle { records, queries, status, restored, join })
+    Ok(Handle { records, queries, status, restored, recent, join })
 }
 
 async fn run(

@@ -6,6 +6,7 @@ use jiff::Timestamp;
 
 use super::{
     files,
+    quality::Recent,
     store::{Opened, Store},
 };
 use crate::{
@@ -74,6 +75,11 @@ impl Writer {
         self.store()?.restore()
     }
 
+    /// What the quality meter of the alarms must know of the last day, see [`Store::recent`].
+    pub fn recent(&self, now: Timestamp) -> Result<Recent, HistoryError> {
+        self.store()?.recent(now)
+    }
+
     /// Takes records to be stored with the next commit.
     pub fn accept(&mut self, records: Vec<Record>) {
         self.pending.extend(records);
@@ -116,10 +122,10 @@ impl Writer {
         self.describe();
     }
 
-    /// Answers a question. A report first commits what is pending, so that it lacks nothing.
+    /// Answers a question. What counts a period first commits what is pending, so that it lacks nothing.
     pub fn answer(&mut self, question: &Question, now: Timestamp) -> Result<Answer, HistoryError> {
         match question {
-            Question::Report { .. } => self.commit(now),
+            Question::Report { .. } | Question::AlarmQuality { .. } => self.commit(now),
             Question::Series { .. }
             | Question::Journal { .. }
             | Question::Actions { .. }

@@ -17,7 +17,7 @@ fn plant(profile: &str) -> Arc<PlantDef> {
     let path = folder.path().join("device.toml");
     let head = "vendor = 'A'\nmodel = 'B'\nstatus = 'manual'\nsource = 'C'\n";
     std::fs::write(&path, format!("{head}{profile}")).expect("the folder takes a file");
-    profile::check(&path, &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}"))
+    profile::check(&path, &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}")).plant
 }
 
 const OVEN: &str = r#"

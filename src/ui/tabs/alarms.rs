@@ -160,7 +160,7 @@ impl Alarms {
             match answer {
                 Ok(Answer::Journal(rows)) => journal.alarms = rows,
                 Ok(Answer::Actions(rows)) => journal.actions = rows,
-                Ok(Answer::Series(_) | Answer::LineMinutes(_) | Answer::Report(_)) => {}
+                Ok(Answer::Series(_) | Answer::LineMinutes(_) | Answer::Report(_) | Answer::AlarmQuality(_)) => {}
                 Err(error) => journal.trouble = Some(error.to_string()),
             }
         }

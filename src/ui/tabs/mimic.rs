@@ -156,9 +156,14 @@ impl Mimic {
         if let Some((_, series)) = self.trends.get_mut(place) {
             *series = match answer {
                 Ok(Answer::Series(all)) => all.into_iter().next(),
-                Ok(Answer::Journal(_) | Answer::Actions(_) | Answer::LineMinutes(_) | Answer::Report(_)) | Err(_) => {
-                    None
-                }
+                Ok(
+                    Answer::Journal(_)
+                    | Answer::Actions(_)
+                    | Answer::LineMinutes(_)
+                    | Answer::Report(_)
+                    | Answer::AlarmQuality(_),
+                )
+                | Err(_) => None,
             };
         }
         Vec::new()

@@ -195,7 +195,11 @@ impl Trends {
             Answer::Journal(records) if raised.is_some() => {
                 self.data.raised = records.into_iter().filter(|record| record.step == AlarmStep::Raised).collect();
             }
-            Answer::Journal(_) | Answer::Actions(_) | Answer::LineMinutes(_) | Answer::Report(_) => {}
+            Answer::Journal(_)
+            | Answer::Actions(_)
+            | Answer::LineMinutes(_)
+            | Answer::Report(_)
+            | Answer::AlarmQuality(_) => {}
         }
         self.ask(cx)
     }

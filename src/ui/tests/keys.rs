@@ -473,7 +473,10 @@ fn the_journal_tells_alarms_and_deeds_in_one_order() {
                 step(90_000, AlarmStep::Raised, None),
             ]),
             Question::Actions { .. } => Answer::Actions(vec![deed.clone()]),
-            Question::Series { .. } | Question::LineMinutes { .. } | Question::Report { .. } => continue,
+            Question::Series { .. }
+            | Question::LineMinutes { .. }
+            | Question::Report { .. }
+            | Question::AlarmQuality { .. } => continue,
         };
         update(&mut model, Msg::Answer(id, Ok(answer)));
     }

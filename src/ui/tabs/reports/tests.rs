@@ -135,6 +135,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
             tag("PLC-1.FLOW", "l/min", 2, 0.0, 0.412, 1.25, None, 0, 0.742),
         ],
         alarms: if full { alarms } else { Vec::new() },
+        quality: crate::plant::alarm::Figures::default(),
         actions: if full { vec![action] } else { Vec::new() },
         record: Vec::new(),
         record_of: full.then(|| ("TIC-1".to_owned(), "°C".to_owned())),

@@ -232,7 +232,10 @@ fn kinds(asked: &[(AskId, Question)]) -> String {
         Question::Series { buckets: HOUR_COLUMNS, .. } => "hour",
         Question::Series { .. } => "curves",
         Question::Journal { .. } => "alarms",
-        Question::Actions { .. } | Question::LineMinutes { .. } | Question::Report { .. } => "other",
+        Question::Actions { .. }
+        | Question::LineMinutes { .. }
+        | Question::Report { .. }
+        | Question::AlarmQuality { .. } => "other",
     };
     asked.iter().map(|(_, question)| kind(question)).collect::<Vec<_>>().join(" ")
 }

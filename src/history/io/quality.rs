@@ -1,0 +1,75 @@
+//! How good the alarm system was: the journal, day by day, through the meter that also measures the running plant.
+
+use duckdb::params;
+use jiff::Timestamp;
+
+use super::{
+    read::{CHUNK, ROWS_MAX, alarm, check_span, within},
+    sql,
+    store::{Store, utc},
+};
+use crate::{
+    history::HistoryError,
+    plant::{
+        alarm::{
+            Figures, Meter,
+            meter::{LEAD, RUNNING},
+        },
+        record::AlarmRecord,
+    },
+};
+
+/// Steps of alarms behind the figures of one answer: years of a plant that is run well.
+const STEPS_MAX: u64 = 2_000_000;
+
+/// What the meter of a plant that starts again must know.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Recent {
+    /// The raising steps of the alarms that were active before the last day.
+    pub active: Vec<AlarmRecord>,
+    /// The steps of the last day, oldest first.
+    pub steps: Vec<AlarmRecord>,
+}
+
+impl Store {
+    /// The figures of the alarm system from `from` to `to`, or to `now` if that is earlier. The journal is read a day at
+    /// a time, so that months of it need no more memory than a day.
+    pub fn alarm_quality(&self, from: Timestamp, to: Timestamp, now: Timestamp) -> Result<Figures, HistoryError> {
+        let until = to.min(now);
+        check_span(from, until)?;
+        let known = from.checked_sub(LEAD).unwrap_or(Timestamp::MIN);
+        let mut meter = Meter::of_period(from, until);
+        self.active_at(known)?.iter().for_each(|step| meter.already(step));
+        let (first, last) = self.extent().unwrap_or((until, known));
+        let (mut next, mut rows) = (known.max(first), 0);
+        let end = until.min(last.checked_add(std::time::Duration::from_micros(1)).unwrap_or(last));
+        while next < end {
+            let to = next.checked_add(CHUNK).unwrap_or(end).min(end);
+            let steps = self.steps(next, to)?;
+            rows += steps.len() as u64;
+            within(rows, STEPS_MAX)?;
+            steps.iter().for_each(|step| meter.take(step));
+            next = to;
+        }
+        Ok(meter.figures())
+    }
+
+    /// What the meter of a plant that starts `now` must know of the time before.
+    pub fn recent(&self, now: Timestamp) -> Result<Recent, HistoryError> {
+        let since = now.checked_sub(RUNNING).unwrap_or(Timestamp::MIN);
+        if now <= since {
+            return Ok(Recent::default());
+        }
+        Ok(Recent { active: self.active_at(since)?, steps: self.steps(since, now)? })
+    }
+
+    /// The raising steps of the alarms that were active at an instant.
+    pub(super) fn active_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
+        self.whole_list(&sql::active_at(), params![utc(at), ROWS_MAX + 1], alarm)
+    }
+
+    /// The steps of alarms in a span, oldest first.
+    pub(super) fn steps(&self, from: Timestamp, to: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
+        self.whole_list(&sql::journal_oldest(), params![utc(from), utc(to), ROWS_MAX + 1], alarm)
+    }
+}

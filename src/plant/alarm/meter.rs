@@ -1,0 +1,346 @@
+//! The quality meter: a fold over the steps of alarms that counts them for the last 24 hours, or for any past period.
+//!
+//! One fold for both, so that what the screen shows now is what the report says tomorrow. Memory is bounded: counts per
+//! second of the last hour, at most 24 sums, and a few times for each alarm.
+
+use std::{
+    collections::{BTreeMap, BTreeSet, VecDeque},
+    sync::Arc,
+    time::Duration,
+};
+
+use jiff::Timestamp;
+
+use super::{
+    quality::{AlarmQuality, Figures, Frequent, Named, TOP, place},
+    rate::Rate,
+};
+use crate::plant::record::{AlarmRecord, AlarmStep};
+
+/// Width of a window, seconds: windows begin at its multiples since 1970 UTC.
+const WINDOW_S: i64 = 600;
+/// A window with more activations than this counts as above.
+const WINDOW_MAX: u64 = 10;
+const HOUR_S: i64 = 3_600;
+/// Hours of the running figures, the running one included.
+const HOURS: i64 = 24;
+/// Chattering: so many activations within this time. ISA-18.2 names three in a minute as the usual test.
+const CHATTER: usize = 3;
+const CHATTER_TIME: Duration = Duration::from_secs(60);
+/// Fleeting: active for a short time without repeating (ISA-18.2, terms). The standard gives no number; ten seconds
+/// without an acknowledgement is less than anybody needs to read an alarm.
+const FLEETING: Duration = Duration::from_secs(10);
+/// Stale: active for longer (ISA-18.2).
+const STALE_S: i64 = 86_400;
+/// What happened so long before a period is looked at too, to know whether a flood was under way; longer floods begin
+/// at the period.
+pub const LEAD: Duration = Duration::from_secs(86_400);
+/// What a meter that starts again must be told of the time before: the hours of the running figures.
+pub const RUNNING: Duration = Duration::from_secs((HOURS * HOUR_S) as u64);
+/// The running figures are formed anew after so many seconds.
+const REFRESH_S: i64 = 10;
+
+/// Counts activations. Steps come in order of time.
+#[derive(Debug, Clone)]
+pub struct Meter {
+    span: Span,
+    rate: Rate,
+    habits: BTreeMap<Named, Habit>,
+    /// By the second in which they begin, oldest first: the only one of a period, or one an hour.
+    sums: VecDeque<(i64, Sum)>,
+    /// Times (from, until), in seconds, in which an alarm was stale that is not any more.
+    stale: Vec<(i64, i64)>,
+    /// The latest figures of the running day.
+    day: Arc<Figures>,
+}
+
+/// What is counted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Span {
+    /// The running hour and those before it.
+    Running,
+    /// What lies in a period.
+    Period { from: Timestamp, until: Timestamp },
+}
+
+/// What is remembered of an alarm.
+#[derive(Debug, Clone, Default)]
+struct Habit {
+    /// Since when it is active.
+    active: Option<Timestamp>,
+    acknowledged: bool,
+    /// The latest activations, newest last; at most [`CHATTER`].
+    raised: VecDeque<Timestamp>,
+}
+
+/// The counts of a span.
+#[derive(Debug, Clone, Default)]
+struct Sum {
+    by_priority: [u64; 4],
+    windows_over: u64,
+    most: u64,
+    /// The latest window with an activation (its number), and how many it has.
+    window: (i64, u64),
+    flood_s: u64,
+    raised: BTreeMap<Named, u64>,
+    chattering: BTreeSet<Named>,
+    fleeting: BTreeSet<Named>,
+}
+
+impl Meter {
+    /// Counts from now on, for as long as the plant runs.
+    pub fn running(at: Timestamp) -> Meter {
+        Meter::new(Span::Running, second(at))
+    }
+
+    /// Counts what lies from `from` until before `until`. It is fed from [`LEAD`] before `from` on.
+    pub fn of_period(from: Timestamp, until: Timestamp) -> Meter {
+        let start = second(from) - LEAD.as_secs() as i64;
+        let mut meter = Meter::new(Span::Period { from, until }, start);
+        meter.sums.push_back((second(from), Sum::default()));
+        meter
+    }
+
+    fn new(span: Span, start: i64) -> Meter {
+        Meter {
+            span,
+            rate: Rate::new(start),
+            habits: BTreeMap::new(),
+            sums: VecDeque::new(),
+            stale: Vec::new(),
+            day: Arc::default(),
+        }
+    }
+
+    /// Takes up an alarm that was active before anything is counted.
+    pub fn already(&mut self, step: &AlarmRecord) {
+        let habit = self.habits.entry(named(step)).or_default();
+        match step.step {
+            AlarmStep::Raised => (habit.active, habit.acknowledged) = (Some(step.at), false),
+            AlarmStep::Acknowledged => habit.acknowledged = true,
+            AlarmStep::Returned => habit.active = None,
+        }
+    }
+
+    /// Takes a step.
+    pub fn take(&mut self, step: &AlarmRecord) {
+        self.advance(step.at);
+        match step.step {
+            AlarmStep::Raised => self.raised(step),
+            AlarmStep::Acknowledged => self.habits.entry(named(step)).or_default().acknowledged = true,
+            AlarmStep::Returned => self.returned(step),
+        }
+    }
+
+    /// Time passes.
+    pub fn advance(&mut self, at: Timestamp) {
+        for flooded in self.rate.advance(second(at)) {
+            self.flooded(flooded);
+        }
+        if self.span == Span::Running {
+            self.forget();
+        }
+    }
+
+    /// The alarm system as of the last step or advance.
+    pub fn quality(&mut self) -> AlarmQuality {
+        let now = self.rate.now();
+        let flood = self.rate.flood_since().and_then(|since| Timestamp::from_second(since).ok());
+        let age = now - second(self.day.until);
+        let began = self.day.until == Timestamp::UNIX_EPOCH;
+        if began || !(0..REFRESH_S).contains(&age) {
+            let from = now.div_euclid(HOUR_S) * HOUR_S - (HOURS - 1) * HOUR_S;
+            if let (Ok(from), Ok(until)) = (Timestamp::from_second(from), Timestamp::from_second(now)) {
+                self.day = Arc::new(self.figures_of(from, until));
+            }
+        }
+        AlarmQuality {
+            last_10_min: self.rate.in_window(),
+            last_hour: self.rate.in_hour(),
+            flood_since: flood,
+            day: self.day.clone(),
+        }
+    }
+
+    /// The figures of the period, once every step of it has been taken.
+    pub fn figures(mut self) -> Figures {
+        match self.span {
+            Span::Period { from, until } => {
+                self.advance(until);
+                self.figures_of(from, until)
+            }
+            Span::Running => Arc::unwrap_or_clone(self.quality().day),
+        }
+    }
+
+    fn raised(&mut self, step: &AlarmRecord) {
+        self.rate.raised();
+        let name = named(step);
+        self.end(&name, step.at);
+        let habit = self.habits.entry(name.clone()).or_default();
+        (habit.active, habit.acknowledged) = (Some(step.at), false);
+        habit.raised.push_back(step.at);
+        if habit.raised.len() > CHATTER {
+            habit.raised.pop_front();
+        }
+        let spread = habit.raised.front().map(|first| span(*first, step.at)).unwrap_or_default();
+        let chatters = habit.raised.len() == CHATTER && spread < CHATTER_TIME;
+        let window = second(step.at).div_euclid(WINDOW_S);
+        let Some(sum) = self.sum(step.at) else { return };
+        sum.by_priority[place(step.priority)] += 1;
+        sum.window = if sum.window.0 == window { (window, sum.window.1 + 1) } else { (window, 1) };
+        sum.most = sum.most.max(sum.window.1);
+        sum.windows_over += u64::from(sum.window.1 == WINDOW_MAX + 1);
+        if chatters {
+            sum.chattering.insert(name.clone());
+        }
+        *sum.raised.entry(name).or_default() += 1;
+    }
+
+    fn returned(&mut self, step: &AlarmRecord) {
+        let name = named(step);
+        let habit = self.habits.entry(name.clone()).or_default();
+        let fleeting = habit.active.is_some_and(|since| span(since, step.at) < FLEETING) && !habit.acknowledged;
+        self.end(&name, step.at);
+        if let Some(sum) = self.sum(step.at).filter(|_| fleeting) {
+            sum.fleeting.insert(name);
+        }
+    }
+
+    /// Ends the activation of an alarm, if there is one.
+    fn end(&mut self, name: &Named, at: Timestamp) {
+        let active = self.habits.get_mut(name).and_then(|habit| habit.active.take());
+        let stale = active.map(|since| second(since) + STALE_S).filter(|stale| *stale < second(at));
+        self.stale.extend(stale.map(|from| (from, second(at))));
+    }
+
+    /// The sum that an instant belongs to; `None` outside the period.
+    fn sum(&mut self, at: Timestamp) -> Option<&mut Sum> {
+        match self.span {
+            Span::Period { from, until } => {
+                let inside = from <= at && at < until;
+                self.sums.back_mut().map(|(_, sum)| sum).filter(|_| inside)
+            }
+            Span::Running => Some(self.hour(second(at))),
+        }
+    }
+
+    /// The sum of the hour of a second. A clock that went back counts into the latest.
+    fn hour(&mut self, second: i64) -> &mut Sum {
+        let hour = second.div_euclid(HOUR_S) * HOUR_S;
+        if self.sums.back().is_none_or(|(last, _)| *last < hour) {
+            self.sums.push_back((hour, Sum::default()));
+        }
+        &mut self.sums.back_mut().expect("one was pushed if there was none").1
+    }
+
+    /// Counts a span of seconds (from, until) in which there was a flood.
+    fn flooded(&mut self, (from, until): (i64, i64)) {
+        match self.span {
+            Span::Period { from: first, until: end } => {
+                let inside = until.min(second(end)) - from.max(second(first));
+                if let Some((_, sum)) = self.sums.back_mut() {
+                    sum.flood_s += u64::try_from(inside).unwrap_or(0);
+                }
+            }
+            Span::Running => {
+                let mut from = from;
+                while from < until {
+                    let next = until.min((from.div_euclid(HOUR_S) + 1) * HOUR_S);
+                    self.hour(from).flood_s += u64::try_from(next - from).unwrap_or(0);
+                    from = next;
+                }
+            }
+        }
+    }
+
+    /// Lets go of what is older than the running figures.
+    fn forget(&mut self) {
+        let first = (self.rate.now().div_euclid(HOUR_S) - (HOURS - 1)) * HOUR_S;
+        while self.sums.front().is_some_and(|(hour, _)| *hour < first) {
+            self.sums.pop_front();
+            self.stale.retain(|(_, until)| first < *until);
+            // Nothing is lost with an alarm that has not come for an hour: it counts anew.
+            let recent = |at: &Timestamp| self.rate.now() - HOUR_S < second(*at);
+            self.habits.retain(|_, habit| habit.active.is_some() || habit.raised.back().is_some_and(recent));
+        }
+    }
+
+    fn figures_of(&self, from: Timestamp, until: Timestamp) -> Figures {
+        let mut all = Sum::default();
+        self.sums.iter().for_each(|(_, sum)| all.add(sum));
+        let (first, last) = (second(from), second(until));
+        // The window of the last microsecond before the end is the last one.
+        let last_window = (until.as_microsecond() - 1).div_euclid(WINDOW_S * 1_000_000);
+        let windows = last_window - first.div_euclid(WINDOW_S) + 1;
+        let now_stale = self.habits.values().filter_map(|habit| habit.active);
+        let now_stale = now_stale.map(|since| (second(since) + STALE_S, last));
+        let stale = self.stale.iter().copied().chain(now_stale);
+        let stale = stale.map(|(a, b)| (a.max(first), b.min(last))).filter(|(a, b)| a < b).collect();
+        Figures {
+            from,
+            until,
+            by_priority: all.by_priority,
+            windows: u64::try_from(windows).unwrap_or(0),
+            windows_over: all.windows_over,
+            most: all.most,
+            flood: Duration::from_secs(all.flood_s),
+            top: top(all.raised),
+            chattering: all.chattering.into_iter().collect(),
+            fleeting: all.fleeting.into_iter().collect(),
+            stale: most_at_once(stale),
+        }
+    }
+}
+
+impl Sum {
+    fn add(&mut self, other: &Sum) {
+        for (all, more) in self.by_priority.iter_mut().zip(other.by_priority) {
+            *all += more;
+        }
+        self.windows_over += other.windows_over;
+        self.most = self.most.max(other.most);
+        self.flood_s += other.flood_s;
+        for (name, raised) in &other.raised {
+            *self.raised.entry(name.clone()).or_default() += raised;
+        }
+        self.chattering.extend(other.chattering.iter().cloned());
+        self.fleeting.extend(other.fleeting.iter().cloned());
+    }
+}
+
+/// The most frequent first; equally frequent ones by name.
+fn top(raised: BTreeMap<Named, u64>) -> Vec<Frequent> {
+    let mut list: Vec<_> = raised.into_iter().map(|(alarm, raised)| Frequent { alarm, raised }).collect();
+    list.sort_by_key(|alarm| std::cmp::Reverse(alarm.raised));
+    list.truncate(TOP);
+    list
+}
+
+/// The most spans that hold one instant.
+fn most_at_once(spans: Vec<(i64, i64)>) -> u64 {
+    // An end comes before a beginning of the same second: the one has gone when the other comes.
+    let mut edges: Vec<(i64, i64)> = spans.into_iter().flat_map(|(from, until)| [(from, 1), (until, -1)]).collect();
+    edges.sort_unstable();
+    let mut now = 0;
+    let most = edges.into_iter().map(|(_, step)| {
+        now += step;
+        now
+    });
+    most.max().map_or(0, |most| u64::try_from(most).unwrap_or(0))
+}
+
+fn named(step: &AlarmRecord) -> Named {
+    Named { subject: step.subject.clone(), text: step.text.clone() }
+}
+
+fn second(at: Timestamp) -> i64 {
+    at.as_microsecond().div_euclid(1_000_000)
+}
+
+fn span(from: Timestamp, to: Timestamp) -> Duration {
+    Duration::try_from(to.duration_since(from)).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,168 @@
+//! The meter as an operator would check it with pencil and paper.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::plant::{alarm::quality::Measure, def::Priority};
+
+/// A Saturday, 06:00 UTC.
+const START: i64 = 1_795_240_800;
+
+fn at(second: f64) -> Timestamp {
+    Timestamp::from_microsecond(START * 1_000_000 + (second * 1e6) as i64).expect("within the calendar")
+}
+
+fn step(second: f64, name: &str, step: AlarmStep) -> AlarmRecord {
+    AlarmRecord {
+        at: at(second),
+        subject: "TIC-1.PV".into(),
+        text: name.into(),
+        priority: Priority::High,
+        step,
+        value: None,
+        limit: None,
+        by: None,
+    }
+}
+
+/// The figures of 06:00 to a second after it.
+fn figures(until: f64, steps: &[(f64, &str, AlarmStep)]) -> Figures {
+    let mut meter = Meter::of_period(at(0.0), at(until));
+    steps.iter().for_each(|(second, name, kind)| meter.take(&step(*second, name, *kind)));
+    meter.figures()
+}
+
+fn names(alarms: &[Named]) -> Vec<&str> {
+    alarms.iter().map(|alarm| &*alarm.text).collect()
+}
+
+use AlarmStep::{Acknowledged, Raised, Returned};
+
+#[test]
+fn only_activations_within_the_period_count_and_windows_without_any_do_too() {
+    let steps = [
+        (-0.001, "before", Raised),
+        (0.0, "first", Raised),
+        (599.9, "first", Raised),
+        (600.0, "second window", Raised),
+        (700.0, "second window", Acknowledged),
+        (800.0, "second window", Returned),
+        (7_200.0, "after", Raised),
+    ];
+    let got = figures(7_200.0, &steps);
+    assert_eq!((got.annunciated(), got.windows, got.most, got.windows_over), (3, 12, 2, 0));
+    assert_eq!(got.value(Measure::PerWindow), Some(0.25));
+    assert_eq!(got.top.iter().map(|alarm| (&*alarm.alarm.text, alarm.raised)).collect::<Vec<_>>()[0], ("first", 2));
+    // A period that begins and ends within windows touches 14 of them.
+    let mut meter = Meter::of_period(at(-1.0), at(7_200.5));
+    steps.iter().for_each(|(second, name, kind)| meter.take(&step(*second, name, *kind)));
+    let got = meter.figures();
+    assert_eq!((got.annunciated(), got.windows), (5, 14));
+}
+
+#[test]
+fn eleven_in_a_window_are_too_many_and_ten_are_not() {
+    let raise = |count: usize| (0..count).map(|i| (i as f64, "x", Raised)).collect::<Vec<_>>();
+    for (count, over) in [(10, 0), (11, 1), (25, 1)] {
+        let got = figures(3_600.0, &raise(count));
+        assert_eq!((got.most, got.windows_over), (count as u64, over), "{count}");
+    }
+}
+
+#[test]
+fn an_alarm_chatters_with_its_third_activation_within_a_minute() {
+    let third = |second: f64| figures(3_600.0, &[(-20.0, "a", Raised), (-5.0, "a", Raised), (second, "a", Raised)]);
+    assert_eq!(names(&third(39.9).chattering), ["a"]);
+    assert_eq!(names(&third(40.0).chattering), [""; 0]);
+    let two = figures(3_600.0, &[(1.0, "a", Raised), (2.0, "b", Raised), (3.0, "a", Raised), (4.0, "b", Raised)]);
+    assert_eq!(names(&two.chattering), [""; 0], "two alarms in turn are not one that chatters");
+}
+
+#[test]
+fn an_alarm_is_fleeting_if_it_goes_before_anybody_could_read_it() {
+    let gone = |second: f64| figures(3_600.0, &[(1.0, "a", Raised), (second, "a", Returned)]);
+    assert_eq!(names(&gone(10.9).fleeting), ["a"]);
+    assert_eq!(names(&gone(11.0).fleeting), [""; 0]);
+    let seen = figures(3_600.0, &[(1.0, "a", Raised), (2.0, "a", Acknowledged), (3.0, "a", Returned)]);
+    assert_eq!(names(&seen.fleeting), [""; 0], "somebody has seen it");
+}
+
+#[test]
+fn alarms_are_stale_after_a_day_and_the_most_at_one_time_count() {
+    let day = 86_400.0;
+    let steps = [
+        (10.0, "a", Raised),
+        (20.0, "b", Raised),
+        (day + 15.0, "a", Returned),
+        // "b" becomes stale after "a" has gone: never two at once.
+        (day + 40.0, "b", Returned),
+        (day + 50.0, "c", Raised),
+    ];
+    assert_eq!(figures(day + 10.0, &steps[..2]).stale, 0, "active for exactly a day is not over a day");
+    assert_eq!(figures(day + 11.0, &steps[..2]).stale, 1);
+    assert_eq!(figures(day + 60.0, &steps).stale, 1);
+    assert_eq!(figures(day + 60.0, &steps[..2]).stale, 2);
+    let mut meter = Meter::of_period(at(0.0), at(600.0));
+    meter.already(&step(-100_000.0, "old", Raised));
+    let got = meter.figures();
+    assert_eq!((got.stale, got.annunciated()), (1, 0), "what was there before the period is stale, not new");
+}
+
+#[test]
+fn the_flood_of_a_period_has_its_whole_seconds_within_the_period() {
+    let raises = |from: f64| (0..11).map(|i| (from + f64::from(i), "x", Raised)).collect::<Vec<_>>();
+    assert_eq!(figures(3_600.0, &raises(100.0)).flood.as_secs(), 596);
+    assert_eq!(figures(200.0, &raises(100.0)).flood.as_secs(), 90, "it goes on beyond the end");
+    assert_eq!(figures(3_600.0, &raises(-510.0)).flood.as_secs(), 96, "it began before the beginning");
+}
+
+#[test]
+fn memory_does_not_grow_with_the_storms_it_has_seen() {
+    let mut meter = Meter::running(at(0.0));
+    for day in 0..10 {
+        for second in 0..2_000 {
+            let name = format!("alarm {}", second % 500);
+            meter.take(&step(f64::from(day) * 86_400.0 + f64::from(second), &name, Raised));
+            meter.take(&step(f64::from(day) * 86_400.0 + f64::from(second) + 0.5, &name, Returned));
+        }
+    }
+    meter.advance(at(12.0 * 86_400.0));
+    assert_eq!((meter.sums.len(), meter.habits.len(), meter.stale.len()), (0, 0, 0));
+}
+
+fn steps() -> impl Strategy<Value = Vec<AlarmRecord>> {
+    // Bursts and quiet: most steps follow within seconds, some after hours.
+    let gap = prop_oneof![8 => 0.0..20.0, 2 => 20.0..900.0, 1 => 900.0..20_000.0f64];
+    let kind = prop_oneof![3 => Just(Raised), 2 => Just(Returned), 1 => Just(Acknowledged)];
+    let priority =
+        prop_oneof![Just(Priority::Critical), Just(Priority::High), Just(Priority::Medium), Just(Priority::Low)];
+    proptest::collection::vec((gap, 0..6u8, kind, priority), 1..400).prop_map(|rows| {
+        let mut now = 0.0;
+        let mut list = Vec::new();
+        for (gap, name, kind, priority) in rows {
+            now += gap;
+            list.push(AlarmRecord { priority, ..step(now, &format!("alarm {name}"), kind) });
+        }
+        list
+    })
+}
+
+proptest! {
+    #[test]
+    fn what_the_screen_shows_now_is_what_the_report_of_the_same_span_says(steps in steps(), rest in 0.0..5_000.0f64) {
+        let mut running = Meter::running(at(0.0));
+        steps.iter().for_each(|step| running.take(step));
+        let now = steps.last().map_or(at(0.0), |step| step.at) + Duration::from_secs_f64(rest);
+        // The running figures are of whole seconds.
+        let now = Timestamp::from_second(second(now) + 1).expect("within the calendar");
+        running.advance(now);
+        let quality = running.quality();
+        let mut period = Meter::of_period(quality.day.from, quality.day.until);
+        let known = quality.day.from - LEAD;
+        steps.iter().filter(|step| step.at < known).for_each(|step| period.already(step));
+        steps.iter().filter(|step| known <= step.at).for_each(|step| period.take(step));
+        let in_window = steps.iter().filter(|step| step.step == Raised && second(now) - 600 < second(step.at));
+        prop_assert_eq!(quality.last_10_min as usize, in_window.count());
+        prop_assert_eq!(&*quality.day, &period.figures());
+    }
+}

@@ -1,0 +1,315 @@
+//! The figures of an alarm system, and the targets and limits that they are held against: one table in one place.
+//!
+//! Targets and limits are those of ISA-18.2 and IEC 62682 for one operator's position, meant for at least 30 days; the
+//! plant is one position. Only *annunciated* activations count: a step `raised` of an alarm that is not put aside.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+
+use crate::plant::def::Priority;
+
+/// How many of the most frequent alarms are named.
+pub const TOP: usize = 10;
+/// Shares of fewer activations than this say nothing and are not judged.
+pub const SHARED_MIN: u64 = 20;
+
+/// The alarm system as it is now: the rates of this moment, and the figures of the last 24 hours.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct AlarmQuality {
+    /// Activations in the last 10 minutes.
+    pub last_10_min: u32,
+    /// Activations in the last hour.
+    pub last_hour: u32,
+    /// Since when there is a flood: it begins above 10 in 10 minutes and ends below 5.
+    pub flood_since: Option<Timestamp>,
+    /// The running hour and the 23 before it; some seconds old, `until` says how old.
+    pub day: Arc<Figures>,
+}
+
+/// The figures of a span of time. Windows are 10 minutes of the UTC clock, the empty ones included; one that lies only
+/// partly in the span counts with what is in it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// From, inclusive.
+    pub from: Timestamp,
+    /// Until, exclusive.
+    pub until: Timestamp,
+    /// Activations by priority, the most urgent first.
+    pub by_priority: [u64; 4],
+    /// Windows that the span touches.
+    pub windows: u64,
+    /// Windows with more than 10 activations.
+    pub windows_over: u64,
+    /// Activations in the worst window.
+    pub most: u64,
+    /// Time in flood, in whole seconds.
+    pub flood: Duration,
+    /// The most frequent alarms, the most frequent first; at most [`TOP`].
+    pub top: Vec<Frequent>,
+    /// Alarms that chattered: raised three times or more within 60 s.
+    pub chattering: Vec<Named>,
+    /// Alarms that were fleeting: gone within 10 s, before anybody had acknowledged them.
+    pub fleeting: Vec<Named>,
+    /// The most alarms at one time that had been active for over 24 hours.
+    pub stale: u64,
+}
+
+/// An alarm by its names, as the journal has them.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Named {
+    /// Full name of the tag or device: `TIC-1.PV`.
+    pub subject: Arc<str>,
+    /// `temperature high`.
+    pub text: Arc<str>,
+}
+
+/// An alarm and how often it was raised.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Frequent {
+    /// Which.
+    pub alarm: Named,
+    /// Activations in the span.
+    pub raised: u64,
+}
+
+impl Default for Figures {
+    fn default() -> Figures {
+        let (from, until) = (Timestamp::UNIX_EPOCH, Timestamp::UNIX_EPOCH);
+        Figures {
+            from,
+            until,
+            by_priority: [0; 4],
+            windows: 0,
+            windows_over: 0,
+            most: 0,
+            flood: Duration::ZERO,
+            top: Vec::new(),
+            chattering: Vec::new(),
+            fleeting: Vec::new(),
+            stale: 0,
+        }
+    }
+}
+
+/// What is measured, in the order of the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Measure {
+    /// Activations a day, on average.
+    PerDay,
+    /// Activations an hour, on average.
+    PerHour,
+    /// Activations in 10 minutes, on average.
+    PerWindow,
+    /// Percent of the windows with more than 10.
+    WindowsOver,
+    /// Most in a window.
+    Most,
+    /// Percent of the time in flood.
+    Flood,
+    /// Percent of the activations that come from the most frequent alarms.
+    Top,
+    /// Alarms that chattered.
+    Chattering,
+    /// Alarms that were fleeting.
+    Fleeting,
+    /// Alarms active for over 24 hours, the most at one time.
+    Stale,
+    /// Percent of the activations with this priority.
+    Share(Priority),
+}
+
+/// What a figure should be, and what it must not pass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goal {
+    /// What is measured.
+    pub measure: Measure,
+    /// In words, with its unit last.
+    pub words: &'static str,
+    /// The target.
+    pub target: Bound,
+    /// The limit, where there is one.
+    pub limit: Option<Bound>,
+}
+
+/// How far a figure may go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bound {
+    /// So much or less.
+    AtMost(f64),
+    /// Less than this.
+    Below(f64),
+    /// So much or more.
+    AtLeast(f64),
+}
+
+/// Targets and limits (ISA-18.2-2016, clause 16.5; the order of the screens).
+pub const GOALS: [Goal; 14] = {
+    use Bound::{AtLeast, AtMost, Below};
+    use Measure::{Chattering, Fleeting, Flood, Most, PerDay, PerHour, PerWindow, Share, Stale, Top, WindowsOver};
+    const fn goal(measure: Measure, words: &'static str, target: Bound, limit: Option<Bound>) -> Goal {
+        Goal { measure, words, target, limit }
+    }
+    [
+        goal(PerDay, "alarms a day", AtMost(150.0), Some(AtMost(300.0))),
+        goal(PerHour, "alarms an hour", AtMost(6.0), Some(AtMost(12.0))),
+        goal(PerWindow, "alarms in 10 min", AtMost(1.0), Some(AtMost(2.0))),
+        goal(WindowsOver, "10-min windows above 10 (%)", Below(1.0), None),
+        goal(Most, "most in a 10-min window", AtMost(10.0), None),
+        goal(Flood, "time in flood (%)", Below(1.0), None),
+        goal(Top, "share of the ten most frequent (%)", AtMost(5.0), None),
+        goal(Chattering, "chattering alarms", AtMost(0.0), None),
+        goal(Fleeting, "fleeting alarms", AtMost(0.0), None),
+        goal(Stale, "active over 24 h (most at once)", Below(5.0), None),
+        goal(Share(Priority::Critical), "priority critical (%)", Below(1.0), None),
+        goal(Share(Priority::High), "priority high (%)", AtMost(5.0), None),
+        goal(Share(Priority::Medium), "priority medium (%)", AtMost(15.0), None),
+        goal(Share(Priority::Low), "priority low (%)", AtLeast(80.0), None),
+    ]
+};
+
+/// How a figure stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Verdict {
+    /// As it should be.
+    Good,
+    /// Beyond the target.
+    Beyond,
+    /// Beyond the limit.
+    Over,
+    /// There is too little to judge.
+    TooFew,
+}
+
+impl Verdict {
+    /// The word in CSV and on screen.
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::Good => "good",
+            Verdict::Beyond => "beyond target",
+            Verdict::Over => "over limit",
+            Verdict::TooFew => "too few",
+        }
+    }
+}
+
+impl Bound {
+    /// Is it kept?
+    pub fn holds(self, value: f64) -> bool {
+        match self {
+            Bound::AtMost(bound) => value <= bound,
+            Bound::Below(bound) => value < bound,
+            Bound::AtLeast(bound) => bound <= value,
+        }
+    }
+}
+
+impl std::fmt::Display for Bound {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Bound::AtMost(bound) => write!(f, "at most {bound}"),
+            Bound::Below(bound) => write!(f, "below {bound}"),
+            Bound::AtLeast(bound) => write!(f, "at least {bound}"),
+        }
+    }
+}
+
+impl Goal {
+    /// How a figure stands against it; `None` is a figure that could not be formed.
+    pub fn verdict(&self, figures: &Figures) -> Verdict {
+        let Some(value) = figures.value(self.measure) else { return Verdict::TooFew };
+        let share = matches!(self.measure, Measure::Top | Measure::Share(_));
+        if share && figures.annunciated() < SHARED_MIN {
+            Verdict::TooFew
+        } else if self.target.holds(value) {
+            Verdict::Good
+        } else if self.limit.is_some_and(|limit| !limit.holds(value)) {
+            Verdict::Over
+        } else {
+            Verdict::Beyond
+        }
+    }
+}
+
+impl Figures {
+    /// Activations of all priorities.
+    pub fn annunciated(&self) -> u64 {
+        self.by_priority.iter().sum()
+    }
+    /// A figure; `None` if it cannot be formed, as a share of nothing.
+    pub fn value(&self, measure: Measure) -> Option<f64> {
+        let all = self.annunciated() as f64;
+        let seconds = self.until.duration_since(self.from).as_secs_f64();
+        let of = |part: f64, whole: f64| (0.0 < whole).then(|| part / whole);
+        match measure {
+            Measure::PerDay => of(all * 86_400.0, seconds),
+            Measure::PerHour => of(all * 3_600.0, seconds),
+            Measure::PerWindow => of(all * 600.0, seconds),
+            Measure::WindowsOver => of(self.windows_over as f64 * 100.0, self.windows as f64),
+            Measure::Most => Some(self.most as f64),
+            Measure::Flood => of(self.flood.as_secs_f64() * 100.0, seconds),
+            Measure::Top => of(self.top.iter().map(|alarm| alarm.raised).sum::<u64>() as f64 * 100.0, all),
+            Measure::Chattering => Some(self.chattering.len() as f64),
+            Measure::Fleeting => Some(self.fleeting.len() as f64),
+            Measure::Stale => Some(self.stale as f64),
+            Measure::Share(priority) => of(self.by_priority[place(priority)] as f64 * 100.0, all),
+        }
+    }
+}
+
+/// Where a priority stands in a list, the most urgent first.
+pub fn place(priority: Priority) -> usize {
+    usize::from(priority.number() - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures(by_priority: [u64; 4]) -> Figures {
+        let until = Timestamp::UNIX_EPOCH + Duration::from_secs(86_400);
+        Figures { by_priority, until, windows: 144, ..Figures::default() }
+    }
+
+    fn verdict(figures: &Figures, measure: Measure) -> Verdict {
+        GOALS.iter().find(|goal| goal.measure == measure).expect("every measure has a goal").verdict(figures)
+    }
+
+    #[test]
+    fn a_rate_is_good_up_to_its_target_and_over_beyond_its_limit() {
+        for (a_day, expect) in [
+            (0, Verdict::Good),
+            (144, Verdict::Good),
+            (151, Verdict::Beyond),
+            (300, Verdict::Beyond),
+            (301, Verdict::Over),
+        ] {
+            assert_eq!(verdict(&figures([0, 0, 0, a_day]), Measure::PerDay), expect, "{a_day}");
+        }
+        assert_eq!(figures([0, 0, 0, 144]).value(Measure::PerWindow), Some(1.0));
+        assert_eq!(figures([0, 0, 0, 144]).value(Measure::PerHour), Some(6.0));
+    }
+
+    #[test]
+    fn the_split_is_judged_from_a_handful_of_alarms_up() {
+        let split = figures([0, 5, 15, 80]);
+        for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
+            assert_eq!(verdict(&split, Measure::Share(priority)), Verdict::Good, "{}", priority.word());
+        }
+        let urgent = figures([2, 10, 10, 10]);
+        for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
+            assert_eq!(verdict(&urgent, Measure::Share(priority)), Verdict::Beyond, "{}", priority.word());
+        }
+        assert_eq!(verdict(&figures([0, 19, 0, 0]), Measure::Share(Priority::High)), Verdict::TooFew);
+        assert_eq!(verdict(&figures([0; 4]), Measure::Share(Priority::Low)), Verdict::TooFew);
+    }
+
+    #[test]
+    fn fewer_than_five_stale_alarms_and_less_than_one_percent_of_flood_are_good() {
+        for (stale, flood, expect) in [(4, 863, Verdict::Good), (5, 864, Verdict::Beyond)] {
+            let figures = Figures { stale, flood: Duration::from_secs(flood), ..figures([0; 4]) };
+            assert_eq!([Measure::Stale, Measure::Flood].map(|measure| verdict(&figures, measure)), [expect; 2]);
+        }
+    }
+}

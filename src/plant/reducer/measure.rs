@@ -1,0 +1,84 @@
+//! The quality meter in the reducer: it counts every step of an alarm, and after a restart those of the last day.
+
+use jiff::Timestamp;
+
+use super::Plant;
+use crate::plant::{
+    alarm::Meter,
+    record::{AlarmRecord, Record},
+};
+
+impl Plant {
+    /// Lets the quality meter count what the journal remembers of the last day. `active` are the raising steps of alarms
+    /// that were active before it, `steps` what came since; both oldest first, none after `now`.
+    pub fn remeasure(&mut self, active: &[AlarmRecord], steps: &[AlarmRecord], now: Timestamp) {
+        let began = steps.first().map_or(now, |step| step.at.min(now));
+        self.meter = Meter::running(began);
+        active.iter().for_each(|step| self.meter.already(step));
+        steps.iter().for_each(|step| self.meter.take(step));
+        self.meter.advance(now);
+        self.quality = self.meter.quality();
+    }
+
+    /// Counts the steps of alarms among what is to be stored.
+    pub(super) fn measure(&mut self, records: &[Record]) {
+        for record in records {
+            match record {
+                Record::Alarm(step) => self.meter.take(step),
+                Record::Sample(..) | Record::Action(_) | Record::Line(_) => {}
+            }
+        }
+        self.meter.advance(self.at);
+        self.quality = self.meter.quality();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::plant::{
+        event::Event,
+        fixture::{self, DP, FAULT, PV, TIC},
+    };
+
+    fn at(second: i64) -> Timestamp {
+        Timestamp::from_second(second).expect("a small number")
+    }
+
+    /// The temperature at a second; above 75 is too hot after two seconds.
+    fn read(plant: &mut Plant, second: i64, value: f64) -> Vec<AlarmRecord> {
+        let values = vec![(DP, 0.0), (FAULT, 0.0), (PV, value)];
+        let (device, texts, reply) = (TIC, Vec::new(), Duration::from_millis(12));
+        let event = Event::Read { at: at(second), device, values, texts, reply, exchange: None };
+        let steps = plant.on_event(event).records.into_iter().filter_map(|record| match record {
+            Record::Alarm(step) => Some(step),
+            Record::Sample(..) | Record::Action(_) | Record::Line(_) => None,
+        });
+        steps.collect()
+    }
+
+    #[test]
+    fn every_screen_has_the_rates_of_the_moment_and_a_restart_keeps_them() {
+        let mut plant = Plant::new(fixture::shared(), at(0), 1.0);
+        let mut journal = Vec::new();
+        for second in 0..44 {
+            let hot = second % 4 != 3;
+            journal.extend(read(&mut plant, second, if hot { 80.0 } else { 20.0 }));
+        }
+        let quality = plant.snapshot().alarm_quality;
+        assert_eq!((quality.last_10_min, quality.last_hour, quality.flood_since), (11, 11, Some(at(42))));
+        let mut again = Plant::new(fixture::shared(), at(50), 1.0);
+        again.restore(&journal);
+        again.remeasure(&[], &journal, at(50));
+        plant.on_tick(at(53));
+        again.on_tick(at(53));
+        assert_eq!(again.snapshot().alarm_quality.last_10_min, 11);
+        assert_eq!(again.snapshot().alarm_quality.flood_since, Some(at(42)));
+        assert_eq!(again.snapshot().alarm_quality.day.chattering, plant.snapshot().alarm_quality.day.chattering);
+        plant.on_tick(at(700));
+        assert_eq!(plant.snapshot().alarm_quality.last_10_min, 0);
+        assert_eq!(plant.snapshot().alarm_quality.flood_since, None);
+    }
+}

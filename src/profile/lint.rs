@@ -1,0 +1,225 @@
+//! The lint of alarms: what an alarm lacks that can be used but would not help an operator.
+//!
+//! An alarm is complete with cause, effect, action, time to respond and priority (ISA-18.2); one without an action is
+//! none. What is plainly wrong, such as a limit without a deadband or two alarms of one name, is an error elsewhere.
+
+use std::collections::BTreeMap;
+
+use super::{
+    alarm::conditions_of,
+    diagnostic::{Problems, Span},
+    reader::At,
+    schema::AlarmTable,
+};
+use crate::plant::def::Priority;
+
+/// From so many alarms up their split by priority says something.
+const SPLIT_MIN: usize = 20;
+/// Most alarms of high and critical priority, percent. The target for those that are raised is 5; a file may have more of
+/// them, because what is urgent should come seldom.
+const URGENT_MAX: usize = 20;
+
+/// Looks through the alarms of a plant file; those that are wrong by themselves are passed over.
+pub(super) fn lint(tables: &[At<AlarmTable>], problems: &mut Problems) {
+    let sound: Vec<&AlarmTable> = tables.iter().map(|table| &table.value).filter(|table| table.sound).collect();
+    for table in &sound {
+        incomplete(table, problems);
+        delay(table, problems);
+    }
+    twice(&sound, problems);
+    split(&sound, problems);
+}
+
+/// What the operator would have to guess.
+fn incomplete(table: &AlarmTable, problems: &mut Problems) {
+    let empty = |words: &Option<At<String>>| words.as_ref().is_none_or(|words| words.value.trim().is_empty());
+    let missing: Vec<&str> = [
+        ("`cause`", empty(&table.cause)),
+        ("`effect`", empty(&table.effect)),
+        ("`action`", empty(&table.action)),
+        ("`respond`", table.respond.is_none()),
+    ]
+    .into_iter()
+    .filter_map(|(key, missing)| missing.then_some(key))
+    .collect();
+    if missing.is_empty() {
+        return;
+    }
+    let message = format!("{} has no {}", name(table), missing.join(", "));
+    let problem = problems.warn(place(table), message);
+    problem.label("not complete").help(match missing.contains(&"`action`") {
+        true => "an alarm that nobody can do anything about is none: leave it out, or say what to do",
+        false => "say what may be wrong, what follows, what to do and within what time",
+    });
+}
+
+/// A limit without a delay, or with one that leaves no time.
+fn delay(table: &AlarmTable, problems: &mut Problems) {
+    let analog = [table.high_high, table.high, table.low, table.low_low, table.deviation].into_iter().flatten().next();
+    match (analog, table.on_delay, table.respond) {
+        (Some(limit), None, _) => {
+            let problem = problems.warn(limit.at, format!("{} has no `on_delay`", name(table)));
+            problem.label("a single peak raises it").help(
+                "usual: flow and pressure 15s, level and temperature 60s; write on_delay = \"0s\" where it must come at once",
+            );
+        }
+        (_, Some(delay), Some(respond)) if respond.value < delay.value => {
+            let problem = problems.warn(delay.at, format!("{} comes later than it must be answered", name(table)));
+            problem.label("longer than `respond`").also(respond.at, "the time to respond");
+        }
+        (Some(_) | None, _, _) => {}
+    }
+}
+
+/// Two alarms that say the same.
+fn twice(tables: &[&AlarmTable], problems: &mut Problems) {
+    let mut seen: BTreeMap<(String, String), Span> = BTreeMap::new();
+    for table in tables {
+        let found = conditions_of(table).into_iter().next();
+        let (Some((at, word)), Some(tag)) = (found, &table.tag) else { continue };
+        // There is one high limit of a tag, but an alarm for each of its states.
+        let analog = ["high_high", "high", "low", "low_low", "deviation"].contains(&word);
+        let value = problems.text(at.source).get(at.start..at.end).unwrap_or_default();
+        let condition = if analog { word.to_owned() } else { format!("{word} = {value}") };
+        match seen.get(&(tag.value.clone(), condition.clone())) {
+            Some(first) => {
+                let first = *first;
+                let problem = problems.warn(at, format!("{} has two alarms for `{condition}`", tag.value));
+                problem.label("again").also(first, "first here");
+            }
+            None => {
+                seen.insert((tag.value.clone(), condition), at);
+            }
+        }
+    }
+}
+
+/// Where everything is urgent nothing is.
+fn split(tables: &[&AlarmTable], problems: &mut Problems) {
+    let urgent = |priority: Priority| match priority {
+        Priority::Critical | Priority::High => true,
+        Priority::Medium | Priority::Low => false,
+    };
+    let priorities = tables.iter().filter_map(|table| table.priority);
+    let list: Vec<_> = priorities.filter(|priority| urgent(priority.value)).collect();
+    let (count, all) = (list.len(), tables.len());
+    if SPLIT_MIN <= all && URGENT_MAX * all < count * 100 {
+        let problem = problems.warn(list[0].at, format!("{count} of {all} alarms are high or critical"));
+        problem
+            .label("the first of them")
+            .help(format!("expected at most {URGENT_MAX} %: about 80 % low, 15 % medium and 5 % high are usual"));
+    }
+}
+
+fn name(table: &AlarmTable) -> String {
+    let words = |words: &Option<At<String>>| words.as_ref().map(|words| words.value.clone());
+    let subject = words(&table.tag).or_else(|| words(&table.device)).unwrap_or_default();
+    format!("the alarm `{}` of {subject}", words(&table.text).unwrap_or_default())
+}
+
+fn place(table: &AlarmTable) -> Span {
+    table.text.as_ref().map_or(table.at, |text| text.at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{
+        plant::{Library, Text, build},
+        tests::{METER, PLANT, PLC},
+    };
+
+    /// A complete alarm with other keys.
+    fn alarm(keys: &str) -> String {
+        format!(
+            "[[alarm]]\n{keys}\ncause = \"a fault\"\neffect = \"a loss\"\naction = \"stop it\"\nrespond = \"10min\"\n"
+        )
+    }
+
+    /// What the lint says of a plant with these alarms, a line each.
+    fn warnings(alarms: &str) -> Vec<String> {
+        let start = PLANT.find("[[alarm]]").expect("the plant has an alarm");
+        let end = PLANT.find("[mimic]").expect("the plant has a picture");
+        let text = format!("{}{alarms}{}", &PLANT[..start], &PLANT[end..]);
+        let find = |name: &str| {
+            let text = if name == "meter" { METER } else { PLC };
+            Ok(Some(Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() }))
+        };
+        let library = Library { find: &find, names: Vec::new() };
+        let built = build("small", &Text { file: "small.toml".into(), bytes: text.into_bytes() }, &library);
+        let (_, warnings) = built.unwrap_or_else(|errors| panic!("{errors}"));
+        warnings.full_lines().collect()
+    }
+
+    fn check(alarms: &str, expect: &[&str]) {
+        let told = warnings(alarms);
+        assert_eq!(told.len(), expect.len(), "{alarms}\n{told:#?}");
+        for (line, part) in told.iter().zip(expect) {
+            assert!(line.contains(part), "no `{part}` in {line}");
+        }
+    }
+
+    const HOT: &str =
+        "tag = \"D1.T\"\nhigh = 80.0\ndeadband = 1.0\non_delay = \"5s\"\npriority = \"high\"\ntext = \"hot\"";
+
+    #[test]
+    fn a_complete_alarm_is_left_in_peace() {
+        check(&alarm(HOT), &[]);
+        check(&alarm("device = \"D1\"\npriority = \"low\"\ntext = \"silent\""), &[]);
+        check(&alarm("tag = \"D1.MODE\"\nis = \"on\"\npriority = \"low\"\ntext = \"runs\""), &[]);
+    }
+
+    #[test]
+    fn what_an_operator_would_have_to_guess_is_named_with_its_place() {
+        let bare = format!("[[alarm]]\n{HOT}\n");
+        check(&bare, &["small.toml:30:8: the alarm `hot` of D1.T has no `cause`, `effect`, `action`, `respond`"]);
+        check(&alarm(HOT).replace("stop it", " "), &["has no `action` (not complete; an alarm that nobody can do"]);
+        check(&alarm(HOT).replace("respond = \"10min\"\n", ""), &["has no `respond`"]);
+    }
+
+    #[test]
+    fn a_limit_needs_a_delay_or_the_word_that_it_needs_none() {
+        check(
+            &alarm(&HOT.replace("on_delay = \"5s\"\n", "")),
+            &["small.toml:26:8: the alarm `hot` of D1.T has no `on_delay`"],
+        );
+        check(&alarm(&HOT.replace("5s", "0s")), &[]);
+        check(&alarm(&HOT.replace("5s", "10min")), &[]);
+        check(&alarm(&HOT.replace("5s", "11min")), &["comes later than it must be answered (longer than `respond`)"]);
+    }
+
+    #[test]
+    fn two_alarms_that_say_the_same_are_found() {
+        let again = HOT.replace("80.0", "85.0").replace("hot", "hotter");
+        check(&(alarm(HOT) + &alarm(&again)), &["D1.T has two alarms for `high`"]);
+        let is = |state: &str| {
+            alarm(&format!("tag = \"D1.MODE\"\nis = \"{state}\"\npriority = \"low\"\ntext = \"{state}!\""))
+        };
+        check(&(is("on") + &is("off")), &[]);
+        let both = is("on") + &is("on").replace("on!", "runs");
+        check(&both, &["D1.MODE has two alarms for `is = \"on\"`"]);
+    }
+
+    #[test]
+    fn where_everything_is_urgent_the_file_is_told_so_from_twenty_alarms_up() {
+        let alarms = |urgent: usize, all: usize| -> String {
+            let one = |i: usize| {
+                let priority = if i < urgent { "high" } else { "low" };
+                let state = ["on", "off"][i % 2];
+                let text = format!("tag = \"D1.MODE\"\nis = \"{state}\"\npriority = \"{priority}\"\ntext = \"{i}\"");
+                alarm(&text)
+            };
+            (0..all).map(one).collect()
+        };
+        let split = |urgent, all| -> Vec<String> {
+            warnings(&alarms(urgent, all)).into_iter().filter(|line| line.contains("critical")).collect()
+        };
+        assert_eq!(split(4, 20), [""; 0]);
+        assert_eq!(split(19, 19), [""; 0], "too few to judge");
+        let told = split(5, 20);
+        assert_eq!(told.len(), 1);
+        assert!(
+            told[0].contains("5 of 20 alarms are high or critical (the first of them; expected at most 20 %"),
+            "{told:?}"
+        );
+    }
+}

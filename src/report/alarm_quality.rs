@@ -1,0 +1,214 @@
+//! The figures of an alarm system as rows and as plain lines: what was measured, its target and limit, how it stands.
+
+use serde::Serialize;
+
+use super::{Period, csv::iso};
+use crate::plant::{
+    alarm::{
+        Figures,
+        quality::{GOALS, Goal, Measure, Named},
+    },
+    def::PlantDef,
+};
+
+/// One figure beside its target and limit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// What was measured, its unit last.
+    pub measure: &'static str,
+    /// The figure; `None` if it cannot be formed.
+    pub value: Option<f64>,
+    /// `at most 150`.
+    pub target: String,
+    /// `at most 300`; empty if there is none.
+    pub limit: String,
+    /// `good`, `beyond target`, `over limit` or `too few` to judge.
+    pub verdict: &'static str,
+    /// Decimals to print.
+    #[serde(skip)]
+    pub decimals: u8,
+}
+
+/// An alarm that somebody should look into, and why.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Culprit {
+    /// `frequent`, `chattering` or `fleeting`.
+    pub kind: &'static str,
+    /// Full name of the tag or device.
+    pub subject: String,
+    /// `temperature high`.
+    pub alarm: String,
+    /// Activations in the period, for the frequent ones.
+    pub raised: Option<u64>,
+}
+
+/// All that is told of a period, as `--json` prints it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Quality {
+    /// Name of the plant.
+    pub plant: String,
+    /// Name of the period.
+    pub period: String,
+    /// From, with the plant's offset.
+    pub from: String,
+    /// Up to when there are figures, with the plant's offset.
+    pub until: String,
+    /// Activations.
+    pub raised: u64,
+    /// Figures against targets and limits.
+    pub figures: Vec<Row>,
+    /// The alarms to look into.
+    pub alarms: Vec<Culprit>,
+}
+
+/// The figures of a period with names and times.
+pub fn quality(figures: &Figures, def: &PlantDef, period: &Period) -> Quality {
+    Quality {
+        plant: def.name.clone(),
+        period: period.name.clone(),
+        from: iso(&def.time_zone, figures.from),
+        until: iso(&def.time_zone, figures.until),
+        raised: figures.annunciated(),
+        figures: rows(figures),
+        alarms: culprits(figures),
+    }
+}
+
+/// Every figure, in the order of the table of goals.
+pub fn rows(figures: &Figures) -> Vec<Row> {
+    GOALS.iter().map(|goal| row(goal, figures)).collect()
+}
+
+/// The most frequent alarms, then those that chattered, then those that were fleeting.
+pub fn culprits(figures: &Figures) -> Vec<Culprit> {
+    let culprit = |kind, alarm: &Named, raised| Culprit {
+        kind,
+        subject: alarm.subject.to_string(),
+        alarm: alarm.text.to_string(),
+        raised,
+    };
+    let frequent = figures.top.iter().map(|frequent| culprit("frequent", &frequent.alarm, Some(frequent.raised)));
+    let chattering = figures.chattering.iter().map(|alarm| culprit("chattering", alarm, None));
+    let fleeting = figures.fleeting.iter().map(|alarm| culprit("fleeting", alarm, None));
+    frequent.chain(chattering).chain(fleeting).collect()
+}
+
+/// The figures as lines for a terminal.
+pub fn quality_text(figures: &Figures, def: &PlantDef, period: &Period) -> String {
+    let all = quality(figures, def, period);
+    let mut lines = vec![
+        format!("{}, alarms of {}", def.title, all.period),
+        format!("{} to {}: {} alarms", all.from, all.until, all.raised),
+        String::new(),
+        format!("{:35} {:>7}  {:12}  {:12}  {}", "measure", "figure", "target", "limit", "verdict"),
+    ];
+    lines.extend(all.figures.iter().map(|row| {
+        let value = row.value.map_or("—".into(), |value| format!("{value:.*}", usize::from(row.decimals)));
+        format!("{:35} {value:>7}  {:12}  {:12}  {}", row.measure, row.target, row.limit, row.verdict)
+    }));
+    if !all.alarms.is_empty() {
+        lines.push(String::new());
+        lines.extend(all.alarms.iter().map(|alarm| {
+            let raised = alarm.raised.map(|raised| raised.to_string()).unwrap_or_default();
+            format!("{:10} {raised:>6}  {}  {}", alarm.kind, alarm.subject, alarm.alarm)
+        }));
+    }
+    lines.push(String::new());
+    lines.push("targets and limits: ISA-18.2 for one operator, meant for 30 days or more".into());
+    lines.join("\n")
+}
+
+fn row(goal: &Goal, figures: &Figures) -> Row {
+    let decimals = match goal.measure {
+        Measure::Most | Measure::Chattering | Measure::Fleeting | Measure::Stale => 0,
+        Measure::PerDay
+        | Measure::PerHour
+        | Measure::PerWindow
+        | Measure::WindowsOver
+        | Measure::Flood
+        | Measure::Top
+        | Measure::Share(_) => 1,
+    };
+    Row {
+        measure: goal.words,
+        value: figures.value(goal.measure),
+        target: goal.target.to_string(),
+        limit: goal.limit.map(|limit| limit.to_string()).unwrap_or_default(),
+        verdict: goal.verdict(figures).word(),
+        decimals,
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::{
+        plant::alarm::quality::Frequent,
+        report::testing::{THREE, at, plant},
+    };
+
+    /// Eight hours with 24 alarms, six of them of one that chatters.
+    pub fn figures() -> Figures {
+        let name = |subject: &str, text: &str| Named { subject: subject.into(), text: text.into() };
+        let high = name("TIC-1.PV", "temperature high");
+        Figures {
+            from: at("2026-11-21T06:00+07"),
+            until: at("2026-11-21T14:00+07"),
+            by_priority: [0, 6, 3, 15],
+            windows: 48,
+            windows_over: 1,
+            most: 12,
+            flood: Duration::from_secs(600),
+            top: vec![
+                Frequent { alarm: name("=PLC-1", "gives no values"), raised: 18 },
+                Frequent { alarm: high.clone(), raised: 6 },
+            ],
+            chattering: vec![high],
+            fleeting: Vec::new(),
+            stale: 0,
+        }
+    }
+
+    #[test]
+    fn a_figure_stands_beside_its_target_and_a_missing_one_is_a_dash() {
+        let period = Period {
+            name: "morning 2026-11-21".into(),
+            from: at("2026-11-21T06:00+07"),
+            to: at("2026-11-21T14:00+07"),
+        };
+        let text = quality_text(&figures(), &plant("Asia/Bangkok", &THREE), &period);
+        let expect = "\
+Water tank, alarms of morning 2026-11-21
+2026-11-21T06:00:00+07:00 to 2026-11-21T14:00:00+07:00: 24 alarms
+
+measure                              figure  target        limit         verdict
+alarms a day                           72.0  at most 150   at most 300   good
+alarms an hour                          3.0  at most 6     at most 12    good
+alarms in 10 min                        0.5  at most 1     at most 2     good
+10-min windows above 10 (%)             2.1  below 1                     beyond target
+most in a 10-min window                  12  at most 10                  beyond target
+time in flood (%)                       2.1  below 1                     beyond target
+share of the ten most frequent (%)    100.0  at most 5                   beyond target
+chattering alarms                         1  at most 0                   beyond target
+fleeting alarms                           0  at most 0                   good
+active over 24 h (most at once)           0  below 5                     good
+priority critical (%)                   0.0  below 1                     good
+priority high (%)                      25.0  at most 5                   beyond target
+priority medium (%)                    12.5  at most 15                  good
+priority low (%)                       62.5  at least 80                 beyond target
+
+frequent       18  =PLC-1  gives no values
+frequent        6  TIC-1.PV  temperature high
+chattering         TIC-1.PV  temperature high
+
+targets and limits: ISA-18.2 for one operator, meant for 30 days or more";
+        assert_eq!(text, expect);
+        let none = quality_text(&Figures::default(), &plant("Asia/Bangkok", &THREE), &period);
+        assert!(
+            none.contains("alarms a day                              —  at most 150   at most 300   too few"),
+            "{none}"
+        );
+    }
+}
