@@ -1,7 +1,7 @@
 //! Which tags are alarm inputs, which process values and which identification, as far as the plant itself tells.
 
 use super::{
-    def::{AlarmDef, Condition, Subject},
+    def::{AlarmDef, Subject},
     id::TagId,
     tag::{Class, Poll, TagDef},
 };
@@ -29,18 +29,16 @@ pub fn classes(tags: &[TagDef], alarms: &[AlarmDef], written: &[Option<Class>]) 
 fn inputs(alarm: &AlarmDef) -> impl Iterator<Item = TagId> {
     let subject = match alarm.subject {
         Subject::Tag(tag) => Some(tag),
-        Subject::Device(_) => None,
+        Subject::Device(_) | Subject::Line(_) => None,
     };
-    let reference = match alarm.condition {
-        Condition::Deviation { from, .. } => Some(from),
-        Condition::Limit { .. } | Condition::State { .. } | Condition::NotAnswering => None,
-    };
-    subject.into_iter().chain(reference)
+    let enabling = alarm.enabled_when.iter().flat_map(|expr| expr.tags());
+    subject.into_iter().chain(alarm.condition.reference()).chain(enabling)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::def::Condition;
     use crate::plant::fixture::{self, DP, FAULT, PV, RUN, SV};
 
     #[test]

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 pub use super::id::WriteId;
 use super::{
-    def::{AlarmId, DeviceId, LineDef, LineId, TagId},
+    alarm::{AlarmCommand, AlarmRefusal},
+    def::{DeviceId, LineDef, LineId, TagId},
     event::{ExceptionCode, Fault},
     restore::RestoreWish,
     tool::Tool,
@@ -58,10 +59,8 @@ pub enum Command {
         /// The new value.
         value: f64,
     },
-    /// Acknowledge one alarm.
-    Acknowledge(AlarmId),
-    /// Acknowledge every alarm that is unacknowledged now.
-    AcknowledgeAll,
+    /// Acknowledge, silence, reset, shelve: what is done with alarms.
+    Alarm(AlarmCommand),
     /// Read all tags of a device now.
     Refresh(DeviceId),
     /// Open (`true`) or close a line.
@@ -96,8 +95,7 @@ impl Command {
     pub fn written(&self) -> Option<(TagId, f64)> {
         match self {
             Command::Write { tag, value } => Some((*tag, *value)),
-            Command::Acknowledge(_)
-            | Command::AcknowledgeAll
+            Command::Alarm(_)
             | Command::Refresh(_)
             | Command::Connect(..)
             | Command::Configure(_)
@@ -225,9 +223,9 @@ pub enum Refusal {
     /// No line has this name and place, or no port can have such settings.
     #[error("no such line")]
     NotALine,
-    /// Nothing to do: the alarm is not unacknowledged.
-    #[error("nothing to acknowledge")]
-    NothingToAcknowledge,
+    /// What was wished of an alarm makes no sense or is not allowed.
+    #[error("{0}")]
+    Alarm(AlarmRefusal),
 }
 
 /// Why a write that the device accepted is not confirmed.

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::tag::{Table, TagDef};
 
 pub use super::{
+    alarm::def::{AlarmClass, AlarmDef, AlarmRules, Condition, Guidance, Level, Priority, Subject},
     guard::Guards,
     id::{AlarmId, DeviceId, LineId, TagId},
     line::{Framing, LineDef, Parity, Rs485, Serial, Transport},
@@ -35,6 +36,8 @@ pub struct PlantDef {
     pub alarms: Vec<AlarmDef>,
     /// The rules for logging in.
     pub access: AccessDef,
+    /// What holds for all alarms.
+    pub alarm_rules: AlarmRules,
     /// What stands between commands and their effect.
     pub guards: Guards,
     /// The picture of the process.
@@ -188,126 +191,6 @@ pub struct ActionDef {
     pub stop: bool,
     /// It saves the settings in the device's own memory.
     pub saves: bool,
-}
-
-/// An alarm: a condition on a tag or device, with what the operator should know and do.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AlarmDef {
-    /// Its place.
-    pub id: AlarmId,
-    /// What it watches.
-    pub subject: Subject,
-    /// When it is active.
-    pub condition: Condition,
-    /// How urgent.
-    pub priority: Priority,
-    /// The condition must hold this long before the alarm is raised.
-    pub on_delay: Duration,
-    /// The condition must be gone this long before the alarm returns.
-    pub off_delay: Duration,
-    /// `temperature high`.
-    pub text: String,
-    /// Cause, effect, action.
-    pub guidance: Guidance,
-}
-
-/// What an alarm watches.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Subject {
-    /// A tag.
-    Tag(TagId),
-    /// A device as a whole.
-    Device(DeviceId),
-}
-
-/// When an alarm is active. Limits and deadbands are in the tag's unit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum Condition {
-    /// A fixed limit; it returns when the value is back by the deadband.
-    Limit {
-        /// Which side, which level.
-        level: Level,
-        /// The limit.
-        limit: f64,
-        /// How far back inside before it returns.
-        deadband: f64,
-    },
-    /// The value is further than `limit` from another tag (its SV), either side.
-    Deviation {
-        /// The tag to compare with.
-        from: TagId,
-        /// Greatest distance.
-        limit: f64,
-        /// How far back inside before it returns.
-        deadband: f64,
-    },
-    /// A discrete tag has this value.
-    State {
-        /// The abnormal value.
-        is: f64,
-    },
-    /// The device does not answer.
-    NotAnswering,
-}
-
-/// The four levels of a limit alarm.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Level {
-    /// Above the high-high limit.
-    HighHigh,
-    /// Above the high limit.
-    High,
-    /// Below the low limit.
-    Low,
-    /// Below the low-low limit.
-    LowLow,
-}
-
-/// Priority of an alarm, the most urgent first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Priority {
-    /// `[1]!`
-    Critical,
-    /// `‹2›!`
-    High,
-    /// `(3)`
-    Medium,
-    /// ` 4 `
-    Low,
-}
-
-impl Priority {
-    /// 1 (critical) to 4 (low).
-    pub fn number(self) -> u8 {
-        match self {
-            Priority::Critical => 1,
-            Priority::High => 2,
-            Priority::Medium => 3,
-            Priority::Low => 4,
-        }
-    }
-    /// The word in TOML, SQL, CSV and on screen.
-    pub fn word(self) -> &'static str {
-        match self {
-            Priority::Critical => "critical",
-            Priority::High => "high",
-            Priority::Medium => "medium",
-            Priority::Low => "low",
-        }
-    }
-}
-
-/// What an operator should know about an alarm. Empty strings where the profile is silent.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Guidance {
-    /// Likely causes.
-    pub cause: String,
-    /// What happens if nothing is done.
-    pub effect: String,
-    /// What to do.
-    pub action: String,
-    /// How soon.
-    pub respond: Option<Duration>,
 }
 
 /// The picture of the process, on a canvas of nominal cells that is stretched to the screen.

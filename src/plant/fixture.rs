@@ -6,8 +6,8 @@ use jiff::tz::TimeZone;
 
 use super::{
     def::{
-        AlarmDef, AlarmId, Condition, DeviceDef, DeviceId, Guidance, Level, Limits, LineDef, LineId, MimicDef,
-        PlantDef, Priority, ReportDef, Serial, Subject, TagId, Transport,
+        AlarmDef, AlarmId, Condition, DeviceDef, DeviceId, Level, Limits, LineDef, LineId, MimicDef, PlantDef,
+        ReportDef, Serial, Subject, TagId, Transport,
     },
     tag::{Access, Bound, Decimals, Kind, Order, Point, Table, TagDef},
 };
@@ -56,14 +56,8 @@ pub fn plant() -> PlantDef {
         program: None,
     };
     let alarm = |id: AlarmId, subject, condition, on_delay| AlarmDef {
-        id,
-        subject,
-        condition,
-        priority: Priority::High,
         on_delay,
-        off_delay: Duration::ZERO,
-        text: format!("alarm {}", id.0),
-        guidance: Guidance::default(),
+        ..AlarmDef::new(id, subject, condition, format!("alarm {}", id.0))
     };
     PlantDef {
         access: Default::default(),
@@ -108,6 +102,7 @@ pub fn plant() -> PlantDef {
             ),
             alarm(SILENT, Subject::Device(TIC), Condition::NotAnswering, Duration::ZERO),
         ],
+        alarm_rules: Default::default(),
         guards: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),

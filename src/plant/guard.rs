@@ -6,6 +6,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    alarm::condition::is_set,
     def::{ActionDef, PlantDef},
     id::TagId,
     sample::{Cause, Sample},
@@ -73,8 +74,7 @@ impl InterlockDef {
             Blocking::Below(limit) => value < limit,
             Blocking::Above(limit) => limit < value,
             Blocking::Is(state) => value == state,
-            // A word with a sign has its highest bit set while it is negative.
-            Blocking::Bit(bit) => (value as i64 as u64).checked_shr(u32::from(bit)).unwrap_or(0) & 1 == 1,
+            Blocking::Bit(bit) => is_set(value, bit),
         };
         if blocked { Standing::Blocked } else { Standing::Free }
     }

@@ -10,6 +10,7 @@
 pub mod id;
 pub mod role;
 pub mod sample;
+pub mod expr;
 pub mod line;
 pub mod program;
 pub mod traffic;

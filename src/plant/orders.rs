@@ -5,9 +5,10 @@ use std::{collections::VecDeque, sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
+    alarm::{AlarmCommand, book::subject_name},
     board::Board,
     command::{BusRequest, Command, NotConfirmed, Order, OrderId, OrderStatus, Outcome, Refusal, WriteId},
-    def::{LineId, PlantDef, TagId},
+    def::{AlarmId, LineId, PlantDef, TagId},
     event::{Fault, WriteResult},
     guard,
     record::ActionRecord,
@@ -193,8 +194,7 @@ impl Desk {
                     Command::Configure(settings) => settings.id == line,
                     Command::Test(tested, _) | Command::StopTest(tested) => *tested == line,
                     Command::Write { .. }
-                    | Command::Acknowledge(_)
-                    | Command::AcknowledgeAll
+                    | Command::Alarm(_)
                     | Command::Refresh(_)
                     | Command::Connect(..)
                     | Command::SaveSettings(_)
@@ -346,11 +346,7 @@ fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
             let tag = def.tag(*tag);
             ("write", tag.name.clone(), Some(value_words(board, tag, *value)))
         }
-        Command::Acknowledge(alarm) => {
-            let alarm = def.alarm(*alarm);
-            ("acknowledge", format!("{} {}", super::alarm::book::subject_name(def, alarm.subject), alarm.text), None)
-        }
-        Command::AcknowledgeAll => ("acknowledge", "all alarms".into(), None),
+        Command::Alarm(command) => alarm_words(def, command),
         Command::Refresh(device) => ("refresh", def.device(*device).name.clone(), None),
         Command::Connect(line, true) => ("connect", def.line(*line).name.clone(), None),
         Command::Connect(line, false) => ("disconnect", def.line(*line).name.clone(), None),
@@ -379,6 +375,30 @@ fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
         outcome: outcome_words(&status.outcome).into(),
         note: status.note.clone(),
         seal: None,
+    }
+}
+
+/// Action, target and new state of a deed with alarms.
+pub fn alarm_words(def: &PlantDef, command: &AlarmCommand) -> (&'static str, String, Option<String>) {
+    let name = |alarm: &AlarmId| match def.alarms.get(alarm.index()) {
+        Some(alarm) => format!("{} {}", subject_name(def, alarm.subject), alarm.text),
+        None => format!("alarm {}", alarm.0),
+    };
+    let note = |note: &Option<Arc<str>>| note.as_ref().map(|note| note.to_string());
+    match command {
+        AlarmCommand::Acknowledge { alarm, note: words, .. } => ("acknowledge", name(alarm), note(words)),
+        AlarmCommand::AcknowledgeAll { seen, note: words } => {
+            let target = if let [(one, _)] = &**seen { name(one) } else { format!("{} alarms", seen.len()) };
+            ("acknowledge", target, note(words))
+        }
+        AlarmCommand::Silence => ("silence", "alarms".into(), None),
+        AlarmCommand::Reset(alarm) => ("reset", name(alarm), None),
+        AlarmCommand::Shelve { alarm, lasts, reason } => {
+            ("shelve", name(alarm), Some(format!("for {} min: {reason}", lasts.as_secs().div_ceil(60))))
+        }
+        AlarmCommand::Unshelve(alarm) => ("unshelve", name(alarm), None),
+        AlarmCommand::OutOfService { alarm, reason } => ("out of service", name(alarm), Some(reason.to_string())),
+        AlarmCommand::InService(alarm) => ("in service", name(alarm), None),
     }
 }
 

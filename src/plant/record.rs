@@ -41,30 +41,98 @@ pub struct AlarmRecord {
     pub value: Option<f64>,
     /// The limit, in the tag's unit.
     pub limit: Option<f64>,
-    /// Who, for an acknowledgement.
+    /// Who, for what an operator did.
     pub by: Option<Arc<str>>,
+    /// The note of an acknowledgement, the reason for putting it aside.
+    pub reason: Option<Arc<str>>,
+    /// When a shelved alarm comes back.
+    pub until: Option<Timestamp>,
+    /// Its place among the alarms that were raised together.
+    pub burst: Option<Burst>,
+}
+
+impl AlarmRecord {
+    /// A step by nobody, without value, limit and all else.
+    pub fn new(at: Timestamp, subject: &str, text: &str, priority: Priority, step: AlarmStep) -> AlarmRecord {
+        let (subject, text) = (subject.into(), text.into());
+        let (value, limit, by, reason, until, burst) = (None, None, None, None, None, None);
+        AlarmRecord { at, subject, text, priority, step, value, limit, by, reason, until, burst }
+    }
+}
+
+/// The place of an alarm among those that were raised within a short time of each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Burst {
+    /// When the first of them was raised; tells one burst from another.
+    pub began: Timestamp,
+    /// From 1: the first-out, which is likely to be the cause of the others.
+    pub rank: u32,
 }
 
 /// The steps in the life of an alarm. The words are what the history and CSV hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AlarmStep {
-    /// It became active.
+    /// It became active and was annunciated.
     Raised,
     /// An operator acknowledged it.
     Acknowledged,
     /// The condition is gone.
     Returned,
+    /// It became active while it was put aside: nobody was told.
+    RaisedQuietly,
+    /// The condition went while it was put aside.
+    ReturnedQuietly,
+    /// Acknowledged long ago and still active: it waits for an acknowledgement again.
+    RaisedAgain,
+    /// An operator reset it after its condition was gone.
+    Reset,
+    /// An operator put it aside for a time.
+    Shelved,
+    /// Its time on the shelf is over, or an operator took it back.
+    Unshelved,
+    /// What enables it became false.
+    Suppressed,
+    /// What enables it is no longer false.
+    Released,
+    /// An operator put it aside until somebody puts it back.
+    OutOfService,
+    /// An operator put it back.
+    InService,
 }
 
 impl AlarmStep {
     /// Every step.
-    pub const ALL: [AlarmStep; 3] = [AlarmStep::Raised, AlarmStep::Acknowledged, AlarmStep::Returned];
+    pub const ALL: [AlarmStep; 13] = [
+        AlarmStep::Raised,
+        AlarmStep::Acknowledged,
+        AlarmStep::Returned,
+        AlarmStep::RaisedQuietly,
+        AlarmStep::ReturnedQuietly,
+        AlarmStep::RaisedAgain,
+        AlarmStep::Reset,
+        AlarmStep::Shelved,
+        AlarmStep::Unshelved,
+        AlarmStep::Suppressed,
+        AlarmStep::Released,
+        AlarmStep::OutOfService,
+        AlarmStep::InService,
+    ];
     /// The word in SQL, CSV and on screen.
     pub fn word(self) -> &'static str {
         match self {
             AlarmStep::Raised => "raised",
             AlarmStep::Acknowledged => "acknowledged",
             AlarmStep::Returned => "returned",
+            AlarmStep::RaisedQuietly => "raised quietly",
+            AlarmStep::ReturnedQuietly => "returned quietly",
+            AlarmStep::RaisedAgain => "raised again",
+            AlarmStep::Reset => "reset",
+            AlarmStep::Shelved => "shelved",
+            AlarmStep::Unshelved => "unshelved",
+            AlarmStep::Suppressed => "suppressed",
+            AlarmStep::Released => "released",
+            AlarmStep::OutOfService => "out of service",
+            AlarmStep::InService => "in service",
         }
     }
     /// The step of a stored word.

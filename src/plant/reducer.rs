@@ -1,5 +1,6 @@
 //! The reducer of facts: event, order or tick in, effects out. The only place where the plant changes.
 
+mod alarms;
 mod health;
 mod measure;
 mod restore;
@@ -12,17 +13,17 @@ use std::{mem::discriminant, sync::Arc};
 use jiff::Timestamp;
 
 use super::{
-    alarm::{AlarmQuality, Book, Meter, condition::Facts},
+    alarm::{AlarmQuality, Book, Meter},
     board::Board,
-    command::{BusRequest, Command, Order, OrderId, Outcome, Refusal, WriteId},
-    def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, Subject, TagId},
+    command::{BusRequest, Command, Order, OrderId, Outcome, WriteId},
+    def::{DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
     guard::Watch,
     line_minute::LineWatch,
     orders::Desk,
     parameter_set::StoredSet,
     program::ProgramWatch,
-    record::{ActionRecord, AlarmRecord, Record},
+    record::{ActionRecord, Record},
     restore::Restore,
     sample::Cause,
     snapshot::{DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
@@ -107,11 +108,6 @@ impl Plant {
         &self.def
     }
 
-    /// Takes up the alarms that the journal remembers from before a restart, oldest step first.
-    pub fn restore(&mut self, steps: &[AlarmRecord]) {
-        self.book.restore(steps);
-    }
-
     /// Takes a fact from the bus.
     pub fn on_event(&mut self, event: Event) -> Effects {
         let (at, action) = match event {
@@ -175,19 +171,7 @@ impl Plant {
                 }
                 Err(action) => action,
             },
-            Command::Acknowledge(alarm) => {
-                let step = self.book.acknowledge(alarm, at, order.by.clone());
-                let outcome = done_if(step.is_some());
-                effects.records.extend(step.map(Record::Alarm));
-                self.desk.note(&order, outcome, &self.board, at)
-            }
-            Command::AcknowledgeAll => {
-                let waiting = self.book.unacknowledged();
-                let outcome = done_if(!waiting.is_empty());
-                let steps = waiting.into_iter().filter_map(|id| self.book.acknowledge(id, at, order.by.clone()));
-                effects.records.extend(steps.map(Record::Alarm));
-                self.desk.note(&order, outcome, &self.board, at)
-            }
+            Command::Alarm(command) => self.alarm_order(&order, command, at, &mut effects),
             Command::Refresh(device) => {
                 effects.bus.push((self.def.device(device).line, BusRequest::Refresh { device, order: Some(order.id) }));
                 // Looking is not a deed: it is shown, but not put on record.
@@ -249,6 +233,7 @@ impl Plant {
 
     /// The plant as of its last event, order or tick.
     pub fn snapshot(&self) -> Snapshot {
+        let lists = self.book.lists();
         Snapshot {
             at: self.at,
             def: self.def.clone(),
@@ -258,7 +243,9 @@ impl Plant {
             evidence: self.evidence.clone(),
             lines: self.lines.clone(),
             devices: self.diagnosed(),
-            alarms: self.book.active(),
+            alarms: lists.active.clone(),
+            aside: lists.aside.clone(),
+            sound: lists.sound,
             alarm_quality: self.quality.clone(),
             orders: self.desk.shown(),
             watch: self.watch.clone(),
@@ -374,43 +361,11 @@ impl Plant {
     fn settle(&mut self, at: Timestamp) -> Effects {
         self.at = self.at.max(at);
         let asked = self.watch_controllers();
-        let (def, board) = (&self.def, &self.board);
-        let answering = |device: DeviceId| {
-            let report = self.lines[def.device(device).line.index()].report.as_deref();
-            answers(self.devices[device.index()].state, report.is_some_and(|report| report.gives_no_values(device)))
-        };
-        self.watch.look(&def.guards, |tag| board.sample(tag), self.at);
-        let steps = self.book.judge(self.at, |alarm| facts(def, board, answering, alarm));
+        let board = &self.board;
+        self.watch.look(&self.def.guards, |tag| board.sample(tag), self.at);
+        let steps = self.judge_alarms();
         let mut records = self.board.records(self.at);
         records.extend(steps.into_iter().map(Record::Alarm));
         Effects { bus: asked, records, ..Effects::default() }
     }
-}
-
-/// What is known for an alarm. Only good values count: an uncertain one neither raises nor clears.
-fn facts(def: &PlantDef, board: &Board, answers: impl Fn(DeviceId) -> Option<bool>, alarm: AlarmId) -> Facts {
-    let alarm = def.alarm(alarm);
-    let (value, answering) = match alarm.subject {
-        Subject::Tag(tag) => (board.sample(tag).trusted(), None),
-        Subject::Device(device) => (None, answers(device)),
-    };
-    let reference = match alarm.condition {
-        Condition::Deviation { from, .. } => board.sample(from).trusted(),
-        Condition::Limit { .. } | Condition::State { .. } | Condition::NotAnswering => None,
-    };
-    Facts { value, reference, answering }
-}
-
-/// A device that refuses everything is as good as silent.
-fn answers(state: DeviceState, no_values: bool) -> Option<bool> {
-    match state {
-        DeviceState::Answering | DeviceState::Failing(_) if no_values => Some(false),
-        DeviceState::Unknown | DeviceState::Failing(_) => None,
-        DeviceState::Answering => Some(true),
-        DeviceState::Down { .. } => Some(false),
-    }
-}
-
-fn done_if(done: bool) -> Outcome {
-    if done { Outcome::Verified } else { Outcome::Refused(Refusal::NothingToAcknowledge) }
 }

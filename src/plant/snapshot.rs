@@ -6,14 +6,18 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    alarm::{AlarmQuality, AlarmState},
-    command::OrderStatus,
+    alarm::{
+        AlarmCommand, AlarmQuality,
+        state::{AlarmState, Deed},
+    },
+    command::{Command, OrderStatus},
     def::{AlarmId, DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Fault, LineCounters, LineState},
     guard::Watch,
     line_report::LineReport,
     ne107,
     parameter_set::StoredSet,
+    record::Burst,
     restore::Restore,
     sample::{Cause, Sample},
     scale,
@@ -42,8 +46,12 @@ pub struct Snapshot {
     pub lines: Vec<LineStatus>,
     /// Devices, by [`DeviceId`].
     pub devices: Vec<DeviceStatus>,
-    /// Alarms that are active or unacknowledged: most urgent first, then latest first.
-    pub alarms: Vec<ActiveAlarm>,
+    /// Alarms that are active, unacknowledged or latched: most urgent first, then latest first.
+    pub alarms: Arc<Vec<ActiveAlarm>>,
+    /// Alarms that are put aside, in the order of the plant file: never annunciated, always listed.
+    pub aside: Arc<Vec<AsideAlarm>>,
+    /// An active alarm that nobody has acknowledged came after the last silence.
+    pub sound: bool,
     /// How good the alarm system is: the rates of this moment, and the figures of the last 24 hours.
     pub alarm_quality: AlarmQuality,
     /// The latest orders, newest first, at most 32.
@@ -150,6 +158,12 @@ impl Snapshot {
     pub fn tuning(&self, id: DeviceId) -> Option<&Tuning> {
         self.tunings.get(id.index())?.as_deref()
     }
+    /// The order to acknowledge all that waits here, as it is seen; `None` if nothing does.
+    pub fn acknowledge_all(&self) -> Option<Command> {
+        let waits = self.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement());
+        let seen: Arc<[_]> = waits.map(|alarm| (alarm.id, alarm.raised_at)).collect();
+        (!seen.is_empty()).then_some(Command::Alarm(AlarmCommand::AcknowledgeAll { seen, note: None }))
+    }
     /// The alarms of a tag, most urgent first.
     pub fn alarms_of(&self, tag: TagId) -> impl Iterator<Item = &ActiveAlarm> {
         use super::def::Subject;
@@ -217,14 +231,47 @@ pub enum DeviceState {
 pub struct ActiveAlarm {
     /// Which.
     pub id: AlarmId,
-    /// Unacknowledged, acknowledged, returned.
+    /// Unacknowledged, acknowledged, returned, latched; never one of those that are put aside.
     pub state: AlarmState,
-    /// When it was raised.
+    /// When it was raised; with the id it names this activation, see [`super::alarm::AlarmCommand::Acknowledge`].
     pub raised_at: Timestamp,
     /// When it returned to normal, if it did.
     pub returned_at: Option<Timestamp>,
     /// The value that raised it.
     pub value: Option<f64>,
+    /// Who acknowledged it, when, with which note.
+    pub acknowledged: Option<Deed>,
+    /// Activations since the station started.
+    pub times: u32,
+    /// Its place among the alarms that were raised together.
+    pub burst: Option<Burst>,
+}
+
+impl ActiveAlarm {
+    /// An alarm without value, deeds and burst.
+    pub fn new(id: AlarmId, state: AlarmState, raised_at: Timestamp) -> ActiveAlarm {
+        let (returned_at, value, acknowledged, times, burst) = (None, None, None, 1, None);
+        ActiveAlarm { id, state, raised_at, returned_at, value, acknowledged, times, burst }
+    }
+    /// The order to acknowledge it, as it is seen here.
+    pub fn acknowledge(&self) -> Command {
+        Command::Alarm(AlarmCommand::Acknowledge { alarm: self.id, seen: self.raised_at, note: None })
+    }
+}
+
+/// An alarm that is put aside.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AsideAlarm {
+    /// Which.
+    pub id: AlarmId,
+    /// Shelved, suppressed or out of service.
+    pub state: AlarmState,
+    /// Who put it aside, when and why; nobody, where it is by design.
+    pub deed: Deed,
+    /// When it comes back by itself, if it is shelved.
+    pub until: Option<Timestamp>,
+    /// Its condition holds all the same.
+    pub active: bool,
 }
 
 /// The history store as it stands.

@@ -72,7 +72,7 @@ fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Opt
 }
 
 /// The bits that can be told from the value of a tag; none where it is not the raw number, or no binary one.
-fn bits_of(of: &TagDef) -> u16 {
+pub(super) fn bits_of(of: &TagDef) -> u16 {
     let is_raw = of.scale == 1.0 && of.offset == 0.0 && matches!(of.decimals, Decimals::Fixed(_));
     let is_binary = match of.point.kind {
         Kind::I16 | Kind::U16 | Kind::I32 | Kind::U32 | Kind::I64 | Kind::U64 => !of.point.table.is_bits(),

@@ -13,9 +13,11 @@
 mod access;
 mod address;
 mod alarm;
+mod condition;
 mod device;
 pub(crate) mod diagnostic;
 mod edit;
+mod expr;
 mod guard;
 mod io;
 pub mod line;

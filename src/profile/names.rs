@@ -7,7 +7,7 @@ use super::{
     reader::{At, Choice},
 };
 use crate::plant::{
-    def::{DeviceDef, DeviceId, TagId},
+    def::{DeviceDef, DeviceId, LineDef, LineId, TagId},
     scale,
     tag::{Decimals, TagDef},
 };
@@ -56,6 +56,7 @@ impl Names {
 /// Devices and tags, finished: what alarms, the picture, trends and reports refer to.
 pub(super) struct Defs<'a> {
     pub names: &'a Names,
+    pub lines: &'a [LineDef],
     pub devices: &'a [DeviceDef],
     pub tags: &'a [TagDef],
 }
@@ -72,6 +73,15 @@ impl Defs<'_> {
     /// The id of a tag that holds a number and may be left out.
     pub fn tag_id(&self, name: &Option<At<String>>, problems: &mut Problems) -> Option<TagId> {
         name.as_ref().and_then(|name| self.tag(name, problems)).map(|tag| tag.id)
+    }
+    /// A line by its name.
+    pub fn line(&self, name: &At<String>, problems: &mut Problems) -> Option<LineId> {
+        let found = self.lines.iter().find(|line| line.name == name.value).map(|line| line.id);
+        if found.is_none() {
+            let problem = problems.add(name.at, format!("unknown line `{}`", name.value));
+            problem.label("no such line").suggest(&name.value, self.lines.iter().map(|line| line.name.as_str()));
+        }
+        found
     }
     /// A device by its name.
     pub fn device(&self, name: &At<String>, problems: &mut Problems) -> Option<DeviceId> {

@@ -54,7 +54,7 @@ pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<(Plan
 fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Problems) -> PlantDef {
     let lines = line::lines(&file.lines, problems);
     let Devices { devices, mut tags, names, classes } = devices(file, &lines, library, problems);
-    let defs = Defs { names: &names, devices: &devices, tags: &tags };
+    let defs = Defs { names: &names, lines: &lines, devices: &devices, tags: &tags };
     let alarms = alarm::alarms(&file.alarms, &defs, problems);
     lint::lint(&file.alarms, problems);
     let mimic =
@@ -71,6 +71,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         title: text(&file.title),
         time_zone: time_zone(&file.time_zone, problems),
         lines,
+        alarm_rules: alarm::rules(file, problems),
         alarms,
         access,
         guards,

@@ -10,7 +10,8 @@ use super::{
     simulate::Choices,
 };
 use crate::plant::{
-    def::{Parity, Priority, Role, Rs485, Sign},
+    def::{AlarmClass, Parity, Priority, Role, Rs485, Sign},
+    ne107::Signal,
     tag::{Access, Class, Confidence, Kind, Order, Table},
 };
 
@@ -24,6 +25,7 @@ table!(
         list "device" devices: DeviceTable,
         opt "access" access: AccessTable,
         list "alarm" alarms: AlarmTable,
+        opt "alarms" alarm_rules: AlarmRulesTable,
         list "interlock" interlocks: InterlockTable,
         list "actuator" actuators: ActuatorTable,
         list "sequence" sequences: SequenceTable,
@@ -293,6 +295,24 @@ table!(
         opt "deviation" deviation: f64,
         opt "from" from: String,
         opt "is" is: Choice,
+        opt "bit" bit: u8,
+        /// Tag's unit per minute, measured `over` a time; below 0 for a fall.
+        opt "rate" rate: f64,
+        opt "over" over: Duration,
+        opt "no_change" no_change: Duration,
+        opt "no_update" no_update: Duration,
+        /// So many changes `within` a time.
+        opt "changes" changes: u32,
+        opt "within" within: Duration,
+        opt "line" line: String,
+        /// `F`, `C`, `S` or `M`.
+        opt "ne107" ne107: Signal,
+        opt "enabled_when" enabled_when: String,
+        opt "class" class: AlarmClass,
+        opt "area" area: String,
+        opt "latch" latch: bool,
+        opt "note" note: Need,
+        opt "re_alarm" re_alarm: Duration,
         opt "deadband" deadband: f64,
         opt "on_delay" on_delay: Duration,
         opt "off_delay" off_delay: Duration,
@@ -302,6 +322,14 @@ table!(
         opt "effect" effect: String,
         opt "action" action: String,
         opt "respond" respond: Duration,
+    }
+);
+
+table!(
+    /// What holds for all alarms, `[alarms]`.
+    AlarmRulesTable, "the rules for alarms" {
+        opt "shelve_max" shelve_max: Duration,
+        opt "burst" burst: Duration,
     }
 );
 
@@ -467,6 +495,25 @@ words!(Sign, "sign" { "password" => Sign::Password, "second person" => Sign::Sec
 
 words!(Class, "class" { "hard" => Class::Hard, "soft" => Class::Soft, "idle" => Class::Idle, });
 
+words!(AlarmClass, "class of alarms" {
+    "process" => AlarmClass::Process, "system" => AlarmClass::System,
+});
+words!(Signal, "signal of NE 107" {
+    "F" => Signal::Failure, "C" => Signal::FunctionCheck, "S" => Signal::OutOfSpecification, "M" => Signal::Maintenance,
+});
+
+/// Whether something must be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Need {
+    /// It must.
+    Required,
+    /// It may.
+    Optional,
+}
+
+words!(Need, "need for a note" {
+    "required" => Need::Required, "optional" => Need::Optional,
+});
 words!(Priority, "priority" {
     "critical" => Priority::Critical, "high" => Priority::High, "medium" => Priority::Medium, "low" => Priority::Low,
 });

@@ -36,7 +36,7 @@ pub fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> V
     alarm_quality::rows(&report.quality).iter().for_each(|row| table.row(quality_row(row, dialect)));
     table.section("alarms to look into", &["kind", "subject", "alarm", "raised"]);
     alarm_quality::culprits(&report.quality).iter().for_each(|alarm| table.row(culprit_row(alarm)));
-    table.section("alarms", &["time", "priority", "subject", "alarm", "step", "value", "limit", "by"]);
+    table.section("alarms", &["time", "priority", "subject", "alarm", "step", "value", "limit", "by", "reason"]);
     report.alarms.iter().for_each(|alarm| table.row(alarm_row(alarm, zone, dialect)));
     table.section("operator actions", &["time", "by", "action", "target", "old", "new", "outcome"]);
     report.actions.iter().for_each(|action| table.row(action_row(action, zone)));
@@ -121,6 +121,7 @@ fn alarm_row(alarm: &AlarmRecord, zone: &TimeZone, dialect: CsvDialect) -> Vec<S
         shortest(alarm.value, dialect),
         shortest(alarm.limit, dialect),
         text(alarm.by.as_deref().unwrap_or("")),
+        text(alarm.reason.as_deref().unwrap_or("")),
     ]
 }
 
@@ -290,6 +291,9 @@ mod tests {
                 value: Some(-85.25),
                 limit: Some(85.0),
                 by: None,
+                reason: None,
+                until: None,
+                burst: None,
             }],
             quality: alarm_quality::tests::figures(),
             actions: vec![ActionRecord {

@@ -67,13 +67,21 @@ pub fn time_in_alarm<'a>(
         }
         since = at;
         match step.step {
-            AlarmStep::Raised => {
+            AlarmStep::Raised | AlarmStep::RaisedQuietly => {
                 active.insert(&step.text);
             }
-            AlarmStep::Returned => {
+            AlarmStep::Returned | AlarmStep::ReturnedQuietly => {
                 active.remove(&*step.text);
             }
-            AlarmStep::Acknowledged => {}
+            AlarmStep::Acknowledged
+            | AlarmStep::RaisedAgain
+            | AlarmStep::Reset
+            | AlarmStep::Shelved
+            | AlarmStep::Unshelved
+            | AlarmStep::Suppressed
+            | AlarmStep::Released
+            | AlarmStep::OutOfService
+            | AlarmStep::InService => {}
         }
     }
     if !active.is_empty() {
@@ -128,8 +136,6 @@ fn on_grid(zone: &TimeZone, interval: Duration, at: Timestamp) -> Option<Timesta
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use proptest::prelude::*;
 
     use super::*;
@@ -165,9 +171,7 @@ mod tests {
     }
 
     fn step(at: i64, text: &str, step: AlarmStep) -> AlarmRecord {
-        let subject = Arc::from("TIC-1.PV");
-        let priority = Priority::High;
-        AlarmRecord { at: sec(at), subject, text: text.into(), priority, step, value: None, limit: None, by: None }
+        AlarmRecord::new(sec(at), "TIC-1.PV", text, Priority::High, step)
     }
 
     #[test]

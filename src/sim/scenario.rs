@@ -13,9 +13,11 @@ use std::time::Duration;
 
 use super::faults::{Fault, Place};
 use crate::plant::{
+    Snapshot,
     command::Command,
     def::{AlarmId, TagId},
     record::AlarmStep,
+    snapshot::ActiveAlarm,
 };
 
 /// A drill. Times count from its start, in plant time.
@@ -74,7 +76,31 @@ pub struct Deed {
     /// When.
     pub at: Duration,
     /// What.
-    pub command: Command,
+    pub wish: OperatorWish,
+}
+
+/// What an operator wishes; alarms are acknowledged as they are seen at that moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum OperatorWish {
+    /// Acknowledge this alarm.
+    Acknowledge(AlarmId),
+    /// Acknowledge all that wait.
+    AcknowledgeAll,
+    /// Write this value.
+    Write(TagId, f64),
+}
+
+impl OperatorWish {
+    /// The order that an operator gives who looks at this; `None` if there is nothing to do.
+    pub fn command(self, seen: &Snapshot) -> Option<Command> {
+        match self {
+            OperatorWish::Acknowledge(id) => {
+                seen.alarms.iter().find(|alarm| alarm.id == id).map(ActiveAlarm::acknowledge)
+            }
+            OperatorWish::AcknowledgeAll => seen.acknowledge_all(),
+            OperatorWish::Write(tag, value) => Some(Command::Write { tag, value }),
+        }
+    }
 }
 
 /// One thing that is expected, and what it is worth.

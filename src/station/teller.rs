@@ -1,8 +1,11 @@
 //! Tells in plain lines what changed between two snapshots: the voice of a station without a terminal.
 
+use std::{collections::HashMap, sync::Arc};
+
 use crate::plant::{
     Snapshot,
     alarm::{AlarmState, book::subject_name},
+    def::AlarmId,
     event::LineState,
     orders::outcome_words,
     snapshot::DeviceState,
@@ -66,25 +69,58 @@ fn device_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
 }
 
 fn alarm_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
-    let state_in = |snapshot: &Snapshot, id| {
-        snapshot.alarms.iter().find(|alarm| alarm.id == id).map_or(AlarmState::Normal, |alarm| alarm.state)
-    };
+    if Arc::ptr_eq(&before.alarms, &after.alarms) && Arc::ptr_eq(&before.aside, &after.aside) {
+        return Vec::new();
+    }
+    let (before, states) = (states_in(before), states_in(after));
     let mut lines = Vec::new();
     for alarm in &after.def.alarms {
-        let (old, new) = (state_in(before, alarm.id), state_in(after, alarm.id));
+        let state = |states: &HashMap<AlarmId, AlarmState>| states.get(&alarm.id).copied().unwrap_or_default();
+        let (old, new) = (state(&before), state(&states));
         if old == new {
             continue;
         }
-        let word = match new {
-            AlarmState::Unacknowledged => "RAISED",
-            AlarmState::Acknowledged => "acknowledged",
-            AlarmState::Returned | AlarmState::Normal if old == AlarmState::Returned => "acknowledged",
-            AlarmState::Returned | AlarmState::Normal => "returned",
-        };
         let subject = subject_name(&after.def, alarm.subject);
+        let word = alarm_word(old, new);
         lines.push(format!("alarm {} {word}: {subject} {}", alarm.priority.number(), alarm.text));
     }
     lines
+}
+
+fn states_in(snapshot: &Snapshot) -> HashMap<AlarmId, AlarmState> {
+    let active = snapshot.alarms.iter().map(|alarm| (alarm.id, alarm.state));
+    active.chain(snapshot.aside.iter().map(|alarm| (alarm.id, alarm.state))).collect()
+}
+
+/// What has happened to an alarm between two states.
+fn alarm_word(old: AlarmState, new: AlarmState) -> &'static str {
+    match (old, new) {
+        (_, AlarmState::Unacknowledged) => "RAISED",
+        (_, AlarmState::Acknowledged) => "acknowledged",
+        (_, AlarmState::LatchedUnacknowledged) => "returned, waits for a reset",
+        (AlarmState::LatchedUnacknowledged | AlarmState::Returned, AlarmState::LatchedAcknowledged) => "acknowledged",
+        (_, AlarmState::LatchedAcknowledged) => "returned, waits for a reset",
+        (_, AlarmState::Shelved) => "shelved",
+        (_, AlarmState::Suppressed) => "suppressed by design",
+        (_, AlarmState::OutOfService) => "out of service",
+        (AlarmState::Returned, AlarmState::Normal | AlarmState::Returned) => "acknowledged",
+        (
+            AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged,
+            AlarmState::Normal | AlarmState::Returned,
+        ) => "reset",
+        (AlarmState::Shelved | AlarmState::Suppressed | AlarmState::OutOfService, AlarmState::Normal) => {
+            "no longer put aside"
+        }
+        (
+            AlarmState::Normal
+            | AlarmState::Unacknowledged
+            | AlarmState::Acknowledged
+            | AlarmState::Shelved
+            | AlarmState::Suppressed
+            | AlarmState::OutOfService,
+            AlarmState::Normal | AlarmState::Returned,
+        ) => "returned",
+    }
 }
 
 fn order_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {

@@ -5,7 +5,11 @@ use ratatui::{Frame, layout::Rect, style::Style};
 use super::{
     Cx, Model, SILENCE, Watch,
     keys::{self, Hint},
-    modal::{Modal, confirm::subject, faceplate::device_words},
+    modal::{
+        Modal,
+        confirm::subject,
+        faceplate::{device_words, line_state_words},
+    },
     tabs::Tab,
     widgets::text::{Canvas, between, clock, fit, fit_words, running, width},
 };
@@ -15,6 +19,7 @@ use crate::plant::{
     def::{LineDef, Priority},
     event::LineState,
     ne107::Reason,
+    orders::alarm_words as alarm_words_of,
     snapshot::{ActiveAlarm, DeviceState},
 };
 use crate::sim::drill::{Progress, Status};
@@ -290,10 +295,18 @@ fn alarm_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
     let now = match def.subject {
         Subject::Tag(tag) => super::widgets::value::show(cx, tag).with_unit(),
         Subject::Device(device) => device_words(cx, device),
+        Subject::Line(line) => line_state_words(cx, line),
     };
     let since = match alarm.state {
-        AlarmState::Returned => alarm.returned_at.unwrap_or(alarm.raised_at),
-        AlarmState::Normal | AlarmState::Unacknowledged | AlarmState::Acknowledged => alarm.raised_at,
+        AlarmState::Returned | AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
+            alarm.returned_at.unwrap_or(alarm.raised_at)
+        }
+        AlarmState::Normal
+        | AlarmState::Unacknowledged
+        | AlarmState::Acknowledged
+        | AlarmState::Shelved
+        | AlarmState::Suppressed
+        | AlarmState::OutOfService => alarm.raised_at,
     };
     let (state, lasted) = (alarm.state.word(), running(between(since, cx.now)));
     format!("{} {}  {state} {lasted}  {now}", subject(cx, alarm.id), def.text)
@@ -379,8 +392,10 @@ pub fn order_words(cx: &Cx, command: &Command, old: Option<f64>) -> String {
             );
             text.trim_end().to_owned()
         }
-        Command::Acknowledge(alarm) => format!("acknowledge {} {}", subject(cx, *alarm), cx.def().alarm(*alarm).text),
-        Command::AcknowledgeAll => "acknowledge all".to_owned(),
+        Command::Alarm(command) => {
+            let (deed, target, _) = alarm_words_of(cx.def(), command);
+            format!("{deed} {target}")
+        }
         Command::Refresh(device) => format!("refresh {}", cx.def().device(*device).name),
         Command::Connect(line, true) => format!("connect {}", cx.def().line(*line).name),
         Command::Connect(line, false) => format!("disconnect {}", cx.def().line(*line).name),

@@ -95,26 +95,12 @@ impl Fixture {
         plant.set("TIC-1.PV", 72.4);
         let ago = |seconds| now() - SignedDuration::from_secs(seconds);
         plant.alarms = vec![
+            ActiveAlarm { value: Some(72.1), ..ActiveAlarm::new(AlarmId(0), AlarmState::Unacknowledged, ago(41)) },
+            ActiveAlarm::new(AlarmId(3), AlarmState::Acknowledged, ago(269)),
             ActiveAlarm {
-                id: AlarmId(0),
-                state: AlarmState::Unacknowledged,
-                raised_at: ago(41),
-                returned_at: None,
-                value: Some(72.1),
-            },
-            ActiveAlarm {
-                id: AlarmId(3),
-                state: AlarmState::Acknowledged,
-                raised_at: ago(269),
-                returned_at: None,
-                value: None,
-            },
-            ActiveAlarm {
-                id: AlarmId(2),
-                state: AlarmState::Returned,
-                raised_at: ago(2_540),
                 returned_at: Some(ago(2_400)),
                 value: Some(3.9),
+                ..ActiveAlarm::new(AlarmId(2), AlarmState::Returned, ago(2_540))
             },
         ];
         plant
@@ -138,13 +124,7 @@ impl Fixture {
             device.state = DeviceState::Down { since: at };
             device.last_fault = Some((at, Fault::NotConnected));
         }
-        plant.alarms = vec![ActiveAlarm {
-            id: AlarmId(3),
-            state: AlarmState::Unacknowledged,
-            raised_at: at,
-            returned_at: None,
-            value: None,
-        }];
+        plant.alarms = vec![ActiveAlarm::new(AlarmId(3), AlarmState::Unacknowledged, at)];
         plant
     }
 
@@ -186,7 +166,9 @@ impl Fixture {
             decimals: decimals.collect(),
             lines: vec![self.line.clone()],
             devices: self.devices.clone(),
-            alarms: self.alarms.clone(),
+            alarms: Arc::new(self.alarms.clone()),
+            aside: Arc::default(),
+            sound: false,
             alarm_quality: crate::plant::alarm::AlarmQuality::default(),
             orders: Vec::new(),
             sets: Arc::new(self.sets.clone()),

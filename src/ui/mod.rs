@@ -26,9 +26,9 @@ use crate::{
     history::{Answer, HistoryError, Question},
     plant::{
         command::{Command, OrderId, OrderStatus, Outcome},
-        def::{AlarmId, DeviceId, PlantDef},
+        def::{DeviceId, PlantDef},
         sample::Cause,
-        snapshot::Snapshot,
+        snapshot::{ActiveAlarm, Snapshot},
     },
     sim::drill,
 };
@@ -244,12 +244,12 @@ impl Model {
 
     /// The alarm that `a` is for: the one selected on the alarms tab if that can be seen, else the most urgent
     /// unacknowledged, which is the banner's.
-    fn alarm_to_acknowledge(&self) -> Option<AlarmId> {
+    fn alarm_to_acknowledge(&self) -> Option<&ActiveAlarm> {
         let selectable = self.tabs.shown == Tab::Alarms && !self.small();
         let selected = selectable.then(|| self.tabs.alarms.selected(&self.cx())).flatten();
         let alarm =
             selected.or_else(|| self.snapshot.alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()))?;
-        alarm.state.needs_acknowledgement().then_some(alarm.id)
+        alarm.state.needs_acknowledgement().then_some(alarm)
     }
 }
 
@@ -344,7 +344,7 @@ fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
         Global::Help => vec![Act::Open(Modal::Help(0))],
         Global::Quit => vec![Act::Open(Modal::Confirm(Confirm::quit()))],
         Global::Acknowledge => match model.alarm_to_acknowledge() {
-            Some(id) => vec![Act::Order(Command::Acknowledge(id))],
+            Some(alarm) => vec![Act::Order(alarm.acknowledge())],
             None => Vec::new(),
         },
         Global::AcknowledgeAll => Confirm::acknowledge_all(&model.cx())

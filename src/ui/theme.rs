@@ -143,7 +143,8 @@ impl Theme {
             AlarmState::Unacknowledged if flash => self.severity(priority).add_modifier(Modifier::REVERSED),
             AlarmState::Unacknowledged => self.severity(priority),
             AlarmState::Acknowledged => self.severity(priority).remove_modifier(Modifier::BOLD),
-            AlarmState::Returned => self.dim(),
+            AlarmState::Returned | AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => self.dim(),
+            AlarmState::Shelved | AlarmState::Suppressed | AlarmState::OutOfService => self.dim(),
             AlarmState::Normal => self.normal(),
         }
     }

@@ -37,6 +37,7 @@ fn tank() -> Arc<PlantDef> {
         devices: Vec::new(),
         tags: (0..TAGS).map(tag).collect(),
         alarms: Vec::new(),
+        alarm_rules: Default::default(),
         guards: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),

@@ -78,6 +78,7 @@ fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
         devices: (0..devices).map(device).collect(),
         tags,
         alarms: Vec::new(),
+        alarm_rules: Default::default(),
         guards: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),

@@ -59,8 +59,9 @@ async fn a_shift_of_eight_hours_is_reported_truly() {
     wait(&session, clock, 2 * 3600).await;
     write(&session, &def, "TIC-1.SV", 80.0, 1).await;
     wait(&session, clock, 3600).await;
-    let high = session.snapshots.borrow().alarms.first().map(|alarm| alarm.id).expect("the high alarm is there");
-    order(&session, Wish::Acknowledge(high), 2).await;
+    let high =
+        session.snapshots.borrow().alarms.first().map(|alarm| alarm.acknowledge()).expect("the high alarm is there");
+    order(&session, high, 2).await;
     write(&session, &def, "TIC-1.SV", 70.0, 3).await;
     wait(&session, clock, 5 * 3600 + 600).await;
     let last = session.snapshots.borrow().clone();

@@ -14,7 +14,7 @@ use crate::{
     plant::{
         def::{DeviceId, Priority, TagId},
         line_minute::LineMinute,
-        record::{ActionRecord, AlarmRecord, AlarmStep, Seal},
+        record::{ActionRecord, AlarmRecord, AlarmStep, Burst, Seal},
         sample::{Cause, Quality, Sample},
         tag::Decimals,
     },
@@ -63,7 +63,7 @@ impl Store {
         }
     }
 
-    /// Of each alarm the steps since it was last raised, oldest first: from these the plant restores what is active and
+    /// Of each alarm the last step of every kind, oldest first: from these the plant restores what is active and
     /// what is acknowledged.
     pub fn restore(&self) -> Result<Vec<AlarmRecord>, HistoryError> {
         self.whole_list(&sql::restore(), params![ROWS_MAX + 1], alarm)
@@ -305,6 +305,12 @@ pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {
         value: row.get(5)?,
         limit: row.get(6)?,
         by: maybe_shared(row, 7)?,
+        reason: maybe_shared(row, 8)?,
+        until: maybe_time(row, 9)?,
+        burst: match (maybe_time(row, 10)?, row.get(11)?) {
+            (Some(began), Some(rank)) => Some(Burst { began, rank }),
+            (_, None) | (None, _) => None,
+        },
     })
 }
 
@@ -352,6 +358,10 @@ fn line_minute(row: &Row) -> duckdb::Result<LineMinute> {
 fn time(row: &Row) -> duckdb::Result<Timestamp> {
     let micros: i64 = row.get(0)?;
     instant(micros).ok_or(duckdb::Error::IntegralValueOutOfRange(0, i128::from(micros)))
+}
+
+fn maybe_time(row: &Row, column: usize) -> duckdb::Result<Option<Timestamp>> {
+    Ok(row.get::<_, Option<i64>>(column)?.and_then(instant))
 }
 
 fn shared(row: &Row, column: usize) -> duckdb::Result<Arc<str>> {

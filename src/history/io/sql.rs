@@ -8,7 +8,7 @@
 /// `value` is a DOUBLE because a FLOAT would turn 123456.7 into 123456.703. `quality` is `Quality::code`.
 ///
 /// `utc` of `line_minute` is the end of the minute; a line goes by its name, as everything that outlives the plant file.
-pub const MIGRATIONS: [&str; 3] = [
+pub const MIGRATIONS: [&str; 4] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -32,6 +32,28 @@ ALTER TABLE operator_action ADD COLUMN note VARCHAR;
 ALTER TABLE operator_action ADD COLUMN number UBIGINT;
 ALTER TABLE operator_action ADD COLUMN hash BLOB;
 ",
+    "
+ALTER TABLE alarm_journal ADD COLUMN reason VARCHAR;
+ALTER TABLE alarm_journal ADD COLUMN until_utc TIMESTAMP;
+ALTER TABLE alarm_journal ADD COLUMN burst_utc TIMESTAMP;
+ALTER TABLE alarm_journal ADD COLUMN burst_rank UINTEGER;
+",
+];
+
+/// Columns of an alarm step, in the order that it is appended and read.
+pub const STEP_COLUMNS: [&str; 12] = [
+    "utc",
+    "subject",
+    "text",
+    "priority",
+    "step",
+    "value",
+    "limit_value",
+    "by_whom",
+    "reason",
+    "until_utc",
+    "burst_utc",
+    "burst_rank",
 ];
 
 /// Holds the number of migrations done.
@@ -68,36 +90,38 @@ pub const COUNT_SAMPLES: &str = "SELECT count(*) FROM sample WHERE tag = ? AND u
 pub const LATEST_GOOD: &str =
     "SELECT arg_max(value, utc) FROM sample WHERE tag = ? AND utc >= ? AND utc < ? AND quality = 0";
 
-/// Columns of an alarm step, in the order that `read` expects.
-const STEP: &str = "utc, subject, text, priority, step, value, limit_value, by_whom";
-
 /// Steps of alarms in a span, newest first.
 pub fn journal_newest() -> String {
-    format!("SELECT {STEP} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc DESC, rowid DESC LIMIT ?")
+    let step = STEP_COLUMNS.join(", ");
+    format!("SELECT {step} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc DESC, rowid DESC LIMIT ?")
 }
 
 /// Steps of alarms in a span, oldest first.
 pub fn journal_oldest() -> String {
-    format!("SELECT {STEP} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc, rowid LIMIT ?")
+    let step = STEP_COLUMNS.join(", ");
+    format!("SELECT {step} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc, rowid LIMIT ?")
 }
 
-/// The raising steps of the alarms that were active at an instant.
+/// The raising steps of the alarms that were active at an instant, also of those that were put aside.
 pub fn active_at() -> String {
+    let step = STEP_COLUMNS.join(", ");
     format!(
-        "SELECT {STEP} FROM (
-            SELECT *, rowid AS place FROM alarm_journal WHERE utc < ? AND step IN ('raised', 'returned')
+        "SELECT {step} FROM (
+            SELECT *, rowid AS place FROM alarm_journal
+            WHERE utc < ? AND step IN ('raised', 'raised quietly', 'returned', 'returned quietly')
             QUALIFY row_number() OVER (PARTITION BY subject, text ORDER BY utc DESC, rowid DESC) = 1)
-         WHERE step = 'raised' ORDER BY utc, place LIMIT ?"
+         WHERE step IN ('raised', 'raised quietly') ORDER BY utc, place LIMIT ?"
     )
 }
 
-/// Of each alarm the steps since it was last raised, in the order in which they were written.
+/// Of each alarm the last step of every kind, in the order in which they were written: all that its state depends on.
 pub fn restore() -> String {
+    let step = STEP_COLUMNS.join(", ");
     format!(
-        "SELECT {STEP} FROM (
-            SELECT *, rowid AS place, max(rowid) FILTER (step = 'raised') OVER (PARTITION BY subject, text) AS raised
-            FROM alarm_journal)
-         WHERE place >= raised ORDER BY place LIMIT ?"
+        "SELECT {step} FROM (
+            SELECT *, rowid AS place FROM alarm_journal
+            QUALIFY row_number() OVER (PARTITION BY subject, text, step ORDER BY rowid DESC) = 1)
+         ORDER BY place LIMIT ?"
     )
 }
 

@@ -276,9 +276,25 @@ impl Store {
             Record::Sample(..) | Record::Action(_) | Record::Line(_) => None,
         });
         let Some(first) = rows.next() else { return Ok(()) };
-        let mut appender = self.db.appender("alarm_journal")?;
-        for AlarmRecord { at, subject, text, priority, step, value, limit, by } in std::iter::once(first).chain(rows) {
-            appender.append_row((utc(*at), subject, text, priority.number(), step.word(), value, limit, by))?;
+        let mut appender = self.db.appender_with_columns("alarm_journal", &sql::STEP_COLUMNS)?;
+        for alarm in std::iter::once(first).chain(rows) {
+            let AlarmRecord { at, subject, text, priority, step, value, limit, by, reason, until, burst } = alarm;
+            let (until, began) = (until.map(utc), burst.map(|burst| utc(burst.began)));
+            let (priority, rank) = (priority.number(), burst.map(|burst| burst.rank));
+            appender.append_row(params![
+                utc(*at),
+                subject,
+                text,
+                priority,
+                step.word(),
+                value,
+                limit,
+                by,
+                reason,
+                until,
+                began,
+                rank
+            ])?;
         }
         appender.flush()
     }

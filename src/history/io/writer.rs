@@ -234,6 +234,9 @@ mod tests {
             value: None,
             limit: None,
             by: None,
+            reason: None,
+            until: None,
+            burst: None,
         })
     }
 

@@ -1,173 +1,223 @@
 //! The book of all alarms: judges them against the plant and lists what an operator should see.
 
-use std::sync::Arc;
+use std::{
+    collections::HashMap,
+    sync::{Arc, OnceLock},
+    time::Duration,
+};
 
 use jiff::Timestamp;
 
 use super::{
-    condition::{Facts, holds, limit_of},
-    state::{AlarmState, Machine},
+    condition::{Facts, Memory, holds, limit_of},
+    lists::Lists,
+    state::{AlarmState, Machine, Manner},
 };
 use crate::plant::{
-    def::{AlarmId, PlantDef, Subject},
-    record::{AlarmRecord, AlarmStep},
-    snapshot::ActiveAlarm,
+    def::{AlarmDef, AlarmId, PlantDef, Subject},
+    record::{AlarmRecord, AlarmStep, Burst},
 };
 
 /// The machines of all alarms, by [`AlarmId`].
 #[derive(Debug, Clone)]
 pub struct Book {
-    def: Arc<PlantDef>,
-    machines: Vec<Machine>,
+    pub(super) def: Arc<PlantDef>,
+    pub(super) machines: Vec<Machine>,
+    /// What conditions that look back remember, by [`AlarmId`].
+    memories: Vec<Memory>,
+    /// The book's own clock: what has passed while it was judged. It never goes back, whatever the station's clock does.
+    ran: Duration,
+    judged_at: Option<Timestamp>,
+    /// The latest burst, and when its last alarm was raised on the book's own clock.
+    burst: Option<(Burst, Duration)>,
+    /// Counts what sounds, so that silence ends what was before it and nothing else.
+    pub(super) edges: u64,
+    pub(super) silenced: u64,
+    /// Made when somebody looks, forgotten when something changes.
+    pub(super) lists: OnceLock<Arc<Lists>>,
 }
 
 impl Book {
     /// Every alarm normal.
     pub fn new(def: Arc<PlantDef>) -> Book {
-        let machines = vec![Machine::default(); def.alarms.len()];
-        Book { def, machines }
+        Book {
+            machines: vec![Machine::default(); def.alarms.len()],
+            memories: vec![Memory::default(); def.alarms.len()],
+            def,
+            ran: Duration::ZERO,
+            judged_at: None,
+            burst: None,
+            edges: 0,
+            silenced: 0,
+            lists: OnceLock::new(),
+        }
     }
 
-    /// Judges every alarm at an instant; `facts` tells what is known for a subject and condition.
-    pub fn judge(&mut self, at: Timestamp, facts: impl Fn(AlarmId) -> Facts) -> Vec<AlarmRecord> {
+    /// Judges every alarm at an instant; `facts` tells what is known for an alarm.
+    pub fn judge(&mut self, at: Timestamp, facts: impl Fn(&AlarmDef) -> Facts) -> Vec<AlarmRecord> {
+        let passed = self.judged_at.replace(at).map(|before| at.duration_since(before));
+        // A clock that was set back lets no time pass; delays go on from where they were.
+        let passed = passed.and_then(|passed| Duration::try_from(passed).ok()).unwrap_or_default();
+        self.ran += passed;
+        let def = self.def.clone();
         let mut records = Vec::new();
-        for index in 0..self.machines.len() {
-            let alarm = &self.def.alarms[index];
-            let (id, facts) = (alarm.id, facts(alarm.id));
-            let machine = &mut self.machines[index];
-            let holds = holds(alarm.condition, facts, machine.is_active());
-            if let Some(step) = machine.step(holds, at, alarm.on_delay, alarm.off_delay) {
-                if step == AlarmStep::Raised {
-                    machine.value = facts.value;
-                }
-                records.push(self.record(id, step, at, facts.value, None));
-            }
+        for alarm in &def.alarms {
+            let facts = facts(alarm);
+            self.suppress(alarm, facts, at, &mut records);
+            self.judge_condition(alarm, facts, at, &mut records);
+            self.bring_back(alarm, facts, at, &mut records);
+            self.remind(alarm, facts, passed, at, &mut records);
         }
         records
     }
 
-    /// Acknowledges one alarm; `None` if there is nothing to acknowledge.
-    pub fn acknowledge(&mut self, id: AlarmId, at: Timestamp, by: Arc<str>) -> Option<AlarmRecord> {
-        let machine = self.machines.get_mut(id.index())?;
-        let value = machine.value;
-        machine.acknowledge().then(|| self.record(id, AlarmStep::Acknowledged, at, value, Some(by)))
-    }
-
-    /// The alarms that wait for an acknowledgement now.
-    pub fn unacknowledged(&self) -> Vec<AlarmId> {
-        let waits = |alarm: &AlarmId| self.machines[alarm.index()].state().needs_acknowledgement();
-        self.def.alarms.iter().map(|alarm| alarm.id).filter(waits).collect()
-    }
-
-    /// Takes up the alarms that the journal remembers from before a restart. Steps come oldest first; those of alarms
-    /// that the plant no longer has are passed over.
+    /// Takes up the alarms that the journal remembers from before a restart: of each alarm at least the last step of every
+    /// kind, oldest first. Steps of alarms that the plant no longer has are passed over.
     pub fn restore(&mut self, steps: &[AlarmRecord]) {
+        let name = |alarm: &AlarmDef| (subject_name(&self.def, alarm.subject).to_owned(), alarm.text.clone());
+        let known: HashMap<(String, String), AlarmId> =
+            self.def.alarms.iter().map(|alarm| (name(alarm), alarm.id)).collect();
         for step in steps {
-            let known = self.def.alarms.iter().position(|alarm| {
-                *alarm.text == *step.text && subject_name(&self.def, alarm.subject) == &*step.subject
-            });
-            if let Some(index) = known {
-                self.machines[index].apply(step.step, step.at);
-                if step.step == AlarmStep::Raised {
-                    self.machines[index].value = step.value;
-                }
+            if let Some(id) = known.get(&(step.subject.to_string(), step.text.to_string())) {
+                self.apply(*id, step);
             }
         }
     }
 
-    /// What an operator should see: most urgent first; among equals those that wait for an acknowledgement, then the latest.
-    pub fn active(&self) -> Vec<ActiveAlarm> {
-        let mut list: Vec<ActiveAlarm> = self
-            .def
-            .alarms
-            .iter()
-            .filter_map(|alarm| {
-                let machine = &self.machines[alarm.id.index()];
-                let raised_at = machine.raised_at.filter(|_| machine.state() != AlarmState::Normal)?;
-                Some(ActiveAlarm {
-                    id: alarm.id,
-                    state: machine.state(),
-                    raised_at,
-                    returned_at: machine.returned_at,
-                    value: machine.value,
-                })
-            })
-            .collect();
-        list.sort_by_key(|alarm| {
-            let waits = alarm.state.needs_acknowledgement();
-            (self.def.alarm(alarm.id).priority, !waits, std::cmp::Reverse(alarm.raised_at))
-        });
-        list
+    /// How an alarm stands.
+    pub fn machine(&self, id: AlarmId) -> &Machine {
+        &self.machines[id.index()]
     }
 
-    fn record(
-        &self,
-        id: AlarmId,
-        step: AlarmStep,
-        at: Timestamp,
-        value: Option<f64>,
-        by: Option<Arc<str>>,
-    ) -> AlarmRecord {
-        let alarm = self.def.alarm(id);
-        AlarmRecord {
-            at,
-            subject: subject_name(&self.def, alarm.subject).into(),
-            text: alarm.text.as_str().into(),
-            priority: alarm.priority,
-            step,
-            value,
-            limit: limit_of(alarm.condition),
-            by,
+    /// What enables the alarm has become false: from now on nobody is told. What cannot be told suppresses nothing.
+    fn suppress(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
+        if alarm.enabled_when.is_some() && facts.enabled == Some(false) && self.machine(alarm.id).suppressed().is_none()
+        {
+            records.push(self.step(alarm, AlarmStep::Suppressed, at, facts.value));
         }
+    }
+
+    fn judge_condition(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
+        let (machine, memory) = (&mut self.machines[alarm.id.index()], &mut self.memories[alarm.id.index()]);
+        let begins_anew = facts.enabled == Some(false) && alarm.condition.looks_back();
+        let step = if begins_anew {
+            // What looks back starts when the alarm is enabled: a value may stand still while nothing is heated.
+            memory.clear();
+            machine.is_active().then_some(AlarmStep::ReturnedQuietly)
+        } else {
+            let holds = holds(alarm.condition, facts, machine.is_active(), memory, self.ran);
+            machine.judge(holds, self.ran, manner(alarm))
+        };
+        if let Some(step) = step {
+            records.push(self.step(alarm, step, at, facts.value));
+        }
+    }
+
+    /// What is over by itself: the time on the shelf, the suppression.
+    fn bring_back(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
+        if self.machine(alarm.id).suppressed().is_some() && facts.enabled != Some(false) {
+            records.push(self.step(alarm, AlarmStep::Released, at, facts.value));
+            let machine = &mut self.machines[alarm.id.index()];
+            let waits = machine.is_active() && !machine.state().is_aside() && alarm.on_delay != Duration::ZERO;
+            if waits && !machine.is_latched() {
+                // A pump that has just started has its delay to bring the flow up.
+                records.push(self.step(alarm, AlarmStep::ReturnedQuietly, at, facts.value));
+                let _ = self.machines[alarm.id.index()].judge(Some(true), self.ran, manner(alarm));
+            }
+            records.extend(self.raise_anew(alarm, at, facts.value));
+        }
+        let Some(shelving) = self.machine(alarm.id).shelved() else { return };
+        if shelving.until <= at {
+            records.push(self.step(alarm, AlarmStep::Unshelved, at, facts.value));
+            records.extend(self.raise_anew(alarm, at, facts.value));
+        } else if let Some(until) = shelving.moved(at) {
+            let (by, reason) = (shelving.deed.by.clone(), shelving.deed.reason.clone());
+            let record = self.record(alarm, AlarmStep::Shelved, at, facts.value);
+            records.push(self.take(alarm.id, AlarmRecord { by, reason, until: Some(until), ..record }));
+        }
+    }
+
+    /// An alarm that is active when nothing keeps it aside any more is raised anew: nobody has seen it.
+    pub(super) fn raise_anew(&mut self, alarm: &AlarmDef, at: Timestamp, value: Option<f64>) -> Option<AlarmRecord> {
+        let machine = self.machine(alarm.id);
+        let due = machine.is_active() && !machine.state().is_aside();
+        due.then(|| self.step(alarm, AlarmStep::Raised, at, value))
+    }
+
+    /// An alarm that was acknowledged long ago and is still active waits for an acknowledgement again.
+    fn remind(
+        &mut self,
+        alarm: &AlarmDef,
+        facts: Facts,
+        passed: Duration,
+        at: Timestamp,
+        records: &mut Vec<AlarmRecord>,
+    ) {
+        let Some(after) = alarm.re_alarm else { return };
+        let machine = &mut self.machines[alarm.id.index()];
+        if machine.state() != AlarmState::Acknowledged {
+            machine.acknowledged_for = None;
+            return;
+        }
+        // After a restart the time before it counts as far as the clock can be believed.
+        let before = || machine.acknowledged.as_ref().map(|deed| at.duration_since(deed.at));
+        let before = || before().and_then(|span| Duration::try_from(span).ok()).unwrap_or_default();
+        let lasts = machine.acknowledged_for.map_or_else(before, |lasts| lasts + passed);
+        machine.acknowledged_for = Some(lasts);
+        if after <= lasts {
+            records.push(self.step(alarm, AlarmStep::RaisedAgain, at, facts.value));
+        }
+    }
+
+    /// A step by nobody.
+    fn step(&mut self, alarm: &AlarmDef, step: AlarmStep, at: Timestamp, value: Option<f64>) -> AlarmRecord {
+        let burst = (step == AlarmStep::Raised).then(|| self.next_burst(at));
+        let record = self.record(alarm, step, at, value);
+        self.take(alarm.id, AlarmRecord { burst, ..record })
+    }
+
+    /// Takes a step that was just decided.
+    pub(super) fn take(&mut self, id: AlarmId, record: AlarmRecord) -> AlarmRecord {
+        self.apply(id, &record);
+        record
+    }
+
+    fn apply(&mut self, id: AlarmId, record: &AlarmRecord) {
+        let latch = self.def.alarm(id).latch;
+        let machine = &mut self.machines[id.index()];
+        machine.apply(record, latch);
+        if matches!(record.step, AlarmStep::Raised | AlarmStep::RaisedAgain) {
+            self.edges += 1;
+            machine.edge = self.edges;
+        }
+        self.lists = OnceLock::new();
+    }
+
+    fn next_burst(&mut self, at: Timestamp) -> Burst {
+        let near = |(_, last): &(Burst, Duration)| self.ran.saturating_sub(*last) <= self.def.alarm_rules.burst;
+        let burst = match self.burst.filter(near) {
+            Some((burst, _)) => Burst { rank: burst.rank.saturating_add(1), ..burst },
+            None => Burst { began: at, rank: 1 },
+        };
+        self.burst = Some((burst, self.ran));
+        burst
+    }
+
+    pub(super) fn record(&self, alarm: &AlarmDef, step: AlarmStep, at: Timestamp, value: Option<f64>) -> AlarmRecord {
+        let record = AlarmRecord::new(at, subject_name(&self.def, alarm.subject), &alarm.text, alarm.priority, step);
+        AlarmRecord { value, limit: limit_of(alarm.condition), ..record }
     }
 }
 
-/// Full name of what an alarm watches: tag or device.
+fn manner(alarm: &AlarmDef) -> Manner {
+    Manner { on_delay: alarm.on_delay, off_delay: alarm.off_delay }
+}
+
+/// Full name of what an alarm watches: tag, device or line.
 pub fn subject_name(def: &PlantDef, subject: Subject) -> &str {
     match subject {
         Subject::Tag(tag) => &def.tag(tag).name,
         Subject::Device(device) => &def.device(device).name,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::plant::fixture::{self, HIGH, SILENT};
-
-    fn at(second: i64) -> Timestamp {
-        Timestamp::from_second(second).expect("a small number")
-    }
-
-    fn facts(value: f64, answering: bool) -> impl Fn(AlarmId) -> Facts {
-        move |_| Facts { value: Some(value), reference: None, answering: Some(answering) }
-    }
-
-    #[test]
-    fn an_alarm_is_told_with_value_and_limit_and_survives_a_restart() {
-        let mut book = Book::new(fixture::shared());
-        assert!(book.judge(at(0), facts(80.0, true)).is_empty(), "the on-delay runs");
-        let steps = book.judge(at(2), facts(81.0, true));
-        assert_eq!(steps.len(), 1);
-        assert_eq!((&*steps[0].subject, steps[0].value, steps[0].limit), ("TIC-1.PV", Some(81.0), Some(75.0)));
-
-        let mut again = Book::new(fixture::shared());
-        again.restore(&steps);
-        assert_eq!(again.active(), book.active());
-        let ack = again.acknowledge(HIGH, at(3), "anna".into()).expect("it waits for an acknowledgement");
-        assert_eq!(ack.by.as_deref(), Some("anna"));
-        assert_eq!(again.acknowledge(HIGH, at(3), "anna".into()), None);
-        assert_eq!(again.active()[0].state, AlarmState::Acknowledged);
-    }
-
-    #[test]
-    fn the_list_puts_what_waits_before_what_is_known() {
-        let mut book = Book::new(fixture::shared());
-        book.judge(at(0), facts(80.0, false));
-        book.judge(at(2), facts(80.0, false));
-        assert_eq!(book.active().iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [HIGH, SILENT], "latest first");
-        book.acknowledge(HIGH, at(3), "anna".into());
-        assert_eq!(book.active().iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [SILENT, HIGH]);
-        assert_eq!(book.unacknowledged(), [SILENT]);
+        Subject::Line(line) => &def.line(line).name,
     }
 }

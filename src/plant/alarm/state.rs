@@ -1,13 +1,13 @@
-//! The state machine of one alarm: two memories, *active* and *unacknowledged*, and the delays between them.
+//! The state machine of one alarm: the memories *active*, *unacknowledged* and *latched*, and why it is put aside.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::plant::record::AlarmStep;
+use crate::plant::record::{AlarmRecord, AlarmStep, Burst};
 
-/// State of an alarm as an operator sees it, derived from the two memories.
+/// State of an alarm as an operator sees it, derived from the memories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub enum AlarmState {
     /// Nothing to see.
@@ -19,9 +19,32 @@ pub enum AlarmState {
     Acknowledged,
     /// No longer active, but nobody has acknowledged it.
     Returned,
+    /// No longer active, not acknowledged, and it waits for a reset.
+    LatchedUnacknowledged,
+    /// No longer active, acknowledged, and it waits for a reset.
+    LatchedAcknowledged,
+    /// Put aside by an operator for a time.
+    Shelved,
+    /// Put aside by design: what enables it is false.
+    Suppressed,
+    /// Put aside until somebody puts it back.
+    OutOfService,
 }
 
 impl AlarmState {
+    /// Every state.
+    pub const ALL: [AlarmState; 9] = [
+        AlarmState::Normal,
+        AlarmState::Unacknowledged,
+        AlarmState::Acknowledged,
+        AlarmState::Returned,
+        AlarmState::LatchedUnacknowledged,
+        AlarmState::LatchedAcknowledged,
+        AlarmState::Shelved,
+        AlarmState::Suppressed,
+        AlarmState::OutOfService,
+    ];
+
     /// The word on screen.
     pub fn word(self) -> &'static str {
         match self {
@@ -29,37 +52,123 @@ impl AlarmState {
             AlarmState::Unacknowledged => "UNACK",
             AlarmState::Acknowledged => "acked",
             AlarmState::Returned => "returned",
+            AlarmState::LatchedUnacknowledged => "LATCHED",
+            AlarmState::LatchedAcknowledged => "latched",
+            AlarmState::Shelved => "shelved",
+            AlarmState::Suppressed => "suppressed",
+            AlarmState::OutOfService => "out of service",
         }
     }
     /// Waits for an acknowledgement.
     pub fn needs_acknowledgement(self) -> bool {
-        matches!(self, AlarmState::Unacknowledged | AlarmState::Returned)
+        match self {
+            AlarmState::Unacknowledged | AlarmState::Returned | AlarmState::LatchedUnacknowledged => true,
+            AlarmState::Normal
+            | AlarmState::Acknowledged
+            | AlarmState::LatchedAcknowledged
+            | AlarmState::Shelved
+            | AlarmState::Suppressed
+            | AlarmState::OutOfService => false,
+        }
+    }
+    /// Put aside: still judged and put on record, never annunciated.
+    pub fn is_aside(self) -> bool {
+        match self {
+            AlarmState::Shelved | AlarmState::Suppressed | AlarmState::OutOfService => true,
+            AlarmState::Normal
+            | AlarmState::Unacknowledged
+            | AlarmState::Acknowledged
+            | AlarmState::Returned
+            | AlarmState::LatchedUnacknowledged
+            | AlarmState::LatchedAcknowledged => false,
+        }
     }
 }
 
-/// The memory of one alarm.
+/// Who did something with an alarm, when, and in which words.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Deed {
+    /// When.
+    pub at: Timestamp,
+    /// Who; `None` if the station did it by itself.
+    pub by: Option<Arc<str>>,
+    /// The note or reason.
+    pub reason: Option<Arc<str>>,
+}
+
+/// An alarm that is shelved.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Shelving {
+    /// Who, when, why.
+    pub deed: Deed,
+    /// It comes back by itself then.
+    pub until: Timestamp,
+}
+
+impl Shelving {
+    /// If the clock has gone back behind the beginning, the end moves along: nobody shelved it for longer than this.
+    pub fn moved(&self, at: Timestamp) -> Option<Timestamp> {
+        (at < self.deed.at).then(|| at + self.until.duration_since(self.deed.at))
+    }
+}
+
+/// The delays of an alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Manner {
+    /// The condition must hold this long before it is raised.
+    pub on_delay: Duration,
+    /// The condition must be gone this long before it returns.
+    pub off_delay: Duration,
+}
+
+/// The memory of one alarm.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Machine {
     active: bool,
     unacknowledged: bool,
-    /// Since when the condition differs from `active`: the delay runs.
-    pending_since: Option<Timestamp>,
-    /// The last activation and its return.
+    latched: bool,
+    suppressed: Option<Timestamp>,
+    shelved: Option<Shelving>,
+    out_of_service: Option<Deed>,
+    /// Since when the condition differs from `active`: the delay runs. An instant of the book's own clock.
+    pending_since: Option<Duration>,
+    /// The last activation that was annunciated.
     pub raised_at: Option<Timestamp>,
     /// When the last activation returned.
     pub returned_at: Option<Timestamp>,
+    /// The last acknowledgement since it was raised.
+    pub acknowledged: Option<Deed>,
     /// The value that raised it.
     pub value: Option<f64>,
+    /// Its place among the alarms that were raised together.
+    pub burst: Option<Burst>,
+    /// Activations since the station started.
+    pub times: u32,
+    /// For how long it has been acknowledged and active.
+    pub acknowledged_for: Option<Duration>,
+    /// Its place among everything that was annunciated since the start.
+    pub edge: u64,
 }
 
 impl Machine {
     /// The state as an operator sees it.
     pub fn state(&self) -> AlarmState {
-        match (self.active, self.unacknowledged) {
-            (false, false) => AlarmState::Normal,
-            (true, true) => AlarmState::Unacknowledged,
-            (true, false) => AlarmState::Acknowledged,
-            (false, true) => AlarmState::Returned,
+        if self.out_of_service.is_some() {
+            return AlarmState::OutOfService;
+        }
+        if self.shelved.is_some() {
+            return AlarmState::Shelved;
+        }
+        if self.suppressed.is_some() {
+            return AlarmState::Suppressed;
+        }
+        match (self.active, self.unacknowledged, self.latched) {
+            (true, true, _) => AlarmState::Unacknowledged,
+            (true, false, _) => AlarmState::Acknowledged,
+            (false, true, true) => AlarmState::LatchedUnacknowledged,
+            (false, false, true) => AlarmState::LatchedAcknowledged,
+            (false, true, false) => AlarmState::Returned,
+            (false, false, false) => AlarmState::Normal,
         }
     }
 
@@ -67,63 +176,105 @@ impl Machine {
     pub fn is_active(&self) -> bool {
         self.active
     }
+    /// Shelved until when, by whom and why; also while it is out of service.
+    pub fn shelved(&self) -> Option<&Shelving> {
+        self.shelved.as_ref()
+    }
+    /// Since when it is out of service, by whom and why.
+    pub fn out_of_service(&self) -> Option<&Deed> {
+        self.out_of_service.as_ref()
+    }
+    /// Since when it is suppressed by design.
+    pub fn suppressed(&self) -> Option<Timestamp> {
+        self.suppressed
+    }
+    /// Waits for a reset once its condition is gone.
+    pub fn is_latched(&self) -> bool {
+        self.latched
+    }
 
-    /// Takes the judgement of an instant. A condition must hold (or be gone) for the whole delay; a flap inside the
-    /// delay leaves no trace. An unknown judgement (`None`) changes nothing and restarts no delay.
-    pub fn step(
-        &mut self,
-        holds: Option<bool>,
-        at: Timestamp,
-        on_delay: Duration,
-        off_delay: Duration,
-    ) -> Option<AlarmStep> {
+    /// Takes the judgement of an instant, and says which step follows. A condition must hold (or be gone) for the whole
+    /// delay; a flap inside the delay leaves no trace. An unknown judgement (`None`) changes nothing and restarts no delay.
+    /// `now` is an instant of the book's own clock. The step is to be [applied](Machine::apply).
+    pub fn judge(&mut self, holds: Option<bool>, now: Duration, manner: Manner) -> Option<AlarmStep> {
         let holds = holds?;
         if holds == self.active {
             self.pending_since = None;
             return None;
         }
-        let since = *self.pending_since.get_or_insert(at);
-        let delay = if holds { on_delay } else { off_delay };
-        if Duration::try_from(at.duration_since(since)).unwrap_or_default() < delay {
+        let since = *self.pending_since.get_or_insert(now);
+        let delay = if holds { manner.on_delay } else { manner.off_delay };
+        if now.saturating_sub(since) < delay {
             return None;
         }
-        let step = if holds { AlarmStep::Raised } else { AlarmStep::Returned };
-        self.apply(step, at);
-        Some(step)
+        let aside = self.state().is_aside();
+        Some(match (holds, aside) {
+            (true, false) => AlarmStep::Raised,
+            (true, true) => AlarmStep::RaisedQuietly,
+            (false, false) => AlarmStep::Returned,
+            (false, true) => AlarmStep::ReturnedQuietly,
+        })
     }
 
-    /// Takes a step without judging: what [`Machine::step`] decided, or what the journal remembers after a restart.
-    pub fn apply(&mut self, step: AlarmStep, at: Timestamp) {
-        self.pending_since = None;
-        match step {
+    /// Takes a step: one that was just decided, or one that the journal remembers after a restart. Both end in the same
+    /// state, because this is the only place where it changes.
+    pub fn apply(&mut self, step: &AlarmRecord, latch: bool) {
+        let deed = || Deed { at: step.at, by: step.by.clone(), reason: step.reason.clone() };
+        match step.step {
             AlarmStep::Raised => {
-                (self.active, self.unacknowledged) = (true, true);
-                (self.raised_at, self.returned_at) = (Some(at), None);
+                (self.active, self.unacknowledged, self.pending_since) = (true, true, None);
+                self.latched |= latch;
+                (self.raised_at, self.returned_at, self.acknowledged) = (Some(step.at), None, None);
+                (self.value, self.burst) = (step.value, step.burst);
+                self.times = self.times.saturating_add(1);
             }
-            AlarmStep::Acknowledged => self.unacknowledged = false,
-            AlarmStep::Returned => {
-                self.active = false;
-                self.returned_at = Some(at);
+            AlarmStep::RaisedQuietly => {
+                (self.active, self.pending_since) = (true, None);
+                if latch {
+                    // Nobody is told now, but what latches must be seen by somebody once it is back.
+                    (self.latched, self.unacknowledged) = (true, true);
+                    (self.raised_at, self.returned_at, self.acknowledged) = (Some(step.at), None, None);
+                    self.value = step.value;
+                }
             }
+            AlarmStep::RaisedAgain => self.unacknowledged = true,
+            AlarmStep::Acknowledged => (self.unacknowledged, self.acknowledged) = (false, Some(deed())),
+            AlarmStep::Returned | AlarmStep::ReturnedQuietly => {
+                (self.active, self.pending_since, self.returned_at) = (false, None, Some(step.at));
+            }
+            AlarmStep::Reset => self.latched = false,
+            AlarmStep::Shelved => {
+                // Without an end it would stay away for ever: the journal of another program, or a damaged one.
+                self.shelved = Some(Shelving { deed: deed(), until: step.until.unwrap_or(step.at) });
+                self.unacknowledged = false;
+            }
+            AlarmStep::Unshelved => self.shelved = None,
+            AlarmStep::Suppressed => self.suppressed = Some(step.at),
+            AlarmStep::Released => self.suppressed = None,
+            AlarmStep::OutOfService => (self.out_of_service, self.unacknowledged) = (Some(deed()), false),
+            AlarmStep::InService => self.out_of_service = None,
         }
-    }
-
-    /// Acknowledges what is there now; `false` if there was nothing to acknowledge.
-    pub fn acknowledge(&mut self) -> bool {
-        std::mem::replace(&mut self.unacknowledged, false)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
+    use crate::plant::def::Priority;
 
-    const ON: Duration = Duration::from_secs(5);
-    const OFF: Duration = Duration::from_secs(10);
+    const MANNER: Manner = Manner { on_delay: Duration::from_secs(5), off_delay: Duration::from_secs(10) };
 
-    fn at(second: i64) -> Timestamp {
-        Timestamp::from_second(second).expect("a small number")
+    fn record(step: AlarmStep, second: i64) -> AlarmRecord {
+        let at = Timestamp::from_second(second).expect("a small number");
+        let record = AlarmRecord::new(at, "TIC-1.PV", "temperature high", Priority::High, step);
+        AlarmRecord { until: Some(at + Duration::from_secs(60)), ..record }
+    }
+
+    /// The judgement of an instant, with what follows from it.
+    fn judged(machine: &mut Machine, holds: Option<bool>, second: u64) -> Option<AlarmStep> {
+        let step = machine.judge(holds, Duration::from_secs(second), MANNER)?;
+        machine.apply(&record(step, second as i64), false);
+        Some(step)
     }
 
     #[test]
@@ -139,43 +290,74 @@ mod tests {
             (20, Some(false), None, AlarmState::Unacknowledged),
             (21, Some(false), Some(AlarmStep::Returned), AlarmState::Returned),
         ] {
-            assert_eq!(machine.step(holds, at(second), ON, OFF), step, "at {second} s");
+            assert_eq!(judged(&mut machine, holds, second), step, "at {second} s");
             assert_eq!(machine.state(), state, "at {second} s");
         }
-        assert!(machine.acknowledge());
+        machine.apply(&record(AlarmStep::Acknowledged, 22), false);
         assert_eq!(machine.state(), AlarmState::Normal);
-        assert!(!machine.acknowledge(), "there is nothing left to acknowledge");
     }
 
     #[test]
-    fn an_acknowledged_alarm_returns_without_a_word() {
-        let mut machine = Machine::default();
-        machine.step(Some(true), at(0), Duration::ZERO, Duration::ZERO);
-        assert!(machine.acknowledge());
-        assert_eq!(machine.state(), AlarmState::Acknowledged);
-        machine.step(Some(false), at(1), Duration::ZERO, Duration::ZERO);
-        assert_eq!(machine.state(), AlarmState::Normal);
+    fn what_an_operator_does_leads_from_state_to_state() {
+        use AlarmState as S;
+        use AlarmStep as T;
+        let check = |latch: bool, steps: &[(T, S)]| {
+            let mut machine = Machine::default();
+            for (step, state) in steps {
+                machine.apply(&record(*step, 0), latch);
+                assert_eq!(machine.state(), *state, "{step:?} of {steps:?}");
+            }
+        };
+        check(false, &[(T::Raised, S::Unacknowledged), (T::Acknowledged, S::Acknowledged), (T::Returned, S::Normal)]);
+        check(
+            false,
+            &[(T::Raised, S::Unacknowledged), (T::Acknowledged, S::Acknowledged), (T::RaisedAgain, S::Unacknowledged)],
+        );
+        let latched = [
+            (T::Raised, S::Unacknowledged),
+            (T::Returned, S::LatchedUnacknowledged),
+            (T::Acknowledged, S::LatchedAcknowledged),
+            (T::Reset, S::Normal),
+        ];
+        check(true, &latched);
+        check(
+            true,
+            &[(T::Raised, S::Unacknowledged), (T::Returned, S::LatchedUnacknowledged), (T::Reset, S::Returned)],
+        );
+        let shelved = [
+            (T::Raised, S::Unacknowledged),
+            (T::Shelved, S::Shelved),
+            (T::ReturnedQuietly, S::Shelved),
+            (T::Unshelved, S::Normal),
+        ];
+        check(false, &shelved);
+        let both = [
+            (T::Shelved, S::Shelved),
+            (T::OutOfService, S::OutOfService),
+            (T::RaisedQuietly, S::OutOfService),
+            (T::InService, S::Shelved),
+            (T::Unshelved, S::Acknowledged),
+            (T::Raised, S::Unacknowledged),
+        ];
+        check(false, &both);
+        let design = [
+            (T::Raised, S::Unacknowledged),
+            (T::Suppressed, S::Suppressed),
+            (T::ReturnedQuietly, S::Suppressed),
+            (T::Released, S::Returned),
+        ];
+        check(false, &design);
+        let quiet = [(T::Shelved, S::Shelved), (T::RaisedQuietly, S::Shelved), (T::ReturnedQuietly, S::Shelved)];
+        check(true, &[&quiet[..], &[(T::Unshelved, S::LatchedUnacknowledged)]].concat());
+        check(false, &[&quiet[..], &[(T::Unshelved, S::Normal)]].concat());
     }
 
-    proptest! {
-        #[test]
-        fn steps_alternate_and_a_new_activation_is_never_acknowledged(
-            holds in proptest::collection::vec(proptest::option::of(any::<bool>()), 1..200),
-            acknowledge in proptest::collection::vec(any::<bool>(), 200),
-        ) {
-            let mut machine = Machine::default();
-            let mut last = AlarmStep::Returned;
-            for (second, holds) in holds.into_iter().enumerate() {
-                if let Some(step) = machine.step(holds, at(second as i64), Duration::from_secs(2), Duration::from_secs(3)) {
-                    prop_assert_ne!(step, last);
-                    last = step;
-                    if step == AlarmStep::Raised {
-                        prop_assert_eq!(machine.state(), AlarmState::Unacknowledged);
-                    }
-                }
-                if acknowledge[second] { machine.acknowledge(); }
-                prop_assert_eq!(machine.is_active(), last == AlarmStep::Raised);
-            }
-        }
+    #[test]
+    fn a_shelving_is_never_longer_than_it_was_given_for() {
+        let at = |second| Timestamp::from_second(second).expect("a small number");
+        let deed = Deed { at: at(1_000), by: None, reason: None };
+        let shelving = Shelving { deed, until: at(1_600) };
+        assert_eq!(shelving.moved(at(1_500)), None);
+        assert_eq!(shelving.moved(at(100)), Some(at(700)));
     }
 }

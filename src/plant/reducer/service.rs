@@ -36,8 +36,7 @@ impl Plant {
                 return None;
             }
             Command::Write { .. }
-            | Command::Acknowledge(_)
-            | Command::AcknowledgeAll
+            | Command::Alarm(_)
             | Command::Refresh(_)
             | Command::Connect(..)
             | Command::ReadSets

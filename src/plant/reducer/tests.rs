@@ -5,10 +5,10 @@ use std::time::Duration;
 use super::*;
 use crate::plant::{
     alarm::AlarmState,
-    command::{NotConfirmed, OrderId},
+    command::{NotConfirmed, OrderId, Refusal},
     def::ActionDef,
     event::ExceptionCode,
-    fixture::{self, DP, FAULT, HIGH, PLC, PV, RUN, SILENT, SV, TIC},
+    fixture::{self, DP, FAULT, PLC, PV, RUN, SILENT, SV, TIC},
     guard::{Blocking, InterlockDef},
     line_report::LineReport,
     record::AlarmStep,
@@ -214,9 +214,11 @@ fn an_alarm_is_raised_acknowledged_by_name_and_returns() {
     plant.on_event(read(1, &[(PV, 760.0)]));
     plant.on_event(read(3, &[(PV, 761.0)]));
     assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Unacknowledged);
-    let effects = plant.on_order(order(1, Command::Acknowledge(HIGH)), at(4));
+    let seen = plant.snapshot();
+    let effects = plant.on_order(order(1, seen.alarms[0].acknowledge()), at(4));
     assert!(matches!(&effects.records[0], Record::Alarm(step) if step.by.as_deref() == Some("anna")));
-    let effects = plant.on_order(order(2, Command::AcknowledgeAll), at(4));
+    let all = seen.acknowledge_all().expect("one waited when it was seen");
+    let effects = plant.on_order(order(2, all), at(4));
     assert!(!effects.records.iter().any(|record| matches!(record, Record::Alarm(_))), "it was acknowledged already");
     plant.on_event(fail(5, &[PV], Fault::Timeout));
     assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Acknowledged, "no answer is no return");

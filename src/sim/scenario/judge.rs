@@ -7,8 +7,9 @@ use jiff::Timestamp;
 use super::{Scenario, Wish};
 use crate::plant::{
     Snapshot,
+    alarm::book::subject_name,
     command::{Command, OrderStatus, Outcome},
-    def::{AlarmId, PlantDef, Subject, TagId},
+    def::{AlarmId, PlantDef, TagId},
     record::{AlarmRecord, AlarmStep, Record},
 };
 
@@ -190,11 +191,7 @@ impl Judge {
 /// Whether a step of the journal is of an alarm: the journal has names, not numbers.
 fn is(def: &PlantDef, alarm: AlarmId, step: &AlarmRecord) -> bool {
     let alarm = def.alarm(alarm);
-    let subject = match alarm.subject {
-        Subject::Tag(tag) => &def.tag(tag).name,
-        Subject::Device(device) => &def.device(device).name,
-    };
-    **subject == *step.subject && *alarm.text == *step.text
+    *subject_name(def, alarm.subject) == *step.subject && *alarm.text == *step.text
 }
 
 impl Mark {

@@ -8,9 +8,9 @@ mod tests;
 use std::{path::Path, sync::Arc, time::Duration};
 
 use self::names::{alarm, tag, unknown, value};
-use super::{Deed, Event, Expect, Scenario, Start, judge::clock};
+use super::{Deed, Event, Expect, OperatorWish, Scenario, Start, judge::clock};
 use crate::{
-    plant::{PlantDef, command::Command, record::AlarmStep},
+    plant::{PlantDef, record::AlarmStep},
     profile::{
         self, Errors, Search,
         diagnostic::{Problems, Span},
@@ -95,6 +95,16 @@ words!(AlarmStep, "step of an alarm" {
     "raised" => AlarmStep::Raised,
     "acknowledged" => AlarmStep::Acknowledged,
     "returned" => AlarmStep::Returned,
+    "raised quietly" => AlarmStep::RaisedQuietly,
+    "returned quietly" => AlarmStep::ReturnedQuietly,
+    "raised again" => AlarmStep::RaisedAgain,
+    "reset" => AlarmStep::Reset,
+    "shelved" => AlarmStep::Shelved,
+    "unshelved" => AlarmStep::Unshelved,
+    "suppressed" => AlarmStep::Suppressed,
+    "released" => AlarmStep::Released,
+    "out of service" => AlarmStep::OutOfService,
+    "in service" => AlarmStep::InService,
 });
 
 impl Value for Fault {
@@ -231,13 +241,13 @@ fn place(table: &EventTable, def: &PlantDef, problems: &mut Problems) -> Option<
 
 fn deed(table: &DeedTable, duration: Duration, def: &PlantDef, problems: &mut Problems) -> Option<Deed> {
     let at = in_time(table.at_time, duration, problems);
-    let command = match (&table.acknowledge, &table.write) {
-        (Some(all), None) if all.value == "all" => Command::AcknowledgeAll,
-        (Some(subject), None) => Command::Acknowledge(alarm(subject, &table.text, def, problems)?),
+    let wish = match (&table.acknowledge, &table.write) {
+        (Some(all), None) if all.value == "all" => OperatorWish::AcknowledgeAll,
+        (Some(subject), None) => OperatorWish::Acknowledge(alarm(subject, &table.text, def, problems)?),
         (None, Some(name)) => {
             let tag = tag(name, def, problems)?;
             let value = value(&table.value, name, tag, def, problems)?;
-            Command::Write { tag, value }
+            OperatorWish::Write(tag, value)
         }
         (Some(_), Some(write)) => {
             problems.add(write.at, "one deed at a time").label("needs an [[operator]] of its own");
@@ -248,7 +258,7 @@ fn deed(table: &DeedTable, duration: Duration, def: &PlantDef, problems: &mut Pr
             return None;
         }
     };
-    Some(Deed { at: at?, command })
+    Some(Deed { at: at?, wish })
 }
 
 fn in_time(at: Option<At<Duration>>, duration: Duration, problems: &mut Problems) -> Option<Duration> {

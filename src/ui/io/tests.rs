@@ -38,10 +38,10 @@ fn on_the_pty() {
                 let Request::Order(OrderRequest { command, .. }) = request else { continue };
                 let mut snapshot = Arc::unwrap_or_clone(Fixture::alarm().snapshot());
                 match command {
-                    Command::Acknowledge(_) => {
+                    Command::Alarm(_) => {
                         let panicked = tokio::spawn(async { panic!("a task of the station") }).await;
                         assert!(panicked.is_err());
-                        snapshot.alarms.clear();
+                        snapshot.alarms = Arc::default();
                     }
                     _ => snapshot.samples.clear(),
                 }

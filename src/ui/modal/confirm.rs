@@ -6,6 +6,7 @@ use ratatui::{Frame, layout::Rect, style::Style};
 use super::{Faceplate, Modal, Next, seen::Seen, window};
 use crate::{
     plant::{
+        alarm::{AlarmCommand, book::subject_name},
         command::Command,
         def::TagId,
         tag::{Access, Confidence, TagDef},
@@ -77,7 +78,7 @@ impl Confirm {
         if waiting.len() > 6 {
             notes.push(format!("… and {} more", waiting.len() - 6));
         }
-        let intent = Intent::Order(Command::AcknowledgeAll);
+        let intent = Intent::Order(cx.snapshot.acknowledge_all()?);
         Some(Confirm { intent, title: "acknowledge all".to_owned(), notes, back: None, seen: None })
     }
 
@@ -135,7 +136,15 @@ impl Confirm {
         match &self.intent {
             Intent::Quit => "quit",
             Intent::Order(Command::Write { .. }) => "write and verify",
-            Intent::Order(Command::Acknowledge(_) | Command::AcknowledgeAll) => "acknowledge",
+            Intent::Order(Command::Alarm(command)) => match command {
+                AlarmCommand::Acknowledge { .. } | AlarmCommand::AcknowledgeAll { .. } => "acknowledge",
+                AlarmCommand::Silence => "silence",
+                AlarmCommand::Reset(_) => "reset",
+                AlarmCommand::Shelve { .. } => "shelve",
+                AlarmCommand::Unshelve(_) => "take back",
+                AlarmCommand::OutOfService { .. } => "put out of service",
+                AlarmCommand::InService(_) => "put in service",
+            },
             Intent::Order(Command::Refresh(_)) => "refresh",
             Intent::Order(Command::Connect(_, true)) => "connect",
             Intent::Order(Command::Connect(_, false)) => "disconnect",
@@ -259,9 +268,5 @@ pub(super) fn write_notes(def: &TagDef) -> Vec<String> {
 
 /// The name of what an alarm watches.
 pub fn subject(cx: &Cx, alarm: crate::plant::def::AlarmId) -> String {
-    use crate::plant::def::Subject;
-    match cx.def().alarm(alarm).subject {
-        Subject::Tag(tag) => cx.def().tag(tag).name.clone(),
-        Subject::Device(device) => cx.def().device(device).name.clone(),
-    }
+    subject_name(cx.def(), cx.def().alarm(alarm).subject).to_owned()
 }

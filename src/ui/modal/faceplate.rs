@@ -7,6 +7,7 @@ use super::{Confirm, Modal, Next, Notice, Why, confirm::wire_words, entry::range
 use crate::{
     plant::{
         def::TagId,
+        event::LineState,
         sample::Quality,
         snapshot::DeviceState,
         tag::{Access, Poll},
@@ -233,5 +234,16 @@ pub fn device_words(cx: &Cx, device: crate::plant::def::DeviceId) -> String {
         },
         DeviceState::Failing(n) => format!("failing, {n} in a row"),
         DeviceState::Down { since } => format!("DOWN since {}", clock(since, &cx.def().time_zone)),
+    }
+}
+
+/// How a line stands, in words.
+pub fn line_state_words(cx: &Cx, line: crate::plant::def::LineId) -> String {
+    match &cx.snapshot.line(line).state {
+        LineState::Connecting => "connecting".to_owned(),
+        LineState::Connected => "connected".to_owned(),
+        LineState::Disconnected => "closed by an operator".to_owned(),
+        LineState::Testing => "a test has it".to_owned(),
+        LineState::Waiting { why, .. } => format!("not connected: {why}"),
     }
 }

@@ -16,7 +16,11 @@ use crate::{
     ui::{
         Act, Cx,
         keys::{Key, char, code},
-        modal::{Faceplate, Modal, Why, confirm::subject, faceplate::device_words},
+        modal::{
+            Faceplate, Modal, Why,
+            confirm::subject,
+            faceplate::{device_words, line_state_words},
+        },
         widgets::{
             text::{self, Canvas, between, fit, fit_words, moment, pad, pad_left, running, wrap},
             value,
@@ -126,11 +130,12 @@ impl Alarms {
             Action::Why => Why::open(self.selected(cx).and_then(|alarm| match cx.def().alarm(alarm.id).subject {
                 Subject::Tag(tag) => Why::new(vec![tag], 0),
                 Subject::Device(device) => Why::of_device(cx, device),
+                Subject::Line(_) => None,
             })),
             Action::Controller => match self.selected(cx).map(|alarm| cx.def().alarm(alarm.id).subject) {
                 Some(Subject::Device(device)) => vec![Act::ShowDevice(device)],
                 Some(Subject::Tag(tag)) => vec![Act::ShowDevice(cx.def().tag(tag).device)],
-                None => Vec::new(),
+                Some(Subject::Line(_)) | None => Vec::new(),
             },
         }
     }
@@ -202,6 +207,7 @@ impl Alarms {
                 let tags = cx.def().tags_of(device).take(8).map(|tag| tag.id).collect();
                 Faceplate::new(format!("{} {}", cx.def().device(device).name, device_words(cx, device)), tags)
             }
+            Subject::Line(_) => None,
         }
     }
 
@@ -215,6 +221,10 @@ impl Alarms {
             count(AlarmState::Acknowledged),
             count(AlarmState::Returned)
         );
+        let latched = count(AlarmState::LatchedUnacknowledged) + count(AlarmState::LatchedAcknowledged);
+        let rare = [(latched, "latched"), (cx.snapshot.aside.len(), "put aside")];
+        let rare: String = rare.iter().filter(|(n, _)| 0 < *n).map(|(n, word)| format!("   {n} {word}")).collect();
+        let summary = summary + &rare;
         let x = canvas.text(1, 0, "Alarms  ", theme.strong());
         canvas.text(x, 0, &summary, theme.normal());
         let columns = Columns::of(cx, canvas.width());
@@ -267,6 +277,7 @@ impl Alarms {
         let now = match def.subject {
             Subject::Tag(tag) => format!("{}, raised at {}", value::show(cx, tag).whole(), raised_value(cx, alarm)),
             Subject::Device(device) => device_words(cx, device),
+            Subject::Line(line) => line_state_words(cx, line),
         };
         let rows: [(&str, &str); 4] = [
             ("now", &now),
@@ -392,7 +403,7 @@ fn cells(cx: &Cx, alarm: &ActiveAlarm) -> [String; 7] {
         format!("{} {}", def.text, condition_words(cx, alarm.id)),
         match def.subject {
             Subject::Tag(tag) => value::show(cx, tag).within(10),
-            Subject::Device(_) => "–".to_owned(),
+            Subject::Device(_) | Subject::Line(_) => "–".to_owned(),
         },
         alarm.state.word().to_owned(),
         running(between(alarm.raised_at, cx.now)),
@@ -404,20 +415,27 @@ fn condition_words(cx: &Cx, alarm: AlarmId) -> String {
     let def = cx.def().alarm(alarm);
     let number = |value| match def.subject {
         Subject::Tag(tag) => cx.snapshot.format(tag, value),
-        Subject::Device(_) => value.to_string(),
+        Subject::Device(_) | Subject::Line(_) => value.to_string(),
     };
     match def.condition {
         Condition::Limit { level: Level::HighHigh | Level::High, limit, .. } => format!("> {}", number(limit)),
         Condition::Limit { level: Level::Low | Level::LowLow, limit, .. } => format!("< {}", number(limit)),
         Condition::Deviation { from, limit, .. } => format!("> {} off {}", number(limit), cx.def().tag(from).short),
         Condition::State { is } => format!("= {}", number(is)),
-        Condition::NotAnswering => String::new(),
+        Condition::Rate { limit, .. } => format!("{} {limit}/min", if limit < 0.0 { "<" } else { ">" }),
+        Condition::Bit { .. }
+        | Condition::NoChange { .. }
+        | Condition::NoUpdate { .. }
+        | Condition::Changes { .. }
+        | Condition::NotAnswering
+        | Condition::Health { .. }
+        | Condition::NotConnected => String::new(),
     }
 }
 
 fn raised_value(cx: &Cx, alarm: &ActiveAlarm) -> String {
     match (alarm.value, cx.def().alarm(alarm.id).subject) {
         (Some(value), Subject::Tag(tag)) => cx.snapshot.format(tag, value),
-        (Some(_) | None, Subject::Tag(_) | Subject::Device(_)) => "–".to_owned(),
+        (Some(_) | None, Subject::Tag(_) | Subject::Device(_) | Subject::Line(_)) => "–".to_owned(),
     }
 }

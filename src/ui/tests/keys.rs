@@ -102,11 +102,7 @@ fn a_screen_too_small_to_see_takes_no_orders() {
         assert_eq!(type_keys(&mut model, "⏎"), [], "{keys}");
     }
     let mut model = small("3↓↓");
-    assert_eq!(
-        order_of(&type_keys(&mut model, "a")),
-        Some(&Command::Acknowledge(fixture.alarms[0].id)),
-        "the banner's"
-    );
+    assert_eq!(order_of(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()), "the banner's");
     type_keys(&mut model, "q");
     assert!(screen(&mut model, 50, 10).contains("Quit? ⏎ quit  Esc stay"));
     assert_eq!(type_keys(&mut model, "⎋"), []);
@@ -451,6 +447,9 @@ fn the_journal_tells_alarms_and_deeds_in_one_order() {
         value: Some(72.1),
         limit: Some(72.0),
         by: by.map(Arc::from),
+        reason: None,
+        until: None,
+        burst: None,
     };
     let deed = ActionRecord {
         at: ago(700),
@@ -501,11 +500,11 @@ fn leaving_is_asked() {
 fn acknowledging_takes_the_most_urgent_or_the_selected() {
     let fixture = Fixture::alarm();
     let mut model = model(&fixture, Theme::FULL);
-    assert_eq!(order_of(&type_keys(&mut model, "a")), Some(&Command::Acknowledge(fixture.alarms[0].id)));
-    assert_eq!(order_of(&type_keys(&mut model, "3↓↓a")), Some(&Command::Acknowledge(fixture.alarms[2].id)));
+    assert_eq!(order_of(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()));
+    assert_eq!(order_of(&type_keys(&mut model, "3↓↓a")), Some(&fixture.alarms[2].acknowledge()));
     assert_eq!(order_of(&type_keys(&mut model, "↑a")), None, "already acknowledged");
     assert_eq!(order_of(&type_keys(&mut model, "A")), None, "all: asks first");
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&Command::AcknowledgeAll));
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), fixture.snapshot().acknowledge_all().as_ref());
     let mut quiet = super::model(&Fixture::normal(), Theme::FULL);
     assert_eq!(type_keys(&mut quiet, "aA"), []);
     assert_eq!(quiet.modal, None);

@@ -61,6 +61,9 @@ fn step(at: i64, text: &str, step: AlarmStep) -> AlarmRecord {
         value: Some(85.5),
         limit: Some(85.0),
         by: (step == AlarmStep::Acknowledged).then(|| "somchai".into()),
+        reason: None,
+        until: None,
+        burst: None,
     }
 }
 

@@ -86,6 +86,9 @@ fn an_alarm_counts_in_its_time_and_in_its_step_only() {
                 value: Some(76.0),
                 limit: None,
                 by: None,
+                reason: None,
+                until: None,
+                burst: None,
             })]);
         }
         assert_eq!(is_over(&mut judge), expect, "{wish:?} {steps:?}");

@@ -3,6 +3,7 @@
 use crate::{
     plant::{
         PlantDef,
+        alarm::book::subject_name,
         def::{AlarmDef, AlarmId, Subject, TagId},
     },
     profile::{
@@ -42,10 +43,7 @@ pub(super) fn alarm(
     def: &PlantDef,
     problems: &mut Problems,
 ) -> Option<AlarmId> {
-    let name = |subject: Subject| match subject {
-        Subject::Tag(tag) => def.tag(tag).name.as_str(),
-        Subject::Device(device) => def.device(device).name.as_str(),
-    };
+    let name = |subject: Subject| subject_name(def, subject);
     let of_subject: Vec<_> = def.alarms.iter().filter(|alarm| name(alarm.subject) == subject.value).collect();
     let mut known: Vec<&str> = def.alarms.iter().map(|alarm| name(alarm.subject)).collect();
     known.dedup();

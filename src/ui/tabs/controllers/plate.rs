@@ -6,7 +6,7 @@ use super::list;
 use crate::{
     history::Series,
     plant::{
-        def::{Condition, DeviceDef, Faceplate, Subject, TagId},
+        def::{DeviceDef, Faceplate, Subject, TagId},
         tuning::Tuning,
     },
     ui::{
@@ -174,12 +174,8 @@ fn bar(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tag: TagId, scale: TagId
 
 /// The limits of a tag's alarms.
 fn limits(cx: &Cx, tag: TagId) -> impl Iterator<Item = f64> {
-    cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag)).filter_map(|alarm| {
-        match alarm.condition {
-            Condition::Limit { limit, .. } => Some(limit),
-            Condition::Deviation { .. } | Condition::State { .. } | Condition::NotAnswering => None,
-        }
-    })
+    let of_tag = cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag));
+    of_tag.filter_map(|alarm| alarm.condition.on_scale())
 }
 
 /// `PID   AT off   RUN   ‹2›! temperature high UNACK`.

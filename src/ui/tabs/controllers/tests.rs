@@ -37,13 +37,8 @@ fn trouble(count: u16) -> Fixture {
     let mut fixture = many(count);
     fixture.set("TIC-1.PV", 72.4);
     let raised_at = fixture::now() - SignedDuration::from_secs(41);
-    fixture.alarms = vec![ActiveAlarm {
-        id: AlarmId(0),
-        state: AlarmState::Unacknowledged,
-        raised_at,
-        returned_at: None,
-        value: Some(72.1),
-    }];
+    let alarm = ActiveAlarm::new(AlarmId(0), AlarmState::Unacknowledged, raised_at);
+    fixture.alarms = vec![ActiveAlarm { value: Some(72.1), ..alarm }];
     if let Some(device) = fixture.devices.get_mut(1) {
         (device.state, device.diagnosis) = (DeviceState::Down { since: raised_at }, Some(Reason::Down));
         for tag in fixture.def.tags.iter().filter(|tag| tag.device == DeviceId(1)) {

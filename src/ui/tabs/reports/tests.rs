@@ -105,6 +105,9 @@ fn report(period: Period, full: bool) -> ShiftReport {
         value: (subject == "TIC-1.PV").then_some(72.44),
         limit: None,
         by: by.map(Into::into),
+        reason: None,
+        until: None,
+        burst: None,
     };
     let (high, low) = (Priority::High, Priority::Low);
     let alarms = vec![

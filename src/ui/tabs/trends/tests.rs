@@ -105,6 +105,9 @@ impl Stand {
                 value: Some(72.1),
                 limit: Some(72.0),
                 by: None,
+                reason: None,
+                until: None,
+                burst: None,
             }]),
             other => panic!("the trends never ask {other:?}"),
         }

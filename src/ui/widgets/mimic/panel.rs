@@ -4,7 +4,7 @@ use ratatui::style::Modifier;
 
 use super::{Bounds, alarm_mark, label_style, put_value, unit::states};
 use crate::{
-    plant::def::{Condition, DeviceDef, Faceplate, Level, Subject, TagId},
+    plant::def::{DeviceDef, Faceplate, Subject, TagId},
     ui::{
         Cx,
         widgets::{
@@ -99,14 +99,8 @@ fn bar(cx: &Cx, canvas: &mut Canvas, y: u16, plate: &Faceplate) {
 
 /// The limits of a tag's alarms.
 fn limits(cx: &Cx, tag: TagId) -> impl Iterator<Item = f64> {
-    cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag)).filter_map(|alarm| {
-        match alarm.condition {
-            Condition::Limit { level: Level::HighHigh | Level::High | Level::Low | Level::LowLow, limit, .. } => {
-                Some(limit)
-            }
-            Condition::Deviation { .. } | Condition::State { .. } | Condition::NotAnswering => None,
-        }
-    })
+    let of_tag = cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag));
+    of_tag.filter_map(|alarm| alarm.condition.on_scale())
 }
 
 /// What a sequence panel shows.

@@ -1,0 +1,267 @@
+//! What an operator does with alarms: acknowledge, silence, reset, shelve, take out of service.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+
+use super::{Book, state::AlarmState};
+use crate::plant::{
+    def::{AlarmDef, AlarmId},
+    record::{AlarmRecord, AlarmStep},
+};
+
+/// Most characters of a note or reason.
+pub const WORDS_MAX: usize = 500;
+
+/// A wish of an operator about alarms.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum AlarmCommand {
+    /// Acknowledge one alarm, as it was seen.
+    Acknowledge {
+        /// Which.
+        alarm: AlarmId,
+        /// When the activation that was seen was raised; a later one stays unacknowledged.
+        seen: Timestamp,
+        /// In the operator's words.
+        note: Option<Arc<str>>,
+    },
+    /// Acknowledge all of these, as they were seen.
+    AcknowledgeAll {
+        /// Which, and when the activation that was seen was raised.
+        seen: Arc<[(AlarmId, Timestamp)]>,
+        /// In the operator's words.
+        note: Option<Arc<str>>,
+    },
+    /// End the sound of what sounds now.
+    Silence,
+    /// Let go an alarm that latches; nothing happens while its cause lasts.
+    Reset(AlarmId),
+    /// Put an alarm aside for a time.
+    Shelve {
+        /// Which.
+        alarm: AlarmId,
+        /// For how long, at most [`crate::plant::def::AlarmRules::shelve_max`].
+        lasts: Duration,
+        /// Why.
+        reason: Arc<str>,
+    },
+    /// Take an alarm back from the shelf before its time.
+    Unshelve(AlarmId),
+    /// Put an alarm aside until somebody puts it back.
+    OutOfService {
+        /// Which.
+        alarm: AlarmId,
+        /// Why.
+        reason: Arc<str>,
+    },
+    /// Put an alarm back in service.
+    InService(AlarmId),
+}
+
+/// Why a wish about an alarm was refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
+pub enum AlarmRefusal {
+    /// The plant has no such alarm.
+    #[error("no such alarm")]
+    NoSuchAlarm,
+    /// It does not wait for an acknowledgement.
+    #[error("nothing to acknowledge")]
+    NothingToAcknowledge,
+    /// It was raised again after the operator looked.
+    #[error("raised anew since you looked")]
+    RaisedSince,
+    /// The plant file wants a note with the acknowledgement.
+    #[error("this alarm needs a note")]
+    NoteNeeded,
+    /// Nobody is to put an alarm aside without saying why.
+    #[error("a reason is needed")]
+    ReasonNeeded,
+    /// A note or reason is longer than [`WORDS_MAX`] characters.
+    #[error("more than {WORDS_MAX} characters")]
+    TooLong,
+    /// Not for no time, and not for longer than the plant allows.
+    #[error("an alarm can be shelved for up to {} min", .max.as_secs() / 60)]
+    ShelveTime {
+        /// The longest.
+        max: Duration,
+    },
+    /// Nothing sounds.
+    #[error("nothing sounds")]
+    NothingSounds,
+    /// It does not wait for a reset.
+    #[error("nothing to reset")]
+    NothingToReset,
+    /// Its condition still holds.
+    #[error("the cause lasts")]
+    CauseLasts,
+    /// It is not shelved.
+    #[error("not shelved")]
+    NotShelved,
+    /// It is out of service.
+    #[error("out of service")]
+    OutOfService,
+    /// It is in service.
+    #[error("in service already")]
+    InService,
+}
+
+impl Book {
+    /// Acknowledges one alarm as it was `seen`.
+    pub fn acknowledge(
+        &mut self,
+        id: AlarmId,
+        seen: Timestamp,
+        note: Option<&Arc<str>>,
+        at: Timestamp,
+        by: &Arc<str>,
+    ) -> Result<AlarmRecord, AlarmRefusal> {
+        let alarm = self.alarm(id)?;
+        let machine = self.machine(id);
+        if !machine.state().needs_acknowledgement() {
+            return Err(AlarmRefusal::NothingToAcknowledge);
+        }
+        if machine.raised_at.is_some_and(|raised| raised != seen) {
+            return Err(AlarmRefusal::RaisedSince);
+        }
+        let note = note.filter(|note| !note.trim().is_empty());
+        if alarm.note && note.is_none() {
+            return Err(AlarmRefusal::NoteNeeded);
+        }
+        check_words(note)?;
+        let value = machine.value;
+        Ok(self.deed(&alarm, AlarmStep::Acknowledged, at, value, by, note))
+    }
+
+    /// Lets go an alarm that latches.
+    pub fn reset(&mut self, id: AlarmId, at: Timestamp, by: &Arc<str>) -> Result<AlarmRecord, AlarmRefusal> {
+        let alarm = self.alarm(id)?;
+        let (machine, state) = (self.machine(id), self.machine(id).state());
+        match state {
+            AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {}
+            AlarmState::Unacknowledged | AlarmState::Acknowledged if machine.is_latched() => {
+                return Err(AlarmRefusal::CauseLasts);
+            }
+            AlarmState::Normal
+            | AlarmState::Unacknowledged
+            | AlarmState::Acknowledged
+            | AlarmState::Returned
+            | AlarmState::Shelved
+            | AlarmState::Suppressed
+            | AlarmState::OutOfService => return Err(AlarmRefusal::NothingToReset),
+        }
+        Ok(self.deed(&alarm, AlarmStep::Reset, at, None, by, None))
+    }
+
+    /// Puts an alarm on the shelf, or one that lies there for another time.
+    pub fn shelve(
+        &mut self,
+        id: AlarmId,
+        lasts: Duration,
+        reason: &Arc<str>,
+        at: Timestamp,
+        by: &Arc<str>,
+    ) -> Result<AlarmRecord, AlarmRefusal> {
+        let alarm = self.alarm(id)?;
+        check_reason(reason)?;
+        let max = self.def.alarm_rules.shelve_max;
+        let until = at.checked_add(lasts).ok().filter(|_| !lasts.is_zero() && lasts <= max);
+        let until = until.ok_or(AlarmRefusal::ShelveTime { max })?;
+        if self.machine(id).out_of_service().is_some() {
+            return Err(AlarmRefusal::OutOfService);
+        }
+        let record = self.record(&alarm, AlarmStep::Shelved, at, None);
+        let (by, reason) = (Some(by.clone()), Some(reason.clone()));
+        Ok(self.take(id, AlarmRecord { by, reason, until: Some(until), ..record }))
+    }
+
+    /// Takes an alarm back from the shelf; if it is active it is raised anew with its present `value`.
+    pub fn unshelve(
+        &mut self,
+        id: AlarmId,
+        value: Option<f64>,
+        at: Timestamp,
+        by: &Arc<str>,
+    ) -> Result<Vec<AlarmRecord>, AlarmRefusal> {
+        let alarm = self.alarm(id)?;
+        if self.machine(id).shelved().is_none() {
+            return Err(AlarmRefusal::NotShelved);
+        }
+        Ok(self.back(&alarm, AlarmStep::Unshelved, value, at, by))
+    }
+
+    /// Puts an alarm aside until somebody puts it back.
+    pub fn out_of_service(
+        &mut self,
+        id: AlarmId,
+        reason: &Arc<str>,
+        at: Timestamp,
+        by: &Arc<str>,
+    ) -> Result<AlarmRecord, AlarmRefusal> {
+        let alarm = self.alarm(id)?;
+        check_reason(reason)?;
+        if self.machine(id).out_of_service().is_some() {
+            return Err(AlarmRefusal::OutOfService);
+        }
+        Ok(self.deed(&alarm, AlarmStep::OutOfService, at, None, by, Some(reason)))
+    }
+
+    /// Puts an alarm back in service; if it is active it is raised anew with its present `value`.
+    pub fn in_service(
+        &mut self,
+        id: AlarmId,
+        value: Option<f64>,
+        at: Timestamp,
+        by: &Arc<str>,
+    ) -> Result<Vec<AlarmRecord>, AlarmRefusal> {
+        let alarm = self.alarm(id)?;
+        if self.machine(id).out_of_service().is_none() {
+            return Err(AlarmRefusal::InService);
+        }
+        Ok(self.back(&alarm, AlarmStep::InService, value, at, by))
+    }
+
+    fn back(
+        &mut self,
+        alarm: &AlarmDef,
+        step: AlarmStep,
+        value: Option<f64>,
+        at: Timestamp,
+        by: &Arc<str>,
+    ) -> Vec<AlarmRecord> {
+        let back = self.deed(alarm, step, at, value, by, None);
+        [Some(back), self.raise_anew(alarm, at, value)].into_iter().flatten().collect()
+    }
+
+    fn deed(
+        &mut self,
+        alarm: &AlarmDef,
+        step: AlarmStep,
+        at: Timestamp,
+        value: Option<f64>,
+        by: &Arc<str>,
+        reason: Option<&Arc<str>>,
+    ) -> AlarmRecord {
+        let record = self.record(alarm, step, at, value);
+        self.take(alarm.id, AlarmRecord { by: Some(by.clone()), reason: reason.cloned(), ..record })
+    }
+
+    /// An id may come over the socket from another plant's terminal: it is not believed.
+    fn alarm(&self, id: AlarmId) -> Result<AlarmDef, AlarmRefusal> {
+        self.def.alarms.get(id.index()).cloned().ok_or(AlarmRefusal::NoSuchAlarm)
+    }
+}
+
+fn check_reason(reason: &Arc<str>) -> Result<(), AlarmRefusal> {
+    if reason.trim().is_empty() {
+        return Err(AlarmRefusal::ReasonNeeded);
+    }
+    check_words(Some(reason))
+}
+
+fn check_words(words: Option<&Arc<str>>) -> Result<(), AlarmRefusal> {
+    match words.is_some_and(|words| WORDS_MAX < words.chars().count()) {
+        true => Err(AlarmRefusal::TooLong),
+        false => Ok(()),
+    }
+}

@@ -1,0 +1,102 @@
+//! What an operator should see of the book: alarms in order of urgency, what is put aside, and whether it sounds.
+
+use std::{cmp::Reverse, sync::Arc};
+
+use jiff::Timestamp;
+
+use super::{
+    Book,
+    state::{AlarmState, Deed, Machine},
+};
+use crate::plant::{
+    def::AlarmId,
+    snapshot::{ActiveAlarm, AsideAlarm},
+};
+
+/// What a snapshot shows of the book. Shared, because most snapshots show the same.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Lists {
+    /// Most urgent first; among equals those that wait for an acknowledgement, then the latest.
+    pub active: Arc<Vec<ActiveAlarm>>,
+    /// What is put aside, in the order of the plant file.
+    pub aside: Arc<Vec<AsideAlarm>>,
+    /// An active alarm that nobody has acknowledged came after the last silence.
+    pub sound: bool,
+}
+
+impl Book {
+    /// What an operator should see.
+    pub fn lists(&self) -> &Arc<Lists> {
+        self.lists.get_or_init(|| Arc::new(self.listed()))
+    }
+
+    /// What an operator should see and answer to.
+    pub fn active(&self) -> &[ActiveAlarm] {
+        &self.lists().active
+    }
+
+    /// What sounds now is silenced; what comes later sounds again. `false` if nothing sounded.
+    pub fn silence(&mut self) -> bool {
+        let sounded = self.lists().sound;
+        self.silenced = self.edges;
+        self.lists = std::sync::OnceLock::new();
+        sounded
+    }
+
+    fn listed(&self) -> Lists {
+        let (mut active, mut aside, mut sound) = (Vec::new(), Vec::new(), false);
+        for (alarm, machine) in self.def.alarms.iter().zip(&self.machines) {
+            let state = machine.state();
+            match state {
+                AlarmState::Normal => {}
+                AlarmState::Shelved | AlarmState::Suppressed | AlarmState::OutOfService => {
+                    aside.extend(put_aside(alarm.id, machine));
+                }
+                AlarmState::Unacknowledged
+                | AlarmState::Acknowledged
+                | AlarmState::Returned
+                | AlarmState::LatchedUnacknowledged
+                | AlarmState::LatchedAcknowledged => {
+                    sound |= state == AlarmState::Unacknowledged && self.silenced < machine.edge;
+                    active.push(shown(alarm.id, machine));
+                }
+            }
+        }
+        active.sort_by_key(|alarm: &ActiveAlarm| {
+            let waits = alarm.state.needs_acknowledgement();
+            (self.def.alarm(alarm.id).priority, !waits, Reverse(alarm.raised_at))
+        });
+        Lists { active: Arc::new(active), aside: Arc::new(aside), sound }
+    }
+}
+
+fn shown(id: AlarmId, machine: &Machine) -> ActiveAlarm {
+    ActiveAlarm {
+        id,
+        state: machine.state(),
+        // Whatever the journal has lost, the alarm itself is not.
+        raised_at: machine.raised_at.or(machine.returned_at).unwrap_or(Timestamp::UNIX_EPOCH),
+        returned_at: machine.returned_at,
+        value: machine.value,
+        acknowledged: machine.acknowledged.clone(),
+        times: machine.times,
+        burst: machine.burst,
+    }
+}
+
+fn put_aside(id: AlarmId, machine: &Machine) -> Option<AsideAlarm> {
+    let state = machine.state();
+    let shelf = machine.shelved().filter(|_| state == AlarmState::Shelved);
+    let deed = match state {
+        AlarmState::OutOfService => machine.out_of_service()?.clone(),
+        AlarmState::Shelved => machine.shelved()?.deed.clone(),
+        AlarmState::Suppressed => Deed { at: machine.suppressed()?, by: None, reason: None },
+        AlarmState::Normal
+        | AlarmState::Unacknowledged
+        | AlarmState::Acknowledged
+        | AlarmState::Returned
+        | AlarmState::LatchedUnacknowledged
+        | AlarmState::LatchedAcknowledged => return None,
+    };
+    Some(AsideAlarm { id, state, deed, until: shelf.map(|shelving| shelving.until), active: machine.is_active() })
+}

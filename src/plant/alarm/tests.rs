@@ -1,0 +1,413 @@
+//! The book as a whole: what is told, acknowledged, put aside, reminded of and restored.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use proptest::prelude::*;
+
+use super::{AlarmRefusal, AlarmState, Book, condition::Facts};
+use crate::plant::{
+    def::{AlarmDef, AlarmId, Condition, Level, PlantDef, Subject},
+    fixture::{self, HIGH, PV, SILENT},
+    record::{AlarmRecord, AlarmStep},
+};
+
+fn at(second: i64) -> Timestamp {
+    Timestamp::from_second(second).expect("a small number")
+}
+
+fn facts(value: f64, answering: bool) -> impl Fn(&AlarmDef) -> Facts {
+    move |_| Facts { value: Some(value), ill: Some(!answering), ..Facts::default() }
+}
+
+fn by() -> Arc<str> {
+    "anna".into()
+}
+
+fn why() -> Arc<str> {
+    "sensor is being changed".into()
+}
+
+/// The fixture with its alarm "high" changed.
+fn with(change: impl Fn(&mut AlarmDef)) -> Arc<PlantDef> {
+    let mut def = fixture::plant();
+    change(&mut def.alarms[0]);
+    Arc::new(def)
+}
+
+fn state(book: &Book) -> AlarmState {
+    book.machine(HIGH).state()
+}
+
+fn steps(records: &[AlarmRecord]) -> Vec<AlarmStep> {
+    records.iter().map(|record| record.step).collect()
+}
+
+#[test]
+fn an_alarm_is_told_with_value_and_limit_and_survives_a_restart() {
+    let mut book = Book::new(fixture::shared());
+    assert!(book.judge(at(0), facts(80.0, true)).is_empty(), "the on-delay runs");
+    let steps = book.judge(at(2), facts(81.0, true));
+    assert_eq!(steps.len(), 1);
+    assert_eq!((&*steps[0].subject, steps[0].value, steps[0].limit), ("TIC-1.PV", Some(81.0), Some(75.0)));
+
+    let mut again = Book::new(fixture::shared());
+    again.restore(&steps);
+    assert_eq!(again.lists(), book.lists());
+    let ack = again.acknowledge(HIGH, at(2), Some(&why()), at(3), &by()).expect("it waits for an acknowledgement");
+    assert_eq!((ack.by, ack.reason), (Some(by()), Some(why())));
+    assert_eq!(again.acknowledge(HIGH, at(2), None, at(3), &by()), Err(AlarmRefusal::NothingToAcknowledge));
+    assert_eq!(again.active()[0].state, AlarmState::Acknowledged);
+    assert_eq!(again.active()[0].acknowledged.as_ref().and_then(|deed| deed.by.clone()), Some(by()));
+}
+
+#[test]
+fn the_list_puts_what_waits_before_what_is_known() {
+    let mut book = Book::new(fixture::shared());
+    book.judge(at(0), facts(80.0, false));
+    book.judge(at(2), facts(80.0, false));
+    assert_eq!(book.active().iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [HIGH, SILENT], "latest first");
+    book.acknowledge(HIGH, at(2), None, at(3), &by()).expect("it waits");
+    assert_eq!(book.active().iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [SILENT, HIGH]);
+}
+
+#[test]
+fn what_was_raised_after_the_operator_looked_stays_unacknowledged() {
+    let def = with(|alarm| alarm.on_delay = Duration::ZERO);
+    let mut book = Book::new(def);
+    book.judge(at(0), facts(80.0, true));
+    let seen = book.active()[0].raised_at;
+    book.judge(at(1), facts(70.0, true));
+    book.judge(at(2), facts(80.0, true));
+    assert_eq!(book.acknowledge(HIGH, seen, None, at(3), &by()), Err(AlarmRefusal::RaisedSince));
+    assert_eq!(state(&book), AlarmState::Unacknowledged);
+    assert!(book.acknowledge(HIGH, at(2), None, at(3), &by()).is_ok());
+}
+
+#[test]
+fn a_note_is_asked_for_where_the_plant_wants_one() {
+    let def = with(|alarm| (alarm.on_delay, alarm.note) = (Duration::ZERO, true));
+    let mut book = Book::new(def);
+    book.judge(at(0), facts(80.0, true));
+    for note in [None, Some("".into()), Some("  ".into())] {
+        assert_eq!(book.acknowledge(HIGH, at(0), note.as_ref(), at(1), &by()), Err(AlarmRefusal::NoteNeeded));
+    }
+    let long: Arc<str> = "x".repeat(501).into();
+    assert_eq!(book.acknowledge(HIGH, at(0), Some(&long), at(1), &by()), Err(AlarmRefusal::TooLong));
+    assert!(book.acknowledge(HIGH, at(0), Some(&why()), at(1), &by()).is_ok());
+}
+
+#[test]
+fn silence_ends_what_sounds_and_a_return_never_sounds() {
+    let mut book = Book::new(with(|alarm| alarm.on_delay = Duration::ZERO));
+    assert!(!book.silence(), "nothing sounds");
+    book.judge(at(0), facts(80.0, true));
+    assert!(book.lists().sound);
+    assert!(book.silence());
+    assert!(!book.lists().sound);
+    assert_eq!(state(&book), AlarmState::Unacknowledged, "silence acknowledges nothing");
+    book.judge(at(1), facts(80.0, false));
+    assert!(book.lists().sound, "a new alarm sounds");
+    book.silence();
+    book.judge(at(2), facts(70.0, true));
+    assert!(!book.lists().sound, "both have returned");
+}
+
+#[test]
+fn a_reset_does_nothing_while_the_cause_lasts() {
+    let mut book = Book::new(with(|alarm| (alarm.on_delay, alarm.latch) = (Duration::ZERO, true)));
+    assert_eq!(book.reset(HIGH, at(0), &by()), Err(AlarmRefusal::NothingToReset));
+    book.judge(at(0), facts(80.0, true));
+    assert_eq!(book.reset(HIGH, at(1), &by()), Err(AlarmRefusal::CauseLasts));
+    book.judge(at(2), facts(70.0, true));
+    assert_eq!(state(&book), AlarmState::LatchedUnacknowledged);
+    book.acknowledge(HIGH, at(0), None, at(3), &by()).expect("it waits");
+    assert_eq!(state(&book), AlarmState::LatchedAcknowledged);
+    book.reset(HIGH, at(4), &by()).expect("the cause has gone");
+    assert_eq!(state(&book), AlarmState::Normal);
+}
+
+#[test]
+fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
+    let mut book = Book::new(with(|alarm| alarm.on_delay = Duration::ZERO));
+    let minute = Duration::from_secs(60);
+    let max = book.def.alarm_rules.shelve_max;
+    for (lasts, reason, refusal) in [
+        (minute, "", AlarmRefusal::ReasonNeeded),
+        (Duration::ZERO, "leak", AlarmRefusal::ShelveTime { max }),
+        (max + minute, "leak", AlarmRefusal::ShelveTime { max }),
+    ] {
+        assert_eq!(book.shelve(HIGH, lasts, &reason.into(), at(0), &by()), Err(refusal));
+    }
+    book.shelve(HIGH, minute, &why(), at(0), &by()).expect("a minute, with a reason");
+    assert_eq!(steps(&book.judge(at(10), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
+    assert!(!book.lists().sound && book.active().is_empty());
+    let aside = book.lists().aside[0].clone();
+    assert_eq!((aside.until, aside.active, aside.deed.reason), (Some(at(60)), true, Some(why())));
+    assert_eq!(steps(&book.judge(at(59), facts(80.0, true))), []);
+    assert_eq!(steps(&book.judge(at(60), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
+    assert_eq!((state(&book), book.active()[0].raised_at), (AlarmState::Unacknowledged, at(60)));
+    book.shelve(HIGH, minute, &why(), at(70), &by()).expect("again");
+    assert_eq!(steps(&book.judge(at(71), facts(70.0, true))), [AlarmStep::ReturnedQuietly]);
+    assert_eq!(steps(&book.unshelve(HIGH, None, at(72), &by()).expect("it is shelved")), [AlarmStep::Unshelved]);
+    assert_eq!(state(&book), AlarmState::Normal);
+    assert_eq!(book.unshelve(HIGH, None, at(73), &by()), Err(AlarmRefusal::NotShelved));
+}
+
+#[test]
+fn a_clock_that_goes_back_lengthens_no_shelf_and_no_delay() {
+    let mut book = Book::new(with(|alarm| alarm.on_delay = Duration::from_secs(10)));
+    book.judge(at(10_000), facts(80.0, true));
+    book.judge(at(10_006), facts(80.0, true));
+    book.judge(at(100), facts(80.0, true));
+    assert_eq!(steps(&book.judge(at(104), facts(80.0, true))), [AlarmStep::Raised], "6 s and 4 s");
+    book.shelve(HIGH, Duration::from_secs(600), &why(), at(5_000), &by()).expect("ten minutes");
+    assert_eq!(steps(&book.judge(at(200), facts(80.0, true))), [AlarmStep::Shelved]);
+    assert_eq!(book.lists().aside[0].until, Some(at(800)));
+    assert_eq!(steps(&book.judge(at(800), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
+}
+
+#[test]
+fn an_alarm_out_of_service_stays_so_until_somebody_puts_it_back() {
+    let mut book = Book::new(with(|alarm| alarm.on_delay = Duration::ZERO));
+    assert_eq!(book.out_of_service(HIGH, &" ".into(), at(0), &by()), Err(AlarmRefusal::ReasonNeeded));
+    assert_eq!(book.in_service(HIGH, None, at(0), &by()), Err(AlarmRefusal::InService));
+    book.out_of_service(HIGH, &why(), at(0), &by()).expect("with a reason");
+    assert_eq!(book.shelve(HIGH, Duration::from_secs(60), &why(), at(1), &by()), Err(AlarmRefusal::OutOfService));
+    assert_eq!(steps(&book.judge(at(100_000), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
+    assert_eq!(book.lists().aside[0].state, AlarmState::OutOfService);
+    let back = book.in_service(HIGH, Some(80.0), at(100_001), &by()).expect("it is out of service");
+    assert_eq!(steps(&back), [AlarmStep::InService, AlarmStep::Raised]);
+    assert_eq!(back[1].value, Some(80.0));
+}
+
+/// The fixture whose alarm "high" is enabled while the facts say so.
+fn enabled_by_design(change: impl Fn(&mut AlarmDef)) -> Arc<PlantDef> {
+    use crate::plant::expr::{Compare, Expr};
+    let expr = Expr::Test { tag: PV, compare: Compare::Above, value: 0.0 };
+    with(|alarm| {
+        (alarm.on_delay, alarm.enabled_when) = (Duration::ZERO, Some(expr.clone()));
+        change(alarm);
+    })
+}
+
+#[test]
+fn an_alarm_that_is_not_enabled_tells_nobody_and_an_unknown_enabling_suppresses_nothing() {
+    let when =
+        |value: f64, enabled| move |_: &AlarmDef| Facts { enabled, ..facts(value, true)(&fixture::plant().alarms[0]) };
+    let mut book = Book::new(enabled_by_design(|_| ()));
+    let quiet = [AlarmStep::Suppressed, AlarmStep::RaisedQuietly];
+    assert_eq!(steps(&book.judge(at(0), when(80.0, Some(false)))), quiet);
+    assert_eq!((state(&book), book.lists().sound), (AlarmState::Suppressed, false));
+    assert_eq!(steps(&book.judge(at(1), when(80.0, None))), [AlarmStep::Released, AlarmStep::Raised]);
+    let mut delayed = Book::new(enabled_by_design(|alarm| alarm.on_delay = Duration::from_secs(5)));
+    delayed.judge(at(0), when(80.0, Some(false)));
+    assert_eq!(steps(&delayed.judge(at(5), when(80.0, Some(false)))), [AlarmStep::RaisedQuietly]);
+    let anew = [AlarmStep::Released, AlarmStep::ReturnedQuietly];
+    assert_eq!(steps(&delayed.judge(at(10), when(80.0, Some(true)))), anew, "the delay begins when the pump starts");
+    assert_eq!(steps(&delayed.judge(at(14), when(80.0, Some(true)))), []);
+    assert_eq!(steps(&delayed.judge(at(15), when(80.0, Some(true)))), [AlarmStep::Raised]);
+}
+
+#[test]
+fn a_value_that_stood_still_before_the_heating_is_not_stuck() {
+    let stuck = Condition::NoChange { lasts: Duration::from_secs(60), deadband: 0.1 };
+    let mut book = Book::new(enabled_by_design(|alarm| alarm.condition = stuck));
+    let when = |enabled| move |_: &AlarmDef| Facts { value: Some(20.0), enabled: Some(enabled), ..Facts::default() };
+    for (second, enabled, expect) in [
+        (0, false, vec![AlarmStep::Suppressed]),
+        (600, false, vec![]),
+        (601, true, vec![AlarmStep::Released]),
+        (660, true, vec![]),
+        (661, true, vec![AlarmStep::Raised]),
+        (662, false, vec![AlarmStep::Suppressed, AlarmStep::ReturnedQuietly]),
+    ] {
+        assert_eq!(steps(&book.judge(at(second), when(enabled))), expect, "at {second} s");
+    }
+}
+
+#[test]
+fn an_acknowledged_alarm_that_lasts_is_reminded_of() {
+    let remind = |alarm: &mut AlarmDef| {
+        (alarm.on_delay, alarm.re_alarm) = (Duration::ZERO, Some(Duration::from_secs(1_800)));
+    };
+    let mut book = Book::new(with(remind));
+    let mut journal = book.judge(at(0), facts(80.0, true));
+    journal.push(book.acknowledge(HIGH, at(0), None, at(10), &by()).expect("it waits"));
+    book.silence();
+    assert_eq!(steps(&book.judge(at(1_809), facts(80.0, true))), []);
+    let mut again = Book::new(with(remind));
+    again.restore(&journal);
+    assert_eq!(
+        steps(&again.judge(at(1_810), facts(80.0, true))),
+        [AlarmStep::RaisedAgain],
+        "a restart forgets no time"
+    );
+    assert_eq!(steps(&book.judge(at(1_810), facts(80.0, true))), [AlarmStep::RaisedAgain]);
+    assert_eq!((state(&book), book.lists().sound), (AlarmState::Unacknowledged, true));
+    assert_eq!(book.active()[0].raised_at, at(0), "it is the same activation");
+}
+
+/// A plant with so many alarms on PV, each with a limit of its own.
+fn many(count: u16) -> Arc<PlantDef> {
+    let mut def = fixture::plant();
+    let alarm = |n: u16| {
+        let condition = Condition::Limit { level: Level::High, limit: f64::from(n), deadband: 0.5 };
+        AlarmDef::new(AlarmId(n), Subject::Tag(PV), condition, format!("over {n}"))
+    };
+    def.alarms = (0..count).map(alarm).collect();
+    Arc::new(def)
+}
+
+#[test]
+fn of_a_storm_none_is_lost_and_the_first_out_is_marked() {
+    let mut book = Book::new(many(10_000));
+    let mut raised = Vec::new();
+    for second in 0..60 {
+        raised.extend(book.judge(at(second), facts(second as f64 * 500.0 / 59.0 + 0.5, true)));
+    }
+    assert_eq!(raised.len(), 501);
+    assert_eq!(book.active().len(), 501);
+    assert!(raised.iter().all(|record| record.burst.is_some_and(|burst| burst.began == at(0))), "one burst");
+    let ranks: Vec<u32> = raised.iter().filter_map(|record| record.burst.map(|burst| burst.rank)).collect();
+    assert_eq!(ranks, (1..=501).collect::<Vec<u32>>());
+    let later = book.judge(at(80), facts(501.5, true));
+    assert_eq!(later[0].burst.map(|burst| (burst.began, burst.rank)), Some((at(80), 1)), "another one");
+}
+
+/// One thing that happens in the property test.
+#[derive(Debug, Clone)]
+enum Happening {
+    Passes(i64),
+    Value(Option<f64>),
+    Enabled(Option<bool>),
+    Acknowledge,
+    Silence,
+    Reset,
+    Shelve(u64),
+    Unshelve,
+    OutOfService,
+    InService,
+    Restart,
+}
+
+fn happening() -> impl Strategy<Value = Happening> {
+    prop_oneof![
+        4 => (0i64..40).prop_map(Happening::Passes),
+        1 => (-5_000i64..5_000).prop_map(Happening::Passes),
+        5 => proptest::option::weighted(0.9, 70.0..80.0f64).prop_map(Happening::Value),
+        2 => proptest::option::of(any::<bool>()).prop_map(Happening::Enabled),
+        3 => Just(Happening::Acknowledge),
+        1 => Just(Happening::Silence),
+        2 => Just(Happening::Reset),
+        2 => (0u64..2_000).prop_map(Happening::Shelve),
+        1 => Just(Happening::Unshelve),
+        1 => Just(Happening::OutOfService),
+        1 => Just(Happening::InService),
+        2 => Just(Happening::Restart),
+    ]
+}
+
+/// What the journal restores: of each alarm the last step of every kind, in their order.
+fn remembered(journal: &[AlarmRecord]) -> Vec<AlarmRecord> {
+    let last = |(place, record): &(usize, &AlarmRecord)| {
+        let same = |later: &AlarmRecord| later.step == record.step && later.text == record.text;
+        !journal[place + 1..].iter().any(same)
+    };
+    journal.iter().enumerate().filter(last).map(|(_, record)| record.clone()).collect()
+}
+
+/// What a restart must bring back: all but the count since the start and what sounds.
+fn lasting(book: &Book) -> impl PartialEq + std::fmt::Debug {
+    let active =
+        book.lists().active.iter().map(|alarm| super::super::snapshot::ActiveAlarm { times: 0, ..alarm.clone() });
+    let machine = book.machine(HIGH);
+    let kept = (machine.is_active(), machine.is_latched(), machine.suppressed(), machine.shelved().cloned());
+    (active.collect::<Vec<_>>(), book.lists().aside.clone(), kept)
+}
+
+proptest! {
+    #[test]
+    fn whatever_happens_no_alarm_is_lost_or_wrong_and_a_restart_changes_nothing(
+        latch in any::<bool>(),
+        designed in any::<bool>(),
+        delay in 0u64..20,
+        happenings in proptest::collection::vec(happening(), 1..120),
+    ) {
+        let manner = |alarm: &mut AlarmDef| {
+            (alarm.latch, alarm.on_delay) = (latch, Duration::from_secs(delay));
+            alarm.re_alarm = Some(Duration::from_secs(900));
+        };
+        let def = if designed { enabled_by_design(manner) } else { with(manner) };
+        let mut book = Book::new(def.clone());
+        let (mut now, mut value, mut enabled) = (100_000, Some(70.0), Some(true));
+        let mut journal: Vec<AlarmRecord> = Vec::new();
+        for happening in happenings {
+            let (before, sounded, known) = (book.machine(HIGH).clone(), book.lists().sound, journal.len());
+            let by = by();
+            match happening.clone() {
+                Happening::Passes(seconds) => now = (now + seconds).max(0),
+                Happening::Value(next) => value = next,
+                Happening::Enabled(next) => enabled = next,
+                Happening::Acknowledge => {
+                    let seen = before.raised_at.unwrap_or(at(0));
+                    let done = book.acknowledge(HIGH, seen, None, at(now), &by);
+                    prop_assert_eq!(done.is_ok(), before.state().needs_acknowledgement());
+                    journal.extend(done);
+                }
+                Happening::Silence => { book.silence(); }
+                Happening::Reset => {
+                    let done = book.reset(HIGH, at(now), &by);
+                    prop_assert!(done.is_err() || !before.is_active(), "a reset while the cause lasts");
+                    journal.extend(done);
+                }
+                Happening::Shelve(seconds) => {
+                    journal.extend(book.shelve(HIGH, Duration::from_secs(seconds), &why(), at(now), &by));
+                }
+                Happening::Unshelve => journal.extend(book.unshelve(HIGH, value, at(now), &by).into_iter().flatten()),
+                Happening::OutOfService => journal.extend(book.out_of_service(HIGH, &why(), at(now), &by)),
+                Happening::InService => journal.extend(book.in_service(HIGH, value, at(now), &by).into_iter().flatten()),
+                Happening::Restart => {
+                    let mut again = Book::new(def.clone());
+                    again.restore(&remembered(&journal));
+                    prop_assert_eq!(lasting(&again), lasting(&book));
+                    book = again;
+                    continue;
+                }
+            }
+            let told = book.judge(at(now), |alarm| Facts {
+                value,
+                ill: Some(false),
+                enabled: enabled.filter(|_| alarm.enabled_when.is_some()),
+                ..Facts::default()
+            });
+            journal.extend(told);
+            let (machine, new) = (book.machine(HIGH), &journal[known..]);
+            let raised = new.iter().any(|step| matches!(step.step, AlarmStep::Raised | AlarmStep::RaisedAgain));
+            // Who is told is told once, and only where something was raised in the open.
+            prop_assert!(!book.lists().sound || sounded || raised, "it sounds for nothing: {:?}", happening);
+            prop_assert!(!(machine.state().is_aside() && book.lists().sound));
+            let shown = book.active().iter().any(|alarm| alarm.id == HIGH);
+            let aside = book.lists().aside.iter().any(|alarm| alarm.id == HIGH);
+            prop_assert_eq!(machine.state() == AlarmState::Normal, !shown && !aside, "what is not normal is listed");
+            prop_assert!(!(shown && aside));
+            // Beyond the limit for longer than its delay it is active; inside the deadband nothing changes.
+            if (74.0..=75.0).contains(&value.unwrap_or(74.5)) {
+                let turned = new.iter().any(|step| matches!(
+                    step.step,
+                    AlarmStep::RaisedQuietly | AlarmStep::Returned
+                ));
+                prop_assert!(!turned || delay > 0, "chatter inside the deadband: {:?}", new);
+            }
+            if raised && !new.iter().any(|step| step.step == AlarmStep::RaisedAgain) {
+                prop_assert_eq!(machine.state(), AlarmState::Unacknowledged, "nobody has seen it");
+            }
+            prop_assert!(!latch || !machine.is_latched() || machine.state() != AlarmState::Normal);
+            // Shelved for no longer than it was given for.
+            if let Some(shelving) = machine.shelved() {
+                prop_assert!(at(now) < shelving.until);
+                prop_assert!(shelving.until.duration_since(at(now)).as_secs() <= 2_000);
+            }
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! Alarms in the plant: what they are judged by, what operators do with them, what a restart takes up.
+
+use jiff::Timestamp;
+
+use super::{Effects, Plant};
+use crate::plant::{
+    alarm::{AlarmCommand, AlarmRefusal, condition::Facts},
+    board::Board,
+    command::{NotConfirmed, Order, Outcome, Refusal},
+    def::{AlarmDef, AlarmId, Condition, Subject},
+    event::LineState,
+    ne107::Signal,
+    record::{ActionRecord, AlarmRecord, Record},
+    snapshot::{DeviceState, DeviceStatus, LineStatus},
+};
+
+impl Plant {
+    /// Takes up the alarms that the journal remembers from before a restart, oldest step first.
+    pub fn restore(&mut self, steps: &[AlarmRecord]) {
+        self.book.restore(steps);
+    }
+
+    /// Takes an order about alarms.
+    pub(super) fn alarm_order(
+        &mut self,
+        order: &Order,
+        command: AlarmCommand,
+        at: Timestamp,
+        effects: &mut Effects,
+    ) -> Option<ActionRecord> {
+        // The steps of one alarm must not go back in time, whatever the clock does.
+        let now = self.at.max(at);
+        let (book, by) = (&mut self.book, &order.by);
+        let done = match command {
+            AlarmCommand::Acknowledge { alarm, seen, note } => {
+                book.acknowledge(alarm, seen, note.as_ref(), now, by).map(|step| vec![step])
+            }
+            AlarmCommand::AcknowledgeAll { seen, note } => {
+                let each = seen.iter().map(|(alarm, seen)| book.acknowledge(*alarm, *seen, note.as_ref(), now, by));
+                let (steps, outcome) = together(each);
+                effects.records.extend(steps.into_iter().map(Record::Alarm));
+                return self.desk.note(order, outcome, &self.board, at);
+            }
+            AlarmCommand::Silence => match book.silence() {
+                true => Ok(Vec::new()),
+                false => Err(AlarmRefusal::NothingSounds),
+            },
+            AlarmCommand::Reset(alarm) => book.reset(alarm, now, by).map(|step| vec![step]),
+            AlarmCommand::Shelve { alarm, lasts, reason } => {
+                book.shelve(alarm, lasts, &reason, now, by).map(|step| vec![step])
+            }
+            AlarmCommand::Unshelve(alarm) => book.unshelve(alarm, value_of(&self.def, &self.board, alarm), now, by),
+            AlarmCommand::OutOfService { alarm, reason } => {
+                book.out_of_service(alarm, &reason, now, by).map(|step| vec![step])
+            }
+            AlarmCommand::InService(alarm) => book.in_service(alarm, value_of(&self.def, &self.board, alarm), now, by),
+        };
+        let outcome = match done {
+            Ok(steps) => {
+                effects.records.extend(steps.into_iter().map(Record::Alarm));
+                Outcome::Verified
+            }
+            Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),
+        };
+        self.desk.note(order, outcome, &self.board, at)
+    }
+
+    /// Judges every alarm now.
+    pub(super) fn judge_alarms(&mut self) -> Vec<AlarmRecord> {
+        let asks_health = |alarm: &AlarmDef| matches!(alarm.condition, Condition::Health { .. });
+        let diagnosed = if self.def.alarms.iter().any(asks_health) { self.diagnosed() } else { Vec::new() };
+        let (def, board, lines, devices) = (&self.def, &self.board, &self.lines, &self.devices);
+        let ill = |alarm: &AlarmDef| match (alarm.subject, alarm.condition) {
+            (Subject::Device(device), Condition::Health { signal }) => {
+                diagnosed.get(device.index()).and_then(|status| has_signal(status, signal))
+            }
+            (Subject::Device(device), _) => {
+                let report = lines[def.device(device).line.index()].report.as_deref();
+                let no_values = report.is_some_and(|report| report.gives_no_values(device));
+                answers(devices[device.index()].state, no_values).map(|answers| !answers)
+            }
+            (Subject::Line(line), _) => is_lost(&lines[line.index()]),
+            (Subject::Tag(_), _) => None,
+        };
+        self.book.judge(self.at, |alarm| facts(board, ill(alarm), alarm))
+    }
+}
+
+/// What is known for an alarm. Only good values count: an uncertain one neither raises nor clears.
+fn facts(board: &Board, ill: Option<bool>, alarm: &AlarmDef) -> Facts {
+    let trusted = |tag| board.sample(tag).trusted();
+    let value = match alarm.subject {
+        Subject::Tag(tag) => trusted(tag),
+        Subject::Device(_) | Subject::Line(_) => None,
+    };
+    let reference = alarm.condition.reference().and_then(trusted);
+    let enabled = alarm.enabled_when.as_ref().and_then(|expr| expr.holds(&trusted));
+    Facts { value, reference, ill, enabled }
+}
+
+/// The present value for an alarm that comes back.
+fn value_of(def: &crate::plant::PlantDef, board: &Board, alarm: AlarmId) -> Option<f64> {
+    facts(board, None, def.alarms.get(alarm.index())?).value
+}
+
+/// A device that refuses everything is as good as silent.
+fn answers(state: DeviceState, no_values: bool) -> Option<bool> {
+    match state {
+        DeviceState::Answering | DeviceState::Failing(_) if no_values => Some(false),
+        DeviceState::Unknown | DeviceState::Failing(_) => None,
+        DeviceState::Answering => Some(true),
+        DeviceState::Down { .. } => Some(false),
+    }
+}
+
+/// Whether a device has a signal; nobody can tell before it was asked.
+fn has_signal(status: &DeviceStatus, signal: Signal) -> Option<bool> {
+    match (status.state, status.diagnosis) {
+        (DeviceState::Unknown, None) => None,
+        (_, reason) => Some(reason.is_some_and(|reason| reason.signal() == signal)),
+    }
+}
+
+/// A line that an operator has closed, or that a test has, is not lost.
+fn is_lost(line: &LineStatus) -> Option<bool> {
+    match line.state {
+        LineState::Connected | LineState::Disconnected | LineState::Testing => Some(false),
+        LineState::Waiting { .. } => Some(true),
+        LineState::Connecting => line.lost_since.is_some().then_some(true),
+    }
+}
+
+/// What came of several wishes at once: the steps, and an outcome that hides none that was refused.
+fn together(each: impl Iterator<Item = Result<AlarmRecord, AlarmRefusal>>) -> (Vec<AlarmRecord>, Outcome) {
+    let (mut steps, mut refused, mut count) = (Vec::new(), Vec::new(), 0);
+    for done in each {
+        count += 1;
+        match done {
+            Ok(step) => steps.push(step),
+            Err(refusal) => refused.push(refusal),
+        }
+    }
+    let outcome = match (steps.len(), refused.first()) {
+        (0, first) => Outcome::Refused(Refusal::Alarm(first.cloned().unwrap_or(AlarmRefusal::NothingToAcknowledge))),
+        (_, None) => Outcome::Verified,
+        (done, Some(first)) => Outcome::NotConfirmed(NotConfirmed::Partly(format!("{done} of {count}; {first}"))),
+    };
+    (steps, outcome)
+}
