@@ -3,7 +3,7 @@
 use super::Wish;
 use crate::{
     history::Question,
-    plant::{command::Command, role::Role, tool::Tool},
+    plant::{alarm::AlarmCommand, command::Command, role::Role, tool::Tool},
 };
 
 /// What a person may do. A role has the rights of those before it.
@@ -42,8 +42,14 @@ impl Right {
 pub fn of_command(command: &Command) -> Right {
     match command {
         Command::Write { .. }
-        | Command::Acknowledge(_)
-        | Command::AcknowledgeAll
+        | Command::Alarm(
+            AlarmCommand::Acknowledge { .. }
+            | AlarmCommand::AcknowledgeAll { .. }
+            | AlarmCommand::Silence
+            | AlarmCommand::Reset(_)
+            | AlarmCommand::Shelve { .. }
+            | AlarmCommand::Unshelve(_),
+        )
         | Command::Refresh(_)
         | Command::Connect(..)
         | Command::StopTest(_)
@@ -51,7 +57,9 @@ pub fn of_command(command: &Command) -> Right {
         | Command::SaveSet { .. }
         | Command::Restore(_)
         | Command::StopRestore(_) => Right::Operate,
-        Command::Configure(_) | Command::SaveSettings(_) => Right::Engineer,
+        Command::Alarm(AlarmCommand::OutOfService(_) | AlarmCommand::InService(_))
+        | Command::Configure(_)
+        | Command::SaveSettings(_) => Right::Engineer,
         Command::Test(_, tool) => of_tool(tool),
     }
 }
@@ -126,8 +134,10 @@ mod tests {
         let serial = crate::plant::def::Serial::USUAL;
         let technician = [
             Command::Write { tag: TagId(1), value: 1.0 },
-            Command::Acknowledge(AlarmId(0)),
-            Command::AcknowledgeAll,
+            Command::Alarm(AlarmCommand::Acknowledge { alarm: AlarmId(0), seen: jiff::Timestamp::UNIX_EPOCH }),
+            Command::Alarm(AlarmCommand::AcknowledgeAll { seen: Arc::from([]) }),
+            Command::Alarm(AlarmCommand::Silence),
+            Command::Alarm(AlarmCommand::Reset(AlarmId(0))),
             Command::Refresh(DeviceId(0)),
             Command::Connect(LineId(0), true),
             Command::StopTest(LineId(0)),

@@ -4,6 +4,7 @@ use crate::{
     history::Question,
     plant::{
         PlantDef,
+        alarm::AlarmCommand,
         command::Command,
         def::{AlarmId, DeviceId, LineId, TagId},
     },
@@ -18,8 +19,8 @@ const SERIES_MAX: usize = 64;
 pub fn command(def: &PlantDef, command: &Command) -> Result<(), String> {
     match command {
         Command::Write { tag: id, value: _ } => tag(def, *id),
-        Command::Acknowledge(id) => alarm(def, *id),
-        Command::AcknowledgeAll | Command::ReadSets => Ok(()),
+        Command::Alarm(command) => of_alarms(def, command),
+        Command::ReadSets => Ok(()),
         Command::Refresh(id) | Command::StopRestore(id) | Command::SaveSet { device: id, .. } => device(def, *id),
         Command::Connect(id, _) | Command::SaveSettings(id) | Command::Test(id, _) | Command::StopTest(id) => {
             line(def, *id)
@@ -29,6 +30,25 @@ pub fn command(def: &PlantDef, command: &Command) -> Result<(), String> {
             device(def, wish.device)?;
             wish.changes.iter().try_for_each(|change| tag(def, change.tag))
         }
+    }
+}
+
+fn of_alarms(def: &PlantDef, command: &AlarmCommand) -> Result<(), String> {
+    match command {
+        AlarmCommand::AcknowledgeAll { seen } => {
+            let (many, count) = (seen.len(), def.alarms.len());
+            if count < many {
+                return Err(format!("{many} alarms, this plant has {count}"));
+            }
+            seen.iter().try_for_each(|(id, _)| alarm(def, *id))
+        }
+        AlarmCommand::Silence => Ok(()),
+        AlarmCommand::Acknowledge { alarm: id, .. }
+        | AlarmCommand::Reset(id)
+        | AlarmCommand::Shelve { alarm: id, .. }
+        | AlarmCommand::Unshelve(id)
+        | AlarmCommand::OutOfService(id)
+        | AlarmCommand::InService(id) => alarm(def, *id),
     }
 }
 

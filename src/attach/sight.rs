@@ -12,7 +12,7 @@ use crate::plant::{
 /// Alarms, clock, trouble of the history, and which lines and devices are reached; no value of the process, no text, no
 /// bytes, no order. What is left out is absent, not hidden: it does not leave the station.
 pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
-    let Snapshot { at, def, decimals, lines, devices, alarms, alarm_quality, history, speed, .. } = snapshot;
+    let Snapshot { at, def, decimals, lines, devices, alarms, aside, sound, alarm_quality, history, speed, .. } = snapshot;
     let reached = |line: &LineStatus| LineStatus {
         state: line.state.clone(),
         since: line.since,
@@ -32,7 +32,9 @@ pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
         evidence: Arc::new(vec![None; def.tags.len()]),
         lines: lines.iter().map(reached).collect(),
         devices: devices.iter().map(answering).collect(),
-        alarms: alarms.iter().map(|alarm| ActiveAlarm { value: None, ..alarm.clone() }).collect(),
+        alarms: Arc::new(alarms.iter().map(|alarm| ActiveAlarm { value: None, ..alarm.clone() }).collect()),
+        aside: aside.clone(),
+        sound: *sound,
         alarm_quality: alarm_quality.clone(),
         orders: Vec::new(),
         watch: Watch::default(),

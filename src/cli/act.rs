@@ -6,7 +6,7 @@ use crate::plant::{
     Snapshot,
     alarm::book::subject_name,
     command::{Command, Outcome},
-    def::{AlarmId, TagId},
+    def::TagId,
     orders::outcome_words,
 };
 
@@ -86,7 +86,7 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
         if let Some(unknown) = args.subjects.iter().find(|name| !known(name)) {
             return Err(CliError::Usage(format!("nothing called `{unknown}` has an alarm in {}", snapshot.def.name)));
         }
-        let waiting: Vec<AlarmId> = snapshot
+        let waiting: Vec<_> = snapshot
             .alarms
             .iter()
             .filter(|alarm| alarm.state.needs_acknowledgement())
@@ -94,11 +94,9 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
                 let subject = subject_name(&snapshot.def, snapshot.def.alarm(alarm.id).subject);
                 args.all || args.subjects.iter().any(|name| name == subject)
             })
-            .map(|alarm| alarm.id)
             .collect();
-        for (number, id) in (1..).zip(&waiting) {
-            let alarm = snapshot.def.alarm(*id);
-            let command = Command::Acknowledge(*id);
+        for (number, seen) in (1..).zip(&waiting) {
+            let (alarm, command) = (snapshot.def.alarm(seen.id), seen.acknowledge());
             let status = client::ordered(&mut session, number, command, None, args.note.as_deref()).await?;
             let line = format!("{} {}: ", subject_name(&snapshot.def, alarm.subject), alarm.text);
             if status.outcome != Outcome::Verified {

@@ -384,20 +384,19 @@ pub fn alarm_words(def: &PlantDef, command: &AlarmCommand) -> (&'static str, Str
         Some(alarm) => format!("{} {}", subject_name(def, alarm.subject), alarm.text),
         None => format!("alarm {}", alarm.0),
     };
-    let note = |note: &Option<Arc<str>>| note.as_ref().map(|note| note.to_string());
     match command {
-        AlarmCommand::Acknowledge { alarm, note: words, .. } => ("acknowledge", name(alarm), note(words)),
-        AlarmCommand::AcknowledgeAll { seen, note: words } => {
+        AlarmCommand::Acknowledge { alarm, .. } => ("acknowledge", name(alarm), None),
+        AlarmCommand::AcknowledgeAll { seen } => {
             let target = if let [(one, _)] = &**seen { name(one) } else { format!("{} alarms", seen.len()) };
-            ("acknowledge", target, note(words))
+            ("acknowledge", target, None)
         }
         AlarmCommand::Silence => ("silence", "alarms".into(), None),
         AlarmCommand::Reset(alarm) => ("reset", name(alarm), None),
-        AlarmCommand::Shelve { alarm, lasts, reason } => {
-            ("shelve", name(alarm), Some(format!("for {} min: {reason}", lasts.as_secs().div_ceil(60))))
+        AlarmCommand::Shelve { alarm, lasts } => {
+            ("shelve", name(alarm), Some(format!("for {} min", lasts.as_secs().div_ceil(60))))
         }
         AlarmCommand::Unshelve(alarm) => ("unshelve", name(alarm), None),
-        AlarmCommand::OutOfService { alarm, reason } => ("out of service", name(alarm), Some(reason.to_string())),
+        AlarmCommand::OutOfService(alarm) => ("out of service", name(alarm), None),
         AlarmCommand::InService(alarm) => ("in service", name(alarm), None),
     }
 }

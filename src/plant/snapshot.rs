@@ -84,7 +84,9 @@ impl Snapshot {
             evidence: Arc::new(vec![None; tags]),
             lines: vec![LineStatus::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); devices],
-            alarms: Vec::new(),
+            alarms: Arc::default(),
+            aside: Arc::default(),
+            sound: false,
             alarm_quality: AlarmQuality::default(),
             orders: Vec::new(),
             watch: Watch::default(),
@@ -162,7 +164,7 @@ impl Snapshot {
     pub fn acknowledge_all(&self) -> Option<Command> {
         let waits = self.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement());
         let seen: Arc<[_]> = waits.map(|alarm| (alarm.id, alarm.raised_at)).collect();
-        (!seen.is_empty()).then_some(Command::Alarm(AlarmCommand::AcknowledgeAll { seen, note: None }))
+        (!seen.is_empty()).then_some(Command::Alarm(AlarmCommand::AcknowledgeAll { seen }))
     }
     /// The alarms of a tag, most urgent first.
     pub fn alarms_of(&self, tag: TagId) -> impl Iterator<Item = &ActiveAlarm> {
@@ -255,7 +257,7 @@ impl ActiveAlarm {
     }
     /// The order to acknowledge it, as it is seen here.
     pub fn acknowledge(&self) -> Command {
-        Command::Alarm(AlarmCommand::Acknowledge { alarm: self.id, seen: self.raised_at, note: None })
+        Command::Alarm(AlarmCommand::Acknowledge { alarm: self.id, seen: self.raised_at })
     }
 }
 

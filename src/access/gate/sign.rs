@@ -117,8 +117,7 @@ fn needed(def: &PlantDef, command: &Command) -> Option<Sign> {
     match command {
         Command::Write { tag, value } => asks(*tag, *value),
         Command::Restore(wish) => wish.changes.iter().map(|change| asks(change.tag, change.new)).fold(None, strictest),
-        Command::Acknowledge(_)
-        | Command::AcknowledgeAll
+        Command::Alarm(_)
         | Command::Refresh(_)
         | Command::Connect(..)
         | Command::Configure(_)

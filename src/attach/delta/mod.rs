@@ -20,7 +20,7 @@ use crate::plant::{
     guard::Watch,
     parameter_set::StoredSet,
     restore::Restore,
-    snapshot::{ActiveAlarm, DeviceStatus, HistoryStatus},
+    snapshot::{ActiveAlarm, AsideAlarm, DeviceStatus, HistoryStatus},
     tuning::Tuning,
 };
 use line::LineDelta;
@@ -39,6 +39,8 @@ pub struct Delta {
     lines: Vec<(u16, LineDelta)>,
     devices: List<DeviceStatus>,
     alarms: List<ActiveAlarm>,
+    aside: List<AsideAlarm>,
+    sound: bool,
     rates: Option<AlarmRates>,
     /// The figures of the day: they change less often than the rates.
     day: Option<Arc<Figures>>,
@@ -75,6 +77,8 @@ impl Delta {
             devices,
             alarms,
             alarm_quality,
+            aside,
+            sound,
             orders,
             watch,
             history,
@@ -95,7 +99,9 @@ impl Delta {
             evidence: readings::evidence_between(&old.evidence, evidence),
             lines: lines.collect(),
             devices: List::between(&old.devices, devices),
-            alarms: List::between(&old.alarms, alarms),
+            alarms: shared(&old.alarms, alarms),
+            aside: shared(&old.aside, aside),
+            sound: *sound,
             rates: (rates(&old.alarm_quality) != rates(alarm_quality)).then(|| rates(alarm_quality)),
             day: (old.alarm_quality.day != alarm_quality.day).then(|| alarm_quality.day.clone()),
             orders: List::between(&old.orders, orders),
@@ -127,7 +133,13 @@ impl Delta {
             delta.apply(snapshot.def.lines.get(place).ok_or(Unfit)?, line)?;
         }
         self.devices.apply(&mut snapshot.devices)?;
-        self.alarms.apply(&mut snapshot.alarms)?;
+        if let Some(alarms) = self.alarms.made_of(&snapshot.alarms)? {
+            snapshot.alarms = Arc::new(alarms);
+        }
+        if let Some(aside) = self.aside.made_of(&snapshot.aside)? {
+            snapshot.aside = Arc::new(aside);
+        }
+        snapshot.sound = self.sound;
         let quality = &mut snapshot.alarm_quality;
         if let Some((last_10_min, last_hour, flood_since)) = self.rates {
             (quality.last_10_min, quality.last_hour, quality.flood_since) = (last_10_min, last_hour, flood_since);

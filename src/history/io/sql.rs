@@ -118,10 +118,8 @@ pub fn active_at() -> String {
 pub fn restore() -> String {
     let step = STEP_COLUMNS.join(", ");
     format!(
-        "SELECT {step} FROM (
-            SELECT *, rowid AS place FROM alarm_journal
-            QUALIFY row_number() OVER (PARTITION BY subject, text, step ORDER BY rowid DESC) = 1)
-         ORDER BY place LIMIT ?"
+        "SELECT {step} FROM alarm_journal
+         WHERE rowid IN (SELECT max(rowid) FROM alarm_journal GROUP BY subject, text, step) ORDER BY rowid LIMIT ?"
     )
 }
 

@@ -14,7 +14,8 @@ use crate::plant::{
 /// Most characters of a note or reason.
 pub const WORDS_MAX: usize = 500;
 
-/// A wish of an operator about alarms.
+/// A wish of an operator about alarms. The note of its order is the note of an acknowledgement, and the reason without which
+/// nothing is shelved or put out of service.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum AlarmCommand {
     /// Acknowledge one alarm, as it was seen.
@@ -23,15 +24,11 @@ pub enum AlarmCommand {
         alarm: AlarmId,
         /// When the activation that was seen was raised; a later one stays unacknowledged.
         seen: Timestamp,
-        /// In the operator's words.
-        note: Option<Arc<str>>,
     },
     /// Acknowledge all of these, as they were seen.
     AcknowledgeAll {
         /// Which, and when the activation that was seen was raised.
         seen: Arc<[(AlarmId, Timestamp)]>,
-        /// In the operator's words.
-        note: Option<Arc<str>>,
     },
     /// End the sound of what sounds now.
     Silence,
@@ -43,18 +40,11 @@ pub enum AlarmCommand {
         alarm: AlarmId,
         /// For how long, at most [`crate::plant::def::AlarmRules::shelve_max`].
         lasts: Duration,
-        /// Why.
-        reason: Arc<str>,
     },
     /// Take an alarm back from the shelf before its time.
     Unshelve(AlarmId),
     /// Put an alarm aside until somebody puts it back.
-    OutOfService {
-        /// Which.
-        alarm: AlarmId,
-        /// Why.
-        reason: Arc<str>,
-    },
+    OutOfService(AlarmId),
     /// Put an alarm back in service.
     InService(AlarmId),
 }
@@ -158,12 +148,12 @@ impl Book {
         &mut self,
         id: AlarmId,
         lasts: Duration,
-        reason: &Arc<str>,
+        reason: Option<&Arc<str>>,
         at: Timestamp,
         by: &Arc<str>,
     ) -> Result<AlarmRecord, AlarmRefusal> {
         let alarm = self.alarm(id)?;
-        check_reason(reason)?;
+        let reason = needed(reason)?;
         let max = self.def.alarm_rules.shelve_max;
         let until = at.checked_add(lasts).ok().filter(|_| !lasts.is_zero() && lasts <= max);
         let until = until.ok_or(AlarmRefusal::ShelveTime { max })?;
@@ -194,12 +184,12 @@ impl Book {
     pub fn out_of_service(
         &mut self,
         id: AlarmId,
-        reason: &Arc<str>,
+        reason: Option<&Arc<str>>,
         at: Timestamp,
         by: &Arc<str>,
     ) -> Result<AlarmRecord, AlarmRefusal> {
         let alarm = self.alarm(id)?;
-        check_reason(reason)?;
+        let reason = needed(reason)?;
         if self.machine(id).out_of_service().is_some() {
             return Err(AlarmRefusal::OutOfService);
         }
@@ -252,11 +242,10 @@ impl Book {
     }
 }
 
-fn check_reason(reason: &Arc<str>) -> Result<(), AlarmRefusal> {
-    if reason.trim().is_empty() {
-        return Err(AlarmRefusal::ReasonNeeded);
-    }
-    check_words(Some(reason))
+fn needed(reason: Option<&Arc<str>>) -> Result<&Arc<str>, AlarmRefusal> {
+    let reason = reason.filter(|reason| !reason.trim().is_empty()).ok_or(AlarmRefusal::ReasonNeeded)?;
+    check_words(Some(reason))?;
+    Ok(reason)
 }
 
 fn check_words(words: Option<&Arc<str>>) -> Result<(), AlarmRefusal> {

@@ -137,9 +137,9 @@ fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
         (Duration::ZERO, "leak", AlarmRefusal::ShelveTime { max }),
         (max + minute, "leak", AlarmRefusal::ShelveTime { max }),
     ] {
-        assert_eq!(book.shelve(HIGH, lasts, &reason.into(), at(0), &by()), Err(refusal));
+        assert_eq!(book.shelve(HIGH, lasts, Some(&reason.into()), at(0), &by()), Err(refusal));
     }
-    book.shelve(HIGH, minute, &why(), at(0), &by()).expect("a minute, with a reason");
+    book.shelve(HIGH, minute, Some(&why()), at(0), &by()).expect("a minute, with a reason");
     assert_eq!(steps(&book.judge(at(10), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
     assert!(!book.lists().sound && book.active().is_empty());
     let aside = book.lists().aside[0].clone();
@@ -147,7 +147,7 @@ fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
     assert_eq!(steps(&book.judge(at(59), facts(80.0, true))), []);
     assert_eq!(steps(&book.judge(at(60), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
     assert_eq!((state(&book), book.active()[0].raised_at), (AlarmState::Unacknowledged, at(60)));
-    book.shelve(HIGH, minute, &why(), at(70), &by()).expect("again");
+    book.shelve(HIGH, minute, Some(&why()), at(70), &by()).expect("again");
     assert_eq!(steps(&book.judge(at(71), facts(70.0, true))), [AlarmStep::ReturnedQuietly]);
     assert_eq!(steps(&book.unshelve(HIGH, None, at(72), &by()).expect("it is shelved")), [AlarmStep::Unshelved]);
     assert_eq!(state(&book), AlarmState::Normal);
@@ -161,7 +161,7 @@ fn a_clock_that_goes_back_lengthens_no_shelf_and_no_delay() {
     book.judge(at(10_006), facts(80.0, true));
     book.judge(at(100), facts(80.0, true));
     assert_eq!(steps(&book.judge(at(104), facts(80.0, true))), [AlarmStep::Raised], "6 s and 4 s");
-    book.shelve(HIGH, Duration::from_secs(600), &why(), at(5_000), &by()).expect("ten minutes");
+    book.shelve(HIGH, Duration::from_secs(600), Some(&why()), at(5_000), &by()).expect("ten minutes");
     assert_eq!(steps(&book.judge(at(200), facts(80.0, true))), [AlarmStep::Shelved]);
     assert_eq!(book.lists().aside[0].until, Some(at(800)));
     assert_eq!(steps(&book.judge(at(800), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
@@ -170,10 +170,10 @@ fn a_clock_that_goes_back_lengthens_no_shelf_and_no_delay() {
 #[test]
 fn an_alarm_out_of_service_stays_so_until_somebody_puts_it_back() {
     let mut book = Book::new(with(|alarm| alarm.on_delay = Duration::ZERO));
-    assert_eq!(book.out_of_service(HIGH, &" ".into(), at(0), &by()), Err(AlarmRefusal::ReasonNeeded));
+    assert_eq!(book.out_of_service(HIGH, Some(&" ".into()), at(0), &by()), Err(AlarmRefusal::ReasonNeeded));
     assert_eq!(book.in_service(HIGH, None, at(0), &by()), Err(AlarmRefusal::InService));
-    book.out_of_service(HIGH, &why(), at(0), &by()).expect("with a reason");
-    assert_eq!(book.shelve(HIGH, Duration::from_secs(60), &why(), at(1), &by()), Err(AlarmRefusal::OutOfService));
+    book.out_of_service(HIGH, Some(&why()), at(0), &by()).expect("with a reason");
+    assert_eq!(book.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()), Err(AlarmRefusal::OutOfService));
     assert_eq!(steps(&book.judge(at(100_000), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
     assert_eq!(book.lists().aside[0].state, AlarmState::OutOfService);
     let back = book.in_service(HIGH, Some(80.0), at(100_001), &by()).expect("it is out of service");
@@ -362,10 +362,10 @@ proptest! {
                     journal.extend(done);
                 }
                 Happening::Shelve(seconds) => {
-                    journal.extend(book.shelve(HIGH, Duration::from_secs(seconds), &why(), at(now), &by));
+                    journal.extend(book.shelve(HIGH, Duration::from_secs(seconds), Some(&why()), at(now), &by));
                 }
                 Happening::Unshelve => journal.extend(book.unshelve(HIGH, value, at(now), &by).into_iter().flatten()),
-                Happening::OutOfService => journal.extend(book.out_of_service(HIGH, &why(), at(now), &by)),
+                Happening::OutOfService => journal.extend(book.out_of_service(HIGH, Some(&why()), at(now), &by)),
                 Happening::InService => journal.extend(book.in_service(HIGH, value, at(now), &by).into_iter().flatten()),
                 Happening::Restart => {
                     let mut again = Book::new(def.clone());

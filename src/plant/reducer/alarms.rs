@@ -30,13 +30,13 @@ impl Plant {
     ) -> Option<ActionRecord> {
         // The steps of one alarm must not go back in time, whatever the clock does.
         let now = self.at.max(at);
-        let (book, by) = (&mut self.book, &order.by);
+        let (book, by, note) = (&mut self.book, &order.by, order.note.as_ref());
         let done = match command {
-            AlarmCommand::Acknowledge { alarm, seen, note } => {
-                book.acknowledge(alarm, seen, note.as_ref(), now, by).map(|step| vec![step])
+            AlarmCommand::Acknowledge { alarm, seen } => {
+                book.acknowledge(alarm, seen, note, now, by).map(|step| vec![step])
             }
-            AlarmCommand::AcknowledgeAll { seen, note } => {
-                let each = seen.iter().map(|(alarm, seen)| book.acknowledge(*alarm, *seen, note.as_ref(), now, by));
+            AlarmCommand::AcknowledgeAll { seen } => {
+                let each = seen.iter().map(|(alarm, seen)| book.acknowledge(*alarm, *seen, note, now, by));
                 let (steps, outcome) = together(each);
                 effects.records.extend(steps.into_iter().map(Record::Alarm));
                 return self.desk.note(order, outcome, &self.board, at);
@@ -46,13 +46,9 @@ impl Plant {
                 false => Err(AlarmRefusal::NothingSounds),
             },
             AlarmCommand::Reset(alarm) => book.reset(alarm, now, by).map(|step| vec![step]),
-            AlarmCommand::Shelve { alarm, lasts, reason } => {
-                book.shelve(alarm, lasts, &reason, now, by).map(|step| vec![step])
-            }
+            AlarmCommand::Shelve { alarm, lasts } => book.shelve(alarm, lasts, note, now, by).map(|step| vec![step]),
             AlarmCommand::Unshelve(alarm) => book.unshelve(alarm, value_of(&self.def, &self.board, alarm), now, by),
-            AlarmCommand::OutOfService { alarm, reason } => {
-                book.out_of_service(alarm, &reason, now, by).map(|step| vec![step])
-            }
+            AlarmCommand::OutOfService(alarm) => book.out_of_service(alarm, note, now, by).map(|step| vec![step]),
             AlarmCommand::InService(alarm) => book.in_service(alarm, value_of(&self.def, &self.board, alarm), now, by),
         };
         let outcome = match done {

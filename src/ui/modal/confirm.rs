@@ -142,7 +142,7 @@ impl Confirm {
                 AlarmCommand::Reset(_) => "reset",
                 AlarmCommand::Shelve { .. } => "shelve",
                 AlarmCommand::Unshelve(_) => "take back",
-                AlarmCommand::OutOfService { .. } => "put out of service",
+                AlarmCommand::OutOfService(_) => "put out of service",
                 AlarmCommand::InService(_) => "put in service",
             },
             Intent::Order(Command::Refresh(_)) => "refresh",

@@ -18,7 +18,7 @@ use crate::{
     plant::{
         def::{LineDef, LineId, PlantDef, Priority, TagId, Transport},
         line_minute::LineMinute,
-        record::{ActionRecord, AlarmRecord, AlarmStep, Record},
+        record::{ActionRecord, AlarmRecord, AlarmStep, Burst, Record},
         sample::{Cause, Sample},
     },
     report::{
@@ -293,8 +293,16 @@ fn the_alarms_of_before_the_restart_are_restored_with_their_acknowledgements() {
     let old = [step(1, "high", Raised), step(2, "high", Returned), step(3, "high", Acknowledged)];
     let new =
         [step(4, "high", Raised), step(5, "low", Raised), step(6, "high", Acknowledged), step(7, "low", Returned)];
-    store.append(&old.into_iter().chain(new.clone()).map(Record::Alarm).collect::<Vec<_>>()).unwrap();
-    assert_eq!(store.restore().unwrap(), new);
+    let shelved = AlarmRecord {
+        reason: Some("sensor is being changed".into()),
+        until: Some(sec(600)),
+        burst: Some(Burst { began: sec(4), rank: 2 }),
+        ..step(8, "low", AlarmStep::Shelved)
+    };
+    let last = [&old[1..2], &new, &[shelved]].concat();
+    let all = old[..1].iter().chain([&old[2]]).chain(&last).cloned();
+    store.append(&all.map(Record::Alarm).collect::<Vec<_>>()).unwrap();
+    assert_eq!(store.restore().unwrap(), last, "the last step of every kind");
 }
 
 #[test]
