@@ -12,7 +12,8 @@ use crate::plant::{
 /// Alarms, clock, trouble of the history, and which lines and devices are reached; no value of the process, no text, no
 /// bytes, no order. What is left out is absent, not hidden: it does not leave the station.
 pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
-    let Snapshot { at, def, decimals, lines, devices, alarms, aside, sound, alarm_quality, history, speed, .. } = snapshot;
+    let Snapshot { at, def, decimals, lines, devices, alarms, aside, sound, alarm_quality, history, speed, .. } =
+        snapshot;
     let reached = |line: &LineStatus| LineStatus {
         state: line.state.clone(),
         since: line.since,

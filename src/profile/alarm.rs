@@ -43,7 +43,9 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
 fn check_names(tables: &[At<AlarmTable>], problems: &mut Problems) {
     let mut seen = Unique::default();
     for table in tables.iter().map(|table| &table.value) {
-        let (Some(subject), Some(text)) = (table.tag.as_ref().or(table.device.as_ref()).or(table.line.as_ref()), &table.text) else {
+        let (Some(subject), Some(text)) =
+            (table.tag.as_ref().or(table.device.as_ref()).or(table.line.as_ref()), &table.text)
+        else {
             continue;
         };
         let message = format!("duplicate alarm `{}` of {}", text.value, subject.value);

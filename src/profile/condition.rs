@@ -61,7 +61,7 @@ fn no_condition(table: &AlarmTable, what: &str, means: &str, problems: &mut Prob
 }
 
 /// The conditions that an alarm table has; exactly one is right.
-fn conditions_of(table: &AlarmTable) -> Vec<(Span, &'static str)> {
+pub(super) fn conditions_of(table: &AlarmTable) -> Vec<(Span, &'static str)> {
     let places = [
         (table.high_high.map(|key| key.at), "high_high"),
         (table.high.map(|key| key.at), "high"),

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::{
-    alarm::conditions_of,
+    condition::conditions_of,
     diagnostic::{Problems, Span},
     reader::At,
     schema::AlarmTable,

@@ -111,6 +111,9 @@ fn the_quality_of_the_alarms_is_told_in_lines_and_in_json() {
             value: Some(76.0),
             limit: Some(75.0),
             by: None,
+            reason: None,
+            until: None,
+            burst: None,
         })
     };
     let store = Store::open(&path, &def, at(0)).unwrap().store;

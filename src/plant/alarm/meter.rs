@@ -118,7 +118,17 @@ impl Meter {
         match step.step {
             AlarmStep::Raised => (habit.active, habit.acknowledged) = (Some(step.at), false),
             AlarmStep::Acknowledged => habit.acknowledged = true,
-            AlarmStep::Returned => habit.active = None,
+            AlarmStep::Returned
+            | AlarmStep::ReturnedQuietly
+            | AlarmStep::Shelved
+            | AlarmStep::Suppressed
+            | AlarmStep::OutOfService => habit.active = None,
+            AlarmStep::RaisedQuietly
+            | AlarmStep::RaisedAgain
+            | AlarmStep::Reset
+            | AlarmStep::Unshelved
+            | AlarmStep::Released
+            | AlarmStep::InService => {}
         }
     }
 
@@ -129,6 +139,17 @@ impl Meter {
             AlarmStep::Raised => self.raised(step),
             AlarmStep::Acknowledged => self.habits.entry(named(step)).or_default().acknowledged = true,
             AlarmStep::Returned => self.returned(step),
+            // What is put aside burdens nobody: it neither stands nor has it come and gone.
+            AlarmStep::ReturnedQuietly | AlarmStep::Shelved | AlarmStep::Suppressed | AlarmStep::OutOfService => {
+                self.habits.entry(named(step)).or_default().acknowledged = true;
+                self.returned(step);
+            }
+            AlarmStep::RaisedQuietly
+            | AlarmStep::RaisedAgain
+            | AlarmStep::Reset
+            | AlarmStep::Unshelved
+            | AlarmStep::Released
+            | AlarmStep::InService => {}
         }
     }
 

@@ -22,6 +22,9 @@ fn step(second: f64, name: &str, step: AlarmStep) -> AlarmRecord {
         value: None,
         limit: None,
         by: None,
+        reason: None,
+        until: None,
+        burst: None,
     }
 }
 
