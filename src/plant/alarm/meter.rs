@@ -134,7 +134,7 @@ impl Meter {
 
     /// Takes a step.
     pub fn take(&mut self, step: &AlarmRecord) {
-        self.advance(step.at);
+        self.pass(step.at);
         match step.step {
             AlarmStep::Raised => self.raised(step),
             AlarmStep::Acknowledged => self.habits.entry(named(step)).or_default().acknowledged = true,
@@ -153,8 +153,21 @@ impl Meter {
         }
     }
 
-    /// Time passes.
+    /// Time passes. The figures of the day are formed here, between two seconds, so that they hold every step before
+    /// their end and none after it: steps of the new second are taken afterwards.
     pub fn advance(&mut self, at: Timestamp) {
+        self.pass(at);
+        let now = self.rate.now();
+        let fresh = (0..REFRESH_S).contains(&(now - second(self.day.until)));
+        if self.span == Span::Running && !(fresh && self.day.windows > 0) {
+            let from = now.div_euclid(HOUR_S) * HOUR_S - (HOURS - 1) * HOUR_S;
+            if let (Ok(from), Ok(until)) = (Timestamp::from_second(from), Timestamp::from_second(now)) {
+                self.day = Arc::new(self.figures_of(from, until));
+            }
+        }
+    }
+
+    fn pass(&mut self, at: Timestamp) {
         for flooded in self.rate.advance(second(at)) {
             self.flooded(flooded);
         }
@@ -163,22 +176,12 @@ impl Meter {
         }
     }
 
-    /// The alarm system as of the last step or advance.
-    pub fn quality(&mut self) -> AlarmQuality {
-        let now = self.rate.now();
-        let flood = self.rate.flood_since().and_then(|since| Timestamp::from_second(since).ok());
-        let age = now - second(self.day.until);
-        let began = self.day.until == Timestamp::UNIX_EPOCH;
-        if began || !(0..REFRESH_S).contains(&age) {
-            let from = now.div_euclid(HOUR_S) * HOUR_S - (HOURS - 1) * HOUR_S;
-            if let (Ok(from), Ok(until)) = (Timestamp::from_second(from), Timestamp::from_second(now)) {
-                self.day = Arc::new(self.figures_of(from, until));
-            }
-        }
+    /// The alarm system as of the last step; the figures of the day as of some seconds ago.
+    pub fn quality(&self) -> AlarmQuality {
         AlarmQuality {
             last_10_min: self.rate.in_window(),
             last_hour: self.rate.in_hour(),
-            flood_since: flood,
+            flood_since: self.rate.flood_since().and_then(|since| Timestamp::from_second(since).ok()),
             day: self.day.clone(),
         }
     }
@@ -190,7 +193,7 @@ impl Meter {
                 self.advance(until);
                 self.figures_of(from, until)
             }
-            Span::Running => Arc::unwrap_or_clone(self.quality().day),
+            Span::Running => Arc::unwrap_or_clone(self.day),
         }
     }
 

@@ -22,13 +22,13 @@ impl Plant {
 
     /// Counts the steps of alarms among what is to be stored.
     pub(super) fn measure(&mut self, records: &[Record]) {
+        self.meter.advance(self.at);
         for record in records {
             match record {
                 Record::Alarm(step) => self.meter.take(step),
                 Record::Sample(..) | Record::Action(_) | Record::Line(_) => {}
             }
         }
-        self.meter.advance(self.at);
         self.quality = self.meter.quality();
     }
 }
