@@ -5,6 +5,7 @@
 //! thread drains, flushes and ends.
 
 pub mod session;
+mod deeds;
 mod door;
 pub mod pulse;
 mod sets;

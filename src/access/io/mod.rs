@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+pub mod book;
 pub mod users;
 
 /// The file of users beside a history: `tank.users.toml` beside `tank.duckdb`.
