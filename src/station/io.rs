@@ -87,7 +87,7 @@ pub struct Station {
 }
 
 /// Starts history, links and plant, in this order: a store that cannot be opened stops the start. Nobody is asked who he
-/// is: whoever sits at a terminal of this process may everything. For demonstrations and drills.
+/// is: whoever has started the station, or could, may everything. For demonstrations and drills.
 pub fn start(options: Options) -> Result<Station, HistoryError> {
     start_told(options, None)
 }
@@ -198,7 +198,8 @@ fn assemble(
     let ways = Ways { orders: orders.clone(), queries, deeds, commands: command };
     let (entrance, knocks, requests) = Entrance::new(snapshots);
     let open = guarded.is_none();
-    let (gate, users) = guarded.map_or_else(|| (Gate::new(def), None), |(gate, users)| (gate, Some(users)));
+    let (gate, users) =
+        guarded.map_or_else(|| (Gate::new(def, Some(own_user().into())), None), |(gate, users)| (gate, Some(users)));
     let door = Door::new(gate, clock, ways, users);
     tasks.push(tokio::spawn(door.run(knocks, requests, stopped)));
     Station { entrance, orders, commands, history, book, open, stop, tasks }

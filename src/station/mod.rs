@@ -13,5 +13,8 @@ pub mod teller;
 mod toil;
 pub mod io;
 
+#[cfg(test)]
+mod tests;
+
 pub use door::{Command, Entrance};
 pub use session::{Request, Session};

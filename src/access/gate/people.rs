@@ -4,7 +4,13 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 
-use super::{Effect, Gate, Peer, deed, enough, login::reply, record, right, work::What};
+use super::{
+    Effect, Gate, Peer, enough,
+    login::reply,
+    paper::{deed, record, words},
+    right,
+    work::What,
+};
 use crate::{
     access::{
         Secret, Who, Wish, password,
@@ -35,7 +41,7 @@ impl Gate {
         if self.people.is_none() {
             return reply(ticket, "this station keeps no users");
         }
-        let (action, target) = super::words(&wish);
+        let (action, target) = words(&wish);
         let result = match wish {
             Wish::FirstSupervisor { user, password } => self.first(terminal, ticket, user.into(), password),
             Wish::ChangePassword { old, new } => self.change_own(terminal, ticket, old, new, at),
@@ -83,15 +89,15 @@ impl Gate {
         effects
     }
 
-    /// Only whoever has started the station, or could, makes the first Supervisor.
-    pub(super) fn may_be_first(&self, peer: &Peer) -> bool {
+    /// Has he started the station, or could he? Only he makes the first Supervisor.
+    pub(super) fn is_host(&self, peer: &Peer) -> bool {
         let user = peer.unix_user.as_deref();
         peer.own || user == Some("root") || (user.is_some() && user == self.host.as_deref())
     }
 
     fn first(&mut self, terminal: u32, ticket: u64, user: Arc<str>, password: Secret) -> Result<Vec<Effect>, String> {
         let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
-        if !self.may_be_first(&seat.peer) {
+        if !self.is_host(&seat.peer) {
             return Err("only whoever has started the station makes the first supervisor".to_owned());
         }
         if self.people.as_ref().is_none_or(|people| !people.is_empty()) {

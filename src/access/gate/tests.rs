@@ -421,7 +421,7 @@ fn a_terminal_that_hangs_up_before_the_answer_has_had_its_try() {
 
 #[test]
 fn a_demonstration_asks_nobody() {
-    let mut bench = Bench::of(Gate::new(Arc::new(fixture::plant())));
+    let mut bench = Bench::of(Gate::new(Arc::new(fixture::plant()), Some("sight".into())));
     let own = Peer { from: "this process".into(), unix_user: Some("anna".into()), own: true };
     bench.gate.open(1, own, bench.now);
     assert_eq!(bench.who(1).as_deref(), Some("anna"));

@@ -193,11 +193,11 @@ impl Gate {
         let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
         let mut effects = Vec::new();
         if let (true, Some(user)) = (locked.account, user) {
-            effects.push(super::deed(seat, "lock-out", &user, &outcome, at));
+            effects.push(super::paper::deed(seat, "lock-out", &user, &outcome, at));
             self.tell(terminal, &mut effects);
         }
         if locked.origin {
-            effects.push(super::deed(seat, "lock-out", &format!("terminals of {origin}"), &outcome, at));
+            effects.push(super::paper::deed(seat, "lock-out", &format!("terminals of {origin}"), &outcome, at));
         }
         effects
     }
