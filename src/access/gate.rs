@@ -20,7 +20,11 @@ use self::{
     seat::{Refusals, Seat},
     work::Errand,
 };
-use super::{OrderRequest, Who, Wish, right, tries::Tries, user::Users};
+use super::{
+    OrderRequest, Who, Wish, right,
+    tries::Tries,
+    user::{Change, Users},
+};
 use crate::{
     history::Question,
     plant::{
@@ -84,6 +88,8 @@ pub struct Gate {
     errands: BTreeMap<Job, Errand>,
     last_job: Job,
     saving: Option<Saving>,
+    /// A change that waits until last logins are written: the terminal, its ticket, what.
+    next: Option<(u32, u64, Change)>,
     /// Somebody's last login is not written down yet.
     unsaved: bool,
 }
@@ -102,6 +108,7 @@ impl Gate {
             errands: BTreeMap::new(),
             last_job: 0,
             saving: None,
+            next: None,
             unsaved: false,
         }
     }
@@ -242,23 +249,19 @@ impl Gate {
             Wish::Logout => self.logout(terminal, ticket, at),
             Wish::Lock => self.lock(terminal, ticket, at),
             Wish::Unlock(password) => self.unlock(terminal, ticket, password, at),
-            Wish::Active => {
-                let mut effects = vec![Effect::Reply(ticket, Ok(()))];
-                self.tell(terminal, &mut effects);
-                effects
-            }
+            Wish::Active => vec![Effect::Reply(ticket, Ok(())), Effect::Standing(terminal)],
             Wish::Exported { file, sha256 } => {
                 let file: Arc<str> = clean(&file).into();
                 let new = Some(clean(&sha256).into());
-                self.done_now(terminal, ticket, "export", &file, new, at)
+                self.granted(terminal, ticket, "export", &file, new, at)
             }
             Wish::Stop => {
-                let mut effects = self.done_now(terminal, ticket, "stop station", &self.plant_name(), None, at);
+                let mut effects = self.granted(terminal, ticket, "stop station", &self.plant_name(), None, at);
                 effects.push(Effect::Stop);
                 effects
             }
             Wish::Reload => {
-                let mut effects = self.done_now(terminal, ticket, "reload", &self.plant_name(), None, at);
+                let mut effects = self.granted(terminal, ticket, "reload", &self.plant_name(), None, at);
                 effects.retain(|effect| !matches!(effect, Effect::Reply(..)));
                 effects.push(Effect::Reload(ticket));
                 effects
@@ -278,7 +281,7 @@ impl Gate {
     }
 
     /// Granted, on record, answered.
-    fn done_now(
+    fn granted(
         &self,
         terminal: u32,
         ticket: u64,
@@ -288,7 +291,9 @@ impl Gate {
         at: Timestamp,
     ) -> Vec<Effect> {
         let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
-        let record = ActionRecord { new, ..record(seat, action, target, "done", at) };
+        // What becomes of a stop or a reload is seen by the stop and the start of the station behind it.
+        let outcome = if new.is_some() { "done" } else { "permitted" };
+        let record = ActionRecord { new, ..record(seat, action, target, outcome, at) };
         vec![Effect::Record(record), Effect::Reply(ticket, Ok(()))]
     }
 

@@ -198,8 +198,13 @@ impl Gate {
                 enough(who.role, right::Right::People.role())?;
             }
         }
-        if self.saving.is_some() {
-            return Err("another change is just being written down, try again".to_owned());
+        match &self.saving {
+            Some(Saving { wish: None, .. }) if self.next.is_none() => {
+                self.next = Some((terminal, ticket, change));
+                return Ok(Vec::new());
+            }
+            Some(_) => return Err("another change is just being written down, try again".to_owned()),
+            None => {}
         }
         let after = self.check_change(&change)?;
         let (action, old, new) = self.told(&change);
@@ -240,7 +245,7 @@ impl Gate {
     /// The people were written down, or not: `Err` says why.
     pub fn saved(&mut self, result: Result<(), String>, at: Timestamp) -> Vec<Effect> {
         let Some(Saving { terminal, wish: Some((ticket, change, record)) }) = self.saving.take() else {
-            return Vec::new();
+            return self.go_on(at);
         };
         let after = result.and_then(|()| self.check_change(&change));
         let people = match after {
@@ -255,6 +260,15 @@ impl Gate {
         effects.extend(self.followed(terminal, &change, at));
         self.tell(terminal, &mut effects);
         effects
+    }
+
+    /// Begins the change that waited while last logins were written.
+    fn go_on(&mut self, at: Timestamp) -> Vec<Effect> {
+        let Some((terminal, ticket, change)) = self.next.take() else { return Vec::new() };
+        let (action, _, _) = self.told(&change);
+        let target = change.user().clone();
+        let begun = self.change(terminal, ticket, change, at);
+        begun.unwrap_or_else(|why| self.not_changed(terminal, ticket, action, &target, &why, at))
     }
 
     /// What a change means for those who are in.

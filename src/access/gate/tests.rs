@@ -328,6 +328,23 @@ fn a_change_acts_on_those_who_are_in_at_once_and_one_that_was_not_saved_is_none(
 }
 
 #[test]
+fn a_change_that_comes_while_last_logins_are_written_waits_for_them() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "10.0.0.1");
+    bench.login(1, "boss", BOSS).unwrap();
+    let writing = bench.gate.tick(bench.now);
+    assert!(matches!(&writing[..], [Effect::Save(users)] if users.get("boss").unwrap().last_login.is_some()));
+    let wish = |user: &str| Wish::DeleteUser { user: user.into() };
+    assert_eq!(bench.gate.wish(1, 71, wish("view"), bench.now), [], "not answered yet");
+    assert!(bench.wish(1, wish("tech")).is_err(), "one at a time");
+    let effects = bench.gate.saved(Ok(()), bench.now);
+    let effects = bench.work(effects);
+    assert!(effects.contains(&Effect::Reply(71, Ok(()))));
+    let kept = bench.kept.unwrap();
+    assert!(kept.get("view").is_none() && kept.get("tech").is_some());
+}
+
+#[test]
 fn a_tag_that_asks_for_a_second_person_is_written_only_with_one() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "10.0.0.1");

@@ -239,18 +239,7 @@ pub struct Handle {
 pub fn start(path: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> io::Result<Handle> {
     let (deeds, queue) = mpsc::channel(DEEDS_MAX);
     let (told, status) = watch::channel(BookStatus::default());
-    let mut scribe = Scribe {
-        path: path.to_owned(),
-        clock,
-        history,
-        book: None,
-        broken: None,
-        fault: None,
-        tried: None,
-        unsealed: 0,
-        taken: 0,
-        lost: 0,
-    };
+    let mut scribe = Scribe::new(path, clock, history);
     let opened = scribe.open();
     told.send_replace(scribe.status());
     let join = std::thread::Builder::new().name("book".into()).spawn(move || scribe.run(queue, &told))?;
@@ -275,6 +264,12 @@ struct Scribe {
 }
 
 impl Scribe {
+    fn new(path: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> Scribe {
+        let path = path.to_owned();
+        let (book, broken, fault, tried) = (None, None, None, None);
+        Scribe { path, clock, history, book, broken, fault, tried, unsealed: 0, taken: 0, lost: 0 }
+    }
+
     fn run(mut self, mut queue: mpsc::Receiver<Vec<ActionRecord>>, told: &watch::Sender<BookStatus>) {
         while let Some(mut deeds) = queue.blocking_recv() {
             while deeds.len() < GROUP_MAX

@@ -127,3 +127,30 @@ fn a_book_that_is_taken_away_while_it_is_written_is_noticed() {
     let (_, opened) = Book::open(&path).unwrap();
     assert!(opened.wrong[0].contains("broken"), "{opened:?}");
 }
+
+#[test]
+fn a_book_whose_disk_comes_back_goes_on_and_says_what_is_missing_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("later").join("tank.audit.jsonl");
+    let (history, mut rows) = mpsc::channel(64);
+    let clock = Clock::starting_at(jiff::Timestamp::from_second(1_000_000).unwrap(), 1.0);
+    let mut scribe = Scribe::new(&path, clock, history);
+    scribe.take(vec![deed("start"), deed("write")]);
+    assert!(scribe.status().trouble.is_some_and(|trouble| trouble.ends_with("2 deeds are not in it")));
+    fs::create_dir(folder.path().join("later")).unwrap();
+    scribe.take(vec![deed("write")]);
+    assert!(scribe.status().trouble.is_some(), "not tried again before its time");
+    scribe.tried = None;
+    scribe.take(vec![deed("stop")]);
+    assert_eq!(scribe.status(), BookStatus { taken: 4, lost: 0, trouble: None });
+    let mut kept = Vec::new();
+    while let Ok(batch) = rows.try_recv() {
+        kept.extend(batch.into_iter().map(|record| match record {
+            Record::Action(deed) => (deed.outcome.to_string(), deed.seal.is_some()),
+            other => panic!("{other:?}"),
+        }));
+    }
+    let plain = |sealed| ("verified".to_owned(), sealed);
+    let told = ("3 deeds before this one are not in it".to_owned(), true);
+    assert_eq!(kept, [plain(false), plain(false), plain(false), told, plain(true)]);
+}
