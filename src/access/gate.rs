@@ -132,7 +132,7 @@ impl Gate {
         seat.who = self.known(&seat.peer);
         seat.trusted = seat.who.is_some();
         let mut effects = Vec::new();
-        if !own && self.may_record(&seat.origin.clone(), at) {
+        if !own && self.may_record(&seat.origin.user.clone(), at) {
             effects.push(deed(&seat, "attach", "", "done", at));
         }
         if let Some(who) = &seat.who
@@ -163,7 +163,7 @@ impl Gate {
     pub fn close(&mut self, terminal: u32, at: Timestamp) -> Vec<Effect> {
         let mut effects = self.sent_out(terminal, "done: the terminal has gone", at);
         let Some(seat) = self.seats.remove(&terminal) else { return effects };
-        if !seat.peer.own && self.may_record(&seat.origin, at) {
+        if !seat.peer.own && self.may_record(&seat.origin.user, at) {
             effects.push(deed(&seat, "detach", "", "done", at));
         }
         self.tell(terminal, &mut effects);
@@ -203,7 +203,7 @@ impl Gate {
 
     /// The plant puts it on record and into the snapshot, so that whoever gave the order sees what became of it.
     fn refuse_order(&mut self, terminal: u32, request: OrderRequest, why: Refusal, at: Timestamp) -> Vec<Effect> {
-        let Some(origin) = self.seats.get(&terminal).map(|seat| seat.origin.clone()) else { return Vec::new() };
+        let Some(origin) = self.seats.get(&terminal).map(|seat| seat.origin.user.clone()) else { return Vec::new() };
         if !self.may_record(&origin, at) {
             return Vec::new();
         }

@@ -15,7 +15,7 @@ use crate::{
 
 /// Most characters of what somebody may put on record in his own words.
 const WORDS_MAX: usize = 500;
-/// Places whose refusals are counted apart; what more there are share one count.
+/// Users of the operating system whose refusals are counted apart; what more there are share one count.
 const ORIGINS_MAX: usize = 512;
 /// What was refused too often to be told each time is told so often.
 const TOLD_EVERY: Duration = Duration::from_secs(60);
@@ -28,7 +28,7 @@ impl Gate {
         if seat.peer.own || seat.requests.take(at) {
             return true;
         }
-        let origin = seat.origin.clone();
+        let origin = seat.origin.user.clone();
         self.refusals_of(&origin, at).untold += 1;
         false
     }
@@ -43,13 +43,13 @@ impl Gate {
             self.refusals.retain(|_, refusals| refusals.untold > 0 || passed(refusals.told, at) < TOLD_EVERY);
         }
         let full = ORIGINS_MAX <= self.refusals.len() && !self.refusals.contains_key(origin);
-        let origin = if full { "many places".into() } else { origin.clone() };
+        let origin = if full { "of many users".into() } else { origin.clone() };
         self.refusals.entry(origin).or_insert_with(|| Refusals::new(at))
     }
 
     /// The record of a refusal, unless there are too many of them.
     pub(super) fn refused(&mut self, seat: &Seat, action: &str, target: &str, why: &str, at: Timestamp) -> Vec<Effect> {
-        let told = self.may_record(&seat.origin, at);
+        let told = self.may_record(&seat.origin.user, at);
         told.then(|| deed(seat, action, target, &format!("refused: {why}"), at)).into_iter().collect()
     }
 
@@ -62,7 +62,7 @@ impl Gate {
                 effects.push(Effect::Record(ActionRecord {
                     at,
                     by: "not logged in".into(),
-                    from: origin.clone(),
+                    from: format!("user {origin}").into(),
                     action: "too many requests".into(),
                     target: "".into(),
                     old: None,

@@ -82,7 +82,7 @@ impl Gate {
         let mut effects = reply(ticket, why);
         let Some(seat) = self.seats.get(&terminal) else { return effects };
         let record = deed(seat, action, target, &format!("refused: {why}"), at);
-        let origin = seat.origin.clone();
+        let origin = seat.origin.user.clone();
         if self.may_record(&origin, at) {
             effects.push(record);
         }

@@ -415,7 +415,11 @@ fn a_hostile_terminal_can_neither_flood_the_plant_nor_fill_the_book() {
     assert!((9..=10).contains(&told), "{told}");
     let mut coming = 0;
     for terminal in 10..2000 {
-        coming += bench.open(terminal, "evil").iter().filter(|effect| matches!(effect, Effect::Record(_))).count();
+        coming += bench
+            .open(terminal, &format!("evil{terminal}"))
+            .iter()
+            .filter(|effect| matches!(effect, Effect::Record(_)))
+            .count();
         bench.gate.close(terminal, bench.now);
     }
     assert!(coming <= 20, "{coming}");
