@@ -1,9 +1,11 @@
 //! The reducer of people: what a terminal asks comes in, what is permitted goes out. The only place where rights are decided.
 
 mod login;
+mod paper;
 mod people;
 mod seat;
 mod sign;
+mod standing;
 #[cfg(test)]
 mod tests;
 mod work;
@@ -13,14 +15,15 @@ use std::{collections::BTreeMap, sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use self::{
+    paper::{clean, deed, record, seat_name, words},
     people::Saving,
     seat::{Refusals, Seat},
     work::Errand,
 };
 use super::{
-    OrderRequest, SessionRow, Standing, UserRow, Who, Wish, right,
+    OrderRequest, Who, Wish, right,
     tries::Tries,
-    user::{self, Users},
+    user::{Change, Users},
 };
 use crate::{
     history::Question,
@@ -34,14 +37,6 @@ use crate::{
 
 pub use work::{Job, Outcome, Work};
 
-/// Most characters of what somebody may put on record in his own words.
-const WORDS_MAX: usize = 500;
-/// Places whose refusals are counted apart; what more there are share one count.
-const ORIGINS_MAX: usize = 512;
-/// What was refused too often to be told each time is told so often.
-const TOLD_EVERY: Duration = Duration::from_secs(60);
-/// A lock for want of keys is announced so long before.
-const LOCK_NEAR: Duration = Duration::from_secs(60);
 /// Said where a terminal asks more than it may.
 const TOO_MANY: &str = "too many requests from this terminal, wait a moment";
 
@@ -93,30 +88,34 @@ pub struct Gate {
     errands: BTreeMap<Job, Errand>,
     last_job: Job,
     saving: Option<Saving>,
+    /// A change that waits until last logins are written: the terminal, its ticket, what.
+    next: Option<(u32, u64, Change)>,
     /// Somebody's last login is not written down yet.
     unsaved: bool,
 }
 
 impl Gate {
-    /// A gate that asks nobody: whoever sits at a terminal of the station's own process may everything.
-    pub fn new(def: Arc<PlantDef>) -> Gate {
+    /// A gate that asks nobody: whoever has started the station, or could, may everything. `host` is the user of the operating
+    /// system that the station runs as.
+    pub fn new(def: Arc<PlantDef>, host: Option<Arc<str>>) -> Gate {
         Gate {
             def,
             people: None,
-            host: None,
+            host,
             seats: BTreeMap::new(),
             tries: Tries::default(),
             refusals: BTreeMap::new(),
             errands: BTreeMap::new(),
             last_job: 0,
             saving: None,
+            next: None,
             unsaved: false,
         }
     }
 
     /// A gate that lets these people in. `host` is the user of the operating system that the station runs as.
     pub fn with_people(def: Arc<PlantDef>, people: Users, host: Option<Arc<str>>) -> Gate {
-        Gate { people: Some(people), host, ..Gate::new(def) }
+        Gate { people: Some(people), ..Gate::new(def, host) }
     }
 
     /// A terminal has attached.
@@ -133,7 +132,7 @@ impl Gate {
         seat.who = self.known(&seat.peer);
         seat.trusted = seat.who.is_some();
         let mut effects = Vec::new();
-        if !own && self.may_record(&seat.origin.clone(), at) {
+        if !own && self.may_record(&seat.origin.user.clone(), at) {
             effects.push(deed(&seat, "attach", "", "done", at));
         }
         if let Some(who) = &seat.who
@@ -150,7 +149,7 @@ impl Gate {
     fn known(&self, peer: &Peer) -> Option<Who> {
         let user = peer.unix_user.clone();
         let role = match (&self.people, &user) {
-            (None, _) if peer.own => Some(Role::Supervisor),
+            (None, _) if self.is_host(peer) => Some(Role::Supervisor),
             (_, Some(name)) => {
                 self.def.access.trusted.iter().find(|(trusted, _)| trusted.as_str() == &**name).map(|(_, role)| *role)
             }
@@ -164,7 +163,7 @@ impl Gate {
     pub fn close(&mut self, terminal: u32, at: Timestamp) -> Vec<Effect> {
         let mut effects = self.sent_out(terminal, "done: the terminal has gone", at);
         let Some(seat) = self.seats.remove(&terminal) else { return effects };
-        if !seat.peer.own && self.may_record(&seat.origin, at) {
+        if !seat.peer.own && self.may_record(&seat.origin.user, at) {
             effects.push(deed(&seat, "detach", "", "done", at));
         }
         self.tell(terminal, &mut effects);
@@ -204,7 +203,7 @@ impl Gate {
 
     /// The plant puts it on record and into the snapshot, so that whoever gave the order sees what became of it.
     fn refuse_order(&mut self, terminal: u32, request: OrderRequest, why: Refusal, at: Timestamp) -> Vec<Effect> {
-        let Some(origin) = self.seats.get(&terminal).map(|seat| seat.origin.clone()) else { return Vec::new() };
+        let Some(origin) = self.seats.get(&terminal).map(|seat| seat.origin.user.clone()) else { return Vec::new() };
         if !self.may_record(&origin, at) {
             return Vec::new();
         }
@@ -250,23 +249,19 @@ impl Gate {
             Wish::Logout => self.logout(terminal, ticket, at),
             Wish::Lock => self.lock(terminal, ticket, at),
             Wish::Unlock(password) => self.unlock(terminal, ticket, password, at),
-            Wish::Active => {
-                let mut effects = vec![Effect::Reply(ticket, Ok(()))];
-                self.tell(terminal, &mut effects);
-                effects
-            }
+            Wish::Active => vec![Effect::Reply(ticket, Ok(())), Effect::Standing(terminal)],
             Wish::Exported { file, sha256 } => {
                 let file: Arc<str> = clean(&file).into();
                 let new = Some(clean(&sha256).into());
-                self.done_now(terminal, ticket, "export", &file, new, at)
+                self.granted(terminal, ticket, "export", &file, new, at)
             }
             Wish::Stop => {
-                let mut effects = self.done_now(terminal, ticket, "stop station", &self.plant_name(), None, at);
+                let mut effects = self.granted(terminal, ticket, "stop station", &self.plant_name(), None, at);
                 effects.push(Effect::Stop);
                 effects
             }
             Wish::Reload => {
-                let mut effects = self.done_now(terminal, ticket, "reload", &self.plant_name(), None, at);
+                let mut effects = self.granted(terminal, ticket, "reload", &self.plant_name(), None, at);
                 effects.retain(|effect| !matches!(effect, Effect::Reply(..)));
                 effects.push(Effect::Reload(ticket));
                 effects
@@ -286,7 +281,7 @@ impl Gate {
     }
 
     /// Granted, on record, answered.
-    fn done_now(
+    fn granted(
         &self,
         terminal: u32,
         ticket: u64,
@@ -296,7 +291,9 @@ impl Gate {
         at: Timestamp,
     ) -> Vec<Effect> {
         let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
-        let record = ActionRecord { new, ..record(seat, action, target, "done", at) };
+        // What becomes of a stop or a reload is seen by the stop and the start of the station behind it.
+        let outcome = if new.is_some() { "done" } else { "permitted" };
+        let record = ActionRecord { new, ..record(seat, action, target, outcome, at) };
         vec![Effect::Record(record), Effect::Reply(ticket, Ok(()))]
     }
 
@@ -312,82 +309,11 @@ impl Gate {
     /// Time passes.
     pub fn tick(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = self.lock_idle(at);
-        for (origin, refusals) in &mut self.refusals {
-            if refusals.untold > 0 && passed(refusals.told, at) >= TOLD_EVERY {
-                let outcome = format!("refused: {} requests", refusals.untold);
-                effects.push(Effect::Record(ActionRecord {
-                    at,
-                    by: "not logged in".into(),
-                    from: origin.clone(),
-                    action: "too many requests".into(),
-                    target: "".into(),
-                    old: None,
-                    new: None,
-                    outcome: outcome.into(),
-                    note: None,
-                    seal: None,
-                }));
-                (refusals.untold, refusals.told) = (0, at);
-            }
-        }
+        effects.extend(self.told_late(at));
         if self.unsaved && self.saving.is_none() {
             effects.extend(self.save_logins());
         }
         effects
-    }
-
-    /// How a terminal stands.
-    pub fn standing(&self, terminal: u32, at: Timestamp) -> Standing {
-        let rules = &self.def.access;
-        let notice = rules.notice.as_deref().map(Arc::from);
-        let Some(seat) = self.seats.get(&terminal) else { return Standing { notice, ..Standing::default() } };
-        let supervisor = seat.acting().is_some_and(|who| who.role == Role::Supervisor && !who.must_change);
-        let idle_lock = self.idle_lock(seat);
-        let left = idle_lock.map(|span| span.saturating_sub(passed(seat.active, at)));
-        Standing {
-            who: seat.who.clone(),
-            locked: seat.locked,
-            view: rules.view || seat.who.is_some(),
-            first: self.people.as_ref().is_some_and(Users::is_empty) && self.may_be_first(&seat.peer),
-            notice,
-            password_chars_min: rules.password_chars_min,
-            idle_lock,
-            locks_in: left.filter(|left| *left <= LOCK_NEAR && seat.acting().is_some()),
-            users: Arc::new(if supervisor { self.user_rows(at) } else { Vec::new() }),
-            sessions: Arc::new(if supervisor { self.session_rows() } else { Vec::new() }),
-            gone: None,
-        }
-    }
-
-    fn user_rows(&self, at: Timestamp) -> Vec<UserRow> {
-        let rows = self.people.iter().flat_map(Users::iter).map(|user| UserRow {
-            user: user.name.clone(),
-            role: user.role,
-            disabled: user.disabled,
-            locked_until: self.tries.locked_until(&user::key(&user.name), at),
-            must_change: user.must_change,
-            last_login: user.last_login,
-        });
-        rows.collect()
-    }
-
-    fn session_rows(&self) -> Vec<SessionRow> {
-        let rows = self.seats.iter().map(|(terminal, seat)| SessionRow {
-            terminal: *terminal,
-            user: seat.who.as_ref().map(|who| who.user.clone()),
-            from: seat.peer.from.clone(),
-            since: seat.since,
-            locked: seat.locked,
-        });
-        rows.collect()
-    }
-
-    /// This terminal and all that see the lists hear how they stand.
-    fn tell(&self, terminal: u32, effects: &mut Vec<Effect>) {
-        let sees = |seat: &Seat| seat.acting().is_some_and(|who| who.role == Role::Supervisor);
-        let others = self.seats.iter().filter(|(id, seat)| **id != terminal && sees(seat)).map(|(id, _)| *id);
-        let own = self.seats.contains_key(&terminal).then_some(terminal);
-        effects.extend(own.into_iter().chain(others).map(Effect::Standing));
     }
 
     /// Who sits here, if he may do what needs this role. `Err` says in words for him why not.
@@ -403,38 +329,6 @@ impl Gate {
         enough(who.role, needed.unwrap_or(Role::Viewer))?;
         Ok(who)
     }
-
-    /// Is a request of this terminal listened to?
-    fn heard(&mut self, terminal: u32, at: Timestamp) -> bool {
-        let Some(seat) = self.seats.get_mut(&terminal) else { return false };
-        // The station's own process shares its fate anyway.
-        if seat.peer.own || seat.requests.take(at) {
-            return true;
-        }
-        let origin = seat.origin.clone();
-        self.refusals_of(&origin, at).untold += 1;
-        false
-    }
-
-    /// May one more refusal, or coming and going, of this place be on record by itself?
-    fn may_record(&mut self, origin: &Arc<str>, at: Timestamp) -> bool {
-        self.refusals_of(origin, at).one(at)
-    }
-
-    fn refusals_of(&mut self, origin: &Arc<str>, at: Timestamp) -> &mut Refusals {
-        if ORIGINS_MAX <= self.refusals.len() && !self.refusals.contains_key(origin) {
-            self.refusals.retain(|_, refusals| refusals.untold > 0 || passed(refusals.told, at) < TOLD_EVERY);
-        }
-        let full = ORIGINS_MAX <= self.refusals.len() && !self.refusals.contains_key(origin);
-        let origin = if full { "many places".into() } else { origin.clone() };
-        self.refusals.entry(origin).or_insert_with(|| Refusals::new(at))
-    }
-
-    /// The record of a refusal, unless there are too many of them.
-    fn refused(&mut self, seat: &Seat, action: &str, target: &str, why: &str, at: Timestamp) -> Vec<Effect> {
-        let told = self.may_record(&seat.origin, at);
-        told.then(|| deed(seat, action, target, &format!("refused: {why}"), at)).into_iter().collect()
-    }
 }
 
 const LOG_IN_FIRST: &str = "log in first";
@@ -445,58 +339,6 @@ fn enough(role: Role, needed: Role) -> Result<(), String> {
         return Ok(());
     }
     Err(format!("this is for a {}, you are {}", needed.word(), role.word()))
-}
-
-/// What a wish is called on record, and whom or what it is about.
-fn words(wish: &Wish) -> (&'static str, Arc<str>) {
-    // What is typed in the wrong field may be a password.
-    let name = |user: &str| if user::check_name(user).is_ok() { user.into() } else { "unknown user".into() };
-    match wish {
-        Wish::Login { .. } => ("login", "unknown user".into()),
-        Wish::Logout => ("logout", "".into()),
-        Wish::Lock => ("lock", "".into()),
-        Wish::Unlock(_) => ("unlock", "".into()),
-        Wish::Active => ("active", "".into()),
-        Wish::FirstSupervisor { user, .. } => ("add user", name(user)),
-        Wish::ChangePassword { .. } => ("change password", "".into()),
-        Wish::AddUser { user, .. } => ("add user", name(user)),
-        Wish::SetRole { user, .. } => ("set role", name(user)),
-        Wish::Disable { user, disabled: true } => ("disable user", name(user)),
-        Wish::Disable { user, disabled: false } => ("enable user", name(user)),
-        Wish::DeleteUser { user } => ("delete user", name(user)),
-        Wish::ResetPassword { user, .. } => ("reset password", name(user)),
-        Wish::Exported { file, .. } => ("export", clean(file).into()),
-        Wish::Stop => ("stop station", "".into()),
-        Wish::Reload => ("reload", "".into()),
-    }
-}
-
-fn seat_name(seat: &Seat) -> Arc<str> {
-    seat.who.as_ref().map_or_else(|| "not logged in".into(), |who| who.user.clone())
-}
-
-fn record(seat: &Seat, action: &str, target: &str, outcome: &str, at: Timestamp) -> ActionRecord {
-    ActionRecord {
-        at,
-        by: seat_name(seat),
-        from: seat.peer.from.clone(),
-        action: action.into(),
-        target: target.into(),
-        old: None,
-        new: None,
-        outcome: outcome.into(),
-        note: None,
-        seal: None,
-    }
-}
-
-fn deed(seat: &Seat, action: &str, target: &str, outcome: &str, at: Timestamp) -> Effect {
-    Effect::Record(record(seat, action, target, outcome, at))
-}
-
-/// Words of a terminal as they may stand on record: not endless, and nothing that moves a cursor.
-fn clean(words: &str) -> String {
-    words.chars().take(WORDS_MAX).map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
 }
 
 fn passed(from: Timestamp, to: Timestamp) -> Duration {

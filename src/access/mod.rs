@@ -6,6 +6,7 @@ pub mod password;
 pub mod user;
 pub mod tries;
 pub mod gate;
+pub mod book;
 pub mod io;
 
 pub use gate::{Effect, Gate, Peer};

@@ -1,6 +1,6 @@
 //! Wrong passwords: they are counted for each account and for each place they come from, and too many lock both out for a while.
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{collections::BTreeMap, fmt, sync::Arc, time::Duration};
 
 use jiff::{SignedDuration, Timestamp};
 
@@ -10,6 +10,8 @@ use crate::plant::role::AccessDef;
 const DELAY_MAX: Duration = Duration::from_secs(16);
 /// Places that are remembered; those that were quiet longest are forgotten first.
 const ORIGINS_MAX: usize = 512;
+/// All places of one user of the operating system together have so many times the tries of one of them.
+const PLACES: u16 = 8;
 
 /// Whom an attempt is counted for: the [`super::user::key`] of an account, or `None` for a name that nobody has.
 pub type Account<'a> = Option<&'a str>;
@@ -18,17 +20,52 @@ pub type Account<'a> = Option<&'a str>;
 #[derive(Debug, Default)]
 pub struct Tries {
     accounts: BTreeMap<String, Count>,
-    origins: BTreeMap<Arc<str>, Origin>,
+    origins: BTreeMap<Origin, Place>,
+    users: BTreeMap<Arc<str>, Count>,
+}
+
+/// Where a password comes from.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Origin {
+    /// The user of the operating system: the system says it, nobody can make it up.
+    pub user: Arc<str>,
+    /// The host, as the terminal says it. One that lies has another one each time, and is stopped by what its user has left.
+    pub host: Arc<str>,
+}
+
+impl fmt::Display for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} from {}", self.user, self.host)
+    }
 }
 
 #[derive(Debug, Default)]
 struct Count {
     wrong: u16,
+    last: Timestamp,
     locked_until: Option<Timestamp>,
 }
 
+impl Count {
+    /// One more wrong try; `true` if it is one too many, and locks out until then.
+    fn one(&mut self, most: u16, until: Timestamp, at: Timestamp) -> bool {
+        // A lock-out is not made longer by those who go on: they could shut somebody out for ever.
+        if self.locked_until.is_some_and(|until| at < until) {
+            return false;
+        }
+        if self.locked_until.take().is_some() {
+            self.wrong = 0;
+        }
+        (self.wrong, self.last) = (self.wrong.saturating_add(1), at);
+        if most <= self.wrong {
+            self.locked_until = Some(until);
+        }
+        most <= self.wrong
+    }
+}
+
 #[derive(Debug)]
-struct Origin {
+struct Place {
     /// For whom each wrong try was: never more than lock it out.
     wrong: Vec<Option<String>>,
     last: Timestamp,
@@ -49,9 +86,10 @@ pub struct LockedOut {
 impl Tries {
     /// May a password be tried from here now? `Err` is how long to wait. Only one is looked at a time: who is let through
     /// must come back to [`Tries::right`] or [`Tries::wrong`].
-    pub fn begin(&mut self, origin: &Arc<str>, rules: &AccessDef, at: Timestamp) -> Result<(), Duration> {
+    pub fn begin(&mut self, origin: &Origin, rules: &AccessDef, at: Timestamp) -> Result<(), Duration> {
         self.forget(rules, at);
-        let place = self.origins.entry(origin.clone()).or_insert_with(|| Origin {
+        let user = self.users.get(&origin.user).and_then(|user| user.locked_until).unwrap_or(at);
+        let place = self.origins.entry(origin.clone()).or_insert_with(|| Place {
             wrong: Vec::new(),
             last: at,
             wait_until: at,
@@ -60,22 +98,23 @@ impl Tries {
         if place.busy {
             return Err(Duration::from_secs(1));
         }
-        if at < place.wait_until {
-            return Err(Duration::try_from(place.wait_until.duration_since(at)).unwrap_or_default());
+        let until = place.wait_until.max(user);
+        if at < until {
+            return Err(Duration::try_from(until.duration_since(at)).unwrap_or_default());
         }
         (place.busy, place.last) = (true, at);
         Ok(())
     }
 
     /// The password could not be looked at.
-    pub fn end(&mut self, origin: &str) {
+    pub fn end(&mut self, origin: &Origin) {
         if let Some(place) = self.origins.get_mut(origin) {
             place.busy = false;
         }
     }
 
     /// The password was right: what was wrong before for this account counts no more.
-    pub fn right(&mut self, origin: &str, account: &str) {
+    pub fn right(&mut self, origin: &Origin, account: &str) {
         self.accounts.remove(account);
         if let Some(place) = self.origins.get_mut(origin) {
             place.busy = false;
@@ -84,23 +123,15 @@ impl Tries {
     }
 
     /// The name or the password was wrong.
-    pub fn wrong(&mut self, origin: &str, account: Account, rules: &AccessDef, at: Timestamp) -> LockedOut {
+    pub fn wrong(&mut self, origin: &Origin, account: Account, rules: &AccessDef, at: Timestamp) -> LockedOut {
         let until = at.saturating_add(span(rules.lock_out)).unwrap_or(Timestamp::MAX);
         let mut locked = LockedOut::default();
         if let Some(account) = account {
             let count = self.accounts.entry(account.to_owned()).or_default();
-            // A lock-out is not made longer by those who go on: they could shut somebody out for ever.
-            if count.locked_until.is_none_or(|until| until <= at) {
-                if count.locked_until.take().is_some() {
-                    count.wrong = 0;
-                }
-                count.wrong += 1;
-                if rules.tries_max <= count.wrong {
-                    count.locked_until = Some(until);
-                    locked.account = true;
-                }
-            }
+            locked.account = count.one(rules.tries_max, until, at);
         }
+        let user = self.users.entry(origin.user.clone()).or_default();
+        locked.origin = user.one(rules.tries_max.saturating_mul(PLACES), until, at);
         if let Some(place) = self.origins.get_mut(origin) {
             place.busy = false;
             place.last = at;
@@ -124,9 +155,10 @@ impl Tries {
     }
 
     /// How long one must still wait at this place.
-    pub fn wait(&self, origin: &str, at: Timestamp) -> Option<Duration> {
-        let place = self.origins.get(origin)?;
-        Duration::try_from(place.wait_until.duration_since(at)).ok().filter(|wait| !wait.is_zero())
+    pub fn wait(&self, origin: &Origin, at: Timestamp) -> Option<Duration> {
+        let place = self.origins.get(origin).map(|place| place.wait_until);
+        let user = self.users.get(&origin.user).and_then(|user| user.locked_until);
+        Duration::try_from(place.max(user)?.duration_since(at)).ok().filter(|wait| !wait.is_zero())
     }
 
     /// A Supervisor ends the lock-out of an account, or it is another account now.
@@ -137,6 +169,7 @@ impl Tries {
     /// Places that have been quiet for as long as a lock-out lasts are as new.
     fn forget(&mut self, rules: &AccessDef, at: Timestamp) {
         let old = at.saturating_sub(span(rules.lock_out.max(DELAY_MAX))).unwrap_or(Timestamp::MIN);
+        self.users.retain(|_, user| old < user.last || user.locked_until.is_some_and(|until| at < until));
         self.origins.retain(|_, place| place.busy || at < place.wait_until || old < place.last);
         if ORIGINS_MAX <= self.origins.len() {
             let quiet = self.origins.iter().filter(|(_, place)| !place.busy).min_by_key(|(_, place)| place.last);
@@ -158,13 +191,17 @@ mod tests {
 
     use super::*;
 
+    fn from(host: &str) -> Origin {
+        Origin { user: "panel".into(), host: host.into() }
+    }
+
     fn at(seconds: i64) -> Timestamp {
         Timestamp::from_second(1_000_000 + seconds).unwrap()
     }
 
     #[test]
     fn one_waits_longer_after_each_wrong_password_and_is_locked_out_at_last() {
-        let (rules, here): (_, Arc<str>) = (AccessDef::default(), "here".into());
+        let (rules, here) = (AccessDef::default(), from("here"));
         let mut tries = Tries::default();
         let mut now = 0;
         for (delay, locked) in [(1, false), (2, false), (4, false), (8, false), (300, true)] {
@@ -180,7 +217,7 @@ mod tests {
 
     #[test]
     fn a_terminal_that_tries_every_account_is_locked_out_though_no_account_is() {
-        let (rules, here): (_, Arc<str>) = (AccessDef::default(), "here".into());
+        let (rules, here) = (AccessDef::default(), from("here"));
         let mut tries = Tries::default();
         let names = ["a", "b", "c", "d", "e"];
         for (place, name) in names.iter().enumerate() {
@@ -189,12 +226,12 @@ mod tests {
         }
         assert!(tries.begin(&here, &rules, at(120)).is_err());
         assert!(names.iter().all(|name| tries.locked_until(name, at(120)).is_none()));
-        assert_eq!(tries.begin(&"there".into(), &rules, at(120)), Ok(()), "other terminals are not touched");
+        assert_eq!(tries.begin(&from("there"), &rules, at(120)), Ok(()), "other terminals are not touched");
     }
 
     #[test]
     fn an_own_right_password_does_not_wash_away_the_tries_for_others() {
-        let (rules, here): (_, Arc<str>) = (AccessDef::default(), "here".into());
+        let (rules, here) = (AccessDef::default(), from("here"));
         let mut tries = Tries::default();
         for round in 0..5 {
             let now = at(round * 20);
@@ -207,13 +244,29 @@ mod tests {
         assert!(tries.begin(&here, &rules, at(110)).is_err());
     }
 
+    #[test]
+    fn a_terminal_that_says_it_is_another_one_each_time_is_locked_out_too() {
+        let rules = AccessDef::default();
+        let mut tries = Tries::default();
+        let host = |n: u32| from(&format!("10.0.0.{n}"));
+        let looked_at = (0..1_000).filter(|n| {
+            let begun = tries.begin(&host(*n), &rules, at(0)).is_ok();
+            begun.then(|| tries.wrong(&host(*n), None, &rules, at(0))).is_some()
+        });
+        assert_eq!(looked_at.count(), 40);
+        assert_eq!(tries.wait(&host(5_000), at(0)), Some(Duration::from_secs(300)));
+        let other = Origin { user: "anna".into(), host: "here".into() };
+        assert_eq!(tries.begin(&other, &rules, at(0)), Ok(()), "other users of the system are not touched");
+        assert_eq!(tries.begin(&from("here"), &rules, at(300)), Ok(()));
+    }
+
     proptest! {
         #[test]
         fn a_script_never_has_more_tries_than_permitted_in_a_lock_out(
             tries_max in 1u16..8, steps in prop::collection::vec((0usize..3, 0usize..3, 0i64..40), 1..200)
         ) {
             let rules = AccessDef { tries_max, ..AccessDef::default() };
-            let origins: [Arc<str>; 3] = ["x".into(), "y".into(), "z".into()];
+            let origins = ["x", "y", "z"].map(from);
             let (mut tries, mut now) = (Tries::default(), 0);
             let mut looked_at: Vec<(usize, i64)> = Vec::new();
             for (origin, account, later) in steps {

@@ -1,32 +1,51 @@
 //! The rules for logging in: the table `[access]` of a plant file.
 
+use std::{ops::RangeInclusive, time::Duration};
+
 use super::{diagnostic::Problems, reader::At, schema::AccessTable};
-use crate::plant::role::AccessDef;
+use crate::plant::role::{AccessDef, Role};
 
 /// Passwords shorter than this are nobody's business to permit (NIST SP 800-63B rev 4, 8 with a second factor).
 const CHARS_LEAST: u16 = 8;
 /// Wrong tries that may be permitted at the most (the same, 3.2.2).
 const TRIES_MOST: u16 = 100;
+/// How long a lock-out may last.
+const LOCK_OUT: RangeInclusive<Duration> = Duration::from_secs(10)..=Duration::from_secs(3600);
 
 /// The rules; without the table the usual ones.
 pub(super) fn access(table: Option<&AccessTable>, problems: &mut Problems) -> AccessDef {
     let usual = AccessDef::default();
     let Some(table) = table else { return usual };
     let chars = number(table.password_chars_min, CHARS_LEAST, 64, usual.password_chars_min, problems);
-    let trusted = table.trusted.iter().filter_map(|table| {
-        let table = &table.value;
-        Some((table.user.as_ref()?.value.clone(), table.role?.value))
-    });
+    let mut trusted: Vec<(String, Role)> = Vec::new();
+    for table in &table.trusted {
+        let (Some(user), Some(role)) = (&table.value.user, table.value.role) else { continue };
+        if trusted.iter().any(|(other, _)| *other == user.value) {
+            problems.add(user.at, format!("the user `{}` is trusted twice", user.value)).label("already above");
+        } else {
+            trusted.push((user.value.clone(), role.value));
+        }
+    }
     AccessDef {
         notice: table.notice.as_ref().map(|notice| notice.value.clone()),
         view: table.view.map_or(usual.view, |view| view.value),
         password_chars_min: chars,
         tries_max: number(table.tries_max, 1, TRIES_MOST, usual.tries_max, problems),
-        lock_out: table.lock_out.map_or(usual.lock_out, |span| span.value),
+        lock_out: lock_out(table.lock_out, usual.lock_out, problems),
         idle_lock: table.idle_lock.map_or(usual.idle_lock, |span| span.value),
         sessions_max: number(table.sessions_max, 1, 256, usual.sessions_max, problems),
-        trusted: trusted.collect(),
+        trusted,
     }
+}
+
+/// A lock-out that lasts nothing is none, and one of days stops the plant instead of a guesser.
+fn lock_out(given: Option<At<Duration>>, usual: Duration, problems: &mut Problems) -> Duration {
+    let Some(given) = given else { return usual };
+    if !LOCK_OUT.contains(&given.value) {
+        problems.add(given.at, format!("{:?} cannot be used here", given.value)).label("expected 10s … 1h");
+        return usual;
+    }
+    given.value
 }
 
 fn number(given: Option<At<u16>>, least: u16, most: u16, usual: u16, problems: &mut Problems) -> u16 {

@@ -10,7 +10,10 @@ use tokio::{
 };
 
 use crate::{
-    access::{Gate, Peer},
+    access::{
+        Gate, Peer,
+        io::{book, own_user, users, users_beside},
+    },
     bus::io::{clock::Clock, task, transport::Connector},
     history::{
         HistoryError,
@@ -29,6 +32,7 @@ use crate::{
 };
 
 use super::{
+    deeds::{self, Deeds},
     door::{self, Door, Entrance, Ways},
     session::Session,
     sets,
@@ -74,26 +78,63 @@ pub struct Station {
     pub commands: mpsc::Receiver<door::Command>,
     /// `None` for a rehearsal, which keeps nothing.
     history: Option<history::Handle>,
+    /// The thread of the book, which ends before the history.
+    book: Option<std::thread::JoinHandle<()>>,
+    /// Nobody is asked who he is.
+    open: bool,
     stop: watch::Sender<bool>,
     tasks: Vec<JoinHandle<()>>,
 }
 
-/// Starts history, links and plant, in this order: a store that cannot be opened stops the start.
+/// Starts history, links and plant, in this order: a store that cannot be opened stops the start. Nobody is asked who he
+/// is: whoever has started the station, or could, may everything. For demonstrations and drills.
 pub fn start(options: Options) -> Result<Station, HistoryError> {
     start_told(options, None)
 }
 
 /// The same, where the steps of alarms are also told to a listener.
 pub fn start_told(options: Options, listener: Option<Listener>) -> Result<Station, HistoryError> {
-    let Options { def, clock, history, connectors, file } = options;
-    let sets = sets::folder(&history, &def.name);
-    let history = history::start(&history, def.clone(), clock)?;
+    begin(options, listener, None)
+}
+
+/// The same for a plant whose people are kept beside its history: everybody must log in.
+pub fn start_guarded(options: Options) -> Result<Station, StartError> {
+    let path = users_beside(&options.history);
+    let people = users::read(&path)?;
+    let gate = Gate::with_people(options.def.clone(), people, Some(own_user().into()));
+    Ok(begin(options, None, Some((gate, path)))?)
+}
+
+/// Why a station did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The history cannot be used.
+    #[error(transparent)]
+    History(#[from] HistoryError),
+    /// The users are not known.
+    #[error(transparent)]
+    Users(#[from] users::UsersError),
+}
+
+fn begin(
+    options: Options,
+    listener: Option<Listener>,
+    guarded: Option<(Gate, PathBuf)>,
+) -> Result<Station, HistoryError> {
+    let Options { def, clock, history: path, connectors, file } = options;
+    let sets = sets::folder(&path, &def.name);
+    let history = history::start(&path, def.clone(), clock)?;
     let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
     plant.restore(&history.restored);
     plant.remeasure(&history.recent.active, &history.recent.steps, clock.now());
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
-    let keeping = Keeping { records: Some(records), store, sets: Some(sets), listener };
-    Ok(assemble(def, clock, connectors, plant, file, keeping, (queries, Some(history))))
+    let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the book: {error}"));
+    let book = book::start(&book::beside(&path), clock, records.clone()).map_err(no_thread)?;
+    let mut deeds = Deeds::new(&book);
+    deeds.started(&def.name, file.as_ref(), clock.now());
+    let keeping = Keeping { records: Some(records), store, book: Some(deeds), sets: Some(sets), listener };
+    let threads = Threads { queries, history: Some(history), book: Some(book.join) };
+    Ok(assemble(def, clock, connectors, plant, file, keeping, threads, guarded))
 }
 
 /// A station that keeps nothing, for drills in virtual time, where no other thread may take part. Questions to the history
@@ -102,19 +143,31 @@ pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, li
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
-    let keeping = Keeping { records: None, store, sets: None, listener: Some(listener) };
-    assemble(def, clock, connectors, plant, None, keeping, (queries, None))
+    let keeping = Keeping { records: None, store, book: None, sets: None, listener: Some(listener) };
+    let threads = Threads { queries, history: None, book: None };
+    assemble(def, clock, connectors, plant, None, keeping, threads, None)
+}
+
+/// What runs beside the tasks.
+struct Threads {
+    queries: mpsc::Sender<Query>,
+    history: Option<history::Handle>,
+    book: Option<std::thread::JoinHandle<()>>,
 }
 
 /// Where the journal and the parameter sets go.
 struct Keeping {
     records: Option<mpsc::Sender<Vec<Record>>>,
     store: watch::Receiver<HistoryStatus>,
+    /// Deeds go there first.
+    book: Option<Deeds>,
     /// The folder of parameter sets.
     sets: Option<PathBuf>,
     listener: Option<Listener>,
 }
 
+// Everything that a station is made of, each once.
+#[allow(clippy::too_many_arguments)]
 fn assemble(
     def: Arc<PlantDef>,
     clock: Clock,
@@ -122,8 +175,10 @@ fn assemble(
     plant: Plant,
     file: Option<PlantFile>,
     keeping: Keeping,
-    (queries, history): (mpsc::Sender<Query>, Option<history::Handle>),
+    threads: Threads,
+    guarded: Option<(Gate, PathBuf)>,
 ) -> Station {
+    let Threads { queries, history, book } = threads;
     let (stop, stopped) = watch::channel(false);
     let (events, event_queue) = mpsc::channel(EVENTS);
     let (orders, order_queue) = mpsc::channel(ORDERS);
@@ -142,9 +197,12 @@ fn assemble(
     let (command, commands) = mpsc::channel(door::COMMANDS);
     let ways = Ways { orders: orders.clone(), queries, deeds, commands: command };
     let (entrance, knocks, requests) = Entrance::new(snapshots);
-    let door = Door::new(Gate::new(def), clock, ways, None);
+    let open = guarded.is_none();
+    let (gate, users) =
+        guarded.map_or_else(|| (Gate::new(def, Some(own_user().into())), None), |(gate, users)| (gate, Some(users)));
+    let door = Door::new(gate, clock, ways, users);
     tasks.push(tokio::spawn(door.run(knocks, requests, stopped)));
-    Station { entrance, orders, commands, history, stop, tasks }
+    Station { entrance, orders, commands, history, book, open, stop, tasks }
 }
 
 /// Waits for the end of a link. One that ends before the station does takes its values with it, visibly.
@@ -174,12 +232,14 @@ impl Station {
 
     /// Attaches a terminal of this very process.
     pub fn session(&self, operator: &str) -> Session {
-        self.entrance.attach(Peer { from: "this process".into(), unix_user: Some(operator.into()), own: true })
+        // What somebody calls himself counts only where nobody is asked.
+        let user = if self.open { operator.to_owned() } else { own_user() };
+        self.entrance.attach(Peer { from: "this process".into(), unix_user: Some(user.into()), own: true })
     }
 
     /// Stops downstream and waits until the last record is on disk.
     pub async fn stop(self) {
-        let Station { entrance, orders, commands, history, stop, tasks } = self;
+        let Station { entrance, orders, commands, history, book, open: _, stop, tasks } = self;
         // Links may have ended already; then nobody listens, which is fine.
         let _ = stop.send(true);
         drop((entrance, orders, commands));
@@ -188,9 +248,14 @@ impl Station {
                 tracing::error!(%error, "a task of the station ended badly");
             }
         }
-        // The last records are on their way; the thread ends when it has stored them.
+        // The last records are on their way; each thread ends when it has stored them, the book before the history.
         let Some(history) = history else { return };
-        if let Err(error) = tokio::task::spawn_blocking(move || history.stop()).await {
+        let ended = move || {
+            // A panic of the thread has already been reported by the panic hook.
+            let _ = book.map(std::thread::JoinHandle::join);
+            history.stop();
+        };
+        if let Err(error) = tokio::task::spawn_blocking(ended).await {
             tracing::error!(%error, "the history did not end well");
         }
     }
@@ -256,9 +321,11 @@ impl PlantTask {
         // Changed since the last snapshot, and when the next one may go out.
         let (mut changed, mut next) = (false, Instant::now());
         loop {
+            // What a snapshot shows as done is in the book.
+            let due = self.keeping.book.as_ref().map_or(next, |book| book.due(next));
             tokio::select! {
                 biased;
-                () = tokio::time::sleep_until(next), if changed => {
+                () = tokio::time::sleep_until(due), if changed => {
                     self.publish.send_replace(Arc::new(self.plant.snapshot()));
                     (changed, next) = (false, Instant::now() + SNAPSHOT_EVERY);
                 }
@@ -280,10 +347,15 @@ impl PlantTask {
                     self.hear_store();
                     changed = true;
                 }
+                () = Deeds::changed(&mut self.keeping.book) => {
+                    self.hear_store();
+                    changed = true;
+                }
                 // Before the events: however many there are, values age and orders expire.
                 _ = tick.tick() => {
                     let effects = self.plant.on_tick(self.clock.now());
                     self.carry_out(effects);
+                    self.look_at_clock();
                     changed = true;
                 }
                 event = events.recv() => {
@@ -307,7 +379,21 @@ impl PlantTask {
                 Err(_) => tracing::error!("the folder of the parameter sets does not answer: left behind"),
             }
         }
+        let stopped = deeds::stopped(&self.plant.def().name, self.clock.now());
+        if self.keeping.book.is_some() {
+            self.write_down(vec![stopped]);
+        }
         self.publish.send_replace(Arc::new(self.plant.snapshot()));
+    }
+
+    fn look_at_clock(&mut self) {
+        // A clock that runs faster, or in virtual time, is nobody's wall clock.
+        let real = self.clock.speed() == 1.0;
+        let now = self.clock.now();
+        let step = self.keeping.book.as_mut().filter(|_| real).and_then(|book| book.look_at_clock(now));
+        if let Some(step) = step {
+            self.write_down(vec![step]);
+        }
     }
 
     fn carry_out(&mut self, effects: Effects) {
@@ -373,6 +459,9 @@ impl PlantTask {
     fn take_saved(&mut self, (order, settings, done): Saved) {
         let result = match done {
             Ok((file, result)) => {
+                let now = self.clock.now();
+                let changed = self.keeping.book.as_mut().and_then(|book| book.plant_file(&file, now));
+                self.write_down(changed.into_iter().collect());
                 self.file = Some(file);
                 result
             }
@@ -410,7 +499,31 @@ impl PlantTask {
         if let Some(listener) = &self.keeping.listener {
             listener.tell(&records);
         }
-        let Some(store) = &self.keeping.records else { return };
+        let (mut deeds, mut others) = (Vec::new(), Vec::new());
+        for record in records {
+            match record {
+                Record::Action(deed) => deeds.push(deed),
+                Record::Sample(..) | Record::Alarm(_) | Record::Line(_) => others.push(record),
+            }
+        }
+        self.write_down(deeds);
+        self.store(others);
+    }
+
+    /// Deeds into the book, which sends them on to the history; straight there where it has no room.
+    fn write_down(&mut self, deeds: Vec<ActionRecord>) {
+        if deeds.is_empty() {
+            return;
+        }
+        let left = match &mut self.keeping.book {
+            Some(book) => book.put(deeds),
+            None => deeds,
+        };
+        self.store(left.into_iter().map(Record::Action).collect());
+    }
+
+    fn store(&mut self, records: Vec<Record>) {
+        let Some(store) = self.keeping.records.as_ref().filter(|_| !records.is_empty()) else { return };
         if let Err(refused) = store.try_send(records) {
             self.lost += refused.into_inner().len() as u64;
             self.hear_store();
@@ -420,6 +533,14 @@ impl PlantTask {
     fn hear_store(&mut self) {
         let mut status = self.keeping.store.borrow_and_update().clone();
         status.lost += self.lost;
+        if let Some(book) = &mut self.keeping.book {
+            let (lost, trouble) = book.trouble();
+            status.lost += lost;
+            status.trouble = match (status.trouble, trouble) {
+                (Some(one), Some(other)) => Some(format!("{one}; {other}")),
+                (one, other) => one.or(other),
+            };
+        }
         self.plant.on_history(status);
     }
 }

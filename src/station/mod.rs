@@ -5,12 +5,16 @@
 //! thread drains, flushes and ends.
 
 pub mod session;
+mod deeds;
 mod door;
 pub mod pulse;
 mod sets;
 pub mod teller;
 mod toil;
 pub mod io;
+
+#[cfg(test)]
+mod tests;
 
 pub use door::{Command, Entrance};
 pub use session::{Request, Session};

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{Effect, Gate, LOG_IN_FIRST, Seat, deed, passed, work::What};
+use super::{Effect, Gate, LOG_IN_FIRST, Seat, paper::deed, passed, standing::LOCK_NEAR, work::What};
 use crate::access::{Secret, Who, user};
 
 /// Said where nobody is asked who he is.
@@ -159,7 +159,7 @@ impl Gate {
         let mut effects = Vec::new();
         let idle = |gate: &Gate, seat: &Seat| {
             let left = gate.idle_lock(seat)?.saturating_sub(passed(seat.active, at));
-            (seat.acting().is_some() && left <= super::LOCK_NEAR).then_some(left)
+            (seat.acting().is_some() && left <= LOCK_NEAR).then_some(left)
         };
         let near: Vec<_> = self.seats.iter().filter_map(|(id, seat)| Some((*id, idle(self, seat)?))).collect();
         for (terminal, left) in near {

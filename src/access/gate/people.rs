@@ -4,7 +4,13 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 
-use super::{Effect, Gate, Peer, deed, enough, login::reply, record, right, work::What};
+use super::{
+    Effect, Gate, Peer, enough,
+    login::reply,
+    paper::{deed, record, words},
+    right,
+    work::What,
+};
 use crate::{
     access::{
         Secret, Who, Wish, password,
@@ -35,7 +41,7 @@ impl Gate {
         if self.people.is_none() {
             return reply(ticket, "this station keeps no users");
         }
-        let (action, target) = super::words(&wish);
+        let (action, target) = words(&wish);
         let result = match wish {
             Wish::FirstSupervisor { user, password } => self.first(terminal, ticket, user.into(), password),
             Wish::ChangePassword { old, new } => self.change_own(terminal, ticket, old, new, at),
@@ -76,22 +82,22 @@ impl Gate {
         let mut effects = reply(ticket, why);
         let Some(seat) = self.seats.get(&terminal) else { return effects };
         let record = deed(seat, action, target, &format!("refused: {why}"), at);
-        let origin = seat.origin.clone();
+        let origin = seat.origin.user.clone();
         if self.may_record(&origin, at) {
             effects.push(record);
         }
         effects
     }
 
-    /// Only whoever has started the station, or could, makes the first Supervisor.
-    pub(super) fn may_be_first(&self, peer: &Peer) -> bool {
+    /// Has he started the station, or could he? Only he makes the first Supervisor.
+    pub(super) fn is_host(&self, peer: &Peer) -> bool {
         let user = peer.unix_user.as_deref();
         peer.own || user == Some("root") || (user.is_some() && user == self.host.as_deref())
     }
 
     fn first(&mut self, terminal: u32, ticket: u64, user: Arc<str>, password: Secret) -> Result<Vec<Effect>, String> {
         let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
-        if !self.may_be_first(&seat.peer) {
+        if !self.is_host(&seat.peer) {
             return Err("only whoever has started the station makes the first supervisor".to_owned());
         }
         if self.people.as_ref().is_none_or(|people| !people.is_empty()) {
@@ -192,8 +198,13 @@ impl Gate {
                 enough(who.role, right::Right::People.role())?;
             }
         }
-        if self.saving.is_some() {
-            return Err("another change is just being written down, try again".to_owned());
+        match &self.saving {
+            Some(Saving { wish: None, .. }) if self.next.is_none() => {
+                self.next = Some((terminal, ticket, change));
+                return Ok(Vec::new());
+            }
+            Some(_) => return Err("another change is just being written down, try again".to_owned()),
+            None => {}
         }
         let after = self.check_change(&change)?;
         let (action, old, new) = self.told(&change);
@@ -234,7 +245,7 @@ impl Gate {
     /// The people were written down, or not: `Err` says why.
     pub fn saved(&mut self, result: Result<(), String>, at: Timestamp) -> Vec<Effect> {
         let Some(Saving { terminal, wish: Some((ticket, change, record)) }) = self.saving.take() else {
-            return Vec::new();
+            return self.go_on(at);
         };
         let after = result.and_then(|()| self.check_change(&change));
         let people = match after {
@@ -249,6 +260,15 @@ impl Gate {
         effects.extend(self.followed(terminal, &change, at));
         self.tell(terminal, &mut effects);
         effects
+    }
+
+    /// Begins the change that waited while last logins were written.
+    fn go_on(&mut self, at: Timestamp) -> Vec<Effect> {
+        let Some((terminal, ticket, change)) = self.next.take() else { return Vec::new() };
+        let (action, _, _) = self.told(&change);
+        let target = change.user().clone();
+        let begun = self.change(terminal, ticket, change, at);
+        begun.unwrap_or_else(|why| self.not_changed(terminal, ticket, action, &target, &why, at))
     }
 
     /// What a change means for those who are in.

@@ -1,11 +1,9 @@
 //! One terminal as the gate knows it, and how much it may ask for.
 
-use std::sync::Arc;
-
 use jiff::Timestamp;
 
 use super::Peer;
-use crate::access::Who;
+use crate::access::{Who, tries::Origin};
 
 /// Requests a second of one terminal that are answered in the long run, and so many at once.
 const REQUESTS: (f64, f64) = (20.0, 40.0);
@@ -17,9 +15,8 @@ const REFUSALS: (f64, f64) = (0.5, 20.0);
 pub struct Seat {
     /// Where it is.
     pub peer: Peer,
-    /// Whose wrong passwords and refusals count together: the host it came from, not the terminal, of which anybody can
-    /// open another.
-    pub origin: Arc<str>,
+    /// Whose wrong passwords count together: the host it came from, not the terminal, of which anybody can open another.
+    pub origin: Origin,
     /// Since when.
     pub since: Timestamp,
     /// Who sits there.
@@ -54,10 +51,15 @@ impl Seat {
     }
 }
 
-/// The user of the operating system and the host: `pts/3 from 10.0.0.5, user panel` comes from `panel from 10.0.0.5`.
-fn origin(peer: &Peer) -> Arc<str> {
+/// Where it is, as far as this can be told. `pts/3 from 10.0.0.5, user panel`: the terminal says that it comes from there,
+/// the system says who it belongs to.
+fn origin(peer: &Peer) -> Origin {
     let host = peer.from.split_once(" from ").map(|(_, host)| host.split([',', ' ']).next().unwrap_or(host));
-    format!("{} from {}", peer.unix_user.as_deref().unwrap_or("?"), host.unwrap_or("here")).into()
+    let user = peer.unix_user.as_deref().filter(|_| !peer.own);
+    Origin {
+        user: user.unwrap_or(if peer.own { "this process" } else { "nobody" }).into(),
+        host: host.unwrap_or("here").into(),
+    }
 }
 
 /// So much a second, and so much at once.

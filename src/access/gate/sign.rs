@@ -65,7 +65,7 @@ impl Gate {
             let mut effects = Vec::new();
             if let Some(seat) = self.seats.get(&terminal) {
                 let signer = signer.as_deref().unwrap_or("unknown user");
-                effects.push(super::deed(seat, "signature failed", signer, &format!("refused: {why}"), at));
+                effects.push(super::paper::deed(seat, "signature failed", signer, &format!("refused: {why}"), at));
             }
             effects.extend(self.not_signed(terminal, request, told, at));
             return effects;

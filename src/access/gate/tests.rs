@@ -328,6 +328,23 @@ fn a_change_acts_on_those_who_are_in_at_once_and_one_that_was_not_saved_is_none(
 }
 
 #[test]
+fn a_change_that_comes_while_last_logins_are_written_waits_for_them() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "10.0.0.1");
+    bench.login(1, "boss", BOSS).unwrap();
+    let writing = bench.gate.tick(bench.now);
+    assert!(matches!(&writing[..], [Effect::Save(users)] if users.get("boss").unwrap().last_login.is_some()));
+    let wish = |user: &str| Wish::DeleteUser { user: user.into() };
+    assert_eq!(bench.gate.wish(1, 71, wish("view"), bench.now), [], "not answered yet");
+    assert!(bench.wish(1, wish("tech")).is_err(), "one at a time");
+    let effects = bench.gate.saved(Ok(()), bench.now);
+    let effects = bench.work(effects);
+    assert!(effects.contains(&Effect::Reply(71, Ok(()))));
+    let kept = bench.kept.unwrap();
+    assert!(kept.get("view").is_none() && kept.get("tech").is_some());
+}
+
+#[test]
 fn a_tag_that_asks_for_a_second_person_is_written_only_with_one() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "10.0.0.1");
@@ -398,7 +415,11 @@ fn a_hostile_terminal_can_neither_flood_the_plant_nor_fill_the_book() {
     assert!((9..=10).contains(&told), "{told}");
     let mut coming = 0;
     for terminal in 10..2000 {
-        coming += bench.open(terminal, "evil").iter().filter(|effect| matches!(effect, Effect::Record(_))).count();
+        coming += bench
+            .open(terminal, &format!("evil{terminal}"))
+            .iter()
+            .filter(|effect| matches!(effect, Effect::Record(_)))
+            .count();
         bench.gate.close(terminal, bench.now);
     }
     assert!(coming <= 20, "{coming}");
@@ -421,7 +442,7 @@ fn a_terminal_that_hangs_up_before_the_answer_has_had_its_try() {
 
 #[test]
 fn a_demonstration_asks_nobody() {
-    let mut bench = Bench::of(Gate::new(Arc::new(fixture::plant())));
+    let mut bench = Bench::of(Gate::new(Arc::new(fixture::plant()), Some("sight".into())));
     let own = Peer { from: "this process".into(), unix_user: Some("anna".into()), own: true };
     bench.gate.open(1, own, bench.now);
     assert_eq!(bench.who(1).as_deref(), Some("anna"));

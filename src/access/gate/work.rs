@@ -5,7 +5,11 @@ use std::sync::Arc;
 use jiff::Timestamp;
 
 use super::{Effect, Gate, people::Hashing, seat::Seat};
-use crate::access::{OrderRequest, Secret, password, tries::Account, user};
+use crate::access::{
+    OrderRequest, Secret, password,
+    tries::{Account, Origin},
+    user,
+};
 
 /// Passwords that may be under way at once; more are told to come back.
 pub const JOBS_MAX: usize = 16;
@@ -55,7 +59,7 @@ pub enum Outcome {
 pub(super) struct Errand {
     pub terminal: u32,
     /// Where the password came from; it counts even when the terminal has gone.
-    pub origin: Arc<str>,
+    pub origin: Origin,
     pub what: What,
 }
 
@@ -143,7 +147,7 @@ impl Gate {
         self.judge(terminal, &origin, what, right, at)
     }
 
-    fn judge(&mut self, terminal: u32, origin: &Arc<str>, what: What, right: bool, at: Timestamp) -> Vec<Effect> {
+    fn judge(&mut self, terminal: u32, origin: &Origin, what: What, right: bool, at: Timestamp) -> Vec<Effect> {
         let account = what.whose().map(|user| user::key(user));
         let why = self.why_not(&what, right, at);
         let mut effects = match (&why, &account) {
@@ -183,7 +187,7 @@ impl Gate {
     fn count_wrong(
         &mut self,
         terminal: u32,
-        origin: &Arc<str>,
+        origin: &Origin,
         account: Account,
         user: Option<Arc<str>>,
         at: Timestamp,
@@ -193,11 +197,11 @@ impl Gate {
         let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
         let mut effects = Vec::new();
         if let (true, Some(user)) = (locked.account, user) {
-            effects.push(super::deed(seat, "lock-out", &user, &outcome, at));
+            effects.push(super::paper::deed(seat, "lock-out", &user, &outcome, at));
             self.tell(terminal, &mut effects);
         }
         if locked.origin {
-            effects.push(super::deed(seat, "lock-out", &format!("terminals of {origin}"), &outcome, at));
+            effects.push(super::paper::deed(seat, "lock-out", &format!("terminals of {origin}"), &outcome, at));
         }
         effects
     }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+pub mod book;
 pub mod users;
 
 /// The file of users beside a history: `tank.users.toml` beside `tank.duckdb`.
@@ -20,18 +21,8 @@ pub fn salt() -> Result<[u8; super::password::SALT_BYTES], String> {
     }
 }
 
-/// The name of a user of the operating system; his number where it has none.
-pub fn user_name(uid: u32) -> String {
-    let passwd = std::fs::read_to_string("/etc/passwd").unwrap_or_default();
-    let named = passwd.lines().find_map(|line| {
-        let mut fields = line.split(':');
-        let (name, number) = (fields.next()?, fields.nth(1)?);
-        (number.parse() == Ok(uid)).then(|| name.to_owned())
-    });
-    named.unwrap_or_else(|| uid.to_string())
-}
-
-/// The user of the operating system that this process runs as.
+/// The user of the operating system that this process runs as; his number where he has no name. May ask another machine.
 pub fn own_user() -> String {
-    user_name(rustix::process::geteuid().as_raw())
+    let name = uzers::get_effective_username().map(|name| name.to_string_lossy().into_owned());
+    name.unwrap_or_else(|| uzers::get_effective_uid().to_string())
 }

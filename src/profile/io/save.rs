@@ -23,6 +23,16 @@ impl PlantFile {
         PlantFile { path, bytes: bytes.to_vec() }
     }
 
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What is in it: as it was loaded or last saved.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
     /// Puts the settings of a line into the file; everything else in it stays as it is, comments included. `Err` says in
     /// words for the operator why nothing was written: the file has changed since, cannot be written, or the settings
     /// cannot be told in it. Blocks while the disk works.

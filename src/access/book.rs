@@ -1,0 +1,329 @@
+//! The chained book of deeds: one line each, tied to the line before by a hash, so that nothing can be changed, cut,
+//! moved or put in without being seen.
+//!
+//! ```text
+//! {"n":1,"utc":"2026-05-01T12:00:00Z","who":"anna",…,"outcome":"verified","hash":"5f…"}
+//!  └────────────── these bytes, after the hash of the line before ──┘        = SHA-256
+//! ```
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::plant::record::{ActionRecord, Seal};
+
+/// What the first line is tied to.
+pub const START: Seal = Seal { number: 0, hash: *b"sightglass, the book of deeds, 1" };
+/// Bytes of a line at the most; whatever is longer was not written by a station.
+pub const LINE_MAX: usize = 64 << 10;
+/// What stands before the hash and after it.
+const HASH: (&str, &str) = (",\"hash\":\"", "\"}");
+/// Hexadecimal digits of a hash.
+const DIGITS: usize = 64;
+/// What a change of the plant file is called.
+pub const PLANT_FILE: &str = "plant file";
+
+/// A line of the book.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entry {
+    /// Running number, from 1.
+    pub n: u64,
+    /// When.
+    pub utc: Timestamp,
+    /// Who.
+    pub who: Arc<str>,
+    /// From where.
+    pub from: Arc<str>,
+    /// What he did.
+    pub action: Arc<str>,
+    /// To what or whom.
+    pub target: Arc<str>,
+    /// Value before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub old: Option<Arc<str>>,
+    /// Value wished.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub new: Option<Arc<str>>,
+    /// How it ended.
+    pub outcome: Arc<str>,
+    /// Why.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<Arc<str>>,
+}
+
+/// The next line after `last`, with its end of line, and its seal.
+pub fn line(last: Seal, deed: &ActionRecord) -> (String, Seal) {
+    let ActionRecord { at, by, from, action, target, old, new, outcome, note, seal: _ } = deed.clone();
+    let entry = Entry { n: last.number + 1, utc: at, who: by, from, action, target, old, new, outcome, note };
+    let mut text = serde_json::to_string(&entry).expect("texts, numbers and times can always be written");
+    text.pop();
+    let hash = tied(last.hash, text.as_bytes());
+    text += &format!("{}{}{}\n", HASH.0, hex(&hash), HASH.1);
+    (text, Seal { number: entry.n, hash })
+}
+
+fn tied(last: [u8; 32], bytes: &[u8]) -> [u8; 32] {
+    Sha256::new().chain_update(last).chain_update(bytes).finalize().into()
+}
+
+/// What is found in a book that is whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Summary {
+    /// Lines.
+    pub entries: u64,
+    /// The seal of the last one.
+    pub last: Seal,
+    /// The first and the last time.
+    pub span: Option<(Timestamp, Timestamp)>,
+    /// Rows of the history that have their line here.
+    pub compared: u64,
+    /// Behind the last line stands the beginning of another one: just being written, or torn by a loss of power. It was
+    /// never confirmed to anybody.
+    pub torn: bool,
+}
+
+/// The first line that is not as it was written.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {why}")]
+pub struct FirstBad {
+    /// From 1.
+    pub line: u64,
+    /// What is wrong with it.
+    pub why: String,
+}
+
+/// Reads a book line by line and finds what is wrong with it.
+#[derive(Debug)]
+pub struct Check {
+    last: Seal,
+    line: u64,
+    span: Option<(Timestamp, Timestamp)>,
+    bad: Option<FirstBad>,
+    head: Option<Seal>,
+    rows: BTreeMap<u64, [u8; 32]>,
+    compared: u64,
+}
+
+impl Check {
+    /// Before the first line. `head` is the seal that the station noted last, `rows` are those of the history.
+    pub fn new(head: Option<Seal>, rows: &[Seal]) -> Check {
+        let rows = rows.iter().map(|seal| (seal.number, seal.hash)).collect();
+        Check { last: START, line: 0, span: None, bad: None, head, rows, compared: 0 }
+    }
+
+    /// The next line, without its end. Gives the entry if it is as it was written; one that is not is left out, and what
+    /// continues behind it from the last sound one is sound again.
+    pub fn line(&mut self, bytes: &[u8]) -> Option<Entry> {
+        self.line += 1;
+        match self.look_at(bytes) {
+            Ok((entry, seal)) => {
+                self.last = seal;
+                self.span = Some((self.span.map_or(entry.utc, |span| span.0), entry.utc));
+                Some(entry)
+            }
+            Err(why) => {
+                self.bad.get_or_insert(FirstBad { line: self.line, why });
+                None
+            }
+        }
+    }
+
+    fn look_at(&mut self, bytes: &[u8]) -> Result<(Entry, Seal), String> {
+        let text = std::str::from_utf8(bytes).map_err(|_| "this is no text".to_owned())?;
+        let (body, hash) = split(text).ok_or("this does not end with a hash: it was cut or is no line of the book")?;
+        let entry: Entry =
+            serde_json::from_str(&format!("{body}}}")).map_err(|_| "this is no line of the book".to_owned())?;
+        let expected = self.last.number + 1;
+        if entry.n < expected {
+            return Err(format!("found entry {}, expected {expected}: it was moved or doubled", entry.n));
+        }
+        if expected < entry.n {
+            return Err(format!("found entry {}, expected {expected}: lines before it were cut out or moved", entry.n));
+        }
+        if tied(self.last.hash, body.as_bytes()) != hash {
+            return Err("the hash does not fit: this line was changed or put in".to_owned());
+        }
+        if self.head.is_some_and(|head| head.number == entry.n && head.hash != hash) {
+            return Err("the station has noted another hash for this entry: the book was written anew".to_owned());
+        }
+        match self.rows.remove(&entry.n) {
+            Some(row) if row != hash => return Err("the history holds another hash for this entry".to_owned()),
+            Some(_) => self.compared += 1,
+            None => {}
+        }
+        let number = entry.n;
+        Ok((entry, Seal { number, hash }))
+    }
+
+    /// The seal of the last sound line.
+    pub fn last(&self) -> Seal {
+        self.last
+    }
+
+    /// After the last line.
+    pub fn end(self, torn: bool) -> Result<Summary, FirstBad> {
+        if let Some(bad) = self.bad {
+            return Err(bad);
+        }
+        let line = self.line + 1;
+        if let Some(head) = self.head.filter(|head| self.last.number < head.number) {
+            let why = format!("the book was cut here: the station has noted {} entries", head.number);
+            return Err(FirstBad { line, why });
+        }
+        if self.head.is_none() && 0 < self.line {
+            let why = "what the station has noted of the last entry is missing or damaged: lines may be missing here";
+            return Err(FirstBad { line, why: why.to_owned() });
+        }
+        if let Some((row, _)) = self.rows.range(self.last.number + 1..).next() {
+            return Err(FirstBad { line, why: format!("the book was cut here: the history holds entry {row}") });
+        }
+        let Check { last, span, compared, .. } = self;
+        Ok(Summary { entries: self.line, last, span, compared, torn })
+    }
+}
+
+/// The bytes that are tied, and their hash.
+fn split(text: &str) -> Option<(&str, [u8; 32])> {
+    let digits = text.strip_suffix(HASH.1)?;
+    let place = digits.len().checked_sub(DIGITS)?;
+    let body = digits.get(..place)?.strip_suffix(HASH.0)?;
+    Some((body, unhex(&digits[place..])?))
+}
+
+/// The hash as text.
+pub fn hex(hash: &[u8]) -> String {
+    hash.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn unhex(text: &str) -> Option<[u8; 32]> {
+    let mut hash = [0; 32];
+    if text.len() != DIGITS || !text.bytes().all(|digit| matches!(digit, b'0'..=b'9' | b'a'..=b'f')) {
+        return None;
+    }
+    for (byte, digits) in hash.iter_mut().zip(text.as_bytes().chunks(2)) {
+        *byte = u8::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()?;
+    }
+    Some(hash)
+}
+
+/// The SHA-256 of a file, as text.
+pub fn sha256(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// What is noted of the last entry, beside the book: always of the same length, so that it is written in one piece.
+pub fn head_text(seal: Seal) -> String {
+    format!("{:020} {}\n", seal.number, hex(&seal.hash))
+}
+
+/// The seal of such a note.
+pub fn head(text: &str) -> Option<Seal> {
+    let (number, hash) = text.strip_suffix('\n')?.split_once(' ')?;
+    Some(Seal { number: number.parse().ok()?, hash: unhex(hash)? })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn deed(n: u64) -> ActionRecord {
+        ActionRecord {
+            at: Timestamp::from_microsecond(1_000_000 * n as i64 + 7).unwrap(),
+            by: "anna".into(),
+            from: "pts/3 from 10.0.0.5, user panel".into(),
+            action: "write".into(),
+            target: "TIC-1.SV".into(),
+            old: (n % 2 == 0).then(|| "1.0 °C".into()),
+            new: Some(format!("{n} \"°C\"\n").into()),
+            outcome: "verified".into(),
+            note: None,
+            seal: None,
+        }
+    }
+
+    fn book(count: u64) -> (Vec<String>, Vec<Seal>) {
+        let (mut lines, mut seals, mut last) = (Vec::new(), Vec::new(), START);
+        for n in 1..=count {
+            let (line, seal) = super::line(last, &deed(n));
+            lines.push(line.strip_suffix('\n').unwrap().to_owned());
+            seals.push(seal);
+            last = seal;
+        }
+        (lines, seals)
+    }
+
+    fn verify(lines: &[String], head: Option<Seal>, rows: &[Seal]) -> Result<Summary, FirstBad> {
+        let mut check = Check::new(head, rows);
+        for line in lines {
+            check.line(line.as_bytes());
+        }
+        check.end(false)
+    }
+
+    #[test]
+    fn a_book_as_it_was_written_is_whole_and_its_lines_can_be_read() {
+        let (lines, seals) = book(5);
+        let summary = verify(&lines, seals.last().copied(), &seals).unwrap();
+        assert_eq!((summary.entries, summary.compared, summary.last), (5, 5, seals[4]));
+        let entry = Check::new(None, &[]).line(lines[0].as_bytes()).unwrap();
+        assert_eq!((entry.n, &*entry.who, entry.new.as_deref()), (1, "anna", Some("1 \"°C\"\n")));
+        assert!(lines.iter().all(|line| !line.contains('\n')), "one line each, whatever the note");
+        assert_eq!(head(&head_text(seals[4])), Some(seals[4]));
+        assert_eq!(verify(&[], Some(START), &[]).unwrap().entries, 0);
+    }
+
+    #[test]
+    fn a_book_that_was_written_anew_is_found_by_the_note_and_by_the_history() {
+        let (lines, seals) = book(5);
+        let forged = Seal { number: 3, hash: [1; 32] };
+        assert_eq!(verify(&lines, Some(forged), &[]).unwrap_err().line, 3);
+        assert_eq!(verify(&lines, seals.last().copied(), &[forged]).unwrap_err().line, 3);
+        assert_eq!(verify(&lines[..3], Some(seals[2]), &seals).unwrap_err().line, 4, "cut, and the note as well");
+        assert_eq!(verify(&lines, None, &[]).unwrap_err().line, 6, "without the note a cut cannot be ruled out");
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_is_done_to_a_book_the_first_bad_line_is_named(
+            count in 3u64..12, what in 0u8..6, at in 0usize..100, other in 0usize..100, byte in 0usize..1000, bit in 0u8..7
+        ) {
+            let (good, seals) = book(count);
+            let (place, other) = (at % good.len(), other % good.len());
+            let mut lines = good.clone();
+            let first = match what {
+                0 => {
+                    let mut bytes = lines[place].clone().into_bytes();
+                    let byte = byte % bytes.len();
+                    bytes[byte] ^= 1 << bit;
+                    let mut check = Check::new(seals.last().copied(), &[]);
+                    for (index, line) in lines.iter().enumerate() {
+                        check.line(if index == place { &bytes } else { line.as_bytes() });
+                    }
+                    prop_assert_eq!(check.end(false).unwrap_err().line, place as u64 + 1);
+                    return Ok(());
+                }
+                1 => { lines.truncate(place); place }
+                2 => { lines.remove(place); place }
+                3 => { let line = lines[place].clone(); lines.insert(place, line); place + 1 }
+                4 => { lines.swap(place, other); place.min(other) }
+                _ => {
+                    let (line, _) = super::line(Seal { number: place as u64, hash: [9; 32] }, &deed(99));
+                    lines.insert(place, line.trim_end().to_owned());
+                    place
+                }
+            };
+            let verdict = verify(&lines, seals.last().copied(), &seals);
+            if lines == good {
+                prop_assert!(verdict.is_ok());
+            } else {
+                prop_assert_eq!(verdict.unwrap_err().line, first as u64 + 1);
+            }
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! How each terminal stands, and who hears of it when that changes.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use super::{Effect, Gate, passed, seat::Seat};
+use crate::{
+    access::{SessionRow, Standing, UserRow, Users, user},
+    plant::role::Role,
+};
+
+/// A lock for want of keys is announced so long before.
+pub(super) const LOCK_NEAR: Duration = Duration::from_secs(60);
+
+impl Gate {
+    /// How a terminal stands.
+    pub fn standing(&self, terminal: u32, at: Timestamp) -> Standing {
+        let rules = &self.def.access;
+        let notice = rules.notice.as_deref().map(Arc::from);
+        let Some(seat) = self.seats.get(&terminal) else { return Standing { notice, ..Standing::default() } };
+        let supervisor = seat.acting().is_some_and(|who| who.role == Role::Supervisor && !who.must_change);
+        let idle_lock = self.idle_lock(seat);
+        let left = idle_lock.map(|span| span.saturating_sub(passed(seat.active, at)));
+        Standing {
+            who: seat.who.clone(),
+            locked: seat.locked,
+            view: rules.view || seat.who.is_some(),
+            first: self.people.as_ref().is_some_and(Users::is_empty) && self.is_host(&seat.peer),
+            notice,
+            password_chars_min: rules.password_chars_min,
+            idle_lock,
+            locks_in: left.filter(|left| *left <= LOCK_NEAR && seat.acting().is_some()),
+            users: Arc::new(if supervisor { self.user_rows(at) } else { Vec::new() }),
+            sessions: Arc::new(if supervisor { self.session_rows() } else { Vec::new() }),
+            gone: None,
+        }
+    }
+
+    fn user_rows(&self, at: Timestamp) -> Vec<UserRow> {
+        let rows = self.people.iter().flat_map(Users::iter).map(|user| UserRow {
+            user: user.name.clone(),
+            role: user.role,
+            disabled: user.disabled,
+            locked_until: self.tries.locked_until(&user::key(&user.name), at),
+            must_change: user.must_change,
+            last_login: user.last_login,
+        });
+        rows.collect()
+    }
+
+    fn session_rows(&self) -> Vec<SessionRow> {
+        let rows = self.seats.iter().map(|(terminal, seat)| SessionRow {
+            terminal: *terminal,
+            user: seat.who.as_ref().map(|who| who.user.clone()),
+            from: seat.peer.from.clone(),
+            since: seat.since,
+            locked: seat.locked,
+        });
+        rows.collect()
+    }
+
+    /// This terminal and all that see the lists hear how they stand.
+    pub(super) fn tell(&self, terminal: u32, effects: &mut Vec<Effect>) {
+        let sees = |seat: &Seat| seat.acting().is_some_and(|who| who.role == Role::Supervisor);
+        let others = self.seats.iter().filter(|(id, seat)| **id != terminal && sees(seat)).map(|(id, _)| *id);
+        let own = self.seats.contains_key(&terminal).then_some(terminal);
+        effects.extend(own.into_iter().chain(others).map(Effect::Standing));
+    }
+}

@@ -1,0 +1,367 @@
+//! The book on disk and the one thread that writes it: deeds in, sealed deeds out to the history, many with one sync.
+
+use std::{
+    ffi::OsStr,
+    fs::{File, OpenOptions},
+    io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write},
+    os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt},
+    path::{Path, PathBuf},
+    sync::Arc,
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use tokio::sync::{mpsc, watch};
+
+use crate::{
+    access::book::{self, Check, FirstBad, PLANT_FILE, Summary},
+    bus::io::clock::Clock,
+    plant::record::{ActionRecord, Record, Seal},
+};
+
+/// Batches of deeds on their way to the thread; a full queue is the sender's to tell.
+const DEEDS_MAX: usize = 256;
+/// Deeds that are written with one sync.
+const GROUP_MAX: usize = 512;
+/// A book that cannot be written is tried again so often.
+const AGAIN: Duration = Duration::from_secs(10);
+
+/// The book beside a history: `tank.audit.jsonl` beside `tank.duckdb`.
+pub fn beside(history: &Path) -> PathBuf {
+    history.with_extension("audit.jsonl")
+}
+
+/// Where the last seal is noted: `tank.audit.head` beside `tank.audit.jsonl`.
+fn head_of(book: &Path) -> PathBuf {
+    book.with_extension("head")
+}
+
+/// Why a book is not whole, or cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// It cannot be read.
+    #[error("{path} cannot be read: {error}")]
+    Io {
+        /// The file.
+        path: String,
+        /// Why.
+        error: io::Error,
+    },
+    /// It was changed.
+    #[error("{path}: {bad}")]
+    Bad {
+        /// The file.
+        path: String,
+        /// Where.
+        bad: FirstBad,
+    },
+}
+
+/// Reads a book from its beginning and finds the first line that is not as it was written. `rows` are the seals that the
+/// history holds; empty to look at the book alone. Safe while a station writes.
+pub fn verify(path: &Path, rows: &[Seal]) -> Result<Summary, VerifyError> {
+    let failed = |error| VerifyError::Io { path: path.display().to_string(), error };
+    // The note first: the book may be ahead of it, never behind.
+    let head = read_head(path).map_err(failed)?;
+    let file = File::open(path).map_err(failed)?;
+    let mut check = Check::new(head, rows);
+    let scanned = scan(file, &mut check, |_| {}).map_err(failed)?;
+    check.end(scanned.torn).map_err(|bad| VerifyError::Bad { path: path.display().to_string(), bad })
+}
+
+fn read_head(book: &Path) -> io::Result<Option<Seal>> {
+    match File::open(head_of(book)) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(error),
+        Ok(file) => {
+            let mut text = String::new();
+            file.take(1_000).read_to_string(&mut text)?;
+            Ok(book::head(&text))
+        }
+    }
+}
+
+/// How far the whole lines reach, in bytes, and whether something stands behind them.
+struct Scanned {
+    bytes: u64,
+    torn: bool,
+}
+
+fn scan(file: File, check: &mut Check, mut each: impl FnMut(book::Entry)) -> io::Result<Scanned> {
+    let mut reader = BufReader::new(file);
+    let mut bytes = 0;
+    let mut line = Vec::new();
+    loop {
+        line.clear();
+        let read = (&mut reader).take(book::LINE_MAX as u64).read_until(b'\n', &mut line)?;
+        if line.last() != Some(&b'\n') && read < book::LINE_MAX {
+            return Ok(Scanned { bytes, torn: read > 0 });
+        }
+        bytes += read as u64;
+        let whole = line.strip_suffix(b"\n").unwrap_or(&line);
+        check.line(whole).into_iter().for_each(&mut each);
+    }
+}
+
+/// A book that can be written.
+#[derive(Debug)]
+struct Book {
+    file: File,
+    head: File,
+    last: Seal,
+    bytes: u64,
+}
+
+/// What was found when the book was opened.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Opened {
+    /// What is wrong with it, each for a line of its own.
+    pub wrong: Vec<String>,
+    /// The hash of the plant file that was recorded last.
+    pub plant_file: Option<Arc<str>>,
+}
+
+impl Book {
+    /// Opens a book, or begins one. Nothing in it is ever changed or removed: a torn last line is put beside, and behind
+    /// lines that were tampered with it goes on from the last seal that the station knows.
+    fn open(path: &Path) -> io::Result<(Book, Opened)> {
+        let mut file = own(OpenOptions::new().read(true).append(true).create(true), path)?;
+        let mut opened = Opened::default();
+        let head = read_head(path)?;
+        let mut check = Check::new(head, &[]);
+        let Scanned { bytes, torn } = scan(file.try_clone()?, &mut check, |entry| {
+            if &*entry.action == PLANT_FILE {
+                opened.plant_file = entry.new;
+            }
+        })?;
+        if torn {
+            let beside = set_aside(&mut file, path, bytes)?;
+            opened.wrong.push(format!("the last line was torn, it is kept in {}", beside.display()));
+        }
+        let last = head.filter(|head| check.last().number < head.number).unwrap_or(check.last());
+        if let Err(bad) = check.end(false) {
+            opened.wrong.push(format!("it is broken at {bad}; it goes on after entry {}", last.number));
+        }
+        let head = own(OpenOptions::new().write(true).create(true).truncate(false), &head_of(path))?;
+        let book = Book { file, head, last, bytes };
+        book.note(last)?;
+        book.head.sync_all()?;
+        // The names must outlive a loss of power too.
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        File::open(folder)?.sync_all()?;
+        Ok((book, opened))
+    }
+
+    /// Writes deeds, all or none, and seals them. When this returns they are on disk.
+    fn append(&mut self, deeds: &mut [ActionRecord]) -> io::Result<()> {
+        let metadata = self.file.metadata()?;
+        if metadata.nlink() == 0 || metadata.len() != self.bytes {
+            return Err(io::Error::other("somebody else has removed or changed it"));
+        }
+        let (mut last, mut text, mut seals) = (self.last, String::new(), Vec::with_capacity(deeds.len()));
+        for deed in deeds.iter() {
+            let (line, seal) = book::line(last, deed);
+            text += &line;
+            seals.push(seal);
+            last = seal;
+        }
+        let written = self.file.write_all(text.as_bytes()).and_then(|()| self.file.sync_data());
+        if let Err(error) = written {
+            // Half a line helps nobody; if it cannot be taken back it is put beside when the book is opened again.
+            let _ = self.file.set_len(self.bytes);
+            return Err(error);
+        }
+        (self.last, self.bytes) = (last, self.bytes + text.len() as u64);
+        for (deed, seal) in deeds.iter_mut().zip(seals) {
+            deed.seal = Some(seal);
+        }
+        // The deeds are safe already; a note that is behind is no fault.
+        self.note(last)
+    }
+
+    fn note(&self, last: Seal) -> io::Result<()> {
+        self.head.write_all_at(book::head_text(last).as_bytes(), 0)
+    }
+}
+
+/// Opens a file for the station's own user only; nothing but a plain file.
+fn own(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
+    let file = options.mode(0o600).custom_flags(rustix::fs::OFlags::NOFOLLOW.bits() as i32).open(path)?;
+    if !file.metadata()?.is_file() {
+        return Err(io::Error::other("it is no file"));
+    }
+    Ok(file)
+}
+
+/// Puts what stands behind the last whole line into a file beside the book.
+fn set_aside(file: &mut File, path: &Path, bytes: u64) -> io::Result<PathBuf> {
+    let mut torn = Vec::new();
+    file.seek(SeekFrom::Start(bytes))?;
+    file.take(book::LINE_MAX as u64).read_to_end(&mut torn)?;
+    let name = path.file_name().unwrap_or(OsStr::new("audit")).to_string_lossy().into_owned();
+    // The place of the line, so that a second one does not replace the first.
+    let mut places = (0..).map(|more| path.with_file_name(format!("{name}.torn-{bytes}-{more}")));
+    let beside = places.find(|path| !path.exists()).expect("there is always one more number");
+    let mut kept = own(OpenOptions::new().write(true).create_new(true), &beside)?;
+    kept.write_all(&torn)?;
+    kept.sync_all()?;
+    file.set_len(bytes)?;
+    file.sync_all()?;
+    Ok(beside)
+}
+
+/// How the book stands.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct BookStatus {
+    /// Deeds that were taken since the start: in the book, or passed on without a seal while there is trouble.
+    pub taken: u64,
+    /// Deeds that the history had no room for.
+    pub lost: u64,
+    /// What is wrong with it, in words for the operator.
+    pub trouble: Option<String>,
+}
+
+/// The station's end of the thread.
+#[derive(Debug)]
+pub struct Handle {
+    /// Deeds to write. When the last sender is dropped the thread writes what it has and ends.
+    pub deeds: mpsc::Sender<Vec<ActionRecord>>,
+    /// How the book stands, after every sync.
+    pub status: watch::Receiver<BookStatus>,
+    /// What was found when it was opened.
+    pub opened: Opened,
+    /// The thread.
+    pub join: JoinHandle<()>,
+}
+
+/// Opens the book and starts its thread. A book that cannot be opened is trouble, and no reason not to start. `Err` only
+/// where the system gives no thread.
+pub fn start(path: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> io::Result<Handle> {
+    let (deeds, queue) = mpsc::channel(DEEDS_MAX);
+    let (told, status) = watch::channel(BookStatus::default());
+    let mut scribe = Scribe::new(path, clock, history);
+    let opened = scribe.open();
+    told.send_replace(scribe.status());
+    let join = std::thread::Builder::new().name("book".into()).spawn(move || scribe.run(queue, &told))?;
+    Ok(Handle { deeds, status, opened, join })
+}
+
+/// The thread.
+struct Scribe {
+    path: PathBuf,
+    clock: Clock,
+    history: mpsc::Sender<Vec<Record>>,
+    book: Option<Book>,
+    /// What was found wrong in it: true until the next start.
+    broken: Option<String>,
+    /// Why it cannot be written now.
+    fault: Option<String>,
+    tried: Option<Instant>,
+    /// Deeds that went to the history without a seal since the last fault.
+    unsealed: u64,
+    taken: u64,
+    lost: u64,
+}
+
+impl Scribe {
+    fn new(path: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> Scribe {
+        let path = path.to_owned();
+        let (book, broken, fault, tried) = (None, None, None, None);
+        Scribe { path, clock, history, book, broken, fault, tried, unsealed: 0, taken: 0, lost: 0 }
+    }
+
+    fn run(mut self, mut queue: mpsc::Receiver<Vec<ActionRecord>>, told: &watch::Sender<BookStatus>) {
+        while let Some(mut deeds) = queue.blocking_recv() {
+            while deeds.len() < GROUP_MAX
+                && let Ok(more) = queue.try_recv()
+            {
+                deeds.extend(more);
+            }
+            self.take(deeds);
+            told.send_replace(self.status());
+        }
+    }
+
+    /// Opens the book; what is found is put on record in it.
+    fn open(&mut self) -> Opened {
+        self.tried = Some(Instant::now());
+        match Book::open(&self.path) {
+            Ok((book, opened)) => {
+                (self.book, self.fault) = (Some(book), None);
+                let broken: Vec<_> = opened.wrong.iter().filter(|wrong| wrong.contains("broken")).cloned().collect();
+                if !broken.is_empty() {
+                    self.broken = Some(broken.join("; "));
+                }
+                let mut deeds: Vec<_> = opened.wrong.iter().map(|wrong| self.deed(wrong)).collect();
+                if self.unsealed > 0 {
+                    deeds.push(self.deed(&format!("{} deeds before this one are not in it", self.unsealed)));
+                    self.unsealed = 0;
+                }
+                if !deeds.is_empty() {
+                    self.write(deeds);
+                }
+                opened
+            }
+            Err(error) => {
+                self.fail(&error);
+                Opened::default()
+            }
+        }
+    }
+
+    fn take(&mut self, deeds: Vec<ActionRecord>) {
+        self.taken += deeds.len() as u64;
+        if self.book.is_none() && self.tried.is_none_or(|tried| AGAIN <= tried.elapsed()) {
+            self.open();
+        }
+        self.write(deeds);
+    }
+
+    /// Into the book, and on to the history; only there while the book cannot be written.
+    fn write(&mut self, mut deeds: Vec<ActionRecord>) {
+        if let Some(book) = &mut self.book
+            && let Err(error) = book.append(&mut deeds)
+        {
+            self.fail(&error);
+        }
+        self.unsealed += deeds.iter().filter(|deed| deed.seal.is_none()).count() as u64;
+        let records = deeds.into_iter().map(Record::Action).collect();
+        if let Err(refused) = self.history.try_send(records) {
+            self.lost += refused.into_inner().len() as u64;
+        }
+    }
+
+    fn fail(&mut self, error: &io::Error) {
+        tracing::error!(%error, path = %self.path.display(), "the audit trail cannot be written");
+        self.book = None;
+        self.fault = Some(error.to_string());
+    }
+
+    /// Something about the book itself.
+    fn deed(&self, outcome: &str) -> ActionRecord {
+        ActionRecord {
+            at: self.clock.now(),
+            by: "station".into(),
+            from: "".into(),
+            action: "audit trail".into(),
+            target: self.path.display().to_string().into(),
+            old: None,
+            new: None,
+            outcome: outcome.into(),
+            note: None,
+            seal: None,
+        }
+    }
+
+    fn status(&self) -> BookStatus {
+        let fault = self
+            .fault
+            .as_ref()
+            .map(|fault| format!("the audit trail cannot be written: {fault}; {} deeds are not in it", self.unsealed));
+        let broken = self.broken.as_ref().map(|broken| format!("the audit trail was tampered with: {broken}"));
+        BookStatus { taken: self.taken, lost: self.lost, trouble: fault.or(broken) }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,83 @@
+//! A whole station with people: from the first supervisor to the last line of the book.
+#![allow(clippy::unwrap_used)]
+
+use std::{path::Path, sync::Arc};
+
+use super::io::{Options, StartError, start_guarded};
+use crate::{
+    access::{
+        Wish,
+        io::{book, users_beside},
+    },
+    bus::io::{clock::Clock, transport::Connector},
+    history::{Answer, Question, io::Query},
+    plant::{command::Command, fixture, record::ActionRecord},
+};
+
+fn options(history: &Path) -> Options {
+    let def = Arc::new(fixture::plant());
+    let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
+    Options { def, clock: Clock::real(), history: history.to_owned(), connectors, file: None }
+}
+
+/// What the history holds of deeds, once it holds one of this name.
+async fn deeds(session: &super::Session, action: &str) -> Vec<ActionRecord> {
+    let (from, to) = (jiff::Timestamp::MIN, jiff::Timestamp::MAX);
+    let mut snapshots = session.snapshots.clone();
+    loop {
+        let (reply, answer) = tokio::sync::oneshot::channel();
+        let question = Question::Actions { from, to, limit: 1_000 };
+        session.ask(Query { question, reply }).unwrap();
+        let Answer::Actions(deeds) = answer.await.unwrap().unwrap() else { panic!("another answer") };
+        if deeds.iter().any(|deed| &*deed.action == action) {
+            return deeds;
+        }
+        // The store commits once a second.
+        snapshots.changed().await.unwrap();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_the_history() {
+    let folder = tempfile::tempdir().unwrap();
+    let history = folder.path().join("fixture.duckdb");
+    let mut station = start_guarded(options(&history)).unwrap();
+    let mut session = station.session("whoever");
+    session.standing.wait_for(|standing| standing.first).await.unwrap();
+    assert!(session.wish(Wish::Stop).await.is_err(), "nobody is logged in");
+    let password = "four wet horses in a tank";
+    session.wish(Wish::FirstSupervisor { user: "anna".into(), password: password.into() }).await.unwrap();
+    session.wish(Wish::Lock).await.unwrap();
+    assert!(session.wish(Wish::Unlock("four wet horses".into())).await.is_err());
+    session.wish(Wish::Login { user: "Anna".into(), password: password.into() }).await.unwrap_err();
+    session.wish(Wish::Logout).await.unwrap();
+    let mut other = station.session("whoever");
+    other.standing.wait_for(|standing| !standing.first && standing.password_chars_min > 0).await.unwrap();
+    let order = other.order(1, Command::AcknowledgeAll).unwrap();
+    let shown = |snapshot: &Arc<crate::plant::Snapshot>| snapshot.orders.iter().any(|status| status.id == order);
+    let snapshot = other.snapshots.wait_for(shown).await.unwrap().clone();
+    let line = std::fs::read_to_string(book::beside(&history)).unwrap();
+    assert!(line.contains("refused: log in first"), "what a snapshot shows is in the book");
+    assert_eq!(snapshot.history.trouble, None);
+    // The delay after the wrong password is over by the clock of the station, not by that of this test.
+    while other.wish(Wish::Login { user: "ANNA".into(), password: password.into() }).await.is_err() {
+        tokio::task::yield_now().await;
+    }
+    let rows = deeds(&other, "unlock failed").await;
+    other.wish(Wish::Stop).await.unwrap();
+    assert!(matches!(station.commands.recv().await, Some(super::Command::Stop)));
+    drop((session, other));
+    station.stop().await;
+
+    let seals: Vec<_> = rows.iter().filter_map(|row| row.seal).collect();
+    assert_eq!(seals.len(), rows.len(), "every row is sealed");
+    let summary = book::verify(&book::beside(&history), &seals).unwrap();
+    assert!(summary.compared == rows.len() as u64 && summary.entries > summary.compared);
+    let text = std::fs::read_to_string(book::beside(&history)).unwrap();
+    let actions: Vec<_> = text.lines().map(|line| line.split("\"action\":\"").nth(1).unwrap()).collect();
+    assert!(actions[0].starts_with("start\"") && actions[actions.len() - 1].starts_with("stop\""), "{text}");
+    assert!(!text.contains("horses"), "a password is never written down");
+
+    std::fs::write(users_beside(&history), "").unwrap();
+    assert!(matches!(start_guarded(options(&history)), Err(StartError::Users(_))), "a damaged file is not nobody");
+}
