@@ -3,7 +3,7 @@
 mod login;
 mod people;
 mod seat;
-mod sign;
+pub mod sign;
 #[cfg(test)]
 mod tests;
 mod work;

@@ -47,6 +47,7 @@ pub fn question(def: &PlantDef, question: &Question) -> Result<(), String> {
         Question::LineMinutes { line: id, .. } => line(def, *id),
         Question::Journal { .. }
         | Question::Actions { .. }
+        | Question::Audit { .. }
         | Question::Report { .. }
         | Question::AlarmQuality { .. } => Ok(()),
     }
