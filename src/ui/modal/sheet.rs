@@ -19,7 +19,6 @@ use crate::{
     ui::{
         Act, Cx,
         keys::{self, Hint},
-        rights::title,
         tabs::Tab,
         widgets::text::{Canvas, width, wrap},
     },
@@ -374,11 +373,6 @@ fn seconds(words: &str) -> Option<(usize, u32)> {
             (ends && digits > 0).then(|| rest[..digits].parse().ok()).flatten().map(|n| (place, n))
         })
     })
-}
-
-/// `anna, Technician`.
-pub fn person(user: &str, role: Role) -> String {
-    format!("{user}, {}", title(role))
 }
 
 #[cfg(test)]

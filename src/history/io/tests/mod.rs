@@ -229,7 +229,9 @@ fn lists_come_newest_first_within_their_span_and_limit() {
 fn deeds_are_found_by_words_by_whom_and_by_what() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
-    let login = ActionRecord { by: "Anna".into(), action: "login".into(), target: "ฝ่ายผลิต 50%".into(), ..deed(4) };
+    let login = ActionRecord {
+        by: "Anna".into(), action: "login".into(), target: "ฝ่ายผลิต 50%".into(), ..deed(4)
+    };
     store.append(&[Record::Action(deed(3)), Record::Action(login.clone())]).unwrap();
     let check = |words: &str, by: &str, action: &str, expect: Vec<ActionRecord>| {
         let (words, by, action) = (words.to_owned(), by.to_owned(), action.to_owned());
