@@ -113,19 +113,16 @@ impl Sheet {
         let enter = self.form.rows() == 0 && keys::code(crossterm::event::KeyCode::Enter).is(event);
         let turn = if enter { Turn::Finished } else { self.form.on_key(event) };
         match turn {
-            Turn::Finished => match self.wait(cx) {
-                0 => match self.wish(cx) {
-                    Ok(wish) => {
-                        (self.waiting, self.problem) = (true, None);
-                        return Some(wish);
-                    }
-                    Err(problem) => self.problem = Some((problem, cx.phase)),
-                },
-                _ => {}
+            Turn::Finished if self.wait(cx) == 0 => match self.wish(cx) {
+                Ok(wish) => {
+                    (self.waiting, self.problem) = (true, None);
+                    return Some(wish);
+                }
+                Err(problem) => self.problem = Some((problem, cx.phase)),
             },
             // How long one must wait stays to be read.
             Turn::Taken if self.wait(cx) == 0 => self.problem = None,
-            Turn::Taken | Turn::Nothing => {}
+            Turn::Finished | Turn::Taken | Turn::Nothing => {}
         }
         None
     }
