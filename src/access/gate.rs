@@ -4,7 +4,7 @@ mod login;
 mod paper;
 mod people;
 mod seat;
-mod sign;
+pub mod sign;
 mod standing;
 #[cfg(test)]
 mod tests;

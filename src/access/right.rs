@@ -89,6 +89,7 @@ pub fn needs_for_question(question: &Question) -> Role {
         | Question::LineMinutes { .. }
         | Question::AlarmQuality { .. }
         | Question::Report { .. } => Right::Look,
+        Question::Audit { .. } => Right::People,
     };
     right.role()
 }

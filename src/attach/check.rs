@@ -67,6 +67,7 @@ pub fn question(def: &PlantDef, question: &Question) -> Result<(), String> {
         Question::LineMinutes { line: id, .. } => line(def, *id),
         Question::Journal { .. }
         | Question::Actions { .. }
+        | Question::Audit { .. }
         | Question::Report { .. }
         | Question::AlarmQuality { .. } => Ok(()),
     }

@@ -50,6 +50,21 @@ pub enum Question {
         /// At most so many.
         limit: usize,
     },
+    /// The same for those who watch over all deeds, with a search; answered by [`Answer::Actions`].
+    Audit {
+        /// From.
+        from: Timestamp,
+        /// To.
+        to: Timestamp,
+        /// Some words of any column; empty for all.
+        words: String,
+        /// Part of the name of who did it; empty for all.
+        by: String,
+        /// Part of the action; empty for all.
+        action: String,
+        /// At most so many.
+        limit: usize,
+    },
     /// What a line counted, minute by minute, oldest first.
     LineMinutes {
         /// Which line.

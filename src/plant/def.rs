@@ -17,7 +17,7 @@ pub use super::{
 };
 
 /// Everything that a plant file says, checked.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlantDef {
     /// Short name, the stem of the file: `tank`.
     pub name: String,

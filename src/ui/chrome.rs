@@ -1,26 +1,26 @@
 //! What every tab shares: header, tab bar, alarm banner, the last order's outcome, and the keys of the moment.
 
+mod banner;
+
 use ratatui::{Frame, layout::Rect, style::Style};
+
+use banner::banner;
+pub use banner::{alarm_words, counts};
 
 use super::{
     Cx, Model, SILENCE, Watch,
     keys::{self, Hint},
-    modal::{
-        Modal,
-        confirm::subject,
-        faceplate::{device_words, line_state_words},
-    },
+    modal::Modal,
+    rights,
     tabs::Tab,
     widgets::text::{Canvas, between, clock, fit, fit_words, running, width},
 };
 use crate::plant::{
-    alarm::AlarmState,
     command::{Command, NotConfirmed, Outcome},
-    def::{LineDef, Priority},
+    def::LineDef,
     event::LineState,
-    ne107::Reason,
     orders::alarm_words as alarm_words_of,
-    snapshot::{ActiveAlarm, DeviceState},
+    role::Role,
 };
 use crate::sim::drill::{Progress, Status};
 
@@ -93,7 +93,12 @@ pub fn view(model: &Model, cx: &Cx, frame: &mut Frame) {
         Some(modal) => modal.hints(cx),
         None => model.tabs.hints(cx),
     };
-    footer(cx, &mut Canvas::new(frame.buffer_mut(), parts.footer), &hints, model.modal.is_none());
+    let typing = model.tabs.shown == Tab::Login && model.tabs.login.is_typing();
+    let global = model.modal.is_none() && !typing;
+    let lacks = |hint: &Hint| rights::of_key(cx, model.tabs.shown, hint).filter(|_| model.modal.is_none());
+    let (refused, may): (Vec<Hint>, Vec<Hint>) = hints.into_iter().partition(|hint| lacks(hint).is_some());
+    let role = refused.first().and_then(lacks).map(|role| (role, refused));
+    footer(cx, &mut Canvas::new(frame.buffer_mut(), parts.footer), &may, role, global);
     if let Some(modal) = &model.modal {
         modal.view(cx, &model.tabs, frame, parts.body);
     }
@@ -125,9 +130,13 @@ fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     let theme = cx.theme;
     let x = canvas.text(1, 0, "sightglass", theme.dim());
     let start = canvas.text(x + 2, 0, &fit(&cx.def().title, canvas.width() / 3), theme.strong()) + 2;
-    let mut parts = header_parts(model, cx);
     let mut end = canvas.width().saturating_sub(1);
-    while parts.iter().map(|(_, text, _)| width(text) + 2).sum::<u16>() > end.saturating_sub(start) + 2 {
+    let fits = |parts: &[(usize, String, Style)]| {
+        parts.iter().map(|(_, text, _)| width(text) + 2).sum::<u16>() <= end.saturating_sub(start) + 2
+    };
+    let full = header_parts(model, cx, true);
+    let mut parts = if fits(&full) { full } else { header_parts(model, cx, false) };
+    while !fits(&parts) {
         let Some(least) = parts.iter().map(|(need, _, _)| *need).max() else { break };
         parts.retain(|(need, _, _)| *need != least);
     }
@@ -138,15 +147,17 @@ fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {
 }
 
 /// What the header tells, from the right, each with its need: the greatest number is the first to be left out.
-fn header_parts(model: &Model, cx: &Cx) -> Vec<(usize, String, Style)> {
+/// The role of who sits here is told where there is room for everything.
+fn header_parts(model: &Model, cx: &Cx, role: bool) -> Vec<(usize, String, Style)> {
     let theme = cx.theme;
-    let time = if model.clock.silent >= SILENCE {
+    let time = if let Some(gone) = model.gone() {
+        (0, format!("STATION GONE {} s: reconnecting", gone.as_secs()), theme.trouble())
+    } else if model.clock.silent >= SILENCE {
         (0, format!("STATION SILENT {}", running(model.clock.silent)), theme.trouble())
     } else {
         (0, clock(cx.now, &cx.def().time_zone), theme.normal())
     };
-    let who = model.standing.who.as_ref().map_or("not logged in", |who| &who.user);
-    let mut parts = vec![time, (9, fit(who, 12), theme.dim())];
+    let mut parts = vec![time, who_words(model, cx, role)];
     if let Some(status) = cx.drill {
         parts.push(demo_words(cx, status));
         parts.extend(over_words(cx, status));
@@ -169,6 +180,19 @@ fn header_parts(model: &Model, cx: &Cx) -> Vec<(usize, String, Style)> {
     parts
 }
 
+/// Who sits here: `tech1 TECHNICIAN`, `LOCKED by anna`, and when it will be locked.
+fn who_words(model: &Model, cx: &Cx, role: bool) -> (usize, String, Style) {
+    let theme = cx.theme;
+    let Some(who) = &model.standing.who else { return (9, "not logged in".to_owned(), theme.strong()) };
+    let user = fit(&who.user, 12);
+    match model.locks_in() {
+        _ if model.standing.locked => (2, format!("LOCKED by {user}"), theme.trouble()),
+        Some(left) => (1, format!("locks in {} s: press a key", left.as_secs()), theme.trouble()),
+        None if role => (9, format!("{user} {}", who.role.word().to_uppercase()), theme.dim()),
+        None => (9, user, theme.dim()),
+    }
+}
+
 /// That nothing here is real, and how much of it is wrong on purpose; an exam does not tell.
 fn demo_words(cx: &Cx, status: &Status) -> (usize, String, Style) {
     match (status.is_open(), status.in_force.len()) {
@@ -187,9 +211,9 @@ fn demo_words(cx: &Cx, status: &Status) -> (usize, String, Style) {
 fn over_words(cx: &Cx, status: &Status) -> Option<(usize, String, Style)> {
     let verdict = status.scenario.as_ref().map(|progress| &progress.verdict).filter(|verdict| verdict.over)?;
     Some(if verdict.passed() {
-        (5, "drill PASSED: see 7".to_owned(), cx.theme.strong())
+        (5, "drill PASSED: see 8".to_owned(), cx.theme.strong())
     } else {
-        (5, "drill FAILED: see 7".to_owned(), cx.theme.trouble())
+        (5, "drill FAILED: see 8".to_owned(), cx.theme.trouble())
     })
 }
 
@@ -219,107 +243,22 @@ fn line_words(cx: &Cx, line: &LineDef) -> (String, Style) {
 }
 
 fn tab_bar(model: &Model, cx: &Cx, canvas: &mut Canvas) {
+    let name = |tab: Tab| {
+        let count = if tab == Tab::Alarms { cx.snapshot.alarms.len() } else { 0 };
+        let count = if count > 0 { format!(" {count}") } else { String::new() };
+        format!("{} {}{count}", tab.number(), tab.title())
+    };
+    let names: Vec<(Tab, String)> = Tab::offered(cx).into_iter().map(|tab| (tab, name(tab))).collect();
+    // Where there is no room for blanks around the names they stand closer.
+    let wide = names.iter().map(|(_, name)| width(name) + 3).sum::<u16>() <= canvas.width() + 1;
+    let blank = if wide { " " } else { "" };
     let mut x = 0;
-    for (n, tab) in Tab::offered(cx).iter().copied().enumerate() {
+    for (n, (tab, name)) in names.iter().enumerate() {
         if n > 0 {
             x = canvas.text(x, 0, "│", cx.theme.dim());
         }
-        let count = if tab == Tab::Alarms { cx.snapshot.alarms.len() } else { 0 };
-        let count = if count > 0 { format!(" {count}") } else { String::new() };
-        let shown = tab == model.tabs.shown;
-        x = canvas.text(x, 0, &format!(" {} {}{count} ", n + 1, tab.title()), cx.theme.tab(shown));
+        x = canvas.text(x, 0, &format!("{blank}{name}{blank}"), cx.theme.tab(*tab == model.tabs.shown));
     }
-}
-
-/// The most urgent alarm that waits for an acknowledgement, else trouble of the history, else the most urgent alarm; and
-/// the counts by priority. "No alarms" is said only when alarms could be seen.
-fn banner(model: &Model, cx: &Cx, canvas: &mut Canvas) {
-    let alarms = &cx.snapshot.alarms;
-    let urgent = alarms.iter().find(|alarm| alarm.state.needs_acknowledgement());
-    let trouble = cx.snapshot.history.trouble.as_ref().map(|trouble| format!("history: {trouble}"));
-    let other = alarms.first().filter(|_| trouble.is_none());
-    let Some(alarm) = urgent.or(other) else {
-        let blind = blind_words(model, cx).filter(|_| alarms.is_empty());
-        let room = canvas.width().saturating_sub(1);
-        match [blind, trouble].into_iter().flatten().reduce(|blind, trouble| format!("{blind}   {trouble}")) {
-            Some(words) => canvas.text(1, 0, &fit_words(&words, room), cx.theme.trouble()),
-            None => canvas.text(1, 0, "no alarms", cx.theme.dim()),
-        };
-        return;
-    };
-    let def = cx.def().alarm(alarm.id);
-    let waiting = alarm.state.needs_acknowledgement();
-    let mark = cx.theme.alarm(def.priority, alarm.state, cx.flash());
-    let x = canvas.text(1, 0, cx.theme.priority_mark(def.priority), mark) + 1;
-    let (text, room) = (alarm_words(cx, alarm), canvas.width());
-    let ack = if waiting { "a ack " } else { "" };
-    // That it waits for somebody must not be what a long text cuts off.
-    let left = room.saturating_sub(x + if waiting { 2 + width(ack) } else { 0 });
-    let text = if width(&text) <= left { text } else { fit_words(&text, left) };
-    // The alarm itself comes first; the counts and the key only where there is room left.
-    let tails = [format!("{}   {ack}", counts(cx)), ack.to_owned(), String::new()];
-    let fits = |tail: &&String| x + width(&text) + 2 + width(tail) <= room;
-    let tail = tails.iter().find(fits).map_or("", String::as_str);
-    canvas.text(x, 0, &text, cx.theme.alarm(def.priority, alarm.state, false));
-    canvas.text_right(room, 0, tail, cx.theme.normal());
-}
-
-/// Why alarms may be there without being seen: `alarms not judged: L1 disconnected`.
-fn blind_words(model: &Model, cx: &Cx) -> Option<String> {
-    let snapshot = cx.snapshot;
-    let silent = (model.clock.silent >= SILENCE).then(|| "station silent".to_owned());
-    let lines = cx.def().lines.iter().filter_map(|line| match snapshot.line(line.id).state {
-        LineState::Connected => None,
-        LineState::Disconnected => Some(format!("{} disconnected", line.name)),
-        LineState::Testing => Some(format!("{} given to a test", line.name)),
-        LineState::Connecting | LineState::Waiting { .. } => Some(format!("{} not connected", line.name)),
-    });
-    let devices = cx.def().devices.iter().filter(|device| snapshot.line(device.line).state == LineState::Connected);
-    let devices = devices.filter_map(|device| match snapshot.device(device.id).state {
-        DeviceState::Down { .. } => Some(format!("{} not answering", device.name)),
-        DeviceState::Answering | DeviceState::Failing(_)
-            if snapshot.device(device.id).diagnosis == Some(Reason::NoValues) =>
-        {
-            Some(format!("{} gives no values", device.name))
-        }
-        DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_) => None,
-    });
-    let blind: Vec<String> = silent.into_iter().chain(lines).chain(devices).collect();
-    (!blind.is_empty()).then(|| format!("alarms not judged: {}", blind.join(", ")))
-}
-
-/// `TIC-1.PV temperature high  72.4 °C  UNACK 00:41`.
-fn alarm_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
-    use crate::plant::def::Subject;
-    let def = cx.def().alarm(alarm.id);
-    let now = match def.subject {
-        Subject::Tag(tag) => super::widgets::value::show(cx, tag).with_unit(),
-        Subject::Device(device) => device_words(cx, device),
-        Subject::Line(line) => line_state_words(cx, line),
-    };
-    let since = match alarm.state {
-        AlarmState::Returned | AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
-            alarm.returned_at.unwrap_or(alarm.raised_at)
-        }
-        AlarmState::Normal
-        | AlarmState::Unacknowledged
-        | AlarmState::Acknowledged
-        | AlarmState::Shelved
-        | AlarmState::Suppressed
-        | AlarmState::OutOfService => alarm.raised_at,
-    };
-    let (state, lasted) = (alarm.state.word(), running(between(since, cx.now)));
-    format!("{} {}  {state} {lasted}  {now}", subject(cx, alarm.id), def.text)
-}
-
-/// How many of each priority: `[1]!1 (3)2`.
-fn counts(cx: &Cx) -> String {
-    let all =
-        [Priority::Critical, Priority::High, Priority::Medium, Priority::Low].into_iter().filter_map(|priority| {
-            let count = cx.snapshot.alarms.iter().filter(|alarm| cx.def().alarm(alarm.id).priority == priority).count();
-            (count > 0).then(|| format!("{}×{count}", cx.theme.priority_tag(priority)))
-        });
-    all.collect::<Vec<_>>().join(" ")
 }
 
 fn status(model: &Model, cx: &Cx, canvas: &mut Canvas) {
@@ -413,7 +352,8 @@ pub fn order_words(cx: &Cx, command: &Command, old: Option<f64>) -> String {
 }
 
 /// As many keys as fit; those of every tab stand at the right end.
-fn footer(cx: &Cx, canvas: &mut Canvas, hints: &[Hint], global: bool) {
+/// What whoever sits here may not do stands behind the role that it needs, all of it dim.
+fn footer(cx: &Cx, canvas: &mut Canvas, hints: &[Hint], refused: Option<(Role, Vec<Hint>)>, global: bool) {
     let tail: Vec<Hint> = if global {
         keys::hints(keys::GLOBAL).into_iter().filter(|hint| !hint.label.is_empty()).collect()
     } else {
@@ -431,6 +371,15 @@ fn footer(cx: &Cx, canvas: &mut Canvas, hints: &[Hint], global: bool) {
             break;
         }
         x = key(cx, canvas, x, &hint);
+    }
+    if let Some((role, refused)) = refused {
+        let named = |hint: &&Hint| !hint.label.is_empty();
+        let keys: Vec<&str> = refused.iter().filter(named).map(|hint| hint.key.as_str()).collect();
+        let keys = cx.theme.enter(&format!("{}: {}", rights::title(role), keys.join(" ")));
+        let words = [format!("needs {keys}"), keys];
+        if let Some(words) = words.iter().find(|words| x + width(words) < end) {
+            canvas.text(x, 0, words, cx.theme.dim());
+        }
     }
     for hint in &tail {
         end = key(cx, canvas, end, hint);

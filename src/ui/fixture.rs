@@ -185,7 +185,7 @@ impl Fixture {
 /// Calls with a context over this snapshot, at 80x24 in full looks.
 pub fn with_cx<T>(snapshot: &Snapshot, call: impl FnOnce(&Cx) -> T) -> T {
     let area = ratatui::layout::Rect::new(0, 4, 80, 18);
-    call(&Cx { snapshot, theme: &Theme::FULL, now: snapshot.at, phase: 0, area, drill: None })
+    call(&Cx { snapshot, theme: &Theme::FULL, now: snapshot.at, phase: 0, area, drill: None, standing: &standing() })
 }
 
 fn start(tag: &str) -> f64 {

@@ -88,8 +88,8 @@ struct Loop {
     session: Session,
     model: Model,
     screen: Screen,
-    /// For answers and saved reports, which come from other tasks.
-    outbox: mpsc::Sender<Msg>,
+    /// For answers and saved reports, which come from other tasks, with the plant (its count) that they were asked of.
+    outbox: mpsc::Sender<(u32, Msg)>,
     /// When the next frame is due; `None` while the screen is up to date.
     redraw_at: Option<Instant>,
     drawn_at: Option<Instant>,
@@ -98,7 +98,7 @@ struct Loop {
 }
 
 impl Loop {
-    async fn run(mut self, mut inbox: mpsc::Receiver<Msg>) -> Result<(), UiError> {
+    async fn run(mut self, mut inbox: mpsc::Receiver<(u32, Msg)>) -> Result<(), UiError> {
         let mut events = EventStream::new();
         let mut hangup = signal(SignalKind::hangup())?;
         let mut terminate = signal(SignalKind::terminate())?;
@@ -134,7 +134,11 @@ impl Loop {
                     self.take(Msg::Standing(standing), ECHO)?
                 }
                 Some(status) = drilled(&mut self.session.drill) => self.take(Msg::Drill(status), FRAME)?,
-                Some(msg) = inbox.recv() => self.take(msg, FRAME)?,
+                Some((plants, msg)) = inbox.recv() => {
+                    // Ids of one plant mean something else in another.
+                    let fits = plants == self.model.plants || matches!(msg, Msg::Granted(..));
+                    if fits { self.take(msg, FRAME)? } else { false }
+                }
                 _ = ticks.tick() => {
                     let silent = self.heard_at.elapsed();
                     self.take(Msg::Tick { silent }, FRAME)?
@@ -191,31 +195,31 @@ impl Loop {
     fn ask(&self, id: AskId, question: Question) {
         let (reply, answer) = oneshot::channel();
         let sent = self.session.ask(Query { question, reply });
-        let outbox = self.outbox.clone();
+        let (outbox, plants) = (self.outbox.clone(), self.model.plants);
         tokio::spawn(async move {
             let answer = match sent {
                 Ok(()) => answer.await.unwrap_or_else(|_| Err(HistoryError::Engine("the store has gone".to_owned()))),
                 Err(_) => Err(HistoryError::Engine("too busy, asked again later".to_owned())),
             };
             // A terminal that has left needs no answer.
-            let _ = outbox.send(Msg::Answer(id, answer)).await;
+            let _ = outbox.send((plants, Msg::Answer(id, answer))).await;
         });
     }
 
     fn wish(&self, id: AskId, wish: Wish) {
-        let (session, outbox) = (self.session.clone(), self.outbox.clone());
+        let (session, outbox, plants) = (self.session.clone(), self.outbox.clone(), self.model.plants);
         tokio::spawn(async move {
             let answer = session.wish(wish).await;
             // A terminal that has left needs no answer.
-            let _ = outbox.send(Msg::Granted(id, answer)).await;
+            let _ = outbox.send((plants, Msg::Granted(id, answer))).await;
         });
     }
 
     fn save(&self, tab: Tab, path: PathBuf, bytes: Vec<u8>) {
-        let outbox = self.outbox.clone();
+        let (outbox, plants) = (self.outbox.clone(), self.model.plants);
         tokio::task::spawn_blocking(move || {
             let saved = save(&path, &bytes).map_err(|error| format!("{}: {error}", path.display()));
-            let _ = outbox.blocking_send(Msg::Saved(tab, saved));
+            let _ = outbox.blocking_send((plants, Msg::Saved(tab, saved)));
         });
     }
 

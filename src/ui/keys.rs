@@ -2,6 +2,8 @@
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
+use super::tabs::Tab;
+
 /// One row of a key table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Key<A: 'static> {
@@ -41,6 +43,9 @@ impl Hint {
         Hint { key: key.into(), label: label.into(), help: help.into() }
     }
 }
+
+/// The modifier of Ctrl keys.
+pub const CONTROL: KeyModifiers = KeyModifiers::CONTROL;
 
 /// A letter or sign as a chord.
 pub const fn char(c: char) -> Chord {
@@ -99,8 +104,8 @@ impl Chord {
 /// What the keys of every tab mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Global {
-    /// Show the n-th tab.
-    Show(usize),
+    /// Show a tab.
+    Show(Tab),
     /// Show the next tab.
     Next,
     /// Show the one before.
@@ -117,17 +122,31 @@ pub enum Global {
     Redraw,
     /// Take the outcome of the last order off the screen.
     Dismiss,
+    /// Lock this terminal at once.
+    Lock,
 }
 
 /// Keys of every tab.
 pub const GLOBAL: &[Key<Global>] = &[
-    Key { chord: char('1'), label: "", help: "mimic", action: Global::Show(0) },
-    Key { chord: char('2'), label: "", help: "trends", action: Global::Show(1) },
-    Key { chord: char('3'), label: "", help: "alarms", action: Global::Show(2) },
-    Key { chord: char('4'), label: "", help: "controllers", action: Global::Show(3) },
-    Key { chord: char('5'), label: "", help: "reports", action: Global::Show(4) },
-    Key { chord: char('6'), label: "", help: "bus: lines, frames, tests", action: Global::Show(5) },
-    Key { chord: char('7'), label: "", help: "faults: of a simulated plant only", action: Global::Show(6) },
+    Key { chord: char('1'), label: "", help: "mimic", action: Global::Show(Tab::Mimic) },
+    Key { chord: char('2'), label: "", help: "trends", action: Global::Show(Tab::Trends) },
+    Key { chord: char('3'), label: "", help: "alarms", action: Global::Show(Tab::Alarms) },
+    Key { chord: char('4'), label: "", help: "controllers", action: Global::Show(Tab::Controllers) },
+    Key { chord: char('5'), label: "", help: "reports", action: Global::Show(Tab::Reports) },
+    Key { chord: char('6'), label: "", help: "bus: lines, frames, tests", action: Global::Show(Tab::Bus) },
+    Key {
+        chord: char('7'),
+        label: "",
+        help: "users and audit list: for a Supervisor",
+        action: Global::Show(Tab::Users),
+    },
+    Key { chord: char('8'), label: "", help: "faults: of a simulated plant only", action: Global::Show(Tab::Faults) },
+    Key {
+        chord: char('0'),
+        label: "",
+        help: "who sits here: log in, log out, password",
+        action: Global::Show(Tab::Login),
+    },
     Key { chord: code(KeyCode::Tab), label: "", help: "next tab", action: Global::Next },
     Key { chord: code(KeyCode::BackTab), label: "", help: "previous tab", action: Global::Previous },
     Key {
@@ -143,6 +162,7 @@ pub const GLOBAL: &[Key<Global>] = &[
         help: "close a window; take a failure off the screen; a page back",
         action: Global::Dismiss,
     },
+    Key { chord: ctrl('k'), label: "", help: "lock this terminal; works in every window too", action: Global::Lock },
     Key { chord: ctrl('l'), label: "", help: "draw everything anew", action: Global::Redraw },
     Key { chord: ctrl('c'), label: "", help: "quit (asks first)", action: Global::Quit },
     Key {
@@ -157,7 +177,7 @@ pub const GLOBAL: &[Key<Global>] = &[
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ui::tabs::{alarms, bus, controllers, faults, mimic, reports, trends};
+    use crate::ui::tabs::{alarms, bus, controllers, faults, login, mimic, reports, trends, users};
 
     fn no_clash(name: &str, chords: Vec<Chord>) {
         let global = GLOBAL.iter().map(|key| key.chord);
@@ -178,6 +198,9 @@ mod tests {
         no_clash("alarms", chords(alarms::KEYS));
         no_clash("reports", chords(reports::KEYS));
         no_clash("faults", chords(faults::KEYS));
+        no_clash("login", chords(login::KEYS));
+        no_clash("users", chords(users::LIST));
+        no_clash("audit", chords(users::AUDIT));
         for (page, chords) in bus::all_chords().into_iter().chain(controllers::all_chords()) {
             no_clash(page, chords);
         }

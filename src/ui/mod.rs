@@ -6,8 +6,12 @@ pub mod io;
 pub mod guard;
 pub mod keys;
 pub mod modal;
+pub mod msg;
+pub mod presence;
+pub mod rights;
 pub mod tabs;
 pub mod theme;
+pub mod watch;
 pub mod widgets;
 
 #[cfg(test)]
@@ -15,33 +19,31 @@ pub mod fixture;
 #[cfg(test)]
 mod tests;
 
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use crossterm::event::{KeyEvent, KeyEventKind};
 use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
 use crate::{
-    access::{OrderRequest, Standing, Wish},
-    history::{Answer, HistoryError, Question},
+    access::Standing,
     plant::{
-        command::{Command, OrderId, OrderStatus, Outcome},
-        def::{DeviceId, PlantDef},
+        def::PlantDef,
         sample::Cause,
         snapshot::{ActiveAlarm, Snapshot},
     },
     sim::drill,
 };
 use keys::Global;
-use modal::{Confirm, Intent, Modal};
+use modal::{Confirm, Modal};
+pub use msg::{Act, AskId, Effect, Msg};
+use presence::Presence;
 use tabs::{Tab, Tabs};
 use theme::Theme;
+pub use watch::{Confirmed, Watch};
 
 /// A station that has said nothing for so long (real time) is silent: its values are doubted.
 pub const SILENCE: Duration = Duration::from_secs(5);
-
-/// An outcome that is no worry is shown for so many ticks: a minute of real time.
-const OUTCOME_TICKS: u32 = 120;
 
 /// All that a terminal knows.
 #[derive(Debug)]
@@ -64,8 +66,14 @@ pub struct Model {
     pub terminal: u32,
     /// Who sits here and what he may.
     pub standing: Arc<Standing>,
+    /// The lock, its warning, and wishes on their way.
+    pub presence: Presence,
+    /// The window with work in it that waits for an unlock, and the tab that it stood on.
+    pub kept: Option<(Tab, Modal)>,
     /// Orders given so far.
     pub ordered: u32,
+    /// How often the station has come with another plant file: an answer to what was asked before is not heard.
+    pub plants: u32,
     /// The simulation behind the plant; `None` at a real one.
     pub drill: Option<Arc<drill::Status>>,
 }
@@ -77,108 +85,6 @@ pub struct Clock {
     pub silent: Duration,
     /// Counts ticks, two a second: drives flashing and motion.
     pub phase: u32,
-}
-
-/// An order of this terminal on its way.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Watch {
-    /// Which.
-    pub id: OrderId,
-    /// What was wished.
-    pub command: Command,
-    /// As last seen in a snapshot.
-    pub status: Option<OrderStatus>,
-    /// Tick at which it was given, and at which its outcome last changed.
-    pub changed_at: u32,
-    /// Why it never left the terminal.
-    pub undelivered: Option<&'static str>,
-}
-
-/// What happens to a terminal.
-#[derive(Debug)]
-pub enum Msg {
-    /// A key.
-    Key(KeyEvent),
-    /// Pasted text: never acts as keys.
-    Paste(String),
-    /// The screen has a new size.
-    Resize(u16, u16),
-    /// News of the plant.
-    Snapshot(Arc<Snapshot>),
-    /// News of who sits here.
-    Standing(Arc<Standing>),
-    /// A wish was granted, or why not.
-    Granted(AskId, Result<(), String>),
-    /// News of the simulation.
-    Drill(Arc<drill::Status>),
-    /// The history answered.
-    Answer(AskId, Result<Answer, HistoryError>),
-    /// A file of this tab was written, or why not.
-    Saved(Tab, Result<PathBuf, String>),
-    /// The station did not take this order: its queue is full, or it has gone.
-    Undelivered(OrderId, &'static str),
-    /// Half a second passed; so long ago (real time) came the last snapshot.
-    Tick {
-        /// Real time since the last snapshot.
-        silent: Duration,
-    },
-}
-
-/// What a terminal wants done.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Effect {
-    /// Give the station an order.
-    Order(OrderRequest),
-    /// Wish something of the station; answered by [`Msg::Granted`].
-    Wish(AskId, Wish),
-    /// Ask the history.
-    Ask(AskId, Question),
-    /// Let something go wrong in the simulation, or mend it.
-    Drill(drill::Order),
-    /// Write a report or a capture; answered by [`Msg::Saved`].
-    SaveReport {
-        /// The tab that wants it.
-        tab: Tab,
-        /// Where, relative to the working folder.
-        path: PathBuf,
-        /// What.
-        bytes: Vec<u8>,
-    },
-    /// Forget what the terminal shows and draw everything.
-    Redraw,
-    /// Leave.
-    Quit,
-}
-
-/// Identifies a question: who asked, and its running count. An answer to an older question is ignored by the tab.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct AskId {
-    /// The tab that asked.
-    pub tab: Tab,
-    /// Chosen by the tab.
-    pub number: u32,
-}
-
-/// What a tab or window asks of the terminal.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Act {
-    /// Put a window on top.
-    Open(Modal),
-    /// Show a tab.
-    Show(Tab),
-    /// Show a device on the controllers tab.
-    ShowDevice(DeviceId),
-    /// Give an order and watch its outcome.
-    Order(Command),
-    /// Pass on an effect as it is.
-    Do(Effect),
-}
-
-impl Act {
-    /// Asks the history on behalf of a tab.
-    pub fn ask(tab: Tab, number: u32, question: Question) -> Act {
-        Act::Do(Effect::Ask(AskId { tab, number }, question))
-    }
 }
 
 /// What every tab, window and widget may read.
@@ -196,6 +102,8 @@ pub struct Cx<'a> {
     pub area: Rect,
     /// The simulation behind the plant; `None` at a real one.
     pub drill: Option<&'a drill::Status>,
+    /// Who sits here and what he may.
+    pub standing: &'a Standing,
 }
 
 impl<'a> Cx<'a> {
@@ -217,7 +125,7 @@ impl Model {
     /// A terminal that has just attached.
     pub fn new(snapshot: Arc<Snapshot>, theme: Theme, terminal: u32, standing: Arc<Standing>) -> Model {
         let tabs = Tabs::new(&snapshot);
-        Model {
+        let mut model = Model {
             snapshot,
             tabs,
             modal: None,
@@ -226,20 +134,35 @@ impl Model {
             clock: Clock::default(),
             watch: None,
             terminal,
-            standing,
+            standing: Arc::default(),
+            presence: Presence::default(),
+            kept: None,
             ordered: 0,
+            plants: 0,
             drill: None,
-        }
+        };
+        update(&mut model, Msg::Standing(standing));
+        model
     }
 
     /// What the parts of the terminal may read.
     pub fn cx(&self) -> Cx<'_> {
-        context(&self.snapshot, &self.theme, self.clock, self.screen, &self.drill)
+        context(self, self.screen)
     }
 
     /// Is the screen too small for more than the banner?
     pub fn small(&self) -> bool {
         chrome::layout(self.screen).small
+    }
+
+    /// Doubts every value: nothing has been heard of them for too long.
+    fn doubt(&mut self) {
+        if self.snapshot.samples.iter().any(|sample| sample.quality.is_good()) {
+            let doubted = Arc::make_mut(&mut self.snapshot);
+            for sample in doubted.samples.iter_mut().filter(|sample| sample.quality.is_good()) {
+                *sample = sample.doubted(Cause::Stale);
+            }
+        }
     }
 
     /// The alarm that `a` is for: the one selected on the alarms tab if that can be seen, else the most urgent
@@ -257,10 +180,17 @@ impl Model {
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let acts = match msg {
         Msg::Key(event) if event.kind == KeyEventKind::Release => Vec::new(),
-        Msg::Key(event) => on_key(model, event),
+        Msg::Key(event) => {
+            let active = presence::active(model);
+            let acts = on_key(model, event);
+            active.map(Act::Do).into_iter().chain(acts).collect()
+        }
         Msg::Paste(text) => {
-            if let Some(modal) = &mut model.modal {
-                modal.on_paste(&text);
+            match &mut model.modal {
+                Some(modal) if model.standing.locked && !modal.is_unlock() => {}
+                Some(modal) => modal.on_paste(&text),
+                None if model.tabs.shown == Tab::Login => model.tabs.login.on_paste(&text),
+                None => {}
             }
             Vec::new()
         }
@@ -273,11 +203,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
         }
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
-        Msg::Standing(standing) => {
-            model.standing = standing;
-            Vec::new()
-        }
-        Msg::Granted(id, answer) => with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer)),
+        Msg::Standing(standing) => presence::on_standing(model, standing),
+        Msg::Granted(id, answer) => presence::on_granted(model, id, answer),
         Msg::Drill(status) => {
             model.drill = Some(status);
             Vec::new()
@@ -292,40 +219,60 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Tick { silent } => on_tick(model, silent),
     };
+    let acts = presence::hold_back(model, acts);
     perform(model, acts)
 }
 
 /// Draws the terminal as it stands.
 pub fn view(model: &Model, frame: &mut Frame) {
-    let cx = context(&model.snapshot, &model.theme, model.clock, frame.area(), &model.drill);
+    let cx = context(model, frame.area());
     chrome::view(model, &cx, frame);
     edge::finish(frame.buffer_mut(), &model.theme);
 }
 
-fn context<'a>(
+/// What the parts of a terminal of this size may read.
+fn context(model: &Model, screen: Rect) -> Cx<'_> {
+    let Model { snapshot, theme, clock, drill, standing, .. } = model;
+    cx_of(snapshot, theme, *clock, screen, drill, standing)
+}
+
+/// The same of parts of a model, while others of it change.
+fn cx_of<'a>(
     snapshot: &'a Snapshot,
     theme: &'a Theme,
     clock: Clock,
     screen: Rect,
     drill: &'a Option<Arc<drill::Status>>,
+    standing: &'a Standing,
 ) -> Cx<'a> {
     let ahead = jiff::SignedDuration::from_secs_f64(clock.silent.as_secs_f64() * snapshot.speed.clamp(0.0, 1e6));
     let now = snapshot.at.checked_add(ahead).unwrap_or(snapshot.at);
-    Cx { snapshot, theme, now, phase: clock.phase, area: chrome::layout(screen).body, drill: drill.as_deref() }
+    let area = chrome::layout(screen).body;
+    Cx { snapshot, theme, now, phase: clock.phase, area, drill: drill.as_deref(), standing }
 }
 
 /// Lets the tabs change while they read the rest of the model.
 fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &Cx) -> Vec<Act>) -> Vec<Act> {
-    let cx = context(&model.snapshot, &model.theme, model.clock, model.screen, &model.drill);
-    change(&mut model.tabs, &cx)
+    let Model { snapshot, theme, clock, drill, standing, screen, tabs, .. } = model;
+    change(tabs, &cx_of(snapshot, theme, *clock, *screen, drill, standing))
 }
 
 fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
+    if keys::find(keys::GLOBAL, event) == Some(Global::Lock) {
+        return presence::lock(model);
+    }
+    if presence::ask_before_work(model, event) {
+        return Vec::new();
+    }
     if let Some(modal) = model.modal.take() {
-        let cx = context(&model.snapshot, &model.theme, model.clock, model.screen, &model.drill);
-        let (rest, acts) = modal.on_key(&cx, &mut model.tabs, event);
+        let Model { snapshot, theme, clock, drill, standing, screen, tabs, .. } = model;
+        let cx = cx_of(snapshot, theme, *clock, *screen, drill, standing);
+        let (rest, acts) = modal.on_key(&cx, tabs, event);
         model.modal = rest;
         return acts;
+    }
+    if model.tabs.shown == Tab::Login && model.tabs.login.is_typing() && !model.small() {
+        return presence::on_typed(model, event);
     }
     match keys::find(keys::GLOBAL, event) {
         Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw)) => on_global(model, global),
@@ -338,9 +285,11 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
 
 fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
     match global {
-        Global::Show(n) => Tab::offered(&model.cx()).get(n).map(|tab| Act::Show(*tab)).into_iter().collect(),
-        Global::Next => vec![Act::Show(model.tabs.shown.step(Tab::offered(&model.cx()), 1))],
-        Global::Previous => vec![Act::Show(model.tabs.shown.step(Tab::offered(&model.cx()), -1))],
+        Global::Show(tab) if Tab::offered(&model.cx()).contains(&tab) => vec![Act::Show(tab)],
+        Global::Show(_) => Vec::new(),
+        Global::Next => vec![Act::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), 1))],
+        Global::Previous => vec![Act::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), -1))],
+        Global::Lock => presence::lock(model),
         Global::Help => vec![Act::Open(Modal::Help(0))],
         Global::Quit => vec![Act::Open(Modal::Confirm(Confirm::quit()))],
         Global::Acknowledge => match model.alarm_to_acknowledge() {
@@ -367,15 +316,16 @@ fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
 }
 
 fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<Act> {
-    model.snapshot = snapshot;
     model.clock.silent = Duration::ZERO;
-    if let Some(watch) = &mut model.watch
-        && let Some(status) = model.snapshot.orders.iter().find(|status| status.id == watch.id)
-    {
-        if watch.status.as_ref() != Some(status) {
-            watch.changed_at = model.clock.phase;
-        }
-        watch.status = Some(status.clone());
+    if !Arc::ptr_eq(&snapshot.def, &model.snapshot.def) && snapshot.def != model.snapshot.def {
+        let acts = presence::on_other_plant(model, snapshot);
+        return acts.into_iter().chain(with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))).collect();
+    }
+    model.snapshot = snapshot;
+    model.follow();
+    if model.standing.gone.is_some() {
+        // What still came through is as old as all the rest.
+        model.doubt();
     }
     with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
 }
@@ -384,12 +334,9 @@ fn on_tick(model: &mut Model, silent: Duration) -> Vec<Act> {
     model.clock.phase = model.clock.phase.wrapping_add(1);
     model.clock.silent = silent;
     let phase = model.clock.phase;
-    model.watch.take_if(|watch| watch.is_done() && phase.wrapping_sub(watch.changed_at) >= OUTCOME_TICKS);
-    if silent >= SILENCE && model.snapshot.samples.iter().any(|sample| sample.quality.is_good()) {
-        let doubted = Arc::make_mut(&mut model.snapshot);
-        for sample in doubted.samples.iter_mut().filter(|sample| sample.quality.is_good()) {
-            *sample = sample.doubted(Cause::Stale);
-        }
+    model.watch.take_if(|watch| watch.is_over(phase));
+    if silent >= SILENCE {
+        model.doubt();
     }
     with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
 }
@@ -404,12 +351,12 @@ fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
                 model.tabs.controllers.show(device);
                 effects.extend(show(model, Tab::Controllers));
             }
-            Act::Order(command) => {
-                model.ordered = model.ordered.wrapping_add(1);
-                let id = OrderId { terminal: model.terminal, number: model.ordered };
-                let changed_at = model.clock.phase;
-                model.watch = Some(Watch { id, command: command.clone(), status: None, changed_at, undelivered: None });
-                effects.push(Effect::Order(OrderRequest::new(id, command)));
+            Act::Order(command) => effects.extend(model.order(command.into())),
+            Act::Confirmed(confirmed) => effects.extend(model.order(confirmed)),
+            Act::Wish(tab, wish) => {
+                // Nought is nobody's: whoever waits has a number.
+                model.presence.wished = model.presence.wished.checked_add(1).unwrap_or(1);
+                effects.push(Effect::Wish(AskId { tab, number: model.presence.wished }, wish));
             }
             Act::Do(effect) => effects.push(effect),
         }
@@ -423,32 +370,7 @@ fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     let asked = with_tabs(model, |tabs, cx| tabs.on_snapshot(cx));
     let effects = asked.into_iter().filter_map(|act| match act {
         Act::Do(effect) => Some(effect),
-        Act::Open(_) | Act::Show(_) | Act::ShowDevice(_) | Act::Order(_) => None,
+        Act::Open(_) | Act::Show(_) | Act::ShowDevice(_) | Act::Order(_) | Act::Confirmed(_) | Act::Wish(..) => None,
     });
     effects.collect()
-}
-
-impl Watch {
-    /// Has it ended in a way that its operator must read?
-    fn is_trouble(&self) -> bool {
-        let outcome = self.status.as_ref().map(|status| &status.outcome);
-        self.undelivered.is_some() || outcome.is_some_and(|outcome| chrome::outcome_words(outcome).1)
-    }
-
-    /// Has it ended as wished? Such an outcome leaves the screen by itself; trouble stays, with its time, until it is
-    /// dismissed.
-    fn is_done(&self) -> bool {
-        let outcome = self.status.as_ref().map(|status| &status.outcome);
-        outcome.is_some_and(|outcome| *outcome != Outcome::Pending && !chrome::outcome_words(outcome).1)
-    }
-}
-
-impl Intent {
-    /// What a confirmed intent does.
-    pub fn act(self) -> Act {
-        match self {
-            Intent::Quit => Act::Do(Effect::Quit),
-            Intent::Order(command) => Act::Order(command),
-        }
-    }
 }

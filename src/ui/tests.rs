@@ -1,13 +1,14 @@
 //! Tests of the whole terminal: what an operator sees, and what the keys do; here is what they share.
 
 mod keys;
+mod people;
 mod screens;
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::{Terminal, backend::TestBackend, buffer::Buffer};
 
 use super::{Effect, Model, Msg, fixture::Fixture, theme::Theme, update, view};
-use crate::plant::command::Command;
+use crate::{access::Wish, plant::command::Command};
 
 pub fn model(fixture: &Fixture, theme: Theme) -> Model {
     let mut model = Model::new(fixture.snapshot(), theme, 1, crate::ui::fixture::standing());
@@ -45,7 +46,10 @@ pub fn type_keys(model: &mut Model, keys: &str) -> Vec<Effect> {
         '\u{8}' => KeyCode::Backspace,
         c => KeyCode::Char(c),
     };
-    keys.chars().flat_map(|c| update(model, Msg::Key(KeyEvent::new(code(c), KeyModifiers::NONE)))).collect()
+    let press = |c| update(model, Msg::Key(KeyEvent::new(code(c), KeyModifiers::NONE)));
+    // That a key was pressed at all is told to the station now and then.
+    let told = |effect: &Effect| !matches!(effect, Effect::Wish(_, Wish::Active));
+    keys.chars().flat_map(press).filter(told).collect()
 }
 
 pub fn order_of(effects: &[Effect]) -> Option<&Command> {

@@ -104,7 +104,7 @@ impl Gate {
 }
 
 /// What a command must be signed with. A stop never waits for a signature.
-fn needed(def: &PlantDef, command: &Command) -> Option<Sign> {
+pub fn needed(def: &PlantDef, command: &Command) -> Option<Sign> {
     let asks = |tag: TagId, value: f64| {
         let sign = def.tags.get(tag.index())?.sign?;
         (!guard::is_stop(def, tag, value)).then_some(sign)

@@ -50,6 +50,11 @@ impl Store {
                 self.list(&sql::actions_newest(), params![utc(*from), utc(*to), capped(*limit)], action)
                     .map(Answer::Actions)
             }
+            Question::Audit { from, to, words, by, action: what, limit } => {
+                check_span(*from, *to)?;
+                self.list(&sql::audit(), params![utc(*from), utc(*to), capped(*limit), by, what, words], action)
+                    .map(Answer::Actions)
+            }
             Question::LineMinutes { line, from, to, limit } => {
                 check_span(*from, *to)?;
                 let name = self.def.lines.get(line.index()).map_or("", |line| &line.name);

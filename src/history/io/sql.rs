@@ -131,6 +131,18 @@ pub fn actions_newest() -> String {
     format!("SELECT {DEED} FROM operator_action WHERE utc >= ? AND utc < ? ORDER BY utc DESC, rowid DESC LIMIT ?")
 }
 
+/// Deeds in a span, newest first, with a part of who, of the action, and of the words of all columns; large and small
+/// letters are the same. An empty part is in everything.
+pub fn audit() -> String {
+    format!(
+        "SELECT {DEED} FROM operator_action WHERE utc >= $1 AND utc < $2
+            AND contains(lower(by_whom), lower($4)) AND contains(lower(action), lower($5))
+            AND contains(lower(concat_ws(' ', by_whom, from_where, action, target, old_value, new_value, outcome, note)),
+                lower($6))
+         ORDER BY utc DESC, rowid DESC LIMIT $3"
+    )
+}
+
 /// Deeds of operators in a span, oldest first.
 pub fn actions_oldest() -> String {
     format!("SELECT {DEED} FROM operator_action WHERE utc >= ? AND utc < ? ORDER BY utc, rowid LIMIT ?")

@@ -129,6 +129,7 @@ impl Writer {
             Question::Series { .. }
             | Question::Journal { .. }
             | Question::Actions { .. }
+            | Question::Audit { .. }
             | Question::LineMinutes { .. } => {}
         }
         self.store()?.answer(question, now)

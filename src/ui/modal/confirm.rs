@@ -3,20 +3,27 @@
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
-use super::{Faceplate, Modal, Next, seen::Seen, window};
+use super::{
+    Faceplate, Modal, Next,
+    form::{Field, Form, Turn},
+    seen::Seen,
+    window,
+};
 use crate::{
+    access::{Signature, gate::sign},
     plant::{
         alarm::{AlarmCommand, book::subject_name},
         command::Command,
         def::TagId,
+        role::Sign,
         tag::{Access, Confidence, TagDef},
         tool::Tool,
     },
     ui::{
-        Cx, guard, keys,
+        Act, Confirmed, Cx, Effect, guard, keys, rights,
         tabs::mimic,
         widgets::{
-            text::{width, wrap},
+            text::{Canvas, width, wrap},
             value,
         },
     },
@@ -32,6 +39,10 @@ pub struct Confirm {
     back: Option<Faceplate>,
     /// What its reader saw, where a value is written.
     seen: Option<Seen>,
+    /// What the tag asks for again.
+    sign: Option<Form>,
+    /// Why the last Enter was not taken.
+    problem: Option<String>,
 }
 
 /// What a confirmed window does.
@@ -47,13 +58,11 @@ impl Confirm {
     /// Leave?
     pub fn quit() -> Confirm {
         let notes = ["Quit?", "Polling and alarms stop too: the station runs in this terminal."];
-        Confirm {
-            intent: Intent::Quit,
-            title: "quit".to_owned(),
-            notes: notes.map(str::to_owned).to_vec(),
-            back: None,
-            seen: None,
-        }
+        Confirm::new(Intent::Quit, "quit", notes.map(str::to_owned).to_vec())
+    }
+
+    fn new(intent: Intent, title: impl Into<String>, notes: Vec<String>) -> Confirm {
+        Confirm { intent, title: title.into(), notes, back: None, seen: None, sign: None, problem: None }
     }
 
     /// Is it the question whether to leave?
@@ -79,20 +88,15 @@ impl Confirm {
             notes.push(format!("… and {} more", waiting.len() - 6));
         }
         let intent = Intent::Order(cx.snapshot.acknowledge_all()?);
-        Some(Confirm { intent, title: "acknowledge all".to_owned(), notes, back: None, seen: None })
+        Some(Confirm::new(intent, "acknowledge all", notes))
     }
 
     /// Write this value? Old and new value are drawn from the intent, so they cannot differ from what is sent.
     pub fn write(cx: &Cx, tag: TagId, value: f64) -> Confirm {
         let def = cx.def().tag(tag);
         let intent = Intent::Order(Command::Write { tag, value });
-        Confirm {
-            intent,
-            title: format!("write {}", def.name),
-            notes: write_notes(def),
-            back: None,
-            seen: Some(Seen::new(cx, tag)),
-        }
+        let confirm = Confirm::new(intent, format!("write {}", def.name), write_notes(def));
+        Confirm { seen: Some(Seen::new(cx, tag)), ..confirm }.signed(cx)
     }
 
     /// The same, asked from a faceplate, with words of its own above all others.
@@ -111,13 +115,16 @@ impl Confirm {
 
     /// Open or close a line, or any other order, with words of its own.
     pub fn order(title: impl Into<String>, words: impl Into<String>, command: Command) -> Confirm {
-        Confirm {
-            intent: Intent::Order(command),
-            title: title.into(),
-            notes: vec![words.into()],
-            back: None,
-            seen: None,
-        }
+        Confirm::new(Intent::Order(command), title, vec![words.into()])
+    }
+
+    /// The same with a signature, where a tag that it writes asks for one.
+    pub fn signed(self, cx: &Cx) -> Confirm {
+        let sign = match &self.intent {
+            Intent::Order(command) => sign::needed(cx.def(), command).map(sign_form),
+            Intent::Quit => None,
+        };
+        Confirm { sign, ..self }
     }
 
     /// The faceplate that it was asked from.
@@ -180,20 +187,17 @@ impl Confirm {
 
     pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
         let enter = keys::code(KeyCode::Enter).is(event) && !self.wants_y();
+        if let Some(form) = &mut self.sign {
+            // Letters belong to the name and the password.
+            match form.on_key(event) {
+                Turn::Finished => return self.yes(cx),
+                Turn::Taken => self.problem = None,
+                Turn::Nothing => {}
+            }
+            return Next::Stay(Modal::Confirm(self));
+        }
         if enter || keys::char('y').is(event) {
-            if self.is_refused(cx) {
-                return Next::Stay(Modal::Confirm(self));
-            }
-            if let Some(seen) = &mut self.seen
-                && seen.changed(cx)
-            {
-                return Next::Stay(Modal::Confirm(self));
-            }
-            let acts = vec![self.intent.act()];
-            match self.back {
-                Some(back) => Next::Both(Modal::Faceplate(back), acts),
-                None => Next::Do(acts),
-            }
+            self.yes(cx)
         } else if keys::char('n').is(event) || keys::char('q').is(event) {
             match self.back {
                 Some(back) => Next::Stay(Modal::Faceplate(back)),
@@ -203,6 +207,45 @@ impl Confirm {
             let write = matches!(self.intent, Intent::Order(Command::Write { .. }));
             let other = mimic::command_of(cx, event).filter(|_| write);
             Next::Stay(other.unwrap_or(Modal::Confirm(self)))
+        }
+    }
+
+    /// Does it, unless something has changed, is missing, or makes it useless.
+    fn yes(mut self, cx: &Cx) -> Next {
+        let refused = self.is_refused(cx);
+        if refused || self.seen.as_mut().is_some_and(|seen| seen.changed(cx)) {
+            return Next::Stay(Modal::Confirm(self));
+        }
+        if let Some(why) = self.sign.as_mut().and_then(Form::lacking) {
+            self.problem = Some(why);
+            return Next::Stay(Modal::Confirm(self));
+        }
+        let act = match self.intent {
+            Intent::Quit => Act::Do(Effect::Quit),
+            Intent::Order(command) => {
+                let seen = self.seen.as_ref().and_then(|seen| seen.shown(cx));
+                let sign = self.sign.as_ref().map(signature);
+                Act::Confirmed(Confirmed { command, seen, sign })
+            }
+        };
+        match self.back {
+            Some(back) => Next::Both(Modal::Faceplate(back), vec![act]),
+            None => Next::Do(vec![act]),
+        }
+    }
+
+    /// Pasted text: a password or a name, where one is asked for.
+    pub(super) fn on_paste(&mut self, text: &str) {
+        if let Some(form) = &mut self.sign {
+            form.paste(text);
+        }
+    }
+
+    /// What of the window is below the words: rows of the form and of what is wrong with it.
+    fn view_sign(&self, cx: &Cx, canvas: &mut Canvas, y: u16) {
+        if let Some(form) = &self.sign {
+            form.view(cx, canvas, y);
+            canvas.text(0, y + form.rows(), self.problem.as_deref().unwrap_or_default(), cx.theme.trouble());
         }
     }
 
@@ -221,21 +264,43 @@ impl Confirm {
             let told = guard::before_write(cx, *tag, *value).into_iter();
             rows.extend(told.flat_map(|(note, style)| wrap(&note, room).into_iter().map(move |line| (line, style))));
         }
-        if let Some(seen) = self.seen.as_ref().filter(|seen| seen.has_asked()) {
-            rows.extend(wrap(&seen.words(cx), room).into_iter().map(|line| (line, cx.theme.trouble())));
-        }
+        let missing = match &self.intent {
+            Intent::Order(command) => rights::missing(cx, command),
+            Intent::Quit => None,
+        };
+        let news = self.seen.as_ref().and_then(|seen| seen.news(cx)).map(|words| cx.theme.enter(&words));
+        let told = news.into_iter().chain(missing);
+        rows.extend(told.flat_map(|words| wrap(&words, room)).map(|line| (line, cx.theme.trouble())));
         let yes = if self.wants_y() { "y".to_owned() } else { cx.theme.enter("⏎") };
         let keys = match self.is_refused(cx) {
             true => format!("Esc {}", self.escape()),
             false => format!("{yes} {}   Esc {}", self.verb(), self.escape()),
         };
-        let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&keys));
-        let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + 2));
+        let form = self.sign.as_ref().map_or((0, 0), |form| (form.width(), form.rows() + 1));
+        let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&keys)).max(form.0);
+        let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + form.1 + 2));
         for (y, (text, style)) in rows.iter().enumerate() {
             canvas.text(0, y as u16, text, *style);
         }
+        self.view_sign(cx, &mut canvas, rows.len() as u16);
         let last = canvas.height().saturating_sub(1);
         canvas.text(0, last, &keys, cx.theme.strong());
+    }
+}
+
+/// What is filled in where a tag asks for it again.
+fn sign_form(sign: Sign) -> Form {
+    Form::new(match sign {
+        Sign::Password => vec![Field::secret("your password again")],
+        Sign::SecondPerson => vec![Field::name("second person"), Field::secret("password")],
+    })
+}
+
+/// A second person gives his name; the one who writes is known.
+fn signature(form: &Form) -> Signature {
+    match form.rows() {
+        1 => Signature { user: None, password: form.secret(0) },
+        _ => Signature { user: Some(form.name(0)), password: form.secret(1) },
     }
 }
 

@@ -11,9 +11,10 @@ use super::{
     window,
 };
 use crate::{
+    access::gate::sign,
     plant::{command::Command, def::TagId},
     ui::{
-        Act, Cx, guard, keys,
+        Act, Confirmed, Cx, guard, keys, rights,
         widgets::{
             text::{width, wrap},
             value,
@@ -47,11 +48,15 @@ impl Entry {
                 false => check(cx, self.tag, &self.line.text()),
             };
             match checked {
-                Ok(_) if self.seen.changed(cx) => self.problem = Some(self.seen.words(cx)),
-                Ok(value) if cx.def().tag(self.tag).confirm.is_some() => {
+                Ok(_) if self.seen.changed(cx) => self.problem = None,
+                Ok(value) if asks(cx, self.tag, value) => {
                     return Next::Stay(Modal::Confirm(Confirm::write(cx, self.tag, value)));
                 }
-                Ok(value) => return Next::Do(vec![Act::Order(Command::Write { tag: self.tag, value })]),
+                Ok(value) => {
+                    let seen = self.seen.shown(cx);
+                    let command = Command::Write { tag: self.tag, value };
+                    return Next::Do(vec![Act::Confirmed(Confirmed { command, seen, sign: None })]);
+                }
                 Err(problem) => self.problem = Some(problem),
             }
         } else if self.line.on_key(event) {
@@ -69,10 +74,19 @@ impl Entry {
         let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
         let notes = notes.chain(guard::key_words(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
-        let problem = self.problem.clone().unwrap_or_default();
-        let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&problem)).max(46);
+        let missing = rights::missing(cx, &Command::Write { tag: self.tag, value: 0.0 });
+        let told = self.problem.clone().or_else(|| self.seen.news(cx)).or(missing);
+        let problem = wrap(&told.map_or(String::new(), |words| theme.enter(&words)), room);
+        let inner = rows
+            .iter()
+            .map(|(text, _)| width(text))
+            .chain(problem.iter().map(|text| width(text)))
+            .max()
+            .unwrap_or(0)
+            .max(46);
         let title = format!("write {} {}", def.name, def.label);
-        let mut canvas = window(cx, frame, body, &title, (inner, rows.len() as u16 + 4));
+        let told = problem.len().max(1) as u16;
+        let mut canvas = window(cx, frame, body, &title, (inner, rows.len() as u16 + 3 + told));
         let old = value::show(cx, self.tag);
         let x = canvas.text(0, 0, "old ", theme.dim());
         let x = canvas.text(x, 0, &old.whole(), old.style);
@@ -83,9 +97,16 @@ impl Entry {
             canvas.text(0, y as u16 + 1, text, *style);
         }
         let last = canvas.height().saturating_sub(1);
-        canvas.text(0, last.saturating_sub(1), &problem, theme.trouble());
+        for (y, line) in problem.iter().enumerate() {
+            canvas.text(0, last.saturating_sub(told) + y as u16, line, theme.trouble());
+        }
         canvas.text(0, last, &theme.enter("⏎ write and verify   Esc leave unchanged"), theme.strong());
     }
+}
+
+/// Is a number for this tag asked again in a window of its own? What must be signed is.
+fn asks(cx: &Cx, tag: TagId, value: f64) -> bool {
+    cx.def().tag(tag).confirm.is_some() || sign::needed(cx.def(), &Command::Write { tag, value }).is_some()
 }
 
 /// The permitted range in words.

@@ -88,6 +88,14 @@ impl Line {
             self.insert(if c.is_control() { ' ' } else { c });
         }
     }
+    /// Pasted text as it is, for a password: what cannot be in a line is missed, not replaced.
+    pub fn paste_whole(&mut self, text: &str) {
+        text.chars().for_each(|c| self.insert(c));
+    }
+    /// The same line with another character for each of its own: for a password.
+    pub fn hidden(&self, dot: char) -> Line {
+        Line { text: vec![dot; self.text.len()], ..self.clone() }
+    }
     /// Draws text and cursor; returns the column after it. A text that is too wide is drawn from a later character on,
     /// marked with `…`, so that the cursor stays in sight.
     pub fn view(&self, theme: &Theme, canvas: &mut Canvas, x: u16, y: u16) -> u16 {

@@ -2,26 +2,31 @@
 
 pub mod choice;
 pub mod confirm;
+pub mod deed;
 pub mod entry;
 pub mod faceplate;
+pub mod form;
 pub mod help;
 pub mod line;
 pub mod notice;
 pub mod prompt;
 pub mod seen;
 pub mod settings;
+pub mod sheet;
 pub mod why;
 
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
 pub use choice::Choice;
-pub use confirm::{Confirm, Intent};
+pub use confirm::Confirm;
+pub use deed::Deed;
 pub use entry::Entry;
 pub use faceplate::Faceplate;
 pub use notice::Notice;
 pub use prompt::Prompt;
 pub use settings::Settings;
+pub use sheet::Sheet;
 pub use why::Why;
 
 use super::{
@@ -55,6 +60,10 @@ pub enum Modal {
     Settings(Box<Settings>),
     /// A frame, a block, a test of the bus tab.
     Bus(Box<bus::Window>),
+    /// A form about people.
+    Sheet(Box<Sheet>),
+    /// A deed on record, whole.
+    Deed(Box<Deed>),
 }
 
 /// What a key did to a window.
@@ -88,6 +97,7 @@ impl Modal {
         if keys::code(KeyCode::Esc).is(event) {
             let back = match self {
                 Modal::Confirm(confirm) => confirm.back().map(Modal::Faceplate),
+                Modal::Sheet(sheet) => sheet.below(),
                 _ => None,
             };
             return (back, Vec::new());
@@ -106,6 +116,8 @@ impl Modal {
             Modal::Why(why) => why.on_key(event),
             Modal::Settings(settings) => settings.on_key(cx, event),
             Modal::Bus(window) => window.on_key(cx, tabs, event),
+            Modal::Sheet(sheet) => sheet.on_key(cx, event),
+            Modal::Deed(deed) => deed.on_key(event),
         };
         match next {
             Next::Stay(modal) => (Some(modal), Vec::new()),
@@ -120,17 +132,29 @@ impl Modal {
         matches!(self, Modal::Confirm(confirm) if confirm.is_quit())
     }
 
+    /// Does it only show, so that a locked terminal may have it?
+    pub fn only_shows(&self) -> bool {
+        match self {
+            Modal::Help(_) | Modal::Notice(_) | Modal::Why(_) | Modal::Faceplate(_) | Modal::Deed(_) => true,
+            Modal::Confirm(confirm) => confirm.is_quit(),
+            Modal::Bus(window) => window.only_shows(),
+            Modal::Entry(_) | Modal::Choice(_) | Modal::Prompt(_) | Modal::Settings(_) | Modal::Sheet(_) => false,
+        }
+    }
+
     /// Pasted text goes into a text line, or nowhere.
     pub fn on_paste(&mut self, text: &str) {
         match self {
             Modal::Entry(entry) => entry.line.paste(text),
             Modal::Prompt(prompt) => prompt.line.paste(text),
             Modal::Settings(settings) => settings.on_paste(text),
+            Modal::Confirm(confirm) => confirm.on_paste(text),
+            Modal::Sheet(sheet) => sheet.paste(text),
             Modal::Help(_)
-            | Modal::Confirm(_)
             | Modal::Choice(_)
             | Modal::Faceplate(_)
             | Modal::Notice(_)
+            | Modal::Deed(_)
             | Modal::Why(_) => {}
             Modal::Bus(window) => window.on_paste(text),
         }
@@ -151,6 +175,8 @@ impl Modal {
             Modal::Why(why) => why.hints(),
             Modal::Settings(settings) => settings.hints(),
             Modal::Bus(window) => window.hints(),
+            Modal::Sheet(sheet) => sheet.hints().into_iter().chain([hint("Esc", "leave")]).collect(),
+            Modal::Deed(_) => vec![hint("Esc", "close")],
         }
     }
 
@@ -167,6 +193,8 @@ impl Modal {
             Modal::Why(why) => why.view(cx, frame, body),
             Modal::Settings(settings) => settings.view(cx, frame, body),
             Modal::Bus(window) => window.view(cx, frame, body),
+            Modal::Sheet(sheet) => sheet.view(cx, frame, body),
+            Modal::Deed(deed) => deed.view(cx, frame, body),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     plant::{command::Outcome, def::TagId},
-    ui::{Cx, widgets::value},
+    ui::{Cx, widgets::text::clock},
 };
 
 /// A value that changes again and again moves by itself (a program, a tuning): to ask for ever would only be in the way.
@@ -36,20 +36,32 @@ impl Seen {
         true
     }
 
-    /// Has a change been noticed?
-    pub fn has_asked(&self) -> bool {
-        self.asked > 0
+    /// The value that a write confirmed now is meant to replace; `None` for one that moves by itself.
+    pub fn shown(&self, cx: &Cx) -> Option<f64> {
+        cx.snapshot.sample(self.tag).trusted().filter(|_| self.asked < ASKED_MAX)
     }
 
-    /// `changed meanwhile from 240 to 300 s by anna; ⏎ writes all the same`.
-    pub fn words(&self, cx: &Cx) -> String {
-        let before = self.before.map_or("unknown".to_owned(), |before| cx.snapshot.format(self.tag, before));
-        let now = value::show(cx, self.tag).with_unit();
+    /// What the window says of a change that its reader may not have noticed; `None` while it is as he saw it.
+    pub fn news(&self, cx: &Cx) -> Option<String> {
+        let now = cx.snapshot.sample(self.tag).trusted();
+        let other = now.is_some() && now != self.value && self.asked < ASKED_MAX;
+        match (other, self.asked) {
+            (true, _) => Some(format!("{}; ⏎ asks again", self.words(cx, self.value, now))),
+            (false, 0) => None,
+            (false, _) => Some(format!("{}; ⏎ writes all the same", self.words(cx, self.before, self.value))),
+        }
+    }
+
+    /// `changed to 65.0 °C by anna 14:02:31 (was 70.0)`.
+    fn words(&self, cx: &Cx, before: Option<f64>, now: Option<f64>) -> String {
+        let text = |value: Option<f64>| value.map_or("unknown".to_owned(), |value| cx.snapshot.format(self.tag, value));
+        let unit = cx.snapshot.unit(self.tag);
         let by = cx.snapshot.orders.iter().find(|order| {
             order.outcome == Outcome::Verified
-                && order.command.written().is_some_and(|(tag, new)| tag == self.tag && Some(new) == self.value)
+                && order.command.written().is_some_and(|(tag, new)| tag == self.tag && Some(new) == now)
         });
-        let by = by.map_or(String::new(), |order| format!(" by {}", order.by));
-        format!("changed meanwhile from {before} to {now}{by}; ⏎ writes all the same")
+        let by = by.map_or(String::new(), |order| format!(" by {} {}", order.by, clock(order.at, &cx.def().time_zone)));
+        let now = format!("{} {unit}", text(now));
+        format!("changed to {}{by} (was {})", now.trim_end(), text(before))
     }
 }

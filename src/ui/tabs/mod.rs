@@ -8,9 +8,11 @@ pub mod bus;
 pub mod controllers;
 mod errand;
 pub mod faults;
+pub mod login;
 pub mod mimic;
 pub mod reports;
 pub mod trends;
+pub mod users;
 
 use std::path::PathBuf;
 
@@ -20,15 +22,18 @@ use ratatui::{Frame, layout::Rect};
 use super::{
     Act, AskId, Cx,
     keys::{self, Hint},
+    presence,
 };
 use crate::{
     history::{Answer, HistoryError},
-    plant::snapshot::Snapshot,
+    plant::{role::Role, snapshot::Snapshot},
 };
 
 /// A tab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Tab {
+    /// Who sits here.
+    Login,
     /// The picture of the process.
     Mimic,
     /// Curves.
@@ -41,30 +46,56 @@ pub enum Tab {
     Reports,
     /// Lines, their plan, frames and tests.
     Bus,
+    /// Users, terminals, and the audit list.
+    Users,
     /// Faults of a simulated plant.
     Faults,
 }
 
 impl Tab {
     /// Every tab, in the order of its number key.
-    pub const ALL: [Tab; 7] =
-        [Tab::Mimic, Tab::Trends, Tab::Alarms, Tab::Controllers, Tab::Reports, Tab::Bus, Tab::Faults];
+    pub const ALL: [Tab; 9] = [
+        Tab::Login,
+        Tab::Mimic,
+        Tab::Trends,
+        Tab::Alarms,
+        Tab::Controllers,
+        Tab::Reports,
+        Tab::Bus,
+        Tab::Users,
+        Tab::Faults,
+    ];
 
-    /// Those that there are here: faults only where the plant is simulated, and not in an exam.
-    pub fn offered(cx: &Cx) -> &'static [Tab] {
-        let simulated = cx.drill.is_some_and(|status| status.is_open());
-        if simulated { &Tab::ALL } else { &Tab::ALL[..Tab::ALL.len() - 1] }
+    /// Those that there are here. Before a login only the login page, unless the plant file lets everybody look; users
+    /// only for a Supervisor; faults only where the plant is simulated, and not in an exam.
+    pub fn offered(cx: &Cx) -> Vec<Tab> {
+        let closed = presence::is_closed(cx.standing);
+        let supervisor = cx.standing.who.as_ref().is_some_and(|who| who.role == Role::Supervisor);
+        let there = |tab: &Tab| match tab {
+            Tab::Login => true,
+            Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Controllers | Tab::Reports | Tab::Bus => !closed,
+            Tab::Users => !closed && supervisor,
+            Tab::Faults => !closed && cx.drill.is_some_and(|status| status.is_open()),
+        };
+        Tab::ALL.into_iter().filter(there).collect()
+    }
+
+    /// The number key that shows it.
+    pub fn number(self) -> usize {
+        Tab::ALL.iter().position(|tab| *tab == self).unwrap_or(0)
     }
 
     /// Its heading.
     pub fn title(self) -> &'static str {
         match self {
+            Tab::Login => "Login",
             Tab::Mimic => "Mimic",
             Tab::Trends => "Trends",
             Tab::Alarms => "Alarms",
             Tab::Controllers => "Controllers",
             Tab::Reports => "Reports",
             Tab::Bus => "Bus",
+            Tab::Users => "Users",
             Tab::Faults => "Faults",
         }
     }
@@ -80,6 +111,8 @@ impl Tab {
 pub struct Tabs {
     /// Which one is shown.
     pub shown: Tab,
+    /// Tab 0.
+    pub login: login::Login,
     /// Tab 1.
     pub mimic: mimic::Mimic,
     /// Tab 2.
@@ -92,7 +125,9 @@ pub struct Tabs {
     pub reports: reports::Reports,
     /// Tab 6.
     pub bus: bus::Bus,
-    /// Tab 7, of simulated plants.
+    /// Tab 7, of Supervisors.
+    pub users: users::Users,
+    /// Tab 8, of simulated plants.
     pub faults: faults::Faults,
 }
 
@@ -101,12 +136,14 @@ impl Tabs {
     pub fn new(snapshot: &Snapshot) -> Tabs {
         Tabs {
             shown: Tab::Mimic,
+            login: login::Login::default(),
             mimic: mimic::Mimic::new(snapshot),
             trends: trends::Trends::new(snapshot),
             alarms: alarms::Alarms::new(snapshot),
             controllers: controllers::Controllers::new(snapshot),
             reports: reports::Reports::new(snapshot),
             bus: bus::Bus::new(snapshot),
+            users: users::Users::default(),
             faults: faults::Faults::default(),
         }
     }
@@ -117,6 +154,7 @@ impl Tabs {
             keys::find(table, event).map(on_key).unwrap_or_default()
         }
         match self.shown {
+            Tab::Login => self.login.on_key(cx, event),
             Tab::Mimic => match keys::find(mimic::KEYS, event) {
                 Some(action) => self.mimic.on_key(cx, action),
                 None => self.mimic.on_command_key(cx, event),
@@ -126,6 +164,7 @@ impl Tabs {
             Tab::Controllers => self.controllers.on_key(cx, event),
             Tab::Reports => act(reports::KEYS, event, |action| self.reports.on_key(cx, action)),
             Tab::Bus => self.bus.on_key(cx, event),
+            Tab::Users => self.users.on_key(cx, event),
             Tab::Faults => act(faults::KEYS, event, |action| self.faults.on_key(cx, action)),
         }
     }
@@ -133,6 +172,7 @@ impl Tabs {
     /// The keys of the shown tab.
     pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
         match self.shown {
+            Tab::Login => self.login.hints(cx),
             Tab::Mimic => self.mimic.hints(cx),
             Tab::Trends => keys::hints(trends::KEYS),
             Tab::Alarms => {
@@ -144,13 +184,18 @@ impl Tabs {
             Tab::Controllers => self.controllers.hints(cx),
             Tab::Reports => keys::hints(reports::KEYS),
             Tab::Bus => self.bus.hints(cx),
+            Tab::Users => self.users.hints(),
             Tab::Faults => self.faults.hints(cx),
         }
     }
 
     /// Esc on the shown tab: a step back, `false` where there is none.
     pub fn back(&mut self, cx: &Cx) -> bool {
-        self.shown == Tab::Controllers && self.controllers.back(cx)
+        match self.shown {
+            Tab::Controllers => self.controllers.back(cx),
+            Tab::Users => self.users.back(),
+            Tab::Login | Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Reports | Tab::Bus | Tab::Faults => false,
+        }
     }
 
     /// News, or time has passed, or the tab was just shown.
@@ -162,7 +207,8 @@ impl Tabs {
             Tab::Controllers => self.controllers.on_snapshot(cx),
             Tab::Reports => self.reports.on_snapshot(cx),
             Tab::Bus => self.bus.on_snapshot(cx),
-            Tab::Faults => Vec::new(),
+            Tab::Users => self.users.on_snapshot(cx),
+            Tab::Login | Tab::Faults => Vec::new(),
         }
     }
 
@@ -172,7 +218,11 @@ impl Tabs {
             Tab::Mimic => self.mimic.on_answer(cx, id.number, answer),
             Tab::Trends => self.trends.on_answer(cx, id.number, answer),
             Tab::Alarms => self.alarms.on_answer(cx, id.number, answer),
-            Tab::Faults => Vec::new(),
+            Tab::Users => {
+                self.users.on_answer(id.number, answer);
+                Vec::new()
+            }
+            Tab::Login | Tab::Faults => Vec::new(),
             Tab::Controllers => {
                 self.controllers.on_answer(id.number, answer);
                 Vec::new()
@@ -186,7 +236,10 @@ impl Tabs {
     }
 
     /// A wish goes to the tab that wished, shown or not.
-    pub fn on_granted(&mut self, _cx: &Cx, _id: AskId, _answer: Result<(), String>) -> Vec<Act> {
+    pub fn on_granted(&mut self, cx: &Cx, id: AskId, answer: Result<(), String>) -> Vec<Act> {
+        if id.tab == Tab::Login {
+            self.login.on_granted(cx, answer);
+        }
         Vec::new()
     }
 
@@ -197,7 +250,8 @@ impl Tabs {
             Tab::Reports => self.reports.on_text(cx, text),
             Tab::Bus => self.bus.on_text(cx, text),
             Tab::Controllers => self.controllers.on_text(cx, text),
-            Tab::Mimic | Tab::Alarms | Tab::Faults => Ok(Vec::new()),
+            Tab::Users => self.users.on_text(cx, text),
+            Tab::Login | Tab::Mimic | Tab::Alarms | Tab::Faults => Ok(Vec::new()),
         }
     }
 
@@ -206,7 +260,7 @@ impl Tabs {
         match tab {
             Tab::Reports => return self.reports.on_saved(cx, result),
             Tab::Bus => self.bus.on_saved(result),
-            Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Controllers | Tab::Faults => {}
+            Tab::Login | Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Controllers | Tab::Users | Tab::Faults => {}
         }
         Vec::new()
     }
@@ -214,12 +268,14 @@ impl Tabs {
     /// Draws the shown tab.
     pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
         match self.shown {
+            Tab::Login => self.login.view(cx, frame, area),
             Tab::Mimic => self.mimic.view(cx, frame, area),
             Tab::Trends => self.trends.view(cx, frame, area),
             Tab::Alarms => self.alarms.view(cx, frame, area),
             Tab::Controllers => self.controllers.view(cx, frame, area),
             Tab::Reports => self.reports.view(cx, frame, area),
             Tab::Bus => self.bus.view(cx, frame, area),
+            Tab::Users => self.users.view(cx, frame, area),
             Tab::Faults => self.faults.view(cx, frame, area),
         }
     }

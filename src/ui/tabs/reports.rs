@@ -1,6 +1,6 @@
 //! Tab 5: the report of a shift or of any period, as the CSV will have it; and the CSV.
 
-mod period;
+pub(super) mod period;
 mod view;
 
 #[cfg(test)]

@@ -377,7 +377,7 @@ fn a_toggle_is_asked_and_does_what_it_said() {
     later.set("PLC-1.RUN", 0.0);
     update(&mut model, Msg::Snapshot(later.snapshot()));
     assert_eq!(type_keys(&mut model, "⏎"), []);
-    assert!(screen(&mut model, 80, 24).contains("changed meanwhile from RUN to STOP"));
+    assert!(screen(&mut model, 80, 24).contains("changed to STOP (was RUN)"));
     let effects = type_keys(&mut model, "⏎");
     assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 }));
 }
@@ -473,6 +473,7 @@ fn the_journal_tells_alarms_and_deeds_in_one_order() {
             ]),
             Question::Actions { .. } => Answer::Actions(vec![deed.clone()]),
             Question::Series { .. }
+            | Question::Audit { .. }
             | Question::LineMinutes { .. }
             | Question::Report { .. }
             | Question::AlarmQuality { .. } => continue,

@@ -102,8 +102,7 @@ fn the_picture_with_commands() {
     for (name, theme, width, height) in
         [("80x24", Theme::FULL, 80, 24), ("120x40", Theme::FULL, 120, 40), ("ascii", Theme::PLAIN, 80, 24)]
     {
-        let mut model = model(&Fixture::normal(), theme);
-        update(&mut model, Msg::Snapshot(Arc::new(commanded())));
+        let mut model = Model::new(Arc::new(commanded()), theme, 1, fixture::standing());
         let shown = screen(&mut model, width, height);
         assert!(theme != Theme::PLAIN || shown.is_ascii());
         insta::assert_snapshot!(format!("mimic_commands_{name}"), shown);
@@ -111,8 +110,7 @@ fn the_picture_with_commands() {
         insta::assert_snapshot!(format!("window_commands_{name}"), screen(&mut model, width, height));
     }
     let console = Theme { colours: Colours::Sixteen, glyphs: Glyphs::Block, motion: true };
-    let mut model = model(&Fixture::normal(), console);
-    update(&mut model, Msg::Snapshot(Arc::new(commanded())));
+    let mut model = Model::new(Arc::new(commanded()), console, 1, fixture::standing());
     assert!(screen(&mut model, 80, 24).contains("! not OFF"));
 }
 

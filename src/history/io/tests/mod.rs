@@ -228,6 +228,28 @@ fn lists_come_newest_first_within_their_span_and_limit() {
     assert_eq!(store.answer(&journal(5, 5, 1), sec(10)), Err(HistoryError::EmptyPeriod));
 }
 
+#[test]
+fn deeds_are_found_by_words_by_whom_and_by_what() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    let login = ActionRecord {
+        by: "Anna".into(), action: "login".into(), target: "ฝ่ายผลิต 50%".into(), ..deed(4)
+    };
+    store.append(&[Record::Action(deed(3)), Record::Action(login.clone())]).unwrap();
+    let check = |words: &str, by: &str, action: &str, expect: Vec<ActionRecord>| {
+        let (words, by, action) = (words.to_owned(), by.to_owned(), action.to_owned());
+        let question = Question::Audit { from: sec(0), to: sec(10), words, by, action, limit: 10 };
+        assert_eq!(store.answer(&question, sec(10)).unwrap(), Answer::Actions(expect), "{question:?}");
+    };
+    check("", "", "", vec![login.clone(), deed(3)]);
+    check("tic-1", "", "write", vec![deed(3)]);
+    check("", "ANNA", "", vec![login.clone()]);
+    check("ผลิต 50%", "", "log", vec![login.clone()]);
+    check("70.0 °c", "anna", "", vec![login.clone()]);
+    check("", "", "_rite", vec![]);
+    check("'; DROP TABLE sample", "", "", vec![]);
+}
+
 /// A minute of a line that ends `at`, with so many requests.
 fn minute(line: &str, at: i64, requests: u64) -> LineMinute {
     LineMinute {

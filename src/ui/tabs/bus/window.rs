@@ -44,6 +44,14 @@ pub enum Window {
 }
 
 impl Window {
+    /// Is it only something to read?
+    pub fn only_shows(&self) -> bool {
+        match self {
+            Window::Sheet(_) => true,
+            Window::Send(_) | Window::Form(_) | Window::Registers(_) => false,
+        }
+    }
+
     /// A key.
     pub fn on_key(self, cx: &Cx, tabs: &mut Tabs, event: KeyEvent) -> Next {
         match self {

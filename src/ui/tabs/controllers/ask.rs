@@ -41,7 +41,7 @@ pub fn question(cx: &Cx, device: &DeviceDef, source: &Source, set: Arc<Parameter
     notes.extend(warnings);
     let title = format!("{from} → {}", device.name);
     let wish = RestoreWish { device: device.id, from, set, changes };
-    Confirm::order(title, question, Command::Restore(Box::new(wish))).with_notes(notes)
+    Confirm::order(title, question, Command::Restore(Box::new(wish))).with_notes(notes).signed(cx)
 }
 
 fn change_words(cx: &Cx, change: &Change) -> String {

@@ -375,7 +375,7 @@ fn a_value_that_another_has_changed_meanwhile_is_asked_again() {
     update(&mut model, Msg::Snapshot(snapshot));
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), None);
     let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("changed meanwhile from 1.2 to 3.0 % by boris"), "{shown}");
+    assert!(shown.contains("changed to 3.0 % by boris 14:02:31 (was 1.2)"), "{shown}");
     let effects = type_keys(&mut model, "⏎");
     assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("TIC-1.P"), value: 7.5 }));
 }

@@ -123,18 +123,18 @@ fn the_number_of_a_fault_in_force_changes_at_once() {
 fn the_tab_is_only_where_a_plant_is_simulated() {
     let fixture = Fixture::normal();
     let mut real = model(&fixture, Theme::FULL);
-    press(&mut real, "7");
+    press(&mut real, "8");
     let shown = screen(&mut real, 80, 24);
     assert!(!shown.contains("Faults") && !shown.contains("DEMO"), "{shown}");
     assert_eq!(real.tabs.shown, Tab::Mimic);
     let exam = Status { exam: true, scenario: Some(drill(false)), ..status(&fixture) };
     let mut trainee = with(&fixture, exam.clone(), Theme::FULL);
     trainee.tabs.shown = Tab::Mimic;
-    press(&mut trainee, "7");
+    press(&mut trainee, "8");
     let shown = screen(&mut trainee, 80, 24);
     assert!(shown.contains("EXAM") && !shown.to_lowercase().contains("fault"), "{shown}");
     update(&mut trainee, Msg::Drill(Arc::new(Status { scenario: Some(drill(true)), ..exam })));
-    press(&mut trainee, "7");
+    press(&mut trainee, "8");
     let shown = screen(&mut trainee, 80, 24);
     assert!(shown.contains("DEMO 2 FAULTS") && shown.contains("FAILED"), "{shown}");
 }

@@ -236,6 +236,7 @@ fn kinds(asked: &[(AskId, Question)]) -> String {
         Question::Series { .. } => "curves",
         Question::Journal { .. } => "alarms",
         Question::Actions { .. }
+        | Question::Audit { .. }
         | Question::LineMinutes { .. }
         | Question::Report { .. }
         | Question::AlarmQuality { .. } => "other",

@@ -1,0 +1,115 @@
+//! The line of alarms that is on every tab: the most urgent one, how many there are, and why some might not be seen.
+
+use super::{Canvas, Cx, Model, SILENCE, between, fit_words, running, width};
+use crate::{
+    plant::{
+        alarm::AlarmState,
+        def::Priority,
+        event::LineState,
+        ne107::Reason,
+        snapshot::{ActiveAlarm, DeviceState},
+    },
+    ui::{
+        modal::{
+            confirm::subject,
+            faceplate::{device_words, line_state_words},
+        },
+        rights,
+        widgets::value,
+    },
+};
+
+/// The most urgent alarm that waits for an acknowledgement, else trouble of the history, else the most urgent alarm; and
+/// the counts by priority. "No alarms" is said only when alarms could be seen.
+pub(super) fn banner(model: &Model, cx: &Cx, canvas: &mut Canvas) {
+    let alarms = &cx.snapshot.alarms;
+    let urgent = alarms.iter().find(|alarm| alarm.state.needs_acknowledgement());
+    let trouble = cx.snapshot.history.trouble.as_ref().map(|trouble| format!("history: {trouble}"));
+    let other = alarms.first().filter(|_| trouble.is_none());
+    let Some(alarm) = urgent.or(other) else {
+        let blind = blind_words(model, cx).filter(|_| alarms.is_empty());
+        let room = canvas.width().saturating_sub(1);
+        match [blind, trouble].into_iter().flatten().reduce(|blind, trouble| format!("{blind}   {trouble}")) {
+            Some(words) => canvas.text(1, 0, &fit_words(&words, room), cx.theme.trouble()),
+            None => canvas.text(1, 0, "no alarms", cx.theme.dim()),
+        };
+        return;
+    };
+    let def = cx.def().alarm(alarm.id);
+    let waiting = alarm.state.needs_acknowledgement();
+    let mark = cx.theme.alarm(def.priority, alarm.state, cx.flash());
+    let x = canvas.text(1, 0, cx.theme.priority_mark(def.priority), mark) + 1;
+    let (text, room) = (alarm_words(cx, alarm), canvas.width());
+    let may = rights::missing(cx, &alarm.acknowledge()).is_none();
+    let ack = if waiting && may { "a ack " } else { "" };
+    // That it waits for somebody must not be what a long text cuts off.
+    let left = room.saturating_sub(x + if waiting { 2 + width(ack) } else { 0 });
+    let text = if width(&text) <= left { text } else { fit_words(&text, left) };
+    // The alarm itself comes first; the counts and the key only where there is room left.
+    let tails = [format!("{}   {ack}", counts(cx)), ack.to_owned(), String::new()];
+    let fits = |tail: &&String| x + width(&text) + 2 + width(tail) <= room;
+    let tail = tails.iter().find(fits).map_or("", String::as_str);
+    canvas.text(x, 0, &text, cx.theme.alarm(def.priority, alarm.state, false));
+    canvas.text_right(room, 0, tail, cx.theme.normal());
+}
+
+/// Why alarms may be there without being seen: `alarms not judged: L1 disconnected`.
+fn blind_words(model: &Model, cx: &Cx) -> Option<String> {
+    let snapshot = cx.snapshot;
+    let silent = match &model.standing.gone {
+        Some(why) => Some(format!("station gone, {why}")),
+        None => (model.clock.silent >= SILENCE).then(|| "station silent".to_owned()),
+    };
+    let lines = cx.def().lines.iter().filter_map(|line| match snapshot.line(line.id).state {
+        LineState::Connected => None,
+        LineState::Disconnected => Some(format!("{} disconnected", line.name)),
+        LineState::Testing => Some(format!("{} given to a test", line.name)),
+        LineState::Connecting | LineState::Waiting { .. } => Some(format!("{} not connected", line.name)),
+    });
+    let devices = cx.def().devices.iter().filter(|device| snapshot.line(device.line).state == LineState::Connected);
+    let devices = devices.filter_map(|device| match snapshot.device(device.id).state {
+        DeviceState::Down { .. } => Some(format!("{} not answering", device.name)),
+        DeviceState::Answering | DeviceState::Failing(_)
+            if snapshot.device(device.id).diagnosis == Some(Reason::NoValues) =>
+        {
+            Some(format!("{} gives no values", device.name))
+        }
+        DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_) => None,
+    });
+    let blind: Vec<String> = silent.into_iter().chain(lines).chain(devices).collect();
+    (!blind.is_empty()).then(|| format!("alarms not judged: {}", blind.join(", ")))
+}
+
+/// `TIC-1.PV temperature high  72.4 °C  UNACK 00:41`.
+pub fn alarm_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
+    use crate::plant::def::Subject;
+    let def = cx.def().alarm(alarm.id);
+    let now = match def.subject {
+        Subject::Tag(tag) => value::show(cx, tag).with_unit(),
+        Subject::Device(device) => device_words(cx, device),
+        Subject::Line(line) => line_state_words(cx, line),
+    };
+    let since = match alarm.state {
+        AlarmState::Returned | AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
+            alarm.returned_at.unwrap_or(alarm.raised_at)
+        }
+        AlarmState::Normal
+        | AlarmState::Unacknowledged
+        | AlarmState::Acknowledged
+        | AlarmState::Shelved
+        | AlarmState::Suppressed
+        | AlarmState::OutOfService => alarm.raised_at,
+    };
+    let (state, lasted) = (alarm.state.word(), running(between(since, cx.now)));
+    format!("{} {}  {state} {lasted}  {now}", subject(cx, alarm.id), def.text)
+}
+
+/// How many of each priority: `[1]!1 (3)2`.
+pub fn counts(cx: &Cx) -> String {
+    let all =
+        [Priority::Critical, Priority::High, Priority::Medium, Priority::Low].into_iter().filter_map(|priority| {
+            let count = cx.snapshot.alarms.iter().filter(|alarm| cx.def().alarm(alarm.id).priority == priority).count();
+            (count > 0).then(|| format!("{}×{count}", cx.theme.priority_tag(priority)))
+        });
+    all.collect::<Vec<_>>().join(" ")
+}

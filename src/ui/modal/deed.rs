@@ -1,0 +1,78 @@
+//! A deed on record, whole: what the list has no room for.
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect};
+
+use super::{Modal, Next, window};
+use crate::{
+    plant::record::ActionRecord,
+    ui::{
+        Cx,
+        widgets::text::{pad, wrap},
+    },
+};
+
+/// Columns of the names at the left.
+const NAMES: u16 = 8;
+
+/// The window.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Deed(pub ActionRecord);
+
+impl Deed {
+    pub(super) fn on_key(self, event: KeyEvent) -> Next {
+        match event.code {
+            KeyCode::Enter | KeyCode::Char('q') => Next::Close,
+            _ => Next::Stay(Modal::Deed(Box::new(self))),
+        }
+    }
+
+    /// Name and words of every line that says something.
+    fn lines(&self, cx: &Cx) -> Vec<(&'static str, String)> {
+        let deed = &self.0;
+        let told = |words: &Option<std::sync::Arc<str>>| words.as_deref().unwrap_or_default().to_owned();
+        let at = deed.at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S %:z").to_string();
+        let seal = deed.seal.map_or((String::new(), "not in the chained book".to_owned()), |seal| {
+            (seal.number.to_string(), seal.hash.iter().map(|byte| format!("{byte:02x}")).collect())
+        });
+        let lines = [
+            ("number", seal.0),
+            ("time", at),
+            ("who", deed.by.to_string()),
+            ("from", deed.from.to_string()),
+            ("action", deed.action.to_string()),
+            ("target", deed.target.to_string()),
+            ("old", told(&deed.old)),
+            ("new", told(&deed.new)),
+            ("outcome", deed.outcome.to_string()),
+            ("note", told(&deed.note)),
+            ("hash", seal.1),
+        ];
+        lines.into_iter().filter(|(_, words)| !words.is_empty()).collect()
+    }
+
+    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+        let room = body.width.saturating_sub(8).min(76).saturating_sub(NAMES).max(1);
+        let lines = self.lines(cx).into_iter().map(|(name, words)| (name, broken(&words, room)));
+        let lines: Vec<(&str, Vec<String>)> = lines.collect();
+        let height = lines.iter().map(|(_, rows)| rows.len() as u16).sum::<u16>();
+        let mut canvas = window(cx, frame, body, "a deed on record", (room + NAMES, height));
+        let mut y = 0;
+        for (name, rows) in &lines {
+            canvas.text(0, y, &pad(name, NAMES), cx.theme.dim());
+            for row in rows {
+                canvas.text(NAMES, y, row, cx.theme.normal());
+                y += 1;
+            }
+        }
+    }
+}
+
+/// Words in lines of so many columns; a word that is longer, as a hash is, goes on in the next one.
+fn broken(words: &str, room: u16) -> Vec<String> {
+    if words.contains(' ') {
+        return wrap(words, room);
+    }
+    let chars: Vec<char> = words.chars().collect();
+    chars.chunks(usize::from(room)).map(|part| part.iter().collect()).collect()
+}

@@ -1,0 +1,389 @@
+//! A form about people: logging in, a password, a user. It carries a wish to the station and waits for the answer.
+
+use std::sync::Arc;
+
+use crossterm::event::KeyEvent;
+use ratatui::{Frame, layout::Rect, style::Style};
+
+use super::{
+    Modal, Next,
+    form::{Field, Form, Turn},
+    window,
+};
+use crate::{
+    access::{
+        Wish,
+        wish::{Secret, UserRow},
+    },
+    plant::role::Role,
+    ui::{
+        Act, Cx,
+        keys::{self, Hint},
+        tabs::Tab,
+        widgets::text::{Canvas, width, wrap},
+    },
+};
+
+/// What a sheet is for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Purpose {
+    /// The first Supervisor of a plant that knows nobody.
+    First,
+    /// Somebody sits down.
+    Login,
+    /// A password of one's own; the present one is asked for unless it has just been given.
+    Change(Option<Secret>),
+    /// The one who locked the terminal is back.
+    Unlock(Arc<str>),
+    /// Somebody new.
+    Add,
+    /// A new first password.
+    Reset(Arc<str>),
+    /// Another role.
+    Role(Arc<str>),
+    /// Shut out, or let in again.
+    Disable(Arc<str>, bool),
+    /// Removed.
+    Delete(Arc<str>),
+}
+
+/// A form and how its wish stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sheet {
+    /// What for.
+    pub purpose: Purpose,
+    form: Form,
+    /// The wish is on its way.
+    waiting: bool,
+    /// Why the last Enter led to nothing, and at which tick that was told.
+    problem: Option<(String, u32)>,
+    /// The window that waits below, with all that was typed in it.
+    below: Option<Box<Modal>>,
+}
+
+impl Sheet {
+    /// An empty sheet.
+    pub fn new(purpose: Purpose) -> Sheet {
+        let twice = || [Field::secret("password"), Field::secret("password again")];
+        let fields = match &purpose {
+            Purpose::First => [Field::name("name")].into_iter().chain(twice()).collect(),
+            Purpose::Login => vec![Field::name("name"), Field::secret("password")],
+            Purpose::Change(given) => {
+                let present = given.is_none().then(|| Field::secret("present password"));
+                present.into_iter().chain([Field::secret("new password"), Field::secret("new one again")]).collect()
+            }
+            Purpose::Unlock(_) => vec![Field::secret("password")],
+            Purpose::Add => {
+                [Field::name("name"), Field::role("role", Role::Technician)].into_iter().chain(twice()).collect()
+            }
+            Purpose::Reset(_) => twice().to_vec(),
+            Purpose::Role(_) => vec![Field::role("role", Role::Technician)],
+            Purpose::Disable(..) => Vec::new(),
+            Purpose::Delete(_) => vec![Field::name("name")],
+        };
+        Sheet { purpose, form: Form::new(fields), waiting: false, problem: None, below: None }
+    }
+
+    /// Another role for this user; the present one is shown first.
+    pub fn role_of(row: &UserRow) -> Sheet {
+        let form = Form::new(vec![Field::role("role", row.role)]);
+        Sheet { form, ..Sheet::new(Purpose::Role(row.user.clone())) }
+    }
+
+    /// Asks for the password of the one who locked this terminal, above what he was doing.
+    pub fn unlock(user: Arc<str>, below: Option<Modal>) -> Sheet {
+        Sheet { below: below.map(Box::new), ..Sheet::new(Purpose::Unlock(user)) }
+    }
+
+    /// The window below.
+    pub fn below(self) -> Option<Modal> {
+        self.below.map(|below| *below)
+    }
+
+    /// Is an answer waited for?
+    pub fn is_waiting(&self) -> bool {
+        self.waiting
+    }
+
+    /// A key: the wish, once the form is finished and nothing is wrong with it.
+    pub fn press(&mut self, cx: &Cx, event: KeyEvent) -> Option<Wish> {
+        if self.waiting {
+            return None;
+        }
+        let enter = self.form.rows() == 0 && keys::code(crossterm::event::KeyCode::Enter).is(event);
+        let turn = if enter { Turn::Finished } else { self.form.on_key(event) };
+        match turn {
+            Turn::Finished if self.wait(cx) == 0 => match self.wish(cx) {
+                Ok(wish) => {
+                    (self.waiting, self.problem) = (true, None);
+                    return Some(wish);
+                }
+                Err(problem) => self.problem = Some((problem, cx.phase)),
+            },
+            // How long one must wait stays to be read.
+            Turn::Taken if self.wait(cx) == 0 => self.problem = None,
+            Turn::Finished | Turn::Taken | Turn::Nothing => {}
+        }
+        None
+    }
+
+    /// The password that was typed for a login.
+    pub fn password(&self) -> Secret {
+        self.form.secret(1)
+    }
+
+    /// The station's answer; `true` if the sheet has done its work.
+    pub fn answered(&mut self, cx: &Cx, answer: Result<(), String>) -> bool {
+        self.waiting = false;
+        match answer {
+            Ok(()) => return true,
+            Err(problem) => {
+                self.problem = Some((problem, cx.phase));
+                self.form.forget();
+            }
+        }
+        false
+    }
+
+    /// What is wished, or what is wrong with the form.
+    fn wish(&mut self, cx: &Cx) -> Result<Wish, String> {
+        if let Some(why) = self.form.lacking() {
+            return Err(why);
+        }
+        let name = self.form.name(0);
+        Ok(match &self.purpose {
+            Purpose::First => Wish::FirstSupervisor { user: name, password: self.new_password(cx, 1)? },
+            Purpose::Login => Wish::Login { user: name, password: self.form.secret(1) },
+            Purpose::Change(Some(old)) => Wish::ChangePassword { old: old.clone(), new: self.new_password(cx, 0)? },
+            Purpose::Change(None) => Wish::ChangePassword { old: self.form.secret(0), new: self.new_password(cx, 1)? },
+            Purpose::Unlock(_) => Wish::Unlock(self.form.secret(0)),
+            Purpose::Add => Wish::AddUser {
+                user: name,
+                role: self.form.role().unwrap_or(Role::Viewer),
+                password: self.new_password(cx, 2)?,
+            },
+            Purpose::Reset(user) => Wish::ResetPassword { user: user.to_string(), password: self.new_password(cx, 0)? },
+            Purpose::Role(user) => {
+                Wish::SetRole { user: user.to_string(), role: self.form.role().unwrap_or(Role::Viewer) }
+            }
+            Purpose::Disable(user, disabled) => Wish::Disable { user: user.to_string(), disabled: *disabled },
+            Purpose::Delete(user) if name == **user => Wish::DeleteUser { user: name },
+            Purpose::Delete(user) => return Err(format!("\"{name}\" is not \"{user}\"")),
+        })
+    }
+
+    /// The password in line `n`, which must stand in the next line too. Courtesy: the station judges it again.
+    fn new_password(&self, cx: &Cx, n: usize) -> Result<Secret, String> {
+        let (password, again) = (self.form.secret(n), self.form.secret(n + 1));
+        let (chars, least) = (password.0.chars().count(), cx.standing.password_chars_min);
+        if password != again {
+            return Err("the two passwords differ".to_owned());
+        }
+        if chars < usize::from(least) {
+            return Err(format!("{chars} characters; at least {least}"));
+        }
+        Ok(password)
+    }
+
+    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+        if matches!(self.purpose, Purpose::Unlock(_)) && keys::ctrl('o').is(event) {
+            return Next::Do(vec![Act::Show(Tab::Login)]);
+        }
+        match self.press(cx, event) {
+            Some(wish) => {
+                let tab = self.tab();
+                Next::Both(Modal::Sheet(Box::new(self)), vec![Act::Wish(tab, wish)])
+            }
+            None => Next::Stay(Modal::Sheet(Box::new(self))),
+        }
+    }
+
+    /// The tab that the answer is for.
+    fn tab(&self) -> Tab {
+        match self.purpose {
+            Purpose::First | Purpose::Login | Purpose::Change(_) | Purpose::Unlock(_) => Tab::Login,
+            Purpose::Add | Purpose::Reset(_) | Purpose::Role(_) | Purpose::Disable(..) | Purpose::Delete(_) => {
+                Tab::Users
+            }
+        }
+    }
+
+    /// Pasted text.
+    pub fn paste(&mut self, text: &str) {
+        if !self.waiting {
+            self.form.paste(text);
+        }
+    }
+
+    /// What Enter does at the end.
+    fn verb(&self) -> &'static str {
+        match &self.purpose {
+            Purpose::First => "become Supervisor",
+            Purpose::Login => "log in",
+            Purpose::Change(_) => "change it",
+            Purpose::Unlock(_) => "unlock",
+            Purpose::Add => "add",
+            Purpose::Reset(_) => "set it",
+            Purpose::Role(_) => "change it",
+            Purpose::Disable(_, true) => "disable",
+            Purpose::Disable(_, false) => "enable",
+            Purpose::Delete(_) => "delete",
+        }
+    }
+
+    /// The keys of the moment; Esc is told by whoever shows the sheet.
+    pub fn hints(&self) -> Vec<Hint> {
+        let hint = |key: &str, label: &str| Hint::new(key, label, "");
+        let mut hints = vec![hint("⏎", self.verb())];
+        if self.form.rows() > 1 {
+            hints.push(hint("Tab", "next line"));
+        }
+        if self.form.has_secret() {
+            hints.push(hint("Ctrl-R", "show password"));
+        }
+        if matches!(self.purpose, Purpose::Unlock(_)) {
+            hints.push(hint("Ctrl-O", "another person"));
+        }
+        hints
+    }
+
+    /// Its heading.
+    pub fn title(&self) -> String {
+        match &self.purpose {
+            Purpose::First => "the first Supervisor".to_owned(),
+            Purpose::Login => "log in".to_owned(),
+            Purpose::Change(_) => "a password of your own".to_owned(),
+            Purpose::Unlock(user) => format!("locked by {user}"),
+            Purpose::Add => "add a user".to_owned(),
+            Purpose::Reset(user) => format!("new password for {user}"),
+            Purpose::Role(user) => format!("role of {user}"),
+            Purpose::Disable(user, true) => format!("disable {user}"),
+            Purpose::Disable(user, false) => format!("enable {user}"),
+            Purpose::Delete(user) => format!("delete {user}"),
+        }
+    }
+
+    fn words(&self, cx: &Cx) -> Vec<String> {
+        let least = cx.standing.password_chars_min;
+        let rule = format!("A password has at least {least} characters. A phrase is good, in any language, Thai too.");
+        let first = "It must be changed at the first login.".to_owned();
+        match &self.purpose {
+            Purpose::First => vec![
+                "Nobody is known here yet. The first person is a Supervisor: may do everything, and adds the others."
+                    .to_owned(),
+                rule,
+            ],
+            Purpose::Login => Vec::new(),
+            Purpose::Change(Some(_)) => {
+                vec!["The present password was given by somebody else: choose one that only you know.".to_owned(), rule]
+            }
+            Purpose::Change(None) => vec![rule],
+            Purpose::Unlock(_) => vec!["Everything stays to be seen. Your work waits as it is.".to_owned()],
+            Purpose::Add => vec![rule, first],
+            Purpose::Reset(_) => vec![rule, first],
+            Purpose::Role(_) => vec![],
+            Purpose::Disable(user, true) => {
+                vec![format!("{user} is logged out everywhere and cannot log in until this is taken back.")]
+            }
+            Purpose::Disable(user, false) => vec![format!("{user} may log in again; a lock-out ends too.")],
+            Purpose::Delete(user) => {
+                vec![format!("{user} is removed; all that {user} did stays in the books. Type the name to be sure.")]
+            }
+        }
+    }
+
+    /// Seconds that one must still wait, as the station has said.
+    fn wait(&self, cx: &Cx) -> u32 {
+        let told = self.problem.as_ref().and_then(|(words, at)| Some((seconds(words)?.1, *at)));
+        told.map_or(0, |(wait, at)| wait.saturating_sub(cx.phase.wrapping_sub(at) / 2))
+    }
+
+    fn problem_words(&self, cx: &Cx) -> Option<String> {
+        if self.waiting {
+            return Some("asking the station …".to_owned());
+        }
+        let (words, _) = self.problem.as_ref()?;
+        Some(match (seconds(words), self.wait(cx)) {
+            (None, _) => words.clone(),
+            (Some(_), 0) => format!("{}; try again now", words.split(';').next().unwrap_or_default()),
+            (Some((place, _)), left) => {
+                let rest = words[place..].find(" s").map_or("", |end| &words[place + end + 2..]);
+                let start = words[..place].trim_end_matches([' ', ';', ',']);
+                format!("{start}; wait {left} s{rest}")
+            }
+        })
+    }
+
+    /// Rows of a sheet in so many columns.
+    fn rows(&self, cx: &Cx, room: u16) -> Vec<(String, Style)> {
+        let told = self.words(cx).into_iter().flat_map(|words| wrap(&words, room));
+        told.map(|words| (words, cx.theme.normal())).collect()
+    }
+
+    /// Rows that all of it takes in so many columns.
+    pub fn height(&self, cx: &Cx, room: u16) -> u16 {
+        self.rows(cx, room).len() as u16 + self.form.rows() + 1
+    }
+
+    /// Draws words, form and answer; returns the rows that it took.
+    pub fn draw(&self, cx: &Cx, canvas: &mut Canvas) -> u16 {
+        let mut y = 0;
+        // Where there is no room for all of it, what must be filled in comes before what there is to read.
+        let most = canvas.height().saturating_sub(self.form.rows() + 1);
+        for (words, style) in self.rows(cx, canvas.width()).into_iter().take(usize::from(most)) {
+            canvas.text(0, y, &words, style);
+            y += 1;
+        }
+        self.form.view(cx, canvas, y);
+        y += self.form.rows();
+        let style = if self.waiting { cx.theme.dim() } else { cx.theme.trouble() };
+        let room = canvas.width();
+        for words in self.problem_words(cx).iter().flat_map(|words| wrap(words, room)) {
+            canvas.text(0, y, &words, style);
+            y += 1;
+        }
+        y
+    }
+
+    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+        let keys: Vec<String> = self.hints().iter().map(|hint| format!("{} {}", hint.key, hint.label)).collect();
+        let keys = cx.theme.enter(&format!("{}   Esc leave", keys.join("   ")));
+        let inner = self.form.width().max(width(&keys)).clamp(40, body.width.saturating_sub(8).clamp(40, 72));
+        let problem = self.problem_words(cx).map_or(1, |words| wrap(&words, inner).len() as u16);
+        let height = self.rows(cx, inner).len() as u16 + self.form.rows() + problem + 2;
+        let mut canvas = window(cx, frame, body, &self.title(), (inner, height));
+        self.draw(cx, &mut canvas);
+        let last = canvas.height().saturating_sub(1);
+        canvas.text(0, last, &keys, cx.theme.strong());
+    }
+}
+
+/// Where the station's words tell a wait in seconds (`wait 8 s`, `in 8 s`), and how many.
+fn seconds(words: &str) -> Option<(usize, u32)> {
+    ["wait ", "in "].iter().find_map(|lead| {
+        words.match_indices(lead).find_map(|(place, _)| {
+            let rest = &words[place + lead.len()..];
+            let digits = rest.len() - rest.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+            let after = &rest[digits..];
+            let unit = after.strip_prefix(" s")?;
+            let ends = !unit.starts_with(|c: char| c.is_alphanumeric());
+            (ends && digits > 0).then(|| rest[..digits].parse().ok()).flatten().map(|n| (place, n))
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wait_is_read_out_of_the_words_of_the_station() {
+        let check = |words: &str, expect: Option<u32>| assert_eq!(seconds(words).map(|(_, n)| n), expect, "{words}");
+        check("wrong name or password; wait 8 s", Some(8));
+        check("try again in 300 s.", Some(300));
+        check("at least 15 characters", None);
+        check("in 5 min", None);
+        check("wait 5 seconds", None);
+        check("wait for anna", None);
+    }
+}

@@ -1,0 +1,108 @@
+//! What happens to a terminal, what it wants done, and what its tabs and windows ask of it.
+
+use std::{path::PathBuf, sync::Arc, time::Duration};
+
+use crossterm::event::KeyEvent;
+
+use super::{Confirmed, modal::Modal, tabs::Tab};
+use crate::{
+    access::{OrderRequest, Standing, Wish},
+    history::{Answer, HistoryError, Question},
+    plant::{
+        command::{Command, OrderId},
+        def::DeviceId,
+        snapshot::Snapshot,
+    },
+    sim::drill,
+};
+
+/// What happens to a terminal.
+#[derive(Debug)]
+pub enum Msg {
+    /// A key.
+    Key(KeyEvent),
+    /// Pasted text: never acts as keys.
+    Paste(String),
+    /// The screen has a new size.
+    Resize(u16, u16),
+    /// News of the plant.
+    Snapshot(Arc<Snapshot>),
+    /// News of who sits here.
+    Standing(Arc<Standing>),
+    /// A wish was granted, or why not.
+    Granted(AskId, Result<(), String>),
+    /// News of the simulation.
+    Drill(Arc<drill::Status>),
+    /// The history answered.
+    Answer(AskId, Result<Answer, HistoryError>),
+    /// A file of this tab was written, or why not.
+    Saved(Tab, Result<PathBuf, String>),
+    /// The station did not take this order: its queue is full, or it has gone.
+    Undelivered(OrderId, &'static str),
+    /// Half a second passed; so long ago (real time) came the last snapshot.
+    Tick {
+        /// Real time since the last snapshot.
+        silent: Duration,
+    },
+}
+
+/// What a terminal wants done.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Effect {
+    /// Give the station an order.
+    Order(OrderRequest),
+    /// Wish something of the station; answered by [`Msg::Granted`].
+    Wish(AskId, Wish),
+    /// Ask the history.
+    Ask(AskId, Question),
+    /// Let something go wrong in the simulation, or mend it.
+    Drill(drill::Order),
+    /// Write a report or a capture; answered by [`Msg::Saved`].
+    SaveReport {
+        /// The tab that wants it.
+        tab: Tab,
+        /// Where, relative to the working folder.
+        path: PathBuf,
+        /// What.
+        bytes: Vec<u8>,
+    },
+    /// Forget what the terminal shows and draw everything.
+    Redraw,
+    /// Leave.
+    Quit,
+}
+
+/// Identifies a question: who asked, and its running count. An answer to an older question is ignored by the tab.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct AskId {
+    /// The tab that asked.
+    pub tab: Tab,
+    /// Chosen by the tab.
+    pub number: u32,
+}
+
+/// What a tab or window asks of the terminal.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Act {
+    /// Put a window on top.
+    Open(Modal),
+    /// Show a tab.
+    Show(Tab),
+    /// Show a device on the controllers tab.
+    ShowDevice(DeviceId),
+    /// Give an order and watch its outcome.
+    Order(Command),
+    /// The same with what its operator has seen and signed.
+    Confirmed(Confirmed),
+    /// Wish something of the station; the answer goes to the window that waits for one, else to this tab.
+    Wish(Tab, Wish),
+    /// Pass on an effect as it is.
+    Do(Effect),
+}
+
+impl Act {
+    /// Asks the history on behalf of a tab.
+    pub fn ask(tab: Tab, number: u32, question: Question) -> Act {
+        Act::Do(Effect::Ask(AskId { tab, number }, question))
+    }
+}

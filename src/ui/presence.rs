@@ -1,0 +1,236 @@
+//! Who sits at this terminal: what is open to him, the lock and its warning, and word to the station that keys are pressed.
+
+use std::{mem, sync::Arc, time::Duration};
+
+use crossterm::event::KeyEvent;
+
+use super::{
+    Act, AskId, Effect, Model, context,
+    keys::{self, Global},
+    modal::{Modal, Notice, Sheet, sheet::Purpose},
+    tabs::{Tab, Tabs, login},
+    with_tabs,
+};
+use crate::{
+    access::{Standing, Wish},
+    plant::snapshot::Snapshot,
+};
+
+/// Ticks between two words that keys are pressed: 30 s of real time.
+const ACTIVE_TICKS: u32 = 60;
+/// The same once the station has said that it will lock.
+const WARNED_TICKS: u32 = 4;
+
+/// What the terminal remembers of the station's dealings with whoever sits here, in ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Presence {
+    /// Number of the last wish; only its answer counts.
+    pub wished: u32,
+    /// When the present standing came.
+    told_at: u32,
+    /// When the station was last told that a key was pressed.
+    active_at: Option<u32>,
+    /// When the station went.
+    gone_at: Option<u32>,
+}
+
+/// Is everything but the login page closed?
+pub fn is_closed(standing: &Standing) -> bool {
+    standing.who.as_ref().map_or(!standing.view, |who| who.must_change)
+}
+
+impl Model {
+    /// How long ago the station went.
+    pub fn gone(&self) -> Option<Duration> {
+        let at = self.standing.gone.as_ref().and(self.presence.gone_at)?;
+        Some(Duration::from_millis(500) * self.clock.phase.wrapping_sub(at))
+    }
+
+    /// Time until the terminal is locked, once the station has said that this is near.
+    pub fn locks_in(&self) -> Option<Duration> {
+        let passed = Duration::from_millis(500) * self.clock.phase.wrapping_sub(self.presence.told_at);
+        self.standing.locks_in.filter(|_| !self.standing.locked).map(|left| left.saturating_sub(passed))
+    }
+}
+
+/// The station tells how this terminal stands.
+pub(super) fn on_standing(model: &mut Model, standing: Arc<Standing>) -> Vec<Act> {
+    let before = mem::replace(&mut model.standing, standing);
+    let (now, phase) = (model.standing.clone(), model.clock.phase);
+    model.presence.told_at = phase;
+    match (&before.gone, &now.gone) {
+        (None, Some(_)) => {
+            model.presence.gone_at = Some(phase);
+            model.doubt();
+        }
+        (_, None) => model.presence.gone_at = None,
+        (Some(_), Some(_)) => {}
+    }
+    // Nobody inherits the window of somebody else. Whoever is only locked out for a while finds his own again.
+    let user = |standing: &Standing| standing.who.as_ref().map(|who| who.user.clone());
+    if user(&before) != user(&now) || is_closed(&now) {
+        model.modal.take_if(|modal| !modal.is_quit());
+        model.watch = model.watch.take_if(|_| user(&before) == user(&now));
+        model.kept = None;
+    }
+    let back = keep_work(model, &before, &now);
+    with_tabs(model, |tabs, cx| {
+        tabs.login.on_standing(cx);
+        Vec::new()
+    });
+    let shown = model.tabs.shown;
+    let let_in = shown == Tab::Login && now.who.is_some() && user(&before) != user(&now);
+    let opened = shown == Tab::Login && is_closed(&before) && !now.first;
+    if is_closed(&now) || (now.first && !before.first) {
+        return vec![Act::Show(Tab::Login)];
+    }
+    let offered = Tab::offered(&model.cx()).contains(&shown);
+    match back {
+        Some(tab) => vec![Act::Show(tab)],
+        None if let_in || opened || !offered => vec![Act::Show(Tab::Mimic)],
+        None => Vec::new(),
+    }
+}
+
+/// What was under way when the terminal was locked is put aside, so that nothing hides process and alarms, and comes back
+/// as it was when it is unlocked: then the tab that it stood on.
+fn keep_work(model: &mut Model, before: &Standing, now: &Standing) -> Option<Tab> {
+    match (before.locked, now.locked) {
+        (false, true) => {
+            let work = model.modal.take_if(|modal| !modal.only_shows());
+            model.kept = work.map(|work| (model.tabs.shown, work));
+            None
+        }
+        (true, false) => {
+            if let Some(Modal::Sheet(sheet)) = model.modal.take_if(|modal| modal.is_unlock()) {
+                model.modal = sheet.below();
+            }
+            let (tab, work) = model.kept.take()?;
+            model.modal = Some(work);
+            Some(tab)
+        }
+        (false, false) | (true, true) => None,
+    }
+}
+
+/// A key of the login page while a form has every letter.
+pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<Act> {
+    if login::is_leave(event) {
+        let standing = model.standing.clone();
+        let changing = standing.who.is_some() && !standing.locked;
+        model.tabs.login.back(&standing);
+        let leads = !changing && !is_closed(&standing);
+        return if leads { vec![Act::Show(Tab::Mimic)] } else { Vec::new() };
+    }
+    match keys::find(keys::GLOBAL, event) {
+        Some(global @ (Global::Quit | Global::Redraw)) if event.modifiers.contains(keys::CONTROL) => {
+            super::on_global(model, global)
+        }
+        Some(_) | None => with_tabs(model, |tabs, cx| tabs.login.on_key(cx, event)),
+    }
+}
+
+/// Locks at once, if there is somebody to lock it.
+pub(super) fn lock(model: &Model) -> Vec<Act> {
+    let may = model.standing.who.is_some() && !model.standing.locked;
+    if may { vec![Act::Wish(Tab::Login, Wish::Lock)] } else { Vec::new() }
+}
+
+/// A key on a locked terminal that is meant for a window with work in it, as a faceplate opens one: the password is asked
+/// for above it.
+pub(super) fn ask_before_work(model: &mut Model, event: KeyEvent) -> bool {
+    let work = model.modal.as_ref().is_some_and(|modal| !modal.only_shows() && !modal.is_unlock());
+    let leaves = keys::ctrl('c').is(event) || login::is_leave(event);
+    if !model.standing.locked || !work || leaves {
+        return false;
+    }
+    let below = model.modal.take();
+    model.modal = unlock(model, below);
+    true
+}
+
+/// While the terminal is locked nothing is done: the password is asked for, and what was to be opened waits below.
+pub(super) fn hold_back(model: &mut Model, acts: Vec<Act>) -> Vec<Act> {
+    if !model.standing.locked {
+        return acts;
+    }
+    let mut held = None;
+    let mut rest = Vec::new();
+    for act in acts {
+        match act {
+            Act::Open(modal) if !modal.only_shows() && !modal.is_unlock() => held = Some(Some(modal)),
+            Act::Order(_) | Act::Confirmed(_) | Act::Do(Effect::SaveReport { .. } | Effect::Drill(_)) => {
+                held = held.or(Some(None));
+            }
+            Act::Open(_) | Act::Show(_) | Act::ShowDevice(_) | Act::Wish(..) | Act::Do(_) => rest.push(act),
+        }
+    }
+    if let Some(wanted) = held {
+        let below = wanted.or_else(|| model.modal.take());
+        rest.extend(unlock(model, below).map(Act::Open));
+    }
+    rest
+}
+
+fn unlock(model: &Model, below: Option<Modal>) -> Option<Modal> {
+    let who = model.standing.who.as_ref()?;
+    Some(Modal::Sheet(Box::new(Sheet::unlock(who.user.clone(), below))))
+}
+
+/// Word to the station that somebody is there; twice a minute at most, but at once when it is about to lock.
+pub(super) fn active(model: &mut Model) -> Option<Effect> {
+    let standing = &model.standing;
+    if standing.who.is_none() || standing.locked || standing.gone.is_some() {
+        return None;
+    }
+    let pause = if standing.locks_in.is_some() { WARNED_TICKS } else { ACTIVE_TICKS };
+    if model.presence.active_at.is_some_and(|at| model.clock.phase.wrapping_sub(at) < pause) {
+        return None;
+    }
+    model.presence.active_at = Some(model.clock.phase);
+    Some(Effect::Wish(AskId { tab: Tab::Login, number: 0 }, Wish::Active))
+}
+
+/// The station's answer to a wish; only the last one is waited for.
+pub(super) fn on_granted(model: &mut Model, id: AskId, answer: Result<(), String>) -> Vec<Act> {
+    if id.number == 0 || id.number != model.presence.wished {
+        return Vec::new();
+    }
+    let waiting = model.modal.take_if(|modal| matches!(modal, Modal::Sheet(sheet) if sheet.is_waiting()));
+    let Some(Modal::Sheet(mut sheet)) = waiting else {
+        return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
+    };
+    let done = {
+        let cx = context(model, model.screen);
+        sheet.answered(&cx, answer)
+    };
+    model.modal = if done { sheet.below() } else { Some(Modal::Sheet(sheet)) };
+    Vec::new()
+}
+
+/// The station runs another plant file: nothing that was known of the old one may stay.
+pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<Act> {
+    let shown = model.tabs.shown;
+    model.tabs = Tabs::new(&snapshot);
+    (model.snapshot, model.watch, model.kept) = (snapshot, None, None);
+    model.plants = model.plants.wrapping_add(1);
+    let words = vec![
+        "The plant file changed".to_owned(),
+        "The station has taken up another plant file. What was open here is closed; nothing of it was sent.".to_owned(),
+    ];
+    with_tabs(model, |tabs, cx| {
+        tabs.login.on_standing(cx);
+        tabs.shown = if Tab::offered(cx).contains(&shown) { shown } else { Tab::Mimic };
+        Vec::new()
+    });
+    let closed = is_closed(&model.standing);
+    model.modal = (!closed).then(|| Modal::Notice(Notice::new("plant file", words)));
+    if closed { vec![Act::Show(Tab::Login)] } else { Vec::new() }
+}
+
+impl Modal {
+    /// Does it ask for the password of a locked terminal?
+    pub fn is_unlock(&self) -> bool {
+        matches!(self, Modal::Sheet(sheet) if matches!(sheet.purpose, Purpose::Unlock(_)))
+    }
+}

@@ -1,0 +1,54 @@
+//! Rights as courtesy: what the one who sits here may not do is said before it is tried. The station decides.
+
+use super::{Cx, keys::Hint, tabs::Tab};
+use crate::{
+    access::right,
+    plant::{command::Command, role::Role},
+};
+
+/// `Technician`.
+pub fn title(role: Role) -> &'static str {
+    match role {
+        Role::Viewer => "Viewer",
+        Role::Technician => "Technician",
+        Role::Supervisor => "Supervisor",
+    }
+}
+
+/// What a role may, in words.
+pub fn words(role: Role) -> &'static str {
+    match role {
+        Role::Viewer => "look at everything: process, curves, alarms, reports",
+        Role::Technician => "look at everything, control the process, acknowledge alarms, write reports",
+        Role::Supervisor => "do everything: also users, the audit list, line settings, tests, stopping the station",
+    }
+}
+
+/// Why whoever sits here may not give this command: `needs Technician, tom is Viewer`.
+pub fn missing(cx: &Cx, command: &Command) -> Option<String> {
+    lacks(cx, right::needs(command))
+}
+
+/// The same for a role.
+pub fn lacks(cx: &Cx, role: Role) -> Option<String> {
+    match &cx.standing.who {
+        None => Some(format!("needs {}; nobody is logged in", title(role))),
+        Some(who) if who.role < role => Some(format!("needs {}; {} is {}", title(role), who.user, title(who.role))),
+        Some(_) => None,
+    }
+}
+
+/// The role that a key of a tab needs, where whoever sits here has a lesser one.
+pub fn of_key(cx: &Cx, tab: Tab, hint: &Hint) -> Option<Role> {
+    let plants = |hint: &Hint| cx.def().mimic.commands.iter().any(|command| hint.key == command.key.to_string());
+    let acts = match tab {
+        Tab::Mimic => plants(hint),
+        Tab::Alarms => matches!(hint.key.as_str(), "a" | "A"),
+        Tab::Controllers => matches!(hint.label.as_str(), "edit" | "tune" | "actions" | "refresh" | "line"),
+        Tab::Bus => hint.label == "start",
+        Tab::Reports => hint.label == "export",
+        Tab::Login | Tab::Users | Tab::Trends | Tab::Faults => false,
+    };
+    let role = cx.standing.who.as_ref().map(|who| who.role);
+    (acts && role.is_none_or(|role| role < Role::Technician)).then_some(Role::Technician)
+}

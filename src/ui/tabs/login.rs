@@ -1,0 +1,175 @@
+//! Tab 0: who sits here. Logging in, the first Supervisor, a password of one's own; and what the one who is in may do.
+
+mod view;
+
+use std::sync::Arc;
+
+use crossterm::event::{KeyCode, KeyEvent};
+use jiff::Timestamp;
+use ratatui::{Frame, layout::Rect};
+
+use super::Tab;
+use crate::{
+    access::{Standing, Wish, wish::Secret},
+    ui::{
+        Act, Cx,
+        keys::{self, Hint, Key, char},
+        modal::sheet::{Purpose, Sheet},
+    },
+};
+
+/// What a key means here while somebody is logged in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Another password for oneself.
+    Password,
+    /// Lock this terminal.
+    Lock,
+    /// Log out.
+    Leave,
+}
+
+/// Keys of this tab while somebody is logged in; in a form every letter is a letter.
+pub const KEYS: &[Key<Action>] = &[
+    Key { chord: char('p'), label: "password", help: "choose another password for yourself", action: Action::Password },
+    Key {
+        chord: char('k'),
+        label: "lock",
+        help: "lock this terminal, as Ctrl-K does on every tab",
+        action: Action::Lock,
+    },
+    Key { chord: char('o'), label: "log out", help: "log out of this terminal", action: Action::Leave },
+];
+
+/// State of this tab.
+#[derive(Debug, Default)]
+pub struct Login {
+    /// The form that is filled in.
+    sheet: Option<Sheet>,
+    /// The password with which somebody has just logged in, as long as he may have to change it.
+    given: Option<Secret>,
+    /// He wishes another password.
+    changing: bool,
+    /// Who is in, and since when as far as this terminal knows.
+    since: Option<(Arc<str>, Timestamp)>,
+    /// What came of the last wish that had no form.
+    told: Option<Result<&'static str, String>>,
+}
+
+impl Login {
+    /// A key: the form has all of them while there is one.
+    pub fn on_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+        let Some(sheet) = &mut self.sheet else {
+            return keys::find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default();
+        };
+        let Some(wish) = sheet.press(cx, event) else { return Vec::new() };
+        if let Wish::Login { password, .. } = &wish {
+            self.given = Some(password.clone());
+        }
+        vec![Act::Wish(Tab::Login, wish)]
+    }
+
+    fn act(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+        if cx.standing.who.is_none() {
+            return Vec::new();
+        }
+        self.told = None;
+        match action {
+            Action::Password => {
+                self.changing = true;
+                self.fit(cx.standing);
+                Vec::new()
+            }
+            Action::Lock => vec![Act::Wish(Tab::Login, Wish::Lock)],
+            Action::Leave => vec![Act::Wish(Tab::Login, Wish::Logout)],
+        }
+    }
+
+    /// Does a form take every key?
+    pub fn is_typing(&self) -> bool {
+        self.sheet.is_some()
+    }
+
+    /// Esc: out of the form, where that leads somewhere; else the form is emptied. `false`: there was nothing to leave.
+    pub fn back(&mut self, standing: &Standing) -> bool {
+        let typing = self.sheet.take().is_some();
+        self.changing = false;
+        self.fit(standing);
+        typing
+    }
+
+    /// Pasted text.
+    pub fn on_paste(&mut self, text: &str) {
+        if let Some(sheet) = &mut self.sheet {
+            sheet.paste(text);
+        }
+    }
+
+    /// Somebody came, went, or has something else to do here.
+    pub fn on_standing(&mut self, cx: &Cx) {
+        let standing = cx.standing;
+        let user = standing.who.as_ref().map(|who| &who.user);
+        if self.since.as_ref().map(|(user, _)| user) != user {
+            self.since = user.map(|user| (user.clone(), cx.now));
+            (self.changing, self.told) = (false, None);
+        }
+        if standing.who.as_ref().is_some_and(|who| !who.must_change) {
+            self.given = None;
+        }
+        self.fit(standing);
+    }
+
+    /// The form that fits how things stand; one that fits stays as it is.
+    fn fit(&mut self, standing: &Standing) {
+        let purpose = match &standing.who {
+            Some(_) if standing.locked => Some(Purpose::Login),
+            Some(who) if who.must_change => Some(Purpose::Change(self.given.clone())),
+            Some(_) if self.changing => Some(Purpose::Change(None)),
+            Some(_) => None,
+            None if standing.first => Some(Purpose::First),
+            None => Some(Purpose::Login),
+        };
+        let fits = self.sheet.as_ref().map(|sheet| &sheet.purpose) == purpose.as_ref();
+        if !fits {
+            self.sheet = purpose.map(Sheet::new);
+        }
+    }
+
+    /// The station's answer to the last wish.
+    pub fn on_granted(&mut self, cx: &Cx, answer: Result<(), String>) {
+        match &mut self.sheet {
+            Some(sheet) if sheet.is_waiting() => {
+                if answer.is_err() {
+                    self.given = self.given.take_if(|_| sheet.purpose != Purpose::Login);
+                }
+                if sheet.answered(cx, answer) {
+                    if matches!(sheet.purpose, Purpose::Change(_)) {
+                        self.told = Some(Ok("The new password is in force."));
+                    }
+                    self.changing = false;
+                    self.sheet = None;
+                    self.fit(cx.standing);
+                }
+            }
+            Some(_) | None => self.told = answer.err().map(Err),
+        }
+    }
+
+    /// The keys of the moment.
+    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+        let Some(sheet) = &self.sheet else { return keys::hints(KEYS) };
+        let leads = if self.changing || cx.standing.view || cx.standing.locked { "back" } else { "empty it" };
+        let quit = Hint::new("Ctrl-C", "quit", "");
+        sheet.hints().into_iter().chain([Hint::new("Esc", leads, ""), quit]).collect()
+    }
+
+    /// Draws it.
+    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+        view::draw(self, cx, frame, area);
+    }
+}
+
+/// Is this the key that leaves a form?
+pub fn is_leave(event: KeyEvent) -> bool {
+    keys::code(KeyCode::Esc).is(event)
+}

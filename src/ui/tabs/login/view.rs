@@ -1,0 +1,118 @@
+//! The picture of the login page: the notice, the form or who is in, and the most urgent alarms, which never hide.
+
+use ratatui::{Frame, layout::Rect};
+
+use super::Login;
+use crate::ui::{
+    Cx,
+    chrome::{alarm_words, counts},
+    rights,
+    widgets::text::{Canvas, clock, fit_words, running, wrap},
+};
+
+/// Widest text to be read.
+const READ_MAX: u16 = 72;
+/// Rows that the alarms have at least, heading included.
+const ALARM_ROWS_MIN: u16 = 4;
+
+/// Draws the page.
+pub(super) fn draw(login: &Login, cx: &Cx, frame: &mut Frame, area: Rect) {
+    let mut canvas = Canvas::new(frame.buffer_mut(), area);
+    let (width, height) = (canvas.width(), canvas.height());
+    let room = width.saturating_sub(6).min(READ_MAX);
+    // A low screen has room for the form and the most urgent alarm.
+    let least = if height < 14 { 2 } else { ALARM_ROWS_MIN };
+    let above = height.saturating_sub(least);
+    let mut part = canvas.part(3, u16::from(least > 2), room, above);
+    let form = login.sheet.as_ref().map_or(0, |sheet| sheet.height(cx, room) + 4);
+    let mut y = notice(cx, &mut part, above.saturating_sub(form));
+    y = match &login.sheet {
+        Some(sheet) => {
+            part.text(0, y, &heading(cx, &sheet.title()), cx.theme.strong());
+            let (width, height) = (part.width(), part.height());
+            let mut rest = part.part(0, y + 2, width, height.saturating_sub(y + 2));
+            y + 2 + sheet.draw(cx, &mut rest)
+        }
+        None => who(login, cx, &mut part, y),
+    };
+    if let Some(told) = &login.told {
+        let (words, style) = match told {
+            Ok(words) => (*words, cx.theme.done()),
+            Err(why) => (why.as_str(), cx.theme.trouble()),
+        };
+        part.text(0, y + 1, &fit_words(words, room), style);
+        y += 2;
+    }
+    let top = (y + 2).min(above);
+    alarms(cx, &mut canvas.part(0, top, width, height - top));
+}
+
+/// The title of the plant stands where somebody has yet to learn where he is.
+fn heading(cx: &Cx, title: &str) -> String {
+    match &cx.standing.who {
+        Some(who) if cx.standing.locked => format!("{title} as another person than {}", who.user),
+        Some(_) | None => title.to_owned(),
+    }
+}
+
+/// What must be read before a login, in so many rows at the most; returns the row after it.
+fn notice(cx: &Cx, canvas: &mut Canvas, most: u16) -> u16 {
+    let Some(notice) = cx.standing.notice.as_ref().filter(|_| cx.standing.who.is_none()) else { return 0 };
+    let most = usize::from(most.max(1));
+    let mut lines: Vec<String> = notice.lines().flat_map(|line| wrap(line, canvas.width())).collect();
+    if lines.len() > most {
+        lines.truncate(most);
+        // That it goes on must be seen; a larger screen shows it.
+        lines.last_mut().into_iter().for_each(|line| line.push_str(" …"));
+    }
+    for (y, line) in lines.iter().enumerate() {
+        canvas.text(0, y as u16, &fit_words(line, canvas.width()), cx.theme.normal());
+    }
+    lines.len() as u16 + 1
+}
+
+/// Who is in, since when, and what he may; returns the row after it.
+fn who(login: &Login, cx: &Cx, canvas: &mut Canvas, y: u16) -> u16 {
+    let theme = cx.theme;
+    let Some(who) = &cx.standing.who else { return y };
+    let x = canvas.text(0, y, &who.user, theme.strong());
+    let x = canvas.text(x + 2, y, rights::title(who.role), theme.normal());
+    if let Some((_, since)) = &login.since {
+        canvas.text(x + 2, y, &format!("since {}", clock(*since, &cx.def().time_zone)), theme.dim());
+    }
+    let mut y = y + 1;
+    for line in wrap(&format!("may {}", rights::words(who.role)), canvas.width()) {
+        canvas.text(0, y, &line, theme.normal());
+        y += 1;
+    }
+    let lock = match cx.standing.idle_lock {
+        Some(idle) => format!("This terminal locks itself after {} without a key.", running(idle)),
+        None => "This terminal does not lock itself.".to_owned(),
+    };
+    canvas.text(0, y, &lock, theme.dim());
+    y + 1
+}
+
+/// The most urgent alarms, as many as fit.
+fn alarms(cx: &Cx, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let all = &cx.snapshot.alarms;
+    let width = canvas.width();
+    canvas.run(0, 0, width, '─', theme.dim());
+    let title =
+        if all.is_empty() { " alarms: none ".to_owned() } else { format!(" alarms {}  {} ", all.len(), counts(cx)) };
+    canvas.text(1, 0, &title, theme.dim());
+    let rows = usize::from(canvas.height().saturating_sub(1));
+    // The last row tells what it leaves out.
+    let shown = if all.len() > rows { rows.saturating_sub(1) } else { all.len() };
+    for (y, alarm) in all.iter().take(shown).enumerate() {
+        let (y, def) = (y as u16 + 1, cx.def().alarm(alarm.id));
+        let mark = theme.alarm(def.priority, alarm.state, cx.flash());
+        let x = canvas.text(1, y, theme.priority_mark(def.priority), mark) + 1;
+        let text = fit_words(&alarm_words(cx, alarm), width.saturating_sub(x));
+        canvas.text(x, y, &text, theme.alarm(def.priority, alarm.state, false));
+    }
+    if all.len() > shown {
+        canvas.text(1, rows as u16, &format!("… and {} more", all.len() - shown), theme.dim());
+    }
+}

@@ -1,0 +1,188 @@
+//! Tab 7, for a Supervisor: everybody who may log in, the terminals that are attached, and the list of all that was done.
+
+mod audit;
+mod view;
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect};
+
+pub use audit::{Action as AuditAction, Audit, KEYS as AUDIT};
+
+use crate::{
+    access::UserRow,
+    history::{Answer, HistoryError},
+    ui::{
+        Act, Cx,
+        keys::{self, Hint, Key, char, code},
+        modal::{Modal, Sheet, sheet::Purpose},
+    },
+};
+
+/// What a key means on the list of users.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Select so many rows further on.
+    Move(isize),
+    /// Add somebody.
+    Add,
+    /// Another role.
+    Role,
+    /// Shut out, or let in again.
+    Disable,
+    /// A new first password.
+    Reset,
+    /// Remove.
+    Delete,
+    /// The list of all that was done.
+    Audit,
+}
+
+/// Keys of the list of users.
+pub const LIST: &[Key<Action>] = &[
+    Key { chord: code(KeyCode::Up), label: "", help: "select the user above", action: Action::Move(-1) },
+    Key { chord: code(KeyCode::Down), label: "select", help: "select the user below", action: Action::Move(1) },
+    Key { chord: char('n'), label: "new", help: "add a user", action: Action::Add },
+    Key { chord: char('r'), label: "role", help: "another role for the selected user", action: Action::Role },
+    Key {
+        chord: char('d'),
+        label: "disable",
+        help: "shut the selected user out, or let in again; ends a lock-out too",
+        action: Action::Disable,
+    },
+    Key {
+        chord: char('p'),
+        label: "password",
+        help: "a new first password for the selected user",
+        action: Action::Reset,
+    },
+    Key {
+        chord: char('x'),
+        label: "delete",
+        help: "remove the selected user (asks for the name)",
+        action: Action::Delete,
+    },
+    Key {
+        chord: char('j'),
+        label: "audit list",
+        help: "everything that was done, by whom, from where",
+        action: Action::Audit,
+    },
+];
+
+/// State of this tab.
+#[derive(Debug, Default)]
+pub struct Users {
+    /// The selected user; the selection stays when the list moves.
+    selected: Option<std::sync::Arc<str>>,
+    /// The audit list while it is shown.
+    audit: Option<Audit>,
+    /// Questions asked so far.
+    asked: u32,
+}
+
+impl Users {
+    /// A key.
+    pub fn on_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+        match &mut self.audit {
+            Some(audit) => match keys::find(AUDIT, event) {
+                Some(AuditAction::Back) => {
+                    self.audit = None;
+                    Vec::new()
+                }
+                Some(action) => {
+                    let mut acts = audit.on_key(cx, action);
+                    acts.extend(self.on_snapshot(cx));
+                    acts
+                }
+                None => Vec::new(),
+            },
+            None => keys::find(LIST, event).map(|action| self.act(cx, action)).unwrap_or_default(),
+        }
+    }
+
+    fn act(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+        let users = &cx.standing.users;
+        let place = self.place(cx);
+        let row = users.get(place);
+        let sheet = match (action, row) {
+            (Action::Move(by), _) => {
+                let place = place.saturating_add_signed(by).min(users.len().saturating_sub(1));
+                self.selected = users.get(place).map(|row| row.user.clone());
+                None
+            }
+            (Action::Audit, _) => {
+                self.audit = Some(Audit::new(self.asked));
+                return self.on_snapshot(cx);
+            }
+            (Action::Add, _) => Some(Sheet::new(Purpose::Add)),
+            (Action::Role, Some(row)) => Some(Sheet::role_of(row)),
+            (Action::Disable, Some(row)) => {
+                let locked_out = row.locked_until.is_some_and(|until| until > cx.now);
+                let disable = !row.disabled && !locked_out;
+                Some(Sheet::new(Purpose::Disable(row.user.clone(), disable)))
+            }
+            (Action::Reset, Some(row)) => Some(Sheet::new(Purpose::Reset(row.user.clone()))),
+            (Action::Delete, Some(row)) => Some(Sheet::new(Purpose::Delete(row.user.clone()))),
+            (Action::Role | Action::Disable | Action::Reset | Action::Delete, None) => None,
+        };
+        sheet.map(|sheet| Act::Open(Modal::Sheet(Box::new(sheet)))).into_iter().collect()
+    }
+
+    /// The place of the selected user.
+    fn place(&self, cx: &Cx) -> usize {
+        cx.standing.users.iter().position(|row| Some(&row.user) == self.selected.as_ref()).unwrap_or(0)
+    }
+
+    /// A step back: from the audit list to the users.
+    pub fn back(&mut self) -> bool {
+        self.audit.take().is_some()
+    }
+
+    /// News, or time has passed.
+    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+        let Some(audit) = &mut self.audit else { return Vec::new() };
+        let acts = audit.ask(cx);
+        self.asked = audit.asked();
+        acts
+    }
+
+    /// The history answered question `number`.
+    pub fn on_answer(&mut self, number: u32, answer: Result<Answer, HistoryError>) {
+        if let Some(audit) = &mut self.audit {
+            audit.on_answer(number, answer);
+        }
+    }
+
+    /// What was typed in a window that the audit list had opened.
+    pub fn on_text(&mut self, cx: &Cx, text: &str) -> Result<Vec<Act>, String> {
+        let Some(audit) = &mut self.audit else { return Ok(Vec::new()) };
+        audit.on_text(cx, text)?;
+        Ok(self.on_snapshot(cx))
+    }
+
+    /// The keys of the page.
+    pub fn hints(&self) -> Vec<Hint> {
+        if self.audit.is_some() { keys::hints(AUDIT) } else { keys::hints(LIST) }
+    }
+
+    /// Draws the page.
+    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+        match &self.audit {
+            Some(audit) => audit.view(cx, frame, area),
+            None => view::draw(cx, self.place(cx), frame, area),
+        }
+    }
+}
+
+/// How a user stands: `must change password`.
+fn state(cx: &Cx, row: &UserRow) -> String {
+    let locked = row.locked_until.filter(|until| *until > cx.now);
+    match (row.disabled, locked, row.must_change) {
+        (true, ..) => "disabled".to_owned(),
+        (false, Some(until), _) => {
+            format!("locked out until {}", crate::ui::widgets::text::clock(until, &cx.def().time_zone))
+        }
+        (false, None, true) => "must change password".to_owned(),
+        (false, None, false) => "active".to_owned(),
+    }
+}

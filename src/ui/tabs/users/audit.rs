@@ -1,0 +1,286 @@
+//! The audit list: who did what, from where, when, and how it ended; newest first, with a search that the history does.
+
+use crossterm::event::KeyCode;
+use jiff::SignedDuration;
+use ratatui::{Frame, layout::Rect};
+
+use super::super::{Tab, errand::Errand, reports::period};
+use crate::{
+    history::{Answer, HistoryError, Question},
+    plant::record::ActionRecord,
+    report::Period,
+    ui::{
+        Act, Cx,
+        keys::{Key, char, code},
+        modal::{Deed, Modal, Prompt},
+        widgets::text::{Canvas, fit, moment, pad, pad_left, width},
+    },
+};
+
+/// What a key means on the audit list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Select so many rows further on.
+    Move(isize),
+    /// The whole of the selected deed.
+    Open,
+    /// Search words, a user, an action, a time.
+    Search(Part),
+    /// Search nothing.
+    Everything,
+    /// The list of users.
+    Back,
+}
+
+/// What can be searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Words anywhere.
+    Words,
+    /// Who.
+    Who,
+    /// Which action.
+    Action,
+    /// When.
+    Time,
+}
+
+/// Keys of the audit list.
+pub const KEYS: &[Key<Action>] = &[
+    Key { chord: code(KeyCode::Up), label: "", help: "a row up", action: Action::Move(-1) },
+    Key { chord: code(KeyCode::Down), label: "select", help: "a row down", action: Action::Move(1) },
+    Key { chord: code(KeyCode::PageUp), label: "", help: "ten rows up", action: Action::Move(-10) },
+    Key { chord: code(KeyCode::PageDown), label: "", help: "ten rows down", action: Action::Move(10) },
+    Key { chord: code(KeyCode::Home), label: "", help: "the newest", action: Action::Move(-9_999) },
+    Key { chord: code(KeyCode::End), label: "", help: "the oldest", action: Action::Move(9_999) },
+    Key { chord: code(KeyCode::Enter), label: "open", help: "the whole of the selected deed", action: Action::Open },
+    Key { chord: char('/'), label: "search", help: "only rows with some words", action: Action::Search(Part::Words) },
+    Key { chord: char('b'), label: "by", help: "only what a user did", action: Action::Search(Part::Who) },
+    Key {
+        chord: char('w'),
+        label: "what",
+        help: "only an action: write, login …",
+        action: Action::Search(Part::Action),
+    },
+    Key { chord: char('t'), label: "time", help: "another day or period", action: Action::Search(Part::Time) },
+    Key { chord: char('c'), label: "all", help: "search nothing, show the last week", action: Action::Everything },
+    Key { chord: char('j'), label: "users", help: "the list of users", action: Action::Back },
+];
+
+/// Rows of one answer; more are said to be left out.
+const ROWS: usize = 1_000;
+/// Without another wish the list reaches back so far.
+const SPAN: SignedDuration = SignedDuration::from_hours(24 * 7);
+/// How often the list is read anew, and when an answer counts as lost (real time).
+const EVERY_S: f64 = 10.0;
+const PATIENCE_S: f64 = 20.0;
+
+/// State of the list.
+#[derive(Debug, Default)]
+pub struct Audit {
+    rows: Vec<ActionRecord>,
+    answered: bool,
+    trouble: Option<String>,
+    selected: usize,
+    /// What is searched; empty for anything.
+    words: String,
+    who: String,
+    action: String,
+    period: Option<Period>,
+    /// What the open window asks for.
+    asking: Option<Part>,
+    errand: Errand,
+    number: u32,
+}
+
+impl Audit {
+    /// The last week; questions are counted on from `asked`, so that no older answer fits.
+    pub fn new(asked: u32) -> Audit {
+        Audit { number: asked, ..Audit::default() }
+    }
+
+    /// Questions asked so far.
+    pub fn asked(&self) -> u32 {
+        self.number
+    }
+
+    /// A key of [`KEYS`].
+    pub fn on_key(&mut self, _cx: &Cx, action: Action) -> Vec<Act> {
+        let last = self.rows.len().saturating_sub(1);
+        match action {
+            Action::Move(by) => self.selected = self.selected.saturating_add_signed(by).min(last),
+            Action::Open => {
+                let deed = self.rows.get(self.selected).cloned();
+                return deed.map(|deed| Act::Open(Modal::Deed(Box::new(Deed(deed))))).into_iter().collect();
+            }
+            Action::Search(part) => {
+                self.asking = Some(part);
+                let (title, hint, text) = match part {
+                    Part::Words => ("search", "words of any column; empty for all", self.words.as_str()),
+                    Part::Who => ("only by", "name of a user, or a part of it; empty for all", self.who.as_str()),
+                    Part::Action => ("only this action", "write, acknowledge, login …; empty for all", &*self.action),
+                    Part::Time => ("time", period::FORMS, ""),
+                };
+                return vec![Act::Open(Modal::Prompt(Prompt::new(title, hint, text)))];
+            }
+            Action::Everything => {
+                for part in [&mut self.words, &mut self.who, &mut self.action] {
+                    part.clear();
+                }
+                self.period = None;
+                self.anew();
+            }
+            Action::Back => {}
+        }
+        Vec::new()
+    }
+
+    /// What was typed for the search.
+    pub fn on_text(&mut self, cx: &Cx, text: &str) -> Result<(), String> {
+        let text = text.trim().to_owned();
+        match self.asking {
+            Some(Part::Words) => self.words = text,
+            Some(Part::Who) => self.who = text,
+            Some(Part::Action) => self.action = text,
+            Some(Part::Time) if text.is_empty() => self.period = None,
+            Some(Part::Time) => self.period = Some(period::typed(cx.def(), &text, cx.now)?),
+            None => return Ok(()),
+        }
+        self.asking = None;
+        self.anew();
+        Ok(())
+    }
+
+    /// Rows of another search must not stand under this one.
+    fn anew(&mut self) {
+        (self.rows, self.answered, self.selected) = (Vec::new(), false, 0);
+        self.errand.want();
+    }
+
+    /// Asks the history when it is time to.
+    pub fn ask(&mut self, cx: &Cx) -> Vec<Act> {
+        let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
+        if !self.errand.due(cx.now, real(EVERY_S), real(PATIENCE_S)) {
+            return Vec::new();
+        }
+        self.number = self.number.wrapping_add(1);
+        self.errand.asked(self.number, cx.now);
+        let until = cx.now + SignedDuration::from_secs(1);
+        let (from, to) = self.period.as_ref().map_or((until - SPAN, until), |period| (period.from, period.to));
+        let (words, by, action) = (self.words.clone(), self.who.clone(), self.action.clone());
+        vec![Act::ask(Tab::Users, self.number, Question::Audit { from, to, words, by, action, limit: ROWS })]
+    }
+
+    /// The history answered question `number`.
+    pub fn on_answer(&mut self, number: u32, answer: Result<Answer, HistoryError>) {
+        // An answer to a search that is no longer meant is not shown.
+        if self.errand.answered(number).is_none() || self.errand.is_wanted() {
+            return;
+        }
+        self.answered = true;
+        self.trouble = None;
+        match answer {
+            Ok(Answer::Actions(rows)) => {
+                let selected = self.rows.get(self.selected).cloned();
+                let place = selected.and_then(|deed| rows.iter().position(|row| *row == deed));
+                self.selected = if self.selected == 0 { 0 } else { place.unwrap_or(0) };
+                self.rows = rows;
+            }
+            Ok(
+                Answer::Series(_)
+                | Answer::Journal(_)
+                | Answer::LineMinutes(_)
+                | Answer::Report(_)
+                | Answer::AlarmQuality(_),
+            ) => {}
+            Err(error) => self.trouble = Some(error.to_string()),
+        }
+    }
+
+    /// Draws it.
+    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+        let theme = cx.theme;
+        let mut canvas = Canvas::new(frame.buffer_mut(), area);
+        let columns = canvas.width();
+        let x = canvas.text(1, 0, "Audit list  ", theme.strong());
+        let room = columns.saturating_sub(x + 1);
+        match &self.trouble {
+            Some(trouble) => canvas.text(x, 0, &fit(trouble, room), theme.trouble()),
+            None => canvas.text(x, 0, &fit(&self.summary(), room), theme.normal()),
+        };
+        canvas.text(1, 1, &self.heading(columns), theme.dim());
+        if self.rows.is_empty() {
+            let words = if self.answered { "Nothing of this is on record." } else { "reading the history" };
+            canvas.text(2, 3, words, theme.dim());
+            return;
+        }
+        let rows = usize::from(canvas.height().saturating_sub(2)).max(1);
+        let first = self.selected.saturating_sub(rows - 1);
+        for (y, (n, deed)) in self.rows.iter().enumerate().skip(first).take(rows).enumerate() {
+            let style = if n == self.selected { theme.focus() } else { theme.normal() };
+            canvas.text(0, y as u16 + 2, &pad(&row(cx, deed, columns), columns), style);
+        }
+    }
+
+    /// `last 7 days   by anna   more than 1000: choose a time`.
+    fn summary(&self) -> String {
+        let time = self.period.as_ref().map_or("the last 7 days".to_owned(), |period| period.name.clone());
+        let part = |name: &str, text: &str| (!text.is_empty()).then(|| format!("{name} \"{text}\""));
+        let parts = [part("by", &self.who), part("action", &self.action), part("with", &self.words)];
+        let count = match self.rows.len() {
+            ROWS.. => format!("the newest {ROWS}; choose a time for others"),
+            1 => "1 row".to_owned(),
+            n => format!("{n} rows"),
+        };
+        [Some(time), Some(count)].into_iter().chain(parts).flatten().collect::<Vec<_>>().join("   ")
+    }
+
+    fn heading(&self, columns: u16) -> String {
+        let from = if from_width(columns) > 0 { pad("from", from_width(columns)) } else { String::new() };
+        format!(
+            "{} {}{}{from}{}{}old → new, outcome",
+            pad_left("no", 5),
+            pad("time", 10),
+            pad("who", 10),
+            pad("action", 12),
+            pad("target", 12)
+        )
+    }
+}
+
+/// Columns for where it was done from; none on a narrow screen, where the window of the deed tells it.
+fn from_width(columns: u16) -> u16 {
+    if columns >= 110 { 22 } else { 0 }
+}
+
+/// A deed in one row; where it is too long, its outcome is kept.
+fn row(cx: &Cx, deed: &ActionRecord, columns: u16) -> String {
+    let cell = |text: &str, columns: u16| pad(&fit(text, columns - 1), columns);
+    let number = deed.seal.map_or("–".to_owned(), |seal| seal.number.to_string());
+    let at = moment(deed.at, cx.now, &cx.def().time_zone);
+    let from = from_width(columns);
+    let head = format!(
+        " {} {}{}{}{}{}",
+        pad_left(&number, 5),
+        pad(&at, 10),
+        cell(&deed.by, 10),
+        if from > 0 { cell(&deed.from, from) } else { String::new() },
+        cell(&deed.action, 12),
+        cell(&deed.target, 12),
+    );
+    let arrow = cx.theme.pick("→", "->");
+    let change = match (&deed.old, &deed.new) {
+        (Some(old), Some(new)) => format!("{old} {arrow} {new}  "),
+        (None, Some(new)) => format!("{arrow} {new}  "),
+        (Some(old), None) => format!("{old}  "),
+        (None, None) => String::new(),
+    };
+    let room = columns.saturating_sub(width(&head) + 1);
+    let note = deed.note.as_ref().map_or(String::new(), |note| format!("  {note}"));
+    let outcome = fit(&format!("{}{note}", deed.outcome), room.saturating_sub(width(&change)).max(room / 2));
+    let change = match room.saturating_sub(width(&outcome)) {
+        left if width(&change) > left => format!("{} ", fit(change.trim_end(), left.saturating_sub(1))),
+        _ => change,
+    };
+    format!("{head}{change}{outcome}")
+}

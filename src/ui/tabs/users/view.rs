@@ -1,0 +1,78 @@
+//! The picture of the list of users, and of the terminals that are attached.
+
+use jiff::Timestamp;
+use ratatui::{Frame, layout::Rect};
+
+use super::state;
+use crate::ui::{
+    Cx, rights,
+    widgets::text::{Canvas, clock, fit, pad},
+};
+
+/// Draws both lists; the terminals have the lower third at the most.
+pub(super) fn draw(cx: &Cx, place: usize, frame: &mut Frame, area: Rect) {
+    let mut canvas = Canvas::new(frame.buffer_mut(), area);
+    let (width, height) = (canvas.width(), canvas.height());
+    let terminals = cx.standing.sessions.len() as u16 + 2;
+    let below = terminals.min(height / 3).max(3.min(height));
+    users(cx, place, &mut canvas.part(0, 0, width, height.saturating_sub(below)));
+    sessions(cx, &mut canvas.part(0, height.saturating_sub(below), width, below));
+}
+
+fn users(cx: &Cx, place: usize, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let all = &cx.standing.users;
+    let name = (canvas.width() / 4).clamp(14, 34);
+    canvas.text(1, 0, &format!("{}role         state                      last login", pad("user", name)), theme.dim());
+    let rows = usize::from(canvas.height().saturating_sub(1)).max(1);
+    let first = place.saturating_sub(rows - 1);
+    for (y, (n, row)) in all.iter().enumerate().skip(first).take(rows).enumerate() {
+        let last = row.last_login.map_or("never".to_owned(), |at| date(cx, at));
+        let mark = if n == place { theme.pick("▸", ">") } else { " " };
+        let text = format!(
+            "{mark}{}{}{}{last}",
+            pad(&fit(&row.user, name - 1), name),
+            pad(rights::title(row.role), 13),
+            pad(&state(cx, row), 27),
+        );
+        let style = match (n == place, row.disabled) {
+            (true, _) => theme.focus(),
+            (false, true) => theme.dim(),
+            (false, false) => theme.normal(),
+        };
+        let width = canvas.width();
+        canvas.text(0, y as u16 + 1, &pad(&fit(&text, width), width), style);
+    }
+    if all.is_empty() {
+        canvas.text(1, 2, "Nobody has a name and a password here yet; n adds somebody.", theme.dim());
+    }
+}
+
+fn sessions(cx: &Cx, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let all = &cx.standing.sessions;
+    let width = canvas.width();
+    canvas.run(0, 0, width, '─', theme.dim());
+    canvas.text(1, 0, &format!(" terminals attached {} ", all.len()), theme.dim());
+    let rows = usize::from(canvas.height().saturating_sub(1));
+    let shown = if all.len() > rows { rows.saturating_sub(1) } else { all.len() };
+    for (y, row) in all.iter().take(shown).enumerate() {
+        let user = row.user.as_deref().unwrap_or("nobody");
+        let locked = if row.locked { "  LOCKED" } else { "" };
+        let text = format!(
+            "{:>4}  {}since {}  {}{locked}",
+            row.terminal,
+            pad(&fit(user, 15), 16),
+            clock(row.since, &cx.def().time_zone),
+            row.from
+        );
+        canvas.text(0, y as u16 + 1, &fit(&text, width), theme.normal());
+    }
+    if all.len() > shown {
+        canvas.text(1, rows as u16, &format!("… and {} more", all.len() - shown), theme.dim());
+    }
+}
+
+fn date(cx: &Cx, at: Timestamp) -> String {
+    at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M").to_string()
+}

@@ -1,0 +1,491 @@
+//! Who sits here: the login page, the lock, signatures, two operators at once, users and the audit list.
+
+use std::{sync::Arc, time::Duration};
+
+use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+
+use super::{model, order_of, screen, type_keys};
+use crate::{
+    access::{
+        OrderRequest, Standing, Who, Wish,
+        wish::{SessionRow, UserRow},
+    },
+    history::{Answer, Question},
+    plant::{
+        command::{Command, OrderId, OrderStatus, Outcome},
+        record::{ActionRecord, Seal},
+        role::{Role, Sign},
+        sample::Quality,
+    },
+    ui::{
+        AskId, Effect, Model, Msg,
+        fixture::{self, Fixture},
+        modal::Modal,
+        tabs::Tab,
+        theme::Theme,
+        update,
+    },
+};
+
+/// Nobody is in, and nothing may be seen but alarms.
+fn closed() -> Standing {
+    let notice = "This is the control of the water tank. Only for those who work here; all that is done is recorded.";
+    Standing { who: None, view: false, notice: Some(notice.into()), ..(*fixture::standing()).clone() }
+}
+
+fn person(user: &str, role: Role) -> Standing {
+    Standing {
+        who: Some(Who { user: user.into(), role, must_change: false }),
+        idle_lock: Some(Duration::from_secs(900)),
+        ..(*fixture::standing()).clone()
+    }
+}
+
+fn with(fixture: &Fixture, standing: Standing) -> Model {
+    let mut model = model(fixture, Theme::FULL);
+    update(&mut model, Msg::Standing(Arc::new(standing)));
+    model
+}
+
+fn stand(model: &mut Model, change: impl FnOnce(&mut Standing)) {
+    let mut standing = (*model.standing).clone();
+    change(&mut standing);
+    update(model, Msg::Standing(Arc::new(standing)));
+}
+
+fn ctrl(model: &mut Model, c: char) -> Vec<Effect> {
+    update(model, Msg::Key(KeyEvent::new(KeyCode::Char(c), KeyModifiers::CONTROL)))
+}
+
+fn wish(effects: &[Effect]) -> Option<&Wish> {
+    effects.iter().find_map(|effect| match effect {
+        Effect::Wish(_, wish) if *wish != Wish::Active => Some(wish),
+        _ => None,
+    })
+}
+
+fn answer(model: &mut Model, answer: Result<(), &str>) {
+    let id = AskId { tab: Tab::Login, number: model.presence.wished };
+    update(model, Msg::Granted(id, answer.map_err(str::to_owned)));
+}
+
+fn shows(model: &mut Model, words: &str) {
+    let shown = screen(model, 80, 24);
+    assert!(shown.contains(words), "\"{words}\" is missing:\n{shown}");
+}
+
+#[test]
+fn the_login_page_in_every_mood() {
+    let first = Standing { first: true, ..closed() };
+    let moods = [
+        ("first", Fixture::normal(), first),
+        ("normal", Fixture::normal(), closed()),
+        ("alarm", Fixture::alarm(), closed()),
+        ("in", Fixture::normal(), person("anna", Role::Technician)),
+    ];
+    for (mood, fixture, standing) in moods {
+        for (width, height) in [(80, 24), (120, 40)] {
+            let mut model = with(&fixture, standing.clone());
+            type_keys(&mut model, if mood == "in" { "0" } else { "anna⏎abc" });
+            insta::assert_snapshot!(format!("login_{mood}_{width}x{height}"), screen(&mut model, width, height));
+        }
+    }
+    let mut model = with(&Fixture::alarm(), closed());
+    model.theme = Theme::PLAIN;
+    type_keys(&mut model, "anna⏎abc");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.is_ascii(), "{shown}");
+    insta::assert_snapshot!("login_plain_80x24", shown);
+}
+
+#[test]
+fn a_password_is_sent_and_never_seen_and_a_wrong_one_is_told_with_its_wait() {
+    let mut model = with(&Fixture::normal(), closed());
+    let effects = type_keys(&mut model, "anna⏎horse 1q?⏎");
+    let expect = Wish::Login { user: "anna".to_owned(), password: "horse 1q?".into() };
+    assert_eq!(wish(&effects), Some(&expect));
+    shows(&mut model, "asking the station");
+    assert_eq!(type_keys(&mut model, "⏎⏎"), [], "while the answer is awaited");
+    assert!(!screen(&mut model, 80, 24).contains("horse") && !format!("{model:?}").contains("horse"));
+    answer(&mut model, Err("wrong name or password, or locked out; try again later; wait 8 s at this terminal"));
+    shows(&mut model, "wait 8 s");
+    for _ in 0..6 {
+        update(&mut model, Msg::Tick { silent: Duration::ZERO });
+    }
+    shows(&mut model, "wrong name or password, or locked out; try again later; wait 5 s at");
+    insta::assert_snapshot!("login_wrong_80x24", screen(&mut model, 80, 24));
+    assert_eq!(type_keys(&mut model, "battery⏎"), [], "too early");
+    for _ in 0..10 {
+        update(&mut model, Msg::Tick { silent: Duration::ZERO });
+    }
+    shows(&mut model, "try again now");
+    let expect = Wish::Login { user: "anna".to_owned(), password: "battery".into() };
+    assert_eq!(wish(&type_keys(&mut model, "⏎")), Some(&expect));
+    ctrl(&mut model, 'r');
+    assert!(!screen(&mut model, 80, 24).contains("battery"));
+}
+
+#[test]
+fn a_password_can_be_shown_and_pasted() {
+    let mut model = with(&Fixture::normal(), closed());
+    type_keys(&mut model, "anna⏎");
+    update(&mut model, Msg::Paste("รหัสผ่าน ยาวพอ\n".to_owned()));
+    assert!(screen(&mut model, 80, 24).contains("•••"));
+    ctrl(&mut model, 'r');
+    shows(&mut model, "ยาวพอ");
+    let expect = Wish::Login { user: "anna".to_owned(), password: "รหัสผ่าน ยาวพอ".into() };
+    assert_eq!(wish(&type_keys(&mut model, "⏎")), Some(&expect));
+}
+
+#[test]
+fn before_a_login_every_other_tab_is_closed_and_alarms_are_seen() {
+    let mut model = with(&Fixture::alarm(), closed());
+    for keys in ["1", "⇥", "⎋1", "3", "a", "A"] {
+        let effects = type_keys(&mut model, keys);
+        assert_eq!((model.tabs.shown, order_of(&effects), &model.modal), (Tab::Login, None, &None), "{keys}");
+    }
+    shows(&mut model, "TIC-1.PV temperature high");
+    shows(&mut model, "alarms 3");
+    update(&mut model, Msg::Standing(Arc::new(person("anna", Role::Technician))));
+    assert_eq!(model.tabs.shown, Tab::Mimic);
+    stand(&mut model, |standing| (standing.who, standing.view) = (None, false));
+    assert_eq!(model.tabs.shown, Tab::Login);
+}
+
+#[test]
+fn a_plant_that_lets_everybody_look_shows_the_process_and_nothing_can_be_done() {
+    let mut model = with(&Fixture::normal(), Standing { view: true, ..closed() });
+    assert_eq!(model.tabs.shown, Tab::Mimic);
+    shows(&mut model, "Technician: s r m");
+    shows(&mut model, "not logged in");
+    type_keys(&mut model, "r");
+    shows(&mut model, "needs Technician; nobody is logged in");
+    type_keys(&mut model, "⎋0");
+    assert_eq!(model.tabs.shown, Tab::Login);
+    type_keys(&mut model, "⎋");
+    assert_eq!(model.tabs.shown, Tab::Mimic);
+}
+
+#[test]
+fn the_first_supervisor_types_his_password_twice() {
+    let check = |keys: &str, expect: Result<&str, &str>| {
+        let mut model = with(&Fixture::normal(), Standing { first: true, ..closed() });
+        let effects = type_keys(&mut model, keys);
+        match expect {
+            Ok(password) => {
+                let expect = Wish::FirstSupervisor { user: "anna".to_owned(), password: password.into() };
+                assert_eq!(wish(&effects), Some(&expect), "{keys}");
+            }
+            Err(words) => {
+                assert_eq!(wish(&effects), None, "{keys}");
+                shows(&mut model, words);
+            }
+        }
+    };
+    check("anna⏎correct horse battery⏎correct horse battery⏎", Ok("correct horse battery"));
+    check("anna⏎correct horse battery⏎correct horse batteri⏎", Err("the two passwords differ"));
+    check("anna⏎short⏎short⏎", Err("5 characters; at least 15"));
+    check("⏎correct horse battery⏎correct horse battery⏎", Err("type the name"));
+}
+
+#[test]
+fn a_password_given_by_somebody_else_is_changed_before_anything() {
+    let mut model = with(&Fixture::normal(), closed());
+    type_keys(&mut model, "anna⏎given by boris⏎");
+    answer(&mut model, Ok(()));
+    stand(&mut model, |standing| {
+        standing.who = Some(Who { user: "anna".into(), role: Role::Technician, must_change: true });
+        standing.view = true;
+    });
+    type_keys(&mut model, "1");
+    assert_eq!(model.tabs.shown, Tab::Login);
+    type_keys(&mut model, "\u{8}");
+    let effects = type_keys(&mut model, "correct horse battery⏎correct horse battery⏎");
+    let expect = Wish::ChangePassword { old: "given by boris".into(), new: "correct horse battery".into() };
+    assert_eq!(wish(&effects), Some(&expect));
+    answer(&mut model, Ok(()));
+    stand(&mut model, |standing| standing.who = person("anna", Role::Technician).who);
+    assert_eq!(model.tabs.shown, Tab::Mimic);
+}
+
+#[test]
+fn work_waits_while_the_terminal_is_locked() {
+    let fixture = Fixture::alarm();
+    let mut model = with(&fixture, person("anna", Role::Technician));
+    type_keys(&mut model, "s65");
+    assert_eq!(wish(&ctrl(&mut model, 'k')), Some(&Wish::Lock));
+    stand(&mut model, |standing| standing.locked = true);
+    shows(&mut model, "LOCKED by anna");
+    assert_eq!(model.modal, None, "nothing hides the process");
+    assert_eq!(order_of(&type_keys(&mut model, "⏎⎋3a")), None);
+    insta::assert_snapshot!("locked_80x24", screen(&mut model, 80, 24));
+    assert_eq!(wish(&type_keys(&mut model, "horse⏎")), Some(&Wish::Unlock("horse".into())));
+    answer(&mut model, Err("wrong password; wait 2 s"));
+    shows(&mut model, "wrong password; wait 2 s");
+    stand(&mut model, |standing| standing.locked = false);
+    assert_eq!(model.tabs.shown, Tab::Mimic);
+    shows(&mut model, "new 65");
+    let effects = type_keys(&mut model, ".5⏎");
+    assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
+}
+
+#[test]
+fn a_locked_terminal_looks_and_does_nothing() {
+    let mut model = with(&Fixture::alarm(), person("anna", Role::Technician));
+    stand(&mut model, |standing| standing.locked = true);
+    for keys in ["a", "A", "s", "r", "4⏎f", "4⏎↓⏎"] {
+        let effects = type_keys(&mut model, keys);
+        assert!(order_of(&effects).is_none() && wish(&effects).is_none(), "{keys}: {effects:?}");
+        assert!(model.modal.as_ref().is_some_and(Modal::is_unlock), "{keys}: {:?}", model.modal);
+        type_keys(&mut model, "⎋⎋⎋1");
+        assert_eq!((model.tabs.shown, &model.modal), (Tab::Mimic, &None), "{keys}");
+    }
+    for (keys, tab) in [("3", Tab::Alarms), ("5", Tab::Reports), ("?⎋2", Tab::Trends)] {
+        type_keys(&mut model, keys);
+        assert_eq!((model.tabs.shown, &model.modal), (tab, &None));
+    }
+    type_keys(&mut model, "a");
+    ctrl(&mut model, 'o');
+    shows(&mut model, "log in as another person than anna");
+    let effects = type_keys(&mut model, "boris⏎battery⏎");
+    assert_eq!(wish(&effects), Some(&Wish::Login { user: "boris".to_owned(), password: "battery".into() }));
+    update(&mut model, Msg::Standing(Arc::new(person("boris", Role::Viewer))));
+    assert_eq!((model.tabs.shown, &model.modal), (Tab::Mimic, &None));
+}
+
+#[test]
+fn the_lock_is_told_beforehand_and_a_key_puts_it_off() {
+    let mut model = with(&Fixture::normal(), person("anna", Role::Technician));
+    let active =
+        |effects: &[Effect]| effects.iter().filter(|effect| matches!(effect, Effect::Wish(_, Wish::Active))).count();
+    let press = |model: &mut Model| update(model, Msg::Key(KeyEvent::new(KeyCode::Right, KeyModifiers::NONE)));
+    assert_eq!(active(&press(&mut model)), 1);
+    assert_eq!((0..100).map(|_| active(&press(&mut model))).sum::<usize>(), 0, "twice a minute at most");
+    stand(&mut model, |standing| standing.locks_in = Some(Duration::from_secs(30)));
+    for _ in 0..10 {
+        update(&mut model, Msg::Tick { silent: Duration::ZERO });
+    }
+    shows(&mut model, "locks in 25 s: press a key");
+    assert_eq!(active(&press(&mut model)), 1);
+}
+
+#[test]
+fn what_a_role_may_not_is_told_before_it_is_tried() {
+    let mut model = with(&Fixture::normal(), person("tom", Role::Viewer));
+    shows(&mut model, "Technician: s r m");
+    type_keys(&mut model, "s65");
+    shows(&mut model, "needs Technician; tom is Viewer");
+    type_keys(&mut model, "⎋r");
+    shows(&mut model, "needs Technician; tom is Viewer");
+    assert!(!screen(&mut model, 80, 24).contains("7 Users"));
+    let mut model = with(&Fixture::normal(), person("anna", Role::Technician));
+    assert!(!screen(&mut model, 80, 24).contains("needs"));
+}
+
+fn signed(sign: Sign) -> Fixture {
+    let mut fixture = Fixture::normal();
+    let sv = fixture.tag("TIC-1.SV");
+    fixture.def.tags[sv.index()].sign = Some(sign);
+    fixture
+}
+
+#[test]
+fn a_tag_that_asks_for_a_signature_gets_one() {
+    let request = |effects: &[Effect]| {
+        effects.iter().find_map(|effect| match effect {
+            Effect::Order(request) => Some(request.clone()),
+            _ => None,
+        })
+    };
+    let sent = |sign: Sign, keys: &str| -> Option<OrderRequest> {
+        let mut model = with(&signed(sign), person("anna", Role::Technician));
+        request(&type_keys(&mut model, keys))
+    };
+    assert_eq!(sent(Sign::Password, "s65⏎⏎"), None, "without the password");
+    let order = sent(Sign::Password, "s65⏎yes n q⏎").expect("an order");
+    let sign = order.sign.expect("a signature");
+    assert_eq!((sign.user, sign.password, order.seen), (None, "yes n q".into(), Some(70.0)));
+    let sign = sent(Sign::SecondPerson, "s65⏎boris⏎horse⏎").and_then(|order| order.sign).expect("a signature");
+    assert_eq!((sign.user.as_deref(), sign.password), (Some("boris"), "horse".into()));
+
+    let mut model = with(&signed(Sign::SecondPerson), person("anna", Role::Technician));
+    type_keys(&mut model, "s65⏎boris⏎abc");
+    insta::assert_snapshot!("window_signature_80x24", screen(&mut model, 80, 24));
+}
+
+#[test]
+fn a_value_that_changes_under_an_open_window_is_told_at_once_and_asked_again() {
+    let fixture = Fixture::normal();
+    let mut model = with(&fixture, person("boris", Role::Technician));
+    type_keys(&mut model, "s80");
+    let mut later = fixture.clone();
+    later.set("TIC-1.SV", 65.0);
+    let mut snapshot = later.snapshot();
+    Arc::make_mut(&mut snapshot).orders = vec![OrderStatus {
+        id: OrderId { terminal: 2, number: 1 },
+        by: "anna".into(),
+        from: "".into(),
+        note: None,
+        command: Command::Write { tag: fixture.tag("TIC-1.SV"), value: 65.0 },
+        at: fixture::now(),
+        old: Some(70.0),
+        outcome: Outcome::Verified,
+    }];
+    update(&mut model, Msg::Snapshot(snapshot));
+    shows(&mut model, "changed to 65.0 °C by anna 14:02:31 (was 70.0)");
+    insta::assert_snapshot!("changed_under_you_80x24", screen(&mut model, 80, 24));
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), None);
+    let effects = type_keys(&mut model, "⏎");
+    let Some(Effect::Order(request)) = effects.first() else { panic!("no order: {effects:?}") };
+    assert_eq!(request.seen, Some(65.0), "what was seen when it was confirmed");
+}
+
+#[test]
+fn a_station_that_has_gone_is_said_at_once_and_takes_no_orders() {
+    let mut model = with(&Fixture::normal(), person("anna", Role::Technician));
+    stand(&mut model, |standing| standing.gone = Some("the socket was closed".into()));
+    assert!(model.snapshot.samples.iter().all(|sample| !matches!(sample.quality, Quality::Good)));
+    for _ in 0..8 {
+        update(&mut model, Msg::Tick { silent: Duration::ZERO });
+    }
+    shows(&mut model, "STATION GONE 4 s: reconnecting");
+    shows(&mut model, "alarms not judged: station gone, the socket was closed");
+    type_keys(&mut model, "0");
+    assert_eq!(model.tabs.shown, Tab::Login);
+    type_keys(&mut model, "4⏎u");
+    shows(&mut model, "NOT SENT: the station has gone");
+    stand(&mut model, |standing| standing.gone = None);
+    assert!(!screen(&mut model, 80, 24).contains("GONE"));
+}
+
+#[test]
+fn another_plant_file_builds_everything_anew() {
+    let mut model = with(&Fixture::normal(), person("anna", Role::Technician));
+    type_keys(&mut model, "2");
+    type_keys(&mut model, "1s65");
+    update(&mut model, Msg::Snapshot(Fixture::normal().snapshot()));
+    assert!(matches!(model.modal, Some(Modal::Entry(_))), "an equal one changes nothing");
+    let mut other = Fixture::normal();
+    other.def.title = "Another tank".to_owned();
+    update(&mut model, Msg::Snapshot(other.snapshot()));
+    shows(&mut model, "The plant file changed");
+    shows(&mut model, "Another tank");
+    assert_eq!((model.plants, order_of(&type_keys(&mut model, "⏎"))), (1, None));
+}
+
+fn supervisor() -> Standing {
+    let row = |user: &str, role, disabled, must_change| UserRow {
+        user: user.into(),
+        role,
+        disabled,
+        locked_until: None,
+        must_change,
+        last_login: Some(fixture::now()),
+    };
+    let until = fixture::now() + jiff::SignedDuration::from_secs(240);
+    let users = vec![
+        row("anna", Role::Supervisor, false, false),
+        UserRow { locked_until: Some(until), ..row("boris", Role::Technician, false, false) },
+        UserRow { last_login: None, ..row("สมชาย", Role::Viewer, false, true) },
+        row("tom", Role::Technician, true, false),
+    ];
+    let session = |terminal, user: Option<&str>, locked| SessionRow {
+        terminal,
+        user: user.map(Arc::from),
+        from: "pts/3 from 10.0.0.5, user panel".into(),
+        since: fixture::now(),
+        locked,
+    };
+    let sessions = vec![session(1, Some("anna"), false), session(2, Some("tom"), true), session(3, None, false)];
+    Standing { users: Arc::new(users), sessions: Arc::new(sessions), ..person("anna", Role::Supervisor) }
+}
+
+#[test]
+fn the_users_and_what_can_be_done_with_them() {
+    let mut model = with(&Fixture::normal(), supervisor());
+    type_keys(&mut model, "7");
+    for (width, height) in [(80, 24), (120, 40)] {
+        insta::assert_snapshot!(format!("users_{width}x{height}"), screen(&mut model, width, height));
+    }
+    let check = |keys: &str, expect: Wish| {
+        let mut model = with(&Fixture::normal(), supervisor());
+        let effects = type_keys(&mut model, keys);
+        assert_eq!(wish(&effects), Some(&expect), "{keys}");
+        let id = AskId { tab: Tab::Users, number: model.presence.wished };
+        update(&mut model, Msg::Granted(id, Err("at least one Supervisor must remain".to_owned())));
+        shows(&mut model, "at least one Supervisor must remain");
+        update(&mut model, Msg::Granted(id, Ok(())));
+    };
+    let user = "boris".to_owned();
+    let password = || "correct horse battery".into();
+    check("7↓r ⏎", Wish::SetRole { user: user.clone(), role: Role::Supervisor });
+    check("7↓d⏎", Wish::Disable { user: user.clone(), disabled: false });
+    check("7↓↓d⏎", Wish::Disable { user: "สมชาย".to_owned(), disabled: true });
+    check("7↓xboris⏎", Wish::DeleteUser { user: user.clone() });
+    check(
+        "7↓pcorrect horse battery⏎correct horse battery⏎",
+        Wish::ResetPassword { user: user.clone(), password: password() },
+    );
+    check(
+        "7njane⏎→⏎correct horse battery⏎correct horse battery⏎",
+        Wish::AddUser { user: "jane".to_owned(), role: Role::Supervisor, password: password() },
+    );
+    let mut model = with(&Fixture::normal(), supervisor());
+    assert_eq!(wish(&type_keys(&mut model, "7↓xboriss⏎")), None, "another name deletes nobody");
+}
+
+fn deed(number: u64, by: &str, action: &str, target: &str, change: (&str, &str), outcome: &str) -> ActionRecord {
+    let told = |text: &str| (!text.is_empty()).then(|| Arc::from(text));
+    ActionRecord {
+        at: fixture::now() - jiff::SignedDuration::from_secs(60 * (40 - number as i64)),
+        by: by.into(),
+        from: "pts/3 from 10.0.0.5, user panel".into(),
+        action: action.into(),
+        target: target.into(),
+        old: told(change.0),
+        new: told(change.1),
+        outcome: outcome.into(),
+        note: None,
+        seal: Some(Seal { number, hash: [0xA5; 32] }),
+    }
+}
+
+#[test]
+fn the_audit_list_is_searched_by_the_history_and_read_whole() {
+    let mut model = with(&Fixture::normal(), supervisor());
+    let asked = |effects: &[Effect]| {
+        effects.iter().find_map(|effect| match effect {
+            Effect::Ask(id, Question::Audit { words, by, action, limit, .. }) => {
+                Some((*id, words.clone(), by.clone(), action.clone(), *limit))
+            }
+            _ => None,
+        })
+    };
+    let question = asked(&type_keys(&mut model, "7j")).expect("a question");
+    let rows = vec![
+        deed(38, "anna", "write", "TIC-1.SV", ("70.0 °C", "65.0 °C"), "verified"),
+        deed(37, "tom", "write", "PLC-1.PUMP", ("OFF", "ON"), "refused: needs technician"),
+        deed(36, "unknown user", "login failed", "", ("", ""), "refused: wrong name or password"),
+        ActionRecord {
+            note: Some("countersigned by boris".into()),
+            ..deed(35, "anna", "add user", "tom", ("", "technician"), "done")
+        },
+    ];
+    update(&mut model, Msg::Answer(question.0, Ok(Answer::Actions(rows))));
+    for (width, height) in [(80, 24), (120, 40)] {
+        insta::assert_snapshot!(format!("audit_{width}x{height}"), screen(&mut model, width, height));
+    }
+    type_keys(&mut model, "↓⏎");
+    insta::assert_snapshot!("window_deed_80x24", screen(&mut model, 80, 24));
+    let (_, words, by, action, _) = asked(&type_keys(&mut model, "⎋/pump⏎")).expect("a question");
+    assert_eq!((words.as_str(), by.as_str(), action.as_str()), ("pump", "", ""));
+    let (_, words, by, ..) = {
+        let effects = type_keys(&mut model, "bto⏎");
+        // The question on its way is answered first; the new one follows at once.
+        assert_eq!(asked(&effects), None);
+        let id = AskId { tab: Tab::Users, number: question.0.number + 1 };
+        update(&mut model, Msg::Answer(id, Ok(Answer::Actions(Vec::new()))));
+        asked(&update(&mut model, Msg::Tick { silent: Duration::ZERO })).expect("a question")
+    };
+    assert_eq!((words.as_str(), by.as_str()), ("pump", "to"));
+}

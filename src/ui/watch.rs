@@ -1,0 +1,89 @@
+//! The last order of this terminal, from the key to its outcome.
+
+use super::{Effect, Model, chrome};
+use crate::{
+    access::{OrderRequest, Signature},
+    plant::command::{Command, OrderId, OrderStatus, Outcome},
+};
+
+/// An outcome that is no worry is shown for so many ticks: a minute of real time.
+const OUTCOME_TICKS: u32 = 120;
+
+/// An order as its operator confirmed it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Confirmed {
+    /// What.
+    pub command: Command,
+    /// The value of the tag to be written that stood before his eyes; `None` where it was not known or moves by itself.
+    pub seen: Option<f64>,
+    /// What a tag asks for again.
+    pub sign: Option<Signature>,
+}
+
+impl From<Command> for Confirmed {
+    /// A command that nothing was asked about.
+    fn from(command: Command) -> Confirmed {
+        Confirmed { command, seen: None, sign: None }
+    }
+}
+
+/// An order of this terminal on its way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Watch {
+    /// Which.
+    pub id: OrderId,
+    /// What was wished.
+    pub command: Command,
+    /// As last seen in a snapshot.
+    pub status: Option<OrderStatus>,
+    /// Tick at which it was given, and at which its outcome last changed.
+    pub changed_at: u32,
+    /// Why it never left the terminal.
+    pub undelivered: Option<&'static str>,
+}
+
+impl Watch {
+    /// Has it ended in a way that its operator must read?
+    pub fn is_trouble(&self) -> bool {
+        let outcome = self.status.as_ref().map(|status| &status.outcome);
+        self.undelivered.is_some() || outcome.is_some_and(|outcome| chrome::outcome_words(outcome).1)
+    }
+
+    /// Has it ended as wished? Such an outcome leaves the screen by itself; trouble stays, with its time, until it is
+    /// dismissed.
+    fn is_done(&self) -> bool {
+        let outcome = self.status.as_ref().map(|status| &status.outcome);
+        outcome.is_some_and(|outcome| *outcome != Outcome::Pending && !chrome::outcome_words(outcome).1)
+    }
+
+    /// Has its outcome been on the screen for long enough?
+    pub fn is_over(&self, phase: u32) -> bool {
+        self.is_done() && phase.wrapping_sub(self.changed_at) >= OUTCOME_TICKS
+    }
+}
+
+impl Model {
+    /// Gives an order and watches it. A station that has gone takes none: that is said at once.
+    pub(super) fn order(&mut self, confirmed: Confirmed) -> Option<Effect> {
+        let Confirmed { command, seen, sign } = confirmed;
+        self.ordered = self.ordered.wrapping_add(1);
+        let id = OrderId { terminal: self.terminal, number: self.ordered };
+        let undelivered = self.standing.gone.as_ref().map(|_| "the station has gone");
+        let changed_at = self.clock.phase;
+        self.watch = Some(Watch { id, command: command.clone(), status: None, changed_at, undelivered });
+        let request = OrderRequest { seen, sign, ..OrderRequest::new(id, command) };
+        undelivered.is_none().then_some(Effect::Order(request))
+    }
+
+    /// Takes the outcome of the watched order from the snapshot that has come.
+    pub(super) fn follow(&mut self) {
+        if let Some(watch) = &mut self.watch
+            && let Some(status) = self.snapshot.orders.iter().find(|status| status.id == watch.id)
+        {
+            if watch.status.as_ref() != Some(status) {
+                watch.changed_at = self.clock.phase;
+            }
+            watch.status = Some(status.clone());
+        }
+    }
+}
