@@ -142,3 +142,6 @@ fn push<T>(list: &mut VecDeque<T>, element: T, max: usize) {
         list.pop_front();
     }
 }
+
+#[cfg(test)]
+mod tests;

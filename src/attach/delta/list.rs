@@ -73,6 +73,7 @@ impl<T: Clone + PartialEq> List<T> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use proptest::prelude::*;
 

@@ -54,7 +54,7 @@ where
     tokio::select! {
         Err(ended) = asking.run(read) => ended,
         Err(ended) = telling.run(run, answered) => ended,
-        else => Ended::StationEnded,
+        else => Ended::StationGone,
     }
 }
 
@@ -72,7 +72,7 @@ pub enum Ended {
     SentAway,
     /// The station has ended.
     #[error("the station has ended")]
-    StationEnded,
+    StationGone,
     /// The station has another plant now.
     #[error("the plant file was taken up anew")]
     OtherPlant,
@@ -180,7 +180,7 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
                     due = Some(Instant::now());
                 }
                 changed = self.session.snapshots.changed() => {
-                    changed.map_err(|_| Ended::StationEnded)?;
+                    changed.map_err(|_| Ended::StationGone)?;
                     let snapshot = self.session.snapshots.borrow_and_update().clone();
                     due = Some(if self.has_news_of_own(&sent, &snapshot) { Instant::now() } else { next });
                 }

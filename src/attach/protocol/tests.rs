@@ -1,0 +1,169 @@
+//! Messages survive the way over the socket; whatever else comes is refused in words and without harm.
+#![allow(clippy::unwrap_used)]
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::{
+    attach::check,
+    plant::{
+        command::Command,
+        def::{AlarmId, DeviceId, LineId, TagId},
+        role::Role,
+    },
+    ui::fixture::{Fixture, now},
+};
+
+fn body(bytes: Vec<u8>) -> Vec<u8> {
+    let length = length(bytes[..LENGTH_BYTES].try_into().unwrap(), usize::MAX).unwrap();
+    assert_eq!(length, bytes.len() - LENGTH_BYTES);
+    bytes[LENGTH_BYTES..].to_vec()
+}
+
+fn place() -> Place {
+    Place { tty: Some("pts/3".into()), ssh: Some("10.0.0.5".into()), term: Some("xterm".into()) }
+}
+
+#[test]
+fn a_terminal_says_where_it_is_and_is_told_the_plant() {
+    let hello_bytes = body(encode_first(&Greeting::own(), Some(&place()), HELLO_BYTES_MAX).unwrap());
+    assert_eq!(hello(&hello_bytes), Ok(place()));
+    let def = Fixture::normal().snapshot().def.clone();
+    let told = Welcome { run: 7, terminal: 3, def: def.clone() };
+    let bytes = body(encode_first(&Greeting::own(), Some(&told), NEWS_BYTES_MAX).unwrap());
+    let heard = welcome(&bytes).unwrap().unwrap();
+    assert_eq!((heard.run, heard.terminal), (7, 3));
+    assert_eq!(encode(&heard.def, usize::MAX), encode(&def, usize::MAX));
+}
+
+#[test]
+fn an_old_terminal_is_told_to_log_in_again_after_the_update() {
+    let old = Greeting { protocol: PROTOCOL + 1, version: "9.9".into(), ..Greeting::own() };
+    // Whatever else that version says is never looked at.
+    let bytes = body(encode_first(&old, Some(&vec![0xFFu8; 40]), HELLO_BYTES_MAX).unwrap());
+    let Err(ProtocolError::OtherVersion(why)) = hello(&bytes) else { panic!("taken for one of ours") };
+    let expected =
+        format!("this terminal is version 9.9 (protocol {}), the station is version {VERSION}", PROTOCOL + 1);
+    assert!(why.starts_with(&expected) && why.ends_with("log in again after the update"), "{why}");
+    let Err(ProtocolError::OtherVersion(why)) = welcome(&bytes) else { panic!("taken for one of ours") };
+    assert!(why.starts_with(&format!("this terminal is version {VERSION}")), "{why}");
+    let other_build = Greeting { version: "0.0.1".into(), ..Greeting::own() };
+    let bytes = body(encode_first(&other_build, Some(&place()), HELLO_BYTES_MAX).unwrap());
+    assert!(matches!(hello(&bytes), Err(ProtocolError::OtherVersion(_))));
+    let bytes = body(encode_first(&Greeting::sorry("full"), None::<&()>, HELLO_BYTES_MAX).unwrap());
+    assert_eq!(welcome(&bytes).unwrap().unwrap_err(), "full");
+}
+
+#[test]
+fn what_a_terminal_says_of_itself_cannot_disturb_a_screen_or_say_who_it_is() {
+    let rows: [(&str, &str, &str); 5] = [
+        ("pts/3", "10.0.0.5", "pts/3 from 10.0.0.5, user panel, process 123"),
+        ("", "", "no terminal, user panel, process 123"),
+        ("\x1b[2Jpts/3\n", "10.0.0.5\r\u{202E}", "[2Jpts/3 from 10.0.0.5, user panel, process 123"),
+        ("pts/3, user root", "", "pts/3. user root, user panel, process 123"),
+        ("ทดสอบ", "fe80::1%eth0", "ทดสอบ from fe80::1%eth0, user panel, process 123"),
+    ];
+    for (tty, ssh, expected) in rows {
+        let place = Place { tty: Some(tty.into()), ssh: Some(ssh.into()), term: None };
+        assert_eq!(place.words(Some("panel"), Some(123)), expected);
+    }
+    let long = Place { tty: Some("x".repeat(10_000)), ssh: Some("y".repeat(10_000)), term: None };
+    assert_eq!(long.words(None, None).chars().count(), 64 + " from ".len() + 64);
+    assert!(encode_first(&Greeting::own(), Some(&long.short()), HELLO_BYTES_MAX).is_ok());
+}
+
+#[test]
+fn requests_and_news_survive_the_way() {
+    let order = OrderRequest::new(OrderId { terminal: 1, number: 2 }, Command::Write { tag: TagId(0), value: 0.1 });
+    let asked = [
+        Asked::Order(Box::new(order)),
+        Asked::Ask { ticket: 1, question: Question::Journal { from: now(), to: now(), limit: 5 } },
+        Asked::Wish { ticket: 2, wish: Wish::Login { user: "anna".into(), password: "long and secret".into() } },
+        Asked::Wish { ticket: 3, wish: Wish::SetRole { user: "anna".into(), role: Role::Technician } },
+    ];
+    for asked in asked {
+        assert_eq!(decode(&body(encode(&asked, REQUEST_BYTES_MAX).unwrap()), "message"), Ok(asked));
+    }
+    let told = [
+        Told::Standing(Box::default()),
+        Told::Answer { ticket: 1, answer: Ok(Answer::Journal(Vec::new())) },
+        Told::Answer { ticket: 1, answer: Err(HistoryError::EmptyPeriod) },
+        Told::Granted { ticket: 2, answer: Err("no".into()) },
+        Told::Undelivered { id: OrderId { terminal: 1, number: 2 }, why: "busy".into() },
+    ];
+    for told in told {
+        assert_eq!(decode(&body(encode(&told, NEWS_BYTES_MAX).unwrap()), "message"), Ok(told));
+    }
+}
+
+#[test]
+fn a_message_is_neither_longer_nor_shorter_than_it_says() {
+    assert_eq!(length([0, 0, 1, 0], REQUEST_BYTES_MAX), Ok(65_536));
+    assert_eq!(length([1, 0, 1, 0], REQUEST_BYTES_MAX), Err(ProtocolError::TooLong { bytes: 65_537, max: 65_536 }));
+    assert!(length([0xFF; 4], NEWS_BYTES_MAX).is_err());
+    let mut bytes = body(encode(&Told::Granted { ticket: 2, answer: Ok(()) }, 100).unwrap());
+    bytes.push(0);
+    assert!(decode::<Told>(&bytes, "message").is_err(), "something is left over");
+    assert!(decode::<Told>(&bytes[..2], "message").is_err(), "something is missing");
+    let long = Asked::Wish { ticket: 1, wish: Wish::Unlock("x".repeat(70_000).as_str().into()) };
+    assert!(matches!(encode(&long, REQUEST_BYTES_MAX), Err(ProtocolError::TooLong { .. })));
+}
+
+#[test]
+fn what_this_plant_does_not_have_never_reaches_it() {
+    let def = Fixture::normal().snapshot().def.clone();
+    let far = u16::MAX;
+    let commands = [
+        Command::Write { tag: TagId(far), value: 1.0 },
+        Command::Acknowledge(AlarmId(far)),
+        Command::Refresh(DeviceId(far)),
+        Command::Connect(LineId(far), true),
+        Command::SaveSettings(LineId(far)),
+        Command::StopTest(LineId(far)),
+        Command::SaveSet { device: DeviceId(far), name: "x".into(), replace: false },
+        Command::StopRestore(DeviceId(far)),
+    ];
+    for command in commands {
+        let why = check::command(&def, &command).unwrap_err();
+        assert!(why.contains("number 65535"), "{command:?}: {why}");
+    }
+    assert_eq!(check::command(&def, &Command::Write { tag: TagId(0), value: 1.0 }), Ok(()));
+    let series = |tags: Vec<TagId>, buckets| Question::Series { tags, from: now(), to: now(), buckets };
+    assert_eq!(check::question(&def, &series(vec![TagId(0)], 200)), Ok(()));
+    for wrong in [
+        series(vec![TagId(far)], 200),
+        series(vec![TagId(0)], usize::MAX),
+        series(vec![TagId(0)], 0),
+        series(vec![TagId(0); 1_000], 200),
+        Question::LineMinutes { line: LineId(far), from: now(), to: now(), limit: 1 },
+    ] {
+        assert!(check::question(&def, &wrong).is_err(), "{wrong:?}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn random_bytes_are_refused_without_harm(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
+        let _ = hello(&bytes);
+        let _ = welcome(&bytes).map(|told| told.map(|_| ()));
+        let _ = decode::<Asked>(&bytes, "message");
+        let _ = decode::<Told>(&bytes, "message");
+    }
+
+    #[test]
+    fn a_spoiled_message_is_refused_without_harm(place in 0usize..200, byte: u8, end in 0usize..200) {
+        let signature = crate::access::Signature { user: Some("somchai".into()), password: "secret".into() };
+        let order = OrderRequest {
+            note: Some("because".into()),
+            sign: Some(signature),
+            ..OrderRequest::new(OrderId { terminal: 1, number: 2 }, Command::Write { tag: TagId(3), value: 7.5 })
+        };
+        let mut bytes = body(encode(&Asked::Order(Box::new(order)), REQUEST_BYTES_MAX).unwrap());
+        let place = place % bytes.len();
+        bytes[place] = byte;
+        bytes.truncate(bytes.len() - end % bytes.len());
+        if let Ok(Asked::Order(order)) = decode::<Asked>(&bytes, "message") {
+            let _ = check::command(&Fixture::normal().def, &order.command);
+        }
+    }
+}

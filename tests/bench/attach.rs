@@ -1,0 +1,226 @@
+//! What twenty terminals cost a station of 1,000 tags that all change every second; prints CPU, memory and bytes.
+//!
+//! `cargo bench --bench attach`: 35 seconds. Terminals are processes of their own, so the CPU is the station's alone.
+#![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
+
+use std::{
+    fs,
+    io::{Read, Write},
+    os::unix::net::UnixStream,
+    path::Path,
+    process::{Child, Command, Stdio},
+    sync::Arc,
+    time::Duration,
+};
+
+use jiff::Timestamp;
+use rustix::time::{ClockId, clock_gettime};
+use sightglass::{
+    access::Standing,
+    attach::{
+        io::serve::listen,
+        protocol::{self, Greeting, HELLO_BYTES_MAX, Place},
+    },
+    plant::{
+        Plant, PlantDef,
+        def::{DeviceDef, DeviceId, Framing, LineId, TagId},
+        event::{Event, LineState},
+        line_report::{LineReport, PollReport},
+        tag::{Class, Kind, Order, Point, Poll, Table, TagDef},
+        tally::Tally,
+        traffic::{Exchange, Frame},
+    },
+    profile::{self, Search},
+    station::Entrance,
+};
+use tokio::{sync::watch, time::interval};
+
+const DEVICES: u16 = 10;
+const TAGS_EACH: u16 = 100;
+const TERMINALS: usize = 20;
+/// Seconds of each part.
+const PART: u64 = 10;
+
+fn main() {
+    let words: Vec<String> = std::env::args().collect();
+    match words.iter().position(|word| word == "terminal") {
+        Some(at) => terminal(Path::new(&words[at + 1])),
+        None => station(),
+    }
+}
+
+/// Reads whatever comes and says how much that was, each second.
+fn terminal(path: &Path) {
+    let mut stream = UnixStream::connect(path).unwrap();
+    let hello = protocol::encode_first(&Greeting::own(), Some(&Place::default()), HELLO_BYTES_MAX);
+    stream.write_all(&hello.unwrap()).unwrap();
+    let mut total = 0;
+    let mut bytes = vec![0; 1 << 20];
+    while let Ok(count) = stream.read(&mut bytes)
+        && count != 0
+    {
+        total += count;
+        // The last number is what counts; a reader that has gone is no harm.
+        let _ = fs::write(path.with_extension(std::process::id().to_string()), total.to_string());
+    }
+}
+
+fn station() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bench.sock");
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
+    runtime.block_on(async {
+        let def = plant();
+        let plant = Plant::new(def.clone(), Timestamp::now(), 1.0);
+        let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
+        let (entrance, mut knocks, _requests) = Entrance::new(snapshots);
+        let listener = listen(&path).unwrap();
+        tokio::spawn(async move { listener.serve(&entrance).await });
+        tokio::spawn(async move {
+            let mut there = Vec::new();
+            while let Some(knock) = knocks.recv().await {
+                knock.standing.send_replace(Arc::new(Standing { view: true, ..Standing::default() }));
+                there.push(knock.standing);
+            }
+        });
+        tokio::spawn(live(plant, def, publish));
+        tokio::time::sleep(Duration::from_secs(2)).await;
+        part("no terminal", &[]).await;
+        let mut terminals: Vec<Child> = (0..TERMINALS).map(|_| start(&path)).collect();
+        tokio::time::sleep(Duration::from_secs(2)).await;
+        let files: Vec<_> = terminals.iter().map(|child| path.with_extension(child.id().to_string())).collect();
+        part("20 terminals", &files).await;
+        signal(&terminals[0], "STOP");
+        part("20 terminals, one of them stopped: the others", &files[1..]).await;
+        for child in &mut terminals {
+            signal(child, "KILL");
+            child.wait().unwrap();
+        }
+    });
+}
+
+/// A thousand tags, each with another value every second, a tenth of them at a time; a snapshot after each tenth.
+async fn live(mut plant: Plant, def: Arc<PlantDef>, publish: watch::Sender<Arc<sightglass::plant::Snapshot>>) {
+    let mut tick = interval(Duration::from_millis(100));
+    let mut report = LineReport::new(def.lines[0].clone());
+    report.polls = (0..DEVICES).map(|device| poll(DeviceId(device))).collect();
+    plant.on_event(Event::Line { at: Timestamp::now(), line: LineId(0), state: LineState::Connected });
+    for round in 0u64.. {
+        tick.tick().await;
+        let (at, device) = (Timestamp::now(), (round % u64::from(DEVICES)) as u16);
+        let (request, answer): (Arc<[u8]>, Arc<[u8]>) = ([1; 8].into(), [2; 205].into());
+        let values = tags_of(device).map(|tag| (tag, (round * 7 + u64::from(tag.0)) as f64 % 60_000.0)).collect();
+        let reply = Duration::from_millis(12);
+        let (framing, outcome, tries) = (Framing::Rtu, Ok(()), 1);
+        let (sent, got) = (request.clone(), answer.clone());
+        let exchange = Exchange { at, framing, request, answer, outcome, reply: Some(reply), tries };
+        let exchange = Some(Arc::new(exchange));
+        plant.on_event(Event::Read { at, device: DeviceId(device), values, texts: Vec::new(), reply, exchange });
+        let poll = &mut report.polls[usize::from(device)];
+        poll.tally.count(Ok(()), Some(reply + Duration::from_millis(round % 9)));
+        poll.next = Some(at + jiff::SignedDuration::from_secs(1));
+        let frame =
+            |bytes, sent, number| Frame { at, sent, bytes, framing, verdict: "ok".into(), unit: Some(1), number };
+        report.frames.extend(vec![frame(sent, true, 2 * round + 1), frame(got, false, 2 * round + 2)]);
+        if device == 0 {
+            report.counters.requests = round;
+            report.busy.push(0.5 + (round % 3) as f32);
+            report.busy.drain(..report.busy.len().saturating_sub(60));
+            plant.on_event(Event::Report { at, line: LineId(0), report: Arc::new(report.clone()) });
+            plant.on_tick(at);
+        }
+        publish.send_replace(Arc::new(plant.snapshot()));
+    }
+}
+
+/// Waits and prints what that has cost, and what each of these terminals has read.
+async fn part(what: &str, files: &[std::path::PathBuf]) {
+    let read = || -> Vec<u64> {
+        files.iter().map(|file| fs::read_to_string(file).ok().and_then(|text| text.parse().ok()).unwrap_or(0)).collect()
+    };
+    let (before, used) = (read(), cpu());
+    tokio::time::sleep(Duration::from_secs(PART)).await;
+    let share = (cpu() - used) / PART as f64 * 100.0;
+    let rates: Vec<u64> = read().iter().zip(&before).map(|(now, then)| now.saturating_sub(*then) / PART).collect();
+    println!("{what}: {share:.2} % of a core, {} MiB", resident_mib());
+    if let (Some(least), Some(most)) = (rates.iter().min(), rates.iter().max()) {
+        println!("  {least} to {most} bytes a second for each terminal");
+    }
+}
+
+fn start(path: &Path) -> Child {
+    let program = std::env::current_exe().unwrap();
+    Command::new(program).arg("terminal").arg(path).stdin(Stdio::null()).spawn().unwrap()
+}
+
+fn signal(child: &Child, name: &str) {
+    assert!(Command::new("kill").args([&format!("-{name}"), &child.id().to_string()]).status().unwrap().success());
+}
+
+fn cpu() -> f64 {
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}
+
+fn resident_mib() -> u64 {
+    let pages = fs::read_to_string("/proc/self/statm").unwrap();
+    pages.split(' ').nth(1).and_then(|pages| pages.parse::<u64>().ok()).unwrap() * 4 / 1_024
+}
+
+fn tags_of(device: u16) -> impl Iterator<Item = TagId> {
+    (device * TAGS_EACH..(device + 1) * TAGS_EACH).map(TagId)
+}
+
+fn poll(device: DeviceId) -> PollReport {
+    PollReport {
+        device,
+        table: Table::Holding,
+        address: 0,
+        count: TAGS_EACH,
+        tags: tags_of(device.0).collect::<Vec<_>>().into(),
+        poll: Poll::Every(Duration::from_secs(1)),
+        cost: Duration::from_millis(50),
+        measured: None,
+        class: Class::Soft,
+        factor: 1,
+        shed: false,
+        next: None,
+        tally: Tally::default(),
+    }
+}
+
+fn plant() -> Arc<PlantDef> {
+    let base = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
+    let mut def = PlantDef::clone(&base);
+    let device = def.devices[0].clone();
+    def.alarms.clear();
+    def.devices.clear();
+    def.tags.clear();
+    def.trends.clear();
+    (def.guards, def.mimic) = (Default::default(), Default::default());
+    for id in 0..DEVICES {
+        let name = format!("D{id}");
+        let (id, unit) = (DeviceId(id), id as u8 + 1);
+        def.devices.push(DeviceDef {
+            id,
+            name: name.clone(),
+            unit,
+            faceplate: None,
+            actions: Vec::new(),
+            program: None,
+            ..device.clone()
+        });
+        for (address, tag) in tags_of(id.0).enumerate() {
+            let point = Point {
+                table: Table::Holding,
+                address: address as u16,
+                kind: Kind::U16,
+                order: Order::Abcd,
+                field: None,
+            };
+            let poll = Poll::Every(Duration::from_secs(1));
+            def.tags.push(TagDef { poll, ..TagDef::new(tag, id, &format!("{name}.R{address}"), point) });
+        }
+    }
+    Arc::new(def)
+}

@@ -1,0 +1,496 @@
+//! The station's socket: what terminals see through it, what they can do, and what hostile or stuck ones cannot.
+
+use std::{
+    io::Write,
+    os::unix::{fs::PermissionsExt, net::UnixStream as Plain},
+    path::PathBuf,
+    sync::Arc,
+    time::Duration,
+};
+
+use sightglass::{
+    access::{OrderRequest, Standing, Wish},
+    attach::{
+        io::{
+            connect::{AttachError, connect},
+            find::Places,
+            serve::{ListenError, STRANGERS_MAX, TERMINALS_MAX, listen},
+        },
+        protocol::{
+            self, Asked, Greeting, HELLO_BYTES_MAX, LENGTH_BYTES, NEWS_BYTES_MAX, Place, REQUEST_BYTES_MAX, Told,
+        },
+    },
+    history::{HistoryError, Question, io::Query},
+    plant::{
+        PlantDef, Snapshot,
+        command::{Command, OrderId, OrderStatus, Outcome, Refusal},
+        def::TagId,
+        event::Fault,
+        sample::{Cause, Sample},
+    },
+    profile::{self, Search},
+    station::{Entrance, Request, Session},
+};
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    net::UnixStream,
+    sync::{oneshot, watch},
+    task::JoinHandle,
+};
+
+use crate::support::folder;
+
+/// No terminal waits so long for anything here, in virtual time.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A station without a plant behind it: its snapshots are what a test says.
+struct Stand {
+    folder: tempfile::TempDir,
+    def: Arc<PlantDef>,
+    publish: watch::Sender<Arc<Snapshot>>,
+    /// May newcomers see the process?
+    view: watch::Sender<bool>,
+    /// Terminals that are there.
+    present: watch::Receiver<usize>,
+    /// Requests so far.
+    asked: watch::Receiver<usize>,
+    tasks: [JoinHandle<()>; 2],
+}
+
+impl Stand {
+    fn start() -> Stand {
+        Stand::start_in(folder())
+    }
+
+    fn start_in(folder: tempfile::TempDir) -> Stand {
+        let def = profile::load(std::path::Path::new("tank"), &Search::shipped()).unwrap();
+        let (publish, snapshots) = watch::channel(Arc::new(Snapshot::blank(def.clone())));
+        let (view, may) = watch::channel(true);
+        let (count, present) = watch::channel(0);
+        let (ask, asked) = watch::channel(0);
+        let (entrance, mut knocks, mut requests) = Entrance::new(snapshots);
+        let listener = listen(&folder.path().join("tank.sock")).unwrap();
+        let serving = tokio::spawn(async move { listener.serve(&entrance).await });
+        let orders = publish.clone();
+        let door = tokio::spawn(async move {
+            let mut may = may;
+            let mut terminals = Vec::new();
+            let mut tick = tokio::time::interval(Duration::from_millis(100));
+            loop {
+                tokio::select! {
+                    Some(knock) = knocks.recv() => {
+                        let view = *may.borrow();
+                        knock.standing.send_replace(Arc::new(Standing { view, notice: Some(knock.peer.from), ..Standing::default() }));
+                        terminals.push(knock.standing);
+                    }
+                    Some((_, request)) = requests.recv() => {
+                        answer(request, &orders);
+                        ask.send_modify(|count| *count += 1);
+                    }
+                    Ok(()) = may.changed() => {
+                        let view = *may.borrow_and_update();
+                        for terminal in &terminals {
+                            terminal.send_modify(|standing| *standing = Arc::new(Standing { view, ..Standing::clone(standing) }));
+                        }
+                    }
+                    _ = tick.tick() => terminals.retain(|terminal| !terminal.is_closed()),
+                }
+                count.send_replace(terminals.len());
+            }
+        });
+        Stand { folder, def, publish, view, present, asked, tasks: [serving, door] }
+    }
+
+    fn path(&self) -> PathBuf {
+        self.folder.path().join("tank.sock")
+    }
+
+    async fn session(&self) -> Session {
+        connect(&self.path()).await.unwrap()
+    }
+
+    /// The first tag has this value from now on.
+    fn set(&self, value: f64) {
+        self.publish.send_modify(|snapshot| {
+            let snapshot = Arc::make_mut(snapshot);
+            snapshot.at += jiff::SignedDuration::from_millis(100);
+            snapshot.samples[0] = Sample::good(value, snapshot.at);
+        });
+    }
+
+    async fn until_present(&mut self, count: usize) {
+        let reached = tokio::time::timeout(PATIENCE, self.present.wait_for(|present| *present == count)).await.is_ok();
+        assert!(reached, "there are {} terminals, not {count}", *self.present.borrow());
+    }
+
+    /// As the station ends, or is killed. Its folder stays.
+    async fn end(self) -> tempfile::TempDir {
+        for task in self.tasks {
+            task.abort();
+            let _ = task.await;
+        }
+        self.folder
+    }
+}
+
+fn answer(request: Request, orders: &watch::Sender<Arc<Snapshot>>) {
+    match request {
+        Request::Order(OrderRequest { id, command, note, seen, .. }) => orders.send_modify(|snapshot| {
+            let snapshot = Arc::make_mut(snapshot);
+            let (at, outcome) = (snapshot.at, Outcome::Verified);
+            let status = OrderStatus { id, by: "anna".into(), from: "".into(), note, command, at, old: seen, outcome };
+            snapshot.orders.insert(0, status);
+            snapshot.orders.truncate(32);
+        }),
+        Request::Ask(query) => drop(query.reply.send(Err(HistoryError::EmptyPeriod))),
+        Request::Wish(Wish::Stop, reply) => drop(reply.send(Ok(()))),
+        Request::Wish(_, reply) => drop(reply.send(Err("not yet".into()))),
+    }
+}
+
+/// Waits, in virtual time, until the terminal sees it so.
+async fn until(session: &mut Session, what: &str, so: impl Fn(&Snapshot) -> bool) {
+    let reached = tokio::time::timeout(PATIENCE, session.snapshots.wait_for(|snapshot| so(snapshot))).await;
+    assert!(reached.is_ok_and(|reached| reached.is_ok()), "never: {what}");
+}
+
+async fn sees(session: &mut Session, value: f64) {
+    until(session, &format!("the value {value}"), |snapshot| snapshot.samples[0].value == Some(value)).await;
+}
+
+async fn until_standing(session: &mut Session, what: &str, so: impl Fn(&Standing) -> bool) {
+    let reached = tokio::time::timeout(PATIENCE, session.standing.wait_for(|standing| so(standing))).await;
+    assert!(reached.is_ok_and(|reached| reached.is_ok()), "never: {what}");
+}
+
+fn of(session: &Session, number: u32) -> Option<Outcome> {
+    let id = OrderId { terminal: session.terminal, number };
+    session.snapshots.borrow().orders.iter().find(|order| order.id == id).map(|order| order.outcome.clone())
+}
+
+fn hello() -> Vec<u8> {
+    protocol::encode_first(&Greeting::own(), Some(&Place::default()), HELLO_BYTES_MAX).unwrap()
+}
+
+fn asked(asked: &Asked) -> Vec<u8> {
+    protocol::encode(asked, REQUEST_BYTES_MAX).unwrap()
+}
+
+/// Everything until the station closes; it does close, or the test fails.
+async fn until_closed(stream: &mut UnixStream) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let closed = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut bytes)).await;
+    assert!(closed.is_ok(), "the station never closed");
+    bytes
+}
+
+async fn next(stream: &mut UnixStream) -> Vec<u8> {
+    let mut length = [0; LENGTH_BYTES];
+    stream.read_exact(&mut length).await.unwrap();
+    let mut bytes = vec![0; protocol::length(length, NEWS_BYTES_MAX).unwrap()];
+    stream.read_exact(&mut bytes).await.unwrap();
+    bytes
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_terminal_sees_the_plant_gives_orders_and_is_told_where_it_is() {
+    let mut stand = Stand::start();
+    stand.set(1.0);
+    let mut session = stand.session().await;
+    assert_eq!(session.snapshots.borrow().samples[0].value, Some(1.0), "at once");
+    let from = session.standing.borrow().notice.clone().unwrap();
+    assert!(from.contains(&format!("process {}", std::process::id())), "{from}");
+    for value in [2.0, 3.0, 4.0] {
+        stand.set(value);
+        sees(&mut session, value).await;
+    }
+    let ours = protocol::encode(&**session.snapshots.borrow(), usize::MAX);
+    assert_eq!(ours, protocol::encode(&**stand.publish.borrow(), usize::MAX), "all of it, by its bytes");
+
+    session.order(7, Command::AcknowledgeAll).unwrap();
+    until(&mut session, "the order has an outcome", |snapshot| !snapshot.orders.is_empty()).await;
+    assert_eq!(of(&session, 7), Some(Outcome::Verified));
+    assert_eq!(session.wish(Wish::Stop).await, Ok(()));
+    assert_eq!(session.wish(Wish::Logout).await, Err("not yet".to_owned()));
+    let (reply, answer) = oneshot::channel();
+    let at = session.snapshots.borrow().at;
+    session.ask(Query { question: Question::Journal { from: at, to: at, limit: 1 }, reply }).unwrap();
+    assert_eq!(answer.await.unwrap(), Err(HistoryError::EmptyPeriod));
+    drop(session);
+    stand.until_present(0).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn without_a_login_a_terminal_is_told_no_value_and_after_a_logout_none_stays() {
+    let stand = Stand::start();
+    stand.view.send_replace(false);
+    stand.set(1.0);
+    let mut session = stand.session().await;
+    let hidden = |snapshot: &Snapshot| snapshot.samples[0].quality.cause() == Some(Cause::Withheld);
+    assert!(hidden(&session.snapshots.borrow()));
+    stand.view.send_replace(true);
+    sees(&mut session, 1.0).await;
+    stand.view.send_replace(false);
+    until(&mut session, "nothing is seen any more", hidden).await;
+    assert!(session.snapshots.borrow().samples.iter().all(|sample| sample.value.is_none()));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_terminal_that_does_not_read_costs_only_itself_and_is_let_go_after_five_minutes() {
+    let mut stand = Stand::start();
+    let mut stuck = UnixStream::connect(stand.path()).await.unwrap();
+    stuck.write_all(&hello()).await.unwrap();
+    let mut quick = stand.session().await;
+    stand.until_present(2).await;
+    let started = tokio::time::Instant::now();
+    let mut value = 0.0;
+    // Every snapshot is another long text, so that the socket of the stuck one is full soon.
+    while *stand.present.borrow() == 2 {
+        value += 1.0;
+        stand.publish.send_modify(|snapshot| {
+            let texts = Arc::make_mut(&mut Arc::make_mut(snapshot).texts);
+            texts[1] = Some(format!("{value}").repeat(20_000).into());
+        });
+        stand.set(value);
+        sees(&mut quick, value).await;
+        assert!(started.elapsed() < Duration::from_secs(600), "the stuck one is there for ever");
+    }
+    assert!(Duration::from_secs(290) < started.elapsed(), "it was let go after {:?}", started.elapsed());
+    assert!(1_000.0 < value, "the quick one has seen {value} snapshots meanwhile");
+    stand.until_present(1).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_terminal_says_at_once_that_the_station_has_gone_and_finds_it_again() {
+    let stand = Stand::start();
+    stand.set(1.0);
+    let mut session = stand.session().await;
+    let folder = stand.end().await;
+    until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
+    assert_eq!(session.order(1, Command::AcknowledgeAll), Err("station has gone"));
+    assert_eq!(session.wish(Wish::Stop).await, Err("station has gone".to_owned()));
+    assert_eq!(session.snapshots.borrow().samples[0].value, Some(1.0), "the last picture stays");
+
+    let mut stand = Stand::start_in(folder);
+    let other = stand.session().await;
+    stand.set(2.0);
+    until_standing(&mut session, "back", |standing| standing.gone.is_none()).await;
+    sees(&mut session, 2.0).await;
+    session.order(2, Command::AcknowledgeAll).unwrap();
+    until(&mut session, "the order has an outcome", |snapshot| !snapshot.orders.is_empty()).await;
+    assert_eq!(of(&session, 2), Some(Outcome::Verified), "under the number that the terminal has always had");
+    drop((session, other));
+    stand.until_present(0).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_order_on_its_way_when_the_station_goes_is_called_uncertain() {
+    let stand = Stand::start();
+    let mut session = stand.session().await;
+    // The station takes it and dies before it tells.
+    stand.tasks[1].abort();
+    session.order(1, Command::AcknowledgeAll).unwrap();
+    tokio::task::yield_now().await;
+    let _folder = stand.end().await;
+    until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
+    until(&mut session, "an outcome", |snapshot| !snapshot.orders.is_empty()).await;
+    let outcome = of(&session, 1).unwrap();
+    let honest = [
+        Outcome::Failed(Fault::NotConnected),
+        Outcome::Refused(Refusal::NotPermitted("station has gone".into())),
+        Outcome::Refused(Refusal::NotPermitted("station has ended".into())),
+    ];
+    assert!(honest.contains(&outcome), "{outcome:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn another_plant_after_a_restart_comes_with_its_own_definition() {
+    let stand = Stand::start();
+    let mut session = stand.session().await;
+    let before = session.snapshots.borrow().def.clone();
+    let folder = stand.end().await;
+    until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
+    let stand = Stand::start_in(folder);
+    until_standing(&mut session, "back", |standing| standing.gone.is_none()).await;
+    stand.set(5.0);
+    sees(&mut session, 5.0).await;
+    assert!(Arc::ptr_eq(&before, &session.snapshots.borrow().def), "an equal definition is the same");
+
+    // Taken up anew with another title: the terminal is let go, and comes back to the new one.
+    let mut def = PlantDef::clone(&stand.def);
+    def.title = "Another".to_owned();
+    stand.publish.send_replace(Arc::new(Snapshot::blank(Arc::new(def))));
+    until(&mut session, "the other plant", |snapshot| snapshot.def.title == "Another").await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_second_station_of_a_plant_is_refused_and_a_dead_ones_socket_replaced() {
+    let stand = Stand::start();
+    let mode = std::fs::metadata(stand.path()).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o660);
+    let error = listen(&stand.path()).unwrap_err();
+    assert!(matches!(error, ListenError::Running { .. }));
+    assert_eq!(error.to_string(), format!("the station is already running, process {}", std::process::id()));
+    let path = stand.path();
+    let places = Places {
+        given: Some(stand.folder.path().into()),
+        service: "/nowhere".into(),
+        login: None,
+        last: "/nowhere".into(),
+    };
+    let living: Vec<String> = places.living().await.into_iter().map(|found| found.name).collect();
+    assert_eq!(living, ["tank"]);
+    let folder = stand.end().await;
+    assert!(!path.exists(), "a station takes its socket with it");
+
+    // As kill -9 leaves it: a name that nobody listens behind.
+    drop(std::os::unix::net::UnixListener::bind(&path).unwrap());
+    assert!(path.exists() && places.living().await.is_empty());
+    assert!(matches!(connect(&path).await, Err(AttachError::NoStation { .. })));
+    let stand = Stand::start_in(folder);
+    stand.session().await;
+    assert_eq!(places.socket("tank").unwrap(), path);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_folder_that_others_can_write_to_is_not_trusted_with_passwords() {
+    let folder = folder();
+    let last = folder.path().join("sightglass-1");
+    let places = Places { given: None, service: "/nowhere".into(), login: None, last: last.clone() };
+    assert_eq!(places.socket("tank").unwrap(), last.join("tank.sock"));
+    assert_eq!(std::fs::metadata(&last).unwrap().permissions().mode() & 0o777, 0o700);
+    std::fs::set_permissions(&last, std::fs::Permissions::from_mode(0o777)).unwrap();
+    let _listener = std::os::unix::net::UnixListener::bind(last.join("tank.sock")).unwrap();
+    assert!(places.socket("tank").is_err() && places.living().await.is_empty());
+    std::fs::set_permissions(&last, std::fs::Permissions::from_mode(0o700)).unwrap();
+    assert_eq!(places.living().await.len(), 1);
+}
+
+#[tokio::test(start_paused = true)]
+async fn hostile_connections_are_closed_and_the_others_see_the_plant_go_on() {
+    let mut stand = Stand::start();
+    let mut session = stand.session().await;
+    let mut long = hello();
+    long[..4].copy_from_slice(&u32::MAX.to_le_bytes());
+    let order = asked(&Asked::Wish { ticket: 1, wish: Wish::Stop });
+    let hostile: Vec<(&str, Vec<u8>)> = vec![
+        ("nothing at all", Vec::new()),
+        ("random bytes", (0..4_000u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect()),
+        ("a giant length", long),
+        ("a length and nothing", 4_000u32.to_le_bytes().to_vec()),
+        ("half a hello", hello()[..9].to_vec()),
+        ("a right message before the hello", order.clone()),
+        ("an empty message", vec![0; 4]),
+        ("a giant message after the hello", [hello(), u32::MAX.to_le_bytes().to_vec()].concat()),
+        ("noise after the hello", [hello(), vec![3, 0, 0, 0, 250, 251, 252]].concat()),
+        ("the hello twice", [hello(), hello()].concat()),
+        ("half a message after the hello", [hello(), order[..5].to_vec()].concat()),
+    ];
+    for (index, (what, bytes)) in hostile.into_iter().enumerate() {
+        let mut stream = UnixStream::connect(stand.path()).await.unwrap();
+        // It may be closed before all is sent.
+        let _ = stream.write_all(&bytes).await;
+        let closed = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut Vec::new())).await;
+        assert!(closed.is_ok(), "still open: {what}");
+        stand.set(index as f64);
+        sees(&mut session, index as f64).await;
+    }
+    stand.until_present(1).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_old_terminal_is_told_in_words_what_to_do() {
+    let stand = Stand::start();
+    let mut stream = UnixStream::connect(stand.path()).await.unwrap();
+    let old = Greeting { protocol: 0, version: "0.0.9".into(), ..Greeting::own() };
+    stream.write_all(&protocol::encode_first(&old, Some(&()), HELLO_BYTES_MAX).unwrap()).await.unwrap();
+    let bytes = until_closed(&mut stream).await;
+    let why = protocol::welcome(&bytes[LENGTH_BYTES..]).unwrap().unwrap_err();
+    assert!(why.contains("0.0.9 (protocol 0)") && why.contains("log in again"), "{why}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_order_with_the_number_of_another_terminal_or_of_no_tag_never_arrives() {
+    let stand = Stand::start();
+    let mut stream = UnixStream::connect(stand.path()).await.unwrap();
+    stream.write_all(&hello()).await.unwrap();
+    let own = protocol::welcome(&next(&mut stream).await).unwrap().unwrap().terminal;
+    let order =
+        |terminal, command| asked(&Asked::Order(Box::new(OrderRequest::new(OrderId { terminal, number: 1 }, command))));
+    for (bytes, expected) in [
+        (order(own + 1, Command::AcknowledgeAll), "this is terminal"),
+        (order(own, Command::Write { tag: TagId(u16::MAX), value: 1.0 }), "tag number 65535"),
+    ] {
+        stream.write_all(&bytes).await.unwrap();
+        let why = loop {
+            if let Told::Undelivered { why, .. } = protocol::decode(&next(&mut stream).await, "message").unwrap() {
+                break why;
+            }
+        };
+        assert!(why.contains(expected), "{why}");
+    }
+    assert_eq!(*stand.asked.borrow(), 0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_thousand_silent_connections_keep_nobody_out() {
+    let mut stand = Stand::start();
+    // In ten waves, because a process may not hold a thousand sockets.
+    for wave in 0..10 {
+        let mut silent = Vec::new();
+        for _ in 0..100 {
+            silent.push(UnixStream::connect(stand.path()).await.unwrap());
+            tokio::task::yield_now().await;
+        }
+        assert!(STRANGERS_MAX < silent.len());
+        let mut session = stand.session().await;
+        stand.set(f64::from(wave));
+        sees(&mut session, f64::from(wave)).await;
+        for stream in &mut silent {
+            until_closed(stream).await;
+        }
+        drop(session);
+        stand.until_present(0).await;
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn one_terminal_more_than_there_is_room_for_is_told_so() {
+    let mut stand = Stand::start();
+    let mut sessions = Vec::new();
+    for _ in 0..TERMINALS_MAX {
+        sessions.push(stand.session().await);
+    }
+    let why = connect(&stand.path()).await.unwrap_err().to_string();
+    assert!(why.contains("64 terminals"), "{why}");
+    sessions.pop();
+    stand.until_present(TERMINALS_MAX - 1).await;
+    sessions.push(stand.session().await);
+}
+
+/// A flood waits in the flooding terminal: the station takes no more than a person can ask.
+#[tokio::test(start_paused = true)]
+async fn a_flood_of_questions_waits_where_it_comes_from() {
+    let stand = Stand::start();
+    let mut quick = stand.session().await;
+    let mut flood = Plain::connect(stand.path()).unwrap();
+    flood.set_nonblocking(true).unwrap();
+    flood.write_all(&hello()).unwrap();
+    let at = stand.publish.borrow().at;
+    let question = asked(&Asked::Ask { ticket: 1, question: Question::Journal { from: at, to: at, limit: 1 } });
+    let started = tokio::time::Instant::now();
+    let (mut sent, mut begun) = (0, 0);
+    for value in 0..200 {
+        // As much as the socket takes; what did not fit goes first in the next round.
+        while let Ok(count) = flood.write(&question[begun..]) {
+            begun = (begun + count) % question.len();
+            sent += usize::from(begun == 0);
+        }
+        stand.set(f64::from(value));
+        sees(&mut quick, f64::from(value)).await;
+    }
+    let taken = *stand.asked.borrow();
+    let seconds = started.elapsed().as_secs_f64();
+    assert!(taken as f64 <= 64.0 + 50.0 * (seconds + 1.0), "{taken} of {sent} questions were taken in {seconds} s");
+    assert!(taken < sent, "nothing has waited: {taken} of {sent}");
+}
