@@ -21,6 +21,7 @@ use sightglass::{
         },
     },
     history::{HistoryError, Question, io::Query},
+    plant::alarm::AlarmCommand,
     plant::{
         PlantDef, Snapshot,
         command::{Command, OrderId, OrderStatus, Outcome, Refusal},
@@ -207,7 +208,7 @@ async fn a_terminal_sees_the_plant_gives_orders_and_is_told_where_it_is() {
     let ours = protocol::encode(&**session.snapshots.borrow(), usize::MAX);
     assert_eq!(ours, protocol::encode(&**stand.publish.borrow(), usize::MAX), "all of it, by its bytes");
 
-    session.order(7, Command::AcknowledgeAll).unwrap();
+    session.order(7, Command::Alarm(AlarmCommand::Silence)).unwrap();
     until(&mut session, "the order has an outcome", |snapshot| !snapshot.orders.is_empty()).await;
     assert_eq!(of(&session, 7), Some(Outcome::Verified));
     assert_eq!(session.wish(Wish::Stop).await, Ok(()));
@@ -267,7 +268,7 @@ async fn a_terminal_says_at_once_that_the_station_has_gone_and_finds_it_again() 
     let mut session = stand.session().await;
     let folder = stand.end().await;
     until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
-    assert_eq!(session.order(1, Command::AcknowledgeAll), Err("station has gone"));
+    assert_eq!(session.order(1, Command::Alarm(AlarmCommand::Silence)), Err("station has gone"));
     assert_eq!(session.wish(Wish::Stop).await, Err("station has gone".to_owned()));
     assert_eq!(session.snapshots.borrow().samples[0].value, Some(1.0), "the last picture stays");
 
@@ -276,7 +277,7 @@ async fn a_terminal_says_at_once_that_the_station_has_gone_and_finds_it_again() 
     stand.set(2.0);
     until_standing(&mut session, "back", |standing| standing.gone.is_none()).await;
     sees(&mut session, 2.0).await;
-    session.order(2, Command::AcknowledgeAll).unwrap();
+    session.order(2, Command::Alarm(AlarmCommand::Silence)).unwrap();
     until(&mut session, "the order has an outcome", |snapshot| !snapshot.orders.is_empty()).await;
     assert_eq!(of(&session, 2), Some(Outcome::Verified), "under the number that the terminal has always had");
     drop((session, other));
@@ -289,7 +290,7 @@ async fn an_order_on_its_way_when_the_station_goes_is_called_uncertain() {
     let mut session = stand.session().await;
     // The station takes it and dies before it tells.
     stand.tasks[1].abort();
-    session.order(1, Command::AcknowledgeAll).unwrap();
+    session.order(1, Command::Alarm(AlarmCommand::Silence)).unwrap();
     tokio::task::yield_now().await;
     let _folder = stand.end().await;
     until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
@@ -418,7 +419,7 @@ async fn an_order_with_the_number_of_another_terminal_or_of_no_tag_never_arrives
     let order =
         |terminal, command| asked(&Asked::Order(Box::new(OrderRequest::new(OrderId { terminal, number: 1 }, command))));
     for (bytes, expected) in [
-        (order(own + 1, Command::AcknowledgeAll), "this is terminal"),
+        (order(own + 1, Command::Alarm(AlarmCommand::Silence)), "this is terminal"),
         (order(own, Command::Write { tag: TagId(u16::MAX), value: 1.0 }), "tag number 65535"),
     ] {
         stream.write_all(&bytes).await.unwrap();

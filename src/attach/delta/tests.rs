@@ -95,17 +95,16 @@ fn change(snapshot: &mut Snapshot, (kind, place, amount): (u8, u16, u32)) {
         5 => (snapshot.devices[device].ok, snapshot.devices[device].state) = (amount.into(), DeviceState::Failing(1)),
         6 => {
             let alarm = ActiveAlarm {
-                id: AlarmId(place % 4),
-                state: AlarmState::Returned,
-                raised_at: at,
                 returned_at: Some(at),
                 value: Some(f64::from(amount)),
+                ..ActiveAlarm::new(AlarmId(place % 4), AlarmState::Returned, at)
             };
             let place = usize::from(place) % (snapshot.alarms.len() + 1);
-            snapshot.alarms.insert(place, alarm);
+            Arc::make_mut(&mut snapshot.alarms).insert(place, alarm);
         }
         7 if !snapshot.alarms.is_empty() => {
-            snapshot.alarms.remove(usize::from(place) % snapshot.alarms.len());
+            let place = usize::from(place) % snapshot.alarms.len();
+            Arc::make_mut(&mut snapshot.alarms).remove(place);
         }
         8 => {
             let order = OrderStatus {
@@ -233,7 +232,7 @@ fn tags_of_one_answer_share_its_time() {
 fn without_a_login_no_value_leaves_the_station() {
     let mut snapshot = Snapshot::clone(&Fixture::alarm().snapshot());
     (0..18).for_each(|kind| change(&mut snapshot, (kind, 1, 1)));
-    snapshot.alarms[0].value = Some(72.1);
+    Arc::make_mut(&mut snapshot.alarms)[0].value = Some(72.1);
     let seen = alarms_only(&snapshot);
     assert!(seen.samples.iter().all(|sample| *sample == Sample::bad(Cause::Withheld, snapshot.at)));
     assert!(seen.texts.iter().all(Option::is_none) && seen.evidence.iter().all(Option::is_none));

@@ -4,10 +4,11 @@
 use std::sync::Arc;
 
 use super::*;
+use crate::plant::alarm::AlarmCommand;
 use crate::{plant::command::Command, ui::fixture::Fixture};
 
 fn request(terminal: u32, number: u32) -> OrderRequest {
-    OrderRequest::new(OrderId { terminal, number }, Command::AcknowledgeAll)
+    OrderRequest::new(OrderId { terminal, number }, Command::Alarm(AlarmCommand::Silence))
 }
 
 fn snapshot(orders: &[(u32, u32, Outcome)]) -> Arc<Snapshot> {

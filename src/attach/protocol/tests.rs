@@ -4,6 +4,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::plant::alarm::AlarmCommand;
 use crate::{
     attach::check,
     plant::{
@@ -115,7 +116,7 @@ fn what_this_plant_does_not_have_never_reaches_it() {
     let far = u16::MAX;
     let commands = [
         Command::Write { tag: TagId(far), value: 1.0 },
-        Command::Acknowledge(AlarmId(far)),
+        Command::Alarm(AlarmCommand::Reset(AlarmId(far))),
         Command::Refresh(DeviceId(far)),
         Command::Connect(LineId(far), true),
         Command::SaveSettings(LineId(far)),
