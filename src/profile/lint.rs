@@ -81,6 +81,11 @@ fn twice(tables: &[&AlarmTable], problems: &mut Problems) {
         let analog = ["high_high", "high", "low", "low_low", "deviation"].contains(&word);
         let value = problems.text(at.source).get(at.start..at.end).unwrap_or_default();
         let condition = if analog { word.to_owned() } else { format!("{word} = {value}") };
+        // What is enabled at another time says something else.
+        let condition = match &table.enabled_when {
+            Some(when) => format!("{condition} when {}", when.value),
+            None => condition,
+        };
         match seen.get(&(tag.value.clone(), condition.clone())) {
             Some(first) => {
                 let first = *first;
