@@ -239,7 +239,7 @@ mod tests {
             from: "pts/3 from 10.0.0.5, user panel".into(),
             action: "write".into(),
             target: "TIC-1.SV".into(),
-            old: (n % 2 == 0).then(|| "1.0 °C".into()),
+            old: n.is_multiple_of(2).then(|| "1.0 °C".into()),
             new: Some(format!("{n} \"°C\"\n").into()),
             outcome: "verified".into(),
             note: None,

@@ -2,6 +2,7 @@
 
 mod act;
 mod attach;
+mod audit;
 mod alarms;
 mod check;
 mod client;
@@ -31,7 +32,9 @@ use std::{
 
 use clap::{Parser, Subcommand};
 
-use crate::{attach::io::serve, history::HistoryError, profile, ui};
+use crate::{
+    access::io::users::UsersError, attach::io::serve, history::HistoryError, profile, station::io::StartError, ui,
+};
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -70,6 +73,8 @@ enum Command {
     Ack(act::AckArgs),
     /// Writes a tag at the running station and waits until it is verified
     Write(act::WriteArgs),
+    /// Checks the book of deeds: `audit verify` names the first line that was changed
+    Audit(audit::Args),
     /// Ends the running station
     Stop(control::Args),
     /// Has the running station take up its plant file anew; a file with errors changes nothing
@@ -130,6 +135,8 @@ enum CliError {
     #[error("{0}\nthat is no station of this user that can be asked; stop it first")]
     InUse(HistoryError),
     #[error(transparent)]
+    Users(UsersError),
+    #[error(transparent)]
     Listen(#[from] serve::ListenError),
     #[error(transparent)]
     Ui(#[from] ui::io::UiError),
@@ -143,6 +150,15 @@ enum CliError {
     Io { what: String, error: std::io::Error },
 }
 
+impl From<StartError> for CliError {
+    fn from(error: StartError) -> CliError {
+        match error {
+            StartError::History(error) => CliError::History(error),
+            StartError::Users(error) => CliError::Users(error),
+        }
+    }
+}
+
 impl CliError {
     fn exit_code(&self) -> u8 {
         match self {
@@ -152,6 +168,7 @@ impl CliError {
             CliError::NotRunning(_) => 4,
             CliError::History(_)
             | CliError::Listen(_)
+            | CliError::Users(_)
             | CliError::Ui(_)
             | CliError::StationGone
             | CliError::Failed(_)
@@ -174,6 +191,7 @@ pub fn main() -> ExitCode {
         Some(Command::Status(args)) => status::main(args),
         Some(Command::Ack(args)) => act::ack(args),
         Some(Command::Write(args)) => act::write(args),
+        Some(Command::Audit(args)) => audit::main(args),
         Some(Command::Stop(args)) => control::stop(args),
         Some(Command::Reload(args)) => control::reload(args),
         Some(Command::Unit) => unit::main(),

@@ -176,7 +176,7 @@ fn start(
             .map_err(|error| CliError::Io { what: format!("cannot make {}", folder.display()), error })?;
     }
     let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
-    Ok(station::start(station::Options { def: def.clone(), clock, history, connectors, file })?)
+    Ok(station::start_guarded(station::Options { def: def.clone(), clock, history, connectors, file })?)
 }
 
 /// Tells what changes until the time is over, a signal comes, or the station ends; gives the last snapshot. Feeds the

@@ -60,8 +60,7 @@ impl Source {
     /// Tells the station that a file was written out of what it holds; a history without a station has nobody to tell.
     pub async fn exported(&self, file: &str, bytes: &[u8]) -> Result<(), CliError> {
         let Source::Station(session) = self else { return Ok(()) };
-        let sha256 = String::new();
-        let _ = bytes;
+        let sha256 = crate::access::book::sha256(bytes);
         session.wish(crate::access::Wish::Exported { file: file.to_owned(), sha256 }).await.map_err(CliError::Failed)
     }
 }

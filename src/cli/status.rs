@@ -46,7 +46,7 @@ fn in_words(snapshot: &Snapshot) -> Vec<String> {
         lines.push(format!("line     {:12} {}", line.name, line_words(&status.state)));
     }
     for (device, status) in def.devices.iter().zip(&snapshot.devices) {
-        let why = status.diagnosis.map(|reason| format!(": {}", reason.to_string())).unwrap_or_default();
+        let why = status.diagnosis.map(|reason| format!(": {reason}")).unwrap_or_default();
         lines.push(format!("device   {:12} {}{why}", device.name, device_word(status.state)));
     }
     lines.extend(snapshot.alarms.iter().map(|alarm| format!("alarm    {}", alarm_words(snapshot, alarm))));

@@ -63,12 +63,12 @@ impl Desk {
         tag: TagId,
         value: f64,
         at: Timestamp,
-    ) -> Result<BusRequest, Option<ActionRecord>> {
+    ) -> Result<BusRequest, Option<Box<ActionRecord>>> {
         let old = board.sample(tag).value;
         self.open(order, old, at);
         let checked = self.not_overtaken(board, order, tag, value).and_then(|()| self.check(board, tag, value));
         match checked {
-            Err(outcome) => Err(self.close(order.id, outcome, board)),
+            Err(outcome) => Err(self.close(order.id, outcome, board).map(Box::new)),
             Ok(Checked { raw, unlock, urgent }) => {
                 self.last_write += 1;
                 let id = WriteId(self.last_write);

@@ -166,6 +166,33 @@ pub struct ActionRecord {
     pub seal: Option<Seal>,
 }
 
+/// Deeds that are not at the plant but about people, terminals and the station: for the book and the list of a Supervisor,
+/// not for shift reports and curves.
+pub const ELSEWHERE: [&str; 22] = [
+    "attach",
+    "detach",
+    "login",
+    "login failed",
+    "logout",
+    "lock terminal",
+    "unlock terminal",
+    "lock-out",
+    "signature failed",
+    "add user",
+    "change password",
+    "set role",
+    "disable user",
+    "enable user",
+    "delete user",
+    "reset password",
+    "export",
+    "too many requests",
+    "audit trail",
+    "start station",
+    "stop station",
+    "reload",
+];
+
 /// The place of a deed in the chained book.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Seal {

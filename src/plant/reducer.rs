@@ -169,7 +169,7 @@ impl Plant {
                     effects.bus.push((self.line_of(tag), request));
                     None
                 }
-                Err(action) => action,
+                Err(action) => action.map(|action| *action),
             },
             Command::Alarm(command) => self.alarm_order(&order, command, at, &mut effects),
             Command::Refresh(device) => {

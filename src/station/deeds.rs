@@ -53,7 +53,7 @@ impl Deeds {
     /// The first deeds of a station: that it has started, and the plant file if it is another one than the last time.
     pub fn started(&mut self, plant: &str, file: Option<&PlantFile>, at: Timestamp) {
         let version = concat!("sightglass ", env!("CARGO_PKG_VERSION"));
-        let start = ActionRecord { new: Some(version.into()), ..own(at, "start", plant, "done") };
+        let start = ActionRecord { new: Some(version.into()), ..own(at, "start station", plant, "done") };
         let changed = file.and_then(|file| self.plant_file(file, at));
         // Nothing else waits in this queue yet, so nothing comes back.
         self.put([start].into_iter().chain(changed).collect());
@@ -134,7 +134,7 @@ impl Deeds {
 
 /// The last deed of a station.
 pub fn stopped(plant: &str, at: Timestamp) -> ActionRecord {
-    own(at, "stop", plant, "done")
+    own(at, "stop station", plant, "done")
 }
 
 fn own(at: Timestamp, action: &str, target: &str, outcome: &str) -> ActionRecord {

@@ -110,7 +110,7 @@ impl Gate {
             Some(seat) if seat.acting().is_some() => {
                 seat.locked = true;
                 let target = seat.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
-                let mut effects = vec![deed(seat, "lock", &target, "done", at), Effect::Reply(ticket, Ok(()))];
+                let mut effects = vec![deed(seat, "lock terminal", &target, "done", at), Effect::Reply(ticket, Ok(()))];
                 self.tell(terminal, &mut effects);
                 effects
             }
@@ -143,7 +143,7 @@ impl Gate {
         let still = |seat: &&mut Seat| seat.who.as_ref().is_some_and(|who| who.user == user);
         let Some(seat) = self.seats.get_mut(&terminal).filter(still) else { return reply(ticket, LOG_IN_FIRST) };
         (seat.locked, seat.active) = (false, at);
-        let mut effects = vec![deed(seat, "unlock", &user, "done", at), Effect::Reply(ticket, Ok(()))];
+        let mut effects = vec![deed(seat, "unlock terminal", &user, "done", at), Effect::Reply(ticket, Ok(()))];
         self.tell(terminal, &mut effects);
         effects
     }
@@ -166,7 +166,7 @@ impl Gate {
             if let Some(seat) = self.seats.get_mut(&terminal).filter(|_| left.is_zero()) {
                 seat.locked = true;
                 let name = seat.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
-                effects.push(deed(seat, "lock", &name, "done: nobody has touched it", at));
+                effects.push(deed(seat, "lock terminal", &name, "done: nobody has touched it", at));
                 self.tell(terminal, &mut effects);
             } else {
                 effects.push(Effect::Standing(terminal));

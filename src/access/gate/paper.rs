@@ -85,8 +85,8 @@ pub(super) fn words(wish: &Wish) -> (&'static str, Arc<str>) {
     match wish {
         Wish::Login { .. } => ("login", "unknown user".into()),
         Wish::Logout => ("logout", "".into()),
-        Wish::Lock => ("lock", "".into()),
-        Wish::Unlock(_) => ("unlock", "".into()),
+        Wish::Lock => ("lock terminal", "".into()),
+        Wish::Unlock(_) => ("unlock terminal", "".into()),
         Wish::Active => ("active", "".into()),
         Wish::FirstSupervisor { user, .. } => ("add user", name(user)),
         Wish::ChangePassword { .. } => ("change password", "".into()),
@@ -103,7 +103,11 @@ pub(super) fn words(wish: &Wish) -> (&'static str, Arc<str>) {
 }
 
 pub(super) fn seat_name(seat: &Seat) -> Arc<str> {
-    seat.who.as_ref().map_or_else(|| "not logged in".into(), |who| who.user.clone())
+    match (&seat.who, &seat.peer.unix_user) {
+        (Some(who), _) => who.user.clone(),
+        (None, Some(user)) => format!("not logged in ({user})").into(),
+        (None, None) => "not logged in".into(),
+    }
 }
 
 pub(super) fn record(seat: &Seat, action: &str, target: &str, outcome: &str, at: Timestamp) -> ActionRecord {

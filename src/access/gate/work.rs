@@ -175,7 +175,7 @@ impl Gate {
         };
         let Some(user) = user else { return Some("unknown user") };
         // Who is in already is not to be shut out by what somebody else tries from elsewhere.
-        let locked = what.from_outside() && self.tries.locked_until(&user::key(&user.name), at).is_some();
+        let locked = what.comes_from_outside() && self.tries.locked_until(&user::key(&user.name), at).is_some();
         match (right, user.disabled, locked) {
             (_, _, true) => Some("locked out"),
             (_, true, _) => Some("disabled"),
@@ -238,7 +238,7 @@ impl What {
     }
 
     /// Does somebody who is not in yet want to be?
-    fn from_outside(&self) -> bool {
+    fn comes_from_outside(&self) -> bool {
         match self {
             What::Login { .. } => true,
             What::Sign { by, signer, .. } => signer.as_ref() != Some(by),

@@ -59,7 +59,7 @@ fn moods() -> Vec<Snapshot> {
 fn frame(number: u64) -> Frame {
     Frame {
         at: now(),
-        sent: number % 2 == 0,
+        sent: number.is_multiple_of(2),
         bytes: [1, 3, number as u8].into(),
         framing: Framing::Rtu,
         verdict: "ok".into(),

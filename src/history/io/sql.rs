@@ -1,5 +1,7 @@
 //! The schema as numbered migrations, and the questions in SQL. Times are UTC; local time is Rust's business.
 
+use crate::plant::record::ELSEWHERE;
+
 /// The migrations; the schema's version is their number. Each runs in one transaction, followed by a checkpoint before
 /// any data, because data definitions among data in the log are what DuckDB's known recovery bugs need.
 ///
@@ -126,9 +128,18 @@ pub fn restore() -> String {
 /// Deeds in a span.
 const DEED: &str = "utc, by_whom, action, target, old_value, new_value, outcome, from_where, note, number, hash";
 
-/// Deeds of operators in a span, newest first.
+/// Deeds at the plant, without those about people and terminals.
+fn at_the_plant() -> String {
+    let words: Vec<String> = ELSEWHERE.iter().map(|word| format!("'{word}'")).collect();
+    format!("action NOT IN ({})", words.join(", "))
+}
+
+/// Deeds at the plant in a span, newest first.
 pub fn actions_newest() -> String {
-    format!("SELECT {DEED} FROM operator_action WHERE utc >= ? AND utc < ? ORDER BY utc DESC, rowid DESC LIMIT ?")
+    let plant = at_the_plant();
+    format!(
+        "SELECT {DEED} FROM operator_action WHERE utc >= ? AND utc < ? AND {plant} ORDER BY utc DESC, rowid DESC LIMIT ?"
+    )
 }
 
 /// Deeds in a span, newest first, with a part of who, of the action, and of the words of all columns; large and small
@@ -143,9 +154,10 @@ pub fn audit() -> String {
     )
 }
 
-/// Deeds of operators in a span, oldest first.
+/// Deeds at the plant in a span, oldest first.
 pub fn actions_oldest() -> String {
-    format!("SELECT {DEED} FROM operator_action WHERE utc >= ? AND utc < ? ORDER BY utc, rowid LIMIT ?")
+    let plant = at_the_plant();
+    format!("SELECT {DEED} FROM operator_action WHERE utc >= ? AND utc < ? AND {plant} ORDER BY utc, rowid LIMIT ?")
 }
 
 /// Minutes of a line in a span, oldest first; of more than the limit the latest.

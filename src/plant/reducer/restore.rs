@@ -190,7 +190,7 @@ impl Plant {
             }
             match self.desk.write(&self.board, &order, tag, value, at) {
                 Ok(request) => effects.bus.push((self.line_of(tag), request)),
-                Err(action) => effects.records.extend(action.map(Record::Action)),
+                Err(action) => effects.records.extend(action.map(|action| Record::Action(*action))),
             }
         }
         if let Some(outcome) = run.outcome(&self.def) {
