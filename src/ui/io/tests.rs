@@ -11,8 +11,11 @@ use tokio::sync::watch;
 
 use super::*;
 use crate::access::{OrderRequest, Standing, Who};
-use crate::{plant::command::Command, ui::fixture::Fixture};
 use crate::{plant::role::Role, station::Request};
+use crate::{
+    plant::{alarm::AlarmCommand, command::Command},
+    ui::fixture::Fixture,
+};
 
 /// Set for the process on the pty.
 const CHILD: &str = "SIGHTGLASS_UI_CHILD";
@@ -38,7 +41,7 @@ fn on_the_pty() {
                 let Request::Order(OrderRequest { command, .. }) = request else { continue };
                 let mut snapshot = Arc::unwrap_or_clone(Fixture::alarm().snapshot());
                 match command {
-                    Command::Alarm(_) => {
+                    Command::Alarm(AlarmCommand::Acknowledge { .. }) => {
                         let panicked = tokio::spawn(async { panic!("a task of the station") }).await;
                         assert!(panicked.is_err());
                         snapshot.alarms = Arc::default();
