@@ -52,7 +52,7 @@ pub struct AckArgs {
 /// Writes, and tells the outcome; anything but verified is a failure.
 pub fn write(args: WriteArgs) -> Result<(), CliError> {
     in_runtime(async {
-        let mut session = client::attach(args.plant.as_deref(), &args.login).await?;
+        let mut session = client::attach_to_act(args.plant.as_deref(), &args.login).await?;
         let snapshot = session.snapshots.borrow().clone();
         let tag = snapshot
             .def
@@ -79,7 +79,7 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
 /// Acknowledges alarm after alarm; the first refusal ends it.
 pub fn ack(args: AckArgs) -> Result<(), CliError> {
     in_runtime(async {
-        let mut session = client::attach(args.plant.as_deref(), &args.login).await?;
+        let mut session = client::attach_to_act(args.plant.as_deref(), &args.login).await?;
         let snapshot: Arc<Snapshot> = session.snapshots.borrow().clone();
         let known =
             |name: &str| snapshot.def.alarms.iter().any(|alarm| subject_name(&snapshot.def, alarm.subject) == name);

@@ -54,6 +54,15 @@ pub async fn attach(plant: Option<&str>, login: &Login) -> Result<Session, CliEr
     Ok(session)
 }
 
+/// The same for somebody who wants to act: nobody may without a login.
+pub async fn attach_to_act(plant: Option<&str>, login: &Login) -> Result<Session, CliError> {
+    let session = attach(plant, login).await?;
+    if session.standing.borrow().who.is_none() {
+        return Err(CliError::Failed("log in to act: --user NAME asks for the password".to_owned()));
+    }
+    Ok(session)
+}
+
 /// Attaches to a station.
 pub async fn open(plant: Option<&str>) -> Result<Session, CliError> {
     let found = place(plant).await?;

@@ -115,7 +115,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 /// Tells what happens until the time is over, then sums up and writes the report.
 async fn headless(session: Session, clock: Clock, duration: Option<Duration>, args: &Args) -> Result<(), CliError> {
     let from = clock.now();
-    let last = run::follow(session.clone(), clock, duration).await?;
+    let last = run::follow(session.snapshots.clone(), clock, duration).await?;
     let period = Period { name: "demo".into(), from, to: clock.now() };
     let report = ask_report(&session, period).await?;
     for line in summary(&last, &report) {

@@ -4,6 +4,7 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{
     signal::unix::{SignalKind, signal},
+    sync::watch,
     task::JoinHandle,
 };
 
@@ -12,11 +13,14 @@ use crate::{
     bus::io::{clock::Clock, transport::Connector},
     plant::{PlantDef, Snapshot},
     profile::PlantFile,
-    station::{Command, Session, io as station, teller},
+    station::{Command, io as station, teller},
     ui,
 };
 
 use super::{CliError, StationArgs, attach, client, in_runtime, init, load_with_file, log, paths, say, span, status};
+
+/// So long an answer takes at most to leave the station before its socket closes.
+const ANSWER: Duration = Duration::from_millis(200);
 
 /// A plant that is checked, and the file that its settings can be saved into.
 type Plant = (PlantDef, Option<PlantFile>);
@@ -51,15 +55,15 @@ pub fn main(args: Args) -> Result<(), CliError> {
             let station = start(&def, clock, history_file(&def, &args.station), plant.1)?;
             let mut serving = Serving::new(listener, station);
             say(&format!("{}: {} tags on {} lines", def.title, def.tags.len(), def.lines.len()));
-            let session = serving.station.session("station");
+            let snapshots = serving.station.entrance().snapshots.clone();
             init::ready(&def.title);
             let ended = tokio::select! {
-                ended = follow(session.clone(), clock, None) => ended.map(|_| None),
+                ended = follow(snapshots.clone(), clock, None) => ended.map(|_| None),
                 () = &mut over => Ok(None),
                 next = serving.told(|| load_with_file(&args.plant, &args.station)) => Ok(next),
             };
-            let last = session.snapshots.borrow().clone();
-            drop(session);
+            let last = snapshots.borrow().clone();
+            drop(snapshots);
             match &ended {
                 Ok(Some(_)) => init::reloading(),
                 Ok(None) | Err(_) => init::stopping(),
@@ -139,11 +143,16 @@ impl Serving {
     async fn told(&mut self, load: impl Fn() -> Result<Plant, CliError>) -> Option<Plant> {
         loop {
             match self.station.commands.recv().await {
-                Some(Command::Stop) | None => return None,
+                None => return None,
+                Some(Command::Stop) => {
+                    tokio::time::sleep(ANSWER).await;
+                    return None;
+                }
                 Some(Command::Reload(reply)) => match load() {
                     Ok(plant) => {
                         // A terminal that has left needs no answer.
                         let _ = reply.send(Ok(()));
+                        tokio::time::sleep(ANSWER).await;
                         return Some(plant);
                     }
                     Err(error) => drop(reply.send(Err(error.to_string()))),
@@ -181,8 +190,12 @@ fn start(
 
 /// Tells what changes until the time is over, a signal comes, or the station ends; gives the last snapshot. Feeds the
 /// watchdog of the init system, if there is one, for as long as the lines are polled.
-pub async fn follow(mut session: Session, clock: Clock, duration: Option<Duration>) -> Result<Arc<Snapshot>, CliError> {
-    let mut before = session.snapshots.borrow_and_update().clone();
+pub async fn follow(
+    mut snapshots: watch::Receiver<Arc<Snapshot>>,
+    clock: Clock,
+    duration: Option<Duration>,
+) -> Result<Arc<Snapshot>, CliError> {
+    let mut before = snapshots.borrow_and_update().clone();
     let mut watchdog = init::Watchdog::new();
     let end = over(clock, duration);
     tokio::pin!(end);
@@ -192,11 +205,11 @@ pub async fn follow(mut session: Session, clock: Clock, duration: Option<Duratio
         tokio::select! {
             () = &mut end => break,
             () = &mut told_to_stop => break,
-            changed = session.snapshots.changed() => {
+            changed = snapshots.changed() => {
                 if changed.is_err() {
                     return Err(CliError::StationGone);
                 }
-                let after = session.snapshots.borrow_and_update().clone();
+                let after = snapshots.borrow_and_update().clone();
                 watchdog.see(&after);
                 let time = after.at.to_zoned(after.def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S");
                 for line in teller::changes(&before, &after) {
@@ -206,7 +219,7 @@ pub async fn follow(mut session: Session, clock: Clock, duration: Option<Duratio
             }
         }
     }
-    Ok(session.snapshots.borrow().clone())
+    Ok(snapshots.borrow().clone())
 }
 
 /// Returns when a span of plant time is over; never without one.

@@ -168,11 +168,12 @@ pub struct ActionRecord {
 
 /// Deeds that are not at the plant but about people, terminals and the station: for the book and the list of a Supervisor,
 /// not for shift reports and curves.
-pub const ELSEWHERE: [&str; 22] = [
+pub const ELSEWHERE: [&str; 23] = [
     "attach",
     "detach",
     "login",
     "login failed",
+    "unlock failed",
     "logout",
     "lock terminal",
     "unlock terminal",

@@ -26,7 +26,8 @@ async fn deeds(session: &super::Session, action: &str) -> Vec<ActionRecord> {
     let mut snapshots = session.snapshots.clone();
     loop {
         let (reply, answer) = tokio::sync::oneshot::channel();
-        let question = Question::Actions { from, to, limit: 1_000 };
+        let all = String::new;
+        let question = Question::Audit { from, to, words: all(), by: all(), action: all(), limit: 1_000 };
         session.ask(Query { question, reply }).unwrap();
         let Answer::Actions(deeds) = answer.await.unwrap().unwrap() else { panic!("another answer") };
         if deeds.iter().any(|deed| &*deed.action == action) {
@@ -75,7 +76,10 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
     assert!(summary.compared == rows.len() as u64 && summary.entries > summary.compared);
     let text = std::fs::read_to_string(book::beside(&history)).unwrap();
     let actions: Vec<_> = text.lines().map(|line| line.split("\"action\":\"").nth(1).unwrap()).collect();
-    assert!(actions[0].starts_with("start\"") && actions[actions.len() - 1].starts_with("stop\""), "{text}");
+    assert!(
+        actions[0].starts_with("start station") && actions[actions.len() - 1].starts_with("stop station"),
+        "{text}"
+    );
     assert!(!text.contains("horses"), "a password is never written down");
 
     std::fs::write(users_beside(&history), "").unwrap();

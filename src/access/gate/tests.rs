@@ -214,7 +214,7 @@ fn each_role_may_what_is_its_own_and_refused_orders_go_to_the_plant_as_refused()
         }
         let (order, why) = bench.order(1, RUN, None).unwrap();
         assert_eq!(why.is_some(), refused, "{login:?} {why:?}");
-        assert_eq!(&*order.by, login.map_or("not logged in", |login| login.0));
+        assert_eq!(&*order.by, login.map_or("not logged in (panel)", |login| login.0));
         assert_eq!(&*order.from, "pts/1 from 10.0.0.1, user panel");
         let stop = bench.wish(1, Wish::Stop);
         assert!(stop.is_err());
