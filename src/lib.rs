@@ -4,15 +4,16 @@
 //! in DuckDB, draws the process as a living mimic, sets controllers with verified writes and writes shift reports.
 //! It never shows a wrong value as a right one.
 //!
-//! # One binary, three ways to run it
+//! # One binary, four ways to run it
 //!
 //! | command | what runs |
 //! |---|---|
-//! | `sightglass run PLANT` | the **station**: polls, alarms, history. No terminal: what an init system starts on a panel PC |
-//! | `sightglass PLANT` | station and **terminal** in one process |
+//! | `sightglass run PLANT` | the **station**: polls, alarms, history, a socket. No terminal: what an init system starts on a panel PC |
+//! | `sightglass` | a **terminal** attached to the running station; any number at once |
+//! | `sightglass PLANT` | station and terminal in one process, or a terminal at the station of that plant |
 //! | `sightglass demo` | a simulated plant on real pseudo-terminals and sockets, station and terminal in one process |
 //!
-//! `sightglass drill` is the fourth, without a terminal: station and simulated plant in virtual time, judged by a scenario.
+//! `sightglass drill` is the fifth, without a terminal: station and simulated plant in virtual time, judged by a scenario.
 //!
 //! # How data flows
 //!
@@ -30,10 +31,14 @@
 //!    Record        │   │   └────────────────────┐
 //!    mpsc,         │   │ watch<Arc<Snapshot>>   │
 //!    loss counted  ▼   ▼   latest only          │
-//!            history     Session ───────────── Session     one per terminal
-//!            thread  <─── Query / Answer        │
-//!            DuckDB                          terminal (ui)
+//!  book ──> history     door ────────────── Session      one per terminal: channels, or the
+//!  thread   thread  <─── Query / Answer        │          socket of `attach` with deltas
+//!  (chain)  DuckDB       Gate: who may      terminal (ui)
 //! ```
+//!
+//! Everything that a terminal asks goes through the **door**: the task around [`access::Gate`], the reducer of people, which
+//! alone decides what is permitted. What it refuses goes on to the plant as a refused order, so that it is seen and on
+//! record like any other. Deeds are sealed in the book, on disk, before a snapshot shows their outcome.
 //!
 //! There is exactly one awaited send in the station (link → plant). Everything else is `try_send` or `watch`, so the
 //! plant task never blocks and deadlock is ruled out by shape. Shutdown runs downstream: the links stop, the plant ends
@@ -45,8 +50,8 @@
 //!    file, the terminal only what its operator looks at.
 //! 2. **One way.** device → [`bus`] → [`plant`] → snapshot → ([`history`], terminals). Back only as orders, whose
 //!    outcome comes back inside a later snapshot.
-//! 3. **Two pure reducers**: [`plant::Plant`] for facts and [`ui::update`] for the view. Everything asynchronous is a
-//!    thin loop around one of them.
+//! 3. **Three pure reducers**: [`plant::Plant`] for facts, [`access::Gate`] for people, [`ui::update`] for the view.
+//!    Everything asynchronous is a thin loop around one of them.
 //! 4. **The outside world is spelled `io`.** Only `io` files, the station and the command line may name tokio, DuckDB,
 //!    files, sockets, the terminal or a clock. Time is an argument everywhere else.
 //! 5. **A value never travels alone**: [`plant::sample::Sample`] is value, quality and time, on screen, in alarms, in the
