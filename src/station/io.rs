@@ -1,12 +1,11 @@
 //! Starts the tasks of a station, carries effects between them, and stops them in order.
 
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::{path::PathBuf, sync::Arc};
 
 use jiff::Timestamp;
 use tokio::{
     sync::{mpsc, watch},
     task::JoinHandle,
-    time::Instant,
 };
 
 use crate::{
@@ -20,11 +19,10 @@ use crate::{
         io::{Query, thread as history},
     },
     plant::{
-        Effects, Plant, PlantDef, SetWork, Snapshot,
-        command::{BusRequest, Order, OrderId},
-        def::{LineDef, LineId},
+        Plant, PlantDef,
+        command::Order,
+        def::LineId,
         event::{Event, LineState},
-        record::{ActionRecord, Record},
         snapshot::HistoryStatus,
     },
     profile::PlantFile,
@@ -32,8 +30,9 @@ use crate::{
 };
 
 use super::{
-    deeds::{self, Deeds},
+    deeds::Deeds,
     door::{self, Door, Entrance, Ways},
+    plant_task::{KEPT_FOR_STOPS, Keeping, PlantTask},
     session::Session,
     sets,
 };
@@ -42,17 +41,8 @@ use super::{
 const EVENTS: usize = 256;
 /// Requests waiting for one link; a full queue refuses the order.
 const REQUESTS: usize = 16 + KEPT_FOR_STOPS;
-/// Places of that queue that only a stop may take.
-const KEPT_FOR_STOPS: usize = 4;
 /// Orders waiting for the plant; a full queue refuses the order.
 const ORDERS: usize = 64;
-/// Real time between two snapshots: what a person can follow.
-const SNAPSHOT_EVERY: Duration = Duration::from_millis(100);
-/// At the end the folder of parameter sets is waited for so long.
-const FILING_MAX: Duration = Duration::from_secs(2);
-/// Real time between two ticks at the least; one second of plant time otherwise.
-const TICK_MIN: Duration = Duration::from_millis(20);
-
 /// What a station is started with.
 #[derive(Debug)]
 pub struct Options {
@@ -155,17 +145,6 @@ struct Threads {
     book: Option<std::thread::JoinHandle<()>>,
 }
 
-/// Where the journal and the parameter sets go.
-struct Keeping {
-    records: Option<mpsc::Sender<Vec<Record>>>,
-    store: watch::Receiver<HistoryStatus>,
-    /// Deeds go there first.
-    book: Option<Deeds>,
-    /// The folder of parameter sets.
-    sets: Option<PathBuf>,
-    listener: Option<Listener>,
-}
-
 // Everything that a station is made of, each once.
 #[allow(clippy::too_many_arguments)]
 fn assemble(
@@ -191,7 +170,7 @@ fn assemble(
         tasks.push(tokio::spawn(supervise(tokio::spawn(link), line.id, clock, events.clone(), stopped.clone())));
     }
     let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
-    let desk = PlantTask { plant, clock, links, file, saving: None, filing: None, keeping, lost: 0, publish };
+    let desk = PlantTask::new(plant, clock, links, file, keeping, publish);
     let (deeds, deed_queue) = mpsc::channel(ORDERS);
     tasks.push(tokio::spawn(desk.run(event_queue, order_queue, deed_queue)));
     let (command, commands) = mpsc::channel(door::COMMANDS);
@@ -258,289 +237,5 @@ impl Station {
         if let Err(error) = tokio::task::spawn_blocking(ended).await {
             tracing::error!(%error, "the history did not end well");
         }
-    }
-}
-
-/// Said where there is nothing to save into.
-const NO_FILE: &str =
-    "this plant is part of the program; write it to a file with `sightglass profiles NAME` and start that";
-
-/// The plant file on its way to the disk, and for whom.
-struct Saving {
-    order: OrderId,
-    settings: LineDef,
-    work: JoinHandle<(PlantFile, Result<(), String>)>,
-}
-
-/// For whom, and how it ended.
-type Saved = (OrderId, LineDef, Result<(PlantFile, Result<(), String>), tokio::task::JoinError>);
-
-/// Waits for the end of a save; for ever without one.
-async fn saved(saving: &mut Option<Saving>) -> Saved {
-    let Some(Saving { order, settings, work }) = saving else { return std::future::pending().await };
-    let saved = (*order, settings.clone(), work.await);
-    *saving = None;
-    saved
-}
-
-/// Waits for the end of the work with the sets; for ever without any.
-async fn filed(filing: &mut Option<JoinHandle<sets::Done>>) -> Result<sets::Done, tokio::task::JoinError> {
-    let Some(work) = filing else { return std::future::pending().await };
-    let done = work.await;
-    *filing = None;
-    done
-}
-
-/// The loop around the reducer: sole owner of the plant.
-struct PlantTask {
-    plant: Plant,
-    clock: Clock,
-    links: Vec<mpsc::Sender<BusRequest>>,
-    /// The plant file, unless it is just being written.
-    file: Option<PlantFile>,
-    saving: Option<Saving>,
-    /// The work with the parameter sets.
-    filing: Option<JoinHandle<sets::Done>>,
-    keeping: Keeping,
-    /// Records that the queue to the store had no room for.
-    lost: u64,
-    publish: watch::Sender<Arc<Snapshot>>,
-}
-
-impl PlantTask {
-    async fn run(
-        mut self,
-        mut events: mpsc::Receiver<Event>,
-        mut orders: mpsc::Receiver<Order>,
-        mut deeds: mpsc::Receiver<ActionRecord>,
-    ) {
-        let tick_every = self.clock.real_span(Duration::from_secs(1)).max(TICK_MIN);
-        self.file_sets(SetWork::Read);
-        let mut tick = tokio::time::interval(tick_every);
-        tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
-        // Changed since the last snapshot, and when the next one may go out.
-        let (mut changed, mut next) = (false, Instant::now());
-        loop {
-            // What a snapshot shows as done is in the book.
-            let due = self.keeping.book.as_ref().map_or(next, |book| book.due(next));
-            tokio::select! {
-                biased;
-                () = tokio::time::sleep_until(due), if changed => {
-                    self.publish.send_replace(Arc::new(self.plant.snapshot()));
-                    (changed, next) = (false, Instant::now() + SNAPSHOT_EVERY);
-                }
-                Some(order) = orders.recv() => {
-                    let effects = self.plant.on_order(order, self.clock.now());
-                    self.carry_out(effects);
-                    (changed, next) = (true, Instant::now());
-                }
-                Some(deed) = deeds.recv() => self.keep(vec![Record::Action(deed)]),
-                saved = saved(&mut self.saving) => {
-                    self.take_saved(saved);
-                    changed = true;
-                }
-                done = filed(&mut self.filing) => {
-                    self.take_filed(done);
-                    changed = true;
-                }
-                Ok(()) = self.keeping.store.changed() => {
-                    self.hear_store();
-                    changed = true;
-                }
-                () = Deeds::changed(&mut self.keeping.book) => {
-                    self.hear_store();
-                    changed = true;
-                }
-                // Before the events: however many there are, values age and orders expire.
-                _ = tick.tick() => {
-                    let effects = self.plant.on_tick(self.clock.now());
-                    self.carry_out(effects);
-                    self.look_at_clock();
-                    changed = true;
-                }
-                event = events.recv() => {
-                    // The links have stopped: nothing can become true any more.
-                    let Some(event) = event else { break };
-                    let effects = self.plant.on_event(event);
-                    self.carry_out(effects);
-                    changed = true;
-                }
-            }
-        }
-        if self.saving.is_some() {
-            // What was begun is ended: half a second of a disk at the most.
-            let saved = saved(&mut self.saving).await;
-            self.take_saved(saved);
-        }
-        if self.filing.is_some() {
-            // A disk that hangs keeps nobody from leaving.
-            match tokio::time::timeout(FILING_MAX, filed(&mut self.filing)).await {
-                Ok(done) => self.take_filed(done),
-                Err(_) => tracing::error!("the folder of the parameter sets does not answer: left behind"),
-            }
-        }
-        let stopped = deeds::stopped(&self.plant.def().name, self.clock.now());
-        if self.keeping.book.is_some() {
-            self.write_down(vec![stopped]);
-        }
-        self.publish.send_replace(Arc::new(self.plant.snapshot()));
-    }
-
-    fn look_at_clock(&mut self) {
-        // A clock that runs faster, or in virtual time, is nobody's wall clock.
-        let real = self.clock.speed() == 1.0;
-        let now = self.clock.now();
-        let step = self.keeping.book.as_mut().filter(|_| real).and_then(|book| book.look_at_clock(now));
-        if let Some(step) = step {
-            self.write_down(vec![step]);
-        }
-    }
-
-    fn carry_out(&mut self, effects: Effects) {
-        for (line, request) in effects.bus {
-            self.send(line, request);
-        }
-        self.keep(effects.records);
-        if let Some((order, settings)) = effects.save {
-            self.save(order, settings);
-        }
-        if let Some(work) = effects.sets {
-            self.file_sets(work);
-        }
-    }
-
-    /// Has the folder of parameter sets worked on beside the loop, one work at a time.
-    fn file_sets(&mut self, work: SetWork) {
-        let refused = match (&self.keeping.sets, &self.filing) {
-            (Some(folder), None) => {
-                let (folder, def) = (folder.clone(), self.plant.def().clone());
-                self.filing = Some(tokio::task::spawn_blocking(move || sets::work(&folder, &def, work)));
-                return;
-            }
-            (Some(_), Some(_)) => "another set is just being saved, try again",
-            (None, _) => "this station keeps nothing",
-        };
-        // What is being done ends with the folder read, so a wish to read is granted already.
-        if let SetWork::Write { order, .. } = work {
-            let effects = self.plant.on_set_written(order, Err(refused.to_owned()));
-            self.keep(effects.records);
-        }
-    }
-
-    fn take_filed(&mut self, done: Result<sets::Done, tokio::task::JoinError>) {
-        let (written, sets) = match done {
-            Ok(done) => done,
-            // Whoever has ordered it hears of it when his order is given up.
-            Err(error) => return tracing::error!(%error, "the work with the sets ended badly"),
-        };
-        self.plant.on_sets(sets);
-        if let Some((order, result)) = written {
-            let effects = self.plant.on_set_written(order, result);
-            self.keep(effects.records);
-        }
-    }
-
-    /// Has the plant file written beside the loop; the outcome comes to [`PlantTask::take_saved`].
-    fn save(&mut self, order: OrderId, settings: LineDef) {
-        match (self.file.take(), &self.saving) {
-            (Some(mut file), _) => {
-                let saved = settings.clone();
-                let work = tokio::task::spawn_blocking(move || {
-                    let result = file.save(&settings);
-                    (file, result)
-                });
-                self.saving = Some(Saving { order, settings: saved, work });
-            }
-            (None, Some(_)) => self.tell_saved(order, &settings, Err("other settings are just being saved".into())),
-            (None, None) => self.tell_saved(order, &settings, Err(NO_FILE.into())),
-        }
-    }
-
-    fn take_saved(&mut self, (order, settings, done): Saved) {
-        let result = match done {
-            Ok((file, result)) => {
-                let now = self.clock.now();
-                let changed = self.keeping.book.as_mut().and_then(|book| book.plant_file(&file, now));
-                self.write_down(changed.into_iter().collect());
-                self.file = Some(file);
-                result
-            }
-            Err(error) => {
-                tracing::error!(%error, "saving settings ended badly");
-                Err("internal error, see the log".to_owned())
-            }
-        };
-        self.tell_saved(order, &settings, result);
-    }
-
-    fn tell_saved(&mut self, order: OrderId, settings: &LineDef, result: Result<(), String>) {
-        let effects = self.plant.on_saved(order, settings, result);
-        self.keep(effects.records);
-    }
-
-    fn send(&mut self, line: LineId, request: BusRequest) {
-        let link = &self.links[line.index()];
-        let is_stop = matches!(request, BusRequest::Write { urgent: true, .. });
-        let refused = if is_stop || KEPT_FOR_STOPS < link.capacity() {
-            link.try_send(request).err().map(mpsc::error::TrySendError::into_inner)
-        } else {
-            Some(request)
-        };
-        if let Some(refused) = refused {
-            let effects = self.plant.on_undeliverable(line, &refused);
-            self.keep(effects.records);
-        }
-    }
-
-    fn keep(&mut self, records: Vec<Record>) {
-        if records.is_empty() {
-            return;
-        }
-        if let Some(listener) = &self.keeping.listener {
-            listener.tell(&records);
-        }
-        let (mut deeds, mut others) = (Vec::new(), Vec::new());
-        for record in records {
-            match record {
-                Record::Action(deed) => deeds.push(deed),
-                Record::Sample(..) | Record::Alarm(_) | Record::Line(_) => others.push(record),
-            }
-        }
-        self.write_down(deeds);
-        self.store(others);
-    }
-
-    /// Deeds into the book, which sends them on to the history; straight there where it has no room.
-    fn write_down(&mut self, deeds: Vec<ActionRecord>) {
-        if deeds.is_empty() {
-            return;
-        }
-        let left = match &mut self.keeping.book {
-            Some(book) => book.put(deeds),
-            None => deeds,
-        };
-        self.store(left.into_iter().map(Record::Action).collect());
-    }
-
-    fn store(&mut self, records: Vec<Record>) {
-        let Some(store) = self.keeping.records.as_ref().filter(|_| !records.is_empty()) else { return };
-        if let Err(refused) = store.try_send(records) {
-            self.lost += refused.into_inner().len() as u64;
-            self.hear_store();
-        }
-    }
-
-    fn hear_store(&mut self) {
-        let mut status = self.keeping.store.borrow_and_update().clone();
-        status.lost += self.lost;
-        if let Some(book) = &mut self.keeping.book {
-            let (lost, trouble) = book.trouble();
-            status.lost += lost;
-            status.trouble = match (status.trouble, trouble) {
-                (Some(one), Some(other)) => Some(format!("{one}; {other}")),
-                (one, other) => one.or(other),
-            };
-        }
-        self.plant.on_history(status);
     }
 }

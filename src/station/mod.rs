@@ -7,6 +7,7 @@
 pub mod session;
 mod deeds;
 mod door;
+mod plant_task;
 pub mod pulse;
 mod sets;
 pub mod teller;
