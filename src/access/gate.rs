@@ -216,20 +216,34 @@ impl Gate {
         effects
     }
 
-    /// May this terminal ask this of the history? `Err` says why not.
-    pub fn may_ask(&mut self, terminal: u32, question: &Question, at: Timestamp) -> Result<(), String> {
+    /// May this terminal ask this of the history? `Err` says why not, and what must happen because of it.
+    pub fn may_ask(&mut self, terminal: u32, question: &Question, at: Timestamp) -> Result<(), (String, Vec<Effect>)> {
         if !self.heard(terminal, at) {
-            return Err(TOO_MANY.to_owned());
+            return Err((TOO_MANY.to_owned(), Vec::new()));
         }
-        let Some(seat) = self.seats.get(&terminal) else { return Err("this terminal is not attached".to_owned()) };
-        let role = match &seat.who {
+        let needed = right::needs_for_question(question);
+        let may =
+            if needed == Role::Viewer { self.may_look(terminal) } else { self.may(terminal, Some(needed)).map(drop) };
+        let Err(why) = may else { return Ok(()) };
+        // Who may not look is told so; who wants to know what others did is put on record.
+        let mut effects = Vec::new();
+        if needed != Role::Viewer
+            && let Some(seat) = self.seats.remove(&terminal)
+        {
+            effects = self.refused(&seat, "read", "audit trail", &why, at);
+            self.seats.insert(terminal, seat);
+        }
+        Err((why, effects))
+    }
+
+    fn may_look(&self, terminal: u32) -> Result<(), String> {
+        match &self.seats.get(&terminal).ok_or("this terminal is not attached")?.who {
             // Locked or not: the picture stays, and so does what lies behind it.
-            Some(who) if who.must_change => return Err(CHANGE_FIRST.to_owned()),
-            Some(who) => who.role,
-            None if self.def.access.view => Role::Viewer,
-            None => return Err(LOG_IN_FIRST.to_owned()),
-        };
-        enough(role, right::needs_for_question(question))
+            Some(who) if who.must_change => Err(CHANGE_FIRST.to_owned()),
+            Some(_) => Ok(()),
+            None if self.def.access.view => Ok(()),
+            None => Err(LOG_IN_FIRST.to_owned()),
+        }
     }
 
     /// A terminal wishes; the answer goes to the ticket.

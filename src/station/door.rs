@@ -176,8 +176,11 @@ impl Door {
                         let _ = query.reply.send(Err(HistoryError::Engine("too busy, ask again".to_owned())));
                     }
                 }
-                // A terminal that has left needs no answer.
-                Err(why) => drop(query.reply.send(Err(HistoryError::Engine(why)))),
+                Err((why, effects)) => {
+                    self.carry_out(effects);
+                    // A terminal that has left needs no answer.
+                    let _ = query.reply.send(Err(HistoryError::Engine(why)));
+                }
             },
             Request::Wish(wish, reply) => {
                 self.last_ticket += 1;

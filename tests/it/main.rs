@@ -11,8 +11,15 @@
 //! | `capture` | saved traffic, opened by Wireshark's own reader |
 //! | `shift` | a whole shift in virtual time, and its report read by an independent reader |
 //! | `devices` | every shipped profile and plant against its simulated devices: a minute, every fault, golden frames |
+//! | `rights` | every command, wish and question through the socket, by everybody who may be at a terminal |
+//! | `people` | wrong passwords, lock-out, idle lock, second persons, two operators at once |
+//! | `kills` | stations killed during writes and logins: what somebody was told is in the book, which is whole |
+//! | `tampering` | the book changed by hand: what `sightglass audit verify` says |
+//! | `endings` | every way in which a terminal or its station can end, in a pseudo-terminal |
 //! | `settings` | settings of a line: tried out, saved into the plant file |
 //! | `durability` | killed, unplugged, locked, damaged |
+//! | `guarded` | a station whose people must log in, for `rights` and `people` |
+//! | `pty` | the program in a pseudo-terminal, for `terminal` and `endings` |
 //! | `support` | what the others share: processes with deadlines, peers and their installation |
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -22,8 +29,12 @@ mod capture;
 mod commands;
 mod devices;
 mod durability;
+mod guarded;
 mod masters;
+
 mod peers;
+mod people;
+mod rights;
 mod settings;
 mod shift;
 mod support;

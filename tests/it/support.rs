@@ -3,10 +3,12 @@
 use std::{
     io::{BufRead, BufReader, Read},
     net::TcpListener,
+    os::unix::fs::DirBuilderExt,
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     sync::{
         Mutex, MutexGuard, OnceLock, PoisonError,
+        atomic::{AtomicU32, Ordering},
         mpsc::{Receiver, RecvTimeoutError, channel},
     },
     time::{Duration, Instant},
@@ -15,11 +17,23 @@ use std::{
 /// Nothing that these tests wait for takes so long, even on a busy machine.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
-/// The program under test.
+/// The program under test, where it finds no station of another test.
 pub fn sightglass() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sightglass"));
     command.env_remove("NO_COLOR").env("SIGHTGLASS_LOG", "debug");
+    command.env_remove("RUNTIME_DIRECTORY").env("XDG_RUNTIME_DIR", sockets());
     command
+}
+
+/// A folder for sockets that no other call gets. Its name is short, because that of a socket has 107 bytes at the most.
+pub fn sockets() -> PathBuf {
+    // Nobody drops this: it stays behind in the temporary folder with nothing but dead sockets in it.
+    static ALL: OnceLock<tempfile::TempDir> = OnceLock::new();
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    let folder = ALL.get_or_init(folder).path().join(number.to_string());
+    std::fs::DirBuilder::new().mode(0o700).create(&folder).unwrap();
+    folder
 }
 
 /// A folder of its own for the state of a program.

@@ -235,6 +235,22 @@ fn without_a_login_the_history_is_answered_only_where_the_plant_may_be_seen() {
 }
 
 #[test]
+fn the_audit_trail_is_for_a_supervisor_at_an_unlocked_terminal_and_who_else_asks_is_on_record() {
+    let (words, by, action) = (String::new(), String::new(), String::new());
+    let question = Question::Audit { from: Timestamp::MIN, to: Timestamp::MAX, words, by, action, limit: 1 };
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "here");
+    bench.login(1, "tech", TECH).unwrap();
+    let (why, effects) = bench.gate.may_ask(1, &question, bench.now).unwrap_err();
+    assert_eq!(why, "this is for a supervisor, you are technician");
+    assert!(matches!(&effects[..], [Effect::Record(deed)] if &*deed.by == "tech" && deed.outcome.ends_with(&why)));
+    bench.login(1, "boss", BOSS).unwrap();
+    assert_eq!(bench.gate.may_ask(1, &question, bench.now), Ok(()));
+    bench.wish(1, Wish::Lock).unwrap();
+    assert!(bench.gate.may_ask(1, &question, bench.now).unwrap_err().0.contains("locked"));
+}
+
+#[test]
 fn an_untouched_terminal_is_locked_shows_it_and_may_only_look_until_the_password_is_given() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "here");

@@ -1,0 +1,240 @@
+//! People at the terminals of a station: wrong passwords by script, lock-out, idle lock, second persons, two operators at
+//! once. Alarms are seen through all of it.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+use sightglass::{
+    access::{OrderRequest, Signature, Wish},
+    plant::{
+        PlantDef,
+        command::{Command, Outcome, Refusal},
+        def::Sign,
+        sample::Cause,
+    },
+    station::Session,
+};
+
+use crate::guarded::{Guarded, PASSWORD, login, request, until};
+
+/// Wrong tries that lock out.
+const TRIES: u16 = 3;
+/// For how long, plant time.
+const LOCK_OUT: Duration = Duration::from_secs(100);
+/// What everybody is told who is not let in.
+const WRONG: &str = "wrong name or password, or locked out; try again later";
+
+fn strict(def: &mut PlantDef) {
+    (def.access.tries_max, def.access.lock_out) = (TRIES, LOCK_OUT);
+}
+
+fn wait(seconds: u64) -> String {
+    format!("{WRONG}; wait {seconds} s at this terminal")
+}
+
+/// Tries until he is in, and gives the plant time of it.
+async fn login_at_last(guarded: &Guarded, session: &Session, user: &str) -> Timestamp {
+    let written = guarded.entries().len();
+    while let Err(why) = login(session, user, PASSWORD).await {
+        assert!(why.starts_with(WRONG), "{why}");
+        guarded.pass(Duration::from_secs(2)).await;
+    }
+    guarded.written(written, "the login", |entry| &*entry.action == "login" && &*entry.target == user).await.utc
+}
+
+/// Waits until a wait that was told is over.
+async fn waited(guarded: &Guarded, seconds: u64) {
+    guarded.pass(Duration::from_secs(seconds + 1)).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_script_with_wrong_passwords_waits_longer_each_time_is_locked_out_as_configured_and_sees_alarms_throughout() {
+    let guarded = Guarded::start(strict).await;
+    let mut script = guarded.nobody().await;
+    let written = guarded.entries().len();
+    for (try_of, told) in [(1, 1), (2, 2)] {
+        assert_eq!(login(&script, "tom", "wrong").await, Err(wait(told)), "try {try_of}");
+        // While it waits, nothing is even looked at: not the right password either.
+        let why = login(&script, "tom", PASSWORD).await.unwrap_err();
+        assert!(why.starts_with(WRONG), "{why}");
+        waited(&guarded, told).await;
+    }
+    assert_eq!(login(&script, "tom", "wrong").await, Err(wait(LOCK_OUT.as_secs())));
+    let locked = guarded.written(written, "the lock-out", |entry| &*entry.action == "lock-out").await;
+    assert_eq!((&*locked.target, &*locked.outcome), ("tom", "done: for 100 s"));
+
+    // From elsewhere this account is shut as well, with the same words; another one is not.
+    let far = guarded.far("10.0.0.9");
+    assert_eq!(login(&far, "tom", PASSWORD).await, Err(wait(1)));
+    waited(&guarded, 1).await;
+    login(&far, "tina", PASSWORD).await.unwrap();
+    let why = login(&script, "tina", PASSWORD).await.unwrap_err();
+    assert!(why.starts_with(WRONG), "this place is shut for everybody: {why}");
+
+    // The devices fall silent while the script is locked out: it is told, though no value of the process is.
+    assert!(script.snapshots.borrow().alarms.is_empty());
+    guarded.tap.mute();
+    let alarmed = until(&mut script.snapshots, "an alarm", |snapshot| !snapshot.alarms.is_empty()).await;
+    let why = login(&script, "tom", PASSWORD).await.unwrap_err();
+    assert!(why.starts_with(WRONG), "it is still locked out when the alarm is there: {why}");
+    assert!(alarmed.samples.iter().all(|sample| sample.quality.cause() == Some(Cause::Withheld)));
+
+    let let_in = login_at_last(&guarded, &script, "tom").await;
+    let shut = let_in.duration_since(locked.utc).unsigned_abs();
+    assert!(LOCK_OUT <= shut, "let in after {shut:?}");
+    let failed = guarded.entries().into_iter().filter(|entry| &*entry.action == "login failed");
+    let failed: Vec<String> = failed.map(|entry| format!("{} {}", entry.target, entry.outcome)).collect();
+    let wrong = "tom refused: wrong password";
+    assert_eq!(failed, [wrong, wrong, wrong, "tom refused: locked out"], "what was not looked at is no try");
+    guarded.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_place_that_tries_every_name_is_shut_though_no_account_is() {
+    let guarded = Guarded::start(strict).await;
+    let script = guarded.far("10.0.0.8");
+    for (user, told) in [("vera", 1), ("tom", 2), ("sue", LOCK_OUT.as_secs())] {
+        assert_eq!(login(&script, user, "wrong").await, Err(wait(told)), "{user}");
+        if told < 100 {
+            waited(&guarded, told).await;
+        }
+    }
+    for user in ["vera", "tom", "sue"] {
+        let elsewhere = guarded.person(user).await;
+        elsewhere.wish(Wish::Logout).await.unwrap();
+    }
+    assert!(login(&script, "tina", PASSWORD).await.is_err());
+    guarded.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_unknown_name_a_wrong_password_somebody_disabled_and_somebody_locked_out_are_told_the_same() {
+    let guarded = Guarded::start(strict).await;
+    let sue = guarded.person("sue").await;
+    sue.wish(Wish::Disable { user: "vera".into(), disabled: true }).await.unwrap();
+    let mut script = guarded.far("10.0.1.0");
+    for number in 0..TRIES {
+        script = guarded.far(&format!("10.0.1.{number}"));
+        assert_eq!(login(&script, "tina", "wrong").await, Err(wait(1)));
+    }
+    let tries = [
+        ("nobody-of-this-name", PASSWORD, "unknown user", "unknown user"),
+        ("tom", "wrong", "tom", "wrong password"),
+        ("vera", PASSWORD, "vera", "disabled"),
+        ("tina", PASSWORD, "tina", "locked out"),
+        ("not a name\u{1b}[2J", "", "unknown user", "unknown user"),
+    ];
+    for (number, (user, password, target, why)) in tries.into_iter().enumerate() {
+        let written = guarded.entries().len();
+        let script = guarded.far(&format!("10.0.2.{number}"));
+        assert_eq!(login(&script, user, password).await, Err(wait(1)), "{user}");
+        let line = guarded.written(written, user, |entry| &*entry.action == "login failed").await;
+        assert_eq!((&*line.target, &*line.outcome), (target, &*format!("refused: {why}")), "the book knows");
+    }
+    drop(script);
+    let text = format!("{:?}", guarded.entries());
+    assert!(!text.contains("nobody-of-this-name"), "what is typed as a name may be a password");
+    guarded.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_terminal_that_nobody_touches_is_locked_shows_alarms_and_opens_to_the_password_only() {
+    let guarded = Guarded::start(|def| def.access.idle_lock = Duration::from_secs(60)).await;
+    let mut idle = guarded.person("sue").await;
+    let touched = guarded.person("tom").await;
+    let mut standing = idle.standing.clone();
+    let locked = async { standing.wait_for(|standing| standing.locked).await.map(drop) };
+    let touching = async {
+        loop {
+            touched.wish(Wish::Active).await.unwrap();
+            guarded.pass(Duration::from_secs(10)).await;
+        }
+    };
+    tokio::select! {
+        locked = locked => locked.unwrap(),
+        () = touching => unreachable!("it touches for ever"),
+    }
+    assert!(!touched.standing.borrow().locked, "keys were pressed there");
+    assert!(idle.standing.borrow().users.is_empty() && idle.standing.borrow().view, "only looking");
+
+    guarded.tap.mute();
+    let alarmed = until(&mut idle.snapshots, "an alarm", |snapshot| !snapshot.alarms.is_empty()).await;
+    let acknowledge = request(&idle, 1, alarmed.alarms[0].acknowledge());
+    let status = guarded.order(&idle, acknowledge.clone()).await;
+    assert_eq!(status.outcome, Outcome::Refused(Refusal::NotPermitted("this terminal is locked".into())));
+    assert_eq!(idle.wish(Wish::Unlock("wrong".into())).await, Err(wait(1)));
+    while idle.wish(Wish::Unlock(PASSWORD.into())).await.is_err() {
+        guarded.pass(Duration::from_secs(1)).await;
+    }
+    let again = request(&idle, 2, acknowledge.command);
+    assert_eq!(guarded.order(&idle, again).await.outcome, Outcome::Verified);
+    let deeds: Vec<_> = guarded.entries().into_iter().filter(|entry| &*entry.who == "sue").collect();
+    let words: Vec<String> = deeds.iter().map(|entry| format!("{}: {}", entry.action, entry.outcome)).collect();
+    for expected in ["lock: done: nobody has touched it", "unlock failed: refused: wrong password", "unlock: done"] {
+        assert!(words.iter().any(|word| word == expected), "{expected}: {words:?}");
+    }
+    guarded.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_tag_for_two_persons_is_written_once_a_second_one_who_may_has_signed() {
+    let guarded = Guarded::start(|def| {
+        let tag = def.tag_named("TIC-1.SV").unwrap();
+        def.tags[tag.index()].sign = Some(Sign::SecondPerson);
+    })
+    .await;
+    let tom = guarded.person("tom").await;
+    let tag = guarded.tag("TIC-1.SV");
+    let signed = |number: u32, by: Option<(&str, &str)>| OrderRequest {
+        sign: by.map(|(user, password)| Signature { user: Some(user.into()), password: password.into() }),
+        ..request(&tom, number, Command::Write { tag, value: 61.0 })
+    };
+    let refused = [
+        (None, "this tag asks for a second person".to_owned()),
+        (Some(("TOM", PASSWORD)), "the second person must be another one".to_owned()),
+        (Some(("vera", PASSWORD)), "vera may not sign this: it is for a technician".to_owned()),
+        (Some(("mia", PASSWORD)), "mia must first choose a password of his own".to_owned()),
+        (Some(("sue", "wrong")), wait(1)),
+        (Some(("nobody-here", PASSWORD)), wait(2)),
+    ];
+    for (number, (by, why)) in (1..).zip(refused) {
+        let status = guarded.order(&tom, signed(number, by)).await;
+        assert_eq!(status.outcome, Outcome::Refused(Refusal::NotSigned(why)), "{by:?}");
+        waited(&guarded, 2).await;
+    }
+    assert!(guarded.tap.deeds().is_empty(), "something has reached the line: {:?}", guarded.tap.deeds());
+    let written = guarded.entries().len();
+    assert_eq!(guarded.order(&tom, signed(9, Some(("sue", PASSWORD)))).await.outcome, Outcome::Verified);
+    let line = guarded.written(written, "the write", |entry| &*entry.action == "write").await;
+    assert_eq!((&*line.who, line.note.as_deref(), &*line.outcome), ("tom", Some("signed by sue"), "verified"));
+    guarded.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn of_two_operators_at_once_the_second_is_told_that_the_value_has_changed_under_him() {
+    let guarded = Guarded::start(|_| {}).await;
+    let (tom, tina) = (guarded.person("tom").await, guarded.person("tina").await);
+    let (tag, seen) = (guarded.tag("TIC-1.SV"), guarded.value("TIC-1.SV"));
+    let write =
+        |session, number, value, seen| OrderRequest { seen, ..request(session, number, Command::Write { tag, value }) };
+    assert_eq!(guarded.order(&tom, write(&tom, 1, 61.0, seen)).await.outcome, Outcome::Verified);
+    let second = guarded.order(&tina, write(&tina, 1, 62.0, seen)).await;
+    let Outcome::Refused(Refusal::ChangedTo(now)) = &second.outcome else { panic!("{:?}", second.outcome) };
+    assert!(now.starts_with("61.0"), "{now}");
+    assert_eq!(guarded.value("TIC-1.SV"), Some(61.0), "the first one's value stands");
+    let line = guarded.written(0, "the refusal", |entry| &*entry.who == "tina" && &*entry.action == "write").await;
+    assert!(line.outcome.contains("it was changed to 61.0"), "{}", line.outcome);
+
+    // Once he has looked again it is his.
+    assert_eq!(guarded.order(&tina, write(&tina, 2, 62.0, Some(61.0))).await.outcome, Outcome::Verified);
+
+    // Both at the very same moment: one of them, never both.
+    let seen = Some(62.0);
+    let (one, other) = tokio::join!(
+        guarded.order(&tom, write(&tom, 3, 63.0, seen)),
+        guarded.order(&tina, write(&tina, 3, 64.0, seen))
+    );
+    let done = [&one, &other].iter().filter(|status| status.outcome == Outcome::Verified).count();
+    assert_eq!(done, 1, "{:?} and {:?}", one.outcome, other.outcome);
+    guarded.end().await;
+}

@@ -1,0 +1,358 @@
+//! Every command, wish and question through the socket, by everybody who may be at a terminal: what is let through, what
+//! is refused, and that the book has it. The tables below are written by hand; the program has its own.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use sightglass::{
+    access::Wish,
+    history::{Question, io::Query},
+    plant::{
+        PlantDef,
+        alarm::AlarmCommand,
+        command::{Command, OrderStatus, Outcome, Refusal},
+        def::{AlarmId, DeviceId, LineId, Serial},
+        orders::outcome_words,
+        parameter_set::ParameterSet,
+        restore::RestoreWish,
+        role::Role,
+        tag::Table,
+        tool::{Scan, Tool},
+    },
+    report::Period,
+    station::{self, Session},
+};
+use tokio::sync::{mpsc, oneshot};
+
+use crate::guarded::{Guarded, PASSWORD, request};
+
+/// Who sits at the terminal, in the order of the columns below.
+const PEOPLE: [&str; 6] = ["nobody", "vera", "tom", "sue", "lena", "mia"];
+/// What each of them is told who may not; `{}` is the role that is needed.
+const WHY: [&str; 6] = [
+    "log in first",
+    "this is for a {}, you are viewer",
+    "this is for a {}, you are technician",
+    "",
+    "this terminal is locked",
+    "choose a password of your own first",
+];
+
+/// What is called so in the book may be done by whom: nobody, Viewer, Technician, Supervisor, Supervisor at a locked
+/// terminal, Supervisor who must change the password.
+struct Row {
+    action: &'static str,
+    by: &'static str,
+    /// Looking is no deed: it is on record only where it is refused.
+    is_deed: bool,
+}
+
+impl Row {
+    fn lets(&self, person: usize) -> bool {
+        self.by.as_bytes()[person] != b'-'
+    }
+
+    /// What somebody is told who may not.
+    fn why(&self, person: usize) -> String {
+        let least = if self.by.contains('T') { "technician" } else { "supervisor" };
+        WHY[person].replace("{}", least)
+    }
+}
+
+fn row(action: &'static str, by: &'static str) -> Row {
+    Row { action, by, is_deed: true }
+}
+
+fn look(action: &'static str, by: &'static str) -> Row {
+    Row { action, by, is_deed: false }
+}
+
+/// A new command does not compile until it has a row here; put it into [`commands`] as well.
+fn of_command(command: &Command) -> Row {
+    match command {
+        Command::Write { .. } => row("write", "--TS--"),
+        Command::Alarm(AlarmCommand::Acknowledge { .. }) => row("acknowledge", "--TS--"),
+        Command::Alarm(AlarmCommand::AcknowledgeAll { .. }) => row("acknowledge", "--TS--"),
+        Command::Alarm(AlarmCommand::Silence) => row("silence", "--TS--"),
+        Command::Alarm(AlarmCommand::Reset(_)) => row("reset", "--TS--"),
+        Command::Alarm(AlarmCommand::Shelve { .. }) => row("shelve", "--TS--"),
+        Command::Alarm(AlarmCommand::Unshelve(_)) => row("unshelve", "--TS--"),
+        Command::Alarm(AlarmCommand::OutOfService(_)) => row("out of service", "---S--"),
+        Command::Alarm(AlarmCommand::InService(_)) => row("in service", "---S--"),
+        Command::Refresh(_) => look("refresh", "--TS--"),
+        Command::Connect(_, false) => row("disconnect", "--TS--"),
+        Command::Connect(_, true) => row("connect", "--TS--"),
+        Command::Configure(_) => row("configure", "---S--"),
+        Command::SaveSettings(_) => row("save settings", "---S--"),
+        Command::Test(_, tool) => match tool {
+            Tool::Send(_) => row("test", "---S--"),
+            Tool::Scan(Scan { serials, .. }) if !serials.is_empty() => row("test", "---S--"),
+            Tool::Scan(_) | Tool::Loopback { .. } | Tool::Identify { .. } | Tool::Read { .. } => row("test", "--TS--"),
+        },
+        Command::StopTest(_) => row("stop test", "--TS--"),
+        Command::ReadSets => look("read sets", "--TS--"),
+        Command::SaveSet { .. } => row("save set", "--TS--"),
+        Command::Restore(_) => row("restore set", "--TS--"),
+        Command::StopRestore(_) => row("stop restore", "--TS--"),
+    }
+}
+
+fn commands(def: &PlantDef, person: usize) -> Vec<Command> {
+    let (alarm, device, line) = (AlarmId(0), DeviceId(0), LineId(0));
+    let seen = Timestamp::UNIX_EPOCH;
+    let scan = |serials| Tool::Scan(Scan { first: 40, last: 40, serials, timeout: Duration::from_millis(50) });
+    let set = ParameterSet {
+        name: "none".into(),
+        device: "another".into(),
+        profile: "another".into(),
+        saved: seen,
+        by: "tom".into(),
+        given: Vec::new(),
+        values: Vec::new(),
+        units: Default::default(),
+        missing: Vec::new(),
+    };
+    let (from, changes) = ("none".into(), Vec::new());
+    vec![
+        Command::Write { tag: def.tag_named("TIC-1.SV").unwrap(), value: 60.0 + person as f64 },
+        Command::Alarm(AlarmCommand::Acknowledge { alarm, seen }),
+        Command::Alarm(AlarmCommand::AcknowledgeAll { seen: Arc::from([(alarm, seen)]) }),
+        Command::Alarm(AlarmCommand::Silence),
+        Command::Alarm(AlarmCommand::Reset(alarm)),
+        Command::Alarm(AlarmCommand::Shelve { alarm, lasts: Duration::from_secs(60) }),
+        Command::Alarm(AlarmCommand::Unshelve(alarm)),
+        Command::Alarm(AlarmCommand::OutOfService(alarm)),
+        Command::Alarm(AlarmCommand::InService(alarm)),
+        Command::Refresh(device),
+        Command::Test(line, Tool::Loopback { unit: 1, data: 7, count: 1 }),
+        Command::Test(line, Tool::Identify { unit: 1 }),
+        Command::Test(line, Tool::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
+        Command::Test(line, scan(Vec::new())),
+        Command::Test(line, scan(vec![Serial::USUAL])),
+        Command::Test(line, Tool::Send(vec![1, 3, 0, 0, 0, 1])),
+        Command::StopTest(line),
+        Command::ReadSets,
+        Command::SaveSet { device, name: format!("of {person}").into(), replace: false },
+        Command::Restore(Box::new(RestoreWish { device, from, set: Arc::new(set), changes })),
+        Command::StopRestore(device),
+        Command::Connect(line, false),
+        Command::Connect(line, true),
+        Command::Configure(Box::new(def.lines[0].clone())),
+        Command::SaveSettings(line),
+    ]
+}
+
+/// A terminal of this person, as the column says.
+async fn sits(guarded: &Guarded, person: usize) -> Session {
+    if person == 0 {
+        return guarded.nobody().await;
+    }
+    let session = guarded.person(PEOPLE[person]).await;
+    if PEOPLE[person] == "lena" {
+        session.wish(Wish::Lock).await.unwrap();
+    }
+    session
+}
+
+fn is_permitted(status: &OrderStatus) -> bool {
+    !matches!(status.outcome, Outcome::Refused(Refusal::NotPermitted(_)))
+}
+
+/// Who it was, as the book has it.
+fn name(person: usize) -> &'static str {
+    if person == 0 { "not logged in" } else { PEOPLE[person] }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_command_is_let_through_or_refused_as_the_table_says_and_nothing_refused_reaches_the_line() {
+    let guarded = Guarded::start(|_| {}).await;
+    let before = (guarded.tap.deeds(), guarded.tap.connections());
+    // Those who may nothing first, so that the line shows what came of it.
+    for person in [0, 1, 4, 5, 2, 3] {
+        if person == 2 {
+            let after = (guarded.tap.deeds(), guarded.tap.connections());
+            assert_eq!(after, before, "something that was refused has reached the line");
+        }
+        let session = sits(&guarded, person).await;
+        for (number, command) in (1..).zip(commands(&guarded.def, person)) {
+            let row = of_command(&command);
+            let said = format!("{command:?} by {}", PEOPLE[person]);
+            // So slow that each refusal is on record by itself.
+            guarded.pass(Duration::from_secs(2)).await;
+            let written = guarded.entries().len();
+            let status = guarded.order(&session, request(&session, number, command)).await;
+            assert_eq!(is_permitted(&status), row.lets(person), "{said}: {:?}", status.outcome);
+            if !row.lets(person) {
+                assert_eq!(status.outcome, Outcome::Refused(Refusal::NotPermitted(row.why(person))), "{said}");
+            }
+            if row.is_deed || !row.lets(person) {
+                let line = guarded.written(written, &said, |entry| &*entry.action == row.action).await;
+                assert_eq!((&*line.who, &*line.outcome), (name(person), &*outcome_words(&status.outcome)), "{said}");
+                assert!(line.from.contains(&format!("process {}", std::process::id())), "{}", line.from);
+            }
+        }
+    }
+    assert!(guarded.tap.deeds().contains(&6), "what was permitted has reached the line: {:?}", guarded.tap.deeds());
+    assert!(before.1 < guarded.tap.connections());
+    guarded.end().await;
+}
+
+/// What comes of a wish: done, or words that its answer holds, for each column.
+type Answers = [&'static str; 6];
+
+const DONE: &str = "";
+const LOG_IN: &str = "log in first";
+const LOCKED: &str = "this terminal is locked";
+const CHANGE: &str = "choose a password of your own first";
+const NOT_VIEWER: &str = "you are viewer";
+const NOT_TECHNICIAN: &str = "you are technician";
+const SUPERVISOR: Answers = [LOG_IN, NOT_VIEWER, NOT_TECHNICIAN, DONE, LOCKED, CHANGE];
+
+/// A new wish does not compile until it has a row here; put it into [`wishes`] as well. The word is that of the book; an
+/// empty one is not put on record by itself.
+fn of_wish(wish: &Wish) -> (&'static str, Answers) {
+    const SHORT: &str = "has 5 characters";
+    match wish {
+        Wish::Login { .. } => ("login", [DONE; 6]),
+        Wish::Logout => ("logout", ["nobody is logged in here", DONE, DONE, DONE, DONE, DONE]),
+        Wish::Lock => ("lock", [LOG_IN, DONE, DONE, DONE, "locked already", DONE]),
+        Wish::Unlock(_) => ("unlock", ["not locked", "not locked", "not locked", "not locked", DONE, "not locked"]),
+        Wish::Active => ("", [DONE; 6]),
+        Wish::FirstSupervisor { .. } => ("add user", ["there are users already"; 6]),
+        Wish::ChangePassword { .. } => ("change password", ["log in", SHORT, SHORT, SHORT, "unlock", SHORT]),
+        Wish::AddUser { .. } => ("add user", SUPERVISOR),
+        Wish::SetRole { .. } => ("set role", SUPERVISOR),
+        Wish::Disable { disabled: true, .. } => ("disable user", SUPERVISOR),
+        Wish::Disable { disabled: false, .. } => ("enable user", SUPERVISOR),
+        Wish::DeleteUser { .. } => ("delete user", SUPERVISOR),
+        Wish::ResetPassword { .. } => ("reset password", SUPERVISOR),
+        Wish::Exported { .. } => ("export", [LOG_IN, NOT_VIEWER, DONE, DONE, LOCKED, CHANGE]),
+        Wish::Stop => ("stop station", SUPERVISOR),
+        Wish::Reload => ("reload", SUPERVISOR),
+    }
+}
+
+fn wishes() -> Vec<Wish> {
+    let (user, password) = (|name: &str| name.to_owned(), || PASSWORD.into());
+    let other = || "five dry horses on a hill".into();
+    vec![
+        Wish::Login { user: user("vera"), password: password() },
+        Wish::Logout,
+        Wish::Lock,
+        Wish::Unlock(password()),
+        Wish::Active,
+        Wish::FirstSupervisor { user: user("eve"), password: other() },
+        Wish::ChangePassword { old: password(), new: "short".into() },
+        Wish::AddUser { user: user("paul"), role: Role::Viewer, password: other() },
+        Wish::SetRole { user: user("paul"), role: Role::Technician },
+        Wish::Disable { user: user("paul"), disabled: true },
+        Wish::Disable { user: user("paul"), disabled: false },
+        Wish::ResetPassword { user: user("paul"), password: other() },
+        Wish::DeleteUser { user: user("paul") },
+        Wish::Exported { file: user("shift.csv"), sha256: user("00") },
+        Wish::Reload,
+        Wish::Stop,
+    ]
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_wish_is_granted_or_refused_as_the_table_says_and_is_on_record() {
+    let mut guarded = Guarded::start(|_| {}).await;
+    let mut asked = std::mem::replace(&mut guarded.station.commands, mpsc::channel(1).1);
+    // What the command line does when a terminal wishes something of the station as a whole, but for the doing.
+    let heard = tokio::spawn(async move {
+        let mut heard = Vec::new();
+        while let Some(command) = asked.recv().await {
+            match command {
+                station::Command::Reload(reply) => {
+                    heard.push("reload");
+                    reply.send(Ok(())).unwrap();
+                }
+                station::Command::Stop => heard.push("stop"),
+            }
+        }
+        heard
+    });
+    for wish in wishes() {
+        let (action, answers) = of_wish(&wish);
+        for person in 0..PEOPLE.len() {
+            let session = sits(&guarded, person).await;
+            guarded.pass(Duration::from_secs(8)).await;
+            let written = guarded.entries().len();
+            let said = format!("{wish:?} by {}", PEOPLE[person]);
+            let answer = session.wish(wish.clone()).await;
+            match (&answer, answers[person]) {
+                (Ok(()), DONE) => {}
+                (Err(why), expected) if expected != DONE && why.contains(expected) => {}
+                (_, expected) => panic!("{said}: {answer:?}, expected {expected:?}"),
+            }
+            // Who is not there cannot leave, and what is not locked is not unlocked: that is no refusal of a right.
+            let is_own = matches!(wish, Wish::Logout | Wish::Lock | Wish::Unlock(_));
+            if action.is_empty() || is_own && answer.is_err() {
+                continue;
+            }
+            let line = guarded.written(written, &said, |entry| &*entry.action == action).await;
+            let refused = answer.as_ref().err().map(|why| format!("refused: {why}"));
+            assert_eq!(line.outcome.starts_with("refused"), answer.is_err(), "{said}: {line:?}");
+            if let Some(refused) = refused {
+                assert_eq!((&*line.who, &*line.outcome), (name(person), &*refused), "{said}");
+            }
+            assert!(line.from.contains("user "), "{}", line.from);
+        }
+    }
+    guarded.end().await;
+    assert_eq!(heard.await.unwrap(), ["reload", "stop"], "the one Supervisor, once each");
+}
+
+/// A new question does not compile until it has a row here; put it into [`questions`] as well.
+fn of_question(question: &Question) -> Row {
+    match question {
+        Question::Series { .. } => look("", "-VTSL-"),
+        Question::Journal { .. } => look("", "-VTSL-"),
+        Question::Actions { .. } => look("", "-VTSL-"),
+        Question::LineMinutes { .. } => look("", "-VTSL-"),
+        Question::AlarmQuality { .. } => look("", "-VTSL-"),
+        Question::Report { .. } => look("", "-VTSL-"),
+        Question::Audit { .. } => look("read", "---S--"),
+    }
+}
+
+fn questions(def: &PlantDef, to: Timestamp) -> Vec<Question> {
+    let (from, limit) = (to - jiff::SignedDuration::from_secs(60), 10);
+    let (words, by, action) = (String::new(), String::new(), String::new());
+    vec![
+        Question::Series { tags: vec![def.tags[0].id], from, to, buckets: 10 },
+        Question::Journal { from, to, limit },
+        Question::Actions { from, to, limit },
+        Question::LineMinutes { line: LineId(0), from, to, limit },
+        Question::AlarmQuality { from, to },
+        Question::Report { period: Period { name: "period".into(), from, to } },
+        Question::Audit { from, to, words, by, action, limit },
+    ]
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_question_is_answered_or_refused_as_the_table_says_and_who_asks_for_the_audit_trail_is_on_record() {
+    let guarded = Guarded::start(|_| {}).await;
+    let at = guarded.truth.borrow().at;
+    for person in 0..PEOPLE.len() {
+        let session = sits(&guarded, person).await;
+        for question in questions(&guarded.def, at) {
+            let row = of_question(&question);
+            let said = format!("{question:?} by {}", PEOPLE[person]);
+            let written = guarded.entries().len();
+            let (reply, answer) = oneshot::channel();
+            session.ask(Query { question, reply }).unwrap();
+            let answer = answer.await.unwrap();
+            assert_eq!(answer.is_ok(), row.lets(person), "{said}: {answer:?}");
+            let Err(error) = answer else { continue };
+            assert!(error.to_string().contains(&row.why(person)), "{said}: {error}");
+            if !row.action.is_empty() {
+                let line = guarded.written(written, &said, |entry| &*entry.action == row.action).await;
+                assert_eq!((&*line.who, &*line.target), (name(person), "audit trail"), "{said}");
+                assert_eq!(*line.outcome, format!("refused: {}", row.why(person)), "{said}");
+            }
+        }
+    }
+    guarded.end().await;
+}
