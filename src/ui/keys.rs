@@ -118,6 +118,8 @@ pub enum Global {
     Acknowledge,
     /// Ask, then acknowledge all.
     AcknowledgeAll,
+    /// End the sound of the alarms that sound now.
+    Silence,
     /// Draw everything anew.
     Redraw,
     /// Take the outcome of the last order off the screen.
@@ -163,6 +165,12 @@ pub const GLOBAL: &[Key<Global>] = &[
         action: Global::Dismiss,
     },
     Key { chord: ctrl('k'), label: "", help: "lock this terminal; works in every window too", action: Global::Lock },
+    Key {
+        chord: ctrl('s'),
+        label: "",
+        help: "silence what sounds now; nothing is acknowledged",
+        action: Global::Silence,
+    },
     Key { chord: ctrl('l'), label: "", help: "draw everything anew", action: Global::Redraw },
     Key { chord: ctrl('c'), label: "", help: "quit (asks first)", action: Global::Quit },
     Key {

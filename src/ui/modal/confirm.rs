@@ -161,6 +161,8 @@ impl Confirm {
             Intent::Order(Command::Test(..)) => "send",
             Intent::Order(Command::StopTest(_) | Command::StopRestore(_)) => "stop",
             Intent::Order(Command::ReadSets) => "read",
+            Intent::Order(Command::HandOver) => "hand over",
+            Intent::Order(Command::TakeOver) => "take over",
             Intent::Order(Command::SaveSet { replace: true, .. }) => "replace it",
             Intent::Order(Command::SaveSet { replace: false, .. }) => "save",
             Intent::Order(Command::Restore(_)) => "write and verify",
@@ -225,7 +227,7 @@ impl Confirm {
             Intent::Order(command) => {
                 let seen = self.seen.as_ref().and_then(|seen| seen.shown(cx));
                 let sign = self.sign.as_ref().map(signature);
-                Act::Confirmed(Confirmed { command, seen, sign })
+                Act::Confirmed(Confirmed { seen, sign, ..command.into() })
             }
         };
         match self.back {

@@ -88,6 +88,8 @@ pub struct Alarms {
     journal: Option<Journal>,
     /// Questions asked so far: even numbers ask for alarms, odd ones for actions.
     asked: u32,
+    /// The bell of the terminal rings for new alarms.
+    pub bell: bool,
 }
 
 #[derive(Debug, Default)]
