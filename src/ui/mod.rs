@@ -41,7 +41,7 @@ use keys::Global;
 use modal::{Confirm, Modal};
 pub use msg::{Act, AskId, Effect, Msg};
 use presence::Presence;
-use tabs::{Tab, Tabs};
+use tabs::{Tab, Tabs, alarms::deeds};
 use theme::Theme;
 pub use watch::{Confirmed, Watch};
 
@@ -296,13 +296,17 @@ fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
         Global::Help => vec![Act::Open(Modal::Help(0))],
         Global::Quit => vec![Act::Open(Modal::Confirm(Confirm::quit()))],
         Global::Acknowledge => match model.alarm_to_acknowledge() {
-            Some(alarm) => vec![Act::Order(alarm.acknowledge())],
+            Some(alarm) => deeds::acknowledge(&model.cx(), alarm),
             None => Vec::new(),
         },
-        Global::AcknowledgeAll => Confirm::acknowledge_all(&model.cx())
-            .map(|confirm| Act::Open(Modal::Confirm(confirm)))
-            .into_iter()
-            .collect(),
+        Global::AcknowledgeAll => {
+            let cx = model.cx();
+            let listed = (model.tabs.shown == Tab::Alarms).then(|| model.tabs.alarms.listed(&cx)).flatten();
+            match listed {
+                Some(listed) => deeds::acknowledge_all(&cx, listed.into_iter()),
+                None => deeds::acknowledge_all(&cx, cx.snapshot.alarms.iter()),
+            }
+        }
         // Where nothing sounds there is nothing to silence.
         Global::Silence if model.snapshot.sound => vec![Act::Order(Command::Alarm(AlarmCommand::Silence))],
         Global::Silence => Vec::new(),
