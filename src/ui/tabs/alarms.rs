@@ -22,15 +22,13 @@ use ratatui::{Frame, layout::Rect};
 use crate::{
     history::{Answer, HistoryError},
     plant::{
-        alarm::AlarmCommand,
-        command::Command,
         def::{AlarmClass, AlarmId, Priority, Subject},
         snapshot::{ActiveAlarm, AsideAlarm, Snapshot},
     },
     ui::{
         Act, Cx,
         keys::{Hint, find},
-        modal::{Faceplate, Modal, Prompt, Why, confirm::subject, faceplate::device_words},
+        modal::{Faceplate, Modal, Prompt, Why, faceplate::device_words},
     },
 };
 use filter::Filter;
@@ -134,10 +132,7 @@ impl Alarms {
             Action::Shelve => return alarm.map_or_else(Vec::new, |alarm| deeds::shelve(cx, alarm.id)),
             Action::OutOfService => return alarm.map_or_else(Vec::new, |alarm| deeds::out_of_service(cx, alarm.id)),
             Action::PutBack => return self.aside(cx).map_or_else(Vec::new, |aside| deeds::put_back(cx, aside)),
-            Action::Reset => {
-                let reset = alarm.map(|alarm| Command::Alarm(AlarmCommand::Reset(alarm.id)));
-                return reset.map(Act::Order).into_iter().collect();
-            }
+            Action::Reset => return alarm.map_or_else(Vec::new, |alarm| deeds::reset(cx, alarm)),
             Action::Why | Action::Open | Action::Mimic | Action::Trend | Action::Controller => {
                 return self.go(cx, action);
             }
@@ -295,8 +290,8 @@ impl Alarms {
             self.page = Page::Active;
             return;
         }
-        let of = self.target(cx).map(|alarm| subject(cx, alarm)).unwrap_or_default();
-        self.journal.look_for(&of);
+        let of = self.target(cx).map(|alarm| guidance::journal_of(cx, cx.def().alarm(alarm).subject));
+        self.journal.look_for(of.unwrap_or_default());
         self.page = Page::Journal;
     }
 

@@ -95,6 +95,27 @@ pub fn out_of_service(cx: &Cx, alarm: AlarmId) -> Vec<Act> {
     open(Modal::Reason(Box::new(Reason::new("out of service", "put out of service", notes, command, true))))
 }
 
+/// Asks whether to let go an alarm that latches.
+pub fn reset(cx: &Cx, alarm: &ActiveAlarm) -> Vec<Act> {
+    let why = match alarm.state {
+        AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
+            let command = Command::Alarm(AlarmCommand::Reset(alarm.id));
+            return open(Modal::Confirm(Confirm::order("reset a latched alarm", name(cx, alarm.id), command)));
+        }
+        AlarmState::Unacknowledged | AlarmState::Acknowledged if cx.def().alarm(alarm.id).latch => {
+            "Its cause lasts: it can be reset once that is gone."
+        }
+        AlarmState::Normal
+        | AlarmState::Unacknowledged
+        | AlarmState::Acknowledged
+        | AlarmState::Returned
+        | AlarmState::Shelved
+        | AlarmState::Suppressed
+        | AlarmState::OutOfService => "It does not latch: there is nothing to reset.",
+    };
+    open(Modal::Notice(Notice::new("reset", vec![name(cx, alarm.id), why.to_owned()])))
+}
+
 /// Asks whether to take back what was put aside.
 pub fn put_back(cx: &Cx, aside: &AsideAlarm) -> Vec<Act> {
     let (title, command) = match aside.state {

@@ -23,16 +23,13 @@ use crate::{
 pub fn view(cx: &Cx, alarm: &ActiveAlarm, canvas: &mut Canvas) {
     let def = cx.def().alarm(alarm.id);
     let guidance = &def.guidance;
-    let action = match respond_words(cx, def, alarm) {
-        Some(respond) => format!("{}   {respond}", or_dash(&guidance.action)),
-        None => or_dash(&guidance.action).to_owned(),
-    };
     let go = go_words(cx, def, Some(alarm));
     let rows = [
         ("now", now_words(cx, def, alarm)),
         ("cause", or_dash(&guidance.cause).to_owned()),
         ("effect", or_dash(&guidance.effect).to_owned()),
-        ("action", action),
+        ("action", or_dash(&guidance.action).to_owned()),
+        ("time", respond_words(cx, def, alarm).unwrap_or_else(|| "–".to_owned())),
     ];
     draw(cx, def, &rows, &go, canvas);
 }
@@ -131,10 +128,21 @@ fn respond_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<String>
 /// The keys that lead from an alarm to what it watches.
 fn go_words(cx: &Cx, def: &AlarmDef, alarm: Option<&ActiveAlarm>) -> String {
     let at = alarm.map(|alarm| format!(" at {}", clock(alarm.raised_at, &cx.def().time_zone))).unwrap_or_default();
+    let journal = format!("j journal of {}", journal_of(cx, def.subject));
     match def.subject {
-        Subject::Tag(_) => format!("m mimic   t trend{at}   c controller   j journal of this tag"),
-        Subject::Device(_) => "m mimic   c controller   j journal of this device".to_owned(),
-        Subject::Line(_) => "j journal of this line".to_owned(),
+        Subject::Tag(_) => format!("m mimic   t trend{at}   c controller   {journal}"),
+        Subject::Device(_) => format!("m mimic   c controller   {journal}"),
+        Subject::Line(_) => journal,
+    }
+}
+
+/// What the journal is searched for: the whole device, because its settings are what often makes the alarm of a tag.
+pub fn journal_of<'a>(cx: &Cx<'a>, subject: Subject) -> &'a str {
+    let def = cx.def();
+    match subject {
+        Subject::Tag(tag) => &def.device(def.tag(tag).device).name,
+        Subject::Device(device) => &def.device(device).name,
+        Subject::Line(line) => &def.line(line).name,
     }
 }
 

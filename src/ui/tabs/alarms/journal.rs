@@ -70,8 +70,11 @@ impl Journal {
         self.words.join(" ")
     }
 
-    /// So many shifts later; `0` is the last 24 hours.
+    /// So many shifts later; `0` is everything of the last 24 hours.
     pub fn shift(&mut self, cx: &Cx, by: isize) {
+        if by == 0 {
+            self.words.clear();
+        }
         let shown = self.period.as_ref();
         let period = match by {
             0 => None,

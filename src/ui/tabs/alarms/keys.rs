@@ -87,7 +87,7 @@ const DEEDS: [Row; 9] = [
     row(char('/'), "filter", "show only alarms with these words; Esc shows all again", Action::Words),
     row(char('p'), "page", "acknowledge all on this page of the list (asks first)", Action::AcknowledgePage),
     row(char(' '), "unfold", "show or fold away the consequences of a burst", Action::Fold),
-    row(char('r'), "reset", "let go a latched alarm whose cause is gone", Action::Reset),
+    row(char('r'), "reset", "let go a latched alarm whose cause is gone (asks first)", Action::Reset),
     row(
         char('o'),
         "out of service",
