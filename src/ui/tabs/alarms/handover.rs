@@ -191,17 +191,17 @@ impl Handover {
     }
 }
 
-/// `shelved TIC-1.PV temperature high, 00:41:00 left, by anna: sensor is cleaned`.
+/// `shelved ‹2›! TIC-1.PV temperature high, 41:00 left, by anna: sensor is cleaned, since 13:20:00`.
 pub fn aside_words(cx: &Cx, aside: &AsideAlarm) -> String {
     let def = cx.def().alarm(aside.id);
     let mark = cx.theme.priority_tag(def.priority);
     let left = aside.until.map(|until| format!(", {} left", running(between(cx.now, until)))).unwrap_or_default();
     let since = moment(aside.deed.at, cx.now, &cx.def().time_zone);
-    let by = aside.deed.by.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
+    let by = aside.deed.by.as_ref().map(|by| format!(", by {by}")).unwrap_or_default();
     let reason = aside.deed.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
     let active = if aside.active { " ACTIVE" } else { "" };
     let name = subject(cx, aside.id);
-    format!("{} {mark} {name} {}{active}{left}, since {since}{by}{reason}", aside.state.word(), def.text)
+    format!("{} {mark} {name} {}{active}{left}{by}{reason}, since {since}", aside.state.word(), def.text)
 }
 
 /// Lines and devices that somebody has taken away, sequences in manual, actuators that do not obey.

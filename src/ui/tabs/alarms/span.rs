@@ -28,8 +28,11 @@ pub fn due(cx: &Cx, errand: &Errand, seconds: f64, shown: Option<&Period>) -> bo
     errand.due(cx.now, real(if past { 20.0 * seconds } else { seconds }), real(PATIENCE_S))
 }
 
-/// `morning 11-21 06:00–14:00`.
+/// `morning 2026-11-21 06:00–14:00`; a period without a name of its own has its times in it already.
 pub fn words(cx: &Cx, shown: &Period) -> String {
-    let local = |at: jiff::Timestamp, form| at.to_zoned(cx.def().time_zone.clone()).strftime(form).to_string();
-    format!("{} {}–{}", shown.name, local(shown.from, "%m-%d %H:%M"), local(shown.to, "%H:%M"))
+    let local = |at: jiff::Timestamp| at.to_zoned(cx.def().time_zone.clone()).strftime("%H:%M").to_string();
+    match shown.name.contains(':') {
+        true => shown.name.clone(),
+        false => format!("{} {}–{}", shown.name, local(shown.from), local(shown.to)),
+    }
 }

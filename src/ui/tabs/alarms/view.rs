@@ -73,36 +73,41 @@ fn guide(height: u16) -> u16 {
 /// The names of the views, each with how much is in it, and how much of that waits: nothing is hidden in another view.
 fn views(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
     let count = |page| {
-        let alarms = cx.snapshot.alarms.iter().filter(|alarm| is_on(page, cx.def().alarm(alarm.id)));
         let (mut all, mut waiting) = (0, 0);
-        for alarm in alarms {
+        for alarm in cx.snapshot.alarms.iter().filter(|alarm| is_on(page, cx.def().alarm(alarm.id))) {
             all += 1;
             waiting += usize::from(alarm.state.needs_acknowledgement());
         }
-        match waiting {
-            0 => format!(" {all}"),
-            _ => format!(" {all} ({waiting} unack)"),
-        }
+        (all, waiting)
     };
-    let mut x = 1;
-    for page in Page::ALL {
-        let many = match page {
-            Page::Active | Page::System => count(page),
-            Page::Aside => format!(" {}", cx.snapshot.aside.len()),
-            Page::Journal | Page::Quality | Page::Handover => String::new(),
+    let counts = Page::ALL.map(|page| match page {
+        Page::Active | Page::System => Some(count(page)),
+        Page::Aside => Some((cx.snapshot.aside.len(), 0)),
+        Page::Journal | Page::Quality | Page::Handover => None,
+    });
+    let names = |word: &str| -> Vec<String> {
+        let name = |(page, count): (Page, Option<(usize, usize)>)| match count {
+            None => page.title().to_owned(),
+            Some((all, 0)) => format!("{} {all}", page.title()),
+            Some((all, waiting)) => format!("{} {all} ({waiting}{word})", page.title()),
         };
+        Page::ALL.into_iter().zip(counts).map(name).collect()
+    };
+    let bell = if tab.bell { "bell" } else { "" };
+    let room = canvas.width().saturating_sub(2 + width(bell));
+    let fits = |names: &Vec<String>| names.iter().map(|name| width(name) + 3).sum::<u16>() <= room + 3;
+    // Where there is no room for the word the brackets alone tell how many wait.
+    let all = Some(names(" unack")).filter(fits).unwrap_or_else(|| names(""));
+    let mut x = 1;
+    for (page, name) in Page::ALL.into_iter().zip(all) {
         if x > 1 {
             x = canvas.text(x, 0, " │ ", cx.theme.dim());
         }
         let style = if page == tab.page { cx.theme.focus() } else { cx.theme.normal() };
-        x = canvas.text(x, 0, &format!("{}{many}", page.title()), style);
+        x = canvas.text(x, 0, &name, style);
     }
-    if tab.bell {
-        let end = canvas.width().saturating_sub(1);
-        if x + 6 < end {
-            canvas.text_right(end, 0, "bell", cx.theme.strong());
-        }
-    }
+    let end = canvas.width().saturating_sub(1);
+    canvas.text_right(end, 0, bell, cx.theme.strong());
 }
 
 fn list(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
@@ -257,12 +262,18 @@ fn what_words(cx: &Cx, row: &Row, room: u16) -> String {
         (false, true) => cx.theme.pick("└ ", "` "),
         (false, false) => "",
     };
-    let more = match (row.folded, row.more, row.more_waiting) {
-        (false, ..) => String::new(),
-        (true, more, 0) => format!(" +{more} more"),
-        (true, more, waiting) => format!(" +{more} more, {waiting} unack"),
+    let (long, short) = match (row.folded, row.more, row.more_waiting) {
+        (false, ..) => (String::new(), String::new()),
+        (true, more, 0) => (format!(" +{more} more"), format!(" +{more}")),
+        (true, more, waiting) => (format!(" +{more} more, {waiting} unack"), format!(" +{more} ({waiting})")),
     };
-    let text = cx.def().alarm(row.alarm.id).text.clone();
-    let text = format!("{mark}{text} {}", guidance::condition_words(cx, row.alarm.id));
-    format!("{}{more}", fit(text.trim_end(), room.saturating_sub(width(&more))))
+    let name = format!("{mark}{}", cx.def().alarm(row.alarm.id).text);
+    let text = format!("{name} {}", guidance::condition_words(cx, row.alarm.id));
+    let text = text.trim_end();
+    let choices = [(text, &long), (text, &short), (&name, &short)];
+    let whole = choices.iter().find(|(text, more)| width(text) + width(more) <= room);
+    match whole {
+        Some((text, more)) => format!("{text}{more}"),
+        None => format!("{}{short}", fit(text, room.saturating_sub(width(&short)))),
+    }
 }
