@@ -56,7 +56,9 @@ pub fn of_command(command: &Command) -> Right {
         | Command::ReadSets
         | Command::SaveSet { .. }
         | Command::Restore(_)
-        | Command::StopRestore(_) => Right::Operate,
+        | Command::StopRestore(_)
+        | Command::HandOver
+        | Command::TakeOver => Right::Operate,
         Command::Alarm(AlarmCommand::OutOfService(_) | AlarmCommand::InService(_))
         | Command::Configure(_)
         | Command::SaveSettings(_) => Right::Engineer,
@@ -145,6 +147,8 @@ mod tests {
             Command::ReadSets,
             Command::SaveSet { device: DeviceId(0), name: Arc::from("winter"), replace: true },
             Command::StopRestore(DeviceId(0)),
+            Command::HandOver,
+            Command::TakeOver,
             Command::Test(LineId(0), Tool::Loopback { unit: 1, data: 7, count: 1 }),
             Command::Test(LineId(0), Tool::Identify { unit: 1 }),
             Command::Test(LineId(0), Tool::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),

@@ -20,7 +20,7 @@ pub fn command(def: &PlantDef, command: &Command) -> Result<(), String> {
     match command {
         Command::Write { tag: id, value: _ } => tag(def, *id),
         Command::Alarm(command) => of_alarms(def, command),
-        Command::ReadSets => Ok(()),
+        Command::ReadSets | Command::HandOver | Command::TakeOver => Ok(()),
         Command::Refresh(id) | Command::StopRestore(id) | Command::SaveSet { device: id, .. } => device(def, *id),
         Command::Connect(id, _) | Command::SaveSettings(id) | Command::Test(id, _) | Command::StopTest(id) => {
             line(def, *id)

@@ -88,6 +88,10 @@ pub enum Command {
     Restore(Box<RestoreWish>),
     /// Stop the restore of a device after the write under way.
     StopRestore(DeviceId),
+    /// Hand the plant over to the next shift; what its people should know is the note of the order.
+    HandOver,
+    /// Take the plant over from the shift before.
+    TakeOver,
 }
 
 impl Command {
@@ -105,7 +109,9 @@ impl Command {
             | Command::ReadSets
             | Command::SaveSet { .. }
             | Command::Restore(_)
-            | Command::StopRestore(_) => None,
+            | Command::StopRestore(_)
+            | Command::HandOver
+            | Command::TakeOver => None,
         }
     }
 }

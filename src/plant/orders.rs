@@ -16,6 +16,11 @@ use super::{
     tag::TagDef,
 };
 
+/// The word on record for a plant that was handed over to the next shift.
+pub const HAND_OVER: &str = "hand over";
+/// The word on record for a plant that was taken over from the shift before.
+pub const TAKE_OVER: &str = "take over";
+
 /// Orders that a snapshot shows.
 const SHOWN: usize = 32;
 /// A write that has heard nothing for so long is given up: it may or may not have taken effect.
@@ -201,7 +206,9 @@ impl Desk {
                     | Command::ReadSets
                     | Command::SaveSet { .. }
                     | Command::Restore(_)
-                    | Command::StopRestore(_) => false,
+                    | Command::StopRestore(_)
+                    | Command::HandOver
+                    | Command::TakeOver => false,
                 };
                 self.orders.iter_mut().find(|status| of_line(&status.command))?.outcome = busy;
                 None
@@ -361,6 +368,8 @@ fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
             ("restore set", def.device(wish.device).name.clone(), Some(new))
         }
         Command::StopRestore(device) => ("stop restore", def.device(*device).name.clone(), None),
+        Command::HandOver => (HAND_OVER, def.name.clone(), None),
+        Command::TakeOver => (TAKE_OVER, def.name.clone(), None),
     };
     let old = status.old.zip(status.command.written());
     let old = old.map(|(old, (tag, _))| value_words(board, def.tag(tag), old));

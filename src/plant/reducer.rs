@@ -13,9 +13,9 @@ use std::{mem::discriminant, sync::Arc};
 use jiff::Timestamp;
 
 use super::{
-    alarm::{AlarmQuality, Book, Meter},
+    alarm::{AlarmQuality, Book, Meter, command::check_words},
     board::Board,
-    command::{BusRequest, Command, Order, OrderId, Outcome, WriteId},
+    command::{BusRequest, Command, Order, OrderId, Outcome, Refusal, WriteId},
     def::{DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
     guard::Watch,
@@ -193,6 +193,13 @@ impl Plant {
             }
             Command::ReadSets | Command::SaveSet { .. } | Command::Restore(_) | Command::StopRestore(_) => {
                 self.set_order(&order, at, &mut effects)
+            }
+            Command::HandOver | Command::TakeOver => {
+                let outcome = match check_words(order.note.as_ref()) {
+                    Ok(()) => Outcome::Verified,
+                    Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),
+                };
+                self.desk.note(&order, outcome, &self.board, at)
             }
         };
         effects.records.extend(action.map(Record::Action));

@@ -348,6 +348,8 @@ pub fn order_words(cx: &Cx, command: &Command, old: Option<f64>) -> String {
             format!("{} to {}, {} changes", wish.from, cx.def().device(wish.device).name, wish.changes.len())
         }
         Command::StopRestore(device) => format!("stop restore of {}", cx.def().device(*device).name),
+        Command::HandOver => "hand over".to_owned(),
+        Command::TakeOver => "take over".to_owned(),
     }
 }
 

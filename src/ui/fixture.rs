@@ -12,13 +12,13 @@ pub use traffic::more_frames;
 
 use super::{Cx, theme::Theme};
 use crate::plant::{
-    alarm::AlarmState,
+    alarm::{AlarmQuality, AlarmState},
     def::*,
     event::{Fault, LineCounters, LineState},
     parameter_set::StoredSet,
     restore::Restore,
     sample::{Cause, Sample},
-    snapshot::{ActiveAlarm, DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
+    snapshot::{ActiveAlarm, AsideAlarm, DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
     tag::*,
     traffic::Exchange,
     tuning::Tuning,
@@ -38,6 +38,10 @@ pub struct Fixture {
     pub samples: Vec<Sample>,
     /// Alarms that are shown.
     pub alarms: Vec<ActiveAlarm>,
+    /// Alarms that are put aside.
+    pub aside: Vec<AsideAlarm>,
+    /// The figures of the alarm system.
+    pub alarm_quality: AlarmQuality,
     /// The line.
     pub line: LineStatus,
     /// The devices.
@@ -84,6 +88,8 @@ impl Fixture {
             def,
             samples,
             alarms: Vec::new(),
+            aside: Vec::new(),
+            alarm_quality: AlarmQuality::default(),
             line: LineStatus { state: LineState::Connected, counters, ..LineStatus::default() },
             devices,
         }
@@ -167,9 +173,9 @@ impl Fixture {
             lines: vec![self.line.clone()],
             devices: self.devices.clone(),
             alarms: Arc::new(self.alarms.clone()),
-            aside: Arc::default(),
-            sound: false,
-            alarm_quality: crate::plant::alarm::AlarmQuality::default(),
+            aside: Arc::new(self.aside.clone()),
+            sound: self.alarms.iter().any(|alarm| alarm.state == AlarmState::Unacknowledged),
+            alarm_quality: self.alarm_quality.clone(),
             orders: Vec::new(),
             sets: Arc::new(self.sets.clone()),
             restores: self.restores.iter().cloned().map(Arc::new).collect(),

@@ -185,6 +185,7 @@ impl Loop {
                     }
                 }
                 Effect::SaveReport { tab, path, bytes } => self.save(tab, path, bytes),
+                Effect::Bell => self.screen.ring()?,
                 Effect::Redraw => self.screen.renew()?,
                 Effect::Quit => return Ok(true),
             }

@@ -118,6 +118,8 @@ pub enum Global {
     Acknowledge,
     /// Ask, then acknowledge all.
     AcknowledgeAll,
+    /// End the sound of the alarms that sound now.
+    Silence,
     /// Draw everything anew.
     Redraw,
     /// Take the outcome of the last order off the screen.
@@ -163,6 +165,12 @@ pub const GLOBAL: &[Key<Global>] = &[
         action: Global::Dismiss,
     },
     Key { chord: ctrl('k'), label: "", help: "lock this terminal; works in every window too", action: Global::Lock },
+    Key {
+        chord: ctrl('s'),
+        label: "",
+        help: "silence what sounds now; nothing is acknowledged",
+        action: Global::Silence,
+    },
     Key { chord: ctrl('l'), label: "", help: "draw everything anew", action: Global::Redraw },
     Key { chord: ctrl('c'), label: "", help: "quit (asks first)", action: Global::Quit },
     Key {
@@ -195,13 +203,13 @@ mod tests {
         no_clash("global", vec![]);
         no_clash("mimic", chords(mimic::KEYS));
         no_clash("trends", chords(trends::KEYS));
-        no_clash("alarms", chords(alarms::KEYS));
         no_clash("reports", chords(reports::KEYS));
         no_clash("faults", chords(faults::KEYS));
         no_clash("login", chords(login::KEYS));
         no_clash("users", chords(users::LIST));
         no_clash("audit", chords(users::AUDIT));
-        for (page, chords) in bus::all_chords().into_iter().chain(controllers::all_chords()) {
+        let pages = bus::all_chords().into_iter().chain(controllers::all_chords());
+        for (page, chords) in pages.chain(alarms::all_chords()) {
             no_clash(page, chords);
         }
     }

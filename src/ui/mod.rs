@@ -1,5 +1,6 @@
 //! What an operator looks at: `update` turns messages into state and effects, `view` draws state; both are pure.
 
+pub mod bell;
 pub mod chrome;
 pub mod edge;
 pub mod io;
@@ -28,6 +29,8 @@ use ratatui::{Frame, layout::Rect};
 use crate::{
     access::Standing,
     plant::{
+        alarm::AlarmCommand,
+        command::Command,
         def::PlantDef,
         sample::Cause,
         snapshot::{ActiveAlarm, Snapshot},
@@ -38,7 +41,7 @@ use keys::Global;
 use modal::{Confirm, Modal};
 pub use msg::{Act, AskId, Effect, Msg};
 use presence::Presence;
-use tabs::{Tab, Tabs};
+use tabs::{Tab, Tabs, alarms::deeds};
 use theme::Theme;
 pub use watch::{Confirmed, Watch};
 
@@ -293,13 +296,20 @@ fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
         Global::Help => vec![Act::Open(Modal::Help(0))],
         Global::Quit => vec![Act::Open(Modal::Confirm(Confirm::quit()))],
         Global::Acknowledge => match model.alarm_to_acknowledge() {
-            Some(alarm) => vec![Act::Order(alarm.acknowledge())],
+            Some(alarm) => deeds::acknowledge(&model.cx(), alarm),
             None => Vec::new(),
         },
-        Global::AcknowledgeAll => Confirm::acknowledge_all(&model.cx())
-            .map(|confirm| Act::Open(Modal::Confirm(confirm)))
-            .into_iter()
-            .collect(),
+        Global::AcknowledgeAll => {
+            let cx = model.cx();
+            let listed = (model.tabs.shown == Tab::Alarms).then(|| model.tabs.alarms.listed(&cx)).flatten();
+            match listed {
+                Some(listed) => deeds::acknowledge_all(&cx, listed.into_iter()),
+                None => deeds::acknowledge_all(&cx, cx.snapshot.alarms.iter()),
+            }
+        }
+        // Where nothing sounds there is nothing to silence.
+        Global::Silence if model.snapshot.sound => vec![Act::Order(Command::Alarm(AlarmCommand::Silence))],
+        Global::Silence => Vec::new(),
         Global::Redraw => vec![Act::Do(Effect::Redraw)],
         Global::Dismiss => {
             // A failure that is being read is dismissed first; everything else does not hold up the way back.
@@ -321,13 +331,15 @@ fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<Act> {
         let acts = presence::on_other_plant(model, snapshot);
         return acts.into_iter().chain(with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))).collect();
     }
+    let rings = model.tabs.alarms.bell && bell::rings(&model.snapshot, &snapshot);
     model.snapshot = snapshot;
     model.follow();
     if model.standing.gone.is_some() {
         // What still came through is as old as all the rest.
         model.doubt();
     }
-    with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
+    let bell = rings.then_some(Act::Do(Effect::Bell));
+    bell.into_iter().chain(with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))).collect()
 }
 
 fn on_tick(model: &mut Model, silent: Duration) -> Vec<Act> {
@@ -351,6 +363,20 @@ fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
                 model.tabs.controllers.show(device);
                 effects.extend(show(model, Tab::Controllers));
             }
+            Act::ShowOnMimic(tags) => {
+                with_tabs(model, |tabs, cx| {
+                    tabs.mimic.select(cx, &tags);
+                    Vec::new()
+                });
+                effects.extend(show(model, Tab::Mimic));
+            }
+            Act::ShowOnTrends(tag, at) => {
+                with_tabs(model, |tabs, cx| {
+                    tabs.trends.show(cx, tag, at);
+                    Vec::new()
+                });
+                effects.extend(show(model, Tab::Trends));
+            }
             Act::Order(command) => effects.extend(model.order(command.into())),
             Act::Confirmed(confirmed) => effects.extend(model.order(confirmed)),
             Act::Wish(tab, wish) => {
@@ -370,7 +396,14 @@ fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     let asked = with_tabs(model, |tabs, cx| tabs.on_snapshot(cx));
     let effects = asked.into_iter().filter_map(|act| match act {
         Act::Do(effect) => Some(effect),
-        Act::Open(_) | Act::Show(_) | Act::ShowDevice(_) | Act::Order(_) | Act::Confirmed(_) | Act::Wish(..) => None,
+        Act::Open(_)
+        | Act::Show(_)
+        | Act::ShowDevice(_)
+        | Act::ShowOnMimic(_)
+        | Act::ShowOnTrends(..)
+        | Act::Order(_)
+        | Act::Confirmed(_)
+        | Act::Wish(..) => None,
     });
     effects.collect()
 }

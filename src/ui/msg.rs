@@ -3,6 +3,7 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use crossterm::event::KeyEvent;
+use jiff::Timestamp;
 
 use super::{Confirmed, modal::Modal, tabs::Tab};
 use crate::{
@@ -10,7 +11,7 @@ use crate::{
     history::{Answer, HistoryError, Question},
     plant::{
         command::{Command, OrderId},
-        def::DeviceId,
+        def::{DeviceId, TagId},
         snapshot::Snapshot,
     },
     sim::drill,
@@ -66,6 +67,8 @@ pub enum Effect {
         /// What.
         bytes: Vec<u8>,
     },
+    /// Ring the bell of the terminal once.
+    Bell,
     /// Forget what the terminal shows and draw everything.
     Redraw,
     /// Leave.
@@ -90,6 +93,10 @@ pub enum Act {
     Show(Tab),
     /// Show a device on the controllers tab.
     ShowDevice(DeviceId),
+    /// Show the first of these tags that the mimic has there.
+    ShowOnMimic(Vec<TagId>),
+    /// Show the curve of a tag with the cursor at a moment.
+    ShowOnTrends(TagId, Timestamp),
     /// Give an order and watch its outcome.
     Order(Command),
     /// The same with what its operator has seen and signed.

@@ -162,7 +162,13 @@ pub(super) fn hold_back(model: &mut Model, acts: Vec<Act>) -> Vec<Act> {
             Act::Order(_) | Act::Confirmed(_) | Act::Do(Effect::SaveReport { .. } | Effect::Drill(_)) => {
                 held = held.or(Some(None));
             }
-            Act::Open(_) | Act::Show(_) | Act::ShowDevice(_) | Act::Wish(..) | Act::Do(_) => rest.push(act),
+            Act::Open(_)
+            | Act::Show(_)
+            | Act::ShowDevice(_)
+            | Act::ShowOnMimic(_)
+            | Act::ShowOnTrends(..)
+            | Act::Wish(..)
+            | Act::Do(_) => rest.push(act),
         }
     }
     if let Some(wanted) = held {

@@ -43,7 +43,14 @@ pub fn of_key(cx: &Cx, tab: Tab, hint: &Hint) -> Option<Role> {
     let plants = |hint: &Hint| cx.def().mimic.commands.iter().any(|command| hint.key == command.key.to_string());
     let acts = match tab {
         Tab::Mimic => plants(hint),
-        Tab::Alarms => matches!(hint.key.as_str(), "a" | "A"),
+        Tab::Alarms if hint.label == "out of service" => {
+            let lesser = cx.standing.who.as_ref().is_none_or(|who| who.role < Role::Supervisor);
+            return lesser.then_some(Role::Supervisor);
+        }
+        Tab::Alarms => {
+            let deeds = ["note", "shelve", "page", "reset", "put back", "hand over", "take over"];
+            matches!(hint.key.as_str(), "a" | "A") || deeds.contains(&hint.label.as_str())
+        }
         Tab::Controllers => matches!(hint.label.as_str(), "edit" | "tune" | "actions" | "refresh" | "line"),
         Tab::Bus => hint.label == "start",
         Tab::Reports => hint.label == "export",

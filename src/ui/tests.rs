@@ -56,6 +56,11 @@ pub fn order_of(effects: &[Effect]) -> Option<&Command> {
     effects.iter().find_map(|effect| match effect {
         Effect::Order(order) => Some(&order.command),
         Effect::Wish(..) => None,
-        Effect::Ask(..) | Effect::Drill(_) | Effect::SaveReport { .. } | Effect::Redraw | Effect::Quit => None,
+        Effect::Ask(..)
+        | Effect::Drill(_)
+        | Effect::SaveReport { .. }
+        | Effect::Bell
+        | Effect::Redraw
+        | Effect::Quit => None,
     })
 }

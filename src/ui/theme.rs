@@ -183,6 +183,20 @@ impl Theme {
             (Priority::Low, _) => " 4  ",
         }
     }
+    /// The mark of a state: filled while nobody has acknowledged it, a letter for what is not plain.
+    pub fn state_mark(&self, state: AlarmState) -> &'static str {
+        match state {
+            AlarmState::Normal => " ",
+            AlarmState::Unacknowledged => self.pick("■", "#"),
+            AlarmState::Acknowledged => self.pick("□", "="),
+            AlarmState::Returned => self.pick("●", "*"),
+            AlarmState::LatchedUnacknowledged => "L",
+            AlarmState::LatchedAcknowledged => "l",
+            AlarmState::Shelved => "z",
+            AlarmState::Suppressed => "-",
+            AlarmState::OutOfService => "x",
+        }
+    }
     /// The mark of a priority beside a value, where a bare number could be read as one.
     pub fn priority_tag(&self, priority: Priority) -> &'static str {
         match priority {

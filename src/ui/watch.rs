@@ -1,5 +1,7 @@
 //! The last order of this terminal, from the key to its outcome.
 
+use std::sync::Arc;
+
 use super::{Effect, Model, chrome};
 use crate::{
     access::{OrderRequest, Signature},
@@ -18,12 +20,14 @@ pub struct Confirmed {
     pub seen: Option<f64>,
     /// What a tag asks for again.
     pub sign: Option<Signature>,
+    /// Why, in his words.
+    pub note: Option<Arc<str>>,
 }
 
 impl From<Command> for Confirmed {
     /// A command that nothing was asked about.
     fn from(command: Command) -> Confirmed {
-        Confirmed { command, seen: None, sign: None }
+        Confirmed { command, seen: None, sign: None, note: None }
     }
 }
 
@@ -65,13 +69,13 @@ impl Watch {
 impl Model {
     /// Gives an order and watches it. A station that has gone takes none: that is said at once.
     pub(super) fn order(&mut self, confirmed: Confirmed) -> Option<Effect> {
-        let Confirmed { command, seen, sign } = confirmed;
+        let Confirmed { command, seen, sign, note } = confirmed;
         self.ordered = self.ordered.wrapping_add(1);
         let id = OrderId { terminal: self.terminal, number: self.ordered };
         let undelivered = self.standing.gone.as_ref().map(|_| "the station has gone");
         let changed_at = self.clock.phase;
         self.watch = Some(Watch { id, command: command.clone(), status: None, changed_at, undelivered });
-        let request = OrderRequest { seen, sign, ..OrderRequest::new(id, command) };
+        let request = OrderRequest { seen, sign, note, ..OrderRequest::new(id, command) };
         undelivered.is_none().then_some(Effect::Order(request))
     }
 

@@ -126,6 +126,8 @@ pub fn needed(def: &PlantDef, command: &Command) -> Option<Sign> {
         | Command::StopTest(_)
         | Command::ReadSets
         | Command::SaveSet { .. }
-        | Command::StopRestore(_) => None,
+        | Command::StopRestore(_)
+        | Command::HandOver
+        | Command::TakeOver => None,
     }
 }

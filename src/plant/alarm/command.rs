@@ -248,7 +248,8 @@ fn needed(reason: Option<&Arc<str>>) -> Result<&Arc<str>, AlarmRefusal> {
     Ok(reason)
 }
 
-fn check_words(words: Option<&Arc<str>>) -> Result<(), AlarmRefusal> {
+/// A note that is too long is refused; `None` is none.
+pub fn check_words(words: Option<&Arc<str>>) -> Result<(), AlarmRefusal> {
     match words.is_some_and(|words| WORDS_MAX < words.chars().count()) {
         true => Err(AlarmRefusal::TooLong),
         false => Ok(()),

@@ -42,7 +42,9 @@ impl Plant {
             | Command::ReadSets
             | Command::SaveSet { .. }
             | Command::Restore(_)
-            | Command::StopRestore(_) => return None,
+            | Command::StopRestore(_)
+            | Command::HandOver
+            | Command::TakeOver => return None,
         }
         self.desk.note(order, Outcome::Verified, &self.board, at)
     }

@@ -33,6 +33,10 @@ pub(super) fn banner(model: &Model, cx: &Cx, canvas: &mut Canvas) {
             Some(words) => canvas.text(1, 0, &fit_words(&words, room), cx.theme.trouble()),
             None => canvas.text(1, 0, "no alarms", cx.theme.dim()),
         };
+        let aside = aside_words(cx);
+        if canvas.is_blank(room.saturating_sub(width(&aside) + 2), 0, width(&aside) + 2) {
+            canvas.text_right(room, 0, &aside, cx.theme.normal());
+        }
         return;
     };
     let def = cx.def().alarm(alarm.id);
@@ -42,15 +46,43 @@ pub(super) fn banner(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     let (text, room) = (alarm_words(cx, alarm), canvas.width());
     let may = rights::missing(cx, &alarm.acknowledge()).is_none();
     let ack = if waiting && may { "a ack " } else { "" };
-    // That it waits for somebody must not be what a long text cuts off.
-    let left = room.saturating_sub(x + if waiting { 2 + width(ack) } else { 0 });
+    let flood = if cx.snapshot.alarm_quality.flood_since.is_some() { "FLOOD   " } else { "" };
+    let (aside, silenced) = (aside_words(cx), if is_silenced(cx) { "silenced   " } else { "" });
+    let aside = if aside.is_empty() { aside } else { format!("{aside}   ") };
+    // That it waits for somebody, and that there is a flood, must not be what a long text cuts off.
+    let least = format!("{flood}{ack}");
+    let left = room.saturating_sub(x + if least.is_empty() { 0 } else { 2 + width(&least) });
     let text = if width(&text) <= left { text } else { fit_words(&text, left) };
-    // The alarm itself comes first; the counts and the key only where there is room left.
-    let tails = [format!("{}   {ack}", counts(cx)), ack.to_owned(), String::new()];
+    // The alarm itself comes first; the counts and the rest only where there is room left.
+    let counts = counts(cx);
+    let tails = [
+        format!("{flood}{counts}   {aside}{silenced}{ack}"),
+        format!("{flood}{counts}   {aside}{ack}"),
+        format!("{flood}{counts}   {ack}"),
+        least,
+        String::new(),
+    ];
     let fits = |tail: &&String| x + width(&text) + 2 + width(tail) <= room;
     let tail = tails.iter().find(fits).map_or("", String::as_str);
     canvas.text(x, 0, &text, cx.theme.alarm(def.priority, alarm.state, false));
     canvas.text_right(room, 0, tail, cx.theme.normal());
+    if !flood.is_empty() && tail.starts_with(flood) {
+        canvas.text(room.saturating_sub(width(tail)), 0, "FLOOD", cx.theme.trouble());
+    }
+}
+
+/// `3 put aside`; empty where nothing is.
+fn aside_words(cx: &Cx) -> String {
+    match cx.snapshot.aside.len() {
+        0 => String::new(),
+        many => format!("{many} put aside"),
+    }
+}
+
+/// Something is active and unacknowledged, and somebody has silenced it.
+fn is_silenced(cx: &Cx) -> bool {
+    let sounds = |alarm: &ActiveAlarm| alarm.state == AlarmState::Unacknowledged;
+    !cx.snapshot.sound && cx.snapshot.alarms.iter().any(sounds)
 }
 
 /// Why alarms may be there without being seen: `alarms not judged: L1 disconnected`.

@@ -75,6 +75,13 @@ impl Screen {
         self.terminal.resize(ratatui::layout::Rect::new(0, 0, area.width, area.height))
     }
 
+    /// Rings the bell of the terminal.
+    pub fn ring(&mut self) -> io::Result<()> {
+        let wire = self.terminal.backend_mut();
+        wire.bytes.push(0x07);
+        wire.send()
+    }
+
     /// Columns and rows.
     pub fn size(&self) -> (u16, u16) {
         let size = self.terminal.backend().size;

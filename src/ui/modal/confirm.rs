@@ -70,27 +70,6 @@ impl Confirm {
         self.intent == Intent::Quit
     }
 
-    /// Acknowledge all? `None` when there is nothing to acknowledge.
-    pub fn acknowledge_all(cx: &Cx) -> Option<Confirm> {
-        let waiting: Vec<_> = cx.snapshot.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement()).collect();
-        if waiting.is_empty() {
-            return None;
-        }
-        let mut notes = vec![match waiting.len() {
-            1 => "Acknowledge 1 alarm?".to_owned(),
-            n => format!("Acknowledge {n} alarms?"),
-        }];
-        notes.extend(waiting.iter().take(6).map(|alarm| {
-            let def = cx.def().alarm(alarm.id);
-            format!("{} {} {}", cx.theme.priority_mark(def.priority), subject(cx, alarm.id), def.text)
-        }));
-        if waiting.len() > 6 {
-            notes.push(format!("… and {} more", waiting.len() - 6));
-        }
-        let intent = Intent::Order(cx.snapshot.acknowledge_all()?);
-        Some(Confirm::new(intent, "acknowledge all", notes))
-    }
-
     /// Write this value? Old and new value are drawn from the intent, so they cannot differ from what is sent.
     pub fn write(cx: &Cx, tag: TagId, value: f64) -> Confirm {
         let def = cx.def().tag(tag);
@@ -161,6 +140,8 @@ impl Confirm {
             Intent::Order(Command::Test(..)) => "send",
             Intent::Order(Command::StopTest(_) | Command::StopRestore(_)) => "stop",
             Intent::Order(Command::ReadSets) => "read",
+            Intent::Order(Command::HandOver) => "hand over",
+            Intent::Order(Command::TakeOver) => "take over",
             Intent::Order(Command::SaveSet { replace: true, .. }) => "replace it",
             Intent::Order(Command::SaveSet { replace: false, .. }) => "save",
             Intent::Order(Command::Restore(_)) => "write and verify",
@@ -225,7 +206,7 @@ impl Confirm {
             Intent::Order(command) => {
                 let seen = self.seen.as_ref().and_then(|seen| seen.shown(cx));
                 let sign = self.sign.as_ref().map(signature);
-                Act::Confirmed(Confirmed { command, seen, sign })
+                Act::Confirmed(Confirmed { seen, sign, ..command.into() })
             }
         };
         match self.back {

@@ -55,7 +55,7 @@ impl Entry {
                 Ok(value) => {
                     let seen = self.seen.shown(cx);
                     let command = Command::Write { tag: self.tag, value };
-                    return Next::Do(vec![Act::Confirmed(Confirmed { command, seen, sign: None })]);
+                    return Next::Do(vec![Act::Confirmed(Confirmed { seen, ..command.into() })]);
                 }
                 Err(problem) => self.problem = Some(problem),
             }

@@ -10,6 +10,7 @@ pub mod help;
 pub mod line;
 pub mod notice;
 pub mod prompt;
+pub mod reason;
 pub mod seen;
 pub mod settings;
 pub mod sheet;
@@ -25,6 +26,7 @@ pub use entry::Entry;
 pub use faceplate::Faceplate;
 pub use notice::Notice;
 pub use prompt::Prompt;
+pub use reason::Reason;
 pub use settings::Settings;
 pub use sheet::Sheet;
 pub use why::Why;
@@ -50,6 +52,8 @@ pub enum Modal {
     Choice(Choice),
     /// A text for the tab below.
     Prompt(Prompt),
+    /// A deed that wants words.
+    Reason(Box<Reason>),
     /// What there is to know about an item of the mimic.
     Faceplate(Faceplate),
     /// Words to be read: why something cannot be done now.
@@ -111,6 +115,7 @@ impl Modal {
             Modal::Entry(entry) => entry.on_key(cx, event),
             Modal::Choice(choice) => choice.on_key(cx, event),
             Modal::Prompt(prompt) => prompt.on_key(cx, tabs, event),
+            Modal::Reason(reason) => reason.on_key(cx, event),
             Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
             Modal::Notice(notice) => notice.on_key(event),
             Modal::Why(why) => why.on_key(event),
@@ -138,7 +143,12 @@ impl Modal {
             Modal::Help(_) | Modal::Notice(_) | Modal::Why(_) | Modal::Faceplate(_) | Modal::Deed(_) => true,
             Modal::Confirm(confirm) => confirm.is_quit(),
             Modal::Bus(window) => window.only_shows(),
-            Modal::Entry(_) | Modal::Choice(_) | Modal::Prompt(_) | Modal::Settings(_) | Modal::Sheet(_) => false,
+            Modal::Entry(_)
+            | Modal::Choice(_)
+            | Modal::Prompt(_)
+            | Modal::Reason(_)
+            | Modal::Settings(_)
+            | Modal::Sheet(_) => false,
         }
     }
 
@@ -147,6 +157,7 @@ impl Modal {
         match self {
             Modal::Entry(entry) => entry.line.paste(text),
             Modal::Prompt(prompt) => prompt.line.paste(text),
+            Modal::Reason(reason) => reason.paste(text),
             Modal::Settings(settings) => settings.on_paste(text),
             Modal::Confirm(confirm) => confirm.on_paste(text),
             Modal::Sheet(sheet) => sheet.paste(text),
@@ -170,6 +181,7 @@ impl Modal {
             Modal::Entry(_) => vec![hint("⏎", "write and verify"), hint("Esc", "leave unchanged")],
             Modal::Choice(_) => vec![hint("↑↓", "select"), hint("⏎", "next"), hint("Esc", "leave unchanged")],
             Modal::Prompt(_) => vec![hint("⏎", "take it"), hint("Esc", "leave")],
+            Modal::Reason(reason) => reason.hints().into_iter().map(|(key, label)| hint(key, label)).collect(),
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
             Modal::Notice(_) => vec![hint("Esc", "close")],
             Modal::Why(why) => why.hints(),
@@ -188,6 +200,7 @@ impl Modal {
             Modal::Entry(entry) => entry.view(cx, frame, body),
             Modal::Choice(choice) => choice.view(cx, frame, body),
             Modal::Prompt(prompt) => prompt.view(cx, frame, body),
+            Modal::Reason(reason) => reason.view(cx, frame, body),
             Modal::Faceplate(faceplate) => faceplate.view(cx, frame, body),
             Modal::Notice(notice) => notice.view(cx, frame, body),
             Modal::Why(why) => why.view(cx, frame, body),

@@ -8,7 +8,7 @@ use super::Tab;
 use crate::{
     history::{Answer, HistoryError, Question, Series},
     plant::{
-        def::{MimicCommand, MimicItem, Place},
+        def::{MimicCommand, MimicItem, Place, TagId},
         snapshot::Snapshot,
     },
     ui::{
@@ -106,6 +106,12 @@ impl Mimic {
             }
         }
         Vec::new()
+    }
+
+    /// Selects the first item that shows one of these tags; none if the picture has none of them.
+    pub fn select(&mut self, cx: &Cx, wanted: &[TagId]) {
+        let shows = |item: &MimicItem| tags(cx, item).iter().any(|tag| wanted.contains(tag));
+        self.selected = cx.def().mimic.items.iter().position(shows);
     }
 
     /// A key that the plant file defines: a window with the finished intent.

@@ -160,7 +160,7 @@ impl Tabs {
                 None => self.mimic.on_command_key(cx, event),
             },
             Tab::Trends => act(trends::KEYS, event, |action| self.trends.on_key(cx, action)),
-            Tab::Alarms => act(alarms::KEYS, event, |action| self.alarms.on_key(cx, action)),
+            Tab::Alarms => self.alarms.on_key(cx, event),
             Tab::Controllers => self.controllers.on_key(cx, event),
             Tab::Reports => act(reports::KEYS, event, |action| self.reports.on_key(cx, action)),
             Tab::Bus => self.bus.on_key(cx, event),
@@ -175,12 +175,7 @@ impl Tabs {
             Tab::Login => self.login.hints(cx),
             Tab::Mimic => self.mimic.hints(cx),
             Tab::Trends => keys::hints(trends::KEYS),
-            Tab::Alarms => {
-                // Keys of every tab, but here is where they are looked for.
-                let ack = Hint::new("a", "ack", "acknowledge the selected alarm");
-                let all = Hint::new("A", "all", "acknowledge all alarms (asks first)");
-                [ack, all].into_iter().chain(keys::hints(alarms::KEYS)).collect()
-            }
+            Tab::Alarms => self.alarms.hints(),
             Tab::Controllers => self.controllers.hints(cx),
             Tab::Reports => keys::hints(reports::KEYS),
             Tab::Bus => self.bus.hints(cx),
@@ -194,7 +189,8 @@ impl Tabs {
         match self.shown {
             Tab::Controllers => self.controllers.back(cx),
             Tab::Users => self.users.back(),
-            Tab::Login | Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Reports | Tab::Bus | Tab::Faults => false,
+            Tab::Alarms => self.alarms.back(),
+            Tab::Login | Tab::Mimic | Tab::Trends | Tab::Reports | Tab::Bus | Tab::Faults => false,
         }
     }
 
@@ -251,7 +247,8 @@ impl Tabs {
             Tab::Bus => self.bus.on_text(cx, text),
             Tab::Controllers => self.controllers.on_text(cx, text),
             Tab::Users => self.users.on_text(cx, text),
-            Tab::Login | Tab::Mimic | Tab::Alarms | Tab::Faults => Ok(Vec::new()),
+            Tab::Alarms => self.alarms.on_text(cx, text),
+            Tab::Login | Tab::Mimic | Tab::Faults => Ok(Vec::new()),
         }
     }
 

@@ -209,6 +209,15 @@ impl Trends {
         Ok(Vec::new())
     }
 
+    /// Shows the curve of a tag with the cursor at a moment, and a quarter of the window after it.
+    pub fn show(&mut self, cx: &Cx, tag: TagId, at: Timestamp) {
+        self.open_tag(cx, tag);
+        let after = SignedDuration::from_secs(WINDOWS[self.window]) / 4;
+        let end = at.checked_add(after).ok().filter(|end| *end < cx.now);
+        (self.accumulate, self.since, self.end, self.cursor) = (false, None, end, Some(at));
+        self.moved();
+    }
+
     /// Draws it.
     pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
         view::draw(self, cx, frame, area);
@@ -329,7 +338,12 @@ impl Trends {
 
     /// Shows the curve of a value: in the group of the plant that has it, or alone.
     fn open(&mut self, cx: &Cx, row: usize) {
-        let Some(tag) = stored(cx).get(row).copied() else { return };
+        if let Some(tag) = stored(cx).get(row).copied() {
+            self.open_tag(cx, tag);
+        }
+    }
+
+    fn open_tag(&mut self, cx: &Cx, tag: TagId) {
         let groups = &cx.def().trends;
         let place = |group: &TrendGroup| group.pens.iter().take(8).position(|pen| pen.tag == tag);
         let found = groups.iter().enumerate().find_map(|(n, group)| Some((n, place(group)?)));

@@ -183,6 +183,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
             | Effect::Wish(..)
             | Effect::Ask(..)
             | Effect::Drill(_)
+            | Effect::Bell
             | Effect::Redraw
             | Effect::Quit => None,
         })

@@ -42,6 +42,7 @@ impl Stand {
                 | Effect::Order(..)
                 | Effect::Wish(..)
                 | Effect::Drill(_)
+                | Effect::Bell
                 | Effect::Redraw
                 | Effect::Quit => {}
             }

@@ -1,0 +1,168 @@
+//! What an operator does with alarms: the windows that ask, and the orders that need no question.
+
+use std::time::Duration;
+
+use super::super::reports::period;
+use crate::{
+    plant::{
+        alarm::{AlarmCommand, AlarmState},
+        command::Command,
+        def::AlarmId,
+        snapshot::{ActiveAlarm, AsideAlarm},
+    },
+    ui::{
+        Act, Cx,
+        modal::{Confirm, Modal, Notice, Reason, confirm::subject},
+        widgets::text::running,
+    },
+};
+
+/// Times that are offered for the shelf, minutes.
+const SHELVE_MIN: [u64; 3] = [15, 60, 240];
+/// Alarms that a question names.
+const NAMED: usize = 6;
+
+/// Acknowledges one alarm; where the plant file wants a note it is asked for.
+pub fn acknowledge(cx: &Cx, alarm: &ActiveAlarm) -> Vec<Act> {
+    match cx.def().alarm(alarm.id).note {
+        true => note(cx, alarm),
+        false => vec![Act::Order(alarm.acknowledge())],
+    }
+}
+
+/// Acknowledges one alarm with a note.
+pub fn note(cx: &Cx, alarm: &ActiveAlarm) -> Vec<Act> {
+    if !alarm.state.needs_acknowledgement() {
+        return Vec::new();
+    }
+    let needed = cx.def().alarm(alarm.id).note;
+    let notes = vec![name(cx, alarm.id)];
+    let reason = Reason::new("acknowledge with a note", "acknowledge", notes, alarm.acknowledge(), needed);
+    open(Modal::Reason(Box::new(reason)))
+}
+
+/// Asks whether to acknowledge all of these, exactly as they are seen now; where one of them needs a note it is asked for.
+pub fn acknowledge_all<'a>(cx: &Cx, alarms: impl Iterator<Item = &'a ActiveAlarm>) -> Vec<Act> {
+    let waiting: Vec<_> = alarms.filter(|alarm| alarm.state.needs_acknowledgement()).collect();
+    let needed = waiting.iter().any(|alarm| cx.def().alarm(alarm.id).note);
+    if waiting.is_empty() {
+        return Vec::new();
+    }
+    let asked = match waiting.len() {
+        1 => "Acknowledge 1 alarm?".to_owned(),
+        n => format!("Acknowledge {n} alarms?"),
+    };
+    let mut notes: Vec<String> = waiting.iter().take(NAMED).map(|alarm| marked(cx, alarm.id)).collect();
+    if NAMED < waiting.len() {
+        notes.push(format!("… and {} more", waiting.len() - NAMED));
+    }
+    let seen = waiting.iter().map(|alarm| (alarm.id, alarm.raised_at)).collect();
+    let command = Command::Alarm(AlarmCommand::AcknowledgeAll { seen });
+    let title = "acknowledge all";
+    if needed {
+        notes.insert(0, asked);
+        notes.push("At least one of them needs a note.".to_owned());
+        return open(Modal::Reason(Box::new(Reason::new(title, "acknowledge", notes, command, true))));
+    }
+    open(Modal::Confirm(Confirm::order(title, asked, command).with_notes(notes)))
+}
+
+/// Asks for how long an alarm is put aside, and why.
+pub fn shelve(cx: &Cx, alarm: AlarmId) -> Vec<Act> {
+    let max = cx.def().alarm_rules.shelve_max;
+    let minutes = |span: Duration| match span.as_secs() / 60 {
+        minutes if minutes % 60 == 0 => format!("{} h", minutes / 60),
+        minutes => format!("{minutes} min"),
+    };
+    let fixed = SHELVE_MIN.map(|minutes| Duration::from_secs(minutes * 60));
+    let mut times: Vec<_> = fixed.into_iter().filter(|span| *span <= max).map(|span| (minutes(span), span)).collect();
+    let shift = period::at(cx.def(), cx.now).filter(|_| !cx.def().shifts.is_empty());
+    let rest = shift.and_then(|shift| Duration::try_from(shift.to.duration_since(cx.now)).ok());
+    if let Some(rest) = rest.filter(|rest| !rest.is_zero() && *rest <= max) {
+        times.push((format!("rest of the shift, {}", running(rest)), rest));
+    }
+    if times.is_empty() {
+        times.push((minutes(max), max));
+    }
+    let notes = vec![name(cx, alarm), "It is not annunciated for this time, and comes back by itself:".to_owned()];
+    Reason::shelve(notes, alarm, times).map_or_else(Vec::new, |reason| open(Modal::Reason(Box::new(reason))))
+}
+
+/// Asks why an alarm is put aside until somebody puts it back.
+pub fn out_of_service(cx: &Cx, alarm: AlarmId) -> Vec<Act> {
+    let notes = vec![name(cx, alarm), "It is not annunciated until somebody puts it back in service.".to_owned()];
+    let command = Command::Alarm(AlarmCommand::OutOfService(alarm));
+    open(Modal::Reason(Box::new(Reason::new("out of service", "put out of service", notes, command, true))))
+}
+
+/// Asks whether to let go an alarm that latches.
+pub fn reset(cx: &Cx, alarm: &ActiveAlarm) -> Vec<Act> {
+    let why = match alarm.state {
+        AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
+            let command = Command::Alarm(AlarmCommand::Reset(alarm.id));
+            return open(Modal::Confirm(Confirm::order("reset a latched alarm", name(cx, alarm.id), command)));
+        }
+        AlarmState::Unacknowledged | AlarmState::Acknowledged if cx.def().alarm(alarm.id).latch => {
+            "Its cause lasts: it can be reset once that is gone."
+        }
+        AlarmState::Normal
+        | AlarmState::Unacknowledged
+        | AlarmState::Acknowledged
+        | AlarmState::Returned
+        | AlarmState::Shelved
+        | AlarmState::Suppressed
+        | AlarmState::OutOfService => "It does not latch: there is nothing to reset.",
+    };
+    open(Modal::Notice(Notice::new("reset", vec![name(cx, alarm.id), why.to_owned()])))
+}
+
+/// Asks whether to take back what was put aside.
+pub fn put_back(cx: &Cx, aside: &AsideAlarm) -> Vec<Act> {
+    let (title, command) = match aside.state {
+        AlarmState::Shelved => ("take back from the shelf", AlarmCommand::Unshelve(aside.id)),
+        AlarmState::OutOfService => ("put in service", AlarmCommand::InService(aside.id)),
+        AlarmState::Suppressed => {
+            let words = "It is suppressed by design, and comes back when its enabling condition holds again.";
+            return open(Modal::Notice(Notice::new("suppressed", vec![words.to_owned()])));
+        }
+        AlarmState::Normal
+        | AlarmState::Unacknowledged
+        | AlarmState::Acknowledged
+        | AlarmState::Returned
+        | AlarmState::LatchedUnacknowledged
+        | AlarmState::LatchedAcknowledged => return Vec::new(),
+    };
+    let holds = aside.active.then(|| "Its condition holds: it will be annunciated at once.".to_owned());
+    let confirm = Confirm::order(title, name(cx, aside.id), Command::Alarm(command));
+    open(Modal::Confirm(confirm.with_notes(holds)))
+}
+
+/// Asks for what the next shift should know.
+pub fn hand_over() -> Vec<Act> {
+    let notes = vec!["What the next shift should know besides what stands on this page:".to_owned()];
+    let reason = Reason::new("hand over", "hand over", notes, Command::HandOver, false);
+    open(Modal::Reason(Box::new(reason)))
+}
+
+/// Asks whether whoever sits here takes the plant over.
+pub fn take_over(cx: &Cx) -> Vec<Act> {
+    let who = cx.standing.who.as_ref().map_or("nobody", |who| &who.user);
+    let words = format!("{who} has read this page and takes the plant over.");
+    open(Modal::Confirm(Confirm::order("take over", words, Command::TakeOver)))
+}
+
+fn open(modal: Modal) -> Vec<Act> {
+    vec![Act::Open(modal)]
+}
+
+/// The same with the mark as wide as all others, for lists.
+fn marked(cx: &Cx, alarm: AlarmId) -> String {
+    let def = cx.def().alarm(alarm);
+    format!("{} {} {}", cx.theme.priority_mark(def.priority), subject(cx, alarm), def.text)
+}
+
+/// `‹2›! TIC-1.PV temperature high`.
+fn name(cx: &Cx, alarm: AlarmId) -> String {
+    let def = cx.def().alarm(alarm);
+    format!("{} {} {}", cx.theme.priority_tag(def.priority), subject(cx, alarm), def.text)
+}

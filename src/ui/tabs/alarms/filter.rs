@@ -1,0 +1,149 @@
+//! Which alarms of the book the list shows: by priority, state, area and words; pure.
+
+use crate::{
+    plant::{
+        alarm::{AlarmState, book::subject_name},
+        def::{AlarmDef, PlantDef, Priority},
+        snapshot::ActiveAlarm,
+    },
+    ui::Cx,
+};
+
+/// What may be typed, for the entry window.
+pub const FORMS: &str = "words of tag, text, area, class, state or who:  TIC-1 high   unack TK-1   system";
+
+/// A filter; what is empty lets everything through.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Filter {
+    /// This priority only.
+    pub priority: Option<Priority>,
+    /// Alarms in this state only.
+    pub state: Option<AlarmState>,
+    /// Alarms of this area only.
+    pub area: Option<String>,
+    /// Words in small letters that must all be found.
+    words: Vec<String>,
+}
+
+/// The states that an alarm in the list can be in.
+const STATES: [AlarmState; 5] = [
+    AlarmState::Unacknowledged,
+    AlarmState::Acknowledged,
+    AlarmState::Returned,
+    AlarmState::LatchedUnacknowledged,
+    AlarmState::LatchedAcknowledged,
+];
+
+impl Filter {
+    /// Takes the words that were typed; none is no filter.
+    pub fn type_words(&mut self, text: &str) {
+        self.words = text.split_whitespace().map(str::to_lowercase).collect();
+    }
+    /// The words, as they were typed.
+    pub fn typed(&self) -> String {
+        self.words.join(" ")
+    }
+    /// Lets everything through?
+    pub fn is_off(&self) -> bool {
+        *self == Filter::default()
+    }
+
+    /// The next priority, and all of them after the last.
+    pub fn next_priority(&mut self) {
+        let all = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low];
+        self.priority = after(&all, self.priority.as_ref());
+    }
+    /// The next state, and all of them after the last.
+    pub fn next_state(&mut self) {
+        self.state = after(&STATES, self.state.as_ref());
+    }
+    /// The next area of the plant, and all of them after the last.
+    pub fn next_area(&mut self, def: &PlantDef) {
+        let mut areas: Vec<String> = def.alarms.iter().map(|alarm| alarm.area.clone()).collect();
+        areas.retain(|area| !area.is_empty());
+        areas.sort();
+        areas.dedup();
+        self.area = after(&areas, self.area.as_ref());
+    }
+
+    /// Does it let this alarm through?
+    pub fn holds(&self, cx: &Cx, alarm: &ActiveAlarm) -> bool {
+        if self.is_off() {
+            return true;
+        }
+        let def = cx.def().alarm(alarm.id);
+        self.priority.is_none_or(|priority| priority == def.priority)
+            && self.state.is_none_or(|state| state == alarm.state)
+            && self.area.as_ref().is_none_or(|area| *area == def.area)
+            && (self.words.is_empty() || self.finds(&text_of(cx, alarm, def)))
+    }
+
+    fn finds(&self, text: &str) -> bool {
+        self.words.iter().all(|word| text.contains(word))
+    }
+
+    /// What it asks for: `high  UNACK  area TK-1  "tic"`; empty where it lets everything through.
+    pub fn describe(&self) -> String {
+        let parts = [
+            self.priority.map(|priority| priority.word().to_owned()),
+            self.state.map(|state| state.word().to_owned()),
+            self.area.as_ref().map(|area| format!("area {area}")),
+            (!self.words.is_empty()).then(|| format!("\"{}\"", self.typed())),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join("  ")
+    }
+}
+
+/// All that is looked through for words, in small letters.
+fn text_of(cx: &Cx, alarm: &ActiveAlarm, def: &AlarmDef) -> String {
+    let by = alarm.acknowledged.as_ref().and_then(|deed| deed.by.as_deref()).unwrap_or_default();
+    let (class, state) = (def.class.word(), alarm.state.word());
+    format!("{} {} {} {class} {state} {by}", subject_name(cx.def(), def.subject), def.text, def.area).to_lowercase()
+}
+
+/// The one after `now`, nothing after the last one.
+fn after<T: Clone + PartialEq>(all: &[T], now: Option<&T>) -> Option<T> {
+    match now {
+        None => all.first().cloned(),
+        Some(now) => all.iter().skip_while(|other| *other != now).nth(1).cloned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ui::fixture::{Fixture, with_cx};
+
+    #[test]
+    fn every_word_and_every_choice_must_fit() {
+        let mut fixture = Fixture::alarm();
+        fixture.def.alarms[2].area = "TK-1".to_owned();
+        let snapshot = fixture.snapshot();
+        let check = |set: &dyn Fn(&mut Filter), expect: &[u16], what: &str| {
+            let mut filter = Filter::default();
+            set(&mut filter);
+            let shown = with_cx(&snapshot, |cx| {
+                let shown = snapshot.alarms.iter().filter(|alarm| filter.holds(cx, alarm));
+                shown.map(|alarm| alarm.id.0).collect::<Vec<_>>()
+            });
+            assert_eq!(shown, expect, "{what}");
+            assert_eq!(filter.is_off(), filter.describe().is_empty(), "what is in force is always written");
+        };
+        check(&|_| {}, &[0, 3, 2], "no filter");
+        check(&|filter| filter.type_words("TIC-1 HIGH"), &[0], "words, whatever their case");
+        check(&|filter| filter.type_words("tic-1 low"), &[], "all of them");
+        check(&|filter| filter.type_words("unack"), &[0], "a state by its word");
+        check(&|filter| filter.type_words("tk-1"), &[2], "an area by its name");
+        check(&|filter| filter.priority = Some(Priority::Medium), &[3], "a priority");
+        check(&|filter| filter.state = Some(AlarmState::Returned), &[2], "a state");
+        check(&|filter| filter.next_area(&snapshot.def), &[2], "an area");
+        check(
+            &|filter| {
+                filter.next_area(&snapshot.def);
+                filter.next_area(&snapshot.def);
+            },
+            &[0, 3, 2],
+            "all areas again",
+        );
+    }
+}

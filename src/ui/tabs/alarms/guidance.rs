@@ -1,0 +1,170 @@
+//! What to do about an alarm: cause, effect, action, the time there is left, and where to look.
+
+use crate::{
+    plant::{
+        alarm::AlarmState,
+        def::{AlarmDef, AlarmId, Condition, Level, Subject},
+        snapshot::ActiveAlarm,
+    },
+    ui::{
+        Cx,
+        modal::{
+            confirm::subject,
+            faceplate::{device_words, line_state_words},
+        },
+        widgets::{
+            text::{Canvas, between, clock, fit, fit_words, running, wrap},
+            value,
+        },
+    },
+};
+
+/// Draws it for a listed alarm.
+pub fn view(cx: &Cx, alarm: &ActiveAlarm, canvas: &mut Canvas) {
+    let def = cx.def().alarm(alarm.id);
+    let guidance = &def.guidance;
+    let go = go_words(cx, def, Some(alarm));
+    let rows = [
+        ("now", now_words(cx, def, alarm)),
+        ("cause", or_dash(&guidance.cause).to_owned()),
+        ("effect", or_dash(&guidance.effect).to_owned()),
+        ("action", or_dash(&guidance.action).to_owned()),
+        ("time", respond_words(cx, def, alarm).unwrap_or_else(|| "–".to_owned())),
+    ];
+    draw(cx, def, &rows, &go, canvas);
+}
+
+/// Draws what there is to know of any alarm, with words of its own at the top.
+pub fn view_any(cx: &Cx, alarm: AlarmId, now: String, canvas: &mut Canvas) {
+    let def = cx.def().alarm(alarm);
+    let rows = [
+        ("now", now),
+        ("effect", or_dash(&def.guidance.effect).to_owned()),
+        ("action", or_dash(&def.guidance.action).to_owned()),
+    ];
+    draw(cx, def, &rows, &go_words(cx, def, None), canvas);
+}
+
+fn draw(cx: &Cx, def: &AlarmDef, rows: &[(&str, String)], go: &str, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let (width, height) = (canvas.width(), canvas.height());
+    canvas.run(0, 0, width, '─', theme.dim());
+    let mark = theme.priority_tag(def.priority);
+    let title = format!(" {mark} {} {} {} ", subject(cx, def.id), def.text, condition_words(cx, def.id));
+    canvas.text(1, 0, &fit(&title, width.saturating_sub(2)), theme.strong());
+    let room = width.saturating_sub(10);
+    let lines: Vec<Vec<String>> = rows.iter().map(|(_, text)| wrap(text, room)).collect();
+    // Where there is no room for all of it the action is told whole, and one line of the others.
+    let free = usize::from(height.saturating_sub(2));
+    let whole = lines.iter().map(Vec::len).sum::<usize>() <= free;
+    let spare = (free + 1).saturating_sub(rows.len()).max(1);
+    let mut y = 1;
+    for ((label, text), lines) in rows.iter().zip(lines) {
+        let style = if *label == "action" { theme.strong() } else { theme.normal() };
+        canvas.text(1, y, label, theme.dim());
+        let shown = match (whole, *label == "action") {
+            (true, _) => lines,
+            (false, true) => lines.into_iter().take(spare).collect(),
+            (false, false) => vec![fit_words(text, room)],
+        };
+        for line in shown {
+            canvas.text(9, y, &line, style);
+            y += 1;
+        }
+    }
+    let last = height.saturating_sub(1).max(y.min(height.saturating_sub(1)));
+    canvas.text(1, last, "go to", theme.dim());
+    canvas.text(9, last, &fit_words(go, room), theme.normal());
+}
+
+fn or_dash(text: &str) -> &str {
+    if text.is_empty() { "–" } else { text }
+}
+
+/// The value now and when it was raised, how often, and who acknowledged it.
+fn now_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
+    let zone = &cx.def().time_zone;
+    let mut words = match def.subject {
+        Subject::Tag(tag) => {
+            let raised = alarm.value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
+            format!("{}, raised at {raised}", value::show(cx, tag).whole())
+        }
+        Subject::Device(device) => device_words(cx, device),
+        Subject::Line(line) => line_state_words(cx, line),
+    };
+    if 1 < alarm.times {
+        words += &format!(", {} times since the start", alarm.times);
+    }
+    if let Some(deed) = &alarm.acknowledged {
+        let by = deed.by.as_deref().unwrap_or("the station");
+        words += &format!(", acknowledged {} by {by}", clock(deed.at, zone));
+        if let Some(note) = &deed.reason {
+            words += &format!(": {note}");
+        }
+    }
+    words
+}
+
+/// `respond within 10 min, 9 min left`; without a time to respond nothing, and no time left for what is over.
+fn respond_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<String> {
+    let respond = def.guidance.respond?;
+    let within = format!("respond within {} min", respond.as_secs().div_ceil(60));
+    let gone = between(alarm.raised_at, cx.now);
+    Some(match alarm.state {
+        AlarmState::Unacknowledged | AlarmState::Acknowledged => match respond.checked_sub(gone) {
+            Some(left) => format!("{within}, {} left", running(left)),
+            None => format!("{within}, OVERDUE by {}", running(gone - respond)),
+        },
+        AlarmState::Normal
+        | AlarmState::Returned
+        | AlarmState::LatchedUnacknowledged
+        | AlarmState::LatchedAcknowledged
+        | AlarmState::Shelved
+        | AlarmState::Suppressed
+        | AlarmState::OutOfService => within,
+    })
+}
+
+/// The keys that lead from an alarm to what it watches.
+fn go_words(cx: &Cx, def: &AlarmDef, alarm: Option<&ActiveAlarm>) -> String {
+    let at = alarm.map(|alarm| format!(" at {}", clock(alarm.raised_at, &cx.def().time_zone))).unwrap_or_default();
+    let journal = format!("j journal of {}", journal_of(cx, def.subject));
+    match def.subject {
+        Subject::Tag(_) => format!("m mimic   t trend{at}   c controller   {journal}"),
+        Subject::Device(_) => format!("m mimic   c controller   {journal}"),
+        Subject::Line(_) => journal,
+    }
+}
+
+/// What the journal is searched for: the whole device, because its settings are what often makes the alarm of a tag.
+pub fn journal_of<'a>(cx: &Cx<'a>, subject: Subject) -> &'a str {
+    let def = cx.def();
+    match subject {
+        Subject::Tag(tag) => &def.device(def.tag(tag).device).name,
+        Subject::Device(device) => &def.device(device).name,
+        Subject::Line(line) => &def.line(line).name,
+    }
+}
+
+/// The limit of an alarm: `> 72.0`; empty where there is none.
+pub fn condition_words(cx: &Cx, alarm: AlarmId) -> String {
+    let def = cx.def().alarm(alarm);
+    let number = |value| match def.subject {
+        Subject::Tag(tag) => cx.snapshot.format(tag, value),
+        Subject::Device(_) | Subject::Line(_) => value.to_string(),
+    };
+    match def.condition {
+        Condition::Limit { level: Level::HighHigh | Level::High, limit, .. } => format!("> {}", number(limit)),
+        Condition::Limit { level: Level::Low | Level::LowLow, limit, .. } => format!("< {}", number(limit)),
+        Condition::Deviation { from, limit, .. } => format!("> {} off {}", number(limit), cx.def().tag(from).short),
+        Condition::State { is } => format!("= {}", number(is)),
+        Condition::Rate { limit, .. } => format!("{} {limit}/min", if limit < 0.0 { "<" } else { ">" }),
+        Condition::Bit { .. }
+        | Condition::NoChange { .. }
+        | Condition::NoUpdate { .. }
+        | Condition::Changes { .. }
+        | Condition::NotAnswering
+        | Condition::Health { .. }
+        | Condition::NotConnected => String::new(),
+    }
+}

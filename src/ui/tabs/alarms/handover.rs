@@ -1,0 +1,276 @@
+//! The handover: what the next shift must know, as the plant stands and as the shift has left it, and who took it over.
+
+use jiff::Timestamp;
+use ratatui::style::Style;
+
+use super::{
+    super::{Tab, errand::Errand, reports::period},
+    journal::action_words,
+    span,
+};
+use crate::{
+    history::{Answer, HistoryError, Question},
+    plant::{
+        alarm::AlarmState,
+        event::LineState,
+        orders::{HAND_OVER, TAKE_OVER},
+        record::ActionRecord,
+        sample::Quality,
+        snapshot::{AsideAlarm, DeviceState},
+    },
+    report::Period,
+    ui::{
+        Act, Cx,
+        modal::{confirm::subject, faceplate::device_words},
+        widgets::{
+            text::{Canvas, between, clock, fit_words, moment, running, wrap},
+            value,
+        },
+    },
+};
+
+/// Deeds that are read at most; more are said to be left out.
+const ROWS: usize = 500;
+/// How often they are asked anew, real time.
+const EVERY_S: f64 = 5.0;
+/// Values in doubt that are named at most.
+const NAMED: usize = 8;
+/// Deeds that are only about the program, and no change of the plant.
+const NO_CHANGE: [&str; 10] =
+    ["acknowledge", "silence", "login", "logout", "lock", "unlock", "export", "read sets", HAND_OVER, TAKE_OVER];
+
+/// State of the page.
+#[derive(Debug, Default)]
+pub struct Handover {
+    /// The chosen shift; `None` is the running one.
+    period: Option<Period>,
+    /// Deeds of it and of the shift before, newest first.
+    actions: Vec<ActionRecord>,
+    answered: bool,
+    trouble: Option<String>,
+    first: usize,
+    errand: Errand,
+}
+
+impl Handover {
+    /// So many shifts later; `0` is the running one.
+    pub fn shift(&mut self, cx: &Cx, by: isize) {
+        let shown = self.period(cx);
+        let chosen = match by {
+            0 => None,
+            by if by < 0 => span::earlier(cx, shown.as_ref()),
+            _ => span::later(cx, shown.as_ref()),
+        };
+        self.period = chosen.filter(|chosen| chosen.to <= cx.now);
+        (self.actions, self.answered, self.trouble, self.first) = (Vec::new(), false, None, 0);
+        self.errand = Errand::default();
+    }
+
+    /// Scrolls.
+    pub fn step(&mut self, cx: &Cx, by: isize) {
+        let room = usize::from(cx.area.height.saturating_sub(2)).max(1);
+        let lines = self.lines(cx, cx.area.width).len();
+        self.first = self.first.saturating_add_signed(by).min(lines.saturating_sub(room));
+    }
+
+    /// A deed was done: what it left is asked at once.
+    pub fn want(&mut self) {
+        self.errand.want();
+    }
+
+    fn period(&self, cx: &Cx) -> Option<Period> {
+        self.period.clone().or_else(|| period::at(cx.def(), cx.now))
+    }
+
+    /// Asks the history if it is time.
+    pub fn ask(&mut self, cx: &Cx, number: &mut u32) -> Vec<Act> {
+        let Some(shown) = self.period(cx) else { return Vec::new() };
+        if !span::due(cx, &self.errand, EVERY_S, Some(&shown)) {
+            return Vec::new();
+        }
+        *number = number.wrapping_add(1);
+        self.errand.asked(*number, cx.now);
+        // What the shift before wrote down is for this one.
+        let from = period::before(cx.def(), &shown).map_or(shown.from, |before| before.from);
+        vec![Act::ask(Tab::Alarms, *number, Question::Actions { from, to: shown.to, limit: ROWS })]
+    }
+
+    /// The history answered.
+    pub fn on_answer(&mut self, number: u32, answer: &Result<Answer, HistoryError>) {
+        if self.errand.answered(number).is_none() {
+            return;
+        }
+        match answer {
+            Ok(Answer::Actions(rows)) => {
+                (self.actions, self.answered, self.trouble) = (rows.clone(), true, None);
+            }
+            Ok(
+                Answer::Series(_)
+                | Answer::Journal(_)
+                | Answer::AlarmQuality(_)
+                | Answer::LineMinutes(_)
+                | Answer::Report(_),
+            ) => {}
+            Err(error) => self.trouble = Some(error.to_string()),
+        }
+    }
+
+    /// Draws it.
+    pub fn view(&self, cx: &Cx, canvas: &mut Canvas) {
+        let theme = cx.theme;
+        let (width, height) = (canvas.width(), canvas.height());
+        let x = canvas.text(1, 0, "Handover  ", theme.strong());
+        let x = match self.period(cx) {
+            Some(shown) => canvas.text(x, 0, &span::words(cx, &shown), theme.normal()),
+            None => x,
+        };
+        match &self.trouble {
+            Some(trouble) => canvas.text(x + 2, 0, trouble, theme.trouble()),
+            None if !self.answered => canvas.text(x + 2, 0, "reading …", theme.dim()),
+            None => x,
+        };
+        let lines = self.lines(cx, width);
+        let room = usize::from(height.saturating_sub(1));
+        for (y, (text, style)) in lines.iter().skip(self.first).take(room).enumerate() {
+            canvas.text(1, y as u16 + 1, text, *style);
+        }
+        let more = lines.len().saturating_sub(self.first + room);
+        if more > 0 {
+            canvas.text_right(width.saturating_sub(1), 0, &format!("{more} more below"), theme.strong());
+        }
+    }
+
+    fn lines(&self, cx: &Cx, width: u16) -> Vec<(String, Style)> {
+        let theme = cx.theme;
+        let room = width.saturating_sub(4);
+        let mut lines = self.note_lines(cx, room);
+        let mut section = |title: &str, rows: Vec<String>, worry: bool| {
+            let style = if worry && !rows.is_empty() { theme.strong() } else { theme.dim() };
+            let title = if rows.is_empty() { format!("{title}: none") } else { format!("{title}: {}", rows.len()) };
+            lines.push((title, style));
+            let rows = rows.into_iter().map(|row| (format!("  {}", fit_words(row.trim_start(), room)), theme.normal()));
+            lines.extend(rows);
+        };
+        section("put aside", cx.snapshot.aside.iter().map(|aside| aside_words(cx, aside)).collect(), true);
+        section("not as usual: closed, in manual, on trial", unusual(cx), true);
+        section("values in doubt", doubtful(cx), true);
+        if self.answered {
+            let from = self.period(cx).map_or(Timestamp::MIN, |shown| shown.from);
+            let of = |keep: fn(&ActionRecord) -> bool| {
+                let rows = self.actions.iter().filter(|row| from <= row.at && keep(row));
+                let at = |row: &ActionRecord| moment(row.at, cx.now, &cx.def().time_zone);
+                rows.map(|row| format!("{} {}", at(row), action_words(cx, row).trim_start())).collect::<Vec<_>>()
+            };
+            section("failed in this shift", of(|row| is_failed(row) && is_change(row)), true);
+            section("changed in this shift", of(|row| !is_failed(row) && is_change(row)), false);
+            if self.actions.len() >= ROWS {
+                section("the oldest deeds are left out", Vec::new(), true);
+            }
+        }
+        lines
+    }
+
+    /// The last note, and who has taken over since.
+    fn note_lines(&self, cx: &Cx, room: u16) -> Vec<(String, Style)> {
+        let theme = cx.theme;
+        let when = |row: &ActionRecord| moment(row.at, cx.now, &cx.def().time_zone);
+        let note = self.actions.iter().position(|row| &*row.action == HAND_OVER && !is_failed(row));
+        let Some((n, note)) = note.and_then(|n| Some((n, self.actions.get(n)?))) else {
+            let words = if self.answered { "Nobody has handed over in this shift or the one before." } else { "" };
+            return vec![(words.to_owned(), theme.normal())];
+        };
+        let mut lines = vec![(format!("handed over {} by {}", when(note), note.by), theme.strong())];
+        let text = note.note.as_deref().unwrap_or("without a note");
+        lines.extend(wrap(text, room).into_iter().map(|line| (format!("  {line}"), theme.normal())));
+        let taken = self.actions[..n].iter().rev().find(|row| &*row.action == TAKE_OVER && !is_failed(row));
+        lines.push(match taken {
+            Some(row) => (format!("taken over {} by {}", when(row), row.by), theme.strong()),
+            None => ("not taken over yet: o takes over".to_owned(), theme.trouble()),
+        });
+        lines
+    }
+}
+
+/// `shelved ‹2›! TIC-1.PV temperature high, 41:00 left, by anna: sensor is cleaned, since 13:20:00`.
+pub fn aside_words(cx: &Cx, aside: &AsideAlarm) -> String {
+    let def = cx.def().alarm(aside.id);
+    let mark = cx.theme.priority_tag(def.priority);
+    let left = aside.until.map(|until| format!(", {} left", running(between(cx.now, until)))).unwrap_or_default();
+    let since = moment(aside.deed.at, cx.now, &cx.def().time_zone);
+    let by = aside.deed.by.as_ref().map(|by| format!(", by {by}")).unwrap_or_default();
+    let reason = aside.deed.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
+    let active = if aside.active { " ACTIVE" } else { "" };
+    let name = subject(cx, aside.id);
+    format!("{} {mark} {name} {}{active}{left}{by}{reason}, since {since}", aside.state.word(), def.text)
+}
+
+/// Lines and devices that somebody has taken away, sequences in manual, actuators that do not obey.
+fn unusual(cx: &Cx) -> Vec<String> {
+    let (def, snapshot) = (cx.def(), cx.snapshot);
+    let zone = &def.time_zone;
+    let lines = def.lines.iter().flat_map(|line| {
+        let status = snapshot.line(line.id);
+        let state = match status.state {
+            LineState::Disconnected => Some("closed by an operator".to_owned()),
+            LineState::Testing => Some("given to a test".to_owned()),
+            LineState::Waiting { .. } | LineState::Connecting => {
+                status.lost_since.map(|since| format!("not connected since {}", clock(since, zone)))
+            }
+            LineState::Connected => None,
+        };
+        let tried = status.settings_before.as_ref().map(|_| "settings on trial, not saved".to_owned());
+        state.into_iter().chain(tried).map(|words| format!("{} {words}", line.name))
+    });
+    let devices = def.devices.iter().filter_map(|device| {
+        let status = snapshot.device(device.id);
+        let words = match (status.state, status.diagnosis) {
+            (DeviceState::Down { .. }, _) => device_words(cx, device.id),
+            (DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_), reason) => {
+                let signal = reason?.signal();
+                format!("{} {}", signal.letter(), signal.word())
+            }
+        };
+        Some(format!("{} {words}", device.name))
+    });
+    let sequences = def.guards.sequences.iter().filter_map(|sequence| {
+        let (tag, auto) = sequence.auto?;
+        let now = snapshot.sample(tag).trusted().filter(|now| *now != auto)?;
+        Some(format!("{} {}", def.tag(tag).name, snapshot.format(tag, now)))
+    });
+    let stubborn = def.guards.actuators.iter().enumerate().filter_map(|(n, actuator)| {
+        let lasts = snapshot.watch.disobeys(&def.guards, n, cx.now)?;
+        Some(format!("{} has not obeyed for {}", def.tag(actuator.output).name, running(lasts)))
+    });
+    lines.chain(devices).chain(sequences).chain(stubborn).collect()
+}
+
+/// Values that are not good, and alarms that have been active for a day.
+fn doubtful(cx: &Cx) -> Vec<String> {
+    let polled = cx.def().tags.iter().filter(|tag| tag.store);
+    let bad: Vec<String> = polled
+        .filter(|tag| match cx.snapshot.sample(tag.id).quality {
+            Quality::Good => false,
+            Quality::Uncertain(_) | Quality::Bad(_) => true,
+        })
+        .map(|tag| format!("{} {}", tag.name, value::show(cx, tag.id).whole()))
+        .collect();
+    let more = bad.len().saturating_sub(NAMED);
+    let stale = cx.snapshot.alarms.iter().filter(|alarm| {
+        alarm.state == AlarmState::Acknowledged && 24 * 3_600 < between(alarm.raised_at, cx.now).as_secs()
+    });
+    let stale = stale.map(|alarm| {
+        let lasts = running(between(alarm.raised_at, cx.now));
+        format!("{} {} active for {lasts}", subject(cx, alarm.id), cx.def().alarm(alarm.id).text)
+    });
+    let more = (more > 0).then(|| format!("… and {more} more values"));
+    bad.into_iter().take(NAMED).chain(more).chain(stale).collect()
+}
+
+fn is_failed(row: &ActionRecord) -> bool {
+    ["refused", "not confirmed", "failed"].iter().any(|word| row.outcome.starts_with(word))
+}
+
+/// Did it change the plant, or was it meant to?
+fn is_change(row: &ActionRecord) -> bool {
+    !NO_CHANGE.contains(&&*row.action)
+}

@@ -1,0 +1,205 @@
+//! The journal: steps of alarms and deeds of operators in one list, searched by words and by time.
+
+use jiff::{SignedDuration, Timestamp};
+use ratatui::style::Style;
+
+use super::{
+    super::{Tab, errand::Errand, reports::period},
+    span,
+};
+use crate::{
+    history::{Answer, HistoryError, Question},
+    plant::record::{ActionRecord, AlarmRecord},
+    report::Period,
+    ui::{
+        Act, Cx,
+        widgets::text::{Canvas, fit_words, moment, pad},
+    },
+};
+
+/// Without a chosen period the journal reaches back so far.
+const SPAN: SignedDuration = SignedDuration::from_hours(24);
+/// Rows of each kind that the journal holds at most; more are said to be left out.
+const ROWS: usize = 500;
+/// The same while something is searched for.
+const SEARCHED_ROWS: usize = 2_000;
+/// How often it is asked anew, real time.
+const EVERY_S: f64 = 5.0;
+/// What may be typed, for the entry window.
+pub const FORMS: &str = "words of tag, text, user; a time or a day:  TIC-1 anna   06:00-14:00   2026-11-20";
+
+/// State of the page.
+#[derive(Debug, Default)]
+pub struct Journal {
+    alarms: Vec<AlarmRecord>,
+    actions: Vec<ActionRecord>,
+    answered: bool,
+    trouble: Option<String>,
+    /// First row shown.
+    first: usize,
+    /// Words in small letters that must all be found in a row.
+    words: Vec<String>,
+    /// The chosen period; `None` is the last 24 hours.
+    period: Option<Period>,
+    steps: Errand,
+    deeds: Errand,
+}
+
+impl Journal {
+    /// Searches for these words in the last 24 hours.
+    pub fn look_for(&mut self, words: &str) {
+        self.words = words.split_whitespace().map(str::to_lowercase).collect();
+        self.show(None);
+    }
+
+    /// What was typed: words, and what looks like a time is the period.
+    pub fn search(&mut self, cx: &Cx, text: &str) -> Result<(), String> {
+        let is_time = |word: &&str| word.starts_with(|c: char| c.is_ascii_digit()) && word.contains([':', '-']);
+        let (times, words): (Vec<&str>, Vec<&str>) = text.split_whitespace().partition(is_time);
+        let period = match times.is_empty() {
+            true => None,
+            false => Some(period::typed(cx.def(), &times.join(" "), cx.now)?),
+        };
+        self.words = words.into_iter().map(str::to_lowercase).collect();
+        self.show(period);
+        Ok(())
+    }
+
+    /// What is searched for.
+    pub fn typed(&self) -> String {
+        self.words.join(" ")
+    }
+
+    /// So many shifts later; `0` is everything of the last 24 hours.
+    pub fn shift(&mut self, cx: &Cx, by: isize) {
+        if by == 0 {
+            self.words.clear();
+        }
+        let shown = self.period.as_ref();
+        let period = match by {
+            0 => None,
+            by if by < 0 => span::earlier(cx, shown),
+            _ => span::later(cx, shown),
+        };
+        self.show(period);
+    }
+
+    /// Scrolls.
+    pub fn step(&mut self, cx: &Cx, by: isize) {
+        let last = self.rows(cx).len().saturating_sub(1);
+        self.first = self.first.saturating_add_signed(by).min(last);
+    }
+
+    /// Other rows are wanted; those of before must not stand under their heading.
+    fn show(&mut self, period: Option<Period>) {
+        (self.first, self.answered, self.period) = (0, false, period);
+        (self.alarms, self.actions) = (Vec::new(), Vec::new());
+        (self.steps, self.deeds) = (Errand::default(), Errand::default());
+    }
+
+    fn limit(&self) -> usize {
+        if self.words.is_empty() { ROWS } else { SEARCHED_ROWS }
+    }
+
+    /// Asks the history if it is time.
+    pub fn ask(&mut self, cx: &Cx, number: &mut u32) -> Vec<Act> {
+        let to = cx.now + SignedDuration::from_secs(1);
+        let (from, to) = self.period.as_ref().map_or((to - SPAN, to), |period| (period.from, period.to));
+        let limit = self.limit();
+        let mut acts = Vec::new();
+        let mut due = |errand: &mut Errand, question| {
+            if span::due(cx, errand, EVERY_S, self.period.as_ref()) {
+                *number = number.wrapping_add(1);
+                errand.asked(*number, cx.now);
+                acts.push(Act::ask(Tab::Alarms, *number, question));
+            }
+        };
+        due(&mut self.steps, Question::Journal { from, to, limit });
+        due(&mut self.deeds, Question::Actions { from, to, limit });
+        acts
+    }
+
+    /// The history answered.
+    pub fn on_answer(&mut self, number: u32, answer: &Result<Answer, HistoryError>) {
+        if self.steps.answered(number).or_else(|| self.deeds.answered(number)).is_none() {
+            return;
+        }
+        self.answered = true;
+        self.trouble = None;
+        match answer {
+            Ok(Answer::Journal(rows)) => self.alarms.clone_from(rows),
+            Ok(Answer::Actions(rows)) => self.actions.clone_from(rows),
+            Ok(Answer::Series(_) | Answer::LineMinutes(_) | Answer::Report(_) | Answer::AlarmQuality(_)) => {}
+            Err(error) => self.trouble = Some(error.to_string()),
+        }
+    }
+
+    /// Draws it.
+    pub fn view(&self, cx: &Cx, canvas: &mut Canvas) {
+        let theme = cx.theme;
+        let x = canvas.text(1, 0, "Journal  ", theme.strong());
+        let rows = self.rows(cx);
+        let all = self.alarms.len() + self.actions.len();
+        let period = self.period.as_ref().map_or("last 24 hours".to_owned(), |period| span::words(cx, period));
+        let mut what = vec![period];
+        if !self.words.is_empty() {
+            what.push(format!("\"{}\": {} of {all}, / changes it", self.typed(), rows.len()));
+        }
+        if self.alarms.len() >= self.limit() || self.actions.len() >= self.limit() {
+            what.push("the oldest left out".to_owned());
+        }
+        let x = canvas.text(x, 0, &what.join(", "), theme.normal());
+        if let Some(trouble) = &self.trouble {
+            canvas.text(x + 2, 0, trouble, theme.trouble());
+        }
+        if rows.is_empty() {
+            let words = match (self.answered, self.words.is_empty()) {
+                (false, _) => "reading …",
+                (true, true) => "Nothing happened.",
+                (true, false) => "Nothing found.",
+            };
+            canvas.text(6, 2, words, theme.normal());
+            return;
+        }
+        let (width, room) = (canvas.width(), usize::from(canvas.height().saturating_sub(1)));
+        for (y, (at, text, style)) in rows.iter().skip(self.first).take(room).enumerate() {
+            let y = y as u16 + 1;
+            let x = canvas.text(1, y, &pad(&moment(*at, cx.now, &cx.def().time_zone), 10), theme.dim());
+            canvas.text(x, y, &fit_words(text, width.saturating_sub(x + 1)), *style);
+        }
+    }
+
+    /// Alarms and deeds in one list, newest first.
+    fn rows(&self, cx: &Cx) -> Vec<(Timestamp, String, Style)> {
+        let alarms = self.alarms.iter().map(|row| (row.at, alarm_words(cx, row), cx.theme.normal()));
+        let actions = self.actions.iter().map(|row| (row.at, action_words(cx, row), cx.theme.strong()));
+        let mut rows: Vec<_> = alarms.chain(actions).filter(|(_, text, _)| self.finds(text)).collect();
+        rows.sort_by_key(|row| std::cmp::Reverse(row.0));
+        rows
+    }
+
+    fn finds(&self, text: &str) -> bool {
+        let text = if self.words.is_empty() { String::new() } else { text.to_lowercase() };
+        self.words.iter().all(|word| text.contains(word))
+    }
+}
+
+fn alarm_words(cx: &Cx, row: &AlarmRecord) -> String {
+    let number = row.value.map(|value| format!(" {value}")).unwrap_or_default();
+    let by = row.by.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
+    let reason = row.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
+    let mark = cx.theme.priority_mark(row.priority);
+    format!("{mark} {} {} {}{number}{by}{reason}", pad(&row.subject, 12), pad(&row.text, 22), pad(row.step.word(), 12))
+}
+
+/// A deed in one line: `TIC-1.SV write 60.0 → 70.0 °C  verified by anna`.
+pub fn action_words(cx: &Cx, row: &ActionRecord) -> String {
+    let change = match (&row.old, &row.new) {
+        (Some(old), Some(new)) => format!("{old} → {new}  "),
+        (None, Some(new)) => format!("? → {new}  "),
+        (_, None) => String::new(),
+    };
+    let note = row.note.as_ref().map(|note| format!(": {note}")).unwrap_or_default();
+    let dot = cx.theme.pick("·", ".");
+    format!("  {dot}  {} {} {change}{} by {}{note}", pad(&row.target, 12), row.action, row.outcome, row.by)
+}

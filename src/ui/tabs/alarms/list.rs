@@ -1,0 +1,165 @@
+//! The rows of the list: in order of urgency, a burst folded under the alarm that came first; pure.
+
+use std::collections::HashMap;
+
+use jiff::Timestamp;
+
+use crate::plant::{
+    def::{PlantDef, Priority},
+    snapshot::ActiveAlarm,
+};
+
+/// A row of the list.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row<'a> {
+    /// The alarm that stands there.
+    pub alarm: &'a ActiveAlarm,
+    /// It was the first of its burst, and others of the burst are in the list.
+    pub first: bool,
+    /// It stands under the one that its burst is folded under.
+    pub under: bool,
+    /// So many alarms of its burst are folded under it, or can be.
+    pub more: usize,
+    /// So many of those wait for an acknowledgement.
+    pub more_waiting: usize,
+    /// They are folded away.
+    pub folded: bool,
+}
+
+/// A burst, as far as it is in the list.
+struct Group<'a> {
+    /// The earliest of it that is in the list.
+    leader: &'a ActiveAlarm,
+    rank: u32,
+    /// Those that may be folded, in the order of the list; the leader may be among them.
+    below: Vec<&'a ActiveAlarm>,
+    count: usize,
+    told: bool,
+}
+
+/// The rows of these alarms, which come in order of urgency. The first of a burst stands where the most urgent of it
+/// would, the less urgent others below it, unless they are folded; alarms of high and critical priority are never folded.
+pub fn rows<'a>(def: &PlantDef, alarms: impl Iterator<Item = &'a ActiveAlarm>, unfolded: &[Timestamp]) -> Vec<Row<'a>> {
+    let alarms: Vec<&ActiveAlarm> = alarms.collect();
+    let mut groups: HashMap<Timestamp, Group> = HashMap::new();
+    for alarm in &alarms {
+        let Some(burst) = alarm.burst else { continue };
+        let new = || Group { leader: alarm, rank: burst.rank, below: Vec::new(), count: 0, told: false };
+        let group = groups.entry(burst.began).or_insert_with(new);
+        if burst.rank < group.rank {
+            (group.leader, group.rank) = (alarm, burst.rank);
+        }
+        group.count += 1;
+        if may_fold(def, alarm) {
+            group.below.push(alarm);
+        }
+    }
+    let plain = |alarm| Row { alarm, first: false, under: false, more: 0, more_waiting: 0, folded: false };
+    let mut rows = Vec::with_capacity(alarms.len());
+    for alarm in &alarms {
+        let group = alarm.burst.and_then(|burst| Some((burst.began, groups.get_mut(&burst.began)?)));
+        let Some((began, group)) = group.filter(|(_, group)| 1 < group.count) else {
+            rows.push(plain(alarm));
+            continue;
+        };
+        if !std::mem::replace(&mut group.told, true) {
+            let below: Vec<_> = group.below.iter().filter(|other| other.id != group.leader.id).copied().collect();
+            let more_waiting = below.iter().filter(|other| other.state.needs_acknowledgement()).count();
+            let folded = !below.is_empty() && !unfolded.contains(&began);
+            let first = group.rank == 1;
+            rows.push(Row { first, more: below.len(), more_waiting, folded, ..plain(group.leader) });
+            if !folded {
+                rows.extend(below.into_iter().map(|alarm| Row { under: true, ..plain(alarm) }));
+            }
+        }
+        if alarm.id != group.leader.id && !may_fold(def, alarm) {
+            rows.push(plain(alarm));
+        }
+    }
+    rows
+}
+
+fn may_fold(def: &PlantDef, alarm: &ActiveAlarm) -> bool {
+    match def.alarm(alarm.id).priority {
+        Priority::Critical | Priority::High => false,
+        Priority::Medium | Priority::Low => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::{
+        plant::{alarm::AlarmState, def::AlarmId, record::Burst},
+        ui::fixture::{Fixture, now},
+    };
+
+    const PRIORITIES: [Priority; 4] = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low];
+
+    /// Alarms of these priorities, each with the number of its burst and its rank in it.
+    fn book(rows: &[(Priority, i64, u32)]) -> (PlantDef, Vec<ActiveAlarm>) {
+        let mut def = Fixture::normal().def;
+        let pattern = def.alarms[0].clone();
+        def.alarms.clear();
+        let mut alarms = Vec::new();
+        for (n, (priority, burst, rank)) in rows.iter().enumerate() {
+            let id = AlarmId(n as u16);
+            def.alarms.push(crate::plant::def::AlarmDef { id, priority: *priority, ..pattern.clone() });
+            let began = now() + jiff::SignedDuration::from_secs(*burst);
+            let burst = (*burst > 0).then_some(Burst { began, rank: *rank });
+            alarms.push(ActiveAlarm { burst, ..ActiveAlarm::new(id, AlarmState::Unacknowledged, now()) });
+        }
+        alarms.sort_by_key(|alarm| def.alarm(alarm.id).priority);
+        (def, alarms)
+    }
+
+    fn ids(rows: &[Row]) -> Vec<u16> {
+        rows.iter().map(|row| row.alarm.id.0).collect()
+    }
+
+    #[test]
+    fn consequences_are_folded_under_the_first_one_and_urgent_ones_never() {
+        use Priority::{High, Low, Medium};
+        let (def, alarms) = book(&[(Low, 7, 1), (High, 7, 2), (Medium, 7, 3), (Low, 7, 4), (Medium, 0, 1)]);
+        let folded = rows(&def, alarms.iter(), &[]);
+        assert_eq!(ids(&folded), [0, 1, 4], "the cause stands above the urgent one of its burst");
+        assert!(folded[0].first && folded[0].folded && (folded[0].more, folded[0].more_waiting) == (2, 2));
+        let began = alarms[0].burst.expect("it is in a burst").began;
+        let open = rows(&def, alarms.iter(), &[began]);
+        assert_eq!(ids(&open), [0, 2, 3, 1, 4]);
+        assert_eq!(open.iter().map(|row| row.under).collect::<Vec<_>>(), [false, true, true, false, false]);
+        assert!(!open[0].folded && open[0].more == 2);
+        let alone = rows(&def, alarms.iter().filter(|alarm| alarm.id.0 == 0), &[]);
+        assert!(!alone[0].first, "the first of nothing");
+        let headless = rows(&def, alarms.iter().filter(|alarm| alarm.id.0 != 0), &[]);
+        assert!(!headless[0].first, "the second is not called the first once that has gone");
+    }
+
+    proptest! {
+        #[test]
+        fn no_alarm_is_lost_and_none_stands_twice(
+            seeds in proptest::collection::vec((0..4usize, 0..4i64), 0..40),
+            open in any::<bool>(),
+        ) {
+            let mut ranks = [0u32; 4];
+            let seeds: Vec<_> = seeds.into_iter().map(|(priority, burst)| {
+                ranks[burst as usize] += 1;
+                (PRIORITIES[priority], burst, ranks[burst as usize])
+            }).collect();
+            let (def, alarms) = book(&seeds);
+            let unfolded: Vec<_> = alarms.iter().filter_map(|alarm| Some(alarm.burst?.began)).filter(|_| open).collect();
+            let rows = rows(&def, alarms.iter(), &unfolded);
+            let hidden: usize = rows.iter().filter(|row| row.folded).map(|row| row.more).sum();
+            prop_assert_eq!(rows.len() + hidden, alarms.len());
+            let mut seen = ids(&rows);
+            seen.sort_unstable();
+            seen.dedup();
+            prop_assert_eq!(seen.len(), rows.len());
+            for alarm in alarms.iter().filter(|alarm| !may_fold(&def, alarm)) {
+                prop_assert!(rows.iter().any(|row| row.alarm.id == alarm.id));
+            }
+        }
+    }
+}

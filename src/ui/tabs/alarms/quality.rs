@@ -1,0 +1,213 @@
+//! How good the alarm system is: every figure of the meter beside target and limit, and the alarms to look into.
+
+use std::time::Duration;
+
+use ratatui::style::Style;
+
+use super::{
+    super::{Tab, errand::Errand},
+    span,
+};
+use crate::{
+    history::{Answer, HistoryError, Question},
+    plant::alarm::{
+        AlarmState, Figures,
+        quality::{GOALS, Verdict},
+    },
+    report::{Period, alarm_quality},
+    ui::{
+        Act, Cx,
+        modal::confirm::subject,
+        theme::Theme,
+        widgets::text::{Canvas, between, clock, fit_words, pad, pad_left, running},
+    },
+};
+
+/// How often the figures of a running shift are asked anew, real time.
+const EVERY_S: f64 = 30.0;
+/// An alarm that has been active for longer is stale.
+const STALE: Duration = Duration::from_secs(24 * 3_600);
+/// Columns of the table; where there are more than twice as many the alarms to look into stand beside it.
+const TABLE: u16 = 76;
+
+/// State of the page.
+#[derive(Debug, Default)]
+pub struct Quality {
+    /// The chosen shift; `None` is now: the last 24 hours, from the snapshot.
+    period: Option<Period>,
+    figures: Option<Box<Figures>>,
+    trouble: Option<String>,
+    first: usize,
+    errand: Errand,
+}
+
+impl Quality {
+    /// So many shifts later; `0` is the present.
+    pub fn shift(&mut self, cx: &Cx, by: isize) {
+        self.period = match by {
+            0 => None,
+            by if by < 0 => span::earlier(cx, self.period.as_ref()),
+            _ => span::later(cx, self.period.as_ref()),
+        };
+        // Figures of one period must not stand under the name of another.
+        (self.figures, self.trouble, self.first, self.errand) = (None, None, 0, Errand::default());
+    }
+
+    /// Scrolls.
+    pub fn step(&mut self, cx: &Cx, by: isize) {
+        let lines = self.lines(cx, cx.area.width).len();
+        let room = usize::from(cx.area.height.saturating_sub(3)).max(1);
+        self.first = self.first.saturating_add_signed(by).min(lines.saturating_sub(room));
+    }
+
+    /// Asks the history for a chosen shift if it is time.
+    pub fn ask(&mut self, cx: &Cx, number: &mut u32) -> Vec<Act> {
+        let Some(period) = &self.period else { return Vec::new() };
+        if !span::due(cx, &self.errand, EVERY_S, Some(period)) {
+            return Vec::new();
+        }
+        *number = number.wrapping_add(1);
+        self.errand.asked(*number, cx.now);
+        vec![Act::ask(Tab::Alarms, *number, Question::AlarmQuality { from: period.from, to: period.to })]
+    }
+
+    /// The history answered.
+    pub fn on_answer(&mut self, number: u32, answer: &Result<Answer, HistoryError>) {
+        if self.errand.answered(number).is_none() {
+            return;
+        }
+        match answer {
+            Ok(Answer::AlarmQuality(figures)) => (self.figures, self.trouble) = (Some(figures.clone()), None),
+            Ok(
+                Answer::Series(_)
+                | Answer::Journal(_)
+                | Answer::Actions(_)
+                | Answer::LineMinutes(_)
+                | Answer::Report(_),
+            ) => {}
+            Err(error) => self.trouble = Some(error.to_string()),
+        }
+    }
+
+    /// The figures shown: of the chosen shift, or of the last 24 hours.
+    fn figures<'a>(&'a self, cx: &Cx<'a>) -> Option<&'a Figures> {
+        match self.period {
+            Some(_) => self.figures.as_deref(),
+            None => Some(&cx.snapshot.alarm_quality.day),
+        }
+    }
+
+    /// Draws it.
+    pub fn view(&self, cx: &Cx, canvas: &mut Canvas) {
+        let theme = cx.theme;
+        let (width, height) = (canvas.width(), canvas.height());
+        let x = canvas.text(1, 0, "Now  ", theme.strong());
+        let (words, flood) = now_words(cx);
+        canvas.text(x, 0, &words, if flood { theme.trouble() } else { theme.normal() });
+        let what = match &self.period {
+            None => "last 24 hours".to_owned(),
+            Some(period) => span::words(cx, period),
+        };
+        let count = self.figures(cx).map(|figures| format!(": {} alarms", figures.annunciated()));
+        let wait = if self.trouble.is_none() { ": reading …" } else { "" };
+        let x = canvas.text(1, 1, &format!("{what}{}", count.as_deref().unwrap_or(wait)), theme.strong());
+        if let Some(trouble) = &self.trouble {
+            canvas.text(x + 2, 1, trouble, theme.trouble());
+        }
+        let lines = self.lines(cx, width);
+        let room = usize::from(height.saturating_sub(3));
+        for (y, (text, style)) in lines.iter().skip(self.first).take(room).enumerate() {
+            canvas.text(1, y as u16 + 2, text, *style);
+        }
+        if 2 * TABLE <= width {
+            let mut side = canvas.part(TABLE + 1, 2, width - TABLE - 1, height.saturating_sub(3));
+            for (y, (text, style)) in self.culprits(cx).iter().enumerate() {
+                side.text(0, y as u16, text, *style);
+            }
+        }
+        let more = lines.len().saturating_sub(self.first + room);
+        let last = height.saturating_sub(1);
+        let words = "ISA-18.2, one operator, meant for 30 days or more";
+        canvas.text(1, last, words, theme.dim());
+        if more > 0 {
+            canvas.text_right(width.saturating_sub(1), last, &format!("{more} more below"), theme.strong());
+        }
+    }
+
+    /// The table, and below it the alarms to look into unless they stand beside it.
+    fn lines(&self, cx: &Cx, width: u16) -> Vec<(String, Style)> {
+        let Some(figures) = self.figures(cx) else { return Vec::new() };
+        let head = line(cx.theme, ["measure", "figure", "target", "limit", "verdict"]);
+        let mut lines = vec![(head, cx.theme.dim())];
+        for (goal, row) in GOALS.iter().zip(alarm_quality::rows(figures)) {
+            let value = row.value.map_or("–".into(), |value| format!("{value:.*}", usize::from(row.decimals)));
+            let text = line(cx.theme, [row.measure, &value, &row.target, &row.limit, row.verdict]);
+            let style = match goal.verdict(figures) {
+                Verdict::Good => cx.theme.normal(),
+                Verdict::Beyond => cx.theme.strong(),
+                Verdict::Over => cx.theme.trouble(),
+                Verdict::TooFew => cx.theme.dim(),
+            };
+            lines.push((text, style));
+        }
+        if width < 2 * TABLE {
+            lines.push((String::new(), cx.theme.normal()));
+            lines.extend(self.culprits(cx));
+        }
+        lines
+    }
+
+    /// The most frequent alarms and their share, those that chattered, were fleeting, or have been active for a day.
+    fn culprits(&self, cx: &Cx) -> Vec<(String, Style)> {
+        let Some(figures) = self.figures(cx) else { return Vec::new() };
+        let all = figures.annunciated().max(1) as f64;
+        let mut lines = vec![("alarms to look into".to_owned(), cx.theme.dim())];
+        let style = cx.theme.normal();
+        for culprit in alarm_quality::culprits(figures) {
+            let share = culprit.raised.map(|raised| format!("{raised:>5} {:>3.0} %", raised as f64 * 100.0 / all));
+            let share = share.unwrap_or_default();
+            let text = format!("{} {share:11}  {}  {}", pad(culprit.kind, 10), culprit.subject, culprit.alarm);
+            lines.push((fit_words(&text, TABLE), style));
+        }
+        if self.period.is_none() {
+            let stale = cx.snapshot.alarms.iter().filter(|alarm| match alarm.state {
+                AlarmState::Unacknowledged | AlarmState::Acknowledged => STALE < between(alarm.raised_at, cx.now),
+                AlarmState::Normal
+                | AlarmState::Returned
+                | AlarmState::LatchedUnacknowledged
+                | AlarmState::LatchedAcknowledged
+                | AlarmState::Shelved
+                | AlarmState::Suppressed
+                | AlarmState::OutOfService => false,
+            });
+            lines.extend(stale.map(|alarm| {
+                let (since, name) = (running(between(alarm.raised_at, cx.now)), subject(cx, alarm.id));
+                let text = format!("{} {since:11}  {name}  {}", pad("stale", 10), cx.def().alarm(alarm.id).text);
+                (fit_words(&text, TABLE), style)
+            }));
+        }
+        if lines.len() == 1 {
+            lines.push(("none".to_owned(), style));
+        }
+        lines
+    }
+}
+
+/// The rates of this moment, and whether there is a flood.
+fn now_words(cx: &Cx) -> (String, bool) {
+    let quality = &cx.snapshot.alarm_quality;
+    let flood = match quality.flood_since {
+        Some(since) => format!("FLOOD since {}", clock(since, &cx.def().time_zone)),
+        None => "no flood".to_owned(),
+    };
+    let words = format!("last 10 min {}   last hour {}   {flood}", quality.last_10_min, quality.last_hour);
+    (words, quality.flood_since.is_some())
+}
+
+fn line(theme: &Theme, [measure, figure, target, limit, verdict]: [&str; 5]) -> String {
+    let sign = |bound: &str| {
+        let bound = bound.replace("at most", theme.pick("≤", "<=")).replace("at least", theme.pick("≥", ">="));
+        pad(&bound.replace("below", "<"), 8)
+    };
+    format!("{} {}  {} {} {verdict}", pad(measure, 35), pad_left(figure, 8), sign(target), sign(limit))
+}

@@ -1,0 +1,446 @@
+//! Tests of the alarms tab: what its operator sees, and what his keys do.
+
+use std::{
+    collections::HashSet,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use jiff::SignedDuration;
+
+use crate::{
+    history::{Answer, Question},
+    plant::{
+        alarm::{
+            AlarmCommand, AlarmState, Figures,
+            quality::{Frequent, Named},
+            state::Deed,
+        },
+        command::Command,
+        def::{AlarmClass, AlarmDef, AlarmId, Priority},
+        record::{ActionRecord, Burst},
+        role::Role,
+        snapshot::{ActiveAlarm, AsideAlarm},
+    },
+    ui::{
+        Effect, Model, Msg,
+        fixture::{self, Fixture, now},
+        modal::Modal,
+        tabs::Tab,
+        tests::{model, order_of, screen, type_keys},
+        theme::{Colours, Glyphs, Theme},
+        update,
+    },
+};
+
+const PRIORITIES: [Priority; 4] = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low];
+
+fn ago(seconds: i64) -> jiff::Timestamp {
+    now() - SignedDuration::from_secs(seconds)
+}
+
+/// The pump trips; the level, eight more of the process and four of the system follow; one is latched, one acknowledged.
+fn storm() -> Fixture {
+    let mut fixture = Fixture::alarm();
+    let pattern = fixture.def.alarms[2].clone();
+    let texts = ["pump tripped", "flow low", "level low", "level falls fast", "heater dry", "valve not open"];
+    let device = fixture.def.alarms[3].subject;
+    fixture.alarms.truncate(1);
+    for n in 0..14u16 {
+        let id = AlarmId(4 + n);
+        let system = n >= 10;
+        let text = if system { "answers late" } else { texts[usize::from(n) % texts.len()] };
+        fixture.def.alarms.push(AlarmDef {
+            id,
+            text: text.to_owned(),
+            priority: if n % 5 == 3 { Priority::Medium } else { Priority::Low },
+            class: if system { AlarmClass::System } else { AlarmClass::Process },
+            subject: if system { device } else { pattern.subject },
+            area: "TK-1".to_owned(),
+            ..pattern.clone()
+        });
+        let burst = Some(Burst { began: ago(60), rank: u32::from(n) + 1 });
+        let mut alarm = ActiveAlarm::new(id, AlarmState::Unacknowledged, ago(60 - i64::from(n) / 2));
+        (alarm.burst, alarm.value) = (burst, Some(3.8));
+        if n == 2 {
+            alarm.state = AlarmState::Acknowledged;
+            let reason = Some("pump is looked at".into());
+            alarm.acknowledged = Some(Deed { at: ago(20), by: Some("anna".into()), reason });
+        }
+        if n == 4 {
+            (alarm.state, alarm.returned_at) = (AlarmState::LatchedUnacknowledged, Some(ago(9)));
+        }
+        fixture.alarms.push(alarm);
+    }
+    fixture.alarms[0].burst = Some(Burst { began: ago(60), rank: 20 });
+    let def = fixture.def.clone();
+    fixture.alarms.sort_by_key(|alarm| {
+        let waits = alarm.state.needs_acknowledgement();
+        (def.alarm(alarm.id).priority, !waits, std::cmp::Reverse(alarm.raised_at))
+    });
+    fixture
+}
+
+/// Shelved, suppressed, out of service.
+fn put_aside() -> Fixture {
+    let mut fixture = storm();
+    let deed = |seconds, by: Option<&str>, reason: Option<&str>| Deed {
+        at: ago(seconds),
+        by: by.map(Arc::from),
+        reason: reason.map(Arc::from),
+    };
+    let (until, aside) = (Some(now() + SignedDuration::from_secs(2_460)), &mut fixture.aside);
+    aside.push(AsideAlarm {
+        id: AlarmId(1),
+        state: AlarmState::Shelved,
+        deed: deed(1_140, Some("anna"), Some("sensor is being cleaned")),
+        until,
+        active: true,
+    });
+    aside.push(AsideAlarm {
+        id: AlarmId(2),
+        state: AlarmState::OutOfService,
+        deed: deed(90_000, Some("tech1"), Some("level probe broken, spare part ordered")),
+        until: None,
+        active: false,
+    });
+    aside.push(AsideAlarm {
+        id: AlarmId(3),
+        state: AlarmState::Suppressed,
+        deed: deed(300, None, None),
+        until: None,
+        active: false,
+    });
+    fixture
+}
+
+/// A day with a flood behind it.
+fn figures() -> Figures {
+    let named = |subject: &str, text: &str| Named { subject: subject.into(), text: text.into() };
+    let frequent = |subject, text, raised| Frequent { alarm: named(subject, text), raised };
+    Figures {
+        from: ago(86_400),
+        until: now(),
+        by_priority: [0, 12, 30, 178],
+        windows: 145,
+        windows_over: 3,
+        most: 34,
+        flood: Duration::from_secs(1_900),
+        top: vec![frequent("TIC-1.PV", "temperature high", 90), frequent("PLC-1.LT-1", "level low", 61)],
+        chattering: vec![named("TIC-1.PV", "temperature high")],
+        fleeting: vec![named("PLC-1.LT-1", "level low")],
+        stale: 1,
+    }
+}
+
+fn shown(fixture: &Fixture, theme: Theme, keys: &str) -> Model {
+    let mut model = model(fixture, theme);
+    type_keys(&mut model, &format!("3{keys}"));
+    model
+}
+
+/// Pictures at both sizes in full looks, and at 80x24 in plain ones.
+fn pictures(name: &str, fixture: &Fixture, keys: &str) {
+    for (look, theme, width, height) in
+        [("80x24", Theme::FULL, 80, 24), ("120x40", Theme::FULL, 120, 40), ("plain", Theme::PLAIN, 80, 24)]
+    {
+        let mut model = shown(fixture, theme, keys);
+        let picture = screen(&mut model, width, height);
+        assert!(theme != Theme::PLAIN || picture.is_ascii(), "{picture}");
+        insta::assert_snapshot!(format!("{name}_{look}"), picture);
+    }
+}
+
+#[test]
+fn a_storm_is_folded_and_counted() {
+    pictures("storm", &storm(), "");
+    pictures("storm_unfolded", &storm(), " ");
+    pictures("system", &storm(), "vv");
+    pictures("guidance_acknowledged", &storm(), " ↓↓↓↓↓↓↓↓↓↓");
+}
+
+#[test]
+fn what_is_put_aside_is_listed_and_counted_on_every_page() {
+    pictures("aside", &put_aside(), "v");
+    let mut model = shown(&put_aside(), Theme::FULL, "");
+    assert!(screen(&mut model, 120, 40).contains("put aside 3"));
+    let mut quiet = put_aside();
+    quiet.alarms.clear();
+    let mut model = super::super::super::tests::model(&quiet, Theme::FULL);
+    let banner = screen(&mut model, 80, 24).lines().nth(2).map(str::to_owned).unwrap_or_default();
+    assert!(banner.contains("no alarms") && banner.contains("3 put aside"), "{banner}");
+}
+
+#[test]
+fn the_meter_is_shown_with_target_limit_and_verdict() {
+    let mut fixture = storm();
+    fixture.alarm_quality.day = Arc::new(figures());
+    (fixture.alarm_quality.last_10_min, fixture.alarm_quality.last_hour) = (15, 22);
+    fixture.alarm_quality.flood_since = Some(ago(50));
+    pictures("quality", &fixture, "vvvv");
+    let mut model = shown(&fixture, Theme::FULL, "");
+    let banner = screen(&mut model, 80, 24).lines().nth(2).map(str::to_owned).unwrap_or_default();
+    assert!(banner.contains("FLOOD") && banner.contains("a ack"), "{banner}");
+    // A past shift is asked of the history, and its figures stand under its name only.
+    let effects = type_keys(&mut model, "vvvv←←");
+    let Some(Effect::Ask(id, Question::AlarmQuality { from, to })) = effects.last() else { panic!("{effects:?}") };
+    assert_eq!((*from, *to), ("2026-11-20T23:00:00Z".parse().unwrap(), "2026-11-21T07:00:00Z".parse().unwrap()));
+    assert!(screen(&mut model, 80, 24).contains("reading …"));
+    let past = Figures { by_priority: [0, 0, 0, 7], ..figures() };
+    update(&mut model, Msg::Answer(*id, Ok(Answer::AlarmQuality(Box::new(past)))));
+    assert!(
+        screen(&mut model, 80, 24).contains("morning 2026-11-21 06:00–14:00: 7 alarms"),
+        "{}",
+        screen(&mut model, 80, 24)
+    );
+    type_keys(&mut model, "l");
+    assert!(screen(&mut model, 80, 24).contains("last 24 hours: 220 alarms"));
+}
+
+fn deed(seconds: i64, by: &str, action: &str, target: &str, outcome: &str, note: Option<&str>) -> ActionRecord {
+    ActionRecord {
+        at: ago(seconds),
+        by: by.into(),
+        from: "".into(),
+        action: action.into(),
+        target: target.into(),
+        old: None,
+        new: (action == "write").then(|| "70.0 °C".into()),
+        outcome: outcome.into(),
+        note: note.map(Arc::from),
+        seal: None,
+    }
+}
+
+#[test]
+fn the_handover_tells_what_the_next_shift_must_know() {
+    let mut fixture = put_aside();
+    fixture.set("PLC-1.AUTO", 0.0);
+    let note = "Pump P-1 draws too much current; electrician comes at 16:00.";
+    let rows = vec![
+        deed(40, "anna", "write", "TIC-1.SV", "failed: no answer in time", None),
+        deed(60, "anna", "acknowledge", "TIC-1.PV temperature high", "verified", None),
+        deed(100, "anna", "write", "TIC-1.SV", "verified", None),
+        deed(1_000, "tech1", "hand over", "tank", "verified", Some(note)),
+        deed(9_000, "tech1", "write", "TIC-1.P", "verified", None),
+    ];
+    for (look, theme, width, height) in
+        [("80x24", Theme::FULL, 80, 24), ("120x40", Theme::FULL, 120, 40), ("plain", Theme::PLAIN, 80, 24)]
+    {
+        let mut model = model(&fixture, theme);
+        let effects = type_keys(&mut model, "3V");
+        let Some(Effect::Ask(id, Question::Actions { .. })) = effects.last() else { panic!("{effects:?}") };
+        update(&mut model, Msg::Answer(*id, Ok(Answer::Actions(rows.clone()))));
+        let picture = screen(&mut model, width, height);
+        insta::assert_snapshot!(format!("handover_{look}"), picture);
+        if look == "120x40" {
+            assert!(!picture.contains("TIC-1.P "), "another shift: {picture}");
+            assert!(!picture.contains("acknowledge "), "no change of the plant: {picture}");
+        }
+    }
+}
+
+#[test]
+fn a_shift_is_handed_over_with_a_note_and_taken_over() {
+    let mut model = shown(&Fixture::normal(), Theme::FULL, "V");
+    let effects = type_keys(&mut model, "nP-1 is loud⏎");
+    let Some(Effect::Order(order)) = effects.last() else { panic!("{effects:?}") };
+    assert_eq!((&order.command, order.note.as_deref()), (&Command::HandOver, Some("P-1 is loud")));
+    assert_eq!(order_of(&type_keys(&mut model, "o")), None, "asks first");
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&Command::TakeOver));
+}
+
+#[test]
+fn the_filter_in_force_is_written_and_hides_nothing_silently() {
+    let mut model = shown(&Fixture::alarm(), Theme::FULL, "");
+    type_keys(&mut model, "/plc-1⏎");
+    let picture = screen(&mut model, 80, 24);
+    assert!(picture.contains("FILTER \"plc-1\": 2 of 3 shown"), "{picture}");
+    assert!(!picture.lines().skip(4).any(|line| line.contains("temperature high")), "{picture}");
+    type_keys(&mut model, "f");
+    assert!(screen(&mut model, 80, 24).contains("critical  \"plc-1\": 0 of 3 shown"), "{}", screen(&mut model, 80, 24));
+    assert!(screen(&mut model, 80, 24).contains("No alarm fits the filter."));
+    type_keys(&mut model, "⎋");
+    assert!(screen(&mut model, 80, 24).contains("3 shown"));
+    // What the filter hides is not acknowledged by A.
+    type_keys(&mut model, "/level⏎A");
+    let effects = type_keys(&mut model, "⏎");
+    let low = &Fixture::alarm().alarms[2];
+    let Some(Command::Alarm(AlarmCommand::AcknowledgeAll { seen })) = order_of(&effects) else { panic!("{effects:?}") };
+    assert_eq!(**seen, [(low.id, low.raised_at)]);
+}
+
+#[test]
+fn a_page_acknowledges_only_what_was_on_the_screen() {
+    let mut model = shown(&storm(), Theme::FULL, " ");
+    screen(&mut model, 80, 24);
+    type_keys(&mut model, "p");
+    let effects = type_keys(&mut model, "⏎");
+    let Some(Command::Alarm(AlarmCommand::AcknowledgeAll { seen })) = order_of(&effects) else { panic!("{effects:?}") };
+    let picture = screen(&mut model, 80, 24);
+    let on_screen = picture.lines().filter(|line| line.contains("UNACK ") || line.contains("LATCHED ")).count();
+    // The banner is one of those lines.
+    assert_eq!(seen.len() + 1, on_screen, "{picture}");
+}
+
+#[test]
+fn a_note_is_asked_for_where_the_plant_wants_one() {
+    let mut fixture = Fixture::alarm();
+    let alarm = fixture.alarms[0].clone();
+    let order = |fixture: &Fixture, keys: &str| {
+        let mut model = shown(fixture, Theme::FULL, "");
+        let effects = type_keys(&mut model, keys);
+        let order = effects.into_iter().find_map(|effect| match effect {
+            Effect::Order(order) => Some((order.command, order.note)),
+            _ => None,
+        });
+        (order, model.modal)
+    };
+    assert_eq!(order(&fixture, "nSV was raised⏎").0, Some((alarm.acknowledge(), Some("SV was raised".into()))));
+    assert_eq!(order(&fixture, "n⏎").0, Some((alarm.acknowledge(), None)), "here it may be left out");
+    fixture.def.alarms[0].note = true;
+    assert!(matches!(order(&fixture, "a"), (None, Some(Modal::Reason(_)))), "asks before it is refused");
+    assert!(matches!(order(&fixture, "a  ⏎"), (None, Some(Modal::Reason(_)))), "blanks are no note");
+    assert_eq!(order(&fixture, "adoor was open⏎").0, Some((alarm.acknowledge(), Some("door was open".into()))));
+    let (all, _) = order(&fixture, "Adoor was open⏎");
+    assert_eq!(all, fixture.snapshot().acknowledge_all().map(|command| (command, Some("door was open".into()))));
+}
+
+#[test]
+fn an_alarm_is_shelved_for_a_chosen_time_with_a_reason() {
+    let fixture = Fixture::alarm();
+    let mut model = shown(&fixture, Theme::FULL, "z");
+    insta::assert_snapshot!("window_shelve", screen(&mut model, 80, 24));
+    type_keys(&mut model, "⏎");
+    assert!(screen(&mut model, 80, 24).contains("say why"), "nothing is put aside without a reason");
+    let effects = type_keys(&mut model, "↓sensor is cleaned⏎");
+    let Some(Effect::Order(order)) = effects.last() else { panic!("{effects:?}") };
+    let shelve = AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(3_600) };
+    assert_eq!((&order.command, order.note.as_deref()), (&Command::Alarm(shelve), Some("sensor is cleaned")));
+    // No time is offered that the plant does not allow.
+    let mut short = Fixture::alarm();
+    short.def.alarm_rules.shelve_max = Duration::from_secs(1_800);
+    let mut model = shown(&short, Theme::FULL, "z");
+    let picture = screen(&mut model, 80, 24);
+    assert!(!picture.contains("4 h") && !picture.contains("rest of the shift"), "{picture}");
+}
+
+#[test]
+fn what_was_put_aside_is_taken_back() {
+    let back = |keys: &str| {
+        let mut model = shown(&put_aside(), Theme::FULL, "v");
+        assert_eq!(order_of(&type_keys(&mut model, keys)), None, "asks first");
+        order_of(&type_keys(&mut model, "⏎")).cloned()
+    };
+    assert_eq!(back("u"), Some(Command::Alarm(AlarmCommand::Unshelve(AlarmId(1)))));
+    assert_eq!(back("↓u"), Some(Command::Alarm(AlarmCommand::InService(AlarmId(2)))));
+    assert_eq!(back("↓↓u"), None, "suppressed by design");
+}
+
+#[test]
+fn a_technician_is_told_that_out_of_service_needs_a_supervisor() {
+    let mut model = shown(&Fixture::alarm(), Theme::FULL, "");
+    let mut standing = Arc::unwrap_or_clone(fixture::standing());
+    standing.who.as_mut().expect("somebody sits here").role = Role::Technician;
+    update(&mut model, Msg::Standing(Arc::new(standing)));
+    let footer = screen(&mut model, 120, 40).lines().last().map(str::to_owned).unwrap_or_default();
+    assert!(footer.contains("z shelve") && !footer.contains("o out of service"), "{footer}");
+    let effects = type_keys(&mut model, "obroken⏎");
+    assert_eq!(order_of(&effects), None);
+    assert!(screen(&mut model, 80, 24).contains("needs Supervisor; tech1 is Technician"));
+}
+
+#[test]
+fn an_alarm_leads_to_mimic_trend_and_controller() {
+    let mut model = shown(&Fixture::alarm(), Theme::FULL, "m");
+    assert_eq!(model.tabs.shown, Tab::Mimic);
+    type_keys(&mut model, "⏎");
+    assert!(screen(&mut model, 80, 24).contains("process value"), "what the alarm watches is selected");
+    let mut model = shown(&Fixture::alarm(), Theme::FULL, "t");
+    assert_eq!(model.tabs.shown, Tab::Trends);
+    assert!(screen(&mut model, 80, 24).contains("14:01:50"), "the cursor: {}", screen(&mut model, 80, 24));
+    let model = shown(&Fixture::alarm(), Theme::FULL, "↓c");
+    assert_eq!(model.tabs.shown, Tab::Controllers);
+}
+
+#[test]
+fn every_priority_in_every_state_looks_different_without_colour() {
+    for glyphs in [Glyphs::Ascii, Glyphs::Block, Glyphs::Braille] {
+        let theme = Theme { colours: Colours::None, glyphs, motion: false };
+        let mut looks = HashSet::new();
+        for (priority, state) in PRIORITIES.into_iter().flat_map(|p| AlarmState::ALL.map(|state| (p, state))) {
+            if state == AlarmState::Normal {
+                continue;
+            }
+            let mut fixture = Fixture::alarm();
+            fixture.def.alarms[0].priority = priority;
+            let deed = Deed { at: now(), by: None, reason: None };
+            if state.is_aside() {
+                fixture.alarms.clear();
+                fixture.aside = vec![AsideAlarm { id: AlarmId(0), state, deed, until: None, active: true }];
+            } else {
+                fixture.alarms.truncate(1);
+                fixture.alarms[0].state = state;
+            }
+            let mut model = shown(&fixture, theme, if state.is_aside() { "v" } else { "" });
+            let picture = screen(&mut model, 80, 24);
+            let row = picture.lines().skip(5).find(|line| line.contains(state.word())).expect("its row").to_owned();
+            // The marks at the left alone tell it: nobody has to read the row.
+            let marks: String = if state.is_aside() { row.clone() } else { row.chars().take(7).collect() };
+            assert!(looks.insert(marks), "{glyphs:?} {priority:?} {state:?} looks like another one: {row}");
+        }
+    }
+}
+
+#[test]
+fn the_bell_rings_only_where_it_was_switched_on() {
+    let (quiet, loud) = (Fixture::normal(), Fixture::alarm());
+    for (keys, rings) in [("3", 0), ("3b", 1), ("3bb", 0)] {
+        let mut model = model(&quiet, Theme::FULL);
+        type_keys(&mut model, keys);
+        let effects: Vec<Effect> =
+            [&loud, &loud, &quiet].iter().flat_map(|f| update(&mut model, Msg::Snapshot(f.snapshot()))).collect();
+        assert_eq!(effects.iter().filter(|effect| **effect == Effect::Bell).count(), rings, "{keys}");
+    }
+}
+
+#[test]
+fn silence_is_one_key_on_every_tab_and_acknowledges_nothing() {
+    use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+    let press = |model: &mut Model| update(model, Msg::Key(KeyEvent::new(KeyCode::Char('s'), KeyModifiers::CONTROL)));
+    let mut model = super::super::super::tests::model(&Fixture::alarm(), Theme::FULL);
+    assert_eq!(order_of(&press(&mut model)), Some(&Command::Alarm(AlarmCommand::Silence)));
+    let mut snapshot = Arc::unwrap_or_clone(Fixture::alarm().snapshot());
+    snapshot.sound = false;
+    update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
+    assert_eq!(order_of(&press(&mut model)), None, "nothing sounds any more");
+    assert!(screen(&mut model, 120, 40).lines().nth(2).is_some_and(|banner| banner.contains("silenced")));
+}
+
+/// Ten thousand in the book, five hundred of them active in one burst.
+#[test]
+fn a_key_answers_at_once_in_a_storm() {
+    let mut fixture = Fixture::alarm();
+    let pattern = fixture.def.alarms[2].clone();
+    let priorities = [Priority::Low, Priority::Medium, Priority::Low, Priority::High];
+    fixture.def.alarms = (0..10_000u16)
+        .map(|n| AlarmDef { id: AlarmId(n), priority: priorities[usize::from(n) % 4], ..pattern.clone() })
+        .collect();
+    let burst = |n| Some(Burst { began: ago(60), rank: n });
+    let active = (0..500u16).map(|n| {
+        let alarm = ActiveAlarm::new(AlarmId(n * 20), AlarmState::Unacknowledged, ago(60));
+        ActiveAlarm { burst: burst(u32::from(n) + 1), ..alarm }
+    });
+    fixture.alarms = active.collect();
+    let mut model = shown(&fixture, Theme::FULL, " ");
+    screen(&mut model, 120, 40);
+    let mut slowest = Duration::ZERO;
+    for key in ["↓", "↓", "/low⏎", "f", "⎋", " ", "v", "V", "p⎋", "A⎋"] {
+        let began = Instant::now();
+        type_keys(&mut model, key);
+        screen(&mut model, 120, 40);
+        slowest = slowest.max(began.elapsed() / key.chars().count() as u32);
+    }
+    println!("slowest key in a storm: {slowest:?}");
+    assert!(slowest < Duration::from_millis(100), "{slowest:?}");
+}

@@ -1,0 +1,279 @@
+//! How the alarms tab looks: the views and what is in them, the list, what is put aside, and the guidance below.
+
+use ratatui::{Frame, layout::Rect};
+
+use super::{Alarms, Page, guidance, handover::aside_words, is_on, list::Row};
+use crate::{
+    plant::{
+        def::Subject,
+        snapshot::{ActiveAlarm, AsideAlarm},
+    },
+    ui::{
+        Cx,
+        modal::confirm::subject,
+        widgets::{
+            text::{Canvas, between, fit, fit_words, moment, pad, pad_left, running, width, wrap},
+            value,
+        },
+    },
+};
+
+/// Rows above the list: views, filter, headings.
+const HEAD: u16 = 3;
+
+/// Draws the tab.
+pub(super) fn draw(tab: &Alarms, cx: &Cx, frame: &mut Frame, area: Rect) {
+    let mut canvas = Canvas::new(frame.buffer_mut(), area);
+    let top = history_trouble(cx, &mut canvas);
+    let (width, height) = (canvas.width(), canvas.height());
+    views(tab, cx, &mut canvas.part(0, top, width, 1));
+    let mut rest = canvas.part(0, top + 1, width, height.saturating_sub(top + 1));
+    match tab.page {
+        Page::Active | Page::System => list(tab, cx, &mut rest),
+        Page::Aside => aside(tab, cx, &mut rest),
+        Page::Journal => tab.journal.view(cx, &mut rest),
+        Page::Quality => tab.quality.view(cx, &mut rest),
+        Page::Handover => tab.handover.view(cx, &mut rest),
+    }
+}
+
+/// What is wrong with the history, whole, in at most a third of the tab; returns the rows taken. The header has no room
+/// for it.
+fn history_trouble(cx: &Cx, canvas: &mut Canvas) -> u16 {
+    let rows = trouble_rows(cx, canvas.width(), canvas.height());
+    for (y, line) in rows.iter().enumerate() {
+        canvas.text(1, y as u16, line, cx.theme.trouble());
+    }
+    rows.len() as u16
+}
+
+fn trouble_rows(cx: &Cx, width: u16, height: u16) -> Vec<String> {
+    let Some(trouble) = &cx.snapshot.history.trouble else { return Vec::new() };
+    let mut lines = wrap(&format!("history: {trouble}"), width.saturating_sub(2));
+    lines.truncate(usize::from(height / 3).max(1));
+    lines
+}
+
+/// Rows of a list on a tab of this size.
+pub(super) fn room(cx: &Cx, width: u16, height: u16) -> usize {
+    let height = height.saturating_sub(trouble_rows(cx, width, height).len() as u16);
+    usize::from(height.saturating_sub(HEAD + guide(height))).max(1)
+}
+
+/// The first row that is drawn, so that the selected one is seen.
+pub(super) fn first(place: usize, room: usize) -> usize {
+    place.saturating_sub(room - 1)
+}
+
+/// Rows of the guidance.
+fn guide(height: u16) -> u16 {
+    height.saturating_sub(HEAD + 2).min(7)
+}
+
+/// The names of the views, each with how much is in it, and how much of that waits: nothing is hidden in another view.
+fn views(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
+    let count = |page| {
+        let (mut all, mut waiting) = (0, 0);
+        for alarm in cx.snapshot.alarms.iter().filter(|alarm| is_on(page, cx.def().alarm(alarm.id))) {
+            all += 1;
+            waiting += usize::from(alarm.state.needs_acknowledgement());
+        }
+        (all, waiting)
+    };
+    let counts = Page::ALL.map(|page| match page {
+        Page::Active | Page::System => Some(count(page)),
+        Page::Aside => Some((cx.snapshot.aside.len(), 0)),
+        Page::Journal | Page::Quality | Page::Handover => None,
+    });
+    let names = |word: &str| -> Vec<String> {
+        let name = |(page, count): (Page, Option<(usize, usize)>)| match count {
+            None => page.title().to_owned(),
+            Some((all, 0)) => format!("{} {all}", page.title()),
+            Some((all, waiting)) => format!("{} {all} ({waiting}{word})", page.title()),
+        };
+        Page::ALL.into_iter().zip(counts).map(name).collect()
+    };
+    let bell = if tab.bell { "bell" } else { "" };
+    let room = canvas.width().saturating_sub(2 + width(bell));
+    let fits = |names: &Vec<String>| names.iter().map(|name| width(name) + 3).sum::<u16>() <= room + 3;
+    // Where there is no room for the word the brackets alone tell how many wait.
+    let all = Some(names(" unack")).filter(fits).unwrap_or_else(|| names(""));
+    let mut x = 1;
+    for (page, name) in Page::ALL.into_iter().zip(all) {
+        if x > 1 {
+            x = canvas.text(x, 0, " │ ", cx.theme.dim());
+        }
+        let style = if page == tab.page { cx.theme.focus() } else { cx.theme.normal() };
+        x = canvas.text(x, 0, &name, style);
+    }
+    let end = canvas.width().saturating_sub(1);
+    canvas.text_right(end, 0, bell, cx.theme.strong());
+}
+
+fn list(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let (width, height) = (canvas.width(), canvas.height());
+    let rows = tab.rows(cx);
+    let all = tab.of_page(cx).count();
+    let place = tab.place(&rows);
+    let room = usize::from(height.saturating_sub(HEAD - 1 + guide(height + 1))).max(1);
+    let first = first(place, room);
+    filter_line(tab, cx, (&rows, all, first, room), canvas);
+    let columns = Columns::of(&rows[first.min(rows.len())..], cx, room, width);
+    canvas.text(1, 1, &columns.row(["", "", "time", "tag", "what", "value", "state", "for", "by"]), theme.dim());
+    if rows.is_empty() {
+        let words = match all {
+            0 => "No alarm is active. j shows what was.",
+            _ => "No alarm fits the filter. Esc shows all again.",
+        };
+        canvas.text(6, 3, words, theme.normal());
+        return;
+    }
+    for (y, (n, row)) in rows.iter().enumerate().skip(first).take(room).enumerate() {
+        let y = y as u16 + 2;
+        let priority = cx.def().alarm(row.alarm.id).priority;
+        let style = theme.alarm(priority, row.alarm.state, false);
+        let style = if n == place { style.patch(theme.focus()).fg(style.fg.unwrap_or_default()) } else { style };
+        let cells = cells(cx, row, columns.what);
+        canvas.text(1, y, &columns.row(cells.each_ref().map(String::as_str)), style);
+        if n != place {
+            let mark = format!("{}{}", theme.priority_mark(priority), theme.state_mark(row.alarm.state));
+            canvas.text(1, y, &mark, theme.alarm(priority, row.alarm.state, cx.flash()));
+        }
+    }
+    let guide = guide(height + 1);
+    let mut below = canvas.part(0, height.saturating_sub(guide), width, guide);
+    guidance::view(cx, rows[place].alarm, &mut below);
+}
+
+/// The filter in force, how many it shows of how many, and what is above and below the rows that are seen.
+fn filter_line(tab: &Alarms, cx: &Cx, (rows, all, first, room): (&[Row], usize, usize, usize), canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let folded: usize = rows.iter().filter(|row| row.folded).map(|row| row.more).sum();
+    let shown = rows.len() + folded;
+    let end = canvas.width().saturating_sub(1);
+    let below = rows.len().saturating_sub(first + room);
+    let more = match (first, below) {
+        (0, 0) => String::new(),
+        (0, below) => format!("{below} more below"),
+        (above, 0) => format!("{above} more above"),
+        (above, below) => format!("{above} above, {below} more below"),
+    };
+    let mut words = Vec::new();
+    if !tab.filter.is_off() {
+        words.push(format!("FILTER {}: {shown} of {all} shown, Esc shows all", tab.filter.describe()));
+    }
+    if folded > 0 {
+        words.push(format!("{folded} folded, space unfolds"));
+    }
+    if tab.filter.is_off() && words.is_empty() && all > 0 {
+        words.push(format!("{all} shown, the most urgent first"));
+    }
+    let room = end.saturating_sub(3 + width(&more));
+    let style = if tab.filter.is_off() { theme.dim() } else { theme.strong() };
+    canvas.text(1, 0, &fit_words(&words.join("   "), room), style);
+    canvas.text_right(end, 0, &more, theme.strong());
+}
+
+fn aside(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let (width, height) = (canvas.width(), canvas.height());
+    let all: &[AsideAlarm] = &cx.snapshot.aside;
+    canvas.text(1, 0, "Judged and put on record, but not annunciated. u takes back.", theme.dim());
+    if all.is_empty() {
+        canvas.text(6, 2, "Nothing is put aside.", theme.normal());
+        return;
+    }
+    let place = tab.aside(cx).and_then(|aside| all.iter().position(|other| other.id == aside.id)).unwrap_or(0);
+    let guide = guide(height + 1).min(6);
+    let room = usize::from(height.saturating_sub(1 + guide)).max(1);
+    let first = first(place, room);
+    for (y, (n, aside)) in all.iter().enumerate().skip(first).take(room).enumerate() {
+        let style = match (n == place, aside.active) {
+            (true, _) => theme.focus(),
+            (false, true) => theme.strong(),
+            (false, false) => theme.normal(),
+        };
+        let text = format!("{} {}", theme.state_mark(aside.state), aside_words(cx, aside));
+        canvas.text(1, y as u16 + 1, &fit_words(&text, width.saturating_sub(2)), style);
+    }
+    if all.len() > first + room {
+        let end = width.saturating_sub(1);
+        canvas.text_right(end, 0, &format!("{} more below", all.len() - first - room), theme.strong());
+    }
+    let mut below = canvas.part(0, height.saturating_sub(guide), width, guide);
+    guidance::view_any(cx, all[place].id, aside_words(cx, &all[place]), &mut below);
+}
+
+/// Widths of the columns between time and state; wider screens give room to tag, words and who acknowledged.
+struct Columns {
+    tag: u16,
+    what: u16,
+    by: u16,
+}
+
+impl Columns {
+    /// For the rows that are seen.
+    fn of(rows: &[Row], cx: &Cx, room: usize, width: u16) -> Columns {
+        let by = if width >= 110 { 12 } else { 0 };
+        let free = width.saturating_sub(1 + 6 + 10 + 11 + 9 + 10 + if by > 0 { by + 1 } else { 0 });
+        let seen = rows.iter().take(room).map(|row| self::width(&subject(cx, row.alarm.id)));
+        let tag = seen.max().unwrap_or(8).min(free / 2);
+        Columns { tag, what: free.saturating_sub(tag + 1).min(48), by }
+    }
+    fn row(&self, [mark, state_mark, time, tag, what, value, state, since, by]: [&str; 9]) -> String {
+        let (tag, what) = (pad(tag, self.tag), pad(what, self.what));
+        let row = format!(
+            "{}{} {} {tag} {what} {} {} {}",
+            pad(mark, 4),
+            pad(state_mark, 1),
+            pad(time, 9),
+            pad_left(value, 10),
+            pad(state, 8),
+            pad_left(since, 8)
+        );
+        if self.by > 0 { format!("{row} {}", pad(by, self.by)) } else { row }
+    }
+}
+
+fn cells(cx: &Cx, row: &Row, what: u16) -> [String; 9] {
+    let alarm: &ActiveAlarm = row.alarm;
+    let def = cx.def().alarm(alarm.id);
+    [
+        cx.theme.priority_mark(def.priority).to_owned(),
+        cx.theme.state_mark(alarm.state).to_owned(),
+        moment(alarm.raised_at, cx.now, &cx.def().time_zone),
+        subject(cx, alarm.id),
+        what_words(cx, row, what),
+        match def.subject {
+            Subject::Tag(tag) => value::show(cx, tag).within(10),
+            Subject::Device(_) | Subject::Line(_) => "–".to_owned(),
+        },
+        alarm.state.word().to_owned(),
+        running(between(alarm.raised_at, cx.now)),
+        alarm.acknowledged.as_ref().and_then(|deed| deed.by.as_deref()).unwrap_or_default().to_owned(),
+    ]
+}
+
+/// `1st temperature high > 72.0 +14 more, 3 unack`: how many are folded under it is never cut off.
+fn what_words(cx: &Cx, row: &Row, room: u16) -> String {
+    let mark = match (row.first, row.under) {
+        (true, _) => "1st ",
+        (false, true) => cx.theme.pick("└ ", "` "),
+        (false, false) => "",
+    };
+    let (long, short) = match (row.folded, row.more, row.more_waiting) {
+        (false, ..) => (String::new(), String::new()),
+        (true, more, 0) => (format!(" +{more} more"), format!(" +{more}")),
+        (true, more, waiting) => (format!(" +{more} more, {waiting} unack"), format!(" +{more} ({waiting})")),
+    };
+    let name = format!("{mark}{}", cx.def().alarm(row.alarm.id).text);
+    let text = format!("{name} {}", guidance::condition_words(cx, row.alarm.id));
+    let text = text.trim_end();
+    let choices = [(text, &long), (text, &short), (&name, &short)];
+    let whole = choices.iter().find(|(text, more)| width(text) + width(more) <= room);
+    match whole {
+        Some((text, more)) => format!("{text}{more}"),
+        None => format!("{}{short}", fit(text, room.saturating_sub(width(&short)))),
+    }
+}
