@@ -94,6 +94,8 @@ fn of_command(command: &Command) -> Row {
         Command::SaveSet { .. } => row("save set", "--TS--"),
         Command::Restore(_) => row("restore set", "--TS--"),
         Command::StopRestore(_) => row("stop restore", "--TS--"),
+        Command::HandOver => row("hand over", "--TS--"),
+        Command::TakeOver => row("take over", "--TS--"),
     }
 }
 
@@ -124,6 +126,8 @@ fn commands(def: &PlantDef, person: usize) -> Vec<Command> {
         Command::Alarm(AlarmCommand::OutOfService(alarm)),
         Command::Alarm(AlarmCommand::InService(alarm)),
         Command::Refresh(device),
+        Command::HandOver,
+        Command::TakeOver,
         Command::Test(line, Tool::Loopback { unit: 1, data: 7, count: 1 }),
         Command::Test(line, Tool::Identify { unit: 1 }),
         Command::Test(line, Tool::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
