@@ -89,24 +89,32 @@ impl Book {
         &self.machines[id.index()]
     }
 
-    /// What enables the alarm has become false: from now on nobody is told. What cannot be told suppresses nothing.
+    /// What enables the alarm has become false: what was told returns, and once nobody has to answer to it any more nobody
+    /// is told again. What was annunciated never leaves the list by itself. What cannot be told suppresses nothing.
     fn suppress(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
-        if alarm.enabled_when.is_some() && facts.enabled == Some(false) && self.machine(alarm.id).suppressed().is_none()
-        {
+        if !is_disabled(alarm, facts) || self.machine(alarm.id).suppressed().is_some() {
+            return;
+        }
+        if self.machine(alarm.id).is_active() && !self.machine(alarm.id).state().is_aside() {
+            records.push(self.step(alarm, AlarmStep::Returned, at, facts.value));
+        }
+        let state = self.machine(alarm.id).state();
+        if state == AlarmState::Normal || state.is_aside() {
             records.push(self.step(alarm, AlarmStep::Suppressed, at, facts.value));
         }
     }
 
     fn judge_condition(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
         let (machine, memory) = (&mut self.machines[alarm.id.index()], &mut self.memories[alarm.id.index()]);
-        let begins_anew = facts.enabled == Some(false) && alarm.condition.looks_back();
+        let begins_anew = is_disabled(alarm, facts) && alarm.condition.looks_back();
+        let returned = is_disabled(alarm, facts) && machine.suppressed().is_none();
         let step = if begins_anew {
             // What looks back starts when the alarm is enabled: a value may stand still while nothing is heated.
             memory.clear();
             machine.is_active().then_some(AlarmStep::ReturnedQuietly)
         } else {
             let holds = holds(alarm.condition, facts, machine.is_active(), memory, self.ran);
-            machine.judge(holds, self.ran, manner(alarm))
+            machine.judge(if returned { Some(false) } else { holds }, self.ran, manner(alarm))
         };
         if let Some(step) = step {
             records.push(self.step(alarm, step, at, facts.value));
@@ -207,6 +215,11 @@ impl Book {
         let record = AlarmRecord::new(at, subject_name(&self.def, alarm.subject), &alarm.text, alarm.priority, step);
         AlarmRecord { value, limit: limit_of(alarm.condition), ..record }
     }
+}
+
+/// Is what enables it false for certain?
+fn is_disabled(alarm: &AlarmDef, facts: Facts) -> bool {
+    alarm.enabled_when.is_some() && facts.enabled == Some(false)
 }
 
 fn manner(alarm: &AlarmDef) -> Manner {
