@@ -131,7 +131,8 @@ async fn write_on(mut session: Session, done: Arc<AtomicU64>, round: u64) -> Vec
             outcome = order.map(|order| order.outcome.clone()).filter(|outcome| *outcome != Outcome::Pending);
             outcome.is_some()
         });
-        ended.await.map(drop).unwrap();
+        let ended = tokio::time::timeout(PATIENCE, ended).await;
+        assert!(ended.is_ok_and(|ended| ended.is_ok()), "`{note}` never had an outcome");
         match outcome {
             Some(Outcome::Verified) => told.push(note),
             // It had gone, or has refused: too many at once, a value that stood there already.
@@ -215,7 +216,7 @@ async fn whatever_a_terminal_was_told_is_in_the_book_of_a_station_that_is_killed
     station.signal("TERM");
     assert_eq!(station.end(), Some(0), "{:?}", station.said);
     let last = entries(&place.book()).pop().unwrap();
-    assert_eq!(&*last.action, "stop");
+    assert_eq!(&*last.action, "stop station");
 }
 
 /// Lines so far; none before the first start.
