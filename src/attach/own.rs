@@ -30,16 +30,18 @@ pub struct Own {
     run: u64,
     /// The numbers that the station has given it, the present one last.
     numbers: VecDeque<u32>,
-    /// Sent, and not seen in a snapshot yet.
+    /// Sent, and their end not seen in a snapshot yet.
     sent: VecDeque<OrderStatus>,
-    /// Orders that no snapshot of the station will ever tell of.
+    /// Orders that no snapshot of the station will ever tell the end of.
     lost: VecDeque<OrderStatus>,
+    /// The station is there: what its snapshots say of an order under way is still true.
+    connected: bool,
 }
 
 impl Own {
     /// First connection: the number that the station gives is the one to keep.
     pub fn new(run: u64, terminal: u32) -> Own {
-        Own { terminal, run, numbers: [terminal].into(), sent: VecDeque::new(), lost: VecDeque::new() }
+        Own { terminal, run, numbers: [terminal].into(), sent: VecDeque::new(), lost: VecDeque::new(), connected: true }
     }
 
     /// The number of the terminal as its operator's orders have it.
@@ -54,6 +56,7 @@ impl Own {
             self.numbers.clear();
         }
         push(&mut self.numbers, terminal, NUMBERS_MAX);
+        self.connected = true;
     }
 
     /// An order on its way out: with the number that the station knows.
@@ -81,6 +84,7 @@ impl Own {
 
     /// The connection has ended: what was sent and not seen may or may not have been done.
     pub fn gone(&mut self) {
+        self.connected = false;
         while let Some(order) = self.sent.pop_front() {
             let outcome = Outcome::Failed(Fault::NotConnected);
             push(&mut self.lost, OrderStatus { outcome, ..order }, ORDERS_MAX);
@@ -90,10 +94,18 @@ impl Own {
     /// A snapshot of the station as this terminal is to see it: own orders under the own number, lost ones among them.
     pub fn see(&mut self, snapshot: &Arc<Snapshot>) -> Arc<Snapshot> {
         let told = |number: u32| {
-            snapshot.orders.iter().any(|order| order.id.number == number && self.numbers.contains(&order.id.terminal))
+            let own = |order: &&OrderStatus| order.id.number == number && self.numbers.contains(&order.id.terminal);
+            snapshot.orders.iter().find(own).map(|order| order.outcome != Outcome::Pending)
         };
-        self.sent.retain(|order| !told(order.id.number));
-        self.lost.retain(|order| !told(order.id.number));
+        self.sent.retain(|order| told(order.id.number) != Some(true));
+        if self.connected {
+            // The station remembers it after all: what it says counts again.
+            let (known, lost) = self.lost.drain(..).partition(|order| told(order.id.number).is_some());
+            let known: VecDeque<OrderStatus> = known;
+            let under_way = known.into_iter().filter(|order| told(order.id.number) == Some(false));
+            self.sent.extend(under_way.map(|order| OrderStatus { outcome: Outcome::Pending, ..order }));
+            self.lost = lost;
+        }
         if self.lost.is_empty() && self.numbers.iter().all(|number| *number == self.terminal) {
             return snapshot.clone();
         }
@@ -113,6 +125,10 @@ impl Own {
                 line.test = Some(Arc::new(ToolRun { id: self.renumbered(test.id), ..ToolRun::clone(test) }));
             }
         }
+        // The last picture of a station that has gone shows as under way what nobody will hear the end of.
+        let is_lost =
+            |id: OrderId| id.terminal == self.terminal && self.lost.iter().any(|lost| lost.id.number == id.number);
+        seen.orders.retain(|order| !is_lost(order.id));
         seen.orders.splice(0..0, self.lost.iter().rev().cloned());
         seen.orders.truncate(ORDERS_MAX);
         Arc::new(seen)

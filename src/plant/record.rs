@@ -168,7 +168,7 @@ pub struct ActionRecord {
 
 /// Deeds that are not at the plant but about people, terminals and the station: for the book and the list of a Supervisor,
 /// not for shift reports and curves.
-pub const ELSEWHERE: [&str; 23] = [
+pub const ELSEWHERE: [&str; 24] = [
     "attach",
     "detach",
     "login",
@@ -189,6 +189,7 @@ pub const ELSEWHERE: [&str; 23] = [
     "export",
     "too many requests",
     "audit trail",
+    "read audit trail",
     "start station",
     "stop station",
     "reload",

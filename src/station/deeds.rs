@@ -1,13 +1,14 @@
 //! The way of deeds into the book, and what the station itself puts there: start, stop, plant file, steps of the clock.
 
 use std::{
+    collections::VecDeque,
     sync::Arc,
     time::{Duration, Instant as RealInstant, SystemTime},
 };
 
 use jiff::Timestamp;
 use tokio::{
-    sync::{mpsc, watch},
+    sync::{mpsc, oneshot, watch},
     time::Instant,
 };
 
@@ -20,12 +21,39 @@ use crate::{
     profile::PlantFile,
 };
 
-/// A snapshot that shows an outcome waits so long for the book to have it.
+/// A snapshot that shows an outcome, and the answer to a wish, wait so long for the book to have it.
 const WAIT_MAX: Duration = Duration::from_secs(1);
+/// Answers that wait for the book; one more, and the oldest waits no longer.
+const ANSWERS_MAX: usize = 64;
 /// A clock that moves more than this against the steady one was set.
 const STEP_MIN: Duration = Duration::from_millis(500);
 /// Real time between two looks at the clock.
 const LOOK_EVERY: Duration = Duration::from_secs(5);
+
+/// What comes from the door, in its order.
+#[derive(Debug)]
+pub enum Paper {
+    /// Put this into the book.
+    Deed(ActionRecord),
+    /// Tell this once the book has what came before it: nobody is told that something is done which a loss of power undoes.
+    Answer(oneshot::Sender<Result<(), String>>, Result<(), String>),
+}
+
+/// An answer that waits for the book to have so many deeds.
+#[derive(Debug)]
+struct Answer {
+    deeds: u64,
+    since: Instant,
+    reply: oneshot::Sender<Result<(), String>>,
+    answer: Result<(), String>,
+}
+
+impl Answer {
+    /// Whoever has left needs no answer.
+    fn tell(self) {
+        let _ = self.reply.send(self.answer);
+    }
+}
 
 /// The plant's end of the book.
 #[derive(Debug)]
@@ -37,6 +65,7 @@ pub struct Deeds {
     behind: Instant,
     /// Deeds that the queue had no room for: they are in the history only.
     left_out: u64,
+    answers: VecDeque<Answer>,
     clock: ClockWatch,
     /// The hash of the plant file that was recorded last.
     plant_file: Option<Arc<str>>,
@@ -47,7 +76,16 @@ impl Deeds {
     pub fn new(book: &Handle) -> Deeds {
         let (queue, status) = (book.deeds.clone(), book.status.clone());
         let (clock, plant_file) = (ClockWatch::new(), book.opened.plant_file.clone());
-        Deeds { queue, status, sent: 0, behind: Instant::now(), left_out: 0, clock, plant_file }
+        Deeds {
+            queue,
+            status,
+            sent: 0,
+            behind: Instant::now(),
+            left_out: 0,
+            answers: VecDeque::new(),
+            clock,
+            plant_file,
+        }
     }
 
     /// The first deeds of a station: that it has started, and the plant file if it is another one than the last time.
@@ -85,6 +123,29 @@ impl Deeds {
                 refused.into_inner()
             }
         }
+    }
+
+    /// Tells an answer once the book has all that was sent to it before; see [`Deeds::tell`].
+    pub fn answer(&mut self, reply: oneshot::Sender<Result<(), String>>, answer: Result<(), String>) {
+        self.answers.push_back(Answer { deeds: self.sent, since: Instant::now(), reply, answer });
+        self.tell();
+    }
+
+    /// Tells the answers whose deeds are in the book. A book that cannot keep up keeps nobody waiting for ever.
+    pub fn tell(&mut self) {
+        let (taken, alive) = (self.status.borrow().taken, self.status.has_changed().is_ok());
+        let is_due = |answer: &Answer| !alive || answer.deeds <= taken || WAIT_MAX <= answer.since.elapsed();
+        while let Some(answer) = self.answers.pop_front_if(|answer| is_due(answer)) {
+            answer.tell();
+        }
+        while ANSWERS_MAX < self.answers.len() {
+            self.answers.pop_front().into_iter().for_each(Answer::tell);
+        }
+    }
+
+    /// The station ends: what it has begun to write is written, so nobody need wait.
+    pub fn tell_all(&mut self) {
+        self.answers.drain(..).for_each(Answer::tell);
     }
 
     /// When a snapshot may go out that could have gone at `next`: not before the book has what it shows, but in time.

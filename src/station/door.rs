@@ -16,6 +16,7 @@ use tokio::{
 };
 
 use super::{
+    deeds::Paper,
     session::{Request, Session},
     toil::{Done, Toil},
 };
@@ -23,7 +24,7 @@ use crate::{
     access::{Effect, Gate, Peer, Standing},
     bus::io::clock::Clock,
     history::{HistoryError, io::Query},
-    plant::{Snapshot, command::Order, record::ActionRecord},
+    plant::{Snapshot, command::Order},
 };
 
 /// Requests of all terminals that may wait; more are refused.
@@ -63,7 +64,7 @@ pub struct Ways {
     /// To the history.
     pub queries: mpsc::Sender<Query>,
     /// To the book of deeds.
-    pub deeds: mpsc::Sender<ActionRecord>,
+    pub deeds: mpsc::Sender<Paper>,
     /// To whoever has started the station.
     pub commands: mpsc::Sender<Command>,
 }
@@ -192,6 +193,9 @@ impl Door {
     }
 
     fn carry_out(&mut self, effects: Vec<Effect>) {
+        // What is answered is in the book before.
+        let is_deed = effects.iter().any(|effect| matches!(effect, Effect::Record(_)));
+        let mut answers = Vec::new();
         for effect in effects {
             match effect {
                 Effect::Order(order) => {
@@ -201,11 +205,11 @@ impl Door {
                     }
                 }
                 Effect::Record(deed) => {
-                    if let Err(error) = self.ways.deeds.try_send(deed) {
+                    if let Err(error) = self.ways.deeds.try_send(Paper::Deed(deed)) {
                         tracing::error!(%error, "a deed did not reach the book");
                     }
                 }
-                Effect::Reply(ticket, answer) => self.reply(ticket, answer),
+                Effect::Reply(ticket, answer) => answers.push((ticket, answer)),
                 Effect::Standing(terminal) => {
                     if let Some(end) = self.terminals.get(&terminal) {
                         end.send_replace(Arc::new(self.gate.standing(terminal, self.clock.now())));
@@ -227,11 +231,21 @@ impl Door {
                 }
             }
         }
+        for (ticket, answer) in answers {
+            self.reply(ticket, answer, is_deed);
+        }
     }
 
-    fn reply(&mut self, ticket: u64, answer: Result<(), String>) {
-        if let Some(reply) = self.tickets.remove(&ticket) {
+    fn reply(&mut self, ticket: u64, answer: Result<(), String>, is_deed: bool) {
+        let Some(reply) = self.tickets.remove(&ticket) else { return };
+        let late = match is_deed {
+            true => self.ways.deeds.try_send(Paper::Answer(reply, answer)).err(),
             // A terminal that has left needs no answer.
+            false => return drop(reply.send(answer)),
+        };
+        if let Some(error) = late
+            && let Paper::Answer(reply, answer) = error.into_inner()
+        {
             let _ = reply.send(answer);
         }
     }

@@ -9,7 +9,7 @@ use tokio::{
 };
 
 use super::{
-    deeds::{self, Deeds},
+    deeds::{self, Deeds, Paper},
     sets,
 };
 use crate::{
@@ -110,7 +110,7 @@ impl PlantTask {
         mut self,
         mut events: mpsc::Receiver<Event>,
         mut orders: mpsc::Receiver<Order>,
-        mut deeds: mpsc::Receiver<ActionRecord>,
+        mut papers: mpsc::Receiver<Paper>,
     ) {
         let tick_every = self.clock.real_span(Duration::from_secs(1)).max(TICK_MIN);
         self.file_sets(SetWork::Read);
@@ -132,7 +132,7 @@ impl PlantTask {
                     self.carry_out(effects);
                     (changed, next) = (true, Instant::now());
                 }
-                Some(deed) = deeds.recv() => self.keep(vec![Record::Action(deed)]),
+                Some(paper) = papers.recv() => self.take_paper(paper),
                 saved = saved(&mut self.saving) => {
                     self.take_saved(saved);
                     changed = true;
@@ -146,6 +146,7 @@ impl PlantTask {
                     changed = true;
                 }
                 () = Deeds::changed(&mut self.keeping.book) => {
+                    self.tell_answers();
                     self.hear_store();
                     changed = true;
                 }
@@ -154,6 +155,7 @@ impl PlantTask {
                     let effects = self.plant.on_tick(self.clock.now());
                     self.carry_out(effects);
                     self.look_at_clock();
+                    self.tell_answers();
                     changed = true;
                 }
                 event = events.recv() => {
@@ -178,10 +180,26 @@ impl PlantTask {
             }
         }
         let stopped = deeds::stopped(&self.plant.def().name, self.clock.now());
-        if self.keeping.book.is_some() {
+        if let Some(book) = &mut self.keeping.book {
+            book.tell_all();
             self.write_down(vec![stopped]);
         }
         self.publish.send_replace(Arc::new(self.plant.snapshot()));
+    }
+
+    fn take_paper(&mut self, paper: Paper) {
+        match (paper, &mut self.keeping.book) {
+            (Paper::Deed(deed), _) => self.keep(vec![Record::Action(deed)]),
+            (Paper::Answer(reply, answer), Some(book)) => book.answer(reply, answer),
+            // Whoever has left needs no answer.
+            (Paper::Answer(reply, answer), None) => drop(reply.send(answer)),
+        }
+    }
+
+    fn tell_answers(&mut self) {
+        if let Some(book) = &mut self.keeping.book {
+            book.tell();
+        }
     }
 
     fn look_at_clock(&mut self) {

@@ -30,8 +30,8 @@ mod commands;
 mod devices;
 mod durability;
 mod guarded;
+mod kills;
 mod masters;
-
 mod peers;
 mod people;
 mod rights;

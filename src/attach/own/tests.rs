@@ -57,6 +57,30 @@ fn the_outcome_of_an_order_from_before_a_break_is_found_again() {
 }
 
 #[test]
+fn an_order_under_way_when_the_station_goes_is_uncertain_until_the_same_station_tells_more() {
+    let under_way = [(3, 1, Outcome::Pending), (2, 1, Outcome::Verified)];
+    let uncertain = [(3, 1, Outcome::Failed(Fault::NotConnected)), (2, 1, Outcome::Verified)];
+    let begun = || {
+        let mut own = Own::new(1, 3);
+        send(&mut own, 1);
+        assert_eq!(seen(&mut own, &under_way), under_way);
+        own.gone();
+        assert_eq!(seen(&mut own, &under_way), uncertain, "the last picture does not stand for ever");
+        own
+    };
+    let mut same = begun();
+    same.welcomed(1, 5);
+    assert_eq!(seen(&mut same, &under_way), under_way);
+    same.gone();
+    assert_eq!(seen(&mut same, &under_way), uncertain, "a second time as well");
+    same.welcomed(1, 6);
+    assert_eq!(seen(&mut same, &[(3, 1, Outcome::Verified)]), [(3, 1, Outcome::Verified)]);
+    let mut another = begun();
+    another.welcomed(2, 3);
+    assert_eq!(seen(&mut another, &[]), uncertain[..1], "a new station has never heard of it");
+}
+
+#[test]
 fn an_order_that_did_not_arrive_is_refused_in_words() {
     let mut own = Own::new(1, 3);
     let id = send(&mut own, 1);
