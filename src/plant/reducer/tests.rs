@@ -100,6 +100,27 @@ fn after_a_write_that_may_have_failed_the_old_value_is_not_trusted() {
 }
 
 #[test]
+fn a_handover_is_on_record_with_its_note() {
+    let mut plant = running();
+    let mut deed = |number, command, note: Option<String>| {
+        let order = Order { note: note.map(Into::into), ..order(number, command) };
+        let effects = plant.on_order(order, at(1));
+        let [Record::Action(deed)] = &effects.records[..] else { panic!("{effects:?}") };
+        (deed.action.to_string(), deed.note.as_deref().map(str::to_owned), deed.outcome.to_string())
+    };
+    let told = |action: &str, note: Option<&str>, outcome: &str| {
+        (action.to_owned(), note.map(str::to_owned), outcome.to_owned())
+    };
+    assert_eq!(
+        deed(1, Command::HandOver, Some("pump is loud".to_owned())),
+        told("hand over", Some("pump is loud"), "verified")
+    );
+    assert_eq!(deed(2, Command::TakeOver, None), told("take over", None, "verified"));
+    let (_, _, outcome) = deed(3, Command::HandOver, Some("x".repeat(501)));
+    assert_eq!(outcome, "refused: more than 500 characters");
+}
+
+#[test]
 fn a_line_is_closed_when_it_says_so() {
     let mut plant = running();
     let effects = plant.on_order(order(1, Command::Connect(L1, false)), at(1));

@@ -71,9 +71,11 @@ pub(super) fn banner(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     }
 }
 
-/// `3 put aside`; empty where nothing is.
+/// `3 put aside`; empty where nobody has put anything aside. What is suppressed by design is as it should be, and stands
+/// on the alarms tab only.
 fn aside_words(cx: &Cx) -> String {
-    match cx.snapshot.aside.len() {
+    let by_somebody = cx.snapshot.aside.iter().filter(|aside| aside.state != AlarmState::Suppressed);
+    match by_somebody.count() {
         0 => String::new(),
         many => format!("{many} put aside"),
     }

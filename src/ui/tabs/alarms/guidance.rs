@@ -1,5 +1,7 @@
 //! What to do about an alarm: cause, effect, action, the time there is left, and where to look.
 
+use ratatui::style::Style;
+
 use crate::{
     plant::{
         alarm::AlarmState,
@@ -13,7 +15,7 @@ use crate::{
             faceplate::{device_words, line_state_words},
         },
         widgets::{
-            text::{Canvas, between, clock, fit, fit_words, running, wrap},
+            text::{self, Canvas, between, clock, fit_words, running, wrap},
             value,
         },
     },
@@ -29,9 +31,11 @@ pub fn view(cx: &Cx, alarm: &ActiveAlarm, canvas: &mut Canvas) {
         ("cause", or_dash(&guidance.cause).to_owned()),
         ("effect", or_dash(&guidance.effect).to_owned()),
         ("action", or_dash(&guidance.action).to_owned()),
-        ("time", respond_words(cx, def, alarm).unwrap_or_else(|| "–".to_owned())),
     ];
-    draw(cx, def, &rows, &go, canvas);
+    draw(cx, &rows, &go, canvas);
+    let respond = respond_words(cx, def, alarm)
+        .map(|(words, overdue)| (format!(" {words} "), if overdue { cx.theme.trouble() } else { cx.theme.strong() }));
+    title(cx, def, respond, canvas);
 }
 
 /// Draws what there is to know of any alarm, with words of its own at the top.
@@ -42,16 +46,28 @@ pub fn view_any(cx: &Cx, alarm: AlarmId, now: String, canvas: &mut Canvas) {
         ("effect", or_dash(&def.guidance.effect).to_owned()),
         ("action", or_dash(&def.guidance.action).to_owned()),
     ];
-    draw(cx, def, &rows, &go_words(cx, def, None), canvas);
+    draw(cx, &rows, &go_words(cx, def, None), canvas);
+    title(cx, def, None, canvas);
 }
 
-fn draw(cx: &Cx, def: &AlarmDef, rows: &[(&str, String)], go: &str, canvas: &mut Canvas) {
+/// Which alarm it is about; at the right how long there is to respond.
+fn title(cx: &Cx, def: &AlarmDef, respond: Option<(String, Style)>, canvas: &mut Canvas) {
+    let (width, theme) = (canvas.width(), cx.theme);
+    canvas.run(0, 0, width, '─', theme.dim());
+    let (words, style) = respond.unwrap_or_default();
+    let end = width.saturating_sub(1);
+    canvas.text_right(end, 0, &words, style);
+    let name = format!(" {} {} {}", theme.priority_tag(def.priority), subject(cx, def.id), def.text);
+    let whole = format!("{name} {}", condition_words(cx, def.id));
+    let room = end.saturating_sub(text::width(&words) + 3);
+    let shown =
+        if text::width(whole.trim_end()) <= room { whole.trim_end().to_owned() } else { fit_words(&name, room) };
+    canvas.text(1, 0, &format!("{shown} "), theme.strong());
+}
+
+fn draw(cx: &Cx, rows: &[(&str, String)], go: &str, canvas: &mut Canvas) {
     let theme = cx.theme;
     let (width, height) = (canvas.width(), canvas.height());
-    canvas.run(0, 0, width, '─', theme.dim());
-    let mark = theme.priority_tag(def.priority);
-    let title = format!(" {mark} {} {} {} ", subject(cx, def.id), def.text, condition_words(cx, def.id));
-    canvas.text(1, 0, &fit(&title, width.saturating_sub(2)), theme.strong());
     let room = width.saturating_sub(10);
     let lines: Vec<Vec<String>> = rows.iter().map(|(_, text)| wrap(text, room)).collect();
     // Where there is no room for all of it the action is told whole, and one line of the others.
@@ -72,7 +88,7 @@ fn draw(cx: &Cx, def: &AlarmDef, rows: &[(&str, String)], go: &str, canvas: &mut
             y += 1;
         }
     }
-    let last = height.saturating_sub(1).max(y.min(height.saturating_sub(1)));
+    let last = height.saturating_sub(1);
     canvas.text(1, last, "go to", theme.dim());
     canvas.text(9, last, &fit_words(go, room), theme.normal());
 }
@@ -105,15 +121,15 @@ fn now_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
     words
 }
 
-/// `respond within 10 min, 9 min left`; without a time to respond nothing, and no time left for what is over.
-fn respond_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<String> {
+/// `respond within 10 min, 09:19 left`, and whether that time is over; nothing where the plant file gives no time.
+fn respond_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(String, bool)> {
     let respond = def.guidance.respond?;
     let within = format!("respond within {} min", respond.as_secs().div_ceil(60));
     let gone = between(alarm.raised_at, cx.now);
     Some(match alarm.state {
         AlarmState::Unacknowledged | AlarmState::Acknowledged => match respond.checked_sub(gone) {
-            Some(left) => format!("{within}, {} left", running(left)),
-            None => format!("{within}, OVERDUE by {}", running(gone - respond)),
+            Some(left) => (format!("{within}, {} left", running(left)), false),
+            None => (format!("{within}, OVERDUE by {}", running(gone - respond)), true),
         },
         AlarmState::Normal
         | AlarmState::Returned
@@ -121,7 +137,7 @@ fn respond_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<String>
         | AlarmState::LatchedAcknowledged
         | AlarmState::Shelved
         | AlarmState::Suppressed
-        | AlarmState::OutOfService => within,
+        | AlarmState::OutOfService => (within, false),
     })
 }
 

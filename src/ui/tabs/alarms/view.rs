@@ -65,9 +65,9 @@ pub(super) fn first(place: usize, room: usize) -> usize {
     place.saturating_sub(room - 1)
 }
 
-/// Rows of the guidance.
+/// Rows of the guidance on a tab of this height.
 fn guide(height: u16) -> u16 {
-    height.saturating_sub(HEAD + 2).min(7)
+    height.saturating_sub(HEAD + 2).min(if height < 28 { 7 } else { 10 })
 }
 
 /// The names of the views, each with how much is in it, and how much of that waits: nothing is hidden in another view.
