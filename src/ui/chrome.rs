@@ -249,9 +249,20 @@ fn tab_bar(model: &Model, cx: &Cx, canvas: &mut Canvas) {
         format!("{} {}{count}", tab.number(), tab.title())
     };
     let names: Vec<(Tab, String)> = Tab::offered(cx).into_iter().map(|tab| (tab, name(tab))).collect();
-    // Where there is no room for blanks around the names they stand closer.
-    let wide = names.iter().map(|(_, name)| width(name) + 3).sum::<u16>() <= canvas.width() + 1;
-    let blank = if wide { " " } else { "" };
+    // Where there is no room for blanks around the names they stand closer; then all but the shown one are cut alike.
+    let needs = |blanks: u16| names.iter().map(|(_, name)| width(name) + blanks).sum::<u16>() + names.len() as u16;
+    let blank = if needs(2) <= canvas.width() + 1 { " " } else { "" };
+    let longest = names.iter().map(|(_, name)| width(name)).max().unwrap_or(0);
+    let cut = |most: u16| {
+        let cut = |(tab, name): &(Tab, String)| match *tab == model.tabs.shown || *tab == Tab::Alarms {
+            true => (*tab, name.clone()),
+            false => (*tab, fit(name, most)),
+        };
+        names.iter().map(cut).collect::<Vec<_>>()
+    };
+    let fits =
+        |names: &Vec<(Tab, String)>| names.iter().map(|(_, name)| width(name) + 1).sum::<u16>() <= canvas.width() + 1;
+    let names = (5..=longest).rev().map(cut).find(fits).unwrap_or_else(|| cut(5));
     let mut x = 0;
     for (n, (tab, name)) in names.iter().enumerate() {
         if n > 0 {
