@@ -159,15 +159,16 @@ fn a_terminal_whose_window_is_closed_ends_and_its_station_does_not() {
     let mut station = place.station();
     for (name, args) in [("attached", ""), ("embedded", "demo")] {
         let screen = place.folder.path().join(name);
-        let command = format!("EXEC:{} {args},pty,setsid,ctty,raw,echo=0", env!("CARGO_BIN_EXE_sightglass"));
+        let command = [env!("CARGO_BIN_EXE_sightglass"), args].join(" ");
+        let command = format!("EXEC:{},pty,setsid,ctty,raw,echo=0", command.trim());
         let mut window = Process::start(
             Command::new("socat")
-                .args(["-u", command.trim(), &format!("OPEN:{},creat,append", screen.display())])
+                .args([&format!("STDIN,ignoreeof!!OPEN:{},creat,append", screen.display()), &command])
                 .env("TERM", "xterm-256color")
                 .env("XDG_RUNTIME_DIR", if args.is_empty() { place.sockets.clone() } else { sockets() })
                 .env("XDG_STATE_HOME", place.folder.path()),
         );
-        until(&format!("{name}: it draws"), || {
+        until(&format!("{name}: it begins to draw"), || {
             std::fs::read(&screen).is_ok_and(|bytes| String::from_utf8_lossy(&bytes).contains("\x1b[?1049h"))
         });
         let child = child_of(window.child.id());
