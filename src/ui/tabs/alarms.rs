@@ -126,7 +126,7 @@ impl Alarms {
             Action::Words => return self.ask_words(),
             Action::Shift(by) => self.shift(cx, by),
             Action::Now => self.shift(cx, 0),
-            Action::Journal => self.to_journal(cx),
+            Action::Journal => self.turn_to_journal(cx),
             Action::Note => return alarm.map_or_else(Vec::new, |alarm| deeds::note(cx, alarm)),
             Action::AcknowledgePage => return deeds::acknowledge_all(cx, self.seen(cx).into_iter()),
             Action::Shelve => return alarm.map_or_else(Vec::new, |alarm| deeds::shelve(cx, alarm.id)),
@@ -285,7 +285,7 @@ impl Alarms {
         }
     }
 
-    fn to_journal(&mut self, cx: &Cx) {
+    fn turn_to_journal(&mut self, cx: &Cx) {
         if self.page == Page::Journal {
             self.page = Page::Active;
             return;

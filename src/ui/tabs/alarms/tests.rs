@@ -184,7 +184,8 @@ fn the_meter_is_shown_with_target_limit_and_verdict() {
     // A past shift is asked of the history, and its figures stand under its name only.
     let effects = type_keys(&mut model, "vvvv←←");
     let Some(Effect::Ask(id, Question::AlarmQuality { from, to })) = effects.last() else { panic!("{effects:?}") };
-    assert_eq!((*from, *to), ("2026-11-20T23:00:00Z".parse().unwrap(), "2026-11-21T07:00:00Z".parse().unwrap()));
+    let span = [from, to].map(ToString::to_string);
+    assert_eq!(span, ["2026-11-20T23:00:00Z", "2026-11-21T07:00:00Z"]);
     assert!(screen(&mut model, 80, 24).contains("reading …"));
     let past = Figures { by_priority: [0, 0, 0, 7], ..figures() };
     update(&mut model, Msg::Answer(*id, Ok(Answer::AlarmQuality(Box::new(past)))));
@@ -417,21 +418,19 @@ fn silence_is_one_key_on_every_tab_and_acknowledges_nothing() {
     assert!(screen(&mut model, 120, 40).lines().nth(2).is_some_and(|banner| banner.contains("silenced")));
 }
 
-/// Ten thousand in the book, five hundred of them active in one burst.
-#[test]
-fn a_key_answers_at_once_in_a_storm() {
+/// The slowest key and the screen after it, with ten thousand alarms in the book and so many active in one burst.
+fn slowest_key(active: u16) -> Duration {
     let mut fixture = Fixture::alarm();
     let pattern = fixture.def.alarms[2].clone();
     let priorities = [Priority::Low, Priority::Medium, Priority::Low, Priority::High];
     fixture.def.alarms = (0..10_000u16)
         .map(|n| AlarmDef { id: AlarmId(n), priority: priorities[usize::from(n) % 4], ..pattern.clone() })
         .collect();
-    let burst = |n| Some(Burst { began: ago(60), rank: n });
-    let active = (0..500u16).map(|n| {
-        let alarm = ActiveAlarm::new(AlarmId(n * 20), AlarmState::Unacknowledged, ago(60));
-        ActiveAlarm { burst: burst(u32::from(n) + 1), ..alarm }
-    });
-    fixture.alarms = active.collect();
+    let alarm = |n: u16| {
+        let alarm = ActiveAlarm::new(AlarmId(n * (10_000 / active)), AlarmState::Unacknowledged, ago(60));
+        ActiveAlarm { burst: Some(Burst { began: ago(60), rank: u32::from(n) + 1 }), ..alarm }
+    };
+    fixture.alarms = (0..active).map(alarm).collect();
     let mut model = shown(&fixture, Theme::FULL, " ");
     screen(&mut model, 120, 40);
     let mut slowest = Duration::ZERO;
@@ -441,6 +440,14 @@ fn a_key_answers_at_once_in_a_storm() {
         screen(&mut model, 120, 40);
         slowest = slowest.max(began.elapsed() / key.chars().count() as u32);
     }
-    println!("slowest key in a storm: {slowest:?}");
+    slowest
+}
+
+#[test]
+fn a_key_answers_at_once_in_a_storm() {
+    let slowest = slowest_key(500);
     assert!(slowest < Duration::from_millis(100), "{slowest:?}");
+    // All of them active is more than a plant has: some of the time is left to a busy machine.
+    let slowest = slowest_key(10_000);
+    assert!(slowest < Duration::from_millis(400), "{slowest:?}");
 }
