@@ -21,7 +21,7 @@
 //! | `guarded` | a station whose people must log in, for `rights` and `people` |
 //! | `pty` | the program in a pseudo-terminal, for `terminal` and `endings` |
 //! | `support` | what the others share: processes with deadlines, peers and their installation |
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 
 mod architecture;
 mod attach;

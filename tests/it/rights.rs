@@ -359,11 +359,11 @@ fn questions(def: &PlantDef, to: Timestamp) -> Vec<Question> {
 async fn every_question_is_answered_or_refused_as_the_table_says_and_who_asks_for_the_audit_trail_is_on_record() {
     let guarded = Guarded::start(|_| {}).await;
     let at = guarded.truth.borrow().at;
-    for person in 0..PEOPLE.len() {
+    for (person, name) in PEOPLE.into_iter().enumerate() {
         let session = sits(&guarded, person).await;
         for question in questions(&guarded.def, at) {
             let row = of_question(&question);
-            let said = format!("{question:?} by {}", PEOPLE[person]);
+            let said = format!("{question:?} by {name}");
             let written = guarded.entries().len();
             let (reply, answer) = oneshot::channel();
             session.ask(Query { question, reply }).unwrap();
