@@ -32,7 +32,7 @@ use crate::{
 /// Deeds that are read at most; more are said to be left out.
 const ROWS: usize = 500;
 /// How often they are asked anew, real time.
-const EVERY_S: f64 = 5.0;
+const EVERY_S: f64 = 2.0;
 /// Values in doubt that are named at most.
 const NAMED: usize = 8;
 /// Deeds that are only about the program, and no change of the plant.

@@ -108,7 +108,10 @@ impl Quality {
             None => "last 24 hours".to_owned(),
             Some(period) => span::words(cx, period),
         };
-        let count = self.figures(cx).map(|figures| format!(": {} alarms", figures.annunciated()));
+        let count = self.figures(cx).map(|figures| match figures.annunciated() {
+            1 => ": 1 alarm".to_owned(),
+            many => format!(": {many} alarms"),
+        });
         let wait = if self.trouble.is_none() { ": reading …" } else { "" };
         let x = canvas.text(1, 1, &format!("{what}{}", count.as_deref().unwrap_or(wait)), theme.strong());
         if let Some(trouble) = &self.trouble {
