@@ -52,7 +52,7 @@ pub struct AckArgs {
 /// Writes, and tells the outcome; anything but verified is a failure.
 pub fn write(args: WriteArgs) -> Result<(), CliError> {
     in_runtime(async {
-        let mut session = client::attach_to_act(args.plant.as_deref(), &args.login).await?;
+        let (mut session, password) = client::attach_to_act(args.plant.as_deref(), &args.login).await?;
         let snapshot = session.snapshots.borrow().clone();
         let tag = snapshot
             .def
@@ -60,7 +60,7 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
             .ok_or_else(|| CliError::Usage(format!("no tag `{}` in {}", args.tag, snapshot.def.name)))?;
         let value = value(&snapshot, tag, &args.value).map_err(CliError::Usage)?;
         let command = Command::Write { tag, value };
-        let status = client::ordered(&mut session, 1, command, None, args.note.as_deref()).await?;
+        let status = client::ordered(&mut session, 1, command, args.note.as_deref(), password).await?;
         let words = |value: Option<f64>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
         let (old, new, unit) = (words(status.old), words(Some(value)), snapshot.unit(tag));
         let line = format!("{} {old} → {new} {unit}: {}", args.tag, outcome_words(&status.outcome));
@@ -79,7 +79,7 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
 /// Acknowledges alarm after alarm; the first refusal ends it.
 pub fn ack(args: AckArgs) -> Result<(), CliError> {
     in_runtime(async {
-        let mut session = client::attach_to_act(args.plant.as_deref(), &args.login).await?;
+        let (mut session, password) = client::attach_to_act(args.plant.as_deref(), &args.login).await?;
         let snapshot: Arc<Snapshot> = session.snapshots.borrow().clone();
         let known =
             |name: &str| snapshot.def.alarms.iter().any(|alarm| subject_name(&snapshot.def, alarm.subject) == name);
@@ -97,7 +97,7 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
             .collect();
         for (number, seen) in (1..).zip(&waiting) {
             let (alarm, command) = (snapshot.def.alarm(seen.id), seen.acknowledge());
-            let status = client::ordered(&mut session, number, command, None, args.note.as_deref()).await?;
+            let status = client::ordered(&mut session, number, command, args.note.as_deref(), password.clone()).await?;
             let line = format!("{} {}: ", subject_name(&snapshot.def, alarm.subject), alarm.text);
             if status.outcome != Outcome::Verified {
                 return Err(CliError::Failed(line + &outcome_words(&status.outcome)));

@@ -1,6 +1,6 @@
 //! `sightglass audit verify`: is the book of deeds as it was written, line by line, and does the history agree?
 
-use std::{path::PathBuf, sync::Arc};
+use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use jiff::Timestamp;
 
@@ -17,6 +17,8 @@ use super::{CliError, StationArgs, client, in_runtime, load, run, say, say_error
 
 /// A demonstration that ran ahead of time has stored what is yet to come.
 const DAY: jiff::SignedDuration = jiff::SignedDuration::from_hours(24);
+/// The store counts time in these.
+const MICROSECOND: jiff::SignedDuration = jiff::SignedDuration::from_micros(1);
 /// Deeds that one question is answered with.
 const PAGE: usize = 10_000;
 
@@ -91,7 +93,7 @@ fn summary_lines(summary: &Summary, def: &PlantDef) -> Vec<String> {
 /// The seals that the history holds.
 async fn seals(def: &Arc<PlantDef>, args: &VerifyArgs) -> Result<Vec<Seal>, CliError> {
     let source = Source::open(def, &args.station, &args.login).await?;
-    let (mut seals, mut to): (Vec<Seal>, Timestamp) = (Vec::new(), Timestamp::now() + DAY);
+    let (mut seals, mut to) = (BTreeMap::new(), Timestamp::now() + DAY);
     loop {
         let all = String::new;
         let question =
@@ -99,11 +101,12 @@ async fn seals(def: &Arc<PlantDef>, args: &VerifyArgs) -> Result<Vec<Seal>, CliE
         let Answer::Actions(deeds) = source.ask(question).await? else {
             return Err(CliError::Failed("the history answered another question".to_owned()));
         };
-        seals.extend(deeds.iter().filter_map(|deed| deed.seal));
-        // Newest first: the next page ends where this one begins. Deeds of the same instant may come twice, which is harmless.
-        match deeds.last().filter(|_| deeds.len() == PAGE) {
-            Some(last) if last.at < to => to = last.at,
-            Some(_) | None => return Ok(seals),
+        let before = seals.len();
+        seals.extend(deeds.iter().filter_map(|deed| deed.seal).map(|seal| (seal.number, seal)));
+        // Newest first: the next page ends with the instant in which this one begins, whose deeds come once more.
+        match deeds.last().filter(|_| deeds.len() == PAGE && before < seals.len()) {
+            Some(last) => to = last.at + MICROSECOND,
+            None => return Ok(seals.into_values().collect()),
         }
     }
 }

@@ -3,11 +3,13 @@
 use std::{io::IsTerminal, time::Duration};
 
 use crate::{
-    access::{Wish, wish::Secret},
+    access::{Signature, Wish, gate::sign, wish::Secret},
     attach::io::{connect, find},
     plant::{
         Snapshot,
         command::{Command, OrderId, OrderStatus, Outcome},
+        role::Sign,
+        sample::{Cause, Quality},
     },
     station::Session,
 };
@@ -16,6 +18,9 @@ use super::CliError;
 
 /// An order that has no outcome after so long is left; the station follows it further.
 const OUTCOME_MAX: Duration = Duration::from_secs(150);
+
+/// A login is seen everywhere within this time.
+const SETTLED_MAX: Duration = Duration::from_secs(5);
 
 /// Who acts.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -36,31 +41,58 @@ pub async fn place(plant: Option<&str>) -> Result<find::Found, CliError> {
     match (running.len(), plant) {
         (1, _) => Ok(running.remove(0)),
         (0, Some(plant)) => Err(CliError::NotRunning(format!("no station of {plant} runs here"))),
-        (0, None) => Err(CliError::NotRunning("no station runs here".to_owned())),
+        (0, None) => Err(CliError::NotRunning(match find::Places::here().closed() {
+            Some(folder) => {
+                format!("no station runs here that this user may reach; {} is closed to him", folder.display())
+            }
+            None => "no station runs here".to_owned(),
+        })),
         (_, _) => {
             let names: Vec<String> = running.into_iter().map(|found| found.name).collect();
-            Err(CliError::Usage(format!("stations of several plants run here, name one: {}", names.join(", "))))
+            let names = names.join(", ");
+            Err(CliError::Usage(format!(
+                "stations of several plants run here, name one (`write` and `ack`: --plant): {names}"
+            )))
         }
     }
 }
 
 /// Attaches to a station and logs in.
 pub async fn attach(plant: Option<&str>, login: &Login) -> Result<Session, CliError> {
-    let session = open(plant).await?;
-    if let Some(user) = login.user.clone() {
-        let password = Secret(password(&user)?);
-        session.wish(Wish::Login { user, password }).await.map_err(CliError::Failed)?;
-    }
-    Ok(session)
+    Ok(attach_with_password(plant, login).await?.0)
+}
+
+/// The same, and the password that was given.
+async fn attach_with_password(plant: Option<&str>, login: &Login) -> Result<(Session, Option<Secret>), CliError> {
+    let mut session = open(plant).await?;
+    let Some(user) = login.user.clone() else { return Ok((session, None)) };
+    let password = Secret(password(&user)?);
+    session.wish(Wish::Login { user, password: password.clone() }).await.map_err(CliError::Failed)?;
+    let settled = async {
+        // The answer may come before the standing, and the standing before the picture that belongs to it.
+        let _ = session.standing.wait_for(|standing| standing.who.is_some()).await;
+        let view = session.standing.borrow().view;
+        if view {
+            let _ = session.snapshots.wait_for(|snapshot| !is_withheld(snapshot)).await;
+        }
+    };
+    let silent = |_| CliError::Failed("the station says nothing".to_owned());
+    tokio::time::timeout(SETTLED_MAX, settled).await.map_err(silent)?;
+    Ok((session, Some(password)))
+}
+
+/// Are the values shown after a login only?
+pub fn is_withheld(snapshot: &Snapshot) -> bool {
+    snapshot.samples.iter().any(|sample| sample.quality == Quality::Bad(Cause::Withheld))
 }
 
 /// The same for somebody who wants to act: nobody may without a login.
-pub async fn attach_to_act(plant: Option<&str>, login: &Login) -> Result<Session, CliError> {
-    let session = attach(plant, login).await?;
+pub async fn attach_to_act(plant: Option<&str>, login: &Login) -> Result<(Session, Option<Secret>), CliError> {
+    let (session, password) = attach_with_password(plant, login).await?;
     if session.standing.borrow().who.is_none() {
         return Err(CliError::Failed("log in to act: --user NAME asks for the password".to_owned()));
     }
-    Ok(session)
+    Ok((session, password))
 }
 
 /// Attaches to a station.
@@ -77,7 +109,14 @@ fn password(user: &str) -> Result<String, CliError> {
     }
     let mut line = String::new();
     std::io::stdin().read_line(&mut line).map_err(failed)?;
-    Ok(line.trim_end_matches(['\r', '\n']).to_owned())
+    let line = line.trim_end_matches(['\r', '\n']);
+    if line.is_empty() {
+        // Not even tried: it would count as a wrong one.
+        return Err(CliError::Usage(
+            "no password given: type it, or give it as the first line of standard input".into(),
+        ));
+    }
+    Ok(line.to_owned())
 }
 
 /// Gives an order and waits for its outcome. `Err` unless it was done.
@@ -85,12 +124,15 @@ pub async fn ordered(
     session: &mut Session,
     number: u32,
     command: Command,
-    seen: Option<f64>,
     note: Option<&str>,
+    password: Option<Secret>,
 ) -> Result<OrderStatus, CliError> {
     let id = OrderId { terminal: session.terminal, number };
+    // Whoever acts has just given his password: where a tag asks for it again, this is it.
+    let sign = sign::needed(&session.snapshots.borrow().def, &command) == Some(Sign::Password);
+    let sign = password.filter(|_| sign).map(|password| Signature { user: None, password });
     let request = crate::access::OrderRequest {
-        seen,
+        sign,
         note: note.map(Into::into),
         ..crate::access::OrderRequest::new(id, command)
     };

@@ -62,6 +62,8 @@ async fn write(def: Arc<PlantDef>, period: Period, args: Args) -> Result<(), Cli
         false => csv::shift_csv(&report, &def, dialect),
     };
     let path = args.out.unwrap_or_else(|| def.report.folder.join(csv::file_name(&def, &report.period, report.until)));
+    // Asked before anything is written: not everybody may take data away.
+    source.exported(&path.display().to_string(), &bytes).await?;
     let failed = |error| CliError::Io { what: format!("cannot write {}", path.display()), error };
     if path.as_os_str() == "-" {
         return std::io::stdout().write_all(&bytes).map_err(failed);
@@ -70,7 +72,6 @@ async fn write(def: Arc<PlantDef>, period: Period, args: Args) -> Result<(), Cli
         std::fs::create_dir_all(folder).map_err(failed)?;
     }
     std::fs::write(&path, &bytes).map_err(failed)?;
-    source.exported(&path.display().to_string(), &bytes).await?;
     say(&path.display().to_string());
     Ok(())
 }

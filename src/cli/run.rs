@@ -9,6 +9,7 @@ use tokio::{
 };
 
 use crate::{
+    access::io::{users, users_beside},
     attach::io::{find, serve},
     bus::io::{clock::Clock, transport::Connector},
     plant::{PlantDef, Snapshot},
@@ -54,13 +55,14 @@ pub fn main(args: Args) -> Result<(), CliError> {
             let def = Arc::new(plant.0);
             let station = start(&def, clock, history_file(&def, &args.station), plant.1)?;
             let mut serving = Serving::new(listener, station);
-            say(&format!("{}: {} tags on {} lines", def.title, def.tags.len(), def.lines.len()));
+            let lines = if def.lines.len() == 1 { "line" } else { "lines" };
+            say(&format!("{}: {} tags on {} {lines}", def.title, def.tags.len(), def.lines.len()));
             let snapshots = serving.station.entrance().snapshots.clone();
             init::ready(&def.title);
             let ended = tokio::select! {
                 ended = follow(snapshots.clone(), clock, None) => ended.map(|_| None),
                 () = &mut over => Ok(None),
-                next = serving.told(|| load_with_file(&args.plant, &args.station)) => Ok(next),
+                next = serving.told(|| checked(&args)) => Ok(next),
             };
             let last = snapshots.borrow().clone();
             drop(snapshots);
@@ -86,6 +88,13 @@ pub fn main(args: Args) -> Result<(), CliError> {
             }
         }
     })
+}
+
+/// The plant file anew, with all that its station would start with: what is refused now changes nothing.
+fn checked(args: &Args) -> Result<Plant, CliError> {
+    let plant = load_with_file(&args.plant, &args.station)?;
+    users::read(&users_beside(&history_file(&plant.0, &args.station))).map_err(CliError::Users)?;
+    Ok(plant)
 }
 
 /// Station and terminal in one process; at the station of this plant, if it runs already.

@@ -33,7 +33,12 @@ impl Source {
     /// The history of a plant. A file that is named is read as a file.
     pub async fn open(def: &Arc<PlantDef>, args: &StationArgs, login: &client::Login) -> Result<Source, CliError> {
         if args.history.is_none() && client::place(Some(&def.name)).await.is_ok() {
-            return Ok(Source::Station(Box::new(client::attach(Some(&def.name), login).await?)));
+            let session = client::attach(Some(&def.name), login).await?;
+            if !session.standing.borrow().view {
+                let why = "the station of this plant runs: log in to ask it, --user NAME asks for the password";
+                return Err(CliError::Failed(why.to_owned()));
+            }
+            return Ok(Source::Station(Box::new(session)));
         }
         let path: PathBuf = run::history_file(def, args);
         let store = Store::open_read_only(&path, def).map_err(|error| match error {

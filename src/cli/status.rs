@@ -1,5 +1,6 @@
 //! `sightglass status`: how the station and its plant stand, for people and for scripts.
 
+use jiff::Timestamp;
 use serde_json::{Value, json};
 
 use crate::plant::{
@@ -7,7 +8,7 @@ use crate::plant::{
     alarm::book::subject_name,
     event::LineState,
     sample::{Quality, Sample},
-    snapshot::{ActiveAlarm, DeviceState},
+    snapshot::{ActiveAlarm, AsideAlarm, DeviceState},
 };
 
 use super::{CliError, client, in_runtime, say};
@@ -55,6 +56,11 @@ fn in_words(snapshot: &Snapshot) -> Vec<String> {
     }
     let trouble = snapshot.history.trouble.as_deref().unwrap_or("good");
     lines.push(format!("history  {trouble}, {} rows, {} lost", snapshot.history.rows, snapshot.history.lost));
+    lines.extend(snapshot.aside.iter().map(|alarm| format!("aside    {}", aside_words(snapshot, alarm))));
+    if client::is_withheld(snapshot) {
+        lines.push("tag      values are shown after a login: --user NAME".to_owned());
+        return lines;
+    }
     lines.extend(tag_lines(snapshot).into_iter().map(|line| format!("tag      {line}")));
     lines
 }
@@ -82,6 +88,15 @@ fn alarm_words(snapshot: &Snapshot, alarm: &ActiveAlarm) -> String {
     format!("{} {:10} {subject} {} since {since}", def.priority.number(), alarm.state.word(), def.text)
 }
 
+fn aside_words(snapshot: &Snapshot, alarm: &AsideAlarm) -> String {
+    let def = snapshot.def.alarm(alarm.id);
+    let local = |at: Timestamp| at.to_zoned(snapshot.def.time_zone.clone()).strftime("%m-%d %H:%M:%S").to_string();
+    let until = alarm.until.map(|at| format!(" until {}", local(at))).unwrap_or_default();
+    let active = if alarm.active { ", ACTIVE" } else { "" };
+    let subject = subject_name(&snapshot.def, def.subject);
+    format!("{} {:10} {subject} {}{until}{active}", def.priority.number(), alarm.state.word(), def.text)
+}
+
 fn line_words(state: &LineState) -> String {
     match state {
         LineState::Connecting => "connecting".to_owned(),
@@ -104,13 +119,16 @@ fn device_word(state: DeviceState) -> &'static str {
 /// The same and more: times are UTC, numbers are in the tag's unit, `null` is "not known".
 fn in_json(snapshot: &Snapshot) -> Value {
     let def = &snapshot.def;
+    // What is not told is `null`, never 0.
+    let told = !client::is_withheld(snapshot);
+    let count = |count: u64| told.then_some(count);
     let lines = def.lines.iter().zip(&snapshot.lines).map(|(line, status)| {
         let connected = status.state == LineState::Connected;
         let counters = &status.counters;
         json!({
             "name": line.name, "connected": connected, "state": line_words(&status.state),
-            "requests": counters.requests, "ok": counters.ok, "timeouts": counters.timeouts,
-            "corrupt": counters.corrupt, "exceptions": counters.exceptions,
+            "requests": count(counters.requests), "ok": count(counters.ok), "timeouts": count(counters.timeouts),
+            "corrupt": count(counters.corrupt), "exceptions": count(counters.exceptions),
         })
     });
     let devices = def.devices.iter().zip(&snapshot.devices).map(|(device, status)| {
@@ -119,7 +137,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
             "answering": status.state == DeviceState::Answering,
             "ne107": status.diagnosis.map(|reason| reason.to_string()),
             "reply_ms": status.reply.map(|reply| reply.as_secs_f64() * 1e3),
-            "ok": status.ok, "failed": status.failed,
+            "ok": count(status.ok), "failed": count(status.failed),
         })
     });
     let alarms = snapshot.alarms.iter().map(|alarm| {
@@ -128,6 +146,13 @@ fn in_json(snapshot: &Snapshot) -> Value {
             "subject": subject_name(def, found.subject), "text": found.text, "priority": found.priority.number(),
             "state": alarm.state.word(), "raised_at": alarm.raised_at.to_string(),
             "returned_at": alarm.returned_at.map(|at| at.to_string()), "value": alarm.value,
+        })
+    });
+    let aside = snapshot.aside.iter().map(|alarm| {
+        let found = def.alarm(alarm.id);
+        json!({
+            "subject": subject_name(def, found.subject), "text": found.text, "priority": found.priority.number(),
+            "state": alarm.state.word(), "active": alarm.active, "until": alarm.until.map(|at| at.to_string()),
         })
     });
     let tags = def.tags.iter().map(|tag| {
@@ -145,7 +170,8 @@ fn in_json(snapshot: &Snapshot) -> Value {
     json!({
         "plant": def.name, "title": def.title, "at": snapshot.at.to_string(), "speed": snapshot.speed,
         "lines": lines.collect::<Vec<_>>(), "devices": devices.collect::<Vec<_>>(),
-        "alarms": alarms.collect::<Vec<_>>(), "tags": tags.collect::<Vec<_>>(),
+        "alarms": alarms.collect::<Vec<_>>(), "aside": aside.collect::<Vec<_>>(),
+        "tags": told.then(|| tags.collect::<Vec<_>>()),
         "history": {
             "rows": snapshot.history.rows, "lost": snapshot.history.lost, "trouble": snapshot.history.trouble,
             "committed_at": snapshot.history.committed_at.map(|at| at.to_string()),
@@ -155,8 +181,6 @@ fn in_json(snapshot: &Snapshot) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use jiff::Timestamp;
-
     use super::*;
     use crate::plant::{Plant, fixture};
 

@@ -73,6 +73,15 @@ impl Places {
         Ok(folder.join(name))
     }
 
+    /// A folder of sockets that is there, and that this user may not look into.
+    pub fn closed(&self) -> Option<PathBuf> {
+        let folders = self.given.iter().chain([&self.service]).chain(&self.login).chain([&self.last]);
+        let closed = |folder: &&PathBuf| {
+            fs::read_dir(folder).is_err_and(|error| error.kind() == io::ErrorKind::PermissionDenied)
+        };
+        folders.into_iter().find(closed).cloned()
+    }
+
     /// The stations that live, by name. One that is stuck is not among them.
     pub async fn living(&self) -> Vec<Found> {
         let own =
