@@ -1,5 +1,7 @@
-//! Numbers that come from outside: whether they name things of this plant at all. Inside, ids are taken on trust.
+//! What comes from outside: whether it names things of this plant at all, and is no longer than it can be. Inside, ids are
+//! taken on trust.
 
+use super::protocol::encode;
 use crate::{
     history::Question,
     plant::{
@@ -7,8 +9,18 @@ use crate::{
         alarm::AlarmCommand,
         command::Command,
         def::{AlarmId, DeviceId, LineId, TagId},
+        parameter_set::NAME_MAX,
+        restore::RestoreWish,
+        tool::Tool,
     },
 };
+
+/// Most characters of a name, or of where a set of values comes from.
+const WORDS_MAX: usize = 200;
+/// Most bytes of a test: the longest frame that Modbus knows, over TCP.
+const SEND_MAX: usize = 260;
+/// Most bytes of the settings of a line.
+const SETTINGS_BYTES_MAX: usize = 4 << 10;
 
 /// Most columns of a curve: more than any screen has.
 const BUCKETS_MAX: usize = 4_096;
@@ -21,16 +33,46 @@ pub fn command(def: &PlantDef, command: &Command) -> Result<(), String> {
         Command::Write { tag: id, value: _ } => tag(def, *id),
         Command::Alarm(command) => of_alarms(def, command),
         Command::ReadSets | Command::HandOver | Command::TakeOver => Ok(()),
-        Command::Refresh(id) | Command::StopRestore(id) | Command::SaveSet { device: id, .. } => device(def, *id),
-        Command::Connect(id, _) | Command::SaveSettings(id) | Command::Test(id, _) | Command::StopTest(id) => {
+        Command::Refresh(id) | Command::StopRestore(id) => device(def, *id),
+        Command::SaveSet { device: id, name, replace: _ } => {
+            short("name", name, NAME_MAX)?;
+            device(def, *id)
+        }
+        Command::Connect(id, _) | Command::SaveSettings(id) | Command::StopTest(id) => line(def, *id),
+        Command::Test(id, tool) => {
+            if let Tool::Send(bytes) = tool
+                && SEND_MAX < bytes.len()
+            {
+                return Err(format!("{} bytes to send, expected at most {SEND_MAX}", bytes.len()));
+            }
             line(def, *id)
         }
-        Command::Configure(settings) => line(def, settings.id),
-        Command::Restore(wish) => {
-            device(def, wish.device)?;
-            wish.changes.iter().try_for_each(|change| tag(def, change.tag))
+        Command::Configure(settings) => {
+            encode(settings, SETTINGS_BYTES_MAX).map_err(|error| format!("settings: {error}"))?;
+            line(def, settings.id)
         }
+        Command::Restore(wish) => of_restore(def, wish),
     }
+}
+
+fn of_restore(def: &PlantDef, wish: &RestoreWish) -> Result<(), String> {
+    device(def, wish.device)?;
+    short("origin", &wish.from, WORDS_MAX)?;
+    for (what, name) in [("name", &wish.set.name), ("device", &wish.set.device), ("profile", &wish.set.profile)] {
+        short(what, name, WORDS_MAX)?;
+    }
+    short("name", &wish.set.by, WORDS_MAX)?;
+    let (many, count) = (wish.changes.len(), def.tags.len());
+    if count < many {
+        return Err(format!("{many} changes, this plant has {count} tags"));
+    }
+    wish.changes.iter().try_for_each(|change| tag(def, change.tag))
+}
+
+/// A text that is no longer than it can be.
+fn short(what: &str, text: &str, max: usize) -> Result<(), String> {
+    let chars = text.chars().count();
+    if chars <= max { Ok(()) } else { Err(format!("{what} of {chars} characters, expected at most {max}")) }
 }
 
 fn of_alarms(def: &PlantDef, command: &AlarmCommand) -> Result<(), String> {

@@ -318,7 +318,9 @@ impl Scribe {
     }
 
     /// Into the book, and on to the history; only there while the book cannot be written.
-    fn write(&mut self, mut deeds: Vec<ActionRecord>) {
+    fn write(&mut self, deeds: Vec<ActionRecord>) {
+        // The history says the same as the book.
+        let mut deeds: Vec<ActionRecord> = deeds.into_iter().map(book::fit).collect();
         if let Some(book) = &mut self.book
             && let Err(error) = book.append(&mut deeds)
         {
