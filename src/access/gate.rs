@@ -29,7 +29,8 @@ use crate::{
     history::Question,
     plant::{
         PlantDef,
-        command::{Order, Refusal},
+        command::{Order, OrderId, Refusal},
+        guard,
         record::ActionRecord,
         role::Role,
     },
@@ -175,10 +176,18 @@ impl Gate {
         // A terminal speaks for itself only.
         request.id.terminal = terminal;
         request.note = request.note.map(|note| clean(&note).into());
-        if !self.heard(terminal, at) {
-            return Vec::new();
+        // A stop is never one request too many.
+        let stops = request.command.written().is_some_and(|(tag, value)| guard::is_stop(&self.def, tag, value));
+        if !self.heard(terminal, at) && !stops {
+            return self.undelivered(request.id, TOO_MANY);
         }
         let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
+        let number = request.id.number;
+        if seat.last_order.is_some_and(|last| number <= last) {
+            // Its outcome would be taken for that of the order that had the number first.
+            return self.undelivered(request.id, "this order has the number of an earlier one, give it again");
+        }
+        seat.last_order = Some(number);
         if !seat.locked {
             seat.active = at;
         }
@@ -201,11 +210,20 @@ impl Gate {
         vec![Effect::Order(Order { id, by, from, command, seen, note, refused: None })]
     }
 
-    /// The plant puts it on record and into the snapshot, so that whoever gave the order sees what became of it.
+    /// An order did not reach the plant: no snapshot tells its outcome, so its terminal is told with how it stands.
+    pub fn undelivered(&mut self, id: OrderId, why: &str) -> Vec<Effect> {
+        let Some(seat) = self.seats.get_mut(&id.terminal) else { return Vec::new() };
+        seat.undelivered(id, why);
+        vec![Effect::Standing(id.terminal)]
+    }
+
+    /// The plant puts it on record and into the snapshot, so that whoever gave the order sees what became of it. Too many of
+    /// them are only told.
     fn refuse_order(&mut self, terminal: u32, request: OrderRequest, why: Refusal, at: Timestamp) -> Vec<Effect> {
-        let Some(origin) = self.seats.get(&terminal).map(|seat| seat.origin.user.clone()) else { return Vec::new() };
-        if !self.may_record(&origin, at) {
-            return Vec::new();
+        let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
+        let (origin, own) = (seat.origin.user.clone(), seat.peer.own);
+        if !own && !self.may_record(&origin, at) {
+            return self.undelivered(request.id, &why.to_string());
         }
         let mut effects = self.let_through(terminal, request, None);
         for effect in &mut effects {

@@ -37,6 +37,8 @@ pub enum Paper {
     Deed(ActionRecord),
     /// Tell this once the book has what came before it: nobody is told that something is done which a loss of power undoes.
     Answer(oneshot::Sender<Result<(), String>>, Result<(), String>),
+    /// So many deeds found no room on this way.
+    Lost(u64),
 }
 
 /// An answer that waits for the book to have so many deeds.
@@ -65,6 +67,8 @@ pub struct Deeds {
     behind: Instant,
     /// Deeds that the queue had no room for: they are in the history only.
     left_out: u64,
+    /// Deeds that did not even come here.
+    lost: u64,
     answers: VecDeque<Answer>,
     clock: ClockWatch,
     /// The hash of the plant file that was recorded last.
@@ -82,6 +86,7 @@ impl Deeds {
             sent: 0,
             behind: Instant::now(),
             left_out: 0,
+            lost: 0,
             answers: VecDeque::new(),
             clock,
             plant_file,
@@ -123,6 +128,11 @@ impl Deeds {
                 refused.into_inner()
             }
         }
+    }
+
+    /// So many deeds never came here: they are nowhere.
+    pub fn lost(&mut self, count: u64) {
+        self.lost += count;
     }
 
     /// Tells an answer once the book has all that was sent to it before; see [`Deeds::tell`].
@@ -176,12 +186,12 @@ impl Deeds {
             Some("the audit trail has ended by itself, see the log".to_owned())
         } else if status.trouble.is_some() {
             status.trouble
-        } else if self.left_out > 0 {
-            Some(format!("{} deeds are not in the audit trail: it was too slow", self.left_out))
+        } else if self.left_out + self.lost > 0 {
+            Some(format!("{} deeds are not in the audit trail: it was too slow", self.left_out + self.lost))
         } else {
             late.then(|| format!("the audit trail is slow, {waits} deeds wait for it"))
         };
-        (status.lost, trouble)
+        (status.lost + self.lost, trouble)
     }
 
     /// A record if the clock was set since the last look. The time of the plant does not follow such a step before the next

@@ -110,13 +110,15 @@ pub struct Door {
     tickets: BTreeMap<u64, oneshot::Sender<Result<(), String>>>,
     last_ticket: u64,
     toil: Toil,
+    /// Deeds that did not reach the book, not told yet.
+    lost: u64,
 }
 
 impl Door {
     /// A door that nobody has come to. `users` is the file that they are kept in.
     pub fn new(gate: Gate, clock: Clock, ways: Ways, users: Option<PathBuf>) -> Door {
         let (terminals, tickets) = (BTreeMap::new(), BTreeMap::new());
-        Door { gate, clock, ways, terminals, tickets, last_ticket: 0, toil: Toil::new(users) }
+        Door { gate, clock, ways, terminals, tickets, last_ticket: 0, toil: Toil::new(users), lost: 0 }
     }
 
     /// Runs until the station stops.
@@ -152,6 +154,9 @@ impl Door {
                         self.terminals.remove(&terminal);
                         let effects = self.gate.close(terminal, self.clock.now());
                         self.carry_out(effects);
+                    }
+                    if self.lost > 0 && self.ways.deeds.try_send(Paper::Lost(self.lost)).is_ok() {
+                        self.lost = 0;
                     }
                     // Who has left waits for no answer any more.
                     self.tickets.retain(|_, reply| !reply.is_closed());
@@ -200,13 +205,16 @@ impl Door {
             match effect {
                 Effect::Order(order) => {
                     if let Err(error) = self.ways.orders.try_send(order) {
-                        // The terminal sees that its order has no outcome.
                         tracing::error!(%error, "an order did not reach the plant");
+                        let (mpsc::error::TrySendError::Full(order) | mpsc::error::TrySendError::Closed(order)) = error;
+                        let told = self.gate.undelivered(order.id, "station too busy");
+                        self.carry_out(told);
                     }
                 }
                 Effect::Record(deed) => {
                     if let Err(error) = self.ways.deeds.try_send(Paper::Deed(deed)) {
                         tracing::error!(%error, "a deed did not reach the book");
+                        self.lost += 1;
                     }
                 }
                 Effect::Reply(ticket, answer) => answers.push((ticket, answer)),

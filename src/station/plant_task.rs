@@ -193,6 +193,8 @@ impl PlantTask {
             (Paper::Answer(reply, answer), Some(book)) => book.answer(reply, answer),
             // Whoever has left needs no answer.
             (Paper::Answer(reply, answer), None) => drop(reply.send(answer)),
+            (Paper::Lost(count), Some(book)) => book.lost(count),
+            (Paper::Lost(_), None) => {}
         }
     }
 

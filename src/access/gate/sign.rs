@@ -74,7 +74,7 @@ impl Gate {
         // Meanwhile he may have left, or been sent out.
         match self.may(terminal, Some(needed)) {
             Ok(who) if who.user == by => {}
-            Ok(_) => return Vec::new(),
+            Ok(_) => return self.undelivered(request.id, "somebody else has logged in here meanwhile"),
             Err(why) => return self.refuse_order(terminal, request, Refusal::NotPermitted(why), at),
         }
         let other = signer.as_ref().filter(|signer| **signer != by);
