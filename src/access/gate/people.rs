@@ -9,7 +9,7 @@ use super::{
     login::reply,
     paper::{deed, record, words},
     right,
-    work::What,
+    work::{What, Wrong},
 };
 use crate::{
     access::{
@@ -132,11 +132,11 @@ impl Gate {
         ticket: u64,
         user: Arc<str>,
         new: Secret,
-        why: Option<&str>,
+        wrong: Option<Wrong>,
         at: Timestamp,
     ) -> Vec<Effect> {
-        if let Some(why) = why {
-            return self.failed(terminal, ticket, "change password", Some(&user), why, at);
+        if let Some(wrong) = wrong {
+            return self.failed(terminal, ticket, "change password", Some(&user), wrong, at);
         }
         self.new_password(terminal, ticket, new, Hashing::Own(user)).unwrap_or_else(|why| reply(ticket, &why))
     }

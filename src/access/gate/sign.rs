@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 
-use super::{Effect, Gate, right, work::What};
+use super::{
+    Effect, Gate, right,
+    work::{What, Wrong},
+};
 use crate::{
     access::{OrderRequest, Signature, user},
     plant::{
@@ -57,11 +60,10 @@ impl Gate {
         by: Arc<str>,
         signer: Option<Arc<str>>,
         request: OrderRequest,
-        why: Option<&str>,
+        wrong: Option<Wrong>,
         at: Timestamp,
     ) -> Vec<Effect> {
-        if let Some(why) = why {
-            let told = self.wrong(terminal, at);
+        if let Some(Wrong { why, told }) = wrong {
             let mut effects = Vec::new();
             if let Some(seat) = self.seats.get(&terminal) {
                 let signer = signer.as_deref().unwrap_or("unknown user");

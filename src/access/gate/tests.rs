@@ -470,6 +470,7 @@ fn a_demonstration_asks_nobody() {
 }
 
 mod orders;
+mod place;
 
 proptest! {
     #[test]
