@@ -3,6 +3,7 @@
 mod login;
 mod paper;
 mod people;
+mod room;
 mod seat;
 pub mod sign;
 mod standing;
@@ -123,16 +124,16 @@ impl Gate {
     pub fn open(&mut self, terminal: u32, peer: Peer, at: Timestamp) -> Vec<Effect> {
         let peer = Peer { from: clean(&peer.from).into(), ..peer };
         let (own, mut seat) = (peer.own, Seat::new(peer, at));
-        let others = self.seats.values().filter(|seat| !seat.peer.own).count();
-        if !own && usize::from(self.def.access.sessions_max) <= others {
-            let why = format!("{others} terminals are attached, no more may be");
-            let mut effects = self.refused(&seat, "attach", "", &why, at);
-            effects.push(Effect::HangUp(terminal, why));
-            return effects;
-        }
+        let mut effects = match self.make_room(&seat, at) {
+            Ok(effects) => effects,
+            Err(why) => {
+                let mut effects = self.refused(&seat, "attach", "", &why, at);
+                effects.push(Effect::HangUp(terminal, why));
+                return effects;
+            }
+        };
         seat.who = self.known(&seat.peer);
         seat.trusted = seat.who.is_some();
-        let mut effects = Vec::new();
         if !own && self.may_record(&seat.origin.user.clone(), at) {
             effects.push(deed(&seat, "attach", "", "done", at));
         }

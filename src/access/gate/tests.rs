@@ -405,7 +405,7 @@ fn a_user_whom_the_operating_system_knows_is_in_without_a_password() {
 
 #[test]
 fn no_more_terminals_come_in_than_permitted_but_the_stations_own_always_does() {
-    let mut bench = Bench::new(AccessDef { sessions_max: 2, ..AccessDef::default() });
+    let mut bench = Bench::new(AccessDef { sessions_max: 4, ..AccessDef::default() });
     bench.open(1, "a");
     bench.open(2, "b");
     let sent_away = bench.open(3, "c");
@@ -471,6 +471,7 @@ fn a_demonstration_asks_nobody() {
 
 mod orders;
 mod place;
+mod room;
 
 proptest! {
     #[test]
