@@ -1,6 +1,8 @@
 //! What comes from outside: whether it names things of this plant at all, and is no longer than it can be. Inside, ids are
 //! taken on trust.
 
+use jiff::SignedDuration;
+
 use super::protocol::encode;
 use crate::{
     history::Question,
@@ -23,9 +25,15 @@ const SEND_MAX: usize = 260;
 const SETTINGS_BYTES_MAX: usize = 4 << 10;
 
 /// Most columns of a curve: more than any screen has.
-const BUCKETS_MAX: usize = 4_096;
+pub const BUCKETS_MAX: usize = 4_096;
+/// Most columns of all curves of one question.
+pub const COLUMNS_MAX: usize = 65_536;
 /// Most curves of one question.
 const SERIES_MAX: usize = 64;
+/// Most rows of one answer.
+const ROWS_MAX: usize = 10_000;
+/// Longest period of a report.
+const REPORT_MAX: SignedDuration = SignedDuration::from_hours(92 * 24);
 
 /// `Err` says what a command names that this plant does not have.
 pub fn command(def: &PlantDef, command: &Command) -> Result<(), String> {
@@ -104,15 +112,28 @@ pub fn question(def: &PlantDef, question: &Question) -> Result<(), String> {
             if SERIES_MAX < tags.len() {
                 return Err(format!("{} curves, expected at most {SERIES_MAX}", tags.len()));
             }
+            let columns = tags.len() * buckets;
+            if COLUMNS_MAX < columns {
+                return Err(format!("{columns} columns of all curves, expected at most {COLUMNS_MAX}"));
+            }
             tags.iter().try_for_each(|id| tag(def, *id))
         }
-        Question::LineMinutes { line: id, .. } => line(def, *id),
-        Question::Journal { .. }
-        | Question::Actions { .. }
-        | Question::Audit { .. }
-        | Question::Report { .. }
-        | Question::AlarmQuality { .. } => Ok(()),
+        Question::LineMinutes { line: id, limit, .. } => {
+            rows(*limit)?;
+            line(def, *id)
+        }
+        Question::Journal { limit, .. } | Question::Actions { limit, .. } | Question::Audit { limit, .. } => {
+            rows(*limit)
+        }
+        Question::Report { period } if REPORT_MAX < period.to.duration_since(period.from) => {
+            Err(format!("a report of more than {} days, choose a shorter period", REPORT_MAX.as_hours() / 24))
+        }
+        Question::Report { .. } | Question::AlarmQuality { .. } => Ok(()),
     }
+}
+
+fn rows(limit: usize) -> Result<(), String> {
+    if limit <= ROWS_MAX { Ok(()) } else { Err(format!("{limit} rows, expected at most {ROWS_MAX}")) }
 }
 
 fn tag(def: &PlantDef, TagId(id): TagId) -> Result<(), String> {
