@@ -29,6 +29,9 @@ const DIGITS: usize = 64;
 /// What a change of the plant file is called.
 pub const PLANT_FILE: &str = "plant file";
 
+/// What a change of the file of users is called.
+pub const USERS_FILE: &str = "users file";
+
 /// A line of the book.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -120,6 +120,11 @@ impl Gate {
         Gate { people: Some(people), ..Gate::new(def, host) }
     }
 
+    /// The [`Users::digest`] of those it lets in; `None` where nobody is asked who he is.
+    pub fn people_digest(&self) -> Option<String> {
+        self.people.as_ref().map(Users::digest)
+    }
+
     /// A terminal has attached.
     pub fn open(&mut self, terminal: u32, peer: Peer, at: Timestamp) -> Vec<Effect> {
         let peer = Peer { from: clean(&peer.from).into(), ..peer };

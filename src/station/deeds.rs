@@ -14,7 +14,7 @@ use tokio::{
 
 use crate::{
     access::{
-        book::{PLANT_FILE, sha256},
+        book::{PLANT_FILE, USERS_FILE, sha256},
         io::book::{BookStatus, Handle},
     },
     plant::record::ActionRecord,
@@ -73,13 +73,16 @@ pub struct Deeds {
     clock: ClockWatch,
     /// The hash of the plant file that was recorded last.
     plant_file: Option<Arc<str>>,
+    /// The hash of the users that was recorded last.
+    users_file: Option<Arc<str>>,
 }
 
 impl Deeds {
     /// The end of a book that has just been opened.
     pub fn new(book: &Handle) -> Deeds {
         let (queue, status) = (book.deeds.clone(), book.status.clone());
-        let (clock, plant_file) = (ClockWatch::new(), book.opened.plant_file.clone());
+        let clock = ClockWatch::new();
+        let (plant_file, users_file) = (book.opened.plant_file.clone(), book.opened.users_file.clone());
         Deeds {
             queue,
             status,
@@ -90,16 +93,24 @@ impl Deeds {
             answers: VecDeque::new(),
             clock,
             plant_file,
+            users_file,
         }
     }
 
-    /// The first deeds of a station: that it has started, and the plant file if it is another one than the last time.
-    pub fn started(&mut self, plant: &str, file: Option<&PlantFile>, at: Timestamp) {
+    /// The first deeds of a station: that it has started, and the plant file and the users if they are others than the last
+    /// time. `users` is their [`crate::access::Users::digest`], `None` where nobody is asked who he is.
+    pub fn started(&mut self, plant: &str, file: Option<&PlantFile>, users: Option<String>, at: Timestamp) {
         let version = concat!("sightglass ", env!("CARGO_PKG_VERSION"));
         let start = ActionRecord { new: Some(version.into()), ..own(at, "start station", plant, "done") };
         let changed = file.and_then(|file| self.plant_file(file, at));
+        let people =
+            users.map(Arc::from).filter(|users| self.users_file.as_ref() != Some(users)).map(|users| ActionRecord {
+                old: self.users_file.take(),
+                new: Some(users),
+                ..own(at, USERS_FILE, "users", "done: found")
+            });
         // Nothing else waits in this queue yet, so nothing comes back.
-        self.put([start].into_iter().chain(changed).collect());
+        self.put([start].into_iter().chain(changed).chain(people).collect());
     }
 
     /// The record of a plant file, unless it is still the last one that was recorded.

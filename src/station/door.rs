@@ -165,7 +165,12 @@ impl Door {
                 }
             }
         }
-        self.toil.end().await;
+        // The users are written by now, so the book must say so: nothing else is begun any more.
+        if let Some(result) = self.toil.end().await {
+            let mut effects = self.gate.saved(result, self.clock.now());
+            effects.retain(|effect| matches!(effect, Effect::Record(_) | Effect::Reply(..)));
+            self.carry_out(effects);
+        }
     }
 
     fn take(&mut self, terminal: u32, request: Request) {

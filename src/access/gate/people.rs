@@ -13,7 +13,9 @@ use super::{
 };
 use crate::{
     access::{
-        Secret, Who, Wish, password,
+        Secret, Users, Who, Wish,
+        book::USERS_FILE,
+        password,
         user::{self, Change},
     },
     plant::{record::ActionRecord, role::Role},
@@ -255,8 +257,18 @@ impl Gate {
                 return vec![Effect::Record(ActionRecord { outcome, ..*record }), Effect::Reply(ticket, Err(why))];
             }
         };
-        self.people = Some(people);
-        let mut effects = vec![Effect::Record(*record), Effect::Reply(ticket, Ok(()))];
+        let before = self.people.replace(people);
+        let digest = |people: Option<&Users>| people.map(|people| people.digest().into());
+        let by_station =
+            ActionRecord { by: "station".into(), from: "".into(), old: None, new: None, ..(*record).clone() };
+        let file = ActionRecord {
+            action: USERS_FILE.into(),
+            target: "users".into(),
+            old: digest(before.as_ref()),
+            new: digest(self.people.as_ref()),
+            ..by_station
+        };
+        let mut effects = vec![Effect::Record(*record), Effect::Record(file), Effect::Reply(ticket, Ok(()))];
         effects.extend(self.followed(terminal, &change, at));
         self.tell(terminal, &mut effects);
         effects

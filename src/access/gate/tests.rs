@@ -469,6 +469,7 @@ fn a_demonstration_asks_nobody() {
     assert!(bench.order(2, RUN, None).unwrap().1.is_some(), "only at its own terminal");
 }
 
+mod file;
 mod orders;
 mod place;
 mod room;
