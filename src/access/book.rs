@@ -18,12 +18,19 @@ use crate::plant::record::{ActionRecord, Seal};
 pub const START: Seal = Seal { number: 0, hash: *b"sightglass, the book of deeds, 1" };
 /// Bytes of a line at the most; whatever is longer was not written by a station.
 pub const LINE_MAX: usize = 64 << 10;
+/// Bytes of a text of a line at the most: eight of them, all of what must be escaped, are still shorter than a line.
+pub const TEXT_MAX: usize = 3_500;
+/// Ends a text that was longer.
+const CUT: &str = "… (cut)";
 /// What stands before the hash and after it.
 const HASH: (&str, &str) = (",\"hash\":\"", "\"}");
 /// Hexadecimal digits of a hash.
 const DIGITS: usize = 64;
 /// What a change of the plant file is called.
 pub const PLANT_FILE: &str = "plant file";
+
+/// What a change of the file of users is called.
+pub const USERS_FILE: &str = "users file";
 
 /// A line of the book.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,9 +61,31 @@ pub struct Entry {
     pub note: Option<Arc<str>>,
 }
 
-/// The next line after `last`, with its end of line, and its seal.
+/// A deed as it can stand in the book, whatever its texts are made of: none of them endless, and nothing in them that moves
+/// a cursor or turns the direction of what follows. What fits already stays as it is.
+pub fn fit(mut deed: ActionRecord) -> ActionRecord {
+    let ActionRecord { at: _, by, from, action, target, old, new, outcome, note, seal: _ } = &mut deed;
+    let texts = [by, from, action, target, outcome].into_iter();
+    texts.chain([old, new, note].into_iter().flatten()).for_each(fit_text);
+    deed
+}
+
+fn fit_text(text: &mut Arc<str>) {
+    let moves = |letter: char| {
+        let turns = matches!(letter, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+        letter.is_control() || turns
+    };
+    if TEXT_MAX < text.len() {
+        *text = format!("{}{CUT}", &text[..text.floor_char_boundary(TEXT_MAX - CUT.len())]).into();
+    }
+    if text.contains(moves) {
+        *text = text.chars().map(|letter| if moves(letter) { ' ' } else { letter }).collect::<String>().into();
+    }
+}
+
+/// The next line after `last`, with its end of line, and its seal. Whatever the deed says, [`Check`] takes the line.
 pub fn line(last: Seal, deed: &ActionRecord) -> (String, Seal) {
-    let ActionRecord { at, by, from, action, target, old, new, outcome, note, seal: _ } = deed.clone();
+    let ActionRecord { at, by, from, action, target, old, new, outcome, note, seal: _ } = fit(deed.clone());
     let entry = Entry { n: last.number + 1, utc: at, who: by, from, action, target, old, new, outcome, note };
     let mut text = serde_json::to_string(&entry).expect("texts, numbers and times can always be written");
     text.pop();
@@ -272,7 +301,7 @@ mod tests {
         let summary = verify(&lines, seals.last().copied(), &seals).unwrap();
         assert_eq!((summary.entries, summary.compared, summary.last), (5, 5, seals[4]));
         let entry = Check::new(None, &[]).line(lines[0].as_bytes()).unwrap();
-        assert_eq!((entry.n, &*entry.who, entry.new.as_deref()), (1, "anna", Some("1 \"°C\"\n")));
+        assert_eq!((entry.n, &*entry.who, entry.new.as_deref()), (1, "anna", Some("1 \"°C\" ")));
         assert!(lines.iter().all(|line| !line.contains('\n')), "one line each, whatever the note");
         assert_eq!(head(&head_text(seals[4])), Some(seals[4]));
         assert_eq!(verify(&[], Some(START), &[]).unwrap().entries, 0);
@@ -289,6 +318,35 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn whatever_somebody_puts_on_record_the_book_stays_whole_and_says_where_it_was_cut(
+            texts in prop::collection::vec(("[\\PC\\x00-\\x1f\"\\\\\u{202e}]{1,40}", 1usize..4_000), 8)
+        ) {
+            let texts: Vec<Arc<str>> = texts.iter().map(|(text, times)| text.repeat(*times).into()).collect();
+            let [by, from, action, target, outcome, old, new, note] = &texts[..] else { unreachable!() };
+            let deed = ActionRecord {
+                by: by.clone(),
+                from: from.clone(),
+                action: action.clone(),
+                target: target.clone(),
+                outcome: outcome.clone(),
+                old: Some(old.clone()),
+                new: Some(new.clone()),
+                note: Some(note.clone()),
+                ..deed(1)
+            };
+            let (line, seal) = super::line(START, &deed);
+            prop_assert!(line.len() < LINE_MAX, "{} bytes", line.len());
+            let mut check = Check::new(Some(seal), &[]);
+            let entry = check.line(line.trim_end_matches('\n').as_bytes()).unwrap();
+            prop_assert!(check.end(false).is_ok());
+            prop_assert_eq!(&entry.target, &fit(deed.clone()).target);
+            prop_assert_eq!(entry.target.ends_with(CUT), TEXT_MAX < target.len());
+            let moved = entry.who.contains(['\n', '\u{1b}', '\u{202e}']);
+            prop_assert!(!moved, "a cursor could be moved");
+            prop_assert_eq!(fit(fit(deed.clone())), fit(deed));
+        }
+
         #[test]
         fn whatever_is_done_to_a_book_the_first_bad_line_is_named(
             count in 3u64..12, what in 0u8..6, at in 0usize..100, other in 0usize..100, byte in 0usize..1000, bit in 0u8..7

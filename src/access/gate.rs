@@ -3,6 +3,7 @@
 mod login;
 mod paper;
 mod people;
+mod room;
 mod seat;
 pub mod sign;
 mod standing;
@@ -29,7 +30,8 @@ use crate::{
     history::Question,
     plant::{
         PlantDef,
-        command::{Order, Refusal},
+        command::{Order, OrderId, Refusal},
+        guard,
         record::ActionRecord,
         role::Role,
     },
@@ -118,20 +120,25 @@ impl Gate {
         Gate { people: Some(people), ..Gate::new(def, host) }
     }
 
+    /// The [`Users::digest`] of those it lets in; `None` where nobody is asked who he is.
+    pub fn people_digest(&self) -> Option<String> {
+        self.people.as_ref().map(Users::digest)
+    }
+
     /// A terminal has attached.
     pub fn open(&mut self, terminal: u32, peer: Peer, at: Timestamp) -> Vec<Effect> {
         let peer = Peer { from: clean(&peer.from).into(), ..peer };
         let (own, mut seat) = (peer.own, Seat::new(peer, at));
-        let others = self.seats.values().filter(|seat| !seat.peer.own).count();
-        if !own && usize::from(self.def.access.sessions_max) <= others {
-            let why = format!("{others} terminals are attached, no more may be");
-            let mut effects = self.refused(&seat, "attach", "", &why, at);
-            effects.push(Effect::HangUp(terminal, why));
-            return effects;
-        }
+        let mut effects = match self.make_room(&seat, at) {
+            Ok(effects) => effects,
+            Err(why) => {
+                let mut effects = self.refused(&seat, "attach", "", &why, at);
+                effects.push(Effect::HangUp(terminal, why));
+                return effects;
+            }
+        };
         seat.who = self.known(&seat.peer);
         seat.trusted = seat.who.is_some();
-        let mut effects = Vec::new();
         if !own && self.may_record(&seat.origin.user.clone(), at) {
             effects.push(deed(&seat, "attach", "", "done", at));
         }
@@ -175,10 +182,18 @@ impl Gate {
         // A terminal speaks for itself only.
         request.id.terminal = terminal;
         request.note = request.note.map(|note| clean(&note).into());
-        if !self.heard(terminal, at) {
-            return Vec::new();
+        // A stop is never one request too many.
+        let stops = request.command.written().is_some_and(|(tag, value)| guard::is_stop(&self.def, tag, value));
+        if !self.heard(terminal, at) && !stops {
+            return self.undelivered(request.id, TOO_MANY);
         }
         let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
+        let number = request.id.number;
+        if seat.last_order.is_some_and(|last| number <= last) {
+            // Its outcome would be taken for that of the order that had the number first.
+            return self.undelivered(request.id, "this order has the number of an earlier one, give it again");
+        }
+        seat.last_order = Some(number);
         if !seat.locked {
             seat.active = at;
         }
@@ -201,11 +216,20 @@ impl Gate {
         vec![Effect::Order(Order { id, by, from, command, seen, note, refused: None })]
     }
 
-    /// The plant puts it on record and into the snapshot, so that whoever gave the order sees what became of it.
+    /// An order did not reach the plant: no snapshot tells its outcome, so its terminal is told with how it stands.
+    pub fn undelivered(&mut self, id: OrderId, why: &str) -> Vec<Effect> {
+        let Some(seat) = self.seats.get_mut(&id.terminal) else { return Vec::new() };
+        seat.undelivered(id, why);
+        vec![Effect::Standing(id.terminal)]
+    }
+
+    /// The plant puts it on record and into the snapshot, so that whoever gave the order sees what became of it. Too many of
+    /// them are only told.
     fn refuse_order(&mut self, terminal: u32, request: OrderRequest, why: Refusal, at: Timestamp) -> Vec<Effect> {
-        let Some(origin) = self.seats.get(&terminal).map(|seat| seat.origin.user.clone()) else { return Vec::new() };
-        if !self.may_record(&origin, at) {
-            return Vec::new();
+        let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
+        let (origin, own) = (seat.origin.user.clone(), seat.peer.own);
+        if !own && !self.may_record(&origin, at) {
+            return self.undelivered(request.id, &why.to_string());
         }
         let mut effects = self.let_through(terminal, request, None);
         for effect in &mut effects {

@@ -33,6 +33,13 @@ pub struct Origin {
     pub host: Arc<str>,
 }
 
+impl Origin {
+    /// One terminal there by itself: where whoever sits at it is asked for his password again.
+    pub fn of_seat(&self, terminal: u32) -> Origin {
+        Origin { user: format!("{} at terminal {terminal}", self.user).into(), host: self.host.clone() }
+    }
+}
+
 impl fmt::Display for Origin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} from {}", self.user, self.host)

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 
-use super::password::one_form;
+use super::{book::sha256, password::one_form};
 use crate::plant::role::Role;
 
 /// Most people of a plant.
@@ -86,6 +86,15 @@ impl Change {
 }
 
 impl Users {
+    /// The SHA-256 of all that says who may what, as text: the same until somebody changes that. A login changes nothing.
+    pub fn digest(&self) -> String {
+        let row = |User { name, role, hash, disabled, must_change, last_login: _ }: &User| {
+            // None of these holds an end of line.
+            format!("{name}\n{}\n{hash}\n{disabled}\n{must_change}\n", role.word())
+        };
+        sha256(self.iter().map(row).collect::<String>().as_bytes())
+    }
+
     /// These people. `Err` says what is wrong with which of them, by its place.
     pub fn new(list: Vec<User>) -> Result<Users, (usize, String)> {
         let mut users = Users::default();

@@ -171,6 +171,8 @@ pub struct Standing {
     pub users: Arc<Vec<UserRow>>,
     /// Who is attached; only for a Supervisor.
     pub sessions: Arc<Vec<SessionRow>>,
+    /// Its latest orders that the plant never saw, and why: no snapshot tells their outcome. The latest stands last.
+    pub undelivered: Vec<(OrderId, Arc<str>)>,
     /// The station has gone, and why; set by the terminal's own end of the socket.
     pub gone: Option<Arc<str>>,
 }

@@ -1,5 +1,9 @@
-//! Numbers that come from outside: whether they name things of this plant at all. Inside, ids are taken on trust.
+//! What comes from outside: whether it names things of this plant at all, and is no longer than it can be. Inside, ids are
+//! taken on trust.
 
+use jiff::SignedDuration;
+
+use super::protocol::encode;
 use crate::{
     history::Question,
     plant::{
@@ -7,13 +11,29 @@ use crate::{
         alarm::AlarmCommand,
         command::Command,
         def::{AlarmId, DeviceId, LineId, TagId},
+        parameter_set::NAME_MAX,
+        restore::RestoreWish,
+        tool::Tool,
     },
 };
 
+/// Most characters of a name, or of where a set of values comes from.
+const WORDS_MAX: usize = 200;
+/// Most bytes of a test: the longest frame that Modbus knows, over TCP.
+const SEND_MAX: usize = 260;
+/// Most bytes of the settings of a line.
+const SETTINGS_BYTES_MAX: usize = 4 << 10;
+
 /// Most columns of a curve: more than any screen has.
-const BUCKETS_MAX: usize = 4_096;
+pub const BUCKETS_MAX: usize = 4_096;
+/// Most columns of all curves of one question.
+pub const COLUMNS_MAX: usize = 65_536;
 /// Most curves of one question.
 const SERIES_MAX: usize = 64;
+/// Most rows of one answer.
+const ROWS_MAX: usize = 10_000;
+/// Longest period of a report.
+const REPORT_MAX: SignedDuration = SignedDuration::from_hours(92 * 24);
 
 /// `Err` says what a command names that this plant does not have.
 pub fn command(def: &PlantDef, command: &Command) -> Result<(), String> {
@@ -21,16 +41,46 @@ pub fn command(def: &PlantDef, command: &Command) -> Result<(), String> {
         Command::Write { tag: id, value: _ } => tag(def, *id),
         Command::Alarm(command) => of_alarms(def, command),
         Command::ReadSets | Command::HandOver | Command::TakeOver => Ok(()),
-        Command::Refresh(id) | Command::StopRestore(id) | Command::SaveSet { device: id, .. } => device(def, *id),
-        Command::Connect(id, _) | Command::SaveSettings(id) | Command::Test(id, _) | Command::StopTest(id) => {
+        Command::Refresh(id) | Command::StopRestore(id) => device(def, *id),
+        Command::SaveSet { device: id, name, replace: _ } => {
+            short("name", name, NAME_MAX)?;
+            device(def, *id)
+        }
+        Command::Connect(id, _) | Command::SaveSettings(id) | Command::StopTest(id) => line(def, *id),
+        Command::Test(id, tool) => {
+            if let Tool::Send(bytes) = tool
+                && SEND_MAX < bytes.len()
+            {
+                return Err(format!("{} bytes to send, expected at most {SEND_MAX}", bytes.len()));
+            }
             line(def, *id)
         }
-        Command::Configure(settings) => line(def, settings.id),
-        Command::Restore(wish) => {
-            device(def, wish.device)?;
-            wish.changes.iter().try_for_each(|change| tag(def, change.tag))
+        Command::Configure(settings) => {
+            encode(settings, SETTINGS_BYTES_MAX).map_err(|error| format!("settings: {error}"))?;
+            line(def, settings.id)
         }
+        Command::Restore(wish) => of_restore(def, wish),
     }
+}
+
+fn of_restore(def: &PlantDef, wish: &RestoreWish) -> Result<(), String> {
+    device(def, wish.device)?;
+    short("origin", &wish.from, WORDS_MAX)?;
+    for (what, name) in [("name", &wish.set.name), ("device", &wish.set.device), ("profile", &wish.set.profile)] {
+        short(what, name, WORDS_MAX)?;
+    }
+    short("name", &wish.set.by, WORDS_MAX)?;
+    let (many, count) = (wish.changes.len(), def.tags.len());
+    if count < many {
+        return Err(format!("{many} changes, this plant has {count} tags"));
+    }
+    wish.changes.iter().try_for_each(|change| tag(def, change.tag))
+}
+
+/// A text that is no longer than it can be.
+fn short(what: &str, text: &str, max: usize) -> Result<(), String> {
+    let chars = text.chars().count();
+    if chars <= max { Ok(()) } else { Err(format!("{what} of {chars} characters, expected at most {max}")) }
 }
 
 fn of_alarms(def: &PlantDef, command: &AlarmCommand) -> Result<(), String> {
@@ -62,15 +112,28 @@ pub fn question(def: &PlantDef, question: &Question) -> Result<(), String> {
             if SERIES_MAX < tags.len() {
                 return Err(format!("{} curves, expected at most {SERIES_MAX}", tags.len()));
             }
+            let columns = tags.len() * buckets;
+            if COLUMNS_MAX < columns {
+                return Err(format!("{columns} columns of all curves, expected at most {COLUMNS_MAX}"));
+            }
             tags.iter().try_for_each(|id| tag(def, *id))
         }
-        Question::LineMinutes { line: id, .. } => line(def, *id),
-        Question::Journal { .. }
-        | Question::Actions { .. }
-        | Question::Audit { .. }
-        | Question::Report { .. }
-        | Question::AlarmQuality { .. } => Ok(()),
+        Question::LineMinutes { line: id, limit, .. } => {
+            rows(*limit)?;
+            line(def, *id)
+        }
+        Question::Journal { limit, .. } | Question::Actions { limit, .. } | Question::Audit { limit, .. } => {
+            rows(*limit)
+        }
+        Question::Report { period } if REPORT_MAX < period.to.duration_since(period.from) => {
+            Err(format!("a report of more than {} days, choose a shorter period", REPORT_MAX.as_hours() / 24))
+        }
+        Question::Report { .. } | Question::AlarmQuality { .. } => Ok(()),
     }
+}
+
+fn rows(limit: usize) -> Result<(), String> {
+    if limit <= ROWS_MAX { Ok(()) } else { Err(format!("{limit} rows, expected at most {ROWS_MAX}")) }
 }
 
 fn tag(def: &PlantDef, TagId(id): TagId) -> Result<(), String> {

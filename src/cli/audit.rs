@@ -71,7 +71,8 @@ fn verify(args: VerifyArgs) -> Result<(), CliError> {
         }
     };
     let summary = book::verify(&path, &seals).map_err(|error| CliError::Failed(error.to_string()))?;
-    say(&format!("{}: whole", path.display()));
+    let found = if summary.entries == 0 { "empty: no deed was ever recorded in it" } else { "whole" };
+    say(&format!("{}: {found}", path.display()));
     summary_lines(&summary, &def).iter().for_each(|line| say(line));
     Ok(())
 }

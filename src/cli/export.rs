@@ -5,6 +5,7 @@ use std::{io::Write, path::PathBuf, sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use crate::{
+    attach::check::{BUCKETS_MAX, COLUMNS_MAX},
     history::{Answer, HistoryError, Question, Series},
     plant::{
         PlantDef,
@@ -16,8 +17,6 @@ use crate::{
 
 use super::{CliError, StationArgs, client, in_runtime, load, report::dialect, say, source::Source, span};
 
-/// Rows of one question: what one answer holds at the most.
-const ROWS: usize = 10_000;
 /// Rows of one file.
 const ROWS_MAX: u128 = 2_000_000;
 
@@ -66,8 +65,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let source = Source::open(&def, &args.station, &args.login).await?;
         let mut columns: Vec<export::Column> = tags.iter().map(|tag| column(def.tag(*tag))).collect();
-        for begin in (0..rows).step_by(ROWS) {
-            let count = ROWS.min(rows - begin);
+        let piece = (COLUMNS_MAX / tags.len().max(1)).clamp(1, BUCKETS_MAX);
+        for begin in (0..rows).step_by(piece) {
+            let count = piece.min(rows - begin);
             let (from, to) = (instant(period.from, args.every, begin), instant(period.from, args.every, begin + count));
             let question = Question::Series { tags: tags.clone(), from, to, buckets: count };
             for (column, series) in columns.iter_mut().zip(series(source.ask(question).await?)?) {

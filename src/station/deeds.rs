@@ -14,7 +14,7 @@ use tokio::{
 
 use crate::{
     access::{
-        book::{PLANT_FILE, sha256},
+        book::{PLANT_FILE, USERS_FILE, sha256},
         io::book::{BookStatus, Handle},
     },
     plant::record::ActionRecord,
@@ -37,6 +37,8 @@ pub enum Paper {
     Deed(ActionRecord),
     /// Tell this once the book has what came before it: nobody is told that something is done which a loss of power undoes.
     Answer(oneshot::Sender<Result<(), String>>, Result<(), String>),
+    /// So many deeds found no room on this way.
+    Lost(u64),
 }
 
 /// An answer that waits for the book to have so many deeds.
@@ -65,36 +67,50 @@ pub struct Deeds {
     behind: Instant,
     /// Deeds that the queue had no room for: they are in the history only.
     left_out: u64,
+    /// Deeds that did not even come here.
+    lost: u64,
     answers: VecDeque<Answer>,
     clock: ClockWatch,
     /// The hash of the plant file that was recorded last.
     plant_file: Option<Arc<str>>,
+    /// The hash of the users that was recorded last.
+    users_file: Option<Arc<str>>,
 }
 
 impl Deeds {
     /// The end of a book that has just been opened.
     pub fn new(book: &Handle) -> Deeds {
         let (queue, status) = (book.deeds.clone(), book.status.clone());
-        let (clock, plant_file) = (ClockWatch::new(), book.opened.plant_file.clone());
+        let clock = ClockWatch::new();
+        let (plant_file, users_file) = (book.opened.plant_file.clone(), book.opened.users_file.clone());
         Deeds {
             queue,
             status,
             sent: 0,
             behind: Instant::now(),
             left_out: 0,
+            lost: 0,
             answers: VecDeque::new(),
             clock,
             plant_file,
+            users_file,
         }
     }
 
-    /// The first deeds of a station: that it has started, and the plant file if it is another one than the last time.
-    pub fn started(&mut self, plant: &str, file: Option<&PlantFile>, at: Timestamp) {
+    /// The first deeds of a station: that it has started, and the plant file and the users if they are others than the last
+    /// time. `users` is their [`crate::access::Users::digest`], `None` where nobody is asked who he is.
+    pub fn started(&mut self, plant: &str, file: Option<&PlantFile>, users: Option<String>, at: Timestamp) {
         let version = concat!("sightglass ", env!("CARGO_PKG_VERSION"));
         let start = ActionRecord { new: Some(version.into()), ..own(at, "start station", plant, "done") };
         let changed = file.and_then(|file| self.plant_file(file, at));
+        let people =
+            users.map(Arc::from).filter(|users| self.users_file.as_ref() != Some(users)).map(|users| ActionRecord {
+                old: self.users_file.take(),
+                new: Some(users),
+                ..own(at, USERS_FILE, "users", "done: found")
+            });
         // Nothing else waits in this queue yet, so nothing comes back.
-        self.put([start].into_iter().chain(changed).collect());
+        self.put([start].into_iter().chain(changed).chain(people).collect());
     }
 
     /// The record of a plant file, unless it is still the last one that was recorded.
@@ -123,6 +139,11 @@ impl Deeds {
                 refused.into_inner()
             }
         }
+    }
+
+    /// So many deeds never came here: they are nowhere.
+    pub fn lost(&mut self, count: u64) {
+        self.lost += count;
     }
 
     /// Tells an answer once the book has all that was sent to it before; see [`Deeds::tell`].
@@ -176,12 +197,12 @@ impl Deeds {
             Some("the audit trail has ended by itself, see the log".to_owned())
         } else if status.trouble.is_some() {
             status.trouble
-        } else if self.left_out > 0 {
-            Some(format!("{} deeds are not in the audit trail: it was too slow", self.left_out))
+        } else if self.left_out + self.lost > 0 {
+            Some(format!("{} deeds are not in the audit trail: it was too slow", self.left_out + self.lost))
         } else {
             late.then(|| format!("the audit trail is slow, {waits} deeds wait for it"))
         };
-        (status.lost, trouble)
+        (status.lost + self.lost, trouble)
     }
 
     /// A record if the clock was set since the last look. The time of the plant does not follow such a step before the next

@@ -110,13 +110,15 @@ pub struct Door {
     tickets: BTreeMap<u64, oneshot::Sender<Result<(), String>>>,
     last_ticket: u64,
     toil: Toil,
+    /// Deeds that did not reach the book, not told yet.
+    lost: u64,
 }
 
 impl Door {
     /// A door that nobody has come to. `users` is the file that they are kept in.
     pub fn new(gate: Gate, clock: Clock, ways: Ways, users: Option<PathBuf>) -> Door {
         let (terminals, tickets) = (BTreeMap::new(), BTreeMap::new());
-        Door { gate, clock, ways, terminals, tickets, last_ticket: 0, toil: Toil::new(users) }
+        Door { gate, clock, ways, terminals, tickets, last_ticket: 0, toil: Toil::new(users), lost: 0 }
     }
 
     /// Runs until the station stops.
@@ -153,6 +155,9 @@ impl Door {
                         let effects = self.gate.close(terminal, self.clock.now());
                         self.carry_out(effects);
                     }
+                    if self.lost > 0 && self.ways.deeds.try_send(Paper::Lost(self.lost)).is_ok() {
+                        self.lost = 0;
+                    }
                     // Who has left waits for no answer any more.
                     self.tickets.retain(|_, reply| !reply.is_closed());
                     let effects = self.gate.tick(self.clock.now());
@@ -160,7 +165,12 @@ impl Door {
                 }
             }
         }
-        self.toil.end().await;
+        // The users are written by now, so the book must say so: nothing else is begun any more.
+        if let Some(result) = self.toil.end().await {
+            let mut effects = self.gate.saved(result, self.clock.now());
+            effects.retain(|effect| matches!(effect, Effect::Record(_) | Effect::Reply(..)));
+            self.carry_out(effects);
+        }
     }
 
     fn take(&mut self, terminal: u32, request: Request) {
@@ -200,13 +210,16 @@ impl Door {
             match effect {
                 Effect::Order(order) => {
                     if let Err(error) = self.ways.orders.try_send(order) {
-                        // The terminal sees that its order has no outcome.
                         tracing::error!(%error, "an order did not reach the plant");
+                        let (mpsc::error::TrySendError::Full(order) | mpsc::error::TrySendError::Closed(order)) = error;
+                        let told = self.gate.undelivered(order.id, "station too busy");
+                        self.carry_out(told);
                     }
                 }
                 Effect::Record(deed) => {
                     if let Err(error) = self.ways.deeds.try_send(Paper::Deed(deed)) {
                         tracing::error!(%error, "a deed did not reach the book");
+                        self.lost += 1;
                     }
                 }
                 Effect::Reply(ticket, answer) => answers.push((ticket, answer)),

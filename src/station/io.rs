@@ -121,7 +121,8 @@ fn begin(
     let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the book: {error}"));
     let book = book::start(&book::beside(&path), clock, records.clone()).map_err(no_thread)?;
     let mut deeds = Deeds::new(&book);
-    deeds.started(&def.name, file.as_ref(), clock.now());
+    let users = guarded.as_ref().and_then(|(gate, _)| gate.people_digest());
+    deeds.started(&def.name, file.as_ref(), users, clock.now());
     let keeping = Keeping { records: Some(records), store, book: Some(deeds), sets: Some(sets), listener };
     let threads = Threads { queries, history: Some(history), book: Some(book.join) };
     Ok(assemble(def, clock, connectors, plant, file, keeping, threads, guarded))

@@ -30,6 +30,8 @@ use crate::{
 pub(super) const KEPT_FOR_STOPS: usize = 4;
 /// Real time between two snapshots: what a person can follow.
 const SNAPSHOT_EVERY: Duration = Duration::from_millis(100);
+/// At the end the papers of the door are waited for so long: more than it takes itself to end.
+const PAPERS_MAX: Duration = Duration::from_secs(3);
 /// At the end the folder of parameter sets is waited for so long.
 const FILING_MAX: Duration = Duration::from_secs(2);
 /// Real time between two ticks at the least; one second of plant time otherwise.
@@ -167,6 +169,10 @@ impl PlantTask {
                 }
             }
         }
+        // What the door had begun is on record as well; it ends soon after the links.
+        while let Ok(Some(paper)) = tokio::time::timeout(PAPERS_MAX, papers.recv()).await {
+            self.take_paper(paper);
+        }
         if self.saving.is_some() {
             // What was begun is ended: half a second of a disk at the most.
             let saved = saved(&mut self.saving).await;
@@ -193,6 +199,8 @@ impl PlantTask {
             (Paper::Answer(reply, answer), Some(book)) => book.answer(reply, answer),
             // Whoever has left needs no answer.
             (Paper::Answer(reply, answer), None) => drop(reply.send(answer)),
+            (Paper::Lost(count), Some(book)) => book.lost(count),
+            (Paper::Lost(_), None) => {}
         }
     }
 

@@ -94,11 +94,14 @@ impl Toil {
         }
     }
 
-    /// What is being written is written to its end, unless the disk hangs.
-    pub async fn end(&mut self) {
-        if self.saving.is_some() && tokio::time::timeout(SAVING_MAX, saved(&mut self.saving)).await.is_err() {
+    /// What is being written is written to its end, unless the disk hangs; what came of it, if anything was.
+    pub async fn end(&mut self) -> Option<Result<(), String>> {
+        self.saving.as_ref()?;
+        let ended = tokio::time::timeout(SAVING_MAX, saved(&mut self.saving)).await;
+        Some(ended.unwrap_or_else(|_| {
             tracing::error!("the disk does not take the users: left behind");
-        }
+            Err("the disk does not answer: it may or may not be written".to_owned())
+        }))
     }
 }
 

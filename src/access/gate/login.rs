@@ -4,7 +4,13 @@ use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{Effect, Gate, LOG_IN_FIRST, Seat, paper::deed, passed, standing::LOCK_NEAR, work::What};
+use super::{
+    Effect, Gate, LOG_IN_FIRST, Seat,
+    paper::deed,
+    passed,
+    standing::LOCK_NEAR,
+    work::{What, Wrong},
+};
 use crate::access::{Secret, Who, user};
 
 /// Said where nobody is asked who he is.
@@ -35,11 +41,11 @@ impl Gate {
         terminal: u32,
         ticket: u64,
         user: Option<Arc<str>>,
-        why: Option<&str>,
+        wrong: Option<Wrong>,
         at: Timestamp,
     ) -> Vec<Effect> {
-        if let Some(why) = why {
-            return self.failed(terminal, ticket, "login failed", user.as_deref(), why, at);
+        if let Some(wrong) = wrong {
+            return self.failed(terminal, ticket, "login failed", user.as_deref(), wrong, at);
         }
         let Some(user) = user.and_then(|user| self.people.as_ref()?.get(&user).cloned()) else { return Vec::new() };
         if !self.seats.contains_key(&terminal) {
@@ -73,14 +79,14 @@ impl Gate {
         ticket: u64,
         action: &str,
         user: Option<&str>,
-        why: &str,
+        Wrong { why, told }: Wrong,
         at: Timestamp,
     ) -> Vec<Effect> {
         let mut effects = Vec::new();
         if let Some(seat) = self.seats.get(&terminal) {
             effects.push(deed(seat, action, user.unwrap_or("unknown user"), &format!("refused: {why}"), at));
         }
-        effects.push(Effect::Reply(ticket, Err(self.wrong(terminal, at))));
+        effects.push(Effect::Reply(ticket, Err(told)));
         effects
     }
 
@@ -133,11 +139,11 @@ impl Gate {
         terminal: u32,
         ticket: u64,
         user: Arc<str>,
-        why: Option<&str>,
+        wrong: Option<Wrong>,
         at: Timestamp,
     ) -> Vec<Effect> {
-        if let Some(why) = why {
-            return self.failed(terminal, ticket, "unlock failed", Some(&user), why, at);
+        if let Some(wrong) = wrong {
+            return self.failed(terminal, ticket, "unlock failed", Some(&user), wrong, at);
         }
         // Meanwhile somebody else may have sat down, or a Supervisor may have sent him out.
         let still = |seat: &&mut Seat| seat.who.as_ref().is_some_and(|who| who.user == user);

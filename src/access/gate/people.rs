@@ -9,11 +9,13 @@ use super::{
     login::reply,
     paper::{deed, record, words},
     right,
-    work::What,
+    work::{What, Wrong},
 };
 use crate::{
     access::{
-        Secret, Who, Wish, password,
+        Secret, Users, Who, Wish,
+        book::USERS_FILE,
+        password,
         user::{self, Change},
     },
     plant::{record::ActionRecord, role::Role},
@@ -132,11 +134,11 @@ impl Gate {
         ticket: u64,
         user: Arc<str>,
         new: Secret,
-        why: Option<&str>,
+        wrong: Option<Wrong>,
         at: Timestamp,
     ) -> Vec<Effect> {
-        if let Some(why) = why {
-            return self.failed(terminal, ticket, "change password", Some(&user), why, at);
+        if let Some(wrong) = wrong {
+            return self.failed(terminal, ticket, "change password", Some(&user), wrong, at);
         }
         self.new_password(terminal, ticket, new, Hashing::Own(user)).unwrap_or_else(|why| reply(ticket, &why))
     }
@@ -255,8 +257,18 @@ impl Gate {
                 return vec![Effect::Record(ActionRecord { outcome, ..*record }), Effect::Reply(ticket, Err(why))];
             }
         };
-        self.people = Some(people);
-        let mut effects = vec![Effect::Record(*record), Effect::Reply(ticket, Ok(()))];
+        let before = self.people.replace(people);
+        let digest = |people: Option<&Users>| people.map(|people| people.digest().into());
+        let by_station =
+            ActionRecord { by: "station".into(), from: "".into(), old: None, new: None, ..(*record).clone() };
+        let file = ActionRecord {
+            action: USERS_FILE.into(),
+            target: "users".into(),
+            old: digest(before.as_ref()),
+            new: digest(self.people.as_ref()),
+            ..by_station
+        };
+        let mut effects = vec![Effect::Record(*record), Effect::Record(file), Effect::Reply(ticket, Ok(()))];
         effects.extend(self.followed(terminal, &change, at));
         self.tell(terminal, &mut effects);
         effects

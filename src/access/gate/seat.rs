@@ -1,14 +1,22 @@
 //! One terminal as the gate knows it, and how much it may ask for.
 
+use std::{collections::VecDeque, sync::Arc};
+
 use jiff::Timestamp;
 
 use super::Peer;
-use crate::access::{Who, tries::Origin};
+use crate::{
+    access::{Who, tries::Origin},
+    plant::command::OrderId,
+};
 
 /// Requests a second of one terminal that are answered in the long run, and so many at once.
 const REQUESTS: (f64, f64) = (20.0, 40.0);
 /// Refusals a second of one place that are put on record each by itself, and so many at once.
 const REFUSALS: (f64, f64) = (0.5, 20.0);
+
+/// Orders that did not reach the plant and are remembered for their terminal: as many as may come at once.
+const UNDELIVERED_MAX: usize = 64;
 
 /// A terminal.
 #[derive(Debug)]
@@ -29,6 +37,10 @@ pub struct Seat {
     pub active: Timestamp,
     /// What it may still ask.
     pub requests: Bucket,
+    /// The number of its last order: each has a higher one.
+    pub last_order: Option<u32>,
+    /// Its latest orders that did not reach the plant, and why.
+    pub undelivered: VecDeque<(OrderId, Arc<str>)>,
 }
 
 impl Seat {
@@ -36,12 +48,31 @@ impl Seat {
     pub fn new(peer: Peer, at: Timestamp) -> Seat {
         let origin = origin(&peer);
         let requests = Bucket::full(REQUESTS, at);
-        Seat { peer, origin, since: at, who: None, trusted: false, locked: false, active: at, requests }
+        Seat {
+            peer,
+            origin,
+            since: at,
+            who: None,
+            trusted: false,
+            locked: false,
+            active: at,
+            requests,
+            last_order: None,
+            undelivered: VecDeque::new(),
+        }
     }
 
     /// Who sits there, unless the terminal is locked.
     pub fn acting(&self) -> Option<&Who> {
         self.who.as_ref().filter(|_| !self.locked)
+    }
+
+    /// An order that did not reach the plant.
+    pub fn undelivered(&mut self, id: OrderId, why: &str) {
+        if UNDELIVERED_MAX <= self.undelivered.len() {
+            self.undelivered.pop_front();
+        }
+        self.undelivered.push_back((id, why.into()));
     }
 
     /// Nobody sits there any more.

@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 
-use super::{Effect, Gate, right, work::What};
+use super::{
+    Effect, Gate, right,
+    work::{What, Wrong},
+};
 use crate::{
     access::{OrderRequest, Signature, user},
     plant::{
@@ -57,11 +60,10 @@ impl Gate {
         by: Arc<str>,
         signer: Option<Arc<str>>,
         request: OrderRequest,
-        why: Option<&str>,
+        wrong: Option<Wrong>,
         at: Timestamp,
     ) -> Vec<Effect> {
-        if let Some(why) = why {
-            let told = self.wrong(terminal, at);
+        if let Some(Wrong { why, told }) = wrong {
             let mut effects = Vec::new();
             if let Some(seat) = self.seats.get(&terminal) {
                 let signer = signer.as_deref().unwrap_or("unknown user");
@@ -74,7 +76,7 @@ impl Gate {
         // Meanwhile he may have left, or been sent out.
         match self.may(terminal, Some(needed)) {
             Ok(who) if who.user == by => {}
-            Ok(_) => return Vec::new(),
+            Ok(_) => return self.undelivered(request.id, "somebody else has logged in here meanwhile"),
             Err(why) => return self.refuse_order(terminal, request, Refusal::NotPermitted(why), at),
         }
         let other = signer.as_ref().filter(|signer| **signer != by);

@@ -33,6 +33,7 @@ impl Gate {
             locks_in: left.filter(|left| *left <= LOCK_NEAR && seat.acting().is_some()),
             users: Arc::new(if supervisor { self.user_rows(at) } else { Vec::new() }),
             sessions: Arc::new(if supervisor { self.session_rows() } else { Vec::new() }),
+            undelivered: seat.undelivered.iter().cloned().collect(),
             gone: None,
         }
     }

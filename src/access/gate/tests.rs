@@ -23,6 +23,7 @@ struct Bench {
     gate: Gate,
     now: Timestamp,
     last_ticket: u64,
+    last_order: u32,
     /// What was kept by the last save.
     kept: Option<Users>,
     disk_full: bool,
@@ -46,7 +47,7 @@ impl Bench {
 
     fn of(gate: Gate) -> Bench {
         let now = Timestamp::from_second(1_000_000).unwrap();
-        Bench { gate, now, last_ticket: 0, kept: None, disk_full: false, records: Vec::new() }
+        Bench { gate, now, last_ticket: 0, last_order: 0, kept: None, disk_full: false, records: Vec::new() }
     }
 
     fn open(&mut self, terminal: u32, host: &str) -> Vec<Effect> {
@@ -113,7 +114,8 @@ impl Bench {
 
     /// `None`: nothing reached the plant. `Some(None)`: permitted.
     fn order(&mut self, terminal: u32, command: Command, sign: Option<Signature>) -> Option<(Order, Option<Refusal>)> {
-        let id = OrderId { terminal, number: 1 };
+        self.last_order += 1;
+        let id = OrderId { terminal, number: self.last_order };
         let request = OrderRequest { sign, note: Some("why".into()), ..OrderRequest::new(id, command) };
         let effects = self.gate.order(terminal, request, self.now);
         let effects = self.work(effects);
@@ -403,7 +405,7 @@ fn a_user_whom_the_operating_system_knows_is_in_without_a_password() {
 
 #[test]
 fn no_more_terminals_come_in_than_permitted_but_the_stations_own_always_does() {
-    let mut bench = Bench::new(AccessDef { sessions_max: 2, ..AccessDef::default() });
+    let mut bench = Bench::new(AccessDef { sessions_max: 4, ..AccessDef::default() });
     bench.open(1, "a");
     bench.open(2, "b");
     let sent_away = bench.open(3, "c");
@@ -466,6 +468,11 @@ fn a_demonstration_asks_nobody() {
     bench.open(2, "10.0.0.1");
     assert!(bench.order(2, RUN, None).unwrap().1.is_some(), "only at its own terminal");
 }
+
+mod file;
+mod orders;
+mod place;
+mod room;
 
 proptest! {
     #[test]

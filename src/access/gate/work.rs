@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 
-use super::{Effect, Gate, people::Hashing, seat::Seat};
+use super::{Effect, Gate, people::Hashing};
 use crate::access::{
     OrderRequest, Secret, password,
     tries::{Account, Origin},
@@ -77,6 +77,15 @@ pub(super) enum What {
     Hash { ticket: u64, by: Option<Arc<str>>, hashing: Hashing },
 }
 
+/// What was wrong with an attempt.
+#[derive(Debug)]
+pub(super) struct Wrong {
+    /// For the book.
+    pub why: &'static str,
+    /// For the operator: the same whatever it was, and how long he must wait.
+    pub told: String,
+}
+
 impl Gate {
     /// Has a password looked at for somebody. `hash` is `None` for a name that nobody has, which must not be seen from the
     /// time it takes. `Err` says in words for the operator why it is not looked at.
@@ -87,7 +96,8 @@ impl Gate {
         what: What,
         at: Timestamp,
     ) -> Result<Vec<Effect>, String> {
-        let origin = self.seats.get(&terminal).ok_or("this terminal is not attached")?.origin.clone();
+        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
+        let origin = if what.comes_from_outside() { seat.origin.clone() } else { seat.origin.of_seat(terminal) };
         if JOBS_MAX <= self.errands.len() {
             return Err(BUSY.to_owned());
         }
@@ -157,6 +167,7 @@ impl Gate {
             }
             _ => self.count_wrong(terminal, origin, account.as_deref(), what.whose().cloned(), at),
         };
+        let why = why.map(|why| Wrong { why, told: self.wrong(origin, at) });
         effects.extend(match what {
             What::Login { ticket, user } => self.login_done(terminal, ticket, user, why, at),
             What::Unlock { ticket, user } => self.unlock_done(terminal, ticket, user, why, at),
@@ -217,9 +228,8 @@ impl Gate {
     }
 
     /// What an operator is told of a wrong attempt: the same whatever was wrong, and how long he must wait here.
-    pub(super) fn wrong(&self, terminal: u32, at: Timestamp) -> String {
-        let wait = self.seats.get(&terminal).and_then(|seat: &Seat| self.tries.wait(&seat.origin, at));
-        match wait {
+    fn wrong(&self, origin: &Origin, at: Timestamp) -> String {
+        match self.tries.wait(origin, at) {
             Some(wait) => format!("{WRONG}; wait {} s at this terminal", wait.as_secs_f64().ceil()),
             None => WRONG.to_owned(),
         }
@@ -237,7 +247,8 @@ impl What {
         }
     }
 
-    /// Does somebody who is not in yet want to be?
+    /// Does somebody who is not in yet want to be? Whoever is in already has tries of his own: others at the same place
+    /// must not keep him from his work.
     fn comes_from_outside(&self) -> bool {
         match self {
             What::Login { .. } => true,

@@ -14,7 +14,7 @@ use std::{
 use tokio::sync::{mpsc, watch};
 
 use crate::{
-    access::book::{self, Check, FirstBad, PLANT_FILE, Summary},
+    access::book::{self, Check, FirstBad, PLANT_FILE, Summary, USERS_FILE},
     bus::io::clock::Clock,
     plant::record::{ActionRecord, Record, Seal},
 };
@@ -119,6 +119,8 @@ pub struct Opened {
     pub wrong: Vec<String>,
     /// The hash of the plant file that was recorded last.
     pub plant_file: Option<Arc<str>>,
+    /// The hash of the users that was recorded last.
+    pub users_file: Option<Arc<str>>,
 }
 
 impl Book {
@@ -132,6 +134,8 @@ impl Book {
         let Scanned { bytes, torn } = scan(file.try_clone()?, &mut check, |entry| {
             if &*entry.action == PLANT_FILE {
                 opened.plant_file = entry.new;
+            } else if &*entry.action == USERS_FILE {
+                opened.users_file = entry.new;
             }
         })?;
         if torn {
@@ -318,7 +322,9 @@ impl Scribe {
     }
 
     /// Into the book, and on to the history; only there while the book cannot be written.
-    fn write(&mut self, mut deeds: Vec<ActionRecord>) {
+    fn write(&mut self, deeds: Vec<ActionRecord>) {
+        // The history says the same as the book.
+        let mut deeds: Vec<ActionRecord> = deeds.into_iter().map(book::fit).collect();
         if let Some(book) = &mut self.book
             && let Err(error) = book.append(&mut deeds)
         {

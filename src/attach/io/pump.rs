@@ -138,7 +138,15 @@ impl Pump {
                 delta.apply(Arc::make_mut(&mut self.latest)).map_err(|error| error.to_string())?;
                 self.show();
             }
-            Told::Standing(standing) => drop(self.stand.send_replace(Arc::new(*standing))),
+            Told::Standing(standing) => {
+                for (id, why) in &standing.undelivered {
+                    self.own.undelivered(*id, why.to_string());
+                }
+                if !standing.undelivered.is_empty() {
+                    self.show();
+                }
+                self.stand.send_replace(Arc::new(*standing));
+            }
             Told::Answer { ticket, answer } => {
                 if let Some(Waiting::Ask(reply)) = self.waiting.remove(&ticket) {
                     // Whoever has left needs no answer.

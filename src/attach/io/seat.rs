@@ -29,16 +29,20 @@ use crate::{
 pub const SNAPSHOT_EVERY: Duration = Duration::from_millis(250);
 /// A terminal that takes nothing for so long is let go.
 pub const STUCK_MAX: Duration = Duration::from_secs(300);
+/// A terminal that does not take the answer to its own question is let go after so long: answers may be large.
+pub const ANSWER_STUCK_MAX: Duration = Duration::from_secs(30);
 /// Questions and wishes of one terminal that may wait for their answers.
 const IN_FLIGHT_MAX: usize = 16;
+/// Questions of one terminal that are before the history, or answered and not taken yet.
+const ANSWERS_MAX: usize = 4;
 /// So long a newcomer may wait to hear how it stands.
 const STANDING_MAX: Duration = Duration::from_secs(2);
 
 /// Nobody ends well: there is always a reason.
 type Never = std::convert::Infallible;
 
-/// An answer on its way to the terminal. It gives its place in flight back only when it has left.
-type Reply = (Told, Option<OwnedSemaphorePermit>);
+/// An answer on its way to the terminal. It gives its places in flight back only when it has left.
+type Reply = (Told, Vec<OwnedSemaphorePermit>);
 
 /// Serves a terminal until either side ends; says why it ended.
 pub async fn serve<R, W>(read: R, write: W, session: Session, run: u64) -> Ended
@@ -49,7 +53,8 @@ where
     let def = session.snapshots.borrow().def.clone();
     let (replies, answered) = mpsc::channel(IN_FLIGHT_MAX);
     let in_flight = Arc::new(Semaphore::new(IN_FLIGHT_MAX));
-    let asking = Asking { session: session.clone(), def: def.clone(), replies, in_flight };
+    let asked = Arc::new(Semaphore::new(ANSWERS_MAX));
+    let asking = Asking { session: session.clone(), def: def.clone(), replies, in_flight, asked };
     let telling = Telling { write, session, def };
     tokio::select! {
         Err(ended) = asking.run(read) => ended,
@@ -65,8 +70,8 @@ pub enum Ended {
     #[error("{0}")]
     Wire(#[from] WireError),
     /// It does not read.
-    #[error("has taken nothing for {} s", STUCK_MAX.as_secs())]
-    Stuck,
+    #[error("has taken nothing for {0:?}")]
+    Stuck(Duration),
     /// It may not stay, or the station has ended.
     #[error("sent away by the station")]
     SentAway,
@@ -84,6 +89,7 @@ struct Asking {
     def: Arc<PlantDef>,
     replies: mpsc::Sender<Reply>,
     in_flight: Arc<Semaphore>,
+    asked: Arc<Semaphore>,
 }
 
 impl Asking {
@@ -112,7 +118,7 @@ impl Asking {
         let sent = sent.and_then(|()| self.session.send(Request::Order(order)).map_err(str::to_owned));
         if let Err(why) = sent {
             // Only a terminal that has ended does not hear it.
-            let _ = self.replies.send((Told::Undelivered { id, why }, None)).await;
+            let _ = self.replies.send((Told::Undelivered { id, why }, Vec::new())).await;
         }
     }
 
@@ -121,15 +127,22 @@ impl Asking {
         let sent = check::question(&self.def, &question);
         let (reply, answer) = oneshot::channel();
         let query = Query { question, reply };
-        let sent = sent.and_then(|()| self.session.ask(query).map_err(str::to_owned));
-        let replies = self.replies.clone();
+        let (session, replies, asked) = (self.session.clone(), self.replies.clone(), self.asked.clone());
         tokio::spawn(async move {
+            // A question waits here for those before it, so that what comes behind it, an order perhaps, does not.
+            let Ok(turn) = asked.acquire_owned().await else { return };
+            if replies.is_closed() {
+                return;
+            }
+            let sent = sent.and_then(|()| session.ask(query).map_err(str::to_owned));
+            // The station takes a terminal for gone when nobody holds its session any more.
+            drop(session);
             let answer = match sent {
                 Ok(()) => answer.await.unwrap_or_else(|_| Err(HistoryError::Engine("the store has gone".to_owned()))),
                 Err(why) => Err(HistoryError::Engine(why)),
             };
             // Only a terminal that has ended does not hear it.
-            let _ = replies.send((Told::Answer { ticket, answer }, Some(place))).await;
+            let _ = replies.send((Told::Answer { ticket, answer }, vec![place, turn])).await;
         });
     }
 
@@ -144,7 +157,7 @@ impl Asking {
                 Err(why) => Err(why),
             };
             // Only a terminal that has ended does not hear it.
-            let _ = replies.send((Told::Granted { ticket, answer }, Some(place))).await;
+            let _ = replies.send((Told::Granted { ticket, answer }, vec![place])).await;
         });
     }
 }
@@ -166,14 +179,14 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
         }
         let welcome = Welcome { run, terminal: self.session.terminal, def: self.def.clone() };
         let welcome = protocol::encode_first(&Greeting::own(), Some(&welcome), NEWS_BYTES_MAX);
-        self.write(&welcome.map_err(WireError::from)?).await?;
+        self.write(&welcome.map_err(WireError::from)?, STUCK_MAX).await?;
         self.tell_standing().await?;
         let mut sent = Arc::new(Snapshot::blank(self.def.clone()));
         let (mut due, mut next) = (Some(Instant::now()), Instant::now());
         loop {
             tokio::select! {
                 biased;
-                Some((told, _place)) = answered.recv() => self.tell(&told).await?,
+                Some((told, _places)) = answered.recv() => self.tell(&told).await?,
                 changed = self.session.standing.changed() => {
                     changed.map_err(|_| Ended::SentAway)?;
                     self.tell_standing().await?;
@@ -227,11 +240,12 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
             }
             (bytes, _) => bytes,
         };
-        self.write(&bytes.map_err(WireError::from)?).await
+        let max = if let Told::Answer { .. } = told { ANSWER_STUCK_MAX } else { STUCK_MAX };
+        self.write(&bytes.map_err(WireError::from)?, max).await
     }
 
-    async fn write(&mut self, bytes: &[u8]) -> Result<(), Ended> {
-        timeout(STUCK_MAX, wire::write(&mut self.write, bytes)).await.map_err(|_| Ended::Stuck)??;
+    async fn write(&mut self, bytes: &[u8], max: Duration) -> Result<(), Ended> {
+        timeout(max, wire::write(&mut self.write, bytes)).await.map_err(|_| Ended::Stuck(max))??;
         Ok(())
     }
 }

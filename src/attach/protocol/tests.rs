@@ -9,8 +9,9 @@ use crate::{
     attach::check,
     plant::{
         command::Command,
-        def::{AlarmId, DeviceId, LineId, TagId},
+        def::{AlarmId, DeviceId, LineDef, LineId, TagId},
         role::Role,
+        tool::Tool,
     },
     ui::fixture::{Fixture, now},
 };
@@ -128,15 +129,35 @@ fn what_this_plant_does_not_have_never_reaches_it() {
         let why = check::command(&def, &command).unwrap_err();
         assert!(why.contains("number 65535"), "{command:?}: {why}");
     }
+    let long = [
+        Command::SaveSet { device: DeviceId(0), name: "x".repeat(33).into(), replace: false },
+        Command::Test(LineId(0), Tool::Send(vec![0; 261])),
+        Command::Configure(Box::new(LineDef { name: "x".repeat(5_000), ..def.lines[0].clone() })),
+    ];
+    for command in long {
+        let why = check::command(&def, &command).unwrap_err();
+        assert!(why.contains("at most"), "{why}");
+    }
+    assert_eq!(check::command(&def, &Command::Configure(Box::new(def.lines[0].clone()))), Ok(()));
     assert_eq!(check::command(&def, &Command::Write { tag: TagId(0), value: 1.0 }), Ok(()));
     let series = |tags: Vec<TagId>, buckets| Question::Series { tags, from: now(), to: now(), buckets };
+    let report = |days: i64| {
+        let to = now() + jiff::SignedDuration::from_hours(24 * days);
+        Question::Report { period: crate::report::Period { name: "period".into(), from: now(), to } }
+    };
     assert_eq!(check::question(&def, &series(vec![TagId(0)], 200)), Ok(()));
+    assert_eq!(check::question(&def, &report(92)), Ok(()));
     for wrong in [
         series(vec![TagId(far)], 200),
         series(vec![TagId(0)], usize::MAX),
         series(vec![TagId(0)], 0),
         series(vec![TagId(0); 1_000], 200),
+        series(vec![TagId(0); 64], 4_096),
         Question::LineMinutes { line: LineId(far), from: now(), to: now(), limit: 1 },
+        Question::LineMinutes { line: LineId(0), from: now(), to: now(), limit: 10_001 },
+        Question::Journal { from: now(), to: now(), limit: usize::MAX },
+        Question::Actions { from: now(), to: now(), limit: usize::MAX },
+        report(93),
     ] {
         assert!(check::question(&def, &wrong).is_err(), "{wrong:?}");
     }

@@ -55,7 +55,7 @@ fn deeds_of_several_lives_are_one_chain_and_only_the_station_can_read_it() {
     }
     let summary = verify(&path, &seals(&rows)).unwrap();
     assert_eq!((summary.entries, summary.compared), (4, 4));
-    assert_eq!(life(&path, &[]).2, Opened { wrong: Vec::new(), plant_file: Some("x".into()) });
+    assert_eq!(life(&path, &[]).2, Opened { wrong: Vec::new(), plant_file: Some("x".into()), users_file: None });
     for file in [path.clone(), head_of(&path)] {
         assert_eq!(fs::metadata(file).unwrap().permissions().mode() & 0o777, 0o600);
     }

@@ -1,0 +1,40 @@
+//! What others at the same place can do to somebody who works there.
+
+use super::*;
+
+#[test]
+fn wrong_names_at_a_place_do_not_keep_those_who_are_in_from_their_work() {
+    let mut bench = Bench::new(AccessDef::default());
+    for terminal in 1..=3 {
+        bench.open(terminal, "10.0.0.5");
+    }
+    bench.login(1, "tech", TECH).unwrap();
+    bench.later(60);
+    for _ in 0..400 {
+        bench.later(1);
+        let _ = bench.login(2, "nobody", "guess");
+    }
+    assert!(bench.login(3, "boss", BOSS).unwrap_err().contains("wait"), "nobody else comes in from there");
+    bench.wish(1, Wish::Lock).unwrap();
+    bench.wish(1, Wish::Unlock(TECH.into())).unwrap();
+    let change = Wish::ChangePassword { old: TECH.into(), new: "another wet horse".into() };
+    bench.wish(1, change).unwrap();
+}
+
+#[test]
+fn who_guesses_at_a_locked_terminal_waits_as_long_as_anywhere_else() {
+    let mut bench = Bench::new(AccessDef { tries_max: 3, ..AccessDef::default() });
+    bench.open(1, "10.0.0.5");
+    bench.open(2, "10.0.0.5");
+    bench.login(1, "tech", TECH).unwrap();
+    bench.wish(1, Wish::Lock).unwrap();
+    for wait in [1, 2, 300] {
+        let told = bench.wish(1, Wish::Unlock("guess".into())).unwrap_err();
+        assert!(told.ends_with(&format!("wait {wait} s at this terminal")), "{told}");
+        bench.later(wait.min(2));
+    }
+    assert!(bench.wish(1, Wish::Unlock(TECH.into())).is_err());
+    bench.login(2, "boss", BOSS).unwrap();
+    bench.later(300);
+    bench.wish(1, Wish::Unlock(TECH.into())).unwrap();
+}

@@ -1,0 +1,41 @@
+//! Who gets a seat when many want one.
+
+use super::*;
+
+impl Bench {
+    /// A terminal of this user comes. Gives the terminals that were sent away because of it.
+    fn comes(&mut self, terminal: u32, user: &str) -> Vec<u32> {
+        let peer = Peer { from: format!("script, user {user}").into(), unix_user: Some(user.into()), own: false };
+        let effects = self.gate.open(terminal, peer, self.now);
+        let gone = effects.into_iter().filter_map(|effect| match effect {
+            Effect::HangUp(terminal, _) => Some(terminal),
+            _ => None,
+        });
+        gone.collect()
+    }
+}
+
+#[test]
+fn one_user_of_the_operating_system_cannot_take_all_seats() {
+    let mut bench = Bench::new(AccessDef { sessions_max: 8, ..AccessDef::default() });
+    let sent_away: Vec<u32> = (1..=20).flat_map(|terminal| bench.comes(terminal, "script")).collect();
+    assert_eq!(sent_away, (5..=20).collect::<Vec<_>>(), "half of them are left for others");
+    let sent_away: Vec<u32> = (21..=25).flat_map(|terminal| bench.comes(terminal, "panel")).collect();
+    assert_eq!(sent_away, [24, 25], "one is kept");
+    assert!(bench.comes(30, "root").is_empty(), "for those who run the station");
+    assert_eq!(bench.comes(31, "sight"), [31], "and no more than that");
+}
+
+#[test]
+fn a_terminal_where_nobody_is_logged_in_makes_room_when_it_was_idle_for_long() {
+    let mut bench = Bench::new(AccessDef { sessions_max: 4, idle_lock: Duration::ZERO, ..AccessDef::default() });
+    bench.comes(1, "panel");
+    bench.comes(2, "panel");
+    bench.login(1, "tech", TECH).unwrap();
+    bench.later(599);
+    assert_eq!(bench.comes(3, "panel"), [3]);
+    bench.later(1);
+    assert_eq!(bench.comes(4, "panel"), [2], "not the one where somebody works");
+    assert_eq!(bench.comes(5, "panel"), [5]);
+    assert_eq!(bench.who(1).as_deref(), Some("tech"));
+}
