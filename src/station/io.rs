@@ -35,6 +35,7 @@ use super::{
     plant_task::{KEPT_FOR_STOPS, Keeping, PlantTask},
     session::Session,
     sets,
+    steps::Steps,
 };
 
 /// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
@@ -122,7 +123,8 @@ fn begin(
     let book = book::start(&book::beside(&path), clock, records.clone()).map_err(no_thread)?;
     let mut deeds = Deeds::new(&book);
     deeds.started(&def.name, file.as_ref(), clock.now());
-    let keeping = Keeping { records: Some(records), store, book: Some(deeds), sets: Some(sets), listener };
+    let steps = Some(Steps::new(history.settled.clone()));
+    let keeping = Keeping { records: Some(records), store, steps, book: Some(deeds), sets: Some(sets), listener };
     let threads = Threads { queries, history: Some(history), book: Some(book.join) };
     Ok(assemble(def, clock, connectors, plant, file, keeping, threads, guarded))
 }
@@ -133,7 +135,7 @@ pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, li
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
-    let keeping = Keeping { records: None, store, book: None, sets: None, listener: Some(listener) };
+    let keeping = Keeping { records: None, store, steps: None, book: None, sets: None, listener: Some(listener) };
     let threads = Threads { queries, history: None, book: None };
     assemble(def, clock, connectors, plant, None, keeping, threads, None)
 }

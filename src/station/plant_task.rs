@@ -11,9 +11,11 @@ use tokio::{
 use super::{
     deeds::{self, Deeds, Paper},
     sets,
+    steps::Steps,
 };
 use crate::{
     bus::io::clock::Clock,
+    history::io::writer::by_operators,
     plant::{
         Effects, Plant, SetWork, Snapshot,
         command::{BusRequest, Order, OrderId},
@@ -39,6 +41,8 @@ const TICK_MIN: Duration = Duration::from_millis(20);
 pub(super) struct Keeping {
     pub records: Option<mpsc::Sender<Vec<Record>>>,
     pub store: watch::Receiver<HistoryStatus>,
+    /// What operators do with alarms is stored before it is shown as done.
+    pub steps: Option<Steps>,
     /// Deeds go there first.
     pub book: Option<Deeds>,
     /// The folder of parameter sets.
@@ -119,8 +123,9 @@ impl PlantTask {
         // Changed since the last snapshot, and when the next one may go out.
         let (mut changed, mut next) = (false, Instant::now());
         loop {
-            // What a snapshot shows as done is in the book.
+            // What a snapshot shows as done is in the book, and in the store if a restart takes it from there.
             let due = self.keeping.book.as_ref().map_or(next, |book| book.due(next));
+            let due = self.keeping.steps.as_ref().map_or(due, |steps| steps.due(due));
             tokio::select! {
                 biased;
                 () = tokio::time::sleep_until(due), if changed => {
@@ -340,9 +345,14 @@ impl PlantTask {
 
     fn store(&mut self, records: Vec<Record>) {
         let Some(store) = self.keeping.records.as_ref().filter(|_| !records.is_empty()) else { return };
-        if let Err(refused) = store.try_send(records) {
-            self.lost += refused.into_inner().len() as u64;
-            self.hear_store();
+        let steps = by_operators(&records);
+        match (store.try_send(records), &mut self.keeping.steps) {
+            (Ok(()), Some(waits)) => waits.sent(steps),
+            (Ok(()), None) => {}
+            (Err(refused), _) => {
+                self.lost += refused.into_inner().len() as u64;
+                self.hear_store();
+            }
         }
     }
 
