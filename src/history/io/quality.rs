@@ -39,7 +39,7 @@ impl Store {
         check_span(from, until)?;
         let known = from.checked_sub(LEAD).unwrap_or(Timestamp::MIN);
         let mut meter = Meter::of_period(from, until);
-        self.active_at(known)?.iter().for_each(|step| meter.already(step));
+        self.standing_at(known)?.iter().for_each(|step| meter.already(step));
         let (first, last) = self.extent().unwrap_or((until, known));
         let (mut next, mut rows) = (known.max(first), 0);
         let end = until.min(last.checked_add(std::time::Duration::from_micros(1)).unwrap_or(last));
@@ -60,10 +60,15 @@ impl Store {
         if now <= since {
             return Ok(Recent::default());
         }
-        Ok(Recent { active: self.active_at(since)?, steps: self.steps(since, now)? })
+        Ok(Recent { active: self.standing_at(since)?, steps: self.steps(since, now)? })
     }
 
-    /// The raising steps of the alarms that were active at an instant.
+    /// The raising steps of the alarms that were active at an instant and not put aside: what is aside is not stale.
+    fn standing_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
+        self.whole_list(&sql::standing_at(), params![utc(at), ROWS_MAX + 1], alarm)
+    }
+
+    /// The raising steps of the alarms that were active at an instant, also of those that were put aside.
     pub(super) fn active_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
         self.whole_list(&sql::active_at(), params![utc(at), ROWS_MAX + 1], alarm)
     }

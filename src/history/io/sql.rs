@@ -116,6 +116,19 @@ pub fn active_at() -> String {
     )
 }
 
+/// The raising steps of the alarms that stood before the operator at an instant: active, and not put aside since.
+pub fn standing_at() -> String {
+    let step = STEP_COLUMNS.join(", ");
+    format!(
+        "SELECT {step} FROM (
+            SELECT *, rowid AS place FROM alarm_journal
+            WHERE utc < ? AND step IN ('raised', 'raised quietly', 'returned', 'returned quietly', 'shelved',
+                'suppressed', 'out of service')
+            QUALIFY row_number() OVER (PARTITION BY subject, text ORDER BY utc DESC, rowid DESC) = 1)
+         WHERE step = 'raised' ORDER BY utc, place LIMIT ?"
+    )
+}
+
 /// Of each alarm the last step of every kind, in the order in which they were written: all that its state depends on.
 pub fn restore() -> String {
     let step = STEP_COLUMNS.join(", ");

@@ -194,3 +194,22 @@ fn a_station_that_starts_again_knows_the_alarms_of_its_last_day() {
     let recent = store.recent(at(0.0)).unwrap();
     assert_eq!((recent.active.as_slice(), recent.steps.as_slice()), (&steps[..1], &steps[1..]));
 }
+
+#[test]
+fn an_alarm_that_was_put_aside_before_a_period_is_not_stale_in_it() {
+    use AlarmStep::{OutOfService, Raised, RaisedQuietly, Shelved, Suppressed};
+    let (_folder, db) = folder();
+    let store = open(&db, START);
+    let pair = |second: f64, text: &str, first, then| {
+        [(second, first), (second + 1.0, then)]
+            .map(|(second, kind)| Record::Alarm(AlarmRecord { at: at(second), ..step(0, text, kind) }))
+    };
+    let aside = [("shelved", Shelved), ("suppressed", Suppressed), ("out of service", OutOfService)];
+    for (text, kind) in aside {
+        store.append(&pair(-200_000.0, text, Raised, kind)).unwrap();
+    }
+    store.append(&pair(-200_000.0, "quiet", Suppressed, RaisedQuietly)).unwrap();
+    store.append(&pair(-200_000.0, "back", Shelved, Raised)).unwrap();
+    assert_eq!(store.alarm_quality(at(0.0), at(3_600.0), at(3_600.0)).unwrap().stale, 1);
+    assert_eq!(store.recent(at(0.0)).unwrap().active.len(), 1);
+}
