@@ -184,6 +184,8 @@ impl PlantTask {
                 Err(_) => tracing::error!("the folder of the parameter sets does not answer: left behind"),
             }
         }
+        let ended = self.plant.on_stop();
+        self.keep(ended.records);
         let stopped = deeds::stopped(&self.plant.def().name, self.clock.now());
         if let Some(book) = &mut self.keeping.book {
             book.tell_all();
@@ -218,6 +220,9 @@ impl PlantTask {
     }
 
     fn carry_out(&mut self, effects: Effects) {
+        // Written down before it is sent: a station that is killed in between leaves a trace.
+        let intents = effects.bus.iter().filter_map(|(_, request)| self.plant.intent(request)).collect();
+        self.write_down(intents);
         for (line, request) in effects.bus {
             self.send(line, request);
         }
@@ -300,17 +305,18 @@ impl PlantTask {
     }
 
     fn send(&mut self, line: LineId, request: BusRequest) {
-        let link = &self.links[line.index()];
+        let link = self.links[line.index()].clone();
         let is_stop = matches!(request, BusRequest::Write { urgent: true, .. });
-        let refused = if is_stop || KEPT_FOR_STOPS < link.capacity() {
-            link.try_send(request).err().map(mpsc::error::TrySendError::into_inner)
-        } else {
-            Some(request)
+        let place = if is_stop || KEPT_FOR_STOPS < link.capacity() { link.try_reserve().ok() } else { None };
+        let effects = match place {
+            Some(place) => {
+                let effects = self.plant.on_delivered(line, &request);
+                place.send(request);
+                effects
+            }
+            None => self.plant.on_undeliverable(line, &request),
         };
-        if let Some(refused) = refused {
-            let effects = self.plant.on_undeliverable(line, &refused);
-            self.keep(effects.records);
-        }
+        self.keep(effects.records);
     }
 
     fn keep(&mut self, records: Vec<Record>) {
