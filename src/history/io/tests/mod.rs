@@ -431,6 +431,15 @@ fn a_stopped_station_leaves_every_curve_ended_and_a_running_one_answers() {
 }
 
 #[test]
+fn a_question_behind_which_too_much_lies_is_refused_before_anything_is_read() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.append(&[good(PV, 1, 27.0), good(PV, 2, 28.0), good(PV, 3, 28.0)]).unwrap();
+    assert_eq!(store.bounded(&[PV], sec(0), sec(3), 2), Ok(()));
+    assert_eq!(store.bounded(&[PV], sec(0), sec(4), 2), Err(HistoryError::TooManyRows { rows: 3, max: 2 }));
+}
+
+#[test]
 fn what_an_operator_does_with_an_alarm_is_committed_at_once() {
     let (_folder, db) = folder();
     let mut writer = Writer::open(db, def(), sec(0)).unwrap();
