@@ -117,7 +117,8 @@ fn begin(
     let history = history::start(&path, def.clone(), clock)?;
     let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
     plant.restore(&history.restored);
-    plant.remeasure(&history.recent.active, &history.recent.steps, clock.now());
+    let recent = &history.recent;
+    plant.remeasure(&recent.active, &recent.steps, &recent.watched, clock.now());
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
     let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the book: {error}"));
     let book = book::start(&book::beside(&path), clock, records.clone()).map_err(no_thread)?;

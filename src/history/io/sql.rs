@@ -92,6 +92,13 @@ pub const COUNT_SAMPLES: &str = "SELECT count(*) FROM sample WHERE tag = ? AND u
 pub const LATEST_GOOD: &str =
     "SELECT arg_max(value, utc) FROM sample WHERE tag = ? AND utc >= ? AND utc < ? AND quality = 0";
 
+/// The windows of ten minutes, by their number since 1970, in which anything was stored: in these a station ran.
+pub const WATCHED: &str = "SELECT DISTINCT epoch_us(utc) // 600000000 FROM (
+        SELECT utc FROM sample WHERE utc >= $1 AND utc < $2
+        UNION ALL SELECT utc FROM alarm_journal WHERE utc >= $1 AND utc < $2
+        UNION ALL SELECT utc - INTERVAL 1 MINUTE FROM line_minute WHERE utc >= $1 AND utc < $2)
+    ORDER BY 1 LIMIT $3";
+
 /// Steps of alarms in a span, newest first.
 pub fn journal_newest() -> String {
     let step = STEP_COLUMNS.join(", ");
