@@ -246,6 +246,9 @@ pub enum NotConfirmed {
     /// Of several writes only some are done.
     #[error("{0}")]
     Partly(String),
+    /// The station was stopped before anybody answered for it.
+    #[error("the station stopped; it may have taken effect")]
+    StationStopped,
     /// The profile wants no read-back.
     #[error("accepted, not read back")]
     NoReadBack,

@@ -11,7 +11,7 @@ use super::{
     def::{AlarmId, LineId, PlantDef, TagId},
     event::{Fault, WriteResult},
     guard,
-    record::ActionRecord,
+    record::{ActionRecord, ORDER},
     scale,
     tag::TagDef,
 };
@@ -174,6 +174,24 @@ impl Desk {
         self.close(order, outcome, board)
     }
 
+    /// A line has taken a request: what asks for no answer is done.
+    pub fn delivered(&mut self, line: LineId, request: &BusRequest, board: &Board) -> Option<ActionRecord> {
+        let id = self.of_line(line, request)?;
+        self.close(id, Outcome::Verified, board)
+    }
+
+    /// The order under way behind a request to a line that asks for no answer.
+    fn of_line(&self, line: LineId, request: &BusRequest) -> Option<OrderId> {
+        let asks = |status: &&OrderStatus| match (request, &status.command) {
+            (BusRequest::Test { id, .. }, _) => status.id == *id,
+            (BusRequest::Configure(wished), Command::Configure(settings)) => wished == settings,
+            (BusRequest::StopTest, Command::StopTest(tested)) => *tested == line,
+            _ => false,
+        };
+        let mut under_way = self.orders.iter().filter(|status| status.outcome == Outcome::Pending);
+        under_way.find(asks).map(|status| status.id)
+    }
+
     /// The line had no room for a request: nothing was sent, and whoever wished it is told.
     pub fn undeliverable(&mut self, line: LineId, request: &BusRequest, board: &Board) -> Option<ActionRecord> {
         let busy = Outcome::Refused(Refusal::Busy);
@@ -195,23 +213,8 @@ impl Desk {
                 None
             }
             BusRequest::Configure(_) | BusRequest::Test { .. } | BusRequest::StopTest => {
-                let of_line = |command: &Command| match command {
-                    Command::Configure(settings) => settings.id == line,
-                    Command::Test(tested, _) | Command::StopTest(tested) => *tested == line,
-                    Command::Write { .. }
-                    | Command::Alarm(_)
-                    | Command::Refresh(_)
-                    | Command::Connect(..)
-                    | Command::SaveSettings(_)
-                    | Command::ReadSets
-                    | Command::SaveSet { .. }
-                    | Command::Restore(_)
-                    | Command::StopRestore(_)
-                    | Command::HandOver
-                    | Command::TakeOver => false,
-                };
-                self.orders.iter_mut().find(|status| of_line(&status.command))?.outcome = busy;
-                None
+                let id = self.of_line(line, request)?;
+                self.close(id, busy, board)
             }
         }
     }
@@ -227,6 +230,23 @@ impl Desk {
         let ids: Vec<OrderId> = self.orders.iter().filter(|status| late(status)).map(|status| status.id).collect();
         self.writes.retain(|write| !ids.contains(&write.1));
         ids.into_iter().filter_map(|id| self.close(id, Outcome::Failed(Fault::Timeout), board)).collect()
+    }
+
+    /// The station ends: nobody can answer for what is still under way.
+    pub fn stop(&mut self, board: &Board) -> Vec<ActionRecord> {
+        self.writes.clear();
+        let pending = self.orders.iter().rev().filter(|status| status.outcome == Outcome::Pending);
+        let ids: Vec<OrderId> = pending.map(|status| status.id).collect();
+        let stopped = || Outcome::NotConfirmed(NotConfirmed::StationStopped);
+        ids.into_iter().filter_map(|id| self.close(id, stopped(), board)).collect()
+    }
+
+    /// The record that a write is about to be sent: whatever ends the station then, it was tried.
+    pub fn intent(&self, request: &BusRequest, board: &Board) -> Option<ActionRecord> {
+        let BusRequest::Write { id, .. } = request else { return None };
+        let order = self.writes.iter().find(|write| write.0 == *id)?.1;
+        let status = self.orders.iter().find(|status| status.id == order)?;
+        Some(ActionRecord { action: ORDER.into(), outcome: "ordered".into(), ..record(&self.def, status, board) })
     }
 
     /// Refuses a write over a value that its operator has not seen. A stop is right whatever stood there.

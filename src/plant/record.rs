@@ -166,9 +166,13 @@ pub struct ActionRecord {
     pub seal: Option<Seal>,
 }
 
+/// The word on record for a write that is about to be sent; its outcome has a line of its own.
+pub const ORDER: &str = "order";
+
 /// Deeds that are not at the plant but about people, terminals and the station: for the book and the list of a Supervisor,
-/// not for shift reports and curves.
-pub const ELSEWHERE: [&str; 24] = [
+/// not for shift reports and curves. So it is with the intent of a write, whose outcome is there already.
+pub const ELSEWHERE: [&str; 25] = [
+    ORDER,
     "attach",
     "detach",
     "login",

@@ -209,6 +209,23 @@ impl Plant {
         effects
     }
 
+    /// A line has taken a request.
+    pub fn on_delivered(&mut self, line: LineId, request: &BusRequest) -> Effects {
+        let action = self.desk.delivered(line, request, &self.board);
+        Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
+    }
+
+    /// The record that a write is about to be sent; none for other requests.
+    pub fn intent(&self, request: &BusRequest) -> Option<ActionRecord> {
+        self.desk.intent(request, &self.board)
+    }
+
+    /// The station ends, and with it all that is under way.
+    pub fn on_stop(&mut self) -> Effects {
+        let ended = self.desk.stop(&self.board);
+        Effects { records: ended.into_iter().map(Record::Action).collect(), ..Effects::default() }
+    }
+
     /// The queue to a line was full: the request was not sent.
     pub fn on_undeliverable(&mut self, line: LineId, request: &BusRequest) -> Effects {
         let action = match self.restore_not_read(request) {

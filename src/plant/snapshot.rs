@@ -163,7 +163,7 @@ impl Snapshot {
     /// The order to acknowledge all that waits here, as it is seen; `None` if nothing does.
     pub fn acknowledge_all(&self) -> Option<Command> {
         let waits = self.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement());
-        let seen: Arc<[_]> = waits.map(|alarm| (alarm.id, alarm.raised_at)).collect();
+        let seen: Arc<[_]> = waits.map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
         (!seen.is_empty()).then_some(Command::Alarm(AlarmCommand::AcknowledgeAll { seen }))
     }
     /// The alarms of a tag, most urgent first.
@@ -235,8 +235,10 @@ pub struct ActiveAlarm {
     pub id: AlarmId,
     /// Unacknowledged, acknowledged, returned, latched; never one of those that are put aside.
     pub state: AlarmState,
-    /// When it was raised; with the id it names this activation, see [`super::alarm::AlarmCommand::Acknowledge`].
+    /// When it was raised.
     pub raised_at: Timestamp,
+    /// When an operator was last told of it; names what he saw, see [`super::alarm::AlarmCommand::Acknowledge`].
+    pub annunciated_at: Timestamp,
     /// When it returned to normal, if it did.
     pub returned_at: Option<Timestamp>,
     /// The value that raised it.
@@ -253,11 +255,12 @@ impl ActiveAlarm {
     /// An alarm without value, deeds and burst.
     pub fn new(id: AlarmId, state: AlarmState, raised_at: Timestamp) -> ActiveAlarm {
         let (returned_at, value, acknowledged, times, burst) = (None, None, None, 1, None);
-        ActiveAlarm { id, state, raised_at, returned_at, value, acknowledged, times, burst }
+        let annunciated_at = raised_at;
+        ActiveAlarm { id, state, raised_at, annunciated_at, returned_at, value, acknowledged, times, burst }
     }
     /// The order to acknowledge it, as it is seen here.
     pub fn acknowledge(&self) -> Command {
-        Command::Alarm(AlarmCommand::Acknowledge { alarm: self.id, seen: self.raised_at })
+        Command::Alarm(AlarmCommand::Acknowledge { alarm: self.id, seen: self.annunciated_at })
     }
 }
 

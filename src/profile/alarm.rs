@@ -17,6 +17,9 @@ const SHELVE_MAX: Duration = Duration::from_secs(7 * 86_400);
 /// A time on the shelf that is too short to be of use.
 const SHELVE_MIN: Duration = Duration::from_secs(60);
 
+/// The name of the alarm that every device has.
+const NO_VALUES: &str = "gives no values";
+
 /// The alarms of a plant file, and one for each device that does not have its own "gives no values".
 pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Problems) -> Vec<AlarmDef> {
     let mut alarms = Vec::new();
@@ -33,6 +36,7 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
             alarm.subject == Subject::Device(device.id) && alarm.condition == Condition::NotAnswering
         };
         if !alarms.iter().any(own) {
+            check_generated(tables, device, problems);
             alarms.push(not_answering(AlarmId(alarms.len() as u16), device));
         }
     }
@@ -50,6 +54,18 @@ fn check_names(tables: &[At<AlarmTable>], problems: &mut Problems) {
         };
         let message = format!("duplicate alarm `{}` of {}", text.value, subject.value);
         seen.insert(&format!("{}\n{}", subject.value, text.value), text.at, message, problems);
+    }
+}
+
+/// The same where the other one is not in the file: the alarm that every device has.
+fn check_generated(tables: &[At<AlarmTable>], device: &DeviceDef, problems: &mut Problems) {
+    for table in tables.iter().map(|table| &table.value) {
+        let subject = table.tag.as_ref().or(table.device.as_ref()).or(table.line.as_ref());
+        let same = subject.is_some_and(|subject| subject.value == device.name);
+        if let Some(text) = table.text.as_ref().filter(|text| same && text.value == NO_VALUES) {
+            let problem = problems.add(text.at, format!("duplicate alarm `{NO_VALUES}` of {}", device.name));
+            problem.label("the device has one of this name of its own: expected another text");
+        }
     }
 }
 
@@ -143,6 +159,6 @@ fn not_answering(id: AlarmId, device: &DeviceDef) -> AlarmDef {
             action: "look at the device itself; then at supply, cable, terminator and the Bus tab".to_owned(),
             respond: Some(Duration::from_secs(600)),
         },
-        ..AlarmDef::new(id, Subject::Device(device.id), Condition::NotAnswering, "gives no values")
+        ..AlarmDef::new(id, Subject::Device(device.id), Condition::NotAnswering, NO_VALUES)
     }
 }

@@ -439,6 +439,8 @@ fn an_alarm_that_could_never_come_or_never_go_is_refused() {
 fn two_alarms_of_one_name_would_share_their_state_and_are_refused() {
     let second = "[[alarm]]\ntag = \"D1.T\"\nlow = 5.0\ndeadband = 1.0\npriority = \"low\"\ntext = \"hot\"\n[mimic]";
     check("[mimic]", second, &["[small.toml:36:8]", "duplicate alarm `hot` of D1.T", "first here"]);
+    let own = "[[alarm]]\ndevice = \"D1\"\nne107 = \"F\"\npriority = \"low\"\ntext = \"gives no values\"\n[mimic]";
+    check("[mimic]", own, &["duplicate alarm `gives no values` of D1", "expected another text"]);
 }
 
 #[test]

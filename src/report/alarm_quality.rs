@@ -22,7 +22,7 @@ pub struct Row {
     pub target: String,
     /// `at most 300`; empty if there is none.
     pub limit: String,
-    /// `good`, `beyond target`, `over limit` or `too few` to judge.
+    /// `good`, `beyond target`, `over limit` or `too few` or `watched < 1 h` to judge.
     pub verdict: &'static str,
     /// Decimals to print.
     #[serde(skip)]
@@ -53,6 +53,8 @@ pub struct Quality {
     pub from: String,
     /// Up to when there are figures, with the plant's offset.
     pub until: String,
+    /// Seconds of it in which a station ran: what the rates are of.
+    pub watched_s: u64,
     /// Activations.
     pub raised: u64,
     /// Figures against targets and limits.
@@ -68,6 +70,7 @@ pub fn quality(figures: &Figures, def: &PlantDef, period: &Period) -> Quality {
         period: period.name.clone(),
         from: iso(&def.time_zone, figures.from),
         until: iso(&def.time_zone, figures.until),
+        watched_s: figures.watched.as_secs(),
         raised: figures.annunciated(),
         figures: rows(figures),
         alarms: culprits(figures),
@@ -98,7 +101,7 @@ pub fn quality_text(figures: &Figures, def: &PlantDef, period: &Period) -> Strin
     let all = quality(figures, def, period);
     let mut lines = vec![
         format!("{}, alarms of {}", def.title, all.period),
-        format!("{} to {}: {} alarms", all.from, all.until, all.raised),
+        format!("{} to {}: {} alarms{}", all.from, all.until, all.raised, gaps(figures)),
         String::new(),
         format!("{:35} {:>7}  {:12}  {:12}  {}", "measure", "figure", "target", "limit", "verdict"),
     ];
@@ -116,6 +119,16 @@ pub fn quality_text(figures: &Figures, def: &PlantDef, period: &Period) -> Strin
     lines.push(String::new());
     lines.push("targets and limits: ISA-18.2 for one operator, meant for 30 days or more".into());
     lines.join("\n")
+}
+
+/// How much of the span was watched, if not all of it.
+fn gaps(figures: &Figures) -> String {
+    let (watched, whole) = (figures.watched.as_secs(), figures.until.duration_since(figures.from).as_secs());
+    let minutes = watched / 60;
+    match i64::try_from(watched).is_ok_and(|watched| watched < whole) {
+        true => format!("; a station ran for {} h {:02} min", minutes / 60, minutes % 60),
+        false => String::new(),
+    }
 }
 
 fn row(goal: &Goal, figures: &Figures) -> Row {
@@ -158,6 +171,7 @@ pub(super) mod tests {
             until: at("2026-11-21T14:00+07"),
             by_priority: [0, 6, 3, 15],
             windows: 48,
+            watched: Duration::from_secs(8 * 3_600),
             windows_over: 1,
             most: 12,
             flood: Duration::from_secs(600),
@@ -205,9 +219,12 @@ chattering         TIC-1.PV  temperature high
 
 targets and limits: ISA-18.2 for one operator, meant for 30 days or more";
         assert_eq!(text, expect);
+        let short = Figures { watched: std::time::Duration::from_secs(5_460), ..figures() };
+        let short = quality_text(&short, &plant("Asia/Bangkok", &THREE), &period);
+        assert!(short.contains(": 24 alarms; a station ran for 1 h 31 min\n"), "{short}");
         let none = quality_text(&Figures::default(), &plant("Asia/Bangkok", &THREE), &period);
         assert!(
-            none.contains("alarms a day                              —  at most 150   at most 300   too few"),
+            none.contains("alarms a day                              —  at most 150   at most 300   watched < 1 h"),
             "{none}"
         );
     }

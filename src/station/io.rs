@@ -35,6 +35,7 @@ use super::{
     plant_task::{KEPT_FOR_STOPS, Keeping, PlantTask},
     session::Session,
     sets,
+    steps::Steps,
 };
 
 /// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
@@ -116,14 +117,16 @@ fn begin(
     let history = history::start(&path, def.clone(), clock)?;
     let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
     plant.restore(&history.restored);
-    plant.remeasure(&history.recent.active, &history.recent.steps, clock.now());
+    let recent = &history.recent;
+    plant.remeasure(&recent.active, &recent.steps, &recent.watched, clock.now());
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
     let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the book: {error}"));
     let book = book::start(&book::beside(&path), clock, records.clone()).map_err(no_thread)?;
     let mut deeds = Deeds::new(&book);
     let users = guarded.as_ref().and_then(|(gate, _)| gate.people_digest());
     deeds.started(&def.name, file.as_ref(), users, clock.now());
-    let keeping = Keeping { records: Some(records), store, book: Some(deeds), sets: Some(sets), listener };
+    let steps = Some(Steps::new(history.settled.clone()));
+    let keeping = Keeping { records: Some(records), store, steps, book: Some(deeds), sets: Some(sets), listener };
     let threads = Threads { queries, history: Some(history), book: Some(book.join) };
     Ok(assemble(def, clock, connectors, plant, file, keeping, threads, guarded))
 }
@@ -134,7 +137,7 @@ pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, li
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
-    let keeping = Keeping { records: None, store, book: None, sets: None, listener: Some(listener) };
+    let keeping = Keeping { records: None, store, steps: None, book: None, sets: None, listener: Some(listener) };
     let threads = Threads { queries, history: None, book: None };
     assemble(def, clock, connectors, plant, None, keeping, threads, None)
 }

@@ -11,9 +11,11 @@ use tokio::{
 use super::{
     deeds::{self, Deeds, Paper},
     sets,
+    steps::Steps,
 };
 use crate::{
     bus::io::clock::Clock,
+    history::io::writer::by_operators,
     plant::{
         Effects, Plant, SetWork, Snapshot,
         command::{BusRequest, Order, OrderId},
@@ -41,6 +43,8 @@ const TICK_MIN: Duration = Duration::from_millis(20);
 pub(super) struct Keeping {
     pub records: Option<mpsc::Sender<Vec<Record>>>,
     pub store: watch::Receiver<HistoryStatus>,
+    /// What operators do with alarms is stored before it is shown as done.
+    pub steps: Option<Steps>,
     /// Deeds go there first.
     pub book: Option<Deeds>,
     /// The folder of parameter sets.
@@ -121,8 +125,9 @@ impl PlantTask {
         // Changed since the last snapshot, and when the next one may go out.
         let (mut changed, mut next) = (false, Instant::now());
         loop {
-            // What a snapshot shows as done is in the book.
+            // What a snapshot shows as done is in the book, and in the store if a restart takes it from there.
             let due = self.keeping.book.as_ref().map_or(next, |book| book.due(next));
+            let due = self.keeping.steps.as_ref().map_or(due, |steps| steps.due(due));
             tokio::select! {
                 biased;
                 () = tokio::time::sleep_until(due), if changed => {
@@ -185,6 +190,8 @@ impl PlantTask {
                 Err(_) => tracing::error!("the folder of the parameter sets does not answer: left behind"),
             }
         }
+        let ended = self.plant.on_stop();
+        self.keep(ended.records);
         let stopped = deeds::stopped(&self.plant.def().name, self.clock.now());
         if let Some(book) = &mut self.keeping.book {
             book.tell_all();
@@ -221,6 +228,9 @@ impl PlantTask {
     }
 
     fn carry_out(&mut self, effects: Effects) {
+        // Written down before it is sent: a station that is killed in between leaves a trace.
+        let intents = effects.bus.iter().filter_map(|(_, request)| self.plant.intent(request)).collect();
+        self.write_down(intents);
         for (line, request) in effects.bus {
             self.send(line, request);
         }
@@ -303,17 +313,18 @@ impl PlantTask {
     }
 
     fn send(&mut self, line: LineId, request: BusRequest) {
-        let link = &self.links[line.index()];
+        let link = self.links[line.index()].clone();
         let is_stop = matches!(request, BusRequest::Write { urgent: true, .. });
-        let refused = if is_stop || KEPT_FOR_STOPS < link.capacity() {
-            link.try_send(request).err().map(mpsc::error::TrySendError::into_inner)
-        } else {
-            Some(request)
+        let place = if is_stop || KEPT_FOR_STOPS < link.capacity() { link.try_reserve().ok() } else { None };
+        let effects = match place {
+            Some(place) => {
+                let effects = self.plant.on_delivered(line, &request);
+                place.send(request);
+                effects
+            }
+            None => self.plant.on_undeliverable(line, &request),
         };
-        if let Some(refused) = refused {
-            let effects = self.plant.on_undeliverable(line, &refused);
-            self.keep(effects.records);
-        }
+        self.keep(effects.records);
     }
 
     fn keep(&mut self, records: Vec<Record>) {
@@ -348,9 +359,14 @@ impl PlantTask {
 
     fn store(&mut self, records: Vec<Record>) {
         let Some(store) = self.keeping.records.as_ref().filter(|_| !records.is_empty()) else { return };
-        if let Err(refused) = store.try_send(records) {
-            self.lost += refused.into_inner().len() as u64;
-            self.hear_store();
+        let steps = by_operators(&records);
+        match (store.try_send(records), &mut self.keeping.steps) {
+            (Ok(()), Some(waits)) => waits.sent(steps),
+            (Ok(()), None) => {}
+            (Err(refused), _) => {
+                self.lost += refused.into_inner().len() as u64;
+                self.hear_store();
+            }
         }
     }
 

@@ -322,9 +322,9 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
         Outcome::Refused(why) => (format!("REFUSED: {why}"), true),
         Outcome::NotConfirmed(NotConfirmed::NoReadBack) => ("accepted (cannot be read back)".to_owned(), false),
         Outcome::NotConfirmed(NotConfirmed::Partly(how)) => (format!("STOPPED: {how}"), true),
-        Outcome::NotConfirmed(why @ (NotConfirmed::Different(_) | NotConfirmed::NotRead(_))) => {
-            (format!("NOT CONFIRMED: {why}"), true)
-        }
+        Outcome::NotConfirmed(
+            why @ (NotConfirmed::Different(_) | NotConfirmed::NotRead(_) | NotConfirmed::StationStopped),
+        ) => (format!("NOT CONFIRMED: {why}"), true),
         Outcome::Failed(fault) => (format!("FAILED, may have taken effect: {fault}"), true),
     }
 }

@@ -191,7 +191,7 @@ async fn whatever_a_terminal_was_told_is_in_the_book_of_a_station_that_is_killed
         assert_eq!(all.len() as u64, whole.entries, "round {round}");
         let lived = &all[before..];
         for note in &told.writes {
-            let line = lived.iter().find(|line| line.note.as_deref() == Some(note));
+            let line = lived.iter().find(|line| &*line.action == "write" && line.note.as_deref() == Some(note));
             assert!(
                 line.is_some_and(|line| &*line.outcome == "verified"),
                 "round {round}: `{note}` is not in the book: {line:?}"

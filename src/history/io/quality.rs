@@ -29,6 +29,8 @@ pub struct Recent {
     pub active: Vec<AlarmRecord>,
     /// The steps of the last day, oldest first.
     pub steps: Vec<AlarmRecord>,
+    /// The windows of the last day in which a station ran, see [`Meter::watched`].
+    pub watched: Vec<i64>,
 }
 
 impl Store {
@@ -39,7 +41,8 @@ impl Store {
         check_span(from, until)?;
         let known = from.checked_sub(LEAD).unwrap_or(Timestamp::MIN);
         let mut meter = Meter::of_period(from, until);
-        self.active_at(known)?.iter().for_each(|step| meter.already(step));
+        self.standing_at(known)?.iter().for_each(|step| meter.already(step));
+        self.watched(from, until)?.into_iter().for_each(|window| meter.watched(window));
         let (first, last) = self.extent().unwrap_or((until, known));
         let (mut next, mut rows) = (known.max(first), 0);
         let end = until.min(last.checked_add(std::time::Duration::from_micros(1)).unwrap_or(last));
@@ -60,10 +63,21 @@ impl Store {
         if now <= since {
             return Ok(Recent::default());
         }
-        Ok(Recent { active: self.active_at(since)?, steps: self.steps(since, now)? })
+        let (active, steps) = (self.standing_at(since)?, self.steps(since, now)?);
+        Ok(Recent { active, steps, watched: self.watched(since, now)? })
     }
 
-    /// The raising steps of the alarms that were active at an instant.
+    /// The windows in which anything was stored.
+    fn watched(&self, from: Timestamp, to: Timestamp) -> Result<Vec<i64>, HistoryError> {
+        self.whole_list(sql::WATCHED, params![utc(from), utc(to), ROWS_MAX + 1], |row| row.get(0))
+    }
+
+    /// The raising steps of the alarms that were active at an instant and not put aside: what is aside is not stale.
+    fn standing_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
+        self.whole_list(&sql::standing_at(), params![utc(at), ROWS_MAX + 1], alarm)
+    }
+
+    /// The raising steps of the alarms that were active at an instant, also of those that were put aside.
     pub(super) fn active_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
         self.whole_list(&sql::active_at(), params![utc(at), ROWS_MAX + 1], alarm)
     }

@@ -30,6 +30,8 @@ pub const ROWS_MAX: u64 = 200_000;
 /// Stored samples behind the curves of one answer (measured: ten million take about three seconds,
 /// in which no commit is made).
 pub const SAMPLES_MAX: u64 = 10_000_000;
+/// The same behind one report, which reads each of them once more for the record: years of a small plant.
+pub const REPORTED_MAX: u64 = 20_000_000;
 /// Stored samples in memory at a time: those of one tag in this span.
 pub(super) const CHUNK: Duration = Duration::from_secs(86_400);
 
@@ -76,11 +78,7 @@ impl Store {
 
     fn curves(&self, tags: &[TagId], span: series::Span, buckets: usize) -> Result<Vec<Series>, HistoryError> {
         check_span(span.from, span.to)?;
-        let mut rows = 0;
-        for tag in tags {
-            rows += self.count(*tag, span.from, span.to)?;
-        }
-        within(rows, SAMPLES_MAX)?;
+        self.bounded(tags, span.from, span.to, SAMPLES_MAX)?;
         let curve = |tag: &TagId| {
             let samples = self.samples(*tag, span.from, span.to)?;
             sound(samples, |samples| series::series(*tag, samples, span, buckets))
@@ -92,6 +90,7 @@ impl Store {
     pub fn report(&self, period: &Period, now: Timestamp) -> Result<ShiftReport, HistoryError> {
         let (from, until) = (period.from, period.to.min(now));
         check_span(from, until)?;
+        self.bounded(&self.reported_tags(), from, until, REPORTED_MAX)?;
         let active = self.active_at(from)?;
         let span = params![utc(from), utc(until), ROWS_MAX + 1];
         let alarms = self.steps(from, until)?;
@@ -167,6 +166,12 @@ impl Store {
         });
         let off = self.ended.map(|at| Sample::bad(Cause::StationOff, at));
         Ok(Samples { store: self, id: self.id(tag), next, end, rows: Vec::new().into_iter(), off })
+    }
+
+    /// Refuses what would keep the thread, and with it every commit, for too long.
+    pub(super) fn bounded(&self, tags: &[TagId], from: Timestamp, to: Timestamp, max: u64) -> Result<(), HistoryError> {
+        let rows = tags.iter().map(|tag| self.count(*tag, from, to)).sum::<Result<u64, _>>()?;
+        within(rows, max)
     }
 
     fn count(&self, tag: TagId, from: Timestamp, to: Timestamp) -> Result<u64, HistoryError> {

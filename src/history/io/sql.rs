@@ -92,6 +92,13 @@ pub const COUNT_SAMPLES: &str = "SELECT count(*) FROM sample WHERE tag = ? AND u
 pub const LATEST_GOOD: &str =
     "SELECT arg_max(value, utc) FROM sample WHERE tag = ? AND utc >= ? AND utc < ? AND quality = 0";
 
+/// The windows of ten minutes, by their number since 1970, in which anything was stored: in these a station ran.
+pub const WATCHED: &str = "SELECT DISTINCT epoch_us(utc) // 600000000 FROM (
+        SELECT utc FROM sample WHERE utc >= $1 AND utc < $2
+        UNION ALL SELECT utc FROM alarm_journal WHERE utc >= $1 AND utc < $2
+        UNION ALL SELECT utc - INTERVAL 1 MINUTE FROM line_minute WHERE utc >= $1 AND utc < $2)
+    ORDER BY 1 LIMIT $3";
+
 /// Steps of alarms in a span, newest first.
 pub fn journal_newest() -> String {
     let step = STEP_COLUMNS.join(", ");
@@ -113,6 +120,19 @@ pub fn active_at() -> String {
             WHERE utc < ? AND step IN ('raised', 'raised quietly', 'returned', 'returned quietly')
             QUALIFY row_number() OVER (PARTITION BY subject, text ORDER BY utc DESC, rowid DESC) = 1)
          WHERE step IN ('raised', 'raised quietly') ORDER BY utc, place LIMIT ?"
+    )
+}
+
+/// The raising steps of the alarms that stood before the operator at an instant: active, and not put aside since.
+pub fn standing_at() -> String {
+    let step = STEP_COLUMNS.join(", ");
+    format!(
+        "SELECT {step} FROM (
+            SELECT *, rowid AS place FROM alarm_journal
+            WHERE utc < ? AND step IN ('raised', 'raised quietly', 'returned', 'returned quietly', 'shelved',
+                'suppressed', 'out of service')
+            QUALIFY row_number() OVER (PARTITION BY subject, text ORDER BY utc DESC, rowid DESC) = 1)
+         WHERE step = 'raised' ORDER BY utc, place LIMIT ?"
     )
 }
 

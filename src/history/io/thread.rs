@@ -34,6 +34,8 @@ pub struct Handle {
     pub queries: mpsc::Sender<Query>,
     /// How the store stands, after every commit.
     pub status: watch::Receiver<HistoryStatus>,
+    /// Steps of alarms by operators that are committed; told before `status` is.
+    pub settled: watch::Receiver<u64>,
     /// The alarm steps that the plant restores at its start.
     pub restored: Vec<AlarmRecord>,
     /// What the quality meter of the alarms must know of the last day.
@@ -45,8 +47,8 @@ pub struct Handle {
 impl Handle {
     /// Drops this end and waits until everything is stored. Blocks for as long as other senders of records exist.
     pub fn stop(self) {
-        let Handle { records, queries, status, restored: _, recent: _, join } = self;
-        drop((records, queries, status));
+        let Handle { records, queries, status, settled, restored: _, recent: _, join } = self;
+        drop((records, queries, status, settled));
         // A panic of the thread has already been reported by the panic hook.
         let _ = join.join();
     }
@@ -64,12 +66,27 @@ pub fn start(path: &Path, def: Arc<PlantDef>, clock: Clock) -> Result<Handle, Hi
     let (records, records_in) = mpsc::channel(RECORDS_MAX);
     let (queries, queries_in) = mpsc::channel(QUERIES_MAX);
     let (status_out, status) = watch::channel(writer.status().clone());
+    let (settled_out, settled) = watch::channel(0);
+    let tell = Tell { settled: settled_out, status: status_out };
     let trouble = |error: std::io::Error| HistoryError::Engine(format!("thread: {error}"));
     // A runtime of its own only to wait for two queues and a tick at once; nothing else ever runs on it.
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().map_err(trouble)?;
-    let work = move || runtime.block_on(run(writer, clock, records_in, queries_in, status_out));
+    let work = move || runtime.block_on(run(writer, clock, records_in, queries_in, tell));
     let join = std::thread::Builder::new().name("history".into()).spawn(work).map_err(trouble)?;
-    Ok(Handle { records, queries, status, restored, recent, join })
+    Ok(Handle { records, queries, status, settled, restored, recent, join })
+}
+
+/// Where the thread tells how it stands.
+struct Tell {
+    settled: watch::Sender<u64>,
+    status: watch::Sender<HistoryStatus>,
+}
+
+impl Tell {
+    fn tell(&self, writer: &Writer) {
+        self.settled.send_replace(writer.settled());
+        self.status.send_replace(writer.status().clone());
+    }
 }
 
 async fn run(
@@ -77,7 +94,7 @@ async fn run(
     clock: Clock,
     mut records: mpsc::Receiver<Vec<Record>>,
     mut queries: mpsc::Receiver<Query>,
-    status: watch::Sender<HistoryStatus>,
+    tell: Tell,
 ) {
     let mut tick = tokio::time::interval(COMMIT_EVERY);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -87,12 +104,15 @@ async fn run(
             biased;
             _ = tick.tick() => {
                 writer.commit(clock.now());
-                status.send_replace(writer.status().clone());
+                tell.tell(&writer);
             }
-            batch = records.recv() => match batch {
-                Some(batch) => writer.accept(batch),
-                None => break,
-            },
+            batch = records.recv() => {
+                let Some(batch) = batch else { break };
+                if writer.accept(batch) {
+                    writer.commit(clock.now());
+                    tell.tell(&writer);
+                }
+            }
             Some(query) = queries.recv() => reply(&mut writer, query, &clock),
         }
     }
@@ -100,7 +120,7 @@ async fn run(
         reply(&mut writer, query, &clock);
     }
     writer.finish(clock.now());
-    status.send_replace(writer.status().clone());
+    tell.tell(&writer);
 }
 
 fn reply(writer: &mut Writer, query: Query, clock: &Clock) {

@@ -31,6 +31,9 @@ pub struct Writer {
     path: PathBuf,
     def: Arc<PlantDef>,
     pending: Vec<Record>,
+    /// Steps of alarms by operators: taken so far, and how many of them are settled, see [`Writer::settled`].
+    steps: u64,
+    settled: u64,
     status: HistoryStatus,
     /// What was wrong at the last open; stays until the station ends.
     opened_with: Option<String>,
@@ -54,6 +57,8 @@ impl Writer {
             path,
             def,
             pending: Vec::new(),
+            steps: 0,
+            settled: 0,
             status: HistoryStatus::default(),
             opened_with: trouble.or(clock),
             failing: None,
@@ -80,14 +85,23 @@ impl Writer {
         self.store()?.recent(now)
     }
 
-    /// Takes records to be stored with the next commit.
-    pub fn accept(&mut self, records: Vec<Record>) {
+    /// Steps of alarms by operators that nobody need wait for any more: committed, or lost and counted as such.
+    pub fn settled(&self) -> u64 {
+        self.settled
+    }
+
+    /// Takes records to be stored with the next commit. `true` if that should be now: an operator has done something with an
+    /// alarm, and no loss of power is to undo what he was told.
+    pub fn accept(&mut self, records: Vec<Record>) -> bool {
+        let steps = by_operators(&records);
+        self.steps += steps;
         self.pending.extend(records);
         let lost = shed(&mut self.pending, PENDING_MAX);
         if lost > 0 {
             self.status.lost += lost;
             self.describe();
         }
+        steps > 0
     }
 
     /// Stores what is pending, all or nothing; what could not be stored stays pending. Called once a second.
@@ -105,6 +119,7 @@ impl Writer {
                     tracing::debug!(rows = self.pending.len(), total = self.status.rows, "committed");
                     self.pending.clear();
                 }
+                self.settled = self.steps;
                 self.failures = 0;
                 self.failing = None;
                 if self.commits.is_multiple_of(CHECKPOINT_EVERY) {
@@ -200,6 +215,12 @@ fn shed(pending: &mut Vec<Record>, max: usize) -> u64 {
     });
     pending.drain(..excess);
     lost
+}
+
+/// Steps of alarms that an operator has made.
+pub fn by_operators(records: &[Record]) -> u64 {
+    let step = |record: &&Record| matches!(record, Record::Alarm(step) if step.by.is_some());
+    records.iter().filter(step).count() as u64
 }
 
 fn is_fatal(error: &HistoryError) -> bool {

@@ -18,6 +18,10 @@ use crate::plant::{
     record::{AlarmRecord, AlarmStep, Burst},
 };
 
+/// A suppressed alarm whose enabling has been unknown for so long comes back: one that cannot be told any more must not keep
+/// an alarm away for ever, and a lost frame or a restart must not bring all of them back at once.
+const UNKNOWN_MAX: Duration = Duration::from_secs(60);
+
 /// The machines of all alarms, by [`AlarmId`].
 #[derive(Debug, Clone)]
 pub struct Book {
@@ -25,6 +29,8 @@ pub struct Book {
     pub(super) machines: Vec<Machine>,
     /// What conditions that look back remember, by [`AlarmId`].
     memories: Vec<Memory>,
+    /// Since when it is unknown whether an alarm is enabled, on the book's own clock, by [`AlarmId`].
+    unknown: Vec<Option<Duration>>,
     /// The book's own clock: what has passed while it was judged. It never goes back, whatever the station's clock does.
     ran: Duration,
     judged_at: Option<Timestamp>,
@@ -43,6 +49,7 @@ impl Book {
         Book {
             machines: vec![Machine::default(); def.alarms.len()],
             memories: vec![Memory::default(); def.alarms.len()],
+            unknown: vec![None; def.alarms.len()],
             def,
             ran: Duration::ZERO,
             judged_at: None,
@@ -106,7 +113,9 @@ impl Book {
 
     fn judge_condition(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
         let (machine, memory) = (&mut self.machines[alarm.id.index()], &mut self.memories[alarm.id.index()]);
-        let begins_anew = is_disabled(alarm, facts) && alarm.condition.looks_back();
+        // What is not known to be enabled again is still not judged by what it remembers.
+        let disabled = is_disabled(alarm, facts) || machine.suppressed().is_some() && facts.enabled != Some(true);
+        let begins_anew = disabled && alarm.condition.looks_back();
         let returned = is_disabled(alarm, facts) && machine.suppressed().is_none();
         let step = if begins_anew {
             // What looks back starts when the alarm is enabled: a value may stand still while nothing is heated.
@@ -123,7 +132,7 @@ impl Book {
 
     /// What is over by itself: the time on the shelf, the suppression.
     fn bring_back(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
-        if self.machine(alarm.id).suppressed().is_some() && facts.enabled != Some(false) {
+        if self.machine(alarm.id).suppressed().is_some() && self.is_released(alarm, facts) {
             records.push(self.step(alarm, AlarmStep::Released, at, facts.value));
             let machine = &mut self.machines[alarm.id.index()];
             let waits = machine.is_active() && !machine.state().is_aside() && alarm.on_delay != Duration::ZERO;
@@ -142,6 +151,26 @@ impl Book {
             let (by, reason) = (shelving.deed.by.clone(), shelving.deed.reason.clone());
             let record = self.record(alarm, AlarmStep::Shelved, at, facts.value);
             records.push(self.take(alarm.id, AlarmRecord { by, reason, until: Some(until), ..record }));
+        }
+    }
+
+    /// Is it over with the suppression? Unknown releases nothing, unless it lasts.
+    fn is_released(&mut self, alarm: &AlarmDef, facts: Facts) -> bool {
+        let unknown = &mut self.unknown[alarm.id.index()];
+        match (&alarm.enabled_when, facts.enabled) {
+            // The plant file was changed: nothing enables it any more.
+            (None, _) => true,
+            (Some(_), Some(enabled)) => {
+                *unknown = None;
+                enabled
+            }
+            (Some(_), None) => {
+                let lasts = self.ran.saturating_sub(*unknown.get_or_insert(self.ran));
+                if UNKNOWN_MAX <= lasts {
+                    *unknown = None;
+                }
+                UNKNOWN_MAX <= lasts
+            }
         }
     }
 

@@ -22,12 +22,12 @@ pub enum AlarmCommand {
     Acknowledge {
         /// Which.
         alarm: AlarmId,
-        /// When the activation that was seen was raised; a later one stays unacknowledged.
+        /// When what was seen was annunciated; what was raised or reminded of later stays unacknowledged.
         seen: Timestamp,
     },
     /// Acknowledge all of these, as they were seen.
     AcknowledgeAll {
-        /// Which, and when the activation that was seen was raised.
+        /// Which, and when what was seen was annunciated.
         seen: Arc<[(AlarmId, Timestamp)]>,
     },
     /// End the sound of what sounds now.
@@ -111,7 +111,7 @@ impl Book {
         if !machine.state().needs_acknowledgement() {
             return Err(AlarmRefusal::NothingToAcknowledge);
         }
-        if machine.raised_at.is_some_and(|raised| raised != seen) {
+        if machine.annunciated_at.is_some_and(|annunciated| annunciated != seen) {
             return Err(AlarmRefusal::RaisedSince);
         }
         let note = note.filter(|note| !note.trim().is_empty());

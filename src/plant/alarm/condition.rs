@@ -31,6 +31,9 @@ pub struct Memory {
     lasted: Duration,
     /// When it was last asked.
     asked: Option<Duration>,
+    /// Since when it remembers, and whether it has seen a change since.
+    since: Option<Duration>,
+    changed: bool,
 }
 
 impl Memory {
@@ -65,6 +68,7 @@ impl Memory {
         if self.from.is_some_and(|from| (value - from).abs() <= deadband) {
             self.lasted += passed;
         } else {
+            self.changed |= self.from.is_some();
             (self.from, self.lasted) = (Some(value), Duration::ZERO);
         }
         self.lasted
@@ -112,7 +116,9 @@ pub fn holds(condition: Condition, facts: Facts, active: bool, memory: &mut Memo
         }
         Condition::NoChange { lasts, deadband } => {
             let passed = passed(memory);
-            facts.value.map(|value| lasts <= memory.unchanged(value, passed, deadband))
+            let stuck = lasts <= memory.unchanged(facts.value?, passed, deadband);
+            // After a restart it is as stuck as it was until it has moved.
+            (stuck || !active || memory.changed).then_some(stuck)
         }
         Condition::NoUpdate { lasts } => {
             let passed = passed(memory);
@@ -124,7 +130,10 @@ pub fn holds(condition: Condition, facts: Facts, active: bool, memory: &mut Memo
             }
         }
         Condition::Changes { count, within, deadband } => {
-            facts.value.map(|value| memory.changes(value, now, count, within, deadband))
+            let busy = memory.changes(facts.value?, now, count, within, deadband);
+            // After a restart nobody can tell that it is calm before it was watched for that long.
+            let watched = within <= now.saturating_sub(*memory.since.get_or_insert(now));
+            (busy || !active || watched).then_some(busy)
         }
         Condition::NotAnswering | Condition::Health { .. } | Condition::NotConnected => facts.ill,
     }
@@ -258,6 +267,24 @@ mod tests {
         let values =
             [(0, 0.0), (1, 1.0), (5, 0.0), (8, 1.0), (11, 1.0), (12, 1.0)].map(|(at, value)| (at, Some(value)));
         assert_eq!(over_time(busy, &values), [no, no, no, yes, yes, no]);
+    }
+
+    #[test]
+    fn an_alarm_of_before_a_restart_returns_only_when_its_value_has_moved_or_was_calm_for_long_enough() {
+        let (no, yes) = (Some(false), Some(true));
+        let check = |condition, values: &[(u64, f64, Option<bool>)]| {
+            let mut memory = Memory::default();
+            for (second, value, expect) in values {
+                let facts = Facts { value: Some(*value), ..Facts::default() };
+                assert_eq!(holds(condition, facts, true, &mut memory, sec(*second)), *expect, "at {second} s");
+            }
+        };
+        let stuck = Condition::NoChange { lasts: sec(60), deadband: 0.2 };
+        check(stuck, &[(0, 20.0, None), (59, 20.1, None), (60, 20.0, yes)]);
+        check(stuck, &[(0, 20.0, None), (10, 20.5, no), (11, 20.5, no)]);
+        let busy = Condition::Changes { count: 2, within: sec(10), deadband: 0.0 };
+        check(busy, &[(0, 0.0, None), (9, 0.0, None), (10, 0.0, no)]);
+        check(busy, &[(0, 0.0, None), (1, 1.0, None), (2, 0.0, yes), (12, 0.0, no)]);
     }
 
     #[test]

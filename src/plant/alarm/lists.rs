@@ -71,11 +71,13 @@ impl Book {
 }
 
 fn shown(id: AlarmId, machine: &Machine) -> ActiveAlarm {
+    // Whatever the journal has lost, the alarm itself is not.
+    let raised_at = machine.raised_at.or(machine.returned_at).unwrap_or(Timestamp::UNIX_EPOCH);
     ActiveAlarm {
         id,
         state: machine.state(),
-        // Whatever the journal has lost, the alarm itself is not.
-        raised_at: machine.raised_at.or(machine.returned_at).unwrap_or(Timestamp::UNIX_EPOCH),
+        raised_at,
+        annunciated_at: machine.annunciated_at.unwrap_or(raised_at),
         returned_at: machine.returned_at,
         value: machine.value,
         acknowledged: machine.acknowledged.clone(),

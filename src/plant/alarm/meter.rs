@@ -50,6 +50,8 @@ pub struct Meter {
     sums: VecDeque<(i64, Sum)>,
     /// Times (from, until), in seconds, in which an alarm was stale that is not any more.
     stale: Vec<(i64, i64)>,
+    /// The numbers of the windows in which a station ran.
+    watched: BTreeSet<i64>,
     /// The latest figures of the running day.
     day: Arc<Figures>,
 }
@@ -108,8 +110,14 @@ impl Meter {
             habits: BTreeMap::new(),
             sums: VecDeque::new(),
             stale: Vec::new(),
+            watched: BTreeSet::new(),
             day: Arc::default(),
         }
+    }
+
+    /// A station ran in this window, by its number since 1970. A running meter knows of those in which it runs itself.
+    pub fn watched(&mut self, window: i64) {
+        self.watched.insert(window);
     }
 
     /// Takes up an alarm that was active before anything is counted.
@@ -172,6 +180,7 @@ impl Meter {
             self.flooded(flooded);
         }
         if self.span == Span::Running {
+            self.watched.insert(self.rate.now().div_euclid(WINDOW_S));
             self.forget();
         }
     }
@@ -281,6 +290,10 @@ impl Meter {
     /// Lets go of what is older than the running figures.
     fn forget(&mut self) {
         let first = (self.rate.now().div_euclid(HOUR_S) - (HOURS - 1)) * HOUR_S;
+        // Nearly always none goes, and then nothing is looked through.
+        while self.watched.first().is_some_and(|window| (window + 1) * WINDOW_S <= first) {
+            self.watched.pop_first();
+        }
         while self.sums.front().is_some_and(|(hour, _)| *hour < first) {
             self.sums.pop_front();
             self.stale.retain(|(_, until)| first < *until);
@@ -294,9 +307,7 @@ impl Meter {
         let mut all = Sum::default();
         self.sums.iter().for_each(|(_, sum)| all.add(sum));
         let (first, last) = (second(from), second(until));
-        // The window of the last microsecond before the end is the last one.
-        let last_window = (until.as_microsecond() - 1).div_euclid(WINDOW_S * 1_000_000);
-        let windows = last_window - first.div_euclid(WINDOW_S) + 1;
+        let (windows, watched) = self.watched_in(from, until);
         let now_stale = self.habits.values().filter_map(|habit| habit.active);
         let now_stale = now_stale.map(|since| (second(since) + STALE_S, last));
         let stale = self.stale.iter().copied().chain(now_stale);
@@ -305,7 +316,8 @@ impl Meter {
             from,
             until,
             by_priority: all.by_priority,
-            windows: u64::try_from(windows).unwrap_or(0),
+            windows,
+            watched,
             windows_over: all.windows_over,
             most: all.most,
             flood: Duration::from_secs(all.flood_s),
@@ -314,6 +326,17 @@ impl Meter {
             fleeting: all.fleeting.into_iter().collect(),
             stale: most_at_once(stale),
         }
+    }
+}
+
+impl Meter {
+    /// The windows of a span in which a station ran, and the time of the span that lies in them.
+    fn watched_in(&self, from: Timestamp, until: Timestamp) -> (u64, Duration) {
+        let (from, until, width) = (from.as_microsecond(), until.as_microsecond(), WINDOW_S * 1_000_000);
+        let inside = |window: &i64| ((window + 1) * width).min(until) - (window * width).max(from);
+        let spans = self.watched.iter().map(inside).filter(|span| 0 < *span);
+        let (windows, micros) = spans.fold((0, 0), |(windows, all), span| (windows + 1, all + span));
+        (windows, Duration::from_micros(u64::try_from(micros).unwrap_or(0)))
     }
 }
 

@@ -15,6 +15,9 @@ pub const TOP: usize = 10;
 /// Shares of fewer activations than this say nothing and are not judged.
 pub const SHARED_MIN: u64 = 20;
 
+/// Rates of less watched time than this say nothing and are not judged.
+pub const WATCHED_MIN: Duration = Duration::from_secs(3_600);
+
 /// The alarm system as it is now: the rates of this moment, and the figures of the last 24 hours.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct AlarmQuality {
@@ -28,8 +31,8 @@ pub struct AlarmQuality {
     pub day: Arc<Figures>,
 }
 
-/// The figures of a span of time. Windows are 10 minutes of the UTC clock, the empty ones included; one that lies only
-/// partly in the span counts with what is in it.
+/// The figures of a span of time. Windows are 10 minutes of the UTC clock, those without an alarm included, but not those in
+/// which no station ran; one that lies only partly in the span counts with what is in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
     /// From, inclusive.
@@ -38,8 +41,10 @@ pub struct Figures {
     pub until: Timestamp,
     /// Activations by priority, the most urgent first.
     pub by_priority: [u64; 4],
-    /// Windows that the span touches.
+    /// Windows that the span touches and in which a station ran.
     pub windows: u64,
+    /// The time of the span that lies in these windows: what rates are formed over.
+    pub watched: Duration,
     /// Windows with more than 10 activations.
     pub windows_over: u64,
     /// Activations in the worst window.
@@ -82,6 +87,7 @@ impl Default for Figures {
             until,
             by_priority: [0; 4],
             windows: 0,
+            watched: Duration::ZERO,
             windows_over: 0,
             most: 0,
             flood: Duration::ZERO,
@@ -118,6 +124,21 @@ pub enum Measure {
     Stale,
     /// Percent of the activations with this priority.
     Share(Priority),
+}
+
+impl Measure {
+    /// So much in a time.
+    fn is_rate(self) -> bool {
+        match self {
+            Measure::PerDay | Measure::PerHour | Measure::PerWindow | Measure::WindowsOver | Measure::Flood => true,
+            Measure::Most
+            | Measure::Top
+            | Measure::Chattering
+            | Measure::Fleeting
+            | Measure::Stale
+            | Measure::Share(_) => false,
+        }
+    }
 }
 
 /// What a figure should be, and what it must not pass.
@@ -180,6 +201,8 @@ pub enum Verdict {
     Over,
     /// There is too little to judge.
     TooFew,
+    /// A station ran for too little time, see [`WATCHED_MIN`].
+    TooShort,
 }
 
 impl Verdict {
@@ -190,6 +213,7 @@ impl Verdict {
             Verdict::Beyond => "beyond target",
             Verdict::Over => "over limit",
             Verdict::TooFew => "too few",
+            Verdict::TooShort => "watched < 1 h",
         }
     }
 }
@@ -218,6 +242,9 @@ impl std::fmt::Display for Bound {
 impl Goal {
     /// How a figure stands against it; `None` is a figure that could not be formed.
     pub fn verdict(&self, figures: &Figures) -> Verdict {
+        if self.measure.is_rate() && figures.watched < WATCHED_MIN {
+            return Verdict::TooShort;
+        }
         let Some(value) = figures.value(self.measure) else { return Verdict::TooFew };
         let share = matches!(self.measure, Measure::Top | Measure::Share(_));
         if share && figures.annunciated() < SHARED_MIN {
@@ -240,7 +267,7 @@ impl Figures {
     /// A figure; `None` if it cannot be formed, as a share of nothing.
     pub fn value(&self, measure: Measure) -> Option<f64> {
         let all = self.annunciated() as f64;
-        let seconds = self.until.duration_since(self.from).as_secs_f64();
+        let seconds = self.watched.as_secs_f64();
         let of = |part: f64, whole: f64| (0.0 < whole).then(|| part / whole);
         match measure {
             Measure::PerDay => of(all * 86_400.0, seconds),
@@ -269,7 +296,8 @@ mod tests {
 
     fn figures(by_priority: [u64; 4]) -> Figures {
         let until = Timestamp::UNIX_EPOCH + Duration::from_secs(86_400);
-        Figures { by_priority, until, windows: 144, ..Figures::default() }
+        let watched = Duration::from_secs(86_400);
+        Figures { by_priority, until, windows: 144, watched, ..Figures::default() }
     }
 
     fn verdict(figures: &Figures, measure: Measure) -> Verdict {
@@ -289,6 +317,17 @@ mod tests {
         }
         assert_eq!(figures([0, 0, 0, 144]).value(Measure::PerWindow), Some(1.0));
         assert_eq!(figures([0, 0, 0, 144]).value(Measure::PerHour), Some(6.0));
+    }
+
+    #[test]
+    fn a_rate_is_of_the_time_that_was_watched_and_of_less_than_an_hour_it_is_not_judged() {
+        let hours = |hours: u64| Figures { watched: Duration::from_secs(hours * 3_600), ..figures([0, 0, 0, 24]) };
+        assert_eq!(hours(2).value(Measure::PerHour), Some(12.0));
+        assert_eq!(verdict(&hours(1), Measure::PerHour), Verdict::Over);
+        let short = Figures { watched: Duration::from_secs(3_599), ..hours(1) };
+        assert_eq!(verdict(&short, Measure::PerHour), Verdict::TooShort);
+        assert_eq!(verdict(&short, Measure::Most), Verdict::Good, "that much is certain");
+        assert_eq!(verdict(&hours(0), Measure::PerDay), Verdict::TooShort);
     }
 
     #[test]

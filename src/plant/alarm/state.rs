@@ -127,6 +127,8 @@ pub struct Machine {
     active: bool,
     unacknowledged: bool,
     latched: bool,
+    /// It came while it was put aside and latches: to put it aside again is no acknowledgement.
+    unseen: bool,
     suppressed: Option<Timestamp>,
     shelved: Option<Shelving>,
     out_of_service: Option<Deed>,
@@ -134,6 +136,8 @@ pub struct Machine {
     pending_since: Option<Duration>,
     /// The last activation that was annunciated.
     pub raised_at: Option<Timestamp>,
+    /// When an operator was last told of it: raised, or reminded of.
+    pub annunciated_at: Option<Timestamp>,
     /// When the last activation returned.
     pub returned_at: Option<Timestamp>,
     /// The last acknowledgement since it was raised.
@@ -223,6 +227,7 @@ impl Machine {
         match step.step {
             AlarmStep::Raised => {
                 (self.active, self.unacknowledged, self.pending_since) = (true, true, None);
+                (self.unseen, self.annunciated_at) = (false, Some(step.at));
                 self.latched |= latch;
                 (self.raised_at, self.returned_at, self.acknowledged) = (Some(step.at), None, None);
                 (self.value, self.burst) = (step.value, step.burst);
@@ -232,13 +237,15 @@ impl Machine {
                 (self.active, self.pending_since) = (true, None);
                 if latch {
                     // Nobody is told now, but what latches must be seen by somebody once it is back.
-                    (self.latched, self.unacknowledged) = (true, true);
+                    (self.latched, self.unacknowledged, self.unseen) = (true, true, true);
                     (self.raised_at, self.returned_at, self.acknowledged) = (Some(step.at), None, None);
-                    self.value = step.value;
+                    (self.annunciated_at, self.value) = (Some(step.at), step.value);
                 }
             }
-            AlarmStep::RaisedAgain => self.unacknowledged = true,
-            AlarmStep::Acknowledged => (self.unacknowledged, self.acknowledged) = (false, Some(deed())),
+            AlarmStep::RaisedAgain => (self.unacknowledged, self.annunciated_at) = (true, Some(step.at)),
+            AlarmStep::Acknowledged => {
+                (self.unacknowledged, self.unseen, self.acknowledged) = (false, false, Some(deed()));
+            }
             AlarmStep::Returned | AlarmStep::ReturnedQuietly => {
                 (self.active, self.pending_since, self.returned_at) = (false, None, Some(step.at));
             }
@@ -246,12 +253,12 @@ impl Machine {
             AlarmStep::Shelved => {
                 // Without an end it would stay away for ever: the journal of another program, or a damaged one.
                 self.shelved = Some(Shelving { deed: deed(), until: step.until.unwrap_or(step.at) });
-                self.unacknowledged = false;
+                self.unacknowledged = self.unseen;
             }
             AlarmStep::Unshelved => self.shelved = None,
             AlarmStep::Suppressed => self.suppressed = Some(step.at),
             AlarmStep::Released => self.suppressed = None,
-            AlarmStep::OutOfService => (self.out_of_service, self.unacknowledged) = (Some(deed()), false),
+            AlarmStep::OutOfService => (self.out_of_service, self.unacknowledged) = (Some(deed()), self.unseen),
             AlarmStep::InService => self.out_of_service = None,
         }
     }
@@ -350,6 +357,8 @@ mod tests {
         let quiet = [(T::Shelved, S::Shelved), (T::RaisedQuietly, S::Shelved), (T::ReturnedQuietly, S::Shelved)];
         check(true, &[&quiet[..], &[(T::Unshelved, S::LatchedUnacknowledged)]].concat());
         check(false, &[&quiet[..], &[(T::Unshelved, S::Normal)]].concat());
+        let longer = [(T::Shelved, S::Shelved), (T::Unshelved, S::LatchedUnacknowledged)];
+        check(true, &[&quiet[..], &longer].concat());
     }
 
     #[test]

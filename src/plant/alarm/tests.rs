@@ -199,7 +199,9 @@ fn an_alarm_that_is_not_enabled_tells_nobody_and_an_unknown_enabling_suppresses_
     let quiet = [AlarmStep::Suppressed, AlarmStep::RaisedQuietly];
     assert_eq!(steps(&book.judge(at(0), when(80.0, Some(false)))), quiet);
     assert_eq!((state(&book), book.lists().sound), (AlarmState::Suppressed, false));
-    assert_eq!(steps(&book.judge(at(1), when(80.0, None))), [AlarmStep::Released, AlarmStep::Raised]);
+    assert_eq!(steps(&book.judge(at(1), when(80.0, Some(true)))), [AlarmStep::Released, AlarmStep::Raised]);
+    let mut unknown = Book::new(enabled_by_design(|_| ()));
+    assert_eq!(steps(&unknown.judge(at(0), when(80.0, None))), [AlarmStep::Raised]);
     let mut delayed = Book::new(enabled_by_design(|alarm| alarm.on_delay = Duration::from_secs(5)));
     delayed.judge(at(0), when(80.0, Some(false)));
     assert_eq!(steps(&delayed.judge(at(5), when(80.0, Some(false)))), [AlarmStep::RaisedQuietly]);
@@ -207,6 +209,33 @@ fn an_alarm_that_is_not_enabled_tells_nobody_and_an_unknown_enabling_suppresses_
     assert_eq!(steps(&delayed.judge(at(10), when(80.0, Some(true)))), anew, "the delay begins when the pump starts");
     assert_eq!(steps(&delayed.judge(at(14), when(80.0, Some(true)))), []);
     assert_eq!(steps(&delayed.judge(at(15), when(80.0, Some(true)))), [AlarmStep::Raised]);
+}
+
+#[test]
+fn a_restart_or_a_lost_frame_brings_nothing_back_that_is_suppressed_but_a_long_silence_does() {
+    let when =
+        |value: f64, enabled| move |_: &AlarmDef| Facts { enabled, ..facts(value, true)(&fixture::plant().alarms[0]) };
+    let mut book = Book::new(enabled_by_design(|_| ()));
+    let journal = book.judge(at(0), when(80.0, Some(false)));
+    assert_eq!(steps(&book.judge(at(1), when(80.0, None))), [], "a lost frame");
+    assert_eq!(steps(&book.judge(at(2), when(80.0, Some(false)))), []);
+    let mut again = Book::new(enabled_by_design(|_| ()));
+    again.restore(&journal);
+    for (second, enabled, expect) in [
+        (1_000, None, vec![]),
+        (1_059, None, vec![]),
+        (1_059, Some(false), vec![]),
+        (1_060, None, vec![]),
+        (1_119, None, vec![]),
+        (1_120, None, vec![AlarmStep::Released, AlarmStep::Raised]),
+        (1_121, None, vec![]),
+    ] {
+        assert_eq!(steps(&again.judge(at(second), when(80.0, enabled))), expect, "at {second} s");
+    }
+    let mut free = Book::new(with(|alarm| alarm.on_delay = Duration::ZERO));
+    free.restore(&journal);
+    assert_eq!(steps(&free.judge(at(1), facts(70.0, true)))[0], AlarmStep::ReturnedQuietly);
+    assert!(free.machine(HIGH).suppressed().is_none(), "the plant file enables it by nothing any more");
 }
 
 #[test]
@@ -265,6 +294,10 @@ fn an_acknowledged_alarm_that_lasts_is_reminded_of() {
     assert_eq!(steps(&book.judge(at(1_810), facts(80.0, true))), [AlarmStep::RaisedAgain]);
     assert_eq!((state(&book), book.lists().sound), (AlarmState::Unacknowledged, true));
     assert_eq!(book.active()[0].raised_at, at(0), "it is the same activation");
+    let early = book.acknowledge(HIGH, at(0), None, at(1_811), &by());
+    assert_eq!(early, Err(AlarmRefusal::RaisedSince), "a window from before the reminder acknowledges nothing");
+    let seen = book.active()[0].annunciated_at;
+    assert!(book.acknowledge(HIGH, seen, None, at(1_812), &by()).is_ok());
 }
 
 /// A plant with so many alarms on PV, each with a limit of its own.
@@ -369,7 +402,7 @@ proptest! {
                 Happening::Value(next) => value = next,
                 Happening::Enabled(next) => enabled = next,
                 Happening::Acknowledge => {
-                    let seen = before.raised_at.unwrap_or(at(0));
+                    let seen = before.annunciated_at.unwrap_or(at(0));
                     let done = book.acknowledge(HIGH, seen, None, at(now), &by);
                     prop_assert_eq!(done.is_ok(), before.state().needs_acknowledgement());
                     journal.extend(done);
@@ -410,8 +443,9 @@ proptest! {
             let aside = book.lists().aside.iter().any(|alarm| alarm.id == HIGH);
             prop_assert_eq!(machine.state() == AlarmState::Normal, !shown && !aside, "what is not normal is listed");
             prop_assert!(!(shown && aside));
-            // Beyond the limit for longer than its delay it is active; inside the deadband nothing changes.
-            if (74.0..=75.0).contains(&value.unwrap_or(74.5)) {
+            // Beyond the limit for longer than its delay it is active; inside the deadband nothing changes, unless its
+            // enabling ends.
+            if enabled != Some(false) && (74.0..=75.0).contains(&value.unwrap_or(74.5)) {
                 let turned = new.iter().any(|step| matches!(
                     step.step,
                     AlarmStep::RaisedQuietly | AlarmStep::Returned

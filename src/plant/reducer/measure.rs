@@ -10,10 +10,12 @@ use crate::plant::{
 
 impl Plant {
     /// Lets the quality meter count what the journal remembers of the last day. `active` are the raising steps of alarms
-    /// that were active before it, `steps` what came since; both oldest first, none after `now`.
-    pub fn remeasure(&mut self, active: &[AlarmRecord], steps: &[AlarmRecord], now: Timestamp) {
+    /// that were active before it, `steps` what came since; both oldest first, none after `now`. `watched` are the windows
+    /// of that day in which a station ran.
+    pub fn remeasure(&mut self, active: &[AlarmRecord], steps: &[AlarmRecord], watched: &[i64], now: Timestamp) {
         let began = steps.first().map_or(now, |step| step.at.min(now));
         self.meter = Meter::running(began);
+        watched.iter().for_each(|window| self.meter.watched(*window));
         active.iter().for_each(|step| self.meter.already(step));
         steps.iter().for_each(|step| self.meter.take(step));
         self.meter.advance(now);
@@ -71,7 +73,7 @@ mod tests {
         assert_eq!((quality.last_10_min, quality.last_hour, quality.flood_since), (11, 11, Some(at(42))));
         let mut again = Plant::new(fixture::shared(), at(50), 1.0);
         again.restore(&journal);
-        again.remeasure(&[], &journal, at(50));
+        again.remeasure(&[], &journal, &[], at(50));
         plant.on_tick(at(53));
         again.on_tick(at(53));
         assert_eq!(again.snapshot().alarm_quality.last_10_min, 11);

@@ -46,7 +46,8 @@ impl Plant {
             | Command::HandOver
             | Command::TakeOver => return None,
         }
-        self.desk.note(order, Outcome::Verified, &self.board, at)
+        self.desk.take(order, at);
+        None
     }
 
     /// The plant file was written, or not, with the reason.
@@ -116,7 +117,9 @@ mod tests {
 
     /// Orders other settings and lets the line take them.
     fn try_out(plant: &mut Plant, number: u32, settings: LineDef) -> Effects {
-        let effects = order(plant, number, Command::Configure(Box::new(settings.clone())));
+        let mut effects = order(plant, number, Command::Configure(Box::new(settings.clone())));
+        assert_eq!(deeds(&effects), [], "not before the line has it");
+        effects.records.extend(plant.on_delivered(L1, &effects.bus[0].1).records);
         works_with(plant, &settings);
         effects
     }
@@ -157,8 +160,23 @@ mod tests {
         let record = deeds(&try_out(&mut plant, 1, baud(19_200)));
         let new = "RTU /dev/null 19200 8N1";
         assert_eq!(record, [("anna".into(), "configure".into(), new.into(), "verified".into())]);
-        let record = deeds(&order(&mut plant, 2, Command::StopTest(L1)));
+        let effects = order(&mut plant, 2, Command::StopTest(L1));
+        let record = deeds(&plant.on_delivered(L1, &effects.bus[0].1));
         assert_eq!(record, [("anna".into(), "stop test".into(), String::new(), "verified".into())]);
+    }
+
+    #[test]
+    fn an_order_that_the_line_had_no_room_for_is_on_record_as_refused() {
+        let mut plant = plant();
+        let test = Command::Test(L1, crate::plant::tool::Tool::Identify { unit: 1 });
+        for (number, command) in
+            [(1, Command::Configure(Box::new(baud(19_200)))), (2, test), (3, Command::StopTest(L1))]
+        {
+            let effects = order(&mut plant, number, command);
+            assert_eq!(deeds(&effects), []);
+            let refused = deeds(&plant.on_undeliverable(L1, &effects.bus[0].1));
+            assert!(refused.len() == 1 && refused[0].3.starts_with("refused"), "{refused:?}");
+        }
     }
 
     #[test]

@@ -139,6 +139,21 @@ fn a_line_is_closed_when_it_says_so() {
 }
 
 #[test]
+fn a_write_leaves_a_trace_before_it_is_sent_and_is_closed_when_the_station_stops() {
+    let mut plant = running();
+    let effects = plant.on_order(order(1, Command::Write { tag: SV, value: 61.0 }), at(1));
+    let intent = plant.intent(&effects.bus[0].1).expect("a write is about to be sent");
+    assert_eq!((&*intent.action, &*intent.target, &*intent.outcome), ("order", "TIC-1.SV", "ordered"));
+    assert!(crate::plant::record::ELSEWHERE.contains(&&*intent.action), "a shift report has the outcome alone");
+    assert_eq!(plant.intent(&BusRequest::StopTest), None);
+    let ended = plant.on_stop().records;
+    let [Record::Action(deed)] = &ended[..] else { panic!("{ended:?}") };
+    assert_eq!((&*deed.action, &deed.new), ("write", &intent.new));
+    assert_eq!(&*deed.outcome, "not confirmed: the station stopped; it may have taken effect");
+    assert_eq!(plant.on_stop().records, []);
+}
+
+#[test]
 fn a_gateway_that_answers_for_a_dead_device_is_not_the_device() {
     let mut plant = running();
     plant.on_event(fail(1, &[PV], Fault::Exception(ExceptionCode(0x0B))));

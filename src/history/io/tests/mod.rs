@@ -7,6 +7,7 @@ mod quality;
 use std::{
     path::{Path, PathBuf},
     sync::Arc,
+    time::Duration,
 };
 
 use jiff::Timestamp;
@@ -427,6 +428,40 @@ fn a_stopped_station_leaves_every_curve_ended_and_a_running_one_answers() {
     assert_eq!(quality, 139);
     assert!(Timestamp::from_microsecond(last).unwrap() < sec(100));
     assert!(!beside(&db, ".wal").exists(), "the log was written into the file");
+}
+
+#[test]
+fn a_question_behind_which_too_much_lies_is_refused_before_anything_is_read() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.append(&[good(PV, 1, 27.0), good(PV, 2, 28.0), good(PV, 3, 28.0)]).unwrap();
+    assert_eq!(store.bounded(&[PV], sec(0), sec(3), 2), Ok(()));
+    assert_eq!(store.bounded(&[PV], sec(0), sec(4), 2), Err(HistoryError::TooManyRows { rows: 3, max: 2 }));
+}
+
+#[test]
+fn what_an_operator_does_with_an_alarm_is_committed_at_once() {
+    let (_folder, db) = folder();
+    let mut writer = Writer::open(db, def(), sec(0)).unwrap();
+    assert!(!writer.accept(vec![Record::Alarm(AlarmRecord { by: None, ..step(6, "high", AlarmStep::Raised) })]));
+    let deed = AlarmRecord { by: Some("anna".into()), ..step(7, "high", AlarmStep::Acknowledged) };
+    assert!(writer.accept(vec![Record::Alarm(deed)]) && writer.settled() == 0, "it asks for a commit");
+    writer.commit(sec(7));
+    assert_eq!((writer.settled(), writer.status().rows), (1, 2));
+
+    let (_folder, db) = folder();
+    let handle = thread::start(&db, def(), Clock::starting_at(sec(10), 1.0)).unwrap();
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    let (mut settled, mut status) = (handle.settled.clone(), handle.status.clone());
+    let began = std::time::Instant::now();
+    for n in 1..=20 {
+        let deed = AlarmRecord { by: Some("anna".into()), ..step(n, "high", AlarmStep::Acknowledged) };
+        handle.records.blocking_send(vec![Record::Alarm(deed)]).unwrap();
+        runtime.block_on(settled.wait_for(|settled| *settled == n as u64)).unwrap();
+    }
+    runtime.block_on(status.wait_for(|status| status.rows == 20)).unwrap();
+    assert!(began.elapsed() < Duration::from_secs(10), "with a commit a second twenty in a row would take twenty");
+    handle.stop();
 }
 
 #[test]

@@ -22,15 +22,17 @@ const BY_PRIORITY: &str = "SELECT count(*) FILTER (priority = 1), count(*) FILTE
         count(*) FILTER (priority = 3), count(*) FILTER (priority = 4)
     FROM alarm_journal WHERE step = 'raised' AND utc >= $1 AND utc < $2";
 
-/// All windows of ten minutes, those with more than ten, and the worst.
+/// All windows of ten minutes with anything in them, those with more than ten alarms, the worst, and their microseconds.
 const WINDOWS: &str = "WITH ten AS (
-        SELECT unnest(generate_series(time_bucket(INTERVAL 10 MINUTES, $1::TIMESTAMP),
-            time_bucket(INTERVAL 10 MINUTES, $2::TIMESTAMP - INTERVAL 1 MICROSECOND), INTERVAL 10 MINUTES)) AS begins),
+        SELECT DISTINCT time_bucket(INTERVAL 10 MINUTES, utc) AS begins
+        FROM (SELECT utc FROM sample UNION ALL SELECT utc FROM alarm_journal) WHERE utc >= $1 AND utc < $2),
     counts AS (
         SELECT begins, count(j.utc) AS raised FROM ten
         LEFT JOIN (SELECT utc FROM alarm_journal WHERE step = 'raised' AND utc >= $1 AND utc < $2) j
             ON time_bucket(INTERVAL 10 MINUTES, j.utc) = begins GROUP BY begins)
-    SELECT count(*), count(*) FILTER (raised > 10), max(raised) FROM counts";
+    SELECT count(*), count(*) FILTER (raised > 10), coalesce(max(raised), 0),
+        coalesce(sum(epoch_us(least(begins + INTERVAL 10 MINUTES, $2::TIMESTAMP))
+            - epoch_us(greatest(begins, $1::TIMESTAMP))), 0)::UBIGINT FROM counts";
 
 /// Seconds in flood: the count of the last 600 s has been above 10 more lately than below 5.
 const FLOOD: &str = "WITH seconds AS (
@@ -87,8 +89,8 @@ fn counted(store: &Store, from: Timestamp, until: Timestamp) -> Figures {
         db.prepare(sql).unwrap().query_map(span, named).unwrap().map(Result::unwrap).collect()
     };
     let top = |row: &duckdb::Row| Ok(Frequent { alarm: named(row)?, raised: row.get(2)? });
-    let (windows, windows_over, most) =
-        db.query_row(WINDOWS, span, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).unwrap();
+    let (windows, windows_over, most, micros) =
+        db.query_row(WINDOWS, span, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))).unwrap();
     Figures {
         from,
         until,
@@ -96,6 +98,7 @@ fn counted(store: &Store, from: Timestamp, until: Timestamp) -> Figures {
             .query_row(BY_PRIORITY, span, |row| Ok([row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?]))
             .unwrap(),
         windows,
+        watched: Duration::from_micros(micros),
         windows_over,
         most,
         flood: Duration::from_secs(number(FLOOD)),
@@ -172,10 +175,13 @@ fn a_storm_an_alarm_from_the_day_before_and_an_empty_night_are_counted_as_sql_co
         journal.push(AlarmRecord { at: at(second + 0.06), ..step(0, &name, Returned) });
     }
     store.append(&journal.into_iter().map(Record::Alarm).collect::<Vec<_>>()).unwrap();
+    // A station ran all the time but for the last hour.
+    store.append(&(-48..42).map(|n| good(PV, START + n * 600, 27.0)).collect::<Vec<_>>()).unwrap();
     let (from, until) = (at(-28_800.0), at(28_800.0));
     let figures = store.alarm_quality(from, until, until).unwrap();
     assert_eq!(figures, counted(&store, from, until));
-    assert_eq!((figures.annunciated(), figures.windows, figures.windows_over, figures.most), (500, 96, 1, 500));
+    assert_eq!((figures.annunciated(), figures.windows, figures.windows_over, figures.most), (500, 90, 1, 500));
+    assert_eq!(figures.watched.as_secs(), 15 * 3_600);
     assert_eq!((figures.stale, figures.fleeting.len(), figures.top.len()), (1, 250, 10));
     assert_eq!(figures.by_priority[place(Priority::High)], 500);
     // From second 1, the eleventh alarm, until the last but four are ten minutes old.
@@ -193,4 +199,23 @@ fn a_station_that_starts_again_knows_the_alarms_of_its_last_day() {
     store.append(&steps.clone().map(Record::Alarm)).unwrap();
     let recent = store.recent(at(0.0)).unwrap();
     assert_eq!((recent.active.as_slice(), recent.steps.as_slice()), (&steps[..1], &steps[1..]));
+}
+
+#[test]
+fn an_alarm_that_was_put_aside_before_a_period_is_not_stale_in_it() {
+    use AlarmStep::{OutOfService, Raised, RaisedQuietly, Shelved, Suppressed};
+    let (_folder, db) = folder();
+    let store = open(&db, START);
+    let pair = |second: f64, text: &str, first, then| {
+        [(second, first), (second + 1.0, then)]
+            .map(|(second, kind)| Record::Alarm(AlarmRecord { at: at(second), ..step(0, text, kind) }))
+    };
+    let aside = [("shelved", Shelved), ("suppressed", Suppressed), ("out of service", OutOfService)];
+    for (text, kind) in aside {
+        store.append(&pair(-200_000.0, text, Raised, kind)).unwrap();
+    }
+    store.append(&pair(-200_000.0, "quiet", Suppressed, RaisedQuietly)).unwrap();
+    store.append(&pair(-200_000.0, "back", Shelved, Raised)).unwrap();
+    assert_eq!(store.alarm_quality(at(0.0), at(3_600.0), at(3_600.0)).unwrap().stale, 1);
+    assert_eq!(store.recent(at(0.0)).unwrap().active.len(), 1);
 }

@@ -28,9 +28,16 @@ fn step(second: f64, name: &str, step: AlarmStep) -> AlarmRecord {
     }
 }
 
+/// A meter of a period in which a station always ran.
+fn of_period(from: f64, until: f64) -> Meter {
+    let mut meter = Meter::of_period(at(from), at(until));
+    (second(at(from)).div_euclid(WINDOW_S)..=second(at(until)).div_euclid(WINDOW_S)).for_each(|n| meter.watched(n));
+    meter
+}
+
 /// The figures of 06:00 to a second after it.
 fn figures(until: f64, steps: &[(f64, &str, AlarmStep)]) -> Figures {
-    let mut meter = Meter::of_period(at(0.0), at(until));
+    let mut meter = of_period(0.0, until);
     steps.iter().for_each(|(second, name, kind)| meter.take(&step(*second, name, *kind)));
     meter.figures()
 }
@@ -57,10 +64,24 @@ fn only_activations_within_the_period_count_and_windows_without_any_do_too() {
     assert_eq!(got.value(Measure::PerWindow), Some(0.25));
     assert_eq!(got.top.iter().map(|alarm| (&*alarm.alarm.text, alarm.raised)).collect::<Vec<_>>()[0], ("first", 2));
     // A period that begins and ends within windows touches 14 of them.
-    let mut meter = Meter::of_period(at(-1.0), at(7_200.5));
+    let mut meter = of_period(-1.0, 7_200.5);
     steps.iter().for_each(|(second, name, kind)| meter.take(&step(*second, name, *kind)));
     let got = meter.figures();
     assert_eq!((got.annunciated(), got.windows), (5, 14));
+}
+
+#[test]
+fn time_in_which_no_station_ran_thins_no_figure_out() {
+    let mut meter = Meter::of_period(at(300.0), at(86_400.0));
+    [0, 1, 2].into_iter().for_each(|window| meter.watched(START / WINDOW_S + window));
+    meter.take(&step(400.0, "x", Raised));
+    let got = meter.figures();
+    assert_eq!((got.windows, got.watched.as_secs()), (3, 1_500));
+    let mut running = Meter::running(at(0.0));
+    running.advance(at(0.0));
+    running.advance(at(900.0));
+    let day = running.quality().day;
+    assert_eq!((day.windows, day.watched.as_secs()), (2, 900), "the day before it started is not watched");
 }
 
 #[test]
@@ -131,6 +152,7 @@ fn memory_does_not_grow_with_the_storms_it_has_seen() {
     }
     meter.advance(at(12.0 * 86_400.0));
     assert_eq!((meter.sums.len(), meter.habits.len(), meter.stale.len()), (0, 0, 0));
+    assert_eq!(meter.watched.len(), 1);
 }
 
 fn steps() -> impl Strategy<Value = Vec<AlarmRecord>> {
@@ -162,6 +184,7 @@ proptest! {
         let quality = running.quality();
         let mut period = Meter::of_period(quality.day.from, quality.day.until);
         let known = quality.day.from - LEAD;
+        running.watched.iter().for_each(|window| period.watched(*window));
         steps.iter().filter(|step| step.at < known).for_each(|step| period.already(step));
         steps.iter().filter(|step| known <= step.at).for_each(|step| period.take(step));
         let in_window = steps.iter().filter(|step| step.step == Raised && second(now) - 600 < second(step.at));

@@ -56,7 +56,7 @@ pub fn acknowledge_all<'a>(cx: &Cx, alarms: impl Iterator<Item = &'a ActiveAlarm
     if NAMED < waiting.len() {
         notes.push(format!("… and {} more", waiting.len() - NAMED));
     }
-    let seen = waiting.iter().map(|alarm| (alarm.id, alarm.raised_at)).collect();
+    let seen = waiting.iter().map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
     let command = Command::Alarm(AlarmCommand::AcknowledgeAll { seen });
     let title = "acknowledge all";
     if needed {

@@ -149,7 +149,7 @@ impl Quality {
                 Verdict::Good => cx.theme.normal(),
                 Verdict::Beyond => cx.theme.strong(),
                 Verdict::Over => cx.theme.trouble(),
-                Verdict::TooFew => cx.theme.dim(),
+                Verdict::TooFew | Verdict::TooShort => cx.theme.dim(),
             };
             lines.push((text, style));
         }

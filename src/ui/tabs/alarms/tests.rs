@@ -123,6 +123,7 @@ fn figures() -> Figures {
         until: now(),
         by_priority: [0, 12, 30, 178],
         windows: 145,
+        watched: Duration::from_secs(86_400),
         windows_over: 3,
         most: 34,
         flood: Duration::from_secs(1_900),
