@@ -223,7 +223,9 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Tick { silent } => on_tick(model, silent),
     };
     let acts = presence::hold_back(model, acts);
-    perform(model, acts)
+    let effects = perform(model, acts);
+    model.settle();
+    effects
 }
 
 /// Draws the terminal as it stands.

@@ -54,9 +54,11 @@ fn what_is_typed_is_what_is_written_or_refused() {
         }
     };
     check("s3,5⏎", Ok(3.5));
-    check("s7OO⏎", Err("\"7OO\" is no number"));
-    check("s1e5⏎", Err("\"1e5\" is no number"));
-    check("s7 0", Err("new 7 0"));
+    check("s7OO", Err("\"O\" is no part of a number"));
+    check("s7OO⏎", Err("not all of it was taken"));
+    check("s1e5⏎", Err("not all of it was taken"));
+    check("s7 0", Err("a blank is no part of a number"));
+    check("s7-0⏎", Err("\"7-0\" is no number"));
     check(&format!("s{}⏎", "7".repeat(70)), Err("not all of it was taken"));
 }
 

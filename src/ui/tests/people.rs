@@ -12,7 +12,7 @@ use crate::{
     },
     history::{Answer, Question},
     plant::{
-        command::{Command, OrderId, OrderStatus, Outcome},
+        command::{Command, OrderId, OrderStatus, Outcome, Refusal},
         record::{ActionRecord, Seal},
         role::{Role, Sign},
         sample::Quality,
@@ -311,6 +311,39 @@ fn a_tag_that_asks_for_a_signature_gets_one() {
     let mut model = with(&signed(Sign::SecondPerson), person("anna", Role::Technician));
     type_keys(&mut model, "s65⏎boris⏎abc");
     insta::assert_snapshot!("window_signature_80x24", screen(&mut model, 80, 24));
+}
+
+#[test]
+fn a_refused_signature_is_asked_again_in_its_window() {
+    let fixture = signed(Sign::Password);
+    let mut model = with(&fixture, person("anna", Role::Technician));
+    let effects = type_keys(&mut model, "s65⏎hors⏎");
+    let Some(Effect::Order(first)) = effects.last() else { panic!("no order: {effects:?}") };
+    shows(&mut model, "asking the station");
+    assert_eq!(type_keys(&mut model, "1q⏎"), [], "while the answer is awaited");
+    let told = |request: &OrderRequest, outcome: Outcome| {
+        let mut snapshot = fixture.snapshot();
+        Arc::make_mut(&mut snapshot).orders = vec![OrderStatus {
+            id: request.id,
+            by: "anna".into(),
+            from: "".into(),
+            note: None,
+            command: request.command.clone(),
+            at: fixture::now(),
+            old: Some(70.0),
+            outcome,
+        }];
+        Msg::Snapshot(snapshot)
+    };
+    update(&mut model, told(first, Outcome::Refused(Refusal::NotSigned("wrong password; wait 2 s".to_owned()))));
+    shows(&mut model, "wrong password; wait 2 s");
+    let effects = type_keys(&mut model, "r1q 3a⏎");
+    assert_eq!((model.tabs.shown, effects.len()), (Tab::Mimic, 1), "no letter of it was a key: {effects:?}");
+    assert!(!screen(&mut model, 80, 24).contains("r1q"));
+    let Some(Effect::Order(second)) = effects.last() else { panic!("no order: {effects:?}") };
+    assert_eq!(second.sign.as_ref().map(|sign| sign.password.clone()), Some("r1q 3a".into()));
+    update(&mut model, told(second, Outcome::Pending));
+    assert_eq!(model.modal, None);
 }
 
 #[test]
