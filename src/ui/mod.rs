@@ -31,7 +31,7 @@ use crate::{
     plant::{
         alarm::AlarmCommand,
         command::Command,
-        def::PlantDef,
+        def::{AlarmId, PlantDef},
         sample::Cause,
         snapshot::{ActiveAlarm, Snapshot},
     },
@@ -46,7 +46,7 @@ use theme::Theme;
 pub use watch::{Confirmed, Watch};
 
 /// A station that has said nothing for so long (real time) is silent: its values are doubted.
-pub const SILENCE: Duration = Duration::from_secs(5);
+pub const SILENCE: Duration = Duration::from_secs(3);
 
 /// All that a terminal knows.
 #[derive(Debug)]
@@ -79,6 +79,17 @@ pub struct Model {
     pub plants: u32,
     /// The simulation behind the plant; `None` at a real one.
     pub drill: Option<Arc<drill::Status>>,
+    /// What the last frame showed; `None` before the first one.
+    pub drawn: Option<Drawn>,
+}
+
+/// What a frame showed, as far as a key may mean it that is pressed before the next one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Drawn {
+    /// The tab.
+    tab: Tab,
+    /// The alarm that `a` was for: which, and when it was raised.
+    alarm: Option<(AlarmId, Timestamp)>,
 }
 
 /// The terminal's sense of time, fed by ticks.
@@ -143,6 +154,7 @@ impl Model {
             ordered: 0,
             plants: 0,
             drill: None,
+            drawn: None,
         };
         update(&mut model, Msg::Standing(standing));
         model
@@ -168,14 +180,30 @@ impl Model {
         }
     }
 
-    /// The alarm that `a` is for: the one selected on the alarms tab if that can be seen, else the most urgent
-    /// unacknowledged, which is the banner's.
+    /// The alarm that `a` is for as things stand: the one selected on the alarms tab if that can be seen, else the most
+    /// urgent unacknowledged, which is the banner's.
     fn alarm_to_acknowledge(&self) -> Option<&ActiveAlarm> {
-        let selectable = self.tabs.shown == Tab::Alarms && !self.small();
-        let selected = selectable.then(|| self.tabs.alarms.selected(&self.cx())).flatten();
-        let alarm =
-            selected.or_else(|| self.snapshot.alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()))?;
-        alarm.state.needs_acknowledgement().then_some(alarm)
+        let selected = self.lists().then(|| self.tabs.alarms.selected(&self.cx())).flatten();
+        selected.or_else(|| self.snapshot.alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()))
+    }
+
+    /// Is the alarms tab to be seen?
+    fn lists(&self) -> bool {
+        self.tabs.shown == Tab::Alarms && !self.small()
+    }
+
+    /// The alarm that whoever presses `a` has seen: news that came after the last frame are not acknowledged unseen.
+    fn alarm_seen(&self) -> Option<&ActiveAlarm> {
+        match self.drawn {
+            Some(Drawn { tab, .. }) if tab == self.tabs.shown && self.lists() && self.tabs.alarms.is_chosen() => {
+                self.alarm_to_acknowledge()
+            }
+            Some(Drawn { alarm, .. }) => {
+                let (id, raised_at) = alarm?;
+                self.snapshot.alarms.iter().find(|alarm| (alarm.id, alarm.raised_at) == (id, raised_at))
+            }
+            None => self.alarm_to_acknowledge(),
+        }
     }
 }
 
@@ -221,6 +249,11 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             Vec::new()
         }
         Msg::Tick { silent } => on_tick(model, silent),
+        Msg::Drawn => {
+            let alarm = model.alarm_to_acknowledge().map(|alarm| (alarm.id, alarm.raised_at));
+            model.drawn = Some(Drawn { tab: model.tabs.shown, alarm });
+            return Vec::new();
+        }
     };
     let acts = presence::hold_back(model, acts);
     let effects = perform(model, acts);
@@ -269,7 +302,8 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
     if presence::ask_before_work(model, event) {
         return Vec::new();
     }
-    if let Some(modal) = model.modal.take() {
+    let past = presence::is_past_unlock(model, event);
+    if let Some(modal) = model.modal.take_if(|_| !past) {
         let Model { snapshot, theme, clock, drill, standing, screen, tabs, .. } = model;
         let cx = cx_of(snapshot, theme, *clock, *screen, drill, standing);
         let (rest, acts) = modal.on_key(&cx, tabs, event);
@@ -290,16 +324,22 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
 
 fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
     match global {
-        Global::Show(tab) if Tab::offered(&model.cx()).contains(&tab) => vec![Act::Show(tab)],
+        Global::Show(tab) if Tab::offered(&model.cx()).contains(&tab) => {
+            if tab == Tab::Alarms && model.tabs.shown != tab {
+                model.tabs.alarms.front();
+            }
+            vec![Act::Show(tab)]
+        }
         Global::Show(_) => Vec::new(),
         Global::Next => vec![Act::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), 1))],
         Global::Previous => vec![Act::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), -1))],
         Global::Lock => presence::lock(model),
         Global::Help => vec![Act::Open(Modal::Help(0))],
         Global::Quit => vec![Act::Open(Modal::Confirm(Confirm::quit()))],
-        Global::Acknowledge => match model.alarm_to_acknowledge() {
-            Some(alarm) => deeds::acknowledge(&model.cx(), alarm),
-            None => Vec::new(),
+        Global::Acknowledge => match model.alarm_seen() {
+            Some(alarm) if alarm.state.needs_acknowledgement() => deeds::acknowledge(&model.cx(), alarm),
+            Some(alarm) if model.lists() => deeds::acknowledged(&model.cx(), alarm),
+            Some(_) | None => Vec::new(),
         },
         Global::AcknowledgeAll => {
             let cx = model.cx();

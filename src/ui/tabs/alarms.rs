@@ -104,6 +104,16 @@ impl Alarms {
         rows.get(self.place(&rows)).map(|row| row.alarm)
     }
 
+    /// Has an operator selected an alarm himself? Else it is the first of the list, whichever that is.
+    pub fn is_chosen(&self) -> bool {
+        self.selected.is_some()
+    }
+
+    /// Shows the first view.
+    pub fn front(&mut self) {
+        self.page = Page::Active;
+    }
+
     /// The alarms that the filter lets through, in order of urgency; `None` on pages without a list of them.
     pub fn listed<'a>(&self, cx: &Cx<'a>) -> Option<Vec<&'a ActiveAlarm>> {
         let list = matches!(self.page, Page::Active | Page::System);

@@ -240,10 +240,21 @@ fn a_locked_terminal_looks_and_does_nothing() {
         type_keys(&mut model, "⎋⎋⎋1");
         assert_eq!((model.tabs.shown, &model.modal), (Tab::Mimic, &None), "{keys}");
     }
-    for (keys, tab) in [("3", Tab::Alarms), ("5", Tab::Reports), ("?⎋2", Tab::Trends)] {
+    for (keys, tab) in [
+        ("3", Tab::Alarms),
+        ("v↓", Tab::Alarms),
+        ("V/unack⏎", Tab::Alarms),
+        ("5", Tab::Reports),
+        ("?⎋2", Tab::Trends),
+        ("⇥", Tab::Alarms),
+    ] {
         type_keys(&mut model, keys);
-        assert_eq!((model.tabs.shown, &model.modal), (tab, &None));
+        assert_eq!((model.tabs.shown, &model.modal), (tab, &None), "{keys}");
     }
+    type_keys(&mut model, "a⇥");
+    assert_eq!(model.tabs.shown, Tab::Controllers, "below the window too");
+    assert!(model.modal.as_ref().is_some_and(Modal::is_unlock));
+    type_keys(&mut model, "⎋3");
     type_keys(&mut model, "a");
     ctrl(&mut model, 'o');
     shows(&mut model, "log in as another person than anna");
@@ -251,6 +262,16 @@ fn a_locked_terminal_looks_and_does_nothing() {
     assert_eq!(wish(&effects), Some(&Wish::Login { user: "boris".to_owned(), password: "battery".into() }));
     update(&mut model, Msg::Standing(Arc::new(person("boris", Role::Viewer))));
     assert_eq!((model.tabs.shown, &model.modal), (Tab::Mimic, &None));
+}
+
+#[test]
+fn a_terminal_that_is_locked_on_the_login_page_still_shows_the_process() {
+    let mut model = with(&Fixture::alarm(), person("anna", Role::Technician));
+    assert_eq!(wish(&type_keys(&mut model, "0k")), Some(&Wish::Lock));
+    stand(&mut model, |standing| standing.locked = true);
+    assert_eq!(model.tabs.shown, Tab::Mimic);
+    type_keys(&mut model, "3");
+    assert_eq!(model.tabs.shown, Tab::Alarms);
 }
 
 #[test]

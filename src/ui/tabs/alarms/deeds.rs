@@ -13,7 +13,7 @@ use crate::{
     ui::{
         Act, Cx,
         modal::{Confirm, Modal, Notice, Reason, confirm::subject},
-        widgets::text::running,
+        widgets::text::{clock, running},
     },
 };
 
@@ -28,6 +28,16 @@ pub fn acknowledge(cx: &Cx, alarm: &ActiveAlarm) -> Vec<Act> {
         true => note(cx, alarm),
         false => vec![Act::Order(alarm.acknowledge())],
     }
+}
+
+/// Says that this one needs no acknowledgement, and who gave it.
+pub fn acknowledged(cx: &Cx, alarm: &ActiveAlarm) -> Vec<Act> {
+    let by = alarm.acknowledged.as_ref().map(|deed| {
+        let by = deed.by.as_deref().unwrap_or("the station");
+        format!("It was acknowledged {} by {by}.", clock(deed.at, &cx.def().time_zone))
+    });
+    let words = ["already acknowledged".to_owned(), name(cx, alarm.id)].into_iter().chain(by).collect();
+    open(Modal::Notice(Notice::new("acknowledge", words)))
 }
 
 /// Acknowledges one alarm with a note.

@@ -180,7 +180,7 @@ fn the_meter_is_shown_with_target_limit_and_verdict() {
     pictures("quality", &fixture, "vvvv");
     let mut model = shown(&fixture, Theme::FULL, "");
     let banner = screen(&mut model, 80, 24).lines().nth(2).map(str::to_owned).unwrap_or_default();
-    assert!(banner.contains("FLOOD") && banner.contains("a ack"), "{banner}");
+    assert!(banner.contains("FLOOD") && banner.contains("UNACK"), "{banner}");
     // A past shift is asked of the history, and its figures stand under its name only.
     let effects = type_keys(&mut model, "vvvv←←");
     let Some(Effect::Ask(id, Question::AlarmQuality { from, to })) = effects.last() else { panic!("{effects:?}") };
