@@ -405,6 +405,13 @@ fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
                 model.tabs.controllers.show(device);
                 effects.extend(show(model, Tab::Controllers));
             }
+            Act::ShowParameter(tag) => {
+                with_tabs(model, |tabs, cx| {
+                    tabs.controllers.show_parameter(cx, tag);
+                    Vec::new()
+                });
+                effects.extend(show(model, Tab::Controllers));
+            }
             Act::ShowOnMimic(tags) => {
                 with_tabs(model, |tabs, cx| {
                     tabs.mimic.select(cx, &tags);
@@ -441,6 +448,7 @@ fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         Act::Open(_)
         | Act::Show(_)
         | Act::ShowDevice(_)
+        | Act::ShowParameter(_)
         | Act::ShowOnMimic(_)
         | Act::ShowOnTrends(..)
         | Act::Order(_)

@@ -95,6 +95,8 @@ pub enum Act {
     Show(Tab),
     /// Show a device on the controllers tab.
     ShowDevice(DeviceId),
+    /// The same with one of its parameters selected.
+    ShowParameter(TagId),
     /// Show the first of these tags that the mimic has there.
     ShowOnMimic(Vec<TagId>),
     /// Show the curve of a tag with the cursor at a moment.

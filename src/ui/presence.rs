@@ -168,6 +168,7 @@ pub(super) fn hold_back(model: &mut Model, acts: Vec<Act>) -> Vec<Act> {
             Act::Open(_)
             | Act::Show(_)
             | Act::ShowDevice(_)
+            | Act::ShowParameter(_)
             | Act::ShowOnMimic(_)
             | Act::ShowOnTrends(..)
             | Act::Wish(..)
@@ -202,6 +203,10 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
 
 /// The station's answer to a wish; only the last one is waited for.
 pub(super) fn on_granted(model: &mut Model, id: AskId, answer: Result<(), String>) -> Vec<Act> {
+    if matches!(id.tab, Tab::Reports | Tab::Bus) {
+        // A file that waits to be written waits for its own answer, whatever was wished since.
+        return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
+    }
     if id.number == 0 || id.number != model.presence.wished {
         return Vec::new();
     }

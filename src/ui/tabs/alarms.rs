@@ -150,6 +150,7 @@ impl Alarms {
                 self.handover.want();
                 return deeds::hand_over();
             }
+            Action::TakeOver if self.handover.is_own(cx) => return deeds::own_handover(),
             Action::TakeOver => {
                 self.handover.want();
                 return deeds::take_over(cx);
@@ -325,7 +326,7 @@ impl Alarms {
                 vec![Act::ShowOnMimic(cx.def().tags_of(device).map(|tag| tag.id).collect())]
             }
             (Subject::Tag(tag), Action::Trend) => vec![Act::ShowOnTrends(tag, raised)],
-            (Subject::Tag(tag), Action::Controller) => vec![Act::ShowDevice(cx.def().tag(tag).device)],
+            (Subject::Tag(tag), Action::Controller) => vec![Act::ShowParameter(tag)],
             (Subject::Device(device), Action::Controller) => vec![Act::ShowDevice(device)],
             (Subject::Tag(tag), Action::Why) => Why::open(Why::new(vec![tag], 0)),
             (Subject::Device(device), Action::Why) => Why::open(Why::of_device(cx, device)),

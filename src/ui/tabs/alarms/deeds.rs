@@ -154,6 +154,12 @@ pub fn hand_over() -> Vec<Act> {
     open(Modal::Reason(Box::new(reason)))
 }
 
+/// Says that a handover takes two.
+pub fn own_handover() -> Vec<Act> {
+    let words = ["You have handed over yourself.", "Another person reads this page and takes the plant over."];
+    open(Modal::Notice(Notice::new("take over", words.map(str::to_owned).to_vec())))
+}
+
 /// Asks whether whoever sits here takes the plant over.
 pub fn take_over(cx: &Cx) -> Vec<Act> {
     let who = cx.standing.who.as_ref().map_or("nobody", |who| &who.user);
