@@ -22,6 +22,7 @@ use ratatui::{Frame, layout::Rect};
 use crate::{
     history::{Answer, HistoryError},
     plant::{
+        alarm::AlarmState,
         def::{AlarmClass, AlarmId, Priority, Subject},
         snapshot::{ActiveAlarm, AsideAlarm, Snapshot},
     },
@@ -179,9 +180,29 @@ impl Alarms {
         std::mem::take(&mut self.page) != Page::Active
     }
 
-    /// The keys of the page.
-    pub fn hints(&self) -> Vec<Hint> {
-        keys::told(self.page)
+    /// The keys of the page; what cannot be done with the selected row is left to the help.
+    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+        let alarm = self.selected(cx);
+        let can = |label: &str| match label {
+            "reset" => alarm.is_some_and(|alarm| {
+                matches!(alarm.state, AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged)
+            }),
+            "unfold" => alarm.is_some_and(|alarm| alarm.burst.is_some()),
+            "put back" => self
+                .aside(cx)
+                .is_some_and(|aside| matches!(aside.state, AlarmState::Shelved | AlarmState::OutOfService)),
+            _ => true,
+        };
+        let mut hints = keys::told(self.page);
+        hints.iter_mut().filter(|hint| !can(&hint.label)).for_each(|hint| hint.label.clear());
+        // The first of these must not fall off a narrow footer.
+        hints.sort_by_key(|hint| match hint.label.as_str() {
+            "ack" | "all" | "search" | "list" | "put back" | "hand over" | "take over" => 0,
+            "reset" => 1,
+            "view" => 2,
+            _ => 3,
+        });
+        hints
     }
 
     /// News, or time has passed: the page that needs the history asks for it.

@@ -196,7 +196,7 @@ impl Tabs {
             Tab::Login => self.login.hints(cx),
             Tab::Mimic => self.mimic.hints(cx),
             Tab::Trends => keys::hints(trends::KEYS),
-            Tab::Alarms => self.alarms.hints(),
+            Tab::Alarms => self.alarms.hints(cx),
             Tab::Controllers => self.controllers.hints(cx),
             Tab::Reports => keys::hints(reports::KEYS),
             Tab::Bus => self.bus.hints(cx),

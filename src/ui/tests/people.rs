@@ -486,6 +486,11 @@ fn the_users_and_what_can_be_done_with_them() {
     );
     let mut model = with(&Fixture::normal(), supervisor());
     assert_eq!(wish(&type_keys(&mut model, "7↓xboriss⏎")), None, "another name deletes nobody");
+    for (keys, own) in [("7d", true), ("7x", true), ("7↓↓d", false), ("7↓x", false)] {
+        let mut model = with(&Fixture::normal(), supervisor());
+        type_keys(&mut model, keys);
+        assert_eq!(screen(&mut model, 80, 24).contains("This is you"), own, "{keys}");
+    }
 }
 
 fn deed(number: u64, by: &str, action: &str, target: &str, change: (&str, &str), outcome: &str) -> ActionRecord {

@@ -369,6 +369,27 @@ fn a_technician_is_told_that_out_of_service_needs_a_supervisor() {
 }
 
 #[test]
+fn the_footer_offers_what_can_be_done_with_the_selected_row() {
+    let footer = |fixture: &Fixture, keys: &str| {
+        let mut model = shown(fixture, Theme::FULL, keys);
+        screen(&mut model, 80, 24).lines().last().map(str::to_owned).unwrap_or_default()
+    };
+    let mut latched = Fixture::alarm();
+    latched.alarms[0].state = AlarmState::LatchedAcknowledged;
+    for (keys, reset) in [("", true), ("↓", false)] {
+        let footer = footer(&latched, keys);
+        assert_eq!((footer.contains("r reset"), footer.contains("v view")), (reset, true), "{keys}: {footer}");
+    }
+    for (keys, back) in [("v", true), ("v↓", true), ("v↓↓", false)] {
+        let footer = footer(&put_aside(), keys);
+        assert_eq!((footer.contains("u put back"), footer.contains("v view")), (back, true), "{keys}: {footer}");
+    }
+    for keys in ["vv", "vvv", "vvvv", "vvvvv"] {
+        assert!(footer(&put_aside(), keys).contains("v view"), "{keys}");
+    }
+}
+
+#[test]
 fn an_alarm_leads_to_mimic_trend_and_controller() {
     let mut model = shown(&Fixture::alarm(), Theme::FULL, "m");
     assert_eq!(model.tabs.shown, Tab::Mimic);

@@ -99,10 +99,11 @@ fn views(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
     let fits = |names: &Vec<String>| names.iter().map(|name| width(name) + 3).sum::<u16>() <= room + 3;
     // Where there is no room for the word the brackets alone tell how many wait.
     let all = Some(names(" unack")).filter(fits).unwrap_or_else(|| names(""));
+    let bar = if fits(&all) { " │ " } else { "│" };
     let mut x = 1;
     for (page, name) in Page::ALL.into_iter().zip(all) {
         if x > 1 {
-            x = canvas.text(x, 0, " │ ", cx.theme.dim());
+            x = canvas.text(x, 0, bar, cx.theme.dim());
         }
         let style = if page == tab.page { cx.theme.focus() } else { cx.theme.normal() };
         x = canvas.text(x, 0, &name, style);
