@@ -2,6 +2,7 @@
 
 pub mod bell;
 pub mod chrome;
+pub mod drawn;
 pub mod edge;
 pub mod io;
 pub mod guard;
@@ -28,15 +29,10 @@ use ratatui::{Frame, layout::Rect};
 
 use crate::{
     access::Standing,
-    plant::{
-        alarm::AlarmCommand,
-        command::Command,
-        def::{AlarmId, PlantDef},
-        sample::Cause,
-        snapshot::{ActiveAlarm, Snapshot},
-    },
+    plant::{alarm::AlarmCommand, command::Command, def::PlantDef, sample::Cause, snapshot::Snapshot},
     sim::drill,
 };
+use drawn::Drawn;
 use keys::Global;
 use modal::{Confirm, Modal};
 pub use msg::{Act, AskId, Effect, Msg};
@@ -81,15 +77,6 @@ pub struct Model {
     pub drill: Option<Arc<drill::Status>>,
     /// What the last frame showed; `None` before the first one.
     pub drawn: Option<Drawn>,
-}
-
-/// What a frame showed, as far as a key may mean it that is pressed before the next one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Drawn {
-    /// The tab.
-    tab: Tab,
-    /// The alarm that `a` was for: which, and when it was raised.
-    alarm: Option<(AlarmId, Timestamp)>,
 }
 
 /// The terminal's sense of time, fed by ticks.
@@ -179,32 +166,6 @@ impl Model {
             }
         }
     }
-
-    /// The alarm that `a` is for as things stand: the one selected on the alarms tab if that can be seen, else the most
-    /// urgent unacknowledged, which is the banner's.
-    fn alarm_to_acknowledge(&self) -> Option<&ActiveAlarm> {
-        let selected = self.lists().then(|| self.tabs.alarms.selected(&self.cx())).flatten();
-        selected.or_else(|| self.snapshot.alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()))
-    }
-
-    /// Is the alarms tab to be seen?
-    fn lists(&self) -> bool {
-        self.tabs.shown == Tab::Alarms && !self.small()
-    }
-
-    /// The alarm that whoever presses `a` has seen: news that came after the last frame are not acknowledged unseen.
-    fn alarm_seen(&self) -> Option<&ActiveAlarm> {
-        match self.drawn {
-            Some(Drawn { tab, .. }) if tab == self.tabs.shown && self.lists() && self.tabs.alarms.is_chosen() => {
-                self.alarm_to_acknowledge()
-            }
-            Some(Drawn { alarm, .. }) => {
-                let (id, raised_at) = alarm?;
-                self.snapshot.alarms.iter().find(|alarm| (alarm.id, alarm.raised_at) == (id, raised_at))
-            }
-            None => self.alarm_to_acknowledge(),
-        }
-    }
 }
 
 /// Takes in one message. The only place where a terminal's state changes.
@@ -250,9 +211,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Tick { silent } => on_tick(model, silent),
         Msg::Drawn => {
-            let alarm = model.alarm_to_acknowledge().map(|alarm| (alarm.id, alarm.raised_at));
-            model.drawn = Some(Drawn { tab: model.tabs.shown, alarm });
-            return Vec::new();
+            model.note_drawn();
+            Vec::new()
         }
     };
     let acts = presence::hold_back(model, acts);
@@ -336,11 +296,7 @@ fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
         Global::Lock => presence::lock(model),
         Global::Help => vec![Act::Open(Modal::Help(0))],
         Global::Quit => vec![Act::Open(Modal::Confirm(Confirm::quit()))],
-        Global::Acknowledge => match model.alarm_seen() {
-            Some(alarm) if alarm.state.needs_acknowledgement() => deeds::acknowledge(&model.cx(), alarm),
-            Some(alarm) if model.lists() => deeds::acknowledged(&model.cx(), alarm),
-            Some(_) | None => Vec::new(),
-        },
+        Global::Acknowledge => drawn::acknowledge(model),
         Global::AcknowledgeAll => {
             let cx = model.cx();
             let listed = (model.tabs.shown == Tab::Alarms).then(|| model.tabs.alarms.listed(&cx)).flatten();
