@@ -5,7 +5,7 @@ mod banner;
 use ratatui::{Frame, layout::Rect, style::Style};
 
 use banner::banner;
-pub use banner::{alarm_words, counts};
+pub use banner::{alarm_words, counts, history_words};
 
 use super::{
     Cx, Model, SILENCE, Watch,

@@ -227,6 +227,7 @@ impl Loop {
     fn draw(&mut self) -> Result<(), UiError> {
         self.redraw_at = None;
         self.screen.draw(|frame| view(&self.model, frame))?;
+        own(|| update(&mut self.model, Msg::Drawn));
         self.drawn_at = Some(Instant::now());
         Ok(())
     }

@@ -2,6 +2,7 @@
 
 pub mod bell;
 pub mod chrome;
+pub mod drawn;
 pub mod edge;
 pub mod io;
 pub mod guard;
@@ -28,15 +29,10 @@ use ratatui::{Frame, layout::Rect};
 
 use crate::{
     access::Standing,
-    plant::{
-        alarm::AlarmCommand,
-        command::Command,
-        def::PlantDef,
-        sample::Cause,
-        snapshot::{ActiveAlarm, Snapshot},
-    },
+    plant::{alarm::AlarmCommand, command::Command, def::PlantDef, sample::Cause, snapshot::Snapshot},
     sim::drill,
 };
+use drawn::Drawn;
 use keys::Global;
 use modal::{Confirm, Modal};
 pub use msg::{Act, AskId, Effect, Msg};
@@ -46,7 +42,7 @@ use theme::Theme;
 pub use watch::{Confirmed, Watch};
 
 /// A station that has said nothing for so long (real time) is silent: its values are doubted.
-pub const SILENCE: Duration = Duration::from_secs(5);
+pub const SILENCE: Duration = Duration::from_secs(3);
 
 /// All that a terminal knows.
 #[derive(Debug)]
@@ -79,6 +75,8 @@ pub struct Model {
     pub plants: u32,
     /// The simulation behind the plant; `None` at a real one.
     pub drill: Option<Arc<drill::Status>>,
+    /// What the last frame showed; `None` before the first one.
+    pub drawn: Option<Drawn>,
 }
 
 /// The terminal's sense of time, fed by ticks.
@@ -143,6 +141,7 @@ impl Model {
             ordered: 0,
             plants: 0,
             drill: None,
+            drawn: None,
         };
         update(&mut model, Msg::Standing(standing));
         model
@@ -166,16 +165,6 @@ impl Model {
                 *sample = sample.doubted(Cause::Stale);
             }
         }
-    }
-
-    /// The alarm that `a` is for: the one selected on the alarms tab if that can be seen, else the most urgent
-    /// unacknowledged, which is the banner's.
-    fn alarm_to_acknowledge(&self) -> Option<&ActiveAlarm> {
-        let selectable = self.tabs.shown == Tab::Alarms && !self.small();
-        let selected = selectable.then(|| self.tabs.alarms.selected(&self.cx())).flatten();
-        let alarm =
-            selected.or_else(|| self.snapshot.alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()))?;
-        alarm.state.needs_acknowledgement().then_some(alarm)
     }
 }
 
@@ -221,9 +210,15 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             Vec::new()
         }
         Msg::Tick { silent } => on_tick(model, silent),
+        Msg::Drawn => {
+            model.note_drawn();
+            Vec::new()
+        }
     };
     let acts = presence::hold_back(model, acts);
-    perform(model, acts)
+    let effects = perform(model, acts);
+    model.settle();
+    effects
 }
 
 /// Draws the terminal as it stands.
@@ -267,7 +262,8 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
     if presence::ask_before_work(model, event) {
         return Vec::new();
     }
-    if let Some(modal) = model.modal.take() {
+    let past = presence::is_past_unlock(model, event);
+    if let Some(modal) = model.modal.take_if(|_| !past) {
         let Model { snapshot, theme, clock, drill, standing, screen, tabs, .. } = model;
         let cx = cx_of(snapshot, theme, *clock, *screen, drill, standing);
         let (rest, acts) = modal.on_key(&cx, tabs, event);
@@ -288,17 +284,19 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
 
 fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
     match global {
-        Global::Show(tab) if Tab::offered(&model.cx()).contains(&tab) => vec![Act::Show(tab)],
+        Global::Show(tab) if Tab::offered(&model.cx()).contains(&tab) => {
+            if tab == Tab::Alarms && model.tabs.shown != tab {
+                model.tabs.alarms.front();
+            }
+            vec![Act::Show(tab)]
+        }
         Global::Show(_) => Vec::new(),
         Global::Next => vec![Act::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), 1))],
         Global::Previous => vec![Act::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), -1))],
         Global::Lock => presence::lock(model),
         Global::Help => vec![Act::Open(Modal::Help(0))],
         Global::Quit => vec![Act::Open(Modal::Confirm(Confirm::quit()))],
-        Global::Acknowledge => match model.alarm_to_acknowledge() {
-            Some(alarm) => deeds::acknowledge(&model.cx(), alarm),
-            None => Vec::new(),
-        },
+        Global::Acknowledge => drawn::acknowledge(model),
         Global::AcknowledgeAll => {
             let cx = model.cx();
             let listed = (model.tabs.shown == Tab::Alarms).then(|| model.tabs.alarms.listed(&cx)).flatten();
@@ -363,6 +361,13 @@ fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
                 model.tabs.controllers.show(device);
                 effects.extend(show(model, Tab::Controllers));
             }
+            Act::ShowParameter(tag) => {
+                with_tabs(model, |tabs, cx| {
+                    tabs.controllers.show_parameter(cx, tag);
+                    Vec::new()
+                });
+                effects.extend(show(model, Tab::Controllers));
+            }
             Act::ShowOnMimic(tags) => {
                 with_tabs(model, |tabs, cx| {
                     tabs.mimic.select(cx, &tags);
@@ -399,6 +404,7 @@ fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         Act::Open(_)
         | Act::Show(_)
         | Act::ShowDevice(_)
+        | Act::ShowParameter(_)
         | Act::ShowOnMimic(_)
         | Act::ShowOnTrends(..)
         | Act::Order(_)

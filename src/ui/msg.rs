@@ -40,6 +40,8 @@ pub enum Msg {
     Saved(Tab, Result<PathBuf, String>),
     /// The station did not take this order: its queue is full, or it has gone.
     Undelivered(OrderId, &'static str),
+    /// A frame was drawn: what it showed may be meant by the next key.
+    Drawn,
     /// Half a second passed; so long ago (real time) came the last snapshot.
     Tick {
         /// Real time since the last snapshot.
@@ -93,6 +95,8 @@ pub enum Act {
     Show(Tab),
     /// Show a device on the controllers tab.
     ShowDevice(DeviceId),
+    /// The same with one of its parameters selected.
+    ShowParameter(TagId),
     /// Show the first of these tags that the mimic has there.
     ShowOnMimic(Vec<TagId>),
     /// Show the curve of a tag with the cursor at a moment.

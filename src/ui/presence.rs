@@ -2,7 +2,7 @@
 
 use std::{mem, sync::Arc, time::Duration};
 
-use crossterm::event::KeyEvent;
+use crossterm::event::{KeyCode, KeyEvent};
 
 use super::{
     Act, AskId, Effect, Model, context,
@@ -81,13 +81,15 @@ pub(super) fn on_standing(model: &mut Model, standing: Arc<Standing>) -> Vec<Act
     let shown = model.tabs.shown;
     let let_in = shown == Tab::Login && now.who.is_some() && user(&before) != user(&now);
     let opened = shown == Tab::Login && is_closed(&before) && !now.first;
+    // The login page has every letter for itself: a locked terminal is for looking.
+    let locked = shown == Tab::Login && !before.locked && now.locked;
     if is_closed(&now) || (now.first && !before.first) {
         return vec![Act::Show(Tab::Login)];
     }
     let offered = Tab::offered(&model.cx()).contains(&shown);
     match back {
         Some(tab) => vec![Act::Show(tab)],
-        None if let_in || opened || !offered => vec![Act::Show(Tab::Mimic)],
+        None if let_in || opened || locked || !offered => vec![Act::Show(Tab::Mimic)],
         None => Vec::new(),
     }
 }
@@ -139,7 +141,7 @@ pub(super) fn lock(model: &Model) -> Vec<Act> {
 /// A key on a locked terminal that is meant for a window with work in it, as a faceplate opens one: the password is asked
 /// for above it.
 pub(super) fn ask_before_work(model: &mut Model, event: KeyEvent) -> bool {
-    let work = model.modal.as_ref().is_some_and(|modal| !modal.only_shows() && !modal.is_unlock());
+    let work = model.modal.as_ref().is_some_and(|modal| !modal.only_looks() && !modal.is_unlock());
     let leaves = keys::ctrl('c').is(event) || login::is_leave(event);
     if !model.standing.locked || !work || leaves {
         return false;
@@ -158,13 +160,15 @@ pub(super) fn hold_back(model: &mut Model, acts: Vec<Act>) -> Vec<Act> {
     let mut rest = Vec::new();
     for act in acts {
         match act {
-            Act::Open(modal) if !modal.only_shows() && !modal.is_unlock() => held = Some(Some(modal)),
-            Act::Order(_) | Act::Confirmed(_) | Act::Do(Effect::SaveReport { .. } | Effect::Drill(_)) => {
-                held = held.or(Some(None));
-            }
+            Act::Open(modal) if !modal.only_looks() && !modal.is_unlock() => held = Some(Some(modal)),
+            Act::Order(_)
+            | Act::Confirmed(_)
+            | Act::Wish(_, Wish::Exported { .. })
+            | Act::Do(Effect::SaveReport { .. } | Effect::Drill(_)) => held = held.or(Some(None)),
             Act::Open(_)
             | Act::Show(_)
             | Act::ShowDevice(_)
+            | Act::ShowParameter(_)
             | Act::ShowOnMimic(_)
             | Act::ShowOnTrends(..)
             | Act::Wish(..)
@@ -199,6 +203,10 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
 
 /// The station's answer to a wish; only the last one is waited for.
 pub(super) fn on_granted(model: &mut Model, id: AskId, answer: Result<(), String>) -> Vec<Act> {
+    if matches!(id.tab, Tab::Reports | Tab::Bus) {
+        // A file that waits to be written waits for its own answer, whatever was wished since.
+        return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
+    }
     if id.number == 0 || id.number != model.presence.wished {
         return Vec::new();
     }
@@ -234,7 +242,18 @@ pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<
     if closed { vec![Act::Show(Tab::Login)] } else { Vec::new() }
 }
 
+/// A key that the password of a locked terminal has no use for, and that leads to what there is to be seen below it.
+pub(super) fn is_past_unlock(model: &Model, event: KeyEvent) -> bool {
+    let moves = [KeyCode::Tab, KeyCode::BackTab, KeyCode::Up, KeyCode::Down, KeyCode::PageUp, KeyCode::PageDown];
+    model.modal.as_ref().is_some_and(Modal::is_unlock) && moves.into_iter().any(|code| keys::code(code).is(event))
+}
+
 impl Modal {
+    /// Does it at most choose what is seen, so that a locked terminal may open it?
+    pub fn only_looks(&self) -> bool {
+        self.only_shows() || matches!(self, Modal::Prompt(_))
+    }
+
     /// Does it ask for the password of a locked terminal?
     pub fn is_unlock(&self) -> bool {
         matches!(self, Modal::Sheet(sheet) if matches!(sheet.purpose, Purpose::Unlock(_)))

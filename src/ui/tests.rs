@@ -20,6 +20,7 @@ pub fn draw(model: &mut Model, width: u16, height: u16) -> Buffer {
     update(model, Msg::Resize(width, height));
     let mut terminal = Terminal::new(TestBackend::new(width, height)).expect("a test backend");
     terminal.draw(|frame| view(model, frame)).expect("a test backend takes every frame");
+    update(model, Msg::Drawn);
     terminal.backend().buffer().clone()
 }
 

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{Effect, Model, chrome};
+use super::{Effect, Model, chrome, modal::Modal};
 use crate::{
     access::{OrderRequest, Signature},
-    plant::command::{Command, OrderId, OrderStatus, Outcome},
+    plant::command::{Command, OrderId, OrderStatus, Outcome, Refusal},
 };
 
 /// An outcome that is no worry is shown for so many ticks: a minute of real time.
@@ -88,6 +88,21 @@ impl Model {
                 watch.changed_at = self.clock.phase;
             }
             watch.status = Some(status.clone());
+        }
+    }
+
+    /// Ends the wait of a window for the station's word on its signature; one that was not taken is asked for again.
+    pub(super) fn settle(&mut self) {
+        let Some(watch) = &self.watch else { return };
+        let refused = match (watch.undelivered, watch.status.as_ref().map(|status| &status.outcome)) {
+            (Some(why), _) => Some(format!("not sent: {why}")),
+            (None, Some(Outcome::Refused(Refusal::NotSigned(why)))) => Some(why.clone()),
+            (None, Some(_)) => None,
+            (None, None) => return,
+        };
+        let waiting = self.modal.take_if(|modal| matches!(modal, Modal::Confirm(confirm) if confirm.is_waiting()));
+        if let Some(Modal::Confirm(confirm)) = waiting {
+            self.modal = confirm.answered(refused);
         }
     }
 }

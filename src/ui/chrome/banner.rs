@@ -24,10 +24,11 @@ use crate::{
 pub(super) fn banner(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     let alarms = &cx.snapshot.alarms;
     let urgent = alarms.iter().find(|alarm| alarm.state.needs_acknowledgement());
-    let trouble = cx.snapshot.history.trouble.as_ref().map(|trouble| format!("history: {trouble}"));
+    let trouble = history_words(cx);
     let other = alarms.first().filter(|_| trouble.is_none());
     let Some(alarm) = urgent.or(other) else {
-        let blind = blind_words(model, cx).filter(|_| alarms.is_empty());
+        let seen_none = alarms.is_empty();
+        let blind = if seen_none { blind_words(model, cx) } else { silent_words(model).map(|why| not_judged(&why)) };
         let room = canvas.width().saturating_sub(1);
         match [blind, trouble].into_iter().flatten().reduce(|blind, trouble| format!("{blind}   {trouble}")) {
             Some(words) => canvas.text(1, 0, &fit_words(&words, room), cx.theme.trouble()),
@@ -41,34 +42,45 @@ pub(super) fn banner(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     };
     let def = cx.def().alarm(alarm.id);
     let waiting = alarm.state.needs_acknowledgement();
-    let mark = cx.theme.alarm(def.priority, alarm.state, cx.flash());
+    let (mark, style) =
+        (cx.theme.alarm(def.priority, alarm.state, cx.flash()), cx.theme.alarm(def.priority, alarm.state, false));
     let x = canvas.text(1, 0, cx.theme.priority_mark(def.priority), mark) + 1;
-    let (text, room) = (alarm_words(cx, alarm), canvas.width());
+    let x = canvas.text(x, 0, &state_words(cx, alarm), style) + 2;
+    let room = canvas.width();
+    // The key is told where it is meant for this very alarm: on the alarms tab it is for the selected one.
+    let meant = model.alarm_to_acknowledge().is_some_and(|meant| meant.id == alarm.id);
     let may = rights::missing(cx, &alarm.acknowledge()).is_none();
-    let ack = if waiting && may { "a ack " } else { "" };
-    let flood = if cx.snapshot.alarm_quality.flood_since.is_some() { "FLOOD   " } else { "" };
+    let ack = if waiting && meant && may { "a ack " } else { "" };
+    let worry = worry_words(model, cx);
     let (aside, silenced) = (aside_words(cx), if is_silenced(cx) { "silenced   " } else { "" });
     let aside = if aside.is_empty() { aside } else { format!("{aside}   ") };
-    // That it waits for somebody, and that there is a flood, must not be what a long text cuts off.
-    let least = format!("{flood}{ack}");
-    let left = room.saturating_sub(x + if least.is_empty() { 0 } else { 2 + width(&least) });
-    let text = if width(&text) <= left { text } else { fit_words(&text, left) };
-    // The alarm itself comes first; the counts and the rest only where there is room left.
     let counts = counts(cx);
+    // How many there are, that one waits for somebody, and why to doubt all this must not be what a long text pushes out.
     let tails = [
-        format!("{flood}{counts}   {aside}{silenced}{ack}"),
-        format!("{flood}{counts}   {aside}{ack}"),
-        format!("{flood}{counts}   {ack}"),
-        least,
-        String::new(),
+        (25, format!("{worry}{counts}   {aside}{silenced}{ack}")),
+        (25, format!("{worry}{counts}   {aside}{ack}")),
+        (14, format!("{worry}{counts}   {ack}")),
+        (8, format!("{worry}{ack}")),
     ];
-    let fits = |tail: &&String| x + width(&text) + 2 + width(tail) <= room;
-    let tail = tails.iter().find(fits).map_or("", String::as_str);
-    canvas.text(x, 0, &text, cx.theme.alarm(def.priority, alarm.state, false));
-    canvas.text_right(room, 0, tail, cx.theme.normal());
-    if !flood.is_empty() && tail.starts_with(flood) {
-        canvas.text(room.saturating_sub(width(tail)), 0, "FLOOD", cx.theme.trouble());
+    let (text, value) = what_words(cx, alarm);
+    let fits = |least: u16, tail: &str| x + width(&text).min(least) + 2 + width(tail) <= room;
+    let tail = tails.iter().find(|(least, tail)| fits(*least, tail)).map_or("", |(_, tail)| tail.trim_end());
+    let end = room.saturating_sub(1);
+    let left = end.saturating_sub(x + if tail.is_empty() { 0 } else { 2 + width(tail) });
+    let whole = format!("{text}  {value}");
+    let shown = if width(&whole) <= left { whole } else { fit_words(&text, left) };
+    canvas.text(x, 0, &shown, style);
+    canvas.text_right(end, 0, tail, cx.theme.normal());
+    if !worry.is_empty() && tail.starts_with(worry.trim_end()) {
+        canvas.text(end.saturating_sub(width(tail)), 0, worry.trim_end(), cx.theme.trouble());
     }
+}
+
+/// Why more may be wrong than can be seen: the station judges nothing, or there is a flood.
+fn worry_words(model: &Model, cx: &Cx) -> String {
+    let blind = if silent_words(model).is_some() { "alarms not judged   " } else { "" };
+    let flood = if cx.snapshot.alarm_quality.flood_since.is_some() { "FLOOD   " } else { "" };
+    format!("{blind}{flood}")
 }
 
 /// `3 put aside`; empty where nobody has put anything aside. What is suppressed by design is as it should be, and stands
@@ -90,10 +102,7 @@ fn is_silenced(cx: &Cx) -> bool {
 /// Why alarms may be there without being seen: `alarms not judged: L1 disconnected`.
 fn blind_words(model: &Model, cx: &Cx) -> Option<String> {
     let snapshot = cx.snapshot;
-    let silent = match &model.standing.gone {
-        Some(why) => Some(format!("station gone, {why}")),
-        None => (model.clock.silent >= SILENCE).then(|| "station silent".to_owned()),
-    };
+    let silent = silent_words(model);
     let lines = cx.def().lines.iter().filter_map(|line| match snapshot.line(line.id).state {
         LineState::Connected => None,
         LineState::Disconnected => Some(format!("{} disconnected", line.name)),
@@ -111,11 +120,36 @@ fn blind_words(model: &Model, cx: &Cx) -> Option<String> {
         DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_) => None,
     });
     let blind: Vec<String> = silent.into_iter().chain(lines).chain(devices).collect();
-    (!blind.is_empty()).then(|| format!("alarms not judged: {}", blind.join(", ")))
+    (!blind.is_empty()).then(|| not_judged(&blind.join(", ")))
 }
 
-/// `TIC-1.PV temperature high  72.4 °C  UNACK 00:41`.
+fn not_judged(why: &str) -> String {
+    format!("alarms not judged: {why}")
+}
+
+/// Why nothing is heard of the station.
+fn silent_words(model: &Model) -> Option<String> {
+    match &model.standing.gone {
+        Some(why) => Some(format!("station gone, {why}")),
+        None => (model.clock.silent >= SILENCE).then(|| "station silent".to_owned()),
+    }
+}
+
+/// `history: disk full`; nothing while the history is well.
+pub fn history_words(cx: &Cx) -> Option<String> {
+    let trouble = cx.snapshot.history.trouble.as_ref()?;
+    // An error of the history names it already.
+    Some(format!("history: {}", trouble.trim_start_matches("history: ")))
+}
+
+/// `UNACK 00:41  TIC-1.PV temperature high  72.4 °C`.
 pub fn alarm_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
+    let (text, value) = what_words(cx, alarm);
+    format!("{}  {text}  {value}", state_words(cx, alarm))
+}
+
+/// `TIC-1.PV temperature high` and `72.4 °C`.
+fn what_words(cx: &Cx, alarm: &ActiveAlarm) -> (String, String) {
     use crate::plant::def::Subject;
     let def = cx.def().alarm(alarm.id);
     let now = match def.subject {
@@ -123,6 +157,11 @@ pub fn alarm_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
         Subject::Device(device) => device_words(cx, device),
         Subject::Line(line) => line_state_words(cx, line),
     };
+    (format!("{} {}", subject(cx, alarm.id), def.text), now)
+}
+
+/// `UNACK 00:41`: the state and how long it lasts.
+fn state_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
     let since = match alarm.state {
         AlarmState::Returned | AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
             alarm.returned_at.unwrap_or(alarm.raised_at)
@@ -134,8 +173,7 @@ pub fn alarm_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
         | AlarmState::Suppressed
         | AlarmState::OutOfService => alarm.raised_at,
     };
-    let (state, lasted) = (alarm.state.word(), running(between(since, cx.now)));
-    format!("{} {}  {state} {lasted}  {now}", subject(cx, alarm.id), def.text)
+    format!("{} {}", alarm.state.word(), running(between(since, cx.now)))
 }
 
 /// How many of each priority: `[1]!1 (3)2`.

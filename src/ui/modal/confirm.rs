@@ -43,6 +43,8 @@ pub struct Confirm {
     sign: Option<Form>,
     /// Why the last Enter was not taken.
     problem: Option<String>,
+    /// The signed order is on its way: whether the signature is taken is told by the station.
+    waiting: bool,
 }
 
 /// What a confirmed window does.
@@ -62,7 +64,16 @@ impl Confirm {
     }
 
     fn new(intent: Intent, title: impl Into<String>, notes: Vec<String>) -> Confirm {
-        Confirm { intent, title: title.into(), notes, back: None, seen: None, sign: None, problem: None }
+        Confirm {
+            intent,
+            title: title.into(),
+            notes,
+            back: None,
+            seen: None,
+            sign: None,
+            problem: None,
+            waiting: false,
+        }
     }
 
     /// Is it the question whether to leave?
@@ -168,6 +179,9 @@ impl Confirm {
 
     pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
         let enter = keys::code(KeyCode::Enter).is(event) && !self.wants_y();
+        if self.waiting {
+            return Next::Stay(Modal::Confirm(self));
+        }
         if let Some(form) = &mut self.sign {
             // Letters belong to the name and the password.
             match form.on_key(event) {
@@ -201,23 +215,44 @@ impl Confirm {
             self.problem = Some(why);
             return Next::Stay(Modal::Confirm(self));
         }
-        let act = match self.intent {
+        let act = match &self.intent {
             Intent::Quit => Act::Do(Effect::Quit),
             Intent::Order(command) => {
                 let seen = self.seen.as_ref().and_then(|seen| seen.shown(cx));
                 let sign = self.sign.as_ref().map(signature);
-                Act::Confirmed(Confirmed { seen, sign, ..command.into() })
+                Act::Confirmed(Confirmed { seen, sign, ..command.clone().into() })
             }
         };
+        if self.sign.is_some() {
+            // A password that is typed anew after a refusal must find its line, not the keys of the tab below.
+            (self.waiting, self.problem) = (true, None);
+            return Next::Both(Modal::Confirm(self), vec![act]);
+        }
         match self.back {
             Some(back) => Next::Both(Modal::Faceplate(back), vec![act]),
             None => Next::Do(vec![act]),
         }
     }
 
+    /// Is the station's word on a signature waited for?
+    pub(in crate::ui) fn is_waiting(&self) -> bool {
+        self.waiting
+    }
+
+    /// What is left once the station has spoken: the same window where the signature was not taken, else where it was
+    /// asked from.
+    pub(in crate::ui) fn answered(mut self, refused: Option<String>) -> Option<Modal> {
+        let Some(why) = refused else { return self.back.map(Modal::Faceplate) };
+        (self.waiting, self.problem) = (false, Some(why));
+        if let Some(form) = &mut self.sign {
+            form.forget();
+        }
+        Some(Modal::Confirm(self))
+    }
+
     /// Pasted text: a password or a name, where one is asked for.
     pub(super) fn on_paste(&mut self, text: &str) {
-        if let Some(form) = &mut self.sign {
+        if let Some(form) = self.sign.as_mut().filter(|_| !self.waiting) {
             form.paste(text);
         }
     }
@@ -226,7 +261,14 @@ impl Confirm {
     fn view_sign(&self, cx: &Cx, canvas: &mut Canvas, y: u16) {
         if let Some(form) = &self.sign {
             form.view(cx, canvas, y);
-            canvas.text(0, y + form.rows(), self.problem.as_deref().unwrap_or_default(), cx.theme.trouble());
+            let y = y + form.rows();
+            if self.waiting {
+                canvas.text(0, y, "asking the station …", cx.theme.dim());
+            }
+            let room = canvas.width();
+            for (n, words) in self.problem.iter().flat_map(|words| wrap(words, room)).enumerate() {
+                canvas.text(0, y + n as u16, &words, cx.theme.trouble());
+            }
         }
     }
 
@@ -257,9 +299,11 @@ impl Confirm {
             true => format!("Esc {}", self.escape()),
             false => format!("{yes} {}   Esc {}", self.verb(), self.escape()),
         };
-        let form = self.sign.as_ref().map_or((0, 0), |form| (form.width(), form.rows() + 1));
-        let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&keys)).max(form.0);
-        let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + form.1 + 2));
+        let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&keys));
+        let inner = inner.max(self.sign.as_ref().map_or(0, Form::width));
+        let problem = self.problem.as_ref().map_or(1, |words| wrap(words, inner).len() as u16);
+        let form = self.sign.as_ref().map_or(0, |form| form.rows() + problem);
+        let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + form + 2));
         for (y, (text, style)) in rows.iter().enumerate() {
             canvas.text(0, y as u16, text, *style);
         }

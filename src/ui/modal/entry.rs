@@ -1,6 +1,6 @@
 //! A number for a tag: old value, new value, range, address, and what the profile wants said.
 
-use crossterm::event::{KeyCode, KeyEvent};
+use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::{Frame, layout::Rect, style::Style};
 
 use super::{
@@ -59,10 +59,28 @@ impl Entry {
                 }
                 Err(problem) => self.problem = Some(problem),
             }
+        } else if let Some(c) = strange(event) {
+            self.reject(c);
         } else if self.line.on_key(event) {
-            self.problem = None;
+            // What was left out is told until the line is empty again.
+            self.problem.take_if(|_| !self.line.missed());
         }
         Next::Stay(Modal::Entry(self))
+    }
+
+    /// Pasted text, if it is a number.
+    pub(super) fn paste(&mut self, text: &str) {
+        match text.trim().chars().find(|c| !is_numeric(*c)) {
+            Some(c) => self.reject(c),
+            None => self.line.paste(text),
+        }
+    }
+
+    /// What cannot be in a number is not shown, it might be a secret; the number is not written either.
+    fn reject(&mut self, c: char) {
+        self.line.miss();
+        let named = if c.is_control() || c.is_whitespace() { "a blank".to_owned() } else { format!("\"{c}\"") };
+        self.problem = Some(format!("{named} is no part of a number; Ctrl-U empties the line"));
     }
 
     pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
@@ -102,6 +120,19 @@ impl Entry {
         }
         canvas.text(0, last, &theme.enter("⏎ write and verify   Esc leave unchanged"), theme.strong());
     }
+}
+
+/// The character that was typed and can be in no number.
+fn strange(event: KeyEvent) -> Option<char> {
+    let combined = event.modifiers.intersects(KeyModifiers::CONTROL | KeyModifiers::ALT);
+    match event.code {
+        KeyCode::Char(c) if !combined && !is_numeric(c) => Some(c),
+        _ => None,
+    }
+}
+
+fn is_numeric(c: char) -> bool {
+    c.is_ascii_digit() || matches!(c, '+' | '-' | '.' | ',')
 }
 
 /// Is a number for this tag asked again in a window of its own? What must be signed is.

@@ -114,8 +114,8 @@ impl Form {
             What::Text(line) | What::Secret(line) if line.missed() => {
                 Some("not all of it was taken; Ctrl-U empties the line".to_owned())
             }
-            What::Text(line) if line.text().trim().is_empty() => Some(format!("type the {}", field.label)),
-            What::Secret(line) if line.text().is_empty() => Some(format!("type the {}", field.label)),
+            What::Text(line) if line.text().trim().is_empty() => Some(type_words(field.label)),
+            What::Secret(line) if line.text().is_empty() => Some(type_words(field.label)),
             What::Text(_) | What::Secret(_) | What::Role(_) => None,
         };
         let (n, why) = self.fields.iter().enumerate().find_map(|(n, field)| Some((n, lacks(field)?)))?;
@@ -226,6 +226,12 @@ impl fmt::Debug for Field {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.label)
     }
+}
+
+/// `type the name`, `type your password again`.
+fn type_words(label: &str) -> String {
+    let the = if label.starts_with("your ") { "" } else { "the " };
+    format!("type {the}{label}")
 }
 
 #[cfg(test)]

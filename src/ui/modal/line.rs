@@ -81,6 +81,10 @@ impl Line {
         }
         true
     }
+    /// Notes that something typed or pasted was not taken.
+    pub fn miss(&mut self) {
+        self.missed = true;
+    }
     /// Pasted text: control characters (a line end above all) become blanks, so a paste never confirms anything and
     /// two lines never become one number.
     pub fn paste(&mut self, text: &str) {

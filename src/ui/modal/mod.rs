@@ -155,7 +155,7 @@ impl Modal {
     /// Pasted text goes into a text line, or nowhere.
     pub fn on_paste(&mut self, text: &str) {
         match self {
-            Modal::Entry(entry) => entry.line.paste(text),
+            Modal::Entry(entry) => entry.paste(text),
             Modal::Prompt(prompt) => prompt.line.paste(text),
             Modal::Reason(reason) => reason.paste(text),
             Modal::Settings(settings) => settings.on_paste(text),

@@ -267,6 +267,9 @@ impl Sheet {
         let least = cx.standing.password_chars_min;
         let rule = format!("A password has at least {least} characters. A phrase is good, in any language, Thai too.");
         let first = "It must be changed at the first login.".to_owned();
+        let own = |user: &Arc<str>| cx.standing.who.as_ref().is_some_and(|who| who.user == *user);
+        let you =
+            |user: &Arc<str>| own(user).then(|| "This is you: you are out at once, and another Supervisor must help.");
         match &self.purpose {
             Purpose::First => vec![
                 "Nobody is known here yet. The first person is a Supervisor: may do everything, and adds the others."
@@ -283,11 +286,14 @@ impl Sheet {
             Purpose::Reset(_) => vec![rule, first],
             Purpose::Role(_) => vec![],
             Purpose::Disable(user, true) => {
-                vec![format!("{user} is logged out everywhere and cannot log in until this is taken back.")]
+                let words = format!("{user} is logged out everywhere and cannot log in until this is taken back.");
+                you(user).map(str::to_owned).into_iter().chain([words]).collect()
             }
             Purpose::Disable(user, false) => vec![format!("{user} may log in again; a lock-out ends too.")],
             Purpose::Delete(user) => {
-                vec![format!("{user} is removed; all that {user} did stays in the books. Type the name to be sure.")]
+                let words =
+                    format!("{user} is removed; all that {user} did stays in the books. Type the name to be sure.");
+                you(user).map(str::to_owned).into_iter().chain([words]).collect()
             }
         }
     }

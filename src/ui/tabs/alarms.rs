@@ -22,6 +22,7 @@ use ratatui::{Frame, layout::Rect};
 use crate::{
     history::{Answer, HistoryError},
     plant::{
+        alarm::AlarmState,
         def::{AlarmClass, AlarmId, Priority, Subject},
         snapshot::{ActiveAlarm, AsideAlarm, Snapshot},
     },
@@ -104,6 +105,16 @@ impl Alarms {
         rows.get(self.place(&rows)).map(|row| row.alarm)
     }
 
+    /// Has an operator selected an alarm himself? Else it is the first of the list, whichever that is.
+    pub fn is_chosen(&self) -> bool {
+        self.selected.is_some()
+    }
+
+    /// Shows the first view.
+    pub fn front(&mut self) {
+        self.page = Page::Active;
+    }
+
     /// The alarms that the filter lets through, in order of urgency; `None` on pages without a list of them.
     pub fn listed<'a>(&self, cx: &Cx<'a>) -> Option<Vec<&'a ActiveAlarm>> {
         let list = matches!(self.page, Page::Active | Page::System);
@@ -140,6 +151,7 @@ impl Alarms {
                 self.handover.want();
                 return deeds::hand_over();
             }
+            Action::TakeOver if self.handover.is_own(cx) => return deeds::own_handover(),
             Action::TakeOver => {
                 self.handover.want();
                 return deeds::take_over(cx);
@@ -168,9 +180,29 @@ impl Alarms {
         std::mem::take(&mut self.page) != Page::Active
     }
 
-    /// The keys of the page.
-    pub fn hints(&self) -> Vec<Hint> {
-        keys::told(self.page)
+    /// The keys of the page; what cannot be done with the selected row is left to the help.
+    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+        let alarm = self.selected(cx);
+        let can = |label: &str| match label {
+            "reset" => alarm.is_some_and(|alarm| {
+                matches!(alarm.state, AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged)
+            }),
+            "unfold" => alarm.is_some_and(|alarm| alarm.burst.is_some()),
+            "put back" => self
+                .aside(cx)
+                .is_some_and(|aside| matches!(aside.state, AlarmState::Shelved | AlarmState::OutOfService)),
+            _ => true,
+        };
+        let mut hints = keys::told(self.page);
+        hints.iter_mut().filter(|hint| !can(&hint.label)).for_each(|hint| hint.label.clear());
+        // The first of these must not fall off a narrow footer.
+        hints.sort_by_key(|hint| match hint.label.as_str() {
+            "ack" | "all" | "search" | "list" | "put back" | "hand over" | "take over" => 0,
+            "reset" => 1,
+            "view" => 2,
+            _ => 3,
+        });
+        hints
     }
 
     /// News, or time has passed: the page that needs the history asks for it.
@@ -315,7 +347,7 @@ impl Alarms {
                 vec![Act::ShowOnMimic(cx.def().tags_of(device).map(|tag| tag.id).collect())]
             }
             (Subject::Tag(tag), Action::Trend) => vec![Act::ShowOnTrends(tag, raised)],
-            (Subject::Tag(tag), Action::Controller) => vec![Act::ShowDevice(cx.def().tag(tag).device)],
+            (Subject::Tag(tag), Action::Controller) => vec![Act::ShowParameter(tag)],
             (Subject::Device(device), Action::Controller) => vec![Act::ShowDevice(device)],
             (Subject::Tag(tag), Action::Why) => Why::open(Why::new(vec![tag], 0)),
             (Subject::Device(device), Action::Why) => Why::open(Why::of_device(cx, device)),

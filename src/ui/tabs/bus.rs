@@ -257,6 +257,11 @@ impl Bus {
         self.frames.set_filter(text).map(|()| Vec::new())
     }
 
+    /// The station has put a capture on record, or refuses it.
+    pub fn on_granted(&mut self, answer: Result<(), String>) -> Vec<Act> {
+        self.frames.on_granted(answer)
+    }
+
     /// A capture was written, or why not.
     pub fn on_saved(&mut self, result: Result<PathBuf, String>) {
         self.frames.on_saved(result);

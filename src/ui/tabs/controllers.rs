@@ -35,7 +35,7 @@ use crate::{
     history::{Answer, HistoryError, Question, Series},
     plant::{
         command::Command,
-        def::{DeviceDef, DeviceId, ProgramDef},
+        def::{DeviceDef, DeviceId, ProgramDef, TagId},
         parameter_set,
         snapshot::Snapshot,
     },
@@ -124,6 +124,13 @@ impl Controllers {
             errand: Errand::default(),
             asked: self.asked,
         };
+    }
+
+    /// Shows the device of a tag with the tag selected.
+    pub fn show_parameter(&mut self, cx: &Cx, tag: TagId) {
+        let device = cx.def().tag(tag).device;
+        self.show(device);
+        self.table.selected = self.table.rows(cx, device).iter().position(|row| row.id == tag).unwrap_or(0);
     }
 
     /// Esc: a step back, `false` where there is none.
@@ -363,10 +370,11 @@ impl Controllers {
         match self.asked_for {
             Asked::Filter => {
                 let filter = text.to_owned();
-                let table = Table { selected: 0, filter, ..self.table.clone() };
+                let mut table = Table { selected: 0, filter, ..self.table.clone() };
                 if table.rows(cx, self.device).is_empty() {
                     return Err(format!("no parameter has \"{text}\" in its name or meaning"));
                 }
+                table.selected = table.best(cx, self.device);
                 self.table = table;
                 Ok(Vec::new())
             }

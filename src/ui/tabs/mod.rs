@@ -20,14 +20,35 @@ use crossterm::event::KeyEvent;
 use ratatui::{Frame, layout::Rect};
 
 use super::{
-    Act, AskId, Cx,
+    Act, AskId, Cx, Effect,
     keys::{self, Hint},
     presence,
 };
 use crate::{
+    access::{Wish, book::sha256},
     history::{Answer, HistoryError},
     plant::{role::Role, snapshot::Snapshot},
 };
+
+/// A file that is written once the station has put on record that it is.
+#[derive(Debug, Clone, PartialEq)]
+struct Outgoing {
+    tab: Tab,
+    path: PathBuf,
+    bytes: Vec<u8>,
+}
+
+impl Outgoing {
+    /// Asks for it.
+    fn wish(&self) -> Act {
+        let file = self.path.display().to_string();
+        Act::Wish(self.tab, Wish::Exported { file, sha256: sha256(&self.bytes) })
+    }
+    /// Writes it.
+    fn write(self) -> Act {
+        Act::Do(Effect::SaveReport { tab: self.tab, path: self.path, bytes: self.bytes })
+    }
+}
 
 /// A tab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -175,7 +196,7 @@ impl Tabs {
             Tab::Login => self.login.hints(cx),
             Tab::Mimic => self.mimic.hints(cx),
             Tab::Trends => keys::hints(trends::KEYS),
-            Tab::Alarms => self.alarms.hints(),
+            Tab::Alarms => self.alarms.hints(cx),
             Tab::Controllers => self.controllers.hints(cx),
             Tab::Reports => keys::hints(reports::KEYS),
             Tab::Bus => self.bus.hints(cx),
@@ -233,8 +254,11 @@ impl Tabs {
 
     /// A wish goes to the tab that wished, shown or not.
     pub fn on_granted(&mut self, cx: &Cx, id: AskId, answer: Result<(), String>) -> Vec<Act> {
-        if id.tab == Tab::Login {
-            self.login.on_granted(cx, answer);
+        match id.tab {
+            Tab::Login => self.login.on_granted(cx, answer),
+            Tab::Reports => return self.reports.on_granted(answer),
+            Tab::Bus => return self.bus.on_granted(answer),
+            Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Controllers | Tab::Users | Tab::Faults => {}
         }
         Vec::new()
     }

@@ -12,7 +12,7 @@ use crossterm::event::KeyCode;
 use jiff::{SignedDuration, Timestamp};
 use ratatui::{Frame, layout::Rect};
 
-use super::{Tab, errand::Errand};
+use super::{Outgoing, Tab, errand::Errand};
 use crate::{
     history::{Answer, HistoryError, Question},
     plant::{def::CsvDialect, snapshot::Snapshot},
@@ -21,7 +21,7 @@ use crate::{
         csv::{file_name, shift_csv},
     },
     ui::{
-        Act, Cx, Effect,
+        Act, Cx,
         keys::{Key, char, code},
         modal::{Modal, Prompt, Why},
     },
@@ -89,6 +89,8 @@ pub struct Reports {
     trouble: Option<String>,
     dialect: CsvDialect,
     export: Export,
+    /// The CSV that waits for the station's word.
+    outgoing: Option<Outgoing>,
     /// First line shown.
     first: usize,
     errand: Errand,
@@ -118,6 +120,7 @@ impl Reports {
             trouble: None,
             dialect: snapshot.def.report.csv,
             export: Export::Not,
+            outgoing: None,
             first: 0,
             errand: Errand::default(),
             number: 0,
@@ -192,6 +195,18 @@ impl Reports {
         Ok(self.ask(cx))
     }
 
+    /// The station has put the export on record, or refuses it: without that nothing is written.
+    pub fn on_granted(&mut self, answer: Result<(), String>) -> Vec<Act> {
+        let Some(outgoing) = self.outgoing.take() else { return Vec::new() };
+        match answer {
+            Ok(()) => vec![outgoing.write()],
+            Err(why) => {
+                self.export = Export::Failed(why);
+                Vec::new()
+            }
+        }
+    }
+
     /// A report was written, or why not.
     pub fn on_saved(&mut self, _cx: &Cx, result: Result<PathBuf, String>) -> Vec<Act> {
         self.export = match result {
@@ -252,9 +267,14 @@ impl Reports {
             self.export = Export::Failed("nothing to write yet".to_owned());
             return Vec::new();
         };
-        self.export = Export::Writing;
+        if self.outgoing.is_some() {
+            return Vec::new();
+        }
         let bytes = shift_csv(report, cx.def(), self.dialect);
-        vec![Act::Do(Effect::SaveReport { tab: Tab::Reports, path: self.path(cx, report), bytes })]
+        let outgoing = Outgoing { tab: Tab::Reports, path: self.path(cx, report), bytes };
+        let wish = outgoing.wish();
+        (self.export, self.outgoing) = (Export::Writing, Some(outgoing));
+        vec![wish]
     }
 
     fn path(&self, cx: &Cx, report: &ShiftReport) -> PathBuf {

@@ -54,9 +54,11 @@ fn what_is_typed_is_what_is_written_or_refused() {
         }
     };
     check("s3,5⏎", Ok(3.5));
-    check("s7OO⏎", Err("\"7OO\" is no number"));
-    check("s1e5⏎", Err("\"1e5\" is no number"));
-    check("s7 0", Err("new 7 0"));
+    check("s7OO", Err("\"O\" is no part of a number"));
+    check("s7OO⏎", Err("not all of it was taken"));
+    check("s1e5⏎", Err("not all of it was taken"));
+    check("s7 0", Err("a blank is no part of a number"));
+    check("s7-0⏎", Err("\"7-0\" is no number"));
     check(&format!("s{}⏎", "7".repeat(70)), Err("not all of it was taken"));
 }
 
@@ -504,11 +506,40 @@ fn acknowledging_takes_the_most_urgent_or_the_selected() {
     assert_eq!(order_of(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()));
     assert_eq!(order_of(&type_keys(&mut model, "3↓↓a")), Some(&fixture.alarms[2].acknowledge()));
     assert_eq!(order_of(&type_keys(&mut model, "↑a")), None, "already acknowledged");
-    assert_eq!(order_of(&type_keys(&mut model, "A")), None, "all: asks first");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("already acknowledged"), "{shown}");
+    assert!(
+        !shown.lines().nth(2).is_some_and(|banner| banner.contains("a ack")),
+        "it is not for the banner's: {shown}"
+    );
+    assert_eq!(order_of(&type_keys(&mut model, "⎋A")), None, "all: asks first");
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), fixture.snapshot().acknowledge_all().as_ref());
     let mut quiet = super::model(&Fixture::normal(), Theme::FULL);
     assert_eq!(type_keys(&mut quiet, "aA"), []);
     assert_eq!(quiet.modal, None);
+}
+
+#[test]
+fn what_came_after_the_last_frame_is_not_acknowledged_unseen() {
+    let mut fixture = Fixture::alarm();
+    let newer = crate::plant::snapshot::ActiveAlarm { id: AlarmId(1), ..fixture.alarms[0].clone() };
+    for tab in ["", "3"] {
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, tab);
+        screen(&mut model, 80, 24);
+        let mut later = fixture.clone();
+        later.alarms.insert(0, newer.clone());
+        update(&mut model, Msg::Snapshot(later.snapshot()));
+        assert_eq!(order_of(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()), "as it was seen");
+        screen(&mut model, 80, 24);
+        assert_eq!(order_of(&type_keys(&mut model, "a")), Some(&newer.acknowledge()), "now it is seen");
+    }
+    fixture.alarms.clear();
+    let mut model = model(&fixture, Theme::FULL);
+    screen(&mut model, 80, 24);
+    fixture.alarms.push(newer);
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    assert_eq!(type_keys(&mut model, "a"), []);
 }
 
 #[test]

@@ -12,7 +12,7 @@ use crate::{
     },
     history::{Answer, Question},
     plant::{
-        command::{Command, OrderId, OrderStatus, Outcome},
+        command::{Command, OrderId, OrderStatus, Outcome, Refusal},
         record::{ActionRecord, Seal},
         role::{Role, Sign},
         sample::Quality,
@@ -240,10 +240,21 @@ fn a_locked_terminal_looks_and_does_nothing() {
         type_keys(&mut model, "⎋⎋⎋1");
         assert_eq!((model.tabs.shown, &model.modal), (Tab::Mimic, &None), "{keys}");
     }
-    for (keys, tab) in [("3", Tab::Alarms), ("5", Tab::Reports), ("?⎋2", Tab::Trends)] {
+    for (keys, tab) in [
+        ("3", Tab::Alarms),
+        ("v↓", Tab::Alarms),
+        ("V/unack⏎", Tab::Alarms),
+        ("5", Tab::Reports),
+        ("?⎋2", Tab::Trends),
+        ("⇥", Tab::Alarms),
+    ] {
         type_keys(&mut model, keys);
-        assert_eq!((model.tabs.shown, &model.modal), (tab, &None));
+        assert_eq!((model.tabs.shown, &model.modal), (tab, &None), "{keys}");
     }
+    type_keys(&mut model, "a⇥");
+    assert_eq!(model.tabs.shown, Tab::Controllers, "below the window too");
+    assert!(model.modal.as_ref().is_some_and(Modal::is_unlock));
+    type_keys(&mut model, "⎋3");
     type_keys(&mut model, "a");
     ctrl(&mut model, 'o');
     shows(&mut model, "log in as another person than anna");
@@ -251,6 +262,16 @@ fn a_locked_terminal_looks_and_does_nothing() {
     assert_eq!(wish(&effects), Some(&Wish::Login { user: "boris".to_owned(), password: "battery".into() }));
     update(&mut model, Msg::Standing(Arc::new(person("boris", Role::Viewer))));
     assert_eq!((model.tabs.shown, &model.modal), (Tab::Mimic, &None));
+}
+
+#[test]
+fn a_terminal_that_is_locked_on_the_login_page_still_shows_the_process() {
+    let mut model = with(&Fixture::alarm(), person("anna", Role::Technician));
+    assert_eq!(wish(&type_keys(&mut model, "0k")), Some(&Wish::Lock));
+    stand(&mut model, |standing| standing.locked = true);
+    assert_eq!(model.tabs.shown, Tab::Mimic);
+    type_keys(&mut model, "3");
+    assert_eq!(model.tabs.shown, Tab::Alarms);
 }
 
 #[test]
@@ -311,6 +332,39 @@ fn a_tag_that_asks_for_a_signature_gets_one() {
     let mut model = with(&signed(Sign::SecondPerson), person("anna", Role::Technician));
     type_keys(&mut model, "s65⏎boris⏎abc");
     insta::assert_snapshot!("window_signature_80x24", screen(&mut model, 80, 24));
+}
+
+#[test]
+fn a_refused_signature_is_asked_again_in_its_window() {
+    let fixture = signed(Sign::Password);
+    let mut model = with(&fixture, person("anna", Role::Technician));
+    let effects = type_keys(&mut model, "s65⏎hors⏎");
+    let Some(Effect::Order(first)) = effects.last() else { panic!("no order: {effects:?}") };
+    shows(&mut model, "asking the station");
+    assert_eq!(type_keys(&mut model, "1q⏎"), [], "while the answer is awaited");
+    let told = |request: &OrderRequest, outcome: Outcome| {
+        let mut snapshot = fixture.snapshot();
+        Arc::make_mut(&mut snapshot).orders = vec![OrderStatus {
+            id: request.id,
+            by: "anna".into(),
+            from: "".into(),
+            note: None,
+            command: request.command.clone(),
+            at: fixture::now(),
+            old: Some(70.0),
+            outcome,
+        }];
+        Msg::Snapshot(snapshot)
+    };
+    update(&mut model, told(first, Outcome::Refused(Refusal::NotSigned("wrong password; wait 2 s".to_owned()))));
+    shows(&mut model, "wrong password; wait 2 s");
+    let effects = type_keys(&mut model, "r1q 3a⏎");
+    assert_eq!((model.tabs.shown, effects.len()), (Tab::Mimic, 1), "no letter of it was a key: {effects:?}");
+    assert!(!screen(&mut model, 80, 24).contains("r1q"));
+    let Some(Effect::Order(second)) = effects.last() else { panic!("no order: {effects:?}") };
+    assert_eq!(second.sign.as_ref().map(|sign| sign.password.clone()), Some("r1q 3a".into()));
+    update(&mut model, told(second, Outcome::Pending));
+    assert_eq!(model.modal, None);
 }
 
 #[test]
@@ -432,6 +486,11 @@ fn the_users_and_what_can_be_done_with_them() {
     );
     let mut model = with(&Fixture::normal(), supervisor());
     assert_eq!(wish(&type_keys(&mut model, "7↓xboriss⏎")), None, "another name deletes nobody");
+    for (keys, own) in [("7d", true), ("7x", true), ("7↓↓d", false), ("7↓x", false)] {
+        let mut model = with(&Fixture::normal(), supervisor());
+        type_keys(&mut model, keys);
+        assert_eq!(screen(&mut model, 80, 24).contains("This is you"), own, "{keys}");
+    }
 }
 
 fn deed(number: u64, by: &str, action: &str, target: &str, change: (&str, &str), outcome: &str) -> ActionRecord {

@@ -165,7 +165,7 @@ fn no_size_is_too_small_to_survive() {
 fn a_tiny_screen_still_shows_the_alarm() {
     let mut model = model(&Fixture::alarm(), Theme::FULL);
     let shown = screen(&mut model, 50, 5);
-    assert!(shown.contains("‹2›! TIC-1.PV temperature high"), "{shown}");
+    assert!(shown.contains("‹2›! UNACK 00:41  TIC-1.PV"), "{shown}");
     assert!(shown.contains("screen too small: 50x5, needs 60x16"), "{shown}");
 }
 
@@ -196,6 +196,29 @@ fn nobody_says_no_alarms_who_cannot_see_them() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
     update(&mut model, Msg::Tick { silent: Duration::from_secs(7) });
     assert!(screen(&mut model, 80, 24).contains("alarms not judged: station silent"));
+    let mut model = super::model(&Fixture::alarm(), Theme::FULL);
+    update(&mut model, Msg::Tick { silent: Duration::from_secs(3) });
+    let shown = screen(&mut model, 80, 24);
+    let banner = shown.lines().nth(2).unwrap_or_default();
+    assert!(banner.contains("TIC-1.PV") && banner.contains("alarms not judged"), "{banner}");
+}
+
+#[test]
+fn a_long_alarm_text_pushes_neither_state_nor_counts_out_of_the_banner() {
+    let mut fixture = Fixture::alarm();
+    let text = "the outlet of the second heat exchanger is much warmer than its jacket permits for this product at all";
+    fixture.def.alarms[0].text = text.to_owned();
+    for (width, height, counts) in [(60, 16, false), (80, 24, true), (120, 40, true)] {
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, "3");
+        let shown = screen(&mut model, width, height);
+        let banner = shown.lines().nth(2).unwrap_or_default();
+        assert!(banner.starts_with(" ‹2›! UNACK 00:41  TIC-1.PV the outlet"), "{banner}");
+        assert!(banner.ends_with("a ack") && (!counts || banner.contains("×1")), "{banner}");
+        let read: String = shown.lines().skip(6).collect::<Vec<_>>().join(" ");
+        let read = read.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(width < 80 || read.contains(text), "the whole of it can be read below: {shown}");
+    }
 }
 
 #[test]

@@ -13,7 +13,7 @@ use crate::{
     ui::{
         Act, Cx,
         modal::{Confirm, Modal, Notice, Reason, confirm::subject},
-        widgets::text::running,
+        widgets::text::{clock, running},
     },
 };
 
@@ -28,6 +28,16 @@ pub fn acknowledge(cx: &Cx, alarm: &ActiveAlarm) -> Vec<Act> {
         true => note(cx, alarm),
         false => vec![Act::Order(alarm.acknowledge())],
     }
+}
+
+/// Says that this one needs no acknowledgement, and who gave it.
+pub fn acknowledged(cx: &Cx, alarm: &ActiveAlarm) -> Vec<Act> {
+    let by = alarm.acknowledged.as_ref().map(|deed| {
+        let by = deed.by.as_deref().unwrap_or("the station");
+        format!("It was acknowledged {} by {by}.", clock(deed.at, &cx.def().time_zone))
+    });
+    let words = ["already acknowledged".to_owned(), name(cx, alarm.id)].into_iter().chain(by).collect();
+    open(Modal::Notice(Notice::new("acknowledge", words)))
 }
 
 /// Acknowledges one alarm with a note.
@@ -142,6 +152,12 @@ pub fn hand_over() -> Vec<Act> {
     let notes = vec!["What the next shift should know besides what stands on this page:".to_owned()];
     let reason = Reason::new("hand over", "hand over", notes, Command::HandOver, false);
     open(Modal::Reason(Box::new(reason)))
+}
+
+/// Says that a handover takes two.
+pub fn own_handover() -> Vec<Act> {
+    let words = ["You have handed over yourself.", "Another person reads this page and takes the plant over."];
+    open(Modal::Notice(Notice::new("take over", words.map(str::to_owned).to_vec())))
 }
 
 /// Asks whether whoever sits here takes the plant over.

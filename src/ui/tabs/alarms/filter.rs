@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// What may be typed, for the entry window.
-pub const FORMS: &str = "words of tag, text, area, class, state or who:  TIC-1 high   unack TK-1   system";
+pub const FORMS: &str = "words of tag, text, state or who acknowledged:  TIC-1 high   unack   anna";
 
 /// A filter; what is empty lets everything through.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -94,11 +94,10 @@ impl Filter {
     }
 }
 
-/// All that is looked through for words, in small letters.
+/// All that is looked through for words, in small letters: what the view shows, nothing that is hidden.
 fn text_of(cx: &Cx, alarm: &ActiveAlarm, def: &AlarmDef) -> String {
     let by = alarm.acknowledged.as_ref().and_then(|deed| deed.by.as_deref()).unwrap_or_default();
-    let (class, state) = (def.class.word(), alarm.state.word());
-    format!("{} {} {} {class} {state} {by}", subject_name(cx.def(), def.subject), def.text, def.area).to_lowercase()
+    format!("{} {} {} {by}", subject_name(cx.def(), def.subject), def.text, alarm.state.word()).to_lowercase()
 }
 
 /// The one after `now`, nothing after the last one.
@@ -133,7 +132,8 @@ mod tests {
         check(&|filter| filter.type_words("TIC-1 HIGH"), &[0], "words, whatever their case");
         check(&|filter| filter.type_words("tic-1 low"), &[], "all of them");
         check(&|filter| filter.type_words("unack"), &[0], "a state by its word");
-        check(&|filter| filter.type_words("tk-1"), &[2], "an area by its name");
+        check(&|filter| filter.type_words("tk-1"), &[], "an area is not shown, and has a key of its own");
+        check(&|filter| filter.type_words("process"), &[], "nor is a class");
         check(&|filter| filter.priority = Some(Priority::Medium), &[3], "a priority");
         check(&|filter| filter.state = Some(AlarmState::Returned), &[2], "a state");
         check(&|filter| filter.next_area(&snapshot.def), &[2], "an area");

@@ -32,10 +32,10 @@ pub fn view(cx: &Cx, alarm: &ActiveAlarm, canvas: &mut Canvas) {
         ("effect", or_dash(&guidance.effect).to_owned()),
         ("action", or_dash(&guidance.action).to_owned()),
     ];
-    draw(cx, &rows, &go, canvas);
     let respond = respond_words(cx, def, alarm)
         .map(|(words, overdue)| (format!(" {words} "), if overdue { cx.theme.trouble() } else { cx.theme.strong() }));
-    title(cx, def, respond, canvas);
+    let cut = title(cx, def, respond, canvas);
+    draw(cx, cut.as_deref(), &rows, &go, canvas);
 }
 
 /// Draws what there is to know of any alarm, with words of its own at the top.
@@ -46,12 +46,12 @@ pub fn view_any(cx: &Cx, alarm: AlarmId, now: String, canvas: &mut Canvas) {
         ("effect", or_dash(&def.guidance.effect).to_owned()),
         ("action", or_dash(&def.guidance.action).to_owned()),
     ];
-    draw(cx, &rows, &go_words(cx, def, None), canvas);
-    title(cx, def, None, canvas);
+    let cut = title(cx, def, None, canvas);
+    draw(cx, cut.as_deref(), &rows, &go_words(cx, def, None), canvas);
 }
 
-/// Which alarm it is about; at the right how long there is to respond.
-fn title(cx: &Cx, def: &AlarmDef, respond: Option<(String, Style)>, canvas: &mut Canvas) {
+/// Which alarm it is about; at the right how long there is to respond. Its whole name, where there was no room for that.
+fn title(cx: &Cx, def: &AlarmDef, respond: Option<(String, Style)>, canvas: &mut Canvas) -> Option<String> {
     let (width, theme) = (canvas.width(), cx.theme);
     canvas.run(0, 0, width, '─', theme.dim());
     let (words, style) = respond.unwrap_or_default();
@@ -63,18 +63,30 @@ fn title(cx: &Cx, def: &AlarmDef, respond: Option<(String, Style)>, canvas: &mut
     let shown =
         if text::width(whole.trim_end()) <= room { whole.trim_end().to_owned() } else { fit_words(&name, room) };
     canvas.text(1, 0, &format!("{shown} "), theme.strong());
+    (room < text::width(&name)).then(|| name.trim_start().to_owned())
 }
 
-fn draw(cx: &Cx, rows: &[(&str, String)], go: &str, canvas: &mut Canvas) {
+/// Draws the rows below the title, above them the `name` where the title has it only in part.
+fn draw(cx: &Cx, name: Option<&str>, rows: &[(&str, String)], go: &str, canvas: &mut Canvas) {
     let theme = cx.theme;
     let (width, height) = (canvas.width(), canvas.height());
     let room = width.saturating_sub(10);
+    let mut y = 1;
+    for line in name.iter().flat_map(|name| wrap(name, width.saturating_sub(2))) {
+        canvas.text(1, y, &line, theme.strong());
+        y += 1;
+    }
+    // Where there is no room for all of it the action is told whole, and one line of the others; the least wanted go.
+    let free = usize::from(height.saturating_sub(1 + y));
+    let mut rows: Vec<&(&str, String)> = rows.iter().collect();
+    for least in ["effect", "cause", "now"] {
+        if free < rows.len() {
+            rows.retain(|(label, _)| *label != least);
+        }
+    }
     let lines: Vec<Vec<String>> = rows.iter().map(|(_, text)| wrap(text, room)).collect();
-    // Where there is no room for all of it the action is told whole, and one line of the others.
-    let free = usize::from(height.saturating_sub(2));
     let whole = lines.iter().map(Vec::len).sum::<usize>() <= free;
     let spare = (free + 1).saturating_sub(rows.len()).max(1);
-    let mut y = 1;
     for ((label, text), lines) in rows.iter().zip(lines) {
         let style = if *label == "action" { theme.strong() } else { theme.normal() };
         canvas.text(1, y, label, theme.dim());

@@ -36,8 +36,18 @@ const EVERY_S: f64 = 2.0;
 /// Values in doubt that are named at most.
 const NAMED: usize = 8;
 /// Deeds that are only about the program, and no change of the plant.
-const NO_CHANGE: [&str; 10] =
-    ["acknowledge", "silence", "login", "logout", "lock", "unlock", "export", "read sets", HAND_OVER, TAKE_OVER];
+const NO_CHANGE: [&str; 10] = [
+    "acknowledge",
+    "silence",
+    "login",
+    "logout",
+    "lock terminal",
+    "unlock terminal",
+    "export",
+    "read sets",
+    HAND_OVER,
+    TAKE_OVER,
+];
 
 /// State of the page.
 #[derive(Debug, Default)]
@@ -158,8 +168,7 @@ impl Handover {
             let from = self.period(cx).map_or(Timestamp::MIN, |shown| shown.from);
             let of = |keep: fn(&ActionRecord) -> bool| {
                 let rows = self.actions.iter().filter(|row| from <= row.at && keep(row));
-                let at = |row: &ActionRecord| moment(row.at, cx.now, &cx.def().time_zone);
-                rows.map(|row| format!("{} {}", at(row), action_words(cx, row).trim_start())).collect::<Vec<_>>()
+                folded(cx, rows.map(|row| (row.at, action_words(cx, row).trim_start().to_owned())))
             };
             section("failed in this shift", of(|row| is_failed(row) && is_change(row)), true);
             section("changed in this shift", of(|row| !is_failed(row) && is_change(row)), false);
@@ -185,10 +194,39 @@ impl Handover {
         let taken = self.actions[..n].iter().rev().find(|row| &*row.action == TAKE_OVER && !is_failed(row));
         lines.push(match taken {
             Some(row) => (format!("taken over {} by {}", when(row), row.by), theme.strong()),
+            None if is_own(cx, note) => ("not taken over yet: another person does, with o".to_owned(), theme.trouble()),
             None => ("not taken over yet: o takes over".to_owned(), theme.trouble()),
         });
         lines
     }
+
+    /// Was it whoever sits here that handed over, and has nobody taken over since?
+    pub fn is_own(&self, cx: &Cx) -> bool {
+        let last = |row: &&ActionRecord| [HAND_OVER, TAKE_OVER].contains(&&*row.action) && !is_failed(row);
+        self.actions.iter().find(last).is_some_and(|row| &*row.action == HAND_OVER && is_own(cx, row))
+    }
+}
+
+fn is_own(cx: &Cx, row: &ActionRecord) -> bool {
+    cx.standing.who.as_ref().is_some_and(|who| who.user == row.by)
+}
+
+/// Each row with its time; those that are alike once, at the time of the newest, with their count.
+fn folded(cx: &Cx, rows: impl Iterator<Item = (Timestamp, String)>) -> Vec<String> {
+    let mut kinds: Vec<(Timestamp, String, usize)> = Vec::new();
+    for (at, words) in rows {
+        match kinds.iter_mut().find(|(_, other, _)| *other == words) {
+            Some((_, _, count)) => *count += 1,
+            None => kinds.push((at, words, 1)),
+        }
+    }
+    let row = |(at, words, count): (Timestamp, String, usize)| {
+        let at = moment(at, cx.now, &cx.def().time_zone);
+        let dot = cx.theme.pick("·", ".");
+        let times = if 1 < count { format!("{count}{}", cx.theme.pick("×", "x")) } else { dot.to_owned() };
+        format!("{at} {times} {}", words.trim_start_matches(dot).trim_start())
+    };
+    kinds.into_iter().map(row).collect()
 }
 
 /// `shelved ‹2›! TIC-1.PV temperature high, 41:00 left, by anna: sensor is cleaned, since 13:20:00`.
@@ -256,7 +294,8 @@ fn doubtful(cx: &Cx) -> Vec<String> {
         .collect();
     let more = bad.len().saturating_sub(NAMED);
     let stale = cx.snapshot.alarms.iter().filter(|alarm| {
-        alarm.state == AlarmState::Acknowledged && 24 * 3_600 < between(alarm.raised_at, cx.now).as_secs()
+        matches!(alarm.state, AlarmState::Acknowledged | AlarmState::Unacknowledged)
+            && 24 * 3_600 < between(alarm.raised_at, cx.now).as_secs()
     });
     let stale = stale.map(|alarm| {
         let lasts = running(between(alarm.raised_at, cx.now));

@@ -185,7 +185,12 @@ impl Journal {
 }
 
 fn alarm_words(cx: &Cx, row: &AlarmRecord) -> String {
-    let number = row.value.map(|value| format!(" {value}")).unwrap_or_default();
+    // A state by its word, a number with its decimals, as everywhere else.
+    let shown = |value: f64| match cx.def().tag_named(&row.subject) {
+        Some(tag) => format!(" {}", cx.snapshot.format(tag, value)),
+        None => format!(" {value}"),
+    };
+    let number = row.value.map(shown).unwrap_or_default();
     let by = row.by.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
     let reason = row.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
     let mark = cx.theme.priority_mark(row.priority);

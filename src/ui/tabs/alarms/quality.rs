@@ -19,7 +19,7 @@ use crate::{
         Act, Cx,
         modal::confirm::subject,
         theme::Theme,
-        widgets::text::{Canvas, between, clock, fit_words, pad, pad_left, running},
+        widgets::text::{self, Canvas, between, clock, fit_words, pad, pad_left, running},
     },
 };
 
@@ -131,10 +131,10 @@ impl Quality {
         let more = lines.len().saturating_sub(self.first + room);
         let last = height.saturating_sub(1);
         let words = "ISA-18.2, one operator, meant for 30 days or more";
-        canvas.text(1, last, words, theme.dim());
-        if more > 0 {
-            canvas.text_right(width.saturating_sub(1), last, &format!("{more} more below"), theme.strong());
-        }
+        let more = if more > 0 { format!("{more} more below") } else { String::new() };
+        let end = width.saturating_sub(1);
+        canvas.text(1, last, &fit_words(words, end.saturating_sub(3 + text::width(&more))), theme.dim());
+        canvas.text_right(end, last, &more, theme.strong());
     }
 
     /// The table, and below it the alarms to look into unless they stand beside it.

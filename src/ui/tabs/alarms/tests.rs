@@ -181,7 +181,7 @@ fn the_meter_is_shown_with_target_limit_and_verdict() {
     pictures("quality", &fixture, "vvvv");
     let mut model = shown(&fixture, Theme::FULL, "");
     let banner = screen(&mut model, 80, 24).lines().nth(2).map(str::to_owned).unwrap_or_default();
-    assert!(banner.contains("FLOOD") && banner.contains("a ack"), "{banner}");
+    assert!(banner.contains("FLOOD") && banner.contains("UNACK"), "{banner}");
     // A past shift is asked of the history, and its figures stand under its name only.
     let effects = type_keys(&mut model, "vvvv←←");
     let Some(Effect::Ask(id, Question::AlarmQuality { from, to })) = effects.last() else { panic!("{effects:?}") };
@@ -221,6 +221,8 @@ fn the_handover_tells_what_the_next_shift_must_know() {
     let note = "Pump P-1 draws too much current; electrician comes at 16:00.";
     let rows = vec![
         deed(40, "anna", "write", "TIC-1.SV", "failed: no answer in time", None),
+        deed(45, "anna", "write", "TIC-1.SV", "failed: no answer in time", None),
+        deed(50, "anna", "unlock terminal", "anna", "done", None),
         deed(60, "anna", "acknowledge", "TIC-1.PV temperature high", "verified", None),
         deed(100, "anna", "write", "TIC-1.SV", "verified", None),
         deed(1_000, "tech1", "hand over", "tank", "verified", Some(note)),
@@ -238,8 +240,23 @@ fn the_handover_tells_what_the_next_shift_must_know() {
         if look == "120x40" {
             assert!(!picture.contains("TIC-1.P "), "another shift: {picture}");
             assert!(!picture.contains("acknowledge "), "no change of the plant: {picture}");
+            assert!(!picture.contains("unlock terminal"), "no change of the plant: {picture}");
+            assert!(picture.contains("2× TIC-1.SV"), "what failed alike stands once: {picture}");
+            // Whoever hands over does not take over from himself.
+            assert!(picture.contains("another person does, with o"), "{picture}");
+            type_keys(&mut model, "o");
+            assert!(screen(&mut model, 120, 40).contains("You have handed over yourself."));
+            assert_eq!(order_of(&type_keys(&mut model, "⏎⏎")), None);
         }
     }
+}
+
+#[test]
+fn an_alarm_of_more_than_a_day_is_handed_over_whether_acknowledged_or_not() {
+    let mut fixture = Fixture::alarm();
+    fixture.alarms[0].raised_at = ago(100_000);
+    let mut model = shown(&fixture, Theme::FULL, "V");
+    assert!(screen(&mut model, 80, 24).contains("TIC-1.PV temperature high active for"));
 }
 
 #[test]
@@ -353,6 +370,27 @@ fn a_technician_is_told_that_out_of_service_needs_a_supervisor() {
 }
 
 #[test]
+fn the_footer_offers_what_can_be_done_with_the_selected_row() {
+    let footer = |fixture: &Fixture, keys: &str| {
+        let mut model = shown(fixture, Theme::FULL, keys);
+        screen(&mut model, 80, 24).lines().last().map(str::to_owned).unwrap_or_default()
+    };
+    let mut latched = Fixture::alarm();
+    latched.alarms[0].state = AlarmState::LatchedAcknowledged;
+    for (keys, reset) in [("", true), ("↓", false)] {
+        let footer = footer(&latched, keys);
+        assert_eq!((footer.contains("r reset"), footer.contains("v view")), (reset, true), "{keys}: {footer}");
+    }
+    for (keys, back) in [("v", true), ("v↓", true), ("v↓↓", false)] {
+        let footer = footer(&put_aside(), keys);
+        assert_eq!((footer.contains("u put back"), footer.contains("v view")), (back, true), "{keys}: {footer}");
+    }
+    for keys in ["vv", "vvv", "vvvv", "vvvvv"] {
+        assert!(footer(&put_aside(), keys).contains("v view"), "{keys}");
+    }
+}
+
+#[test]
 fn an_alarm_leads_to_mimic_trend_and_controller() {
     let mut model = shown(&Fixture::alarm(), Theme::FULL, "m");
     assert_eq!(model.tabs.shown, Tab::Mimic);
@@ -361,6 +399,10 @@ fn an_alarm_leads_to_mimic_trend_and_controller() {
     let mut model = shown(&Fixture::alarm(), Theme::FULL, "t");
     assert_eq!(model.tabs.shown, Tab::Trends);
     assert!(screen(&mut model, 80, 24).contains("14:01:50"), "the cursor: {}", screen(&mut model, 80, 24));
+    let mut model = shown(&Fixture::alarm(), Theme::FULL, "↓↓c");
+    let shown_now = screen(&mut model, 80, 24);
+    assert!(matches!(&type_keys(&mut model, "⏎")[..], []) && model.tabs.shown == Tab::Controllers, "{shown_now}");
+    assert!(screen(&mut model, 80, 24).contains("LT-1"), "the parameter of the alarm is selected");
     let model = shown(&Fixture::alarm(), Theme::FULL, "↓c");
     assert_eq!(model.tabs.shown, Tab::Controllers);
 }

@@ -10,6 +10,7 @@ use crate::{
     },
     ui::{
         Cx,
+        chrome::history_words,
         modal::confirm::subject,
         widgets::{
             text::{Canvas, between, fit, fit_words, moment, pad, pad_left, running, width, wrap},
@@ -48,8 +49,8 @@ fn history_trouble(cx: &Cx, canvas: &mut Canvas) -> u16 {
 }
 
 fn trouble_rows(cx: &Cx, width: u16, height: u16) -> Vec<String> {
-    let Some(trouble) = &cx.snapshot.history.trouble else { return Vec::new() };
-    let mut lines = wrap(&format!("history: {trouble}"), width.saturating_sub(2));
+    let Some(trouble) = history_words(cx) else { return Vec::new() };
+    let mut lines = wrap(&trouble, width.saturating_sub(2));
     lines.truncate(usize::from(height / 3).max(1));
     lines
 }
@@ -98,10 +99,11 @@ fn views(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
     let fits = |names: &Vec<String>| names.iter().map(|name| width(name) + 3).sum::<u16>() <= room + 3;
     // Where there is no room for the word the brackets alone tell how many wait.
     let all = Some(names(" unack")).filter(fits).unwrap_or_else(|| names(""));
+    let bar = if fits(&all) { " │ " } else { "│" };
     let mut x = 1;
     for (page, name) in Page::ALL.into_iter().zip(all) {
         if x > 1 {
-            x = canvas.text(x, 0, " │ ", cx.theme.dim());
+            x = canvas.text(x, 0, bar, cx.theme.dim());
         }
         let style = if page == tab.page { cx.theme.focus() } else { cx.theme.normal() };
         x = canvas.text(x, 0, &name, style);
@@ -123,6 +125,7 @@ fn list(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
     canvas.text(1, 1, &columns.row(["", "", "time", "tag", "what", "value", "state", "for", "by"]), theme.dim());
     if rows.is_empty() {
         let words = match all {
+            0 if tab.page == Page::System => "No system alarm is active. j shows what was.",
             0 => "No alarm is active. j shows what was.",
             _ => "No alarm fits the filter. Esc shows all again.",
         };
@@ -167,7 +170,11 @@ fn filter_line(tab: &Alarms, cx: &Cx, (rows, all, first, room): (&[Row], usize, 
         words.push(format!("{folded} folded, space unfolds"));
     }
     if tab.filter.is_off() && words.is_empty() && all > 0 {
-        words.push(format!("{all} shown, the most urgent first"));
+        let order = match rows.iter().any(|row| row.first || row.under) {
+            true => "a burst under its first alarm",
+            false => "the most urgent first",
+        };
+        words.push(format!("{all} shown, {order}"));
     }
     let room = end.saturating_sub(3 + width(&more));
     let style = if tab.filter.is_off() { theme.dim() } else { theme.strong() };

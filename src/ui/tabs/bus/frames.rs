@@ -1,6 +1,6 @@
 //! Page Frames: what went over the line, newest at the bottom, in words; runs, or is held still.
 
-use std::path::PathBuf;
+use std::{collections::VecDeque, path::PathBuf};
 
 use super::{
     Place, Window,
@@ -14,9 +14,9 @@ use crate::{
         traffic::{Frame, Frames},
     },
     ui::{
-        Act, Cx, Effect,
+        Act, Cx,
         modal::{Modal, Prompt},
-        tabs::Tab,
+        tabs::{Outgoing, Tab},
         widgets::text::{Canvas, clock, fit, fit_words, pad, width},
     },
 };
@@ -36,6 +36,8 @@ pub struct Ring {
     selected: Option<u64>,
     filter: Filter,
     saved: Vec<Result<PathBuf, String>>,
+    /// Files that wait for the station's word; two at most.
+    outgoing: VecDeque<Outgoing>,
 }
 
 impl Default for Ring {
@@ -47,6 +49,7 @@ impl Default for Ring {
             selected: None,
             filter: Filter::default(),
             saved: Vec::new(),
+            outgoing: VecDeque::new(),
         }
     }
 }
@@ -54,7 +57,8 @@ impl Default for Ring {
 impl Ring {
     /// Another line: its frames are taken in at once.
     pub fn forget(&mut self) {
-        *self = Ring { filter: self.filter.clone(), ..Ring::default() };
+        let outgoing = std::mem::take(&mut self.outgoing);
+        *self = Ring { filter: self.filter.clone(), outgoing, ..Ring::default() };
     }
 
     /// Takes in what is new, if it runs and it is time.
@@ -117,6 +121,9 @@ impl Ring {
 
     /// Writes the frames that are shown, as text and as a capture.
     pub fn save(&mut self, cx: &Cx, at: &Place) -> Vec<Act> {
+        if !self.outgoing.is_empty() {
+            return Vec::new();
+        }
         if self.taken.is_none() {
             self.take(cx, at);
         }
@@ -128,8 +135,22 @@ impl Ring {
         }
         let stamp = cx.now.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d-%H%M%S").to_string();
         let name = |end: &str| cx.def().report.folder.join(format!("{}-{stamp}.{end}", at.settings.name));
-        let save = |path, bytes| Act::Do(Effect::SaveReport { tab: Tab::Bus, path, bytes });
-        vec![save(name("txt"), capture::text(&frames).into_bytes()), save(name("pcapng"), capture::pcapng(&frames))]
+        let outgoing = |path, bytes| Outgoing { tab: Tab::Bus, path, bytes };
+        let text = outgoing(name("txt"), capture::text(&frames).into_bytes());
+        self.outgoing = VecDeque::from([text, outgoing(name("pcapng"), capture::pcapng(&frames))]);
+        self.outgoing.front().map(Outgoing::wish).into_iter().collect()
+    }
+
+    /// The station has put a file on record, which is then written, and the next one is asked for; or it refuses.
+    pub fn on_granted(&mut self, answer: Result<(), String>) -> Vec<Act> {
+        if let Err(why) = answer {
+            self.outgoing.clear();
+            self.saved.push(Err(why));
+            return Vec::new();
+        }
+        let written = self.outgoing.pop_front().map(Outgoing::write);
+        let next = self.outgoing.front().map(Outgoing::wish);
+        written.into_iter().chain(next).collect()
     }
 
     /// A file was written, or why not.

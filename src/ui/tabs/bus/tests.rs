@@ -5,6 +5,7 @@ use std::{sync::Arc, time::Duration};
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use crate::{
+    access::Wish,
     bus::frame::with_crc,
     history::{Answer, Question},
     plant::{
@@ -175,7 +176,16 @@ fn a_filter_shows_what_passes_or_says_what_it_expects() {
 #[test]
 fn frames_are_saved_as_text_and_for_wireshark() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "F");
-    let saved: Vec<_> = type_keys(&mut model, "x")
+    let mut effects = type_keys(&mut model, "x");
+    let mut saved = Vec::new();
+    while let Some(Effect::Wish(id, Wish::Exported { file, sha256 })) = effects.last() {
+        assert_eq!((file.starts_with("reports/L1-"), sha256.len()), (true, 64), "told before it is written");
+        let id = *id;
+        saved.extend(std::mem::take(&mut effects));
+        effects = update(&mut model, Msg::Granted(id, Ok(())));
+    }
+    saved.extend(effects);
+    let saved: Vec<_> = saved
         .into_iter()
         .filter_map(|effect| match effect {
             Effect::SaveReport { tab, path, bytes } => Some((tab, path, bytes)),

@@ -46,6 +46,19 @@ impl Table {
         self.selected = self.selected.saturating_add_signed(by).min(last);
     }
 
+    /// The place of the parameter that the filter means most likely: its exact name, then one with it in its name, then
+    /// one with it in its meaning.
+    pub fn best(&self, cx: &Cx, device: DeviceId) -> usize {
+        let typed = self.filter.trim().to_lowercase();
+        let rank = |tag: &TagDef| match (tag.short.to_lowercase(), tag.label.to_lowercase()) {
+            (short, label) if short == typed || label == typed => 0,
+            (short, label) if short.contains(&typed) || label.contains(&typed) => 1,
+            _ => 2,
+        };
+        let ranked = self.rows(cx, device).into_iter().map(rank).enumerate();
+        ranked.min_by_key(|(place, rank)| (*rank, *place)).map_or(0, |(place, _)| place)
+    }
+
     fn fits(&self, tag: &TagDef) -> bool {
         let text = format!("{} {} {} {}", tag.short, tag.label, tag.meaning, tag.group).to_lowercase();
         self.filter.to_lowercase().split_whitespace().all(|word| text.contains(word))

@@ -394,6 +394,18 @@ fn escape_leads_back_step_by_step_and_never_out() {
 }
 
 #[test]
+fn a_find_selects_the_exact_name_before_names_and_meanings() {
+    let mut fixture = Fixture::normal();
+    let last = fixture.def.tags.iter().rposition(|tag| tag.device == DeviceId(0)).expect("tags of the controller");
+    let exact = fixture.tag("TIC-1.P");
+    fixture.def.tags[last].meaning = "P band".to_owned();
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "4⏎/p⏎");
+    let cx = model.cx();
+    assert_eq!(model.tabs.controllers.table.tag(&cx, DeviceId(0)).map(|tag| tag.id), Some(exact));
+}
+
+#[test]
 fn a_filter_finds_by_name_and_meaning_and_escape_takes_it_away() {
     let mut model = model(&many(1), Theme::FULL);
     type_keys(&mut model, "4/highest⏎");

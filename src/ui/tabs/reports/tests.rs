@@ -5,13 +5,14 @@ use ratatui::{Terminal, backend::TestBackend};
 
 use super::*;
 use crate::{
+    access::Wish,
     plant::{
         def::Priority,
         record::{ActionRecord, AlarmRecord, AlarmStep},
     },
     report::TagFigures,
     ui::{
-        AskId, Model, Msg,
+        AskId, Effect, Model, Msg,
         fixture::{Fixture, now},
         theme::Theme,
         update, view,
@@ -22,12 +23,14 @@ struct Stand {
     model: Model,
     asked: Vec<(AskId, Question)>,
     saved: Vec<(PathBuf, Vec<u8>)>,
+    /// What the station says to an export.
+    granted: Result<(), String>,
 }
 
 impl Stand {
     fn new(theme: Theme, width: u16, height: u16) -> Stand {
         let model = Model::new(Fixture::normal().snapshot(), theme, 1, crate::ui::fixture::standing());
-        let mut stand = Stand { model, asked: Vec::new(), saved: Vec::new() };
+        let mut stand = Stand { model, asked: Vec::new(), saved: Vec::new(), granted: Ok(()) };
         stand.send(Msg::Resize(width, height));
         stand.press("5");
         stand
@@ -38,6 +41,10 @@ impl Stand {
             match effect {
                 Effect::Ask(id, question) if id.tab == Tab::Reports => self.asked.push((id, question)),
                 Effect::SaveReport { path, bytes, .. } => self.saved.push((path, bytes)),
+                Effect::Wish(id, Wish::Exported { file, sha256 }) => {
+                    assert_eq!((file.ends_with(".csv"), sha256.len()), (true, 64));
+                    self.send(Msg::Granted(id, self.granted.clone()));
+                }
                 Effect::Ask(..)
                 | Effect::Order(..)
                 | Effect::Wish(..)
@@ -198,6 +205,10 @@ fn the_csv_that_is_written_is_the_report_that_is_shown() {
     assert!(bytes.starts_with(b"\xef\xbb\xbf"), "the other dialect is for spreadsheets");
     stand.send(Msg::Saved(Tab::Reports, Err("disk full".to_owned())));
     assert!(stand.screen().contains("not written: disk full"));
+    stand.granted = Err("needs Technician; tom is Viewer".to_owned());
+    stand.press("e");
+    assert!(stand.saved.is_empty(), "what the station does not have on record is not written");
+    assert!(stand.screen().contains("not written: needs Technician"));
 }
 
 #[test]
