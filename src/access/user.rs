@@ -204,6 +204,22 @@ pub fn check_name(name: &str) -> Result<(), String> {
     let permitted = |letter: char| letter.is_alphanumeric() || is_mark(letter) || "._-".contains(letter);
     match one_form(name).chars().find(|letter| !permitted(*letter)) {
         Some(letter) => Err(format!("a name has letters, digits, `.`, `_` and `-`, found {letter:?}")),
+        None => one_alphabet(name),
+    }
+}
+
+/// Latin, Greek and Cyrillic have letters that look the same: together they make a name that looks like another one.
+fn one_alphabet(name: &str) -> Result<(), String> {
+    let alphabet = |letter: char| match letter {
+        'A'..='Z' | 'a'..='z' | '\u{aa}' | '\u{ba}' | '\u{c0}'..='\u{2af}' | '\u{1e00}'..='\u{1eff}' => Some("Latin"),
+        '\u{370}'..='\u{3ff}' | '\u{1f00}'..='\u{1fff}' => Some("Greek"),
+        '\u{400}'..='\u{52f}' | '\u{1c80}'..='\u{1c8f}' => Some("Cyrillic"),
+        _ => None,
+    };
+    let mut found = name.chars().filter_map(|letter| Some((letter, alphabet(letter)?)));
+    let Some((_, first)) = found.next() else { return Ok(()) };
+    match found.find(|(_, alphabet)| *alphabet != first) {
+        Some((letter, other)) => Err(format!("a name is of one alphabet, found {letter:?} of {other} beside {first}")),
         None => Ok(()),
     }
 }
@@ -226,10 +242,11 @@ mod tests {
 
     #[test]
     fn names_may_be_in_any_script_and_differ_by_more_than_case() {
-        for name in ["anna", "ÉRIC", "สมชาย", "น้ำ", "a.b_c-9", &"x".repeat(32)] {
+        for name in ["anna", "ÉRIC", "สมชาย", "น้ำ", "Ольга", "Ελένη", "a.b_c-9", &"x".repeat(32)]
+        {
             assert_eq!(check_name(name), Ok(()), "{name}");
         }
-        for name in ["", " ", "a b", "a/b", "a\n", "a\u{202e}b", &"x".repeat(33)] {
+        for name in ["", " ", "a b", "a/b", "a\n", "a\u{202e}b", "аnna", "ann\u{3b1}", &"x".repeat(33)] {
             assert!(check_name(name).is_err(), "{name:?}");
         }
         let again = first().with(&Change::Add { user: "ANNA".into(), role: Role::Viewer, hash: "h".into() });
