@@ -268,8 +268,9 @@ impl Sheet {
         let rule = format!("A password has at least {least} characters. A phrase is good, in any language, Thai too.");
         let first = "It must be changed at the first login.".to_owned();
         let own = |user: &Arc<str>| cx.standing.who.as_ref().is_some_and(|who| who.user == *user);
-        let you =
-            |user: &Arc<str>| own(user).then(|| "This is you: you are out at once, and another Supervisor must help.");
+        let you = |user: &Arc<str>| {
+            own(user).then_some("This is you: you are out at once, and another Supervisor must help.")
+        };
         match &self.purpose {
             Purpose::First => vec![
                 "Nobody is known here yet. The first person is a Supervisor: may do everything, and adds the others."
