@@ -7,6 +7,7 @@ use sightglass::{
     plant::{
         def::Priority,
         record::{AlarmRecord, AlarmStep, Record},
+        sample::Sample,
     },
     profile::{self, Search},
 };
@@ -117,7 +118,10 @@ fn the_quality_of_the_alarms_is_told_in_lines_and_in_json() {
         })
     };
     let store = Store::open(&path, &def, at(0)).unwrap().store;
-    store.append(&[raised(60), raised(70), raised(80)]).unwrap();
+    // A station that was there all the time: only time that was watched counts.
+    let tag = def.tag_named("TIC-1.PV").unwrap();
+    let watched = (0..8 * 6).map(|window| Record::Sample(tag, Sample::good(70.0, at(window * 600))));
+    store.append(&watched.chain([raised(60), raised(70), raised(80)]).collect::<Vec<_>>()).unwrap();
     drop(store);
     let shift = ["alarms", "tank", "--stats", "--history", history, "--shift", "morning@2026-03-02"];
     let (code, out, err) = run(&shift);
