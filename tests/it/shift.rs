@@ -140,6 +140,10 @@ async fn wait(session: &Session, clock: Clock, seconds: u64) {
         let (reply, answer) = oneshot::channel();
         let question = Question::Journal { from: Timestamp::UNIX_EPOCH, to: Timestamp::MAX, limit: 1 };
         session.ask(Query { question, reply }).unwrap();
+        // The question goes through the door, a task of this very runtime, before the thread can answer it.
+        for _ in 0..100 {
+            tokio::task::yield_now().await;
+        }
         let (done, taken_in) = std::sync::mpsc::channel();
         std::thread::spawn(move || done.send(answer.blocking_recv().is_ok()));
         assert!(taken_in.recv().unwrap(), "the history answers");
