@@ -64,7 +64,7 @@ pub enum Effect {
     Reply(u64, Result<(), String>),
     /// The standing of this terminal has changed.
     Standing(u32),
-    /// Do this beside, and tell [`Gate::done`]. At most [`work::JOBS_MAX`] are under way or wait.
+    /// Do this beside, and tell [`Gate::done`]. At most `JOBS_MAX` are under way or wait.
     Work(Job, Work),
     /// Write the people down, and tell [`Gate::saved`]. Never two at a time.
     Save(Users),
