@@ -11,7 +11,7 @@ use sightglass::access::io::own_user;
 
 use crate::{
     pty::Terminal,
-    support::{PATIENCE, Process, folder, have, sightglass, sockets},
+    support::{PATIENCE, Process, folder, have, sightglass, simulated_tank, sockets},
 };
 
 /// What ends a terminal.
@@ -53,8 +53,7 @@ struct Place {
 impl Place {
     fn new() -> Place {
         let (folder, sockets) = (folder(), sockets());
-        let mut sim = Process::start(sightglass().args(["sim", "tank", "--tcp", "127.0.0.1:0"]));
-        let port = sim.wait_for(" on 127.0.0.1:").rsplit(' ').next().unwrap().to_owned();
+        let (sim, port) = simulated_tank();
         let shipped = sightglass().args(["profiles", "tank"]).output().unwrap();
         let rules = format!("\n[[access.trusted]]\nuser = \"{}\"\nrole = \"supervisor\"\n", own_user());
         let plant = String::from_utf8(shipped.stdout).unwrap() + &rules;

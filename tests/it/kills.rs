@@ -3,12 +3,11 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::{
-        Arc,
-        atomic::{AtomicU64, Ordering},
-    },
+    sync::Arc,
     time::Duration,
 };
+
+use tokio::sync::watch;
 
 use sightglass::{
     access::{
@@ -27,7 +26,7 @@ use sightglass::{
 
 use crate::{
     guarded::{PASSWORD, login},
-    support::{PATIENCE, Process, folder, sightglass, sockets},
+    support::{PATIENCE, Process, folder, sightglass, simulated_tank, sockets},
 };
 
 /// Rounds, unless `SIGHTGLASS_KILLS` says how many.
@@ -56,9 +55,7 @@ struct Place {
 impl Place {
     fn new() -> Place {
         let (folder, sockets) = (folder(), sockets());
-        let mut sim = Process::start(sightglass().args(["sim", "tank", "--tcp", "127.0.0.1:0"]));
-        let line = sim.wait_for(" on 127.0.0.1:");
-        let port = line.rsplit(' ').next().unwrap().to_owned();
+        let (sim, port) = simulated_tank();
         let hash: Arc<str> = sightglass::access::password::hash(PASSWORD, [3; 16]).unwrap().into();
         let mut people = Users::default();
         for (user, change) in [
@@ -106,7 +103,7 @@ fn entries(book: &Path) -> Vec<Entry> {
 }
 
 /// Writes again and again, each with a note of its own, until the station goes.
-async fn write_on(mut session: Session, done: Arc<AtomicU64>, round: u64) -> Vec<String> {
+async fn write_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> Vec<String> {
     let mut told = Vec::new();
     // The place of its terminal counts for its password, so it waits for the other one to be looked at.
     while login(&session, "tom", PASSWORD).await.is_err() {
@@ -139,19 +136,19 @@ async fn write_on(mut session: Session, done: Arc<AtomicU64>, round: u64) -> Vec
             Some(_) | None if session.standing.borrow().gone.is_some() => break,
             Some(_) | None => {}
         }
-        done.fetch_add(1, Ordering::Relaxed);
+        done.send_modify(|done| *done += 1);
     }
     told
 }
 
 /// Logs in and out again and again until the station goes.
-async fn log_in_on(session: Session, done: Arc<AtomicU64>) -> Told {
+async fn log_in_on(session: Session, done: watch::Sender<u64>) -> Told {
     let mut told = Told::default();
     while session.standing.borrow().gone.is_none() {
         // Refused while the password of the other terminal is looked at.
         if login(&session, "sue", PASSWORD).await.is_ok() {
             told.logins += 1;
-            done.fetch_add(1, Ordering::Relaxed);
+            done.send_modify(|done| *done += 1);
             told.logouts += u64::from(session.wish(Wish::Logout).await.is_ok());
         }
         tokio::task::yield_now().await;
@@ -162,14 +159,11 @@ async fn log_in_on(session: Session, done: Arc<AtomicU64>) -> Told {
 /// One life of a station: ends with a kill after so many deeds that were answered, and so long after the last of them.
 async fn live(place: &Place, round: u64, deeds: u64, late: Duration) -> Told {
     let mut station = place.station();
-    let done = Arc::new(AtomicU64::new(0));
+    let (done, mut count) = watch::channel(0);
     let writing = tokio::spawn(write_on(place.terminal().await, done.clone(), round));
-    let logging = tokio::spawn(log_in_on(place.terminal().await, done.clone()));
-    let end = tokio::time::Instant::now() + PATIENCE;
-    while done.load(Ordering::Relaxed) < deeds {
-        assert!(tokio::time::Instant::now() < end, "round {round}: nothing goes on; {:?}", station.said);
-        tokio::time::sleep(Duration::from_millis(1)).await;
-    }
+    let logging = tokio::spawn(log_in_on(place.terminal().await, done));
+    let enough = tokio::time::timeout(PATIENCE, count.wait_for(|done| deeds <= *done)).await;
+    assert!(enough.is_ok_and(|count| count.is_ok()), "round {round}: nothing goes on; {:?}", station.said);
     // Another moment of whatever is under way each time.
     tokio::time::sleep(late).await;
     station.signal("KILL");

@@ -113,6 +113,13 @@ impl Drop for Process {
     }
 }
 
+/// The simulated devices of the tank, while they run, and where they serve: `127.0.0.1:PORT`.
+pub fn simulated_tank() -> (Process, String) {
+    let mut sim = Process::start(sightglass().args(["sim", "tank", "--tcp", "127.0.0.1:0"]));
+    let port = sim.wait_for(" on 127.0.0.1:").rsplit(' ').next().unwrap().to_owned();
+    (sim, port)
+}
+
 /// A TCP port that was free a moment ago.
 pub fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
