@@ -3,6 +3,7 @@
 use std::{
     fs::{self, File},
     io::Write,
+    os::unix::fs::{MetadataExt, fchown},
     path::{Path, PathBuf},
 };
 
@@ -49,17 +50,23 @@ impl PlantFile {
         Ok(())
     }
 
-    /// Whoever loses power now finds the old file or the new one, never half of one.
+    /// Whoever loses power now finds the old file or the new one, never half of one. Owner, group and mode stay.
     fn replace(&self, bytes: &[u8]) -> std::io::Result<()> {
         // A file that may not be written is not to be replaced either, although its folder would allow it.
-        let permissions = File::options().append(true).open(&self.path)?.metadata()?.permissions();
-        if permissions.readonly() {
+        let metadata = File::options().append(true).open(&self.path)?.metadata()?;
+        if metadata.permissions().readonly() {
             return Err(std::io::Error::new(std::io::ErrorKind::PermissionDenied, "it is read-only"));
         }
         let mut beside = self.path.clone().into_os_string();
         beside.push(format!(".new-{}", std::process::id()));
         let beside = PathBuf::from(beside);
-        let written = write_whole(&beside, bytes, permissions).and_then(|()| fs::rename(&beside, &self.path));
+        let written = match write_whole(&beside, bytes, &metadata) {
+            // Only root may give a file away: that of another owner is written in place. Should that fail half-way, the
+            // copy beside it stays.
+            Ok(false) => return overwrite(&self.path, bytes).and_then(|()| fs::remove_file(&beside)),
+            Ok(true) => fs::rename(&beside, &self.path),
+            Err(error) => Err(error),
+        };
         if written.is_err() {
             // What was begun is of no use to anybody.
             let _ = fs::remove_file(&beside);
@@ -74,14 +81,25 @@ impl PlantFile {
     }
 }
 
-fn write_whole(path: &Path, bytes: &[u8], permissions: fs::Permissions) -> std::io::Result<()> {
+/// Writes a new file with the mode of `old`, and its owner and group where that is permitted: `false` if it is not.
+fn write_whole(path: &Path, bytes: &[u8], old: &fs::Metadata) -> std::io::Result<bool> {
     // Never through a link that somebody has put there; what an earlier try has left is of no use.
     match fs::remove_file(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
         Ok(()) | Err(_) => {}
     }
     let mut file = File::create_new(path)?;
-    file.set_permissions(permissions)?;
+    let new = file.metadata()?;
+    let (other_user, other_group) = (new.uid() != old.uid(), new.gid() != old.gid());
+    let given = fchown(&file, other_user.then(|| old.uid()), other_group.then(|| old.gid()));
+    file.set_permissions(old.permissions())?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    Ok(given.is_ok())
+}
+
+fn overwrite(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut file = File::options().write(true).truncate(true).open(path)?;
     file.write_all(bytes)?;
     file.sync_all()
 }
@@ -147,6 +165,22 @@ unit = 1
         plant.line.timeout = std::time::Duration::from_millis(700);
         assert_eq!(plant.file.save(&plant.line), Ok(()));
         assert_eq!(load(&plant.path, &Search::shipped()).unwrap().lines, [plant.line]);
+    }
+
+    /// A file that only root may give away is given away by root alone, so for others this is about the mode.
+    #[test]
+    fn a_saved_plant_file_keeps_its_owner() {
+        let mut plant = plant();
+        let root = rustix::process::geteuid().is_root();
+        let (user, group) = if root { (Some(4_711), Some(4_712)) } else { (None, None) };
+        std::os::unix::fs::chown(&plant.path, user, group).unwrap();
+        fs::set_permissions(&plant.path, fs::Permissions::from_mode(0o664)).unwrap();
+        let owner = |path: &Path| fs::metadata(path).map(|file| (file.uid(), file.gid(), file.mode() & 0o7777)).unwrap();
+        let before = owner(&plant.path);
+        assert_eq!(plant.file.save(&plant.line), Ok(()));
+        assert_eq!(owner(&plant.path), before);
+        overwrite(&plant.path, TEXT.as_bytes()).unwrap();
+        assert_eq!((owner(&plant.path), fs::read_to_string(&plant.path).unwrap()), (before, TEXT.to_owned()));
     }
 
     #[test]
