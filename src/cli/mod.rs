@@ -42,7 +42,8 @@ Exit codes:
   1  failed while running (the message says why)
   2  wrong arguments, errors in a profile, or bytes that cannot be read
   3  the history is in use by another process
-  4  no station runs here";
+  4  no station runs here
+  5  the audit log is sound, but could not be compared with the history";
 
 /// The control room of a small plant in a terminal: process mimic, trends, alarms, controllers and shift reports over
 /// Modbus RTU and TCP.
@@ -144,6 +145,8 @@ enum CliError {
     Failed(String),
     #[error("{0}\nstart one: `sightglass run PLANT`; or try it out: `sightglass demo`")]
     NotRunning(String),
+    #[error("the chain is whole, but it was not compared with the history: {0}")]
+    NotCompared(String),
     #[error("the station has ended by itself, see the log")]
     StationGone,
     #[error("{what}: {error}")]
@@ -166,6 +169,7 @@ impl CliError {
             CliError::History(HistoryError::Locked { .. }) | CliError::InUse(_) => 3,
             CliError::Listen(serve::ListenError::Running { .. }) => 3,
             CliError::NotRunning(_) => 4,
+            CliError::NotCompared(_) => 5,
             CliError::History(_)
             | CliError::Listen(_)
             | CliError::Users(_)

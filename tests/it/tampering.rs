@@ -42,7 +42,7 @@ fn whatever_is_done_to_the_book_by_hand_the_first_bad_line_is_named() {
     let history = folder.path().join("tank.duckdb");
     let (code, said) = verify(folder.path(), &["--history", history.to_str().unwrap()]);
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains(": whole") && said.contains(&format!("history    {count} rows")), "{said}");
+    assert!(said.contains(": whole") && said.contains(&format!("history    {count} of {count} entries")), "{said}");
 
     let without = |place: usize| [&lines[..place], &lines[place + 1..]].concat().concat();
     let swapped = {
@@ -84,6 +84,34 @@ fn whatever_is_done_to_the_book_by_hand_the_first_bad_line_is_named() {
     fs::write(&book, &good).unwrap();
     fs::write(&head, noted).unwrap();
     assert_eq!(verify(folder.path(), &["--history", history.to_str().unwrap()]).0, Some(0), "as it was");
+}
+
+#[test]
+fn an_audit_log_that_was_not_compared_with_the_history_is_no_success() {
+    let folder = folder();
+    written(folder.path());
+    let history = folder.path().join("tank.duckdb");
+    let args = ["--history", history.to_str().unwrap()];
+    let not_compared = |why: &str| {
+        let (code, said) = verify(folder.path(), &args);
+        assert_eq!(code, Some(5), "{said}");
+        assert!(said.contains(": whole") && said.contains("not compared with the history: "), "{said}");
+        assert!(said.contains(why), "{said}");
+    };
+    let mut station = Process::start(
+        sightglass()
+            .args(["run", "tank", "--port", "L1=/dev/none", "--history"])
+            .arg(&history)
+            .env("XDG_STATE_HOME", folder.path())
+            .env("XDG_RUNTIME_DIR", folder.path()),
+    );
+    station.wait_for("tags on 1 line");
+    not_compared("in use");
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0), "{:?}", station.said);
+    assert_eq!(verify(folder.path(), &args).0, Some(0));
+    fs::remove_file(&history).unwrap();
+    not_compared("tank.duckdb");
 }
 
 #[test]

@@ -175,7 +175,8 @@ unit = 1
         let (user, group) = if root { (Some(4_711), Some(4_712)) } else { (None, None) };
         std::os::unix::fs::chown(&plant.path, user, group).unwrap();
         fs::set_permissions(&plant.path, fs::Permissions::from_mode(0o664)).unwrap();
-        let owner = |path: &Path| fs::metadata(path).map(|file| (file.uid(), file.gid(), file.mode() & 0o7777)).unwrap();
+        let owner =
+            |path: &Path| fs::metadata(path).map(|file| (file.uid(), file.gid(), file.mode() & 0o7777)).unwrap();
         let before = owner(&plant.path);
         assert_eq!(plant.file.save(&plant.line), Ok(()));
         assert_eq!(owner(&plant.path), before);
