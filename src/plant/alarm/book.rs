@@ -72,7 +72,8 @@ impl Book {
             let facts = facts(alarm);
             self.suppress(alarm, facts, at, &mut records);
             self.judge_condition(alarm, facts, at, &mut records);
-            self.bring_back(alarm, facts, at, &mut records);
+            self.release(alarm, facts, at, &mut records);
+            self.end_shelving(alarm, facts, at, &mut records);
             self.remind(alarm, facts, passed, at, &mut records);
         }
         records
@@ -97,7 +98,8 @@ impl Book {
     }
 
     /// What enables the alarm has become false: what was told returns, and once nobody has to answer to it any more nobody
-    /// is told again. What was annunciated never leaves the list by itself. What cannot be told suppresses nothing.
+    /// is told again. What was annunciated, or waits for a reset, never leaves the list by itself. What cannot be told
+    /// suppresses nothing.
     fn suppress(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
         if !is_disabled(alarm, facts) || self.machine(alarm.id).suppressed().is_some() {
             return;
@@ -105,8 +107,8 @@ impl Book {
         if self.machine(alarm.id).is_active() && !self.machine(alarm.id).state().is_aside() {
             records.push(self.step(alarm, AlarmStep::Returned, at, facts.value));
         }
-        let state = self.machine(alarm.id).state();
-        if state == AlarmState::Normal || state.is_aside() {
+        let machine = self.machine(alarm.id);
+        if machine.state() == AlarmState::Normal || machine.state().is_aside() && !machine.is_latched() {
             records.push(self.step(alarm, AlarmStep::Suppressed, at, facts.value));
         }
     }
@@ -120,7 +122,7 @@ impl Book {
         let step = if begins_anew {
             // What looks back starts when the alarm is enabled: a value may stand still while nothing is heated.
             memory.clear();
-            machine.is_active().then_some(AlarmStep::ReturnedQuietly)
+            machine.judge(Some(false), self.ran, Manner::default())
         } else {
             let holds = holds(alarm.condition, facts, machine.is_active(), memory, self.ran);
             machine.judge(if returned { Some(false) } else { holds }, self.ran, manner(alarm))
@@ -130,19 +132,27 @@ impl Book {
         }
     }
 
-    /// What is over by itself: the time on the shelf, the suppression.
-    fn bring_back(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
-        if self.machine(alarm.id).suppressed().is_some() && self.is_released(alarm, facts) {
-            records.push(self.step(alarm, AlarmStep::Released, at, facts.value));
-            let machine = &mut self.machines[alarm.id.index()];
-            let waits = machine.is_active() && !machine.state().is_aside() && alarm.on_delay != Duration::ZERO;
-            if waits && !machine.is_latched() {
-                // A pump that has just started has its delay to bring the flow up.
-                records.push(self.step(alarm, AlarmStep::ReturnedQuietly, at, facts.value));
-                let _ = self.machines[alarm.id.index()].judge(Some(true), self.ran, manner(alarm));
-            }
-            records.extend(self.raise_anew(alarm, at, facts.value));
+    /// The suppression ends: what holds then begins its on-delay, because a pump that has just started has its time to bring
+    /// the flow up. Without a delay it is raised anew.
+    fn release(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
+        if self.machine(alarm.id).suppressed().is_none() || !self.is_released(alarm, facts) {
+            return;
         }
+        records.push(self.step(alarm, AlarmStep::Released, at, facts.value));
+        let machine = self.machine(alarm.id);
+        let holds = machine.is_active() || machine.is_pending();
+        if machine.is_active() {
+            let anew = if machine.state().is_aside() { AlarmStep::RaisedQuietly } else { AlarmStep::Raised };
+            let step = if alarm.on_delay.is_zero() { anew } else { AlarmStep::ReturnedQuietly };
+            records.push(self.step(alarm, step, at, facts.value));
+        }
+        if holds {
+            self.machines[alarm.id.index()].begin_on_delay(self.ran);
+        }
+    }
+
+    /// The time on the shelf ends by itself.
+    fn end_shelving(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
         let Some(shelving) = self.machine(alarm.id).shelved() else { return };
         if shelving.until <= at {
             records.push(self.step(alarm, AlarmStep::Unshelved, at, facts.value));

@@ -127,8 +127,6 @@ pub struct Machine {
     active: bool,
     unacknowledged: bool,
     latched: bool,
-    /// It came while it was put aside and latches: to put it aside again is no acknowledgement.
-    unseen: bool,
     suppressed: Option<Timestamp>,
     shelved: Option<Shelving>,
     out_of_service: Option<Deed>,
@@ -197,6 +195,17 @@ impl Machine {
         self.latched
     }
 
+    /// The condition differs from what is established: a delay runs.
+    pub fn is_pending(&self) -> bool {
+        self.pending_since.is_some()
+    }
+    /// The condition holds, and its on-delay begins now, unless it is established already.
+    pub fn begin_on_delay(&mut self, now: Duration) {
+        if !self.active {
+            self.pending_since = Some(now);
+        }
+    }
+
     /// Takes the judgement of an instant, and says which step follows. A condition must hold (or be gone) for the whole
     /// delay; a flap inside the delay leaves no trace. An unknown judgement (`None`) changes nothing and restarts no delay.
     /// `now` is an instant of the book's own clock. The step is to be [applied](Machine::apply).
@@ -227,7 +236,7 @@ impl Machine {
         match step.step {
             AlarmStep::Raised => {
                 (self.active, self.unacknowledged, self.pending_since) = (true, true, None);
-                (self.unseen, self.annunciated_at) = (false, Some(step.at));
+                self.annunciated_at = Some(step.at);
                 self.latched |= latch;
                 (self.raised_at, self.returned_at, self.acknowledged) = (Some(step.at), None, None);
                 (self.value, self.burst) = (step.value, step.burst);
@@ -235,16 +244,17 @@ impl Machine {
             }
             AlarmStep::RaisedQuietly => {
                 (self.active, self.pending_since) = (true, None);
-                if latch {
-                    // Nobody is told now, but what latches must be seen by somebody once it is back.
-                    (self.latched, self.unacknowledged, self.unseen) = (true, true, true);
+                if latch && self.suppressed.is_none() {
+                    // Nobody is told now, but what latches must be seen by somebody once it is back. What came while it was
+                    // suppressed by design was no fault.
+                    (self.latched, self.unacknowledged) = (true, true);
                     (self.raised_at, self.returned_at, self.acknowledged) = (Some(step.at), None, None);
                     (self.annunciated_at, self.value) = (Some(step.at), step.value);
                 }
             }
             AlarmStep::RaisedAgain => (self.unacknowledged, self.annunciated_at) = (true, Some(step.at)),
             AlarmStep::Acknowledged => {
-                (self.unacknowledged, self.unseen, self.acknowledged) = (false, false, Some(deed()));
+                (self.unacknowledged, self.acknowledged) = (false, Some(deed()));
             }
             AlarmStep::Returned | AlarmStep::ReturnedQuietly => {
                 (self.active, self.pending_since, self.returned_at) = (false, None, Some(step.at));
@@ -253,14 +263,28 @@ impl Machine {
             AlarmStep::Shelved => {
                 // Without an end it would stay away for ever: the journal of another program, or a damaged one.
                 self.shelved = Some(Shelving { deed: deed(), until: step.until.unwrap_or(step.at) });
-                self.unacknowledged = self.unseen;
+                self.keep_latched();
             }
             AlarmStep::Unshelved => self.shelved = None,
-            AlarmStep::Suppressed => self.suppressed = Some(step.at),
+            AlarmStep::Suppressed => {
+                self.suppressed = Some(step.at);
+                // Only what is normal is suppressed. The journal remembers the last step of every kind: what came in an
+                // earlier suppression must not latch after a restart.
+                (self.latched, self.unacknowledged) = (false, false);
+            }
             AlarmStep::Released => self.suppressed = None,
-            AlarmStep::OutOfService => (self.out_of_service, self.unacknowledged) = (Some(deed()), self.unseen),
+            AlarmStep::OutOfService => {
+                self.out_of_service = Some(deed());
+                self.keep_latched();
+            }
             AlarmStep::InService => self.out_of_service = None,
         }
+    }
+
+    /// What is put aside is raised anew if it is active once it is back; what latches comes back as it was, because to put it
+    /// aside is no acknowledgement.
+    fn keep_latched(&mut self) {
+        self.unacknowledged &= self.latched;
     }
 }
 
@@ -348,12 +372,13 @@ mod tests {
         ];
         check(false, &both);
         let design = [
-            (T::Raised, S::Unacknowledged),
             (T::Suppressed, S::Suppressed),
+            (T::RaisedQuietly, S::Suppressed),
             (T::ReturnedQuietly, S::Suppressed),
-            (T::Released, S::Returned),
+            (T::Released, S::Normal),
         ];
         check(false, &design);
+        check(true, &design);
         let quiet = [(T::Shelved, S::Shelved), (T::RaisedQuietly, S::Shelved), (T::ReturnedQuietly, S::Shelved)];
         check(true, &[&quiet[..], &[(T::Unshelved, S::LatchedUnacknowledged)]].concat());
         check(false, &[&quiet[..], &[(T::Unshelved, S::Normal)]].concat());

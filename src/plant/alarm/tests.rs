@@ -191,6 +191,85 @@ fn enabled_by_design(change: impl Fn(&mut AlarmDef)) -> Arc<PlantDef> {
     })
 }
 
+/// A value, and whether it enables the alarm.
+fn enabled_with(value: f64, enabled: bool) -> impl Fn(&AlarmDef) -> Facts {
+    move |_| Facts { value: Some(value), enabled: Some(enabled), ..Facts::default() }
+}
+
+#[test]
+fn a_latching_alarm_that_came_and_went_while_suppressed_is_normal_on_release() {
+    let mut book = Book::new(enabled_by_design(|alarm| alarm.latch = true));
+    let mut journal = book.judge(at(0), enabled_with(80.0, false));
+    journal.extend(book.judge(at(1), enabled_with(70.0, false)));
+    assert_eq!(steps(&journal), [AlarmStep::Suppressed, AlarmStep::RaisedQuietly, AlarmStep::ReturnedQuietly]);
+    assert_eq!(steps(&book.judge(at(2), enabled_with(70.0, true))), [AlarmStep::Released]);
+    assert_eq!((state(&book), book.active().len()), (AlarmState::Normal, 0));
+    assert_eq!(steps(&book.judge(at(3), enabled_with(80.0, true))), [AlarmStep::Raised]);
+    book.judge(at(4), enabled_with(70.0, true));
+    assert_eq!(state(&book), AlarmState::LatchedUnacknowledged, "it still latches");
+}
+
+#[test]
+fn a_latching_alarm_released_while_shelved_comes_back_latched() {
+    let mut book = Book::new(enabled_by_design(|alarm| alarm.latch = true));
+    book.judge(at(0), enabled_with(80.0, false));
+    book.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()).expect("a minute, with a reason");
+    let quietly = [AlarmStep::Released, AlarmStep::RaisedQuietly];
+    assert_eq!(steps(&book.judge(at(2), enabled_with(80.0, true))), quietly);
+    assert_eq!(steps(&book.judge(at(3), enabled_with(70.0, true))), [AlarmStep::ReturnedQuietly]);
+    assert_eq!(steps(&book.judge(at(61), enabled_with(70.0, true))), [AlarmStep::Unshelved]);
+    assert_eq!(state(&book), AlarmState::LatchedUnacknowledged);
+}
+
+#[test]
+fn an_on_delay_begins_when_the_suppression_ends() {
+    let delay = Duration::from_secs(30);
+    let mut book = Book::new(enabled_by_design(move |alarm| alarm.on_delay = delay));
+    assert_eq!(steps(&book.judge(at(0), enabled_with(70.0, false))), [AlarmStep::Suppressed]);
+    assert_eq!(steps(&book.judge(at(1), enabled_with(80.0, false))), []);
+    assert_eq!(steps(&book.judge(at(25), enabled_with(80.0, true))), [AlarmStep::Released]);
+    assert_eq!(steps(&book.judge(at(54), enabled_with(80.0, true))), [], "enabled for 29 s");
+    assert_eq!(steps(&book.judge(at(55), enabled_with(80.0, true))), [AlarmStep::Raised]);
+}
+
+#[test]
+fn the_on_delay_of_a_rate_begins_when_the_suppression_ends() {
+    let rate = Condition::Rate { limit: 6.0, over: Duration::from_secs(10), deadband: 0.0 };
+    let delay = Duration::from_secs(30);
+    let mut book = Book::new(enabled_by_design(move |alarm| (alarm.condition, alarm.on_delay) = (rate, delay)));
+    let mut raised = Vec::new();
+    for second in 0..100 {
+        // The delay has run for 9 s when the alarm is suppressed.
+        let enabled = !(20..40).contains(&second);
+        let records = book.judge(at(second), enabled_with(second as f64, enabled));
+        raised.extend(records.iter().filter(|record| record.step == AlarmStep::Raised).map(|_| second));
+    }
+    assert_eq!(raised, [80], "40 s, 10 s of window, 30 s of delay");
+}
+
+#[test]
+fn shelving_and_out_of_service_acknowledge_no_latched_alarm() {
+    for shelved in [true, false] {
+        let mut book = Book::new(with(|alarm| (alarm.on_delay, alarm.latch) = (Duration::ZERO, true)));
+        let mut journal = book.judge(at(0), facts(80.0, true));
+        journal.extend(book.judge(at(1), facts(70.0, true)));
+        assert_eq!(state(&book), AlarmState::LatchedUnacknowledged);
+        let back = if shelved {
+            journal.extend(book.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(2), &by()));
+            book.unshelve(HIGH, None, at(3), &by())
+        } else {
+            journal.extend(book.out_of_service(HIGH, Some(&why()), at(2), &by()));
+            book.in_service(HIGH, None, at(3), &by())
+        };
+        journal.extend(back.expect("it is put aside"));
+        assert_eq!(state(&book), AlarmState::LatchedUnacknowledged, "shelved: {shelved}");
+        let mut again = Book::new(book.def.clone());
+        again.restore(&journal);
+        assert_eq!(again.lists(), book.lists());
+        book.acknowledge(HIGH, at(0), None, at(4), &by()).expect("it waits");
+    }
+}
+
 #[test]
 fn an_alarm_that_is_not_enabled_tells_nobody_and_an_unknown_enabling_suppresses_nothing() {
     let when =
@@ -444,8 +523,9 @@ proptest! {
             prop_assert_eq!(machine.state() == AlarmState::Normal, !shown && !aside, "what is not normal is listed");
             prop_assert!(!(shown && aside));
             // Beyond the limit for longer than its delay it is active; inside the deadband nothing changes, unless its
-            // enabling ends.
-            if enabled != Some(false) && (74.0..=75.0).contains(&value.unwrap_or(74.5)) {
+            // enabling begins or ends.
+            let released = new.iter().any(|step| step.step == AlarmStep::Released);
+            if enabled != Some(false) && !released && (74.0..=75.0).contains(&value.unwrap_or(74.5)) {
                 let turned = new.iter().any(|step| matches!(
                     step.step,
                     AlarmStep::RaisedQuietly | AlarmStep::Returned
