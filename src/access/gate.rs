@@ -11,7 +11,11 @@ mod standing;
 mod tests;
 mod work;
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{
+    collections::{BTreeMap, VecDeque},
+    sync::Arc,
+    time::Duration,
+};
 
 use jiff::Timestamp;
 
@@ -22,7 +26,7 @@ use self::{
     work::Errand,
 };
 use super::{
-    OrderRequest, Who, Wish, right,
+    OrderRequest, Secret, Who, Wish, right,
     tries::Tries,
     user::{Change, Users},
 };
@@ -88,6 +92,8 @@ pub struct Gate {
     tries: Tries,
     refusals: BTreeMap<Arc<str>, Refusals>,
     errands: BTreeMap<Job, Errand>,
+    /// Passwords that wait for the one before them of the same origin, or for their time.
+    waiting: VecDeque<(Errand, Secret)>,
     last_job: Job,
     saving: Option<Saving>,
     /// A change that waits until last logins are written: the terminal, its ticket, what.
@@ -108,6 +114,7 @@ impl Gate {
             tries: Tries::default(),
             refusals: BTreeMap::new(),
             errands: BTreeMap::new(),
+            waiting: VecDeque::new(),
             last_job: 0,
             saving: None,
             next: None,
@@ -139,7 +146,7 @@ impl Gate {
         };
         seat.who = self.known(&seat.peer);
         seat.trusted = seat.who.is_some();
-        if !own && self.may_record(&seat.origin.user.clone(), at) {
+        if !own && self.may_record(&seat.origin.clone(), at) {
             effects.push(deed(&seat, "attach", "", "done", at));
         }
         if let Some(who) = &seat.who
@@ -170,7 +177,7 @@ impl Gate {
     pub fn close(&mut self, terminal: u32, at: Timestamp) -> Vec<Effect> {
         let mut effects = self.sent_out(terminal, "done: the terminal has gone", at);
         let Some(seat) = self.seats.remove(&terminal) else { return effects };
-        if !seat.peer.own && self.may_record(&seat.origin.user, at) {
+        if !seat.peer.own && self.may_record(&seat.origin, at) {
             effects.push(deed(&seat, "detach", "", "done", at));
         }
         self.tell(terminal, &mut effects);
@@ -227,7 +234,7 @@ impl Gate {
     /// them are only told.
     fn refuse_order(&mut self, terminal: u32, request: OrderRequest, why: Refusal, at: Timestamp) -> Vec<Effect> {
         let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
-        let (origin, own) = (seat.origin.user.clone(), seat.peer.own);
+        let (origin, own) = (seat.origin.clone(), seat.peer.own);
         if !own && !self.may_record(&origin, at) {
             return self.undelivered(request.id, &why.to_string());
         }
@@ -358,6 +365,7 @@ impl Gate {
     pub fn tick(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = self.lock_idle(at);
         effects.extend(self.told_late(at));
+        effects.extend(self.begin_waiting(at));
         if self.unsaved && self.saving.is_none() {
             effects.extend(self.save_logins());
         }

@@ -1,194 +1,125 @@
-//! Wrong passwords: they are counted for each account and for each place they come from, and too many lock both out for a while.
+//! Wrong passwords: counted for each name by the user of the operating system who tried it, so that nobody can lock out others.
 
-use std::{collections::BTreeMap, fmt, sync::Arc, time::Duration};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::{SignedDuration, Timestamp};
 
 use crate::plant::role::AccessDef;
 
-/// After a wrong password the place waits a second, after each further one twice as long, but no longer than this.
+/// After a wrong password the next one waits a second, after each further one twice as long, but no longer than this.
 const DELAY_MAX: Duration = Duration::from_secs(16);
-/// Places that are remembered; those that were quiet longest are forgotten first.
-const ORIGINS_MAX: usize = 512;
-/// All places of one user of the operating system together have so many times the tries of one of them.
-const PLACES: u16 = 8;
+/// Keys that are remembered; those that were quiet longest are forgotten first.
+const KEYS_MAX: usize = 1024;
+/// One user of the operating system has so many times the tries of one name for all names together.
+const NAMES: u32 = 8;
 
-/// Whom an attempt is counted for: the [`super::user::key`] of an account, or `None` for a name that nobody has.
-pub type Account<'a> = Option<&'a str>;
-
-/// All wrong tries that still count.
-#[derive(Debug, Default)]
-pub struct Tries {
-    accounts: BTreeMap<String, Count>,
-    origins: BTreeMap<Origin, Place>,
-    users: BTreeMap<Arc<str>, Count>,
-}
-
-/// Where a password comes from.
+/// What wrong passwords are counted by.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Origin {
-    /// The user of the operating system: the system says it, nobody can make it up.
-    pub user: Arc<str>,
-    /// The host, as the terminal says it. One that lies has another one each time, and is stopped by what its user has left.
-    pub host: Arc<str>,
-}
-
-impl Origin {
-    /// One terminal there by itself: where whoever sits at it is asked for his password again.
-    pub fn of_seat(&self, terminal: u32) -> Origin {
-        Origin { user: format!("{} at terminal {terminal}", self.user).into(), host: self.host.clone() }
-    }
-}
-
-impl fmt::Display for Origin {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} from {}", self.user, self.host)
-    }
-}
-
-#[derive(Debug, Default)]
-struct Count {
-    wrong: u16,
-    last: Timestamp,
-    locked_until: Option<Timestamp>,
-}
-
-impl Count {
-    /// One more wrong try; `true` if it is one too many, and locks out until then.
-    fn one(&mut self, most: u16, until: Timestamp, at: Timestamp) -> bool {
-        // A lock-out is not made longer by those who go on: they could shut somebody out for ever.
-        if self.locked_until.is_some_and(|until| at < until) {
-            return false;
-        }
-        if self.locked_until.take().is_some() {
-            self.wrong = 0;
-        }
-        (self.wrong, self.last) = (self.wrong.saturating_add(1), at);
-        if most <= self.wrong {
-            self.locked_until = Some(until);
-        }
-        most <= self.wrong
-    }
-}
-
-#[derive(Debug)]
-struct Place {
-    /// For whom each wrong try was: never more than lock it out.
-    wrong: Vec<Option<String>>,
-    last: Timestamp,
-    wait_until: Timestamp,
-    /// A password from here is just being looked at.
-    busy: bool,
+pub struct Key {
+    /// Who tries: the user of the operating system, which nobody can make up, or one terminal where somebody is in already.
+    pub origin: Arc<str>,
+    /// The [`super::user::key`] of the name that was typed, known or not; `None` for what is no name at all.
+    pub account: Option<String>,
+    /// Root and the station's own user wait, but are never locked out.
+    pub never_locked: bool,
 }
 
 /// What a wrong try has led to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LockedOut {
-    /// The account has just been locked out.
+    /// This name has just been locked out for this origin.
     pub account: bool,
-    /// The place has just been locked out.
+    /// The origin has just been locked out for all names.
     pub origin: bool,
 }
 
+/// All wrong tries that still count.
+#[derive(Debug, Default)]
+pub struct Tries {
+    counts: BTreeMap<Key, Count>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Count {
+    wrong: u16,
+    last: Timestamp,
+}
+
+impl Count {
+    /// No password is looked at before.
+    fn wait_until(self, key: &Key, rules: &AccessDef) -> Timestamp {
+        if rules.tries_max <= self.wrong && !key.never_locked {
+            return later(self.last, rules.lock_out);
+        }
+        let doubled = 1u64 << self.wrong.saturating_sub(1).min(8);
+        later(self.last, Duration::from_secs(doubled).min(DELAY_MAX))
+    }
+
+    /// Quiet for as long as a lock-out lasts: it counts no more.
+    fn is_over(self, rules: &AccessDef, at: Timestamp) -> bool {
+        later(self.last, rules.lock_out.max(DELAY_MAX)) <= at
+    }
+}
+
 impl Tries {
-    /// May a password be tried from here now? `Err` is how long to wait. Only one is looked at a time: who is let through
-    /// must come back to [`Tries::right`] or [`Tries::wrong`].
-    pub fn begin(&mut self, origin: &Origin, rules: &AccessDef, at: Timestamp) -> Result<(), Duration> {
-        self.forget(rules, at);
-        let user = self.users.get(&origin.user).and_then(|user| user.locked_until).unwrap_or(at);
-        let place = self.origins.entry(origin.clone()).or_insert_with(|| Place {
-            wrong: Vec::new(),
-            last: at,
-            wait_until: at,
-            busy: false,
-        });
-        if place.busy {
-            return Err(Duration::from_secs(1));
-        }
-        let until = place.wait_until.max(user);
-        if at < until {
-            return Err(Duration::try_from(until.duration_since(at)).unwrap_or_default());
-        }
-        (place.busy, place.last) = (true, at);
-        Ok(())
+    /// How long the next password for this key must wait; `None` if it can be looked at now.
+    pub fn wait(&self, key: &Key, rules: &AccessDef, at: Timestamp) -> Option<Duration> {
+        let own = self.counts.get(key).map(|count| count.wait_until(key, rules));
+        let until = own.max(self.origin_locked_until(key, rules, at))?;
+        Duration::try_from(until.duration_since(at)).ok().filter(|wait| !wait.is_zero())
     }
 
-    /// The password could not be looked at.
-    pub fn end(&mut self, origin: &Origin) {
-        if let Some(place) = self.origins.get_mut(origin) {
-            place.busy = false;
-        }
-    }
-
-    /// The password was right: what was wrong before for this account counts no more.
-    pub fn right(&mut self, origin: &Origin, account: &str) {
-        self.accounts.remove(account);
-        if let Some(place) = self.origins.get_mut(origin) {
-            place.busy = false;
-            place.wrong.retain(|wrong| wrong.as_deref() != Some(account));
-        }
+    /// The password was right: what was wrong before for this name counts no more here.
+    pub fn right(&mut self, key: &Key) {
+        self.counts.remove(key);
     }
 
     /// The name or the password was wrong.
-    pub fn wrong(&mut self, origin: &Origin, account: Account, rules: &AccessDef, at: Timestamp) -> LockedOut {
-        let until = at.saturating_add(span(rules.lock_out)).unwrap_or(Timestamp::MAX);
-        let mut locked = LockedOut::default();
-        if let Some(account) = account {
-            let count = self.accounts.entry(account.to_owned()).or_default();
-            locked.account = count.one(rules.tries_max, until, at);
-        }
-        let user = self.users.entry(origin.user.clone()).or_default();
-        locked.origin = user.one(rules.tries_max.saturating_mul(PLACES), until, at);
-        if let Some(place) = self.origins.get_mut(origin) {
-            place.busy = false;
-            place.last = at;
-            place.wrong.push(account.map(str::to_owned));
-            if usize::from(rules.tries_max) <= place.wrong.len() {
-                place.wrong.clear();
-                place.wait_until = until;
-                locked.origin = true;
-            } else {
-                let doubled = 1u64 << (place.wrong.len() - 1).min(8);
-                let delay = Duration::from_secs(doubled).min(DELAY_MAX);
-                place.wait_until = at.saturating_add(span(delay)).unwrap_or(Timestamp::MAX);
-            }
-        }
-        locked
+    pub fn wrong(&mut self, key: &Key, rules: &AccessDef, at: Timestamp) -> LockedOut {
+        self.forget(key, rules, at);
+        let was_locked = self.origin_locked_until(key, rules, at).is_some();
+        let count = self.counts.entry(key.clone()).or_insert(Count { wrong: 0, last: at });
+        // A lock-out that is over was the end of these tries.
+        let wrong = if rules.tries_max <= count.wrong && !key.never_locked { 0 } else { count.wrong };
+        *count = Count { wrong: wrong.saturating_add(1), last: at };
+        let account = rules.tries_max == count.wrong && !key.never_locked;
+        LockedOut { account, origin: !was_locked && self.origin_locked_until(key, rules, at).is_some() }
     }
 
-    /// Until when an account is locked out.
-    pub fn locked_until(&self, account: &str, at: Timestamp) -> Option<Timestamp> {
-        self.accounts.get(account)?.locked_until.filter(|until| at < *until)
+    /// Until when a name is locked out for any origin.
+    pub fn locked_until(&self, account: &str, rules: &AccessDef, at: Timestamp) -> Option<Timestamp> {
+        let of_account = self.counts.iter().filter(|(key, count)| {
+            key.account.as_deref() == Some(account) && rules.tries_max <= count.wrong && !key.never_locked
+        });
+        of_account.map(|(key, count)| count.wait_until(key, rules)).filter(|until| at < *until).max()
     }
 
-    /// How long one must still wait at this place.
-    pub fn wait(&self, origin: &Origin, at: Timestamp) -> Option<Duration> {
-        let place = self.origins.get(origin).map(|place| place.wait_until);
-        let user = self.users.get(&origin.user).and_then(|user| user.locked_until);
-        Duration::try_from(place.max(user)?.duration_since(at)).ok().filter(|wait| !wait.is_zero())
-    }
-
-    /// A Supervisor ends the lock-out of an account, or it is another account now.
+    /// A Supervisor ends the lock-outs of a name, or it is another account now.
     pub fn pardon(&mut self, account: &str) {
-        self.accounts.remove(account);
+        self.counts.retain(|key, _| key.account.as_deref() != Some(account));
     }
 
-    /// Places that have been quiet for as long as a lock-out lasts are as new.
-    fn forget(&mut self, rules: &AccessDef, at: Timestamp) {
-        let old = at.saturating_sub(span(rules.lock_out.max(DELAY_MAX))).unwrap_or(Timestamp::MIN);
-        self.users.retain(|_, user| old < user.last || user.locked_until.is_some_and(|until| at < until));
-        self.origins.retain(|_, place| place.busy || at < place.wait_until || old < place.last);
-        if ORIGINS_MAX <= self.origins.len() {
-            let quiet = self.origins.iter().filter(|(_, place)| !place.busy).min_by_key(|(_, place)| place.last);
-            if let Some(origin) = quiet.map(|(origin, _)| origin.clone()) {
-                self.origins.remove(&origin);
-            }
+    /// All names together were too many for this origin: until the first of them counts no more.
+    fn origin_locked_until(&self, key: &Key, rules: &AccessDef, at: Timestamp) -> Option<Timestamp> {
+        let of_origin = |(other, count): &(&Key, &Count)| other.origin == key.origin && !count.is_over(rules, at);
+        let counts = || self.counts.iter().filter(of_origin).map(|(_, count)| count);
+        let wrong: u32 = counts().map(|count| u32::from(count.wrong)).sum();
+        let locked = u32::from(rules.tries_max) * NAMES <= wrong && !key.never_locked;
+        let until = |count: &Count| later(count.last, rules.lock_out.max(DELAY_MAX));
+        if locked { counts().map(until).min() } else { None }
+    }
+
+    fn forget(&mut self, new: &Key, rules: &AccessDef, at: Timestamp) {
+        self.counts.retain(|_, count| !count.is_over(rules, at));
+        if KEYS_MAX <= self.counts.len() && !self.counts.contains_key(new) {
+            let quiet = self.counts.iter().min_by_key(|(_, count)| count.last).map(|(key, _)| key.clone());
+            quiet.and_then(|key| self.counts.remove(&key));
         }
     }
 }
 
-fn span(span: Duration) -> SignedDuration {
-    SignedDuration::try_from(span).unwrap_or(SignedDuration::MAX)
+fn later(at: Timestamp, span: Duration) -> Timestamp {
+    at.saturating_add(SignedDuration::try_from(span).unwrap_or(SignedDuration::MAX)).unwrap_or(Timestamp::MAX)
 }
 
 #[cfg(test)]
@@ -198,8 +129,8 @@ mod tests {
 
     use super::*;
 
-    fn from(host: &str) -> Origin {
-        Origin { user: "panel".into(), host: host.into() }
+    fn key(origin: &str, account: &str) -> Key {
+        Key { origin: origin.into(), account: Some(account.to_owned()), never_locked: origin == "root" }
     }
 
     fn at(seconds: i64) -> Timestamp {
@@ -208,84 +139,69 @@ mod tests {
 
     #[test]
     fn one_waits_longer_after_each_wrong_password_and_is_locked_out_at_last() {
-        let (rules, here) = (AccessDef::default(), from("here"));
+        let (rules, anna) = (AccessDef::default(), key("panel", "anna"));
         let mut tries = Tries::default();
         let mut now = 0;
         for (delay, locked) in [(1, false), (2, false), (4, false), (8, false), (300, true)] {
-            assert_eq!(tries.begin(&here, &rules, at(now)), Ok(()), "{delay}");
-            let out = tries.wrong(&here, Some("anna"), &rules, at(now));
-            assert_eq!(out, LockedOut { account: locked, origin: locked });
-            assert_eq!(tries.begin(&here, &rules, at(now)), Err(Duration::from_secs(delay)));
+            assert_eq!(tries.wait(&anna, &rules, at(now)), None, "{delay}");
+            let out = tries.wrong(&anna, &rules, at(now));
+            assert_eq!(out, LockedOut { account: locked, origin: false });
+            assert_eq!(tries.wait(&anna, &rules, at(now)), Some(Duration::from_secs(delay)));
+            assert_eq!(tries.wait(&key("eve", "anna"), &rules, at(now)), None, "others are not touched");
             now += delay as i64;
         }
-        assert_eq!(tries.locked_until("anna", at(now)), None, "it is over as configured");
-        assert_eq!(tries.begin(&here, &rules, at(now)), Ok(()));
+        assert_eq!(tries.locked_until("anna", &rules, at(now)), None, "it is over as configured");
+        assert_eq!(tries.wait(&anna, &rules, at(now)), None);
+        tries.wrong(&anna, &rules, at(now));
+        assert_eq!(tries.wait(&anna, &rules, at(now)), Some(Duration::from_secs(1)), "and counts anew");
     }
 
     #[test]
-    fn a_terminal_that_tries_every_account_is_locked_out_though_no_account_is() {
-        let (rules, here) = (AccessDef::default(), from("here"));
-        let mut tries = Tries::default();
-        let names = ["a", "b", "c", "d", "e"];
-        for (place, name) in names.iter().enumerate() {
-            tries.begin(&here, &rules, at(place as i64 * 20)).unwrap();
-            tries.wrong(&here, Some(name), &rules, at(place as i64 * 20));
-        }
-        assert!(tries.begin(&here, &rules, at(120)).is_err());
-        assert!(names.iter().all(|name| tries.locked_until(name, at(120)).is_none()));
-        assert_eq!(tries.begin(&from("there"), &rules, at(120)), Ok(()), "other terminals are not touched");
-    }
-
-    #[test]
-    fn an_own_right_password_does_not_wash_away_the_tries_for_others() {
-        let (rules, here) = (AccessDef::default(), from("here"));
-        let mut tries = Tries::default();
-        for round in 0..5 {
-            let now = at(round * 20);
-            tries.begin(&here, &rules, now).unwrap();
-            tries.wrong(&here, Some("boss"), &rules, now);
-            if tries.begin(&here, &rules, at(round * 20 + 19)).is_ok() {
-                tries.right(&here, "me");
-            }
-        }
-        assert!(tries.begin(&here, &rules, at(110)).is_err());
-    }
-
-    #[test]
-    fn a_terminal_that_says_it_is_another_one_each_time_is_locked_out_too() {
+    fn a_right_password_forgives_wrong_ones_for_the_same_name_only() {
         let rules = AccessDef::default();
         let mut tries = Tries::default();
-        let host = |n: u32| from(&format!("10.0.0.{n}"));
-        let looked_at = (0..1_000).filter(|n| {
-            let begun = tries.begin(&host(*n), &rules, at(0)).is_ok();
-            begun.then(|| tries.wrong(&host(*n), None, &rules, at(0))).is_some()
-        });
-        assert_eq!(looked_at.count(), 40);
-        assert_eq!(tries.wait(&host(5_000), at(0)), Some(Duration::from_secs(300)));
-        let other = Origin { user: "anna".into(), host: "here".into() };
-        assert_eq!(tries.begin(&other, &rules, at(0)), Ok(()), "other users of the system are not touched");
-        assert_eq!(tries.begin(&from("here"), &rules, at(300)), Ok(()));
+        for name in 0..39 {
+            tries.wrong(&key("eve", &name.to_string()), &rules, at(0));
+        }
+        tries.right(&key("eve", "me"));
+        assert_eq!(tries.wrong(&key("eve", "boss"), &rules, at(0)), LockedOut { account: false, origin: true });
+        assert_eq!(tries.wait(&key("eve", "anybody"), &rules, at(0)), Some(Duration::from_secs(300)));
+        tries.pardon("boss");
+        assert_eq!(tries.wait(&key("eve", "anybody"), &rules, at(0)), None);
+    }
+
+    #[test]
+    fn names_without_end_cost_no_memory_without_end() {
+        let rules = AccessDef::default();
+        let mut tries = Tries::default();
+        for name in 0..10_000 {
+            tries.wrong(&key("root", &name.to_string()), &rules, at(0));
+        }
+        assert_eq!(tries.counts.len(), KEYS_MAX);
     }
 
     proptest! {
         #[test]
-        fn a_script_never_has_more_tries_than_permitted_in_a_lock_out(
-            tries_max in 1u16..8, steps in prop::collection::vec((0usize..3, 0usize..3, 0i64..40), 1..200)
+        fn nobody_has_more_tries_than_permitted_in_a_lock_out(
+            tries_max in 1u16..8, steps in prop::collection::vec((0usize..2, 0usize..20, 0i64..40), 1..400)
         ) {
             let rules = AccessDef { tries_max, ..AccessDef::default() };
-            let origins = ["x", "y", "z"].map(from);
             let (mut tries, mut now) = (Tries::default(), 0);
-            let mut looked_at: Vec<(usize, i64)> = Vec::new();
+            let mut looked_at: Vec<(Key, i64)> = Vec::new();
             for (origin, account, later) in steps {
                 now += later;
-                if tries.begin(&origins[origin], &rules, at(now)).is_ok() {
-                    tries.wrong(&origins[origin], Some(["a", "b", "c"][account]), &rules, at(now));
-                    looked_at.push((origin, now));
+                let key = key(["eve", "mallory"][origin], &account.to_string());
+                if tries.wait(&key, &rules, at(now)).is_none() {
+                    tries.wrong(&key, &rules, at(now));
+                    looked_at.push((key, now));
                 }
             }
-            for (origin, from) in &looked_at {
-                let inside = looked_at.iter().filter(|(o, t)| o == origin && (*from..*from + 300).contains(t)).count();
-                prop_assert!(inside <= usize::from(tries_max), "{inside} tries in five minutes");
+            for (place, (key, from)) in looked_at.iter().enumerate() {
+                let inside = || looked_at[place..].iter().take_while(|(_, t)| *t < from + 300);
+                let of_key = inside().filter(|(other, _)| other == key).count();
+                let of_origin = inside().filter(|(other, _)| other.origin == key.origin).count();
+                prop_assert!(of_key <= usize::from(tries_max), "{of_key} tries in five minutes");
+                prop_assert!(of_origin <= usize::from(tries_max) * NAMES as usize, "{of_origin} tries in five minutes");
             }
         }
     }

@@ -31,8 +31,8 @@ impl Gate {
         if people.is_empty() {
             return reply(ticket, "there are no users yet: whoever has started the station makes the first supervisor");
         }
-        let user = people.get(user).map(|user| user.name.clone());
-        let looked_at = self.look_at(terminal, password, What::Login { ticket, user }, at);
+        let (name, user) = (user.to_owned(), people.get(user).map(|user| user.name.clone()));
+        let looked_at = self.look_at(terminal, &name, password, What::Login { ticket, user }, at);
         looked_at.unwrap_or_else(|why| reply(ticket, &why))
     }
 
@@ -62,7 +62,7 @@ impl Gate {
     pub(super) fn sit_down(&mut self, terminal: u32, who: Who, at: Timestamp) -> Vec<Effect> {
         let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
         let name = who.user.clone();
-        (seat.who, seat.locked, seat.trusted, seat.active) = (Some(who), false, false, at);
+        seat.enter(who, at);
         let mut effects = vec![deed(seat, "login", &name, "done", at)];
         if let Some(people) = &mut self.people {
             people.logged_in(&name, at);
@@ -130,7 +130,7 @@ impl Gate {
         let Some(user) = seat.and_then(|seat| seat.who.as_ref()).map(|who| who.user.clone()) else {
             return reply(ticket, "this terminal is not locked");
         };
-        let looked_at = self.look_at(terminal, password, What::Unlock { ticket, user }, at);
+        let looked_at = self.look_at(terminal, &user.clone(), password, What::Unlock { ticket, user }, at);
         looked_at.unwrap_or_else(|why| reply(ticket, &why))
     }
 
@@ -145,9 +145,7 @@ impl Gate {
         if let Some(wrong) = wrong {
             return self.failed(terminal, ticket, "unlock failed", Some(&user), wrong, at);
         }
-        // Meanwhile somebody else may have sat down, or a Supervisor may have sent him out.
-        let still = |seat: &&mut Seat| seat.who.as_ref().is_some_and(|who| who.user == user);
-        let Some(seat) = self.seats.get_mut(&terminal).filter(still) else { return reply(ticket, LOG_IN_FIRST) };
+        let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
         (seat.locked, seat.active) = (false, at);
         let mut effects = vec![deed(seat, "unlock terminal", &user, "done", at), Effect::Reply(ticket, Ok(()))];
         self.tell(terminal, &mut effects);

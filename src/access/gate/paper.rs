@@ -28,7 +28,7 @@ impl Gate {
         if seat.peer.own || seat.requests.take(at) {
             return true;
         }
-        let origin = seat.origin.user.clone();
+        let origin = seat.origin.clone();
         self.refusals_of(&origin, at).untold += 1;
         false
     }
@@ -49,7 +49,7 @@ impl Gate {
 
     /// The record of a refusal, unless there are too many of them.
     pub(super) fn refused(&mut self, seat: &Seat, action: &str, target: &str, why: &str, at: Timestamp) -> Vec<Effect> {
-        let told = self.may_record(&seat.origin.user, at);
+        let told = self.may_record(&seat.origin, at);
         told.then(|| deed(seat, action, target, &format!("refused: {why}"), at)).into_iter().collect()
     }
 

@@ -84,7 +84,7 @@ impl Gate {
         let mut effects = reply(ticket, why);
         let Some(seat) = self.seats.get(&terminal) else { return effects };
         let record = deed(seat, action, target, &format!("refused: {why}"), at);
-        let origin = seat.origin.user.clone();
+        let origin = seat.origin.clone();
         if self.may_record(&origin, at) {
             effects.push(record);
         }
@@ -125,7 +125,7 @@ impl Gate {
         if password::one_form(&new.0) == password::one_form(&old.0) {
             return Err("this is the present password, choose another one".to_owned());
         }
-        self.look_at(terminal, old, What::Change { ticket, user, new }, at)
+        self.look_at(terminal, &user.clone(), old, What::Change { ticket, user, new }, at)
     }
 
     pub(super) fn old_password_done(
@@ -168,19 +168,14 @@ impl Gate {
         people.with(change)
     }
 
-    pub(super) fn hashed(
+    pub(super) fn set_password(
         &mut self,
         terminal: u32,
         ticket: u64,
-        by: Option<Arc<str>>,
         hashing: Hashing,
         hash: Result<String, String>,
         at: Timestamp,
     ) -> Vec<Effect> {
-        let still = self.seats.get(&terminal).is_some_and(|seat| seat.who.as_ref().map(|who| &who.user) == by.as_ref());
-        if !still {
-            return reply(ticket, super::LOG_IN_FIRST);
-        }
         let name = hashing.user().clone();
         let result = hash.and_then(|hash| self.change(terminal, ticket, hashing.change(hash.into()), at));
         result.unwrap_or_else(|why| self.not_changed(terminal, ticket, hashing.action(), &name, &why, at))
@@ -321,7 +316,7 @@ impl Gate {
 }
 
 impl Hashing {
-    fn user(&self) -> &Arc<str> {
+    pub(super) fn user(&self) -> &Arc<str> {
         match self {
             Hashing::First(user) | Hashing::Add(user, _) | Hashing::Own(user) | Hashing::Reset(user) => user,
         }

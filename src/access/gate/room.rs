@@ -24,8 +24,8 @@ impl Gate {
         let mut effects = Vec::new();
         // His own first: who gets no seat takes none from others.
         if !host {
-            let user = &new.origin.user;
-            let his = |seat: &Seat| seat.origin.user == *user;
+            let user = &new.origin;
+            let his = |seat: &Seat| seat.origin == *user;
             effects.extend(self.room_among(his, most.div_ceil(2), &format!(" of {user}"), at)?);
         }
         effects.extend(self.room_among(|_| true, all, "", at)?);

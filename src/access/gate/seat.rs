@@ -5,10 +5,7 @@ use std::{collections::VecDeque, sync::Arc};
 use jiff::Timestamp;
 
 use super::Peer;
-use crate::{
-    access::{Who, tries::Origin},
-    plant::command::OrderId,
-};
+use crate::{access::Who, plant::command::OrderId};
 
 /// Requests a second of one terminal that are answered in the long run, and so many at once.
 const REQUESTS: (f64, f64) = (20.0, 40.0);
@@ -23,12 +20,14 @@ const UNDELIVERED_MAX: usize = 64;
 pub struct Seat {
     /// Where it is.
     pub peer: Peer,
-    /// Whose wrong passwords count together: the host it came from, not the terminal, of which anybody can open another.
-    pub origin: Origin,
+    /// What is counted together: the user of the operating system, as the system says, not what the terminal says of itself.
+    pub origin: Arc<str>,
     /// Since when.
     pub since: Timestamp,
     /// Who sits there.
     pub who: Option<Who>,
+    /// Goes up with each login and logout here.
+    pub session: u64,
     /// He is known without a password, so none can be asked of him.
     pub trusted: bool,
     /// Only looking until the password is given.
@@ -53,6 +52,7 @@ impl Seat {
             origin,
             since: at,
             who: None,
+            session: 0,
             trusted: false,
             locked: false,
             active: at,
@@ -75,21 +75,24 @@ impl Seat {
         self.undelivered.push_back((id, why.into()));
     }
 
+    /// Somebody sits there now.
+    pub fn enter(&mut self, who: Who, at: Timestamp) {
+        (self.who, self.locked, self.trusted, self.active) = (Some(who), false, false, at);
+        self.session += 1;
+    }
+
     /// Nobody sits there any more.
-    pub fn leave(&mut self) -> Option<Who> {
-        (self.locked, self.trusted) = (false, false);
-        self.who.take()
+    pub fn leave(&mut self) {
+        (self.who, self.locked, self.trusted) = (None, false, false);
+        self.session += 1;
     }
 }
 
-/// Where it is, as far as this can be told. `pts/3 from 10.0.0.5, user panel`: the terminal says that it comes from there,
-/// the system says who it belongs to.
-fn origin(peer: &Peer) -> Origin {
-    let host = peer.from.split_once(" from ").map(|(_, host)| host.split([',', ' ']).next().unwrap_or(host));
-    let user = peer.unix_user.as_deref().filter(|_| !peer.own);
-    Origin {
-        user: user.unwrap_or(if peer.own { "this process" } else { "nobody" }).into(),
-        host: host.unwrap_or("here").into(),
+fn origin(peer: &Peer) -> Arc<str> {
+    match &peer.unix_user {
+        _ if peer.own => "this process".into(),
+        Some(user) => user.clone(),
+        None => "nobody".into(),
     }
 }
 

@@ -45,10 +45,10 @@ impl Gate {
         let (None, Some(Signature { user, password })) = (why, sign) else {
             return self.not_signed(terminal, request, why.unwrap_or_default().to_owned(), at);
         };
-        let name = user.as_deref().unwrap_or(&by);
-        let signer = self.people.as_ref().and_then(|people| people.get(name)).map(|user| user.name.clone());
+        let name = user.as_deref().unwrap_or(&by).to_owned();
+        let signer = self.people.as_ref().and_then(|people| people.get(&name)).map(|user| user.name.clone());
         let (copy, request) = (request.clone(), Box::new(request));
-        match self.look_at(terminal, password, What::Sign { by, signer, request }, at) {
+        match self.look_at(terminal, &name, password, What::Sign { by, signer, request }, at) {
             Ok(effects) => effects,
             Err(why) => self.not_signed(terminal, copy, why, at),
         }
@@ -73,11 +73,9 @@ impl Gate {
             return effects;
         }
         let needed = right::needs(&request.command);
-        // Meanwhile he may have left, or been sent out.
-        match self.may(terminal, Some(needed)) {
-            Ok(who) if who.user == by => {}
-            Ok(_) => return self.undelivered(request.id, "somebody else has logged in here meanwhile"),
-            Err(why) => return self.refuse_order(terminal, request, Refusal::NotPermitted(why), at),
+        // Meanwhile the terminal may have been locked.
+        if let Err(why) = self.may(terminal, Some(needed)) {
+            return self.refuse_order(terminal, request, Refusal::NotPermitted(why), at);
         }
         let other = signer.as_ref().filter(|signer| **signer != by);
         let other = other.and_then(|signer| self.people.as_ref()?.get(signer));

@@ -43,7 +43,7 @@ impl Gate {
             user: user.name.clone(),
             role: user.role,
             disabled: user.disabled,
-            locked_until: self.tries.locked_until(&user::key(&user.name), at),
+            locked_until: self.tries.locked_until(&user::key(&user.name), &self.def.access, at),
             must_change: user.must_change,
             last_login: user.last_login,
         });

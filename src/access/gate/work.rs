@@ -1,20 +1,22 @@
 //! What the gate has others do, because it takes as long as a hash: which password is looked at for what, and what then.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
 use super::{Effect, Gate, people::Hashing};
-use crate::access::{
-    OrderRequest, Secret, password,
-    tries::{Account, Origin},
-    user,
-};
+use crate::access::{OrderRequest, Secret, password, tries::Key, user};
 
-/// Passwords that may be under way at once; more are told to come back.
-pub const JOBS_MAX: usize = 16;
+/// Passwords of all users of the operating system that may be under way or wait; more are told to come back.
+pub(super) const JOBS_MAX: usize = 64;
+/// So many of one user: the others still have room.
+pub(super) const JOBS_OF_USER_MAX: usize = 24;
+/// So many places are kept for root and the station's own user.
+const JOBS_KEPT: usize = 8;
 /// Said when there are more.
-pub const BUSY: &str = "the station is busy with other logins, try again";
+pub(super) const BUSY: &str = "the station is busy with other logins, try again";
+/// Said when a password was right, and what it was right for is no more.
+const CHANGED: &str = "the login here or the password was changed meanwhile, try again";
 
 /// Number of a piece of work.
 pub type Job = u64;
@@ -54,13 +56,20 @@ pub enum Outcome {
     Failed(String),
 }
 
-/// What a piece of work is for.
+/// What a piece of work is for. Its result counts only in the same session and for the same stored hash.
 #[derive(Debug)]
 pub(super) struct Errand {
     pub terminal: u32,
-    /// Where the password came from; it counts even when the terminal has gone.
-    pub origin: Origin,
-    pub what: What,
+    /// Of the terminal, when it was asked for.
+    session: u64,
+    /// The user of the operating system whose jobs it belongs to.
+    user: Arc<str>,
+    /// What a wrong password counts for, even when the terminal has gone. One of each origin is looked at at a time, so that
+    /// none has more tries than it may.
+    key: Key,
+    /// What is kept of the password of whom it is about, when the work was begun.
+    stored: Option<Arc<str>>,
+    what: What,
 }
 
 #[derive(Debug)]
@@ -74,7 +83,7 @@ pub(super) enum What {
     /// Of who signs an order.
     Sign { by: Arc<str>, signer: Option<Arc<str>>, request: Box<OrderRequest> },
     /// A new one is hashed.
-    Hash { ticket: u64, by: Option<Arc<str>>, hashing: Hashing },
+    Hash { ticket: u64, hashing: Hashing },
 }
 
 /// What was wrong with an attempt.
@@ -87,25 +96,31 @@ pub(super) struct Wrong {
 }
 
 impl Gate {
-    /// Has a password looked at for somebody. `hash` is `None` for a name that nobody has, which must not be seen from the
-    /// time it takes. `Err` says in words for the operator why it is not looked at.
+    /// Has a password looked at that was given for this name. A name that nobody has must not be seen from the time it takes.
+    /// `Err` says in words for the operator why it is not looked at.
     pub(super) fn look_at(
         &mut self,
         terminal: u32,
+        name: &str,
         password: Secret,
         what: What,
         at: Timestamp,
     ) -> Result<Vec<Effect>, String> {
         let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
-        let origin = if what.comes_from_outside() { seat.origin.clone() } else { seat.origin.of_seat(terminal) };
-        if JOBS_MAX <= self.errands.len() {
-            return Err(BUSY.to_owned());
+        let inside = || format!("{} at terminal {terminal}", seat.origin).into();
+        let key = Key {
+            origin: if what.comes_from_outside() { seat.origin.clone() } else { inside() },
+            account: user::check_name(name).is_ok().then(|| user::key(name)),
+            never_locked: self.is_host(&seat.peer),
+        };
+        let errand = self.errand(terminal, key, what)?;
+        if let Some(wait) = self.tries.wait(&errand.key, &self.def.access, at)
+            && !errand.key.never_locked
+        {
+            return Err(not_checked(wait));
         }
-        let wait = self.tries.begin(&origin, &self.def.access, at);
-        wait.map_err(|wait| format!("{WRONG}; wait {} s at this terminal", wait.as_secs_f64().ceil()))?;
-        let hash = what.whose().and_then(|user| self.people.as_ref()?.get(user)).map(|user| user.hash.clone());
-        let hash = hash.unwrap_or_else(|| password::DUMMY.into());
-        Ok(self.send_off(Errand { terminal, origin, what }, Work::Verify { password, hash }))
+        self.waiting.push_back((errand, password));
+        Ok(self.begin_waiting(at))
     }
 
     /// Has a new password hashed.
@@ -117,102 +132,130 @@ impl Gate {
         hashing: Hashing,
     ) -> Result<Vec<Effect>, String> {
         let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
-        if JOBS_MAX <= self.errands.len() {
+        let origin = format!("hash for terminal {terminal}").into();
+        let key = Key { origin, account: None, never_locked: self.is_host(&seat.peer) };
+        let errand = self.errand(terminal, key, What::Hash { ticket, hashing })?;
+        Ok(self.send_off(errand, Work::Hash(password)))
+    }
+
+    /// `Err` where too many are under way.
+    fn errand(&self, terminal: u32, key: Key, what: What) -> Result<Errand, String> {
+        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
+        let users = || self.errands.values().chain(self.waiting.iter().map(|(errand, _)| errand)).map(|job| &job.user);
+        let most = if key.never_locked { JOBS_MAX } else { JOBS_MAX - JOBS_KEPT };
+        if most <= users().count() || JOBS_OF_USER_MAX <= users().filter(|user| **user == seat.origin).count() {
             return Err(BUSY.to_owned());
         }
-        let by = seat.who.as_ref().map(|who| who.user.clone());
-        let (origin, what) = (seat.origin.clone(), What::Hash { ticket, by, hashing });
-        Ok(self.send_off(Errand { terminal, origin, what }, Work::Hash(password)))
+        Ok(Errand { terminal, session: seat.session, user: seat.origin.clone(), key, stored: None, what })
+    }
+
+    /// Begins what has waited for the one before it, or for its time.
+    pub(super) fn begin_waiting(&mut self, at: Timestamp) -> Vec<Effect> {
+        let mut effects = Vec::new();
+        for (errand, password) in std::mem::take(&mut self.waiting) {
+            let busy = self.errands.values().any(|other| other.key.origin == errand.key.origin);
+            match self.tries.wait(&errand.key, &self.def.access, at) {
+                _ if !self.seats.contains_key(&errand.terminal) => {}
+                None if !busy => {
+                    let hash = self.stored(&errand.what).unwrap_or_else(|| password::DUMMY.into());
+                    effects.extend(self.send_off(errand, Work::Verify { password, hash }));
+                }
+                Some(wait) if !errand.key.never_locked => {
+                    effects.extend(self.not_looked_at(errand.terminal, errand.what, not_checked(wait), at));
+                }
+                None | Some(_) => self.waiting.push_back((errand, password)),
+            }
+        }
+        effects
     }
 
     fn send_off(&mut self, errand: Errand, work: Work) -> Vec<Effect> {
         self.last_job += 1;
-        self.errands.insert(self.last_job, errand);
+        let stored = self.stored(&errand.what);
+        self.errands.insert(self.last_job, Errand { stored, ..errand });
         vec![Effect::Work(self.last_job, work)]
+    }
+
+    /// What is kept of the password of whom this is about.
+    fn stored(&self, what: &What) -> Option<Arc<str>> {
+        Some(self.people.as_ref()?.get(what.whose()?)?.hash.clone())
+    }
+
+    fn is_stale(&self, errand: &Errand) -> bool {
+        let session = self.seats.get(&errand.terminal).map(|seat| seat.session);
+        session != Some(errand.session) || self.stored(&errand.what) != errand.stored
     }
 
     /// A piece of work is done.
     pub fn done(&mut self, job: Job, outcome: Outcome, at: Timestamp) -> Vec<Effect> {
-        let Some(Errand { terminal, origin, what }) = self.errands.remove(&job) else { return Vec::new() };
-        if let What::Hash { ticket, by, hashing } = what {
-            let hash = match outcome {
-                Outcome::Hashed(hash) => hash,
-                Outcome::Verified(_) => Err("internal error".to_owned()),
-                Outcome::Failed(why) => Err(why),
-            };
-            return self.hashed(terminal, ticket, by, hashing, hash, at);
-        }
-        let right = match outcome {
-            Outcome::Verified(right) => Ok(right),
-            Outcome::Hashed(_) => Err("internal error".to_owned()),
-            Outcome::Failed(why) => Err(why),
+        let Some(errand) = self.errands.remove(&job) else { return Vec::new() };
+        let mut effects = match outcome {
+            Outcome::Verified(right) => self.judge(errand, right, at),
+            Outcome::Hashed(_) if self.is_stale(&errand) => self.hashed(errand, Err(CHANGED.to_owned()), at),
+            Outcome::Hashed(hash) => self.hashed(errand, hash, at),
+            Outcome::Failed(why) => self.not_looked_at(errand.terminal, errand.what, why, at),
         };
-        let right = match right {
-            Ok(right) => right,
-            Err(why) => {
-                self.tries.end(&origin);
-                return self.not_looked_at(terminal, what, why, at);
-            }
-        };
-        self.judge(terminal, &origin, what, right, at)
+        effects.extend(self.begin_waiting(at));
+        effects
     }
 
-    fn judge(&mut self, terminal: u32, origin: &Origin, what: What, right: bool, at: Timestamp) -> Vec<Effect> {
-        let account = what.whose().map(|user| user::key(user));
-        let why = self.why_not(&what, right, at);
-        let mut effects = match (&why, &account) {
-            (None, Some(account)) => {
-                self.tries.right(origin, account);
-                Vec::new()
+    fn hashed(&mut self, errand: Errand, hash: Result<String, String>, at: Timestamp) -> Vec<Effect> {
+        match errand.what {
+            What::Hash { ticket, hashing } => self.set_password(errand.terminal, ticket, hashing, hash, at),
+            other => self.not_looked_at(errand.terminal, other, "internal error".to_owned(), at),
+        }
+    }
+
+    fn judge(&mut self, errand: Errand, right: bool, at: Timestamp) -> Vec<Effect> {
+        let stale = self.is_stale(&errand);
+        let Errand { terminal, key, what, .. } = errand;
+        let mut effects = Vec::new();
+        let wrong = match self.why_not(&what, right) {
+            // It was no guess.
+            None if stale => Some(Wrong { why: "changed meanwhile", told: CHANGED.to_owned() }),
+            None => {
+                self.tries.right(&key);
+                None
             }
-            _ => self.count_wrong(terminal, origin, account.as_deref(), what.whose().cloned(), at),
+            Some(why) => {
+                effects = self.count_wrong(terminal, &key, what.whose().cloned(), at);
+                Some(Wrong { why, told: self.wrong(&key, at) })
+            }
         };
-        let why = why.map(|why| Wrong { why, told: self.wrong(origin, at) });
         effects.extend(match what {
-            What::Login { ticket, user } => self.login_done(terminal, ticket, user, why, at),
-            What::Unlock { ticket, user } => self.unlock_done(terminal, ticket, user, why, at),
-            What::Change { ticket, user, new } => self.old_password_done(terminal, ticket, user, new, why, at),
-            What::Sign { by, signer, request } => self.sign_done(terminal, by, signer, *request, why, at),
+            What::Login { ticket, user } => self.login_done(terminal, ticket, user, wrong, at),
+            What::Unlock { ticket, user } => self.unlock_done(terminal, ticket, user, wrong, at),
+            What::Change { ticket, user, new } => self.old_password_done(terminal, ticket, user, new, wrong, at),
+            What::Sign { by, signer, request } => self.sign_done(terminal, by, signer, *request, wrong, at),
             What::Hash { .. } => Vec::new(),
         });
         effects
     }
 
     /// What speaks against this attempt, in words for the book; the operator is told less.
-    fn why_not(&self, what: &What, right: bool, at: Timestamp) -> Option<&'static str> {
-        let user = match (what.whose(), &self.people) {
-            (Some(user), Some(people)) => people.get(user),
-            _ => None,
-        };
-        let Some(user) = user else { return Some("unknown user") };
-        // Who is in already is not to be shut out by what somebody else tries from elsewhere.
-        let locked = what.comes_from_outside() && self.tries.locked_until(&user::key(&user.name), at).is_some();
-        match (right, user.disabled, locked) {
-            (_, _, true) => Some("locked out"),
-            (_, true, _) => Some("disabled"),
-            (false, ..) => Some("wrong password"),
-            (true, false, false) => None,
+    fn why_not(&self, what: &What, right: bool) -> Option<&'static str> {
+        let user = what.whose().and_then(|user| self.people.as_ref()?.get(user));
+        match (user, right) {
+            (None, _) => Some("unknown user"),
+            (Some(user), _) if user.disabled => Some("disabled"),
+            (Some(_), false) => Some("wrong password"),
+            (Some(_), true) => None,
         }
     }
 
-    fn count_wrong(
-        &mut self,
-        terminal: u32,
-        origin: &Origin,
-        account: Account,
-        user: Option<Arc<str>>,
-        at: Timestamp,
-    ) -> Vec<Effect> {
-        let locked = self.tries.wrong(origin, account, &self.def.access, at);
-        let outcome = format!("done: for {} s", self.def.access.lock_out.as_secs());
+    fn count_wrong(&mut self, terminal: u32, key: &Key, user: Option<Arc<str>>, at: Timestamp) -> Vec<Effect> {
+        let locked = self.tries.wrong(key, &self.def.access, at);
+        let (seconds, origin) = (self.def.access.lock_out.as_secs(), &key.origin);
         let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
         let mut effects = Vec::new();
         if let (true, Some(user)) = (locked.account, user) {
+            let outcome = format!("done: for {seconds} s, system user {origin}");
             effects.push(super::paper::deed(seat, "lock-out", &user, &outcome, at));
             self.tell(terminal, &mut effects);
         }
         if locked.origin {
-            effects.push(super::paper::deed(seat, "lock-out", &format!("terminals of {origin}"), &outcome, at));
+            let outcome = format!("done: for up to {seconds} s");
+            effects.push(super::paper::deed(seat, "lock-out", &format!("system user {origin}"), &outcome, at));
         }
         effects
     }
@@ -227,23 +270,27 @@ impl Gate {
         }
     }
 
-    /// What an operator is told of a wrong attempt: the same whatever was wrong, and how long he must wait here.
-    fn wrong(&self, origin: &Origin, at: Timestamp) -> String {
-        match self.tries.wait(origin, at) {
-            Some(wait) => format!("{WRONG}; wait {} s at this terminal", wait.as_secs_f64().ceil()),
+    /// What an operator is told of a wrong attempt: the same whatever was wrong, and how long the next one must wait.
+    fn wrong(&self, key: &Key, at: Timestamp) -> String {
+        match self.tries.wait(key, &self.def.access, at) {
+            Some(wait) => format!("{WRONG}; wait {} s", wait.as_secs_f64().ceil()),
             None => WRONG.to_owned(),
         }
     }
 }
 
+fn not_checked(wait: Duration) -> String {
+    format!("password not checked: wait {} s after wrong ones", wait.as_secs_f64().ceil())
+}
+
 impl What {
-    /// Whose password it is; `None` for a name that nobody has.
+    /// Whose password it is, or will be; `None` for a name that nobody has.
     fn whose(&self) -> Option<&Arc<str>> {
         match self {
             What::Login { user, .. } => user.as_ref(),
             What::Sign { signer, .. } => signer.as_ref(),
             What::Unlock { user, .. } | What::Change { user, .. } => Some(user),
-            What::Hash { .. } => None,
+            What::Hash { hashing, .. } => Some(hashing.user()),
         }
     }
 
@@ -258,5 +305,5 @@ impl What {
     }
 }
 
-/// The one message for a wrong name, a wrong password, somebody disabled and somebody locked out.
-pub(super) const WRONG: &str = "wrong name or password, or locked out; try again later";
+/// The one message for a wrong name, a wrong password, and somebody disabled.
+pub(super) const WRONG: &str = "wrong name or password";

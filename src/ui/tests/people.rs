@@ -107,12 +107,12 @@ fn a_password_is_sent_and_never_seen_and_a_wrong_one_is_told_with_its_wait() {
     shows(&mut model, "asking the station");
     assert_eq!(type_keys(&mut model, "⏎⏎"), [], "while the answer is awaited");
     assert!(!screen(&mut model, 80, 24).contains("horse") && !format!("{model:?}").contains("horse"));
-    answer(&mut model, Err("wrong name or password, or locked out; try again later; wait 8 s at this terminal"));
+    answer(&mut model, Err("wrong name or password; wait 8 s"));
     shows(&mut model, "wait 8 s");
     for _ in 0..6 {
         update(&mut model, Msg::Tick { silent: Duration::ZERO });
     }
-    shows(&mut model, "wrong name or password, or locked out; try again later; wait 5 s at");
+    shows(&mut model, "wrong name or password; wait 5 s");
     insta::assert_snapshot!("login_wrong_80x24", screen(&mut model, 80, 24));
     assert_eq!(type_keys(&mut model, "battery⏎"), [], "too early");
     for _ in 0..10 {

@@ -1,0 +1,130 @@
+//! Wrong passwords: whom they keep out, and whom they never do.
+
+use super::*;
+use crate::access::gate::work::{BUSY, JOBS_MAX, JOBS_OF_USER_MAX, WRONG};
+
+impl Bench {
+    /// A terminal of this user of the operating system.
+    fn open_as(&mut self, terminal: u32, user: &str) {
+        let peer = Peer { from: format!("script, user {user}").into(), unix_user: Some(user.into()), own: false };
+        self.gate.open(terminal, peer, self.now);
+    }
+
+    /// The answer to a login, if there is one yet.
+    fn answer(&mut self, terminal: u32, ticket: u64, user: &str, password: &str) -> Option<Result<(), String>> {
+        let wish = Wish::Login { user: user.into(), password: password.into() };
+        let effects = self.gate.wish(terminal, ticket, wish, self.now);
+        let effects = self.work(effects);
+        answer_in(&effects, ticket)
+    }
+}
+
+fn answer_in(effects: &[Effect], ticket: u64) -> Option<Result<(), String>> {
+    effects.iter().find_map(|effect| match effect {
+        Effect::Reply(to, answer) if *to == ticket => Some(answer.clone()),
+        _ => None,
+    })
+}
+
+#[test]
+fn wrong_passwords_of_one_system_user_lock_nobody_else_out() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open_as(1, "eve");
+    bench.open_as(2, "panel");
+    for _ in 0..40 {
+        bench.login(1, "boss", "guess").unwrap_err();
+        bench.later(16);
+    }
+    bench.login(2, "boss", BOSS).unwrap();
+    let told = bench.login(1, "boss", BOSS).unwrap_err();
+    assert!(told.starts_with("password not checked: wait"), "{told}");
+    let rows = bench.gate.standing(2, bench.now).users;
+    assert!(rows.iter().any(|row| &*row.user == "boss" && row.locked_until.is_some()), "a supervisor sees it");
+    bench.wish(2, Wish::Disable { user: "boss".into(), disabled: false }).unwrap();
+    bench.login(1, "boss", BOSS).unwrap();
+}
+
+#[test]
+fn root_and_the_stations_own_user_are_delayed_and_never_locked_out() {
+    for user in ["root", "sight"] {
+        let mut bench = Bench::new(AccessDef { tries_max: 2, ..AccessDef::default() });
+        bench.open_as(1, user);
+        for _ in 0..60 {
+            bench.login(1, "boss", "guess").unwrap_err();
+            bench.later(16);
+        }
+        bench.login(1, "boss", "guess").unwrap_err();
+        assert_eq!(bench.answer(1, 7_000, "boss", BOSS), None, "it waits for its turn");
+        assert_eq!(answer_in(&bench.later(15), 7_000), None);
+        assert_eq!(answer_in(&bench.later(1), 7_000), Some(Ok(())), "{user}");
+        assert!(bench.records.iter().all(|record| !record.0.ends_with("lock-out")));
+    }
+}
+
+#[test]
+fn six_right_logins_at_once_all_succeed() {
+    let mut bench = Bench::new(AccessDef { sessions_max: 30, ..AccessDef::default() });
+    let mut begun = Vec::new();
+    for terminal in 1..=6 {
+        bench.open_as(terminal, "panel");
+        let login = Wish::Login { user: "tech".into(), password: TECH.into() };
+        begun.extend(bench.gate.wish(terminal, u64::from(terminal), login, bench.now));
+    }
+    bench.work(begun);
+    assert!((1..=6).all(|terminal| bench.who(terminal).as_deref() == Some("tech")));
+}
+
+#[test]
+fn too_many_logins_at_once_are_told_that_the_station_is_busy() {
+    let mut bench = Bench::new(AccessDef { sessions_max: 60, ..AccessDef::default() });
+    let mut told = Vec::new();
+    for terminal in 1..=20 {
+        bench.open_as(terminal, "eve");
+        for ticket in 0..4 {
+            let login = Wish::Login { user: "tech".into(), password: "guess".into() };
+            let ticket = u64::from(terminal) * 4 + ticket;
+            told.extend(answer_in(&bench.gate.wish(terminal, ticket, login, bench.now), ticket));
+        }
+    }
+    assert_eq!(told.len(), 80 - JOBS_OF_USER_MAX);
+    assert!(told.iter().all(|answer| *answer == Err(BUSY.to_owned())), "{told:?}");
+    assert!(bench.gate.errands.len() + bench.gate.waiting.len() <= JOBS_MAX);
+    // The others are not touched.
+    bench.open_as(30, "panel");
+    bench.login(30, "tech", TECH).unwrap();
+}
+
+#[test]
+fn one_system_user_who_guesses_at_all_names_is_stopped() {
+    let mut bench = Bench::new(AccessDef { sessions_max: 60, ..AccessDef::default() });
+    bench.open_as(1, "eve");
+    let mut looked_at = 0;
+    for name in 0..200 {
+        let told = bench.login(1, &format!("name{name}"), "guess").unwrap_err();
+        looked_at += usize::from(told.starts_with(WRONG));
+        bench.later(1);
+    }
+    assert_eq!(looked_at, 40);
+    let locked = bench.records.iter().filter(|record| record.0.ends_with("lock-out"));
+    assert_eq!(locked.map(|record| &*record.1).collect::<Vec<_>>(), ["system user eve"]);
+    bench.open_as(2, "panel");
+    bench.login(2, "boss", BOSS).unwrap();
+    bench.later(300);
+    bench.login(1, "boss", BOSS).unwrap();
+}
+
+#[test]
+fn a_name_that_nobody_has_is_delayed_and_locked_like_one_that_somebody_has() {
+    let mut told = ["tech", "nobody"].map(|name| {
+        let mut bench = Bench::new(AccessDef { tries_max: 3, ..AccessDef::default() });
+        bench.open_as(1, "eve");
+        let mut told = Vec::new();
+        for _ in 0..10 {
+            told.push(bench.login(1, name, "guess").unwrap_err());
+            bench.later(1);
+        }
+        told
+    });
+    let nobody = told[1].split_off(0);
+    assert_eq!(told[0], nobody);
+}

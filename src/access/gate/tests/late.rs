@@ -1,0 +1,86 @@
+//! What a password check or a hash is worth when it ends later than something else that was done meanwhile.
+
+use super::*;
+
+/// The password that is being checked because of these effects.
+fn under_way(effects: &[Effect]) -> Job {
+    let job = effects.iter().find_map(|effect| match effect {
+        Effect::Work(job, _) => Some(*job),
+        _ => None,
+    });
+    job.expect("a password is checked")
+}
+
+fn two_at_work() -> Bench {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "10.0.0.1");
+    bench.open(2, "10.0.0.2");
+    bench.login(1, "boss", BOSS).unwrap();
+    bench.login(2, "tech", TECH).unwrap();
+    bench
+}
+
+#[test]
+fn a_change_of_password_under_way_does_not_undo_a_reset() {
+    let mut bench = two_at_work();
+    let change = Wish::ChangePassword { old: TECH.into(), new: "mine for ever and ever".into() };
+    let job = under_way(&bench.gate.wish(2, 9_000, change, bench.now));
+    bench.wish(1, Wish::ResetPassword { user: "tech".into(), password: "fresh horse for tech".into() }).unwrap();
+    assert_eq!(bench.who(2), None, "the reset has ended the session");
+    // The old password was right when it was checked.
+    let effects = bench.gate.done(job, Outcome::Verified(true), bench.now);
+    let effects = bench.work(effects);
+    assert!(matches!(effects[..], [.., Effect::Reply(9_000, Err(_))]), "{effects:?}");
+    let tech = bench.gate.people.as_ref().unwrap().get("tech").unwrap();
+    assert_eq!((&*tech.hash, tech.must_change), ("fresh horse for tech", true));
+}
+
+#[test]
+fn a_new_password_being_hashed_does_not_undo_a_reset() {
+    let mut bench = two_at_work();
+    let change = Wish::ChangePassword { old: TECH.into(), new: "mine for ever and ever".into() };
+    let verifying = under_way(&bench.gate.wish(2, 9_000, change, bench.now));
+    let hashing = under_way(&bench.gate.done(verifying, Outcome::Verified(true), bench.now));
+    bench.wish(1, Wish::ResetPassword { user: "tech".into(), password: "fresh horse for tech".into() }).unwrap();
+    // Logged in again with the password of the reset: the same person, another session.
+    bench.login(2, "tech", "fresh horse for tech").unwrap();
+    let effects = bench.gate.done(hashing, Outcome::Hashed(Ok("mine for ever and ever".to_owned())), bench.now);
+    bench.work(effects);
+    let tech = bench.gate.people.as_ref().unwrap().get("tech").unwrap();
+    assert_eq!((&*tech.hash, tech.must_change), ("fresh horse for tech", true));
+}
+
+#[test]
+fn a_login_with_a_password_changed_meanwhile_fails_and_is_no_guess() {
+    let mut bench = two_at_work();
+    bench.open(3, "10.0.0.3");
+    let login = Wish::Login { user: "tech".into(), password: TECH.into() };
+    let job = under_way(&bench.gate.wish(3, 9_000, login, bench.now));
+    bench.wish(2, Wish::ChangePassword { old: TECH.into(), new: "a new horse for tech".into() }).unwrap();
+    let effects = bench.gate.done(job, Outcome::Verified(true), bench.now);
+    bench.work(effects);
+    assert_eq!(bench.who(3), None);
+    assert_eq!(bench.last(), ("not logged in (panel) login failed", "tech", "refused: changed meanwhile"));
+    bench.login(3, "tech", "a new horse for tech").unwrap();
+}
+
+#[test]
+fn an_unlock_or_a_signature_counts_only_in_the_session_it_was_given_in() {
+    let mut bench = two_at_work();
+    bench.wish(2, Wish::Lock).unwrap();
+    let unlock = under_way(&bench.gate.wish(2, 9_000, Wish::Unlock(TECH.into()), bench.now));
+    bench.login(2, "tech", TECH).unwrap();
+    bench.wish(2, Wish::Lock).unwrap();
+    let effects = bench.gate.done(unlock, Outcome::Verified(true), bench.now);
+    bench.work(effects);
+    assert!(bench.gate.standing(2, bench.now).locked, "the unlock belonged to the session before");
+
+    bench.login(2, "tech", TECH).unwrap();
+    let sign = Some(Signature { user: Some("boss".to_owned()), password: BOSS.into() });
+    let id = OrderId { terminal: 2, number: 50 };
+    let effects = bench.gate.order(2, OrderRequest { sign, ..OrderRequest::new(id, SV) }, bench.now);
+    bench.wish(2, Wish::Logout).unwrap();
+    let effects = bench.gate.done(under_way(&effects), Outcome::Verified(true), bench.now);
+    let given = effects.iter().any(|effect| matches!(effect, Effect::Order(Order { refused: None, .. })));
+    assert!(!given, "{effects:?}");
+}
