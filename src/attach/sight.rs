@@ -12,8 +12,21 @@ use crate::plant::{
 /// Alarms, clock, trouble of the history, and which lines and devices are reached; no value of the process, no text, no
 /// bytes, no order. What is left out is absent, not hidden: it does not leave the station.
 pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
-    let Snapshot { at, def, decimals, lines, devices, alarms, aside, sound, alarm_quality, history, speed, .. } =
-        snapshot;
+    let Snapshot {
+        at,
+        def,
+        decimals,
+        lines,
+        devices,
+        alarms,
+        aside,
+        sound,
+        alarm_quality,
+        history,
+        station,
+        speed,
+        ..
+    } = snapshot;
     let reached = |line: &LineStatus| LineStatus {
         state: line.state.clone(),
         since: line.since,
@@ -40,6 +53,7 @@ pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
         orders: Vec::new(),
         watch: Watch::default(),
         history: history.clone(),
+        station: station.clone(),
         sets: Arc::default(),
         restores: Vec::new(),
         tunings: vec![None; def.devices.len()],

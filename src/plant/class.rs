@@ -29,7 +29,7 @@ pub fn classes(tags: &[TagDef], alarms: &[AlarmDef], written: &[Option<Class>]) 
 fn inputs(alarm: &AlarmDef) -> impl Iterator<Item = TagId> {
     let subject = match alarm.subject {
         Subject::Tag(tag) => Some(tag),
-        Subject::Device(_) | Subject::Line(_) => None,
+        Subject::Device(_) | Subject::Line(_) | Subject::Station => None,
     };
     let enabling = alarm.enabled_when.iter().flat_map(|expr| expr.tags());
     subject.into_iter().chain(alarm.condition.reference()).chain(enabling)

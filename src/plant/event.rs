@@ -1,4 +1,4 @@
-//! What the bus tells the plant: values read, requests that failed, states of lines, outcomes of writes.
+//! What the plant is told: values read, requests that failed, states of lines, outcomes of writes, faults of the station.
 
 use std::time::Duration;
 
@@ -10,11 +10,12 @@ use std::sync::Arc;
 use super::{
     id::{DeviceId, LineId, TagId, WriteId},
     line_report::LineReport,
+    station::{FaultState, StationFault},
     tool::ToolRun,
     traffic::Exchange,
 };
 
-/// One fact from the bus. Every event carries the time at which it became true.
+/// One fact, mostly from the bus. Every event carries the time at which it became true.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Event {
     /// A block was read: raw numbers (typed and ordered, not scaled) of its tags.
@@ -82,6 +83,15 @@ pub enum Event {
         key: TagId,
         /// What the device said to the key: accepted, refused or lost.
         result: WriteResult,
+    },
+    /// The station itself has a fault, or no longer has it.
+    Station {
+        /// When.
+        at: Timestamp,
+        /// Which.
+        fault: StationFault,
+        /// Whether it lasts, has occurred or is over.
+        state: FaultState,
     },
     /// A write came to its end on the wire.
     Wrote {

@@ -33,6 +33,7 @@ pub mod alarm;
 pub mod ne107;
 pub mod tuning;
 pub mod restore;
+pub mod station;
 pub mod snapshot;
 pub mod board;
 pub mod orders;

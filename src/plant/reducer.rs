@@ -5,6 +5,7 @@ mod health;
 mod measure;
 mod restore;
 mod service;
+mod station;
 #[cfg(test)]
 mod tests;
 
@@ -27,6 +28,7 @@ use super::{
     restore::Restore,
     sample::Cause,
     snapshot::{DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
+    station::StationFaults,
     traffic::Exchange,
     tuning::TuningWatch,
 };
@@ -65,6 +67,7 @@ pub struct Plant {
     /// The last request for each tag, by [`TagId`].
     evidence: Arc<Vec<Option<Arc<Exchange>>>>,
     history: HistoryStatus,
+    faults: StationFaults,
     speed: f64,
     /// What lies in the folder of parameter sets.
     sets: Arc<Vec<StoredSet>>,
@@ -92,6 +95,7 @@ impl Plant {
             devices: vec![DeviceStatus::default(); def.devices.len()],
             evidence: Arc::new(vec![None; def.tags.len()]),
             history: HistoryStatus::default(),
+            faults: StationFaults::default(),
             sets: Arc::default(),
             restores: Vec::new(),
             numbers: 0,
@@ -137,6 +141,10 @@ impl Plant {
             }
             Event::Tool { at, line, run } => {
                 self.lines[line.index()].test = Some(run);
+                (at, None)
+            }
+            Event::Station { at, fault, state } => {
+                self.faults.set(fault, state);
                 (at, None)
             }
             Event::Unlocked { at, id, key, result } => {
@@ -237,14 +245,10 @@ impl Plant {
         effects
     }
 
-    /// The store says how it stands.
-    pub fn on_history(&mut self, status: HistoryStatus) {
-        self.history = status;
-    }
-
     /// Time passes: values age, delays run out.
     pub fn on_tick(&mut self, at: Timestamp) -> Effects {
         self.board.age(at);
+        self.faults.tick();
         let expired = self.desk.expire(at, self.speed, &self.board);
         let minutes = self.minutes(at);
         let mut effects = self.settle(at);
@@ -274,6 +278,7 @@ impl Plant {
             orders: self.desk.shown(),
             watch: self.watch.clone(),
             history: self.history.clone(),
+            station: self.faults.details().clone(),
             sets: self.sets.clone(),
             restores: self.restores.clone(),
             tunings: self.tunings.iter().map(|watch| watch.tuning.clone()).collect(),

@@ -1,6 +1,6 @@
 //! All that is true at one instant, as plain data: what screens draw and scripts print.
 
-use std::{sync::Arc, time::Duration};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use super::{
         state::{AlarmState, Deed},
     },
     command::{Command, OrderStatus},
-    def::{AlarmId, DeviceId, LineDef, LineId, PlantDef, TagId},
+    def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Fault, LineCounters, LineState},
     guard::Watch,
     line_report::LineReport,
@@ -21,6 +21,7 @@ use super::{
     restore::Restore,
     sample::{Cause, Sample},
     scale,
+    station::StationFault,
     tag::Decimals,
     tool::ToolRun,
     traffic::Exchange,
@@ -60,6 +61,8 @@ pub struct Snapshot {
     pub watch: Watch,
     /// The history store.
     pub history: HistoryStatus,
+    /// The details of each fault that the station has or had.
+    pub station: Arc<BTreeMap<StationFault, Arc<str>>>,
     /// The parameter sets that the station keeps, by name.
     pub sets: Arc<Vec<StoredSet>>,
     /// The latest restore of each device that had one.
@@ -91,6 +94,7 @@ impl Snapshot {
             orders: Vec::new(),
             watch: Watch::default(),
             history: HistoryStatus::default(),
+            station: Arc::default(),
             sets: Arc::default(),
             restores: Vec::new(),
             tunings: vec![None; devices],
@@ -165,6 +169,11 @@ impl Snapshot {
         let waits = self.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement());
         let seen: Arc<[_]> = waits.map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
         (!seen.is_empty()).then_some(Command::Alarm(AlarmCommand::AcknowledgeAll { seen }))
+    }
+    /// The details of a fault of the station, as of the last time it was active.
+    pub fn fault_details(&self, alarm: AlarmId) -> &str {
+        let Condition::Station(fault) = self.def.alarm(alarm).condition else { return "" };
+        self.station.get(&fault).map_or("", |details| details)
     }
     /// The alarms of a tag, most urgent first.
     pub fn alarms_of(&self, tag: TagId) -> impl Iterator<Item = &ActiveAlarm> {
@@ -288,7 +297,17 @@ pub struct HistoryStatus {
     pub lost: u64,
     /// Last commit.
     pub committed_at: Option<Timestamp>,
-    /// What is wrong with it, in words for the operator.
+    /// Why it takes no records now; they wait meanwhile.
+    pub failing: Option<String>,
+    /// Records that wait to be stored, and how many can.
+    pub waiting: u64,
+    /// Most records that can wait; the oldest samples are dropped first.
+    pub waiting_max: u64,
+    /// What was damaged or missing, and where it was set aside; since the start.
+    pub damaged: Option<String>,
+    /// How little of the disk is free; `None` while there is enough.
+    pub disk: Option<String>,
+    /// All that is wrong with it, in words for the operator.
     pub trouble: Option<String>,
     /// Size of the file, bytes.
     pub file_bytes: u64,

@@ -1,4 +1,4 @@
-//! Alarms: one condition each, on a tag, device or line; and "gives no values" for every device.
+//! Alarms: one condition each, on a tag, device or line; "gives no values" for every device; the faults of the station.
 
 use std::time::Duration;
 
@@ -10,7 +10,10 @@ use super::{
     reader::{At, text},
     schema::{AlarmTable, Need, PlantFile},
 };
-use crate::plant::def::{AlarmClass, AlarmDef, AlarmId, AlarmRules, Condition, DeviceDef, Guidance, Priority, Subject};
+use crate::plant::{
+    def::{AlarmClass, AlarmDef, AlarmId, AlarmRules, Condition, DeviceDef, Guidance, Priority, Subject},
+    station::StationFault,
+};
 
 /// The longest that alarms may be shelved for, whatever a plant file says.
 const SHELVE_MAX: Duration = Duration::from_secs(7 * 86_400);
@@ -20,7 +23,7 @@ const SHELVE_MIN: Duration = Duration::from_secs(60);
 /// The name of the alarm that every device has.
 const NO_VALUES: &str = "gives no values";
 
-/// The alarms of a plant file, and one for each device that does not have its own "gives no values".
+/// The alarms of a plant file, one for each device that does not have its own "gives no values", and those of the station.
 pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Problems) -> Vec<AlarmDef> {
     let mut alarms = Vec::new();
     for table in tables.iter().map(|table| &table.value) {
@@ -39,6 +42,9 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
             check_generated(tables, device, problems);
             alarms.push(not_answering(AlarmId(alarms.len() as u16), device));
         }
+    }
+    for fault in StationFault::ALL {
+        alarms.push(fault.alarm(AlarmId(alarms.len() as u16)));
     }
     alarms
 }
@@ -119,9 +125,8 @@ fn alarm(
 /// Whose trouble it is, unless the file says: values that do not come are trouble of the system.
 fn class_of(subject: Subject, condition: Condition) -> AlarmClass {
     match (subject, condition) {
-        (Subject::Device(_) | Subject::Line(_), _) | (Subject::Tag(_), Condition::NoUpdate { .. }) => {
-            AlarmClass::System
-        }
+        (Subject::Device(_) | Subject::Line(_) | Subject::Station, _)
+        | (Subject::Tag(_), Condition::NoUpdate { .. }) => AlarmClass::System,
         (Subject::Tag(_), _) => AlarmClass::Process,
     }
 }

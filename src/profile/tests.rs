@@ -8,8 +8,9 @@ use super::{
     plant::{Library, Text, build},
 };
 use crate::plant::{
-    def::{Condition, PlantDef},
+    def::{Condition, PlantDef, Subject},
     guard::Blocking,
+    station::StationFault,
     tag::{Bound, Class, Kind},
 };
 
@@ -144,7 +145,9 @@ fn changed(changes: &[(&str, &str)]) -> Errors {
 fn the_small_plant_is_right() {
     let plant = load(PLANT.as_bytes(), METER, PLC).unwrap_or_else(|errors| panic!("{errors}"));
     assert_eq!(plant.name, "small");
-    assert_eq!(plant.alarms.len(), 3, "one written, and not answering for two devices");
+    let own = plant.alarms.iter().filter(|alarm| alarm.subject != Subject::Station).count();
+    assert_eq!(own, 3, "one written, and not answering for two devices");
+    assert_eq!(plant.alarms.len(), 3 + StationFault::ALL.len(), "and the faults of the station");
     assert!(matches!(plant.alarms[1].condition, Condition::NotAnswering));
     assert_eq!(plant.trends.len(), 1, "a group of pens is made up");
 }

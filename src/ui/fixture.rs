@@ -4,7 +4,7 @@ pub mod controllers;
 mod plant;
 mod traffic;
 
-use std::{sync::Arc, time::Duration};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::{SignedDuration, Timestamp};
 
@@ -19,6 +19,7 @@ use crate::plant::{
     restore::Restore,
     sample::{Cause, Sample},
     snapshot::{ActiveAlarm, AsideAlarm, DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
+    station::StationFault,
     tag::*,
     traffic::Exchange,
     tuning::Tuning,
@@ -50,6 +51,8 @@ pub struct Fixture {
     pub evidence: Vec<Option<Arc<Exchange>>>,
     /// Sets in the station's folder.
     pub sets: Vec<StoredSet>,
+    /// Details of faults of the station.
+    pub station: BTreeMap<StationFault, Arc<str>>,
     /// Restores, one a device.
     pub restores: Vec<Restore>,
     /// Auto-tunings, by device.
@@ -82,6 +85,7 @@ impl Fixture {
         Fixture {
             evidence: vec![None; def.tags.len()],
             sets: Vec::new(),
+            station: BTreeMap::new(),
             restores: Vec::new(),
             tunings: vec![None; def.devices.len()],
             into: None,
@@ -182,6 +186,7 @@ impl Fixture {
             tunings: self.tunings.iter().cloned().map(|tuning| tuning.map(Arc::new)).collect(),
             programs: vec![self.into; self.def.devices.len()],
             history: HistoryStatus { rows: 5_000, committed_at: Some(now()), ..HistoryStatus::default() },
+            station: Arc::new(self.station.clone()),
             speed: 1.0,
             def: Arc::new(self.def.clone()),
         })

@@ -8,7 +8,7 @@ mod readings;
 #[cfg(test)]
 mod tests;
 
-use std::{sync::Arc, time::Duration};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -21,6 +21,7 @@ use crate::plant::{
     parameter_set::StoredSet,
     restore::Restore,
     snapshot::{ActiveAlarm, AsideAlarm, DeviceStatus, HistoryStatus},
+    station::StationFault,
     tuning::Tuning,
 };
 use line::LineDelta;
@@ -47,6 +48,7 @@ pub struct Delta {
     orders: List<OrderStatus>,
     watch: Option<Watch>,
     history: Option<HistoryStatus>,
+    station: Option<Arc<BTreeMap<StationFault, Arc<str>>>>,
     sets: List<StoredSet>,
     restores: List<Arc<Restore>>,
     tunings: List<Option<Arc<Tuning>>>,
@@ -82,6 +84,7 @@ impl Delta {
             orders,
             watch,
             history,
+            station,
             sets,
             restores,
             tunings,
@@ -107,6 +110,7 @@ impl Delta {
             orders: List::between(&old.orders, orders),
             watch: (old.watch != *watch).then(|| watch.clone()),
             history: (old.history != *history).then(|| history.clone()),
+            station: (old.station != *station).then(|| station.clone()),
             sets: shared(&old.sets, sets),
             restores: List::between(&old.restores, restores),
             tunings: List::between(&old.tunings, tunings),
@@ -153,6 +157,9 @@ impl Delta {
         }
         if let Some(history) = self.history {
             snapshot.history = history;
+        }
+        if let Some(station) = self.station {
+            snapshot.station = station;
         }
         if let Some(sets) = self.sets.made_of(&snapshot.sets)? {
             snapshot.sets = Arc::new(sets);

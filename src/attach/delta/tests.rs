@@ -19,6 +19,7 @@ use crate::{
         parameter_set::StoredSet,
         sample::{Cause, Sample},
         snapshot::{ActiveAlarm, DeviceState},
+        station::StationFault,
         tool::{Tool, ToolRun, ToolState},
         traffic::{Exchange, Frame, Frames},
     },
@@ -144,6 +145,10 @@ fn change(snapshot: &mut Snapshot, (kind, place, amount): (u8, u16, u32)) {
             Arc::make_mut(&mut snapshot.sets).push(set);
         }
         17 => snapshot.decimals[tag] = (amount % 4) as u8,
+        18 => {
+            let details = format!("{amount} lost").into();
+            Arc::make_mut(&mut snapshot.station).insert(StationFault::RecordsLost, details);
+        }
         _ => {}
     }
 }
@@ -172,8 +177,8 @@ proptest! {
     #[test]
     fn a_terminal_sees_what_the_station_has_whatever_happened_in_between(
         (from, to) in (0usize..6, 0usize..6),
-        changes in prop::collection::vec((0u8..18, any::<u16>(), 0u32..1_000), 0..24),
-        more in prop::collection::vec((0u8..18, any::<u16>(), 0u32..1_000), 0..24),
+        changes in prop::collection::vec((0u8..19, any::<u16>(), 0u32..1_000), 0..24),
+        more in prop::collection::vec((0u8..19, any::<u16>(), 0u32..1_000), 0..24),
     ) {
         let mut old = moods().swap_remove(from);
         changes.iter().for_each(|one| change(&mut old, *one));
@@ -187,7 +192,7 @@ proptest! {
 
     #[test]
     fn a_delta_for_another_snapshot_is_found_out_or_harmless(
-        changes in prop::collection::vec((0u8..18, any::<u16>(), 0u32..1_000), 0..24),
+        changes in prop::collection::vec((0u8..19, any::<u16>(), 0u32..1_000), 0..24),
         (from, to) in (0usize..6, 0usize..6),
     ) {
         let mut new = moods().swap_remove(from);
@@ -231,7 +236,7 @@ fn tags_of_one_answer_share_its_time() {
 #[test]
 fn without_a_login_no_value_leaves_the_station() {
     let mut snapshot = Snapshot::clone(&Fixture::alarm().snapshot());
-    (0..18).for_each(|kind| change(&mut snapshot, (kind, 1, 1)));
+    (0..19).for_each(|kind| change(&mut snapshot, (kind, 1, 1)));
     Arc::make_mut(&mut snapshot.alarms)[0].value = Some(72.1);
     let seen = alarms_only(&snapshot);
     assert!(seen.samples.iter().all(|sample| *sample == Sample::bad(Cause::Withheld, snapshot.at)));

@@ -35,8 +35,10 @@ pub struct Writer {
     steps: u64,
     settled: u64,
     status: HistoryStatus,
-    /// What was wrong at the last open; stays until the station ends.
-    opened_with: Option<String>,
+    /// What was found damaged when the store was opened; stays until the station ends.
+    damaged: Option<String>,
+    /// The clock was behind the last record at the start.
+    clock: Option<String>,
     /// What is wrong now; goes when it works again.
     failing: Option<String>,
     /// What was wrong with the last checkpoint; goes with the next good one.
@@ -60,7 +62,8 @@ impl Writer {
             steps: 0,
             settled: 0,
             status: HistoryStatus::default(),
-            opened_with: trouble.or(clock),
+            damaged: trouble,
+            clock,
             failing: None,
             unchecked: None,
             failures: 0,
@@ -186,16 +189,23 @@ impl Writer {
         self.store = None;
         if let Ok(Opened { store, trouble }) = Store::open(&self.path, &self.def, now) {
             self.store = Some(store);
-            self.opened_with = trouble.or(self.opened_with.take());
+            self.damaged = trouble.or(self.damaged.take());
         }
     }
 
     fn describe(&mut self) {
+        let (waiting, max) = (self.pending.len(), PENDING_MAX);
         let lost = (self.status.lost > 0).then(|| format!("{} records lost", self.status.lost));
-        let waiting = self.failing.as_ref().map(|why| format!("{why}; {} records waiting", self.pending.len()));
-        let parts: Vec<String> =
-            [waiting, self.unchecked.clone(), lost, self.opened_with.clone()].into_iter().flatten().collect();
+        let failing = self.failing.as_ref();
+        let failing = failing.map(|why| format!("{why}; {waiting} records waiting ({} %)", waiting * 100 / max));
+        let parts: Vec<String> = [failing, self.unchecked.clone(), lost, self.damaged.clone(), self.clock.clone()]
+            .into_iter()
+            .flatten()
+            .collect();
         self.status.trouble = (!parts.is_empty()).then(|| parts.join("; "));
+        (self.status.waiting, self.status.waiting_max) = (waiting as u64, max as u64);
+        self.status.failing.clone_from(&self.failing);
+        self.status.damaged.clone_from(&self.damaged);
         self.status.file_bytes = files::size(&self.path);
     }
 }

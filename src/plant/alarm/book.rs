@@ -16,6 +16,7 @@ use super::{
 use crate::plant::{
     def::{AlarmDef, AlarmId, PlantDef, Subject},
     record::{AlarmRecord, AlarmStep, Burst},
+    station::STATION,
 };
 
 /// A suppressed alarm whose enabling has been unknown for so long comes back: one that cannot be told any more must not keep
@@ -265,11 +266,12 @@ fn manner(alarm: &AlarmDef) -> Manner {
     Manner { on_delay: alarm.on_delay, off_delay: alarm.off_delay }
 }
 
-/// Full name of what an alarm watches: tag, device or line.
+/// Full name of what an alarm watches: tag, device, line or station.
 pub fn subject_name(def: &PlantDef, subject: Subject) -> &str {
     match subject {
         Subject::Tag(tag) => &def.tag(tag).name,
         Subject::Device(device) => &def.device(device).name,
         Subject::Line(line) => &def.line(line).name,
+        Subject::Station => STATION,
     }
 }

@@ -135,7 +135,9 @@ pub fn holds(condition: Condition, facts: Facts, active: bool, memory: &mut Memo
             let watched = within <= now.saturating_sub(*memory.since.get_or_insert(now));
             (busy || !active || watched).then_some(busy)
         }
-        Condition::NotAnswering | Condition::Health { .. } | Condition::NotConnected => facts.ill,
+        Condition::NotAnswering | Condition::Health { .. } | Condition::NotConnected | Condition::Station(_) => {
+            facts.ill
+        }
     }
 }
 
@@ -157,7 +159,8 @@ pub fn limit_of(condition: Condition) -> Option<f64> {
         | Condition::Changes { .. }
         | Condition::NotAnswering
         | Condition::Health { .. }
-        | Condition::NotConnected => None,
+        | Condition::NotConnected
+        | Condition::Station(_) => None,
     }
 }
 

@@ -8,6 +8,7 @@ use crate::plant::{
     expr::Expr,
     id::{AlarmId, DeviceId, LineId, TagId},
     ne107::Signal,
+    station::StationFault,
 };
 
 /// An alarm: a condition on a tag, device or line, with what the operator should know and do.
@@ -109,6 +110,8 @@ pub enum Subject {
     Device(DeviceId),
     /// A line as a whole.
     Line(LineId),
+    /// The station itself.
+    Station,
 }
 
 /// When an alarm is active. Limits and deadbands are in the tag's unit.
@@ -181,6 +184,8 @@ pub enum Condition {
     },
     /// The line is not connected although it should be.
     NotConnected,
+    /// The station has this fault.
+    Station(StationFault),
 }
 
 impl Condition {
@@ -197,7 +202,8 @@ impl Condition {
             | Condition::Bit { .. }
             | Condition::NotAnswering
             | Condition::Health { .. }
-            | Condition::NotConnected => false,
+            | Condition::NotConnected
+            | Condition::Station(_) => false,
         }
     }
 
@@ -214,7 +220,8 @@ impl Condition {
             | Condition::Changes { .. }
             | Condition::NotAnswering
             | Condition::Health { .. }
-            | Condition::NotConnected => None,
+            | Condition::NotConnected
+            | Condition::Station(_) => None,
         }
     }
 
@@ -231,7 +238,8 @@ impl Condition {
             | Condition::Changes { .. }
             | Condition::NotAnswering
             | Condition::Health { .. }
-            | Condition::NotConnected => None,
+            | Condition::NotConnected
+            | Condition::Station(_) => None,
         }
     }
 }

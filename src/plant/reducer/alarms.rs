@@ -10,8 +10,9 @@ use crate::plant::{
     def::{AlarmDef, AlarmId, Condition, Subject},
     event::LineState,
     ne107::Signal,
-    record::{ActionRecord, AlarmRecord, Record},
+    record::{ActionRecord, AlarmRecord, AlarmStep, Record},
     snapshot::{DeviceState, DeviceStatus, LineStatus},
+    station::{STATION, StationFault, StationFaults},
 };
 
 impl Plant {
@@ -66,6 +67,7 @@ impl Plant {
         let asks_health = |alarm: &AlarmDef| matches!(alarm.condition, Condition::Health { .. });
         let diagnosed = if self.def.alarms.iter().any(asks_health) { self.diagnosed() } else { Vec::new() };
         let (def, board, lines, devices) = (&self.def, &self.board, &self.lines, &self.devices);
+        let faults = &self.faults;
         let ill = |alarm: &AlarmDef| match (alarm.subject, alarm.condition) {
             (Subject::Device(device), Condition::Health { signal }) => {
                 diagnosed.get(device.index()).and_then(|status| has_signal(status, signal))
@@ -76,10 +78,22 @@ impl Plant {
                 answers(devices[device.index()].state, no_values).map(|answers| !answers)
             }
             (Subject::Line(line), _) => is_lost(&lines[line.index()]),
-            (Subject::Tag(_), _) => None,
+            (Subject::Station, Condition::Station(fault)) => Some(faults.is_active(fault)),
+            (Subject::Tag(_) | Subject::Station, _) => None,
         };
-        self.book.judge(self.at, |alarm| facts(board, ill(alarm), alarm))
+        let mut steps = self.book.judge(self.at, |alarm| facts(board, ill(alarm), alarm));
+        steps.iter_mut().for_each(|step| explain(step, faults));
+        steps
     }
+}
+
+/// The journal tells with a fault of the station what exactly it was.
+fn explain(step: &mut AlarmRecord, faults: &StationFaults) {
+    if step.step != AlarmStep::Raised || &*step.subject != STATION {
+        return;
+    }
+    let fault = StationFault::ALL.into_iter().find(|fault| fault.message() == &*step.text);
+    step.reason = fault.and_then(|fault| faults.details().get(&fault).cloned());
 }
 
 /// What is known for an alarm. Only good values count: an uncertain one neither raises nor clears.
@@ -87,7 +101,7 @@ fn facts(board: &Board, ill: Option<bool>, alarm: &AlarmDef) -> Facts {
     let trusted = |tag| board.sample(tag).trusted();
     let value = match alarm.subject {
         Subject::Tag(tag) => trusted(tag),
-        Subject::Device(_) | Subject::Line(_) => None,
+        Subject::Device(_) | Subject::Line(_) | Subject::Station => None,
     };
     let reference = alarm.condition.reference().and_then(trusted);
     let enabled = alarm.enabled_when.as_ref().and_then(|expr| expr.holds(&trusted));

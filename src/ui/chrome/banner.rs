@@ -156,6 +156,7 @@ fn what_words(cx: &Cx, alarm: &ActiveAlarm) -> (String, String) {
         Subject::Tag(tag) => value::show(cx, tag).with_unit(),
         Subject::Device(device) => device_words(cx, device),
         Subject::Line(line) => line_state_words(cx, line),
+        Subject::Station => cx.snapshot.fault_details(alarm.id).to_owned(),
     };
     (format!("{} {}", subject(cx, alarm.id), def.text), now)
 }

@@ -354,7 +354,7 @@ impl Alarms {
             (subject, Action::Open) => {
                 faceplate(cx, subject).map(|plate| Act::Open(Modal::Faceplate(plate))).into_iter().collect()
             }
-            (Subject::Tag(_) | Subject::Device(_) | Subject::Line(_), _) => Vec::new(),
+            (Subject::Tag(_) | Subject::Device(_) | Subject::Line(_) | Subject::Station, _) => Vec::new(),
         }
     }
 }
@@ -379,6 +379,6 @@ fn faceplate(cx: &Cx, subject: Subject) -> Option<Faceplate> {
             let tags = cx.def().tags_of(device).take(8).map(|tag| tag.id).collect();
             Faceplate::new(format!("{} {}", cx.def().device(device).name, device_words(cx, device)), tags)
         }
-        Subject::Line(_) => None,
+        Subject::Line(_) | Subject::Station => None,
     }
 }

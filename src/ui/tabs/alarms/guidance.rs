@@ -7,6 +7,7 @@ use crate::{
         alarm::AlarmState,
         def::{AlarmDef, AlarmId, Condition, Level, Subject},
         snapshot::ActiveAlarm,
+        station::STATION,
     },
     ui::{
         Cx,
@@ -119,6 +120,7 @@ fn now_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
         }
         Subject::Device(device) => device_words(cx, device),
         Subject::Line(line) => line_state_words(cx, line),
+        Subject::Station => cx.snapshot.fault_details(alarm.id).to_owned(),
     };
     if 1 < alarm.times {
         words += &format!(", {} times since the start", alarm.times);
@@ -160,7 +162,7 @@ fn go_words(cx: &Cx, def: &AlarmDef, alarm: Option<&ActiveAlarm>) -> String {
     match def.subject {
         Subject::Tag(_) => format!("m mimic   t trend{at}   c controller   {journal}"),
         Subject::Device(_) => format!("m mimic   c controller   {journal}"),
-        Subject::Line(_) => journal,
+        Subject::Line(_) | Subject::Station => journal,
     }
 }
 
@@ -171,6 +173,7 @@ pub fn journal_of<'a>(cx: &Cx<'a>, subject: Subject) -> &'a str {
         Subject::Tag(tag) => &def.device(def.tag(tag).device).name,
         Subject::Device(device) => &def.device(device).name,
         Subject::Line(line) => &def.line(line).name,
+        Subject::Station => STATION,
     }
 }
 
@@ -179,7 +182,7 @@ pub fn condition_words(cx: &Cx, alarm: AlarmId) -> String {
     let def = cx.def().alarm(alarm);
     let number = |value| match def.subject {
         Subject::Tag(tag) => cx.snapshot.format(tag, value),
-        Subject::Device(_) | Subject::Line(_) => value.to_string(),
+        Subject::Device(_) | Subject::Line(_) | Subject::Station => value.to_string(),
     };
     match def.condition {
         Condition::Limit { level: Level::HighHigh | Level::High, limit, .. } => format!("> {}", number(limit)),
@@ -193,6 +196,7 @@ pub fn condition_words(cx: &Cx, alarm: AlarmId) -> String {
         | Condition::Changes { .. }
         | Condition::NotAnswering
         | Condition::Health { .. }
-        | Condition::NotConnected => String::new(),
+        | Condition::NotConnected
+        | Condition::Station(_) => String::new(),
     }
 }

@@ -254,7 +254,7 @@ fn cells(cx: &Cx, row: &Row, what: u16) -> [String; 9] {
         what_words(cx, row, what),
         match def.subject {
             Subject::Tag(tag) => value::show(cx, tag).within(10),
-            Subject::Device(_) | Subject::Line(_) => "–".to_owned(),
+            Subject::Device(_) | Subject::Line(_) | Subject::Station => "–".to_owned(),
         },
         alarm.state.word().to_owned(),
         running(between(alarm.raised_at, cx.now)),

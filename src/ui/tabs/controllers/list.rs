@@ -228,6 +228,6 @@ pub fn alarms<'a>(cx: &'a Cx, device: DeviceId) -> impl Iterator<Item = &'a Acti
     cx.snapshot.alarms.iter().filter(move |alarm| match cx.def().alarm(alarm.id).subject {
         Subject::Device(of) => of == device,
         Subject::Tag(tag) => cx.def().tag(tag).device == device,
-        Subject::Line(_) => false,
+        Subject::Line(_) | Subject::Station => false,
     })
 }

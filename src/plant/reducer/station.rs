@@ -1,0 +1,103 @@
+//! Faults of the station in the reducer: what the store says of itself becomes alarms.
+
+use super::Plant;
+use crate::plant::{
+    snapshot::HistoryStatus,
+    station::{FaultState, StationFault},
+};
+
+impl Plant {
+    /// The store says how it stands. Alarms follow with the next tick.
+    pub fn on_history(&mut self, status: HistoryStatus) {
+        let lasting = |words: &Option<String>| match words {
+            Some(words) => FaultState::Active(words.as_str().into()),
+            None => FaultState::Cleared,
+        };
+        self.faults.set(StationFault::NotRecording, lasting(&status.failing));
+        self.faults.set(StationFault::DiskSpace, lasting(&status.disk));
+        if self.history.lost < status.lost {
+            let words = format!("{} records lost since the start", status.lost);
+            self.faults.set(StationFault::RecordsLost, FaultState::Occurred(words.into()));
+        }
+        if let Some(damaged) = status.damaged.as_ref().filter(|_| self.history.damaged != status.damaged) {
+            self.faults.set(StationFault::HistoryDamaged, FaultState::Occurred(damaged.as_str().into()));
+        }
+        self.history = status;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use jiff::Timestamp;
+
+    use super::*;
+    use crate::plant::{
+        alarm::AlarmState,
+        def::AlarmId,
+        event::Event,
+        fixture,
+        record::{AlarmRecord, AlarmStep, Record},
+    };
+
+    fn at(second: i64) -> Timestamp {
+        Timestamp::from_second(second).expect("a small number")
+    }
+
+    /// The fixture with the alarms that a loaded plant has, behind its own two.
+    fn plant() -> Plant {
+        let mut def = fixture::plant();
+        let own = def.alarms.len();
+        def.alarms.extend((own..).zip(StationFault::ALL).map(|(id, fault)| fault.alarm(AlarmId(id as u16))));
+        Plant::new(Arc::new(def), at(0), 1.0)
+    }
+
+    fn tick(plant: &mut Plant, second: i64) -> Vec<AlarmRecord> {
+        let steps = plant.on_tick(at(second)).records.into_iter().filter_map(|record| match record {
+            Record::Alarm(step) => Some(step),
+            Record::Sample(..) | Record::Action(_) | Record::Line(_) => None,
+        });
+        steps.collect()
+    }
+
+    #[test]
+    fn a_history_that_does_not_record_sounds_until_it_records() {
+        let mut plant = plant();
+        let failing = HistoryStatus { failing: Some("no space left".into()), ..HistoryStatus::default() };
+        plant.on_history(failing);
+        assert_eq!(tick(&mut plant, 1), [], "one failed commit alarms nobody");
+        let raised = tick(&mut plant, 4);
+        assert_eq!((raised.len(), &*raised[0].text), (1, "history not recording"));
+        assert_eq!((raised[0].step, raised[0].reason.as_deref()), (AlarmStep::Raised, Some("no space left")));
+        let snapshot = plant.snapshot();
+        assert!(snapshot.sound);
+        assert_eq!(snapshot.fault_details(snapshot.alarms[0].id), "no space left");
+        plant.on_history(HistoryStatus::default());
+        assert_eq!(tick(&mut plant, 5)[0].step, AlarmStep::Returned);
+        assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Returned, "until it is acknowledged");
+    }
+
+    #[test]
+    fn lost_records_are_an_alarm_each_time_some_are_lost() {
+        let mut plant = plant();
+        let lost = |lost| HistoryStatus { lost, ..HistoryStatus::default() };
+        plant.on_history(lost(7));
+        let raised = tick(&mut plant, 1);
+        assert_eq!(raised[0].reason.as_deref(), Some("7 records lost since the start"));
+        plant.on_history(lost(7));
+        let steps: Vec<_> = (2..20).flat_map(|second| tick(&mut plant, second)).map(|step| step.step).collect();
+        assert_eq!(steps, [AlarmStep::Returned]);
+        plant.on_history(lost(8));
+        assert_eq!(tick(&mut plant, 20)[0].step, AlarmStep::Raised);
+    }
+
+    #[test]
+    fn any_part_of_the_station_can_report_a_fault() {
+        let mut plant = plant();
+        let fault = |state| Event::Station { at: at(1), fault: StationFault::LineTask, state };
+        let effects = plant.on_event(fault(FaultState::Occurred("line L1 was started again".into())));
+        let Some(Record::Alarm(step)) = effects.records.last() else { panic!("no alarm: {effects:?}") };
+        assert_eq!((&*step.subject, &*step.text), ("station", "line task restarted"));
+    }
+}

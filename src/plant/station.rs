@@ -1,0 +1,233 @@
+//! Faults of the station itself: its history, its disk, its files, its clock. Each is an alarm that every plant has.
+
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    alarm::def::{AlarmClass, AlarmDef, Condition, Guidance, Priority, Subject},
+    id::AlarmId,
+};
+
+/// The name of the station as the subject of its alarms.
+pub const STATION: &str = "station";
+/// Ticks for which a fault that has merely occurred is active.
+const OCCURRED_TICKS: u8 = 10;
+
+/// A fault of the station itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum StationFault {
+    /// The history takes no records; they wait in memory.
+    NotRecording,
+    /// Records were dropped.
+    RecordsLost,
+    /// A part of the history is damaged, missing or set aside.
+    HistoryDamaged,
+    /// The disk of the history is nearly full.
+    DiskSpace,
+    /// The audit log cannot be written, or is damaged.
+    AuditLog,
+    /// The alarm state cannot be saved.
+    AlarmState,
+    /// The users file is missing or cannot be read.
+    UsersFile,
+    /// The clock has stepped, or is behind the last record.
+    Clock,
+    /// The task of a line ended by itself and was started again.
+    LineTask,
+}
+
+/// What is known of a fault.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FaultState {
+    /// It lasts, with the details for the operator.
+    Active(Arc<str>),
+    /// It happened: the alarm is raised, returns by itself and waits for an acknowledgement.
+    Occurred(Arc<str>),
+    /// It is over.
+    Cleared,
+}
+
+impl StationFault {
+    /// Every fault.
+    pub const ALL: [StationFault; 9] = [
+        StationFault::NotRecording,
+        StationFault::RecordsLost,
+        StationFault::HistoryDamaged,
+        StationFault::DiskSpace,
+        StationFault::AuditLog,
+        StationFault::AlarmState,
+        StationFault::UsersFile,
+        StationFault::Clock,
+        StationFault::LineTask,
+    ];
+
+    /// The message of its alarm.
+    pub fn message(self) -> &'static str {
+        match self {
+            StationFault::NotRecording => "history not recording",
+            StationFault::RecordsLost => "history records lost",
+            StationFault::HistoryDamaged => "history damaged",
+            StationFault::DiskSpace => "disk nearly full",
+            StationFault::AuditLog => "audit log not written",
+            StationFault::AlarmState => "alarm state not saved",
+            StationFault::UsersFile => "users file unusable",
+            StationFault::Clock => "clock wrong or stepped",
+            StationFault::LineTask => "line task restarted",
+        }
+    }
+
+    fn priority(self) -> Priority {
+        match self {
+            StationFault::NotRecording
+            | StationFault::RecordsLost
+            | StationFault::HistoryDamaged
+            | StationFault::AuditLog
+            | StationFault::AlarmState
+            | StationFault::UsersFile
+            | StationFault::LineTask => Priority::High,
+            StationFault::DiskSpace | StationFault::Clock => Priority::Medium,
+        }
+    }
+
+    /// A commit that fails once is retried before anyone is alarmed.
+    fn on_delay(self) -> Duration {
+        match self {
+            StationFault::NotRecording => Duration::from_secs(3),
+            _ => Duration::ZERO,
+        }
+    }
+
+    /// Likely cause, effect, action.
+    fn guidance(self) -> [&'static str; 3] {
+        match self {
+            StationFault::NotRecording => [
+                "the disk is full or read-only, the history is used by another process, or its folder is missing",
+                "values, alarms and actions wait in memory; what exceeds the buffer, or a power failure, loses them",
+                "read the details in the banner, free the disk or the file; recording resumes by itself",
+            ],
+            StationFault::RecordsLost => [
+                "the buffer was full: the disk was too slow, or the history did not record for too long",
+                "trends and reports have a gap; values and alarms on the screen are right",
+                "note the time in the handover; look for the cause of the slow or full disk",
+            ],
+            StationFault::HistoryDamaged => [
+                "a power failure, a failing disk, or a file that was changed, moved or removed by hand",
+                "a part of the past is missing; recording goes on in a good file",
+                "keep the file that was set aside; check the disk (SMART) and the power supply",
+            ],
+            StationFault::DiskSpace => [
+                "the history, reports or other files have grown",
+                "when the disk is full, records wait in memory and are lost when the buffer is full",
+                "move old reports and set-aside files away, or give the history a larger disk",
+            ],
+            StationFault::AuditLog => [
+                "the disk is full or read-only, or the file was changed, moved or removed by hand",
+                "actions of operators are carried out, but are not on record until it is repaired",
+                "free the disk; run `sightglass audit verify`",
+            ],
+            StationFault::AlarmState => [
+                "the disk is full or read-only",
+                "after a restart, acknowledged alarms may be unacknowledged again",
+                "free the disk; saving resumes by itself",
+            ],
+            StationFault::UsersFile => [
+                "the file is damaged, missing, or not readable for the station",
+                "nobody can log in; polling and alarms go on",
+                "restore the users file from a backup and reload the station",
+            ],
+            StationFault::Clock => [
+                "the clock was set, its battery is empty, or time synchronisation is missing",
+                "times in trends, reports and the audit log may be wrong",
+                "check date, time and time synchronisation",
+            ],
+            StationFault::LineTask => [
+                "an error in the program; the log has the details",
+                "the line was not polled for some seconds",
+                "check that its values are good again; report the error with the log",
+            ],
+        }
+    }
+
+    /// Its alarm.
+    pub fn alarm(self, id: AlarmId) -> AlarmDef {
+        let [cause, effect, action] = self.guidance().map(str::to_owned);
+        AlarmDef {
+            priority: self.priority(),
+            class: AlarmClass::System,
+            on_delay: self.on_delay(),
+            guidance: Guidance { cause, effect, action, respond: Some(Duration::from_secs(600)) },
+            ..AlarmDef::new(id, Subject::Station, Condition::Station(self), self.message())
+        }
+    }
+}
+
+/// The faults of the station as they stand.
+#[derive(Debug, Clone, Default)]
+pub struct StationFaults {
+    /// Those that are active; `Some` counts the ticks that are left.
+    active: BTreeMap<StationFault, Option<u8>>,
+    details: Arc<BTreeMap<StationFault, Arc<str>>>,
+}
+
+impl StationFaults {
+    /// Takes what is known of a fault.
+    pub fn set(&mut self, fault: StationFault, state: FaultState) {
+        let (details, ticks) = match state {
+            FaultState::Active(details) => (details, None),
+            // What lasts is not ended by what merely occurs beside it.
+            FaultState::Occurred(details) if self.active.get(&fault) == Some(&None) => (details, None),
+            FaultState::Occurred(details) => (details, Some(OCCURRED_TICKS)),
+            FaultState::Cleared => {
+                self.active.remove(&fault);
+                return;
+            }
+        };
+        self.active.insert(fault, ticks);
+        if self.details.get(&fault) != Some(&details) {
+            Arc::make_mut(&mut self.details).insert(fault, details);
+        }
+    }
+
+    /// A second has passed, whatever the clock says.
+    pub fn tick(&mut self) {
+        self.active.retain(|_, ticks| match ticks {
+            Some(0) => false,
+            Some(left) => {
+                *left -= 1;
+                true
+            }
+            None => true,
+        });
+    }
+
+    /// Is it active?
+    pub fn is_active(&self, fault: StationFault) -> bool {
+        self.active.contains_key(&fault)
+    }
+
+    /// The details of the last time, for each fault that was ever active.
+    pub fn details(&self) -> &Arc<BTreeMap<StationFault, Arc<str>>> {
+        &self.details
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_that_occurred_is_over_by_itself_and_one_that_lasts_is_not() {
+        let mut faults = StationFaults::default();
+        faults.set(StationFault::Clock, FaultState::Occurred("set back".into()));
+        faults.set(StationFault::DiskSpace, FaultState::Active("3 % free".into()));
+        let active =
+            |faults: &StationFaults| (faults.is_active(StationFault::Clock), faults.is_active(StationFault::DiskSpace));
+        assert_eq!(active(&faults), (true, true));
+        (0..=OCCURRED_TICKS).for_each(|_| faults.tick());
+        assert_eq!(active(&faults), (false, true));
+        faults.set(StationFault::DiskSpace, FaultState::Cleared);
+        assert_eq!(active(&faults), (false, false));
+        assert_eq!(&*faults.details()[&StationFault::Clock], "set back", "kept for the alarm that waits");
+    }
+}
