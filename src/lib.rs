@@ -38,7 +38,8 @@
 //!
 //! Everything that a terminal asks goes through the **door**: the task around [`access::Gate`], the reducer of people, which
 //! alone decides what is permitted. What it refuses goes on to the plant as a refused order, so that it is seen and on
-//! record like any other. Deeds are sealed in the book, on disk, before a snapshot shows their outcome.
+//! record like any other. Actions are in the audit log and alarms in their state file, on disk, before a snapshot shows an
+//! outcome as recorded; the history follows within a second.
 //!
 //! There is exactly one awaited send in the station (link → plant). Everything else is `try_send` or `watch`, so the
 //! plant task never blocks and deadlock is ruled out by shape. Shutdown runs downstream: the links stop, the plant ends

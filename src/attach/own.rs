@@ -149,7 +149,7 @@ impl Own {
 
 fn status(request: &OrderRequest, by: Arc<str>, at: Timestamp, outcome: Outcome) -> OrderStatus {
     let OrderRequest { id, command, seen, note, sign: _ } = request.clone();
-    OrderStatus { id, by, from: "".into(), note, command, at, old: seen, outcome }
+    OrderStatus { id, by, from: "".into(), note, command, at, old: seen, outcome, recorded: true }
 }
 
 fn push<T>(list: &mut VecDeque<T>, element: T, max: usize) {

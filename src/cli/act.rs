@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::plant::{
     Snapshot,
     alarm::book::subject_name,
-    command::{Command, Outcome},
+    command::{Command, OrderStatus, Outcome},
     def::TagId,
     orders::outcome_words,
 };
@@ -63,7 +63,8 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
         let status = client::ordered(&mut session, 1, command, args.note.as_deref(), password).await?;
         let words = |value: Option<f64>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
         let (old, new, unit) = (words(status.old), words(Some(value)), snapshot.unit(tag));
-        let line = format!("{} {old} → {new} {unit}: {}", args.tag, outcome_words(&status.outcome));
+        let recorded = recorded_words(&status);
+        let line = format!("{} {old} → {new} {unit}: {}{recorded}", args.tag, outcome_words(&status.outcome));
         match status.outcome {
             Outcome::Verified | Outcome::Unchanged => {
                 say(&line);
@@ -102,13 +103,18 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
             if status.outcome != Outcome::Verified {
                 return Err(CliError::Failed(line + &outcome_words(&status.outcome)));
             }
-            say(&(line + "acknowledged"));
+            say(&(line + "acknowledged" + recorded_words(&status)));
         }
         if waiting.is_empty() {
             say("nothing to acknowledge");
         }
         Ok(())
     })
+}
+
+/// Said behind an outcome that the disk of the station has not taken.
+fn recorded_words(status: &OrderStatus) -> &'static str {
+    if status.recorded { "" } else { " (not recorded: the disk of the station does not take it)" }
 }
 
 /// A word of the tag, or a number. The station checks range and decimals.

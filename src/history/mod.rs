@@ -1,6 +1,7 @@
 //! What the plant remembers: DuckDB behind one thread. Everyone else asks it.
 
 pub mod series;
+pub mod alarm_state;
 pub mod io;
 
 use std::time::Duration;

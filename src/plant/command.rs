@@ -135,6 +135,8 @@ pub struct OrderStatus {
     pub old: Option<f64>,
     /// How it stands.
     pub outcome: Outcome,
+    /// Its end is in the audit log, on disk. Said of ended orders only.
+    pub recorded: bool,
 }
 
 /// The outcome of an order. A write is never retried by itself.

@@ -328,6 +328,7 @@ impl Desk {
             at,
             old,
             outcome: Outcome::Pending,
+            recorded: true,
         });
         // An order under way is never forgotten, however many come after it.
         while SHOWN < self.orders.len() {

@@ -1,28 +1,38 @@
-//! The way of deeds into the book, and what the station itself puts there: start, stop, plant file, steps of the clock.
+//! The way of actions and alarms to the disk, and what the station itself puts there: start, stop, plant file, steps of the clock.
 
 use std::{
     collections::VecDeque,
-    sync::Arc,
+    sync::{Arc, mpsc as queue},
     time::{Duration, Instant as RealInstant, SystemTime},
 };
 
 use jiff::Timestamp;
 use tokio::{
-    sync::{mpsc, oneshot, watch},
+    sync::{oneshot, watch},
     time::Instant,
 };
 
 use crate::{
     access::{
         book::{PLANT_FILE, USERS_FILE, sha256},
-        io::book::{BookStatus, Handle},
+        io::recorder::{Batch, Handle, Recorded},
     },
-    plant::record::ActionRecord,
+    history::alarm_state::LatestSteps,
+    plant::{
+        Snapshot,
+        command::{OrderId, OrderStatus, Outcome},
+        record::{ActionRecord, AlarmRecord},
+    },
     profile::PlantFile,
 };
 
-/// A snapshot that shows an outcome, and the answer to a wish, wait so long for the book to have it.
+/// A snapshot that shows an outcome, and the answer to a wish, wait so long for the disk; after that the outcome is shown as
+/// not recorded until it is.
 const WAIT_MAX: Duration = Duration::from_secs(1);
+/// Actions that wait for a place in the queue; the oldest of more go to the history alone.
+const BACKLOG_MAX: usize = 1_000;
+/// Ended orders whose place on disk is remembered: twice what a snapshot shows.
+const ORDERS_MAX: usize = 64;
 /// Answers that wait for the book; one more, and the oldest waits no longer.
 const ANSWERS_MAX: usize = 64;
 /// A clock that moves more than this against the steady one was set.
@@ -41,10 +51,10 @@ pub enum Paper {
     Lost(u64),
 }
 
-/// An answer that waits for the book to have so many deeds.
+/// An answer that waits until so many batches are on disk.
 #[derive(Debug)]
 struct Answer {
-    deeds: u64,
+    batches: u64,
     since: Instant,
     reply: oneshot::Sender<Result<(), String>>,
     answer: Result<(), String>,
@@ -57,15 +67,21 @@ impl Answer {
     }
 }
 
-/// The plant's end of the book.
+/// The plant's end of the recorder.
 #[derive(Debug)]
 pub struct Deeds {
-    queue: mpsc::Sender<Vec<ActionRecord>>,
-    status: watch::Receiver<BookStatus>,
-    /// Deeds that were sent, and since when the book is behind.
+    queue: queue::SyncSender<Batch>,
+    recorded: watch::Receiver<Recorded>,
+    /// What the queue had no room for: the next batch. Its steps are bounded by the alarms of the plant.
+    backlog: Vec<ActionRecord>,
+    backlog_steps: LatestSteps,
+    /// Batches that were sent, the last one that an operator waits for, and since when the disk is behind it.
     sent: u64,
+    needed: u64,
     behind: Instant,
-    /// Deeds that the queue had no room for: they are in the history only.
+    /// Orders that have ended, and the batch with the action of each.
+    ended: VecDeque<(OrderId, u64)>,
+    /// Actions that the queue had no room for: they are in the history only.
     left_out: u64,
     /// Deeds that did not even come here.
     lost: u64,
@@ -78,20 +94,22 @@ pub struct Deeds {
 }
 
 impl Deeds {
-    /// The end of a book that has just been opened.
-    pub fn new(book: &Handle) -> Deeds {
-        let (queue, status) = (book.deeds.clone(), book.status.clone());
-        let clock = ClockWatch::new();
-        let (plant_file, users_file) = (book.opened.plant_file.clone(), book.opened.users_file.clone());
+    /// The end of a recorder that has just been started.
+    pub fn new(recorder: &Handle) -> Deeds {
+        let (plant_file, users_file) = (recorder.opened.plant_file.clone(), recorder.opened.users_file.clone());
         Deeds {
-            queue,
-            status,
+            queue: recorder.batches.clone(),
+            recorded: recorder.recorded.clone(),
+            backlog: Vec::new(),
+            backlog_steps: LatestSteps::default(),
             sent: 0,
+            needed: 0,
             behind: Instant::now(),
+            ended: VecDeque::new(),
             left_out: 0,
             lost: 0,
             answers: VecDeque::new(),
-            clock,
+            clock: ClockWatch::new(),
             plant_file,
             users_file,
         }
@@ -110,7 +128,7 @@ impl Deeds {
                 ..own(at, USERS_FILE, "users", "done: found")
             });
         // Nothing else waits in this queue yet, so nothing comes back.
-        self.put([start].into_iter().chain(changed).chain(people).collect());
+        let _ = self.put([start].into_iter().chain(changed).chain(people).collect(), Vec::new());
     }
 
     /// The record of a plant file, unless it is still the last one that was recorded.
@@ -123,22 +141,43 @@ impl Deeds {
         Some(ActionRecord { old, new: Some(new), ..own(at, PLANT_FILE, &file.path().display().to_string(), "done") })
     }
 
-    /// Sends deeds to the book, which sends them on to the history. Gives back those that it has no room for.
-    pub fn put(&mut self, deeds: Vec<ActionRecord>) -> Vec<ActionRecord> {
-        let count = deeds.len() as u64;
-        if self.status.borrow().taken == self.sent {
-            self.behind = Instant::now();
+    /// Has actions and steps of alarms brought to disk; the actions go on to the history from there. Gives back actions that
+    /// there is no room for.
+    pub fn put(&mut self, actions: Vec<ActionRecord>, steps: Vec<AlarmRecord>) -> Vec<ActionRecord> {
+        if !actions.is_empty() || steps.iter().any(|step| step.by.is_some()) {
+            if self.recorded.borrow().batches == self.needed {
+                self.behind = Instant::now();
+            }
+            self.needed = self.sent + 1;
         }
-        match self.queue.try_send(deeds) {
+        self.backlog.extend(actions);
+        steps.into_iter().for_each(|step| self.backlog_steps.take(step));
+        self.send()
+    }
+
+    /// Sends what waits, as one batch. Gives back actions that have waited in vain.
+    fn send(&mut self) -> Vec<ActionRecord> {
+        if self.backlog.is_empty() && self.backlog_steps.is_empty() {
+            return Vec::new();
+        }
+        let steps = self.backlog_steps.iter().cloned().collect();
+        let excess = match self.queue.try_send(Batch { actions: std::mem::take(&mut self.backlog), steps }) {
             Ok(()) => {
-                self.sent += count;
-                Vec::new()
+                self.sent += 1;
+                self.backlog_steps = LatestSteps::default();
+                return Vec::new();
             }
-            Err(refused) => {
-                self.left_out += count;
-                refused.into_inner()
+            Err(queue::TrySendError::Full(batch)) => {
+                self.backlog = batch.actions;
+                self.backlog.len().saturating_sub(BACKLOG_MAX)
             }
-        }
+            Err(queue::TrySendError::Disconnected(batch)) => {
+                self.backlog = batch.actions;
+                self.backlog.len()
+            }
+        };
+        self.left_out += excess as u64;
+        self.backlog.drain(..excess).collect()
     }
 
     /// So many deeds never came here: they are nowhere.
@@ -146,22 +185,24 @@ impl Deeds {
         self.lost += count;
     }
 
-    /// Tells an answer once the book has all that was sent to it before; see [`Deeds::tell`].
+    /// Tells an answer once all that was put here before it is on disk; see [`Deeds::tell`].
     pub fn answer(&mut self, reply: oneshot::Sender<Result<(), String>>, answer: Result<(), String>) {
-        self.answers.push_back(Answer { deeds: self.sent, since: Instant::now(), reply, answer });
-        self.tell();
+        self.answers.push_back(Answer { batches: self.needed, since: Instant::now(), reply, answer });
+        let _ = self.tell();
     }
 
-    /// Tells the answers whose deeds are in the book. A book that cannot keep up keeps nobody waiting for ever.
-    pub fn tell(&mut self) {
-        let (taken, alive) = (self.status.borrow().taken, self.status.has_changed().is_ok());
-        let is_due = |answer: &Answer| !alive || answer.deeds <= taken || WAIT_MAX <= answer.since.elapsed();
+    /// Tells the answers whose deeds are on disk, and those that have waited too long: what is not recorded is said by
+    /// [`Deeds::trouble`] meanwhile. Gives back actions as [`Deeds::put`].
+    pub fn tell(&mut self) -> Vec<ActionRecord> {
+        let (recorded, alive) = (self.recorded.borrow().batches, self.recorded.has_changed().is_ok());
+        let is_due = |answer: &Answer| !alive || answer.batches <= recorded || WAIT_MAX <= answer.since.elapsed();
         while let Some(answer) = self.answers.pop_front_if(|answer| is_due(answer)) {
             answer.tell();
         }
         while ANSWERS_MAX < self.answers.len() {
             self.answers.pop_front().into_iter().for_each(Answer::tell);
         }
+        self.send()
     }
 
     /// The station ends: what it has begun to write is written, so nobody need wait.
@@ -169,17 +210,34 @@ impl Deeds {
         self.answers.drain(..).for_each(Answer::tell);
     }
 
-    /// When a snapshot may go out that could have gone at `next`: not before the book has what it shows, but in time.
+    /// When a snapshot may go out that could have gone at `next`: not before the disk has what it shows. After [`WAIT_MAX`]
+    /// it goes out with what is not recorded marked as such.
     pub fn due(&self, next: Instant) -> Instant {
-        // A thread that has ended will never take anything any more.
-        let alive = self.status.has_changed().is_ok();
-        if alive && self.status.borrow().taken < self.sent { next.max(self.behind + WAIT_MAX) } else { next }
+        // A thread that has ended will never write anything any more.
+        let alive = self.recorded.has_changed().is_ok();
+        if alive && self.recorded.borrow().batches < self.needed { next.max(self.behind + WAIT_MAX) } else { next }
     }
 
-    /// Waits until the book has taken something.
+    /// Marks the orders of a snapshot whose actions are not on disk.
+    pub fn mark(&mut self, snapshot: &mut Snapshot) {
+        let (recorded, needed) = (self.recorded.borrow().batches, self.needed);
+        let has_ended = |order: &&mut OrderStatus| order.outcome != Outcome::Pending;
+        for order in snapshot.orders.iter_mut().rev().filter(has_ended) {
+            let known = self.ended.iter().find(|(id, _)| *id == order.id).map(|(_, batch)| *batch);
+            let batch = known.unwrap_or_else(|| {
+                self.ended.push_back((order.id, needed));
+                needed
+            });
+            order.recorded = batch <= recorded;
+        }
+        let excess = self.ended.len().saturating_sub(ORDERS_MAX);
+        self.ended.drain(..excess);
+    }
+
+    /// Waits until the disk has taken something.
     pub async fn changed(book: &mut Option<Deeds>) {
         let changed = match book {
-            Some(book) => book.status.changed().await.is_ok(),
+            Some(book) => book.recorded.changed().await.is_ok(),
             None => false,
         };
         if !changed {
@@ -189,10 +247,9 @@ impl Deeds {
 
     /// Deeds that are lost, and what is wrong, in words for the operator.
     pub fn trouble(&mut self) -> (u64, Option<String>) {
-        let ended = self.status.has_changed().is_err();
-        let status = self.status.borrow_and_update().clone();
-        let waits = self.sent.saturating_sub(status.taken);
-        let late = waits > 0 && WAIT_MAX <= self.behind.elapsed();
+        let ended = self.recorded.has_changed().is_err();
+        let status = self.recorded.borrow_and_update().clone();
+        let late = status.batches < self.needed && WAIT_MAX <= self.behind.elapsed();
         let trouble = if ended {
             Some("the audit trail has ended by itself, see the log".to_owned())
         } else if status.trouble.is_some() {
@@ -200,7 +257,7 @@ impl Deeds {
         } else if self.left_out + self.lost > 0 {
             Some(format!("{} deeds are not in the audit trail: it was too slow", self.left_out + self.lost))
         } else {
-            late.then(|| format!("the audit trail is slow, {waits} deeds wait for it"))
+            late.then(|| "the disk is slow: what was done last is not recorded yet".to_owned())
         };
         (status.lost + self.lost, trouble)
     }

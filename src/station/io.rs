@@ -11,7 +11,7 @@ use tokio::{
 use crate::{
     access::{
         Gate, Peer,
-        io::{book, own_user, users, users_beside},
+        io::{own_user, recorder, users, users_beside},
     },
     bus::io::{clock::Clock, task, transport::Connector},
     history::{
@@ -35,7 +35,6 @@ use super::{
     plant_task::{KEPT_FOR_STOPS, Keeping, PlantTask},
     session::Session,
     sets,
-    steps::Steps,
 };
 
 /// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
@@ -116,18 +115,25 @@ fn begin(
     let sets = sets::folder(&path, &def.name);
     let history = history::start(&path, def.clone(), clock)?;
     let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
-    plant.restore(&history.restored);
     let recent = &history.recent;
     plant.remeasure(&recent.active, &recent.steps, &recent.watched, clock.now());
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
-    let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the book: {error}"));
-    let book = book::start(&book::beside(&path), clock, records.clone()).map_err(no_thread)?;
-    let mut deeds = Deeds::new(&book);
+    let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the audit log: {error}"));
+    let recorder = recorder::start(&path, clock, records.clone()).map_err(no_thread)?;
+    let mut deeds = Deeds::new(&recorder);
+    match &recorder.alarms.steps {
+        Some(steps) => plant.restore(steps),
+        None => {
+            // The first start with such a file, or one after it was damaged.
+            tracing::info!(steps = history.restored.len(), "the state of the alarms is taken from the journal");
+            plant.restore(&history.restored);
+            deeds.put(Vec::new(), history.restored.clone());
+        }
+    }
     let users = guarded.as_ref().and_then(|(gate, _)| gate.people_digest());
     deeds.started(&def.name, file.as_ref(), users, clock.now());
-    let steps = Some(Steps::new(history.settled.clone()));
-    let keeping = Keeping { records: Some(records), store, steps, book: Some(deeds), sets: Some(sets), listener };
-    let threads = Threads { queries, history: Some(history), book: Some(book.join) };
+    let keeping = Keeping { records: Some(records), store, book: Some(deeds), sets: Some(sets), listener };
+    let threads = Threads { queries, history: Some(history), book: Some(recorder.join) };
     Ok(assemble(def, clock, connectors, plant, file, keeping, threads, guarded))
 }
 
@@ -137,7 +143,7 @@ pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, li
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
-    let keeping = Keeping { records: None, store, steps: None, book: None, sets: None, listener: Some(listener) };
+    let keeping = Keeping { records: None, store, book: None, sets: None, listener: Some(listener) };
     let threads = Threads { queries, history: None, book: None };
     assemble(def, clock, connectors, plant, None, keeping, threads, None)
 }

@@ -10,7 +10,6 @@ mod door;
 mod plant_task;
 pub mod pulse;
 mod sets;
-mod steps;
 pub mod teller;
 mod toil;
 pub mod io;

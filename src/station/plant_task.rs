@@ -11,17 +11,15 @@ use tokio::{
 use super::{
     deeds::{self, Deeds, Paper},
     sets,
-    steps::Steps,
 };
 use crate::{
     bus::io::clock::Clock,
-    history::io::writer::by_operators,
     plant::{
         Effects, Plant, SetWork, Snapshot,
         command::{BusRequest, Order, OrderId},
         def::{LineDef, LineId},
         event::Event,
-        record::{ActionRecord, Record},
+        record::{ActionRecord, AlarmRecord, Record},
         snapshot::HistoryStatus,
     },
     profile::PlantFile,
@@ -43,9 +41,7 @@ const TICK_MIN: Duration = Duration::from_millis(20);
 pub(super) struct Keeping {
     pub records: Option<mpsc::Sender<Vec<Record>>>,
     pub store: watch::Receiver<HistoryStatus>,
-    /// What operators do with alarms is stored before it is shown as done.
-    pub steps: Option<Steps>,
-    /// Deeds go there first.
+    /// Deeds and the state of the alarms go there first.
     pub book: Option<Deeds>,
     /// The folder of parameter sets.
     pub sets: Option<PathBuf>,
@@ -125,13 +121,12 @@ impl PlantTask {
         // Changed since the last snapshot, and when the next one may go out.
         let (mut changed, mut next) = (false, Instant::now());
         loop {
-            // What a snapshot shows as done is in the book, and in the store if a restart takes it from there.
+            // What a snapshot shows as done is on disk, or marked.
             let due = self.keeping.book.as_ref().map_or(next, |book| book.due(next));
-            let due = self.keeping.steps.as_ref().map_or(due, |steps| steps.due(due));
             tokio::select! {
                 biased;
                 () = tokio::time::sleep_until(due), if changed => {
-                    self.publish.send_replace(Arc::new(self.plant.snapshot()));
+                    self.publish();
                     (changed, next) = (false, Instant::now() + SNAPSHOT_EVERY);
                 }
                 Some(order) = orders.recv() => {
@@ -195,9 +190,17 @@ impl PlantTask {
         let stopped = deeds::stopped(&self.plant.def().name, self.clock.now());
         if let Some(book) = &mut self.keeping.book {
             book.tell_all();
-            self.write_down(vec![stopped]);
+            self.write_down(vec![stopped], Vec::new());
         }
-        self.publish.send_replace(Arc::new(self.plant.snapshot()));
+        self.publish();
+    }
+
+    fn publish(&mut self) {
+        let mut snapshot = self.plant.snapshot();
+        if let Some(book) = &mut self.keeping.book {
+            book.mark(&mut snapshot);
+        }
+        self.publish.send_replace(Arc::new(snapshot));
     }
 
     fn take_paper(&mut self, paper: Paper) {
@@ -212,9 +215,8 @@ impl PlantTask {
     }
 
     fn tell_answers(&mut self) {
-        if let Some(book) = &mut self.keeping.book {
-            book.tell();
-        }
+        let left = self.keeping.book.as_mut().map(Deeds::tell).unwrap_or_default();
+        self.store(left.into_iter().map(Record::Action).collect());
     }
 
     fn look_at_clock(&mut self) {
@@ -223,14 +225,14 @@ impl PlantTask {
         let now = self.clock.now();
         let step = self.keeping.book.as_mut().filter(|_| real).and_then(|book| book.look_at_clock(now));
         if let Some(step) = step {
-            self.write_down(vec![step]);
+            self.write_down(vec![step], Vec::new());
         }
     }
 
     fn carry_out(&mut self, effects: Effects) {
         // Written down before it is sent: a station that is killed in between leaves a trace.
         let intents = effects.bus.iter().filter_map(|(_, request)| self.plant.intent(request)).collect();
-        self.write_down(intents);
+        self.write_down(intents, Vec::new());
         for (line, request) in effects.bus {
             self.send(line, request);
         }
@@ -295,7 +297,7 @@ impl PlantTask {
             Ok((file, result)) => {
                 let now = self.clock.now();
                 let changed = self.keeping.book.as_mut().and_then(|book| book.plant_file(&file, now));
-                self.write_down(changed.into_iter().collect());
+                self.write_down(changed.into_iter().collect(), Vec::new());
                 self.file = Some(file);
                 result
             }
@@ -334,24 +336,28 @@ impl PlantTask {
         if let Some(listener) = &self.keeping.listener {
             listener.tell(&records);
         }
-        let (mut deeds, mut others) = (Vec::new(), Vec::new());
+        let (mut deeds, mut steps, mut others) = (Vec::new(), Vec::new(), Vec::new());
         for record in records {
             match record {
                 Record::Action(deed) => deeds.push(deed),
-                Record::Sample(..) | Record::Alarm(_) | Record::Line(_) => others.push(record),
+                Record::Alarm(step) => {
+                    steps.push(step.clone());
+                    others.push(Record::Alarm(step));
+                }
+                Record::Sample(..) | Record::Line(_) => others.push(record),
             }
         }
-        self.write_down(deeds);
+        self.write_down(deeds, steps);
         self.store(others);
     }
 
-    /// Deeds into the book, which sends them on to the history; straight there where it has no room.
-    fn write_down(&mut self, deeds: Vec<ActionRecord>) {
-        if deeds.is_empty() {
+    /// To the disk, and deeds from there to the history; straight there where there is no room.
+    fn write_down(&mut self, deeds: Vec<ActionRecord>, steps: Vec<AlarmRecord>) {
+        if deeds.is_empty() && steps.is_empty() {
             return;
         }
         let left = match &mut self.keeping.book {
-            Some(book) => book.put(deeds),
+            Some(book) => book.put(deeds, steps),
             None => deeds,
         };
         self.store(left.into_iter().map(Record::Action).collect());
@@ -359,14 +365,9 @@ impl PlantTask {
 
     fn store(&mut self, records: Vec<Record>) {
         let Some(store) = self.keeping.records.as_ref().filter(|_| !records.is_empty()) else { return };
-        let steps = by_operators(&records);
-        match (store.try_send(records), &mut self.keeping.steps) {
-            (Ok(()), Some(waits)) => waits.sent(steps),
-            (Ok(()), None) => {}
-            (Err(refused), _) => {
-                self.lost += refused.into_inner().len() as u64;
-                self.hear_store();
-            }
+        if let Err(refused) = store.try_send(records) {
+            self.lost += refused.into_inner().len() as u64;
+            self.hear_store();
         }
     }
 
@@ -384,3 +385,6 @@ impl PlantTask {
         self.plant.on_history(status);
     }
 }
+
+#[cfg(test)]
+mod tests;

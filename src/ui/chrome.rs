@@ -310,6 +310,11 @@ pub fn watch_words(cx: &Cx, watch: &Watch) -> (String, Style) {
         (_, outcome) => outcome_words(outcome),
     };
     let at = clock(status.at, &cx.def().time_zone);
+    let (words, trouble) = match status.recorded || status.outcome == Outcome::Pending {
+        true => (words, trouble),
+        // Done all the same: the disk has not taken it yet.
+        false => (format!("{words}, NOT RECORDED"), true),
+    };
     (format!("{what}  {words} {at}"), if trouble { theme.trouble() } else { theme.done() })
 }
 

@@ -139,7 +139,17 @@ fn answer(request: Request, orders: &watch::Sender<Arc<Snapshot>>) {
         Request::Order(OrderRequest { id, command, note, seen, .. }) => orders.send_modify(|snapshot| {
             let snapshot = Arc::make_mut(snapshot);
             let (at, outcome) = (snapshot.at, Outcome::Verified);
-            let status = OrderStatus { id, by: "anna".into(), from: "".into(), note, command, at, old: seen, outcome };
+            let status = OrderStatus {
+                id,
+                by: "anna".into(),
+                from: "".into(),
+                note,
+                command,
+                at,
+                old: seen,
+                outcome,
+                recorded: true,
+            };
             snapshot.orders.insert(0, status);
             snapshot.orders.truncate(32);
         }),

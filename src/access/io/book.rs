@@ -1,4 +1,4 @@
-//! The book on disk and the one thread that writes it: deeds in, sealed deeds out to the history, many with one sync.
+//! The book on disk: read, verified, appended to.
 
 use std::{
     ffi::OsStr,
@@ -7,24 +7,12 @@ use std::{
     os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt},
     path::{Path, PathBuf},
     sync::Arc,
-    thread::JoinHandle,
-    time::{Duration, Instant},
 };
-
-use tokio::sync::{mpsc, watch};
 
 use crate::{
     access::book::{self, Check, FirstBad, PLANT_FILE, Summary, USERS_FILE},
-    bus::io::clock::Clock,
-    plant::record::{ActionRecord, Record, Seal},
+    plant::record::{ActionRecord, Seal},
 };
-
-/// Batches of deeds on their way to the thread; a full queue is the sender's to tell.
-const DEEDS_MAX: usize = 256;
-/// Deeds that are written with one sync.
-const GROUP_MAX: usize = 512;
-/// A book that cannot be written is tried again so often.
-const AGAIN: Duration = Duration::from_secs(10);
 
 /// The book beside a history: `tank.audit.jsonl` beside `tank.duckdb`.
 pub fn beside(history: &Path) -> PathBuf {
@@ -105,7 +93,7 @@ fn scan(file: File, check: &mut Check, mut each: impl FnMut(book::Entry)) -> io:
 
 /// A book that can be written.
 #[derive(Debug)]
-struct Book {
+pub struct Book {
     file: File,
     head: File,
     last: Seal,
@@ -126,7 +114,7 @@ pub struct Opened {
 impl Book {
     /// Opens a book, or begins one. Nothing in it is ever changed or removed: a torn last line is put beside, and behind
     /// lines that were tampered with it goes on from the last seal that the station knows.
-    fn open(path: &Path) -> io::Result<(Book, Opened)> {
+    pub fn open(path: &Path) -> io::Result<(Book, Opened)> {
         let mut file = own(OpenOptions::new().read(true).append(true).create(true), path)?;
         let mut opened = Opened::default();
         let head = read_head(path)?;
@@ -156,10 +144,19 @@ impl Book {
         Ok((book, opened))
     }
 
+    /// Is it still as it was left? If not it must be opened again.
+    pub fn is_intact(&self) -> bool {
+        self.file.metadata().is_ok_and(|metadata| metadata.nlink() > 0 && metadata.len() == self.bytes)
+    }
+
+    /// The seal of the last line.
+    pub fn last(&self) -> Seal {
+        self.last
+    }
+
     /// Writes deeds, all or none, and seals them. When this returns they are on disk.
-    fn append(&mut self, deeds: &mut [ActionRecord]) -> io::Result<()> {
-        let metadata = self.file.metadata()?;
-        if metadata.nlink() == 0 || metadata.len() != self.bytes {
+    pub fn append(&mut self, deeds: &mut [ActionRecord]) -> io::Result<()> {
+        if !self.is_intact() {
             return Err(io::Error::other("somebody else has removed or changed it"));
         }
         let (mut last, mut text, mut seals) = (self.last, String::new(), Vec::with_capacity(deeds.len()));
@@ -179,8 +176,11 @@ impl Book {
         for (deed, seal) in deeds.iter_mut().zip(seals) {
             deed.seal = Some(seal);
         }
-        // The deeds are safe already; a note that is behind is no fault.
-        self.note(last)
+        // The deeds are safe already; a note that is behind is no fault, and no reason to write them twice.
+        if let Err(error) = self.note(last) {
+            tracing::warn!(%error, "the last entry of the audit trail could not be noted");
+        }
+        Ok(())
     }
 
     fn note(&self, last: Seal) -> io::Result<()> {
@@ -213,161 +213,3 @@ fn set_aside(file: &mut File, path: &Path, bytes: u64) -> io::Result<PathBuf> {
     file.sync_all()?;
     Ok(beside)
 }
-
-/// How the book stands.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct BookStatus {
-    /// Deeds that were taken since the start: in the book, or passed on without a seal while there is trouble.
-    pub taken: u64,
-    /// Deeds that the history had no room for.
-    pub lost: u64,
-    /// What is wrong with it, in words for the operator.
-    pub trouble: Option<String>,
-}
-
-/// The station's end of the thread.
-#[derive(Debug)]
-pub struct Handle {
-    /// Deeds to write. When the last sender is dropped the thread writes what it has and ends.
-    pub deeds: mpsc::Sender<Vec<ActionRecord>>,
-    /// How the book stands, after every sync.
-    pub status: watch::Receiver<BookStatus>,
-    /// What was found when it was opened.
-    pub opened: Opened,
-    /// The thread.
-    pub join: JoinHandle<()>,
-}
-
-/// Opens the book and starts its thread. A book that cannot be opened is trouble, and no reason not to start. `Err` only
-/// where the system gives no thread.
-pub fn start(path: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> io::Result<Handle> {
-    let (deeds, queue) = mpsc::channel(DEEDS_MAX);
-    let (told, status) = watch::channel(BookStatus::default());
-    let mut scribe = Scribe::new(path, clock, history);
-    let opened = scribe.open();
-    told.send_replace(scribe.status());
-    let join = std::thread::Builder::new().name("book".into()).spawn(move || scribe.run(queue, &told))?;
-    Ok(Handle { deeds, status, opened, join })
-}
-
-/// The thread.
-struct Scribe {
-    path: PathBuf,
-    clock: Clock,
-    history: mpsc::Sender<Vec<Record>>,
-    book: Option<Book>,
-    /// What was found wrong in it: true until the next start.
-    broken: Option<String>,
-    /// Why it cannot be written now.
-    fault: Option<String>,
-    tried: Option<Instant>,
-    /// Deeds that went to the history without a seal since the last fault.
-    unsealed: u64,
-    taken: u64,
-    lost: u64,
-}
-
-impl Scribe {
-    fn new(path: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> Scribe {
-        let path = path.to_owned();
-        let (book, broken, fault, tried) = (None, None, None, None);
-        Scribe { path, clock, history, book, broken, fault, tried, unsealed: 0, taken: 0, lost: 0 }
-    }
-
-    fn run(mut self, mut queue: mpsc::Receiver<Vec<ActionRecord>>, told: &watch::Sender<BookStatus>) {
-        while let Some(mut deeds) = queue.blocking_recv() {
-            while deeds.len() < GROUP_MAX
-                && let Ok(more) = queue.try_recv()
-            {
-                deeds.extend(more);
-            }
-            self.take(deeds);
-            told.send_replace(self.status());
-        }
-    }
-
-    /// Opens the book; what is found is put on record in it.
-    fn open(&mut self) -> Opened {
-        self.tried = Some(Instant::now());
-        match Book::open(&self.path) {
-            Ok((book, opened)) => {
-                (self.book, self.fault) = (Some(book), None);
-                let broken: Vec<_> = opened.wrong.iter().filter(|wrong| wrong.contains("broken")).cloned().collect();
-                if !broken.is_empty() {
-                    self.broken = Some(broken.join("; "));
-                }
-                let mut deeds: Vec<_> = opened.wrong.iter().map(|wrong| self.deed(wrong)).collect();
-                if self.unsealed > 0 {
-                    deeds.push(self.deed(&format!("{} deeds before this one are not in it", self.unsealed)));
-                    self.unsealed = 0;
-                }
-                if !deeds.is_empty() {
-                    self.write(deeds);
-                }
-                opened
-            }
-            Err(error) => {
-                self.fail(&error);
-                Opened::default()
-            }
-        }
-    }
-
-    fn take(&mut self, deeds: Vec<ActionRecord>) {
-        self.taken += deeds.len() as u64;
-        if self.book.is_none() && self.tried.is_none_or(|tried| AGAIN <= tried.elapsed()) {
-            self.open();
-        }
-        self.write(deeds);
-    }
-
-    /// Into the book, and on to the history; only there while the book cannot be written.
-    fn write(&mut self, deeds: Vec<ActionRecord>) {
-        // The history says the same as the book.
-        let mut deeds: Vec<ActionRecord> = deeds.into_iter().map(book::fit).collect();
-        if let Some(book) = &mut self.book
-            && let Err(error) = book.append(&mut deeds)
-        {
-            self.fail(&error);
-        }
-        self.unsealed += deeds.iter().filter(|deed| deed.seal.is_none()).count() as u64;
-        let records = deeds.into_iter().map(Record::Action).collect();
-        if let Err(refused) = self.history.try_send(records) {
-            self.lost += refused.into_inner().len() as u64;
-        }
-    }
-
-    fn fail(&mut self, error: &io::Error) {
-        tracing::error!(%error, path = %self.path.display(), "the audit trail cannot be written");
-        self.book = None;
-        self.fault = Some(error.to_string());
-    }
-
-    /// Something about the book itself.
-    fn deed(&self, outcome: &str) -> ActionRecord {
-        ActionRecord {
-            at: self.clock.now(),
-            by: "station".into(),
-            from: "".into(),
-            action: "audit trail".into(),
-            target: self.path.display().to_string().into(),
-            old: None,
-            new: None,
-            outcome: outcome.into(),
-            note: None,
-            seal: None,
-        }
-    }
-
-    fn status(&self) -> BookStatus {
-        let fault = self
-            .fault
-            .as_ref()
-            .map(|fault| format!("the audit trail cannot be written: {fault}; {} deeds are not in it", self.unsealed));
-        let broken = self.broken.as_ref().map(|broken| format!("the audit trail was tampered with: {broken}"));
-        BookStatus { taken: self.taken, lost: self.lost, trouble: fault.or(broken) }
-    }
-}
-
-#[cfg(test)]
-mod tests;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 pub mod book;
+pub mod recorder;
 pub mod users;
 
 /// The file of users beside a history: `tank.users.toml` beside `tank.duckdb`.

@@ -117,6 +117,7 @@ fn change(snapshot: &mut Snapshot, (kind, place, amount): (u8, u16, u32)) {
                 at,
                 old: None,
                 outcome: Outcome::Pending,
+                recorded: true,
             };
             snapshot.orders.insert(0, order);
             snapshot.orders.truncate(32);

@@ -14,6 +14,7 @@ pub struct Query {
     pub reply: oneshot::Sender<Result<Answer, HistoryError>>,
 }
 
+pub mod alarm_file;
 pub mod sql;
 pub mod files;
 pub mod store;

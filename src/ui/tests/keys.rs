@@ -332,6 +332,7 @@ fn the_picture_tells_how_a_command_went() {
             at,
             old: Some(0.0),
             outcome,
+            recorded: true,
         };
         snapshot.orders = outcome.map(status).into_iter().collect();
         if disobeys {
@@ -573,6 +574,7 @@ fn the_outcome_of_an_order_is_told_until_it_is_dismissed() {
             at: snapshot.at,
             old: Some(70.0),
             outcome,
+            recorded: true,
         }];
         update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
         // The station forgets old orders; the terminal still knows its own.
@@ -610,6 +612,7 @@ fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
             at: snapshot.at,
             old: Some(70.0),
             outcome,
+            recorded: true,
         };
         snapshot.orders = vec![status];
         update(&mut model, Msg::Snapshot(Arc::new(snapshot)));

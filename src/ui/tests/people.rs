@@ -353,6 +353,7 @@ fn a_refused_signature_is_asked_again_in_its_window() {
             at: fixture::now(),
             old: Some(70.0),
             outcome,
+            recorded: true,
         }];
         Msg::Snapshot(snapshot)
     };
@@ -384,6 +385,7 @@ fn a_value_that_changes_under_an_open_window_is_told_at_once_and_asked_again() {
         at: fixture::now(),
         old: Some(70.0),
         outcome: Outcome::Verified,
+        recorded: true,
     }];
     update(&mut model, Msg::Snapshot(snapshot));
     shows(&mut model, "changed to 65.0 °C by anna 14:02:31 (was 70.0)");

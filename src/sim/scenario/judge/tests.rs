@@ -116,6 +116,7 @@ fn only_a_verified_write_of_the_right_value_counts() {
             at: at(second),
             old: None,
             outcome,
+            recorded: true,
         };
         judge.on_values(&shown(50, good(50.0), vec![order]), &Truths::new());
         assert_eq!(is_over(&mut judge), expect);

@@ -371,6 +371,7 @@ fn a_value_that_another_has_changed_meanwhile_is_asked_again() {
         at: fixture::now(),
         old: Some(1.2),
         outcome: Outcome::Verified,
+        recorded: true,
     }];
     update(&mut model, Msg::Snapshot(snapshot));
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), None);

@@ -1,0 +1,279 @@
+//! The one thread that brings to disk what operators are told is done: the audit log first, then the state of the alarms.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+    sync::mpsc as queue,
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use tokio::sync::{mpsc, watch};
+
+use super::book::{self, Book, Opened};
+use crate::{
+    access::book::fit,
+    bus::io::clock::Clock,
+    history::io::alarm_file::{self, AlarmFile, Found},
+    plant::record::{ActionRecord, AlarmRecord, Record},
+};
+
+/// Batches on their way to the thread; a full queue is the sender's to tell.
+const BATCHES_MAX: usize = 256;
+/// Batches that are written with one sync.
+const GROUP_MAX: usize = 64;
+/// Actions that wait for a log that cannot be written; one more, and the oldest is in the history only.
+const PENDING_MAX: usize = 10_000;
+/// What could not be written is tried again so often.
+const AGAIN: Duration = Duration::from_secs(1);
+/// A log that cannot be opened is tried again so often: it is read from its beginning.
+const REOPEN: Duration = Duration::from_secs(10);
+
+/// What belongs together: actions, and the steps of alarms that they made.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Batch {
+    /// For the audit log.
+    pub actions: Vec<ActionRecord>,
+    /// For the alarm-state file.
+    pub steps: Vec<AlarmRecord>,
+}
+
+/// How it stands.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Recorded {
+    /// Batches since the start of which everything is on disk, and of all batches before them.
+    pub batches: u64,
+    /// Batches that were taken and are not.
+    pub waiting: u64,
+    /// Actions that the history had no room for.
+    pub lost: u64,
+    /// What is wrong, in words for the operator.
+    pub trouble: Option<String>,
+}
+
+/// The station's end of the thread.
+#[derive(Debug)]
+pub struct Handle {
+    /// What is to be written. When the last sender is dropped the thread writes what it has and ends.
+    pub batches: queue::SyncSender<Batch>,
+    /// How it stands, after every sync.
+    pub recorded: watch::Receiver<Recorded>,
+    /// What was found when the log was opened.
+    pub opened: Opened,
+    /// What was found when the alarm-state file was opened.
+    pub alarms: Found,
+    /// The thread.
+    pub join: JoinHandle<()>,
+}
+
+/// Opens both files beside a history and starts the thread. A file that cannot be opened is trouble, and no reason not to
+/// start. `Err` only where the system gives no thread.
+pub fn start(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> io::Result<Handle> {
+    let (batches, queue) = queue::sync_channel(BATCHES_MAX);
+    let (mut recorder, alarms) = Recorder::new(history_file, clock, history);
+    let opened = recorder.open();
+    let (told, recorded) = watch::channel(recorder.status());
+    let join = std::thread::Builder::new().name("recorder".into()).spawn(move || recorder.run(&queue, &told))?;
+    Ok(Handle { batches, recorded, opened, alarms, join })
+}
+
+/// An action that waits for the log.
+struct Pending {
+    action: ActionRecord,
+    /// The history has it already, without a seal.
+    stored: bool,
+}
+
+/// The thread.
+struct Recorder {
+    path: PathBuf,
+    clock: Clock,
+    history: mpsc::Sender<Vec<Record>>,
+    book: Option<Book>,
+    alarms: AlarmFile,
+    pending: Vec<Pending>,
+    /// What was found wrong in the files: true until the next start.
+    found: Vec<String>,
+    /// Why the log and the alarm-state file cannot be written now.
+    log_fault: Option<String>,
+    alarm_fault: Option<String>,
+    opened_at: Instant,
+    /// Actions that are in the history without a seal, since the last fault.
+    unsealed: u64,
+    taken: u64,
+    recorded: u64,
+    lost: u64,
+}
+
+impl Recorder {
+    fn new(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> (Recorder, Found) {
+        let (alarms, found) = AlarmFile::open(&alarm_file::beside(history_file), clock.now());
+        let recorder = Recorder {
+            path: book::beside(history_file),
+            clock,
+            history,
+            book: None,
+            alarms,
+            pending: Vec::new(),
+            found: found.trouble.iter().cloned().collect(),
+            log_fault: None,
+            alarm_fault: None,
+            opened_at: Instant::now(),
+            unsealed: 0,
+            taken: 0,
+            recorded: 0,
+            lost: 0,
+        };
+        (recorder, found)
+    }
+
+    fn run(mut self, queue: &queue::Receiver<Batch>, told: &watch::Sender<Recorded>) {
+        loop {
+            let next = match self.recorded == self.taken {
+                true => queue.recv().map_err(|_| queue::RecvTimeoutError::Disconnected),
+                false => queue.recv_timeout(AGAIN),
+            };
+            match next {
+                Ok(batch) => {
+                    let more = queue.try_iter().take(GROUP_MAX - 1);
+                    [batch].into_iter().chain(more).for_each(|batch| self.take(batch));
+                }
+                Err(queue::RecvTimeoutError::Timeout) => {}
+                Err(queue::RecvTimeoutError::Disconnected) => break,
+            }
+            self.write();
+            told.send_replace(self.status());
+        }
+        // The last chance of what could not be written until now.
+        self.write();
+        told.send_replace(self.status());
+    }
+
+    fn take(&mut self, Batch { actions, steps }: Batch) {
+        self.taken += 1;
+        // The history says the same as the log.
+        self.pending.extend(actions.into_iter().map(|action| Pending { action: fit(action), stored: false }));
+        self.alarms.take(steps);
+    }
+
+    /// The log first: an alarm that is acknowledged on disk without a trace of who did it would be worse than one that is not.
+    fn write(&mut self) {
+        if self.book.is_none() && REOPEN <= self.opened_at.elapsed() {
+            self.open();
+        }
+        self.write_log();
+        let written = self.alarms.write();
+        self.alarm_fault = written.err().map(|error| error.to_string());
+        if self.pending.is_empty() && self.alarm_fault.is_none() {
+            self.recorded = self.taken;
+        }
+    }
+
+    /// Opens the log; what is found is put on record in it.
+    fn open(&mut self) -> Opened {
+        self.opened_at = Instant::now();
+        match Book::open(&self.path) {
+            Ok((book, opened)) => {
+                self.book = Some(book);
+                let broken: Vec<_> = opened.wrong.iter().filter(|wrong| wrong.contains("broken")).cloned().collect();
+                if !broken.is_empty() {
+                    self.found.push(format!("the audit trail was tampered with: {}", broken.join("; ")));
+                }
+                let mut notes: Vec<_> = opened.wrong.iter().map(|wrong| self.note(wrong)).collect();
+                if self.unsealed > 0 {
+                    notes.push(self.note(&format!("{} actions before this one are not in it", self.unsealed)));
+                    self.unsealed = 0;
+                }
+                // In front of what waits.
+                self.pending.splice(0..0, notes.into_iter().map(|action| Pending { action, stored: false }));
+                self.write_log();
+                opened
+            }
+            Err(error) => {
+                self.fail(&error);
+                Opened::default()
+            }
+        }
+    }
+
+    /// Into the log, and on to the history; without a seal while the log cannot be written.
+    fn write_log(&mut self) {
+        let mut actions: Vec<ActionRecord> = self.pending.iter().map(|pending| pending.action.clone()).collect();
+        if actions.is_empty() {
+            return;
+        }
+        match self.book.as_mut().map(|book| book.append(&mut actions)) {
+            Some(Ok(())) => {
+                self.pending.clear();
+                self.log_fault = None;
+                return self.store(actions);
+            }
+            Some(Err(error)) => self.fail(&error),
+            None => {}
+        }
+        let fresh = self.pending.iter_mut().filter(|pending| !pending.stored);
+        let fresh = fresh.map(|pending| {
+            pending.stored = true;
+            pending.action.clone()
+        });
+        let fresh = fresh.collect();
+        self.store(fresh);
+        let excess = self.pending.len().saturating_sub(PENDING_MAX);
+        self.pending.drain(..excess);
+        self.unsealed += excess as u64;
+    }
+
+    fn store(&mut self, actions: Vec<ActionRecord>) {
+        let records: Vec<Record> = actions.into_iter().map(Record::Action).collect();
+        if !records.is_empty()
+            && let Err(refused) = self.history.try_send(records)
+        {
+            self.lost += refused.into_inner().len() as u64;
+        }
+    }
+
+    fn fail(&mut self, error: &io::Error) {
+        let why = error.to_string();
+        if self.log_fault.as_ref() != Some(&why) {
+            tracing::error!(%error, path = %self.path.display(), "the audit trail cannot be written");
+        }
+        // One that is as it was left is tried again at once, another one must be read first.
+        self.book = self.book.take().filter(Book::is_intact);
+        self.log_fault = Some(why);
+    }
+
+    /// Something about the log itself.
+    fn note(&self, outcome: &str) -> ActionRecord {
+        ActionRecord {
+            at: self.clock.now(),
+            by: "station".into(),
+            from: "".into(),
+            action: "audit trail".into(),
+            target: self.path.display().to_string().into(),
+            old: None,
+            new: None,
+            outcome: outcome.into(),
+            note: None,
+            seal: None,
+        }
+    }
+
+    fn status(&self) -> Recorded {
+        let waiting = self.pending.len() as u64 + self.unsealed;
+        let log = self
+            .log_fault
+            .as_ref()
+            .map(|why| format!("the audit trail cannot be written: {why}; {waiting} actions are not in it"));
+        let alarms = self.alarm_fault.as_ref().map(|why| format!("the state of the alarms cannot be written: {why}"));
+        let parts: Vec<String> = log.into_iter().chain(alarms).chain(self.found.iter().cloned()).collect();
+        Recorded {
+            batches: self.recorded,
+            waiting: self.taken - self.recorded,
+            lost: self.lost,
+            trouble: (!parts.is_empty()).then(|| parts.join("; ")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,222 @@
+//! Audit log and alarm state on a disk that tears, fails and is tampered with.
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    fs::{self, OpenOptions},
+    io::Write,
+    os::unix::fs::PermissionsExt,
+};
+
+use super::*;
+use crate::{
+    access::io::book::{VerifyError, beside, verify},
+    plant::{
+        def::Priority,
+        record::{AlarmStep, Seal},
+    },
+};
+
+fn deed(what: &str) -> ActionRecord {
+    ActionRecord {
+        at: jiff::Timestamp::from_second(1_000_000).unwrap(),
+        by: "anna".into(),
+        from: "here".into(),
+        action: what.into(),
+        target: "TIC-1.SV".into(),
+        old: None,
+        new: Some("x".into()),
+        outcome: "verified".into(),
+        note: None,
+        seal: None,
+    }
+}
+
+fn clock() -> Clock {
+    Clock::starting_at(jiff::Timestamp::from_second(1_000_000).unwrap(), 1.0)
+}
+
+fn batch(actions: &[&str], steps: &[AlarmStep]) -> Batch {
+    let at = jiff::Timestamp::from_second(1_000_000).unwrap();
+    let step = |kind: &AlarmStep| AlarmRecord::new(at, "TIC-1.PV", "high", Priority::High, *kind);
+    Batch { actions: actions.iter().map(|what| deed(what)).collect(), steps: steps.iter().map(step).collect() }
+}
+
+/// What went to the history.
+fn stored(rows: &mut mpsc::Receiver<Vec<Record>>) -> Vec<ActionRecord> {
+    let mut kept = Vec::new();
+    while let Ok(batch) = rows.try_recv() {
+        kept.extend(batch.into_iter().map(|record| match record {
+            Record::Action(deed) => deed,
+            other => panic!("{other:?}"),
+        }));
+    }
+    kept
+}
+
+/// One life of a station beside `tank.duckdb`: opens the log, writes each of these actions, ends.
+fn life(history_file: &Path, actions: &[&str]) -> (Vec<ActionRecord>, Recorded, Opened) {
+    let (history, mut rows) = mpsc::channel(64);
+    let Handle { batches, recorded, opened, alarms: _, join } = start(history_file, clock(), history).unwrap();
+    for what in actions {
+        batches.send(batch(&[what], &[])).unwrap();
+    }
+    drop(batches);
+    join.join().unwrap();
+    (stored(&mut rows), recorded.borrow().clone(), opened)
+}
+
+fn seals(rows: &[ActionRecord]) -> Vec<Seal> {
+    rows.iter().filter_map(|row| row.seal).collect()
+}
+
+#[test]
+fn deeds_of_several_lives_are_one_chain_and_only_the_station_can_read_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let history = folder.path().join("tank.duckdb");
+    let path = beside(&history);
+    assert!(path.ends_with("tank.audit.jsonl"));
+    let mut rows = Vec::new();
+    for deeds in [&["start", "write"][..], &[], &["plant file", "stop"]] {
+        rows.extend(life(&history, deeds).0);
+    }
+    let summary = verify(&path, &seals(&rows)).unwrap();
+    assert_eq!((summary.entries, summary.compared), (4, 4));
+    assert_eq!(life(&history, &[]).2, Opened { wrong: Vec::new(), plant_file: Some("x".into()), users_file: None });
+    for file in [path.clone(), path.with_extension("head")] {
+        assert_eq!(fs::metadata(file).unwrap().permissions().mode() & 0o777, 0o600);
+    }
+}
+
+#[test]
+fn a_torn_last_line_is_put_beside_and_said_and_the_chain_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let (history, path) = (folder.path().join("tank.duckdb"), folder.path().join("tank.audit.jsonl"));
+    life(&history, &["start", "write"]);
+    let mut file = OpenOptions::new().append(true).open(&path).unwrap();
+    file.write_all(b"{\"n\":3,\"utc\":\"20").unwrap();
+    assert!(verify(&path, &[]).unwrap().torn);
+    let (rows, status, opened) = life(&history, &["start"]);
+    assert!(opened.wrong[0].contains("torn"), "{opened:?}");
+    assert_eq!((rows.len(), status.trouble), (2, None), "one for the torn line, one for the start");
+    assert_eq!(verify(&path, &[]).unwrap().entries, 4);
+    let beside = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+    let beside = beside.filter(|path| path.to_string_lossy().contains("torn")).collect::<Vec<_>>();
+    assert_eq!(fs::read_to_string(&beside[0]).unwrap(), "{\"n\":3,\"utc\":\"20");
+}
+
+#[test]
+fn a_book_that_was_tampered_with_is_said_stays_as_it_is_and_goes_on() {
+    for (what, line) in [("changed", 2), ("cut in the middle", 2), ("cut at the end", 3), ("removed", 1)] {
+        let folder = tempfile::tempdir().unwrap();
+        let (history, path) = (folder.path().join("tank.duckdb"), folder.path().join("tank.audit.jsonl"));
+        life(&history, &["start", "write", "stop"]);
+        let text = fs::read_to_string(&path).unwrap();
+        let lines: Vec<&str> = text.split_inclusive('\n').collect();
+        let tampered = match what {
+            "changed" => text.replacen("\"write\"", "\"wrote\"", 1),
+            "cut in the middle" => [lines[0], lines[2]].concat(),
+            "cut at the end" => [lines[0], lines[1]].concat(),
+            _ => String::new(),
+        };
+        fs::write(&path, &tampered).unwrap();
+        let VerifyError::Bad { bad, .. } = verify(&path, &[]).unwrap_err() else { panic!("{what}") };
+        assert_eq!(bad.line, line, "{what}: {bad}");
+        for _ in 0..2 {
+            let (rows, status, _) = life(&history, &["start"]);
+            assert!(status.trouble.unwrap().contains("tampered"), "{what}");
+            assert!(rows[0].outcome.contains("broken") && rows.iter().all(|row| row.seal.is_some()), "{what}");
+        }
+        assert!(fs::read_to_string(&path).unwrap().starts_with(&tampered), "{what}: nothing is ever removed");
+        let VerifyError::Bad { bad, .. } = verify(&path, &[]).unwrap_err() else { panic!("{what}") };
+        assert_eq!(bad.line, line, "{what}: still the first bad line");
+    }
+}
+
+#[test]
+fn without_a_disk_deeds_go_to_the_history_without_a_seal_and_it_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let (rows, status, _) = life(&folder.path().join("gone").join("tank.duckdb"), &["start", "write"]);
+    assert!(rows.len() == 2 && rows.iter().all(|row| row.seal.is_none()), "each once");
+    let trouble = status.trouble.unwrap();
+    assert!(trouble.starts_with("the audit trail cannot be written: "), "{trouble}");
+    assert!(trouble.contains("2 actions are not in it"), "{trouble}");
+    assert_eq!((status.batches, status.waiting), (0, 2));
+}
+
+#[test]
+fn a_book_that_is_taken_away_while_it_is_written_is_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tank.audit.jsonl");
+    let (mut book, _) = Book::open(&path).unwrap();
+    book.append(&mut [deed("start")]).unwrap();
+    fs::remove_file(&path).unwrap();
+    assert!(book.append(&mut [deed("write")]).unwrap_err().to_string().contains("removed"));
+    let (_, opened) = Book::open(&path).unwrap();
+    assert!(opened.wrong[0].contains("broken"), "{opened:?}");
+}
+
+#[test]
+fn what_a_disk_did_not_take_is_not_recorded_until_it_comes_back_and_then_nothing_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let history_file = folder.path().join("later").join("tank.duckdb");
+    let (history, mut rows) = mpsc::channel(64);
+    let (mut recorder, found) = Recorder::new(&history_file, clock(), history);
+    assert_eq!(found, Found::default());
+    recorder.open();
+    recorder.take(batch(&["start", "acknowledge"], &[AlarmStep::Raised, AlarmStep::Acknowledged]));
+    recorder.write();
+    let status = recorder.status();
+    assert_eq!((status.batches, status.waiting), (0, 1));
+    let trouble = status.trouble.unwrap();
+    assert!(trouble.contains("2 actions are not in it") && trouble.contains("state of the alarms"), "{trouble}");
+    assert_eq!(stored(&mut rows).iter().filter(|row| row.seal.is_none()).count(), 2, "in the history all the same");
+    fs::create_dir(folder.path().join("later")).unwrap();
+    recorder.take(batch(&["write"], &[]));
+    recorder.write();
+    assert_eq!(recorder.status().batches, 0, "the log is not opened again before its time");
+    recorder.opened_at -= REOPEN;
+    recorder.write();
+    assert_eq!(recorder.status(), Recorded { batches: 2, waiting: 0, lost: 0, trouble: None });
+    let rows = stored(&mut rows);
+    let sealed: Vec<_> = rows.iter().filter(|row| row.seal.is_some()).map(|row| &*row.action).collect();
+    assert_eq!(sealed, ["start", "acknowledge", "write"]);
+    assert_eq!(verify(&beside(&history_file), &seals(&rows)).unwrap().compared, 3);
+    let steps = AlarmFile::open(&alarm_file::beside(&history_file), clock().now()).1.steps.unwrap();
+    assert_eq!(steps, batch(&[], &[AlarmStep::Raised, AlarmStep::Acknowledged]).steps);
+}
+
+#[test]
+fn a_log_that_cannot_be_written_for_long_keeps_the_latest_actions_and_says_how_many_it_lacks() {
+    let folder = tempfile::tempdir().unwrap();
+    let history_file = folder.path().join("later").join("tank.duckdb");
+    let (history, _rows) = mpsc::channel(64);
+    let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
+    recorder.open();
+    recorder.take(batch(&vec!["write"; PENDING_MAX + 7], &[]));
+    recorder.write();
+    assert!(recorder.status().trouble.unwrap().contains(&format!("{} actions are not in it", PENDING_MAX + 7)));
+    fs::create_dir(folder.path().join("later")).unwrap();
+    recorder.opened_at -= REOPEN;
+    recorder.write();
+    assert_eq!(recorder.status().trouble, None);
+    let text = fs::read_to_string(beside(&history_file)).unwrap();
+    assert_eq!(text.lines().count(), PENDING_MAX + 1);
+    assert!(text.lines().next().unwrap().contains("7 actions before this one are not in it"));
+}
+
+#[test]
+fn what_was_acknowledged_is_found_by_the_next_station_without_any_history() {
+    let folder = tempfile::tempdir().unwrap();
+    let history_file = folder.path().join("tank.duckdb");
+    let (history, rows) = mpsc::channel(1);
+    drop(rows);
+    let Handle { batches, mut recorded, join, .. } = start(&history_file, clock(), history).unwrap();
+    batches.send(batch(&["acknowledge"], &[AlarmStep::Raised, AlarmStep::Acknowledged])).unwrap();
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    runtime.block_on(recorded.wait_for(|recorded| recorded.batches == 1)).unwrap();
+    // Killed here: only what is on disk counts.
+    let found = AlarmFile::open(&alarm_file::beside(&history_file), clock().now()).1;
+    assert_eq!(found.steps.unwrap(), batch(&[], &[AlarmStep::Raised, AlarmStep::Acknowledged]).steps);
+    drop(batches);
+    join.join().unwrap();
+}

@@ -1,0 +1,182 @@
+//! The text of the alarm-state file: of each alarm the last step of every kind, one checked line each, oldest first.
+//!
+//! ```text
+//! sightglass alarm state 1
+//! 5f0c9a1be2d34477 {"at":"2026-05-01T12:00:00Z","subject":"TIC-1.PV","text":"high",…}
+//!  └ the first 8 bytes of the SHA-256 of what follows
+//! ```
+
+use std::{
+    collections::{BTreeMap, HashMap},
+    fmt::Write,
+    sync::Arc,
+};
+
+use sha2::{Digest, Sha256};
+
+use crate::plant::record::AlarmRecord;
+
+/// The first line; its number goes up with every change of the others.
+pub const HEADER: &str = "sightglass alarm state 1\n";
+/// Most steps that are kept: thirteen kinds of some thousand alarms, also of those that the plant file no longer has.
+const STEPS_MAX: usize = 50_000;
+/// Hexadecimal digits of a checksum.
+const DIGITS: usize = 16;
+
+/// All that the state of the alarms depends on: of each alarm the last step of every kind, oldest first.
+#[derive(Debug, Clone, Default)]
+pub struct LatestSteps {
+    steps: BTreeMap<u64, AlarmRecord>,
+    places: HashMap<Key, u64>,
+    next: u64,
+}
+
+impl LatestSteps {
+    /// Takes the next step; the one of the same kind before it counts no more.
+    pub fn take(&mut self, step: AlarmRecord) {
+        if let Some(old) = self.places.insert(key(&step), self.next) {
+            self.steps.remove(&old);
+        }
+        self.steps.insert(self.next, step);
+        self.next += 1;
+        if STEPS_MAX < self.steps.len()
+            && let Some((_, oldest)) = self.steps.pop_first()
+        {
+            self.places.remove(&key(&oldest));
+        }
+    }
+
+    /// Oldest first.
+    pub fn iter(&self) -> impl Iterator<Item = &AlarmRecord> {
+        self.steps.values()
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// No alarm has ever taken a step.
+    pub fn is_empty(&self) -> bool {
+        self.steps.is_empty()
+    }
+}
+
+/// Which alarm, and the kind of its step.
+type Key = (Arc<str>, Arc<str>, &'static str);
+
+fn key(step: &AlarmRecord) -> Key {
+    (step.subject.clone(), step.text.clone(), step.step.word())
+}
+
+/// A step as a line, with its end.
+pub fn line(step: &AlarmRecord) -> String {
+    let text = serde_json::to_string(step).expect("texts, numbers and times can always be written");
+    format!("{} {text}\n", checksum(&text))
+}
+
+fn checksum(text: &str) -> String {
+    let mut digits = String::with_capacity(DIGITS);
+    for byte in &Sha256::digest(text.as_bytes())[..DIGITS / 2] {
+        // Writing into a text cannot fail.
+        let _ = write!(digits, "{byte:02x}");
+    }
+    digits
+}
+
+/// What a file says.
+#[derive(Debug, Clone, Default)]
+pub struct Parsed {
+    /// The steps.
+    pub steps: LatestSteps,
+    /// Behind the last whole line stands the beginning of another one, which was never confirmed to anybody.
+    pub torn: bool,
+}
+
+/// Reads a file. `Err` names what is damaged.
+pub fn parse(bytes: &[u8]) -> Result<Parsed, String> {
+    let end = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |place| place + 1);
+    let (whole, rest) = bytes.split_at(end);
+    let mut parsed = Parsed { torn: !rest.is_empty(), ..Parsed::default() };
+    let mut lines = whole.split_inclusive(|byte| *byte == b'\n');
+    let header = lines.next().unwrap_or_default();
+    if header != HEADER.as_bytes() {
+        return Err(format!("line 1 is not `{}`", HEADER.trim_end()));
+    }
+    for (number, line) in (2..).zip(lines) {
+        let step = step_of(line).ok_or_else(|| format!("line {number} is not as it was written"))?;
+        parsed.steps.take(step);
+    }
+    Ok(parsed)
+}
+
+fn step_of(line: &[u8]) -> Option<AlarmRecord> {
+    let (sum, text) = std::str::from_utf8(line).ok()?.strip_suffix('\n')?.split_once(' ')?;
+    (sum == checksum(text)).then(|| serde_json::from_str(text).ok())?
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use jiff::Timestamp;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::plant::{
+        def::Priority,
+        record::{AlarmStep, Burst},
+    };
+
+    fn step() -> impl Strategy<Value = AlarmRecord> {
+        let words = || proptest::option::of("\\PC{0,20}").prop_map(|words| words.map(Arc::from));
+        let number = || proptest::option::of(-1e9..1e9f64);
+        let kind = (0..AlarmStep::ALL.len()).prop_map(|place| AlarmStep::ALL[place]);
+        let time = || (0i64..2_000_000_000_000_000).prop_map(|micros| Timestamp::from_microsecond(micros).unwrap());
+        let more = (number(), number(), words(), words(), proptest::option::of(time()));
+        (time(), 0..3u8, kind, more, any::<bool>()).prop_map(|(at, subject, step, more, burst)| {
+            let (value, limit, by, reason, until) = more;
+            let record = AlarmRecord::new(at, &format!("TIC-{subject}.PV"), "high", Priority::High, step);
+            let burst = burst.then_some(Burst { began: at, rank: 7 });
+            AlarmRecord { value, limit, by, reason, until, burst, ..record }
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn of_each_alarm_the_last_step_of_every_kind_comes_back_as_it_was(
+            journal in proptest::collection::vec(step(), 0..80),
+            cut in 0usize..400,
+        ) {
+            let mut text = HEADER.to_owned();
+            journal.iter().for_each(|step| text += &line(step));
+            let parsed = parse(text.as_bytes()).unwrap();
+            prop_assert!(!parsed.torn);
+            let later = |place: usize, step: &AlarmRecord| journal[place + 1..].iter().any(|other| key(other) == key(step));
+            let expected = journal.iter().enumerate().filter(|(place, step)| !later(*place, step)).map(|(_, step)| step);
+            prop_assert_eq!(parsed.steps.iter().collect::<Vec<_>>(), expected.collect::<Vec<_>>());
+            // A loss of power leaves whole lines and at most the beginning of one.
+            let cut = &text.as_bytes()[..(HEADER.len() + cut).min(text.len())];
+            let whole = cut.iter().filter(|byte| **byte == b'\n').count() - 1;
+            let short = parse(cut).unwrap();
+            prop_assert_eq!(short.torn, !cut.ends_with(b"\n"));
+            prop_assert_eq!(short.steps.next as usize, whole);
+        }
+
+        #[test]
+        fn a_flipped_bit_in_a_whole_line_is_found(steps in proptest::collection::vec(step(), 1..5), at in 0usize..5_000, bit in 0u8..8) {
+            let mut bytes = HEADER.as_bytes().to_vec();
+            steps.iter().for_each(|step| bytes.extend(line(step).into_bytes()));
+            // Not the last end of line: without it the line was never confirmed.
+            let place = at % (bytes.len() - 1);
+            bytes[place] ^= 1 << bit;
+            prop_assert!(parse(&bytes).is_err());
+        }
+    }
+
+    #[test]
+    fn a_file_of_a_later_version_and_no_file_at_all_are_not_read_as_no_alarms() {
+        assert!(parse(b"").is_err_and(|why| why.contains("line 1")));
+        assert!(parse(b"sightglass alarm state 2\n").is_err_and(|why| why.contains("line 1")));
+        assert!(parse(HEADER.as_bytes()).unwrap().steps.is_empty());
+    }
+}

@@ -1,0 +1,250 @@
+//! The alarm-state file beside a history: appended to and synced before an operator is told, written anew when it has grown.
+
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{self, Read, Write},
+    os::unix::fs::{MetadataExt, OpenOptionsExt},
+    path::{Path, PathBuf},
+};
+
+use jiff::Timestamp;
+
+use crate::{
+    history::alarm_state::{HEADER, LatestSteps, line, parse},
+    plant::record::AlarmRecord,
+};
+
+/// Largest file that is read: many times what a station writes.
+const BYTES_MAX: u64 = 64 << 20;
+/// A file is written anew when it has more lines than twice those that count, and this many more.
+const SPARE_LINES: usize = 1_000;
+
+/// The file beside a history: `tank.alarms.state` beside `tank.duckdb`.
+pub fn beside(history: &Path) -> PathBuf {
+    history.with_extension("alarms.state")
+}
+
+/// What was found when it was opened.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Found {
+    /// The steps to restore, oldest first; `None` where the file cannot tell: then the journal of the history serves.
+    pub steps: Option<Vec<AlarmRecord>>,
+    /// What is wrong with it, in words for the operator.
+    pub trouble: Option<String>,
+}
+
+/// The state of the alarms, in memory and on disk.
+#[derive(Debug)]
+pub struct AlarmFile {
+    path: PathBuf,
+    steps: LatestSteps,
+    /// Steps that the file does not hold yet; gone after a failure, when the whole file is due.
+    unwritten: Vec<AlarmRecord>,
+    file: Option<Written>,
+}
+
+/// The file as it was left after the last sync.
+#[derive(Debug)]
+struct Written {
+    file: File,
+    bytes: u64,
+    lines: usize,
+}
+
+impl AlarmFile {
+    /// Opens the file. One that is damaged is set aside, never deleted.
+    pub fn open(path: &Path, now: Timestamp) -> (AlarmFile, Found) {
+        let mut alarms =
+            AlarmFile { path: path.to_owned(), steps: LatestSteps::default(), unwritten: Vec::new(), file: None };
+        let name = path.display();
+        let found = match read(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Found::default(),
+            Err(error) => Found { steps: None, trouble: Some(format!("{name} cannot be read: {error}")) },
+            Ok(bytes) => match parse(&bytes) {
+                Ok(parsed) => {
+                    alarms.steps = parsed.steps;
+                    Found { steps: Some(alarms.steps.iter().cloned().collect()), trouble: None }
+                }
+                Err(why) => {
+                    let aside = path.with_extension(format!("damaged-{}", now.strftime("%Y%m%dT%H%M%SZ")));
+                    let kept = match fs::rename(path, &aside) {
+                        Ok(()) => format!("set aside as {}", aside.display()),
+                        Err(error) => format!("cannot be set aside: {error}"),
+                    };
+                    let why = format!("the state of the alarms is damaged ({name}: {why}), {kept}");
+                    Found { steps: None, trouble: Some(format!("{why}; taken from the journal instead")) }
+                }
+            },
+        };
+        (alarms, found)
+    }
+
+    /// Takes steps; [`AlarmFile::write`] brings them to the disk.
+    pub fn take(&mut self, steps: impl IntoIterator<Item = AlarmRecord>) {
+        for step in steps {
+            if self.file.is_some() {
+                self.unwritten.push(step.clone());
+            }
+            self.steps.take(step);
+        }
+    }
+
+    /// Writes what is not on disk yet, and syncs it. After a failure the next try writes the whole file.
+    pub fn write(&mut self) -> io::Result<()> {
+        let file = self.file.take().filter(|written| written.may_grow(&self.path, self.steps.len()));
+        let unwritten = std::mem::take(&mut self.unwritten);
+        self.file = Some(match file {
+            Some(written) if unwritten.is_empty() => written,
+            Some(written) => written.append(&unwritten)?,
+            None => self.write_whole()?,
+        });
+        Ok(())
+    }
+
+    /// Whoever loses power now finds the old file or the new one.
+    fn write_whole(&self) -> io::Result<Written> {
+        let beside = self.path.with_extension("new");
+        let text: String = std::iter::once(HEADER.to_owned()).chain(self.steps.iter().map(line)).collect();
+        let written = create(&beside).and_then(|mut file| {
+            file.write_all(text.as_bytes())?;
+            file.sync_all()?;
+            fs::rename(&beside, &self.path)?;
+            Ok(file)
+        });
+        if written.is_err() {
+            // What was begun is of no use to anybody.
+            let _ = fs::remove_file(&beside);
+        }
+        let file = written?;
+        let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        File::open(folder)?.sync_all()?;
+        Ok(Written { file, bytes: text.len() as u64, lines: self.steps.len() })
+    }
+}
+
+impl Written {
+    /// Is it still the file that was left, and not too long?
+    fn may_grow(&self, path: &Path, live: usize) -> bool {
+        let same = fs::symlink_metadata(path).is_ok_and(|there| {
+            let own = self.file.metadata().map(|own| (own.dev(), own.ino()));
+            there.len() == self.bytes && own.is_ok_and(|own| own == (there.dev(), there.ino()))
+        });
+        same && self.lines <= 2 * live + SPARE_LINES
+    }
+
+    fn append(mut self, steps: &[AlarmRecord]) -> io::Result<Written> {
+        let text: String = steps.iter().map(line).collect();
+        self.file.write_all(text.as_bytes())?;
+        self.file.sync_data()?;
+        Ok(Written { bytes: self.bytes + text.len() as u64, lines: self.lines + steps.len(), ..self })
+    }
+}
+
+fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let file = File::open(path)?;
+    if !file.metadata()?.is_file() {
+        return Err(io::Error::other("it is no file"));
+    }
+    let mut bytes = Vec::new();
+    file.take(BYTES_MAX).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+fn create(path: &Path) -> io::Result<File> {
+    // Never through a link; what an earlier try has left is of no use.
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        Ok(()) | Err(_) => {}
+    }
+    OpenOptions::new().append(true).create_new(true).mode(0o640).open(path)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::plant::{def::Priority, record::AlarmStep};
+
+    fn step(number: i64, step: AlarmStep) -> AlarmRecord {
+        let at = Timestamp::from_second(number).unwrap();
+        AlarmRecord::new(at, &format!("T-{}", number % 3), "high", Priority::High, step)
+    }
+
+    /// What the next station finds.
+    fn found(path: &Path) -> Found {
+        AlarmFile::open(path, Timestamp::from_second(1_000_000).unwrap()).1
+    }
+
+    #[test]
+    fn what_was_written_is_found_by_the_next_station_and_the_file_stays_small() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = beside(&folder.path().join("tank.duckdb"));
+        assert_eq!(found(&path), Found::default(), "no file yet");
+        let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
+        alarms.take([step(1, AlarmStep::Raised)]);
+        alarms.write().unwrap();
+        for number in 0..3_000 {
+            alarms.take([step(number, AlarmStep::Raised), step(number, AlarmStep::Returned)]);
+            if number % 10 == 0 {
+                alarms.write().unwrap();
+            }
+        }
+        alarms.write().unwrap();
+        let last =
+            [2_997, 2_998, 2_999].map(|number| [AlarmStep::Raised, AlarmStep::Returned].map(|kind| step(number, kind)));
+        assert_eq!(found(&path), Found { steps: Some(last.concat()), trouble: None });
+        let lines = fs::read_to_string(&path).unwrap().lines().count();
+        assert!(lines < 2 * SPARE_LINES, "{lines} lines for 6 steps");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside");
+    }
+
+    #[test]
+    fn a_file_that_was_removed_or_changed_is_written_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tank.alarms.state");
+        let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
+        alarms.take([step(1, AlarmStep::Raised)]);
+        alarms.write().unwrap();
+        fs::remove_file(&path).unwrap();
+        alarms.take([step(1, AlarmStep::Acknowledged)]);
+        alarms.write().unwrap();
+        let both = vec![step(1, AlarmStep::Raised), step(1, AlarmStep::Acknowledged)];
+        assert_eq!(found(&path).steps, Some(both.clone()));
+        fs::write(&path, "nonsense").unwrap();
+        alarms.write().unwrap();
+        assert_eq!(found(&path).steps, Some(both));
+    }
+
+    #[test]
+    fn after_a_failure_nothing_is_missing_once_the_disk_takes_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("later").join("tank.alarms.state");
+        let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
+        alarms.take([step(1, AlarmStep::Raised)]);
+        assert!(alarms.write().is_err());
+        alarms.take([step(1, AlarmStep::Acknowledged)]);
+        assert!(alarms.write().is_err());
+        fs::create_dir(folder.path().join("later")).unwrap();
+        alarms.write().unwrap();
+        assert_eq!(found(&path).steps.unwrap().len(), 2);
+    }
+
+    #[test]
+    fn a_damaged_file_is_set_aside_and_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tank.alarms.state");
+        let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
+        alarms.take([step(1, AlarmStep::Raised), step(2, AlarmStep::Raised)]);
+        alarms.write().unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, text.replacen("T-1", "T-7", 1)).unwrap();
+        let Found { steps, trouble } = found(&path);
+        assert_eq!(steps, None);
+        assert!(trouble.unwrap().contains("line 2 is not as it was written"));
+        assert!(!path.exists() && folder.path().join("tank.alarms.damaged-19700112T134640Z").exists());
+        // The beginning of a line that was never confirmed is no damage.
+        fs::write(&path, &text[..text.len() - 9]).unwrap();
+        let Found { steps, trouble } = found(&path);
+        assert_eq!((steps.map(|steps| steps.len()), trouble), (Some(1), None));
+    }
+}
