@@ -11,16 +11,14 @@ use crate::{
         alarm::AlarmCommand,
         command::Command,
         def::{AlarmId, DeviceId, LineId, TagId},
+        line_check::valid,
         parameter_set::NAME_MAX,
         restore::RestoreWish,
-        tool::Tool,
     },
 };
 
 /// Most characters of a name, or of where a set of values comes from.
 const WORDS_MAX: usize = 200;
-/// Most bytes of a test: the longest frame that Modbus knows, over TCP.
-const SEND_MAX: usize = 260;
 /// Most bytes of the settings of a line.
 const SETTINGS_BYTES_MAX: usize = 4 << 10;
 
@@ -48,15 +46,12 @@ pub fn command(def: &PlantDef, command: &Command) -> Result<(), String> {
         }
         Command::Connect(id, _) | Command::SaveSettings(id) | Command::StopTest(id) => line(def, *id),
         Command::Test(id, tool) => {
-            if let Tool::Send(bytes) = tool
-                && SEND_MAX < bytes.len()
-            {
-                return Err(format!("{} bytes to send, expected at most {SEND_MAX}", bytes.len()));
-            }
+            tool.check()?;
             line(def, *id)
         }
         Command::Configure(settings) => {
             encode(settings, SETTINGS_BYTES_MAX).map_err(|error| format!("settings: {error}"))?;
+            valid(settings)?;
             line(def, settings.id)
         }
         Command::Restore(wish) => of_restore(def, wish),
@@ -157,4 +152,62 @@ fn known(what: &str, id: u16, count: usize) -> Result<(), String> {
         return Ok(());
     }
     Err(format!("{what} number {id}: this plant has {count}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::plant::{
+        def::{LineDef, Serial, Transport},
+        fixture,
+        tag::Table,
+        tool::{Scan, Tool},
+    };
+
+    #[test]
+    fn a_test_asks_for_no_more_than_a_line_can_carry() {
+        let def = fixture::plant();
+        let check = |tool: Tool, expect: bool| {
+            assert_eq!(command(&def, &Command::Test(LineId(0), tool.clone())).is_ok(), expect, "{tool:?}");
+        };
+        let usual = Duration::from_millis(100);
+        let scan = |serials, timeout| Tool::Scan(Scan { first: 0, last: 255, serials, timeout });
+        check(scan(vec![Serial::USUAL; 64], Duration::from_secs(10)), true);
+        check(scan(Vec::new(), Duration::MAX), false);
+        check(scan(Vec::new(), Duration::from_secs(3_600)), false);
+        check(scan(Vec::new(), Duration::ZERO), false);
+        check(scan(vec![Serial { baud: 0, ..Serial::USUAL }], usual), false);
+        check(scan(vec![Serial { data_bits: 9, ..Serial::USUAL }], usual), false);
+        check(scan(vec![Serial::USUAL; 65], usual), false);
+        check(Tool::Scan(Scan { first: 2, last: 1, serials: Vec::new(), timeout: usual }), false);
+        let read = |address, count| Tool::Read { unit: 1, table: Table::Holding, address, count };
+        for (tool, expect) in [(read(0xFF83, 125), true), (read(0xFF84, 125), false), (read(0, 126), false)] {
+            check(tool, expect);
+        }
+        let loopback = |count| Tool::Loopback { unit: 1, data: 0, count };
+        for (tool, expect) in [(loopback(1_000), true), (loopback(1_001), false), (loopback(0), false)] {
+            check(tool, expect);
+        }
+        for (length, expect) in [(0, false), (513, true), (514, false)] {
+            check(Tool::Send(vec![0; length]), expect);
+        }
+    }
+
+    #[test]
+    fn settings_that_no_line_can_have_do_not_pass_the_socket() {
+        let def = fixture::plant();
+        let used = def.lines[0].clone();
+        let check = |settings: LineDef| command(&def, &Command::Configure(Box::new(settings)));
+        assert_eq!(check(used.clone()), Ok(()));
+        for wait in [Duration::ZERO, Duration::from_secs(11), Duration::MAX] {
+            assert!(check(LineDef { timeout: wait, ..used.clone() }).is_err(), "timeout {wait:?}");
+        }
+        assert!(check(LineDef { idle: Duration::MAX, ..used.clone() }).is_err());
+        assert!(check(LineDef { gap: Duration::MAX, ..used.clone() }).is_err());
+        assert!(check(LineDef { turnaround: Duration::MAX, ..used.clone() }).is_err());
+        let transport = Transport::rtu("/dev/null", Serial { baud: 0, ..Serial::USUAL });
+        assert!(check(LineDef { transport, ..used }).is_err());
+    }
 }

@@ -43,30 +43,37 @@ pub enum Came {
     Bytes(Vec<u8>, Option<Duration>),
 }
 
-/// A tool at work.
+/// A tool at work. Its steps are made one by one: a scan may have thousands.
 #[derive(Debug, Clone)]
 pub struct Job {
     run: ToolRun,
-    steps: VecDeque<Step>,
+    /// The step at work, or next.
+    step: Option<Step>,
+    /// Steps that an answer has called for; they go first.
+    queued: VecDeque<Step>,
+    /// Steps of the tool itself that have been made.
+    made: u32,
+    /// How many it has.
+    planned: u32,
 }
 
 impl Job {
     /// Ready for its first step.
     pub fn new(id: OrderId, by: Arc<str>, tool: Tool, at: Timestamp) -> Job {
-        let steps = steps_of(&tool);
-        let total = steps.len() as u32;
+        let planned = steps_in(&tool);
         let run = ToolRun {
             id,
             by,
             tool,
             started: at,
             done: 0,
-            total,
+            total: planned,
             now: String::new(),
             state: ToolState::Running,
             findings: Vec::new(),
         };
-        let mut job = Job { run, steps };
+        let mut job = Job { run, step: None, queued: VecDeque::new(), made: 0, planned };
+        job.advance();
         job.tell_now();
         job
     }
@@ -78,12 +85,12 @@ impl Job {
 
     /// Does it need the line for itself, because it tries other serial parameters?
     pub fn is_exclusive(&self) -> bool {
-        self.steps.iter().any(|step| step.serial.is_some())
+        matches!(&self.run.tool, Tool::Scan(scan) if !scan.serials.is_empty())
     }
 
     /// The next step; `None` when it is done or was stopped.
     pub fn next(&self) -> Option<&Step> {
-        self.steps.front().filter(|_| self.run.state == ToolState::Running)
+        self.step.as_ref().filter(|_| self.run.state == ToolState::Running)
     }
 
     /// Stops it.
@@ -95,7 +102,7 @@ impl Job {
 
     /// Takes what came of the step that was next.
     pub fn take(&mut self, came: Came) {
-        let Some(step) = self.steps.pop_front() else { return };
+        let Some(step) = self.step.take() else { return };
         self.run.done += 1;
         match (&self.run.tool, came) {
             (_, Came::Bytes(bytes, reply)) => self.found(Finding::Bytes { bytes, reply }),
@@ -105,12 +112,22 @@ impl Job {
                 self.take_answer(&step, answer);
             }
         }
-        self.run.total = self.run.done + self.steps.len() as u32;
-        if self.steps.is_empty() {
+        self.run.total = self.run.done + self.queued.len() as u32 + (self.planned - self.made);
+        self.advance();
+        if self.step.is_none() {
             self.conclude();
             self.run.state = ToolState::Done;
         }
         self.tell_now();
+    }
+
+    /// Makes the step that is next.
+    fn advance(&mut self) {
+        self.step = self.queued.pop_front().or_else(|| {
+            let step = (self.made < self.planned).then(|| planned_step(&self.run.tool, self.made));
+            self.made += u32::from(step.is_some());
+            step
+        });
     }
 
     fn take_answer(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
@@ -142,14 +159,14 @@ impl Job {
     fn after_failure(&mut self, request: &[u8], fault: Fault) {
         match (&self.run.tool, fault) {
             (Tool::Identify { unit }, Fault::Exception(_)) if request.get(1..4) == Some(&[0x2B, 0x0E, 0x01]) => {
-                self.steps.clear();
-                self.steps.push_back(step(vec![*unit, 0x11]));
+                self.made = self.planned;
+                self.queued.push_back(step(vec![*unit, 0x11]));
             }
             (Tool::Read { unit, table, address, count }, Fault::Exception(code))
                 if code.0 == 2 && 1 < *count && self.run.done == 1 =>
             {
                 let singles = (0..*count).map(|n| step(read(*unit, *table, address.wrapping_add(n), 1)));
-                self.steps.extend(singles);
+                self.queued.extend(singles);
             }
             _ => {}
         }
@@ -171,7 +188,7 @@ impl Job {
         }
         // A device that always says "more" at the same place would be asked for ever.
         if more == 0xFF && request[4] < next {
-            self.steps.push_front(step(vec![unit, 0x2B, 0x0E, code, next]));
+            self.queued.push_front(step(vec![unit, 0x2B, 0x0E, code, next]));
         }
     }
 
@@ -217,7 +234,7 @@ impl Job {
     }
 
     fn tell_now(&mut self) {
-        self.run.now = match self.steps.front().map(|step| (&step.ask, step.serial)) {
+        self.run.now = match self.step.as_ref().map(|step| (&step.ask, step.serial)) {
             Some((Ask::Message(request), Some(serial))) => format!("{} at {serial}", words(request)),
             Some((Ask::Message(request), None)) => words(request),
             Some((Ask::Raw(_), _)) => "bytes as they are".into(),
@@ -226,36 +243,42 @@ impl Job {
     }
 }
 
-fn steps_of(tool: &Tool) -> VecDeque<Step> {
+/// How many steps a tool has before any answer calls for more.
+fn steps_in(tool: &Tool) -> u32 {
     match tool {
-        Tool::Send(bytes) => VecDeque::from([Step { serial: None, timeout: None, ask: Ask::Raw(bytes.clone()) }]),
-        Tool::Loopback { unit, data, count } => {
-            let message = |n: u16| {
-                let [high, low] = data.wrapping_add(n).to_be_bytes();
-                step(vec![*unit, 0x08, 0, 0, high, low])
-            };
-            (0..*count).map(message).collect()
-        }
-        // Basic objects, then the regular ones that follow them (id 3 and on).
-        Tool::Identify { unit } => {
-            VecDeque::from([step(vec![*unit, 0x2B, 0x0E, 0x01, 0]), step(vec![*unit, 0x2B, 0x0E, 0x02, 3])])
-        }
-        Tool::Read { unit, table, address, count } => VecDeque::from([step(read(*unit, *table, *address, *count))]),
-        Tool::Scan(scan) => scan_steps(scan),
+        Tool::Send(_) | Tool::Read { .. } => 1,
+        Tool::Loopback { count, .. } => u32::from(*count),
+        Tool::Identify { .. } => 2,
+        Tool::Scan(scan) => units_of(scan) * scan.serials.len().max(1) as u32,
     }
 }
 
-fn scan_steps(scan: &Scan) -> VecDeque<Step> {
-    let serials: Vec<Option<Serial>> =
-        if scan.serials.is_empty() { vec![None] } else { scan.serials.iter().copied().map(Some).collect() };
-    let of = |serial| {
-        (scan.first..=scan.last).map(move |unit| Step {
-            serial,
-            timeout: Some(scan.timeout),
-            ask: Ask::Message(read(unit, Table::Holding, 0, 1)),
-        })
-    };
-    serials.into_iter().flat_map(of).collect()
+/// Units that a scan asks with each setting.
+fn units_of(scan: &Scan) -> u32 {
+    (u32::from(scan.last) + 1).saturating_sub(u32::from(scan.first))
+}
+
+/// Step `n` of a tool, from 0.
+fn planned_step(tool: &Tool, n: u32) -> Step {
+    match tool {
+        Tool::Send(bytes) => Step { serial: None, timeout: None, ask: Ask::Raw(bytes.clone()) },
+        Tool::Loopback { unit, data, .. } => {
+            let [high, low] = data.wrapping_add(n as u16).to_be_bytes();
+            step(vec![*unit, 0x08, 0, 0, high, low])
+        }
+        // Basic objects, then the regular ones that follow them (id 3 and on).
+        Tool::Identify { unit } if n == 0 => step(vec![*unit, 0x2B, 0x0E, 0x01, 0]),
+        Tool::Identify { unit } => step(vec![*unit, 0x2B, 0x0E, 0x02, 3]),
+        Tool::Read { unit, table, address, count } => step(read(*unit, *table, *address, *count)),
+        Tool::Scan(scan) => {
+            let units = units_of(scan).max(1);
+            Step {
+                serial: scan.serials.get((n / units) as usize).copied(),
+                timeout: Some(scan.timeout),
+                ask: Ask::Message(read((u32::from(scan.first) + n % units) as u8, Table::Holding, 0, 1)),
+            }
+        }
+    }
 }
 
 fn step(message: Vec<u8>) -> Step {

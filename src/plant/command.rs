@@ -228,9 +228,12 @@ pub enum Refusal {
     /// The settings could not be written into the plant file, or a parameter set into its folder.
     #[error("not saved: {0}")]
     NotSaved(String),
-    /// No line has this name and place, or no port can have such settings.
+    /// No line has this name and place.
     #[error("no such line")]
     NotALine,
+    /// Settings or a test that a line cannot have.
+    #[error("{0}")]
+    NotValid(String),
     /// What was wished of an alarm makes no sense or is not allowed.
     #[error("{0}")]
     Alarm(AlarmRefusal),

@@ -12,6 +12,7 @@ pub mod role;
 pub mod sample;
 pub mod expr;
 pub mod line;
+pub mod line_check;
 pub mod program;
 pub mod traffic;
 pub mod def;

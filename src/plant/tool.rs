@@ -5,10 +5,23 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::{command::OrderId, event::Fault, line::Serial, tag::Table, traffic::Exchange};
+use super::{
+    command::OrderId,
+    event::Fault,
+    line::Serial,
+    line_check::{TIMEOUT_MIN, WAIT_MAX},
+    tag::Table,
+    traffic::Exchange,
+};
 
 /// Findings that a run keeps at most.
 pub const FINDINGS_MAX: usize = 1_000;
+/// Most bytes of a test: the longest frame that Modbus knows, in ASCII.
+const SEND_MAX: usize = 513;
+/// Most loopbacks of one test.
+pub const LOOPBACKS_MAX: u16 = 1_000;
+/// Most serial parameters of one scan: eight baud rates with each of the usual characters, twice.
+const SERIALS_MAX: usize = 64;
 
 /// A test of a line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -44,6 +57,28 @@ pub enum Tool {
     Scan(Scan),
 }
 
+impl Tool {
+    /// Can a line carry it? `Err` says why not. A line is never busy with one step for longer than [`WAIT_MAX`].
+    pub fn check(&self) -> Result<(), String> {
+        let within = |what: &str, found: usize, most: usize| match found {
+            0 => Err(format!("{what}: none, expected 1 to {most}")),
+            found if most < found => Err(format!("{what}: {found}, expected 1 to {most}")),
+            _ => Ok(()),
+        };
+        match self {
+            Tool::Send(bytes) => within("bytes to send", bytes.len(), SEND_MAX),
+            Tool::Loopback { count, .. } => within("loopbacks", usize::from(*count), usize::from(LOOPBACKS_MAX)),
+            Tool::Identify { .. } => Ok(()),
+            Tool::Read { table, address, count, .. } => {
+                within("registers", usize::from(*count), if table.is_bits() { 2_000 } else { 125 })?;
+                let last = u32::from(*address) + u32::from(*count) - 1;
+                if last <= 0xFFFF { Ok(()) } else { Err(format!("address {last}: the last is 65535")) }
+            }
+            Tool::Scan(scan) => scan.check(),
+        }
+    }
+}
+
 /// In a few words, for the record.
 impl std::fmt::Display for Tool {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -76,6 +111,24 @@ pub struct Scan {
     pub serials: Vec<Serial>,
     /// How long an answer may take.
     pub timeout: Duration,
+}
+
+impl Scan {
+    fn check(&self) -> Result<(), String> {
+        if self.last < self.first {
+            return Err(format!("units {} to {}: the first is the greater one", self.first, self.last));
+        }
+        if !(TIMEOUT_MIN..=WAIT_MAX).contains(&self.timeout) {
+            return Err("timeout of the scan: expected 10 to 10000 ms".into());
+        }
+        if SERIALS_MAX < self.serials.len() {
+            return Err(format!("{} serial settings, expected at most {SERIALS_MAX}", self.serials.len()));
+        }
+        match self.serials.iter().find(|serial| !serial.is_usual()) {
+            Some(serial) => Err(format!("{serial}: no port has such settings")),
+            None => Ok(()),
+        }
+    }
 }
 
 /// A tool at work, or done.

@@ -8,11 +8,14 @@ use super::{
     reader,
     schema::PlantFile,
 };
-use crate::plant::def::{LineDef, Parity, Rs485, Transport};
+use crate::plant::{
+    def::{LineDef, Parity, Rs485, Transport},
+    line_check::complaints,
+};
 
 /// The text with these settings for the line of their name; `Err` says why not, in words for the operator.
 pub(super) fn with_line(text: &str, settings: &LineDef) -> Result<String, String> {
-    if let Some(complaint) = line::complaints(settings).into_iter().next() {
+    if let Some(complaint) = complaints(settings).into_iter().next() {
         return Err(format!("{}, {}", complaint.what, complaint.expected));
     }
     let mut document: DocumentMut = text.parse().map_err(|error| format!("the file is no TOML: {error}"))?;
@@ -172,7 +175,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::plant::def::{Framing, LineId, Serial};
+    use crate::plant::{
+        def::{Framing, LineId, Serial},
+        line_check::BAUDS,
+    };
 
     const FILE: &str = "\
 # The plant of a test.
@@ -272,16 +278,16 @@ unit = 1
         check(FILE, &serial(|serial| serial.baud = 9_601), "9601 is not a usual baud rate");
         check(FILE, &serial(|serial| serial.data_bits = 7), "Modbus RTU sends 8 data bits");
         let ascii = Transport::Tcp { host: "a".into(), port: 1, framing: Framing::Ascii };
-        check(FILE, &LineDef { transport: ascii, ..l1() }, "no word for this mode");
+        check(FILE, &LineDef { transport: ascii, ..l1() }, "ASCII over TCP is no mode of a line");
     }
 
     fn transports() -> impl Strategy<Value = Transport> {
         let parity = prop_oneof![Just(Parity::None), Just(Parity::Even), Just(Parity::Odd)];
         let rs485 = prop_oneof![Just(Rs485::Off), Just(Rs485::RtsHigh), Just(Rs485::RtsLow)];
-        let serial = (0..line::BAUDS.len(), any::<bool>(), 7u8..=8, parity, 1u8..=2, rs485, "[ -~]{1,20}[!-~]");
+        let serial = (0..BAUDS.len(), any::<bool>(), 7u8..=8, parity, 1u8..=2, rs485, "[ -~]{1,20}[!-~]");
         let serial = serial.prop_map(|(baud, ascii, bits, parity, stop_bits, rs485, port)| Transport::Serial {
             port,
-            serial: Serial { baud: line::BAUDS[baud], data_bits: if ascii { bits } else { 8 }, parity, stop_bits },
+            serial: Serial { baud: BAUDS[baud], data_bits: if ascii { bits } else { 8 }, parity, stop_bits },
             framing: if ascii { Framing::Ascii } else { Framing::Rtu },
             rs485,
         });
@@ -298,8 +304,8 @@ unit = 1
         fn whatever_is_saved_is_read_back(
             first in transports(),
             second in transports(),
-            timeout in 10u64..65_536,
-            gap in 0u64..65_536,
+            timeout in 10u64..=10_000,
+            gap in 0u64..=10_000,
         ) {
             let millis = Duration::from_millis;
             let line = |transport| LineDef { transport, timeout: millis(timeout), gap: millis(gap), ..l1() };

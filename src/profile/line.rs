@@ -8,7 +8,10 @@ use super::{
     reader::{At, Node, Raw, Value, text},
     schema::{SerialTable, TcpTable},
 };
-use crate::plant::def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport};
+use crate::plant::{
+    def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
+    line_check::{Complaint, Key, complaints},
+};
 
 /// The lines in the order of the file.
 pub(super) fn lines(tables: &[At<Raw>], problems: &mut Problems) -> Vec<LineDef> {
@@ -88,7 +91,9 @@ fn serial(raw: Raw, mode: Mode, id: LineId, problems: &mut Problems) -> Option<W
         (Key::DataBits, table.data_bits.map(|bits| bits.at)),
         (Key::StopBits, table.stop_bits.map(|bits| bits.at)),
         (Key::Timeout, table.timeout_ms.map(|time| time.at)),
+        (Key::Gap, table.gap_ms.map(|time| time.at)),
         (Key::Idle, table.idle_ms.map(|time| time.at)),
+        (Key::Turnaround, table.turnaround_ms.map(|time| time.at)),
     ];
     let serial = Serial {
         baud: table.baud.map_or(Serial::USUAL.baud, |baud| baud.value),
@@ -120,6 +125,7 @@ fn tcp(raw: Raw, mode: Mode, id: LineId, problems: &mut Problems) -> Option<Writ
         (Key::Host, table.host.as_ref().map(|host| host.at)),
         (Key::TcpPort, table.tcp_port.map(|port| port.at)),
         (Key::Timeout, table.timeout_ms.map(|time| time.at)),
+        (Key::Gap, table.gap_ms.map(|time| time.at)),
         (Key::Idle, table.idle_ms.map(|time| time.at)),
     ];
     let (host, port) = (text(&table.host), table.tcp_port.map_or(TCP_PORT, |port| port.value));
@@ -142,92 +148,8 @@ fn known<const N: usize>(spans: [(Key, Option<Span>); N]) -> Vec<(Key, Span)> {
     spans.into_iter().filter_map(|(key, span)| Some((key, span?))).collect()
 }
 
-/// A setting of a line, for complaints.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Key {
-    /// Path of a serial port.
-    Port,
-    /// Baud rate.
-    Baud,
-    /// Bits of a character.
-    DataBits,
-    /// Stop bits.
-    StopBits,
-    /// Host name or address.
-    Host,
-    /// TCP port.
-    TcpPort,
-    /// Longest wait for an answer.
-    Timeout,
-    /// Extra silence before a request.
-    Gap,
-    /// Silence that ends an answer.
-    Idle,
-}
-
-/// What is wrong with a setting.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Complaint {
-    /// Which setting.
-    pub key: Key,
-    /// `9601 is not a usual baud rate`.
-    pub what: String,
-    /// `expected 1 or 2`.
-    pub expected: &'static str,
-}
-
-/// Everything that is wrong with a line: what the plant file and the form of the terminal both hold to.
-pub fn complaints(line: &LineDef) -> Vec<Complaint> {
-    let mut all = Vec::new();
-    let mut check = |wrong: bool, key: Key, what: String, expected: &'static str| {
-        if wrong {
-            all.push(Complaint { key, what, expected });
-        }
-    };
-    match &line.transport {
-        Transport::Serial { port, serial, framing, .. } => {
-            let Serial { baud, data_bits, parity: _, stop_bits } = *serial;
-            let (who, expected) = match framing {
-                Framing::Ascii => ("Modbus ASCII sends 7 or 8", "expected 7 or 8"),
-                Framing::Rtu | Framing::Mbap => ("Modbus RTU sends 8", "expected 8"),
-            };
-            let fits = data_bits == 8 || (data_bits == 7 && *framing == Framing::Ascii);
-            check(port.trim().is_empty(), Key::Port, "a serial line needs a port".into(), "expected /dev/…");
-            let unusual = format!("{baud} is not a usual baud rate");
-            let usual = "expected 300, 600, 1200 … 9600, 19200, 38400, 57600, 115200 …";
-            check(!BAUDS.contains(&baud), Key::Baud, unusual, usual);
-            check(!fits, Key::DataBits, format!("{who} data bits"), expected);
-            let wrong = !matches!(stop_bits, 1 | 2);
-            check(wrong, Key::StopBits, format!("{stop_bits} stop bits do not exist"), "expected 1 or 2");
-        }
-        Transport::Tcp { host, port, framing: _ } => {
-            let named = !host.trim().is_empty();
-            check(!named, Key::Host, "a TCP line needs a host".into(), "expected a name or an address");
-            // More than one colon is an address of IPv6.
-            let with_port = host.matches(':').count() == 1;
-            check(with_port, Key::Host, format!("`{host}` is no host"), "expected it alone, the port is tcp_port");
-            check(*port == 0, Key::TcpPort, "there is no TCP port 0".into(), "expected 1 to 65535, usually 502");
-        }
-    }
-    let ms = |span: Duration| span.as_millis();
-    let short = "no device answers within so little time";
-    check(ms(line.timeout) < 10, Key::Timeout, short.into(), "expected at least 10 ms");
-    check(MILLIS_MAX < ms(line.timeout), Key::Timeout, "nobody waits so long".into(), "expected at most 65535 ms");
-    check(MILLIS_MAX < ms(line.gap), Key::Gap, "nobody rests so long".into(), "expected at most 65535 ms");
-    let short = "answers come in pieces further apart than this";
-    check(ms(line.idle) < 2, Key::Idle, short.into(), "expected at least 2 ms");
-    all
-}
-
-/// Baud rates that ports and devices know.
-pub const BAUDS: &[u32] =
-    &[300, 600, 1_200, 2_400, 4_800, 9_600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600];
-
 /// The port of Modbus TCP.
 pub const TCP_PORT: u16 = 502;
-
-/// Longest time that a plant file can say.
-const MILLIS_MAX: u128 = 65_535;
 
 /// Data bits that a line has if nobody says how many.
 pub fn usual_data_bits(ascii: bool) -> u8 {

@@ -48,10 +48,10 @@ use std::{
 pub use self::{
     diagnostic::{Errors, render},
     io::{PlantFile, Search},
-    line::BAUDS,
     set_file::{read_set, text_of_set},
 };
 use crate::plant::def::PlantDef;
+pub use crate::plant::line_check::BAUDS;
 
 /// Loads a plant, or tells everything that is wrong with it.
 ///

@@ -2,7 +2,6 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use jiff::Timestamp;
 use tokio::{
     sync::{mpsc, watch},
     task::JoinHandle,
@@ -13,18 +12,12 @@ use crate::{
         Gate, Peer,
         io::{own_user, recorder, users, users_beside},
     },
-    bus::io::{clock::Clock, task, transport::Connector},
+    bus::io::{clock::Clock, transport::Connector},
     history::{
         HistoryError,
         io::{Query, thread as history},
     },
-    plant::{
-        Plant, PlantDef,
-        command::Order,
-        def::LineId,
-        event::{Event, LineState},
-        snapshot::HistoryStatus,
-    },
+    plant::{Plant, PlantDef, command::Order, snapshot::HistoryStatus},
     profile::PlantFile,
     sim::io::Listener,
 };
@@ -34,7 +27,7 @@ use super::{
     door::{self, Door, Entrance, Ways},
     plant_task::{KEPT_FOR_STOPS, Keeping, PlantTask},
     session::Session,
-    sets,
+    sets, supervisor,
 };
 
 /// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
@@ -176,8 +169,16 @@ fn assemble(
     for (line, connector) in def.lines.iter().zip(connectors) {
         let (requests, request_queue) = mpsc::channel(REQUESTS);
         links.push(requests);
-        let link = task::run(def.clone(), line.id, clock, connector, events.clone(), request_queue, stopped.clone());
-        tasks.push(tokio::spawn(supervise(tokio::spawn(link), line.id, clock, events.clone(), stopped.clone())));
+        let (events, stopped) = (events.clone(), stopped.clone());
+        tasks.push(tokio::spawn(supervisor::run(
+            def.clone(),
+            line.id,
+            clock,
+            connector,
+            events,
+            request_queue,
+            stopped,
+        )));
     }
     let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
     let desk = PlantTask::new(plant, clock, links, file, keeping, publish);
@@ -192,25 +193,6 @@ fn assemble(
     let door = Door::new(gate, clock, ways, users);
     tasks.push(tokio::spawn(door.run(knocks, requests, stopped)));
     Station { entrance, orders, commands, history, book, open, stop, tasks }
-}
-
-/// Waits for the end of a link. One that ends before the station does takes its values with it, visibly.
-async fn supervise(
-    link: JoinHandle<()>,
-    line: LineId,
-    clock: Clock,
-    events: mpsc::Sender<Event>,
-    stopped: watch::Receiver<bool>,
-) {
-    let ended = link.await;
-    if *stopped.borrow() {
-        return;
-    }
-    tracing::error!(?ended, "a link has ended by itself");
-    let why = "internal error, see the log; restart the station".to_owned();
-    let state = LineState::Waiting { why, retry_at: Timestamp::MAX };
-    // If the plant has gone too there is nobody left to tell.
-    let _ = events.send(Event::Line { at: clock.now(), line, state }).await;
 }
 
 impl Station {

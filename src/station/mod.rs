@@ -10,6 +10,7 @@ mod door;
 mod plant_task;
 pub mod pulse;
 mod sets;
+mod supervisor;
 pub mod teller;
 mod toil;
 pub mod io;

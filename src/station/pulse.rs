@@ -2,10 +2,15 @@
 
 use std::{sync::Arc, time::Duration};
 
-use crate::plant::{Snapshot, event::LineState, line_report::LineReport};
+use crate::plant::{
+    Snapshot, event::LineState, line_check::WAIT_MAX, line_report::LineReport, snapshot::LineStatus, tool::ToolState,
+};
 
-/// A connected line that has reported nothing for so long (real time) hangs; it reports about once a second.
+/// A connected line that has reported nothing for so long (real time) hangs; it reports about once a second, but not while it
+/// waits for answers: see [`patience`].
 const LINE_MAX: Duration = Duration::from_secs(15);
+/// Answers that one turn of a line may wait for in vain: a probe, a loopback and a block, each of them twice.
+const WAITS_MAX: u32 = 6;
 
 /// What was last heard of each line, and when.
 #[derive(Debug, Default)]
@@ -27,11 +32,18 @@ impl Pulse {
             if !same || line.state != LineState::Connected {
                 (*last, *since) = (line.report.clone(), now);
             }
-            now.saturating_sub(*since) < LINE_MAX
+            now.saturating_sub(*since) < patience(line)
         });
         // Every line is looked at: to stop at the first that is silent would forget the others.
         heard.filter(|heard| !heard).count() == 0
     }
+}
+
+/// How long a line may be silent: one turn of its task, with every answer that it waits for missing.
+fn patience(line: &LineStatus) -> Duration {
+    let timeout = line.report.as_ref().map_or(Duration::ZERO, |report| report.settings.timeout);
+    let tested = line.test.as_ref().is_some_and(|run| run.state == ToolState::Running);
+    LINE_MAX + WAITS_MAX * if tested { timeout.max(WAIT_MAX) } else { timeout }
 }
 
 #[cfg(test)]
@@ -58,9 +70,11 @@ mod tests {
             report(&mut plant);
             assert!(beats(&plant, second));
         }
-        assert!(beats(&plant, 146));
-        assert!(!beats(&plant, 147), "15 s after the last report");
+        let timeout = fixture::plant().lines[0].timeout.as_secs_f64();
+        let end = 132 + (15.0 + 6.0 * timeout).ceil() as u64;
+        assert!(beats(&plant, end - 1));
+        assert!(!beats(&plant, end), "15 s and six timeouts after the last report");
         plant.on_event(Event::Line { at, line: LineId(0), state: LineState::Testing });
-        assert!(beats(&plant, 148));
+        assert!(beats(&plant, end + 1));
     }
 }

@@ -212,10 +212,13 @@ fn line_task(in_flight: u16) -> (f64, f64) {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     runtime.block_on(async {
         let (sender, mut events) = mpsc::channel(256);
-        let (_requests, queue) = mpsc::channel(1);
+        let (_requests, mut queue) = mpsc::channel(1);
         let (_stop, stopped) = watch::channel(false);
         let clock = Clock::starting_at(Timestamp::now(), 1.0);
-        tokio::spawn(task::run(def, LineId(0), clock, Connector::Real(transport), sender, queue, stopped));
+        tokio::spawn(async move {
+            let mut connector = Connector::Real(transport);
+            task::run(def, LineId(0), clock, &mut connector, sender, &mut queue, stopped).await;
+        });
         // A task of its own hears what is told, as in the station: to wake the future of `block_on` costs a system call.
         let drain = async move {
             let (mut reads, start, used) = (0u64, Instant::now(), cpu(ClockId::ThreadCPUTime));

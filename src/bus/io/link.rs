@@ -71,6 +71,8 @@ pub struct Answered {
 pub struct Link {
     wire: Wire,
     transaction: u16,
+    /// The request under way: its caller may give it up.
+    asked: Option<Vec<u8>>,
     timeout: Duration,
     idle: Duration,
     turnaround: Duration,
@@ -93,6 +95,7 @@ impl Link {
         let wire = Wire::new(opened.stream, opened.pause, line, clock, memory);
         Link {
             transaction: 0,
+            asked: None,
             timeout: line.timeout,
             idle: wire.silence.max(line.idle),
             turnaround: clock.real_span(line.turnaround),
@@ -148,13 +151,14 @@ impl Link {
         // An answer proves that nothing older is to come only if it could not itself have been older.
         let proof = !self.wire.debts.is_ambiguous(message);
         let frame: Arc<[u8]> = frame::wrap(self.framing(), 0, message).into();
-        let sent_at = self.wire.send(&frame).await?;
+        let sent_at = self.send(message, &frame).await?;
         let started = Instant::now();
         self.note_sent(frame.clone());
         let gathered = match message.first() {
             Some(0) => Gathered::nothing(Ok(vec![])),
             _ => self.gather(message, &frame, sent_at).await?,
         };
+        self.asked = None;
         self.busy += started.elapsed();
         let rest = if message.first() == Some(&0) {
             sent_at.saturating_duration_since(Instant::now()) + self.turnaround
@@ -208,11 +212,11 @@ impl Link {
 
     /// Sends bytes as they are and gives everything that comes back until the line is silent: for tests of the line.
     pub async fn send_raw(&mut self, bytes: &[u8]) -> Result<(Vec<u8>, Option<Duration>), Trouble> {
-        let sent_at = self.wire.send(bytes).await?;
-        self.note_sent(bytes.into());
-        let deadline = sent_at + self.timeout + self.wire.char_time * frame::MESSAGE_MAX as u32;
         let framing = self.framing();
         let request = frame::unwrap(framing, bytes).unwrap_or_default();
+        let sent_at = self.send(&request, bytes).await?;
+        self.note_sent(bytes.into());
+        let deadline = sent_at + self.timeout + self.wire.char_time * frame::MESSAGE_MAX as u32;
         let proof = framing != Framing::Mbap && !self.wire.debts.is_ambiguous(&request);
         let (mut buffer, mut reply) = (Vec::new(), None);
         let mut until = deadline;
@@ -236,6 +240,7 @@ impl Link {
                 break true;
             }
         };
+        self.asked = None;
         if !buffer.is_empty() {
             self.wire.record(false, buffer[..].into(), Cow::Borrowed("received"));
         }
@@ -245,6 +250,26 @@ impl Link {
             self.owe(&request);
         }
         Ok((buffer, reply))
+    }
+
+    /// The caller of the exchange under way has given it up, for something that cannot wait. Its answer may still come.
+    pub fn abandon(&mut self) {
+        let Some(message) = self.asked.take() else { return };
+        if self.framing() != Framing::Mbap && !message.is_empty() {
+            self.wire.debts.failed(&message, self.wire.age());
+        }
+        self.wire.rest_after_sending(self.idle);
+    }
+
+    /// A stop is sent next: it waits for what is just coming in, not for what may still come.
+    pub fn hurry(&mut self) {
+        self.wire.rest_at_most(self.idle);
+    }
+
+    /// Sends the frame of a message; until its answer is taken it may be given up.
+    async fn send(&mut self, message: &[u8], frame: &[u8]) -> Result<Instant, Trouble> {
+        self.asked = Some(message.to_vec());
+        self.wire.send(frame).await
     }
 
     /// How messages are framed.

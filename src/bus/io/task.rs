@@ -40,9 +40,9 @@ pub async fn run(
     def: Arc<PlantDef>,
     line: LineId,
     clock: Clock,
-    connector: Connector,
+    connector: &mut Connector,
     events: mpsc::Sender<Event>,
-    requests: mpsc::Receiver<BusRequest>,
+    requests: &mut mpsc::Receiver<BusRequest>,
     stop: watch::Receiver<bool>,
 ) {
     let holes = Holes::default();
@@ -87,15 +87,15 @@ enum Leave {
     Test,
 }
 
-struct Task {
+struct Task<'a> {
     def: Arc<PlantDef>,
     line: LineId,
     /// Those of the plant file until an operator tries others.
     settings: LineDef,
     clock: Clock,
-    connector: Connector,
+    connector: &'a mut Connector,
     events: mpsc::Sender<Event>,
-    requests: mpsc::Receiver<BusRequest>,
+    requests: &'a mut mpsc::Receiver<BusRequest>,
     stop: watch::Receiver<bool>,
     /// The read plan; a block that is refused is split while the search for the culprit goes on.
     blocks: Vec<Block>,
@@ -103,12 +103,12 @@ struct Task {
     holes: Holes,
     hunt: Hunt,
     /// The share of the line's time that writes may take from polls, and the writes that wait for it: the plant has no more
-    /// than one under way for a tag.
+    /// than one under way for a tag. Beside them what came during a step of a test, one refresh for a device.
     budget: WriteBudget,
     waiting: VecDeque<BusRequest>,
     /// Counters and debts, from one opening to the next.
     memory: Memory,
-    /// What an operator wished while a test had the line for itself.
+    /// What has ended a test, to be served next.
     put_back: Option<BusRequest>,
     /// When the books were last told what the link has counted.
     closed_at: Timestamp,
@@ -121,7 +121,7 @@ struct Task {
 /// What a turn of the loop gives: go on, leave the port, or end.
 type Turn = Result<Result<(), Leave>, Ended>;
 
-impl Task {
+impl Task<'_> {
     /// Opens, serves, waits, for ever.
     async fn outer(mut self) -> Result<(), Ended> {
         let mut backoff = Backoff::for_ports();
@@ -272,8 +272,9 @@ impl Task {
                 Err(mpsc::error::TryRecvError::Empty) => break,
             }
         }
-        let may_go = !matches!(next, Next::Run(_)) || self.budget.allows(now);
-        Ok(if may_go { self.waiting.pop_front() } else { None })
+        let may_write = !matches!(next, Next::Run(_)) || self.budget.allows(now);
+        let may_go = |request: &BusRequest| may_write || !matches!(request, BusRequest::Write { .. });
+        Ok(self.waiting.iter().position(may_go).and_then(|index| self.waiting.remove(index)))
     }
 
     /// The port is left: what still waits was never sent.

@@ -2,6 +2,7 @@
 //! shows the address it came from.
 
 mod slave;
+mod tools;
 
 use std::{
     collections::BTreeMap,
@@ -14,17 +15,16 @@ use std::{
 
 use jiff::Timestamp;
 use proptest::prelude::*;
-use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::io::AsyncWriteExt;
 
 use self::slave::{Deed, MS, Mode, line, plant};
 use crate::bus::frame;
 use crate::plant::{
-    command::{BusRequest, OrderId, WriteId},
-    def::{DeviceId, LineDef, Serial, TagId},
+    command::{BusRequest, WriteId},
+    def::{DeviceId, LineDef, TagId},
     event::{Event, ExceptionCode, Fault, LineState, WriteResult},
     tag::{Access, TagDef},
     tally::Tally,
-    tool::{Finding, Scan, Tool, ToolState},
 };
 
 /// Runs a line against a script until `polls` block reads have ended; gives good and failed ones.
@@ -426,22 +426,6 @@ async fn the_echo_of_an_adapter_is_no_answer() {
     assert!(0 < good, "the other unit is read");
 }
 
-#[tokio::test(start_paused = true)]
-async fn a_line_can_be_closed_while_a_scan_has_it_for_itself() {
-    let def = plant(Mode::Rtu);
-    let mut line = line(def.clone());
-    line.plug(Mode::Rtu, |_, _| Deed::Answer);
-    line.read(&def).await;
-    line.plug(Mode::Rtu, |_, _| Deed::Silent);
-    let serials = vec![Serial::USUAL, Serial { baud: 19_200, ..Serial::USUAL }];
-    let tool = Tool::Scan(Scan { first: 1, last: 247, serials, timeout: 100 * MS });
-    let (id, by) = (OrderId { terminal: 1, number: 1 }, "anna".into());
-    line.requests.send(BusRequest::Test { id, by, tool }).await.expect("the line runs");
-    line.until(&def, |event| matches!(event, Event::Line { state: LineState::Testing, .. }).then_some(())).await;
-    line.requests.send(BusRequest::Connect(false)).await.expect("the line runs");
-    line.until(&def, |event| matches!(event, Event::Line { state: LineState::Disconnected, .. }).then_some(())).await;
-}
-
 /// What a retry has cured, and what came late, stands in the books of its device all the same.
 #[tokio::test(start_paused = true)]
 async fn cured_and_late_answers_are_counted_with_their_device() {
@@ -462,38 +446,6 @@ async fn cured_and_late_answers_are_counted_with_their_device() {
         }
     }
     panic!("never counted")
-}
-
-/// Bytes that are no request are sent as they are, and whatever comes back is told.
-#[tokio::test(start_paused = true)]
-async fn nonsense_is_sent_and_nonsense_is_told() {
-    for mode in [Mode::Rtu, Mode::Tcp] {
-        let def = plant(mode);
-        let mut line = line(def.clone());
-        let (ours, mut theirs) = tokio::io::duplex(4096);
-        line.ports.try_send(ours).expect("room for a port");
-        tokio::spawn(async move {
-            let mut heard = [0; 64];
-            while theirs.read(&mut heard).await.is_ok_and(|count| 0 < count) {
-                let _ = theirs.write_all(&[0x55, 1, 2, 3, 0xAA, 0, 9]).await;
-            }
-        });
-        let (id, by) = (OrderId { terminal: 1, number: 1 }, "anna".into());
-        let tool = Tool::Send(vec![0xFF, 1, 2]);
-        line.requests.send(BusRequest::Test { id, by, tool }).await.expect("the line runs");
-        let run = line
-            .until(&def, |event| match event {
-                Event::Tool { run, .. } if run.state != ToolState::Running => Some(run.clone()),
-                _ => None,
-            })
-            .await;
-        let told = |found: &Finding| matches!(found, Finding::Bytes { bytes, .. } if bytes.ends_with(&[0, 9]));
-        match mode {
-            // The poll before it was answered by nonsense too: the stream is out of step, and the test with it.
-            Mode::Tcp => assert_eq!(run.state, ToolState::Failed("the stream is out of step".into())),
-            _ => assert!(run.findings.iter().any(told), "{mode:?}: {run:?}"),
-        }
-    }
 }
 
 /// Writes that got no answer have used up their share of a full line. A stop goes all the same, and what was ordered before

@@ -48,6 +48,8 @@ pub struct Wire {
     timeout: Duration,
     /// Nothing is sent before this.
     quiet_until: Instant,
+    /// When the last byte sent has left.
+    left_at: Instant,
     born: Instant,
     /// What each unit owes.
     pub debts: Debts,
@@ -82,6 +84,7 @@ impl Wire {
             silence: clock.real_span(silence),
             timeout: line.timeout,
             quiet_until: Instant::now() + if may_come { line.timeout } else { Duration::ZERO },
+            left_at: Instant::now(),
             born,
             debts,
             frames: Vec::new(),
@@ -118,6 +121,16 @@ impl Wire {
         self.quiet_until = self.quiet_until.max(Instant::now() + real);
     }
 
+    /// Nothing is sent for this long (real time) after the last byte sent has left.
+    pub fn rest_after_sending(&mut self, real: Duration) {
+        self.quiet_until = self.quiet_until.max(self.left_at.max(Instant::now()) + real);
+    }
+
+    /// A rest under way lasts no longer than this (real time), and never less than what was sent needs to leave.
+    pub fn rest_at_most(&mut self, real: Duration) {
+        self.quiet_until = self.quiet_until.min(self.left_at.max(Instant::now()) + real);
+    }
+
     /// Sends bytes when the line has been silent long enough, and gives the moment when the last of them has left.
     pub async fn send(&mut self, bytes: &[u8]) -> Result<Instant, Trouble> {
         self.wait_for_silence().await;
@@ -126,6 +139,7 @@ impl Wire {
         }
         // No flush: on a serial port that waits for the last byte to leave, and blocks the thread while it does.
         // What the system takes at once, as a rule all of it, costs no timer.
+        self.left_at = Instant::now() + self.char_time * bytes.len() as u32;
         let taken = self.port.write(bytes).now_or_never().unwrap_or(Ok(0));
         let taken = taken.map_err(|error| Trouble::Gone(error.to_string()))?;
         if let Some(rest @ [_, ..]) = bytes.get(taken..) {

@@ -8,6 +8,7 @@ use super::{Effects, Plant};
 use crate::plant::{
     command::{BusRequest, Command, Order, OrderId, Outcome, Refusal},
     def::{LineDef, LineId},
+    line_check::valid,
     record::{ActionRecord, Record},
 };
 
@@ -19,6 +20,12 @@ impl Plant {
                 if self.def.lines.get(settings.id.index()).is_none_or(|line| line.name != settings.name) =>
             {
                 return self.desk.note(order, Outcome::Refused(Refusal::NotALine), &self.board, at);
+            }
+            Command::Configure(settings) if let Err(why) = valid(settings) => {
+                return self.desk.note(order, Outcome::Refused(Refusal::NotValid(why)), &self.board, at);
+            }
+            Command::Test(_, tool) if let Err(why) = tool.check() => {
+                return self.desk.note(order, Outcome::Refused(Refusal::NotValid(why)), &self.board, at);
             }
             Command::Configure(settings) => {
                 self.remember_settings(settings);
@@ -87,6 +94,7 @@ mod tests {
         event::Event,
         fixture,
         line_report::LineReport,
+        tool::{Scan, Tool},
     };
 
     const L1: LineId = LineId(0);
@@ -152,6 +160,26 @@ mod tests {
         let effects = try_out(&mut plant, 4, at_first.clone());
         assert_eq!(effects.bus, [(L1, BusRequest::Configure(Box::new(at_first)))]);
         assert_eq!(before(&plant), None, "there is nothing more to take back");
+    }
+
+    /// What the form of the terminal and the plant file refuse, the station refuses too.
+    #[test]
+    fn what_no_line_can_carry_is_refused_and_never_sent() {
+        let used = fixture::plant().lines[0].clone();
+        let scan = Scan { first: 1, last: 2, serials: Vec::new(), timeout: Duration::MAX };
+        for command in [
+            Command::Configure(Box::new(LineDef { timeout: Duration::MAX, ..used.clone() })),
+            Command::Configure(Box::new(LineDef { timeout: Duration::ZERO, ..used })),
+            Command::Configure(Box::new(baud(0))),
+            Command::Test(L1, Tool::Scan(scan)),
+        ] {
+            let mut plant = plant();
+            let effects = order(&mut plant, 1, command.clone());
+            assert_eq!(effects.bus, [], "{command:?} goes to the line");
+            let refused = deeds(&effects);
+            assert!(refused.len() == 1 && refused[0].3.starts_with("refused: "), "{refused:?}");
+            assert_eq!(before(&plant), None, "nothing to take back");
+        }
     }
 
     #[test]

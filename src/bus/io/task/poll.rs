@@ -30,7 +30,7 @@ const UNANSWERED_MAX: u32 = 5;
 /// How a read has ended: values or a fault, with the evidence.
 pub(super) type Outcome = (Result<Answer, Fault>, Option<Arc<Exchange>>);
 
-impl Task {
+impl Task<'_> {
     /// Reads the block that is due, and with it others where several requests may be under way.
     pub(super) async fn poll(&mut self, link: &mut Link, schedule: &mut Schedule, index: usize) -> Turn {
         self.polls_since_test += 1;

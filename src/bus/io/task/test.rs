@@ -1,6 +1,6 @@
 //! Line tools at work: between polls, or alone on the port when they try other serial parameters.
 
-use std::sync::Arc;
+use std::{pin::pin, sync::Arc};
 
 use tokio::sync::mpsc::error::TryRecvError;
 
@@ -13,7 +13,7 @@ use crate::{
             testing,
         },
         schedule::Next,
-        tool::{Ask, Came},
+        tool::{Ask, Came, Step},
     },
     plant::{
         command::BusRequest,
@@ -26,7 +26,7 @@ use crate::{
 /// A busy line gives a tool every so many-th turn.
 const POLLS_BETWEEN: u32 = 4;
 
-impl Task {
+impl Task<'_> {
     pub(super) fn is_turn_of_test(&self, next: Next) -> bool {
         let idle = !matches!(next, Next::Run(_));
         self.job.as_ref().is_some_and(|job| job.next().is_some()) && (idle || POLLS_BETWEEN <= self.polls_since_test)
@@ -35,18 +35,44 @@ impl Task {
     /// One step of the tool, between polls.
     pub(super) async fn test_step(&mut self, link: &mut Link) -> Turn {
         self.polls_since_test = 0;
-        let Some(job) = &mut self.job else { return Ok(Ok(())) };
-        let Some(step) = job.next().cloned() else { return Ok(Ok(())) };
-        match testing::step(link, &step).await {
-            Ok(came) => {
+        let Some(step) = self.job.as_ref().and_then(|job| job.next().cloned()) else { return Ok(Ok(())) };
+        let Some(came) = self.step_unless_cut(link, &step, false).await? else { return Ok(Ok(())) };
+        match (came, &mut self.job) {
+            (Ok(came), Some(job)) => {
                 let in_step = stays_in_step(link.framing(), &step.ask, &came);
                 job.take(came);
                 self.tell_test().await?;
                 Ok(if in_step { Ok(()) } else { Err(Leave::Reopen) })
             }
-            Err(Trouble::Gone(why)) => Ok(Err(Leave::Lost(why))),
-            Err(Trouble::Fault(_)) => Ok(Ok(())),
+            (Err(Trouble::Gone(why)), _) => Ok(Err(Leave::Lost(why))),
+            (Ok(_), None) | (Err(Trouble::Fault(_)), _) => Ok(Ok(())),
         }
+    }
+
+    /// Carries a step. `None` when it was cut short, and the test with it, by what cannot wait for it: a stop, or what ends
+    /// the test anyway.
+    async fn step_unless_cut(
+        &mut self,
+        link: &mut Link,
+        step: &Step,
+        alone: bool,
+    ) -> Result<Option<Result<Came, Trouble>>, Ended> {
+        {
+            let mut came = pin!(testing::step(link, step));
+            loop {
+                let request = tokio::select! {
+                    biased;
+                    _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
+                    came = &mut came => return Ok(Some(came)),
+                    request = self.requests.recv() => request.ok_or(Ended)?,
+                };
+                if !self.hear_while_testing(request, alone).await? {
+                    break;
+                }
+            }
+        }
+        link.abandon();
+        Ok(None)
     }
 
     /// The tool has the port for itself, opened with the serial parameters that each step wants.
@@ -54,11 +80,15 @@ impl Task {
         let mut open: Option<Link> = None;
         let mut settings = self.settings.clone();
         while let Some(step) = self.job.as_ref().and_then(|job| job.next().cloned()) {
-            if *self.stop.borrow() {
-                return Err(Ended);
-            }
-            if !self.hear_while_testing().await? {
-                break;
+            match self.requests.try_recv() {
+                Ok(request) => {
+                    if self.hear_while_testing(request, true).await? {
+                        continue;
+                    }
+                    break;
+                }
+                Err(TryRecvError::Disconnected) => return Err(Ended),
+                Err(TryRecvError::Empty) => {}
             }
             let wanted = testing::settings_for(&self.settings, &step);
             let mut link = match open.take().filter(|_| wanted == settings) {
@@ -72,8 +102,9 @@ impl Task {
                 },
             };
             settings = wanted;
-            let came = testing::step(&mut link, &step).await;
+            let came = self.step_unless_cut(&mut link, &step, true).await?;
             self.close_second(&mut link);
+            let Some(came) = came else { break };
             match (came, &mut self.job) {
                 (Ok(came), Some(job)) => job.take(came),
                 (Err(Trouble::Gone(why)), _) => {
@@ -88,26 +119,39 @@ impl Task {
         self.tell_test().await
     }
 
-    /// Takes what operators want while nobody is polled; `false` when the test must stop.
-    async fn hear_while_testing(&mut self) -> Result<bool, Ended> {
-        loop {
-            match self.requests.try_recv() {
-                Err(TryRecvError::Empty) => return Ok(true),
-                Err(TryRecvError::Disconnected) => return Err(Ended),
-                Ok(BusRequest::Write { id, .. }) => {
-                    self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
+    /// Takes a request while a test is at work, `alone` on the port or between polls; `false` when the test is ended by it.
+    async fn hear_while_testing(&mut self, request: BusRequest, alone: bool) -> Result<bool, Ended> {
+        match request {
+            BusRequest::Write { id, urgent: false, .. } if alone => {
+                self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
+                Ok(true)
+            }
+            BusRequest::Refresh { .. } if alone => Ok(true),
+            BusRequest::Write { urgent: false, .. } => {
+                self.waiting.push_back(request);
+                Ok(true)
+            }
+            BusRequest::Refresh { device, .. } => {
+                let same =
+                    |other: &BusRequest| matches!(other, BusRequest::Refresh { device: it, .. } if *it == device);
+                if !self.waiting.iter().any(same) {
+                    self.waiting.push_back(request);
                 }
-                Ok(BusRequest::StopTest) => {
-                    self.stop_test().await?;
-                    return Ok(false);
-                }
-                Ok(request @ (BusRequest::Connect(_) | BusRequest::Test { .. })) => {
-                    self.stop_test().await?;
-                    self.put_back = Some(request);
-                    return Ok(false);
-                }
-                Ok(BusRequest::Configure(settings)) => self.configure(*settings),
-                Ok(BusRequest::Refresh { .. }) => {}
+                Ok(true)
+            }
+            BusRequest::Write { urgent: true, .. } => {
+                self.end_test("ended by an urgent stop").await?;
+                self.put_back = Some(request);
+                Ok(false)
+            }
+            BusRequest::StopTest => {
+                self.stop_test().await?;
+                Ok(false)
+            }
+            BusRequest::Connect(_) | BusRequest::Test { .. } | BusRequest::Configure(_) => {
+                self.stop_test().await?;
+                self.put_back = Some(request);
+                Ok(false)
             }
         }
     }

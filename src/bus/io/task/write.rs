@@ -33,7 +33,7 @@ pub(super) struct Wish<'a> {
     pub urgent: bool,
 }
 
-impl Task {
+impl Task<'_> {
     /// Carries a write and tells how it ended.
     pub(super) async fn write(
         &mut self,
@@ -43,6 +43,9 @@ impl Task {
         wish: Wish<'_>,
     ) -> Turn {
         let tag = wish.tag;
+        if wish.urgent {
+            link.hurry();
+        }
         let locked = match wish.unlock {
             Some(key) => self.unlock(link, schedule, id, key, &wish).await?,
             None => Ok(None),

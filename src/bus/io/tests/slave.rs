@@ -201,11 +201,14 @@ pub struct Line {
 
 pub fn line(def: PlantDef) -> Line {
     let (sender, events) = mpsc::channel(64);
-    let (requests, queue) = mpsc::channel(4);
+    let (requests, mut queue) = mpsc::channel(4);
     let (ports, streams) = mpsc::channel(8);
     let (stop, stopped) = watch::channel(false);
     let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
-    tokio::spawn(task::run(Arc::new(def), LineId(0), clock, Connector::Memory(streams), sender, queue, stopped));
+    tokio::spawn(async move {
+        let mut connector = Connector::Memory(streams);
+        task::run(Arc::new(def), LineId(0), clock, &mut connector, sender, &mut queue, stopped).await;
+    });
     Line { events, requests, ports, _stop: stop }
 }
 

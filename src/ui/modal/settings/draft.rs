@@ -6,8 +6,11 @@ use crossterm::event::{KeyCode, KeyEvent};
 
 use super::Deed;
 use crate::{
-    plant::def::{Framing, LineDef, Parity, Rs485, Serial, Transport},
-    profile::line::{BAUDS, TCP_PORT, complaints, usual_data_bits},
+    plant::{
+        def::{Framing, LineDef, Parity, Rs485, Serial, Transport},
+        line_check::{BAUDS, complaints},
+    },
+    profile::line::{TCP_PORT, usual_data_bits},
     ui::modal::line::Line,
 };
 

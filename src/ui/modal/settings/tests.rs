@@ -63,7 +63,7 @@ fn what_is_chosen_is_what_is_ordered() {
     assert_eq!(tried("↑↑→"), with(transport("/dev/ttyUSB0", ascii, Framing::Ascii)));
     assert_eq!(tried("↑1u"), with(transport("/dev/ttyUSB01u", usual, Framing::Rtu)), "letters are text here");
     assert_eq!(tried("↑↑→→↓plc7"), with(Transport::tcp("plc7", 502)));
-    assert_eq!(tried("↓↓↓↓x01").map(|line| line.timeout), Some(Duration::from_millis(30_001)));
+    assert_eq!(tried("↓↓↓↓x1").map(|line| line.timeout), Some(Duration::from_millis(3_001)));
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn what_cannot_be_is_told_before_anything_is_sent() {
         ("⏎", "these are the settings in use"),
         ("↓→", "Modbus RTU always has 8 data bits"),
         ("↑↑→→⏎", "a TCP line needs a host"),
-        ("↓↓↓↓999⏎", "nobody waits so long"),
+        ("↓↓↓↓999⏎", "too long: nothing else is sent meanwhile"),
         ("u", "nothing to take back"),
         ("S", "nothing to save"),
         ("→S", "use these settings first"),

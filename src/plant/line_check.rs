@@ -1,0 +1,117 @@
+//! What a line may be set to: held to by the plant file, the form of the terminal, the socket and the reducer alike.
+
+use std::time::Duration;
+
+use super::line::{Framing, LineDef, Serial, Transport};
+
+/// Shortest time that an answer may take: no device is faster, and less would be all timeouts.
+pub const TIMEOUT_MIN: Duration = Duration::from_millis(10);
+/// Longest time that anything on a line may wait: for so long nothing else goes over it.
+pub const WAIT_MAX: Duration = Duration::from_secs(10);
+
+/// A setting of a line, for complaints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Key {
+    /// Path of a serial port.
+    Port,
+    /// Baud rate.
+    Baud,
+    /// Bits of a character.
+    DataBits,
+    /// Stop bits.
+    StopBits,
+    /// Host name or address.
+    Host,
+    /// TCP port.
+    TcpPort,
+    /// Longest wait for an answer.
+    Timeout,
+    /// Extra silence before a request.
+    Gap,
+    /// Silence that ends an answer.
+    Idle,
+    /// Time after a broadcast.
+    Turnaround,
+    /// Framing that the transport does not have.
+    Mode,
+}
+
+/// What is wrong with a setting.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Complaint {
+    /// Which setting.
+    pub key: Key,
+    /// `9601 is not a usual baud rate`.
+    pub what: String,
+    /// `expected 1 or 2`.
+    pub expected: &'static str,
+}
+
+/// Can a line have these settings? `Err` says why not.
+pub fn valid(line: &LineDef) -> Result<(), String> {
+    match complaints(line).into_iter().next() {
+        Some(Complaint { what, expected, .. }) => Err(format!("{what}; {expected}")),
+        None => Ok(()),
+    }
+}
+
+/// Everything that is wrong with a line: the first complaint is the one to show where there is room for one.
+pub fn complaints(line: &LineDef) -> Vec<Complaint> {
+    let mut all = Vec::new();
+    let mut check = |wrong: bool, key: Key, what: String, expected: &'static str| {
+        if wrong {
+            all.push(Complaint { key, what, expected });
+        }
+    };
+    match &line.transport {
+        Transport::Serial { port, serial, framing, .. } => {
+            let Serial { baud, data_bits, parity: _, stop_bits } = *serial;
+            let (who, expected) = match framing {
+                Framing::Ascii => ("Modbus ASCII sends 7 or 8", "expected 7 or 8"),
+                Framing::Rtu | Framing::Mbap => ("Modbus RTU sends 8", "expected 8"),
+            };
+            let fits = data_bits == 8 || (data_bits == 7 && *framing == Framing::Ascii);
+            check(port.trim().is_empty(), Key::Port, "a serial line needs a port".into(), "expected /dev/…");
+            let unusual = format!("{baud} is not a usual baud rate");
+            let usual = "expected 300, 600, 1200 … 9600, 19200, 38400, 57600, 115200 …";
+            check(!BAUDS.contains(&baud), Key::Baud, unusual, usual);
+            check(!fits, Key::DataBits, format!("{who} data bits"), expected);
+            let wrong = !matches!(stop_bits, 1 | 2);
+            check(wrong, Key::StopBits, format!("{stop_bits} stop bits do not exist"), "expected 1 or 2");
+        }
+        Transport::Tcp { host, port, framing: _ } => {
+            let named = !host.trim().is_empty();
+            check(!named, Key::Host, "a TCP line needs a host".into(), "expected a name or an address");
+            // More than one colon is an address of IPv6.
+            let with_port = host.matches(':').count() == 1;
+            check(with_port, Key::Host, format!("`{host}` is no host"), "expected it alone, the port is tcp_port");
+            check(*port == 0, Key::TcpPort, "there is no TCP port 0".into(), "expected 1 to 65535, usually 502");
+        }
+    }
+    let known = match &line.transport {
+        Transport::Serial { framing, .. } => *framing != Framing::Mbap,
+        Transport::Tcp { framing, .. } => *framing != Framing::Ascii,
+    };
+    check(!known, Key::Mode, format!("{} is no mode of a line", line.transport.mode()), "expected RTU, ASCII or TCP");
+    let short = "no device answers within so little time";
+    check(line.timeout < TIMEOUT_MIN, Key::Timeout, short.into(), "expected at least 10 ms");
+    for (key, span) in
+        [(Key::Timeout, line.timeout), (Key::Gap, line.gap), (Key::Idle, line.idle), (Key::Turnaround, line.turnaround)]
+    {
+        check(WAIT_MAX < span, key, "too long: nothing else is sent meanwhile".into(), "expected at most 10000 ms");
+    }
+    let short = "answers come in pieces further apart than this";
+    check(line.idle < Duration::from_millis(2), Key::Idle, short.into(), "expected at least 2 ms");
+    all
+}
+
+impl Serial {
+    /// Can a port have these parameters? Which of them a framing needs is another question.
+    pub fn is_usual(self) -> bool {
+        BAUDS.contains(&self.baud) && matches!(self.data_bits, 7 | 8) && matches!(self.stop_bits, 1 | 2)
+    }
+}
+
+/// Baud rates that ports and devices know.
+pub const BAUDS: &[u32] =
+    &[300, 600, 1_200, 2_400, 4_800, 9_600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600];

@@ -1,0 +1,100 @@
+//! Keeps the task of a line running: one that panics is started again, and its operators see why.
+
+use std::{panic::AssertUnwindSafe, sync::Arc, time::Duration};
+
+use futures_util::FutureExt;
+use tokio::{
+    sync::{mpsc, watch},
+    time::Instant,
+};
+
+use crate::{
+    bus::{
+        backoff::Backoff,
+        io::{clock::Clock, task, transport::Connector},
+    },
+    plant::{
+        PlantDef,
+        command::BusRequest,
+        def::LineId,
+        event::{Event, LineState},
+    },
+};
+
+/// A task that has run for so long (real time) is started again after the shortest delay.
+const STEADY: Duration = Duration::from_secs(60);
+
+/// Runs a line until the station stops. Requests wait in their queue while it is down: it is up again within seconds.
+pub(super) async fn run(
+    def: Arc<PlantDef>,
+    line: LineId,
+    clock: Clock,
+    mut connector: Connector,
+    events: mpsc::Sender<Event>,
+    mut requests: mpsc::Receiver<BusRequest>,
+    mut stopped: watch::Receiver<bool>,
+) {
+    let mut backoff = Backoff::for_ports();
+    loop {
+        let started = Instant::now();
+        let link = task::run(def.clone(), line, clock, &mut connector, events.clone(), &mut requests, stopped.clone());
+        // Nothing outlives the panic but the port's description and the queue, which it cannot leave half changed.
+        if AssertUnwindSafe(link).catch_unwind().await.is_ok() || *stopped.borrow() {
+            return;
+        }
+        if STEADY < started.elapsed() {
+            backoff.reset();
+        }
+        let retry_at = clock.now() + backoff.fail().mul_f64(clock.speed());
+        tracing::error!(line = def.line(line).name, "the task of a line has panicked and is started again");
+        let state = LineState::Waiting { why: "internal error, see the log".to_owned(), retry_at };
+        // Without a plant task there is nobody to tell, and nothing to start again for.
+        if events.send(Event::Line { at: clock.now(), line, state }).await.is_err() {
+            return;
+        }
+        tokio::select! {
+            _ = stopped.wait_for(|stop| *stop) => return,
+            () = clock.sleep_until(retry_at) => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use jiff::Timestamp;
+
+    use super::*;
+    use crate::plant::{command::WriteId, def::TagId, fixture};
+
+    #[tokio::test(start_paused = true)]
+    async fn a_line_whose_task_panics_is_started_again_and_says_why() {
+        let def = fixture::shared();
+        let (sender, mut events) = mpsc::channel(64);
+        let (requests, queue) = mpsc::channel(4);
+        let (ports, streams) = mpsc::channel(4);
+        let (_stop, stopped) = watch::channel(false);
+        let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
+        tokio::spawn(run(def, LineId(0), clock, Connector::Memory(streams), sender, queue, stopped));
+        // A tag that this plant does not have: inside, ids are taken on trust.
+        let tag = TagId(u16::MAX);
+        let request = BusRequest::Write { id: WriteId(1), tag, raw: 0.0, unlock: None, verify: true, urgent: false };
+        for _ in 0..3 {
+            let (ours, _theirs) = tokio::io::duplex(64);
+            ports.try_send(ours).expect("room for a port");
+            let mut states = Vec::new();
+            while !states.iter().any(|state| matches!(state, LineState::Waiting { .. })) {
+                let Event::Line { state, .. } = events.recv().await.expect("the station has not ended") else {
+                    continue;
+                };
+                if state == LineState::Connected {
+                    requests.send(request.clone()).await.expect("the line takes requests");
+                }
+                states.push(state);
+            }
+            let why = "internal error, see the log".to_owned();
+            let told = |state: &LineState| matches!(state, LineState::Waiting { why: words, .. } if *words == why);
+            assert_eq!(states[..2], [LineState::Connecting, LineState::Connected]);
+            assert!(states.last().is_some_and(told), "{states:?}");
+        }
+    }
+}
