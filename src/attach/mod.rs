@@ -1,5 +1,6 @@
 //! The station's socket: terminals of other processes, each with what it may see and no more.
 
+pub mod callers;
 pub mod check;
 pub mod delta;
 pub mod protocol;

@@ -138,7 +138,7 @@ struct Serving {
 }
 
 impl Serving {
-    fn new(listener: serve::Listener, station: station::Station) -> Serving {
+    fn new(mut listener: serve::Listener, station: station::Station) -> Serving {
         let entrance = station.entrance().clone();
         let socket = tokio::spawn(async move {
             listener.serve(&entrance).await;

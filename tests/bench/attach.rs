@@ -74,7 +74,7 @@ fn station() {
         let plant = Plant::new(def.clone(), Timestamp::now(), 1.0);
         let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
         let (entrance, mut knocks, _requests) = Entrance::new(snapshots);
-        let listener = listen(&path).unwrap();
+        let mut listener = listen(&path).unwrap();
         tokio::spawn(async move { listener.serve(&entrance).await });
         tokio::spawn(async move {
             let mut there = Vec::new();

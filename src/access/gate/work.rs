@@ -280,7 +280,7 @@ impl Gate {
 }
 
 fn not_checked(wait: Duration) -> String {
-    format!("password not checked: wait {} s after wrong ones", wait.as_secs_f64().ceil())
+    format!("password not checked after wrong ones; wait {} s", wait.as_secs_f64().ceil())
 }
 
 impl What {

@@ -1,0 +1,213 @@
+//! Who connects: each user of the operating system has places, a rate and lines in the log of its own, so that none keeps out others.
+
+use std::{collections::BTreeMap, time::Duration};
+
+/// Terminals of all users at once.
+pub const TERMINALS_MAX: usize = 64;
+/// Terminals of one user at once, unless it runs the station.
+const TERMINALS_OF_USER_MAX: usize = TERMINALS_MAX / 2;
+/// Connections of one user that have not said hello; one more, and the oldest of them is dropped.
+pub const STRANGERS_MAX: usize = 8;
+/// The same of all users: the oldest of whoever has most is dropped.
+const STRANGERS_OF_ALL_MAX: usize = 64;
+/// Terminals of one user that may attach: so many at once, and one more each time.
+const ATTACHES: Rate = Rate { burst: 128, every: Duration::from_millis(125) };
+/// Lines about one user in the log.
+const LINES: Rate = Rate { burst: 20, every: Duration::from_secs(2) };
+/// What was not logged is counted, and told so often.
+const TOLD_EVERY: Duration = Duration::from_secs(60);
+/// Users that are told apart; what more there are share one count.
+const USERS_MAX: usize = 256;
+/// Stands for all the others.
+const OTHERS: u32 = u32::MAX;
+
+/// So many at once, and one more each time.
+#[derive(Debug, Clone, Copy)]
+struct Rate {
+    burst: u32,
+    every: Duration,
+}
+
+/// What is left of a [`Rate`]. Times are counted from any one instant.
+#[derive(Debug, Default)]
+struct Allowance {
+    /// Everything may be taken again from then on.
+    full_at: Duration,
+}
+
+impl Allowance {
+    fn take(&mut self, rate: Rate, now: Duration) -> bool {
+        let after = self.full_at.max(now) + rate.every;
+        let some = after <= now + rate.every * rate.burst;
+        if some {
+            self.full_at = after;
+        }
+        some
+    }
+}
+
+#[derive(Debug, Default)]
+struct Caller {
+    terminals: usize,
+    attaches: Allowance,
+    lines: Allowance,
+    unlogged: u64,
+    told: Duration,
+}
+
+/// Everybody who has connected, by the number of the user.
+#[derive(Debug)]
+pub struct Callers {
+    /// Who runs the station, and root: they get the last places.
+    hosts: [u32; 2],
+    users: BTreeMap<u32, Caller>,
+}
+
+impl Callers {
+    /// Nobody yet. `own` is the user that the station runs as.
+    pub fn new(own: u32) -> Callers {
+        Callers { hosts: [0, own], users: BTreeMap::new() }
+    }
+
+    /// A connection that has said hello wants to be a terminal. Gives whom it is counted for, which [`Callers::detach`] needs;
+    /// `Err` says in words for its operator why it may not.
+    pub fn attach(&mut self, user: u32, now: Duration) -> Result<u32, String> {
+        let all: usize = self.users.values().map(|caller| caller.terminals).sum();
+        let host = self.hosts.contains(&user);
+        let user = self.counted_as(user, now);
+        let caller = self.users.entry(user).or_default();
+        if !caller.attaches.take(ATTACHES, now) {
+            return Err("too many terminals of this user have attached just now, wait a moment".to_owned());
+        }
+        if TERMINALS_OF_USER_MAX <= caller.terminals && !host {
+            return Err(format!("this user has {TERMINALS_OF_USER_MAX} terminals, no more can attach"));
+        }
+        if TERMINALS_MAX <= all {
+            return Err(format!("the station has {TERMINALS_MAX} terminals, no more can attach"));
+        }
+        caller.terminals += 1;
+        Ok(user)
+    }
+
+    /// A terminal has gone.
+    pub fn detach(&mut self, counted_as: u32) {
+        if let Some(caller) = self.users.get_mut(&counted_as) {
+            caller.terminals = caller.terminals.saturating_sub(1);
+        }
+    }
+
+    /// May a line about this user be logged? If not it is counted.
+    pub fn may_log(&mut self, user: u32, now: Duration) -> bool {
+        let user = self.counted_as(user, now);
+        let caller = self.users.entry(user).or_default();
+        let some = caller.lines.take(LINES, now);
+        if !some {
+            caller.unlogged += 1;
+        }
+        some
+    }
+
+    /// Users about whom so many lines were not logged, each at most once a minute.
+    pub fn unlogged(&mut self, now: Duration) -> Vec<(u32, u64)> {
+        let due = |caller: &Caller| caller.unlogged > 0 && TOLD_EVERY <= now.saturating_sub(caller.told);
+        let callers = self.users.iter_mut().filter(|(_, caller)| due(caller));
+        let told = callers.map(|(user, caller)| {
+            caller.told = now;
+            (*user, std::mem::take(&mut caller.unlogged))
+        });
+        told.collect()
+    }
+
+    fn counted_as(&mut self, user: u32, now: Duration) -> u32 {
+        let is_new = |users: &BTreeMap<u32, Caller>| USERS_MAX <= users.len() && !users.contains_key(&user);
+        if is_new(&self.users) {
+            let rests = |caller: &Caller| caller.attaches.full_at <= now && caller.lines.full_at <= now;
+            self.users.retain(|_, caller| caller.terminals > 0 || caller.unlogged > 0 || !rests(caller));
+        }
+        if is_new(&self.users) { OTHERS } else { user }
+    }
+}
+
+/// Which of these connections without a hello, the oldest first, makes room for another of this user.
+pub fn makes_room(strangers: &[u32], user: u32) -> Option<usize> {
+    let count = |user: u32| strangers.iter().filter(|stranger| **stranger == user).count();
+    let crowd = match count(user) < STRANGERS_MAX {
+        false => Some(user),
+        true if strangers.len() < STRANGERS_OF_ALL_MAX => None,
+        true => strangers.iter().copied().max_by_key(|stranger| count(*stranger)),
+    };
+    strangers.iter().position(|stranger| Some(*stranger) == crowd)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EVE: u32 = 1_001;
+    const PANEL: u32 = 1_002;
+
+    fn seconds(seconds: u64) -> Duration {
+        Duration::from_secs(seconds)
+    }
+
+    #[test]
+    fn strangers_of_one_user_push_out_only_their_own() {
+        let mut strangers = vec![PANEL; 3];
+        for _ in 0..1_000 {
+            if let Some(place) = makes_room(&strangers, EVE) {
+                assert_eq!(strangers.remove(place), EVE);
+            }
+            strangers.push(EVE);
+        }
+        assert_eq!(strangers.len(), 3 + STRANGERS_MAX);
+        for user in 2_000..2_100 {
+            if let Some(place) = makes_room(&strangers, user) {
+                strangers.remove(place);
+            }
+            strangers.push(user);
+            assert!(strangers.len() <= STRANGERS_OF_ALL_MAX);
+        }
+        assert!(strangers.contains(&PANEL), "whoever has most makes room");
+    }
+
+    #[test]
+    fn a_user_who_attaches_without_end_neither_takes_all_places_nor_keeps_others_out() {
+        let mut callers = Callers::new(500);
+        let attached = (0..10_000).filter(|_| callers.attach(EVE, seconds(1)).is_ok()).count();
+        assert_eq!(attached, TERMINALS_OF_USER_MAX);
+        for (user, most) in [(PANEL, TERMINALS_MAX - TERMINALS_OF_USER_MAX), (500, 0)] {
+            assert_eq!((0..100).filter(|_| callers.attach(user, seconds(2)).is_ok()).count(), most);
+        }
+        (0..4).for_each(|_| callers.detach(PANEL));
+        assert_eq!(callers.attach(0, seconds(3)), Ok(0));
+        // Attaching and leaving again and again.
+        callers.detach(EVE);
+        let quick = (0..10_000).filter(|_| {
+            let attached = callers.attach(EVE, seconds(100)).is_ok();
+            attached.then(|| callers.detach(EVE)).is_some()
+        });
+        assert_eq!(quick.count(), ATTACHES.burst as usize);
+    }
+
+    #[test]
+    fn lines_about_one_user_are_bounded_in_rate_and_what_was_left_out_is_told() {
+        let mut callers = Callers::new(500);
+        let mut logged = 0;
+        for second in 0..600 {
+            logged += (0..1_000).filter(|_| callers.may_log(EVE, seconds(second))).count();
+        }
+        assert!((300..=330).contains(&logged), "{logged}");
+        assert!(callers.may_log(PANEL, seconds(600)));
+        assert_eq!(callers.unlogged(seconds(600)), [(EVE, 600_000 - logged as u64)]);
+        assert_eq!(callers.unlogged(seconds(601)), []);
+    }
+
+    #[test]
+    fn users_without_end_cost_no_memory_without_end() {
+        let mut callers = Callers::new(500);
+        for user in 1_000..10_000 {
+            callers.may_log(user, seconds(1));
+        }
+        assert_eq!(callers.users.len(), USERS_MAX + 1);
+    }
+}
