@@ -387,7 +387,11 @@ fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
             Act::Wish(tab, wish) => {
                 // Nought is nobody's: whoever waits has a number.
                 model.presence.wished = model.presence.wished.checked_add(1).unwrap_or(1);
-                effects.push(Effect::Wish(AskId { tab, number: model.presence.wished }, wish));
+                let number = model.presence.wished;
+                if let Some(Modal::Sheet(sheet)) = &mut model.modal {
+                    sheet.sent(number);
+                }
+                effects.push(Effect::Wish(AskId { tab, number }, wish));
             }
             Act::Do(effect) => effects.push(effect),
         }

@@ -201,25 +201,32 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
     Some(Effect::Wish(AskId { tab: Tab::Login, number: 0 }, Wish::Active))
 }
 
-/// The station's answer to a wish; only the last one is waited for.
+/// The station's answer to a wish: for the window that waits for it, also one that a lock has taken away, else for the tab,
+/// of which only the last wish is waited for.
 pub(super) fn on_granted(model: &mut Model, id: AskId, answer: Result<(), String>) -> Vec<Act> {
     if matches!(id.tab, Tab::Reports | Tab::Bus) {
         // A file that waits to be written waits for its own answer, whatever was wished since.
         return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
     }
-    if id.number == 0 || id.number != model.presence.wished {
-        return Vec::new();
+    let waits = |modal: &Modal| matches!(modal, Modal::Sheet(sheet) if sheet.waits_for(id.number));
+    let shown = model.modal.take_if(|modal| waits(modal));
+    let kept = model.kept.take_if(|(_, modal)| waits(modal));
+    match (shown, kept) {
+        (Some(Modal::Sheet(sheet)), _) => model.modal = answered(model, sheet, answer),
+        (_, Some((tab, Modal::Sheet(sheet)))) => {
+            model.kept = answered(model, sheet, answer).map(|modal| (tab, modal));
+        }
+        _ if id.number != 0 && id.number == model.presence.wished => {
+            return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
+        }
+        _ => {}
     }
-    let waiting = model.modal.take_if(|modal| matches!(modal, Modal::Sheet(sheet) if sheet.is_waiting()));
-    let Some(Modal::Sheet(mut sheet)) = waiting else {
-        return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
-    };
-    let done = {
-        let cx = context(model, model.screen);
-        sheet.answered(&cx, answer)
-    };
-    model.modal = if done { sheet.below() } else { Some(Modal::Sheet(sheet)) };
     Vec::new()
+}
+
+fn answered(model: &Model, mut sheet: Box<Sheet>, answer: Result<(), String>) -> Option<Modal> {
+    let done = sheet.answered(&context(model, model.screen), answer);
+    if done { sheet.below() } else { Some(Modal::Sheet(sheet)) }
 }
 
 /// The station runs another plant file: nothing that was known of the old one may stay.

@@ -100,9 +100,12 @@ impl Model {
             (None, Some(_)) => None,
             (None, None) => return,
         };
-        let waiting = self.modal.take_if(|modal| matches!(modal, Modal::Confirm(confirm) if confirm.is_waiting()));
-        if let Some(Modal::Confirm(confirm)) = waiting {
+        let waits = |modal: &Modal| matches!(modal, Modal::Confirm(confirm) if confirm.is_waiting());
+        if let Some(Modal::Confirm(confirm)) = self.modal.take_if(|modal| waits(modal)) {
             self.modal = confirm.answered(refused);
+        } else if let Some((tab, Modal::Confirm(confirm))) = self.kept.take_if(|(_, modal)| waits(modal)) {
+            // A lock has taken it away.
+            self.kept = confirm.answered(refused).map(|modal| (tab, modal));
         }
     }
 }

@@ -55,6 +55,8 @@ pub struct Sheet {
     form: Form,
     /// The wish is on its way.
     waiting: bool,
+    /// The number of that wish; 0 before it has one.
+    number: u32,
     /// Why the last Enter led to nothing, and at which tick that was told.
     problem: Option<(String, u32)>,
     /// The window that waits below, with all that was typed in it.
@@ -81,7 +83,7 @@ impl Sheet {
             Purpose::Disable(..) => Vec::new(),
             Purpose::Delete(_) => vec![Field::name("name")],
         };
-        Sheet { purpose, form: Form::new(fields), waiting: false, problem: None, below: None }
+        Sheet { purpose, form: Form::new(fields), waiting: false, number: 0, problem: None, below: None }
     }
 
     /// Another role for this user; the present one is shown first.
@@ -103,6 +105,18 @@ impl Sheet {
     /// Is an answer waited for?
     pub fn is_waiting(&self) -> bool {
         self.waiting
+    }
+
+    /// The wish has this number.
+    pub fn sent(&mut self, number: u32) {
+        if self.waiting && self.number == 0 {
+            self.number = number;
+        }
+    }
+
+    /// Does it wait for the answer to the wish of this number?
+    pub fn waits_for(&self, number: u32) -> bool {
+        self.waiting && self.number == number
     }
 
     /// A key: the wish, once the form is finished and nothing is wrong with it.
@@ -134,7 +148,7 @@ impl Sheet {
 
     /// The station's answer; `true` if the sheet has done its work.
     pub fn answered(&mut self, cx: &Cx, answer: Result<(), String>) -> bool {
-        self.waiting = false;
+        (self.waiting, self.number) = (false, 0);
         match answer {
             Ok(()) => return true,
             Err(problem) => {

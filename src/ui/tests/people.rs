@@ -230,6 +230,37 @@ fn work_waits_while_the_terminal_is_locked() {
 }
 
 #[test]
+fn a_form_that_waits_when_the_terminal_is_locked_takes_its_answer() {
+    for (answer, left) in
+        [(Ok(()), None), (Err("at least one Supervisor must remain"), Some("at least one Supervisor"))]
+    {
+        let mut model = with(&Fixture::normal(), supervisor());
+        let effects = type_keys(&mut model, "7↓r ⏎");
+        let Some(Effect::Wish(id, Wish::SetRole { .. })) = effects.last().cloned() else { panic!("{effects:?}") };
+        ctrl(&mut model, 'k');
+        stand(&mut model, |standing| standing.locked = true);
+        update(&mut model, Msg::Granted(id, answer.map_err(str::to_owned)));
+        stand(&mut model, |standing| standing.locked = false);
+        match left {
+            Some(words) => shows(&mut model, words),
+            None => assert_eq!(model.modal, None, "the form has done its work"),
+        }
+    }
+}
+
+#[test]
+fn a_signature_that_waits_when_the_terminal_is_locked_takes_its_answer() {
+    let mut model = with(&signed(Sign::SecondPerson), person("anna", Role::Technician));
+    let effects = type_keys(&mut model, "s65⏎boris⏎horse⏎");
+    let Some(Effect::Order(order)) = effects.last() else { panic!("no order: {effects:?}") };
+    let id = order.id;
+    stand(&mut model, |standing| standing.locked = true);
+    update(&mut model, Msg::Undelivered(id, "station too busy"));
+    stand(&mut model, |standing| standing.locked = false);
+    shows(&mut model, "station too busy");
+}
+
+#[test]
 fn a_locked_terminal_looks_and_does_nothing() {
     let mut model = with(&Fixture::alarm(), person("anna", Role::Technician));
     stand(&mut model, |standing| standing.locked = true);
