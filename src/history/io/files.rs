@@ -6,6 +6,7 @@ use std::{
     ffi::OsString,
     fs::{self, File, TryLockError},
     io::{Read, Seek, Write},
+    os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
 };
 
@@ -129,6 +130,11 @@ pub fn size(db: &Path) -> u64 {
     LOGS.into_iter().chain([""]).map(bytes).sum()
 }
 
+/// Device and number of a file; `None` if it is not there. Another file at the same path differs.
+pub fn inode(path: &Path) -> Option<(u64, u64)> {
+    fs::metadata(path).ok().map(|meta| (meta.dev(), meta.ino()))
+}
+
 /// The path with something appended: DuckDB itself names its log so.
 pub fn beside(db: &Path, suffix: &str) -> PathBuf {
     let mut name = OsString::from(db.as_os_str());
@@ -168,6 +174,11 @@ pub fn diagnose(db: &Path, message: &str) -> Failure {
         true => Failure::Obstacle(HistoryError::Engine(message.to_owned())),
         false => Failure::Damaged(first_line(message)),
     }
+}
+
+/// Whether a message of damage is certainly about the database, not about its log.
+pub fn is_of_database(message: &str) -> bool {
+    message.contains("Corrupt database file") && !message.contains("WAL")
 }
 
 /// DuckDB appends advice and stack traces; the first line says what happened.

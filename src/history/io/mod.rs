@@ -17,7 +17,9 @@ pub struct Query {
 pub mod alarm_file;
 pub mod sql;
 pub mod files;
+pub mod last;
 pub mod store;
+pub mod open;
 pub mod read;
 pub mod quality;
 pub mod writer;

@@ -9,8 +9,11 @@ use crate::plant::record::ELSEWHERE;
 /// microseconds and take the same space on disk (measured), but a TIMESTAMP can be read by a person and by `time_bucket`.
 /// `value` is a DOUBLE because a FLOAT would turn 123456.7 into 123456.703. `quality` is `Quality::code`.
 ///
+/// `last_commit` has one row: who the file is, how many commits it has, the first and last instant stored; each commit
+/// changes it. So a start need not scan the file, and sees what is missing, see `last`.
+///
 /// `utc` of `line_minute` is the end of the minute; a line goes by its name, as everything that outlives the plant file.
-pub const MIGRATIONS: [&str; 4] = [
+pub const MIGRATIONS: [&str; 5] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -40,6 +43,12 @@ ALTER TABLE alarm_journal ADD COLUMN until_utc TIMESTAMP;
 ALTER TABLE alarm_journal ADD COLUMN burst_utc TIMESTAMP;
 ALTER TABLE alarm_journal ADD COLUMN burst_rank UINTEGER;
 ",
+    "
+CREATE TABLE last_commit (
+    identity UBIGINT NOT NULL, number UBIGINT NOT NULL, first_utc TIMESTAMP, last_utc TIMESTAMP);
+INSERT INTO last_commit SELECT (random() * 9007199254740992)::UBIGINT, 0, min(a), max(z) FROM (
+    SELECT min(utc) AS a, max(utc) AS z FROM sample UNION ALL SELECT min(utc), max(utc) FROM alarm_journal);
+",
 ];
 
 /// Columns of an alarm step, in the order that it is appended and read.
@@ -67,12 +76,11 @@ pub const SET_VERSION: &str = "INSERT INTO schema_version VALUES (?)";
 
 /// The dictionary of tags.
 pub const TAGS: &str = "SELECT id, name, unit FROM tag";
-/// Adds a tag.
-pub const ADD_TAG: &str = "INSERT INTO tag VALUES (?, ?, ?)";
 
-/// The first and the last instant stored.
-pub const EXTENT: &str = "SELECT min(a), max(z) FROM (
-    SELECT min(utc) AS a, max(utc) AS z FROM sample UNION ALL SELECT min(utc), max(utc) FROM alarm_journal)";
+/// The last commit.
+pub const LAST_COMMIT: &str = "SELECT identity, number, first_utc, last_utc FROM last_commit";
+/// The next one.
+pub const SET_LAST_COMMIT: &str = "UPDATE last_commit SET number = ?, first_utc = ?, last_utc = ?";
 
 /// Rows of all tables.
 pub const COUNT_ROWS: &str = "SELECT (SELECT count(*) FROM sample) + (SELECT count(*) FROM alarm_journal)

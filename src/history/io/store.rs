@@ -1,15 +1,16 @@
-//! The store: one DuckDB file, opened, guarded, appended to. Plain and synchronous; one thread owns it.
+//! The store: one DuckDB file, appended to. Plain and synchronous; one thread owns it.
 
-use std::{cell::Cell, collections::HashMap, path::Path, path::PathBuf, sync::Arc, time::Duration};
+use std::{cell::Cell, path::Path, path::PathBuf, sync::Arc, time::Duration};
 
 use duckdb::{
-    AccessMode, Config, Connection, params,
+    Connection, params,
     types::{TimeUnit, Value},
 };
 use jiff::Timestamp;
 
 use super::{
-    files::{self, Failure, Opening, Part},
+    files,
+    last::{self, LastCommit},
     sql,
 };
 use crate::{
@@ -30,100 +31,31 @@ pub struct Store {
     path: PathBuf,
     /// The first and last instant stored, kept because reading them scans the whole file.
     extent: Cell<Option<(Timestamp, Timestamp)>>,
+    /// The last commit, as the database itself has it.
+    last: Cell<LastCommit>,
+    /// Device and number of the file as it was opened.
+    file: Option<(u64, u64)>,
     /// The stored number of each tag, by `TagId`; `None` for a tag that the file does not know (only when read-only).
     pub(super) ids: Vec<Option<u16>>,
     /// Where the records end, if nobody is writing any more.
     pub(super) ended: Option<Timestamp>,
 }
 
-/// A store as it was opened, and what the operator should know about that.
-pub struct Opened {
-    /// The store.
-    pub store: Store,
-    /// `history damaged, set aside as …`.
-    pub trouble: Option<String>,
-}
-
 impl Store {
-    /// Opens or creates the store.
-    ///
-    /// A damaged log is set aside: the file is then as old as its last checkpoint, some minutes. A damaged file is set
-    /// aside with its log and a new store is begun. So it is with files whose opening never ended twice before.
-    /// [`HistoryError::Locked`] if another process has it, [`HistoryError::Engine`] for any other obstacle.
-    pub fn open(path: &Path, def: &Arc<PlantDef>, now: Timestamp) -> Result<Opened, HistoryError> {
-        files::refuse_foreign(path)?;
-        let opening = Opening::begin(path)?;
-        let mut trouble = None;
-        let mut set_aside = |part: Part, why: &str| -> Result<(), HistoryError> {
-            let target = files::set_aside(path, part, now)?;
-            let what = match part {
-                Part::Log => "the last minutes of the history are",
-                Part::Everything => "the history is",
-            };
-            trouble = Some(format!("{what} damaged ({why}) and set aside as {}", target.display()));
-            Ok(())
-        };
-        match opening.failed {
-            0..files::FAILED_OPENS_MAX => {}
-            files::FAILED_OPENS_MAX if files::has_log(path) => set_aside(Part::Log, "opening it never ended")?,
-            _ => set_aside(Part::Everything, "opening it never ended")?,
-        }
-        let mut opened = Store::open_file(path, def);
-        for part in [Part::Log, Part::Everything] {
-            let Err(Failure::Damaged(why)) = &opened else { break };
-            if part == Part::Everything || files::has_log(path) {
-                set_aside(part, why)?;
-                opened = Store::open_file(path, def);
-            }
-        }
-        let store = opened.map_err(|failure| match failure {
-            Failure::Obstacle(error) => error,
-            Failure::Damaged(why) => HistoryError::Engine(why),
-        })?;
-        drop(opening);
-        Ok(Opened { store, trouble })
-    }
-
-    /// Opens the store of a station that is not running, to report from it. Never creates or changes a file.
-    /// [`HistoryError::Missing`] if there is none, [`HistoryError::Locked`] if a station has it.
-    pub fn open_read_only(path: &Path, def: &Arc<PlantDef>) -> Result<Store, HistoryError> {
-        if !path.is_file() {
-            return Err(HistoryError::Missing { path: path.display().to_string() });
-        }
-        files::refuse_foreign(path)?;
-        let failed = |message: String| match files::diagnose(path, &message) {
-            Failure::Obstacle(error) => error,
-            Failure::Damaged(why) => HistoryError::Engine(why),
-        };
-        let db = connect(path, AccessMode::ReadOnly).map_err(|error| failed(error.to_string()))?;
-        let mut store = Store::around(db, path, def);
-        let version = store.version().map_err(|_| HistoryError::Engine("the file is not a history".into()))?;
-        if version as usize != sql::MIGRATIONS.len() {
-            let words = format!("schema version {version}, this program reads {}", sql::MIGRATIONS.len());
-            return Err(HistoryError::Engine(words));
-        }
-        let known = store.dictionary().map_err(engine)?;
-        let id = |name: &str, unit: &str| known.get(&(name.to_owned(), unit.to_owned())).copied();
-        store.ids = def.tags.iter().map(|tag| id(&tag.name, &tag.unit)).collect();
-        store.read_extent().map_err(engine)?;
-        store.ended = store.extent().and_then(|(_, last)| after(last));
-        Ok(store)
-    }
-
     /// Appends records in one transaction: all of them or none.
     pub fn append(&self, records: &[Record]) -> Result<(), HistoryError> {
-        self.transaction(|| {
+        let stored = records.iter().filter_map(|record| match record {
+            Record::Sample(_, sample) => Some(sample.at),
+            Record::Alarm(alarm) => Some(alarm.at),
+            Record::Action(_) | Record::Line(_) => None,
+        });
+        self.commit(stored, || {
             self.append_samples(records)?;
             self.append_alarms(records)?;
             self.append_actions(records)?;
-            self.append_lines(records)
-        })?;
-        records.iter().for_each(|record| match record {
-            Record::Sample(_, sample) => self.extend(sample.at),
-            Record::Alarm(alarm) => self.extend(alarm.at),
-            Record::Action(_) | Record::Line(_) => {}
-        });
-        Ok(())
+            self.append_lines(records)?;
+            Ok(true)
+        })
     }
 
     /// Ends every curve at an instant: from here on the station is off.
@@ -132,9 +64,10 @@ impl Store {
         // A tag without a row for so long has no value any more anyway.
         let since = last.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN);
         let off = Quality::Bad(Cause::StationOff).code();
-        self.db.execute(sql::END_CURVES, params![utc(at), off, utc(since)]).map_err(engine)?;
-        self.extend(at);
-        Ok(())
+        self.commit(
+            std::iter::once(at),
+            || Ok(self.db.execute(sql::END_CURVES, params![utc(at), off, utc(since)])? > 0),
+        )
     }
 
     /// Ends the curves that a station left behind when it died, one second after the last row of all. To be called
@@ -166,90 +99,73 @@ impl Store {
         self.extent.get()
     }
 
-    fn around(db: Connection, path: &Path, def: &Arc<PlantDef>) -> Store {
+    pub(super) fn around(db: Connection, path: &Path, def: &Arc<PlantDef>) -> Store {
         let (def, path) = (Arc::clone(def), path.to_owned());
-        Store { db, def, path, extent: Cell::new(None), ids: Vec::new(), ended: None }
+        let (extent, last) = (Cell::new(None), Cell::new(LastCommit { identity: 0, number: 0, at: None }));
+        let file = files::inode(&path);
+        Store { db, def, path, extent, last, file, ids: Vec::new(), ended: None }
     }
 
-    fn read_extent(&self) -> duckdb::Result<()> {
-        let row = |row: &duckdb::Row| Ok((row.get::<_, Option<i64>>(0)?, row.get::<_, Option<i64>>(1)?));
-        let (first, last) = self.db.query_row(sql::EXTENT, [], row)?;
-        self.extent.set(first.zip(last).and_then(|(first, last)| Some((instant(first)?, instant(last)?))));
+    /// The last commit, as the database itself has it.
+    pub(super) fn last_commit(&self) -> LastCommit {
+        self.last.get()
+    }
+
+    /// Whether the file that was opened is still the one at its path.
+    pub fn is_in_place(&self) -> bool {
+        self.file == files::inode(&self.path)
+    }
+
+    /// Writes the last commit down beside the database. Without that a cut log would go unnoticed, nothing else.
+    pub(super) fn note_last_commit(&self) {
+        if let Err(error) = last::write(&self.path, &self.last.get()) {
+            tracing::warn!(%error, "the last commit is not noted beside the history");
+        }
+    }
+
+    pub(super) fn read_last_commit(&self) -> duckdb::Result<()> {
+        let row = |row: &duckdb::Row| {
+            let time = |column| Ok::<_, duckdb::Error>(row.get::<_, Option<i64>>(column)?.and_then(instant));
+            Ok((LastCommit { identity: row.get(0)?, number: row.get(1)?, at: time(3)? }, time(2)?))
+        };
+        let (last, first) = self.db.query_row(sql::LAST_COMMIT, [], row)?;
+        self.last.set(last);
+        self.extent.set(first.zip(last.at));
         Ok(())
     }
 
-    fn extend(&self, at: Timestamp) {
-        let (first, last) = self.extent.get().unwrap_or((at, at));
-        self.extent.set(Some((first.min(at), last.max(at))));
-    }
-
-    fn open_file(path: &Path, def: &Arc<PlantDef>) -> Result<Store, Failure> {
-        let failed = |error: duckdb::Error| files::diagnose(path, &error.to_string());
-        let db = connect(path, AccessMode::ReadWrite).map_err(failed)?;
-        let mut store = Store::around(db, path, def);
-        store.migrate().map_err(failed)?;
-        let newest = sql::MIGRATIONS.len() as u32;
-        let version = store.version().map_err(failed)?;
-        if version > newest {
-            let words = format!("schema version {version} is of a newer sightglass, this one writes {newest}");
-            return Err(Failure::Obstacle(HistoryError::Engine(words)));
-        }
-        store.register_tags().map_err(failed)?;
-        if store.ids.contains(&None) {
-            let words = "the file has known 65536 tags, more cannot be numbered: begin a new one";
-            return Err(Failure::Obstacle(HistoryError::Engine(words.into())));
-        }
-        // Read what every start reads, so that damage shows while the files can still be set aside.
-        store.read_extent().map_err(failed)?;
-        Ok(store)
-    }
-
-    fn migrate(&self) -> duckdb::Result<()> {
-        self.db.execute_batch(sql::CREATE_VERSION)?;
-        let done = self.version()? as usize;
-        for (number, migration) in sql::MIGRATIONS.iter().enumerate().skip(done) {
-            // What a station left in the log goes into the file first, see `sql::MIGRATIONS`.
-            self.db.execute_batch("CHECKPOINT; BEGIN")?;
-            self.db.execute_batch(migration)?;
-            self.db.execute(sql::SET_VERSION, params![number as u32 + 1])?;
-            self.db.execute_batch("COMMIT; CHECKPOINT")?;
-        }
-        Ok(())
-    }
-
-    fn version(&self) -> duckdb::Result<u32> {
-        self.db.query_row(sql::VERSION, [], |row| row.get(0))
-    }
-
-    /// Stored numbers by (name, unit). A tag whose unit was changed is another tag: its old numbers would be misread.
-    fn dictionary(&self) -> duckdb::Result<HashMap<(String, String), u16>> {
-        let mut statement = self.db.prepare(sql::TAGS)?;
-        let rows = statement.query_map([], |row| Ok(((row.get(1)?, row.get(2)?), row.get(0)?)))?;
-        rows.collect()
-    }
-
-    fn register_tags(&mut self) -> duckdb::Result<()> {
-        let mut known = self.dictionary()?;
-        let mut next = known.values().max().map_or(0, |max| u32::from(*max) + 1);
-        self.db.execute_batch("BEGIN")?;
-        for tag in &self.def.tags {
-            let key = (tag.name.clone(), tag.unit.clone());
-            if !known.contains_key(&key)
-                && let Ok(id) = u16::try_from(next)
-            {
-                self.db.execute(sql::ADD_TAG, params![id, tag.name, tag.unit])?;
-                known.insert(key, id);
-                next += 1;
+    /// Stores what `work` appends, all of it or nothing, as the next commit; `stored` are the instants in it. Without
+    /// any row (`false`) there is no commit.
+    fn commit(
+        &self,
+        stored: impl Iterator<Item = Timestamp>,
+        work: impl FnOnce() -> duckdb::Result<bool>,
+    ) -> Result<(), HistoryError> {
+        let wider = |extent: Option<(Timestamp, Timestamp)>, at: Timestamp| {
+            Some(extent.map_or((at, at), |(first, last)| (first.min(at), last.max(at))))
+        };
+        let extent = stored.fold(self.extent.get(), wider);
+        let number = self.last.get().number + 1;
+        let stored = self.transaction(|| {
+            if !work()? {
+                return Ok(false);
             }
+            let (first, last) = extent.map_or((Value::Null, Value::Null), |(first, last)| (utc(first), utc(last)));
+            self.db.prepare_cached(sql::SET_LAST_COMMIT)?.execute(params![number, first, last])?;
+            Ok(true)
+        })?;
+        if !stored {
+            return Ok(());
         }
-        self.db.execute_batch("COMMIT")?;
-        let id = |name: &str, unit: &str| known.get(&(name.to_owned(), unit.to_owned())).copied();
-        self.ids = self.def.tags.iter().map(|tag| id(&tag.name, &tag.unit)).collect();
+        self.extent.set(extent);
+        self.last.set(LastCommit { number, at: extent.map(|(_, last)| last), ..self.last.get() });
+        self.note_last_commit();
         Ok(())
     }
 
-    fn transaction(&self, work: impl FnOnce() -> duckdb::Result<()>) -> Result<(), HistoryError> {
-        let done = self.db.execute_batch("BEGIN").and_then(|()| work()).and_then(|()| self.db.execute_batch("COMMIT"));
+    fn transaction<T>(&self, work: impl FnOnce() -> duckdb::Result<T>) -> Result<T, HistoryError> {
+        let done = self.db.execute_batch("BEGIN").and_then(|()| work());
+        let done = done.and_then(|done| self.db.execute_batch("COMMIT").map(|()| done));
         done.map_err(|error| {
             // A transaction that DuckDB has already given up cannot be rolled back: the first error is the one that counts.
             let _ = self.db.execute_batch("ROLLBACK");
@@ -353,25 +269,6 @@ fn small(count: u64) -> u32 {
     count.try_into().unwrap_or(u32::MAX)
 }
 
-/// One thread, little memory, nothing from the network; and no bit packing, with which some data make a checkpoint fail
-/// (duckdb/duckdb#22823).
-fn connect(path: &Path, mode: AccessMode) -> duckdb::Result<Connection> {
-    let temporary = files::beside(path, ".tmp");
-    let config = Config::default()
-        .access_mode(mode)?
-        .threads(1)?
-        .max_memory("128MB")?
-        .with("temp_directory", temporary.to_string_lossy())?
-        .with("max_temp_directory_size", "512MB")?
-        .with("checkpoint_threshold", "4MB")?
-        .with("autoinstall_known_extensions", "false")?
-        .with("autoload_known_extensions", "false")?;
-    let db = Connection::open_with_flags(path, config)?;
-    // As an option at the open it is taken without a word and has no effect (measured).
-    db.execute_batch("SET disabled_compression_methods = 'bitpacking'")?;
-    Ok(db)
-}
-
 /// An instant as SQL has it: microseconds UTC.
 pub(super) fn utc(at: Timestamp) -> Value {
     Value::Timestamp(TimeUnit::Microsecond, at.as_microsecond())
@@ -387,6 +284,7 @@ pub(super) fn engine(error: duckdb::Error) -> HistoryError {
     HistoryError::Engine(files::first_line(&error.to_string()))
 }
 
-fn after(last: Timestamp) -> Option<Timestamp> {
+/// The instant at which curves end that end with this record.
+pub(super) fn after(last: Timestamp) -> Option<Timestamp> {
     last.checked_add(Duration::from_secs(1)).ok()
 }

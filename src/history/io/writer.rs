@@ -4,11 +4,7 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{
-    files,
-    quality::Recent,
-    store::{Opened, Store},
-};
+use super::{files, open::Opened, quality::Recent, store::Store};
 use crate::{
     history::{Answer, HistoryError, Question},
     plant::{def::PlantDef, record::AlarmRecord, record::Record, snapshot::HistoryStatus},
@@ -50,7 +46,7 @@ pub struct Writer {
 impl Writer {
     /// Opens the store. Errors as [`Store::open`].
     pub fn open(path: PathBuf, def: Arc<PlantDef>, now: Timestamp) -> Result<Writer, HistoryError> {
-        let Opened { store, trouble } = Store::open(&path, &def, now)?;
+        let Opened { store, trouble, .. } = Store::open(&path, &def, now)?;
         store.end_curves_left_behind(now)?;
         let ahead = store.extent().map(|(_, last)| last).filter(|last| *last > now + CLOCK_STEP);
         let clock = ahead.map(|last| format!("the clock is behind the last record, {last:.0}: is it right?"));
@@ -187,7 +183,7 @@ impl Writer {
         }
         // Closed first: two stores of one process on one file would not see each other's locks.
         self.store = None;
-        if let Ok(Opened { store, trouble }) = Store::open(&self.path, &self.def, now) {
+        if let Ok(Opened { store, trouble, .. }) = Store::open(&self.path, &self.def, now) {
             self.store = Some(store);
             self.damaged = trouble.or(self.damaged.take());
         }

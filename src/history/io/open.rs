@@ -1,0 +1,251 @@
+//! Opening a store: guarded, so that damage never keeps a station from starting, and never goes unsaid.
+
+use std::{collections::HashMap, path::Path, sync::Arc};
+
+use duckdb::{AccessMode, Config, Connection, params};
+use jiff::Timestamp;
+
+use super::{
+    files::{self, Failure, Opening, Part},
+    last::{self, LastCommit, Noted},
+    quality::Recent,
+    sql,
+    store::{Store, after, engine},
+};
+use crate::{
+    history::HistoryError,
+    plant::{def::PlantDef, record::AlarmRecord},
+};
+
+/// A store as it was opened, and what the operator should know about that.
+pub struct Opened<T = ()> {
+    /// The store.
+    pub store: Store,
+    /// `the history is damaged (…) and set aside as …`, or what is missing of it.
+    pub trouble: Option<String>,
+    /// What was read of it while damage could still be met.
+    pub read: T,
+}
+
+/// What a station takes up from its history when it starts.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Restored {
+    /// The steps of alarms that the plant restores.
+    pub steps: Vec<AlarmRecord>,
+    /// What the quality meter of the alarms must know of the last day.
+    pub recent: Recent,
+}
+
+impl Store {
+    /// Opens or creates the store of a station that starts: ends the curves that the station before it left behind, and
+    /// reads what the new one takes up. Errors and damage as in [`Store::open`].
+    pub fn open_at_start(path: &Path, def: &Arc<PlantDef>, now: Timestamp) -> Result<Opened<Restored>, HistoryError> {
+        Store::open_and(path, def, now, |store| {
+            store.end_curves_left_behind(now)?;
+            let steps = store.restore()?;
+            let recent = match store.recent(now) {
+                // A plant must start even if its journal is too long to be measured.
+                Err(error @ HistoryError::TooManyRows { .. }) => {
+                    tracing::warn!(%error, "the alarm figures of the last day begin at zero");
+                    Recent::default()
+                }
+                recent => recent?,
+            };
+            Ok(Restored { steps, recent })
+        })
+    }
+
+    /// Opens or creates the store.
+    ///
+    /// A damaged log is set aside: the file is then as old as its last checkpoint, some minutes. A damaged file is set
+    /// aside with its log and a new store is begun. So it is with files whose opening never ended twice before.
+    /// [`HistoryError::Locked`] if another process has it, [`HistoryError::Engine`] for any other obstacle.
+    pub fn open(path: &Path, def: &Arc<PlantDef>, now: Timestamp) -> Result<Opened, HistoryError> {
+        Store::open_and(path, def, now, |_| Ok(()))
+    }
+
+    /// The same, where `read` meets damage while the files can still be set aside.
+    fn open_and<T>(
+        path: &Path,
+        def: &Arc<PlantDef>,
+        now: Timestamp,
+        read: impl Fn(&Store) -> Result<T, HistoryError>,
+    ) -> Result<Opened<T>, HistoryError> {
+        files::refuse_foreign(path)?;
+        let opening = Opening::begin(path)?;
+        let noted = last::read(path);
+        let mut trouble = None;
+        let mut set_aside = |part: Part, why: &str| -> Result<(), HistoryError> {
+            let target = files::set_aside(path, part, now)?;
+            let what = match part {
+                Part::Log => "the last minutes of the history are",
+                Part::Everything => "the history is",
+            };
+            trouble = Some(format!("{what} damaged ({why}) and set aside as {}", target.display()));
+            Ok(())
+        };
+        match opening.failed {
+            0..files::FAILED_OPENS_MAX => {}
+            files::FAILED_OPENS_MAX if files::has_log(path) => set_aside(Part::Log, "opening it never ended")?,
+            _ => set_aside(Part::Everything, "opening it never ended")?,
+        }
+        let try_open = || {
+            let unclean = files::has_log(path);
+            let store = Store::open_file(path, def)?;
+            if unclean {
+                // A block that a checkpoint needs and cannot read would end every later one.
+                store.checkpoint().map_err(|error| failure(path, error))?;
+            }
+            let read = read(&store).map_err(|error| failure(path, error))?;
+            Ok((store, read))
+        };
+        let mut opened = try_open();
+        for part in [Part::Log, Part::Everything] {
+            let Err(Failure::Damaged(why)) = &opened else { break };
+            if part == Part::Everything || files::has_log(path) && !files::is_of_database(why) {
+                set_aside(part, why)?;
+                opened = try_open();
+            }
+        }
+        let (store, read) = opened.map_err(|failure| match failure {
+            Failure::Obstacle(error) => error,
+            Failure::Damaged(why) => HistoryError::Engine(why),
+        })?;
+        let missing = missing(&noted, &store.last_commit(), trouble.is_some());
+        trouble = match (trouble, missing) {
+            (Some(one), Some(other)) => Some(format!("{one}; {other}")),
+            (one, other) => one.or(other),
+        };
+        store.note_last_commit();
+        drop(opening);
+        Ok(Opened { store, trouble, read })
+    }
+
+    /// Opens the store of a station that is not running, to report from it. Never creates or changes a file.
+    /// [`HistoryError::Missing`] if there is none, [`HistoryError::Locked`] if a station has it.
+    pub fn open_read_only(path: &Path, def: &Arc<PlantDef>) -> Result<Store, HistoryError> {
+        if !path.is_file() {
+            return Err(HistoryError::Missing { path: path.display().to_string() });
+        }
+        files::refuse_foreign(path)?;
+        let failed = |message: String| match files::diagnose(path, &message) {
+            Failure::Obstacle(error) => error,
+            Failure::Damaged(why) => HistoryError::Engine(why),
+        };
+        let db = connect(path, AccessMode::ReadOnly).map_err(|error| failed(error.to_string()))?;
+        let mut store = Store::around(db, path, def);
+        let version = store.version().map_err(|_| HistoryError::Engine("the file is not a history".into()))?;
+        if version as usize != sql::MIGRATIONS.len() {
+            let words = format!("schema version {version}, this program reads {}", sql::MIGRATIONS.len());
+            return Err(HistoryError::Engine(words));
+        }
+        let known = store.dictionary().map_err(engine)?;
+        let id = |name: &str, unit: &str| known.get(&(name.to_owned(), unit.to_owned())).copied();
+        store.ids = def.tags.iter().map(|tag| id(&tag.name, &tag.unit)).collect();
+        store.read_last_commit().map_err(engine)?;
+        store.ended = store.extent().and_then(|(_, last)| after(last));
+        Ok(store)
+    }
+
+    fn open_file(path: &Path, def: &Arc<PlantDef>) -> Result<Store, Failure> {
+        let failed = |error: duckdb::Error| files::diagnose(path, &error.to_string());
+        let db = connect(path, AccessMode::ReadWrite).map_err(failed)?;
+        let mut store = Store::around(db, path, def);
+        store.migrate().map_err(failed)?;
+        let newest = sql::MIGRATIONS.len() as u32;
+        let version = store.version().map_err(failed)?;
+        if version > newest {
+            let words = format!("schema version {version} is of a newer sightglass, this one writes {newest}");
+            return Err(Failure::Obstacle(HistoryError::Engine(words)));
+        }
+        store.register_tags().map_err(failed)?;
+        if store.ids.contains(&None) {
+            let words = "the file has known 65536 tags, more cannot be numbered: begin a new one";
+            return Err(Failure::Obstacle(HistoryError::Engine(words.into())));
+        }
+        store.read_last_commit().map_err(failed)?;
+        Ok(store)
+    }
+
+    fn migrate(&self) -> duckdb::Result<()> {
+        self.db.execute_batch(sql::CREATE_VERSION)?;
+        let done = self.version()? as usize;
+        for (number, migration) in sql::MIGRATIONS.iter().enumerate().skip(done) {
+            // What a station left in the log goes into the file first, see `sql::MIGRATIONS`.
+            self.db.execute_batch("CHECKPOINT; BEGIN")?;
+            self.db.execute_batch(migration)?;
+            self.db.execute(sql::SET_VERSION, params![number as u32 + 1])?;
+            self.db.execute_batch("COMMIT; CHECKPOINT")?;
+        }
+        Ok(())
+    }
+
+    fn version(&self) -> duckdb::Result<u32> {
+        self.db.query_row(sql::VERSION, [], |row| row.get(0))
+    }
+
+    /// Stored numbers by (name, unit). A tag whose unit was changed is another tag: its old numbers would be misread.
+    fn dictionary(&self) -> duckdb::Result<HashMap<(String, String), u16>> {
+        let mut statement = self.db.prepare(sql::TAGS)?;
+        let rows = statement.query_map([], |row| Ok(((row.get(1)?, row.get(2)?), row.get(0)?)))?;
+        rows.collect()
+    }
+
+    /// Numbers the tags that the file does not know yet. All at once: one statement a tag took a millisecond each.
+    fn register_tags(&mut self) -> duckdb::Result<()> {
+        let mut known = self.dictionary()?;
+        let mut next = known.values().max().map_or(0, |max| u32::from(*max) + 1);
+        let mut appender = self.db.appender("tag")?;
+        for tag in &self.def.tags {
+            let key = (tag.name.clone(), tag.unit.clone());
+            if !known.contains_key(&key)
+                && let Ok(id) = u16::try_from(next)
+            {
+                appender.append_row(params![id, tag.name, tag.unit])?;
+                known.insert(key, id);
+                next += 1;
+            }
+        }
+        appender.flush()?;
+        drop(appender);
+        let id = |name: &str, unit: &str| known.get(&(name.to_owned(), unit.to_owned())).copied();
+        self.ids = self.def.tags.iter().map(|tag| id(&tag.name, &tag.unit)).collect();
+        Ok(())
+    }
+}
+
+/// What an error of a read at the start means.
+fn failure(path: &Path, error: HistoryError) -> Failure {
+    match error {
+        HistoryError::Engine(words) => files::diagnose(path, &words),
+        other => Failure::Obstacle(other),
+    }
+}
+
+/// What is missing; a file that was set aside itself is not said to be missing as well.
+fn missing(noted: &Noted, open: &LastCommit, set_aside: bool) -> Option<String> {
+    match noted {
+        Noted::Commit(noted) if set_aside && noted.identity != open.identity => None,
+        Noted::Unreadable if set_aside => None,
+        _ => last::missing(noted, open),
+    }
+}
+
+/// One thread, little memory, nothing from the network; and no bit packing, with which some data make a checkpoint fail
+/// (duckdb/duckdb#22823).
+fn connect(path: &Path, mode: AccessMode) -> duckdb::Result<Connection> {
+    let temporary = files::beside(path, ".tmp");
+    let config = Config::default()
+        .access_mode(mode)?
+        .threads(1)?
+        .max_memory("128MB")?
+        .with("temp_directory", temporary.to_string_lossy())?
+        .with("max_temp_directory_size", "512MB")?
+        .with("checkpoint_threshold", "4MB")?
+        .with("autoinstall_known_extensions", "false")?
+        .with("autoload_known_extensions", "false")?;
+    let db = Connection::open_with_flags(path, config)?;
+    // As an option at the open it is taken without a word and has no effect (measured).
+    db.execute_batch("SET disabled_compression_methods = 'bitpacking'")?;
+    Ok(db)
+}
