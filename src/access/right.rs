@@ -90,6 +90,7 @@ pub fn needs_for_question(question: &Question) -> Role {
         | Question::Actions { .. }
         | Question::LineMinutes { .. }
         | Question::AlarmQuality { .. }
+        | Question::Values { .. }
         | Question::Report { .. } => Right::Look,
         Question::Audit { .. } => Right::People,
     };

@@ -100,7 +100,7 @@ fn of_alarms(def: &PlantDef, command: &AlarmCommand) -> Result<(), String> {
 /// `Err` says what a question names that this plant does not have, or that it asks too much at once.
 pub fn question(def: &PlantDef, question: &Question) -> Result<(), String> {
     match question {
-        Question::Series { tags, buckets, .. } => {
+        Question::Series { tags, buckets, .. } | Question::Values { tags, count: buckets, .. } => {
             if *buckets == 0 || BUCKETS_MAX < *buckets {
                 return Err(format!("{buckets} columns, expected 1 to {BUCKETS_MAX}"));
             }

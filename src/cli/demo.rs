@@ -140,7 +140,8 @@ async fn ask_report(session: &Session, period: Period) -> Result<Box<ShiftReport
         | Answer::Journal(_)
         | Answer::Actions(_)
         | Answer::LineMinutes(_)
-        | Answer::AlarmQuality(_) => Err(HistoryError::Engine("answered another question".into())),
+        | Answer::AlarmQuality(_)
+        | Answer::Values(_) => Err(HistoryError::Engine("answered another question".into())),
     }
 }
 

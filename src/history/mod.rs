@@ -1,4 +1,4 @@
-//! What the plant remembers: DuckDB behind one thread. Everyone else asks it.
+//! What the plant remembers: one thread writes it with DuckDB, another answers questions about it.
 
 pub mod series;
 pub mod alarm_state;
@@ -15,6 +15,7 @@ use crate::{
         def::{LineId, TagId},
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord},
+        sample::{Quality, Sample},
     },
     report::{Period, ShiftReport},
 };
@@ -89,6 +90,17 @@ pub enum Question {
         /// To.
         to: Timestamp,
     },
+    /// What stood at equal distances; one column a tag, in the order asked.
+    Values {
+        /// Which tags.
+        tags: Vec<TagId>,
+        /// The first instant is one distance later.
+        from: Timestamp,
+        /// The distance.
+        every: Duration,
+        /// Instants.
+        count: usize,
+    },
 }
 
 /// The answer to the question of the same name.
@@ -106,6 +118,23 @@ pub enum Answer {
     Report(Box<ShiftReport>),
     /// The figures of the alarm system.
     AlarmQuality(Box<Figures>),
+    /// By tag what stood at each instant; `None` where nothing is stored, or nothing recent enough.
+    Values(Vec<Vec<Option<Stood>>>),
+}
+
+/// A stored value and its quality.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Stood {
+    /// In the tag's unit; `None` exactly when the quality is bad.
+    pub value: Option<f64>,
+    /// How far to trust it.
+    pub quality: Quality,
+}
+
+impl From<Sample> for Stood {
+    fn from(sample: Sample) -> Stood {
+        Stood { value: sample.value, quality: sample.quality }
+    }
 }
 
 /// A curve reduced to columns of equal width.
@@ -175,4 +204,13 @@ pub enum HistoryError {
     /// The question makes no sense: empty or negative span.
     #[error("empty period")]
     EmptyPeriod,
+    /// No store is open: not yet, not any more, or none could be opened.
+    #[error("the history is not open")]
+    NotOpen,
+    /// The answer was not ready in the time that a question may take.
+    #[error("no answer within {seconds} s; choose a shorter period")]
+    TooLong {
+        /// That time.
+        seconds: u64,
+    },
 }

@@ -7,7 +7,7 @@ use jiff::{SignedDuration, Timestamp};
 use super::{Bucket, Series};
 use crate::{
     plant::{def::TagId, sample::Sample},
-    report::hold::{Held, Tally, held},
+    report::hold::{Held, Holding, Tally},
 };
 
 /// The span of a curve; `from < to`.
@@ -21,24 +21,54 @@ pub struct Span {
     pub until: Timestamp,
 }
 
-/// A curve of at most `buckets` columns. The samples are in order of time and begin
+/// A curve of at most `buckets` columns on its way. The samples come in order of time and begin
 /// [`HOLD_MAX`](crate::report::hold::HOLD_MAX) before the span, so that the value standing at its start is known.
-pub fn series(tag: TagId, samples: impl Iterator<Item = Sample>, span: Span, buckets: usize) -> Series {
-    let columns = Columns::new(span, buckets);
-    let mut tallies: Vec<Option<Tally>> = vec![None; columns.count];
-    let mut whole = None;
-    for piece in held(samples, span.from, span.until.min(span.to)) {
-        Tally::add(&mut whole, piece);
-        columns.cut(piece, |column, part| Tally::add(&mut tallies[column], part));
+pub struct Curve {
+    tag: TagId,
+    from: Timestamp,
+    columns: Columns,
+    holding: Holding,
+    tallies: Vec<Option<Tally>>,
+    whole: Option<Tally>,
+}
+
+impl Curve {
+    /// Nothing has come yet.
+    pub fn new(tag: TagId, span: Span, buckets: usize) -> Curve {
+        let columns = Columns::new(span, buckets);
+        let tallies = vec![None; columns.count];
+        let holding = Holding::new(span.from, span.until.min(span.to));
+        Curve { tag, from: span.from, columns, holding, tallies, whole: None }
     }
-    let bucket = |tally: Tally| Bucket { min: tally.min, max: tally.max, mean: tally.mean, last: tally.last };
-    Series {
-        tag,
-        from: span.from,
-        step: columns.step(),
-        buckets: tallies.into_iter().map(|tally| tally.map(bucket)).collect(),
-        summary: whole.map(|tally| (tally.min, tally.mean, tally.max)),
-        good: whole.map_or(0.0, |tally| (tally.seconds * 1e9 / columns.nanos as f64).clamp(0.0, 1.0)),
+
+    /// The next sample.
+    pub fn next(&mut self, sample: Sample) {
+        if let Some(piece) = self.holding.next(sample) {
+            self.add(piece);
+        }
+    }
+
+    /// The curve, when the last sample has come.
+    pub fn end(mut self) -> Series {
+        if let Some(piece) = self.holding.clone().end() {
+            self.add(piece);
+        }
+        let Curve { tag, from, columns, tallies, whole, holding: _ } = self;
+        let bucket = |tally: Tally| Bucket { min: tally.min, max: tally.max, mean: tally.mean, last: tally.last };
+        Series {
+            tag,
+            from,
+            step: columns.step(),
+            buckets: tallies.into_iter().map(|tally| tally.map(bucket)).collect(),
+            summary: whole.map(|tally| (tally.min, tally.mean, tally.max)),
+            good: whole.map_or(0.0, |tally| (tally.seconds * 1e9 / columns.nanos as f64).clamp(0.0, 1.0)),
+        }
+    }
+
+    fn add(&mut self, piece: Held) {
+        let Curve { columns, tallies, whole, .. } = self;
+        Tally::add(whole, piece);
+        columns.cut(piece, |column, part| Tally::add(&mut tallies[column], part));
     }
 }
 
@@ -103,6 +133,12 @@ mod tests {
 
     fn span(from: i64, to: i64) -> Span {
         Span { from: sec(from), to: sec(to), until: sec(to) }
+    }
+
+    fn series(tag: TagId, samples: impl Iterator<Item = Sample>, span: Span, buckets: usize) -> Series {
+        let mut curve = Curve::new(tag, span, buckets);
+        samples.for_each(|sample| curve.next(sample));
+        curve.end()
     }
 
     /// Buckets as (min, mean, max, last) of 0..40 s in four columns.

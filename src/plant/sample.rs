@@ -42,11 +42,13 @@ pub enum Cause {
     StationOff = 11,
     /// There is a value, but nobody who may see it is logged in here. Never stored.
     Withheld = 12,
+    /// It was stored, but the file is damaged there. Never stored.
+    Unreadable = 13,
 }
 
 impl Cause {
     /// Every cause, in the order of its number.
-    pub const ALL: [Cause; 12] = [
+    pub const ALL: [Cause; 13] = [
         Cause::NotRead,
         Cause::Timeout,
         Cause::Corrupt,
@@ -59,6 +61,7 @@ impl Cause {
         Cause::OutOfRange,
         Cause::StationOff,
         Cause::Withheld,
+        Cause::Unreadable,
     ];
 
     /// A few words for the operator.
@@ -76,6 +79,7 @@ impl Cause {
             Cause::OutOfRange => "out of range",
             Cause::StationOff => "station was off",
             Cause::Withheld => "shown after login",
+            Cause::Unreadable => "history damaged",
         }
     }
 }

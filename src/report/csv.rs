@@ -258,6 +258,7 @@ mod tests {
         ShiftReport {
             period: Period { name: "morning 2026-11-21".into(), from, to: at("2026-11-21T14:00+07") },
             until: at("2026-11-21T13:59:30+07"),
+            unreadable: Vec::new(),
             tags: vec![
                 TagFigures {
                     tag: "TIC-1.PV".into(),

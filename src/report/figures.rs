@@ -1,16 +1,21 @@
 //! The figures of a period: from stored samples and alarm steps to the rows of a report.
 
-use std::{collections::HashSet, time::Duration};
+use std::{
+    collections::{HashMap, HashSet},
+    time::Duration,
+};
 
 use jiff::{Timestamp, ToSpan, tz::TimeZone};
 
 use super::{
-    RecordRow, TagFigures,
-    hold::{AsOf, Tally, held},
+    DECIMALS_UNKNOWN, RecordRow, TagFigures,
+    hold::{Holding, Tally, good_value},
 };
 use crate::plant::{
+    def::TagId,
     record::{AlarmRecord, AlarmStep},
     sample::Sample,
+    tag::{Decimals, TagDef},
 };
 
 /// What a tag is called in a report.
@@ -24,43 +29,83 @@ pub struct Label {
     pub decimals: u8,
 }
 
-/// The figures of one tag over `from..until`. The samples are in order of time and begin
-/// [`HOLD_MAX`](super::hold::HOLD_MAX) before `from`.
-pub fn figures(
-    label: Label,
-    samples: impl Iterator<Item = Sample>,
-    from: Timestamp,
-    until: Timestamp,
-    in_alarm: Duration,
-) -> TagFigures {
-    let mut tally = None;
-    held(samples, from, until).for_each(|span| Tally::add(&mut tally, span));
-    let seconds = until.duration_since(from).as_secs_f64();
-    TagFigures {
-        tag: label.tag,
-        unit: label.unit,
-        decimals: label.decimals,
-        min: tally.map(|tally| tally.min),
-        mean: tally.map(|tally| tally.mean),
-        max: tally.map(|tally| tally.max),
-        last: tally.map(|tally| tally.last),
-        in_alarm,
-        good: tally.map_or(0.0, |tally| (tally.seconds / seconds).clamp(0.0, 1.0)),
+impl Label {
+    /// Name, unit and decimals of a tag, where the device may have chosen the last two: `latest` has the latest good values
+    /// of the tags that tell.
+    pub fn at(def: &TagDef, latest: &HashMap<TagId, f64>) -> Label {
+        let decimals = match def.decimals {
+            Decimals::Fixed(decimals) => decimals,
+            Decimals::From(tag) => match latest.get(&tag) {
+                Some(decimals) if (0.0..=9.0).contains(decimals) => *decimals as u8,
+                Some(_) | None => DECIMALS_UNKNOWN,
+            },
+        };
+        let chosen = def.unit_from.as_ref().and_then(|(chooser, units)| {
+            let value = latest.get(chooser)?;
+            units.iter().find(|(number, _)| *value == *number as f64).map(|(_, unit)| unit.clone())
+        });
+        Label { tag: def.name.clone(), unit: chosen.unwrap_or_else(|| def.unit.clone()), decimals }
     }
 }
 
-/// Time within `from..until` in which at least one alarm of a subject was active. The steps are in order and begin with
-/// those of the alarms that were active at `from`; an alarm still active at the end counts to the end.
-pub fn time_in_alarm<'a>(
-    steps: impl Iterator<Item = &'a AlarmRecord>,
-    subject: &str,
-    from: Timestamp,
-    until: Timestamp,
-) -> Duration {
+/// The tags that tell unit and decimals of a tag.
+pub fn choosers(def: &TagDef) -> impl Iterator<Item = TagId> + use<> {
+    let decimals = match def.decimals {
+        Decimals::From(tag) => Some(tag),
+        Decimals::Fixed(_) => None,
+    };
+    decimals.into_iter().chain(def.unit_from.as_ref().map(|(tag, _)| *tag))
+}
+
+/// The figures of one tag over a period on their way. The samples come in order of time and begin
+/// [`HOLD_MAX`](super::hold::HOLD_MAX) before it.
+pub struct Figures {
+    seconds: f64,
+    holding: Holding,
+    tally: Option<Tally>,
+}
+
+impl Figures {
+    /// Over `from..until`; nothing has come yet.
+    pub fn new(from: Timestamp, until: Timestamp) -> Figures {
+        let seconds = until.duration_since(from).as_secs_f64();
+        Figures { seconds, holding: Holding::new(from, until), tally: None }
+    }
+
+    /// The next sample.
+    pub fn next(&mut self, sample: Sample) {
+        if let Some(span) = self.holding.next(sample) {
+            Tally::add(&mut self.tally, span);
+        }
+    }
+
+    /// The figures, when the last sample has come.
+    pub fn end(self, label: Label, in_alarm: Duration) -> TagFigures {
+        let Figures { seconds, holding, mut tally } = self;
+        if let Some(span) = holding.end() {
+            Tally::add(&mut tally, span);
+        }
+        TagFigures {
+            tag: label.tag,
+            unit: label.unit,
+            decimals: label.decimals,
+            min: tally.map(|tally| tally.min),
+            mean: tally.map(|tally| tally.mean),
+            max: tally.map(|tally| tally.max),
+            last: tally.map(|tally| tally.last),
+            in_alarm,
+            good: tally.map_or(0.0, |tally| (tally.seconds / seconds).clamp(0.0, 1.0)),
+        }
+    }
+}
+
+/// Time within `from..until` in which at least one alarm of a subject was active. The steps are all of this subject, in
+/// order, and begin with those of the alarms that were active at `from`; an alarm still active at the end counts to the end.
+pub fn time_in_alarm<'a>(steps: impl Iterator<Item = &'a AlarmRecord>, from: Timestamp, until: Timestamp) -> Duration {
     let mut active: HashSet<&str> = HashSet::new();
     let mut since = from;
     let mut total = Duration::ZERO;
-    for step in steps.filter(|step| &*step.subject == subject && step.at < until) {
+    for step in steps.filter(|step| step.at < until) {
         let at = step.at.max(since);
         if !active.is_empty() {
             total += Duration::try_from(at.duration_since(since)).unwrap_or_default();
@@ -90,25 +135,20 @@ pub fn time_in_alarm<'a>(
     total
 }
 
-/// The thesis's record over `from..until`: one row at every instant whose local time of day is a multiple of `interval`.
-/// The samples are in order of time and begin [`HOLD_MAX`](super::hold::HOLD_MAX) before `from`.
-pub fn record(
-    sv: impl Iterator<Item = Sample>,
-    pv: impl Iterator<Item = Sample>,
-    interval: Duration,
-    zone: &TimeZone,
-    from: Timestamp,
-    until: Timestamp,
-) -> Vec<RecordRow> {
-    let (mut sv, mut pv) = (AsOf::new(sv), AsOf::new(pv));
-    let mut rows = Vec::new();
-    let mut next = on_grid(zone, interval, from);
-    while let Some(at) = next.filter(|at| *at < until) {
-        let (sv, pv) = (sv.at(at), pv.at(at));
-        rows.push(RecordRow { at, sv, pv, er: sv.zip(pv).map(|(sv, pv)| sv - pv) });
-        next = at.checked_add(1.microsecond()).ok().and_then(|after| on_grid(zone, interval, after));
-    }
-    rows
+/// The rows of the thesis's record, from what stood at each of its instants.
+pub fn record(instants: &[Timestamp], sv: &[Option<Sample>], pv: &[Option<Sample>]) -> Vec<RecordRow> {
+    let good = |sample: &Option<Sample>| sample.and_then(good_value);
+    let row = |((at, sv), pv): ((&Timestamp, &Option<Sample>), &Option<Sample>)| {
+        let (sv, pv) = (good(sv), good(pv));
+        RecordRow { at: *at, sv, pv, er: sv.zip(pv).map(|(sv, pv)| sv - pv) }
+    };
+    instants.iter().zip(sv).zip(pv).map(row).collect()
+}
+
+/// The instants of the record over `from..until`: those whose local time of day is a multiple of `interval`.
+pub fn record_grid(interval: Duration, zone: &TimeZone, from: Timestamp, until: Timestamp) -> Vec<Timestamp> {
+    let after = |at: &Timestamp| on_grid(zone, interval, at.checked_add(1.microsecond()).ok()?);
+    std::iter::successors(on_grid(zone, interval, from), after).take_while(|at| *at < until).collect()
 }
 
 /// The first instant not before `at` whose local time of day is a multiple of `interval`. The grid starts anew at every
@@ -138,11 +178,20 @@ fn on_grid(zone: &TimeZone, interval: Duration, at: Timestamp) -> Option<Timesta
 mod tests {
     use proptest::prelude::*;
 
+    use std::sync::Arc;
+
     use super::*;
     use crate::{
         plant::{def::Priority, sample::Cause},
+        report::hold::AsOf,
         report::testing::{at, sec, zone},
     };
+
+    fn figures(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> TagFigures {
+        let mut figures = Figures::new(from, until);
+        samples.for_each(|sample| figures.next(sample));
+        figures.end(label(), Duration::ZERO)
+    }
 
     fn label() -> Label {
         Label { tag: "TIC-1.PV".into(), unit: "°C".into(), decimals: 1 }
@@ -153,7 +202,7 @@ mod tests {
         let samples = samples.iter().map(|&(at, value)| {
             value.map_or(Sample::bad(Cause::Timeout, sec(at)), |value| Sample::good(value, sec(at)))
         });
-        let got = figures(label(), samples, sec(0), sec(100), Duration::ZERO);
+        let got = figures(samples, sec(0), sec(100));
         let [min, mean, max, last] = expect.0.map_or([None; 4], |values| values.map(Some));
         assert_eq!((got.min, got.mean, got.max, got.last), (min, mean, max, last));
         assert!((got.good - expect.1).abs() < 1e-9, "{}", got.good);
@@ -210,9 +259,8 @@ mod tests {
             (vec![step(90, "high", Raised), step(150, "high", Returned)], 10),
             (vec![step(110, "high", Raised)], 0),
         ] {
-            let got = time_in_alarm(steps.iter(), "TIC-1.PV", sec(0), sec(100));
+            let got = time_in_alarm(steps.iter(), sec(0), sec(100));
             assert_eq!(got, Duration::from_secs(expect), "{steps:?}");
-            assert_eq!(time_in_alarm(steps.iter(), "TIC-2.PV", sec(0), sec(100)), Duration::ZERO);
         }
     }
 
@@ -220,16 +268,21 @@ mod tests {
     fn the_record_stands_on_the_local_grid_and_leaves_out_what_was_not_good() {
         let sv = [Sample::good(70.0, sec(-5))];
         let pv = [Sample::good(27.0, sec(3)), Sample::bad(Cause::Timeout, sec(15)), Sample::good(28.5, sec(30))];
-        let rows = record(sv.into_iter(), pv.into_iter(), Duration::from_secs(10), &TimeZone::UTC, sec(0), sec(40));
+        let instants: Arc<[_]> = record_grid(Duration::from_secs(10), &TimeZone::UTC, sec(0), sec(40)).into();
+        let stood = |samples: &[Sample]| {
+            let mut as_of = AsOf::new(instants.clone());
+            samples.iter().for_each(|sample| as_of.next(*sample));
+            as_of.end()
+        };
+        let rows = record(&instants, &stood(&sv), &stood(&pv));
         let row = |at, pv: Option<f64>| RecordRow { at: sec(at), sv: Some(70.0), pv, er: pv.map(|pv| 70.0 - pv) };
         assert_eq!(rows, [row(0, None), row(10, Some(27.0)), row(20, None), row(30, Some(28.5))]);
     }
 
     fn grid(zone_name: &str, interval: u64, from: &str, until: &str) -> Vec<String> {
-        let none = std::iter::empty::<Sample>;
         let zone = zone(zone_name);
-        let rows = record(none(), none(), Duration::from_secs(interval), &zone, at(from), at(until));
-        rows.iter().map(|row| row.at.to_zoned(zone.clone()).strftime("%H:%M%:z").to_string()).collect()
+        let instants = record_grid(Duration::from_secs(interval), &zone, at(from), at(until));
+        instants.iter().map(|at| at.to_zoned(zone.clone()).strftime("%H:%M%:z").to_string()).collect()
     }
 
     #[test]
@@ -266,7 +319,7 @@ mod tests {
                 value.map_or(Sample::bad(Cause::Timeout, sec(at)), |value| Sample::good(value, sec(at)))
             }).collect();
             let until = from + length;
-            let got = figures(label(), samples.iter().copied(), sec(from), sec(until), Duration::ZERO);
+            let got = figures(samples.iter().copied(), sec(from), sec(until));
             // Naive: what stood in each second, by searching the whole list.
             let stood = |second: i64| samples.iter().rev().find(|sample| sample.at <= sec(second))
                 .filter(|sample| sec(second).duration_since(sample.at).as_secs() < 150)

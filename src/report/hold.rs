@@ -6,7 +6,7 @@
 //!                                  no value        HOLD_MAX     no value
 //! ```
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
@@ -34,42 +34,71 @@ impl Held {
     }
 }
 
-/// The spans of good values within `from..until`, in order. The samples are in order of time and should begin
+/// The spans of good values within `from..until`, in order. The samples come in order of time and should begin
 /// [`HOLD_MAX`] before `from`, so that the value standing there is known. Nothing is held beyond `until`.
-pub fn held(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> impl Iterator<Item = Held> {
-    let mut samples = samples.peekable();
-    std::iter::from_fn(move || {
-        loop {
-            let sample = samples.next()?;
-            let Some(value) = good_value(sample) else { continue };
-            let successor = samples.peek().map_or(until, |next| next.at);
-            let to = successor.min(expiry(sample)).min(until);
-            let from = sample.at.max(from);
-            if from < to {
-                return Some(Held { from, to, value });
-            }
-        }
-    })
-}
-
-/// The good value in force at rising instants.
-pub struct AsOf<I: Iterator<Item = Sample>> {
-    samples: std::iter::Peekable<I>,
+#[derive(Debug, Clone)]
+pub struct Holding {
+    from: Timestamp,
+    until: Timestamp,
     current: Option<Sample>,
 }
 
-impl<I: Iterator<Item = Sample>> AsOf<I> {
-    /// Over samples in order of time.
-    pub fn new(samples: I) -> AsOf<I> {
-        AsOf { samples: samples.peekable(), current: None }
+impl Holding {
+    /// Nothing has come yet.
+    pub fn new(from: Timestamp, until: Timestamp) -> Holding {
+        Holding { from, until, current: None }
     }
 
-    /// The good value at an instant, which must not be before the one asked last.
-    pub fn at(&mut self, at: Timestamp) -> Option<f64> {
-        while let Some(sample) = self.samples.next_if(|next| next.at <= at) {
-            self.current = Some(sample);
+    /// The span that ends with the next sample.
+    pub fn next(&mut self, sample: Sample) -> Option<Held> {
+        let before = self.current.replace(sample)?;
+        self.span(before, sample.at)
+    }
+
+    /// The span that nothing comes after.
+    pub fn end(mut self) -> Option<Held> {
+        let last = self.current.take()?;
+        self.span(last, self.until)
+    }
+
+    fn span(&self, sample: Sample, successor: Timestamp) -> Option<Held> {
+        let value = good_value(sample)?;
+        let to = successor.min(expiry(sample)).min(self.until);
+        let from = sample.at.max(self.from);
+        (from < to).then_some(Held { from, to, value })
+    }
+}
+
+/// What stood at rising instants. The samples come in order of time and should begin [`HOLD_MAX`] before the first.
+#[derive(Debug, Clone)]
+pub struct AsOf {
+    instants: Arc<[Timestamp]>,
+    current: Option<Sample>,
+    stood: Vec<Option<Sample>>,
+}
+
+impl AsOf {
+    /// At instants in order of time.
+    pub fn new(instants: Arc<[Timestamp]>) -> AsOf {
+        AsOf { stood: Vec::with_capacity(instants.len()), instants, current: None }
+    }
+
+    /// The next sample.
+    pub fn next(&mut self, sample: Sample) {
+        self.up_to(sample.at);
+        self.current = Some(sample);
+    }
+
+    /// By instant the sample that stood there; `None` if there was none, or it was too old.
+    pub fn end(mut self) -> Vec<Option<Sample>> {
+        self.up_to(Timestamp::MAX);
+        self.stood
+    }
+
+    fn up_to(&mut self, next: Timestamp) {
+        while let Some(at) = self.instants.get(self.stood.len()).filter(|at| **at < next) {
+            self.stood.push(self.current.filter(|sample| *at < expiry(*sample)));
         }
-        self.current.filter(|sample| at < expiry(*sample)).and_then(good_value)
     }
 }
 
@@ -107,7 +136,7 @@ impl Tally {
 }
 
 /// A good value that is a number. A stored NaN or infinity is no value, whatever its quality says.
-fn good_value(sample: Sample) -> Option<f64> {
+pub fn good_value(sample: Sample) -> Option<f64> {
     sample.trusted().filter(|value| value.is_finite())
 }
 
@@ -120,12 +149,20 @@ mod tests {
     use super::*;
     use crate::{plant::sample::Cause, report::testing::sec};
 
+    fn held(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> Vec<Held> {
+        let mut holding = Holding::new(from, until);
+        let mut spans: Vec<Held> = samples.filter_map(|sample| holding.next(sample)).collect();
+        spans.extend(holding.end());
+        spans
+    }
+
     fn check(samples: &[(i64, Option<f64>)], window: (i64, i64), expect: &[(i64, i64, f64)]) {
         let samples = samples.iter().map(|&(at, value)| match value {
             Some(value) => Sample::good(value, sec(at)),
             None => Sample::bad(Cause::Timeout, sec(at)),
         });
         let got: Vec<_> = held(samples, sec(window.0), sec(window.1))
+            .iter()
             .map(|span| (span.from.as_second(), span.to.as_second(), span.value))
             .collect();
         assert_eq!(got, expect);
@@ -152,15 +189,15 @@ mod tests {
     #[test]
     fn an_uncertain_value_is_not_counted_as_good() {
         let samples = [Sample::good(5.0, sec(0)), Sample::good(5.0, sec(4)).doubted(Cause::Stale)];
-        let spans: Vec<_> = held(samples.into_iter(), sec(0), sec(10)).collect();
-        assert_eq!(spans, [Held { from: sec(0), to: sec(4), value: 5.0 }]);
+        assert_eq!(held(samples.into_iter(), sec(0), sec(10)), [Held { from: sec(0), to: sec(4), value: 5.0 }]);
     }
 
     #[test]
     fn the_value_at_an_instant_is_the_one_that_stood_then() {
         let samples = [Sample::good(1.0, sec(0)), Sample::bad(Cause::Timeout, sec(10)), Sample::good(3.0, sec(20))];
-        let mut as_of = AsOf::new(samples.into_iter());
-        let got: Vec<_> = [-1, 0, 9, 10, 19, 20, 169, 170].map(|at| as_of.at(sec(at))).to_vec();
+        let mut as_of = AsOf::new([-1, 0, 9, 10, 19, 20, 169, 170].map(sec).into());
+        samples.into_iter().for_each(|sample| as_of.next(sample));
+        let got: Vec<_> = as_of.end().into_iter().map(|sample| sample.and_then(good_value)).collect();
         assert_eq!(got, [None, Some(1.0), Some(1.0), None, None, Some(3.0), Some(3.0), None]);
     }
 }

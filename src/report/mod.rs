@@ -35,6 +35,17 @@ pub struct Period {
     pub to: Timestamp,
 }
 
+/// A span of stored values that could not be read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Gap {
+    /// From, inclusive.
+    pub from: Timestamp,
+    /// To, exclusive.
+    pub to: Timestamp,
+    /// What the engine says, with the block.
+    pub why: String,
+}
+
 /// The figures of a period.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShiftReport {
@@ -42,6 +53,8 @@ pub struct ShiftReport {
     pub period: Period,
     /// Up to when data were there: the end of the period, or earlier for a running shift.
     pub until: Timestamp,
+    /// Where stored values could not be read: there, none is counted.
+    pub unreadable: Vec<Gap>,
     /// One row a tag.
     pub tags: Vec<TagFigures>,
     /// Steps of alarms in the period, oldest first.

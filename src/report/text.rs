@@ -69,6 +69,7 @@ mod tests {
                 to: at("2026-11-21T14:00+07"),
             },
             until: at("2026-11-21T09:00+07"),
+            unreadable: Vec::new(),
             tags: vec![TagFigures {
                 tag: "TIC-1.PV".into(),
                 unit: "°C".into(),

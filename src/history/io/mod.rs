@@ -1,10 +1,10 @@
-//! The edge of the history: DuckDB, its files and its thread.
+//! The edge of the history: DuckDB, its files, the thread that writes and the one that answers questions.
 
 use tokio::sync::oneshot;
 
 use super::{Answer, HistoryError, Question};
 
-/// A question on its way to the history thread, with the place for its answer.
+/// A question on its way to the history, with the place for its answer.
 /// A dropped answer means: the store has gone.
 #[derive(Debug)]
 pub struct Query {
@@ -21,8 +21,11 @@ pub mod last;
 pub mod store;
 pub mod open;
 pub mod read;
+pub mod samples;
+pub mod report;
 pub mod quality;
 pub mod writer;
+pub mod reader;
 pub mod thread;
 #[cfg(test)]
 mod tests;

@@ -1,12 +1,15 @@
 //! How good the alarm system was: the journal, day by day, through the meter that also measures the running plant.
 
+use std::time::Duration;
+
 use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
-    read::{CHUNK, ROWS_MAX, alarm, check_span, within},
+    read::{ROWS_MAX, alarm, check_span, within},
+    samples::is_damage,
     sql,
-    store::{Store, utc},
+    store::{Store, engine, instant, utc},
 };
 use crate::{
     history::HistoryError,
@@ -19,6 +22,8 @@ use crate::{
     },
 };
 
+/// The journal in memory at a time.
+const CHUNK: Duration = Duration::from_secs(86_400);
 /// Steps of alarms behind the figures of one answer: years of a plant that is run well.
 const STEPS_MAX: u64 = 2_000_000;
 
@@ -42,10 +47,21 @@ impl Store {
         let known = from.checked_sub(LEAD).unwrap_or(Timestamp::MIN);
         let mut meter = Meter::of_period(from, until);
         self.standing_at(known)?.iter().for_each(|step| meter.already(step));
-        self.watched(from, until)?.into_iter().for_each(|window| meter.watched(window));
-        let (first, last) = self.extent().unwrap_or((until, known));
+        let watched = match self.watched(from, until) {
+            Err(error) if is_damage(&error) => {
+                let span = params![utc(from), utc(until), ROWS_MAX + 1];
+                self.whole_list(sql::WATCHED_BY_LINES, span, |row| row.get(0))?
+            }
+            watched => watched?,
+        };
+        watched.into_iter().for_each(|window| meter.watched(window));
+        let journaled = |row: &duckdb::Row| Ok((row.get(0)?, row.get(1)?));
+        let (first, last): (Option<i64>, Option<i64>) =
+            self.db.query_row(sql::JOURNALED, [], journaled).map_err(engine)?;
+        // Only days that have rows are asked for.
+        let (first, last) = (first.and_then(instant).unwrap_or(until), last.map(|last| last + 1).and_then(instant));
         let (mut next, mut rows) = (known.max(first), 0);
-        let end = until.min(last.checked_add(std::time::Duration::from_micros(1)).unwrap_or(last));
+        let end = until.min(last.unwrap_or(known));
         while next < end {
             let to = next.checked_add(CHUNK).unwrap_or(end).min(end);
             let steps = self.steps(next, to)?;

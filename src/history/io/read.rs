@@ -1,46 +1,52 @@
-//! What the store answers: curves, journal, deeds, reports, and the alarms to restore.
+//! What the store answers: curves, values, journal, deeds, and the alarms to restore.
 
-use std::{cell::RefCell, sync::Arc, time::Duration};
+use std::{collections::HashMap, sync::Arc, time::Duration};
 
 use duckdb::{Row, params};
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 
 use super::{
+    samples::is_damage,
     sql,
     store::{Store, engine, instant, utc},
 };
 use crate::{
-    history::{Answer, HistoryError, Question, Series, series},
+    history::{
+        Answer, HistoryError, Question, Series, Stood,
+        series::{self, Curve},
+    },
     plant::{
-        def::{DeviceId, Priority, TagId},
+        def::{Priority, TagId},
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord, AlarmStep, Burst, Seal},
-        sample::{Cause, Quality, Sample},
-        tag::Decimals,
     },
-    report::{
-        DECIMALS_UNKNOWN, Period, RecordRow, ShiftReport,
-        figures::{self, Label},
-        hold::HOLD_MAX,
-    },
+    report::hold::AsOf,
 };
 
 /// Rows of a list or of a record in one answer; an answer that would be longer is refused, never cut.
 pub const ROWS_MAX: u64 = 200_000;
-/// Stored samples behind the curves of one answer (measured: ten million take about three seconds,
-/// in which no commit is made).
-pub const SAMPLES_MAX: u64 = 10_000_000;
-/// The same behind one report, which reads each of them once more for the record: years of a small plant.
-pub const REPORTED_MAX: u64 = 20_000_000;
-/// Stored samples in memory at a time: those of one tag in this span.
-pub(super) const CHUNK: Duration = Duration::from_secs(86_400);
+/// Stored samples behind one answer: what is read in some seconds (see the bench `history`).
+pub const SAMPLES_MAX: u64 = 100_000_000;
 
 impl Store {
     /// Answers a question; nothing after `now` is known.
     pub fn answer(&self, question: &Question, now: Timestamp) -> Result<Answer, HistoryError> {
+        let answer = self.look_up(question, now);
+        if let Err(error) = &answer
+            && is_damage(error)
+        {
+            self.unreadable.replace(Some(error.to_string()));
+        }
+        answer
+    }
+
+    fn look_up(&self, question: &Question, now: Timestamp) -> Result<Answer, HistoryError> {
         match question {
             Question::Series { tags, from, to, buckets } => {
                 self.curves(tags, series::Span { from: *from, to: *to, until: now }, *buckets).map(Answer::Series)
+            }
+            Question::Values { tags, from, every, count } => {
+                self.values(tags, *from, *every, *count, now).map(Answer::Values)
             }
             Question::Journal { from, to, limit } => {
                 check_span(*from, *to)?;
@@ -78,118 +84,43 @@ impl Store {
 
     fn curves(&self, tags: &[TagId], span: series::Span, buckets: usize) -> Result<Vec<Series>, HistoryError> {
         check_span(span.from, span.to)?;
-        self.bounded(tags, span.from, span.to, SAMPLES_MAX)?;
-        let curve = |tag: &TagId| {
-            let samples = self.samples(*tag, span.from, span.to)?;
-            sound(samples, |samples| series::series(*tag, samples, span, buckets))
-        };
-        tags.iter().map(curve).collect()
+        self.bounded(tags.len(), span.from, span.to, span.until, SAMPLES_MAX)?;
+        let tags = Distinct::new(tags);
+        let mut curves: Vec<Curve> = tags.each.iter().map(|tag| Curve::new(*tag, span, buckets)).collect();
+        self.each_sample(&tags.each, span.from, span.to, |place, sample| curves[place].next(sample))?;
+        Ok(tags.all(curves.into_iter().map(Curve::end)))
     }
 
-    /// The report of a period, up to `now`.
-    pub fn report(&self, period: &Period, now: Timestamp) -> Result<ShiftReport, HistoryError> {
-        let (from, until) = (period.from, period.to.min(now));
-        check_span(from, until)?;
-        self.bounded(&self.reported_tags(), from, until, REPORTED_MAX)?;
-        let active = self.active_at(from)?;
-        let span = params![utc(from), utc(until), ROWS_MAX + 1];
-        let alarms = self.steps(from, until)?;
-        let actions = self.whole_list(&sql::actions_oldest(), span, action)?;
-        let mut tags = Vec::new();
-        for tag in self.reported_tags() {
-            let label = self.label(tag, from, until)?;
-            let in_alarm = figures::time_in_alarm(active.iter().chain(&alarms), &label.tag, from, until);
-            let samples = self.samples(tag, from, until)?;
-            tags.push(sound(samples, |samples| figures::figures(label, samples, from, until, in_alarm))?);
-        }
-        let (record, record_of) = match self.def.report.record {
-            Some((device, interval)) => self.record(device, interval, from, until)?,
-            None => (Vec::new(), None),
-        };
-        let quality = self.alarm_quality(from, until, now)?;
-        Ok(ShiftReport { period: period.clone(), until, tags, alarms, quality, actions, record, record_of })
-    }
-
-    /// The tags that the plant file asks for, or every stored tag with a unit.
-    fn reported_tags(&self) -> Vec<TagId> {
-        match self.def.report.tags.as_slice() {
-            [] => self.def.tags.iter().filter(|tag| tag.store && !tag.unit.is_empty()).map(|tag| tag.id).collect(),
-            tags => tags.to_vec(),
-        }
-    }
-
-    /// Name, unit and decimals of a tag as they stood at the end of a period; the device may choose the last two.
-    fn label(&self, tag: TagId, from: Timestamp, until: Timestamp) -> Result<Label, HistoryError> {
-        let def = self.def.tag(tag);
-        let decimals = match def.decimals {
-            Decimals::Fixed(decimals) => decimals,
-            Decimals::From(tag) => match self.latest_good(tag, from, until)? {
-                Some(decimals) if (0.0..=9.0).contains(&decimals) => decimals as u8,
-                Some(_) | None => DECIMALS_UNKNOWN,
-            },
-        };
-        let chosen = match &def.unit_from {
-            Some((chooser, units)) => {
-                let value = self.latest_good(*chooser, from, until)?;
-                units.iter().find(|(number, _)| value == Some(*number as f64)).map(|(_, unit)| unit.clone())
-            }
-            None => None,
-        };
-        Ok(Label { tag: def.name.clone(), unit: chosen.unwrap_or_else(|| def.unit.clone()), decimals })
-    }
-
-    fn record(
+    /// What stood at equal distances: the first instant is one `every` after `from`. Nothing stands after `now`.
+    fn values(
         &self,
-        device: DeviceId,
-        interval: Duration,
+        tags: &[TagId],
         from: Timestamp,
-        until: Timestamp,
-    ) -> Result<(Vec<RecordRow>, Option<NameAndUnit>), HistoryError> {
-        let def = self.def.device(device);
-        let Some(face) = &def.faceplate else { return Ok((Vec::new(), None)) };
-        let rows =
-            until.duration_since(from).as_millis() / i128::try_from(interval.as_millis().max(1)).unwrap_or(i128::MAX);
-        within(u64::try_from(rows).unwrap_or(u64::MAX), ROWS_MAX)?;
-        let (sv, pv) = (self.samples(face.sv, from, until)?, self.samples(face.pv, from, until)?);
-        let zone = &self.def.time_zone;
-        let rows = sound(sv, |sv| sound(pv, |pv| figures::record(sv, pv, interval, zone, from, until)))??;
-        Ok((rows, Some((def.name.clone(), self.label(face.pv, from, until)?.unit))))
+        every: Duration,
+        count: usize,
+        now: Timestamp,
+    ) -> Result<Vec<Vec<Option<Stood>>>, HistoryError> {
+        let instants = (1..=count).map_while(|number| grid(from, every, number)).take_while(|at| *at <= now);
+        let instants: Arc<[Timestamp]> = instants.collect();
+        let Some(last) = instants.last() else { return Ok(vec![vec![None; count]; tags.len()]) };
+        let to = last.checked_add(Duration::from_micros(1)).unwrap_or(*last);
+        check_span(from, to)?;
+        self.bounded(tags.len(), from, to, now, SAMPLES_MAX)?;
+        let tags = Distinct::new(tags);
+        let mut stood: Vec<AsOf> = tags.each.iter().map(|_| AsOf::new(instants.clone())).collect();
+        self.each_sample(&tags.each, from, to, |place, sample| stood[place].next(sample))?;
+        let column = |stood: AsOf| {
+            let stood = stood.end().into_iter().map(|sample| sample.map(Stood::from));
+            stood.chain(std::iter::repeat(None)).take(count).collect()
+        };
+        Ok(tags.all(stood.into_iter().map(column)))
     }
 
-    /// The samples of a tag that matter in a span, in order of time, beginning [`HOLD_MAX`] before it.
-    fn samples(&self, tag: TagId, from: Timestamp, to: Timestamp) -> Result<Samples<'_>, HistoryError> {
-        let extent = self.extent().filter(|_| self.id(tag).is_some());
-        let from = from.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN);
-        // Only days that have rows are asked for.
-        let (next, end) = extent.map_or((0, 0), |(first, last)| {
-            (from.max(first).as_microsecond(), to.as_microsecond().min(last.as_microsecond() + 1))
-        });
-        let off = self.ended.map(|at| Sample::bad(Cause::StationOff, at));
-        Ok(Samples { store: self, id: self.id(tag), next, end, rows: Vec::new().into_iter(), off })
-    }
-
-    /// Refuses what would keep the thread, and with it every commit, for too long.
-    pub(super) fn bounded(&self, tags: &[TagId], from: Timestamp, to: Timestamp, max: u64) -> Result<(), HistoryError> {
-        let rows = tags.iter().map(|tag| self.count(*tag, from, to)).sum::<Result<u64, _>>()?;
-        within(rows, max)
-    }
-
-    fn count(&self, tag: TagId, from: Timestamp, to: Timestamp) -> Result<u64, HistoryError> {
-        let params = params![self.id(tag), utc(from), utc(to)];
-        self.db.query_row(sql::COUNT_SAMPLES, params, |row| row.get(0)).map_err(engine)
-    }
-
-    fn latest_good(&self, tag: TagId, from: Timestamp, until: Timestamp) -> Result<Option<f64>, HistoryError> {
-        let since = from.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN);
-        let params = params![self.id(tag), utc(since), utc(until)];
-        self.db.query_row(sql::LATEST_GOOD, params, |row| row.get(0)).map_err(engine)
-    }
-
-    fn id(&self, tag: TagId) -> Option<u16> {
+    pub(super) fn id(&self, tag: TagId) -> Option<u16> {
         self.ids.get(tag.index()).copied().flatten()
     }
 
-    fn list<T>(
+    pub(super) fn list<T>(
         &self,
         sql: &str,
         params: &[&dyn duckdb::ToSql],
@@ -213,66 +144,37 @@ impl Store {
     }
 }
 
-/// Name and unit of the recorded controller.
-type NameAndUnit = (String, String);
-
-/// The samples of a tag, read a day at a time.
-struct Samples<'a> {
-    store: &'a Store,
-    id: Option<u16>,
-    /// Microseconds: the next day to read begins here, the last ends at `end`.
-    next: i64,
-    end: i64,
-    rows: std::vec::IntoIter<Sample>,
-    /// The end of all records, if the station is not running.
-    off: Option<Sample>,
+/// Tags without repetition, so that each sample has one place, and where each that was asked for stands among them.
+struct Distinct {
+    each: Vec<TagId>,
+    asked: Vec<usize>,
 }
 
-impl Samples<'_> {
-    fn read(&self, from: i64, to: i64) -> Result<Vec<Sample>, HistoryError> {
-        let (Some(from), Some(to)) = (instant(from), instant(to)) else { return Ok(Vec::new()) };
-        self.store.list(sql::SAMPLES, params![self.id, utc(from), utc(to)], sample)
+impl Distinct {
+    fn new(asked: &[TagId]) -> Distinct {
+        let mut places = HashMap::new();
+        let mut each = Vec::new();
+        let place = |tag: &TagId| {
+            *places.entry(*tag).or_insert_with(|| {
+                each.push(*tag);
+                each.len() - 1
+            })
+        };
+        let asked = asked.iter().map(place).collect();
+        Distinct { each, asked }
+    }
+
+    /// What was found for each, in the order asked for.
+    fn all<T: Clone>(&self, found: impl Iterator<Item = T>) -> Vec<T> {
+        let found: Vec<T> = found.collect();
+        self.asked.iter().map(|place| found[*place].clone()).collect()
     }
 }
 
-impl Iterator for Samples<'_> {
-    type Item = Result<Sample, HistoryError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        loop {
-            if let Some(sample) = self.rows.next() {
-                return Some(Ok(sample));
-            }
-            if self.next >= self.end {
-                return self.off.take().map(Ok);
-            }
-            let to = self.next.saturating_add(CHUNK.as_micros() as i64).min(self.end);
-            match self.read(self.next, to) {
-                Ok(rows) => self.rows = rows.into_iter(),
-                Err(error) => {
-                    self.next = self.end;
-                    return Some(Err(error));
-                }
-            }
-            self.next = to;
-        }
-    }
-}
-
-/// Hands the items of a fallible sequence to `work` as far as they are sound; an error makes the whole an error.
-fn sound<T, R>(
-    mut items: impl Iterator<Item = Result<T, HistoryError>>,
-    work: impl FnOnce(&mut dyn Iterator<Item = T>) -> R,
-) -> Result<R, HistoryError> {
-    let failed = RefCell::new(None);
-    let result = work(&mut std::iter::from_fn(|| match items.next()? {
-        Ok(item) => Some(item),
-        Err(error) => {
-            *failed.borrow_mut() = Some(error);
-            None
-        }
-    }));
-    failed.into_inner().map_or(Ok(result), Err)
+/// An instant of an even grid, computed from the start, so that no rounding adds up.
+fn grid(from: Timestamp, every: Duration, number: usize) -> Option<Timestamp> {
+    let nanos = i128::try_from(every.as_nanos()).ok()?.checked_mul(number as i128)?;
+    from.checked_add(SignedDuration::from_nanos_i128(nanos)).ok()
 }
 
 pub(super) fn check_span(from: Timestamp, to: Timestamp) -> Result<(), HistoryError> {
@@ -285,18 +187,6 @@ pub(super) fn within(rows: u64, max: u64) -> Result<(), HistoryError> {
 
 fn capped(limit: usize) -> u64 {
     (limit as u64).min(ROWS_MAX)
-}
-
-fn sample(row: &Row) -> duckdb::Result<Sample> {
-    let at = time(row)?;
-    let value: Option<f64> = row.get(1)?;
-    // A number that no version wrote is no value.
-    let quality = Quality::from_code(row.get(2)?).unwrap_or(Quality::Bad(Cause::Corrupt));
-    Ok(match (value, quality) {
-        (Some(_), Quality::Good | Quality::Uncertain(_)) => Sample { value, quality, at },
-        (None, Quality::Good) => Sample::bad(Cause::Corrupt, at),
-        (None, Quality::Uncertain(cause)) | (_, Quality::Bad(cause)) => Sample::bad(cause, at),
-    })
 }
 
 pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {
@@ -324,7 +214,7 @@ pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {
     })
 }
 
-fn action(row: &Row) -> duckdb::Result<ActionRecord> {
+pub(super) fn action(row: &Row) -> duckdb::Result<ActionRecord> {
     Ok(ActionRecord {
         at: time(row)?,
         by: shared(row, 1)?,

@@ -91,19 +91,32 @@ pub const END_CURVES: &str = "INSERT INTO sample
     SELECT ?, tag, NULL, ? FROM (SELECT tag, arg_max(quality, rowid) AS last FROM sample WHERE utc >= ? GROUP BY tag)
     WHERE last < 128";
 
-/// Samples of a tag in a span. Rows of one instant keep the order in which they were written.
-pub const SAMPLES: &str =
-    "SELECT utc, value, quality FROM sample WHERE tag = ? AND utc >= ? AND utc < ? ORDER BY utc, rowid";
-/// How many there are.
-pub const COUNT_SAMPLES: &str = "SELECT count(*) FROM sample WHERE tag = ? AND utc >= ? AND utc < ?";
-/// The latest good value of a tag in a span.
-pub const LATEST_GOOD: &str =
-    "SELECT arg_max(value, utc) FROM sample WHERE tag = ? AND utc >= ? AND utc < ? AND quality = 0";
+/// Samples in a span, of some stored numbers of tags or of all, in the order in which they were written.
+pub fn samples(tags: Option<&str>) -> String {
+    let some = match tags {
+        None => String::new(),
+        Some("") => " AND false".into(),
+        Some(list) => format!(" AND tag IN ({list})"),
+    };
+    format!("SELECT utc, tag, value, quality FROM sample WHERE utc >= ? AND utc < ?{some}")
+}
+/// Rows of the table of samples, from what the engine keeps of it: nothing is read.
+pub const ROWS_ABOUT: &str = "SELECT estimated_size FROM duckdb_tables() WHERE table_name = 'sample'";
+/// When the first sample in the file was stored.
+pub const FIRST_STORED: &str = "SELECT epoch_us(utc) FROM sample LIMIT 1";
+/// The first and the last instant of the journal.
+pub const JOURNALED: &str = "SELECT min(utc), max(utc) FROM alarm_journal";
 
 /// The windows of ten minutes, by their number since 1970, in which anything was stored: in these a station ran.
 pub const WATCHED: &str = "SELECT DISTINCT epoch_us(utc) // 600000000 FROM (
         SELECT utc FROM sample WHERE utc >= $1 AND utc < $2
         UNION ALL SELECT utc FROM alarm_journal WHERE utc >= $1 AND utc < $2
+        UNION ALL SELECT utc - INTERVAL 1 MINUTE FROM line_minute WHERE utc >= $1 AND utc < $2)
+    ORDER BY 1 LIMIT $3";
+
+/// The same where samples cannot be read; a line has a row every minute.
+pub const WATCHED_BY_LINES: &str = "SELECT DISTINCT epoch_us(utc) // 600000000 FROM (
+        SELECT utc FROM alarm_journal WHERE utc >= $1 AND utc < $2
         UNION ALL SELECT utc - INTERVAL 1 MINUTE FROM line_minute WHERE utc >= $1 AND utc < $2)
     ORDER BY 1 LIMIT $3";
 

@@ -1,9 +1,14 @@
-//! The store: one DuckDB file, appended to. Plain and synchronous; one thread owns it.
+//! The store: one DuckDB file, appended to. Plain and synchronous; one thread writes, clones of it read.
 
-use std::{cell::Cell, path::Path, path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    cell::{Cell, RefCell},
+    path::{Path, PathBuf},
+    sync::{Arc, Weak},
+    time::Duration,
+};
 
 use duckdb::{
-    Connection, params,
+    Connection, InterruptHandle, params,
     types::{TimeUnit, Value},
 };
 use jiff::Timestamp;
@@ -11,6 +16,7 @@ use jiff::Timestamp;
 use super::{
     files,
     last::{self, LastCommit},
+    samples::PIECE,
     sql,
 };
 use crate::{
@@ -39,9 +45,34 @@ pub struct Store {
     pub(super) ids: Vec<Option<u16>>,
     /// Where the records end, if nobody is writing any more.
     pub(super) ended: Option<Timestamp>,
+    /// Rows that are read at a time.
+    pub(super) piece: usize,
+    /// What could not be read of the file, said once to whoever asks.
+    pub(super) unreadable: RefCell<Option<String>>,
+    /// Shared with every clone, and dropped after their connections: while one is left, the file is not closed.
+    alive: Arc<()>,
 }
 
 impl Store {
+    /// The same store through a connection of its own, to read beside the one that writes.
+    pub fn try_clone(&self) -> Result<Store, HistoryError> {
+        let db = self.db.try_clone().map_err(engine)?;
+        let mut own = Store { alive: Arc::clone(&self.alive), ..Store::around(db, &self.path, &self.def) };
+        (own.extent, own.last, own.file) = (self.extent.clone(), self.last.clone(), self.file);
+        (own.ids, own.ended, own.piece) = (self.ids.clone(), self.ended, self.piece);
+        Ok(own)
+    }
+
+    /// Gone when the last connection to the file is closed.
+    pub(super) fn alive(&self) -> Weak<()> {
+        Arc::downgrade(&self.alive)
+    }
+
+    /// Ends what this connection is doing, from any thread.
+    pub(super) fn interrupt_handle(&self) -> Arc<InterruptHandle> {
+        self.db.interrupt_handle()
+    }
+
     /// Appends records in one transaction: all of them or none.
     pub fn append(&self, records: &[Record]) -> Result<(), HistoryError> {
         let stored = records.iter().filter_map(|record| match record {
@@ -103,7 +134,8 @@ impl Store {
         let (def, path) = (Arc::clone(def), path.to_owned());
         let (extent, last) = (Cell::new(None), Cell::new(LastCommit { identity: 0, number: 0, at: None }));
         let file = files::inode(&path);
-        Store { db, def, path, extent, last, file, ids: Vec::new(), ended: None }
+        let (unreadable, alive) = (RefCell::default(), Arc::default());
+        Store { db, def, path, extent, last, file, ids: Vec::new(), ended: None, piece: PIECE, unreadable, alive }
     }
 
     /// The last commit, as the database itself has it.

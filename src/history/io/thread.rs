@@ -1,4 +1,4 @@
-//! The one thread that owns the store: records in, one commit a second, questions between commits.
+//! The thread that writes: records in, one commit a second; and the thread beside it that answers questions.
 
 use std::{path::Path, sync::Arc, thread::JoinHandle, time::Duration};
 
@@ -7,7 +7,13 @@ use tokio::{
     time::MissedTickBehavior,
 };
 
-use super::{Query, quality::Recent, writer::Writer};
+use super::{
+    Query,
+    quality::Recent,
+    reader::{Answerer, QUESTIONS_MAX, Reader, Request},
+    store::Store,
+    writer::Writer,
+};
 use crate::{
     bus::io::clock::Clock,
     history::HistoryError,
@@ -20,8 +26,10 @@ use crate::{
 
 /// Batches of records on their way to the thread; a full queue is the sender's to count.
 pub const RECORDS_MAX: usize = 1024;
-/// Questions on their way to the thread.
+/// Questions that wait for their turn; a full queue refuses more.
 pub const QUERIES_MAX: usize = 64;
+/// Requests of questions on their way to the writer: each that is being answered has one at most.
+const REQUESTS_MAX: usize = 2 * QUESTIONS_MAX;
 /// Real time between two commits: what a power failure may cost.
 const COMMIT_EVERY: Duration = Duration::from_secs(1);
 
@@ -30,7 +38,7 @@ const COMMIT_EVERY: Duration = Duration::from_secs(1);
 pub struct Handle {
     /// Records to store. When the last sender is dropped the thread stores what it has and ends.
     pub records: mpsc::Sender<Vec<Record>>,
-    /// Questions; those that the thread can no longer answer are dropped with their reply.
+    /// Questions; those that can no longer be answered are dropped with their reply.
     pub queries: mpsc::Sender<Query>,
     /// How the store stands, after every commit.
     pub status: watch::Receiver<HistoryStatus>,
@@ -54,9 +62,19 @@ impl Handle {
     }
 }
 
-/// Opens the store and starts its thread. Errors as [`Store::open`](super::store::Store::open).
+/// Opens the store and starts its threads. Errors as [`Store::open`].
 pub fn start(path: &Path, def: Arc<PlantDef>, clock: Clock) -> Result<Handle, HistoryError> {
-    let writer = Writer::open(path.to_owned(), def, clock.now())?;
+    start_with(path, def, clock, Arc::new(Store::answer))
+}
+
+/// The same with other answers.
+pub(super) fn start_with(
+    path: &Path,
+    def: Arc<PlantDef>,
+    clock: Clock,
+    answer: Answerer,
+) -> Result<Handle, HistoryError> {
+    let mut writer = Writer::open(path.to_owned(), def, clock.now())?;
     let restored = writer.restore()?;
     // A plant must start even if its journal is too long to be measured.
     let recent = writer.recent(clock.now()).unwrap_or_else(|error| {
@@ -69,11 +87,29 @@ pub fn start(path: &Path, def: Arc<PlantDef>, clock: Clock) -> Result<Handle, Hi
     let (settled_out, settled) = watch::channel(0);
     let tell = Tell { settled: settled_out, status: status_out };
     let trouble = |error: std::io::Error| HistoryError::Engine(format!("thread: {error}"));
-    // A runtime of its own only to wait for two queues and a tick at once; nothing else ever runs on it.
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().map_err(trouble)?;
-    let work = move || runtime.block_on(run(writer, clock, records_in, queries_in, tell));
-    let join = std::thread::Builder::new().name("history".into()).spawn(work).map_err(trouble)?;
+    let (requests, requests_in) = mpsc::channel(REQUESTS_MAX);
+    let reader = Reader { stores: writer.stores(), writer: requests, clock, answer };
+    let reading = spawn("history-reader", || reader.run(queries_in)).map_err(trouble)?;
+    let writing = move || async move {
+        run(&mut writer, clock, records_in, requests_in, &tell).await;
+        writer.end_reading();
+        // A panic of the thread has already been reported by the panic hook.
+        let _ = reading.join();
+        writer.finish(clock.now());
+        tell.tell(&writer);
+    };
+    let join = spawn("history", writing).map_err(trouble)?;
     Ok(Handle { records, queries, status, settled, restored, recent, join })
+}
+
+/// A thread with a runtime of its own, only to wait for queues and times at once.
+fn spawn<F: Future<Output = ()>>(
+    name: &str,
+    work: impl FnOnce() -> F + Send + 'static,
+) -> std::io::Result<JoinHandle<()>> {
+    let runtime =
+        tokio::runtime::Builder::new_current_thread().enable_time().max_blocking_threads(QUESTIONS_MAX).build()?;
+    std::thread::Builder::new().name(name.into()).spawn(move || runtime.block_on(work()))
 }
 
 /// Where the thread tells how it stands.
@@ -90,44 +126,41 @@ impl Tell {
 }
 
 async fn run(
-    mut writer: Writer,
+    writer: &mut Writer,
     clock: Clock,
     mut records: mpsc::Receiver<Vec<Record>>,
-    mut queries: mpsc::Receiver<Query>,
-    tell: Tell,
+    mut requests: mpsc::Receiver<Request>,
+    tell: &Tell,
 ) {
     let mut tick = tokio::time::interval(COMMIT_EVERY);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         tokio::select! {
-            // In this order: a commit is never late for a question, and a question sees the records before it.
+            // In this order: a question sees the records before it.
             biased;
             _ = tick.tick() => {
                 writer.commit(clock.now());
-                tell.tell(&writer);
+                tell.tell(writer);
             }
             batch = records.recv() => {
                 let Some(batch) = batch else { break };
                 if writer.accept(batch) {
                     writer.commit(clock.now());
-                    tell.tell(&writer);
+                    tell.tell(writer);
                 }
             }
-            Some(query) = queries.recv() => reply(&mut writer, query, &clock),
+            Some(request) = requests.recv() => match request {
+                Request::Commit(done) => {
+                    writer.commit(clock.now());
+                    tell.tell(writer);
+                    // A question that waits no longer needs no word.
+                    let _ = done.send(());
+                }
+                Request::Unreadable(what) => {
+                    writer.unreadable(what);
+                    tell.tell(writer);
+                }
+            }
         }
     }
-    while let Ok(query) = queries.try_recv() {
-        reply(&mut writer, query, &clock);
-    }
-    writer.finish(clock.now());
-    tell.tell(&writer);
-}
-
-fn reply(writer: &mut Writer, query: Query, clock: &Clock) {
-    // Nobody waits any more: the work is spared.
-    if query.reply.is_closed() {
-        return;
-    }
-    let answer = writer.answer(&query.question, clock.now());
-    let _ = query.reply.send(answer);
 }

@@ -1,12 +1,17 @@
-//! What the history thread does, without the thread: gathers records, commits, retries, answers, keeps the status.
+//! What the history thread does, without the thread: gathers records, commits, retries, keeps the status.
 
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    path::PathBuf,
+    sync::{Arc, Weak},
+    time::Duration,
+};
 
 use jiff::Timestamp;
+use tokio::sync::mpsc;
 
 use super::{files, open::Opened, quality::Recent, store::Store};
 use crate::{
-    history::{Answer, HistoryError, Question},
+    history::HistoryError,
     plant::{def::PlantDef, record::AlarmRecord, record::Record, snapshot::HistoryStatus},
 };
 
@@ -19,11 +24,18 @@ const CHECKPOINT_EVERY: u32 = 300;
 const CLOCK_STEP: Duration = Duration::from_secs(5);
 /// Failed commits between two attempts to open the store anew.
 const REOPEN_EVERY: u32 = 10;
+/// Stores on their way to the reader, which takes them at once: one is handed over at an opening, and taken back before
+/// the next, which is ten failed commits later.
+const STORES_MAX: usize = 8;
 
 /// The writing side of a store.
 pub struct Writer {
     /// Gone while it could not be opened again after a fatal error.
     store: Option<Store>,
+    /// Where the reader is told of every store that is opened or about to be closed.
+    reader: Option<mpsc::Sender<Option<Store>>>,
+    /// The store that was closed: readers may still have connections to it.
+    closed: Weak<()>,
     path: PathBuf,
     def: Arc<PlantDef>,
     pending: Vec<Record>,
@@ -39,7 +51,11 @@ pub struct Writer {
     failing: Option<String>,
     /// What was wrong with the last checkpoint; goes with the next good one.
     unchecked: Option<String>,
+    /// What a question could not read; stays until the station ends.
+    unreadable: Option<String>,
     failures: u32,
+    /// Failures at which the store may be opened anew.
+    retry_at: u32,
     commits: u32,
 }
 
@@ -52,6 +68,8 @@ impl Writer {
         let clock = ahead.map(|last| format!("the clock is behind the last record, {last:.0}: is it right?"));
         let mut writer = Writer {
             store: Some(store),
+            reader: None,
+            closed: Weak::new(),
             path,
             def,
             pending: Vec::new(),
@@ -62,7 +80,9 @@ impl Writer {
             clock,
             failing: None,
             unchecked: None,
+            unreadable: None,
             failures: 0,
+            retry_at: 0,
             commits: 0,
         };
         writer.describe();
@@ -120,6 +140,7 @@ impl Writer {
                 }
                 self.settled = self.steps;
                 self.failures = 0;
+                self.retry_at = 0;
                 self.failing = None;
                 if self.commits.is_multiple_of(CHECKPOINT_EVERY) {
                     self.checkpoint();
@@ -136,17 +157,33 @@ impl Writer {
         self.describe();
     }
 
-    /// Answers a question. What counts a period first commits what is pending, so that it lacks nothing.
-    pub fn answer(&mut self, question: &Question, now: Timestamp) -> Result<Answer, HistoryError> {
-        match question {
-            Question::Report { .. } | Question::AlarmQuality { .. } => self.commit(now),
-            Question::Series { .. }
-            | Question::Journal { .. }
-            | Question::Actions { .. }
-            | Question::Audit { .. }
-            | Question::LineMinutes { .. } => {}
+    /// The stores that questions are answered from: this one, and each that is opened after it.
+    pub fn stores(&mut self) -> mpsc::Receiver<Option<Store>> {
+        let (reader, stores) = mpsc::channel(STORES_MAX);
+        self.reader = Some(reader);
+        self.hand_over();
+        stores
+    }
+
+    /// Takes the store back from the reader for good.
+    pub fn end_reading(&mut self) {
+        self.reader = None;
+    }
+
+    fn hand_over(&mut self) {
+        let Some(reader) = &self.reader else { return };
+        let handed = self.store.as_ref().and_then(|store| {
+            store.try_clone().inspect_err(|error| tracing::error!(%error, "questions cannot be answered")).ok()
+        });
+        if reader.try_send(handed).is_err() {
+            tracing::error!("the reader of the history does not take the store");
         }
-        self.store()?.answer(question, now)
+    }
+
+    /// Notes what a question could not read.
+    pub fn unreadable(&mut self, what: String) {
+        self.unreadable = Some(what);
+        self.describe();
     }
 
     /// The orderly end: everything stored, every curve ended, the log written into the file.
@@ -168,7 +205,7 @@ impl Writer {
     }
 
     pub(super) fn store(&self) -> Result<&Store, HistoryError> {
-        self.store.as_ref().ok_or_else(|| HistoryError::Engine("not open".into()))
+        self.store.as_ref().ok_or(HistoryError::NotOpen)
     }
 
     fn checkpoint(&mut self) {
@@ -177,15 +214,21 @@ impl Writer {
     }
 
     /// After a fatal error DuckDB answers nothing more until the file is opened anew.
-    fn reopen(&mut self, now: Timestamp) {
-        if self.failures % REOPEN_EVERY != 1 {
+    pub(super) fn reopen(&mut self, now: Timestamp) {
+        if let Some(store) = self.store.take() {
+            self.closed = store.alive();
+            self.hand_over();
+        }
+        // Not before all its connections are closed: two stores of one process on one file would not see each other's
+        // locks.
+        if self.closed.strong_count() > 0 || self.failures < self.retry_at {
             return;
         }
-        // Closed first: two stores of one process on one file would not see each other's locks.
-        self.store = None;
+        self.retry_at = self.failures + REOPEN_EVERY;
         if let Ok(Opened { store, trouble, .. }) = Store::open(&self.path, &self.def, now) {
             self.store = Some(store);
             self.damaged = trouble.or(self.damaged.take());
+            self.hand_over();
         }
     }
 
@@ -194,14 +237,16 @@ impl Writer {
         let lost = (self.status.lost > 0).then(|| format!("{} records lost", self.status.lost));
         let failing = self.failing.as_ref();
         let failing = failing.map(|why| format!("{why}; {waiting} records waiting ({} %)", waiting * 100 / max));
-        let parts: Vec<String> = [failing, self.unchecked.clone(), lost, self.damaged.clone(), self.clock.clone()]
+        let damaged: Vec<&str> = [&self.unreadable, &self.damaged].into_iter().flatten().map(String::as_str).collect();
+        let damaged = (!damaged.is_empty()).then(|| damaged.join("; "));
+        let parts: Vec<String> = [failing, self.unchecked.clone(), lost, damaged.clone(), self.clock.clone()]
             .into_iter()
             .flatten()
             .collect();
         self.status.trouble = (!parts.is_empty()).then(|| parts.join("; "));
         (self.status.waiting, self.status.waiting_max) = (waiting as u64, max as u64);
         self.status.failing.clone_from(&self.failing);
-        self.status.damaged.clone_from(&self.damaged);
+        self.status.damaged = damaged;
         self.status.file_bytes = files::size(&self.path);
     }
 }
@@ -236,7 +281,9 @@ fn is_fatal(error: &HistoryError) -> bool {
         | HistoryError::Foreign { .. }
         | HistoryError::Missing { .. }
         | HistoryError::TooManyRows { .. }
-        | HistoryError::EmptyPeriod => false,
+        | HistoryError::EmptyPeriod
+        | HistoryError::NotOpen
+        | HistoryError::TooLong { .. } => false,
     }
 }
 

@@ -167,7 +167,8 @@ impl Mimic {
                     | Answer::Actions(_)
                     | Answer::LineMinutes(_)
                     | Answer::Report(_)
-                    | Answer::AlarmQuality(_),
+                    | Answer::AlarmQuality(_)
+                    | Answer::Values(_),
                 )
                 | Err(_) => None,
             };

@@ -199,7 +199,8 @@ impl Trends {
             | Answer::Actions(_)
             | Answer::LineMinutes(_)
             | Answer::Report(_)
-            | Answer::AlarmQuality(_) => {}
+            | Answer::AlarmQuality(_)
+            | Answer::Values(_) => {}
         }
         self.ask(cx)
     }

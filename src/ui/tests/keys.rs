@@ -479,7 +479,8 @@ fn the_journal_tells_alarms_and_deeds_in_one_order() {
             | Question::Audit { .. }
             | Question::LineMinutes { .. }
             | Question::Report { .. }
-            | Question::AlarmQuality { .. } => continue,
+            | Question::AlarmQuality { .. }
+            | Question::Values { .. } => continue,
         };
         update(&mut model, Msg::Answer(id, Ok(answer)));
     }

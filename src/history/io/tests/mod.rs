@@ -4,6 +4,8 @@
 mod damage;
 mod flips;
 mod quality;
+mod pieces;
+mod reading;
 
 use std::{
     path::{Path, PathBuf},
@@ -436,8 +438,14 @@ fn a_question_behind_which_too_much_lies_is_refused_before_anything_is_read() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
     store.append(&[good(PV, 1, 27.0), good(PV, 2, 28.0), good(PV, 3, 28.0)]).unwrap();
-    assert_eq!(store.bounded(&[PV], sec(0), sec(3), 2), Ok(()));
-    assert_eq!(store.bounded(&[PV], sec(0), sec(4), 2), Err(HistoryError::TooManyRows { rows: 3, max: 2 }));
+    // As if the three rows lay evenly over their two seconds and the three tags: one second of all is half of them.
+    let now = sec(3);
+    assert_eq!(store.bounded(3, sec(1), sec(2), now, 2), Ok(()));
+    assert_eq!(store.bounded(1, sec(0), sec(4), now, 2), Ok(()));
+    assert_eq!(store.bounded(3, sec(0), sec(4), now, 2), Err(HistoryError::TooManyRows { rows: 3, max: 2 }));
+    // A connection that has not seen the rows come refuses as well.
+    let reader = open(&folder().1, 0).try_clone().unwrap();
+    assert_eq!(reader.bounded(3, sec(0), sec(4), now, 0), Ok(()), "nothing is stored there");
 }
 
 #[test]

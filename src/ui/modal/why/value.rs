@@ -79,7 +79,7 @@ fn because(cx: &Cx, def: &TagDef, cause: Cause, exchange: Option<&Exchange>, fou
         },
         // The verdict on the last answer says it all.
         Cause::Corrupt | Cause::Exception | Cause::Timeout | Cause::DeviceDown => None,
-        Cause::NotRead | Cause::OutOfRange | Cause::StationOff | Cause::Withheld => None,
+        Cause::NotRead | Cause::OutOfRange | Cause::StationOff | Cause::Withheld | Cause::Unreadable => None,
     }
 }
 
@@ -111,7 +111,7 @@ fn advice(cx: &Cx, def: &TagDef, cause: Cause, exchange: Option<&Exchange>) -> O
         },
         Cause::OutOfRange => Some("compare the value with the range of the device".to_owned()),
         Cause::Withheld => Some("log in: tab 0".to_owned()),
-        Cause::StationOff => None,
+        Cause::StationOff | Cause::Unreadable => None,
     }
 }
 

@@ -118,6 +118,7 @@ impl Handover {
                 Answer::Series(_)
                 | Answer::Journal(_)
                 | Answer::AlarmQuality(_)
+                | Answer::Values(_)
                 | Answer::LineMinutes(_)
                 | Answer::Report(_),
             ) => {}

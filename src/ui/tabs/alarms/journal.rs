@@ -129,7 +129,13 @@ impl Journal {
         match answer {
             Ok(Answer::Journal(rows)) => self.alarms.clone_from(rows),
             Ok(Answer::Actions(rows)) => self.actions.clone_from(rows),
-            Ok(Answer::Series(_) | Answer::LineMinutes(_) | Answer::Report(_) | Answer::AlarmQuality(_)) => {}
+            Ok(
+                Answer::Series(_)
+                | Answer::LineMinutes(_)
+                | Answer::Report(_)
+                | Answer::AlarmQuality(_)
+                | Answer::Values(_),
+            ) => {}
             Err(error) => self.trouble = Some(error.to_string()),
         }
     }

@@ -83,7 +83,8 @@ impl Quality {
                 | Answer::Journal(_)
                 | Answer::Actions(_)
                 | Answer::LineMinutes(_)
-                | Answer::Report(_),
+                | Answer::Report(_)
+                | Answer::Values(_),
             ) => {}
             Err(error) => self.trouble = Some(error.to_string()),
         }

@@ -239,7 +239,8 @@ fn kinds(asked: &[(AskId, Question)]) -> String {
         | Question::Audit { .. }
         | Question::LineMinutes { .. }
         | Question::Report { .. }
-        | Question::AlarmQuality { .. } => "other",
+        | Question::AlarmQuality { .. }
+        | Question::Values { .. } => "other",
     };
     asked.iter().map(|(_, question)| kind(question)).collect::<Vec<_>>().join(" ")
 }

@@ -191,7 +191,8 @@ impl Audit {
                 | Answer::Journal(_)
                 | Answer::LineMinutes(_)
                 | Answer::Report(_)
-                | Answer::AlarmQuality(_),
+                | Answer::AlarmQuality(_)
+                | Answer::Values(_),
             ) => {}
             Err(error) => self.trouble = Some(error.to_string()),
         }

@@ -1,0 +1,136 @@
+//! The report of a period: every sample is read once, for the figures of its tag, for the names and units that a device
+//! chooses, and for the record.
+
+use std::{collections::HashMap, sync::Arc, time::Duration};
+
+use duckdb::params;
+use jiff::Timestamp;
+
+use super::{
+    read::{ROWS_MAX, SAMPLES_MAX, action, check_span, within},
+    sql,
+    store::{Store, utc},
+};
+use crate::{
+    history::HistoryError,
+    plant::{PlantDef, def::TagId, record::AlarmRecord, sample::Sample},
+    report::{
+        Period, ShiftReport,
+        figures::{self, Figures, Label},
+        hold::AsOf,
+    },
+};
+
+/// What is gathered of one tag.
+struct Gathered {
+    figures: Option<Figures>,
+    record: Option<AsOf>,
+    latest_good: Option<f64>,
+}
+
+impl Gathered {
+    fn next(&mut self, sample: Sample) {
+        if let Some(figures) = &mut self.figures {
+            figures.next(sample);
+        }
+        if let Some(record) = &mut self.record {
+            record.next(sample);
+        }
+        self.latest_good = sample.trusted().or(self.latest_good);
+    }
+}
+
+/// The controller of the record.
+struct Recorded {
+    name: String,
+    sv: TagId,
+    pv: TagId,
+    instants: Arc<[Timestamp]>,
+}
+
+impl Store {
+    /// The report of a period, up to `now`.
+    pub fn report(&self, period: &Period, now: Timestamp) -> Result<ShiftReport, HistoryError> {
+        let (from, until) = (period.from, period.to.min(now));
+        check_span(from, until)?;
+        let (def, reported) = (&*self.def, reported_tags(&self.def));
+        let recorded = self.recorded(from, until)?;
+        let tags = tags_to_read(def, &reported, recorded.as_ref());
+        self.bounded(tags.len(), from, until, now, SAMPLES_MAX)?;
+        let active = self.active_at(from)?;
+        let alarms = self.steps(from, until)?;
+        let actions = self.whole_list(&sql::actions_oldest(), params![utc(from), utc(until), ROWS_MAX + 1], action)?;
+        let gather = |tag: &TagId| Gathered {
+            figures: reported.contains(tag).then(|| Figures::new(from, until)),
+            record: recorded
+                .as_ref()
+                .filter(|recorded| [recorded.sv, recorded.pv].contains(tag))
+                .map(|recorded| AsOf::new(recorded.instants.clone())),
+            latest_good: None,
+        };
+        let mut gathered: Vec<Gathered> = tags.iter().map(gather).collect();
+        let unreadable = self.each_sample(&tags, from, until, |place, sample| gathered[place].next(sample))?;
+        let latest: HashMap<TagId, f64> =
+            tags.iter().zip(&gathered).filter_map(|(tag, gathered)| Some((*tag, gathered.latest_good?))).collect();
+        let mut gathered: HashMap<TagId, Gathered> = tags.into_iter().zip(gathered).collect();
+        let mut stood = |tag| gathered.get_mut(&tag).and_then(|tag| tag.record.take()).map(AsOf::end);
+        let (record, record_of) = match recorded {
+            Some(Recorded { name, sv, pv, instants }) => {
+                let pv_stood = stood(pv).unwrap_or_default();
+                let sv_stood = if sv == pv { pv_stood.clone() } else { stood(sv).unwrap_or_default() };
+                let rows = figures::record(&instants, &sv_stood, &pv_stood);
+                (rows, Some((name, Label::at(def.tag(pv), &latest).unit)))
+            }
+            None => (Vec::new(), None),
+        };
+        let mut steps: HashMap<&str, Vec<&AlarmRecord>> = HashMap::new();
+        active.iter().chain(&alarms).for_each(|step| steps.entry(&step.subject).or_default().push(step));
+        let row = |tag: &TagId| {
+            let label = Label::at(def.tag(*tag), &latest);
+            let steps = steps.get(label.tag.as_str()).into_iter().flatten().copied();
+            let in_alarm = figures::time_in_alarm(steps, from, until);
+            Some(gathered.get_mut(tag)?.figures.take()?.end(label, in_alarm))
+        };
+        let tags = reported.iter().filter_map(row).collect();
+        let quality = self.alarm_quality(from, until, now)?;
+        Ok(ShiftReport { period: period.clone(), until, unreadable, tags, alarms, quality, actions, record, record_of })
+    }
+
+    /// The controller of the record and the instants of its rows.
+    fn recorded(&self, from: Timestamp, until: Timestamp) -> Result<Option<Recorded>, HistoryError> {
+        let Some((device, interval)) = self.def.report.record else { return Ok(None) };
+        let device = self.def.device(device);
+        let Some(face) = &device.faceplate else { return Ok(None) };
+        within(rows(from, until, interval), ROWS_MAX)?;
+        let instants = figures::record_grid(interval, &self.def.time_zone, from, until).into();
+        Ok(Some(Recorded { name: device.name.clone(), sv: face.sv, pv: face.pv, instants }))
+    }
+}
+
+fn rows(from: Timestamp, until: Timestamp, interval: Duration) -> u64 {
+    let rows =
+        until.duration_since(from).as_millis() / i128::try_from(interval.as_millis().max(1)).unwrap_or(i128::MAX);
+    u64::try_from(rows).unwrap_or(u64::MAX)
+}
+
+/// The tags that the plant file asks for, or every stored tag with a unit; each once.
+fn reported_tags(def: &PlantDef) -> Vec<TagId> {
+    let mut tags = match def.report.tags.as_slice() {
+        [] => def.tags.iter().filter(|tag| tag.store && !tag.unit.is_empty()).map(|tag| tag.id).collect(),
+        tags => tags.to_vec(),
+    };
+    let mut seen = std::collections::HashSet::new();
+    tags.retain(|tag| seen.insert(*tag));
+    tags
+}
+
+/// The tags of a report, those that choose their units and decimals, and those of the record.
+fn tags_to_read(def: &PlantDef, reported: &[TagId], recorded: Option<&Recorded>) -> Vec<TagId> {
+    let recorded = recorded.into_iter().flat_map(|recorded| [recorded.sv, recorded.pv]);
+    let mut tags: Vec<TagId> = reported.iter().copied().chain(recorded).collect();
+    let choosers: Vec<TagId> = tags.iter().flat_map(|tag| figures::choosers(def.tag(*tag))).collect();
+    tags.extend(choosers);
+    tags.sort_unstable_by_key(|tag| tag.index());
+    tags.dedup();
+    tags
+}

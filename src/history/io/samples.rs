@@ -1,0 +1,219 @@
+//! Stored samples of many tags, read once, piece by piece in order of time: the memory that a question needs does not
+//! grow with its period.
+
+use duckdb::{
+    arrow::{
+        array::{Array, AsArray, StructArray},
+        datatypes::{Float64Type, TimestampMicrosecondType, UInt8Type, UInt16Type},
+    },
+    params,
+};
+use jiff::Timestamp;
+
+use super::{
+    read::within,
+    sql,
+    store::{Store, engine, instant, utc},
+};
+use crate::{
+    history::HistoryError,
+    plant::{
+        def::TagId,
+        sample::{Cause, Quality, Sample},
+    },
+    report::{Gap, hold::HOLD_MAX},
+};
+
+/// Rows of a piece that are aimed at; twice as many are held at most.
+pub(super) const PIECE: usize = 1 << 18;
+/// Of a period with unreadable blocks at most this share, in parts, is given up with each of them; and this long at the
+/// least, in microseconds.
+const GAP_PARTS: i64 = 500;
+const GAP_MIN: i64 = 60_000_000;
+/// How a tag is asked for that the file does not know, and one that was not asked for.
+const NONE: u32 = u32::MAX;
+
+/// A stored sample, as small as it can be.
+struct Row {
+    micros: i64,
+    value: Option<f64>,
+    /// Where its tag stands among those asked for.
+    place: u32,
+    quality: u8,
+}
+
+/// What became of reading a piece.
+enum Piece {
+    Whole,
+    /// It has more rows than are held.
+    TooLong,
+}
+
+impl Store {
+    /// Hands over the samples of some different tags that matter in a span: its own and those of [`HOLD_MAX`] before. Each
+    /// comes with the place of its tag in `tags`, each tag's in order of time. Returns what could not be read; there, no
+    /// value is known.
+    pub(super) fn each_sample(
+        &self,
+        tags: &[TagId],
+        from: Timestamp,
+        to: Timestamp,
+        mut each: impl FnMut(usize, Sample),
+    ) -> Result<Vec<Gap>, HistoryError> {
+        let (places, sql) = self.asked_for(tags);
+        let mut next = from.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN).as_microsecond();
+        let end = to.as_microsecond();
+        let gap_min = ((end - next) / GAP_PARTS).max(GAP_MIN);
+        let (mut span, mut rows, mut gaps) = (end - next, Vec::new(), Vec::<Gap>::new());
+        if let Some(rows_a_micro) = self.density(to).filter(|density| *density > 0.0) {
+            span = span.min((self.piece as f64 / rows_a_micro) as i64).max(1);
+        }
+        while next < end {
+            let to = next.saturating_add(span).min(end);
+            // What happened at one instant is never cut.
+            let max = if to - next > 1 { 2 * self.piece } else { usize::MAX };
+            match self.read(&sql, (next, to), &places, max, &mut rows) {
+                Ok(Piece::TooLong) => span = ((to - next) / 8).max(1),
+                Ok(Piece::Whole) => {
+                    // Rows of one instant keep the order in which they were written.
+                    if !rows.is_sorted_by_key(|row: &Row| row.micros) {
+                        rows.sort_by_key(|row| row.micros);
+                    }
+                    rows.iter().for_each(|row| row.hand_to(&mut each));
+                    next = to;
+                    span = if rows.len() < self.piece / 8 { span.saturating_mul(8) } else { span };
+                }
+                Err(error) if is_damage(&error) && to - next > gap_min => span = ((to - next) / 8).max(gap_min),
+                Err(error) if is_damage(&error) => {
+                    tracing::error!(%error, "a part of the history cannot be read");
+                    let (Some(from), Some(until)) = (instant(next), instant(to)) else { return Err(error) };
+                    (0..tags.len()).for_each(|place| each(place, Sample::bad(Cause::Unreadable, from)));
+                    self.unreadable.replace(Some(format!("{from:.0} to {until:.0} cannot be read: {error}")));
+                    match gaps.last_mut().filter(|last| last.to == from) {
+                        Some(last) => last.to = until,
+                        None => gaps.push(Gap { from, to: until, why: error.to_string() }),
+                    }
+                    next = to;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        if let Some(at) = self.ended {
+            (0..tags.len()).for_each(|place| each(place, Sample::bad(Cause::StationOff, at)));
+        }
+        Ok(gaps)
+    }
+
+    /// The place of each stored number, and the question for their rows. A list of numbers is worth its cost where it
+    /// leaves most rows out.
+    fn asked_for(&self, tags: &[TagId]) -> (Vec<u32>, String) {
+        let numbers: Vec<Option<u16>> = tags.iter().map(|tag| self.id(*tag)).collect();
+        let mut places = vec![NONE; usize::from(u16::MAX) + 1];
+        for (place, number) in numbers.iter().enumerate() {
+            if let Some(number) = number {
+                places[usize::from(*number)] = place as u32;
+            }
+        }
+        let list: Vec<String> = numbers.iter().flatten().map(u16::to_string).collect();
+        let some = (2 * list.len() < self.ids.len()).then(|| list.join(", "));
+        (places, sql::samples(some.as_deref()))
+    }
+
+    fn read(
+        &self,
+        sql: &str,
+        (from, to): (i64, i64),
+        places: &[u32],
+        max: usize,
+        rows: &mut Vec<Row>,
+    ) -> Result<Piece, HistoryError> {
+        rows.clear();
+        let (Some(from), Some(to)) = (instant(from), instant(to)) else { return Ok(Piece::Whole) };
+        // Not from the cache: a statement that is left before its end must go.
+        let mut statement = self.db.prepare(sql).map_err(engine)?;
+        // The rows are fetched by `step`, because the stream itself panics where it meets an error.
+        let _ = statement.stream_arrow(params![utc(from), utc(to)]).map_err(engine)?;
+        while let Some(batch) = statement.step().map_err(engine)? {
+            push(&batch, places, rows).ok_or_else(|| HistoryError::Engine("unexpected columns of samples".into()))?;
+            if rows.len() > max {
+                return Ok(Piece::TooLong);
+            }
+        }
+        Ok(Piece::Whole)
+    }
+
+    /// Refuses a question behind which more rows lie than can be answered in time, without counting them: as if the rows
+    /// of the file lay evenly over its period and its tags.
+    pub(super) fn bounded(
+        &self,
+        tags: usize,
+        from: Timestamp,
+        to: Timestamp,
+        now: Timestamp,
+        max: u64,
+    ) -> Result<(), HistoryError> {
+        let Some((first, last)) = self.period(now)? else { return Ok(()) };
+        let (from, to) = (from.as_microsecond().max(first), to.as_microsecond().min(last));
+        let share = (to - from).max(0) as f64 / (last - first).max(1) as f64;
+        let tags = tags as f64 / self.ids.len().max(1) as f64;
+        within((self.rows_about()? as f64 * share * tags.min(1.0)).ceil() as u64, max)
+    }
+
+    /// Rows a microsecond, about, up to an instant; `None` if that is not known.
+    fn density(&self, to: Timestamp) -> Option<f64> {
+        let (first, last) = self.period(to).ok()??;
+        Some(self.rows_about().ok()? as f64 / (last - first).max(1) as f64)
+    }
+
+    /// Rows of the table of samples, as the engine believes.
+    fn rows_about(&self) -> Result<u64, HistoryError> {
+        self.db.query_row(sql::ROWS_ABOUT, [], |row| row.get(0)).map_err(engine)
+    }
+
+    /// About when the first sample was stored, and the last or `now`, in microseconds.
+    fn period(&self, now: Timestamp) -> Result<Option<(i64, i64)>, HistoryError> {
+        let known = self.extent();
+        let first = match known {
+            Some((first, _)) => Some(first.as_microsecond()),
+            None => self.list(sql::FIRST_STORED, &[], |row| row.get(0))?.first().copied(),
+        };
+        let last = known.map_or(i64::MIN, |(_, last)| last.as_microsecond() + 1);
+        Ok(first.map(|first| (first, last.max(now.as_microsecond()).max(first + 1))))
+    }
+}
+
+impl Row {
+    fn hand_to(&self, each: &mut impl FnMut(usize, Sample)) {
+        let Some(at) = instant(self.micros) else { return };
+        // A number that no version wrote is no value.
+        let quality = Quality::from_code(self.quality).unwrap_or(Quality::Bad(Cause::Corrupt));
+        let sample = match (self.value, quality) {
+            (value @ Some(_), Quality::Good | Quality::Uncertain(_)) => Sample { value, quality, at },
+            (None, Quality::Good) => Sample::bad(Cause::Corrupt, at),
+            (None, Quality::Uncertain(cause)) | (_, Quality::Bad(cause)) => Sample::bad(cause, at),
+        };
+        each(self.place as usize, sample);
+    }
+}
+
+/// Adds the rows of a batch that are asked for; `None` if its columns are not those of samples.
+fn push(batch: &StructArray, places: &[u32], rows: &mut Vec<Row>) -> Option<()> {
+    let [utc, tags, values, qualities] = batch.columns() else { return None };
+    let micros = utc.as_primitive_opt::<TimestampMicrosecondType>()?.values();
+    let tags = tags.as_primitive_opt::<UInt16Type>()?.values();
+    let values = values.as_primitive_opt::<Float64Type>()?;
+    let qualities = qualities.as_primitive_opt::<UInt8Type>()?.values();
+    for (index, tag) in tags.iter().enumerate() {
+        let place = places[usize::from(*tag)];
+        if place != NONE {
+            let value = values.is_valid(index).then(|| values.value(index));
+            rows.push(Row { micros: micros[index], value, place, quality: qualities[index] });
+        }
+    }
+    Some(())
+}
+
+/// A block of the file cannot be read; what lies in other blocks can.
+pub(super) fn is_damage(error: &HistoryError) -> bool {
+    matches!(error, HistoryError::Engine(words) if words.contains("checksum") || words.contains("Corrupt"))
+}

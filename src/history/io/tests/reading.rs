@@ -1,0 +1,169 @@
+//! Questions beside the recording: they neither hold it up nor outlive their askers, and end when their time is over.
+
+use std::sync::mpsc as std_mpsc;
+
+use tokio::sync::{mpsc, oneshot};
+
+use super::*;
+use crate::history::io::reader::{Answerer, QUESTIONS_MAX, Reader, Request, TIME_MAX};
+
+/// Answers that never end by themselves. Tells when one has begun, and how it ended.
+fn endless() -> (Answerer, std_mpsc::Receiver<()>, std_mpsc::Receiver<String>) {
+    let ((begins, begun), (ends, ended)) = (std_mpsc::channel(), std_mpsc::channel());
+    let answer = move |store: &Store, _: &Question, _: Timestamp| {
+        begins.send(()).unwrap();
+        let result = store.db.execute_batch("SELECT count(*) FROM range(1000000000000000)");
+        let why = result.unwrap_err().to_string();
+        ends.send(why.clone()).unwrap();
+        Err(HistoryError::Engine(why))
+    };
+    (Arc::new(answer), begun, ended)
+}
+
+fn query() -> (Query, oneshot::Receiver<Result<Answer, HistoryError>>) {
+    let (reply, answer) = oneshot::channel();
+    (Query { question: Question::Journal { from: sec(0), to: sec(9), limit: 1 }, reply }, answer)
+}
+
+#[test]
+fn records_are_committed_while_a_question_runs() {
+    let (_folder, db) = folder();
+    let (answer, begun, ended) = endless();
+    let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), answer).unwrap();
+    let questions: Vec<_> = (0..QUESTIONS_MAX).map(|_| query()).collect();
+    let mut answers = Vec::new();
+    for (query, answer) in questions {
+        handle.queries.blocking_send(query).unwrap();
+        begun.recv().unwrap();
+        answers.push(answer);
+    }
+    handle.records.blocking_send(vec![good(PV, 5, 27.0)]).unwrap();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
+    let mut status = handle.status.clone();
+    let committed =
+        async { tokio::time::timeout(Duration::from_secs(30), status.wait_for(|status| status.rows == 1)).await };
+    assert!(runtime.block_on(committed).is_ok(), "no commit while questions run");
+    // Whoever has left is not worked for any longer.
+    drop(answers);
+    assert!((0..QUESTIONS_MAX).all(|_| ended.recv().unwrap().contains("INTERRUPT")));
+    handle.stop();
+}
+
+#[test]
+fn a_station_that_stops_ends_the_questions_and_closes_the_file() {
+    let (_folder, db) = folder();
+    let (answer, begun, ended) = endless();
+    let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), answer).unwrap();
+    let (query, answer) = query();
+    handle.queries.blocking_send(query).unwrap();
+    begun.recv().unwrap();
+    handle.stop();
+    assert!(ended.recv().unwrap().contains("INTERRUPT"));
+    assert_eq!(answer.blocking_recv(), Ok(Err(HistoryError::NotOpen)));
+    open(&db, 100);
+}
+
+/// A reader by itself: where stores are handed over, and where questions go.
+struct Alone {
+    stores: mpsc::Sender<Option<Store>>,
+    queries: mpsc::Sender<Query>,
+    requests: mpsc::Receiver<Request>,
+}
+
+fn alone(answer: Answerer) -> Alone {
+    let ((stores, stores_in), (queries, queries_in)) = (mpsc::channel(4), mpsc::channel(4));
+    let (writer, requests) = mpsc::channel(4);
+    let reader = Reader { stores: stores_in, writer, clock: Clock::starting_at(sec(10), 1.0), answer };
+    tokio::spawn(reader.run(queries_in));
+    Alone { stores, queries, requests }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_question_that_takes_too_long_is_ended_and_says_so() {
+    let (_folder, db) = folder();
+    let (answer, begun, ended) = endless();
+    let reader = alone(answer);
+    reader.stores.send(Some(open(&db, 0))).await.unwrap();
+    let (query, answer) = query();
+    reader.queries.send(query).await.unwrap();
+    tokio::task::spawn_blocking(move || begun.recv().unwrap()).await.unwrap();
+    tokio::time::advance(TIME_MAX + Duration::from_secs(1)).await;
+    assert_eq!(answer.await, Ok(Err(HistoryError::TooLong { seconds: TIME_MAX.as_secs() })));
+    assert!(ended.recv().unwrap().contains("INTERRUPT"));
+}
+
+#[tokio::test]
+async fn without_a_store_a_question_is_answered_with_the_reason() {
+    let (_folder, db) = folder();
+    let reader = alone(Arc::new(Store::answer));
+    let ask = async || {
+        let (query, answer) = query();
+        reader.queries.send(query).await.unwrap();
+        answer.await.unwrap()
+    };
+    assert_eq!(ask().await, Err(HistoryError::NotOpen));
+    reader.stores.send(Some(open(&db, 0))).await.unwrap();
+    assert_eq!(ask().await, Ok(Answer::Journal(vec![])));
+    reader.stores.send(None).await.unwrap();
+    assert_eq!(ask().await, Err(HistoryError::NotOpen));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_report_waits_for_the_commit_but_not_for_ever() {
+    let (_folder, db) = folder();
+    let mut reader = alone(Arc::new(Store::answer));
+    reader.stores.send(Some(open(&db, 0))).await.unwrap();
+    for answers in [true, false] {
+        let (reply, mut answer) = oneshot::channel();
+        let period = Period { name: "period".into(), from: sec(0), to: sec(10) };
+        reader.queries.send(Query { question: Question::Report { period }, reply }).await.unwrap();
+        let Some(Request::Commit(done)) = reader.requests.recv().await else { panic!("no commit asked for") };
+        assert!(answer.try_recv().is_err(), "answered before the commit");
+        if answers {
+            done.send(()).unwrap();
+        }
+        assert!(matches!(answer.await, Ok(Ok(Answer::Report(_)))));
+    }
+}
+
+#[test]
+fn a_store_is_opened_anew_only_when_the_last_question_to_the_old_one_has_ended() {
+    let (_folder, db) = folder();
+    let mut writer = Writer::open(db, def(), sec(0)).unwrap();
+    let mut stores = writer.stores();
+    let asked = stores.try_recv().unwrap().unwrap();
+    writer.reopen(sec(1));
+    assert!(stores.try_recv().unwrap().is_none(), "taken back");
+    assert!(matches!(writer.store(), Err(HistoryError::NotOpen)));
+    drop(asked);
+    writer.reopen(sec(2));
+    let fresh = stores.try_recv().unwrap().unwrap();
+    assert_eq!(fresh.restore(), Ok(vec![]));
+    writer.accept(vec![good(PV, 3, 27.0)]);
+    writer.commit(sec(3));
+    assert_eq!(writer.status().rows, 1);
+    assert_eq!(means(&fresh, PV, 3, 4, 1), [Some(27.0)]);
+}
+
+#[test]
+fn a_question_that_takes_all_memory_costs_no_record() {
+    let (_folder, db) = folder();
+    let mut writer = Writer::open(db, def(), sec(0)).unwrap();
+    let reader = writer.store().unwrap().try_clone().unwrap();
+    // More in one list than the whole engine may use.
+    let greedy = "SELECT list(i) FROM range(1000000000) t(i)";
+    let working = std::thread::spawn(move || (reader.db.execute_batch(greedy).unwrap_err().to_string(), reader));
+    let mut at = 0;
+    while !working.is_finished() {
+        at += 1;
+        writer.accept(vec![good(PV, at, 27.0), Record::Alarm(step(at, "high", AlarmStep::Raised))]);
+        writer.commit(sec(at));
+    }
+    let (why, reader) = working.join().unwrap();
+    assert!(why.contains("Out of Memory"), "{why}");
+    // A commit may have had no memory meanwhile: what it was to store waited for the next.
+    writer.commit(sec(at + 1));
+    let status = writer.status();
+    assert_eq!((status.rows, status.lost, &status.trouble), (2 * at as u64, 0, &None));
+    assert_eq!(means(&reader, PV, at, at + 1, 1), [Some(27.0)]);
+}
