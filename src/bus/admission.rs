@@ -8,7 +8,7 @@ use std::{collections::BTreeMap, time::Duration};
 
 use super::{
     plan::{Block, Wire, cost},
-    schedule::{FACTOR_MAX, FITS, WRITE_SHARE},
+    schedule::{Demand, FACTOR_MAX, WRITE_SHARE},
 };
 use crate::plant::{
     admission::{Admission, DeadDevice, PollWords, Verdict, Warning, Witness},
@@ -183,13 +183,10 @@ fn judge(loads: &[&Load], extra: Option<&PollWords>) -> Verdict {
 }
 
 /// By what the schedule will stretch the soft polls.
-fn factor(loads: &[Load]) -> Option<u32> {
+fn factor(loads: &[Load]) -> Option<f64> {
     let of = |class| load_of(&loads.iter().filter(|load| load.class == class).collect::<Vec<_>>());
-    let (hard, soft, idle) = (of(Class::Hard), of(Class::Soft), of(Class::Idle));
-    if hard + soft + idle <= 1.0 {
-        return Some(1);
-    }
-    (1..=FACTOR_MAX).find(|factor| hard + soft / f64::from(*factor) <= FITS)
+    let demand = Demand { hard: of(Class::Hard), soft: of(Class::Soft), idle: of(Class::Idle) };
+    if demand.total() <= 1.0 { Some(1.0) } else { Some(demand.factor()).filter(|factor| *factor < FACTOR_MAX) }
 }
 
 /// Each device in turn does not answer: its polls are gone, its probes come.

@@ -157,7 +157,7 @@ impl Books {
         let Plan { blocks, polls, refused, load } = plan;
         let poll = |(index, (block, tally)): (usize, (&Block, &Tally))| PollReport {
             class: block.class,
-            factor: polls.get(index).map_or(1, |poll| poll.factor),
+            factor: polls.get(index).map_or(1.0, |poll| poll.factor),
             shed: polls.get(index).is_some_and(|poll| poll.shed),
             device: block.device,
             table: block.table,

@@ -2,18 +2,21 @@
 //!
 //! A transaction cannot be pre-empted, so this is non-preemptive EDF: whatever is released and has the nearest deadline
 //! (release + period) goes first. A release that is missed is counted and skipped, never piled up. On a line with too much
-//! to do (see [`overload`]) idle polls are shed, hard polls go before soft ones, and soft ones are read every k-th period.
+//! to do (see [`overload`]) idle polls are shed, hard polls go before soft ones, and soft ones share what is left. A device
+//! that does not answer ([`device`]) is asked with one block only, within a small share of the line's time for all of them.
 
 pub mod budget;
 pub mod overload;
 mod device;
 mod poll;
 #[cfg(test)]
+mod model;
+#[cfg(test)]
 mod tests;
 
-pub use budget::{WRITE_SHARE, WriteBudget};
+pub use budget::{Budget, WRITE_SHARE};
 pub use device::FAILURES_MAX;
-pub use overload::{FACTOR_MAX, FITS, Load};
+pub use overload::{Demand, FACTOR_MAX, Load};
 pub use poll::{PollInfo, Served};
 
 use std::time::Duration;
@@ -21,15 +24,14 @@ use std::time::Duration;
 use jiff::Timestamp;
 
 use self::{
+    budget::PROBE_SHARE,
     device::Health,
-    overload::{Demand, Overload},
-    poll::Pending,
+    overload::Overload,
+    poll::{ONCE_WITHIN, Pace, Pending},
 };
 use super::plan::Block;
 use crate::plant::{def::DeviceId, event::ExceptionCode, tag::Class};
 
-/// A block that is read once should be read within this time.
-const ONCE_WITHIN: Duration = Duration::from_secs(5);
 /// On an overloaded line even what is shed or always comes last is read once it has waited so long. Only a line that its
 /// hard polls alone fill to the brim gets that far.
 const STARVED_AFTER: Duration = Duration::from_secs(60);
@@ -56,6 +58,8 @@ pub struct Schedule {
     polls: Vec<Pending>,
     devices: Vec<Health>,
     overload: Overload,
+    /// The time for devices that do not answer.
+    probes: Budget,
     /// The last read was one that had starved: the next is not.
     fed: bool,
 }
@@ -70,7 +74,8 @@ impl Schedule {
     /// Everything is due at `now`, which is also the origin of the grid.
     pub fn new(blocks: &[Block], now: Timestamp) -> Schedule {
         let (polls, devices, overload) = (Vec::new(), Vec::new(), Overload::default());
-        let mut schedule = Schedule { origin: now, polls, devices, overload, fed: false };
+        let probes = Budget::new(PROBE_SHARE, now);
+        let mut schedule = Schedule { origin: now, polls, devices, overload, probes, fed: false };
         schedule.replan(blocks, now);
         schedule
     }
@@ -116,15 +121,12 @@ impl Schedule {
     fn due(&self, index: usize, poll: &Pending, now: Timestamp) -> Option<Due> {
         let health = &self.devices[poll.place];
         let (from, deadline) = if let Some(probe_at) = health.probe_at {
-            // A device that is down is probed with its first block only.
-            let from = probe_at.max(health.rests_until);
-            (health.probe == Some(index)).then_some((from, from + ONCE_WITHIN))?
+            // A device that does not answer is asked with its first block only; who has waited longest goes first.
+            let affordable = if health.prompt { probe_at } else { probe_at.max(self.probes.allows_from()) };
+            (health.probe == Some(index)).then_some((affordable.max(health.rests_until), probe_at + ONCE_WITHIN))?
         } else {
-            let release = poll.wanted()?;
-            (
-                release.max(health.rests_until).max(poll.not_before),
-                release + self.period_of(poll).unwrap_or(ONCE_WITHIN),
-            )
+            let from = poll.wanted()?.max(health.rests_until).max(poll.not_before);
+            (from, poll.deadline(self.pace_of(poll))?)
         };
         let starves = || from + STARVED_AFTER <= now;
         let (from, tier) = match (self.overload.load(), poll.class) {
@@ -137,33 +139,43 @@ impl Schedule {
         Some(Due { from, rank: (tier, deadline) })
     }
 
-    /// The period that a poll has now, stretched or not.
-    fn period_of(&self, poll: &Pending) -> Option<Duration> {
-        Some(poll.period? * self.factor_of(poll))
-    }
-
-    fn factor_of(&self, poll: &Pending) -> u32 {
-        match (self.overload.load(), poll.class) {
-            (Load::Overload { factor }, Class::Soft) => factor,
-            (Load::Overload { .. }, Class::Hard | Class::Idle) | (Load::Normal, _) => 1,
+    fn pace_of(&self, poll: &Pending) -> Pace {
+        match (self.overload.load(), poll.class, poll.period) {
+            (Load::Overload { factor }, Class::Soft, Some(period)) => Pace::Stretched(period.mul_f64(factor)),
+            (Load::Overload { .. }, Class::Idle, _) => Pace::Shed,
+            (Load::Overload { .. }, Class::Hard | Class::Soft, _) | (Load::Normal, _, _) => Pace::Normal,
         }
     }
 
-    fn is_shed(&self, poll: &Pending) -> bool {
-        matches!((self.overload.load(), poll.class), (Load::Overload { .. }, Class::Idle))
+    /// How a poll stands.
+    fn info(&self, poll: &Pending) -> PollInfo {
+        let pace = self.pace_of(poll);
+        let factor = match (self.overload.load(), pace) {
+            (Load::Overload { factor }, Pace::Stretched(_)) => factor as f32,
+            (Load::Overload { .. }, Pace::Normal | Pace::Shed) | (Load::Normal, _) => 1.0,
+        };
+        PollInfo {
+            class: poll.class,
+            period: poll.period,
+            factor,
+            shed: pace == Pace::Shed,
+            next: poll.wanted(),
+            missed: poll.missed,
+            measured: poll.measured(),
+        }
     }
 
     /// The block has been read, well or not, from `started` to `now`: that served its releases up to `started`. What was
     /// released and is over by now is missed; the next release is the first point of its grid that is not. Says how late
     /// the read began and what was missed, for the counters.
     pub fn done(&mut self, index: usize, started: Timestamp, now: Timestamp) -> Served {
-        let (factor, shed) = (self.factor_of(&self.polls[index]), self.is_shed(&self.polls[index]));
+        let pace = self.pace_of(&self.polls[index]);
         let rank = self.due(index, &self.polls[index], started).map(|due| due.rank.0);
         self.fed = rank == Some(STARVED);
         let rests_until = self.devices[self.polls[index].place].rests_until;
         let poll = &mut self.polls[index];
         let free = rests_until.max(poll.not_before);
-        let served = poll.serve(factor, shed, free, started, now);
+        let served = poll.serve(pace, free, started, now);
         let late = poll.class == Class::Hard && poll.is_late();
         self.judge(late, now);
         served
@@ -179,14 +191,13 @@ impl Schedule {
             };
             *share += poll.demand();
         }
-        let before = self.overload.load();
-        if self.overload.judge(demand, late, now) < before {
-            // What was stretched comes back to the next point of its own grid.
-            self.polls.iter_mut().filter(|poll| poll.class == Class::Soft).for_each(|poll| poll.pull_in(now));
+        if self.overload.judge(demand, late, now) && self.overload.load() == Load::Normal {
+            let soft = self.polls.iter_mut().filter(|poll| poll.class == Class::Soft);
+            soft.for_each(|poll| poll.back_on_grid(self.origin, now));
         }
     }
 
-    /// A block that was told as done when it began has taken so long.
+    /// The block was answered, and that has taken so long.
     pub fn spent(&mut self, index: usize, time: Duration) {
         self.polls[index].spent(time);
     }
@@ -212,27 +223,58 @@ impl Schedule {
         Some(until)
     }
 
-    /// The device answered (an exception is an answer too). If it was down, everything of it is due.
-    pub fn answered(&mut self, device: DeviceId, now: Timestamp) {
-        if self.health_mut(device).is_some_and(Health::answered) {
-            self.refresh(device, now);
+    /// The device answered (an exception is an answer too), `reply` after the request, where that is known. If it was down,
+    /// everything of it is due. What was released while it did not answer is not missed: the line had time.
+    pub fn answered(&mut self, device: DeviceId, reply: Option<Duration>, now: Timestamp) {
+        let Some(place) = self.place_of(device) else { return };
+        let failing = self.devices[place].probe_at.is_some();
+        let was_down = self.devices[place].answered(reply);
+        if failing {
+            let polls = self.polls.iter_mut().filter(|poll| poll.place == place);
+            polls.for_each(|poll| poll.back_on_grid(self.origin, now));
+        }
+        if was_down {
+            self.due_now(device, now);
         }
     }
 
-    /// The device did not answer. `true` if it is given up with this.
-    pub fn failed(&mut self, device: DeviceId, now: Timestamp) -> bool {
-        self.health_mut(device).is_some_and(|health| health.failed(now))
+    /// An answer of the device came after it had been given up.
+    pub fn answered_late(&mut self, device: DeviceId) {
+        if let Some(place) = self.place_of(device) {
+            self.devices[place].answered_late();
+        }
+    }
+
+    /// The device did not answer a request that was sent at `sent`, and that took the line for so long. `true` if it is
+    /// given up with this.
+    pub fn failed(&mut self, device: DeviceId, sent: Timestamp, spent: Duration, now: Timestamp) -> bool {
+        let Some(place) = self.place_of(device) else { return false };
+        self.probes.spent(spent, now);
+        self.devices[place].failed(sent, now, self.probes.allows(now))
+    }
+
+    /// How long the answer to a block is waited for (real time), at most the `timeout` of the line.
+    pub fn patience(&self, index: usize, timeout: Duration) -> Duration {
+        self.devices[self.polls[index].place].patience(timeout)
     }
 
     /// The device is not to be asked before `until`.
     pub fn rest(&mut self, device: DeviceId, until: Timestamp) {
-        let Some(health) = self.health_mut(device) else { return };
+        let Some(place) = self.place_of(device) else { return };
+        let health = &mut self.devices[place];
         health.rests_until = health.rests_until.max(until);
     }
 
-    /// Everything of a device is due now; its grid stays.
+    /// Everything of a device is due now; its grid stays. A device that does not answer is asked at once.
     pub fn refresh(&mut self, device: DeviceId, now: Timestamp) {
-        let place = self.devices.iter().position(|health| health.device == device);
+        if let Some(place) = self.place_of(device) {
+            self.devices[place].retry(now);
+        }
+        self.due_now(device, now);
+    }
+
+    fn due_now(&mut self, device: DeviceId, now: Timestamp) {
+        let place = self.place_of(device);
         for poll in self.polls.iter_mut().filter(|poll| Some(poll.place) == place) {
             poll.urgent = Some(now);
         }
@@ -240,7 +282,7 @@ impl Schedule {
 
     /// Is the device given up?
     pub fn is_down(&self, device: DeviceId) -> bool {
-        self.health(device).is_some_and(|health| health.probe_at.is_some())
+        self.health(device).is_some_and(Health::is_down)
     }
 
     /// Must the device be left alone now (it is settling, or owes answers)?
@@ -255,23 +297,15 @@ impl Schedule {
 
     /// How each poll stands, in the order of the blocks.
     pub fn polls(&self) -> impl Iterator<Item = PollInfo> {
-        self.polls.iter().map(|poll| PollInfo {
-            class: poll.class,
-            period: poll.period,
-            factor: self.factor_of(poll),
-            shed: self.is_shed(poll),
-            next: poll.wanted(),
-            missed: poll.missed,
-            measured: poll.measured(),
-        })
+        self.polls.iter().map(|poll| self.info(poll))
     }
 
     /// `None` for a device of which nothing is read.
     fn health(&self, device: DeviceId) -> Option<&Health> {
-        self.devices.iter().find(|health| health.device == device)
+        self.place_of(device).map(|place| &self.devices[place])
     }
 
-    fn health_mut(&mut self, device: DeviceId) -> Option<&mut Health> {
-        self.devices.iter_mut().find(|health| health.device == device)
+    fn place_of(&self, device: DeviceId) -> Option<usize> {
+        self.devices.iter().position(|health| health.device == device)
     }
 }

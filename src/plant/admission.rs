@@ -17,9 +17,9 @@ pub struct Admission {
     pub verdict: Verdict,
     /// Can those of the alarm inputs, if all others are left out?
     pub hard: Verdict,
-    /// Process values are read only each so many periods where the line has too much to do; 1 is every period. `None`:
-    /// the hard polls alone are too much.
-    pub factor: Option<u32>,
+    /// By what the periods of process values grow where the line has too much to do; 1 is not at all. `None`: the hard
+    /// polls leave nothing for them.
+    pub factor: Option<f64>,
     /// Time of one read of every periodic block.
     pub cycle: Duration,
     /// What each device costs while it does not answer, in the order of the plant.
@@ -41,7 +41,7 @@ impl Admission {
             utilisation: 0.0,
             verdict: Verdict::Fits,
             hard: Verdict::Fits,
-            factor: Some(1),
+            factor: Some(1.0),
             cycle: Duration::ZERO,
             dead: Vec::new(),
             warnings: Vec::new(),
@@ -99,7 +99,7 @@ pub struct PollWords {
     pub cost: Duration,
 }
 
-/// A device that does not answer: it is probed each 30 s, and each probe takes the line until its timeout.
+/// A device that does not answer: it is probed each 30 s at most, and each probe takes the line until its timeout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DeadDevice {
     /// Which.

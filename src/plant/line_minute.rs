@@ -126,16 +126,12 @@ impl LineWatch {
         Some(minute(line.into(), &before, report, end))
     }
 
-    /// What a device has answered lately, with the polls that were left out.
+    /// What a device has answered lately.
     pub fn lately(&self, report: &LineReport, device: DeviceId) -> Tally {
         // Since the start, as long as that is not long ago.
         let before = self.older.as_deref();
         let now = report.device(device).cloned().unwrap_or_default();
-        let missed = |report: &LineReport| -> u64 {
-            report.polls.iter().filter(|poll| poll.device == device).map(|poll| poll.tally.missed).sum()
-        };
-        let tally = since(&now, before.and_then(|before| before.device(device)));
-        Tally { missed: missed(report).saturating_sub(before.map_or(0, missed)), ..tally }
+        since(&now, before.and_then(|before| before.device(device)))
     }
 }
 

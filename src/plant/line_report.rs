@@ -87,12 +87,12 @@ pub struct PollReport {
     pub poll: Poll,
     /// Worst time of a good read on the wire.
     pub cost: Duration,
-    /// What its reads have really taken of late, good or not (plant time); `None` before the first.
+    /// What its answered reads have really taken of late (plant time); `None` before the first.
     pub measured: Option<Duration>,
     /// What happens to it when the line has too much to do.
     pub class: Class,
-    /// It is read each so many periods now; 1 is every period.
-    pub factor: u32,
+    /// Its period is stretched to so many now; 1 is not at all.
+    pub factor: f32,
     /// It is left out now, because the line has too much to do.
     pub shed: bool,
     /// When it is read next, if that is known.

@@ -74,8 +74,6 @@ pub enum Reason {
     },
     /// It answers, and none of its latest answers held a value.
     NoValues,
-    /// Reads were left out, because the line had no time for them.
-    Missed(u64),
     /// Spoiled or repeated requests.
     Spoiled {
         /// So many.
@@ -95,7 +93,7 @@ impl Reason {
         match self {
             Reason::NotConnected | Reason::Down | Reason::NoValues => Signal::Failure,
             Reason::LineClosed | Reason::LineTesting | Reason::Settling => Signal::FunctionCheck,
-            Reason::Slow { .. } | Reason::Failing { .. } | Reason::Missed(_) => Signal::OutOfSpecification,
+            Reason::Slow { .. } | Reason::Failing { .. } => Signal::OutOfSpecification,
             Reason::Spoiled { .. } | Reason::Late(_) | Reason::MemoryParity(_) => Signal::Maintenance,
         }
     }
@@ -114,7 +112,6 @@ impl fmt::Display for Reason {
             }
             Reason::Failing { failed, of } => write!(f, "{failed} of {of} requests failed"),
             Reason::NoValues => f.write_str("answers, but gives no values"),
-            Reason::Missed(count) => write!(f, "{count} reads left out, line too busy"),
             Reason::Spoiled { spoiled, of } => write!(f, "{spoiled} of {of} answers spoiled or repeated"),
             Reason::Late(count) => write!(f, "{count} answers came too late"),
             Reason::MemoryParity(count) => write!(f, "memory parity error ({count})"),
@@ -131,7 +128,7 @@ pub struct Evidence<'a> {
     pub line: &'a LineState,
     /// It is left alone after an action.
     pub settling: bool,
-    /// What it has answered lately, its missed polls included.
+    /// What it has answered lately. Reads that its line had no time for are not its fault, so they do not count.
     pub lately: &'a Tally,
     /// How long is waited for an answer.
     pub timeout: Duration,
@@ -181,7 +178,7 @@ fn out_of_specification(lately: &Tally, timeout: Duration) -> Option<Reason> {
     } else if enough && of * FAILING_PERCENT <= failed * 100 {
         Some(Reason::Failing { failed, of })
     } else {
-        (0 < lately.missed).then_some(Reason::Missed(lately.missed))
+        None
     }
 }
 
@@ -252,8 +249,6 @@ mod tests {
         check(&tally(94, 12, &[Fault::Timeout; 6]), "");
         check(&tally(93, 12, &[Fault::Timeout; 7]), "S 7 of 64 requests failed");
         check(&tally(3, 12, &[Fault::Timeout; 3]), "");
-        let missed = Tally { missed: 2, ..tally(100, 12, &[]) };
-        check(&missed, "S 2 reads left out, line too busy");
     }
 
     #[test]

@@ -229,8 +229,10 @@ fn line_words(cx: &Cx, line: &LineDef) -> (String, Style) {
             let tx = if recent(counters.last_tx) { "tx" } else { "--" };
             let rx = if recent(counters.last_rx) { "rx" } else { "--" };
             let busy = counters.utilisation * 100.0;
-            let style = if rx == "rx" { cx.theme.normal() } else { cx.theme.trouble() };
-            (format!("{} {} {tx} {rx} {busy:.0} %", line.name, cx.theme.pick("▪", "*")), style)
+            let overloaded = status.report.as_ref().is_some_and(|report| report.strain.is_some());
+            let style = if rx == "rx" && !overloaded { cx.theme.normal() } else { cx.theme.trouble() };
+            let overload = if overloaded { " OVERLOADED" } else { "" };
+            (format!("{} {} {tx} {rx} {busy:.0} %{overload}", line.name, cx.theme.pick("▪", "*")), style)
         }
         LineState::Connecting => (format!("{} connecting", line.name), cx.theme.trouble()),
         LineState::Waiting { retry_at, .. } => {

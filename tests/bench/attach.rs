@@ -182,7 +182,7 @@ fn poll(device: DeviceId) -> PollReport {
         cost: Duration::from_millis(50),
         measured: None,
         class: Class::Soft,
-        factor: 1,
+        factor: 1.0,
         shed: false,
         next: None,
         tally: Tally::default(),

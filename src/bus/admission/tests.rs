@@ -71,7 +71,7 @@ proptest! {
 fn a_plant_that_fits_is_told_with_its_cycle_and_its_dead_units() {
     let def = fixture::plant();
     let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &Holes::default()));
-    assert_eq!((&admission.verdict, admission.factor), (&Verdict::Fits, Some(1)));
+    assert_eq!((&admission.verdict, admission.factor), (&Verdict::Fits, Some(1.0)));
     // Four blocks, one a second each: cycle and utilisation are the same number.
     assert!((admission.cycle.as_secs_f64() - admission.utilisation).abs() < 1e-9);
     assert_eq!(admission.warnings, [Warning::NoParityOneStopBit]);
@@ -102,7 +102,7 @@ fn what_is_too_much_says_how_far_process_values_will_be_stretched() {
     let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &Holes::default()));
     assert!(matches!(admission.verdict, Verdict::TooMuch { utilisation } if utilisation > 1.0), "{admission:?}");
     assert!(admission.hard.fits(), "no tag of the fixture is hard");
-    assert!(admission.factor.is_some_and(|factor| factor > 1));
+    assert!(admission.factor.is_some_and(|factor| factor > 1.0));
     let timeout = |warning: &Warning| matches!(warning, Warning::TimeoutBelowAnswer { .. });
     assert!(admission.warnings.iter().any(timeout), "an answer of 8 words takes 21 characters, 21.9 ms");
 }

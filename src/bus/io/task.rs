@@ -20,7 +20,7 @@ use crate::{
         backoff::Backoff,
         books::{Books, Plan},
         plan::{self, Block, Holes, Hunt},
-        schedule::{Load, Next, Schedule, WRITE_SHARE, WriteBudget},
+        schedule::{Budget, Load, Next, Schedule, WRITE_SHARE},
         tool::Job,
     },
     plant::{
@@ -51,7 +51,7 @@ pub async fn run(
         books: Books::new(&def, line, &blocks),
         holes,
         hunt: Hunt::default(),
-        budget: WriteBudget::new(WRITE_SHARE, clock.now()),
+        budget: Budget::new(WRITE_SHARE, clock.now()),
         waiting: VecDeque::new(),
         memory: Memory::new(def.line(line)),
         settings: def.line(line).clone(),
@@ -104,7 +104,7 @@ struct Task<'a> {
     hunt: Hunt,
     /// The share of the line's time that writes may take from polls, and the writes that wait for it: the plant has no more
     /// than one under way for a tag. Beside them what came during a step of a test, one refresh for a device.
-    budget: WriteBudget,
+    budget: Budget,
     waiting: VecDeque<BusRequest>,
     /// Counters and debts, from one opening to the next.
     memory: Memory,

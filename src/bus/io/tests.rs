@@ -170,6 +170,33 @@ async fn one_dead_unit_leaves_the_others_their_rate() {
     assert!(!reads.contains_key(&DeviceId(0)));
 }
 
+/// A unit that has always answered at once and falls silent does not hold the line for the whole timeout of 300 ms.
+#[tokio::test(start_paused = true)]
+async fn a_fast_unit_that_dies_is_not_waited_for_long() {
+    let def = plant(Mode::Rtu);
+    let mut line = line(def.clone());
+    line.plug(Mode::Rtu, |number, message| if 200 < number && message[0] == 1 { Deed::Silent } else { Deed::Answer });
+    let waited = |event: &Event| match event {
+        Event::Failed { at, fault: Fault::Timeout, exchange: Some(exchange), .. } => {
+            Some(at.duration_since(exchange.at))
+        }
+        _ => None,
+    };
+    let waited = Duration::try_from(line.until(&def, waited).await).expect("not negative");
+    assert!((100 * MS..150 * MS).contains(&waited), "{waited:?}");
+}
+
+/// A unit that becomes slow has the whole timeout again as soon as one of its answers has come late.
+#[tokio::test(start_paused = true)]
+async fn a_fast_unit_that_becomes_slow_is_waited_for() {
+    for mode in [Mode::Rtu, Mode::Ascii, Mode::RtuOverTcp] {
+        let slow = |number, _: &[u8]| if 200 < number { Deed::Late(220 * MS) } else { Deed::Answer };
+        let (good, failed) = poll(mode, 400, slow).await;
+        // Behind this slave requests wait for their turn, so that one late answer makes others late.
+        assert!(failed <= 6, "{mode:?}: {good} good, {failed} failed");
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_hole_in_a_block_costs_only_itself() {
     let def = plant(Mode::Rtu);

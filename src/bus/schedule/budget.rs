@@ -1,4 +1,5 @@
-//! The share of a line's time that operators' writes may take from polls that are due.
+//! Shares of a line's time: what operators' writes, and requests to devices that do not answer, may take from polls that
+//! are due.
 
 use std::time::Duration;
 
@@ -6,32 +7,41 @@ use jiff::Timestamp;
 
 /// Share of the line's time for writes, while polls are due.
 pub const WRITE_SHARE: f64 = 0.2;
-/// What may be spent at once after a quiet time: some sixteen writes with their reading back at 9600 baud.
+/// Share of the line's time for requests to devices that do not answer, all of them together.
+pub const PROBE_SHARE: f64 = 0.05;
+/// What may be spent at once after a quiet time: some sixteen writes with their reading back at 9600 baud, or one timeout.
 const SAVED_MAX: Duration = Duration::from_secs(1);
-/// A write that waited for its timeout is not paid for longer than this, at the usual share.
+/// What waited for its timeout is not paid for longer than this, at the usual share.
 const OWED_MAX: Duration = Duration::from_secs(2);
 
-/// A bucket that fills with time: writes go before polls while there is something in it. When nothing is due they go anyway.
+/// A bucket that fills with time: it allows spending while there is something in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WriteBudget {
+pub struct Budget {
     share: f64,
-    /// Seconds; below zero while a write is being paid for.
+    /// Seconds; below zero while what was spent is being paid for.
     saved: f64,
     at: Timestamp,
 }
 
-impl WriteBudget {
+impl Budget {
     /// Full, with a share of 0–1.
-    pub fn new(share: f64, now: Timestamp) -> WriteBudget {
-        WriteBudget { share: share.clamp(0.01, 1.0), saved: SAVED_MAX.as_secs_f64(), at: now }
+    pub fn new(share: f64, now: Timestamp) -> Budget {
+        Budget { share: share.clamp(0.01, 1.0), saved: SAVED_MAX.as_secs_f64(), at: now }
     }
 
-    /// May a write go before a poll that is due?
+    /// May some of the line's time be spent now?
     pub fn allows(&self, now: Timestamp) -> bool {
         0.0 < self.saved_at(now)
     }
 
-    /// A write, with its reading back, has taken the line for so long.
+    /// From when on it allows spending, if nothing more is spent.
+    pub fn allows_from(&self) -> Timestamp {
+        // A microsecond more: at zero it does not allow yet.
+        let missing = Duration::from_micros((-self.saved / self.share * 1e6) as u64 + 1);
+        if 0.0 < self.saved { self.at } else { self.at + missing }
+    }
+
+    /// So much of the line's time has been taken.
     pub fn spent(&mut self, time: Duration, now: Timestamp) {
         self.saved = (self.saved_at(now) - time.as_secs_f64()).max(-OWED_MAX.as_secs_f64());
         self.at = now;
@@ -55,7 +65,7 @@ mod tests {
 
     #[test]
     fn a_flood_of_writes_leaves_four_fifths_of_the_line_to_the_polls() {
-        let mut budget = WriteBudget::new(WRITE_SHARE, at(0));
+        let mut budget = Budget::new(WRITE_SHARE, at(0));
         let (mut now, mut writes, mut polls) = (0, 0, 0);
         while now < 100_000 {
             if budget.allows(at(now)) {
@@ -69,10 +79,20 @@ mod tests {
         assert!((20_000..=21_100).contains(&writes), "{writes} ms for writes, {polls} ms for polls");
     }
 
+    #[test]
+    fn what_was_spent_is_paid_for_with_time() {
+        let mut budget = Budget::new(PROBE_SHARE, at(0));
+        assert_eq!(budget.allows_from(), at(0));
+        budget.spent(Duration::from_millis(1_100), at(2_000));
+        let from = budget.allows_from();
+        assert!(at(4_000) < from && from <= at(4_001), "a tenth of a second at a twentieth: {from}");
+        assert!(budget.allows(from) && !budget.allows(at(4_000)));
+    }
+
     proptest! {
         #[test]
         fn an_operator_never_waits_longer_than_the_debt_takes(spent in proptest::collection::vec(1u64..60_000, 1..20)) {
-            let mut budget = WriteBudget::new(WRITE_SHARE, at(0));
+            let mut budget = Budget::new(WRITE_SHARE, at(0));
             let mut now = 0;
             for ms in spent {
                 now += ms;

@@ -1,4 +1,13 @@
-//! What a schedule knows of a device: whether it answers, and when it may be asked.
+//! What a schedule knows of a device: whether it answers, how fast, and when it may be asked.
+//!
+//! ```text
+//!             no answer               no answer, 3 in a row, or the line has no time for another try
+//!   answering ─────────> failing ───────────────────────────────────────────────────────────> down
+//!             <─────────         second try at once, third after 1 s: only its first block
+//!               an answer                                                                   probed with that
+//! ```
+
+use std::time::Duration;
 
 use jiff::Timestamp;
 
@@ -6,41 +15,108 @@ use crate::{bus::backoff::Backoff, plant::def::DeviceId};
 
 /// Failures in a row after which a device is given up and only probed.
 pub const FAILURES_MAX: u32 = 3;
+/// After so many answers it is known how fast a device answers.
+const ANSWERS_MIN: u32 = 32;
+/// A device that has always answered faster is waited for so many times its slowest answer …
+const SLOWER_MAX: u32 = 4;
+/// … but not less than this: systems, adapters and serial servers pause now and then.
+const PATIENCE_MIN: Duration = Duration::from_millis(100);
+/// Every so many-th try in a row waits for the whole timeout: the device may have become slow.
+const WHOLE_TIMEOUT_EVERY: u32 = 4;
 
 #[derive(Debug, Clone)]
 pub(super) struct Health {
     pub device: DeviceId,
     failures: u32,
+    down: bool,
+    /// When the last failure was noticed.
+    failed_at: Timestamp,
     backoff: Backoff,
-    /// While the device is down: when it is probed next.
+    /// While it does not answer: when it is asked next.
     pub probe_at: Option<Timestamp>,
-    /// The poll that it is probed with: its first.
+    /// The next try does not wait for its share of the line's time.
+    pub prompt: bool,
+    /// The next try waits for the whole timeout.
+    thorough: bool,
+    /// The poll that it is asked with while it does not answer: its first.
     pub probe: Option<usize>,
     /// Not to be asked before this moment.
     pub rests_until: Timestamp,
+    answers: u32,
+    /// The longest time that an answer has taken (real time).
+    slowest: Duration,
 }
 
 impl Health {
     pub fn new(device: DeviceId, now: Timestamp) -> Health {
-        Health { device, failures: 0, backoff: Backoff::default(), probe_at: None, probe: None, rests_until: now }
+        Health {
+            device,
+            failures: 0,
+            down: false,
+            failed_at: now,
+            backoff: Backoff::default(),
+            probe_at: None,
+            prompt: false,
+            thorough: false,
+            probe: None,
+            rests_until: now,
+            answers: 0,
+            slowest: Duration::ZERO,
+        }
     }
 
-    /// It lives. `true` if it was given up before.
-    pub fn answered(&mut self) -> bool {
-        self.failures = 0;
+    /// Is it given up?
+    pub fn is_down(&self) -> bool {
+        self.down
+    }
+
+    /// It has answered, `reply` after the request. `true` if it was given up before.
+    pub fn answered(&mut self, reply: Option<Duration>) -> bool {
+        if let Some(reply) = reply {
+            self.answers = self.answers.saturating_add(1);
+            self.slowest = self.slowest.max(reply);
+        }
+        (self.failures, self.probe_at, self.thorough) = (0, None, false);
         self.backoff.reset();
-        self.probe_at.take().is_some()
+        std::mem::take(&mut self.down)
     }
 
-    /// It did not answer. `true` if it is given up with this.
-    pub fn failed(&mut self, now: Timestamp) -> bool {
-        self.failures = self.failures.saturating_add(1);
-        // What was under way when it was given up says nothing new.
-        if self.failures < FAILURES_MAX || self.probe_at.is_some_and(|probe_at| now < probe_at) {
+    /// An answer came after it had been given up: from now on the device has the whole timeout.
+    pub fn answered_late(&mut self) {
+        self.slowest = Duration::MAX;
+    }
+
+    /// It did not answer a request that was sent at `sent`; `affordable`: the line has time for another try. `true` if it is
+    /// given up with this.
+    pub fn failed(&mut self, sent: Timestamp, now: Timestamp, affordable: bool) -> bool {
+        // What was under way when the last failure was noticed says nothing new.
+        if 0 < self.failures && sent < self.failed_at {
             return false;
         }
-        let goes_down = self.probe_at.is_none();
-        self.probe_at = Some(now + self.backoff.fail());
+        (self.failed_at, self.failures) = (now, self.failures.saturating_add(1));
+        // A device that has answered until now may have lost one frame.
+        self.prompt = self.failures == 1 && 0 < self.answers;
+        self.thorough = false;
+        let goes_down = !self.down && (FAILURES_MAX <= self.failures || !(affordable || self.prompt));
+        self.down |= goes_down;
+        self.probe_at = Some(if self.prompt { now } else { now + self.backoff.fail() });
         goes_down
+    }
+
+    /// It is asked again at once, and the waits between tries begin anew.
+    pub fn retry(&mut self, now: Timestamp) {
+        if self.probe_at.is_some() {
+            self.backoff.reset();
+            (self.probe_at, self.prompt, self.thorough) = (Some(now), true, true);
+        }
+    }
+
+    /// How long an answer is waited for (real time), at most the `timeout` of the line.
+    pub fn patience(&self, timeout: Duration) -> Duration {
+        let whole = self.thorough || self.failures % WHOLE_TIMEOUT_EVERY == WHOLE_TIMEOUT_EVERY - 1;
+        if whole || self.answers < ANSWERS_MIN {
+            return timeout;
+        }
+        self.slowest.saturating_mul(SLOWER_MAX).max(PATIENCE_MIN).min(timeout)
     }
 }

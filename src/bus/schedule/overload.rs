@@ -1,26 +1,32 @@
-//! What is left out on a line with too much to do: idle polls first, then periods of soft polls. Hard polls never.
+//! What gives way on a line with too much to do: idle polls are left out, soft polls are stretched. Hard polls never.
 //!
 //! ```text
 //!            demand > 1 for 2 s, or a hard poll late three times running
-//!   normal ───────────────────────────────────────────────> overload: idle shed, hard first, soft every k-th period
+//!   normal ───────────────────────────────────────────────> overload: idle shed, hard first, soft share what is left
 //!          <───────────────────────────────────────────────
-//!            demand of the milder state ≤ 0.95 for the hold time (10 s, doubled each time it comes back too soon)
+//!            demand ≤ 0.95 for the hold time (10 s, doubled each time it comes back too soon)
 //! ```
+//!
+//! All soft periods grow by one factor, so that what the hard polls leave is shared alike and nearly all of it is used.
 
 use std::time::Duration;
 
 use jiff::Timestamp;
 
-/// The reads that are kept should take at most this share of the line's time.
-pub const FITS: f64 = 0.95;
-/// Soft polls are read at least each so many periods.
-pub const FACTOR_MAX: u32 = 32;
+/// The line is back to normal when the reads take at most this share of its time.
+const FITS: f64 = 0.95;
+/// Soft polls are stretched at most to so many times their period.
+pub const FACTOR_MAX: f64 = 32.0;
 /// A demand above this is overload.
 const FULL: f64 = 1.0;
-/// A short peak, such as a device that is about to be given up, is ridden out.
+/// A short peak is ridden out.
 const OVER_FOR: Duration = Duration::from_secs(2);
 const HOLD: Duration = Duration::from_secs(10);
 const HOLD_MAX: Duration = Duration::from_secs(640);
+/// The factor follows the demand in steps of this share …
+const FACTOR_STEP: f64 = 0.01;
+/// … and is greater by this one: were it too small, the shortest periods alone would be missed.
+const FACTOR_SPARE: f64 = 0.02;
 
 /// Shares of the line's time that polls want at their full rate, by class.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -34,30 +40,28 @@ pub struct Demand {
 }
 
 impl Demand {
-    fn under(self, load: Load) -> f64 {
-        match load {
-            Load::Normal => self.hard + self.soft + self.idle,
-            Load::Overload { factor } => self.hard + self.soft / f64::from(factor),
-        }
+    /// Of all polls.
+    pub fn total(self) -> f64 {
+        self.hard + self.soft + self.idle
     }
 
-    /// The mildest state in which the line is at most so full.
-    fn mildest(self, full: f64) -> Load {
-        let stretched = (1..=FACTOR_MAX).map(|factor| Load::Overload { factor });
-        let worst = Load::Overload { factor: FACTOR_MAX };
-        std::iter::once(Load::Normal).chain(stretched).find(|load| self.under(*load) <= full).unwrap_or(worst)
+    /// By what soft periods grow where idle polls are left out; 1 is not at all.
+    pub fn factor(self) -> f64 {
+        let left = FULL - self.hard;
+        let soft = self.soft * (1.0 + FACTOR_SPARE);
+        if left <= soft / FACTOR_MAX { FACTOR_MAX } else { (soft / left).max(1.0) }
     }
 }
 
 /// How a line copes. Ordered: the milder is less.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub enum Load {
     /// Every poll at its period.
     Normal,
-    /// Idle polls are shed, hard polls go first, soft ones are read each so many periods.
+    /// Idle polls are shed, hard polls go first, soft ones share what is left.
     Overload {
-        /// 1 to [`FACTOR_MAX`].
-        factor: u32,
+        /// By what soft periods grow, 1 to [`FACTOR_MAX`].
+        factor: f64,
     },
 }
 
@@ -65,9 +69,9 @@ impl std::fmt::Display for Load {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Load::Normal => f.write_str("every poll at its period"),
-            Load::Overload { factor: 1 } => f.write_str("too much to do: identification is left out"),
+            Load::Overload { factor } if *factor < 1.05 => f.write_str("line overloaded: identification polls skipped"),
             Load::Overload { factor } => {
-                write!(f, "too much to do: identification is left out, process values are read every {factor} periods")
+                write!(f, "line overloaded: identification polls skipped, process values every {factor:.1} periods")
             }
         }
     }
@@ -80,7 +84,7 @@ pub struct Overload {
     over_since: Option<Timestamp>,
     easy_since: Option<Timestamp>,
     hold: Duration,
-    /// When it was last made milder.
+    /// When it last went back to normal.
     eased_at: Option<Timestamp>,
 }
 
@@ -96,25 +100,32 @@ impl Overload {
         self.load
     }
 
-    /// Judges the present demand; `late` when a hard poll cannot keep its period. The state may change.
-    pub fn judge(&mut self, demand: Demand, late: bool, now: Timestamp) -> Load {
-        let over = FULL < demand.under(self.load);
-        self.over_since = over.then(|| self.over_since.unwrap_or(now));
-        let persists = self.over_since.is_some_and(|since| OVER_FOR <= span(since, now));
-        let worse = if persists { demand.mildest(FITS) } else { Load::Normal };
-        let worse = if late { worse.max(Load::Overload { factor: 1 }) } else { worse };
-        if self.load < worse {
-            let too_soon = self.eased_at.is_some_and(|eased| span(eased, now) <= 2 * self.hold);
-            self.hold = if too_soon { (2 * self.hold).min(HOLD_MAX) } else { HOLD };
-            (self.load, self.over_since) = (worse, None);
+    /// Judges the present demand; `late` when a hard poll cannot keep its period. `true` if the state has changed.
+    pub fn judge(&mut self, demand: Demand, late: bool, now: Timestamp) -> bool {
+        let (before, total) = (self.load, demand.total());
+        match self.load {
+            Load::Normal => {
+                self.over_since = (FULL < total).then(|| self.over_since.unwrap_or(now));
+                if late || self.over_since.is_some_and(|since| OVER_FOR <= span(since, now)) {
+                    let too_soon = self.eased_at.is_some_and(|eased| span(eased, now) <= 2 * self.hold);
+                    self.hold = if too_soon { (2 * self.hold).min(HOLD_MAX) } else { HOLD };
+                    self.load = Load::Overload { factor: demand.factor() };
+                    self.easy_since = None;
+                }
+            }
+            Load::Overload { factor } => {
+                let wanted = demand.factor();
+                if FACTOR_STEP < (wanted / factor - 1.0).abs() {
+                    self.load = Load::Overload { factor: wanted };
+                }
+                if late || FITS < total {
+                    self.easy_since = None;
+                } else if self.hold <= span(*self.easy_since.get_or_insert(now), now) {
+                    (self.load, self.over_since, self.eased_at) = (Load::Normal, None, Some(now));
+                }
+            }
         }
-        let milder = demand.mildest(FITS);
-        if late || self.load <= milder {
-            self.easy_since = None;
-        } else if self.hold <= span(*self.easy_since.get_or_insert(now), now) {
-            (self.load, self.easy_since, self.eased_at) = (milder, None, Some(now));
-        }
-        self.load
+        self.load != before
     }
 }
 

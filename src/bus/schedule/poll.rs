@@ -13,6 +13,8 @@ use crate::{
     },
 };
 
+/// A block that is read once should be read within this time.
+pub(super) const ONCE_WITHIN: Duration = Duration::from_secs(5);
 /// A hard poll that was late so often in a row means overload, whatever the costs say.
 const LATE_MAX: u32 = 3;
 /// A device that has acknowledged (05) wants to be left alone for a while.
@@ -31,22 +33,33 @@ pub struct Served {
 }
 
 /// How a poll stands, for screens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PollInfo {
     /// What happens to it under overload.
     pub class: Class,
     /// Its period, unstretched; `None` for a block that is read once.
     pub period: Option<Duration>,
-    /// It is read each so many periods now.
-    pub factor: u32,
+    /// Its period is stretched to so many now; 1 is not at all.
+    pub factor: f32,
     /// It is left out now.
     pub shed: bool,
     /// When it is due next; `None` for a block that is read once and has been.
     pub next: Option<Timestamp>,
     /// Releases that were skipped because the line had no time.
     pub missed: u64,
-    /// Measured time of a read, smoothed; `None` before the first.
+    /// Measured time of an answered read, smoothed; `None` before the first.
     pub measured: Option<Duration>,
+}
+
+/// How a poll is treated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Pace {
+    /// On its grid.
+    Normal,
+    /// Its period has grown to this, because the line is overloaded.
+    Stretched(Duration),
+    /// Left out, because the line is overloaded.
+    Shed,
 }
 
 #[derive(Debug, Clone)]
@@ -63,7 +76,7 @@ pub(super) struct Pending {
     /// Put off until then.
     pub not_before: Timestamp,
     pub missed: u64,
-    /// Measured time of a read in seconds, smoothed.
+    /// Measured time of an answered read in seconds, smoothed.
     cost: Option<f64>,
     /// Times in a row that it began a whole period late although its device was free.
     late: u32,
@@ -110,19 +123,25 @@ impl Pending {
         }
     }
 
+    /// When it should have been read.
+    pub fn deadline(&self, pace: Pace) -> Option<Timestamp> {
+        let slack = match pace {
+            Pace::Stretched(stretched) => stretched,
+            Pace::Normal | Pace::Shed => self.period.unwrap_or(ONCE_WITHIN),
+        };
+        Some(self.wanted()? + slack)
+    }
+
     /// See [`super::Schedule::done`]. `free`: since when its device could be asked at all.
-    pub fn serve(&mut self, factor: u32, shed: bool, free: Timestamp, started: Timestamp, now: Timestamp) -> Served {
+    pub fn serve(&mut self, pace: Pace, free: Timestamp, started: Timestamp, now: Timestamp) -> Served {
         self.urgent = None;
         if !std::mem::take(&mut self.excused) {
             self.excuses = 0;
         }
-        if started < now {
-            self.spent(span(started, now));
-        }
         let mut told = Served { jitter: None, missed: 0 };
         self.release = match (self.period, self.release) {
             (Some(period), Some(release)) if release <= now => {
-                let period = period * factor;
+                let period = if let Pace::Stretched(stretched) = pace { stretched } else { period };
                 let served = if release <= started { periods_in(release, started, period) + 1 } else { 0 };
                 let over = periods_in(release, now, period).max(served);
                 if served > 0 {
@@ -131,7 +150,7 @@ impl Pending {
                     self.late = if period <= waited { self.late.saturating_add(1) } else { 0 };
                 }
                 // Of the releases served together only the last was in time. What was shed was not to be read at all.
-                told.missed = if shed { 0 } else { over - served.min(1) };
+                told.missed = if pace == Pace::Shed { 0 } else { over - served.min(1) };
                 Some(release + period * over)
             }
             (Some(_), release) => release,
@@ -141,7 +160,7 @@ impl Pending {
         told
     }
 
-    /// A read has taken so long. An eighth of the news: one timeout does not make a line overloaded.
+    /// An answered read has taken so long. An eighth of the news: one slow answer does not make a line overloaded.
     pub fn spent(&mut self, time: Duration) {
         let spent = time.as_secs_f64();
         self.cost = Some(self.cost.map_or(spent, |cost| cost + (spent - cost) / 8.0));
@@ -161,12 +180,10 @@ impl Pending {
         self.cost.zip(self.period).map_or(0.0, |(cost, period)| cost / period.as_secs_f64())
     }
 
-    /// Its next release may stand on a later point of the grid than it need.
-    pub fn pull_in(&mut self, now: Timestamp) {
-        if let (Some(period), Some(release)) = (self.period, &mut self.release)
-            && now < *release
-        {
-            *release -= period * periods_in(now, *release, period);
+    /// Its next release is on the grid that has a point at `origin`; none before `now` counts as missed.
+    pub fn back_on_grid(&mut self, origin: Timestamp, now: Timestamp) {
+        if let (Some(period), Some(release)) = (self.period, &mut self.release) {
+            *release = origin + period * periods_in(origin, now.max(*release), period);
         }
     }
 

@@ -27,8 +27,16 @@ use crate::{
 /// Requests in a row without any answer after which a TCP connection is made anew.
 const UNANSWERED_MAX: u32 = 5;
 
-/// How a read has ended: values or a fault, with the evidence.
-pub(super) type Outcome = (Result<Answer, Fault>, Option<Arc<Exchange>>);
+/// How a read has ended.
+struct Outcome {
+    began: Timestamp,
+    ended: Timestamp,
+    /// The time of the line that it took.
+    took: Duration,
+    answer: Result<Answer, Fault>,
+    /// The evidence.
+    exchange: Option<Arc<Exchange>>,
+}
 
 impl Task<'_> {
     /// Reads the block that is due, and with it others where several requests may be under way.
@@ -39,15 +47,22 @@ impl Task<'_> {
             return self.poll_many(link, schedule, index, in_flight).await;
         }
         let block = self.blocks[index].clone();
-        let started = self.clock.now();
+        let began = self.clock.now();
         let sent = link.last.clone();
+        let timeout = link.timeout();
+        // Only where a late answer is known as one can a device be found to need more time than it did.
+        if link.framing() != Framing::Mbap {
+            link.set_timeout(schedule.patience(index, timeout));
+        }
         let read = match self.in_step(link, &block).await {
             Ok(()) => self.read_twice(link, &block, Some(index)).await,
             Err(trouble) => Err(trouble),
         };
-        let at = self.clock.now();
-        let served = schedule.done(index, started, at);
+        link.set_timeout(timeout);
+        let ended = self.clock.now();
+        let served = schedule.done(index, began, ended);
         self.note_served(index, served);
+        self.note_late(link, schedule);
         link.rest(self.def.device(block.device).gap);
         let answer = match read {
             Ok(answer) => Ok(answer),
@@ -56,8 +71,19 @@ impl Task<'_> {
         };
         // Nothing new was sent when patience was the only way.
         let exchange = link.last.clone().filter(|last| sent.as_ref().is_none_or(|sent| !Arc::ptr_eq(sent, last)));
-        self.settle(link, schedule, &block, at, (answer, exchange)).await?;
+        let took = Duration::try_from(ended.duration_since(began)).unwrap_or_default();
+        self.settle(link, schedule, &block, Outcome { began, ended, took, answer, exchange }).await?;
         Ok(self.still_there(link))
+    }
+
+    /// Answers that had been given up have come: their devices need more time than they used to.
+    fn note_late(&mut self, link: &mut Link, schedule: &mut Schedule) {
+        let late = link.take_late();
+        self.books.late(&self.def, &late);
+        for unit in late {
+            let on_line = self.def.devices.iter().filter(|device| device.line == self.line && device.unit == unit);
+            on_line.for_each(|device| schedule.answered_late(device.id));
+        }
     }
 
     /// A peer may have forgotten a connection, or hold it without ever answering: only a new one tells.
@@ -91,17 +117,13 @@ impl Task<'_> {
             // The connection stands, so every message has its own outcome.
             Err(Trouble::Fault(_)) => return Ok(Ok(())),
         };
-        let at = self.clock.now();
-        // They were told as done when they began; what they took counts for the load of the line.
-        let each = Duration::try_from(at.duration_since(started)).unwrap_or_default() / requests.len().max(1) as u32;
-        for block in &taken {
-            if let Some(index) = self.blocks.iter().position(|planned| planned == block) {
-                schedule.spent(index, each);
-            }
-        }
+        let (began, ended) = (started, self.clock.now());
+        // They share the time.
+        let took = Duration::try_from(ended.duration_since(began)).unwrap_or_default() / requests.len().max(1) as u32;
         for (block, answered) in taken.iter().zip(answers) {
             let answer = answered.answer.and_then(|answer| parse(block, answer));
-            self.settle(link, schedule, block, at, (answer, Some(answered.exchange))).await?;
+            let exchange = Some(answered.exchange);
+            self.settle(link, schedule, block, Outcome { began, ended, took, answer, exchange }).await?;
         }
         Ok(self.still_there(link))
     }
@@ -121,8 +143,7 @@ impl Task<'_> {
         link: &mut Link,
         schedule: &mut Schedule,
         block: &Block,
-        at: Timestamp,
-        (answer, exchange): Outcome,
+        Outcome { began, ended: at, took, answer, exchange }: Outcome,
     ) -> Result<(), Ended> {
         let index = self.blocks.iter().position(|planned| planned == block);
         let reply = exchange.as_ref().and_then(|exchange| exchange.reply);
@@ -130,17 +151,24 @@ impl Task<'_> {
             let outcome = answer.as_ref().map(drop).map_err(|fault| *fault);
             self.books.polled(index, block.device, outcome, reply, exchange.tries);
         }
+        let is_answer = match &answer {
+            Ok(_) => true,
+            Err(Fault::Exception(code)) => !code.is_of_gateway(),
+            Err(_) => false,
+        };
+        if is_answer {
+            schedule.answered(block.device, reply, at);
+            index.into_iter().for_each(|index| schedule.spent(index, took));
+        }
         match answer {
             Ok(values) => {
-                schedule.answered(block.device, at);
                 self.tell_values(at, block, &values, reply.unwrap_or_default(), exchange).await?;
                 self.hunt.answered(block);
                 let disproved = self.holes.disproved(block);
                 self.replan(schedule, at, disproved);
                 Ok(())
             }
-            Err(fault @ Fault::Exception(code)) if !code.is_of_gateway() => {
-                schedule.answered(block.device, at);
+            Err(fault @ Fault::Exception(code)) if is_answer => {
                 self.tell_failed(at, block.device, block.tags.to_vec(), fault, exchange).await?;
                 let its_own = link.debt(block.unit).is_clear();
                 let Some(index) = index else { return Ok(()) };
@@ -162,7 +190,7 @@ impl Task<'_> {
                     schedule.again(index, at);
                 }
                 self.tell_failed(at, block.device, block.tags.to_vec(), fault, exchange).await?;
-                if schedule.failed(block.device, at) {
+                if schedule.failed(block.device, began, took, at) {
                     let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
                     self.tell_failed(at, block.device, tags, Fault::Resting, None).await?;
                     self.holes.forget(block.device);

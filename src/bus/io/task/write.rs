@@ -142,7 +142,7 @@ impl Task<'_> {
         let own = (urgent && is_clear(link, device)) || (!urgent && self.owes_nothing(link, device).await?);
         match self.send_write(link, device, request).await {
             Ok(()) => {
-                schedule.answered(tag.device, self.clock.now());
+                schedule.answered(tag.device, None, self.clock.now());
                 Ok(WriteResult::Accepted)
             }
             Err(Trouble::Gone(why)) => Err(why),

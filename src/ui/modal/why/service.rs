@@ -70,9 +70,9 @@ pub(super) fn poll_rows(cx: &Cx, def: &TagDef) -> Vec<Row> {
         wait => format!(", next in {}", span(wait)),
     });
     let busy = match (poll.shed, poll.factor) {
-        (true, _) => ", left out while the line is too busy".to_owned(),
-        (false, 0 | 1) => String::new(),
-        (false, factor) => format!(", now only each {factor} periods: the line is too busy"),
+        (true, _) => ", skipped while the line is overloaded".to_owned(),
+        (false, factor) if factor < 1.05 => String::new(),
+        (false, factor) => format!(", now every {factor:.1} periods: the line is overloaded"),
     };
     let mut text = format!("{period}{busy}{}, {} missed", next.unwrap_or_default(), poll.tally.missed);
     if let Some(p99) = poll.tally.jitter.p99() {

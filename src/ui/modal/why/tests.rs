@@ -55,7 +55,7 @@ fn fixture() -> Fixture {
             measured: Some(Duration::from_millis(61)),
             next: Some(fixture::now() + SignedDuration::from_millis(600)),
             class: crate::plant::tag::Class::Soft,
-            factor: 1,
+            factor: 1.0,
             shed: false,
             tally: tally.clone(),
         }],

@@ -303,11 +303,12 @@ fn worries(cx: &Cx, at: &Place) -> Vec<String> {
         worries.push(format!("these settings are tried, not saved; before: {}", before.transport));
     }
     let Some(report) = at.report else { return worries };
-    worries.extend(report.strain.clone());
-    if !report.admission.verdict.fits() {
+    if let Some(strain) = &report.strain {
+        worries.push(format!("{strain}. Poll less often, or raise the baud rate"));
+    } else if !report.admission.verdict.fits() {
         worries.push(report.admission.verdict.to_string());
     }
-    if missed_lately(report) {
+    if report.strain.is_none() && missed_lately(report) {
         worries.push(format!(
             "the line is full: {} reads were skipped. Poll less often, or raise the baud rate",
             grouped(report.counters.missed)

@@ -137,12 +137,12 @@ fn cells(cx: &Cx, poll: &PollReport) -> [String; 15] {
     ]
 }
 
-/// `1 s`, `1 s ×3` where it is stretched, `left out`.
+/// `1 s`, `1 s ×1.3` where it is stretched, `left out`.
 fn pace(poll: &PollReport) -> String {
     match (poll.shed, poll.factor) {
         (true, _) => "left out".to_owned(),
-        (false, 0 | 1) => every(poll.poll),
-        (false, factor) => format!("{} ×{factor}", every(poll.poll)),
+        (false, factor) if factor < 1.05 => every(poll.poll),
+        (false, factor) => format!("{} ×{factor:.1}", every(poll.poll)),
     }
 }
 

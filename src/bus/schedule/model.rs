@@ -1,0 +1,167 @@
+//! A line in figures: units that answer after a while or not at all, played in virtual time. What each poll is read of its
+//! full rate, and how much of the line's time is used.
+
+use super::{tests::at, *};
+use crate::plant::{
+    def::TagId,
+    tag::{Poll, Table},
+};
+
+/// How long an answer is waited for by default.
+const TIMEOUT: Duration = Duration::from_secs(1);
+
+/// One unit with one poll.
+#[derive(Debug, Clone)]
+struct Unit {
+    period: i64,
+    /// What a read takes, ms.
+    cost: i64,
+    class: Class,
+    /// It does not answer in this time, ms.
+    dead: std::ops::Range<i64>,
+}
+
+fn unit(period: i64, cost: i64) -> Unit {
+    Unit { period, cost, class: Class::Soft, dead: 0..0 }
+}
+
+struct Model {
+    units: Vec<Unit>,
+    schedule: Schedule,
+    now: i64,
+    /// Good reads, by unit: when they began.
+    reads: Vec<Vec<i64>>,
+    /// Time that good reads took, from when on: (begin, end).
+    busy: Vec<(i64, i64)>,
+}
+
+impl Model {
+    fn new(units: Vec<Unit>) -> Model {
+        let block = |(n, unit): (usize, &Unit)| Block {
+            device: DeviceId(n as u16),
+            unit: n as u8 + 1,
+            table: Table::Holding,
+            address: 0,
+            count: 10,
+            tags: vec![TagId(0)].into(),
+            poll: Poll::Every(Duration::from_millis(unit.period as u64)),
+            class: unit.class,
+            alignment: 1,
+        };
+        let blocks: Vec<Block> = units.iter().enumerate().map(block).collect();
+        let reads = vec![Vec::new(); units.len()];
+        Model { schedule: Schedule::new(&blocks, at(0)), units, now: 0, reads, busy: Vec::new() }
+    }
+
+    fn play(&mut self, until: i64) {
+        while self.now < until {
+            let index = match self.schedule.next(at(self.now)) {
+                Next::Run(index) => index,
+                Next::WaitUntil(at) => {
+                    self.now = at.as_millisecond().max(self.now + 1).min(until);
+                    continue;
+                }
+                Next::Idle => return,
+            };
+            let (unit, started) = (&self.units[index], self.now);
+            let (device, dead) = (DeviceId(index as u16), unit.dead.contains(&started));
+            let patience = self.schedule.patience(index, TIMEOUT);
+            let took = if dead { patience } else { Duration::from_millis(unit.cost as u64) };
+            self.now += took.as_millis() as i64;
+            self.schedule.done(index, at(started), at(self.now));
+            if dead {
+                self.schedule.failed(device, at(started), took, at(self.now));
+            } else {
+                self.schedule.answered(device, Some(Duration::from_millis(5)), at(self.now));
+                self.schedule.spent(index, took);
+                self.reads[index].push(started);
+                self.busy.push((started, self.now));
+            }
+        }
+    }
+
+    /// The share of its full rate that a unit has kept in a span.
+    fn kept(&self, unit: usize, span: &std::ops::Range<i64>) -> f64 {
+        let reads = self.reads[unit].iter().filter(|began| span.contains(began)).count();
+        reads as f64 * self.units[unit].period as f64 / (span.end - span.start) as f64
+    }
+
+    /// The same of all units that never die.
+    fn healthy(&self, span: std::ops::Range<i64>) -> f64 {
+        let healthy: Vec<usize> = (0..self.units.len()).filter(|unit| self.units[*unit].dead.is_empty()).collect();
+        healthy.iter().map(|unit| self.kept(*unit, &span)).sum::<f64>() / healthy.len() as f64
+    }
+
+    /// The share of the time that good reads took.
+    fn used(&self, span: std::ops::Range<i64>) -> f64 {
+        let within = |(from, to): &(i64, i64)| ((*to).min(span.end) - (*from).max(span.start)).max(0);
+        self.busy.iter().map(within).sum::<i64>() as f64 / (span.end - span.start) as f64
+    }
+}
+
+/// Eight units, 250 ms each, 23 ms a read (10 registers at 19200 baud); some die.
+fn eight(dead: &[(usize, i64)]) -> Model {
+    let mut units = vec![unit(250, 23); 8];
+    for (unit, since) in dead {
+        units[*unit].dead = *since..i64::MAX;
+    }
+    let mut model = Model::new(units);
+    model.play(200_000);
+    model
+}
+
+#[test]
+fn living_units_keep_their_rate_while_others_die() {
+    const DIES: i64 = 60_000;
+    let one = eight(&[(3, DIES)]);
+    let three = eight(&[(1, DIES), (3, DIES), (6, DIES)]);
+    let one_by_one = eight(&[(1, DIES), (3, DIES + 10_000), (4, DIES + 20_000), (6, DIES + 30_000)]);
+    let start = eight(&[(3, 0)]);
+    let mut poor = Vec::new();
+    for (what, model, since) in [
+        ("one", one, DIES),
+        ("three", three, DIES),
+        ("one after another", one_by_one, DIES),
+        ("from the start", start, 0),
+    ] {
+        for span in [20_000, 60_000] {
+            let kept = model.healthy(since..since + span);
+            if kept < 0.90 {
+                poor.push(format!("{what}, first {span} ms: {kept:.3}"));
+            }
+        }
+    }
+    assert!(poor.is_empty(), "{poor:#?}");
+}
+
+/// Soft units of an overloaded line.
+const SOFT: usize = 24;
+
+#[test]
+fn an_overloaded_line_is_used_and_shared_fairly() {
+    let mut poor = Vec::new();
+    for (demand, hard) in [102, 115, 153, 300].into_iter().flat_map(|demand| [(demand, false), (demand, true)]) {
+        // Six units each at 250, 500, 1000 and 2000 ms that want the same share each; and an alarm input of 10 %.
+        let mut units: Vec<Unit> = (0..SOFT).map(|n| unit(250 << (n / 6), 0)).collect();
+        let hard_share = if hard { 10 } else { 0 };
+        for (n, unit) in units.iter_mut().enumerate() {
+            // Whole milliseconds, and what is left over goes to the last of them.
+            let wanted = |n: usize| unit.period * (demand - hard_share) * n as i64 / SOFT as i64 / 100;
+            unit.cost = wanted(n + 1) - wanted(n);
+        }
+        if hard {
+            units.push(Unit { class: Class::Hard, ..unit(400, 40) });
+        }
+        let mut model = Model::new(units);
+        model.play(300_000);
+        let span = 30_000..300_000;
+        let used = model.used(span.clone());
+        let kept: Vec<f64> = (0..SOFT).map(|unit| model.kept(unit, &span)).collect();
+        let (least, most) =
+            kept.iter().fold((f64::MAX, 0.0f64), |(least, most), kept| (least.min(*kept), most.max(*kept)));
+        if used < 0.95 || most > 1.1 * least || (hard && model.kept(SOFT, &span) < 0.999) {
+            poor.push(format!("{demand} %: used {used:.3}, kept {least:.3}–{most:.3}"));
+        }
+    }
+    assert!(poor.is_empty(), "{poor:#?}");
+}
