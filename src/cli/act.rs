@@ -62,7 +62,9 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
         let command = Command::Write { tag, value };
         let status = client::ordered(&mut session, 1, command, args.note.as_deref(), password).await?;
         let words = |value: Option<f64>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
-        let (old, new, unit) = (words(status.old), words(Some(value)), snapshot.unit(tag));
+        // What the station says that the device holds, which need not be what was typed.
+        let new = status.command.written().map(|(_, held)| held);
+        let (old, new, unit) = (words(status.old), words(new), snapshot.unit(tag));
         let recorded = recorded_words(&status);
         let line = format!("{} {old} → {new} {unit}: {}{recorded}", args.tag, outcome_words(&status.outcome));
         match status.outcome {

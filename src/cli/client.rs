@@ -132,6 +132,7 @@ pub async fn ordered(
     let sign = sign::needed(&session.snapshots.borrow().def, &command) == Some(Sign::Password);
     let sign = password.filter(|_| sign).map(|password| Signature { user: None, password });
     let request = crate::access::OrderRequest {
+        seen: session.snapshots.borrow().seen(&command),
         sign,
         note: note.map(Into::into),
         ..crate::access::OrderRequest::new(id, command)

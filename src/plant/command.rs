@@ -169,6 +169,9 @@ pub enum Refusal {
     /// Somebody or something has changed the value since the operator looked; this is what it is now.
     #[error("it was changed to {0} since you looked")]
     ChangedTo(String),
+    /// The order does not say which value it replaces; this is what it is now.
+    #[error("it is {0} now; look and confirm again")]
+    NotSeen(String),
     /// The profile says read-only.
     #[error("read only")]
     ReadOnly,

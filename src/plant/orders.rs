@@ -70,8 +70,13 @@ impl Desk {
         at: Timestamp,
     ) -> Result<BusRequest, Option<Box<ActionRecord>>> {
         let old = board.sample(tag).value;
-        self.open(order, old, at);
-        let checked = self.not_overtaken(board, order, tag, value).and_then(|()| self.check(board, tag, value));
+        let checked = self.check(board, tag, value);
+        let checked = checked.and_then(|checked| self.not_overtaken(board, order, tag, checked));
+        // What is shown and recorded is what the device will hold, not what was typed.
+        let def = self.def.tag(tag);
+        let held = board.scaling_decimals(def).and_then(|decimals| scale::held(def, value, decimals));
+        let command = Command::Write { tag, value: held.unwrap_or(value) };
+        self.open(&Order { command, ..order.clone() }, old, at);
         match checked {
             Err(outcome) => Err(self.close(order.id, outcome, board).map(Box::new)),
             Ok(Checked { raw, unlock, urgent }) => {
@@ -159,7 +164,7 @@ impl Desk {
         let (_, order, tag, raw) = self.writes.swap_remove(index);
         let def = self.def.tag(tag);
         let outcome = match result {
-            WriteResult::ReadBack(back) if scale::same_raw(def.point.kind, raw, back) => Outcome::Verified,
+            WriteResult::ReadBack(back) if scale::same_raw(def, raw, back) => Outcome::Verified,
             WriteResult::ReadBack(back) => {
                 let decimals = board.scaling_decimals(def).unwrap_or(0);
                 Outcome::NotConfirmed(NotConfirmed::Different(scale::to_value(def, back, decimals)))
@@ -250,20 +255,16 @@ impl Desk {
     }
 
     /// Refuses a write over a value that its operator has not seen. A stop is right whatever stood there.
-    fn not_overtaken(&self, board: &Board, order: &Order, tag: TagId, value: f64) -> Result<(), Outcome> {
+    fn not_overtaken(&self, board: &Board, order: &Order, tag: TagId, checked: Checked) -> Result<Checked, Outcome> {
         let def = self.def.tag(tag);
-        let (Some(seen), Some(decimals)) = (order.seen, board.scaling_decimals(def)) else { return Ok(()) };
-        let held = scale::held(def, value, decimals);
-        if held.is_some_and(|held| guard::is_stop(&self.def, tag, held)) {
-            return Ok(());
-        }
-        let raw = scale::to_raw(def, seen, decimals);
-        match (board.trusted_raw(tag), raw) {
-            (Some(now), Some(raw)) if !scale::same_raw(def.point.kind, now, raw) => {
-                let now = scale::to_value(def, now, decimals);
-                Err(Outcome::Refused(Refusal::ChangedTo(value_words(board, def, now))))
-            }
-            (Some(_) | None, _) => Ok(()),
+        let now = board.trusted_raw(tag).zip(board.scaling_decimals(def)).filter(|_| !checked.urgent);
+        let Some((raw, decimals)) = now else { return Ok(checked) };
+        let now = scale::to_value(def, raw, decimals);
+        let same_raw = |seen| scale::to_raw(def, seen, decimals).is_some_and(|seen| scale::same_raw(def, seen, raw));
+        match order.seen {
+            Some(seen) if same_raw(seen) => Ok(checked),
+            Some(_) => Err(Outcome::Refused(Refusal::ChangedTo(value_words(board, def, now)))),
+            None => Err(Outcome::Refused(Refusal::NotSeen(value_words(board, def, now)))),
         }
     }
 
@@ -296,7 +297,8 @@ impl Desk {
         let Some(decimals) = decimals else {
             return refuse(Refusal::Unknown("number of decimals".into()));
         };
-        let inside = value.is_finite() && min.is_none_or(|min| min <= value) && max.is_none_or(|max| value <= max);
+        // A limit holds for what is sent: rounding must not lead beyond it, nor hide that more was asked for.
+        let inside = scale::is_inside(min, max, value) && held.is_none_or(|held| scale::is_inside(min, max, held));
         let raw = scale::to_raw(def, value, decimals).filter(|_| inside);
         let Some(raw) = raw else {
             let shown = usize::from(board.shown_decimals(def));
@@ -304,7 +306,7 @@ impl Desk {
             return refuse(Refusal::OutOfRange { min: text(min, "−∞"), max: text(max, "∞") });
         };
         // What was read before the write under way says nothing about the time after it.
-        if !is_busy && board.trusted_raw(tag).is_some_and(|now| scale::same_raw(def.point.kind, now, raw)) {
+        if !is_busy && board.trusted_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw)) {
             return Err(Outcome::Unchanged);
         }
         let raw_of = |key, value| scale::to_raw(self.def.tag(key), value, 0).unwrap_or(value);
@@ -313,7 +315,7 @@ impl Desk {
         let unlock = unlock.filter(|(key, turned)| {
             let moving = self.writes.iter().any(|write| write.2 == *key);
             let now = board.trusted_raw(*key).filter(|_| !moving);
-            now.is_none_or(|now| !scale::same_raw(self.def.tag(*key).point.kind, now, *turned))
+            now.is_none_or(|now| !scale::same_raw(self.def.tag(*key), now, *turned))
         });
         Ok(Checked { raw, unlock, urgent })
     }

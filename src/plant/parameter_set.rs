@@ -177,7 +177,7 @@ pub fn compare(def: &PlantDef, device: DeviceId, set: &ParameterSet, trusted: Tr
 /// Would the device hold the same raw number for both?
 fn same(tag: &TagDef, one: f64, other: f64, trusted: Trusted) -> bool {
     let raw = |value| decimals(tag, trusted).and_then(|decimals| scale::to_raw(tag, value, decimals));
-    raw(one).zip(raw(other)).map_or(one == other, |(one, other)| scale::same_raw(tag.point.kind, one, other))
+    raw(one).zip(raw(other)).map_or(one == other, |(one, other)| scale::same_raw(tag, one, other))
 }
 
 /// Decimals that the device announces for a tag, as they scale its raw number.

@@ -35,22 +35,29 @@ pub fn held(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
     to_raw(tag, value, decimals).map(|raw| to_value(tag, raw, decimals))
 }
 
-/// Do two raw numbers mean the same stored value?
-pub fn same_raw(kind: Kind, one: f64, other: f64) -> bool {
-    match kind {
+/// Do two raw numbers of a tag mean the same stored value?
+pub fn same_raw(tag: &TagDef, one: f64, other: f64) -> bool {
+    match tag.point.kind {
         Kind::F32 => one as f32 == other as f32,
+        // What was lost in scaling forth and back is lost in the value, which an offset makes much larger than the raw number.
+        Kind::F64 => alike(one, other) || alike(to_value(tag, one, 0), to_value(tag, other, 0)),
         Kind::Bool => (one != 0.0) == (other != 0.0),
         Kind::Text(_) => false,
-        Kind::I16
-        | Kind::U16
-        | Kind::I32
-        | Kind::U32
-        | Kind::I64
-        | Kind::U64
-        | Kind::F64
-        | Kind::Bcd16
-        | Kind::Bcd32 => one == other,
+        Kind::I16 | Kind::U16 | Kind::I32 | Kind::U32 | Kind::I64 | Kind::U64 | Kind::Bcd16 | Kind::Bcd32 => {
+            one == other
+        }
     }
+}
+
+/// The same number but for what scaling forth and back rounds: within two units in the last place.
+pub fn alike(one: f64, other: f64) -> bool {
+    (one - other).abs() <= 2.0 * f64::EPSILON * one.abs().max(other.abs())
+}
+
+/// Is a value that a device will hold between its bounds, where there are any?
+pub fn is_inside(min: Option<f64>, max: Option<f64>, held: f64) -> bool {
+    let at_most = |low: f64, high: f64| low <= high || alike(low, high);
+    held.is_finite() && min.is_none_or(|min| at_most(min, held)) && max.is_none_or(|max| at_most(held, max))
 }
 
 /// Lowest and highest raw number of a tag's type or bit field.

@@ -128,12 +128,23 @@ impl Snapshot {
     }
     /// A value as the device will hold it once it is written; as it is where it cannot be sent.
     pub fn held(&self, tag: TagId, value: f64) -> f64 {
-        let def = self.def.tag(tag);
-        let decimals = match def.decimals {
+        scale::held(self.def.tag(tag), value, self.scaling_decimals(tag)).unwrap_or(value)
+    }
+    /// The smallest change of a value that a whole number in the device can hold.
+    pub fn step(&self, tag: TagId) -> f64 {
+        self.def.tag(tag).scale.abs() * 10f64.powi(-i32::from(self.scaling_decimals(tag)))
+    }
+    fn scaling_decimals(&self, tag: TagId) -> u8 {
+        match self.def.tag(tag).decimals {
             Decimals::Fixed(_) => 0,
             Decimals::From(_) => self.decimals[tag.index()],
-        };
-        scale::held(def, value, decimals).unwrap_or(value)
+        }
+    }
+    /// The value that stands before a reader's eyes of the tag that a command writes; `None` where it writes none or none is
+    /// shown.
+    pub fn seen(&self, command: &Command) -> Option<f64> {
+        let (tag, _) = command.written()?;
+        self.samples.get(tag.index())?.value
     }
     /// The unit of a tag, which the device may choose (°C or °F).
     pub fn unit(&self, tag: TagId) -> &str {

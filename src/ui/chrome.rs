@@ -277,7 +277,9 @@ fn tab_bar(model: &Model, cx: &Cx, canvas: &mut Canvas) {
 fn status(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     let length = canvas.width();
     canvas.run(0, 0, length, '─', cx.theme.dim());
-    if let Some(watch) = &model.watch {
+    if let Some(note) = model.note {
+        canvas.text(1, 0, &format!(" {note} "), cx.theme.strong());
+    } else if let Some(watch) = &model.watch {
         let (text, style) = watch_words(cx, watch);
         let room = length.saturating_sub(4);
         // The time stays whatever must be cut: an old outcome is not a new one.
@@ -295,7 +297,9 @@ fn status(model: &Model, cx: &Cx, canvas: &mut Canvas) {
 /// An order and how it stands: `TIC-1.SV 60.0 → 70.0 °C verified 13:40:02`.
 pub fn watch_words(cx: &Cx, watch: &Watch) -> (String, Style) {
     let theme = cx.theme;
-    let what = order_words(cx, &watch.command, watch.status.as_ref().and_then(|status| status.old));
+    // As the station took it: a write of what the device can hold.
+    let (command, old) = watch.status.as_ref().map_or((&watch.command, None), |status| (&status.command, status.old));
+    let what = order_words(cx, command, old);
     let Some(status) = &watch.status else {
         return match watch.undelivered {
             Some(why) => (format!("{what}  NOT SENT: {why}"), theme.trouble()),

@@ -1,5 +1,11 @@
-//! What the last frame showed: news that came after it are not acknowledged unseen.
+//! What the last frame showed: a key acts on the row that its operator saw, or on none.
+//!
+//! Keys alone change nothing unseen: what they lead to follows from what is on the screen. News do, between two frames; then a
+//! key that would act on another row than the drawn one, or on the same in another state, does nothing and says so.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use crossterm::event::{KeyCode, KeyEvent};
 use jiff::Timestamp;
 
 use super::{
@@ -8,20 +14,92 @@ use super::{
 };
 use crate::plant::{def::AlarmId, snapshot::ActiveAlarm};
 
+/// Said where a key was not taken.
+const CHANGED: &str = "The list has changed, press again";
+
+/// The rows of a list that keys act on, each with its state, and the selected one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Rows {
+    all: u64,
+    selected: u64,
+}
+
+impl Rows {
+    /// The rows of a list, and the place of the selected one.
+    pub fn of<T: Hash>(rows: impl IntoIterator<Item = T>, selected: usize) -> Rows {
+        let mut all = DefaultHasher::new();
+        let mut chosen = DefaultHasher::new();
+        for (place, row) in rows.into_iter().enumerate() {
+            row.hash(&mut all);
+            if place == selected {
+                row.hash(&mut chosen);
+            }
+        }
+        Rows { all: all.finish(), selected: chosen.finish() }
+    }
+}
+
 /// What a frame showed, as far as a key may mean it that is pressed before the next one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Drawn {
     /// The tab.
     tab: Tab,
-    /// The alarm that `a` was for: which, and when it was raised.
+    /// Its list.
+    rows: Rows,
+    /// The alarm that `a` was for: which, and when it was annunciated.
     alarm: Option<(AlarmId, Timestamp)>,
+    /// Something has come from the station since.
+    news: bool,
+    /// The selection was moved over rows that are not those of the frame: nobody can tell what was meant.
+    astray: bool,
 }
 
 impl Model {
     /// A frame was drawn.
     pub(super) fn note_drawn(&mut self) {
-        let alarm = self.alarm_to_acknowledge().map(|alarm| (alarm.id, alarm.raised_at));
-        self.drawn = Some(Drawn { tab: self.tabs.shown, alarm });
+        self.drawn = Some(self.as_drawn());
+    }
+
+    /// Something has come from the station that no frame has shown.
+    pub(super) fn note_news(&mut self) {
+        if let Some(drawn) = &mut self.drawn {
+            drawn.news = true;
+        }
+    }
+
+    /// Is all that a key can mean as it was drawn?
+    pub(super) fn is_as_drawn(&self) -> bool {
+        self.drawn.is_some_and(|drawn| !drawn.news || Drawn { news: true, ..self.as_drawn() } == drawn)
+    }
+
+    /// A key alone has led to what there is now: it is as good as seen.
+    pub(super) fn note_keyed(&mut self) {
+        let news = self.drawn.is_some_and(|drawn| drawn.news);
+        self.drawn = Some(Drawn { news, ..self.as_drawn() });
+    }
+
+    fn as_drawn(&self) -> Drawn {
+        let alarm = self.alarm_to_acknowledge().map(|alarm| (alarm.id, alarm.annunciated_at));
+        Drawn { tab: self.tabs.shown, rows: self.tabs.rows(&self.cx()), alarm, news: false, astray: false }
+    }
+
+    /// May a key of the tab act on the selected row? Else that is said. To move on is always possible.
+    pub(super) fn may_act(&mut self, event: KeyEvent) -> bool {
+        let moves = matches!(
+            event.code,
+            KeyCode::Up | KeyCode::Down | KeyCode::PageUp | KeyCode::PageDown | KeyCode::Home | KeyCode::End
+        );
+        let now = self.tabs.rows(&self.cx());
+        let Some(drawn) = self.drawn.as_mut().filter(|drawn| drawn.news) else { return true };
+        if moves {
+            drawn.astray |= drawn.tab != self.tabs.shown || drawn.rows.all != now.all;
+            return true;
+        }
+        let seen = !drawn.astray && drawn.tab == self.tabs.shown && drawn.rows.selected == now.selected;
+        if !seen {
+            self.note = Some(CHANGED);
+        }
+        seen
     }
 
     /// The alarm that `a` is for as things stand: the one selected on the alarms tab if that can be seen, else the most
@@ -36,26 +114,29 @@ impl Model {
         self.tabs.shown == Tab::Alarms && !self.small()
     }
 
-    /// The alarm that whoever presses `a` has seen: news that came after the last frame are not acknowledged unseen.
-    fn alarm_seen(&self) -> Option<&ActiveAlarm> {
-        match self.drawn {
-            Some(Drawn { tab, .. }) if tab == self.tabs.shown && self.lists() && self.tabs.alarms.is_chosen() => {
-                self.alarm_to_acknowledge()
-            }
-            Some(Drawn { alarm, .. }) => {
-                let (id, raised_at) = alarm?;
-                self.snapshot.alarms.iter().find(|alarm| (alarm.id, alarm.raised_at) == (id, raised_at))
-            }
-            None => self.alarm_to_acknowledge(),
+    /// The alarm that whoever presses `a` has seen, exactly as it was annunciated; `Err` if there is another one by now.
+    fn alarm_seen(&self) -> Result<Option<&ActiveAlarm>, &'static str> {
+        let now = self.alarm_to_acknowledge();
+        let Some(drawn) = self.drawn else { return Ok(now) };
+        if drawn.astray {
+            return Err(CHANGED);
         }
+        let Some((id, annunciated_at)) = drawn.alarm else {
+            return if now.is_none() { Ok(None) } else { Err(CHANGED) };
+        };
+        let seen = |alarm: &&ActiveAlarm| (alarm.id, alarm.annunciated_at) == (id, annunciated_at);
+        self.snapshot.alarms.iter().find(seen).map(Some).ok_or(CHANGED)
     }
 }
 
 /// Acknowledges what `a` is for; says so where that needs none.
-pub(super) fn acknowledge(model: &Model) -> Vec<Act> {
-    match model.alarm_seen() {
-        Some(alarm) if alarm.state.needs_acknowledgement() => deeds::acknowledge(&model.cx(), alarm),
-        Some(alarm) if model.lists() => deeds::acknowledged(&model.cx(), alarm),
-        Some(_) | None => Vec::new(),
-    }
+pub(super) fn acknowledge(model: &mut Model) -> Vec<Act> {
+    let (acts, note) = match model.alarm_seen() {
+        Ok(Some(alarm)) if alarm.state.needs_acknowledgement() => (deeds::acknowledge(&model.cx(), alarm), None),
+        Ok(Some(alarm)) if model.lists() => (deeds::acknowledged(&model.cx(), alarm), None),
+        Ok(_) => (Vec::new(), None),
+        Err(why) => (Vec::new(), Some(why)),
+    };
+    model.note = note;
+    acts
 }

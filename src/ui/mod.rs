@@ -77,6 +77,8 @@ pub struct Model {
     pub drill: Option<Arc<drill::Status>>,
     /// What the last frame showed; `None` before the first one.
     pub drawn: Option<Drawn>,
+    /// Why the last key did nothing; until the next one.
+    pub note: Option<&'static str>,
 }
 
 /// The terminal's sense of time, fed by ticks.
@@ -142,6 +144,7 @@ impl Model {
             plants: 0,
             drill: None,
             drawn: None,
+            note: None,
         };
         update(&mut model, Msg::Standing(standing));
         model
@@ -170,6 +173,10 @@ impl Model {
 
 /// Takes in one message. The only place where a terminal's state changes.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
+    let keyed = matches!(msg, Msg::Key(_)) && model.is_as_drawn();
+    if matches!(msg, Msg::Snapshot(_) | Msg::Standing(_) | Msg::Answer(..) | Msg::Drill(_) | Msg::Tick { .. }) {
+        model.note_news();
+    }
     let acts = match msg {
         Msg::Key(event) if event.kind == KeyEventKind::Release => Vec::new(),
         Msg::Key(event) => {
@@ -218,6 +225,9 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let acts = presence::hold_back(model, acts);
     let effects = perform(model, acts);
     model.settle();
+    if keyed {
+        model.note_keyed();
+    }
     effects
 }
 
@@ -256,6 +266,7 @@ fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &Cx) -> Vec<Act>)
 }
 
 fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
+    model.note = None;
     if keys::find(keys::GLOBAL, event) == Some(Global::Lock) {
         return presence::lock(model);
     }
@@ -278,6 +289,7 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
         // Nobody gives orders to what cannot be seen.
         Some(_) | None if model.small() => Vec::new(),
         Some(global) => on_global(model, global),
+        None if !model.may_act(event) => Vec::new(),
         None => with_tabs(model, |tabs, cx| tabs.on_key(cx, event)),
     }
 }

@@ -16,7 +16,7 @@ const OUTCOME_TICKS: u32 = 120;
 pub struct Confirmed {
     /// What.
     pub command: Command,
-    /// The value of the tag to be written that stood before his eyes; `None` where it was not known or moves by itself.
+    /// The value of the tag to be written that stood before his eyes; `None` where it was not known.
     pub seen: Option<f64>,
     /// What a tag asks for again.
     pub sign: Option<Signature>,
@@ -75,6 +75,7 @@ impl Model {
         let undelivered = self.standing.gone.as_ref().map(|_| "the station has gone");
         let changed_at = self.clock.phase;
         self.watch = Some(Watch { id, command: command.clone(), status: None, changed_at, undelivered });
+        let seen = seen.or_else(|| self.snapshot.seen(&command));
         let request = OrderRequest { seen, sign, note, ..OrderRequest::new(id, command) };
         undelivered.is_none().then_some(Effect::Order(request))
     }

@@ -9,14 +9,13 @@ use std::{
 
 use jiff::Timestamp;
 use sightglass::{
-    access::OrderRequest,
     bus::{
         frame::with_crc,
         io::{clock::Clock, transport::Connector},
     },
     plant::{
         PlantDef, Snapshot,
-        command::{Command, OrderId},
+        command::Command,
         def::{LineDef, LineId, TagId},
         tag::{Access, Poll},
     },
@@ -26,7 +25,7 @@ use sightglass::{
         io::{Service, WorldHandle, serve_stream},
         world::World,
     },
-    station::{self, Request, Session},
+    station::{self, Session},
 };
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
@@ -257,9 +256,7 @@ async fn check(golden: Golden<'_>) {
     tokio::time::sleep(Duration::from_secs(5)).await;
     for (number, (short, value)) in golden.writes.iter().enumerate() {
         let tag = def.tag_named(&full(short)).unwrap();
-        let id = OrderId { terminal: session.terminal, number: number as u32 };
-        let command = Command::Write { tag, value: *value };
-        session.send(Request::Order(OrderRequest::new(id, command))).unwrap();
+        session.order(number as u32, Command::Write { tag, value: *value }).unwrap();
         tokio::time::sleep(Duration::from_secs(10)).await;
     }
     let asked: Vec<Vec<u8>> = asked.lock().unwrap().clone();

@@ -201,7 +201,8 @@ pub async fn login(session: &Session, user: &str, password: &str) -> Result<(), 
 
 /// An order of this terminal.
 pub fn request(session: &Session, number: u32, command: Command) -> OrderRequest {
-    OrderRequest::new(OrderId { terminal: session.terminal, number }, command)
+    let seen = session.snapshots.borrow().seen(&command);
+    OrderRequest { seen, ..OrderRequest::new(OrderId { terminal: session.terminal, number }, command) }
 }
 
 /// Waits until a snapshot is so, and gives it.

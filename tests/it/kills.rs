@@ -117,8 +117,9 @@ async fn write_on(mut session: Session, done: watch::Sender<u64>, round: u64) ->
         let note = format!("write {number} of round {round}");
         let value = (VALUES.start + (round * 37 + u64::from(number)) % (VALUES.end - VALUES.start)) as f64 / 10.0;
         let id = OrderId { terminal: session.terminal, number };
-        let order =
-            OrderRequest { note: Some(note.as_str().into()), ..OrderRequest::new(id, Command::Write { tag, value }) };
+        let command = Command::Write { tag, value };
+        let seen = session.snapshots.borrow().seen(&command);
+        let order = OrderRequest { seen, note: Some(note.as_str().into()), ..OrderRequest::new(id, command) };
         if session.send(Request::Order(order)).is_err() {
             break;
         }

@@ -181,7 +181,8 @@ impl Plant {
             let id = OrderId { terminal: PLANT, number: *numbers };
             step.order = Some(id);
             let (tag, value) = (step.change.tag, step.change.new);
-            let order = Order::new(id, by, Command::Write { tag, value });
+            let seen = Some(step.change.old);
+            let order = Order { seen, ..Order::new(id, by, Command::Write { tag, value }) };
             let refusal = if line_changed { Some(Refusal::LineChanged) } else { overtaken(step, &self.board) };
             if let Some(why) = refusal {
                 let action = self.desk.note(&order, Outcome::Refused(why), &self.board, at);

@@ -47,9 +47,15 @@ fn order(number: u32, command: Command) -> Order {
     Order::new(OrderId { terminal: 1, number }, "anna", command)
 }
 
+/// A write by an operator who has the plant's present values before him.
+fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> Order {
+    let command = Command::Write { tag, value };
+    Order { seen: plant.snapshot().seen(&command), ..order(number, command) }
+}
+
 /// Orders `SV := value`, answers with `result`, and gives the outcome and the raw number that was sent.
 fn write(plant: &mut Plant, value: f64, result: WriteResult) -> (Outcome, Option<f64>) {
-    let effects = plant.on_order(order(1, Command::Write { tag: SV, value }), at(1));
+    let effects = plant.on_order(shown(&plant, 1, SV, value), at(1));
     let sent = effects.bus.first().map(|(_, request)| match request {
         BusRequest::Write { id, raw, .. } => (*id, *raw),
         other => panic!("not a write: {other:?}"),
@@ -141,7 +147,7 @@ fn a_line_is_closed_when_it_says_so() {
 #[test]
 fn a_write_leaves_a_trace_before_it_is_sent_and_is_closed_when_the_station_stops() {
     let mut plant = running();
-    let effects = plant.on_order(order(1, Command::Write { tag: SV, value: 61.0 }), at(1));
+    let effects = plant.on_order(shown(&plant, 1, SV, 61.0), at(1));
     let intent = plant.intent(&effects.bus[0].1).expect("a write is about to be sent");
     assert_eq!((&*intent.action, &*intent.target, &*intent.outcome), ("order", "TIC-1.SV", "ordered"));
     assert!(crate::plant::record::ELSEWHERE.contains(&&*intent.action), "a shift report has the outcome alone");
@@ -166,7 +172,7 @@ fn nothing_is_written_blindly() {
     let unknown = Outcome::Refused(Refusal::Unknown("number of decimals".into()));
     assert_eq!(write(&mut plant, 50.0, WriteResult::Accepted), (unknown, None));
     for (tag, value, refusal) in [(PV, 1.0, Refusal::ReadOnly), (RUN, 2.0, Refusal::NotAChoice)] {
-        let effects = plant.on_order(order(2, Command::Write { tag, value }), at(1));
+        let effects = plant.on_order(shown(&plant, 2, tag, value), at(1));
         assert!(effects.bus.is_empty());
         assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(refusal));
     }
@@ -175,8 +181,8 @@ fn nothing_is_written_blindly() {
 #[test]
 fn a_second_write_waits_for_the_first_and_a_lost_one_is_given_up() {
     let mut plant = running();
-    plant.on_order(order(1, Command::Write { tag: SV, value: 71.0 }), at(1));
-    plant.on_order(order(2, Command::Write { tag: SV, value: 72.0 }), at(2));
+    plant.on_order(shown(&plant, 1, SV, 71.0), at(1));
+    plant.on_order(shown(&plant, 2, SV, 72.0), at(2));
     assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::UnderWay));
     let effects = plant.on_tick(at(122));
     assert_eq!(plant.snapshot().orders[1].outcome, Outcome::Failed(Fault::Timeout));
@@ -186,7 +192,7 @@ fn a_second_write_waits_for_the_first_and_a_lost_one_is_given_up() {
 #[test]
 fn the_record_of_a_write_has_old_new_and_outcome() {
     let mut plant = running();
-    let effects = plant.on_order(order(1, Command::Write { tag: SV, value: 72.5 }), at(1));
+    let effects = plant.on_order(shown(&plant, 1, SV, 72.5), at(1));
     let BusRequest::Write { id, .. } = effects.bus[0].1 else { panic!("a write was ordered") };
     let effects = plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(725.0) });
     let Some(Record::Action(action)) = effects.records.last() else { panic!("no action on record") };
@@ -265,26 +271,21 @@ fn an_alarm_is_raised_acknowledged_by_name_and_returns() {
 #[test]
 fn a_full_queue_is_told_to_the_operator() {
     let mut plant = running();
-    let effects = plant.on_order(order(1, Command::Write { tag: SV, value: 72.5 }), at(1));
+    let effects = plant.on_order(shown(&plant, 1, SV, 72.5), at(1));
     plant.on_undeliverable(effects.bus[0].0, &effects.bus[0].1);
     assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Busy));
 }
 
 #[test]
 fn what_an_interlock_blocks_is_refused_with_its_reason_and_a_stop_never() {
-    use crate::plant::{
-        command::{Command, Order, OrderId, Outcome, Refusal},
-        guard::{Blocking, Guards, InterlockDef},
-    };
+    use crate::plant::guard::Guards;
     let mut def = fixture::plant();
     let text = "not above 60 °C".to_owned();
     let lock = InterlockDef { tag: fixture::RUN, value: 1.0, of: PV, when: Blocking::Above(60.0), text, refuse: true };
     def.guards = Guards { interlocks: vec![lock], ..Guards::default() };
     let mut plant = Plant::new(std::sync::Arc::new(def), at(0), 1.0);
     let order = |plant: &mut Plant, number: u32, value: f64, second: i64| {
-        let id = OrderId { terminal: 1, number };
-        let command = Command::Write { tag: fixture::RUN, value };
-        let effects = plant.on_order(Order::new(id, "op", command), at(second));
+        let effects = plant.on_order(shown(plant, number, fixture::RUN, value), at(second));
         let outcome = plant.snapshot().orders[0].outcome.clone();
         (effects.bus.len(), outcome)
     };
@@ -328,7 +329,7 @@ fn with_stop() -> Plant {
 fn a_stop_is_sent_though_a_start_is_under_way() {
     let mut plant = with_stop();
     let mut check = |number, value, expect: Option<(f64, bool)>| {
-        let effects = plant.on_order(order(number, Command::Write { tag: RUN, value }), at(1));
+        let effects = plant.on_order(shown(&plant, number, RUN, value), at(1));
         let sent = effects.bus.first().map(|(_, request)| match request {
             BusRequest::Write { raw, urgent, .. } => (*raw, *urgent),
             other => panic!("not a write: {other:?}"),
@@ -349,7 +350,7 @@ fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
     def.tags[SV.index()].write_unlock = Some((FAULT, 1.0));
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
     let keyed = |plant: &mut Plant, number, value| {
-        let effects = plant.on_order(order(number, Command::Write { tag: SV, value }), at(1));
+        let effects = plant.on_order(shown(&plant, number, SV, value), at(1));
         match &effects.bus[0].1 {
             BusRequest::Write { id, unlock, .. } => (*id, *unlock),
             other => panic!("not a write: {other:?}"),
@@ -382,7 +383,7 @@ fn what_will_be_sent_is_blocked_whatever_was_typed() {
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
     plant.on_event(read(0, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
     for (value, refused) in [(1.0, true), (0.6, true), (0.4, false)] {
-        let effects = plant.on_order(order(1, Command::Write { tag: RUN, value }), at(1));
+        let effects = plant.on_order(shown(&plant, 1, RUN, value), at(1));
         assert_eq!(effects.bus.is_empty(), refused, "{value}: {:?}", plant.snapshot().orders[0].outcome);
         assert!(!refused || matches!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Interlock(_))));
     }
@@ -398,4 +399,118 @@ fn a_lost_refresh_that_nobody_ordered_falsifies_no_order() {
     plant.on_undeliverable(L1, &effects.bus[0].1);
     let outcomes = plant.snapshot().orders.into_iter().map(|status| status.outcome).collect::<Vec<_>>();
     assert_eq!(outcomes, [Outcome::Verified, Outcome::Refused(Refusal::Busy)], "newest first");
+}
+
+/// SV in steps of 0.5 °C (scale 5 on a register with one decimal), at 70 °C.
+fn in_steps(max: f64) -> Plant {
+    let mut def = fixture::plant();
+    let sv = &mut def.tags[SV.index()];
+    (sv.scale, sv.max) = (5.0, Some(crate::plant::tag::Bound::Fixed(max)));
+    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+    plant.on_event(Event::Line { at: at(0), line: L1, state: LineState::Connected });
+    plant.on_event(read(0, &[(PV, 700.0), (SV, 140.0), (DP, 1.0), (FAULT, 0.0)]));
+    plant
+}
+
+/// The line of the journal that an operator's command leaves.
+fn action_of(effects: &Effects) -> &ActionRecord {
+    let action = effects.records.iter().find_map(|record| match record {
+        Record::Action(action) => Some(action),
+        _ => None,
+    });
+    action.expect("it is on record")
+}
+
+#[test]
+fn a_write_is_recorded_with_the_value_that_the_device_holds() {
+    let mut plant = in_steps(100.0);
+    let effects = plant.on_order(shown(&plant, 1, SV, 72.3), at(1));
+    let BusRequest::Write { id, raw, .. } = effects.bus[0].1 else { panic!("a write was ordered") };
+    assert_eq!(raw, 145.0, "72.5 °C goes out");
+    assert_eq!(plant.snapshot().orders[0].command, Command::Write { tag: SV, value: 72.5 }, "screens show it too");
+    let effects = plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(raw) });
+    let action = action_of(&effects);
+    assert_eq!((action.new.as_deref(), &*action.outcome), (Some("72.5 °C"), "verified"));
+}
+
+#[test]
+fn rounding_never_leads_beyond_a_limit() {
+    let range = Refusal::OutOfRange { min: "0.0".into(), max: "99.8".into() };
+    for (value, sent, outcome) in [
+        (99.8, None, Outcome::Refused(range.clone())),
+        (99.7, Some(199.0), Outcome::Pending),
+        (99.9, None, Outcome::Refused(range)),
+    ] {
+        let mut plant = in_steps(99.8);
+        let effects = plant.on_order(shown(&plant, 1, SV, value), at(1));
+        let raw = effects.bus.first().map(|(_, request)| match request {
+            BusRequest::Write { raw, .. } => *raw,
+            other => panic!("not a write: {other:?}"),
+        });
+        assert_eq!((raw, plant.snapshot().orders[0].outcome.clone()), (sent, outcome), "{value}");
+    }
+}
+
+#[test]
+fn a_limit_itself_may_be_written_whatever_the_scale() {
+    for (scale, max) in [(1.1, 3.3), (0.3, 0.9), (0.7, 4.9)] {
+        let mut def = fixture::plant();
+        let sv = &mut def.tags[SV.index()];
+        (sv.scale, sv.max) = (scale, Some(crate::plant::tag::Bound::Fixed(max)));
+        let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+        plant.on_event(read(0, &[(SV, 0.0), (DP, 0.0), (FAULT, 0.0)]));
+        plant.on_order(shown(&plant, 1, SV, max), at(1));
+        assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Pending, "{max} in steps of {scale}");
+    }
+}
+
+#[test]
+fn an_unchanged_double_is_not_refused_as_changed() {
+    for (raw, scale, offset) in [(0.09, 0.1, 0.0), (0.14, 3.6, 0.0), (0.03, 0.01, 0.0), (20.05, 1.0, 273.15)] {
+        let mut def = fixture::plant();
+        let sv = &mut def.tags[SV.index()];
+        (sv.point.kind, sv.decimals) = (crate::plant::tag::Kind::F64, crate::plant::tag::Decimals::Fixed(2));
+        (sv.scale, sv.offset, sv.min, sv.max) = (scale, offset, None, None);
+        let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+        plant.on_event(read(0, &[(SV, raw), (DP, 1.0), (FAULT, 0.0)]));
+        plant.on_order(shown(&plant, 1, SV, 5.0), at(1));
+        assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Pending, "raw {raw}");
+        // What it holds already is not written, however its number came about.
+        let mut again = plant.clone();
+        again.on_event(read(2, &[(SV, raw + raw * f64::EPSILON)]));
+        let held = again.snapshot().sample(SV).value.expect("it was read");
+        let mut fresh = Plant::new(again.def().clone(), at(0), 1.0);
+        fresh.on_event(read(0, &[(SV, raw), (DP, 1.0), (FAULT, 0.0)]));
+        fresh.on_order(shown(&fresh, 1, SV, held), at(1));
+        assert_eq!(fresh.snapshot().orders[0].outcome, Outcome::Unchanged, "raw {raw}");
+    }
+}
+
+#[test]
+fn a_write_that_saw_no_value_is_asked_again_and_a_stop_is_not() {
+    let mut plant = running();
+    let blind = |number, tag, value| order(number, Command::Write { tag, value });
+    let effects = plant.on_order(blind(1, SV, 65.0), at(1));
+    assert_eq!(effects.bus, []);
+    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::NotSeen("70.0 °C".into())));
+    plant.on_order(blind(2, SV, 70.0), at(1));
+    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Unchanged, "there is nothing to overwrite");
+    plant.on_event(fail(2, &[SV], Fault::Timeout));
+    plant.on_order(blind(3, SV, 65.0), at(3));
+    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Pending, "the station does not know it either");
+    let mut stopped = with_stop();
+    stopped.on_event(read(1, &[(RUN, 1.0)]));
+    stopped.on_order(blind(1, RUN, 0.0), at(1));
+    assert_eq!(stopped.snapshot().orders[0].outcome, Outcome::Pending);
+}
+
+#[test]
+fn a_write_over_a_value_that_came_back_as_another_one_is_refused() {
+    let mut plant = running();
+    plant.on_event(fail(1, &[SV], Fault::Timeout));
+    let write = shown(&plant, 1, SV, 65.0);
+    assert_eq!(write.seen, Some(70.0), "a doubted value was shown as well");
+    plant.on_event(read(2, &[(SV, 800.0)]));
+    plant.on_order(write, at(3));
+    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::ChangedTo("80.0 °C".into())));
 }

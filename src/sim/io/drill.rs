@@ -186,10 +186,12 @@ impl Task {
             Cue::Event(Event { place, fault, begins: false, .. }) => self.trainer.world.clear(place, fault).await,
             Cue::Deed(deed) => {
                 let Some(orders) = &self.trainer.operator else { return };
-                let Some(command) = deed.wish.command(&self.trainer.snapshots.borrow()) else { return };
+                let snapshot = self.trainer.snapshots.borrow().clone();
+                let Some(command) = deed.wish.command(&snapshot) else { return };
                 self.ordered += 1;
                 let id = OrderId { terminal: OPERATOR, number: self.ordered };
-                let order = command::Order::new(id, "operator of the drill", command);
+                let seen = snapshot.seen(&command);
+                let order = command::Order { seen, ..command::Order::new(id, "operator of the drill", command) };
                 if orders.try_send(order).is_err() {
                     tracing::error!("the station has not taken an order of the drill");
                 }

@@ -6,6 +6,7 @@ use ratatui::{Frame, layout::Rect, style::Style};
 use super::{
     Faceplate, Modal, Next,
     form::{Field, Form, Turn},
+    number::rounded_words,
     seen::Seen,
     window,
 };
@@ -81,11 +82,15 @@ impl Confirm {
         self.intent == Intent::Quit
     }
 
-    /// Write this value? Old and new value are drawn from the intent, so they cannot differ from what is sent.
+    /// Write this value, as the device will hold it? Old and new value are drawn from the intent, so they cannot differ from
+    /// what is sent.
     pub fn write(cx: &Cx, tag: TagId, value: f64) -> Confirm {
         let def = cx.def().tag(tag);
+        let rounded = rounded_words(cx, tag, value);
+        let value = if rounded.is_some() { cx.snapshot.held(tag, value) } else { value };
         let intent = Intent::Order(Command::Write { tag, value });
-        let confirm = Confirm::new(intent, format!("write {}", def.name), write_notes(def));
+        let notes = rounded.into_iter().chain(write_notes(def)).collect();
+        let confirm = Confirm::new(intent, format!("write {}", def.name), notes);
         Confirm { seen: Some(Seen::new(cx, tag)), ..confirm }.signed(cx)
     }
 

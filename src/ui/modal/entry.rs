@@ -7,11 +7,11 @@ use super::{
     Confirm, Modal, Next,
     confirm::{wire_words, write_notes},
     line::Line,
+    number::{self, is_numeric, range_words},
     seen::Seen,
     window,
 };
 use crate::{
-    access::gate::sign,
     plant::{command::Command, def::TagId},
     ui::{
         Act, Confirmed, Cx, guard, keys, rights,
@@ -45,12 +45,13 @@ impl Entry {
         if keys::code(KeyCode::Enter).is(event) {
             let checked = match self.line.missed() {
                 true => Err("not all of it was taken; Ctrl-U empties the line".to_owned()),
-                false => check(cx, self.tag, &self.line.text()),
+                false => number::check(cx, self.tag, &self.line.text()),
             };
             match checked {
                 Ok(_) if self.seen.changed(cx) => self.problem = None,
-                Ok(value) if asks(cx, self.tag, value) => {
-                    return Next::Stay(Modal::Confirm(Confirm::write(cx, self.tag, value)));
+                Ok(value) if number::asks(cx, self.tag, value) => {
+                    let why = number::worries(cx, self.tag, value);
+                    return Next::Stay(Modal::Confirm(Confirm::write(cx, self.tag, value).with_notes(why)));
                 }
                 Ok(value) => {
                     let seen = self.seen.shown(cx);
@@ -89,6 +90,7 @@ impl Entry {
         let room = body.width.saturating_sub(8).min(64);
         let mut rows: Vec<(String, Style)> =
             vec![(range_words(cx, self.tag), theme.normal()), (wire_words(def), theme.dim())];
+        rows.push((number::help(cx, self.tag), theme.dim()));
         let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
         let notes = notes.chain(guard::key_words(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
@@ -110,7 +112,10 @@ impl Entry {
         let x = canvas.text(x, 0, &old.whole(), old.style);
         let x = canvas.text(x, 0, "  →  new ", theme.dim());
         let x = self.line.view(theme, &mut canvas, x, 0);
-        canvas.text(x + 1, 0, cx.snapshot.unit(self.tag), theme.normal());
+        let x = canvas.text(x + 1, 0, cx.snapshot.unit(self.tag), theme.normal());
+        if let Some(words) = number::relative_words(cx, self.tag, &self.line.text()) {
+            canvas.text(x + 2, 0, &words, theme.strong());
+        }
         for (y, (text, style)) in rows.iter().enumerate() {
             canvas.text(0, y as u16 + 1, text, *style);
         }
@@ -128,93 +133,5 @@ fn strange(event: KeyEvent) -> Option<char> {
     match event.code {
         KeyCode::Char(c) if !combined && !is_numeric(c) => Some(c),
         _ => None,
-    }
-}
-
-fn is_numeric(c: char) -> bool {
-    c.is_ascii_digit() || matches!(c, '+' | '-' | '.' | ',')
-}
-
-/// Is a number for this tag asked again in a window of its own? What must be signed is.
-fn asks(cx: &Cx, tag: TagId, value: f64) -> bool {
-    cx.def().tag(tag).confirm.is_some() || sign::needed(cx.def(), &Command::Write { tag, value }).is_some()
-}
-
-/// The permitted range in words.
-pub fn range_words(cx: &Cx, tag: TagId) -> String {
-    let labels = &cx.def().tag(tag).labels;
-    if !labels.is_empty() {
-        return format!("range one of {}", labels.len());
-    }
-    match cx.snapshot.range(tag) {
-        Some((min, max)) => {
-            let unit = cx.snapshot.unit(tag);
-            format!("range {} … {} {unit}", cx.snapshot.format(tag, min), cx.snapshot.format(tag, max))
-                .trim_end()
-                .to_owned()
-        }
-        None => "range not known".to_owned(),
-    }
-}
-
-/// The number if it can be written; else what is wrong with it. Courtesy: the station checks again.
-fn check(cx: &Cx, tag: TagId, text: &str) -> Result<f64, String> {
-    let text = text.trim();
-    if text.is_empty() {
-        return Err("type a number".to_owned());
-    }
-    let (value, typed) = number(text).ok_or_else(|| format!("\"{text}\" is no number"))?;
-    // Zeros count: where no decimals are taken, `1,000` and `1.000` mean a thousand to their author, and are refused.
-    let decimals = usize::from(cx.snapshot.decimals[tag.index()]);
-    if typed > decimals {
-        return Err(match decimals {
-            0 => "whole numbers only".to_owned(),
-            1 => "at most 1 decimal".to_owned(),
-            n => format!("at most {n} decimals"),
-        });
-    }
-    match cx.snapshot.range(tag) {
-        Some((min, max)) if !(min..=max).contains(&value) => Err(format!("outside {}", range_words(cx, tag))),
-        Some(_) | None => Ok(value),
-    }
-}
-
-/// A plain number and its decimals: sign, digits and one decimal mark, a point or a comma. No exponent, no `inf`.
-fn number(text: &str) -> Option<(f64, usize)> {
-    let plain = text.replacen(',', ".", 1);
-    let (whole, fraction) = plain.split_once('.').unwrap_or((&plain, ""));
-    let whole = whole.strip_prefix(['-', '+']).unwrap_or(whole);
-    let digits = |text: &str| text.bytes().all(|c| c.is_ascii_digit());
-    let numeric = digits(whole) && digits(fraction) && !(whole.is_empty() && fraction.is_empty());
-    numeric.then(|| plain.parse().ok()).flatten().map(|value| (value, fraction.len()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ui::fixture::{Fixture, with_cx};
-
-    #[test]
-    fn a_wrong_number_is_told_before_it_is_sent() {
-        let fixture = Fixture::normal();
-        let sv = fixture.tag("TIC-1.SV");
-        with_cx(&fixture.snapshot(), |cx| {
-            let check = |text: &str, expect: Result<f64, &str>| {
-                assert_eq!(check(cx, sv, text), expect.map_err(str::to_owned), "{text}")
-            };
-            check("70", Ok(70.0));
-            check("70.5", Ok(70.5));
-            check("3,5", Ok(3.5));
-            check("+3,5 ", Ok(3.5));
-            check("-0", Ok(0.0));
-            check("70.50", Err("at most 1 decimal"));
-            check("", Err("type a number"));
-            for text in ["7-0", "7OO", "1e1", "1e5", "7 0", "1,0.5", "1.0.5", "inf", "NaN", "-", ".", "0x10", "๗"] {
-                check(text, Err(&format!("\"{text}\" is no number")));
-            }
-            check("70.55", Err("at most 1 decimal"));
-            check("1,000", Err("at most 1 decimal"));
-            check("1000", Err("outside range 0.0 … 120.0 °C"));
-        });
     }
 }

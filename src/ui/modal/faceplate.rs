@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
-use super::{Confirm, Modal, Next, Notice, Why, confirm::wire_words, entry::range_words, window};
+use super::{Confirm, Modal, Next, Notice, Why, confirm::wire_words, number::range_words, window};
 use crate::{
     plant::{
         def::TagId,

@@ -9,6 +9,7 @@ pub mod form;
 pub mod help;
 pub mod line;
 pub mod notice;
+pub mod number;
 pub mod prompt;
 pub mod reason;
 pub mod seen;

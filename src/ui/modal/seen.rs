@@ -21,7 +21,7 @@ pub struct Seen {
 impl Seen {
     /// The tag as it stands.
     pub fn new(cx: &Cx, tag: TagId) -> Seen {
-        Seen { tag, value: cx.snapshot.sample(tag).trusted(), before: None, asked: 0 }
+        Seen { tag, value: cx.snapshot.sample(tag).value, before: None, asked: 0 }
     }
 
     /// Is it another value than was seen? Then that is what was seen from now on, and its author should be asked again.
@@ -36,9 +36,11 @@ impl Seen {
         true
     }
 
-    /// The value that a write confirmed now is meant to replace; `None` for one that moves by itself.
+    /// The value that a write confirmed now is meant to replace: the one that was shown, also where it is in doubt or gone
+    /// by now; the present one where it moves by itself.
     pub fn shown(&self, cx: &Cx) -> Option<f64> {
-        cx.snapshot.sample(self.tag).trusted().filter(|_| self.asked < ASKED_MAX)
+        let now = cx.snapshot.sample(self.tag).value;
+        if self.asked < ASKED_MAX { self.value.or(now) } else { now.or(self.value) }
     }
 
     /// What the window says of a change that its reader may not have noticed; `None` while it is as he saw it.

@@ -28,6 +28,7 @@ use crate::{
     },
     ui::{
         Act, Cx,
+        drawn::Rows,
         keys::{Hint, find},
         modal::{Faceplate, Modal, Prompt, Why, faceplate::device_words},
     },
@@ -105,9 +106,22 @@ impl Alarms {
         rows.get(self.place(&rows)).map(|row| row.alarm)
     }
 
-    /// Has an operator selected an alarm himself? Else it is the first of the list, whichever that is.
-    pub fn is_chosen(&self) -> bool {
-        self.selected.is_some()
+    /// The list that keys act on.
+    pub fn drawn_rows(&self, cx: &Cx) -> Rows {
+        match self.page {
+            Page::Active | Page::System => {
+                let rows = self.rows(cx);
+                let seen = |row: &list::Row| (row.alarm.id, row.alarm.annunciated_at, row.alarm.state);
+                Rows::of(rows.iter().map(seen), self.place(&rows))
+            }
+            Page::Aside => {
+                let place = |aside: &AsideAlarm| Some(aside.id) == self.selected;
+                let place = cx.snapshot.aside.iter().position(place).unwrap_or(0);
+                Rows::of(cx.snapshot.aside.iter().map(|aside| (aside.id, aside.state, aside.deed.at)), place)
+            }
+            // Nothing is done with a row of these.
+            Page::Journal | Page::Quality | Page::Handover => Rows::default(),
+        }
     }
 
     /// Shows the first view.

@@ -33,6 +33,7 @@ use crate::{
     },
     ui::{
         Act, Cx,
+        drawn::Rows,
         keys::{self, Hint, Key, char, code},
         modal::{Modal, Settings},
         widgets::{
@@ -214,6 +215,15 @@ impl Bus {
             Action::Settings => return vec![Act::Open(Modal::Settings(Box::new(Settings::new(cx, self.line))))],
         }
         self.on_snapshot(cx)
+    }
+
+    /// The list that keys act on.
+    pub fn drawn_rows(&self, cx: &Cx) -> Rows {
+        match (self.page, Place::of(cx, self.line)) {
+            (Page::Plan, Some(at)) => self.plan.drawn_rows(&at),
+            (Page::Frames, Some(_)) => self.frames.drawn_rows(),
+            (Page::Line | Page::Plan | Page::Frames | Page::Test, _) => Rows::default(),
+        }
     }
 
     /// The keys of the moment.

@@ -41,6 +41,7 @@ use crate::{
     },
     ui::{
         Act, Cx,
+        drawn::Rows,
         keys::{Hint, find, hints},
         modal::{Confirm, Faceplate, Modal, Prompt},
         widgets::text::Canvas,
@@ -155,6 +156,18 @@ impl Controllers {
             }
         };
         true
+    }
+
+    /// The list that keys act on: devices, parameters and steps stand where the plant file has them, sets come and go.
+    pub fn drawn_rows(&self, cx: &Cx) -> Rows {
+        match (&self.page, cx.def().devices.get(self.device.index())) {
+            (Page::Sets, Some(device)) => {
+                Rows::of(sets::sources(cx, device).iter().map(|source| source.words(cx)), self.set)
+            }
+            (Page::List | Page::Device | Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..), _) => {
+                Rows::default()
+            }
+        }
     }
 
     /// A key of the page.

@@ -17,6 +17,7 @@ use crate::{
     },
     ui::{
         Act, Cx, Effect,
+        drawn::Rows,
         keys::{self, Hint, Key, char, code},
     },
 };
@@ -106,6 +107,16 @@ impl Faults {
             Action::Verdict => self.verdict = !self.verdict && status.scenario.is_some(),
         }
         Vec::new()
+    }
+
+    /// The list that keys act on, and what of it is in force.
+    pub fn drawn_rows(&self, cx: &Cx) -> Rows {
+        let Some(status) = open(cx) else { return Rows::default() };
+        let rows = rows(status);
+        let seen = |(place, fault): &(Place, Fault)| {
+            (format!("{place:?}"), fault.word(), status.find(*place, *fault).is_some())
+        };
+        Rows::of(rows.iter().map(seen), self.selected.min(rows.len().saturating_sub(1)))
     }
 
     /// The fault with the number it has, or would have.

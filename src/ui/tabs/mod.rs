@@ -21,6 +21,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{
     Act, AskId, Cx, Effect,
+    drawn::Rows,
     keys::{self, Hint},
     presence,
 };
@@ -187,6 +188,19 @@ impl Tabs {
             Tab::Bus => self.bus.on_key(cx, event),
             Tab::Users => self.users.on_key(cx, event),
             Tab::Faults => act(faults::KEYS, event, |action| self.faults.on_key(cx, action)),
+        }
+    }
+
+    /// The list of the shown tab whose rows keys act on, each row with what an operator should have seen of it.
+    pub fn rows(&self, cx: &Cx) -> Rows {
+        match self.shown {
+            Tab::Alarms => self.alarms.drawn_rows(cx),
+            Tab::Controllers => self.controllers.drawn_rows(cx),
+            Tab::Bus => self.bus.drawn_rows(cx),
+            Tab::Users => self.users.drawn_rows(cx),
+            Tab::Faults => self.faults.drawn_rows(cx),
+            // What can be selected here stands where it is in the plant file.
+            Tab::Login | Tab::Mimic | Tab::Trends | Tab::Reports => Rows::default(),
         }
     }
 

@@ -13,6 +13,7 @@ use crate::{
     history::{Answer, HistoryError},
     ui::{
         Act, Cx,
+        drawn::Rows,
         keys::{self, Hint, Key, char, code},
         modal::{Modal, Sheet, sheet::Purpose},
     },
@@ -126,6 +127,14 @@ impl Users {
             (Action::Role | Action::Disable | Action::Reset | Action::Delete, None) => None,
         };
         sheet.map(|sheet| Act::Open(Modal::Sheet(Box::new(sheet)))).into_iter().collect()
+    }
+
+    /// The list that keys act on.
+    pub fn drawn_rows(&self, cx: &Cx) -> Rows {
+        match &self.audit {
+            Some(audit) => audit.drawn_rows(),
+            None => Rows::of(cx.standing.users.iter().map(|row| (&row.user, state(cx, row))), self.place(cx)),
+        }
     }
 
     /// The place of the selected user.

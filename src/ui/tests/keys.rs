@@ -53,7 +53,11 @@ fn what_is_typed_is_what_is_written_or_refused() {
             }
         }
     };
-    check("s3,5⏎", Ok(3.5));
+    check("s63,5⏎", Ok(63.5));
+    check("s+1⏎", Ok(71.0));
+    check("s+5⏎", Err("beyond the alarm limit of TIC-1.PV temperature high (72.0 °C)"));
+    check("s3,5⏎", Err("a step of 66.5 °C, 55 % of the range"));
+    check("s3,5⏎⏎", Ok(3.5));
     check("s7OO", Err("\"O\" is no part of a number"));
     check("s7OO⏎", Err("not all of it was taken"));
     check("s1e5⏎", Err("not all of it was taken"));
@@ -667,4 +671,89 @@ fn a_history_without_answer_is_said_so() {
         }
     }
     assert!(screen(&mut model, 80, 24).contains("history: disk full"));
+}
+
+/// An alarm fixture whose acknowledgement asks for no note.
+fn plain_alarms() -> Fixture {
+    let mut fixture = Fixture::alarm();
+    fixture.def.alarms.iter_mut().for_each(|alarm| alarm.note = false);
+    fixture
+}
+
+#[test]
+fn a_key_for_an_alarm_that_has_left_the_list_acknowledges_no_other() {
+    let mut fixture = plain_alarms();
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "3");
+    screen(&mut model, 80, 24);
+    type_keys(&mut model, "↓↓↓");
+    screen(&mut model, 80, 24);
+    let chosen = model.tabs.alarms.selected(&model.cx()).map(|alarm| alarm.id).expect("one is selected");
+    assert_ne!(chosen, fixture.alarms[0].id, "another one than the first");
+    // The frame with it is on the screen; now a colleague's acknowledgement takes it from the list.
+    fixture.alarms.retain(|alarm| alarm.id != chosen);
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    assert_eq!(order_of(&type_keys(&mut model, "a")), None);
+    assert!(screen(&mut model, 80, 24).contains("The list has changed, press again"));
+    // What is on the screen now is what the next press is for.
+    assert!(order_of(&type_keys(&mut model, "a")).is_some());
+    assert!(!screen(&mut model, 80, 24).contains("press again"));
+}
+
+#[test]
+fn a_chosen_alarm_that_was_raised_again_is_not_acknowledged_unseen() {
+    let mut fixture = plain_alarms();
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "3↓↑");
+    screen(&mut model, 80, 24);
+    let chosen = model.tabs.alarms.selected(&model.cx()).map(|alarm| alarm.id).expect("one is selected");
+    for alarm in fixture.alarms.iter_mut().filter(|alarm| alarm.id == chosen) {
+        (alarm.raised_at, alarm.annunciated_at) = (fixture::now(), fixture::now());
+    }
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    assert_eq!(order_of(&type_keys(&mut model, "a")), None);
+}
+
+#[test]
+fn rows_that_move_between_two_frames_take_no_key_meant_for_another() {
+    let mut fixture = plain_alarms();
+    let newest = fixture.alarms.remove(0);
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "3");
+    screen(&mut model, 80, 24);
+    // A new one pushes in at the top, unseen: neither the first row nor the next one is what it was.
+    fixture.alarms.insert(0, newest);
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    for keys in ["z", "↓a", "o"] {
+        // To move on is possible, but what was meant by that nobody can tell until it is drawn.
+        assert_eq!(order_of(&type_keys(&mut model, keys)), None, "{keys}");
+        assert_eq!(model.modal, None, "{keys}");
+    }
+}
+
+#[test]
+fn what_was_seen_is_sent_though_the_values_are_doubted_meanwhile() {
+    let fixture = Fixture::normal();
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "s65.5");
+    update(&mut model, Msg::Tick { silent: Duration::from_secs(4) });
+    let effects = type_keys(&mut model, "⏎");
+    let seen = effects.iter().find_map(|effect| match effect {
+        Effect::Order(request) => Some(request.seen),
+        _ => None,
+    });
+    assert_eq!(seen, Some(Some(70.0)), "the window showed `old 70.0`");
+}
+
+#[test]
+fn a_number_that_the_device_rounds_is_shown_rounded_before_it_is_written() {
+    let mut fixture = Fixture::normal();
+    let sv = fixture.tag("TIC-1.SV");
+    fixture.def.tags[sv.index()].scale = 0.5;
+    let mut model = model(&fixture, Theme::FULL);
+    assert_eq!(order_of(&type_keys(&mut model, "s72.3⏎")), None);
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("72.3 → the device holds steps of 0.5: 72.5"), "{shown}");
+    assert!(shown.contains("new 72.5 °C"), "{shown}");
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&Command::Write { tag: sv, value: 72.5 }));
 }

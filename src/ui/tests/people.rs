@@ -403,7 +403,7 @@ fn a_refused_signature_is_asked_again_in_its_window() {
 fn a_value_that_changes_under_an_open_window_is_told_at_once_and_asked_again() {
     let fixture = Fixture::normal();
     let mut model = with(&fixture, person("boris", Role::Technician));
-    type_keys(&mut model, "s80");
+    type_keys(&mut model, "s68");
     let mut later = fixture.clone();
     later.set("TIC-1.SV", 65.0);
     let mut snapshot = later.snapshot();

@@ -34,7 +34,7 @@ fn fixture() -> Fixture {
     let mut plant = Fixture::normal();
     let (pv, sv) = (plant.tag("TIC-1.PV"), plant.tag("TIC-1.SV"));
     // PV counts in tenths, as SV says: no such device, but every step of the way is there.
-    plant.def.tags[pv.index()].decimals = Decimals::From(sv);
+    (plant.def.tags[pv.index()].decimals, plant.def.tags[pv.index()].scale) = (Decimals::From(sv), 1.0);
     let mut tally = Tally::default();
     for n in 0..200 {
         let outcome = if n % 100 == 7 { Err(Fault::Timeout) } else { Ok(()) };

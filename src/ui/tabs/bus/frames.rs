@@ -15,6 +15,7 @@ use crate::{
     },
     ui::{
         Act, Cx,
+        drawn::Rows,
         modal::{Modal, Prompt},
         tabs::{Outgoing, Tab},
         widgets::text::{Canvas, clock, fit, fit_words, pad, width},
@@ -223,6 +224,12 @@ impl Ring {
     fn place(&self, shown: &[&Frame]) -> usize {
         let last = shown.len().saturating_sub(1);
         self.selected.map_or(last, |number| shown.partition_point(|frame| frame.number < number).min(last))
+    }
+
+    /// The list that keys act on.
+    pub fn drawn_rows(&self) -> Rows {
+        let shown = self.shown();
+        Rows::of(shown.iter().map(|frame| frame.number), self.place(&shown))
     }
 
     /// Earlier frames, the latest first.

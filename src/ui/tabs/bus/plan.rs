@@ -17,6 +17,7 @@ use crate::{
     },
     ui::{
         Act, Cx,
+        drawn::Rows,
         modal::{Modal, Why},
         widgets::text::{Canvas, between, fit_words, wrap},
     },
@@ -36,6 +37,12 @@ impl Plan {
     pub fn scroll(&mut self, at: &Place, by: isize) {
         let last = at.report.map_or(0, |report| report.polls.len()).saturating_sub(1);
         self.selected = self.selected.saturating_add_signed(by).min(last);
+    }
+
+    /// The list that keys act on.
+    pub fn drawn_rows(&self, at: &Place) -> Rows {
+        let polls = at.report.map_or(&[][..], |report| &report.polls);
+        Rows::of(polls.iter().map(|poll| &poll.tags), self.selected)
     }
 
     /// The tags of the selected block.

@@ -7,7 +7,7 @@ use crate::{
     },
     ui::{
         Cx,
-        modal::entry::range_words,
+        modal::number::range_words,
         widgets::{
             text::{Canvas, age, pad, pad_left, whole, width},
             value,

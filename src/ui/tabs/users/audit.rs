@@ -11,6 +11,7 @@ use crate::{
     report::Period,
     ui::{
         Act, Cx,
+        drawn::Rows,
         keys::{Key, char, code},
         modal::{Deed, Modal, Prompt},
         widgets::text::{Canvas, fit, moment, pad, pad_left, width},
@@ -102,6 +103,11 @@ impl Audit {
     /// Questions asked so far.
     pub fn asked(&self) -> u32 {
         self.number
+    }
+
+    /// The list that keys act on.
+    pub fn drawn_rows(&self) -> Rows {
+        Rows::of(self.rows.iter().map(|row| (row.at, &row.by, &row.action, &row.target)), self.selected)
     }
 
     /// A key of [`KEYS`].

@@ -1,0 +1,240 @@
+//! A typed number: what it means, whether it can be written, and why to ask again before it is.
+
+use crate::{
+    access::gate::sign,
+    plant::{
+        command::Command,
+        def::{Condition, Level, Subject, TagId},
+        scale,
+    },
+    ui::{Cx, modal::confirm::subject},
+};
+
+/// A step over this share of the range is asked again: more than an operator usually changes at once.
+const STEP_MAX: f64 = 0.2;
+
+/// Can this character be in a number?
+pub fn is_numeric(c: char) -> bool {
+    c.is_ascii_digit() || matches!(c, '+' | '-' | '.' | ',' | '=')
+}
+
+/// The number that is meant if it can be written; else what is wrong with it. Courtesy: the station checks again.
+pub fn check(cx: &Cx, tag: TagId, text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    if text.is_empty() {
+        return Err("type a number".to_owned());
+    }
+    let (number, typed) = parse(text).ok_or_else(|| format!("\"{text}\" is no number"))?;
+    // Zeros count: where no decimals are taken, `1,000` and `1.000` mean a thousand to their author, and are refused.
+    let decimals = usize::from(cx.snapshot.decimals[tag.index()]);
+    if typed > decimals {
+        return Err(match decimals {
+            0 => "whole numbers only".to_owned(),
+            1 => "at most 1 decimal".to_owned(),
+            n => format!("at most {n} decimals"),
+        });
+    }
+    let value = match number {
+        Number::Whole(value) => value,
+        Number::Step(by) => stepped(cx, tag, by).ok_or("the present value is not known: type the whole number")?,
+    };
+    let Some((min, max)) = cx.snapshot.range(tag) else { return Ok(value) };
+    let inside = |value| scale::is_inside(Some(min), Some(max), value);
+    let held = cx.snapshot.held(tag, value);
+    match (inside(value), inside(held)) {
+        (false, _) => Err(format!("outside {}", range_words(cx, tag))),
+        (true, false) => Err(format!("the device would hold {}, outside {}", plain(held), range_words(cx, tag))),
+        (true, true) => Ok(value),
+    }
+}
+
+/// `70.0 → 75.0`, while a number with a sign is typed.
+pub fn relative_words(cx: &Cx, tag: TagId, text: &str) -> Option<String> {
+    let (Number::Step(by), _) = parse(text.trim())? else { return None };
+    let text = |value| cx.snapshot.format(tag, value);
+    Some(format!("{} → {}", text(cx.snapshot.sample(tag).trusted()?), text(stepped(cx, tag, by)?)))
+}
+
+/// How to type a change.
+pub fn help(cx: &Cx, tag: TagId) -> String {
+    match cx.snapshot.range(tag) {
+        Some((min, _)) if min < 0.0 => "+5 adds 5, -5 takes 5 away, =-5 is minus 5".to_owned(),
+        Some(_) | None => "+5 adds 5, -5 takes 5 away".to_owned(),
+    }
+}
+
+/// Is a number for this tag asked again in a window of its own? What must be signed is.
+pub fn asks(cx: &Cx, tag: TagId, value: f64) -> bool {
+    cx.def().tag(tag).confirm.is_some()
+        || sign::needed(cx.def(), &Command::Write { tag, value }).is_some()
+        || rounded_words(cx, tag, value).is_some()
+        || !worries(cx, tag, value).is_empty()
+}
+
+/// `72.3 → the device holds steps of 0.5: 72.5`; `None` where it holds what was typed.
+pub fn rounded_words(cx: &Cx, tag: TagId, value: f64) -> Option<String> {
+    let held = cx.snapshot.held(tag, value);
+    // A single-precision register is as good as exact.
+    let same = (held - value).abs() <= 1e-6 * value.abs().max(1.0);
+    let step = plain(cx.snapshot.step(tag));
+    (!same).then(|| format!("{} → the device holds steps of {step}: {}", cx.snapshot.format(tag, value), plain(held)))
+}
+
+/// Why a number that is allowed may still not be what its author meant.
+pub fn worries(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
+    let text =
+        |value: f64| format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)).trim_end().to_owned();
+    let step = cx.snapshot.sample(tag).value.map(|now| (value - now).abs());
+    let share = step.zip(cx.snapshot.range(tag)).map(|(step, (min, max))| (step, step / (max - min)));
+    let large = share.filter(|(_, share)| STEP_MAX < *share);
+    let large = large.map(|(step, share)| format!("! a step of {}, {:.0} % of the range", text(step), share * 100.0));
+    let plate = cx.def().device(cx.def().tag(tag).device).faceplate.as_ref();
+    let process = plate.filter(|plate| plate.sv == tag).map(|plate| plate.pv);
+    let alarms = cx.def().alarms.iter().filter(|alarm| alarm.subject == Subject::Tag(process.unwrap_or(tag)));
+    let limits = alarms.filter_map(|alarm| {
+        let Condition::Limit { level, limit, .. } = alarm.condition else { return None };
+        let beyond = match level {
+            Level::High | Level::HighHigh => value - limit,
+            Level::Low | Level::LowLow => limit - value,
+        };
+        let place = if beyond > 0.0 { "beyond" } else { "at" };
+        (beyond >= 0.0)
+            .then(|| format!("! {place} the alarm limit of {} {} ({})", subject(cx, alarm.id), alarm.text, text(limit)))
+    });
+    large.into_iter().chain(limits).collect()
+}
+
+/// The permitted range in words.
+pub fn range_words(cx: &Cx, tag: TagId) -> String {
+    let labels = &cx.def().tag(tag).labels;
+    if !labels.is_empty() {
+        return format!("range one of {}", labels.len());
+    }
+    match cx.snapshot.range(tag) {
+        Some((min, max)) => {
+            let unit = cx.snapshot.unit(tag);
+            format!("range {} … {} {unit}", cx.snapshot.format(tag, min), cx.snapshot.format(tag, max))
+                .trim_end()
+                .to_owned()
+        }
+        None => "range not known".to_owned(),
+    }
+}
+
+/// The present value and a step from it.
+fn stepped(cx: &Cx, tag: TagId, by: f64) -> Option<f64> {
+    let now = cx.snapshot.sample(tag).trusted()?;
+    // As many decimals as are shown: 0.1 + 0.2 is 0.3.
+    format!("{:.*}", usize::from(cx.snapshot.decimals[tag.index()]), now + by).parse().ok()
+}
+
+/// With as many decimals as it has.
+fn plain(value: f64) -> String {
+    format!("{}", (value * 1e9).round() / 1e9)
+}
+
+/// What was typed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Number {
+    /// A new value.
+    Whole(f64),
+    /// A change of the present one.
+    Step(f64),
+}
+
+/// A number and its decimals: digits and one decimal mark, a point or a comma. A sign before it makes it a step; `=` makes
+/// it a value all the same. No exponent, no `inf`.
+fn parse(text: &str) -> Option<(Number, usize)> {
+    let (whole, text) = text.strip_prefix('=').map_or((false, text), |rest| (true, rest));
+    let unsigned = text.strip_prefix(['-', '+']);
+    let point = text.replacen(',', ".", 1);
+    let digits = unsigned.unwrap_or(text).replacen(',', ".", 1);
+    let (before, after) = digits.split_once('.').unwrap_or((&digits, ""));
+    let numeric = |text: &str| text.bytes().all(|c| c.is_ascii_digit());
+    if !numeric(before) || !numeric(after) || before.is_empty() && after.is_empty() {
+        return None;
+    }
+    let value = point.parse().ok()?;
+    let number = if unsigned.is_some() && !whole { Number::Step(value) } else { Number::Whole(value) };
+    Some((number, after.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        plant::{
+            sample::{Cause, Sample},
+            tag::Bound,
+        },
+        ui::fixture::{Fixture, now, with_cx},
+    };
+
+    fn checked(fixture: &Fixture, text: &str) -> Result<f64, String> {
+        with_cx(&fixture.snapshot(), |cx| check(cx, fixture.tag("TIC-1.SV"), text))
+    }
+
+    #[test]
+    fn a_wrong_number_is_told_before_it_is_sent() {
+        let fixture = Fixture::normal();
+        let check = |text: &str, expect: Result<f64, &str>| {
+            assert_eq!(checked(&fixture, text), expect.map_err(str::to_owned), "{text}")
+        };
+        check("70", Ok(70.0));
+        check("70.5", Ok(70.5));
+        check("3,5", Ok(3.5));
+        check("=3,5 ", Ok(3.5));
+        check("70.50", Err("at most 1 decimal"));
+        check("", Err("type a number"));
+        for text in ["7-0", "7OO", "1e1", "1e5", "7 0", "1,0.5", "1.0.5", "inf", "NaN", "-", "=", "+", ".", "0x10", "๗"]
+        {
+            check(text, Err(&format!("\"{text}\" is no number")));
+        }
+        check("70.55", Err("at most 1 decimal"));
+        check("1,000", Err("at most 1 decimal"));
+        check("1000", Err("outside range 0.0 … 120.0 °C"));
+    }
+
+    #[test]
+    fn a_sign_makes_a_number_relative_to_the_present_value() {
+        let mut fixture = Fixture::normal();
+        for (text, value) in [("+5", 75.0), ("-5", 65.0), ("+0,5", 70.5), ("-0", 70.0), ("=5", 5.0)] {
+            assert_eq!(checked(&fixture, text), Ok(value), "{text}");
+        }
+        assert_eq!(checked(&fixture, "+60"), Err("outside range 0.0 … 120.0 °C".to_owned()), "70 + 60");
+        assert_eq!(checked(&fixture, "=-5"), Err("outside range 0.0 … 120.0 °C".to_owned()), "an absolute number");
+        let sv = fixture.tag("TIC-1.SV");
+        with_cx(&fixture.snapshot(), |cx| {
+            assert_eq!(relative_words(cx, sv, "+5").as_deref(), Some("70.0 → 75.0"));
+            assert_eq!((relative_words(cx, sv, "5"), relative_words(cx, sv, "+")), (None, None));
+        });
+        fixture.samples[sv.index()] = Sample::bad(Cause::Timeout, now());
+        assert_eq!(checked(&fixture, "+5"), Err("the present value is not known: type the whole number".to_owned()));
+        assert_eq!(checked(&fixture, "75"), Ok(75.0));
+    }
+
+    #[test]
+    fn rounding_beyond_a_limit_is_told_before_it_is_sent() {
+        let mut fixture = Fixture::normal();
+        let sv = fixture.tag("TIC-1.SV");
+        let def = &mut fixture.def.tags[sv.index()];
+        (def.scale, def.max) = (0.5, Some(Bound::Fixed(99.8)));
+        let why = "the device would hold 100, outside range 0.0 … 99.8 °C";
+        assert_eq!(checked(&fixture, "99.8"), Err(why.to_owned()));
+        assert_eq!(checked(&fixture, "99.7"), Ok(99.7));
+    }
+
+    #[test]
+    fn a_large_step_or_a_set_value_at_an_alarm_limit_is_asked_again() {
+        let fixture = Fixture::normal();
+        let sv = fixture.tag("TIC-1.SV");
+        let asked = |value: f64| with_cx(&fixture.snapshot(), |cx| (asks(cx, sv, value), worries(cx, sv, value)));
+        assert_eq!(asked(65.0), (false, Vec::new()));
+        let (again, why) = asked(5.0);
+        assert!(again && why[0].starts_with("! a step of 65.0 °C, 54 % of the range"), "{why:?}");
+        let (again, why) = asked(72.0);
+        assert!(again && why[0].contains("at the alarm limit of TIC-1.PV temperature high (72.0 °C)"), "{why:?}");
+        let (_, why) = asked(73.0);
+        assert!(why[0].contains("beyond the alarm limit of TIC-1.PV"), "{why:?}");
+    }
+}
