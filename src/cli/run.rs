@@ -46,13 +46,14 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let plant = load_with_file(&args.plant, &args.station)?;
     let _log = log::start(args.station.log.as_deref())?;
     in_runtime(async {
-        let clock = Clock::real();
-        let over = over(clock, args.duration);
+        let over = over(Clock::real(), args.duration);
         tokio::pin!(over);
         let mut plant = plant;
         let mut listener = listen(&plant.0)?;
         loop {
             let def = Arc::new(plant.0);
+            // Each station begins with what the system clock says then.
+            let clock = Clock::real();
             let station = start(&def, clock, history_file(&def, &args.station), plant.1)?;
             let mut serving = Serving::new(listener, station);
             let lines = if def.lines.len() == 1 { "line" } else { "lines" };

@@ -160,6 +160,11 @@ pub struct Watch {
 }
 
 impl Watch {
+    /// Its times.
+    pub(super) fn times(&mut self) -> impl Iterator<Item = &mut Timestamp> {
+        self.since.iter_mut().flatten()
+    }
+
     /// Looks again at `at`.
     pub fn look(&mut self, guards: &Guards, sample: impl Fn(TagId) -> Sample, at: Timestamp) {
         self.since.resize(guards.actuators.len(), None);

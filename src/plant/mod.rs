@@ -36,6 +36,7 @@ pub mod tuning;
 pub mod restore;
 pub mod station;
 pub mod snapshot;
+pub mod clock_step;
 pub mod board;
 pub mod orders;
 pub mod reducer;

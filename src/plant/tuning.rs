@@ -60,6 +60,12 @@ pub struct Turn {
 }
 
 impl Tuning {
+    /// Its times.
+    pub(super) fn times(&mut self) -> impl Iterator<Item = &mut Timestamp> {
+        let turns = self.turns.iter_mut().chain(&mut self.extreme).map(|turn| &mut turn.at);
+        [&mut self.began].into_iter().chain(&mut self.ended).chain(turns)
+    }
+
     /// How long it took, or has taken by now.
     pub fn elapsed(&self, now: Timestamp) -> Duration {
         Duration::try_from(self.ended.unwrap_or(now).duration_since(self.began)).unwrap_or_default()

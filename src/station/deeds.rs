@@ -3,7 +3,7 @@
 use std::{
     collections::VecDeque,
     sync::{Arc, mpsc as queue},
-    time::{Duration, Instant as RealInstant, SystemTime},
+    time::Duration,
 };
 
 use jiff::Timestamp;
@@ -35,10 +35,6 @@ const BACKLOG_MAX: usize = 1_000;
 const ORDERS_MAX: usize = 64;
 /// Answers that wait for the book; one more, and the oldest waits no longer.
 const ANSWERS_MAX: usize = 64;
-/// A clock that moves more than this against the steady one was set.
-const STEP_MIN: Duration = Duration::from_millis(500);
-/// Real time between two looks at the clock.
-const LOOK_EVERY: Duration = Duration::from_secs(5);
 
 /// What comes from the door, in its order.
 #[derive(Debug)]
@@ -86,7 +82,6 @@ pub struct Deeds {
     /// Deeds that did not even come here.
     lost: u64,
     answers: VecDeque<Answer>,
-    clock: ClockWatch,
     /// The hash of the plant file that was recorded last.
     plant_file: Option<Arc<str>>,
     /// The hash of the users that was recorded last.
@@ -109,7 +104,6 @@ impl Deeds {
             left_out: 0,
             lost: 0,
             answers: VecDeque::new(),
-            clock: ClockWatch::new(),
             plant_file,
             users_file,
         }
@@ -261,13 +255,15 @@ impl Deeds {
         };
         (status.lost + self.lost, trouble)
     }
+}
 
-    /// A record if the clock was set since the last look. The time of the plant does not follow such a step before the next
-    /// start, so that nothing is stored twice or left out.
-    pub fn look_at_clock(&mut self, at: Timestamp) -> Option<ActionRecord> {
-        let step = self.clock.look(SystemTime::now(), RealInstant::now())?;
-        let record = own(at, "clock step", "system clock", "done: the plant keeps its time until the next start");
-        Some(ActionRecord { new: Some(format!("{step:+.1} s").into()), ..record })
+/// The system clock was set, from `old` to `new`.
+pub fn clock_step(old: Timestamp, new: Timestamp) -> ActionRecord {
+    let words = |at: Timestamp| Some(at.strftime("%Y-%m-%dT%H:%M:%SZ").to_string().into());
+    ActionRecord {
+        old: words(old),
+        new: words(new),
+        ..own(new, "clock step", "system clock", "done: followed at once")
     }
 }
 
@@ -288,52 +284,5 @@ fn own(at: Timestamp, action: &str, target: &str, outcome: &str) -> ActionRecord
         outcome: outcome.into(),
         note: None,
         seal: None,
-    }
-}
-
-/// Compares the clock that can be set with the one that cannot.
-#[derive(Debug)]
-struct ClockWatch {
-    wall: SystemTime,
-    steady: RealInstant,
-}
-
-impl ClockWatch {
-    fn new() -> ClockWatch {
-        ClockWatch { wall: SystemTime::now(), steady: RealInstant::now() }
-    }
-
-    /// The step since the last look, seconds; `None` for none worth a word, or where the last look was just now.
-    fn look(&mut self, wall: SystemTime, steady: RealInstant) -> Option<f64> {
-        let passed = steady.saturating_duration_since(self.steady);
-        if passed < LOOK_EVERY {
-            return None;
-        }
-        let moved = match wall.duration_since(self.wall) {
-            Ok(ahead) => ahead.as_secs_f64(),
-            Err(back) => -back.duration().as_secs_f64(),
-        };
-        (self.wall, self.steady) = (wall, steady);
-        let step = moved - passed.as_secs_f64();
-        (STEP_MIN.as_secs_f64() <= step.abs()).then_some(step)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_clock_that_was_set_is_seen_and_one_that_only_drifts_is_not() {
-        let mut watch = ClockWatch::new();
-        let (wall, steady) = (watch.wall, watch.steady);
-        let seconds = Duration::from_secs;
-        assert_eq!(watch.look(wall + seconds(3600), steady + seconds(1)), None, "not looked at yet");
-        let drift = Duration::from_millis(400);
-        assert_eq!(watch.look(wall + seconds(5) + drift, steady + seconds(5)), None);
-        let step = watch.look(wall + seconds(3610) + drift, steady + seconds(10));
-        assert!(step.is_some_and(|step| (step - 3600.0).abs() < 1e-6), "{step:?}");
-        let step = watch.look(wall + seconds(15) + drift, steady + seconds(15));
-        assert!(step.is_some_and(|step| (step + 3600.0).abs() < 1e-6), "{step:?}");
     }
 }

@@ -2,6 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
+use jiff::Timestamp;
 use tokio::{
     sync::{mpsc, watch},
     task::JoinHandle,
@@ -21,6 +22,7 @@ use crate::{
         event::Event,
         record::{ActionRecord, AlarmRecord, Record},
         snapshot::HistoryStatus,
+        station::{FaultState, StationFault},
     },
     profile::PlantFile,
     sim::io::Listener,
@@ -129,7 +131,8 @@ impl PlantTask {
                     self.publish();
                     (changed, next) = (false, Instant::now() + SNAPSHOT_EVERY);
                 }
-                Some(order) = orders.recv() => {
+                Some(mut order) = orders.recv() => {
+                    order.command.unshift(self.clock.behind_utc());
                     let effects = self.plant.on_order(order, self.clock.now());
                     self.carry_out(effects);
                     (changed, next) = (true, Instant::now());
@@ -187,7 +190,7 @@ impl PlantTask {
         }
         let ended = self.plant.on_stop();
         self.keep(ended.records);
-        let stopped = deeds::stopped(&self.plant.def().name, self.clock.now());
+        let stopped = deeds::stopped(&self.plant.def().name, self.clock.utc());
         if let Some(book) = &mut self.keeping.book {
             book.tell_all();
             self.write_down(vec![stopped], Vec::new());
@@ -197,6 +200,7 @@ impl PlantTask {
 
     fn publish(&mut self) {
         let mut snapshot = self.plant.snapshot();
+        snapshot.shift(self.clock.behind_utc());
         if let Some(book) = &mut self.keeping.book {
             book.mark(&mut snapshot);
         }
@@ -219,20 +223,26 @@ impl PlantTask {
         self.store(left.into_iter().map(Record::Action).collect());
     }
 
+    /// A step of the system clock is followed at once, recorded and alarmed.
     fn look_at_clock(&mut self) {
-        // A clock that runs faster, or in virtual time, is nobody's wall clock.
-        let real = self.clock.speed() == 1.0;
-        let now = self.clock.now();
-        let step = self.keeping.book.as_mut().filter(|_| real).and_then(|book| book.look_at_clock(now));
-        if let Some(step) = step {
-            self.write_down(vec![step], Vec::new());
-        }
+        let before = self.clock.utc();
+        let Some(step) = self.clock.follow() else { return };
+        self.clock_stepped(before, before.checked_add(step).unwrap_or(before));
+    }
+
+    fn clock_stepped(&mut self, old: Timestamp, new: Timestamp) {
+        self.write_down(vec![deeds::clock_step(old, new)], Vec::new());
+        let words = format!("the clock was set from {old:.0} to {new:.0}; times follow it from here on");
+        tracing::warn!("{words}");
+        let state = FaultState::Occurred(words.into());
+        let effects = self.plant.on_event(Event::Station { at: self.clock.now(), fault: StationFault::Clock, state });
+        self.carry_out(effects);
     }
 
     fn carry_out(&mut self, effects: Effects) {
         // Written down before it is sent: a station that is killed in between leaves a trace.
-        let intents = effects.bus.iter().filter_map(|(_, request)| self.plant.intent(request)).collect();
-        self.write_down(intents, Vec::new());
+        let intents = effects.bus.iter().filter_map(|(_, request)| self.plant.intent(request));
+        self.keep(intents.map(Record::Action).collect());
         for (line, request) in effects.bus {
             self.send(line, request);
         }
@@ -295,7 +305,7 @@ impl PlantTask {
     fn take_saved(&mut self, (order, settings, done): Saved) {
         let result = match done {
             Ok((file, result)) => {
-                let now = self.clock.now();
+                let now = self.clock.utc();
                 let changed = self.keeping.book.as_mut().and_then(|book| book.plant_file(&file, now));
                 self.write_down(changed.into_iter().collect(), Vec::new());
                 self.file = Some(file);
@@ -329,10 +339,13 @@ impl PlantTask {
         self.keep(effects.records);
     }
 
-    fn keep(&mut self, records: Vec<Record>) {
+    /// Records of the plant, in its own time.
+    fn keep(&mut self, mut records: Vec<Record>) {
         if records.is_empty() {
             return;
         }
+        let behind = self.clock.behind_utc();
+        records.iter_mut().for_each(|record| record.shift(behind));
         if let Some(listener) = &self.keeping.listener {
             listener.tell(&records);
         }

@@ -107,7 +107,7 @@ struct Recorder {
 
 impl Recorder {
     fn new(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> (Recorder, Found) {
-        let (alarms, found) = AlarmFile::open(&alarm_file::beside(history_file), clock.now());
+        let (alarms, found) = AlarmFile::open(&alarm_file::beside(history_file), clock.utc());
         let recorder = Recorder {
             path: book::beside(history_file),
             clock,
@@ -245,7 +245,7 @@ impl Recorder {
     /// Something about the log itself.
     fn note(&self, outcome: &str) -> ActionRecord {
         ActionRecord {
-            at: self.clock.now(),
+            at: self.clock.utc(),
             by: "station".into(),
             from: "".into(),
             action: "audit trail".into(),

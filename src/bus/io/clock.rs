@@ -1,27 +1,84 @@
 //! The one clock of a station: plant time, which a demonstration may run faster than real time.
+//!
+//! Plant time is steady: nothing that the station waits for comes early or late when the system clock is set. What leaves
+//! the station (records, snapshots) is in UTC: plant time and the steps of the system clock since the start.
 
-use std::time::Duration;
+use std::{
+    sync::atomic::{AtomicI64, Ordering},
+    time::{Duration, Instant as RealInstant, SystemTime},
+};
 
 use jiff::{SignedDuration, Timestamp};
 use tokio::time::Instant;
 
-/// Reads plant time. Steady between two readings even when the system clock is stepped.
+/// A system clock that moves more than this against the steady one was set.
+const STEP_MIN: SignedDuration = SignedDuration::from_millis(500);
+
+/// Reads plant time, steady also when the system clock is stepped, and UTC.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
     base: Timestamp,
     start: Instant,
     speed: f64,
+    /// `None` for a clock that is nobody's wall clock: faster than real time, or virtual.
+    system: Option<System>,
+}
+
+/// The system clock at the start, and what it was set by since then, in microseconds.
+#[derive(Debug, Clone, Copy)]
+struct System {
+    wall: SystemTime,
+    steady: RealInstant,
+    // Shared by all copies of the clock for as long as the process lives, which has one or two clocks.
+    steps: &'static AtomicI64,
 }
 
 impl Clock {
     /// Plant time begins at `base` and runs `speed` times as fast as real time.
     pub fn starting_at(base: Timestamp, speed: f64) -> Clock {
-        Clock { base, start: Instant::now(), speed }
+        Clock { base, start: Instant::now(), speed, system: None }
     }
 
-    /// Real time.
+    /// Real time, which follows the system clock: see [`Clock::follow`].
     pub fn real() -> Clock {
-        Clock::starting_at(Timestamp::now(), 1.0)
+        let steps = Box::leak(Box::new(AtomicI64::new(0)));
+        let system = System { wall: SystemTime::now(), steady: RealInstant::now(), steps };
+        Clock { system: Some(system), ..Clock::starting_at(Timestamp::now(), 1.0) }
+    }
+
+    /// What plant time lacks of UTC.
+    pub fn behind_utc(&self) -> SignedDuration {
+        SignedDuration::from_micros(self.system.map_or(0, |system| system.steps.load(Ordering::Relaxed)))
+    }
+
+    /// UTC now, as far as the system clock is right.
+    pub fn utc(&self) -> Timestamp {
+        self.to_utc(self.now())
+    }
+
+    /// The UTC of an instant of plant time.
+    pub fn to_utc(&self, at: Timestamp) -> Timestamp {
+        at.checked_add(self.behind_utc()).unwrap_or(at)
+    }
+
+    /// Looks at the system clock: if it was set, [`Clock::utc`] follows at once, in all copies of this clock. Gives the step.
+    pub fn follow(&self) -> Option<SignedDuration> {
+        self.follow_at(SystemTime::now(), RealInstant::now())
+    }
+
+    pub(crate) fn follow_at(&self, wall: SystemTime, steady: RealInstant) -> Option<SignedDuration> {
+        let System { wall: wall_before, steady: steady_before, steps } = self.system?;
+        let passed = SignedDuration::try_from(steady.saturating_duration_since(steady_before)).ok()?;
+        let moved = match wall.duration_since(wall_before) {
+            Ok(ahead) => SignedDuration::try_from(ahead).ok()?,
+            Err(back) => -SignedDuration::try_from(back.duration()).ok()?,
+        };
+        let step = moved - passed - self.behind_utc();
+        if step.abs() < STEP_MIN {
+            return None;
+        }
+        steps.fetch_add(i64::try_from(step.as_micros()).ok()?, Ordering::Relaxed);
+        Some(step)
     }
 
     /// Plant time now, in whole microseconds (what the history stores).
@@ -56,5 +113,29 @@ impl Clock {
     /// Sleeps for a span of plant time.
     pub async fn sleep(&self, plant: Duration) {
         tokio::time::sleep(self.real_span(plant)).await;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_system_clock_that_was_set_is_followed_and_one_that_only_drifts_is_not() {
+        let clock = Clock::real();
+        let copy = clock;
+        let System { wall, steady, .. } = clock.system.expect("a real clock");
+        let (seconds, drift) = (Duration::from_secs, Duration::from_millis(400));
+        assert_eq!(clock.follow_at(wall + seconds(5) + drift, steady + seconds(5)), None);
+        let two_years = seconds(2 * 365 * 86_400);
+        let years = SignedDuration::from_hours(2 * 365 * 24);
+        assert_eq!(clock.follow_at(wall + seconds(6) + two_years, steady + seconds(6)), Some(years));
+        assert_eq!(copy.behind_utc(), years, "every copy follows");
+        assert_eq!(copy.to_utc(Timestamp::UNIX_EPOCH), Timestamp::UNIX_EPOCH + years);
+        assert_eq!(clock.follow_at(wall + seconds(7) + two_years, steady + seconds(7)), None, "once");
+        assert_eq!(clock.follow_at(wall + seconds(8) - two_years, steady + seconds(8)), Some(-years - years));
+        assert_eq!(clock.behind_utc(), -years);
+        let demo = Clock::starting_at(Timestamp::UNIX_EPOCH, 60.0);
+        assert_eq!((demo.follow(), demo.behind_utc()), (None, SignedDuration::ZERO), "nobody's wall clock");
     }
 }

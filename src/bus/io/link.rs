@@ -365,7 +365,7 @@ impl Link {
 
     fn keep(&mut self, request: Arc<[u8]>, gathered: Gathered, sent_at: Instant) -> Answered {
         let exchange = Arc::new(Exchange {
-            at: self.wire.clock().at(sent_at),
+            at: self.wire.clock().to_utc(self.wire.clock().at(sent_at)),
             framing: self.framing(),
             request,
             answer: gathered.frame,

@@ -371,9 +371,11 @@ impl Task<'_> {
     }
 
     async fn tell_report(&mut self, schedule: Option<&Schedule>) -> Result<(), Ended> {
+        let mut polls: Vec<_> = schedule.map(|schedule| schedule.polls().collect()).unwrap_or_default();
+        polls.iter_mut().for_each(|poll| poll.next = poll.next.map(|at| self.clock.to_utc(at)));
         let plan = Plan {
             blocks: &self.blocks,
-            polls: schedule.map(|schedule| schedule.polls().collect()).unwrap_or_default(),
+            polls,
             refused: plan::refused(&self.def, self.line, &self.holes),
             load: schedule.map_or(Load::Normal, Schedule::load),
         };

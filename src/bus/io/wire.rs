@@ -150,7 +150,7 @@ impl Wire {
         }
         let sent_at = Instant::now();
         self.counters.sent_bytes += bytes.len() as u64;
-        self.counters.last_tx = Some(self.clock.at(sent_at));
+        self.counters.last_tx = Some(self.clock.to_utc(self.clock.at(sent_at)));
         Ok(sent_at + self.char_time * bytes.len() as u32)
     }
 
@@ -168,7 +168,7 @@ impl Wire {
         };
         let count = received(read)?;
         self.counters.received_bytes += count as u64;
-        self.counters.last_rx = Some(self.clock.now());
+        self.counters.last_rx = Some(self.clock.utc());
         Ok(true)
     }
 
@@ -215,7 +215,7 @@ impl Wire {
         }
         let unit = frame::unit_of(self.framing, &bytes);
         let moved_at = if sent { self.counters.last_tx } else { self.counters.last_rx };
-        let at = moved_at.unwrap_or_else(|| self.clock.now());
+        let at = moved_at.unwrap_or_else(|| self.clock.utc());
         let (framing, number) = (self.framing, self.counters.frames);
         self.frames.push(Frame { at, sent, bytes, framing, verdict, unit, number });
     }

@@ -94,7 +94,7 @@ impl Reader {
                 if counts_a_period(&question) {
                     commit_first(&writer).await;
                 }
-                let now = clock.now();
+                let now = clock.utc();
                 work.insert(spawn_blocking(move || (answer(&store, &question, now), store.unreadable.take()))).await
             };
             let ended = tokio::select! {

@@ -74,10 +74,10 @@ pub(super) fn start_with(
     clock: Clock,
     answer: Answerer,
 ) -> Result<Handle, HistoryError> {
-    let mut writer = Writer::open(path.to_owned(), def, clock.now())?;
+    let mut writer = Writer::open(path.to_owned(), def, clock.utc())?;
     let restored = writer.restore()?;
     // A plant must start even if its journal is too long to be measured.
-    let recent = writer.recent(clock.now()).unwrap_or_else(|error| {
+    let recent = writer.recent(clock.utc()).unwrap_or_else(|error| {
         tracing::warn!(%error, "the quality meter of the alarms begins anew");
         Recent::default()
     });
@@ -95,7 +95,7 @@ pub(super) fn start_with(
         writer.end_reading();
         // A panic of the thread has already been reported by the panic hook.
         let _ = reading.join();
-        writer.finish(clock.now());
+        writer.finish(clock.utc());
         tell.tell(&writer);
     };
     let join = spawn("history", writing).map_err(trouble)?;
@@ -139,19 +139,19 @@ async fn run(
             // In this order: a question sees the records before it.
             biased;
             _ = tick.tick() => {
-                writer.commit(clock.now());
+                writer.commit(clock.utc());
                 tell.tell(writer);
             }
             batch = records.recv() => {
                 let Some(batch) = batch else { break };
                 if writer.accept(batch) {
-                    writer.commit(clock.now());
+                    writer.commit(clock.utc());
                     tell.tell(writer);
                 }
             }
             Some(request) = requests.recv() => match request {
                 Request::Commit(done) => {
-                    writer.commit(clock.now());
+                    writer.commit(clock.utc());
                     tell.tell(writer);
                     // A question that waits no longer needs no word.
                     let _ = done.send(());

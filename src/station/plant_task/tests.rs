@@ -10,7 +10,7 @@ use crate::{
     plant::{
         alarm::AlarmCommand,
         command::{Command, Outcome},
-        def::TagId,
+        def::{AlarmId, TagId},
         event::Fault,
         fixture,
         record::AlarmStep,
@@ -33,8 +33,14 @@ struct Station {
 
 impl Station {
     async fn start(history: &Path) -> Station {
-        let def = fixture::shared();
-        let clock = Clock::real();
+        Station::start_with(history, Clock::real()).await
+    }
+
+    async fn start_with(history: &Path, clock: Clock) -> Station {
+        let mut def = fixture::plant();
+        let own = def.alarms.len();
+        def.alarms.extend((own..).zip(StationFault::ALL).map(|(id, fault)| fault.alarm(AlarmId(id as u16))));
+        let def = Arc::new(def);
         let plant = Plant::new(def.clone(), clock.now(), 1.0);
         let (records, blocked) = mpsc::channel(1);
         records.try_send(Vec::new()).unwrap();
@@ -50,7 +56,7 @@ impl Station {
         let task = PlantTask::new(plant, clock, vec![request], None, keeping, publish);
         let task = tokio::spawn(task.run(event_queue, order_queue, paper_queue));
         let recorder = recorder.join;
-        let mut station = Station {
+        let station = Station {
             events,
             orders,
             snapshots,
@@ -64,11 +70,17 @@ impl Station {
         let silent =
             Event::Failed { at: clock.now(), device: fixture::TIC, tags, fault: Fault::Resting, exchange: None };
         station.events.send(silent).await.unwrap();
-        let raised = station.snapshots.wait_for(|snapshot| !snapshot.alarms.is_empty());
-        let command = raised.await.unwrap().alarms[0].acknowledge();
-        assert!(matches!(command, Command::Alarm(AlarmCommand::Acknowledge { .. })));
-        station.orders.send(Order::new(ORDER, "anna", command)).await.unwrap();
         station
+    }
+
+    /// Acknowledges the alarm as it is shown.
+    async fn acknowledge(&mut self) {
+        let is_silent = |snapshot: &Arc<Snapshot>| snapshot.alarms.iter().any(|alarm| alarm.id == fixture::SILENT);
+        let snapshot = self.snapshots.wait_for(is_silent).await.unwrap().clone();
+        let silent = snapshot.alarms.iter().find(|alarm| alarm.id == fixture::SILENT).unwrap();
+        let command = silent.acknowledge();
+        assert!(matches!(command, Command::Alarm(AlarmCommand::Acknowledge { .. })));
+        self.orders.send(Order::new(ORDER, "anna", command)).await.unwrap();
     }
 
     /// The first snapshot in which the acknowledgement has its end, recorded or not.
@@ -90,7 +102,8 @@ impl Station {
 
 fn steps(history: &Path) -> Vec<AlarmStep> {
     let (_, found) = AlarmFile::open(&alarm_file::beside(history), jiff::Timestamp::UNIX_EPOCH);
-    found.steps.unwrap_or_default().iter().map(|step| step.step).collect()
+    let steps = found.steps.unwrap_or_default();
+    steps.iter().filter(|step| &*step.subject == "TIC-1").map(|step| step.step).collect()
 }
 
 #[tokio::test]
@@ -98,6 +111,7 @@ async fn an_acknowledgement_that_is_shown_is_on_disk_also_while_the_history_take
     let folder = tempfile::tempdir().unwrap();
     let history = folder.path().join("fixture.duckdb");
     let mut station = Station::start(&history).await;
+    station.acknowledge().await;
     let snapshot = station.told(|_| true).await;
     assert!(snapshot.orders[0].recorded);
     // A kill at this very moment leaves these files.
@@ -115,9 +129,11 @@ async fn what_the_disk_does_not_take_is_done_and_shown_as_not_recorded_until_it_
     let obstacle = alarm_file::beside(&history);
     fs::create_dir(&obstacle).unwrap();
     let mut station = Station::start(&history).await;
+    station.acknowledge().await;
     let snapshot = station.told(|_| true).await;
     assert!(!snapshot.orders[0].recorded, "it is done, and nobody is told that it is recorded");
-    assert!(!snapshot.alarms[0].state.needs_acknowledgement());
+    let silent = snapshot.alarms.iter().find(|alarm| alarm.id == fixture::SILENT).unwrap();
+    assert!(!silent.state.needs_acknowledgement());
     let trouble = station.snapshots.wait_for(|snapshot| snapshot.history.trouble.is_some()).await.unwrap().clone();
     let trouble = trouble.history.trouble.as_ref().unwrap();
     assert!(trouble.contains("the state of the alarms cannot be written"), "{trouble}");
@@ -125,4 +141,33 @@ async fn what_the_disk_does_not_take_is_done_and_shown_as_not_recorded_until_it_
     station.told(|recorded| recorded).await;
     assert_eq!(steps(&history), [AlarmStep::Raised, AlarmStep::Acknowledged]);
     station.stop().await;
+}
+
+#[tokio::test]
+async fn a_clock_that_is_set_while_the_station_runs_is_followed_recorded_and_alarmed() {
+    let folder = tempfile::tempdir().unwrap();
+    let history = folder.path().join("fixture.duckdb");
+    // The station begins two years ahead of the system clock, which is as if it was set back then.
+    let (years, clock) = (Duration::from_secs(2 * 365 * 86_400), Clock::real());
+    clock.follow_at(std::time::SystemTime::now() + years, std::time::Instant::now()).unwrap();
+    let wrong = clock.utc();
+    let mut station = Station::start_with(&history, clock).await;
+    let stepped = |snapshot: &Arc<Snapshot>| {
+        snapshot.alarms.iter().any(|alarm| snapshot.def.alarm(alarm.id).text == StationFault::Clock.message())
+    };
+    let snapshot = station.snapshots.wait_for(stepped).await.unwrap().clone();
+    let right = jiff::Timestamp::now();
+    let off = |at: jiff::Timestamp| at.duration_since(right).abs();
+    assert!(off(snapshot.at) < jiff::SignedDuration::from_secs(60), "{} is not {right}", snapshot.at);
+    assert!(snapshot.alarms.iter().all(|alarm| off(alarm.raised_at) < jiff::SignedDuration::from_secs(60)));
+    station.acknowledge().await;
+    let snapshot = station.told(|_| true).await;
+    assert!(off(snapshot.orders[0].at) < jiff::SignedDuration::from_secs(60));
+    station.stop().await;
+    let log = fs::read_to_string(book::beside(&history)).unwrap();
+    let line = log.lines().find(|line| line.contains("clock step")).unwrap_or_else(|| panic!("{log}"));
+    let day = |at: jiff::Timestamp| at.strftime("%Y-%m-%dT").to_string();
+    assert!(line.contains(&format!("\"old\":\"{}", day(wrong))), "{line}");
+    assert!(line.contains(&format!("\"new\":\"{}", day(right))), "{line}");
+    assert!(log.lines().last().unwrap().contains(&format!("\"utc\":\"{}", day(right))), "the stop, on the right day");
 }

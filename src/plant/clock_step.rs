@@ -1,0 +1,187 @@
+//! What leaves the plant after the system clock was set: its times, moved from the plant's steady time to UTC.
+//!
+//! Inside, time never jumps, so that no delay ends early and no value grows old by a clock that was set. `by` is what the
+//! steady time lacks of UTC: zero until the first step.
+
+use std::sync::Arc;
+
+use jiff::{SignedDuration, Timestamp};
+
+use super::{
+    alarm::{AlarmCommand, state::Deed},
+    command::Command,
+    event::LineState,
+    record::{AlarmRecord, Burst, Record},
+    restore::Restore,
+    snapshot::{ActiveAlarm, AsideAlarm, DeviceState, DeviceStatus, LineStatus, Snapshot},
+    tuning::Tuning,
+};
+
+/// Moves an instant; one that would leave the calendar stays.
+fn shift(at: &mut Timestamp, by: SignedDuration) {
+    *at = at.checked_add(by).unwrap_or(*at);
+}
+
+impl Record {
+    /// The same in UTC.
+    pub fn shift(&mut self, by: SignedDuration) {
+        match self {
+            Record::Sample(_, sample) => shift(&mut sample.at, by),
+            Record::Alarm(step) => step.shift(by),
+            Record::Action(action) => shift(&mut action.at, by),
+            Record::Line(minute) => shift(&mut minute.at, by),
+        }
+    }
+}
+
+impl AlarmRecord {
+    fn shift(&mut self, by: SignedDuration) {
+        shift(&mut self.at, by);
+        self.until.iter_mut().for_each(|until| shift(until, by));
+        shift_burst(&mut self.burst, by);
+    }
+}
+
+fn shift_burst(burst: &mut Option<Burst>, by: SignedDuration) {
+    burst.iter_mut().for_each(|burst| shift(&mut burst.began, by));
+}
+
+fn shift_deed(deed: &mut Deed, by: SignedDuration) {
+    shift(&mut deed.at, by);
+}
+
+impl Command {
+    /// The same in the plant's own time: what names an alarm by the instant that a snapshot showed.
+    pub fn unshift(&mut self, by: SignedDuration) {
+        match self {
+            Command::Alarm(AlarmCommand::Acknowledge { seen, .. }) => shift(seen, -by),
+            Command::Alarm(AlarmCommand::AcknowledgeAll { seen }) => {
+                *seen = seen.iter().map(|(alarm, at)| (*alarm, at.checked_sub(by).unwrap_or(*at))).collect();
+            }
+            _ => {}
+        }
+    }
+}
+
+impl Snapshot {
+    /// The same in UTC. What the bus has noted (frames, requests, last bytes) is in UTC already.
+    pub fn shift(&mut self, by: SignedDuration) {
+        if by.is_zero() {
+            return;
+        }
+        shift(&mut self.at, by);
+        self.samples.iter_mut().for_each(|sample| shift(&mut sample.at, by));
+        self.lines.iter_mut().for_each(|line| line.shift(by));
+        self.devices.iter_mut().for_each(|device| device.shift(by));
+        Arc::make_mut(&mut self.alarms).iter_mut().for_each(|alarm| alarm.shift(by));
+        Arc::make_mut(&mut self.aside).iter_mut().for_each(|alarm| alarm.shift(by));
+        self.alarm_quality.flood_since.iter_mut().for_each(|since| shift(since, by));
+        let day = Arc::make_mut(&mut self.alarm_quality.day);
+        (shift(&mut day.from, by), shift(&mut day.until, by));
+        self.orders.iter_mut().for_each(|order| {
+            shift(&mut order.at, by);
+            order.command.unshift(-by);
+        });
+        self.watch.times().for_each(|since| shift(since, by));
+        self.restores.iter_mut().for_each(|run| {
+            let at: &mut Restore = Arc::make_mut(run);
+            shift(&mut at.at, by);
+        });
+        self.tunings.iter_mut().flatten().for_each(|tuning| {
+            let tuning: &mut Tuning = Arc::make_mut(tuning);
+            tuning.times().for_each(|at| shift(at, by));
+        });
+    }
+}
+
+impl LineStatus {
+    fn shift(&mut self, by: SignedDuration) {
+        if let LineState::Waiting { retry_at, .. } = &mut self.state {
+            shift(retry_at, by);
+        }
+        self.since.iter_mut().chain(&mut self.lost_since).for_each(|at| shift(at, by));
+    }
+}
+
+impl DeviceStatus {
+    fn shift(&mut self, by: SignedDuration) {
+        if let DeviceState::Down { since } = &mut self.state {
+            shift(since, by);
+        }
+        self.last_fault.iter_mut().for_each(|(at, _)| shift(at, by));
+    }
+}
+
+impl ActiveAlarm {
+    fn shift(&mut self, by: SignedDuration) {
+        let times = [&mut self.raised_at, &mut self.annunciated_at].into_iter().chain(&mut self.returned_at);
+        times.for_each(|at| shift(at, by));
+        self.acknowledged.iter_mut().for_each(|deed| shift_deed(deed, by));
+        shift_burst(&mut self.burst, by);
+    }
+}
+
+impl AsideAlarm {
+    fn shift(&mut self, by: SignedDuration) {
+        shift_deed(&mut self.deed, by);
+        self.until.iter_mut().for_each(|until| shift(until, by));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::plant::{
+        Plant,
+        command::{Order, OrderId, Outcome},
+        event::{Event, Fault},
+        fixture::{self, DP, FAULT, PV, SV, TIC},
+    };
+
+    const YEARS: SignedDuration = SignedDuration::from_hours(24 * 365 * 56);
+
+    fn at(second: i64) -> Timestamp {
+        Timestamp::from_second(second).expect("a small number")
+    }
+
+    fn values(second: i64) -> Event {
+        let values = vec![(PV, 700.0), (SV, 700.0), (DP, 1.0), (FAULT, 0.0)];
+        let reply = Duration::from_millis(12);
+        Event::Read { at: at(second), device: TIC, values, texts: Vec::new(), reply, exchange: None }
+    }
+
+    #[test]
+    fn after_the_clock_was_set_values_are_as_old_as_before_and_alarms_are_acknowledged_as_they_are_shown() {
+        for by in [YEARS, -YEARS] {
+            let mut plant = Plant::new(fixture::shared(), at(1_000_000), 1.0);
+            plant.on_event(values(1_000_000));
+            plant.on_tick(at(1_000_003));
+            let (age, good) = (plant.snapshot().age(PV), plant.snapshot().sample(PV).quality);
+            let mut snapshot = plant.snapshot();
+            snapshot.shift(by);
+            assert_eq!(snapshot.at, at(1_000_003) + by);
+            assert_eq!((snapshot.age(PV), snapshot.sample(PV).quality), (age, good));
+            let tags = fixture::plant().tags_of(TIC).map(|tag| tag.id).collect();
+            let silent = Event::Failed { at: at(1_000_004), device: TIC, tags, fault: Fault::Resting, exchange: None };
+            let mut records = plant.on_event(silent).records;
+            records.iter_mut().for_each(|record| record.shift(by));
+            let Some(Record::Alarm(raised)) = records.iter().find(|record| matches!(record, Record::Alarm(_))) else {
+                panic!("no alarm: {records:?}")
+            };
+            let mut snapshot = plant.snapshot();
+            snapshot.shift(by);
+            assert_eq!((raised.at, snapshot.alarms[0].raised_at), (at(1_000_004) + by, at(1_000_004) + by));
+            // What a terminal sends is what it was shown.
+            let mut command = snapshot.alarms[0].acknowledge();
+            command.unshift(by);
+            let id = OrderId { terminal: 1, number: 1 };
+            plant.on_order(Order::new(id, "anna", command), at(1_000_005));
+            let mut snapshot = plant.snapshot();
+            snapshot.shift(by);
+            assert_eq!(snapshot.orders[0].outcome, Outcome::Verified);
+            assert_eq!(snapshot.alarms[0].acknowledged.as_ref().map(|deed| deed.at), Some(at(1_000_005) + by));
+        }
+    }
+}
