@@ -55,7 +55,7 @@ fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> Order {
 
 /// Orders `SV := value`, answers with `result`, and gives the outcome and the raw number that was sent.
 fn write(plant: &mut Plant, value: f64, result: WriteResult) -> (Outcome, Option<f64>) {
-    let effects = plant.on_order(shown(&plant, 1, SV, value), at(1));
+    let effects = plant.on_order(shown(plant, 1, SV, value), at(1));
     let sent = effects.bus.first().map(|(_, request)| match request {
         BusRequest::Write { id, raw, .. } => (*id, *raw),
         other => panic!("not a write: {other:?}"),
@@ -350,7 +350,7 @@ fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
     def.tags[SV.index()].write_unlock = Some((FAULT, 1.0));
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
     let keyed = |plant: &mut Plant, number, value| {
-        let effects = plant.on_order(shown(&plant, number, SV, value), at(1));
+        let effects = plant.on_order(shown(plant, number, SV, value), at(1));
         match &effects.bus[0].1 {
             BusRequest::Write { id, unlock, .. } => (*id, *unlock),
             other => panic!("not a write: {other:?}"),

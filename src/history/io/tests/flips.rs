@@ -1,6 +1,7 @@
 //! Every kind of damage to the files of a history: the station starts, records, and says what it has met.
 //!
 //! `SIGHTGLASS_DAMAGE=200` makes 200 cases of each kind instead of a few.
+#![allow(clippy::print_stdout)]
 
 use std::{
     fs,
