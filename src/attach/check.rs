@@ -27,7 +27,7 @@ pub const BUCKETS_MAX: usize = 4_096;
 /// Most columns of all curves of one question.
 pub const COLUMNS_MAX: usize = 65_536;
 /// Most curves of one question.
-const SERIES_MAX: usize = 64;
+pub const SERIES_MAX: usize = 64;
 /// Most rows of one answer.
 const ROWS_MAX: usize = 10_000;
 /// Longest period of a report.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     history::{Answer, HistoryError, Question},
     plant::PlantDef,
-    report::{Period, alarm_quality, ask},
+    report::alarm_quality,
 };
 
 use super::{CliError, StationArgs, client, in_runtime, load, say, source::Source};
@@ -42,14 +42,12 @@ pub fn main(args: Args) -> Result<(), CliError> {
         return Err(CliError::Usage("found nothing to tell: expected --stats".into()));
     }
     let def = Arc::new(load(&args.plant, &args.station)?);
-    let now = jiff::Timestamp::now();
-    let period = ask::period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref(), now)
-        .map_err(|error| CliError::Usage(error.to_string()))?;
-    in_runtime(tell(def, period, args))
+    in_runtime(tell(def, args))
 }
 
-async fn tell(def: Arc<PlantDef>, period: Period, args: Args) -> Result<(), CliError> {
+async fn tell(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     let source = Source::open(&def, &args.station, &args.login).await?;
+    let period = source.period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref())?;
     let question = Question::AlarmQuality { from: period.from, to: period.to };
     let Answer::AlarmQuality(figures) = source.ask(question).await? else {
         return Err(CliError::History(HistoryError::Engine("answered another question".into())));

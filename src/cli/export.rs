@@ -1,24 +1,32 @@
-//! `sightglass export`: stored values of chosen tags at a fixed interval as CSV.
+//! `sightglass export`: stored values of chosen tags at a fixed interval, with their quality, as CSV.
 
-use std::{io::Write, path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    collections::{BTreeSet, HashMap},
+    io::Write,
+    path::PathBuf,
+    sync::Arc,
+    time::Duration,
+};
 
 use jiff::Timestamp;
 
 use crate::{
-    attach::check::{BUCKETS_MAX, COLUMNS_MAX},
-    history::{Answer, HistoryError, Question, Series},
-    plant::{
-        PlantDef,
-        def::TagId,
-        tag::{Decimals, TagDef},
+    attach::check::{BUCKETS_MAX, COLUMNS_MAX, SERIES_MAX},
+    history::{Answer, HistoryError, Question},
+    plant::{PlantDef, def::TagId},
+    report::{
+        export,
+        figures::{self, Label},
+        hold::Stood,
     },
-    report::{DECIMALS_UNKNOWN, ask, export},
 };
 
 use super::{CliError, StationArgs, client, in_runtime, load, report::dialect, say, source::Source, span};
 
 /// Rows of one file.
 const ROWS_MAX: u128 = 2_000_000;
+/// Values of one file: they are all in memory before the first is written.
+const VALUES_MAX: u128 = 20_000_000;
 
 /// Arguments of `export`.
 #[derive(Debug, clap::Args)]
@@ -55,36 +63,68 @@ pub struct Args {
     station: StationArgs,
 }
 
-/// Asks for the curves, piece by piece, and writes the table.
+/// Asks for the values, piece by piece, and writes the table.
 pub fn main(args: Args) -> Result<(), CliError> {
     let def = Arc::new(load(&args.plant, &args.station)?);
+    in_runtime(write(def, args))
+}
+
+async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     let tags = tags(&def, &args.tags)?;
-    let period = ask::period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref(), Timestamp::now())
-        .map_err(|error| CliError::Usage(error.to_string()))?;
-    let rows = rows(period.from, period.to, args.every)?;
-    in_runtime(async {
-        let source = Source::open(&def, &args.station, &args.login).await?;
-        let mut columns: Vec<export::Column> = tags.iter().map(|tag| column(def.tag(*tag))).collect();
-        let piece = (COLUMNS_MAX / tags.len().max(1)).clamp(1, BUCKETS_MAX);
-        for begin in (0..rows).step_by(piece) {
-            let count = piece.min(rows - begin);
-            let (from, to) = (instant(period.from, args.every, begin), instant(period.from, args.every, begin + count));
-            let question = Question::Series { tags: tags.clone(), from, to, buckets: count };
-            for (column, series) in columns.iter_mut().zip(series(source.ask(question).await?)?) {
-                column.values.extend(series.buckets.iter().map(|bucket| bucket.map(|bucket| bucket.last)));
+    let source = Source::open(&def, &args.station, &args.login).await?;
+    let period = source.period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref())?;
+    let rows = rows(period.from, period.to, args.every, tags.len())?;
+    let latest = latest(&source, &def, &tags, period.from, period.to).await?;
+    let mut columns = Vec::new();
+    for group in tags.chunks(SERIES_MAX) {
+        let label = |tag: &TagId| Label::at(def.tag(*tag), &latest);
+        let begin = columns.len();
+        columns.extend(group.iter().map(label).map(|label| {
+            let Label { tag, unit, decimals, counts: _ } = label;
+            export::Column { tag, unit, decimals, values: Vec::with_capacity(rows) }
+        }));
+        for (from, count) in pieces(period.from, args.every, rows, group.len()) {
+            let question = Question::Values { tags: group.to_vec(), from, every: args.every, count };
+            for (column, values) in columns[begin..].iter_mut().zip(values(source.ask(question).await?)?) {
+                column.values.extend(values);
             }
         }
-        let dialect = dialect(def.report.csv, args.separator.as_deref(), args.bom);
-        let bytes = export::export_csv(&def, period.from, args.every, &columns, dialect);
-        source.exported(&args.out.display().to_string(), &bytes).await?;
-        let failed = |error| CliError::Io { what: format!("cannot write {}", args.out.display()), error };
-        if args.out.as_os_str() == "-" {
-            return std::io::stdout().write_all(&bytes).map_err(failed);
-        }
-        std::fs::write(&args.out, bytes).map_err(failed)?;
-        say(&args.out.display().to_string());
-        Ok(())
-    })
+    }
+    let dialect = dialect(def.report.csv, args.separator.as_deref(), args.bom);
+    let bytes = export::export_csv(&def, period.from, args.every, &columns, dialect);
+    source.exported(&args.out.display().to_string(), &bytes).await?;
+    let failed = |error| CliError::Io { what: format!("cannot write {}", args.out.display()), error };
+    if args.out.as_os_str() == "-" {
+        return std::io::stdout().write_all(&bytes).map_err(failed);
+    }
+    std::fs::write(&args.out, bytes).map_err(failed)?;
+    say(&args.out.display().to_string());
+    Ok(())
+}
+
+/// The latest good values of the tags that tell unit and decimals of others.
+async fn latest(
+    source: &Source,
+    def: &PlantDef,
+    tags: &[TagId],
+    from: Timestamp,
+    to: Timestamp,
+) -> Result<HashMap<TagId, f64>, CliError> {
+    let choosers: BTreeSet<TagId> = tags.iter().flat_map(|tag| figures::choosers(def.tag(*tag))).collect();
+    let choosers: Vec<TagId> = choosers.into_iter().collect();
+    let mut latest = HashMap::new();
+    for tags in choosers.chunks(SERIES_MAX) {
+        let question = Question::Series { tags: tags.to_vec(), from, to, buckets: 1 };
+        let Answer::Series(series) = source.ask(question).await? else { return Err(other()) };
+        latest.extend(series.iter().filter_map(|series| Some((series.tag, (*series.buckets.last()?)?.last))));
+    }
+    Ok(latest)
+}
+
+/// Where each question about so many tags begins, and how many rows it is about.
+fn pieces(from: Timestamp, every: Duration, rows: usize, tags: usize) -> impl Iterator<Item = (Timestamp, usize)> {
+    let piece = (COLUMNS_MAX / tags.max(1)).clamp(1, BUCKETS_MAX);
+    (0..rows).step_by(piece).map(move |begin| (instant(from, every, begin), piece.min(rows - begin)))
 }
 
 /// The tags that were named, or all that are stored.
@@ -99,15 +139,16 @@ fn tags(def: &PlantDef, names: &[String]) -> Result<Vec<TagId>, CliError> {
     names.iter().map(find).collect()
 }
 
-fn rows(from: Timestamp, to: Timestamp, every: Duration) -> Result<usize, CliError> {
+fn rows(from: Timestamp, to: Timestamp, every: Duration, tags: usize) -> Result<usize, CliError> {
     if every < Duration::from_millis(1) {
         return Err(CliError::Usage("--every: expected 1ms or more".to_owned()));
     }
     let span = Duration::try_from(to.duration_since(from)).unwrap_or_default();
     let rows = span.as_nanos() / every.as_nanos();
-    if rows == 0 || ROWS_MAX < rows {
+    let max = ROWS_MAX.min(VALUES_MAX / tags.max(1) as u128);
+    if rows == 0 || max < rows {
         return Err(CliError::Usage(format!(
-            "found {rows} rows, expected 1 … {ROWS_MAX}: change --every or the period"
+            "found {rows} rows of {tags} tags, expected 1 … {max}: change --every, --tags or the period"
         )));
     }
     Ok(rows as usize)
@@ -118,17 +159,13 @@ fn instant(from: Timestamp, every: Duration, count: usize) -> Timestamp {
     from.checked_add(jiff::SignedDuration::from_nanos_i128(ahead)).unwrap_or(Timestamp::MAX)
 }
 
-fn column(tag: &TagDef) -> export::Column {
-    let decimals = match tag.decimals {
-        Decimals::Fixed(decimals) => decimals,
-        Decimals::From(_) => DECIMALS_UNKNOWN,
-    };
-    export::Column { tag: tag.name.clone(), unit: tag.unit.clone(), decimals, values: Vec::new() }
+fn values(answer: Answer) -> Result<Vec<Vec<Option<Stood>>>, CliError> {
+    match answer {
+        Answer::Values(values) => Ok(values),
+        _ => Err(other()),
+    }
 }
 
-fn series(answer: Answer) -> Result<Vec<Series>, CliError> {
-    match answer {
-        Answer::Series(series) => Ok(series),
-        _ => Err(CliError::History(HistoryError::Engine("answered another question".into()))),
-    }
+fn other() -> CliError {
+    CliError::History(HistoryError::Engine("answered another question".into()))
 }

@@ -5,7 +5,7 @@ use std::{io::Write, path::PathBuf, sync::Arc};
 use crate::{
     history::{Answer, HistoryError, Question},
     plant::{PlantDef, def::CsvDialect},
-    report::{Period, ask, csv},
+    report::csv,
 };
 
 use super::{CliError, StationArgs, client, in_runtime, load, say, source::Source};
@@ -45,14 +45,12 @@ pub struct Args {
 /// Asks for the report and writes it.
 pub fn main(args: Args) -> Result<(), CliError> {
     let def = Arc::new(load(&args.plant, &args.station)?);
-    let now = jiff::Timestamp::now();
-    let period = ask::period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref(), now)
-        .map_err(|error| CliError::Usage(error.to_string()))?;
-    in_runtime(write(def, period, args))
+    in_runtime(write(def, args))
 }
 
-async fn write(def: Arc<PlantDef>, period: Period, args: Args) -> Result<(), CliError> {
+async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     let source = Source::open(&def, &args.station, &args.login).await?;
+    let period = source.period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref())?;
     let Answer::Report(report) = source.ask(Question::Report { period }).await? else {
         return Err(CliError::History(HistoryError::Engine("answered another question".into())));
     };

@@ -11,6 +11,7 @@ use crate::{
         io::{Query, store::Store},
     },
     plant::PlantDef,
+    report::{Period, ask},
     station::Session,
 };
 
@@ -48,6 +49,21 @@ impl Source {
         let now = Timestamp::now();
         let until = store.extent().map_or(now, |(_, last)| last.max(now));
         Ok(Source::File { store: Box::new(store), until })
+    }
+
+    /// The period that was asked for. Now is the time of the plant: a demonstration may have run ahead of time.
+    pub fn period(
+        &self,
+        def: &PlantDef,
+        shift: Option<&str>,
+        from: Option<&str>,
+        to: Option<&str>,
+    ) -> Result<Period, CliError> {
+        let now = match self {
+            Source::Station(session) => session.snapshots.borrow().at,
+            Source::File { until, .. } => *until,
+        };
+        ask::period(def, shift, from, to, now).map_err(|error| CliError::Usage(error.to_string()))
     }
 
     /// Asks.

@@ -15,9 +15,8 @@ use crate::{
         def::{LineId, TagId},
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord},
-        sample::{Quality, Sample},
     },
-    report::{Period, ShiftReport},
+    report::{Period, ShiftReport, hold::Stood},
 };
 
 /// What can be asked. Spans include `from` and exclude `to`.
@@ -120,21 +119,6 @@ pub enum Answer {
     AlarmQuality(Box<Figures>),
     /// By tag what stood at each instant; `None` where nothing is stored, or nothing recent enough.
     Values(Vec<Vec<Option<Stood>>>),
-}
-
-/// A stored value and its quality.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Stood {
-    /// In the tag's unit; `None` exactly when the quality is bad.
-    pub value: Option<f64>,
-    /// How far to trust it.
-    pub quality: Quality,
-}
-
-impl From<Sample> for Stood {
-    fn from(sample: Sample) -> Stood {
-        Stood { value: sample.value, quality: sample.quality }
-    }
 }
 
 /// A curve reduced to columns of equal width.

@@ -101,6 +101,11 @@ pub enum AlarmStep {
 }
 
 impl AlarmStep {
+    /// Does it belong to an alarm that is not annunciated?
+    pub fn is_quiet(self) -> bool {
+        matches!(self, AlarmStep::RaisedQuietly | AlarmStep::ReturnedQuietly)
+    }
+
     /// Every step.
     pub const ALL: [AlarmStep; 13] = [
         AlarmStep::Raised,

@@ -70,6 +70,8 @@ pub struct TagDef {
     pub deadband: f64,
     /// Stored in the history.
     pub store: bool,
+    /// Whether it counts up, so that a report gives its difference and no mean; `None`: by its unit.
+    pub counter: Option<bool>,
     /// How sure the register map is of this row.
     pub confidence: Confidence,
     /// Where the row comes from (manual, clause).
@@ -115,6 +117,7 @@ impl TagDef {
             class: Class::Soft,
             deadband: 0.0,
             store: true,
+            counter: None,
             confidence: Confidence::Proven,
             source: String::new(),
             simulate: None,

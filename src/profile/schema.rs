@@ -163,6 +163,8 @@ table!(
         opt "class" class: Class,
         opt "deadband" deadband: f64,
         opt "store" store: bool,
+        /// Counts up, or not: by its unit if this is not said.
+        opt "counter" counter: bool,
         opt "confidence" confidence: Confidence,
         opt "source" source: String,
         opt "simulate" simulate: SimulateTable,

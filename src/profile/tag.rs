@@ -105,6 +105,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
         deadband: row.deadband.map_or(0.0, |deadband| deadband.value),
         store: !is_text
             && row.store.map_or(access != Access::Write && matches!(poll, Poll::Every(_)), |store| store.value),
+        counter: row.counter.map(|counter| counter.value),
         confidence: row.confidence.map_or(Confidence::Medium, |confidence| confidence.value),
         source: text(&row.source),
         // Needs all tags of the plant.

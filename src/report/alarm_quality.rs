@@ -57,6 +57,8 @@ pub struct Quality {
     pub watched_s: u64,
     /// Activations.
     pub raised: u64,
+    /// Activations that were not annunciated.
+    pub suppressed: u64,
     /// Figures against targets and limits.
     pub figures: Vec<Row>,
     /// The alarms to look into.
@@ -72,6 +74,7 @@ pub fn quality(figures: &Figures, def: &PlantDef, period: &Period) -> Quality {
         until: iso(&def.time_zone, figures.until),
         watched_s: figures.watched.as_secs(),
         raised: figures.annunciated(),
+        suppressed: figures.suppressed,
         figures: rows(figures),
         alarms: culprits(figures),
     }
@@ -101,7 +104,7 @@ pub fn quality_text(figures: &Figures, def: &PlantDef, period: &Period) -> Strin
     let all = quality(figures, def, period);
     let mut lines = vec![
         format!("{}, alarms of {}", def.title, all.period),
-        format!("{} to {}: {} alarms{}", all.from, all.until, all.raised, gaps(figures)),
+        format!("{} to {}: {} alarms{}{}", all.from, all.until, all.raised, quiet(figures), gaps(figures)),
         String::new(),
         format!("{:35} {:>7}  {:12}  {:12}  {}", "measure", "figure", "target", "limit", "verdict"),
     ];
@@ -119,6 +122,14 @@ pub fn quality_text(figures: &Figures, def: &PlantDef, period: &Period) -> Strin
     lines.push(String::new());
     lines.push("targets and limits: ISA-18.2 for one operator, meant for 30 days or more".into());
     lines.join("\n")
+}
+
+/// How many were not annunciated.
+pub fn quiet(figures: &Figures) -> String {
+    match figures.suppressed {
+        0 => String::new(),
+        many => format!(", {many} more while suppressed"),
+    }
 }
 
 /// How much of the span was watched, if not all of it.
@@ -182,6 +193,7 @@ pub(super) mod tests {
             chattering: vec![high],
             fleeting: Vec::new(),
             stale: 0,
+            suppressed: 0,
         }
     }
 

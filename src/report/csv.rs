@@ -3,7 +3,7 @@
 use jiff::{Timestamp, tz::TimeZone};
 
 use super::{
-    Period, RecordRow, ShiftReport, TagFigures,
+    Gap, Period, RecordRow, ShiftReport, SuppressedAlarm, TagFigures,
     alarm_quality::{self, Culprit, Row},
 };
 use crate::plant::{
@@ -12,7 +12,7 @@ use crate::plant::{
     tag::Decimals,
 };
 
-/// The whole report: facts, tags, alarm counts, alarm quality, alarm list, operator actions, raw record. Every section has a title row,
+/// The whole report: facts, tags, what could not be read, alarm counts, suppressed alarms, alarm quality, alarm list, operator actions, raw record. Every section has a title row,
 /// a header row and its rows; every row has as many columns as the widest. The same report gives the same bytes.
 pub fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u8> {
     let zone = &def.time_zone;
@@ -26,12 +26,23 @@ pub fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> V
         plain(iso(zone, report.until)),
         plain(concat!("sightglass ", env!("CARGO_PKG_VERSION"))),
     ]);
-    table.section("tags", &["tag", "unit", "min", "mean", "max", "last", "minutes in alarm", "good %"]);
+    table.section("tags", &["tag", "unit", "min", "mean", "max", "last", "minutes in alarm", "good %", "difference"]);
     report.tags.iter().for_each(|tag| table.row(tag_row(tag, dialect)));
-    table.section("alarm counts", &["priority", "raised"]);
-    for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
-        table.row(vec![plain(priority.word()), plain(raised(&report.alarms, priority).to_string())]);
+    if !report.unreadable.is_empty() {
+        table.section("not readable, not counted", &["from", "to", "why"]);
+        for Gap { from, to, why } in &report.unreadable {
+            table.row(vec![plain(iso(zone, *from)), plain(iso(zone, *to)), text(why)]);
+        }
     }
+    table.section("alarm counts", &["priority", "raised", "raised while suppressed"]);
+    for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
+        let suppressed = report.suppressed.iter().filter(|alarm| alarm.priority == priority);
+        let suppressed: u64 = suppressed.map(|alarm| alarm.raised).sum();
+        let raised = raised(&report.alarms, priority);
+        table.row(vec![plain(priority.word()), plain(raised.to_string()), plain(suppressed.to_string())]);
+    }
+    table.section("suppressed alarms", &["priority", "subject", "alarm", "raised", "minutes active"]);
+    report.suppressed.iter().for_each(|alarm| table.row(suppressed_row(alarm, dialect)));
     table.section("alarm quality", &["measure", "figure", "target", "limit", "verdict"]);
     alarm_quality::rows(&report.quality).iter().for_each(|row| table.row(quality_row(row, dialect)));
     table.section("alarms to look into", &["kind", "subject", "alarm", "raised"]);
@@ -93,6 +104,17 @@ fn tag_row(tag: &TagFigures, dialect: CsvDialect) -> Vec<String> {
         value(tag.last),
         number(Some(tag.in_alarm.as_secs_f64() / 60.0), 1, dialect),
         number(Some(floor_percent(tag.good)), 1, dialect),
+        value(tag.difference),
+    ]
+}
+
+fn suppressed_row(alarm: &SuppressedAlarm, dialect: CsvDialect) -> Vec<String> {
+    vec![
+        plain(alarm.priority.word()),
+        text(&alarm.subject),
+        text(&alarm.text),
+        plain(alarm.raised.to_string()),
+        number(Some(alarm.active.as_secs_f64() / 60.0), 1, dialect),
     ]
 }
 
@@ -268,6 +290,7 @@ mod tests {
                     mean: Some(54.3219),
                     max: Some(71.2),
                     last: Some(70.0),
+                    difference: None,
                     in_alarm: Duration::from_secs(90),
                     good: 0.99999,
                 },
@@ -279,10 +302,12 @@ mod tests {
                     mean: None,
                     max: None,
                     last: None,
+                    difference: None,
                     in_alarm: Duration::ZERO,
                     good: 0.0,
                 },
             ],
+            suppressed: Vec::new(),
             alarms: vec![AlarmRecord {
                 at: at("2026-11-21T06:12:45.5+07"),
                 subject: "TIC-1.PV".into(),

@@ -1,11 +1,17 @@
-//! Stored values at a fixed interval as CSV: one row an instant, one column a tag.
+//! Stored values at a fixed interval as CSV: one row an instant, two columns a tag, its value and its quality.
 
 use std::time::Duration;
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::csv::{Table, iso_millis, number, plain, text};
-use crate::plant::def::{CsvDialect, PlantDef};
+use super::{
+    csv::{Table, iso_millis, number, plain, text},
+    hold::Stood,
+};
+use crate::plant::{
+    def::{CsvDialect, PlantDef},
+    sample::Quality,
+};
 
 /// A tag to export.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,11 +22,12 @@ pub struct Column {
     pub unit: String,
     /// Decimals to print.
     pub decimals: u8,
-    /// The good value that stood at the end of each interval; a gap is a gap.
-    pub values: Vec<Option<f64>>,
+    /// What stood at the end of each interval; `None` where nothing was stored.
+    pub values: Vec<Option<Stood>>,
 }
 
-/// The table: time with offset, then the tags with their units in the header. The first row stands one interval after
+/// The table: time with offset, then of each tag the value, with its unit in the header, and the quality. A value that is
+/// not good is left out; its quality says why. The first row stands one interval after
 /// `from`: a value belongs to the instant that it was known at.
 pub fn export_csv(
     def: &PlantDef,
@@ -30,19 +37,36 @@ pub fn export_csv(
     dialect: CsvDialect,
 ) -> Vec<u8> {
     let mut table = Table::default();
-    let head = |column: &Column| match column.unit.is_empty() {
-        true => text(&column.tag),
-        false => text(&format!("{} {}", column.tag, column.unit)),
+    let head = |column: &Column| {
+        let value = match column.unit.is_empty() {
+            true => text(&column.tag),
+            false => text(&format!("{} {}", column.tag, column.unit)),
+        };
+        [value, text(&format!("{} quality", column.tag))]
     };
-    table.row(std::iter::once(plain("time")).chain(columns.iter().map(head)).collect());
+    let cells = |column: &Column, row: usize| {
+        let stood = column.values.get(row).copied().flatten();
+        let good = stood.filter(|stood| stood.quality.is_good()).and_then(|stood| stood.value);
+        [number(good, column.decimals, dialect), plain(quality(stood))]
+    };
+    table.row(std::iter::once(plain("time")).chain(columns.iter().flat_map(head)).collect());
     let rows = columns.iter().map(|column| column.values.len()).max().unwrap_or(0);
     for row in 0..rows {
         let Some(at) = instant(from, every, row + 1) else { break };
-        let cells =
-            columns.iter().map(|column| number(column.values.get(row).copied().flatten(), column.decimals, dialect));
+        let cells = columns.iter().flat_map(|column| cells(column, row));
         table.row(std::iter::once(plain(iso_millis(&def.time_zone, at))).chain(cells).collect());
     }
     table.write(dialect)
+}
+
+/// `good`, `bad: no answer in time`; `none` where nothing was stored.
+fn quality(stood: Option<Stood>) -> String {
+    match stood.map(|stood| stood.quality) {
+        Some(Quality::Good) => "good".into(),
+        Some(Quality::Uncertain(cause)) => format!("uncertain: {}", cause.words()),
+        Some(Quality::Bad(cause)) => format!("bad: {}", cause.words()),
+        None => "none".into(),
+    }
 }
 
 /// Each instant is computed from the start, so that no rounding adds up.
@@ -54,23 +78,30 @@ fn instant(from: Timestamp, every: Duration, count: usize) -> Option<Timestamp> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::testing::{THREE, at, plant};
+    use crate::{
+        plant::sample::{Cause, Sample},
+        report::testing::{THREE, at, plant, sec},
+    };
 
     #[test]
-    fn a_gap_is_an_empty_cell_and_times_carry_their_offset() {
+    fn every_cell_has_its_quality_and_only_good_values_are_written() {
         let def = plant("Asia/Bangkok", &THREE);
-        let column = |tag: &str, unit: &str, values: &[Option<f64>]| Column {
+        let good = |value| Some(Stood::from(Sample::good(value, sec(0))));
+        let column = |tag: &str, unit: &str, values: &[Option<Stood>]| Column {
             tag: tag.into(),
             unit: unit.into(),
             decimals: 1,
             values: values.to_vec(),
         };
-        let columns = [column("TIC-1.PV", "°C", &[Some(20.04), None]), column("=RUN", "", &[None, Some(1.0)])];
+        let doubted = Some(Stood::from(Sample::good(20.0, sec(0)).doubted(Cause::Stale)));
+        let bad = Some(Stood::from(Sample::bad(Cause::Timeout, sec(0))));
+        let columns = [column("TIC-1.PV", "°C", &[good(20.04), bad]), column("=RUN", "", &[doubted, None])];
         let from = at("2026-11-21T06:00+07");
         let german = CsvDialect { separator: ';', decimal: ',', bom: false };
         let bytes = export_csv(&def, from, Duration::from_millis(1_500), &columns, german);
-        let expect = "time;TIC-1.PV °C;'=RUN\r\n\
-            2026-11-21T06:00:01.500+07:00;20,0;\r\n2026-11-21T06:00:03.000+07:00;;1,0\r\n";
+        let expect = "time;TIC-1.PV °C;TIC-1.PV quality;'=RUN;'=RUN quality\r\n\
+            2026-11-21T06:00:01.500+07:00;20,0;good;;uncertain: too old\r\n\
+            2026-11-21T06:00:03.000+07:00;;bad: no answer in time;;none\r\n";
         assert_eq!(String::from_utf8(bytes).as_deref(), Ok(expect));
     }
 }

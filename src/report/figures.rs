@@ -1,15 +1,15 @@
 //! The figures of a period: from stored samples and alarm steps to the rows of a report.
 
 use std::{
-    collections::{HashMap, HashSet},
+    collections::{BTreeMap, HashMap, HashSet},
     time::Duration,
 };
 
 use jiff::{Timestamp, ToSpan, tz::TimeZone};
 
 use super::{
-    DECIMALS_UNKNOWN, RecordRow, TagFigures,
-    hold::{Holding, Tally, good_value},
+    DECIMALS_UNKNOWN, RecordRow, SuppressedAlarm, TagFigures,
+    hold::{Held, Holding, Tally, good_value},
 };
 use crate::plant::{
     def::TagId,
@@ -27,7 +27,12 @@ pub struct Label {
     pub unit: String,
     /// Decimals to print.
     pub decimals: u8,
+    /// Whether it is a counter.
+    pub counts: bool,
 }
+
+/// Units in which only counters of energy and charge count.
+const COUNTED: [&str; 12] = ["Wh", "kWh", "MWh", "GWh", "varh", "kvarh", "Mvarh", "VAh", "kVAh", "MVAh", "Ah", "kAh"];
 
 impl Label {
     /// Name, unit and decimals of a tag, where the device may have chosen the last two: `latest` has the latest good values
@@ -44,7 +49,9 @@ impl Label {
             let value = latest.get(chooser)?;
             units.iter().find(|(number, _)| *value == *number as f64).map(|(_, unit)| unit.clone())
         });
-        Label { tag: def.name.clone(), unit: chosen.unwrap_or_else(|| def.unit.clone()), decimals }
+        let unit = chosen.unwrap_or_else(|| def.unit.clone());
+        let counts = def.counter.unwrap_or_else(|| COUNTED.contains(&unit.as_str()));
+        Label { tag: def.name.clone(), unit, decimals, counts }
     }
 }
 
@@ -63,34 +70,49 @@ pub struct Figures {
     seconds: f64,
     holding: Holding,
     tally: Option<Tally>,
+    counted: f64,
 }
 
 impl Figures {
     /// Over `from..until`; nothing has come yet.
     pub fn new(from: Timestamp, until: Timestamp) -> Figures {
         let seconds = until.duration_since(from).as_secs_f64();
-        Figures { seconds, holding: Holding::new(from, until), tally: None }
+        Figures { seconds, holding: Holding::new(from, until), tally: None, counted: 0.0 }
     }
 
     /// The next sample.
     pub fn next(&mut self, sample: Sample) {
         if let Some(span) = self.holding.next(sample) {
-            Tally::add(&mut self.tally, span);
+            self.add(span);
         }
     }
 
+    fn add(&mut self, span: Held) {
+        let last = self.tally.map_or(span.value, |tally| tally.last);
+        // A counter that shows less than half of what it did was reset or has run over: it counts from zero. One that
+        // goes back by less is a balance, as of energy taken and fed back.
+        let anew = span.value < last / 2.0;
+        self.counted += if anew { span.value } else { span.value - last };
+        Tally::add(&mut self.tally, span);
+    }
+
     /// The figures, when the last sample has come.
-    pub fn end(self, label: Label, in_alarm: Duration) -> TagFigures {
-        let Figures { seconds, holding, mut tally } = self;
-        if let Some(span) = holding.end() {
-            Tally::add(&mut tally, span);
+    pub fn end(mut self, label: Label, in_alarm: Duration) -> TagFigures {
+        if let Some(span) = self.holding.clone().end() {
+            self.add(span);
         }
+        let Figures { seconds, tally, counted, holding: _ } = self;
+        let (mean, difference) = match label.counts {
+            true => (None, tally.map(|_| counted)),
+            false => (tally.map(|tally| tally.mean), None),
+        };
         TagFigures {
             tag: label.tag,
             unit: label.unit,
             decimals: label.decimals,
             min: tally.map(|tally| tally.min),
-            mean: tally.map(|tally| tally.mean),
+            mean,
+            difference,
             max: tally.map(|tally| tally.max),
             last: tally.map(|tally| tally.last),
             in_alarm,
@@ -145,6 +167,64 @@ pub fn record(instants: &[Timestamp], sv: &[Option<Sample>], pv: &[Option<Sample
     instants.iter().zip(sv).zip(pv).map(row).collect()
 }
 
+/// The alarms that were active over `from..until` while they were not annunciated. `active` are the raising steps of those
+/// active at `from`, `standing` of those that were annunciated then; `steps` are those of the period, in order.
+pub fn suppressed(
+    active: &[AlarmRecord],
+    standing: &[AlarmRecord],
+    steps: &[AlarmRecord],
+    from: Timestamp,
+    until: Timestamp,
+) -> Vec<SuppressedAlarm> {
+    let mut alarms: BTreeMap<(&str, &str), Quiet> = BTreeMap::new();
+    let annunciated: HashSet<(&str, &str)> = standing.iter().map(|step| (&*step.subject, &*step.text)).collect();
+    for step in active {
+        let name = (&*step.subject, &*step.text);
+        alarms.entry(name).or_insert_with(|| Quiet::new(step)).set(true, !annunciated.contains(&name), from);
+    }
+    for step in steps {
+        let alarm = alarms.entry((&step.subject, &step.text)).or_insert_with(|| Quiet::new(step));
+        let (active, quiet) = match step.step {
+            AlarmStep::Raised => (true, false),
+            AlarmStep::RaisedQuietly => (true, true),
+            AlarmStep::Returned | AlarmStep::ReturnedQuietly => (false, alarm.quiet),
+            AlarmStep::Shelved | AlarmStep::Suppressed | AlarmStep::OutOfService => (alarm.active, true),
+            AlarmStep::Unshelved | AlarmStep::Released | AlarmStep::InService => (alarm.active, false),
+            AlarmStep::Acknowledged | AlarmStep::RaisedAgain | AlarmStep::Reset => continue,
+        };
+        alarm.found.raised += u64::from(step.step == AlarmStep::RaisedQuietly);
+        alarm.set(active, quiet, step.at);
+    }
+    let ended = alarms.into_values().map(|mut alarm| {
+        alarm.set(false, false, until);
+        alarm.found
+    });
+    ended.filter(|found| found.raised > 0 || !found.active.is_zero()).collect()
+}
+
+/// An alarm on its way through a period.
+struct Quiet {
+    active: bool,
+    quiet: bool,
+    since: Timestamp,
+    found: SuppressedAlarm,
+}
+
+impl Quiet {
+    fn new(step: &AlarmRecord) -> Quiet {
+        let (subject, text) = (step.subject.clone(), step.text.clone());
+        let found = SuppressedAlarm { subject, text, priority: step.priority, raised: 0, active: Duration::ZERO };
+        Quiet { active: false, quiet: false, since: step.at, found }
+    }
+
+    fn set(&mut self, active: bool, quiet: bool, at: Timestamp) {
+        if self.active && self.quiet {
+            self.found.active += Duration::try_from(at.duration_since(self.since)).unwrap_or_default();
+        }
+        (self.active, self.quiet, self.since) = (active, quiet, at);
+    }
+}
+
 /// The instants of the record over `from..until`: those whose local time of day is a multiple of `interval`.
 pub fn record_grid(interval: Duration, zone: &TimeZone, from: Timestamp, until: Timestamp) -> Vec<Timestamp> {
     let after = |at: &Timestamp| on_grid(zone, interval, at.checked_add(1.microsecond()).ok()?);
@@ -194,7 +274,7 @@ mod tests {
     }
 
     fn label() -> Label {
-        Label { tag: "TIC-1.PV".into(), unit: "°C".into(), decimals: 1 }
+        Label { tag: "TIC-1.PV".into(), unit: "°C".into(), decimals: 1, counts: false }
     }
 
     /// Figures over 0..100 s of samples (second, value or none) as (min, mean, max, last, good).
@@ -221,6 +301,62 @@ mod tests {
 
     fn step(at: i64, text: &str, step: AlarmStep) -> AlarmRecord {
         AlarmRecord::new(sec(at), "TIC-1.PV", text, Priority::High, step)
+    }
+
+    #[test]
+    fn a_counter_has_a_difference_and_no_mean() {
+        for (readings, expect) in [
+            (vec![], None),
+            (vec![(-10, 100.0)], Some(0.0)),
+            (vec![(-10, 100.0), (20, 101.5), (60, 104.0), (110, 200.0)], Some(4.0)),
+            // Reset between 7 and 2: 5 before it, 2 and 1 after it.
+            (vec![(0, 2.0), (20, 7.0), (40, 2.0), (60, 3.0)], Some(8.0)),
+            // A balance goes back a little.
+            (vec![(0, 50.0), (20, 49.5)], Some(-0.5)),
+        ] {
+            let mut figures = Figures::new(sec(0), sec(100));
+            readings.iter().for_each(|(at, value)| figures.next(Sample::good(*value, sec(*at))));
+            let got = figures.end(Label { unit: "kWh".into(), counts: true, ..label() }, Duration::ZERO);
+            assert_eq!((got.difference, got.mean), (expect, None), "{readings:?}");
+        }
+        let mut def = crate::report::testing::tag(0, "E");
+        let counts = |def: &TagDef| Label::at(def, &HashMap::new()).counts;
+        assert!(!counts(&def));
+        def.unit = "kWh".into();
+        assert!(counts(&def));
+        def.counter = Some(false);
+        assert!(!counts(&def));
+    }
+
+    #[test]
+    fn an_alarm_that_was_active_while_suppressed_is_listed_with_its_time() {
+        use AlarmStep::{
+            Acknowledged, Raised, RaisedQuietly, Released, Returned, ReturnedQuietly, Shelved, Suppressed,
+        };
+        for (active, standing, steps, expect) in [
+            (None, None, vec![(10, Raised), (30, Returned)], None),
+            (
+                None,
+                None,
+                vec![(10, Suppressed), (20, RaisedQuietly), (50, ReturnedQuietly), (60, Released)],
+                Some((1, 30)),
+            ),
+            // Shelved while it was active, and active again after that.
+            (None, None, vec![(10, Raised), (20, Shelved), (25, Acknowledged), (70, Returned)], Some((0, 50))),
+            (None, None, vec![(10, RaisedQuietly), (20, Released), (20, Raised)], Some((1, 10))),
+            // Active before the period: annunciated, or not.
+            (Some(Raised), Some(Raised), vec![(40, Returned)], None),
+            (Some(Raised), None, vec![(40, Returned)], Some((0, 40))),
+            (Some(RaisedQuietly), None, vec![], Some((0, 100))),
+        ] {
+            let all = |steps: &[(i64, AlarmStep)]| {
+                steps.iter().map(|(at, kind)| step(*at, "high", *kind)).collect::<Vec<_>>()
+            };
+            let before = |kind: Option<AlarmStep>| all(&kind.map(|kind| (-50, kind)).into_iter().collect::<Vec<_>>());
+            let got = suppressed(&before(active), &before(standing), &all(&steps), sec(0), sec(100));
+            let got: Vec<_> = got.iter().map(|alarm| (alarm.raised, alarm.active.as_secs())).collect();
+            assert_eq!(got, expect.into_iter().collect::<Vec<_>>(), "{steps:?}");
+        }
     }
 
     #[test]

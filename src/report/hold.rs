@@ -9,8 +9,9 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
-use crate::plant::sample::Sample;
+use crate::plant::sample::{Quality, Sample};
 
 /// The plant stores every change of value or quality at once, and an unchanged value at least every 60 s. A value
 /// without a successor for longer than this was therefore not stored any more: from here on it is not known.
@@ -99,6 +100,21 @@ impl AsOf {
         while let Some(at) = self.instants.get(self.stood.len()).filter(|at| **at < next) {
             self.stood.push(self.current.filter(|sample| *at < expiry(*sample)));
         }
+    }
+}
+
+/// A stored value and its quality.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Stood {
+    /// In the tag's unit; `None` exactly when the quality is bad.
+    pub value: Option<f64>,
+    /// How far to trust it.
+    pub quality: Quality,
+}
+
+impl From<Sample> for Stood {
+    fn from(sample: Sample) -> Stood {
+        Stood { value: sample.value, quality: sample.quality }
     }
 }
 

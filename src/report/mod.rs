@@ -11,13 +11,14 @@ pub mod text;
 #[cfg(test)]
 pub(crate) mod testing;
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use crate::plant::{
     alarm::Figures,
+    def::Priority,
     record::{ActionRecord, AlarmRecord},
 };
 
@@ -57,6 +58,8 @@ pub struct ShiftReport {
     pub unreadable: Vec<Gap>,
     /// One row a tag.
     pub tags: Vec<TagFigures>,
+    /// Alarms that were active while they were suppressed, shelved or out of service.
+    pub suppressed: Vec<SuppressedAlarm>,
     /// Steps of alarms in the period, oldest first.
     pub alarms: Vec<AlarmRecord>,
     /// How good the alarm system was in the period.
@@ -86,10 +89,27 @@ pub struct TagFigures {
     pub max: Option<f64>,
     /// Last good value.
     pub last: Option<f64>,
+    /// Of a counter (energy, volume, pieces): by how much it has counted up. It has no mean.
+    pub difference: Option<f64>,
     /// Time in which an alarm of this tag was active.
     pub in_alarm: Duration,
     /// Share of the period with a good value, 0–1.
     pub good: f64,
+}
+
+/// An alarm that was active without being annunciated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SuppressedAlarm {
+    /// Full name of the tag or device.
+    pub subject: Arc<str>,
+    /// `temperature high`.
+    pub text: Arc<str>,
+    /// Its priority.
+    pub priority: Priority,
+    /// Activations in the period that were not annunciated.
+    pub raised: u64,
+    /// Time in the period in which it was active and not annunciated.
+    pub active: Duration,
 }
 
 /// One row of the thesis's record: `er = sv − pv`.

@@ -16,11 +16,14 @@ pub fn shift_text(report: &ShiftReport, def: &PlantDef) -> String {
     if report.until < report.period.to {
         lines.push(format!("still running: figures until {}", iso(zone, report.until)));
     }
+    for gap in &report.unreadable {
+        lines.push(format!("not readable, not counted: {} to {}", iso(zone, gap.from), iso(zone, gap.to)));
+    }
     let width = report.tags.iter().map(|tag| tag.tag.chars().count()).max().unwrap_or(0).max(3);
     lines.push(String::new());
     lines.push(format!(
         "{:width$} {:>10} {:>10} {:>10} {:>10} {:>8} {:>7}  unit",
-        "tag", "min", "mean", "max", "last", "alarm/m", "good %"
+        "tag", "min", "mean/+", "max", "last", "alarm/m", "good %"
     ));
     lines.extend(report.tags.iter().map(|tag| tag_line(tag, width)));
     lines.push(String::new());
@@ -28,6 +31,11 @@ pub fn shift_text(report: &ShiftReport, def: &PlantDef) -> String {
         .map(|priority| format!("{} {}", raised(&report.alarms, priority), priority.word()))
         .to_vec();
     lines.push(format!("alarms raised: {}", counts.join(", ")));
+    for alarm in &report.suppressed {
+        let (subject, minutes) = (&alarm.subject, alarm.active.as_secs_f64() / 60.0);
+        let raised = alarm.raised;
+        lines.push(format!("suppressed: {subject} {}, active {minutes:.1} min, raised {raised} times", alarm.text));
+    }
     lines.push(format!("operator actions: {}", report.actions.len()));
     lines.join("\n") + "\n"
 }
@@ -41,13 +49,24 @@ fn tag_line(tag: &TagFigures, width: usize) -> String {
         "{:width$} {:>10} {:>10} {:>10} {:>10} {:>8.1} {:>7.1}  {}",
         tag.tag,
         value(tag.min, tag.decimals),
-        value(tag.mean, tag.decimals.saturating_add(1)),
+        mean_or_difference(tag),
         value(tag.max, tag.decimals),
         value(tag.last, tag.decimals),
         tag.in_alarm.as_secs_f64() / 60.0,
         floor_percent(tag.good),
         tag.unit,
     )
+}
+
+/// `54.32`; of a counter `+12.5`, its difference; of neither a dash.
+pub fn mean_or_difference(tag: &TagFigures) -> String {
+    let decimals = usize::from(tag.decimals);
+    match (tag.mean, tag.difference) {
+        // A mean carries one digit more than the values that it is of.
+        (Some(mean), _) => format!("{mean:.*}", decimals + 1),
+        (None, Some(difference)) => format!("{difference:+.decimals$}"),
+        (None, None) => "—".into(),
+    }
 }
 
 #[cfg(test)]
@@ -78,9 +97,11 @@ mod tests {
                 mean: Some(54.321),
                 max: Some(71.2),
                 last: None,
+                difference: None,
                 in_alarm: Duration::from_secs(90),
                 good: 0.5,
             }],
+            suppressed: Vec::new(),
             alarms: Vec::new(),
             quality: crate::plant::alarm::Figures::default(),
             actions: Vec::new(),
@@ -93,7 +114,7 @@ Water tank, morning 2026-11-21
 2026-11-21T06:00:00+07:00 to 2026-11-21T14:00:00+07:00
 still running: figures until 2026-11-21T09:00:00+07:00
 
-tag             min       mean        max       last  alarm/m  good %  unit
+tag             min     mean/+        max       last  alarm/m  good %  unit
 TIC-1.PV       27.0      54.32       71.2          —      1.5    50.0  °C
 
 alarms raised: 0 critical, 0 high, 0 medium, 0 low

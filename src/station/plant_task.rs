@@ -15,6 +15,7 @@ use super::{
 };
 use crate::{
     bus::io::clock::Clock,
+    history::io::thread::offer,
     plant::{
         Effects, Plant, SetWork, Snapshot,
         command::{BusRequest, Order, OrderId},
@@ -377,9 +378,10 @@ impl PlantTask {
     }
 
     fn store(&mut self, records: Vec<Record>) {
-        let Some(store) = self.keeping.records.as_ref().filter(|_| !records.is_empty()) else { return };
-        if let Err(refused) = store.try_send(records) {
-            self.lost += refused.into_inner().len() as u64;
+        let Some(store) = &self.keeping.records else { return };
+        let lost = offer(store, records);
+        if lost > 0 {
+            self.lost += lost;
             self.hear_store();
         }
     }
@@ -387,6 +389,8 @@ impl PlantTask {
     fn hear_store(&mut self) {
         let mut status = self.keeping.store.borrow_and_update().clone();
         status.lost += self.lost;
+        let lost = (self.lost > 0).then(|| format!("{} records found the queue to the history full", self.lost));
+        status.trouble = [status.trouble, lost].into_iter().flatten().reduce(|one, other| format!("{one}; {other}"));
         if let Some(book) = &mut self.keeping.book {
             let (lost, trouble) = book.trouble();
             status.lost += lost;

@@ -1,9 +1,13 @@
-//! What the history costs: one commit, rows a second, bytes a sample, and reading a curve of a week.
+//! What the history costs: one commit, rows a second, bytes a sample, and reading a curve of a week; with `-- load`, what
+//! questions cost the recording.
 #![allow(clippy::print_stdout, missing_docs)]
+
+#[path = "history/load.rs"]
+mod load;
 
 use std::{hint::black_box, path::Path, sync::Arc, time::Duration, time::Instant};
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group};
 use jiff::{Timestamp, tz::TimeZone};
 use sightglass::{
     history::{Question, io::store::Store},
@@ -107,4 +111,13 @@ criterion_group! {
     config = Criterion::default().sample_size(10).measurement_time(Duration::from_secs(3)).warm_up_time(Duration::from_millis(300));
     targets = history
 }
-criterion_main!(benches);
+fn main() {
+    let words: Vec<String> = std::env::args().collect();
+    match words.iter().position(|word| word == "load") {
+        Some(place) => load::main(&words[place + 1..]),
+        None => {
+            benches();
+            Criterion::default().configure_from_args().final_summary();
+        }
+    }
+}

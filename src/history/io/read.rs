@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     history::{
-        Answer, HistoryError, Question, Series, Stood,
+        Answer, HistoryError, Question, Series,
         series::{self, Curve},
     },
     plant::{
@@ -20,7 +20,7 @@ use crate::{
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord, AlarmStep, Burst, Seal},
     },
-    report::hold::AsOf,
+    report::hold::{AsOf, Stood},
 };
 
 /// Rows of a list or of a record in one answer; an answer that would be longer is refused, never cut.

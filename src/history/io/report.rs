@@ -59,6 +59,7 @@ impl Store {
         self.bounded(tags.len(), from, until, now, SAMPLES_MAX)?;
         let active = self.active_at(from)?;
         let alarms = self.steps(from, until)?;
+        let suppressed = figures::suppressed(&active, &self.standing_at(from)?, &alarms, from, until);
         let actions = self.whole_list(&sql::actions_oldest(), params![utc(from), utc(until), ROWS_MAX + 1], action)?;
         let gather = |tag: &TagId| Gathered {
             figures: reported.contains(tag).then(|| Figures::new(from, until)),
@@ -93,7 +94,8 @@ impl Store {
         };
         let tags = reported.iter().filter_map(row).collect();
         let quality = self.alarm_quality(from, until, now)?;
-        Ok(ShiftReport { period: period.clone(), until, unreadable, tags, alarms, quality, actions, record, record_of })
+        let period = period.clone();
+        Ok(ShiftReport { period, until, unreadable, tags, suppressed, alarms, quality, actions, record, record_of })
     }
 
     /// The controller of the record and the instants of its rows.

@@ -24,8 +24,10 @@ use crate::{
     },
 };
 
-/// Batches of records on their way to the thread; a full queue is the sender's to count.
+/// Batches of records on their way to the thread; see [`offer`].
 pub const RECORDS_MAX: usize = 1024;
+/// Places of that queue that samples may not take.
+const KEPT_FOR_EVENTS: usize = 128;
 /// Questions that wait for their turn; a full queue refuses more.
 pub const QUERIES_MAX: usize = 64;
 /// Requests of questions on their way to the writer: each that is being answered has one at most.
@@ -60,6 +62,17 @@ impl Handle {
         // A panic of the thread has already been reported by the panic hook.
         let _ = join.join();
     }
+}
+
+/// Puts records into the queue, as far as it has room; alarms and operator actions never wait behind samples, which have no
+/// more room when the queue is nearly full. Returns how many records are lost.
+pub fn offer(queue: &mpsc::Sender<Vec<Record>>, mut records: Vec<Record>) -> u64 {
+    let all = records.len();
+    if queue.capacity() <= KEPT_FOR_EVENTS {
+        records.retain(|record| !matches!(record, Record::Sample(..)));
+    }
+    let kept = records.len();
+    if kept == 0 || queue.try_send(records).is_ok() { (all - kept) as u64 } else { all as u64 }
 }
 
 /// Opens the store and starts its threads. Errors as [`Store::open`].

@@ -79,6 +79,7 @@ struct Habit {
 #[derive(Debug, Clone, Default)]
 struct Sum {
     by_priority: [u64; 4],
+    suppressed: u64,
     windows_over: u64,
     most: u64,
     /// The latest window with an activation (its number), and how many it has.
@@ -152,8 +153,12 @@ impl Meter {
                 self.habits.entry(named(step)).or_default().acknowledged = true;
                 self.returned(step);
             }
-            AlarmStep::RaisedQuietly
-            | AlarmStep::RaisedAgain
+            AlarmStep::RaisedQuietly => {
+                if let Some(sum) = self.sum(step.at) {
+                    sum.suppressed += 1;
+                }
+            }
+            AlarmStep::RaisedAgain
             | AlarmStep::Reset
             | AlarmStep::Unshelved
             | AlarmStep::Released
@@ -325,6 +330,7 @@ impl Meter {
             chattering: all.chattering.into_iter().collect(),
             fleeting: all.fleeting.into_iter().collect(),
             stale: most_at_once(stale),
+            suppressed: all.suppressed,
         }
     }
 }
@@ -345,6 +351,7 @@ impl Sum {
         for (all, more) in self.by_priority.iter_mut().zip(other.by_priority) {
             *all += more;
         }
+        self.suppressed += other.suppressed;
         self.windows_over += other.windows_over;
         self.most = self.most.max(other.most);
         self.flood_s += other.flood_s;

@@ -59,6 +59,8 @@ pub struct Figures {
     pub fleeting: Vec<Named>,
     /// The most alarms at one time that had been active for over 24 hours.
     pub stale: u64,
+    /// Activations that were not annunciated, because the alarm was suppressed, shelved or out of service.
+    pub suppressed: u64,
 }
 
 /// An alarm by its names, as the journal has them.
@@ -95,6 +97,7 @@ impl Default for Figures {
             chattering: Vec::new(),
             fleeting: Vec::new(),
             stale: 0,
+            suppressed: 0,
         }
     }
 }

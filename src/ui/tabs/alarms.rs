@@ -234,10 +234,10 @@ impl Alarms {
     }
 
     /// The history answered question `number`; an answer to an older one is ignored.
-    pub fn on_answer(&mut self, _cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
-        self.journal.on_answer(number, &answer);
-        self.quality.on_answer(number, &answer);
-        self.handover.on_answer(number, &answer);
+    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+        self.journal.on_answer(cx, number, &answer);
+        self.quality.on_answer(cx, number, &answer);
+        self.handover.on_answer(cx, number, &answer);
         Vec::new()
     }
 

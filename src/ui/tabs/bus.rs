@@ -256,8 +256,8 @@ impl Bus {
     }
 
     /// The history has answered. Without an answer the day before is left as it was.
-    pub fn on_answer(&mut self, number: u32, answer: Result<Answer, HistoryError>) {
-        if let (Some(_), Ok(Answer::LineMinutes(minutes))) = (self.errand.answered(number), answer) {
+    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
+        if let (Some(_), Ok(Answer::LineMinutes(minutes))) = (self.errand.answered(number, cx.now), answer) {
             self.minutes = minutes;
         }
     }

@@ -371,8 +371,8 @@ impl Controllers {
     }
 
     /// The history has answered.
-    pub fn on_answer(&mut self, number: u32, answer: Result<Answer, HistoryError>) {
-        if let (Some(_), Ok(Answer::Series(series))) = (self.errand.answered(number), answer) {
+    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
+        if let (Some(_), Ok(Answer::Series(series))) = (self.errand.answered(number, cx.now), answer) {
             self.trend = series.into_iter().next();
         }
     }

@@ -2,23 +2,35 @@
 
 use jiff::{SignedDuration, Timestamp};
 
+/// Between two questions passes at least so many times as long as the last answer took.
+const REST: i32 = 4;
+/// An answer that was not there after so many times the patience is lost: the station answers each question, and says so
+/// where it cannot.
+const LOST: i32 = 4;
+
 /// One kind of question of a tab.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Errand {
     on_way: Option<(u32, Timestamp)>,
     asked: Option<Timestamp>,
+    took: SignedDuration,
     wanted: bool,
 }
 
 impl Errand {
-    /// Is it time to ask: something changed, or the last question is `every` old? While one is on its way only after
+    /// Is it time to ask: something changed, or the last question is `every` old, and the history has rested from it?
+    /// While one is on its way, its answer is waited for; only where it is no longer what is wanted not longer than
     /// `patience`, so that fast keys never pile up questions before the history.
     pub fn due(&self, now: Timestamp, every: SignedDuration, patience: SignedDuration) -> bool {
         // A clock that was set back must not silence the question for good; a small step back is only the difference
         // between the time of a snapshot and what was guessed before it came.
         let set_back = |at: Timestamp| at.duration_since(now) >= patience;
+        let every = every.max(self.took * REST);
         match self.on_way {
-            Some((_, at)) => now.duration_since(at) >= patience || set_back(at),
+            Some((_, at)) => {
+                let patience = if self.wanted { patience } else { patience * LOST };
+                now.duration_since(at) >= patience || set_back(at)
+            }
             None => self.wanted || self.asked.is_none_or(|at| now.duration_since(at) >= every || set_back(at)),
         }
     }
@@ -30,12 +42,13 @@ impl Errand {
 
     /// Question `number` goes out.
     pub fn asked(&mut self, number: u32, now: Timestamp) {
-        *self = Errand { on_way: Some((number, now)), asked: Some(now), wanted: false };
+        *self = Errand { on_way: Some((number, now)), asked: Some(now), took: self.took, wanted: false };
     }
 
     /// An answer has come: when it was asked for, or `None` if it is the answer to an older question.
-    pub fn answered(&mut self, number: u32) -> Option<Timestamp> {
+    pub fn answered(&mut self, number: u32, now: Timestamp) -> Option<Timestamp> {
         let (_, at) = self.on_way.take_if(|(on_way, _)| *on_way == number)?;
+        self.took = now.duration_since(at).max(SignedDuration::ZERO);
         Some(at)
     }
 
@@ -69,16 +82,29 @@ mod tests {
         errand.asked(1, at(0));
         errand.want();
         assert!(!due(&errand, 5), "while one is on its way");
-        assert!(due(&errand, 10), "after a lost answer");
+        assert!(due(&errand, 10), "when it is not what is wanted any more");
         errand.asked(2, at(10));
-        assert_eq!(errand.answered(1), None, "an older answer");
-        assert_eq!(errand.answered(2), Some(at(10)));
-        assert_eq!(errand.answered(2), None, "twice");
+        assert_eq!(errand.answered(1, at(10)), None, "an older answer");
+        assert_eq!(errand.answered(2, at(10)), Some(at(10)));
+        assert_eq!(errand.answered(2, at(10)), None, "twice");
         assert!(!due(&errand, 11) && due(&errand, 12), "at its rate");
         errand.want();
         assert!(due(&errand, 11), "after a change");
         errand.asked(3, at(20));
         assert!(!due(&errand, 19), "guessed time may run a little ahead");
         assert!(due(&errand, 10), "after the clock was set back");
+    }
+
+    #[test]
+    fn a_late_answer_counts_and_the_history_rests_after_it() {
+        let mut errand = Errand::default();
+        errand.asked(1, at(0));
+        assert!(!due(&errand, 30), "no second question while the first is answered");
+        assert_eq!(errand.answered(1, at(30)), Some(at(0)), "late, but what was asked for");
+        assert!(!due(&errand, 119) && due(&errand, 120), "a quarter of the time at most");
+        errand.asked(2, at(120));
+        assert!(!due(&errand, 159) && due(&errand, 160), "an answer may be lost");
+        errand.answered(2, at(121));
+        assert!(due(&errand, 124), "a fast answer is asked for at its own rate again");
     }
 }

@@ -250,16 +250,16 @@ impl Tabs {
             Tab::Trends => self.trends.on_answer(cx, id.number, answer),
             Tab::Alarms => self.alarms.on_answer(cx, id.number, answer),
             Tab::Users => {
-                self.users.on_answer(id.number, answer);
+                self.users.on_answer(cx, id.number, answer);
                 Vec::new()
             }
             Tab::Login | Tab::Faults => Vec::new(),
             Tab::Controllers => {
-                self.controllers.on_answer(id.number, answer);
+                self.controllers.on_answer(cx, id.number, answer);
                 Vec::new()
             }
             Tab::Bus => {
-                self.bus.on_answer(id.number, answer);
+                self.bus.on_answer(cx, id.number, answer);
                 Vec::new()
             }
             Tab::Reports => self.reports.on_answer(cx, id.number, answer),

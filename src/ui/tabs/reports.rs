@@ -172,7 +172,7 @@ impl Reports {
 
     /// The history answered question `number`; an answer for another period than the one shown is ignored.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
-        if self.errand.answered(number).is_none() {
+        if self.errand.answered(number, cx.now).is_none() {
             return Vec::new();
         }
         match answer {

@@ -171,8 +171,8 @@ impl Trends {
     /// The history answered question `number`; an answer to an older question is ignored.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
         let errands = &mut self.errands;
-        let curves = errands.curves.answered(number);
-        let (hours, raised) = (errands.hours.answered(number), errands.raised.answered(number));
+        let curves = errands.curves.answered(number, cx.now);
+        let (hours, raised) = (errands.hours.answered(number, cx.now), errands.raised.answered(number, cx.now));
         let answer = match answer {
             Ok(answer) => answer,
             Err(error) => {

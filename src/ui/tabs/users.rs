@@ -156,9 +156,9 @@ impl Users {
     }
 
     /// The history answered question `number`.
-    pub fn on_answer(&mut self, number: u32, answer: Result<Answer, HistoryError>) {
+    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
         if let Some(audit) = &mut self.audit {
-            audit.on_answer(number, answer);
+            audit.on_answer(cx, number, answer);
         }
     }
 

@@ -76,6 +76,9 @@ const STALE: &str = "WITH activations AS (
     SELECT coalesce(max(n), 0) FROM (
         SELECT (SELECT count(*) FROM spans o WHERE o.a <= s.a AND s.a < o.z) AS n FROM spans s)";
 
+/// Activations that were not annunciated.
+const SUPPRESSED: &str = "SELECT count(*) FROM alarm_journal WHERE step = 'raised quietly' AND utc >= $1 AND utc < $2";
+
 /// The figures as SQL counts them.
 fn counted(store: &Store, from: Timestamp, until: Timestamp) -> Figures {
     let db = &store.db;
@@ -106,6 +109,7 @@ fn counted(store: &Store, from: Timestamp, until: Timestamp) -> Figures {
         chattering: names(CHATTERING),
         fleeting: names(FLEETING),
         stale: number(STALE),
+        suppressed: number(SUPPRESSED),
     }
 }
 

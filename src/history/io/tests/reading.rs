@@ -63,6 +63,25 @@ fn a_station_that_stops_ends_the_questions_and_closes_the_file() {
     open(&db, 100);
 }
 
+#[test]
+fn alarms_and_actions_have_room_when_samples_have_filled_the_queue() {
+    let (queue, mut waiting) = mpsc::channel(thread::RECORDS_MAX);
+    let mut lost = 0;
+    let mut sent = 0;
+    while lost == 0 {
+        lost = thread::offer(&queue, vec![good(PV, sent, 27.0)]);
+        sent += 1;
+    }
+    assert!(lost == 1 && queue.capacity() > 0);
+    let alarm = Record::Alarm(step(sent, "high", AlarmStep::Raised));
+    assert_eq!(thread::offer(&queue, vec![good(PV, sent, 27.0), alarm.clone()]), 1, "the sample alone is lost");
+    assert_eq!(thread::offer(&queue, vec![Record::Action(deed(sent))]), 0);
+    assert_eq!(thread::offer(&queue, vec![]), 0);
+    drop(queue);
+    let batches: Vec<_> = std::iter::from_fn(|| waiting.blocking_recv()).skip(sent as usize - 1).collect();
+    assert_eq!(batches, [vec![alarm], vec![Record::Action(deed(sent))]]);
+}
+
 /// A reader by itself: where stores are handed over, and where questions go.
 struct Alone {
     stores: mpsc::Sender<Option<Store>>,

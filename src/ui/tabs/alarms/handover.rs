@@ -106,8 +106,8 @@ impl Handover {
     }
 
     /// The history answered.
-    pub fn on_answer(&mut self, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self.errand.answered(number).is_none() {
+    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: &Result<Answer, HistoryError>) {
+        if self.errand.answered(number, cx.now).is_none() {
             return;
         }
         match answer {

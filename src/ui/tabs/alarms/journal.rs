@@ -120,8 +120,8 @@ impl Journal {
     }
 
     /// The history answered.
-    pub fn on_answer(&mut self, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self.steps.answered(number).or_else(|| self.deeds.answered(number)).is_none() {
+    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: &Result<Answer, HistoryError>) {
+        if self.steps.answered(number, cx.now).or_else(|| self.deeds.answered(number, cx.now)).is_none() {
             return;
         }
         self.answered = true;

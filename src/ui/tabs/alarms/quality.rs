@@ -72,8 +72,8 @@ impl Quality {
     }
 
     /// The history answered.
-    pub fn on_answer(&mut self, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self.errand.answered(number).is_none() {
+    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: &Result<Answer, HistoryError>) {
+        if self.errand.answered(number, cx.now).is_none() {
             return;
         }
         match answer {
@@ -110,8 +110,8 @@ impl Quality {
             Some(period) => span::words(cx, period),
         };
         let count = self.figures(cx).map(|figures| match figures.annunciated() {
-            1 => ": 1 alarm".to_owned(),
-            many => format!(": {many} alarms"),
+            1 => format!(": 1 alarm{}", alarm_quality::quiet(figures)),
+            many => format!(": {many} alarms{}", alarm_quality::quiet(figures)),
         });
         let wait = if self.trouble.is_none() { ": reading …" } else { "" };
         let x = canvas.text(1, 1, &format!("{what}{}", count.as_deref().unwrap_or(wait)), theme.strong());

@@ -127,6 +127,7 @@ fn figures() -> Figures {
         chattering: vec![named("TIC-1.PV", "temperature high")],
         fleeting: vec![named("PLC-1.LT-1", "level low")],
         stale: 1,
+        suppressed: 0,
     }
 }
 

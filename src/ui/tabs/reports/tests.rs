@@ -100,6 +100,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
         mean: full.then_some(mean),
         max: full.then_some(max),
         last: last.filter(|_| full),
+        difference: None,
         in_alarm: std::time::Duration::from_secs(in_alarm),
         good: if full { good } else { 0.0 },
     };
@@ -146,6 +147,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
             tag("TIC-1.MV", "%", 1, 0.0, 41.3, 100.0, Some(12.0), 0, 1.0),
             tag("PLC-1.FLOW", "l/min", 2, 0.0, 0.412, 1.25, None, 0, 0.742),
         ],
+        suppressed: Vec::new(),
         alarms: if full { alarms } else { Vec::new() },
         quality: crate::plant::alarm::Figures::default(),
         actions: if full { vec![action] } else { Vec::new() },

@@ -16,7 +16,7 @@ use crate::{
         def::Priority,
         record::{ActionRecord, AlarmRecord, AlarmStep},
     },
-    report::{Period, ShiftReport, TagFigures, csv::raised},
+    report::{Period, ShiftReport, SuppressedAlarm, TagFigures, csv::raised, text::mean_or_difference},
     ui::{
         Cx,
         widgets::text::{Canvas, fit, pad, pad_left, width},
@@ -122,7 +122,7 @@ fn widths(width: u16) -> (u16, u16) {
 fn heading(cx: &Cx, width: u16) -> Line<'static> {
     let (tag, figure) = widths(width);
     let mut text = format!("  {}{}", pad("tag", tag), pad("unit", 7));
-    for (name, more) in [("min", 0), ("mean", 0), ("max", 0), ("last", 0), ("in alarm", 1), ("good", 0)] {
+    for (name, more) in [("min", 0), ("mean/+", 0), ("max", 0), ("last", 0), ("in alarm", 1), ("good", 0)] {
         text.push_str(&pad_left(name, figure + more));
     }
     Line::from(Span::styled(text, cx.theme.dim()))
@@ -139,6 +139,11 @@ pub fn lines(cx: &Cx, report: &ShiftReport) -> Vec<Line<'static>> {
     lines.extend(report.tags.iter().map(|tag| figures(cx, tag)));
     lines.push(Line::default());
     lines.push(counts(cx, report));
+    for gap in &report.unreadable {
+        let time = |at: Timestamp| local(at, &cx.def().time_zone, "%m-%d %H:%M");
+        let words = format!("  not readable, not counted: {} to {}", time(gap.from), time(gap.to));
+        lines.push(Line::from(Span::styled(words, theme.trouble())));
+    }
     if let Some((of, _)) = &report.record_of {
         let words = format!("  record of {of}: {} rows in the CSV", report.record.len());
         lines.push(Line::from(Span::styled(words, theme.normal())));
@@ -148,10 +153,17 @@ pub fn lines(cx: &Cx, report: &ShiftReport) -> Vec<Line<'static>> {
     let form = if short { "%H:%M:%S" } else { "%m-%d %H:%M:%S" };
     let time = |at: Timestamp| format!("  {}  ", local(at, &cx.def().time_zone, form));
     let more = |n: usize| Line::from(Span::styled(format!("  and {n} more in the CSV"), theme.dim()));
-    if !report.alarms.is_empty() {
+    if !report.suppressed.is_empty() {
+        lines.push(section(cx, "suppressed alarms"));
+        lines.extend(report.suppressed.iter().take(LIST_MAX).map(|alarm| suppressed_line(cx, alarm)));
+        lines.extend(report.suppressed.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
+    }
+    let annunciated = |alarm: &&AlarmRecord| !alarm.step.is_quiet();
+    let alarms: Vec<&AlarmRecord> = report.alarms.iter().filter(annunciated).collect();
+    if !alarms.is_empty() {
         lines.push(section(cx, "alarms"));
-        lines.extend(report.alarms.iter().take(LIST_MAX).map(|alarm| alarm_line(cx, alarm, time(alarm.at))));
-        lines.extend(report.alarms.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
+        lines.extend(alarms.iter().take(LIST_MAX).map(|alarm| alarm_line(cx, alarm, time(alarm.at))));
+        lines.extend(alarms.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
     }
     if !report.actions.is_empty() {
         lines.push(section(cx, "operator actions"));
@@ -163,11 +175,11 @@ pub fn lines(cx: &Cx, report: &ShiftReport) -> Vec<Line<'static>> {
 
 fn figures(cx: &Cx, tag: &TagFigures) -> Line<'static> {
     let (theme, (name, figure)) = (cx.theme, widths(cx.area.width));
-    // A mean carries one digit more than the values that it is of.
-    let value = |value: Option<f64>, more: usize| match value {
-        Some(value) => pad_left(&format!("{value:.*}", usize::from(tag.decimals) + more), figure),
+    let value = |value: Option<f64>| match value {
+        Some(value) => pad_left(&format!("{value:.*}", usize::from(tag.decimals)), figure),
         None => pad_left("–", figure),
     };
+    let mean = mean_or_difference(tag).replace('—', "–");
     let alarm = if tag.in_alarm.is_zero() { "–".to_owned() } else { long(tag.in_alarm) };
     let good =
         if tag.good >= 1.0 { "100 %".to_owned() } else { format!("{:.1} %", (tag.good * 1_000.0).floor() / 10.0) };
@@ -175,7 +187,7 @@ fn figures(cx: &Cx, tag: &TagFigures) -> Line<'static> {
         Span::styled(format!("  {}", pad(&tag.tag, name - 1)), theme.normal()),
         Span::styled(format!(" {}", pad(&tag.unit, 7)), theme.dim()),
         Span::styled(
-            [value(tag.min, 0), value(tag.mean, 1), value(tag.max, 0), value(tag.last, 0)].concat(),
+            [value(tag.min), pad_left(&mean, figure), value(tag.max), value(tag.last)].concat(),
             theme.normal(),
         ),
         Span::styled(pad_left(&alarm, figure + 1), if tag.in_alarm.is_zero() { theme.dim() } else { theme.strong() }),
@@ -193,6 +205,10 @@ fn counts(cx: &Cx, report: &ShiftReport) -> Line<'static> {
     if total > 0 {
         text.push_str(&format!(" ({})", parts.join(", ")));
     }
+    let suppressed: u64 = report.suppressed.iter().map(|alarm| alarm.raised).sum();
+    if suppressed > 0 {
+        text.push_str(&format!(", {suppressed} more while suppressed"));
+    }
     let mut subjects: BTreeMap<&str, usize> = BTreeMap::new();
     for alarm in report.alarms.iter().filter(|alarm| alarm.step == AlarmStep::Raised) {
         *subjects.entry(&alarm.subject).or_default() += 1;
@@ -208,6 +224,16 @@ fn section(cx: &Cx, title: &str) -> Line<'static> {
     let rule = cx.theme.pick("─", "-");
     let rest = usize::from(cx.area.width).saturating_sub(title.len() + 5);
     Line::from(Span::styled(format!(" {rule} {title} {}", rule.repeat(rest)), cx.theme.dim()))
+}
+
+/// An alarm that was active without being annunciated, and for how long.
+fn suppressed_line(cx: &Cx, alarm: &SuppressedAlarm) -> Line<'static> {
+    let (theme, room) = (cx.theme, cx.area.width.saturating_sub(46));
+    Line::from(vec![
+        Span::styled(format!("  {}", theme.priority_mark(alarm.priority)), theme.dim()),
+        Span::styled(format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.text, room.clamp(12, 41))), theme.normal()),
+        Span::styled(format!("active {}, raised {}", long(alarm.active), alarm.raised), theme.normal()),
+    ])
 }
 
 /// One step of an alarm. An acknowledgement tells who, the other steps tell the value.

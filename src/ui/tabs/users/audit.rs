@@ -178,9 +178,9 @@ impl Audit {
     }
 
     /// The history answered question `number`.
-    pub fn on_answer(&mut self, number: u32, answer: Result<Answer, HistoryError>) {
+    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
         // An answer to a search that is no longer meant is not shown.
-        if self.errand.answered(number).is_none() || self.errand.is_wanted() {
+        if self.errand.answered(number, cx.now).is_none() || self.errand.is_wanted() {
             return;
         }
         self.answered = true;

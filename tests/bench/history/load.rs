@@ -1,0 +1,203 @@
+//! What questions cost the recording: 1,000 tags that change every second, written by the station's own threads, while a
+//! shift report and a day's trends are asked without pause.
+//!
+//! `cargo bench --bench history -- load [SECONDS] [HOURS]`: for so many seconds (10) over a history of so many hours (2).
+
+use std::{
+    path::Path,
+    process::Command,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use jiff::Timestamp;
+use sightglass::{
+    bus::io::clock::Clock,
+    history::{
+        Answer, Question,
+        io::{Query, store::Store, thread as history},
+    },
+    plant::{
+        PlantDef,
+        def::{Priority, TagId},
+        record::{AlarmRecord, AlarmStep, Record},
+        sample::Sample,
+    },
+    report::Period,
+};
+use tokio::sync::oneshot;
+
+const TAGS: u16 = 1_000;
+/// Batches that the samples of a second come in.
+const BATCHES: u16 = 100;
+/// Time between two steps of an operator.
+const STEP_EVERY: Duration = Duration::from_millis(200);
+/// Where the history begins: some day at midnight.
+const BEGIN: i64 = 1_790_000_000;
+
+/// Tells what it found. `words` are those of the command line behind `load`.
+pub fn main(words: &[String]) {
+    let number = |place: usize, default: i64| words.get(place).and_then(|word| word.parse().ok()).unwrap_or(default);
+    if words.first().is_some_and(|word| word == "fill") {
+        return fill(Path::new(&words[1]), number(2, 2));
+    }
+    let (seconds, hours) = (number(0, 10), number(1, 2));
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("load.duckdb");
+    // In a process of its own, so that its memory is not counted.
+    let own = std::env::current_exe().expect("this program");
+    let filled = Command::new(own).args(["load", "fill"]).arg(&path).arg(hours.to_string()).status();
+    assert!(filled.expect("a process").success(), "the history was not filled");
+    run(&path, seconds, hours);
+}
+
+fn def() -> Arc<PlantDef> {
+    Arc::new(PlantDef { tags: (0..TAGS).map(super::tag).collect(), ..(*super::tank()).clone() })
+}
+
+/// Stores so many hours as a station would have done, second by second; no bit packing, as there.
+fn fill(path: &Path, hours: i64) {
+    let start = Timestamp::from_second(BEGIN).expect("in range");
+    drop(Store::open(path, &def(), start).expect("a new file"));
+    let db = duckdb::Connection::open(path).expect("the file");
+    db.execute_batch("SET disabled_compression_methods = 'bitpacking'; SET threads = 1").expect("settings");
+    let began = Instant::now();
+    for hour in 0..hours {
+        let (from, to) = (hour * 3_600 * i64::from(TAGS), (hour + 1) * 3_600 * i64::from(TAGS));
+        db.execute_batch(&format!(
+            "INSERT INTO sample SELECT make_timestamp({BEGIN} * 1000000 + s * 1000000 + k * 997), k::USMALLINT,
+                round(60 + 10 * sin(s / (300.0 + 4 * k)) + (hash(i) % 5)::DOUBLE / 10 - 0.2, 1), 0
+             FROM (SELECT i, i // {TAGS} AS s, i % {TAGS} AS k FROM range({from}, {to}) t(i)); CHECKPOINT"
+        ))
+        .expect("an hour");
+    }
+    let bytes = std::fs::metadata(path).map_or(0, |meta| meta.len());
+    println!("{hours} h of {TAGS} tags: {:.0} s to fill, {} MB", began.elapsed().as_secs_f64(), bytes / 1_000_000);
+}
+
+/// What is counted while it runs.
+#[derive(Default)]
+struct Counts {
+    stop: AtomicBool,
+    refused: AtomicU64,
+    rss_max_kb: AtomicU64,
+}
+
+fn run(path: &Path, seconds: i64, hours: i64) {
+    let now = Timestamp::from_second(BEGIN + hours * 3_600).expect("in range");
+    let clock = Clock::starting_at(now, 1.0);
+    let began = Instant::now();
+    let handle = history::start(path, def(), clock).expect("started");
+    println!("opened in {:.0} ms, {} MB resident", began.elapsed().as_secs_f64() * 1e3, rss_kb() / 1_000);
+    let counts = Counts::default();
+    let (mut steps, mut asked) = (Vec::new(), Vec::new());
+    thread::scope(|scope| {
+        scope.spawn(|| record(&handle, clock, &counts));
+        let askers = [report(now), trend(now, hours)].map(|(name, question)| {
+            let (handle, counts) = (&handle, &counts);
+            scope.spawn(move || (name, ask(handle, &question, counts)))
+        });
+        let stepper = scope.spawn(|| step(&handle, clock, &counts));
+        for _ in 0..seconds {
+            thread::sleep(Duration::from_secs(1));
+            counts.rss_max_kb.fetch_max(rss_kb(), Ordering::Relaxed);
+        }
+        counts.stop.store(true, Ordering::Relaxed);
+        steps = stepper.join().expect("steps");
+        asked.extend(askers.into_iter().map(|asker| asker.join().expect("answers")));
+    });
+    let status = handle.status.borrow().clone();
+    println!("{} rows in {seconds} s, lost {}, refused {}", status.rows, status.lost, counts.refused.into_inner());
+    println!("trouble: {}", status.trouble.as_deref().unwrap_or("none"));
+    spread("operator's step until it is on disk", steps);
+    for (name, (times, failed)) in asked {
+        spread(name, times);
+        failed.iter().for_each(|why| println!("  failed: {why}"));
+    }
+    println!("{} MB resident at most", counts.rss_max_kb.into_inner() / 1_000);
+    handle.stop();
+}
+
+/// Sends the samples of every second in even batches, as lines do.
+fn record(handle: &history::Handle, clock: Clock, counts: &Counts) {
+    let began = Instant::now();
+    for number in 0_u64.. {
+        if counts.stop.load(Ordering::Relaxed) {
+            break;
+        }
+        thread::sleep((Duration::from_secs(1) / u32::from(BATCHES) * number as u32).saturating_sub(began.elapsed()));
+        let (at, each) = (clock.now(), TAGS / BATCHES);
+        let first = (number % u64::from(BATCHES)) as u16 * each;
+        let value = |id: u16| 60.0 + 10.0 * (number as f64 / 3e4 + f64::from(id)).sin();
+        let sample = |id| Record::Sample(TagId(id), Sample::good((value(id) * 10.0).round() / 10.0, at));
+        if handle.records.try_send((first..first + each).map(sample).collect()).is_err() {
+            counts.refused.fetch_add(u64::from(each), Ordering::Relaxed);
+        }
+    }
+}
+
+/// Acknowledges an alarm again and again; how long each took to be on disk.
+fn step(handle: &history::Handle, clock: Clock, counts: &Counts) -> Vec<Duration> {
+    let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
+    let (mut settled, mut times) = (handle.settled.clone(), Vec::new());
+    while !counts.stop.load(Ordering::Relaxed) {
+        thread::sleep(STEP_EVERY);
+        let step = AlarmRecord::new(clock.now(), "TIC-1.T1", "high", Priority::High, AlarmStep::Acknowledged);
+        let began = Instant::now();
+        handle
+            .records
+            .blocking_send(vec![Record::Alarm(AlarmRecord { by: Some("anna".into()), ..step })])
+            .expect("sent");
+        let number = times.len() as u64 + 1;
+        runtime.block_on(settled.wait_for(|settled| *settled == number)).expect("stored");
+        times.push(began.elapsed());
+    }
+    times
+}
+
+fn report(now: Timestamp) -> (&'static str, Question) {
+    let period = Period { name: "period".into(), from: now - Duration::from_secs(8 * 3_600), to: now };
+    ("report of 8 h, 1,000 tags", Question::Report { period })
+}
+
+fn trend(now: Timestamp, hours: i64) -> (&'static str, Question) {
+    let from = now - Duration::from_secs(hours as u64 * 3_600);
+    let tags = (0..8).map(|pen| TagId(pen * 120)).collect();
+    ("trend of all hours, 8 pens", Question::Series { tags, from, to: now, buckets: 300 })
+}
+
+/// Asks without pause; how long each answer took, and what went wrong.
+fn ask(handle: &history::Handle, question: &Question, counts: &Counts) -> (Vec<Duration>, Vec<String>) {
+    let (mut times, mut failed) = (Vec::new(), Vec::new());
+    while !counts.stop.load(Ordering::Relaxed) {
+        let (reply, answer) = oneshot::channel();
+        let began = Instant::now();
+        handle.queries.blocking_send(Query { question: question.clone(), reply }).expect("asked");
+        match answer.blocking_recv().expect("answered") {
+            Ok(Answer::Series(series)) => assert!(series[0].good > 0.9, "{}", series[0].good),
+            Ok(Answer::Report(report)) => assert_eq!(report.tags.len(), usize::from(TAGS)),
+            Ok(_) => failed.push("another answer".to_owned()),
+            Err(error) => failed.push(error.to_string()),
+        }
+        times.push(began.elapsed());
+    }
+    (times, failed)
+}
+
+fn spread(name: &str, mut times: Vec<Duration>) {
+    times.sort();
+    let at = |share: f64| times.get(((times.len() as f64 * share) as usize).min(times.len() - 1));
+    let ms = |time: Option<&Duration>| time.map_or(f64::NAN, |time| time.as_secs_f64() * 1e3);
+    let (half, most, worst) = (ms(at(0.5)), ms(at(0.99)), ms(times.last()));
+    println!("{name}: {} times, p50 {half:.1} ms, p99 {most:.1} ms, worst {worst:.1} ms", times.len());
+}
+
+fn rss_kb() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find(|line| line.starts_with("VmRSS"));
+    line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok()).unwrap_or(0)
+}
