@@ -2,6 +2,8 @@
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
+use jiff::Timestamp;
+
 use super::{
     admission,
     plan::{self, Block},
@@ -33,6 +35,8 @@ pub struct Plan<'a> {
     pub polls: Vec<PollInfo>,
     /// Tags that their devices have refused.
     pub refused: Vec<TagId>,
+    /// The devices that do not answer, and when each is asked next; empty without a port.
+    pub retries: Vec<(DeviceId, Timestamp)>,
     /// How the schedule copes; normal without a port.
     pub load: Load,
 }
@@ -154,7 +158,7 @@ impl Books {
 
     /// All of it, for a snapshot.
     pub fn report(&self, def: &PlantDef, settings: &LineDef, plan: Plan, counters: LineCounters) -> Arc<LineReport> {
-        let Plan { blocks, polls, refused, load } = plan;
+        let Plan { blocks, polls, refused, retries, load } = plan;
         let poll = |(index, (block, tally)): (usize, (&Block, &Tally))| PollReport {
             class: block.class,
             factor: polls.get(index).map_or(1.0, |poll| poll.factor),
@@ -173,6 +177,7 @@ impl Books {
         Arc::new(LineReport {
             admission: self.admission.clone(),
             refused,
+            retries,
             strain: (load != Load::Normal).then(|| load.to_string()),
             settings: settings.clone(),
             counters,
@@ -204,7 +209,13 @@ mod tests {
         books.polled(Some(0), blocks[0].device, Err(Fault::Timeout), None, 1);
         books.polled(Some(1), blocks[1].device, Ok(()), None, 1);
         books.replan(&blocks, &blocks[1..]);
-        let plan = Plan { blocks: &blocks[1..], polls: Vec::new(), refused: Vec::new(), load: Load::Normal };
+        let plan = Plan {
+            blocks: &blocks[1..],
+            polls: Vec::new(),
+            refused: Vec::new(),
+            retries: Vec::new(),
+            load: Load::Normal,
+        };
         let report = books.report(&def, &def.lines[0], plan, counters);
         assert_eq!(report.polls[0].tally.requests, 1, "a block that stays keeps its tally");
         assert_eq!(report.device(blocks[0].device).map(|tally| tally.timeouts), Some(1));

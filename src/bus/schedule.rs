@@ -122,8 +122,8 @@ impl Schedule {
         let health = &self.devices[poll.place];
         let (from, deadline) = if let Some(probe_at) = health.probe_at {
             // A device that does not answer is asked with its first block only; who has waited longest goes first.
-            let affordable = if health.prompt { probe_at } else { probe_at.max(self.probes.allows_from()) };
-            (health.probe == Some(index)).then_some((affordable.max(health.rests_until), probe_at + ONCE_WITHIN))?
+            let from = self.probe_from(health)?;
+            (health.probe == Some(index)).then_some((from, probe_at + ONCE_WITHIN))?
         } else {
             let from = poll.wanted()?.max(health.rests_until).max(poll.not_before);
             (from, poll.deadline(self.pace_of(poll))?)
@@ -288,6 +288,19 @@ impl Schedule {
     /// Must the device be left alone now (it is settling, or owes answers)?
     pub fn is_resting(&self, device: DeviceId, now: Timestamp) -> bool {
         self.health(device).is_some_and(|health| now < health.rests_until)
+    }
+
+    /// The devices that do not answer, each with the moment when it is asked next.
+    pub fn retries(&self) -> Vec<(DeviceId, Timestamp)> {
+        let retry = |health: &Health| Some((health.device, self.probe_from(health)?));
+        self.devices.iter().filter_map(retry).collect()
+    }
+
+    /// When a device that does not answer is asked next.
+    fn probe_from(&self, health: &Health) -> Option<Timestamp> {
+        let probe_at = health.probe_at?;
+        let affordable = if health.prompt { probe_at } else { probe_at.max(self.probes.allows_from()) };
+        Some(affordable.max(health.rests_until))
     }
 
     /// How the line copes: what is shed, and by what soft polls are stretched.

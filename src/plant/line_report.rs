@@ -26,6 +26,8 @@ pub struct LineReport {
     pub polls: Vec<PollReport>,
     /// Tags that their devices have refused: they are asked for once a minute at most.
     pub refused: Vec<TagId>,
+    /// The devices that do not answer, and when each is asked next.
+    pub retries: Vec<(DeviceId, Timestamp)>,
     /// How the schedule copes with too much to do, in words; `None` while every poll has its period.
     pub strain: Option<String>,
     /// Whether all polls can meet their periods.
@@ -50,6 +52,7 @@ impl LineReport {
             counters: LineCounters::default(),
             polls: Vec::new(),
             refused: Vec::new(),
+            retries: Vec::new(),
             strain: None,
             admission: Admission::of_nothing(settings.id),
             devices: Vec::new(),
@@ -62,6 +65,11 @@ impl LineReport {
     /// The poll that reads a tag.
     pub fn poll_of(&self, tag: TagId) -> Option<&PollReport> {
         self.polls.iter().find(|poll| poll.tags.contains(&tag))
+    }
+
+    /// When a device that does not answer is asked next.
+    pub fn retry_at(&self, id: DeviceId) -> Option<Timestamp> {
+        self.retries.iter().find(|(device, _)| *device == id).map(|(_, at)| *at)
     }
 
     /// What a device has answered.

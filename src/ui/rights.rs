@@ -52,7 +52,7 @@ pub fn of_key(cx: &Cx, tab: Tab, hint: &Hint) -> Option<Role> {
             matches!(hint.key.as_str(), "a" | "A") || deeds.contains(&hint.label.as_str())
         }
         Tab::Controllers => matches!(hint.label.as_str(), "edit" | "tune" | "actions" | "refresh" | "line"),
-        Tab::Bus => hint.label == "start",
+        Tab::Bus => ["start", "retry"].contains(&hint.label.as_str()),
         Tab::Reports => hint.label == "export",
         Tab::Login | Tab::Users | Tab::Trends | Tab::Faults => false,
     };

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{List, Unfit};
@@ -31,6 +32,7 @@ struct ReportDelta {
     counters: Option<LineCounters>,
     polls: List<PollReport>,
     refused: Option<Vec<TagId>>,
+    retries: Option<Vec<(DeviceId, Timestamp)>>,
     strain: Option<Option<String>>,
     admission: Option<Box<Admission>>,
     devices: List<(DeviceId, Tally)>,
@@ -93,12 +95,13 @@ fn bare(line: &LineStatus) -> LineStatus {
 
 impl ReportDelta {
     fn between(old: &LineReport, new: &LineReport) -> ReportDelta {
-        let LineReport { settings, counters, polls, refused, strain, admission, devices, busy, frames } = new;
+        let LineReport { settings, counters, polls, refused, retries, strain, admission, devices, busy, frames } = new;
         ReportDelta {
             settings: (old.settings != *settings).then(|| Box::new(settings.clone())),
             counters: (old.counters != *counters).then_some(*counters),
             polls: List::between(&old.polls, polls),
             refused: (old.refused != *refused).then(|| refused.clone()),
+            retries: (old.retries != *retries).then(|| retries.clone()),
             strain: (old.strain != *strain).then(|| strain.clone()),
             admission: (old.admission != *admission).then(|| Box::new(admission.clone())),
             devices: List::between(&old.devices, devices),
@@ -108,10 +111,12 @@ impl ReportDelta {
     }
 
     fn apply(self, report: &mut LineReport) -> Result<(), Unfit> {
-        let ReportDelta { settings, counters, polls, refused, strain, admission, devices, busy, frames } = self;
+        let ReportDelta { settings, counters, polls, refused, retries, strain, admission, devices, busy, frames } =
+            self;
         set(&mut report.settings, settings.map(|settings| *settings));
         set(&mut report.counters, counters);
         set(&mut report.refused, refused);
+        set(&mut report.retries, retries);
         set(&mut report.strain, strain);
         set(&mut report.admission, admission.map(|admission| *admission));
         polls.apply(&mut report.polls)?;

@@ -186,6 +186,8 @@ impl Task<'_> {
             };
             match request {
                 BusRequest::Write { id, .. } => self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?,
+                // An operator does not wait for the next try to open the port.
+                BusRequest::Refresh { .. } if until.is_some() => return Ok(()),
                 BusRequest::Refresh { .. } | BusRequest::StopTest => {}
                 BusRequest::Connect(true) => return Ok(()),
                 BusRequest::Connect(false) => {
@@ -377,6 +379,7 @@ impl Task<'_> {
             blocks: &self.blocks,
             polls,
             refused: plan::refused(&self.def, self.line, &self.holes),
+            retries: schedule.map(Schedule::retries).unwrap_or_default(),
             load: schedule.map_or(Load::Normal, Schedule::load),
         };
         let report = self.books.report(&self.def, &self.settings, plan, self.memory.counters);

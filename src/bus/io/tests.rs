@@ -170,6 +170,33 @@ async fn one_dead_unit_leaves_the_others_their_rate() {
     assert!(!reads.contains_key(&DeviceId(0)));
 }
 
+/// A unit that was silent for minutes is repaired: with the retry of an operator it is read at once.
+#[tokio::test(start_paused = true)]
+async fn a_repaired_unit_is_read_as_soon_as_an_operator_retries() {
+    let def = plant(Mode::Rtu);
+    let mut line = line(def.clone());
+    let repaired = Arc::new(AtomicUsize::new(0));
+    let is_repaired = repaired.clone();
+    line.plug(Mode::Rtu, move |_, message| match (message[0], is_repaired.load(Ordering::Relaxed)) {
+        (1, 0) => Deed::Silent,
+        _ => Deed::Answer,
+    });
+    let of_other = |event: &Event, after: Timestamp| match event {
+        Event::Read { at, device: DeviceId(1), .. } if after < *at => Some(*at),
+        _ => None,
+    };
+    let minutes = Timestamp::from_second(300).expect("a small number");
+    let now = line.until(&def, |event| of_other(event, minutes)).await;
+    repaired.store(1, Ordering::Relaxed);
+    line.requests.send(BusRequest::Refresh { device: DeviceId(0), order: None }).await.expect("the line runs");
+    let read = |event: &Event| match event {
+        Event::Read { at, device: DeviceId(0), .. } => Some(*at),
+        _ => None,
+    };
+    let waited = line.until(&def, read).await.duration_since(now).as_secs_f64();
+    assert!(waited < 1.5, "{waited} s");
+}
+
 /// A unit that has always answered at once and falls silent does not hold the line for the whole timeout of 300 ms.
 #[tokio::test(start_paused = true)]
 async fn a_fast_unit_that_dies_is_not_waited_for_long() {

@@ -17,7 +17,7 @@ use crate::{
         keys::Hint,
         tabs::mimic,
         widgets::{
-            text::{age, clock, fit, fit_words, pad, width, wrap},
+            text::{age, between, clock, fit, fit_words, pad, width, wrap},
             value,
         },
     },
@@ -233,7 +233,19 @@ pub fn device_words(cx: &Cx, device: crate::plant::def::DeviceId) -> String {
             None => "answering".to_owned(),
         },
         DeviceState::Failing(n) => format!("failing, {n} in a row"),
-        DeviceState::Down { since } => format!("DOWN since {}", clock(since, &cx.def().time_zone)),
+        DeviceState::Down { since } => {
+            format!("DOWN since {}{}", clock(since, &cx.def().time_zone), retry_words(cx, device))
+        }
+    }
+}
+
+/// `, retry in 12 s` for a device that does not answer.
+pub fn retry_words(cx: &Cx, device: crate::plant::def::DeviceId) -> String {
+    let report = cx.snapshot.line(cx.def().device(device).line).report.as_ref();
+    match report.and_then(|report| report.retry_at(device)) {
+        Some(at) if cx.now < at => format!(", retry in {} s", between(cx.now, at).as_secs_f64().ceil()),
+        Some(_) => ", retrying".to_owned(),
+        None => String::new(),
     }
 }
 

@@ -25,11 +25,12 @@ use super::{Tab, errand::Errand};
 use crate::{
     history::{Answer, HistoryError},
     plant::{
-        def::{LineDef, LineId},
+        command::Command,
+        def::{DeviceDef, LineDef, LineId},
         event::LineState,
         line_minute::LineMinute,
         line_report::LineReport,
-        snapshot::{LineStatus, Snapshot},
+        snapshot::{DeviceState, LineStatus, Snapshot},
     },
     ui::{
         Act, Cx,
@@ -109,6 +110,8 @@ pub enum Action {
     Stop,
     /// The communication settings of the line.
     Settings,
+    /// Asks the devices that do not answer at once.
+    Retry,
 }
 
 /// Keys of every page.
@@ -129,6 +132,7 @@ pub const KEYS: &[Key<Action>] = &[
 /// Keys of the first page.
 const LINE_KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::Down), label: "scroll", help: "a row down", action: Action::Move(1) },
+    Key { chord: char('r'), label: "retry", help: "ask devices that do not answer now", action: Action::Retry },
     Key { chord: char('c'), label: "settings", help: "communication settings of the line", action: Action::Settings },
 ];
 const PLAN_KEYS: &[Key<Action>] = &[
@@ -213,6 +217,7 @@ impl Bus {
             Action::Again => return test::again(cx, &at),
             Action::Stop => return test::stop(&at),
             Action::Settings => return vec![Act::Open(Modal::Settings(Box::new(Settings::new(cx, self.line))))],
+            Action::Retry => return retry(cx, Some(self.line)),
         }
         self.on_snapshot(cx)
     }
@@ -395,6 +400,15 @@ impl<'a> Place<'a> {
         use crate::plant::tool::ToolState;
         self.status.test.as_ref().is_some_and(|run| run.state == ToolState::Running)
     }
+}
+
+/// The devices that do not answer are asked at once: those of a line, or of all.
+pub fn retry(cx: &Cx, line: Option<LineId>) -> Vec<Act> {
+    let silent = |device: &&DeviceDef| match cx.snapshot.device(device.id).state {
+        DeviceState::Failing(_) | DeviceState::Down { .. } => line.is_none_or(|line| line == device.line),
+        DeviceState::Unknown | DeviceState::Answering => false,
+    };
+    cx.def().devices.iter().filter(silent).map(|device| Act::Order(Command::Refresh(device.id))).collect()
 }
 
 /// `connected since 13:02:11`, `DOWN 00:12: No such file or directory, next try in 4s`.

@@ -19,6 +19,8 @@ use crate::{
         Act, Cx, Effect,
         drawn::Rows,
         keys::{self, Hint, Key, char, code},
+        rights,
+        tabs::bus,
     },
 };
 
@@ -93,7 +95,7 @@ impl Faults {
                 self.selected =
                     rows.iter().skip(self.selected).position(|row| row.0 != place).map_or(0, |by| self.selected + by);
             }
-            Action::Toggle if in_force => return wish(Order::Clear(place, fault)),
+            Action::Toggle if in_force => return cleared(cx, Order::Clear(place, fault)),
             Action::Toggle => return wish(Order::Set(place, fault)),
             Action::Less | Action::More => {
                 let other = fault.step(action == Action::More);
@@ -103,7 +105,7 @@ impl Faults {
                     return wish(Order::Set(place, other));
                 }
             }
-            Action::AllWell => return wish(Order::AllWell),
+            Action::AllWell => return cleared(cx, Order::AllWell),
             Action::Verdict => self.verdict = !self.verdict && status.scenario.is_some(),
         }
         Vec::new()
@@ -147,6 +149,12 @@ fn open<'a>(cx: &Cx<'a>) -> Option<&'a Status> {
 
 fn rows(status: &Status) -> Vec<(Place, Fault)> {
     status.offers.iter().flat_map(|offer| offer.faults.iter().map(|fault| (offer.place, *fault))).collect()
+}
+
+/// What was silent may answer again: the station asks at once, where whoever sits here may order that.
+fn cleared(cx: &Cx, order: Order) -> Vec<Act> {
+    let allowed = |act: &Act| matches!(act, Act::Order(command) if rights::missing(cx, command).is_none());
+    wish(order).into_iter().chain(bus::retry(cx, None).into_iter().filter(allowed)).collect()
 }
 
 fn wish(order: Order) -> Vec<Act> {

@@ -19,6 +19,7 @@ use crate::{
     },
     ui::{
         Cx,
+        modal::faceplate::retry_words,
         tabs::controllers::signal_mark,
         widgets::{
             spark,
@@ -280,7 +281,9 @@ fn state(cx: &Cx, device: &DeviceDef) -> String {
         DeviceState::Unknown => "not asked".to_owned(),
         DeviceState::Answering => "answering".to_owned(),
         DeviceState::Failing(times) => format!("failing {times}×"),
-        DeviceState::Down { since } => format!("DOWN {}", running(between(since, cx.now))),
+        DeviceState::Down { since } => {
+            format!("DOWN {}{}", running(between(since, cx.now)), retry_words(cx, device.id))
+        }
     }
 }
 

@@ -10,13 +10,13 @@ use crate::{
     history::Series,
     plant::{
         def::{DeviceDef, DeviceId},
-        ne107::Signal,
+        ne107::{Reason, Signal},
         snapshot::DeviceState,
     },
     ui::{
         Cx,
         chrome::{order_words, outcome_words},
-        modal::faceplate::device_words,
+        modal::faceplate::{device_words, retry_words},
         widgets::text::{Canvas, clock, fit_words, width, wrap},
     },
 };
@@ -106,7 +106,8 @@ pub fn status_words(cx: &Cx, device: DeviceId) -> (String, Style) {
     match (status.diagnosis, status.state) {
         (Some(reason), _) => {
             let signal = reason.signal();
-            (format!("{} {}: {reason}", signal_mark(signal), signal.word()), theme.trouble())
+            let retry = if reason == Reason::Down { retry_words(cx, device) } else { String::new() };
+            (format!("{} {}: {reason}{retry}", signal_mark(signal), signal.word()), theme.trouble())
         }
         (None, DeviceState::Answering) => (format!("✓ {}", device_words(cx, device)), theme.normal()),
         (None, DeviceState::Unknown) => (format!("? {}", device_words(cx, device)), theme.dim()),

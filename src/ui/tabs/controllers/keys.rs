@@ -84,7 +84,12 @@ const HOME: Key<Action> = key(code(KeyCode::Home), "", "first row", Action::Move
 const END: Key<Action> = key(code(KeyCode::End), "", "last row", Action::Move(9_999));
 const GUIDE: Key<Action> =
     key(char('h'), "guide", "what P, I, D, fuzzy and tuning do, and what to change", Action::Guide);
-const REFRESH: Key<Action> = key(char('u'), "refresh", "read all parameters of the device now", Action::Refresh);
+const REFRESH: Key<Action> = key(
+    char('u'),
+    "refresh",
+    "read all parameters of the device now; retry it at once if it does not answer",
+    Action::Refresh,
+);
 const WHY: Key<Action> = key(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why);
 const ACTIONS: Key<Action> = key(char('f'), "actions", "actions of the device (save to memory)", Action::Actions);
 const LINE: Key<Action> =

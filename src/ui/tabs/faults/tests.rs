@@ -107,6 +107,25 @@ fn faults_go_on_and_off_by_enter_with_their_numbers() {
 }
 
 #[test]
+fn devices_that_do_not_answer_are_asked_at_once_when_their_faults_are_cleared() {
+    use crate::plant::{command::Command, def::DeviceId, snapshot::DeviceState};
+    let mut fixture = Fixture::normal();
+    fixture.devices[0].state = DeviceState::Down { since: fixture::now() };
+    let mut model = with(&fixture, status(&fixture), Theme::FULL);
+    let retried = |effects: Vec<Effect>| -> Vec<DeviceId> {
+        let order = |effect| match effect {
+            Effect::Order(request) => Some(request.command),
+            _ => None,
+        };
+        let refreshed = |command| if let Command::Refresh(device) = command { Some(device) } else { None };
+        effects.into_iter().filter_map(order).filter_map(refreshed).collect()
+    };
+    assert_eq!(retried(type_keys(&mut model, "m")), [DeviceId(0)]);
+    assert_eq!(retried(type_keys(&mut model, "↓⏎")), [DeviceId(0)], "also when one fault is cleared");
+    assert_eq!(retried(type_keys(&mut model, "↓⏎")), [], "not when one is set");
+}
+
+#[test]
 fn the_number_of_a_fault_in_force_changes_at_once() {
     let fixture = Fixture::normal();
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
