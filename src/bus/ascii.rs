@@ -88,6 +88,11 @@ pub fn left_over(message: &[u8], buffer: &[u8]) -> Fault {
     if buffer.is_empty() { Fault::Timeout } else { spoiled.unwrap_or_else(cut) }
 }
 
+/// The messages of all whole good frames.
+pub fn messages(buffer: &[u8]) -> impl Iterator<Item = Vec<u8>> {
+    frames(buffer).filter_map(|frame| open(&buffer[frame]).ok())
+}
+
 /// Every run from a `:` to its CR LF. A second `:` restarts; what stands between frames is noise.
 fn frames(buffer: &[u8]) -> impl Iterator<Item = Range<usize>> {
     let ends = (0..=buffer.len()).filter(|end| buffer[..*end].ends_with(END));

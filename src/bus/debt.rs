@@ -4,6 +4,9 @@
 //! next request of the same shape: the value of another tag, called good. So while a unit owes, only a request is sent
 //! whose answer cannot be mistaken for an owed one. A serial device answers in order; a valid answer to such a request
 //! therefore proves that nothing older is still to come, and the debt is cleared.
+//!
+//! A unit that was never asked before may owe an answer to an earlier process that was killed, and one that sends what it was
+//! not asked for may do so again: both are *unproven*, and are first asked something that is no usual block of theirs.
 
 use std::time::Duration;
 
@@ -14,6 +17,9 @@ use super::{
 
 /// Most answers that are remembered as owed; a unit that owes more is asked nothing until it has rested.
 const OWED_MAX: usize = 16;
+
+/// Usual shapes that are remembered of a unit; one with more is brought into step by a loopback.
+const USUAL_MAX: usize = 64;
 
 /// A unit rests no longer than this, however late it seems to have been.
 const REST_MAX: Duration = Duration::from_secs(600);
@@ -26,6 +32,10 @@ pub struct Debt {
     loopback: bool,
     /// Functions whose answers have no shape (identification, event log) that are owed.
     functions: Vec<u8>,
+    /// Shapes of the blocks that the unit is asked for.
+    usual: Vec<Shape>,
+    /// It may owe an answer of a usual shape that this line has not asked for.
+    unproven: bool,
 }
 
 impl Debt {
@@ -47,7 +57,8 @@ impl Debt {
 
     /// Could an answer of this shape be an owed one?
     pub fn is_ambiguous(&self, shape: Shape) -> bool {
-        !shape.is_loopback() && (self.owed.contains(&shape) || self.owed.len() == OWED_MAX)
+        let usual = self.unproven && (self.usual.contains(&shape) || self.usual.len() == USUAL_MAX);
+        !shape.is_loopback() && (usual || self.owed.contains(&shape) || self.owed.len() == OWED_MAX)
     }
 
     /// Does the refusal of a loopback (exception 01, by devices that do not have it) prove as much as its echo?
@@ -62,12 +73,12 @@ impl Debt {
 
     /// Nothing older can come any more.
     pub fn clear(&mut self) {
-        *self = Debt::default();
+        *self = Debt { usual: std::mem::take(&mut self.usual), ..Debt::default() };
     }
 
     /// Does the unit owe nothing?
     pub fn is_clear(&self) -> bool {
-        self.owed.is_empty() && self.functions.is_empty() && !self.loopback
+        self.owed.is_empty() && self.functions.is_empty() && !self.loopback && !self.unproven
     }
 
     /// A read that brings the unit back into step: part of a block that is read anyway, with a count whose answer cannot
@@ -110,12 +121,90 @@ struct Unit {
     late_max: Duration,
     /// When it last failed to answer in time.
     failed_at: Option<Duration>,
+    /// When it last sent what it was not asked for, unless it has been brought into step since.
+    unasked_at: Option<Duration>,
+    /// Its last good answer, and whether that came again.
+    answer: Vec<u8>,
+    repeats: bool,
+}
+
+impl Unit {
+    fn in_step(&mut self) {
+        self.debt.clear();
+        (self.failed_at, self.unasked_at) = (None, None);
+    }
 }
 
 impl Debts {
-    /// Nobody owes anything.
-    pub fn new(timeout: Duration) -> Debts {
-        Debts { units: vec![Unit::default(); 256], timeout, loopbacks: 0 }
+    /// Nobody owes anything. The numbers of loopbacks begin behind `seed`, which differs from process to process.
+    pub fn new(timeout: Duration, seed: u16) -> Debts {
+        Debts { units: vec![Unit::default(); 256], timeout, loopbacks: seed }
+    }
+
+    /// These blocks are asked for from now on; a unit that was asked for none before is unproven.
+    pub fn expect(&mut self, blocks: &[Block]) {
+        for (unit, known) in (0..).zip(&mut self.units) {
+            let debt = &mut known.debt;
+            let first = debt.usual.is_empty();
+            debt.usual.clear();
+            for shape in blocks.iter().filter(|block| block.unit == unit).filter_map(|block| shape_of(&block.request()))
+            {
+                if !debt.usual.contains(&shape) && debt.usual.len() < USUAL_MAX {
+                    debt.usual.push(shape);
+                }
+            }
+            debt.unproven |= first && !debt.usual.is_empty();
+        }
+    }
+
+    /// A unit has answered, `proof` if this cannot have been an older answer. One that sends each answer again rests after
+    /// each block until the repetition must have come.
+    pub fn answered(&mut self, request: &[u8], answer: &[u8], proof: bool, now: Duration) {
+        let Some(unit) = request.first().map(|unit| usize::from(*unit)) else { return };
+        let unsettled = self.is_unsettled(unit as u8, now);
+        let unit = &mut self.units[unit];
+        if proof && !unsettled {
+            unit.in_step();
+        }
+        answer.clone_into(&mut unit.answer);
+        let is_usual = shape_of(request).is_some_and(|shape| unit.debt.usual.contains(&shape));
+        if is_usual && std::mem::take(&mut unit.repeats) {
+            unit.debt.unproven = true;
+            unit.unasked_at = Some(now);
+        }
+    }
+
+    /// A good frame of this unit came that nobody had asked for. `true` if that puts what was read of it into doubt.
+    pub fn unasked(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
+        let unit = &mut self.units[usize::from(unit)];
+        if unit.answer == message {
+            unit.repeats = true;
+            let usual = unit.debt.usual.iter().any(|shape| shape.fits(message));
+            if usual {
+                unit.debt.unproven = true;
+                unit.unasked_at = Some(now);
+            }
+            return false;
+        }
+        let was_in_step = unit.debt.is_clear() && !unit.debt.usual.is_empty();
+        if was_in_step || unit.unasked_at.is_some() {
+            unit.debt.unproven = true;
+            unit.unasked_at = Some(now);
+        }
+        was_in_step
+    }
+
+    /// Another master asks on this line: any unit may be answering it.
+    pub fn distrust_all(&mut self) {
+        for unit in self.units.iter_mut().filter(|unit| !unit.debt.usual.is_empty()) {
+            unit.debt.unproven = true;
+        }
+    }
+
+    /// Has this unit sent within one timeout what it was not asked for? Nothing that it sends now proves anything.
+    pub fn is_unsettled(&self, unit: u8, now: Duration) -> bool {
+        let unasked_at = self.units[usize::from(unit)].unasked_at;
+        unasked_at.is_some_and(|at| now.saturating_sub(at) < self.timeout)
     }
 
     /// Other settings: an answer may take this long from now on.
@@ -134,14 +223,14 @@ impl Debts {
         let debt = self.of(*unit);
         match (shape_of(message), message.get(1)) {
             (Some(shape), _) => debt.is_ambiguous(shape),
-            (None, Some(function)) => debt.functions.contains(function),
+            (None, Some(function)) => debt.unproven || debt.functions.contains(function),
             (None, None) => false,
         }
     }
 
     /// Nothing older than its last answer can come from this unit any more.
     pub fn clear(&mut self, unit: u8) {
-        self.units[usize::from(unit)].debt.clear();
+        self.units[usize::from(unit)].in_step();
     }
 
     /// A request was not answered, or only by something spoiled.
@@ -185,7 +274,7 @@ impl Debts {
         if waited < rest {
             return Some(rest - waited);
         }
-        unit.debt.clear();
+        unit.in_step();
         None
     }
 }
@@ -252,7 +341,7 @@ mod tests {
     #[test]
     fn a_unit_that_was_late_must_rest_longer() {
         let s = Duration::from_secs;
-        let mut debts = Debts::new(s(1));
+        let mut debts = Debts::new(s(1), 0);
         let request = [1, 3, 0, 0, 0, 2];
         assert_eq!(debts.forget(1, s(0)), None, "who owes nothing has nothing to forget");
         debts.failed(&request, s(100));

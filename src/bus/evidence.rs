@@ -72,6 +72,9 @@ pub fn advice(fault: Fault) -> &'static str {
         Fault::WrongUnit { .. } | Fault::WrongFunction { .. } | Fault::WrongLength { .. } | Fault::WrongEcho => {
             "an answer to something else: raise the timeout of the line (c), look for a second master or one address used twice"
         }
+        Fault::OutOfStep => {
+            "look for a second master on the line, one address used twice, or a repeater that sends each answer again"
+        }
         Fault::NotANumber => {
             "the registers came well but hold no number of this type: check type, word order and address in the profile"
         }

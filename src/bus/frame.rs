@@ -134,6 +134,49 @@ fn device_identification_length(received: &[u8]) -> Option<usize> {
     (0..count).try_fold(8, |end: usize, _| Some(end + 2 + usize::from(*received.get(end + 1)?)))
 }
 
+/// Length of the request message (unit and PDU) that begins in `received`; `None` while too little has come to tell, or for
+/// a function whose requests nobody sends while a line is polled.
+fn request_length(received: &[u8]) -> Option<usize> {
+    match received.get(1)? {
+        0x01..=0x06 | 0x08 => Some(6),
+        0x0F | 0x10 => Some(7 + usize::from(*received.get(6)?)),
+        _ => None,
+    }
+}
+
+/// A good message that nobody has asked for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Unasked {
+    /// A unit answers, or something looks like it.
+    Answer(Vec<u8>),
+    /// Another master asks.
+    Request(Vec<u8>),
+}
+
+/// The whole good frames among bytes that nobody waits for, on lines without transaction ids.
+pub fn unasked(framing: Framing, bytes: &[u8]) -> Vec<Unasked> {
+    let judge = |message: &[u8]| match (answer_length(message), request_length(message)) {
+        (Some(length), _) if length == message.len() => Some(Unasked::Answer(message.to_vec())),
+        (_, Some(length)) if length == message.len() => Some(Unasked::Request(message.to_vec())),
+        _ => None,
+    };
+    match framing {
+        Framing::Mbap => Vec::new(),
+        Framing::Ascii => ascii::messages(bytes).filter_map(|message| judge(&message)).collect(),
+        Framing::Rtu => {
+            let (mut found, mut rest) = (Vec::new(), bytes);
+            while !rest.is_empty() {
+                let lengths = [answer_length(rest), request_length(rest)];
+                let whole = |length: &usize| rest.get(..length + 2).is_some_and(|frame| without_crc(frame).is_ok());
+                let length = lengths.into_iter().flatten().find(whole);
+                found.extend(length.and_then(|length| judge(&rest[..length])));
+                rest = &rest[length.map_or(1, |length| length + 2)..];
+            }
+            found
+        }
+    }
+}
+
 /// What an answer looks like from outside. RTU answers carry no transaction id: two answers of one shape cannot be told
 /// apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

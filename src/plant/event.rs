@@ -183,6 +183,9 @@ pub enum Fault {
     /// The echo of a write names another address or value.
     #[error("echo of the write differs from the request")]
     WrongEcho,
+    /// Frames came that nobody had asked for: the answer may be one of them.
+    #[error("frames that were not asked for: answers cannot be trusted")]
+    OutOfStep,
     /// The answer is good, but the registers hold no number of the tag's type (a BCD digit above 9, NaN).
     #[error("the registers hold no number of this type")]
     NotANumber,
@@ -209,7 +212,12 @@ impl Fault {
             | Fault::WrongFunction { .. }
             | Fault::WrongLength { .. }
             | Fault::WrongEcho => true,
-            Fault::Timeout | Fault::NotANumber | Fault::Exception(_) | Fault::NotConnected | Fault::Resting => false,
+            Fault::Timeout
+            | Fault::OutOfStep
+            | Fault::NotANumber
+            | Fault::Exception(_)
+            | Fault::NotConnected
+            | Fault::Resting => false,
         }
     }
 }

@@ -340,7 +340,8 @@ impl Plant {
             | Fault::WrongUnit { .. }
             | Fault::WrongFunction { .. }
             | Fault::WrongLength { .. }
-            | Fault::WrongEcho => {
+            | Fault::WrongEcho
+            | Fault::OutOfStep => {
                 status.state = match status.state {
                     DeviceState::Down { since } => DeviceState::Down { since },
                     DeviceState::Failing(n) => DeviceState::Failing(n.saturating_add(1)),

@@ -55,7 +55,9 @@ impl Tally {
             Fault::Truncated { .. } | Fault::WrongLength { .. } | Fault::NotHex(_) | Fault::NotANumber => {
                 self.length += 1;
             }
-            Fault::WrongUnit { .. } | Fault::WrongFunction { .. } | Fault::WrongEcho => self.foreign += 1,
+            Fault::WrongUnit { .. } | Fault::WrongFunction { .. } | Fault::WrongEcho | Fault::OutOfStep => {
+                self.foreign += 1
+            }
             Fault::Exception(code) => match self.exceptions.iter_mut().find(|(known, _)| *known == code) {
                 Some((_, count)) => *count += 1,
                 None => self.exceptions.push((code, 1)),

@@ -18,6 +18,7 @@ use crate::{
         command::BusRequest,
         def::LineId,
         event::{Event, LineState},
+        station::{FaultState, StationFault},
     },
 };
 
@@ -48,9 +49,14 @@ pub(super) async fn run(
         let retry_at = clock.now() + backoff.fail().mul_f64(clock.speed());
         tracing::error!(line = def.line(line).name, "the task of a line has panicked and is started again");
         let state = LineState::Waiting { why: "internal error, see the log".to_owned(), retry_at };
+        let words = format!("line {} was started again; see the log", def.line(line).name);
+        let (fault, occurred) = (StationFault::LineTask, FaultState::Occurred(words.into()));
         // Without a plant task there is nobody to tell, and nothing to start again for.
-        if events.send(Event::Line { at: clock.now(), line, state }).await.is_err() {
-            return;
+        let at = clock.now();
+        for event in [Event::Station { at, fault, state: occurred }, Event::Line { at, line, state }] {
+            if events.send(event).await.is_err() {
+                return;
+            }
         }
         tokio::select! {
             _ = stopped.wait_for(|stop| *stop) => return,
@@ -81,16 +87,22 @@ mod tests {
         for _ in 0..3 {
             let (ours, _theirs) = tokio::io::duplex(64);
             ports.try_send(ours).expect("room for a port");
-            let mut states = Vec::new();
+            let (mut states, mut alarms) = (Vec::new(), 0);
             while !states.iter().any(|state| matches!(state, LineState::Waiting { .. })) {
-                let Event::Line { state, .. } = events.recv().await.expect("the station has not ended") else {
-                    continue;
+                let state = match events.recv().await.expect("the station has not ended") {
+                    Event::Line { state, .. } => state,
+                    Event::Station { fault: StationFault::LineTask, state: FaultState::Occurred(_), .. } => {
+                        alarms += 1;
+                        continue;
+                    }
+                    _ => continue,
                 };
                 if state == LineState::Connected {
                     requests.send(request.clone()).await.expect("the line takes requests");
                 }
                 states.push(state);
             }
+            assert_eq!(alarms, 1);
             let why = "internal error, see the log".to_owned();
             let told = |state: &LineState| matches!(state, LineState::Waiting { why: words, .. } if *words == why);
             assert_eq!(states[..2], [LineState::Connecting, LineState::Connected]);

@@ -35,6 +35,7 @@ use crate::{
         debt::Debt,
         frame::{self, Mbap, Shape},
         gather::{self, Verdict},
+        plan::Block,
     },
     plant::{
         def::{Framing, LineDef},
@@ -154,10 +155,14 @@ impl Link {
         let sent_at = self.send(message, &frame).await?;
         let started = Instant::now();
         self.note_sent(frame.clone());
-        let gathered = match message.first() {
+        let mut gathered = match message.first() {
             Some(0) => Gathered::nothing(Ok(vec![])),
             _ => self.gather(message, &frame, sent_at).await?,
         };
+        // Something came meanwhile that nobody had asked for: so may have this.
+        if proof && gathered.answer.is_ok() && self.wire.debts.is_ambiguous(message) {
+            gathered.answer = Err(Fault::OutOfStep);
+        }
         self.asked = None;
         self.busy += started.elapsed();
         let rest = if message.first() == Some(&0) {
@@ -167,11 +172,10 @@ impl Link {
         };
         self.wire.rest(rest);
         match &gathered.answer {
-            Ok(_) => {
+            Ok(answer) => {
                 self.wire.counters.ok += 1;
-                if let Some(unit) = message.first().filter(|_| proof) {
-                    self.wire.debts.clear(*unit);
-                }
+                let age = self.wire.age();
+                self.wire.debts.answered(message, answer, proof, age);
             }
             Err(fault) => self.account(message, *fault),
         }
@@ -304,7 +308,9 @@ impl Link {
         match self.exchange(&loopback).await {
             Ok(_) => Ok(()),
             Err(Trouble::Fault(Fault::Exception(_))) if proves => {
-                self.wire.debts.clear(unit);
+                if !self.is_unsettled(unit) {
+                    self.wire.debts.clear(unit);
+                }
                 Ok(())
             }
             // It may be the answer to an earlier loopback: the unit is alive, but not in step.
@@ -337,6 +343,21 @@ impl Link {
     /// Totals of this line; `utilisation`, `opens` and `missed` are the task's.
     pub fn counters(&mut self) -> &mut LineCounters {
         &mut self.wire.counters
+    }
+
+    /// See [`crate::bus::debt::Debts::is_unsettled`].
+    pub fn is_unsettled(&self, unit: u8) -> bool {
+        self.wire.debts.is_unsettled(unit, self.wire.age())
+    }
+
+    /// Other blocks are asked for from now on.
+    pub fn expect(&mut self, blocks: &[Block]) {
+        self.wire.debts.expect(blocks);
+    }
+
+    /// See [`Wire::take_unasked`].
+    pub fn take_unasked(&mut self) -> Vec<u8> {
+        self.wire.take_unasked()
     }
 
     /// See [`Wire::take_late`].
@@ -399,6 +420,7 @@ impl Link {
             | Fault::WrongFunction { .. }
             | Fault::WrongLength { .. }
             | Fault::WrongEcho
+            | Fault::OutOfStep
             | Fault::NotANumber
             | Fault::NotConnected
             | Fault::Resting => self.wire.counters.corrupt += 1,

@@ -53,7 +53,7 @@ pub async fn run(
         hunt: Hunt::default(),
         budget: Budget::new(WRITE_SHARE, clock.now()),
         waiting: VecDeque::new(),
-        memory: Memory::new(def.line(line)),
+        memory: Memory::new(def.line(line), clock).expect(&blocks),
         settings: def.line(line).clone(),
         clock,
         connector,
@@ -240,6 +240,7 @@ impl Task<'_> {
                 self.close_second(&mut link);
                 self.tell_report(Some(&schedule)).await?;
             }
+            self.tell_doubts(&mut link).await?;
             let next = schedule.next(now);
             let Ok(request) = self.next_request(next, now) else { break Err(Ended) };
             let turn = match (request, next) {
@@ -370,6 +371,19 @@ impl Task<'_> {
         self.books.late(&self.def, &link.take_late());
         self.books.take(link.take_frames(), link.counters());
         (self.memory, self.closed_at) = (link.memory(), now);
+    }
+
+    /// What was read of a unit that sends what it was not asked for may be such a frame itself.
+    async fn tell_doubts(&mut self, link: &mut Link) -> Result<(), Ended> {
+        let (def, line) = (self.def.clone(), self.line);
+        for unit in link.take_unasked() {
+            for device in def.devices.iter().filter(|device| device.line == line && device.unit == unit) {
+                tracing::warn!(device = device.name, "frames that nobody asked for: its values are in doubt");
+                let tags = def.tags_of(device.id).map(|tag| tag.id).collect();
+                self.tell_failed(self.clock.now(), device.id, tags, Fault::OutOfStep, None).await?;
+            }
+        }
+        Ok(())
     }
 
     async fn tell_report(&mut self, schedule: Option<&Schedule>) -> Result<(), Ended> {

@@ -25,7 +25,8 @@ pub async fn step(link: &mut Link, step: &Step) -> Result<Came, Trouble> {
             // An answer that the unit still owes would be shown as the answer to this.
             if let (true, Some(unit)) = (link.is_ambiguous(message), message.first()) {
                 match link.loopback(*unit).await {
-                    Ok(()) | Err(Trouble::Fault(_)) => {}
+                    Ok(()) => {}
+                    Err(Trouble::Fault(_)) => drop(link.forget_debt(*unit)),
                     Err(gone) => return Err(gone),
                 }
             }
@@ -60,7 +61,7 @@ pub fn settings_for(line: &LineDef, step: &Step) -> LineDef {
 /// Runs a tool to its end on a line that nobody polls; `progress` sees every step and may stop it by `false`.
 pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&ToolRun) -> bool) -> ToolRun {
     let mut connector = Connector::Real(line.transport.clone());
-    let mut memory = Memory::new(line);
+    let mut memory = Memory::new(line, Clock::real());
     let mut open: Option<(LineDef, Link)> = None;
     while let Some(next) = job.next().cloned() {
         let wanted = settings_for(line, &next);

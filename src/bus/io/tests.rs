@@ -2,6 +2,7 @@
 //! shows the address it came from.
 
 mod slave;
+mod strangers;
 mod tools;
 
 use std::{
@@ -111,9 +112,9 @@ async fn an_answer_in_two_pieces_is_one_answer() {
 
 #[tokio::test(start_paused = true)]
 async fn each_spoiled_answer_is_told_by_its_name() {
-    // Twice, so that the one retry of a spoiled read does not hide it; the probe between the two answers well.
+    // Twice, so that the one retry of a spoiled read does not hide it; the probes before each of the two answer well.
     let twice =
-        |deed: Deed| move |number, _: &[u8]| if number == 0 || number == 2 { deed.clone() } else { Deed::Answer };
+        |deed: Deed| move |number, _: &[u8]| if number == 1 || number == 3 { deed.clone() } else { Deed::Answer };
     let crc = Fault::Crc { got: 0, computed: 0 };
     for (deed, expect) in [
         (Deed::BadCheck, crc),
@@ -256,7 +257,7 @@ async fn a_device_that_nothing_brings_into_step_is_read_again_after_a_rest() {
     def.tags.retain(|tag| tag.device == DeviceId(0) && tag.point.address == 400);
     def.tags[0].id = TagId(0);
     let mut line = line(def.clone());
-    line.plug(Mode::Rtu, |number, message| if number == 3 || message[1] == 8 { Deed::Silent } else { Deed::Answer });
+    line.plug(Mode::Rtu, |number, message| if number == 4 || message[1] == 8 { Deed::Silent } else { Deed::Answer });
     for _ in 0..3 {
         line.read(&def).await;
     }

@@ -10,7 +10,11 @@ use tokio::{
 
 use super::{clock::Clock, link::Trouble, pause::Pause, transport::Stream};
 use crate::{
-    bus::{debt::Debts, frame},
+    bus::{
+        debt::Debts,
+        frame::{self, Unasked},
+        plan::Block,
+    },
     plant::{
         def::{Framing, LineDef},
         event::LineCounters,
@@ -30,8 +34,15 @@ pub struct Memory {
 
 impl Memory {
     /// Nothing has gone over the line yet.
-    pub fn new(line: &LineDef) -> Memory {
-        Memory { counters: LineCounters::default(), debts: Debts::new(line.timeout), born: Instant::now() }
+    pub fn new(line: &LineDef, clock: Clock) -> Memory {
+        let seed = clock.now().as_microsecond() as u16;
+        Memory { counters: LineCounters::default(), debts: Debts::new(line.timeout, seed), born: Instant::now() }
+    }
+
+    /// These blocks will be asked for.
+    pub fn expect(mut self, blocks: &[Block]) -> Memory {
+        self.debts.expect(blocks);
+        self
     }
 }
 
@@ -57,6 +68,8 @@ pub struct Wire {
     frames: Vec<Frame>,
     /// Units whose answers came late since this was last taken.
     late: Vec<u8>,
+    /// Units that sent since then what they were not asked for, though nothing was owed.
+    unasked: Vec<u8>,
     /// Totals of the line; `utilisation`, `opens` and `missed` are the task's.
     pub counters: LineCounters,
 }
@@ -89,6 +102,7 @@ impl Wire {
             debts,
             frames: Vec::new(),
             late: Vec::new(),
+            unasked: Vec::new(),
             counters,
         }
     }
@@ -191,19 +205,27 @@ impl Wire {
         }
         self.counters.stale += 1;
         tracing::debug!(bytes = %frame::hex(bytes), "stale bytes dropped");
+        let mut late = false;
         // Only a whole good frame tells who was late: chance bytes name anybody.
-        let whole = frame::unwrap(self.framing, bytes).ok();
-        let unit = whole.as_ref().and_then(|message| message.first().copied());
-        let late = unit.filter(|unit| self.debts.came_late(*unit, self.age()));
-        if let Some(unit) = late {
-            self.counters.late += 1;
-            self.late.push(unit);
+        for unasked in frame::unasked(self.framing, bytes) {
+            let age = self.age();
+            let (Unasked::Answer(message) | Unasked::Request(message)) = &unasked;
+            let Some(unit) = message.first().copied() else { continue };
+            let asks = matches!(unasked, Unasked::Request(_));
+            if !asks && self.debts.came_late(unit, age) {
+                late = true;
+                self.counters.late += 1;
+                self.late.push(unit);
+                continue;
+            }
+            if self.debts.unasked(unit, message, age) {
+                self.unasked.push(unit);
+            }
+            if asks {
+                self.debts.distrust_all();
+            }
         }
-        self.record(
-            false,
-            bytes.into(),
-            Cow::Borrowed(if late.is_some() { "late, dropped" } else { "stale, dropped" }),
-        );
+        self.record(false, bytes.into(), Cow::Borrowed(if late { "late, dropped" } else { "stale, dropped" }));
     }
 
     /// Puts bytes on record.
@@ -228,6 +250,11 @@ impl Wire {
     /// The units whose answers came late since this was last asked, once for each answer.
     pub fn take_late(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.late)
+    }
+
+    /// The units that have sent what they were not asked for since this was last asked.
+    pub fn take_unasked(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.unasked)
     }
 
     async fn wait_for_silence(&mut self) {

@@ -165,7 +165,7 @@ impl Task<'_> {
                 self.tell_values(at, block, &values, reply.unwrap_or_default(), exchange).await?;
                 self.hunt.answered(block);
                 let disproved = self.holes.disproved(block);
-                self.replan(schedule, at, disproved);
+                self.replan(link, schedule, at, disproved);
                 Ok(())
             }
             Err(fault @ Fault::Exception(code)) if is_answer => {
@@ -178,8 +178,8 @@ impl Task<'_> {
                     tracing::debug!(address = block.address, count = block.count, "exception 02: the block is split");
                     let mut blocks = self.blocks.clone();
                     blocks.splice(index..=index, parts);
-                    self.use_plan(schedule, blocks, at);
-                    self.replan(schedule, at, false);
+                    self.use_plan(link, schedule, blocks, at);
+                    self.replan(link, schedule, at, false);
                 } else {
                     schedule.excused(index, code, at);
                 }
@@ -190,11 +190,15 @@ impl Task<'_> {
                     schedule.again(index, at);
                 }
                 self.tell_failed(at, block.device, block.tags.to_vec(), fault, exchange).await?;
+                // It answers, and is asked again in its turn.
+                if fault == Fault::OutOfStep {
+                    return Ok(());
+                }
                 if schedule.failed(block.device, began, took, at) {
                     let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
                     self.tell_failed(at, block.device, tags, Fault::Resting, None).await?;
                     self.holes.forget(block.device);
-                    self.replan(schedule, at, true);
+                    self.replan(link, schedule, at, true);
                 }
                 Ok(())
             }
@@ -207,18 +211,23 @@ impl Task<'_> {
         if !link.is_ambiguous(&block.request()) {
             return Ok(());
         }
+        if link.is_unsettled(block.unit) {
+            return Err(Fault::OutOfStep.into());
+        }
         let own = std::iter::once(block);
         let others = self.blocks.iter().filter(|other| other.device == block.device && *other != block);
         if let Some(probe) = link.debt(block.unit).probe(own.chain(others)) {
             match link.exchange(&probe).await {
                 // The device does not read parts of a block, or this answers an older request: neither proves anything.
                 Err(Trouble::Fault(Fault::Exception(_))) => {}
-                other => return other.map(drop),
+                Ok(_) => return proven(link, block),
+                Err(trouble) => return Err(trouble),
             }
         }
         match link.loopback(block.unit).await {
             Err(Trouble::Fault(_)) if link.forget_debt(block.unit).is_none() => Ok(()),
-            other => other,
+            Ok(()) => proven(link, block),
+            Err(trouble) => Err(trouble),
         }
     }
 
@@ -245,20 +254,21 @@ impl Task<'_> {
     }
 
     /// Makes the plan anew when the search for what a device does not have has come to an end, or knowledge was `wrong`.
-    fn replan(&mut self, schedule: &mut Schedule, at: Timestamp, wrong: bool) {
+    fn replan(&mut self, link: &mut Link, schedule: &mut Schedule, at: Timestamp, wrong: bool) {
         if wrong {
             self.hunt.reset();
         }
         if wrong || self.hunt.conclude(&mut self.holes) {
             let blocks = plan::blocks(&self.def, self.line, &self.holes);
-            self.use_plan(schedule, blocks, at);
+            self.use_plan(link, schedule, blocks, at);
         }
     }
 
-    fn use_plan(&mut self, schedule: &mut Schedule, blocks: Vec<Block>, at: Timestamp) {
+    fn use_plan(&mut self, link: &mut Link, schedule: &mut Schedule, blocks: Vec<Block>, at: Timestamp) {
         self.books.replan(&self.blocks, &blocks);
         self.books.admit(&self.def, &self.settings, &blocks);
         schedule.replan(&blocks, at);
+        link.expect(&blocks);
         self.blocks = blocks;
     }
 
@@ -289,6 +299,11 @@ impl Task<'_> {
         }
         Ok(())
     }
+}
+
+/// What came in between may have shown that the unit sends what it was not asked for.
+fn proven(link: &Link, block: &Block) -> Result<(), Trouble> {
+    if link.is_ambiguous(&block.request()) { Err(Fault::OutOfStep.into()) } else { Ok(()) }
 }
 
 /// What a block read gave: bits or registers, the first at the block's address.

@@ -62,7 +62,7 @@ impl Mode {
     }
 
     /// Where the request at the beginning of the buffer ends, once it is whole. Requests here have eight bytes in RTU.
-    fn end(self, buffer: &[u8]) -> Option<usize> {
+    pub fn end(self, buffer: &[u8]) -> Option<usize> {
         match self.framing() {
             Framing::Rtu => (8 <= buffer.len()).then_some(8),
             Framing::Ascii => buffer.iter().position(|char| *char == b'\n').map(|last| last + 1),
@@ -131,7 +131,7 @@ pub enum Deed {
     Exception(u8),
 }
 
-fn correct(message: &[u8]) -> Vec<u8> {
+pub fn correct(message: &[u8]) -> Vec<u8> {
     let word = |index: usize| u16::from_be_bytes([message[index], message[index + 1]]);
     match message[1] {
         3 => {

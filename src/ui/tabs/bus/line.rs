@@ -351,9 +351,11 @@ fn of_device(cx: &Cx, line: &LineDef, report: &LineReport, device: &DeviceDef, t
             "look at baud rate, parity, termination and shield of the line".to_owned()
         }
         Fault::Exception(code) => names::advice(code.0).to_owned(),
-        Fault::WrongUnit { .. } | Fault::WrongFunction { .. } | Fault::WrongLength { .. } | Fault::WrongEcho => {
-            "is there another master, or a unit number twice?".to_owned()
-        }
+        Fault::WrongUnit { .. }
+        | Fault::WrongFunction { .. }
+        | Fault::WrongLength { .. }
+        | Fault::WrongEcho
+        | Fault::OutOfStep => "is there another master, or a unit number twice?".to_owned(),
         Fault::NotANumber | Fault::NotConnected | Fault::Resting => String::new(),
     };
     worries.push(format!("{fault} at {when}: {advice}").trim_end_matches(": ").to_owned());
