@@ -14,6 +14,9 @@ use crate::plant::{
     traffic::Exchange,
 };
 
+/// Most units of a scan with the same settings of which only spoiled bytes may come.
+const TRACES_MAX: usize = 3;
+
 /// What is to be sent next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
@@ -55,6 +58,8 @@ pub struct Job {
     made: u32,
     /// How many it has.
     planned: u32,
+    /// Units of a scan that gave spoiled bytes, with which settings: each by itself may be a unit, all together are none.
+    traces: Vec<(u8, Option<Serial>, Fault)>,
 }
 
 impl Job {
@@ -72,7 +77,7 @@ impl Job {
             state: ToolState::Running,
             findings: Vec::new(),
         };
-        let mut job = Job { run, step: None, queued: VecDeque::new(), made: 0, planned };
+        let mut job = Job { run, step: None, queued: VecDeque::new(), made: 0, planned, traces: Vec::new() };
         job.advance();
         job.tell_now();
         job
@@ -107,6 +112,8 @@ impl Job {
         match (&self.run.tool, came) {
             (_, Came::Bytes(bytes, reply)) => self.found(Finding::Bytes { bytes, reply }),
             (Tool::Scan(_), Came::Answer(answer, _)) => self.take_unit(&step, answer),
+            // It only had an adapter with echo give itself away.
+            (Tool::Loopback { .. }, Came::Answer(..)) if self.run.done == 1 => {}
             (_, Came::Answer(answer, exchange)) => {
                 self.found(Finding::Exchange(exchange));
                 self.take_answer(&step, answer);
@@ -202,16 +209,37 @@ impl Job {
                 _ => "answers".into(),
             },
             Err(fault @ Fault::Exception(code)) if !code.is_of_gateway() => fault.to_string(),
-            // Spoiled bytes are a trace too: somebody may be there with another parity or baud rate.
-            Err(fault) if fault.is_corrupt() => format!("something is there: {fault}"),
+            // Spoiled bytes are a trace too: a unit may be there with another parity or baud rate.
+            Err(fault) if fault.is_corrupt() => return self.traces.push((request[0], step.serial, fault)),
             Err(_) => return,
         };
         self.found(Finding::Unit { unit: request[0], serial: step.serial, words });
     }
 
+    /// Few spoiled answers are told as what may be units; more with the same settings come from something else that talks.
+    fn conclude_traces(&mut self) {
+        let traces = std::mem::take(&mut self.traces);
+        for same in traces.chunk_by(|one, other| one.1 == other.1) {
+            let (_, serial, fault) = same[0];
+            if same.len() <= TRACES_MAX {
+                let unit = |(unit, serial, fault): &(u8, Option<Serial>, Fault)| Finding::Unit {
+                    unit: *unit,
+                    serial: *serial,
+                    words: format!("something is there: {fault}"),
+                };
+                same.iter().for_each(|trace| self.found(unit(trace)));
+                continue;
+            }
+            let at = serial.map(|serial| format!(" at {serial}")).unwrap_or_default();
+            let what = format!("{} addresses{at}: something else talks on this line", same.len());
+            self.found(Finding::Failed { what, fault });
+        }
+    }
+
     fn conclude(&mut self) {
+        self.conclude_traces();
         let verdict = match &self.run.tool {
-            Tool::Loopback { .. } => loopback_words(&self.run.findings, self.run.done),
+            Tool::Loopback { .. } => loopback_words(&self.run.findings, self.run.done - 1),
             Tool::Scan(scan) => {
                 let units = self.run.findings.iter().filter(|found| matches!(found, Finding::Unit { .. })).count();
                 match units {
@@ -247,7 +275,7 @@ impl Job {
 fn steps_in(tool: &Tool) -> u32 {
     match tool {
         Tool::Send(_) | Tool::Read { .. } => 1,
-        Tool::Loopback { count, .. } => u32::from(*count),
+        Tool::Loopback { count, .. } => 1 + u32::from(*count),
         Tool::Identify { .. } => 2,
         Tool::Scan(scan) => units_of(scan) * scan.serials.len().max(1) as u32,
     }
@@ -262,8 +290,11 @@ fn units_of(scan: &Scan) -> u32 {
 fn planned_step(tool: &Tool, n: u32) -> Step {
     match tool {
         Tool::Send(bytes) => Step { serial: None, timeout: None, ask: Ask::Raw(bytes.clone()) },
+        // An adapter that gives back what it sends would pass every loopback. A read cannot be answered by itself: the link
+        // knows such an adapter from then on.
+        Tool::Loopback { unit, .. } if n == 0 => step(read(*unit, Table::Holding, 0, 1)),
         Tool::Loopback { unit, data, .. } => {
-            let [high, low] = data.wrapping_add(n as u16).to_be_bytes();
+            let [high, low] = data.wrapping_add(n as u16 - 1).to_be_bytes();
             step(vec![*unit, 0x08, 0, 0, high, low])
         }
         // Basic objects, then the regular ones that follow them (id 3 and on).
@@ -420,6 +451,26 @@ mod tests {
         let job = Job::new(OrderId { terminal: 1, number: 1 }, "anna".into(), Tool::Scan(scan), Timestamp::UNIX_EPOCH);
         assert!(job.is_exclusive());
         assert_eq!(job.run().total, 6);
+    }
+
+    #[test]
+    fn a_foreign_unit_that_chatters_is_not_every_unit() {
+        let scan = |last| {
+            let tool = Tool::Scan(Scan { first: 1, last, serials: vec![], timeout: Duration::from_millis(100) });
+            run(tool, |request| match request[0] {
+                2 => Ok(vec![2, 3, 2, 0, 77]),
+                asked => Err(Fault::WrongUnit { got: 99, asked }),
+            })
+        };
+        let units = |run: &ToolRun| run.findings.iter().filter(|found| matches!(found, Finding::Unit { .. })).count();
+        assert_eq!(units(&scan(4)), 4, "a few may be units with other settings");
+        let many = scan(20);
+        assert_eq!((units(&many), verdict(&many)), (1, "1 answer"));
+        let told = many.findings.iter().find_map(|finding| match finding {
+            Finding::Failed { what, .. } => Some(what.as_str()),
+            _ => None,
+        });
+        assert_eq!(told, Some("19 addresses: something else talks on this line"));
     }
 
     #[test]

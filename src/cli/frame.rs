@@ -20,7 +20,7 @@ use super::{CliError, say, say_error};
 pub struct Args {
     /// Bytes in hex (`01 03 00 00 00 01`, `0x01,0x03…`), an ASCII frame (`:0103…`) or lines of a log (`TX 01 03 …`);
     /// none or `-`: lines from standard input
-    #[arg(value_name = "BYTES", allow_hyphen_values = true)]
+    #[arg(value_name = "BYTES")]
     bytes: Vec<String>,
     /// The bytes are an RTU frame, with CRC
     #[arg(long, group = "framing")]
@@ -49,7 +49,10 @@ pub fn main(args: Args) -> Result<(), CliError> {
     if !args.bytes.is_empty() && args.bytes != ["-"] {
         let typed = typed::parse(&args.bytes.join(" "), framing).map_err(|error| CliError::Usage(error.to_string()))?;
         tell(&typed, framing, None).iter().for_each(|line| say(line));
-        return Ok(());
+        return match explained(&typed, framing, None).verdict {
+            verdict if verdict == "ok" => Ok(()),
+            wrong => Err(CliError::Failed(format!("the frame is wrong: {wrong}"))),
+        };
     }
     if std::io::stdin().is_terminal() {
         say_error("one frame a line, Ctrl-D ends");
@@ -59,7 +62,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 
 /// Tells frames as their lines come. An answer behind its request gets its addresses.
 fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> {
-    let (mut frames, mut spoiled) = (0, 0);
+    let (mut frames, mut spoiled, mut wrong) = (0, 0, 0);
     let mut asked: Option<Explained> = None;
     for (index, line) in input.split(b'\n').enumerate() {
         let line = line.map_err(|error| CliError::Io { what: "cannot read standard input".into(), error })?;
@@ -80,12 +83,14 @@ fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> 
         }
         frames += 1;
         tell(&typed, framing, asked.as_ref()).iter().for_each(|line| say(line));
+        wrong += usize::from(explained(&typed, framing, asked.as_ref()).verdict != "ok");
         let told = explained(&typed, framing, None);
         asked = (told.direction != Some(Direction::Answer)).then_some(told);
     }
-    match (frames, spoiled) {
-        (0, 0) => Err(CliError::Usage(typed::TypedError::Empty.to_string())),
-        (_, 0) => Ok(()),
+    match (frames, spoiled, wrong) {
+        (0, 0, _) => Err(CliError::Usage(typed::TypedError::Empty.to_string())),
+        (_, 0, 0) => Ok(()),
+        (_, 0, _) => Err(CliError::Failed(format!("{wrong} of {frames} frames are wrong"))),
         _ => Err(CliError::Usage(format!("{spoiled} of {} lines cannot be read", frames + spoiled))),
     }
 }

@@ -49,7 +49,7 @@ pub fn replace_port(def: &mut PlantDef, text: &str) -> Result<(), String> {
         let serial = line.transport.serial().unwrap_or(Serial::USUAL);
         Transport::Serial { port: port.to_owned(), serial, framing, rs485 }
     } else {
-        let parsed = port.rsplit_once(':').and_then(|(host, port)| Some((host.to_owned(), port.parse().ok()?)));
+        let parsed = Transport::host_and_port(port).and_then(|(host, port)| Some((host.to_owned(), port?)));
         let (host, port) =
             parsed.ok_or_else(|| format!("--port: found `{port}`, expected an absolute path or HOST:TCPPORT"))?;
         let framing = match &line.transport {
@@ -74,6 +74,8 @@ mod tests {
         assert_eq!((port.as_str(), serial.baud), ("/dev/ttyUSB0", 9600));
         replace_port(&mut def, "L1=localhost:1502").expect("a good port");
         assert_eq!(def.lines[0].transport, Transport::tcp("localhost", 1502));
+        replace_port(&mut def, "L1=[::1]:1502").expect("a good port");
+        assert_eq!(def.lines[0].transport, Transport::tcp("::1", 1502));
     }
 
     #[test]

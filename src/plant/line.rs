@@ -77,6 +77,22 @@ impl Transport {
         Transport::Tcp { host: host.to_owned(), port, framing: Framing::Mbap }
     }
 
+    /// `host:502`, `host`, `10.0.0.5:502`, `[::1]:502` or `::1` as host and TCP port; `None` for a port that is none.
+    pub fn host_and_port(text: &str) -> Option<(&str, Option<u16>)> {
+        if let Some((host, rest)) = text.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+            return match rest.strip_prefix(':') {
+                Some(port) => Some((host, Some(port.parse().ok()?))),
+                None => rest.is_empty().then_some((host, None)),
+            };
+        }
+        match text.split_once(':') {
+            // More than one colon without brackets is an IPv6 address and nothing else.
+            Some((_, rest)) if rest.contains(':') => Some((text, None)),
+            Some((host, port)) => Some((host, Some(port.parse().ok()?))),
+            None => Some((text, None)),
+        }
+    }
+
     /// How frames are delimited and checked.
     pub fn framing(&self) -> Framing {
         match self {
@@ -109,6 +125,7 @@ impl std::fmt::Display for Transport {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Transport::Serial { port, serial, .. } => write!(f, "{} {port} {serial}", self.mode()),
+            Transport::Tcp { host, port, .. } if host.contains(':') => write!(f, "{} [{host}]:{port}", self.mode()),
             Transport::Tcp { host, port, .. } => write!(f, "{} {host}:{port}", self.mode()),
         }
     }

@@ -25,7 +25,7 @@ use super::{CliError, runtime, say};
 /// The port that a tool works on.
 #[derive(Debug, Clone, clap::Args)]
 pub struct PortArgs {
-    /// A serial port (/dev/ttyUSB0), or HOST or HOST:TCPPORT
+    /// A serial port (/dev/ttyUSB0), or HOST, HOST:TCPPORT or [IPV6]:TCPPORT
     #[arg(value_name = "PORT")]
     port: String,
     /// rtu, ascii, tcp or rtu-over-tcp [default: rtu on a serial port, else tcp]
@@ -91,11 +91,11 @@ impl PortArgs {
         let transport = if is_path {
             Transport::Serial { port: self.port.clone(), serial: self.serial(framing)?, framing, rs485: Rs485::Off }
         } else {
-            let (host, port) = self.port.rsplit_once(':').unwrap_or((&self.port, "502"));
-            let tcp_port = port.parse().map_err(|_| {
-                CliError::Usage(format!("port: found `{port}` in `{}`, expected a TCP port up to 65535", self.port))
+            let (host, tcp_port) = Transport::host_and_port(&self.port).ok_or_else(|| {
+                let expected = "expected HOST or HOST:TCPPORT with a TCP port up to 65535, or [IPV6]:TCPPORT";
+                CliError::Usage(format!("port: found `{}`, {expected}", self.port))
             })?;
-            Transport::Tcp { host: host.to_owned(), port: tcp_port, framing }
+            Transport::Tcp { host: host.to_owned(), port: tcp_port.unwrap_or(502), framing }
         };
         Ok(LineDef { timeout: Duration::from_millis(self.timeout), ..LineDef::new(LineId(0), "line", transport) })
     }
@@ -228,6 +228,9 @@ mod tests {
             ("/dev/ttyUSB0 --mode ascii --parity e --baud 19200", "ASCII /dev/ttyUSB0 19200 7E1"),
             ("plc", "TCP plc:502"),
             ("plc:1502 --mode rtu-over-tcp", "RTU over TCP plc:1502"),
+            ("[::1]:1502", "TCP [::1]:1502"),
+            ("[fe80::1]", "TCP [fe80::1]:502"),
+            ("::1", "TCP [::1]:502"),
         ] {
             assert_eq!(line(args).as_deref(), Ok(expect), "{args}");
         }
@@ -238,7 +241,8 @@ mod tests {
         for (args, part) in [
             ("/dev/ttyUSB0 --mode tcp", "expected HOST or HOST:TCPPORT for tcp"),
             ("plc --mode rtu", "expected a path such as /dev/ttyUSB0"),
-            ("plc:99999", "found `99999` in `plc:99999`, expected a TCP port"),
+            ("plc:99999", "found `plc:99999`, expected HOST or HOST:TCPPORT with a TCP port"),
+            ("[::1]x", "or [IPV6]:TCPPORT"),
             ("/dev/ttyUSB0 --baud 9601", "found 9601, expected one of 300"),
             ("/dev/ttyUSB0 --data 7", "found 7, expected 8"),
             ("/dev/ttyUSB0 --parity X", "[possible values: N, E, O]"),

@@ -5,6 +5,7 @@ use crate::{
     bus::{codec, names},
     cli::{CliError, say},
     plant::{
+        event::Fault,
         tag::{Kind, Order, Point, Table},
         tool::{Finding, Tool},
     },
@@ -44,12 +45,21 @@ pub fn main(args: Args) -> Result<(), CliError> {
         Finding::Exchange(_) | Finding::Bytes { .. } | Finding::Unit { .. } | Finding::Verdict(_) => Vec::new(),
     })?;
     let found = |finding: &Finding| matches!(finding, Finding::Object { .. } | Finding::Values { .. });
-    let refused = |finding: &Finding| matches!(finding, Finding::Failed { fault, .. } if matches!(fault, crate::plant::event::Fault::Exception(_)));
-    match (run.findings.iter().any(found), run.findings.iter().any(refused)) {
-        (true, _) => Ok(()),
-        (false, true) => Err(CliError::Failed("the unit is there, but does not give that".into())),
-        (false, false) => Err(CliError::Failed("the unit does not answer".into())),
+    if run.findings.iter().any(found) {
+        return Ok(());
     }
+    let faults = || {
+        run.findings.iter().filter_map(|finding| match finding {
+            Finding::Failed { fault, .. } => Some(*fault),
+            _ => None,
+        })
+    };
+    let wrong = faults().find(|fault| fault.is_corrupt());
+    Err(CliError::Failed(match (faults().any(|fault| matches!(fault, Fault::Exception(_))), wrong) {
+        (true, _) => "the unit is there, but does not give that".to_owned(),
+        (false, Some(fault)) => format!("something answers, but wrongly: {fault}"),
+        (false, None) => "the unit does not answer".to_owned(),
+    }))
 }
 
 /// A row a register: both forms of the address, hex, unsigned, signed, and with its neighbour a float in four orders.

@@ -6,6 +6,7 @@ use crate::{
     cli::{CliError, say, say_error},
     plant::{
         def::Framing,
+        event::Fault,
         tool::{Finding, Tool},
     },
 };
@@ -16,7 +17,7 @@ pub struct Args {
     #[command(flatten)]
     port: PortArgs,
     /// Bytes in hex: unit, function, data; the check (TCP: the header) is added unless it is there
-    #[arg(value_name = "BYTES", required = true, allow_hyphen_values = true)]
+    #[arg(value_name = "BYTES", required = true)]
     bytes: Vec<String>,
     /// Add nothing: send exactly these bytes
     #[arg(long)]
@@ -54,11 +55,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         Finding::Bytes { bytes, reply } => {
             let mut lines = sent.to_vec();
             lines.extend(answer_lines(bytes, framing, &request));
-            let verdict = match frame::unwrap(framing, bytes).and_then(|answer| frame::check_answer(&request, &answer))
-            {
-                Ok(()) => "ok".to_owned(),
-                Err(fault) => fault.to_string(),
-            };
+            let verdict = verdict(framing, &request, bytes).unwrap_or_else(|why| why);
             let after = reply.map(|reply| format!(", after {:.1} ms", reply.as_secs_f64() * 1e3)).unwrap_or_default();
             lines.push(format!("   {verdict}{after}"));
             lines
@@ -70,15 +67,35 @@ pub fn main(args: Args) -> Result<(), CliError> {
         | Finding::Failed { .. }
         | Finding::Verdict(_) => Vec::new(),
     })?;
-    let silent = run.findings.iter().all(|finding| matches!(finding, Finding::Bytes { bytes, .. } if bytes.is_empty()));
+    let answer = run.findings.iter().find_map(|finding| match finding {
+        Finding::Bytes { bytes, .. } if !bytes.is_empty() => Some(bytes),
+        _ => None,
+    });
     let broadcast = framing != Framing::Mbap && message.first() == Some(&0);
-    match (silent, broadcast) {
-        (true, false) => Err(CliError::Failed(format!("no answer within {} ms", line.timeout.as_millis()))),
-        (true, true) => {
+    match (answer, broadcast) {
+        (None, false) => Err(CliError::Failed(format!("no answer within {} ms", line.timeout.as_millis()))),
+        (None, true) => {
             say("   sent to all; nobody answers a broadcast");
             Ok(())
         }
-        (false, _) => Ok(()),
+        // What was no request has no answer that could be wrong.
+        (Some(_), _) if message.is_empty() => Ok(()),
+        (Some(bytes), _) => verdict(framing, &message, bytes)
+            .map(drop)
+            .map_err(|why| CliError::Failed(format!("what came back is no answer to this: {why}"))),
+    }
+}
+
+/// What an answer is, in words; `Err` for bytes that are none.
+fn verdict(framing: Framing, request: &[u8], bytes: &[u8]) -> Result<String, String> {
+    if framing == Framing::Mbap && frame::mbap(bytes) == frame::Mbap::Broken {
+        return Err("no header of Modbus TCP".to_owned());
+    }
+    match frame::unwrap(framing, bytes).and_then(|answer| frame::check_answer(request, &answer)) {
+        Ok(()) => Ok("ok".to_owned()),
+        // A refusal is an answer.
+        Err(fault @ Fault::Exception(_)) => Ok(fault.to_string()),
+        Err(fault) => Err(fault.to_string()),
     }
 }
 

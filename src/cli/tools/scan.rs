@@ -51,11 +51,8 @@ pub fn main(args: Args) -> Result<(), CliError> {
             vec![format!("unit {unit:3}{settings}: {words}")]
         }
         Finding::Verdict(words) => vec![words.clone()],
-        Finding::Exchange(_)
-        | Finding::Bytes { .. }
-        | Finding::Object { .. }
-        | Finding::Values { .. }
-        | Finding::Failed { .. } => Vec::new(),
+        Finding::Failed { what, fault } => vec![format!("{what} ({fault})")],
+        Finding::Exchange(_) | Finding::Bytes { .. } | Finding::Object { .. } | Finding::Values { .. } => Vec::new(),
     })?;
     let found = run.findings.iter().any(|finding| matches!(finding, Finding::Unit { .. }));
     if found { Ok(()) } else { Err(CliError::Failed("no unit was found".into())) }

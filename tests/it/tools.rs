@@ -1,0 +1,138 @@
+//! The tools for a line without a plant, against peers that echo, chatter and lie: what they say, and how they end.
+
+use std::{
+    io::{Read, Write},
+    net::{Ipv4Addr, Ipv6Addr, TcpListener, TcpStream},
+};
+
+use crate::support::sightglass;
+
+/// A peer that does this with every connection. Gives its address.
+fn peer(work: impl Fn(TcpStream) + Send + 'static) -> String {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    serve(listener, work);
+    address
+}
+
+fn serve(listener: TcpListener, work: impl Fn(TcpStream) + Send + 'static) {
+    std::thread::spawn(move || listener.incoming().flatten().for_each(|stream| work(stream)));
+}
+
+/// A peer that gives this for every request it gets.
+fn answers(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> impl Fn(TcpStream) + Send + 'static {
+    move |mut stream| {
+        let mut buffer = [0; 300];
+        while let Ok(length @ 1..) = stream.read(&mut buffer) {
+            if stream.write_all(&answer(&buffer[..length])).is_err() {
+                break;
+            }
+        }
+    }
+}
+
+/// Exit code, and all that was said.
+fn run(args: &[&str]) -> (Option<i32>, String) {
+    let output = sightglass().args(args).output().unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    (output.status.code(), String::from_utf8(said).unwrap())
+}
+
+fn with_crc(message: &[u8]) -> Vec<u8> {
+    sightglass::bus::frame::wrap(sightglass::plant::line::Framing::Rtu, 0, message)
+}
+
+#[test]
+fn an_echo_of_the_adapter_is_no_loopback_of_the_unit() {
+    let echo = peer(answers(<[u8]>::to_vec));
+    let (code, said) = run(&["loopback", &echo, "--mode", "rtu-over-tcp", "--timeout", "50"]);
+    assert!(code == Some(1) && said.contains("none of 10 came back"), "{code:?} {said}");
+
+    // The same adapter with a unit behind it, which has no function 03.
+    let unit = peer(answers(|request| {
+        let answer = if request[1] == 3 { with_crc(&[1, 0x83, 1]) } else { request.to_vec() };
+        [request, &answer].concat()
+    }));
+    let (code, said) = run(&["loopback", &unit, "--mode", "rtu-over-tcp", "--timeout", "500"]);
+    assert!(code == Some(0) && said.contains("10 of 10 came back"), "{code:?} {said}");
+}
+
+#[test]
+fn options_behind_the_bytes_are_options() {
+    let unit = peer(answers(|_| vec![0, 1, 0, 0, 0, 5, 1, 3, 2, 0, 7]));
+    let (code, said) = run(&["raw", &unit, "01", "03", "00", "00", "00", "01", "--timeout", "2000"]);
+    assert!(code == Some(0) && said.contains("ok, after"), "{code:?} {said}");
+    let (code, said) = run(&["frame", "01", "03", "00", "00", "00", "01", "84", "0A", "--rtu"]);
+    assert!(code == Some(0) && said.contains("RTU request"), "{code:?} {said}");
+}
+
+#[test]
+fn bytes_that_are_no_answer_end_raw_with_an_error_and_are_counted_right() {
+    let garbage = peer(answers(|_| vec![0x55; 8_128]));
+    for mode in ["tcp", "rtu-over-tcp"] {
+        let (code, said) = run(&["raw", &garbage, "--mode", mode, "--timeout", "100", "01 03 00 00 00 01"]);
+        assert_eq!(code, Some(1), "{said}");
+        assert!(!said.contains(" of 8 bytes"), "{said}");
+    }
+    // A refusal is an answer.
+    let unit = peer(answers(|_| vec![0, 1, 0, 0, 0, 3, 1, 0x83, 2]));
+    let (code, said) = run(&["raw", &unit, "01 03 00 00 00 01"]);
+    assert!(code == Some(0) && said.contains("illegal data address"), "{code:?} {said}");
+}
+
+#[test]
+fn a_frame_with_a_wrong_check_ends_with_an_error() {
+    let (code, said) = run(&["frame", "--rtu", "01 03 00 00 00 01 84 0B"]);
+    assert!(code == Some(1) && said.contains("wrong: CRC error"), "{code:?} {said}");
+    let (code, said) = run(&["frame", ":010300000001FC"]);
+    assert!(code == Some(1) && said.contains("wrong: LRC error"), "{code:?} {said}");
+}
+
+#[test]
+fn one_unit_that_talks_all_the_time_is_not_every_unit() {
+    let chatter = |bytes: Vec<u8>| {
+        peer(move |mut stream| {
+            stream.set_nodelay(true).unwrap();
+            while stream.write_all(&bytes).is_ok() {
+                std::thread::yield_now();
+            }
+        })
+    };
+    for bytes in [vec![0x55; 64], with_crc(&[99, 3, 2, 0, 7])] {
+        let address = chatter(bytes);
+        let (code, said) = run(&["scan", &address, "--mode", "rtu-over-tcp", "--units", "1-20", "--timeout", "20"]);
+        assert!(code == Some(1) && said.contains("no unit was found"), "{code:?} {said}");
+        assert!(said.contains("20 addresses: something else talks on this line"), "{said}");
+    }
+}
+
+#[test]
+fn an_ipv6_address_is_understood() {
+    let Ok(listener) = TcpListener::bind((Ipv6Addr::LOCALHOST, 0)) else { return };
+    let address = listener.local_addr().unwrap().to_string();
+    serve(listener, answers(|_| vec![0, 1, 0, 0, 0, 5, 1, 3, 2, 0, 7]));
+    assert!(address.starts_with("[::1]:"));
+    let (code, said) = run(&["probe", &address, "--read", "holding:0"]);
+    assert!(code == Some(0) && said.contains(&format!("TCP {address}")), "{code:?} {said}");
+}
+
+#[test]
+fn a_unit_that_answers_wrongly_is_not_called_silent() {
+    let unit = peer(answers(|_| vec![0, 1, 0, 0, 0, 9, 1, 3, 6, 0, 7, 0, 7, 0, 7]));
+    let (code, said) = run(&["probe", &unit, "--read", "holding:0:2"]);
+    assert_eq!(code, Some(1));
+    assert!(said.contains("answers, but wrongly: answer with") && !said.contains("does not answer"), "{said}");
+    let silent = peer(std::mem::forget);
+    let (code, said) = run(&["probe", &silent, "--timeout", "20"]);
+    assert!(code == Some(1) && said.contains("the unit does not answer"), "{code:?} {said}");
+}
+
+#[test]
+fn a_mistyped_command_gets_a_suggestion() {
+    for (typed, meant) in [("demoo", "demo"), ("atach", "attach"), ("staus", "status")] {
+        let (code, said) = run(&[typed]);
+        assert!(code == Some(2) && said.contains(&format!("`sightglass {meant}`")), "{code:?} {said}");
+    }
+    let (_, said) = run(&["no-such-plant-at-all"]);
+    assert!(!said.contains("did you mean the command"), "{said}");
+}
