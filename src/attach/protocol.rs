@@ -11,7 +11,7 @@ use super::delta::Delta;
 use crate::{
     access::{OrderRequest, Standing, Wish},
     history::{Answer, HistoryError, Question},
-    plant::{PlantDef, command::OrderId},
+    plant::{PlantDef, command::OrderId, visible::acts},
 };
 
 /// The number of this protocol; goes up with every change of a message.
@@ -259,14 +259,12 @@ impl Place {
 
 /// Text of somebody else on one line: only what is seen, and not too much of it.
 fn one_line(text: &str, chars_max: usize) -> String {
-    let is_seen = |letter: &char| !letter.is_control() && !is_invisible(*letter);
     // What says where it is must not be able to say who it is.
-    text.chars().filter(is_seen).map(|letter| if letter == ',' { '.' } else { letter }).take(chars_max).collect()
-}
-
-/// Turns the direction of writing, or joins what should not be joined.
-fn is_invisible(letter: char) -> bool {
-    matches!(letter, '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2060}'..='\u{206F}' | '\u{FEFF}')
+    text.chars()
+        .filter(|letter| !acts(*letter))
+        .map(|letter| if letter == ',' { '.' } else { letter })
+        .take(chars_max)
+        .collect()
 }
 
 #[cfg(test)]

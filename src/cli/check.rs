@@ -16,7 +16,7 @@ use crate::{
     profile::{self, Search},
 };
 
-use super::{CliError, render, say, say_error};
+use super::{CliError, say, say_problems};
 
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
@@ -30,10 +30,10 @@ pub struct Args {
 
 /// Checks; on success prints what would be read, how busy each line would be, and whether every poll can meet its period.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let checked = profile::check(&args.file, &Search::usual()).map_err(|errors| CliError::Profile(render(&errors)))?;
+    let checked = profile::check(&args.file, &Search::usual()).map_err(|errors| CliError::Profile(Box::new(errors)))?;
     let (def, warnings) = (checked.plant, checked.warnings);
     if warnings.count() > 0 && args.strict {
-        return Err(CliError::Profile(render(&warnings.strictly())));
+        return Err(CliError::Profile(Box::new(warnings.strictly())));
     }
     let (tags, alarms) = (def.tags.len(), def.alarms.len());
     say(&format!("{}: {} is good: {tags} tags, {alarms} alarms", args.file.display(), def.title));
@@ -41,7 +41,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         describe(&def, line.id).iter().for_each(|text| say(text));
     }
     if warnings.count() > 0 {
-        say_error(&render(&warnings));
+        say_problems(&warnings);
     }
     Ok(())
 }

@@ -58,7 +58,7 @@ async fn gone(place: &Found) -> Result<(), CliError> {
 pub fn reload(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let session = client::attach(args.plant.as_deref(), &args.login).await?;
-        session.wish(Wish::Reload).await.map_err(CliError::Profile)?;
+        session.wish(Wish::Reload).await.map_err(CliError::Usage)?;
         say("reloaded");
         Ok(())
     })

@@ -21,7 +21,7 @@ use crate::{
     station::{io as station, teller},
 };
 
-use super::{CliError, demo::simulation_error, log, render, say};
+use super::{CliError, demo::simulation_error, log, say};
 
 /// Arguments of `drill`.
 #[derive(Debug, clap::Args)]
@@ -54,7 +54,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 
 /// Reads a scenario and its plant.
 pub fn load(path: &Path) -> Result<(Scenario, Arc<PlantDef>), CliError> {
-    read::load(path, &Search::usual()).map_err(|errors| CliError::Profile(render(&errors)))
+    read::load(path, &Search::usual()).map_err(|errors| CliError::Profile(Box::new(errors)))
 }
 
 /// The world of a scenario at its start.

@@ -1,11 +1,15 @@
 //! The log: a file, never the screen that the interface draws on.
 
-use std::path::{Path, PathBuf};
+use std::{
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
 
 use tracing_appender::{non_blocking::WorkerGuard, rolling};
 use tracing_subscriber::{EnvFilter, fmt};
 
 use super::{CliError, paths};
+use crate::plant::visible::visible;
 
 /// Days of logs that are kept.
 const DAYS: usize = 7;
@@ -18,7 +22,7 @@ pub fn start(file: Option<&Path>) -> Result<WorkerGuard, CliError> {
         error,
     };
     if file.is_some_and(|file| file.as_os_str() == "-") {
-        let (writer, guard) = tracing_appender::non_blocking(std::io::stderr());
+        let (writer, guard) = tracing_appender::non_blocking(Visible(std::io::stderr()));
         init(writer);
         return Ok(guard);
     }
@@ -47,9 +51,23 @@ pub fn start(file: Option<&Path>) -> Result<WorkerGuard, CliError> {
                 .map_err(|error| failed(&folder, std::io::Error::other(error)))?
         }
     };
-    let (writer, guard) = tracing_appender::non_blocking(writer);
+    let (writer, guard) = tracing_appender::non_blocking(Visible(writer));
     init(writer);
     Ok(guard)
+}
+
+/// Whoever reads the log in a terminal must not be played tricks by what stands in it. A line is written at a time.
+struct Visible<W>(W);
+
+impl<W: Write> Write for Visible<W> {
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        self.0.write_all(visible(&String::from_utf8_lossy(line)).as_bytes())?;
+        Ok(line.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
 }
 
 fn init(writer: tracing_appender::non_blocking::NonBlocking) {

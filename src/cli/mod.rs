@@ -25,7 +25,7 @@ mod tools;
 mod unit;
 
 use std::{
-    io::IsTerminal,
+    io::{IsTerminal, Write},
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -33,13 +33,14 @@ use std::{
 use clap::{Parser, Subcommand};
 
 use crate::{
-    access::io::users::UsersError, attach::io::serve, history::HistoryError, profile, station::io::StartError, ui,
+    access::io::users::UsersError, attach::io::serve, history::HistoryError, plant::visible::visible, profile,
+    station::io::StartError, ui,
 };
 
 const EXIT_CODES: &str = "\
 Exit codes:
   0  done, or left by the operator
-  1  failed while running (the message says why)
+  1  failed while running, or what was looked at is wrong (the message says why)
   2  wrong arguments, errors in a profile, or bytes that cannot be read
   3  the history is in use by another process
   4  no station runs here
@@ -128,7 +129,7 @@ struct StationArgs {
 #[derive(Debug, thiserror::Error)]
 enum CliError {
     #[error("{0}")]
-    Profile(String),
+    Profile(Box<profile::Errors>),
     #[error("{0}")]
     Usage(String),
     #[error(transparent)]
@@ -183,10 +184,20 @@ impl CliError {
 
 /// Parses the arguments of this process, does what they say, and names the exit code.
 pub fn main() -> ExitCode {
-    let args = Args::parse();
+    // Histories, logs and reports are for the user and the group, whatever the shell says.
+    let mask = rustix::process::umask(rustix::fs::Mode::empty());
+    rustix::process::umask(mask | rustix::fs::Mode::from_raw_mode(0o027));
+    let args = Args::try_parse().unwrap_or_else(|error| {
+        if !error.use_stderr() {
+            error.exit();
+        }
+        // What was typed, or comes out of a script, stands in it.
+        let _ = write!(std::io::stderr(), "{}", visible(&error.to_string()));
+        std::process::exit(error.exit_code())
+    });
     let result = match args.command {
         None => match args.plant {
-            Some(plant) => run::with_terminal(&plant, &args.station),
+            Some(plant) => run::with_terminal(&plant, &args.station).map_err(|error| mistyped(&plant, error)),
             None => attach::main(attach::Args { plant: None }),
         },
         Some(Command::Demo(args)) => demo::main(args),
@@ -216,22 +227,45 @@ pub fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            say_error(&error.to_string());
+            match &error {
+                CliError::Profile(errors) => say_problems(errors),
+                _ => say_error(&error.to_string()),
+            }
             ExitCode::from(error.exit_code())
         }
     }
 }
 
+/// Says which command was probably meant where there is no plant of this name.
+fn mistyped(word: &str, error: CliError) -> CliError {
+    let command = <Args as clap::CommandFactory>::command();
+    let names: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+    match (error, profile::diagnostic::nearest(word, &names)) {
+        (CliError::Profile(why), Some(meant)) if !Path::new(word).exists() => {
+            let why = why.to_string();
+            CliError::Usage(format!("{}\ndid you mean the command `sightglass {meant}`?", why.trim_end()))
+        }
+        (error, _) => error,
+    }
+}
+
 /// Prints one line to standard output. A reader that has gone away (`| head`) is no error worth a word.
 fn say(line: &str) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stdout(), "{line}");
+    let _ = writeln!(std::io::stdout(), "{}", visible(line));
 }
 
 /// Prints a message to standard error.
 fn say_error(message: &str) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stderr(), "sightglass: {message}");
+    let _ = writeln!(std::io::stderr(), "sightglass: {}", visible(message));
+}
+
+/// Writes the bytes of a file to standard output: as they are, unless a person looks at them.
+fn put_out(bytes: &[u8]) -> std::io::Result<()> {
+    let mut out = std::io::stdout();
+    if out.is_terminal() {
+        return out.write_all(visible(&String::from_utf8_lossy(bytes)).as_bytes());
+    }
+    out.write_all(bytes)
 }
 
 /// A runtime for the tasks of a station: two workers are plenty, and the terminal stays quick.
@@ -275,7 +309,7 @@ fn load_with_file(
     plant: &str,
     station: &StationArgs,
 ) -> Result<(crate::plant::PlantDef, Option<profile::PlantFile>), CliError> {
-    let errors = |errors: profile::Errors| CliError::Profile(render(&errors));
+    let errors = |errors| CliError::Profile(Box::new(errors));
     let (def, file) = profile::load_with_file(Path::new(plant), &profile::Search::usual()).map_err(errors)?;
     let mut def = std::sync::Arc::unwrap_or_clone(def);
     for port in &station.ports {
@@ -284,10 +318,12 @@ fn load_with_file(
     Ok((def, file))
 }
 
-/// Errors of a profile, in colour where somebody looks and has not refused it.
-fn render(errors: &profile::Errors) -> String {
+/// Prints problems or warnings of a profile, in colour where a person looks and has not refused it.
+fn say_problems(problems: &profile::Errors) {
     let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
-    profile::render(errors, std::io::stderr().is_terminal() && !plain)
+    // The rendering holds nothing raw but its own colours.
+    let text = profile::render(problems, std::io::stderr().is_terminal() && !plain);
+    let _ = writeln!(std::io::stderr(), "sightglass: {text}");
 }
 
 #[cfg(test)]

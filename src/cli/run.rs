@@ -63,7 +63,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
             let ended = tokio::select! {
                 ended = follow(snapshots.clone(), clock, None) => ended.map(|_| None),
                 () = &mut over => Ok(None),
-                next = serving.told(|| checked(&args)) => Ok(next),
+                next = serving.told(checked(&args)) => Ok(next),
             };
             let last = snapshots.borrow().clone();
             drop(snapshots);
@@ -91,11 +91,14 @@ pub fn main(args: Args) -> Result<(), CliError> {
     })
 }
 
-/// The plant file anew, with all that its station would start with: what is refused now changes nothing.
-fn checked(args: &Args) -> Result<Plant, CliError> {
-    let plant = load_with_file(&args.plant, &args.station)?;
-    users::read(&users_beside(&history_file(&plant.0, &args.station))).map_err(CliError::Users)?;
-    Ok(plant)
+/// Loads the plant file again, with all that its station would start with: what is refused now changes nothing.
+fn checked(args: &Args) -> impl Fn() -> Result<Plant, CliError> + Clone + Send + 'static + use<> {
+    let (plant, station) = (args.plant.clone(), args.station.clone());
+    move || {
+        let loaded = load_with_file(&plant, &station)?;
+        users::read(&users_beside(&history_file(&loaded.0, &station))).map_err(CliError::Users)?;
+        Ok(loaded)
+    }
 }
 
 /// Station and terminal in one process; at the station of this plant, if it runs already.
@@ -131,6 +134,11 @@ fn listen(def: &PlantDef) -> Result<serve::Listener, CliError> {
     serve::listen(&path).map_err(CliError::from)
 }
 
+async fn loaded(load: impl FnOnce() -> Result<Plant, CliError> + Send + 'static) -> Result<Plant, CliError> {
+    let loaded = tokio::task::spawn_blocking(load).await;
+    loaded.unwrap_or_else(|_| Err(CliError::Failed("the plant file cannot be read, see the log".to_owned())))
+}
+
 /// A station and its socket.
 struct Serving {
     station: station::Station,
@@ -150,7 +158,7 @@ impl Serving {
 
     /// Waits until a terminal has it stopped (`None`) or the plant file taken up anew (`Some`, already checked). A file
     /// with errors is refused, and everything goes on as it is.
-    async fn told(&mut self, load: impl Fn() -> Result<Plant, CliError>) -> Option<Plant> {
+    async fn told(&mut self, load: impl Fn() -> Result<Plant, CliError> + Clone + Send + 'static) -> Option<Plant> {
         loop {
             match self.station.commands.recv().await {
                 None => return None,
@@ -158,7 +166,8 @@ impl Serving {
                     tokio::time::sleep(ANSWER).await;
                     return None;
                 }
-                Some(Command::Reload(reply)) => match load() {
+                // Beside the station: however long a file takes to read, and even if reading it fails badly, it goes on.
+                Some(Command::Reload(reply)) => match loaded(load.clone()).await {
                     Ok(plant) => {
                         // A terminal that has left needs no answer.
                         let _ = reply.send(Ok(()));

@@ -7,6 +7,7 @@
 //!               values alarms orders
 //! ```
 
+pub mod visible;
 pub mod id;
 pub mod role;
 pub mod sample;

@@ -4,8 +4,14 @@ use std::fmt;
 
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report, Severity};
 
+use crate::plant::visible::{same_length, visible};
+
 /// Most problems that are drawn at once; the rest are counted.
 const SHOWN_MAX: usize = 40;
+/// Most problems that are kept: a file that has more is no plant file, and must not cost memory for each.
+const KEPT_MAX: usize = 1_000;
+/// A longer line is not drawn, only named: it was not written by a person.
+const LINE_BYTES_MAX: usize = 1_000;
 
 /// Everything that is wrong with a plant file and its profiles, or everything that could be better, in the order of the
 /// files.
@@ -26,7 +32,7 @@ pub fn render(errors: &Errors, color: bool) -> String {
         let report = problem.report(&errors.sources, errors.severity);
         // Writing into a string does not fail; should it ever, the plain message still gets out.
         if handler.render_report(&mut out, report.as_ref()).is_err() {
-            out.push_str(&problem.message);
+            out.push_str(&visible(&problem.message));
         }
         out.push('\n');
     }
@@ -68,9 +74,9 @@ impl Errors {
             Some(at) => {
                 let source = &self.sources[at.source];
                 let (line, column) = source.position(at.start);
-                format!("{}:{line}:{column}: {}", source.file, problem.message)
+                visible(&format!("{}:{line}:{column}: {}", source.file, problem.message)).into_owned()
             }
-            None => problem.message.clone(),
+            None => visible(&problem.message).into_owned(),
         })
     }
     /// The same with what was expected and what may have been meant, for places where the text itself is not shown.
@@ -78,7 +84,7 @@ impl Errors {
         self.lines().zip(&self.list).map(|(line, problem)| {
             let more = [problem.label.as_str(), problem.help.as_deref().unwrap_or("")];
             let more: Vec<&str> = more.into_iter().filter(|words| !words.is_empty()).collect();
-            if more.is_empty() { line } else { format!("{line} ({})", more.join("; ")) }
+            if more.is_empty() { line } else { format!("{line} ({})", visible(&more.join("; "))) }
         })
     }
 }
@@ -104,6 +110,13 @@ impl Source {
         let before = self.text.get(..byte).unwrap_or(&self.text);
         let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
         (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+    }
+    /// Length of the longest line of the three around a byte, as they are drawn.
+    fn line_bytes(&self, byte: usize) -> usize {
+        let (before, after) = self.text.split_at_checked(byte).unwrap_or((&self.text, ""));
+        let (mut back, mut ahead) = (before.rsplit('\n').map(str::len), after.split('\n').map(str::len));
+        let own = back.next().unwrap_or(0) + ahead.next().unwrap_or(0);
+        own.max(back.next().unwrap_or(0)).max(ahead.next().unwrap_or(0))
     }
 }
 
@@ -159,17 +172,26 @@ impl Problem {
         }
     }
     fn report(&self, sources: &[Source], severity: Severity) -> Report {
-        let mut diagnostic = MietteDiagnostic::new(self.message.clone()).with_severity(severity);
-        diagnostic.help = self.help.clone();
+        let shown = |text: &str| visible(text).into_owned();
+        let mut diagnostic = MietteDiagnostic::new(shown(&self.message)).with_severity(severity);
+        diagnostic.help = self.help.as_deref().map(shown);
         let Some(at) = self.at else { return Report::new(diagnostic) };
-        let second = self.also.iter().filter(|(span, _)| span.source == at.source);
-        // The primary label is the place that the heading names.
-        let primary = LabeledSpan::new_primary_with_span(Some(self.label.clone()), at.start..at.end);
-        let labels =
-            std::iter::once(primary).chain(second.map(|(span, text)| LabeledSpan::at(span.start..span.end, text)));
         let source = &sources[at.source];
+        if LINE_BYTES_MAX < source.line_bytes(at.start) {
+            let (line, column) = source.position(at.start);
+            diagnostic.message = format!("[{}:{line}:{column}] {}", shown(&source.file), diagnostic.message);
+            return Report::new(diagnostic);
+        }
+        let second = self
+            .also
+            .iter()
+            .filter(|(span, _)| span.source == at.source && source.line_bytes(span.start) <= LINE_BYTES_MAX);
+        // The primary label is the place that the heading names.
+        let primary = LabeledSpan::new_primary_with_span(Some(shown(&self.label)), at.start..at.end);
+        let labels = std::iter::once(primary)
+            .chain(second.map(|(span, text)| LabeledSpan::at(span.start..span.end, shown(text))));
         Report::new(diagnostic.with_labels(labels))
-            .with_source_code(NamedSource::new(source.file.clone(), source.text.clone()))
+            .with_source_code(NamedSource::new(shown(&source.file), same_length(&source.text)))
     }
 }
 
@@ -186,6 +208,10 @@ impl Problems {
     pub fn source(&mut self, file: &str, text: String) -> usize {
         self.sources.push(Source { file: file.to_owned(), text });
         self.sources.len() - 1
+    }
+    /// Bytes of all texts.
+    pub fn bytes(&self) -> usize {
+        self.sources.iter().map(|source| source.text.len()).sum()
     }
     /// The text of a source.
     pub fn text(&self, source: usize) -> &str {
@@ -220,12 +246,14 @@ impl Problems {
 }
 
 fn push(list: &mut Vec<Problem>, at: Span, message: String) -> &mut Problem {
+    // Beyond the limit the last one gives up its place.
+    list.truncate(KEPT_MAX - 1);
     list.push(Problem { at: Some(at), message, label: String::new(), also: None, help: None });
     list.last_mut().expect("it was pushed one line above")
 }
 
 /// The known word that was probably meant: at most one edit in three letters away.
-fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     let lower = word.to_lowercase();
     let distance = |candidate: &str| strsim::damerau_levenshtein(&lower, &candidate.to_lowercase());
     let allowed = (word.chars().count() / 3).max(1);

@@ -10,7 +10,7 @@ use super::{
     guard, line, lint,
     names::{Defs, Names, Unique, check_name},
     picture, program, reader,
-    reader::{At, text},
+    reader::{At, Node, Raw, text},
     report,
     schema::{DeviceTable, PlantFile, ProfileFile},
     sets,
@@ -40,7 +40,8 @@ pub(super) struct Library<'a> {
 /// Builds the plant called `name` and tells what could be better in its texts, or tells everything that is wrong with them.
 pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<(PlantDef, Errors), Errors> {
     let mut problems = Problems::default();
-    let built = reader::parse(&plant.file, &plant.bytes, &mut problems).map(|raw| {
+    let raw = reader::parse(&plant.file, &plant.bytes, &mut problems);
+    let built = raw.filter(|raw| is_of_size(raw, &mut problems)).and_then(|raw| {
         let file = PlantFile::of(&[raw], &mut problems);
         assemble(name, &file, library, &mut problems)
     });
@@ -51,9 +52,22 @@ pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<(Plan
     }
 }
 
-fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Problems) -> PlantDef {
+/// Looks how much a plant file asks for, before anything is made of it.
+fn is_of_size(raw: &Raw, problems: &mut Problems) -> bool {
+    for (key, most) in MOST {
+        let Some((_, At { value: Node::Array(rows), .. })) = raw.table.get(key) else { continue };
+        if let Some(first) = rows.get(most) {
+            let message = format!("{} times [[{key}]] is too much", rows.len());
+            problems.add(first.at, message).label(format!("expected at most {most}"));
+            return false;
+        }
+    }
+    true
+}
+
+fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Problems) -> Option<PlantDef> {
     let lines = line::lines(&file.lines, problems);
-    let Devices { devices, mut tags, names, classes } = devices(file, &lines, library, problems);
+    let Devices { devices, mut tags, names, classes } = devices(file, &lines, library, problems)?;
     let defs = Defs { names: &names, lines: &lines, devices: &devices, tags: &tags };
     let alarms = alarm::alarms(&file.alarms, &defs, problems);
     lint::lint(&file.alarms, problems);
@@ -66,7 +80,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, problems);
     let classes = class::classes(&tags, &alarms, &classes);
     tags.iter_mut().zip(classes).for_each(|(tag, class)| tag.class = class);
-    PlantDef {
+    Some(PlantDef {
         name: name.to_owned(),
         title: text(&file.title),
         time_zone: time_zone(&file.time_zone, problems),
@@ -82,7 +96,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         simulation: file.simulation.as_ref().map(|simulation| simulation.value.clone()),
         devices,
         tags,
-    }
+    })
 }
 
 fn time_zone(name: &Option<At<String>>, problems: &mut Problems) -> TimeZone {
@@ -113,7 +127,8 @@ struct Devices {
     classes: Vec<Option<Class>>,
 }
 
-fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mut Problems) -> Devices {
+/// `None` where they have too many tags together.
+fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mut Problems) -> Option<Devices> {
     check_devices(file, lines, problems);
     let mut names = Names::default();
     let known = known_devices(file, library, &mut names, problems);
@@ -122,6 +137,12 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     let mut rows = Vec::new();
     for device in &known {
         let of_device = device::rows(device.table, &device.profile, problems);
+        if TAGS_MAX < count + of_device.len() {
+            let at = device.table.name.as_ref().map_or(file.at, |name| name.at);
+            let message = format!("too many tags: {} has number {}", device.name, TAGS_MAX + 1);
+            problems.add(at, message).label(format!("expected at most {TAGS_MAX} in all"));
+            return None;
+        }
         for row in &of_device {
             // A row without a name is reported when it is read.
             if !row.short.is_empty() {
@@ -130,10 +151,6 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
             count += 1;
         }
         rows.push(of_device);
-    }
-    if count > TAGS_MAX {
-        problems.add(file.at, format!("{count} tags are too many")).label(format!("at most {TAGS_MAX}"));
-        return Devices { devices: Vec::new(), tags: Vec::new(), names, classes: Vec::new() };
     }
     let (mut devices, mut defined) = (Vec::new(), Vec::new());
     for (device, rows) in known.iter().zip(rows) {
@@ -158,7 +175,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         def.program = program.and_then(|table| program::program(table, device.name, &names, &tags, problems));
     }
     sets::mark(&devices, &mut tags, &written, problems);
-    Devices { devices, tags, names, classes }
+    Some(Devices { devices, tags, names, classes })
 }
 
 /// Unit 0 of a serial line is everybody: it can be written, and nobody answers a read.
@@ -241,8 +258,20 @@ fn define_device<'a>(
     (def, around)
 }
 
-/// Most tags of a plant; an id has 16 bits, and a terminal plant is far from it.
+/// Most tags of a plant, those of its profiles with them; an id has 16 bits, and a terminal plant is far from it.
 const TAGS_MAX: usize = 20_000;
+/// Most tables of each kind in a plant file.
+const MOST: [(&str, usize); 7] = [
+    ("line", 64),
+    ("device", 2_000),
+    ("alarm", 10_000),
+    ("interlock", 10_000),
+    ("expect", 10_000),
+    ("trend", 1_000),
+    ("shift", 100),
+];
+/// Most bytes of a plant file and its profiles together.
+const BYTES_MAX: usize = 16 << 20;
 
 /// A poll period that a line can keep and an operator can wait for.
 fn period(written: Option<At<Duration>>, default_s: u64, problems: &mut Problems) -> Duration {
@@ -300,6 +329,11 @@ fn profile(
         return known.clone();
     }
     let read = match (library.find)(&name.value) {
+        Ok(Some(text)) if BYTES_MAX < problems.bytes() + text.bytes.len() => {
+            let message = format!("with the profile `{}` there is too much to read", name.value);
+            problems.add(name.at, message).label("expected at most 16 MiB in all files");
+            None
+        }
         Ok(Some(text)) => reader::parse(&text.file, &text.bytes, problems).map(|raw| {
             let file = ProfileFile::of(&[raw], problems);
             if let Some(base) = file.address_base.filter(|base| base.value != 0) {

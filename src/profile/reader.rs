@@ -12,6 +12,10 @@ use toml::{
 };
 
 use super::diagnostic::{Problems, Span};
+use crate::plant::visible::first_hidden;
+
+/// Most unknown keys of one table that are told.
+const UNKNOWN_MAX: usize = 40;
 
 /// A value and where it stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +66,9 @@ pub(crate) fn parse(file: &str, bytes: &[u8], problems: &mut Problems) -> Option
         return None;
     }
     let text = problems.text(source).to_owned();
+    if hidden(&text, source, problems) {
+        return None;
+    }
     let (document, errors) = DeTable::parse_recoverable(&text);
     let table = table_of(document.get_ref(), source);
     for error in &errors {
@@ -75,8 +82,50 @@ pub(crate) fn parse(file: &str, bytes: &[u8], problems: &mut Problems) -> Option
             .add(Span { source, start: 0, end: 0 }, format!("{file} is empty"))
             .help("see `sightglass profiles tank`");
     }
+    let before = problems.count();
+    check_table(&table, problems);
     let at = Span { source, start: 0, end: 0 };
-    (errors.is_empty() && !table.is_empty()).then_some(Raw { at, table })
+    (errors.is_empty() && !table.is_empty() && problems.count() == before).then_some(Raw { at, table })
+}
+
+/// Reports the first character that no editor shows, also in a comment: what one reads is not what is there.
+fn hidden(text: &str, source: usize, problems: &mut Problems) -> bool {
+    // Editors of some systems put a byte order mark at the beginning.
+    let body = text.strip_prefix('\u{FEFF}').unwrap_or(text);
+    let found = first_hidden(body);
+    if let Some((at, letter)) = found {
+        let start = text.len() - body.len() + at;
+        tell_hidden(letter, Span { source, start, end: start + letter.len_utf8() }, problems);
+    }
+    found.is_some()
+}
+
+/// The same for what TOML writes as `\u001b`, in names and texts.
+fn check_table(table: &Table, problems: &mut Problems) {
+    for (key, (at, value)) in table {
+        check_text(key, *at, problems);
+        check_node(value, problems);
+    }
+}
+
+fn check_node(node: &At<Node>, problems: &mut Problems) {
+    match &node.value {
+        Node::Text(text) => check_text(text, node.at, problems),
+        Node::Array(items) => items.iter().for_each(|item| check_node(item, problems)),
+        Node::Table(table) => check_table(table, problems),
+        Node::Whole(_) | Node::Number(_) | Node::Flag(_) | Node::Time(_) => {}
+    }
+}
+
+fn check_text(text: &str, at: Span, problems: &mut Problems) {
+    if let Some((_, letter)) = first_hidden(text) {
+        tell_hidden(letter, at, problems);
+    }
+}
+
+fn tell_hidden(letter: char, at: Span, problems: &mut Problems) {
+    let message = format!("the character U+{:04X} is not shown, or turns the direction of writing", u32::from(letter));
+    problems.add(at, message).label("expected only characters that are seen");
 }
 
 fn table_of(table: &DeTable<'_>, source: usize) -> Table {
@@ -117,7 +166,8 @@ impl<'a> Fields<'a> {
     /// Starts reading; reports every key that is not known.
     pub fn new(layers: &'a [Raw], what: &'static str, known: &[&'static str], problems: &mut Problems) -> Self {
         for layer in layers {
-            for (word, (at, _)) in layer.table.iter().filter(|(word, _)| !known.contains(&word.as_str())) {
+            let unknown = layer.table.iter().filter(|(word, _)| !known.contains(&word.as_str()));
+            for (word, (at, _)) in unknown.take(UNKNOWN_MAX) {
                 problems
                     .add(*at, format!("unknown key `{word}` in {what}"))
                     .label("not known here")

@@ -16,6 +16,7 @@ use crate::plant::{
     def::PlantDef,
     parameter_set::{ParameterSet, SetValue},
     tag::TagDef,
+    visible::acts,
 };
 
 table!(
@@ -207,7 +208,7 @@ fn row(value: &SetValue, tag: Option<&TagDef>, unit: &str) -> String {
     let key = if value.tag.chars().all(bare) && !value.tag.is_empty() { value.tag.clone() } else { quoted(&value.tag) };
     let words = tag.map_or("", |tag| tag.label.as_str());
     let note = [unit, words].into_iter().filter(|words| !words.is_empty()).collect::<Vec<_>>().join(", ");
-    let note: String = note.chars().filter(|c| !c.is_control()).collect();
+    let note: String = note.chars().filter(|c| !acts(*c)).collect();
     format!("{:<24}# {note}", format!("{key} = {written}")).trim_end_matches("# ").trim_end().to_owned() + "\n"
 }
 

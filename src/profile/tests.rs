@@ -695,3 +695,66 @@ proptest! {
         }
     }
 }
+
+/// What one reads in an editor or on a screen is what the file says.
+#[test]
+fn characters_that_hide_or_move_the_cursor_are_refused_where_they_stand() {
+    let named = "title = \"Small\"";
+    for (to, expect) in [
+        ("title = \"Sm\\u001b[2Jall\"", ["[small.toml:1:9]", "U+001B"]),
+        ("title = \"Sm\\u202Eall\"", ["[small.toml:1:9]", "U+202E"]),
+        ("title = \"Sm\u{202E}all\"", ["[small.toml:1:12]", "U+202E"]),
+        ("title = \"Small\" # \u{2066}a comment", ["[small.toml:1:19]", "U+2066"]),
+    ] {
+        let text = load(PLANT.replace(named, to).as_bytes(), METER, PLC).expect_err("it is refused").to_string();
+        for piece in expect {
+            assert!(text.contains(piece), "no `{piece}` in\n{text}");
+        }
+        assert!(!text.contains(['\u{1b}', '\u{202E}', '\u{2066}']), "{text:?}");
+    }
+    check("priority = \"high\"", "priority = \"high\"\n\"a\\u0007\" = 1", &["[small.toml:", "U+0007"]);
+    check("text = \"hot\"", "text = \"hot\\u200f\"", &["[small.toml:29:8]", "U+200F"]);
+    let meter = METER.replace("ACME", "AC\\u009BME");
+    let text = load(PLANT.as_bytes(), &meter, PLC).expect_err("a profile too").to_string();
+    assert!(text.contains("U+009B") && text.contains("[meter.toml:1:10]"), "{text}");
+}
+
+#[test]
+fn a_plant_that_is_too_large_is_refused_before_it_is_made() {
+    let large = |tables: &str| {
+        let text = load(format!("{PLANT}\n{tables}").as_bytes(), METER, PLC).expect_err("it is refused");
+        assert_eq!(text.count(), 1, "one word about the size, none about what is in it");
+        text.full_lines().next().unwrap()
+    };
+    let device = |n: usize| format!("[[device]]\nname = \"M{n}\"\nprofile = \"meter\"\nline = \"L1\"\nunit = 3\n");
+    let told = large(&(0..20_000).map(device).collect::<String>());
+    assert!(told.starts_with("small.toml:") && told.contains("20002 times [[device]]"), "{told}");
+    assert!(told.ends_with("(expected at most 2000)"), "{told}");
+    let told = large(&"[[alarm]]\ntag = \"D1.T\"\n".repeat(10_000));
+    assert!(told.contains("10001 times [[alarm]]"), "{told}");
+    let told = large(&"[[line]]\nname = \"L\"\n".repeat(70));
+    assert!(told.contains("71 times [[line]]"), "{told}");
+
+    // Few devices of a profile with many tags.
+    let tag = |n: usize| format!("[[tag]]\nname = \"R{n}\"\ntable = \"holding\"\naddress = {n}\ntype = \"uint16\"\n");
+    let many = format!("{METER}\n{}", (2_000..10_000).map(tag).collect::<String>());
+    let plant = format!("{PLANT}\n{}", (0..2).map(device).collect::<String>());
+    let text = load(plant.as_bytes(), &many, PLC).expect_err("it is refused").to_string();
+    assert!(text.contains("too many tags: M1 has number 20001") && text.contains("at most 20000 in all"), "{text}");
+}
+
+#[test]
+fn a_line_without_end_and_problems_without_end_are_told_in_bounded_words() {
+    let long = format!("{PLANT}\n[x]\na = [{}]\n", "[],".repeat(100_000));
+    let keys: String = (0..50_000).map(|n| format!("k{n} = 1\n")).collect();
+    let devices = "[[device]]\nname = \"\"\n".repeat(1_900);
+    for text in [long, format!("{keys}\n{PLANT}"), format!("{PLANT}\n{devices}")] {
+        let told = load(text.as_bytes(), METER, PLC).expect_err("it is refused");
+        assert!(
+            told.count() <= 1_000 && told.to_string().len() < 100_000,
+            "{} {}",
+            told.count(),
+            told.to_string().len()
+        );
+    }
+}

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use ratatui::buffer::Buffer;
 
 use super::theme::{Glyphs, Theme};
+use crate::plant::visible::acts;
 
 /// Rewrites SARA AM (U+0E33) as NIKHAHIT + SARA AA: it looks the same, and every cluster becomes one cell wide.
 /// Terminals put SARA AM in a cell of its own, and the diff of two frames then leaves it behind on the screen.
@@ -29,9 +30,13 @@ pub fn thai_cells(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Makes a drawn frame safe for the terminal: no SARA AM, and only characters of the glyph set.
+/// Makes a drawn frame safe for the terminal: nothing that moves the cursor or turns the direction of writing, no SARA AM,
+/// and only characters of the glyph set.
 pub fn finish(buffer: &mut Buffer, theme: &Theme) {
     for cell in &mut buffer.content {
+        if cell.symbol().chars().any(acts) {
+            cell.set_symbol("?");
+        }
         if cell.symbol().is_ascii() {
             continue;
         }

@@ -15,6 +15,8 @@
 //! | `people` | wrong passwords, lock-out, idle lock, second persons, two operators at once |
 //! | `kills` | stations killed during writes and logins: what somebody was told is in the book, which is whole |
 //! | `tampering` | the book changed by hand: what `sightglass audit verify` says |
+//! | `hostile` | text of others, by every command: nothing of it acts on a terminal |
+//! | `tools` | the tools for a line against peers that echo, chatter and lie |
 //! | `endings` | every way in which a terminal or its station can end, in a pseudo-terminal |
 //! | `settings` | settings of a line: tried out, saved into the plant file |
 //! | `durability` | killed, unplugged, locked, damaged |
@@ -31,6 +33,7 @@ mod devices;
 mod durability;
 mod endings;
 mod guarded;
+mod hostile;
 mod kills;
 mod masters;
 mod peers;
@@ -42,3 +45,4 @@ mod shift;
 mod support;
 mod tampering;
 mod terminal;
+mod tools;

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     access::{Wish, user},
-    plant::record::ActionRecord,
+    plant::{record::ActionRecord, visible::acts},
 };
 
 /// Most characters of what somebody may put on record in his own words.
@@ -129,7 +129,7 @@ pub(super) fn deed(seat: &Seat, action: &str, target: &str, outcome: &str, at: T
     Effect::Record(record(seat, action, target, outcome, at))
 }
 
-/// Words of a terminal as they may stand on record: not endless, and nothing that moves a cursor.
+/// Words of a terminal as they may stand on record: not endless, and nothing that moves a cursor or hides in the text.
 pub(super) fn clean(words: &str) -> String {
-    words.chars().take(WORDS_MAX).map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
+    words.chars().take(WORDS_MAX).map(|letter| if acts(letter) { ' ' } else { letter }).collect()
 }
