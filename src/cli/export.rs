@@ -2,7 +2,6 @@
 
 use std::{
     collections::{BTreeSet, HashMap},
-    io::Write,
     path::PathBuf,
     sync::Arc,
     time::Duration,
@@ -14,6 +13,7 @@ use crate::{
     attach::check::{BUCKETS_MAX, COLUMNS_MAX, SERIES_MAX},
     history::{Answer, HistoryError, Question},
     plant::{PlantDef, def::TagId},
+    profile::io::atomic::write_atomic,
     report::{
         export,
         figures::{self, Label},
@@ -21,7 +21,7 @@ use crate::{
     },
 };
 
-use super::{CliError, StationArgs, client, in_runtime, load, report::dialect, say, source::Source, span};
+use super::{CliError, StationArgs, client, in_runtime, load, put_out, report::dialect, say, source::Source, span};
 
 /// Rows of one file.
 const ROWS_MAX: u128 = 2_000_000;
@@ -95,9 +95,9 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     source.exported(&args.out.display().to_string(), &bytes).await?;
     let failed = |error| CliError::Io { what: format!("cannot write {}", args.out.display()), error };
     if args.out.as_os_str() == "-" {
-        return std::io::stdout().write_all(&bytes).map_err(failed);
+        return put_out(&bytes).map_err(failed);
     }
-    std::fs::write(&args.out, bytes).map_err(failed)?;
+    write_atomic(&args.out, &bytes, 0o640).map_err(failed)?;
     say(&args.out.display().to_string());
     Ok(())
 }

@@ -1,14 +1,15 @@
 //! `sightglass report`: the report of a shift or period from the history as CSV, through the station while it runs.
 
-use std::{io::Write, path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc};
 
 use crate::{
     history::{Answer, HistoryError, Question},
     plant::{PlantDef, def::CsvDialect},
+    profile::io::atomic::write_atomic,
     report::csv,
 };
 
-use super::{CliError, StationArgs, client, in_runtime, load, say, source::Source};
+use super::{CliError, StationArgs, client, in_runtime, load, put_out, say, source::Source};
 
 /// Arguments of `report`.
 #[derive(Debug, clap::Args)]
@@ -64,12 +65,12 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     source.exported(&path.display().to_string(), &bytes).await?;
     let failed = |error| CliError::Io { what: format!("cannot write {}", path.display()), error };
     if path.as_os_str() == "-" {
-        return std::io::stdout().write_all(&bytes).map_err(failed);
+        return put_out(&bytes).map_err(failed);
     }
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(failed)?;
     }
-    std::fs::write(&path, &bytes).map_err(failed)?;
+    write_atomic(&path, &bytes, 0o640).map_err(failed)?;
     say(&path.display().to_string());
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Finds and reads plant files and device profiles: beside the plant file, in configuration folders, or in the binary.
 
+pub mod atomic;
 mod save;
 
 use std::{

@@ -19,7 +19,7 @@ pub(crate) mod diagnostic;
 mod edit;
 mod expr;
 mod guard;
-mod io;
+pub(crate) mod io;
 pub mod line;
 mod lint;
 pub(crate) mod names;

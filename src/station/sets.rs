@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File},
-    io::{Read, Write},
+    io::Read,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -13,7 +13,7 @@ use crate::{
         command::OrderId,
         parameter_set::{ParameterSet, StoredSet, check_name},
     },
-    profile::{read_set, text_of_set},
+    profile::{io::atomic, read_set, text_of_set},
 };
 
 /// Most sets that are read; an operator can choose among some dozens at most.
@@ -44,9 +44,9 @@ fn write(folder: &Path, def: &PlantDef, set: &ParameterSet, replace: bool) -> Re
     let path = folder.join(format!("{}.toml", set.name));
     let failed = |error: std::io::Error| format!("{} cannot be written: {error}", path.display());
     fs::create_dir_all(folder).map_err(failed)?;
-    let beside = folder.join(format!(".{}.new-{}", set.name, std::process::id()));
+    let beside = atomic::beside(&path);
     let text = text_of_set(set, def);
-    let written = write_whole(&beside, text.as_bytes()).and_then(|()| {
+    let written = atomic::write_beside(&beside, text.as_bytes(), 0o640).and_then(|_| {
         if replace {
             return fs::rename(&beside, &path);
         }
@@ -61,16 +61,6 @@ fn write(folder: &Path, def: &PlantDef, set: &ParameterSet, replace: bool) -> Re
         }
         written => written.map_err(failed),
     }
-}
-
-fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
-        Ok(()) | Err(_) => {}
-    }
-    let mut file = File::create_new(path)?;
-    file.write_all(bytes)?;
-    file.sync_all()
 }
 
 /// Every set of the folder, by name; a file that is no set is told with what is wrong with it, and so is a folder that

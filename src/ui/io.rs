@@ -23,6 +23,7 @@ use super::{AskId, Effect, Model, Msg, tabs::Tab, theme::Theme, update, view};
 use crate::{
     access::Wish,
     history::{HistoryError, Question, io::Query},
+    profile::io::atomic::write_atomic,
     sim::{drill, io::Port},
     station::{Request, Session},
 };
@@ -242,14 +243,11 @@ async fn drilled(port: &mut Option<Port>) -> Option<Arc<drill::Status>> {
     Some(status.borrow_and_update().clone())
 }
 
-/// Writes beside and renames, so that a half-written report never has the name of a whole one.
+/// A half-written report never has the name of a whole one.
 fn save(path: &Path, bytes: &[u8]) -> io::Result<PathBuf> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    std::fs::write(&part, bytes)?;
-    std::fs::rename(&part, path)?;
+    write_atomic(path, bytes, 0o640)?;
     std::path::absolute(path)
 }

@@ -1,11 +1,6 @@
 //! The file of users, beside the history: written whole or not at all, and never taken for empty when it is damaged.
 
-use std::{
-    fs::{self, File, OpenOptions},
-    io::{Read, Write},
-    os::unix::fs::OpenOptionsExt,
-    path::{Path, PathBuf},
-};
+use std::{fs::File, io::Read, path::Path};
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -16,6 +11,7 @@ use crate::{
         user::{self, User, Users},
     },
     plant::role::Role,
+    profile::io::atomic::write_atomic,
 };
 
 /// Some hundred users are some ten kilobytes; whatever is larger than this is something else.
@@ -76,28 +72,7 @@ pub fn read(path: &Path) -> Result<Users, UsersError> {
 /// Blocks while the disk works.
 pub fn write(path: &Path, users: &Users) -> Result<(), String> {
     let failed = |error: std::io::Error| format!("{} cannot be written: {error}", path.display());
-    let mut beside = path.to_owned().into_os_string();
-    beside.push(format!(".new-{}", std::process::id()));
-    let beside = PathBuf::from(beside);
-    let written = write_whole(&beside, text(users).as_bytes()).and_then(|()| fs::rename(&beside, path));
-    if written.is_err() {
-        // What was begun is of no use to anybody.
-        let _ = fs::remove_file(&beside);
-    }
-    written.map_err(failed)?;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    File::open(folder).and_then(|folder| folder.sync_all()).map_err(failed)
-}
-
-fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    // Never through a link that somebody has put there; what an earlier try has left is of no use.
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
-        Ok(()) | Err(_) => {}
-    }
-    let mut file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path)?;
-    file.write_all(bytes)?;
-    file.sync_all()
+    write_atomic(path, text(users).as_bytes(), 0o600).map_err(failed)
 }
 
 #[derive(Deserialize)]
@@ -169,7 +144,7 @@ fn text(users: &Users) -> String {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
-    use std::{os::unix::fs::PermissionsExt, sync::Arc};
+    use std::{fs, os::unix::fs::PermissionsExt, sync::Arc};
 
     use super::*;
     use crate::access::user::Change;

@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::read;
+use super::{atomic, read};
 use crate::{plant::def::LineDef, profile::edit};
 
 /// The plant file as it was when the plant was loaded or last saved.
@@ -57,9 +57,7 @@ impl PlantFile {
         if metadata.permissions().readonly() {
             return Err(std::io::Error::new(std::io::ErrorKind::PermissionDenied, "it is read-only"));
         }
-        let mut beside = self.path.clone().into_os_string();
-        beside.push(format!(".new-{}", std::process::id()));
-        let beside = PathBuf::from(beside);
+        let beside = atomic::beside(&self.path);
         let written = match write_whole(&beside, bytes, &metadata) {
             // Only root may give a file away: that of another owner is written in place. Should that fail half-way, the
             // copy beside it stays.
@@ -73,9 +71,8 @@ impl PlantFile {
         }
         written?;
         // The new file is there; only a loss of power right now could still bring the old one back.
-        let folder = self.path.parent().unwrap_or(Path::new("/"));
-        if let Err(error) = File::open(folder).and_then(|folder| folder.sync_all()) {
-            tracing::warn!(%error, folder = %folder.display(), "the folder could not be synced");
+        if let Err(error) = atomic::sync_folder(&self.path) {
+            tracing::warn!(%error, file = %self.path.display(), "its folder could not be synced");
         }
         Ok(())
     }

@@ -1,0 +1,108 @@
+//! Files that are whole or not there: written beside, synced, then renamed.
+
+use std::{
+    ffi::OsString,
+    fs::{self, File, OpenOptions},
+    io::{self, Write},
+    os::unix::fs::OpenOptionsExt,
+    path::{Path, PathBuf},
+};
+
+use rustix::{io::Errno, process};
+
+/// Writes a file with these rights: a loss of power now leaves the old one or the new one. Blocks while the disk works.
+///
+/// A link stays a link, and what is no file, such as `/dev/null`, is written as it is.
+pub fn write_atomic(path: &Path, bytes: &[u8], mode: u32) -> io::Result<()> {
+    let path = &fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+        return fs::write(path, bytes);
+    }
+    let beside = beside(path);
+    let written = write_beside(&beside, bytes, mode).and_then(|_| fs::rename(&beside, path));
+    if written.is_err() {
+        // What was begun is of no use to anybody.
+        let _ = fs::remove_file(&beside);
+    }
+    written?;
+    sync_folder(path)
+}
+
+/// Where a file is written before it takes the place of `path`. What killed processes have left there is removed.
+pub fn beside(path: &Path) -> PathBuf {
+    let mut start = path.file_name().map(OsString::from).unwrap_or_default();
+    start.push(".new-");
+    let (start, own) = (start.to_string_lossy().into_owned(), std::process::id());
+    for entry in fs::read_dir(folder(path)).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let process = name.to_str().and_then(|name| name.strip_prefix(&start)?.parse::<i32>().ok());
+        if process.is_some_and(|process| process != own as i32 && is_gone(process)) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+    path.with_file_name(format!("{start}{own}"))
+}
+
+fn is_gone(process: i32) -> bool {
+    let process = process::Pid::from_raw(process.max(0));
+    process.is_none_or(|process| process::test_kill_process(process) == Err(Errno::SRCH))
+}
+
+/// Writes and syncs a new file. Never through a link that somebody has put there.
+pub fn write_beside(path: &Path, bytes: &[u8], mode: u32) -> io::Result<File> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        Ok(()) | Err(_) => {}
+    }
+    let mut file = OpenOptions::new().write(true).create_new(true).mode(mode).open(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    Ok(file)
+}
+
+/// Makes the rename in its folder lasting.
+pub fn sync_folder(path: &Path) -> io::Result<()> {
+    File::open(folder(path))?.sync_all()
+}
+
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::os::unix::fs::PermissionsExt;
+
+    use super::*;
+
+    #[test]
+    fn a_file_is_replaced_whole_and_what_killed_processes_left_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("shift.csv");
+        let names = || {
+            let names = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+            let mut names: Vec<String> = names.map(|name| name.into_string().unwrap()).collect();
+            names.sort();
+            names
+        };
+        // No process has the highest number there is; the first one lives as long as the machine.
+        for name in ["shift.csv.new-2147483647", "shift.csv.new-1", "shift.csv.new-x", "other.csv.new-2147483647"] {
+            fs::write(folder.path().join(name), "left").unwrap();
+        }
+        for text in ["one", "another"] {
+            write_atomic(&path, text.as_bytes(), 0o640).unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), text);
+        }
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o640);
+        assert_eq!(names(), ["other.csv.new-2147483647", "shift.csv", "shift.csv.new-1", "shift.csv.new-x"]);
+        std::os::unix::fs::symlink(&path, folder.path().join("link")).unwrap();
+        write_atomic(&folder.path().join("link"), b"by the link", 0o640).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "by the link");
+        write_atomic(Path::new("/dev/null"), b"nothing", 0o640).unwrap();
+        assert!(!fs::metadata("/dev/null").unwrap().is_file(), "a device stays one");
+        fs::create_dir(folder.path().join("taken")).unwrap();
+        write_atomic(&folder.path().join("taken"), b"x", 0o640).unwrap_err();
+        assert!(names().iter().all(|name| !name.starts_with("taken.new-")), "nothing is left of a try in vain");
+    }
+}
