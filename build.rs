@@ -1,10 +1,12 @@
-//! Makes the prebuilt DuckDB library present before the link, and lets the binary find it when it starts.
+//! Makes the prebuilt DuckDB library present before the link, checks it, and lets the binary find it when it starts.
 //!
-//! Order of sources: what `DUCKDB_LIB_DIR` already holds; the npm package that ships the library; DuckDB's own release.
+//! It is what `DUCKDB_LIB_DIR` already holds, or comes from the npm package that ships it. Either way its SHA-256 must be the
+//! one that is known here, or the one that `DUCKDB_LIB_SHA256` states.
 //! With the feature `bundled` DuckDB is compiled from source and nothing of this happens.
 
 use std::{
     env, fs,
+    os::unix::fs::symlink,
     path::{Path, PathBuf},
     process::Command,
 };
@@ -14,36 +16,32 @@ use sha2::{Digest, Sha256};
 const VERSION: &str = "1.5.6";
 const LIBRARY: &str = "libduckdb.so";
 
-/// What is fetched for one processor.
-struct Source {
-    npm: &'static str,
-    release: &'static str,
-    /// SHA-256 of the library in the npm package, where it is known.
-    sha256: Option<&'static str>,
-}
+/// The npm package with the library for one processor, and the SHA-256 of the library in it.
+const NPM_X64: (&str, &str) =
+    ("@duckdb/node-bindings-linux-x64", "3f4962cdd266eab2b479a5b5a4a6d063d279b2954ae814ed00385d553b747633");
 
 fn main() {
     println!("cargo:rerun-if-env-changed=DUCKDB_LIB_DIR");
+    println!("cargo:rerun-if-env-changed=DUCKDB_LIB_SHA256");
     if env::var_os("CARGO_FEATURE_BUNDLED").is_some() {
         return;
     }
     let folder = lib_dir();
     let library = folder.join(LIBRARY);
     println!("cargo:rerun-if-changed={}", library.display());
-    // Beside the binary (an installed program), in the cache as seen from target/release and target/release/deps,
-    // and where the library was at build time (a target folder elsewhere).
-    for path in ["$ORIGIN", "$ORIGIN/../lib", "$ORIGIN/../../vendor/duckdb", "$ORIGIN/../../../vendor/duckdb"] {
+    // Beside the binary or in the folder `lib` next to its own (an installed program); beside target/release/deps.
+    // No path of this machine: whoever could write there would run code in an installed program.
+    for path in ["$ORIGIN", "$ORIGIN/../lib", "$ORIGIN/.."] {
         println!("cargo:rustc-link-arg=-Wl,-rpath,{path}");
     }
-    println!("cargo:rustc-link-arg=-Wl,-rpath,{}", folder.display());
-    if !library.exists()
-        && let Err(why) = fetch(&folder)
-    {
+    let there = if library.exists() { check(&library) } else { fetch(&folder) };
+    if let Err(why) = there.and_then(|()| link_beside_binary(&library)) {
         panic!(
-            "\n\nDuckDB {VERSION} is not in {} and could not be fetched:\n{why}\n\n\
+            "\n\nDuckDB {VERSION} in {}:\n  {why}\n\n\
              Do one of these:\n\
-             - install npm (Debian: apt-get install npm) or curl and unzip, with a network, and build again;\n\
-             - put {LIBRARY} of DuckDB {VERSION} into that folder, or point DUCKDB_LIB_DIR at a folder that has it;\n\
+             - on x86-64: remove what is there, install npm (Debian: apt-get install npm), with a network, and build again;\n\
+             - put {LIBRARY} of DuckDB {VERSION} into that folder, or point DUCKDB_LIB_DIR at a folder that has it, and\n  \
+               state its SHA-256, from a source that you trust, in DUCKDB_LIB_SHA256;\n\
              - build with `--features bundled`, which compiles DuckDB from source (an hour on two cores).\n",
             folder.display()
         );
@@ -57,37 +55,36 @@ fn lib_dir() -> PathBuf {
     }
 }
 
-fn source() -> Result<Source, String> {
+/// The package of the processor that is built for, if its library is known.
+fn package() -> Result<(&'static str, &'static str), String> {
     match (env::var("CARGO_CFG_TARGET_OS").as_deref(), env::var("CARGO_CFG_TARGET_ARCH").as_deref()) {
-        (Ok("linux"), Ok("x86_64")) => Ok(Source {
-            npm: "@duckdb/node-bindings-linux-x64",
-            release: "libduckdb-linux-amd64.zip",
-            sha256: Some("3f4962cdd266eab2b479a5b5a4a6d063d279b2954ae814ed00385d553b747633"),
-        }),
-        (Ok("linux"), Ok("aarch64")) => {
-            Ok(Source { npm: "@duckdb/node-bindings-linux-arm64", release: "libduckdb-linux-arm64.zip", sha256: None })
-        }
-        (os, arch) => Err(format!("no prebuilt library is known for {os:?} on {arch:?}")),
+        (Ok("linux"), Ok("x86_64")) => Ok(NPM_X64),
+        (os, arch) => Err(format!(
+            "no checksum of the library is known for {} on {}",
+            os.unwrap_or_default(),
+            arch.unwrap_or_default()
+        )),
     }
 }
 
-fn fetch(folder: &Path) -> Result<(), String> {
-    let source = source()?;
-    let work = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets it")).join("duckdb-fetch");
-    let _ = fs::remove_dir_all(&work);
-    fs::create_dir_all(&work).and_then(|()| fs::create_dir_all(folder)).map_err(|error| error.to_string())?;
-    let fetched = from_npm(&source, &work).or_else(|npm| {
-        from_release(&source, &work).map_err(|release| format!("  by npm: {npm}\n  by curl: {release}"))
-    })?;
-    // Rename within the folder, so that a build that is killed never leaves half a library behind.
-    let part = folder.join(format!("{LIBRARY}.part"));
-    fs::copy(&fetched, &part).and_then(|_| fs::rename(&part, folder.join(LIBRARY))).map_err(|error| error.to_string())
+/// Nothing is linked that is not what was meant.
+fn check(library: &Path) -> Result<(), String> {
+    let expected = match env::var("DUCKDB_LIB_SHA256") {
+        Ok(stated) => stated.to_ascii_lowercase(),
+        Err(_) => package()?.1.to_owned(),
+    };
+    let bytes = fs::read(library).map_err(|error| error.to_string())?;
+    let found = format!("{:x}", Sha256::digest(bytes));
+    if found == expected { Ok(()) } else { Err(format!("{LIBRARY} has SHA-256 {found}, expected {expected}")) }
 }
 
-fn from_npm(source: &Source, work: &Path) -> Result<PathBuf, String> {
-    let package = format!("{}@{VERSION}-r.1", source.npm);
-    run(Command::new("npm").args(["pack", "--silent", &package]).current_dir(work))?;
-    let archive = fs::read_dir(work)
+fn fetch(folder: &Path) -> Result<(), String> {
+    let (npm, _) = package()?;
+    let work = out_dir().join("duckdb-fetch");
+    let _ = fs::remove_dir_all(&work);
+    fs::create_dir_all(&work).and_then(|()| fs::create_dir_all(folder)).map_err(|error| error.to_string())?;
+    run(Command::new("npm").args(["pack", "--silent", &format!("{npm}@{VERSION}-r.1")]).current_dir(&work))?;
+    let archive = fs::read_dir(&work)
         .map_err(|error| error.to_string())?
         .filter_map(|entry| entry.ok().map(|entry| entry.path()))
         .find(|path| path.extension().is_some_and(|ending| ending == "tgz"))
@@ -96,20 +93,30 @@ fn from_npm(source: &Source, work: &Path) -> Result<PathBuf, String> {
         .arg("xzf")
         .arg(archive)
         .args(["--strip-components=1", &format!("package/{LIBRARY}")])
-        .current_dir(work))?;
-    let library = work.join(LIBRARY);
-    let found = format!("{:x}", Sha256::digest(fs::read(&library).map_err(|error| error.to_string())?));
-    match source.sha256 {
-        Some(expected) if expected != found => Err(format!("SHA-256 is {found}, expected {expected}")),
-        Some(_) | None => Ok(library),
-    }
+        .current_dir(&work))?;
+    let fetched = work.join(LIBRARY);
+    check(&fetched)?;
+    // Rename within the folder, so that a build that is killed never leaves half a library behind.
+    let part = folder.join(format!("{LIBRARY}.part"));
+    fs::copy(&fetched, &part).and_then(|_| fs::rename(&part, folder.join(LIBRARY))).map_err(|error| error.to_string())
 }
 
-fn from_release(source: &Source, work: &Path) -> Result<PathBuf, String> {
-    let url = format!("https://github.com/duckdb/duckdb/releases/download/v{VERSION}/{}", source.release);
-    run(Command::new("curl").args(["-fsSL", "--max-time", "600", "-o", "duckdb.zip", &url]).current_dir(work))?;
-    run(Command::new("unzip").args(["-o", "-q", "duckdb.zip", LIBRARY]).current_dir(work))?;
-    Ok(work.join(LIBRARY))
+fn out_dir() -> PathBuf {
+    PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets it"))
+}
+
+/// The binary finds the library beside itself, wherever the target folder is: `OUT_DIR` is target/release/build/NAME/out.
+fn link_beside_binary(library: &Path) -> Result<(), String> {
+    let out = out_dir();
+    let beside = out.ancestors().nth(3).ok_or("OUT_DIR is no folder of cargo")?.join(LIBRARY);
+    println!("cargo:rerun-if-changed={}", beside.display());
+    let library = fs::canonicalize(library).map_err(|error| error.to_string())?;
+    if fs::canonicalize(&beside).is_ok_and(|there| there == library) {
+        return Ok(());
+    }
+    let new = out.join(LIBRARY);
+    let _ = fs::remove_file(&new);
+    symlink(&library, &new).and_then(|()| fs::rename(&new, &beside)).map_err(|error| error.to_string())
 }
 
 fn run(command: &mut Command) -> Result<(), String> {

@@ -30,4 +30,12 @@ mod tests {
         assert!(text.contains("ExecStart=\"/opt/sight glass/100%%\" run /etc/sightglass/%i.toml"), "{text}");
         assert!(!text.contains("@EXE@"));
     }
+
+    #[test]
+    fn the_unit_bounds_what_a_station_can_take_and_reach() {
+        for line in ["LimitCORE=0", "MemoryMax=1G", "OOMScoreAdjust=-500", "IPAddressDeny=any", "UMask=0027"] {
+            assert!(UNIT.lines().any(|there| there == line), "{line}");
+        }
+        assert!(UNIT.lines().any(|line| line.starts_with("IPAddressAllow=localhost ")));
+    }
 }
