@@ -61,6 +61,48 @@ pub struct Entry {
     pub note: Option<Arc<str>>,
 }
 
+impl Entry {
+    /// The action that it records.
+    pub fn sealed(self, seal: Seal) -> ActionRecord {
+        let Entry { n: _, utc: at, who: by, from, action, target, old, new, outcome, note } = self;
+        ActionRecord { at, by, from, action, target, old, new, outcome, note, seal: Some(seal) }
+    }
+}
+
+/// Whether the history holds what the audit log holds, as far as both reach back.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Comparison {
+    /// Entries of the log that the history lacks, oldest first.
+    pub missing: Vec<ActionRecord>,
+    /// Entries whose hash differs.
+    pub differing: Vec<u64>,
+    /// Entries of the history that the log lacks.
+    pub not_in_log: Vec<u64>,
+}
+
+/// Compares the latest entries of the log, up to its seal `last`, with the latest `rows` of the history, at most `rows_max`.
+pub fn compare<'a>(
+    tail: impl IntoIterator<Item = &'a ActionRecord>,
+    last: Seal,
+    rows: &[Seal],
+    rows_max: usize,
+) -> Comparison {
+    let rows: BTreeMap<u64, [u8; 32]> = rows.iter().map(|seal| (seal.number, seal.hash)).collect();
+    // Before the first of as many as were asked for there may be others.
+    let from = if rows.len() < rows_max { 0 } else { rows.keys().next().copied().unwrap_or(0) };
+    let mut comparison = Comparison::default();
+    for entry in tail {
+        let Some(seal) = entry.seal.filter(|seal| from <= seal.number) else { continue };
+        match rows.get(&seal.number) {
+            Some(hash) if *hash == seal.hash => {}
+            Some(_) => comparison.differing.push(seal.number),
+            None => comparison.missing.push(entry.clone()),
+        }
+    }
+    comparison.not_in_log = rows.range(last.number + 1..).map(|(number, _)| *number).collect();
+    comparison
+}
+
 /// A deed as it can stand in the book, whatever its texts are made of: none of them endless, and nothing in them that moves
 /// a cursor or turns the direction of what follows. What fits already stays as it is.
 pub fn fit(mut deed: ActionRecord) -> ActionRecord {
@@ -315,6 +357,24 @@ mod tests {
         assert_eq!(verify(&lines, seals.last().copied(), &[forged]).unwrap_err().line, 3);
         assert_eq!(verify(&lines[..3], Some(seals[2]), &seals).unwrap_err().line, 4, "cut, and the note as well");
         assert_eq!(verify(&lines, None, &[]).unwrap_err().line, 6, "without the note a cut cannot be ruled out");
+    }
+
+    #[test]
+    fn what_the_history_lacks_of_the_log_is_found_and_so_is_what_differs() {
+        let (lines, seals) = book(6);
+        let mut check = Check::new(None, &[]);
+        let entry = |line: &String| check.line(line.as_bytes()).map(|entry| entry.sealed(check.last()));
+        let tail: Vec<_> = lines.iter().filter_map(entry).collect();
+        let forged = Seal { number: 5, hash: [1; 32] };
+        let ahead = Seal { number: 9, hash: [2; 32] };
+        let found = compare(&tail, seals[5], &[ahead, forged, seals[3], seals[1]], 100);
+        let missing: Vec<_> = found.missing.iter().map(|entry| entry.seal.unwrap().number).collect();
+        assert_eq!((missing, found.differing, found.not_in_log), (vec![1, 3, 6], vec![5], vec![9]));
+        assert_eq!(found.missing[0].new.as_deref(), Some("1 \"°C\" "), "as it is in the log");
+        assert_eq!(compare(&tail, seals[5], &seals, 100), Comparison::default());
+        let found = compare(&tail, seals[5], &[seals[5], seals[3]], 2);
+        assert_eq!(found.missing.len(), 1, "nobody knows what else the history holds before the rows that were read");
+        assert_eq!(compare(&tail, seals[5], &[], 100).missing.len(), 6, "a new history is completed from the log");
     }
 
     proptest! {

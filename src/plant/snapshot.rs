@@ -318,6 +318,8 @@ pub struct HistoryStatus {
     pub damaged: Option<String>,
     /// How little of the disk is free; `None` while there is enough.
     pub disk: Option<String>,
+    /// The clock was behind the last record at the start.
+    pub clock: Option<String>,
     /// All that is wrong with it, in words for the operator.
     pub trouble: Option<String>,
     /// Size of the file, bytes.

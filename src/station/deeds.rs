@@ -15,13 +15,13 @@ use tokio::{
 use crate::{
     access::{
         book::{PLANT_FILE, USERS_FILE, sha256},
-        io::recorder::{Batch, Handle, Recorded},
+        io::recorder::{Batch, Handle, Message, Recorded},
     },
     history::alarm_state::LatestSteps,
     plant::{
         Snapshot,
         command::{OrderId, OrderStatus, Outcome},
-        record::{ActionRecord, AlarmRecord},
+        record::{ActionRecord, AlarmRecord, Seal},
     },
     profile::PlantFile,
 };
@@ -66,7 +66,7 @@ impl Answer {
 /// The plant's end of the recorder.
 #[derive(Debug)]
 pub struct Deeds {
-    queue: queue::SyncSender<Batch>,
+    queue: queue::SyncSender<Message>,
     recorded: watch::Receiver<Recorded>,
     /// What the queue had no room for: the next batch. Its steps are bounded by the alarms of the plant.
     backlog: Vec<ActionRecord>,
@@ -155,19 +155,22 @@ impl Deeds {
             return Vec::new();
         }
         let steps = self.backlog_steps.iter().cloned().collect();
-        let excess = match self.queue.try_send(Batch { actions: std::mem::take(&mut self.backlog), steps }) {
+        let batch = Batch { actions: std::mem::take(&mut self.backlog), steps };
+        let excess = match self.queue.try_send(Message::Batch(batch)) {
             Ok(()) => {
                 self.sent += 1;
                 self.backlog_steps = LatestSteps::default();
                 return Vec::new();
             }
-            Err(queue::TrySendError::Full(batch)) => {
-                self.backlog = batch.actions;
-                self.backlog.len().saturating_sub(BACKLOG_MAX)
-            }
-            Err(queue::TrySendError::Disconnected(batch)) => {
-                self.backlog = batch.actions;
-                self.backlog.len()
+            Err(refused) => {
+                let (message, most) = match refused {
+                    queue::TrySendError::Full(message) => (message, BACKLOG_MAX),
+                    queue::TrySendError::Disconnected(message) => (message, 0),
+                };
+                if let Message::Batch(batch) = message {
+                    self.backlog = batch.actions;
+                }
+                self.backlog.len().saturating_sub(most)
             }
         };
         self.left_out += excess as u64;
@@ -239,21 +242,29 @@ impl Deeds {
         }
     }
 
-    /// Deeds that are lost, and what is wrong, in words for the operator.
-    pub fn trouble(&mut self) -> (u64, Option<String>) {
+    /// The history is open and holds these entries of the audit log.
+    pub fn stored(&self, seals: Vec<Seal>) {
+        if self.queue.try_send(Message::Stored(seals)).is_err() {
+            tracing::warn!("the audit log is too busy to be compared with the history before the next start");
+        }
+    }
+
+    /// Deeds that are lost, and what is wrong with the audit log and with the alarm-state file, in words for the operator.
+    pub fn trouble(&mut self) -> (u64, Option<String>, Option<String>) {
         let ended = self.recorded.has_changed().is_err();
         let status = self.recorded.borrow_and_update().clone();
         let late = status.batches < self.needed && WAIT_MAX <= self.behind.elapsed();
-        let trouble = if ended {
+        let log = if ended {
             Some("the audit trail has ended by itself, see the log".to_owned())
-        } else if status.trouble.is_some() {
-            status.trouble
+        } else if status.log.is_some() {
+            status.log
         } else if self.left_out + self.lost > 0 {
             Some(format!("{} deeds are not in the audit trail: it was too slow", self.left_out + self.lost))
         } else {
-            late.then(|| "the disk is slow: what was done last is not recorded yet".to_owned())
+            let slow = late && status.alarms.is_none();
+            slow.then(|| "the disk is slow: what was done last is not recorded yet".to_owned())
         };
-        (status.lost + self.lost, trouble)
+        (status.lost + self.lost, log, status.alarms)
     }
 }
 

@@ -123,6 +123,9 @@ fn begin(
             deeds.put(Vec::new(), history.restored.clone());
         }
     }
+    if let Some(seals) = &history.seals {
+        deeds.stored(seals.clone());
+    }
     let users = guarded.as_ref().and_then(|(gate, _)| gate.people_digest());
     deeds.started(&def.name, file.as_ref(), users, clock.now());
     let keeping = Keeping { records: Some(records), store, book: Some(deeds), sets: Some(sets), listener };

@@ -392,12 +392,12 @@ impl PlantTask {
         let lost = (self.lost > 0).then(|| format!("{} records found the queue to the history full", self.lost));
         status.trouble = [status.trouble, lost].into_iter().flatten().reduce(|one, other| format!("{one}; {other}"));
         if let Some(book) = &mut self.keeping.book {
-            let (lost, trouble) = book.trouble();
+            let (lost, log, alarms) = book.trouble();
             status.lost += lost;
-            status.trouble = match (status.trouble, trouble) {
-                (Some(one), Some(other)) => Some(format!("{one}; {other}")),
-                (one, other) => one.or(other),
-            };
+            let parts: Vec<String> = [&status.trouble, &log, &alarms].into_iter().flatten().cloned().collect();
+            status.trouble = (!parts.is_empty()).then(|| parts.join("; "));
+            self.plant.on_fault(StationFault::AuditLog, log);
+            self.plant.on_fault(StationFault::AlarmState, alarms);
         }
         self.plant.on_history(status);
     }

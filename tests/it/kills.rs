@@ -1,5 +1,5 @@
-//! Stations killed during writes and logins: whatever a terminal was told is in the book, the book is whole, and the station
-//! starts again.
+//! Stations killed during writes, shelvings and logins: whatever a terminal was told is in the audit log, which is whole; the
+//! alarms are as they were, the station starts again, and its history is completed from the log.
 
 use std::{
     path::{Path, PathBuf},
@@ -17,10 +17,18 @@ use sightglass::{
         user::Change,
     },
     attach::io::connect::connect,
+    history::io::{
+        alarm_file::{self, AlarmFile},
+        store::Store,
+    },
     plant::{
+        alarm::AlarmCommand,
         command::{Command, OrderId, Outcome},
+        def::AlarmId,
+        record::AlarmStep,
         role::Role,
     },
+    profile::{self, Search},
     station::{Request, Session},
 };
 
@@ -39,6 +47,8 @@ const VALUES: std::ops::Range<u64> = 500..700;
 struct Told {
     /// Notes of writes that were verified.
     writes: Vec<String>,
+    /// The last shelving that was told as recorded, by its number.
+    shelved: u32,
     /// Logins and logouts that were granted.
     logins: u64,
     logouts: u64,
@@ -103,12 +113,12 @@ fn entries(book: &Path) -> Vec<Entry> {
 }
 
 /// Writes again and again, each with a note of its own, until the station goes.
-async fn write_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> Vec<String> {
-    let mut told = Vec::new();
+async fn write_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> (Vec<String>, u32) {
+    let (mut told, mut shelved) = (Vec::new(), 0);
     // The place of its terminal counts for its password, so it waits for the other one to be looked at.
     while login(&session, "tom", PASSWORD).await.is_err() {
         if session.standing.borrow().gone.is_some() {
-            return told;
+            return (told, shelved);
         }
         tokio::task::yield_now().await;
     }
@@ -117,7 +127,11 @@ async fn write_on(mut session: Session, done: watch::Sender<u64>, round: u64) ->
         let note = format!("write {number} of round {round}");
         let value = (VALUES.start + (round * 37 + u64::from(number)) % (VALUES.end - VALUES.start)) as f64 / 10.0;
         let id = OrderId { terminal: session.terminal, number };
-        let command = Command::Write { tag, value };
+        let shelves = number % 2 == 0;
+        let command = match shelves {
+            true => Command::Alarm(AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(1_800) }),
+            false => Command::Write { tag, value },
+        };
         let seen = session.snapshots.borrow().seen(&command);
         let order = OrderRequest { seen, note: Some(note.as_str().into()), ..OrderRequest::new(id, command) };
         if session.send(Request::Order(order)).is_err() {
@@ -126,12 +140,14 @@ async fn write_on(mut session: Session, done: watch::Sender<u64>, round: u64) ->
         let mut outcome = None;
         let ended = session.snapshots.wait_for(|snapshot| {
             let order = snapshot.orders.iter().find(|order| order.id == id);
-            outcome = order.map(|order| order.outcome.clone()).filter(|outcome| *outcome != Outcome::Pending);
+            let ended = order.filter(|order| order.outcome != Outcome::Pending && order.recorded);
+            outcome = ended.map(|order| order.outcome.clone());
             outcome.is_some()
         });
         let ended = tokio::time::timeout(PATIENCE, ended).await;
         assert!(ended.is_ok_and(|ended| ended.is_ok()), "`{note}` never had an outcome");
         match outcome {
+            Some(Outcome::Verified) if shelves => shelved = number,
             Some(Outcome::Verified) => told.push(note),
             // It had gone, or has refused: too many at once, a value that stood there already.
             Some(_) | None if session.standing.borrow().gone.is_some() => break,
@@ -139,7 +155,15 @@ async fn write_on(mut session: Session, done: watch::Sender<u64>, round: u64) ->
         }
         done.send_modify(|done| *done += 1);
     }
-    told
+    (told, shelved)
+}
+
+/// Why the first alarm is shelved, as the next station will find it.
+fn shelved_for(history: &Path) -> Option<Arc<str>> {
+    let (_, found) = AlarmFile::open(&alarm_file::beside(history), jiff::Timestamp::UNIX_EPOCH);
+    assert_eq!(found.trouble, None);
+    let steps = found.steps.unwrap_or_default();
+    steps.iter().find(|step| step.step == AlarmStep::Shelved).and_then(|step| step.reason.clone())
 }
 
 /// Logs in and out again and again until the station goes.
@@ -159,9 +183,13 @@ async fn log_in_on(session: Session, done: watch::Sender<u64>) -> Told {
 
 /// One life of a station: ends with a kill after so many deeds that were answered, and so long after the last of them.
 async fn live(place: &Place, round: u64, deeds: u64, late: Duration) -> Told {
+    let before = shelved_for(&place.history());
     let mut station = place.station();
     let (done, mut count) = watch::channel(0);
-    let writing = tokio::spawn(write_on(place.terminal().await, done.clone(), round));
+    let session = place.terminal().await;
+    let aside = session.snapshots.borrow().aside.iter().find_map(|alarm| alarm.deed.reason.clone());
+    assert_eq!(aside, before, "round {round}: the alarms are as they were");
+    let writing = tokio::spawn(write_on(session, done.clone(), round));
     let logging = tokio::spawn(log_in_on(place.terminal().await, done));
     let enough = tokio::time::timeout(PATIENCE, count.wait_for(|done| deeds <= *done)).await;
     assert!(enough.is_ok_and(|count| count.is_ok()), "round {round}: nothing goes on; {:?}", station.said);
@@ -169,8 +197,8 @@ async fn live(place: &Place, round: u64, deeds: u64, late: Duration) -> Told {
     tokio::time::sleep(late).await;
     station.signal("KILL");
     assert_eq!(station.end(), None);
-    let (writes, told) = (writing.await.unwrap(), logging.await.unwrap());
-    Told { writes, ..told }
+    let ((writes, shelved), told) = (writing.await.unwrap(), logging.await.unwrap());
+    Told { writes, shelved, ..told }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -192,6 +220,10 @@ async fn whatever_a_terminal_was_told_is_in_the_book_of_a_station_that_is_killed
                 "round {round}: `{note}` is not in the book: {line:?}"
             );
         }
+        let reason = shelved_for(&place.history()).unwrap_or_default();
+        let number = |reason: &str| reason.strip_prefix("write ")?.split(' ').next()?.parse::<u32>().ok();
+        let kept = number(&reason).filter(|_| reason.ends_with(&format!("of round {round}"))).unwrap_or(0);
+        assert!(told.shelved <= kept, "round {round}: shelving {} was told, the file has `{reason}`", told.shelved);
         let count =
             |action: &str| lived.iter().filter(|line| &*line.action == action && &*line.target == "sue").count() as u64;
         let (logins, logouts) = (count("login"), count("logout"));
@@ -212,6 +244,11 @@ async fn whatever_a_terminal_was_told_is_in_the_book_of_a_station_that_is_killed
     assert_eq!(station.end(), Some(0), "{:?}", station.said);
     let last = entries(&place.book()).pop().unwrap();
     assert_eq!(&*last.action, "stop station");
+    // Each start has completed the history by what the log held before it.
+    let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
+    let seals = Store::open_read_only(&place.history(), &def).unwrap().seals().unwrap();
+    let summary = book::verify(&place.book(), &seals).unwrap();
+    assert_eq!((summary.compared, seals.len() as u64), (summary.entries.min(5_000), summary.entries.min(5_000)));
 }
 
 /// Lines so far; none before the first start.

@@ -1,6 +1,7 @@
 //! The book on disk: read, verified, appended to.
 
 use std::{
+    collections::VecDeque,
     ffi::OsStr,
     fs::{File, OpenOptions},
     io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write},
@@ -11,6 +12,7 @@ use std::{
 
 use crate::{
     access::book::{self, Check, FirstBad, PLANT_FILE, Summary, USERS_FILE},
+    history::io::seals::SEALS_MAX,
     plant::record::{ActionRecord, Seal},
 };
 
@@ -53,7 +55,7 @@ pub fn verify(path: &Path, rows: &[Seal]) -> Result<Summary, VerifyError> {
     let head = read_head(path).map_err(failed)?;
     let file = File::open(path).map_err(failed)?;
     let mut check = Check::new(head, rows);
-    let scanned = scan(file, &mut check, |_| {}).map_err(failed)?;
+    let scanned = scan(file, &mut check, |_, _| {}).map_err(failed)?;
     check.end(scanned.torn).map_err(|bad| VerifyError::Bad { path: path.display().to_string(), bad })
 }
 
@@ -75,7 +77,7 @@ struct Scanned {
     torn: bool,
 }
 
-fn scan(file: File, check: &mut Check, mut each: impl FnMut(book::Entry)) -> io::Result<Scanned> {
+fn scan(file: File, check: &mut Check, mut each: impl FnMut(book::Entry, Seal)) -> io::Result<Scanned> {
     let mut reader = BufReader::new(file);
     let mut bytes = 0;
     let mut line = Vec::new();
@@ -87,7 +89,9 @@ fn scan(file: File, check: &mut Check, mut each: impl FnMut(book::Entry)) -> io:
         }
         bytes += read as u64;
         let whole = line.strip_suffix(b"\n").unwrap_or(&line);
-        check.line(whole).into_iter().for_each(&mut each);
+        if let Some(entry) = check.line(whole) {
+            each(entry, check.last());
+        }
     }
 }
 
@@ -101,7 +105,7 @@ pub struct Book {
 }
 
 /// What was found when the book was opened.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Opened {
     /// What is wrong with it, each for a line of its own.
     pub wrong: Vec<String>,
@@ -109,6 +113,8 @@ pub struct Opened {
     pub plant_file: Option<Arc<str>>,
     /// The hash of the users that was recorded last.
     pub users_file: Option<Arc<str>>,
+    /// The latest sound entries, with their seals, oldest first: to compare the history with, and to complete it.
+    pub tail: VecDeque<ActionRecord>,
 }
 
 impl Book {
@@ -119,11 +125,15 @@ impl Book {
         let mut opened = Opened::default();
         let head = read_head(path)?;
         let mut check = Check::new(head, &[]);
-        let Scanned { bytes, torn } = scan(file.try_clone()?, &mut check, |entry| {
+        let Scanned { bytes, torn } = scan(file.try_clone()?, &mut check, |entry, seal| {
             if &*entry.action == PLANT_FILE {
-                opened.plant_file = entry.new;
+                opened.plant_file.clone_from(&entry.new);
             } else if &*entry.action == USERS_FILE {
-                opened.users_file = entry.new;
+                opened.users_file.clone_from(&entry.new);
+            }
+            opened.tail.push_back(entry.sealed(seal));
+            if SEALS_MAX < opened.tail.len() {
+                opened.tail.pop_front();
             }
         })?;
         if torn {

@@ -1,6 +1,7 @@
 //! The one thread that brings to disk what operators are told is done: the audit log first, then the state of the alarms.
 
 use std::{
+    collections::VecDeque,
     io,
     path::{Path, PathBuf},
     sync::mpsc as queue,
@@ -12,10 +13,13 @@ use tokio::sync::{mpsc, watch};
 
 use super::book::{self, Book, Opened};
 use crate::{
-    access::book::fit,
+    access::book::{Comparison, START, compare, fit},
     bus::io::clock::Clock,
-    history::io::alarm_file::{self, AlarmFile, Found},
-    plant::record::{ActionRecord, AlarmRecord, Record},
+    history::io::{
+        alarm_file::{self, AlarmFile, Found},
+        seals::SEALS_MAX,
+    },
+    plant::record::{ActionRecord, AlarmRecord, Record, Seal},
 };
 
 /// Batches on their way to the thread; a full queue is the sender's to tell.
@@ -38,6 +42,15 @@ pub struct Batch {
     pub steps: Vec<AlarmRecord>,
 }
 
+/// What the thread is sent.
+#[derive(Debug)]
+pub enum Message {
+    /// To be written.
+    Batch(Batch),
+    /// The history is open, and holds these entries: what it lacks of the log is sent to it.
+    Stored(Vec<Seal>),
+}
+
 /// How it stands.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Recorded {
@@ -47,15 +60,17 @@ pub struct Recorded {
     pub waiting: u64,
     /// Actions that the history had no room for.
     pub lost: u64,
-    /// What is wrong, in words for the operator.
-    pub trouble: Option<String>,
+    /// What is wrong with the log, in words for the operator.
+    pub log: Option<String>,
+    /// What is wrong with the alarm-state file.
+    pub alarms: Option<String>,
 }
 
 /// The station's end of the thread.
 #[derive(Debug)]
 pub struct Handle {
     /// What is to be written. When the last sender is dropped the thread writes what it has and ends.
-    pub batches: queue::SyncSender<Batch>,
+    pub batches: queue::SyncSender<Message>,
     /// How it stands, after every sync.
     pub recorded: watch::Receiver<Recorded>,
     /// What was found when the log was opened.
@@ -71,7 +86,9 @@ pub struct Handle {
 pub fn start(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> io::Result<Handle> {
     let (batches, queue) = queue::sync_channel(BATCHES_MAX);
     let (mut recorder, alarms) = Recorder::new(history_file, clock, history);
-    let opened = recorder.open();
+    let mut opened = recorder.open();
+    recorder.tail = std::mem::take(&mut opened.tail);
+    recorder.last_at_start = recorder.tail.back().and_then(|entry| entry.seal).unwrap_or(START);
     let (told, recorded) = watch::channel(recorder.status());
     let join = std::thread::Builder::new().name("recorder".into()).spawn(move || recorder.run(&queue, &told))?;
     Ok(Handle { batches, recorded, opened, alarms, join })
@@ -92,8 +109,12 @@ struct Recorder {
     book: Option<Book>,
     alarms: AlarmFile,
     pending: Vec<Pending>,
-    /// What was found wrong in the files: true until the next start.
+    /// The latest entries of the log at the start, until they were compared with the history, and its seal then.
+    tail: VecDeque<ActionRecord>,
+    last_at_start: Seal,
+    /// What was found wrong in the log and in the alarm-state file: true until the next start.
     found: Vec<String>,
+    alarms_found: Option<String>,
     /// Why the log and the alarm-state file cannot be written now.
     log_fault: Option<String>,
     alarm_fault: Option<String>,
@@ -115,7 +136,10 @@ impl Recorder {
             book: None,
             alarms,
             pending: Vec::new(),
-            found: found.trouble.iter().cloned().collect(),
+            tail: VecDeque::new(),
+            last_at_start: START,
+            found: Vec::new(),
+            alarms_found: found.trouble.clone(),
             log_fault: None,
             alarm_fault: None,
             opened_at: Instant::now(),
@@ -127,16 +151,19 @@ impl Recorder {
         (recorder, found)
     }
 
-    fn run(mut self, queue: &queue::Receiver<Batch>, told: &watch::Sender<Recorded>) {
+    fn run(mut self, queue: &queue::Receiver<Message>, told: &watch::Sender<Recorded>) {
         loop {
             let next = match self.recorded == self.taken {
                 true => queue.recv().map_err(|_| queue::RecvTimeoutError::Disconnected),
                 false => queue.recv_timeout(AGAIN),
             };
             match next {
-                Ok(batch) => {
+                Ok(message) => {
                     let more = queue.try_iter().take(GROUP_MAX - 1);
-                    [batch].into_iter().chain(more).for_each(|batch| self.take(batch));
+                    [message].into_iter().chain(more).for_each(|message| match message {
+                        Message::Batch(batch) => self.take(batch),
+                        Message::Stored(rows) => self.compare(&rows),
+                    });
                 }
                 Err(queue::RecvTimeoutError::Timeout) => {}
                 Err(queue::RecvTimeoutError::Disconnected) => break,
@@ -154,6 +181,26 @@ impl Recorder {
         // The history says the same as the log.
         self.pending.extend(actions.into_iter().map(|action| Pending { action: fit(action), stored: false }));
         self.alarms.take(steps);
+    }
+
+    /// Compares the history with the log as both were at the start, and sends it what it lacks: a station that was killed
+    /// had written it here first.
+    fn compare(&mut self, rows: &[Seal]) {
+        let tail = std::mem::take(&mut self.tail);
+        let Comparison { missing, differing, not_in_log } = compare(&tail, self.last_at_start, rows, SEALS_MAX);
+        let mut wrong = Vec::new();
+        if let Some(first) = differing.first() {
+            wrong.push(format!("{} entries differ from the history, the first is {first}", differing.len()));
+        }
+        if let (Some(first), false) = (not_in_log.iter().min(), self.last_at_start == START && rows.is_empty()) {
+            wrong.push(format!("it lacks {} entries that the history holds, from {first} on", not_in_log.len()));
+        }
+        let completed = (!missing.is_empty()).then(|| format!("{} entries were missing in the history", missing.len()));
+        let notes: Vec<ActionRecord> = wrong.iter().chain(&completed).map(|words| self.note(words)).collect();
+        self.pending.extend(notes.into_iter().map(|action| Pending { action, stored: false }));
+        self.found
+            .extend(wrong.iter().map(|words| format!("the audit trail does not agree with the history: {words}")));
+        self.store(missing);
     }
 
     /// The log first: an alarm that is acknowledged on disk without a trace of who did it would be worse than one that is not.
@@ -265,12 +312,16 @@ impl Recorder {
             .as_ref()
             .map(|why| format!("the audit trail cannot be written: {why}; {waiting} actions are not in it"));
         let alarms = self.alarm_fault.as_ref().map(|why| format!("the state of the alarms cannot be written: {why}"));
-        let parts: Vec<String> = log.into_iter().chain(alarms).chain(self.found.iter().cloned()).collect();
+        let all = |fault: Option<String>, found: &[String]| {
+            let parts: Vec<String> = fault.into_iter().chain(found.iter().cloned()).collect();
+            (!parts.is_empty()).then(|| parts.join("; "))
+        };
         Recorded {
             batches: self.recorded,
             waiting: self.taken - self.recorded,
             lost: self.lost,
-            trouble: (!parts.is_empty()).then(|| parts.join("; ")),
+            log: all(log, &self.found),
+            alarms: all(alarms, self.alarms_found.as_slice()),
         }
     }
 }

@@ -24,6 +24,7 @@ pub mod read;
 pub mod samples;
 pub mod report;
 pub mod quality;
+pub mod seals;
 pub mod writer;
 pub mod reader;
 pub mod thread;

@@ -83,6 +83,7 @@ impl Store {
         self.commit(stored, || {
             self.append_samples(records)?;
             self.append_alarms(records)?;
+            self.remove_unsealed(records)?;
             self.append_actions(records)?;
             self.append_lines(records)?;
             Ok(true)

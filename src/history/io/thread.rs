@@ -19,7 +19,7 @@ use crate::{
     history::HistoryError,
     plant::{
         def::PlantDef,
-        record::{AlarmRecord, Record},
+        record::{AlarmRecord, Record, Seal},
         snapshot::HistoryStatus,
     },
 };
@@ -50,6 +50,8 @@ pub struct Handle {
     pub restored: Vec<AlarmRecord>,
     /// What the quality meter of the alarms must know of the last day.
     pub recent: Recent,
+    /// The latest entries of the audit log that the store holds; `None` where they cannot be read.
+    pub seals: Option<Vec<Seal>>,
     /// The thread.
     pub join: JoinHandle<()>,
 }
@@ -57,7 +59,7 @@ pub struct Handle {
 impl Handle {
     /// Drops this end and waits until everything is stored. Blocks for as long as other senders of records exist.
     pub fn stop(self) {
-        let Handle { records, queries, status, settled, restored: _, recent: _, join } = self;
+        let Handle { records, queries, status, settled, restored: _, recent: _, seals: _, join } = self;
         drop((records, queries, status, settled));
         // A panic of the thread has already been reported by the panic hook.
         let _ = join.join();
@@ -94,6 +96,8 @@ pub(super) fn start_with(
         tracing::warn!(%error, "the quality meter of the alarms begins anew");
         Recent::default()
     });
+    let seals = writer.store().and_then(Store::seals);
+    let seals = seals.inspect_err(|error| tracing::warn!(%error, "not compared with the audit log")).ok();
     let (records, records_in) = mpsc::channel(RECORDS_MAX);
     let (queries, queries_in) = mpsc::channel(QUERIES_MAX);
     let (status_out, status) = watch::channel(writer.status().clone());
@@ -112,7 +116,7 @@ pub(super) fn start_with(
         tell.tell(&writer);
     };
     let join = spawn("history", writing).map_err(trouble)?;
-    Ok(Handle { records, queries, status, settled, restored, recent, join })
+    Ok(Handle { records, queries, status, settled, restored, recent, seals, join })
 }
 
 /// A thread with a runtime of its own, only to wait for queues and times at once.

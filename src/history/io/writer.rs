@@ -247,6 +247,7 @@ impl Writer {
         (self.status.waiting, self.status.waiting_max) = (waiting as u64, max as u64);
         self.status.failing.clone_from(&self.failing);
         self.status.damaged = damaged;
+        self.status.clock.clone_from(&self.clock);
         self.status.file_bytes = files::size(&self.path);
     }
 }

@@ -7,6 +7,12 @@ use crate::plant::{
 };
 
 impl Plant {
+    /// What is wrong with a part of the station, if anything is. The alarm follows with the next tick.
+    pub fn on_fault(&mut self, fault: StationFault, words: Option<String>) {
+        let state = words.map_or(FaultState::Cleared, |words| FaultState::Active(words.into()));
+        self.faults.set(fault, state);
+    }
+
     /// The store says how it stands. Alarms follow with the next tick.
     pub fn on_history(&mut self, status: HistoryStatus) {
         let lasting = |words: &Option<String>| match words {
@@ -21,6 +27,9 @@ impl Plant {
         }
         if let Some(damaged) = status.damaged.as_ref().filter(|_| self.history.damaged != status.damaged) {
             self.faults.set(StationFault::HistoryDamaged, FaultState::Occurred(damaged.as_str().into()));
+        }
+        if let Some(behind) = status.clock.as_ref().filter(|_| self.history.clock != status.clock) {
+            self.faults.set(StationFault::Clock, FaultState::Occurred(behind.as_str().into()));
         }
         self.history = status;
     }
@@ -90,6 +99,17 @@ mod tests {
         assert_eq!(steps, [AlarmStep::Returned]);
         plant.on_history(lost(8));
         assert_eq!(tick(&mut plant, 20)[0].step, AlarmStep::Raised);
+    }
+
+    #[test]
+    fn a_start_before_the_last_record_is_an_alarm() {
+        let mut plant = plant();
+        let behind = HistoryStatus { clock: Some("the clock is behind".into()), ..HistoryStatus::default() };
+        plant.on_history(behind.clone());
+        let raised = tick(&mut plant, 1);
+        assert_eq!((raised.len(), &*raised[0].text), (1, StationFault::Clock.message()));
+        plant.on_history(behind);
+        assert_eq!(tick(&mut plant, 2), [], "once");
     }
 
     #[test]

@@ -58,7 +58,7 @@ fn life(history_file: &Path, actions: &[&str]) -> (Vec<ActionRecord>, Recorded, 
     let (history, mut rows) = mpsc::channel(64);
     let Handle { batches, recorded, opened, alarms: _, join } = start(history_file, clock(), history).unwrap();
     for what in actions {
-        batches.send(batch(&[what], &[])).unwrap();
+        batches.send(Message::Batch(batch(&[what], &[]))).unwrap();
     }
     drop(batches);
     join.join().unwrap();
@@ -81,7 +81,7 @@ fn deeds_of_several_lives_are_one_chain_and_only_the_station_can_read_it() {
     }
     let summary = verify(&path, &seals(&rows)).unwrap();
     assert_eq!((summary.entries, summary.compared), (4, 4));
-    assert_eq!(life(&history, &[]).2, Opened { wrong: Vec::new(), plant_file: Some("x".into()), users_file: None });
+    assert_eq!(life(&history, &[]).2, Opened { plant_file: Some("x".into()), ..Opened::default() });
     for file in [path.clone(), path.with_extension("head")] {
         assert_eq!(fs::metadata(file).unwrap().permissions().mode() & 0o777, 0o600);
     }
@@ -97,7 +97,7 @@ fn a_torn_last_line_is_put_beside_and_said_and_the_chain_goes_on() {
     assert!(verify(&path, &[]).unwrap().torn);
     let (rows, status, opened) = life(&history, &["start"]);
     assert!(opened.wrong[0].contains("torn"), "{opened:?}");
-    assert_eq!((rows.len(), status.trouble), (2, None), "one for the torn line, one for the start");
+    assert_eq!((rows.len(), status.log), (2, None), "one for the torn line, one for the start");
     assert_eq!(verify(&path, &[]).unwrap().entries, 4);
     let beside = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
     let beside = beside.filter(|path| path.to_string_lossy().contains("torn")).collect::<Vec<_>>();
@@ -123,7 +123,7 @@ fn a_book_that_was_tampered_with_is_said_stays_as_it_is_and_goes_on() {
         assert_eq!(bad.line, line, "{what}: {bad}");
         for _ in 0..2 {
             let (rows, status, _) = life(&history, &["start"]);
-            assert!(status.trouble.unwrap().contains("tampered"), "{what}");
+            assert!(status.log.unwrap().contains("tampered"), "{what}");
             assert!(rows[0].outcome.contains("broken") && rows.iter().all(|row| row.seal.is_some()), "{what}");
         }
         assert!(fs::read_to_string(&path).unwrap().starts_with(&tampered), "{what}: nothing is ever removed");
@@ -137,7 +137,7 @@ fn without_a_disk_deeds_go_to_the_history_without_a_seal_and_it_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let (rows, status, _) = life(&folder.path().join("gone").join("tank.duckdb"), &["start", "write"]);
     assert!(rows.len() == 2 && rows.iter().all(|row| row.seal.is_none()), "each once");
-    let trouble = status.trouble.unwrap();
+    let trouble = status.log.unwrap();
     assert!(trouble.starts_with("the audit trail cannot be written: "), "{trouble}");
     assert!(trouble.contains("2 actions are not in it"), "{trouble}");
     assert_eq!((status.batches, status.waiting), (0, 2));
@@ -167,8 +167,8 @@ fn what_a_disk_did_not_take_is_not_recorded_until_it_comes_back_and_then_nothing
     recorder.write();
     let status = recorder.status();
     assert_eq!((status.batches, status.waiting), (0, 1));
-    let trouble = status.trouble.unwrap();
-    assert!(trouble.contains("2 actions are not in it") && trouble.contains("state of the alarms"), "{trouble}");
+    assert!(status.log.unwrap().contains("2 actions are not in it"));
+    assert!(status.alarms.unwrap().contains("the state of the alarms cannot be written"));
     assert_eq!(stored(&mut rows).iter().filter(|row| row.seal.is_none()).count(), 2, "in the history all the same");
     fs::create_dir(folder.path().join("later")).unwrap();
     recorder.take(batch(&["write"], &[]));
@@ -176,7 +176,7 @@ fn what_a_disk_did_not_take_is_not_recorded_until_it_comes_back_and_then_nothing
     assert_eq!(recorder.status().batches, 0, "the log is not opened again before its time");
     recorder.opened_at -= REOPEN;
     recorder.write();
-    assert_eq!(recorder.status(), Recorded { batches: 2, waiting: 0, lost: 0, trouble: None });
+    assert_eq!(recorder.status(), Recorded { batches: 2, ..Recorded::default() });
     let rows = stored(&mut rows);
     let sealed: Vec<_> = rows.iter().filter(|row| row.seal.is_some()).map(|row| &*row.action).collect();
     assert_eq!(sealed, ["start", "acknowledge", "write"]);
@@ -194,11 +194,11 @@ fn a_log_that_cannot_be_written_for_long_keeps_the_latest_actions_and_says_how_m
     recorder.open();
     recorder.take(batch(&vec!["write"; PENDING_MAX + 7], &[]));
     recorder.write();
-    assert!(recorder.status().trouble.unwrap().contains(&format!("{} actions are not in it", PENDING_MAX + 7)));
+    assert!(recorder.status().log.unwrap().contains(&format!("{} actions are not in it", PENDING_MAX + 7)));
     fs::create_dir(folder.path().join("later")).unwrap();
     recorder.opened_at -= REOPEN;
     recorder.write();
-    assert_eq!(recorder.status().trouble, None);
+    assert_eq!(recorder.status().log, None);
     let text = fs::read_to_string(beside(&history_file)).unwrap();
     assert_eq!(text.lines().count(), PENDING_MAX + 1);
     assert!(text.lines().next().unwrap().contains("7 actions before this one are not in it"));
@@ -211,7 +211,8 @@ fn what_was_acknowledged_is_found_by_the_next_station_without_any_history() {
     let (history, rows) = mpsc::channel(1);
     drop(rows);
     let Handle { batches, mut recorded, join, .. } = start(&history_file, clock(), history).unwrap();
-    batches.send(batch(&["acknowledge"], &[AlarmStep::Raised, AlarmStep::Acknowledged])).unwrap();
+    let done = batch(&["acknowledge"], &[AlarmStep::Raised, AlarmStep::Acknowledged]);
+    batches.send(Message::Batch(done)).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     runtime.block_on(recorded.wait_for(|recorded| recorded.batches == 1)).unwrap();
     // Killed here: only what is on disk counts.
@@ -219,4 +220,32 @@ fn what_was_acknowledged_is_found_by_the_next_station_without_any_history() {
     assert_eq!(found.steps.unwrap(), batch(&[], &[AlarmStep::Raised, AlarmStep::Acknowledged]).steps);
     drop(batches);
     join.join().unwrap();
+}
+
+/// What a station that was killed had written into the log and not into the history.
+#[test]
+fn a_history_that_lacks_entries_of_the_log_is_completed_and_one_that_differs_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let history_file = folder.path().join("tank.duckdb");
+    let (rows, ..) = life(&history_file, &["start", "write", "acknowledge"]);
+    let compared = |known: Vec<Seal>| {
+        let (history, mut stored_rows) = mpsc::channel(64);
+        let Handle { batches, recorded, join, .. } = start(&history_file, clock(), history).unwrap();
+        batches.send(Message::Stored(known)).unwrap();
+        drop(batches);
+        join.join().unwrap();
+        (stored(&mut stored_rows), recorded.borrow().log.clone())
+    };
+    let (sent, log) = compared(seals(&rows[..1]));
+    assert_eq!(sent[..2], rows[1..], "the very entries, with their seals");
+    assert!(sent.len() == 3 && sent[2].outcome.contains("2 entries were missing in the history"), "{sent:?}");
+    assert_eq!(log, None, "nothing is wrong with the log");
+    let all: Vec<Seal> = seals(&rows).into_iter().chain(seals(&sent[2..])).collect();
+    assert_eq!(compared(all.clone()), (Vec::new(), None), "nothing is missing any more");
+    let forged = Seal { hash: [7; 32], ..all[1] };
+    let (_, log) = compared([&all[..1], &[forged], &all[2..]].concat());
+    assert!(log.unwrap().contains("1 entries differ from the history, the first is 2"));
+    let ahead = Seal { number: 99, hash: [7; 32] };
+    let (_, log) = compared([&all[..], &[ahead]].concat());
+    assert!(log.unwrap().contains("lacks 1 entries that the history holds, from 99 on"));
 }

@@ -487,3 +487,30 @@ fn migrations_are_numbered_and_run_once() {
     );
     assert!(db.exists());
 }
+
+#[test]
+fn an_action_that_was_stored_without_its_seal_is_there_once_when_it_comes_with_it() {
+    use crate::plant::record::{ActionRecord, Seal};
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(&folder.path().join("h.duckdb"), &def(), sec(0)).unwrap().store;
+    let action = |number: i64, seal: Option<Seal>| {
+        Record::Action(ActionRecord {
+            at: sec(number),
+            by: "anna".into(),
+            from: "".into(),
+            action: "write".into(),
+            target: "TIC-1.SV".into(),
+            old: None,
+            new: Some("70".into()),
+            outcome: "verified".into(),
+            note: None,
+            seal,
+        })
+    };
+    let seal = |number| Seal { number, hash: [number as u8; 32] };
+    store.append(&[action(1, Some(seal(1))), action(2, None), action(3, None)]).unwrap();
+    assert_eq!(store.seals().unwrap(), [seal(1)]);
+    store.append(&[action(2, Some(seal(2))), action(4, Some(seal(4)))]).unwrap();
+    assert_eq!(store.seals().unwrap(), [seal(4), seal(2), seal(1)]);
+    assert_eq!(store.count_rows().unwrap(), 4, "the second was stored twice, the third waits for its seal");
+}
