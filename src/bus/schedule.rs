@@ -9,6 +9,7 @@ pub mod budget;
 pub mod overload;
 mod device;
 mod poll;
+mod queue;
 #[cfg(test)]
 mod model;
 #[cfg(test)]
@@ -28,6 +29,7 @@ use self::{
     device::Health,
     overload::Overload,
     poll::{ONCE_WITHIN, Pace, Pending},
+    queue::{Queue, Spot},
 };
 use super::plan::Block;
 use crate::plant::{def::DeviceId, event::ExceptionCode, tag::Class};
@@ -36,8 +38,10 @@ use crate::plant::{def::DeviceId, event::ExceptionCode, tag::Class};
 /// hard polls alone fill to the brim gets that far.
 const STARVED_AFTER: Duration = Duration::from_secs(60);
 
-/// Rank of what has waited so long.
+/// Tier of what has waited so long.
 const STARVED: u8 = 0;
+/// The demand is looked at so often.
+const JUDGE_EVERY: Duration = Duration::from_secs(1);
 
 /// What to do now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,18 +60,19 @@ pub struct Schedule {
     /// A point of every grid.
     origin: Timestamp,
     polls: Vec<Pending>,
+    /// Those of devices that answer, as they come.
+    queue: Queue,
+    /// What the places of many polls depend on has changed: the queue is filled anew before it is looked at.
+    stale: bool,
     devices: Vec<Health>,
     overload: Overload,
     /// The time for devices that do not answer.
     probes: Budget,
+    /// A hard poll was late since the demand was last looked at, and when that was.
+    late: bool,
+    judged_at: Timestamp,
     /// The last read was one that had starved: the next is not.
     fed: bool,
-}
-
-/// When a poll may be read, and what counts against the others.
-struct Due {
-    from: Timestamp,
-    rank: (u8, Timestamp),
 }
 
 impl Schedule {
@@ -75,7 +80,9 @@ impl Schedule {
     pub fn new(blocks: &[Block], now: Timestamp) -> Schedule {
         let (polls, devices, overload) = (Vec::new(), Vec::new(), Overload::default());
         let probes = Budget::new(PROBE_SHARE, now);
-        let mut schedule = Schedule { origin: now, polls, devices, overload, probes, fed: false };
+        let (queue, stale, late, judged_at, fed) = (Queue::default(), true, false, now, false);
+        let mut schedule =
+            Schedule { origin: now, polls, queue, stale, devices, overload, probes, late, judged_at, fed };
         schedule.replan(blocks, now);
         schedule
     }
@@ -83,6 +90,7 @@ impl Schedule {
     /// The plan has changed: blocks that stay keep their grid and counts, devices their health; new blocks are due now.
     pub fn replan(&mut self, blocks: &[Block], now: Timestamp) {
         let mut old: Vec<Option<Pending>> = std::mem::take(&mut self.polls).into_iter().map(Some).collect();
+        self.stale = true;
         for health in &mut self.devices {
             health.probe = None;
         }
@@ -99,16 +107,31 @@ impl Schedule {
         }
     }
 
-    /// The block whose deadline is nearest among those that may be read now. Looks at every poll: 500 take microseconds.
-    pub fn next(&self, now: Timestamp) -> Next {
+    /// The block whose deadline is nearest among those that may be read now.
+    pub fn next(&mut self, now: Timestamp) -> Next {
+        if std::mem::take(&mut self.stale) {
+            let spots: Vec<Option<Spot>> = (0..self.polls.len()).map(|index| self.queued(index)).collect();
+            self.queue.fill(spots.into_iter());
+        }
+        self.queue.advance(now);
+        let mut wake = self.queue.wakes_at();
         let mut best: Option<((u8, Timestamp), usize)> = None;
-        let mut wake: Option<Timestamp> = None;
-        for (index, poll) in self.polls.iter().enumerate() {
-            let Some(due) = self.due(index, poll, now) else { continue };
-            if now < due.from {
-                wake = Some(wake.map_or(due.from, |wake| wake.min(due.from)));
-            } else if best.is_none_or(|(rank, _)| due.rank < rank) {
-                best = Some((due.rank, index));
+        let starved = self.queue.starved().filter(|_| !self.fed).map(|(deadline, index)| ((STARVED, deadline), index));
+        for (rank, index) in starved.chain(self.queue.ready()) {
+            let free_at = self.devices[self.polls[index].place].free_at;
+            if free_at <= now {
+                best = Some((rank, index));
+                break;
+            }
+            wake = Some(wake.map_or(free_at, |wake| wake.min(free_at)));
+        }
+        for health in self.devices.iter().filter(|health| health.probe_at.is_some()) {
+            let Some((index, spot)) = health.probe.and_then(|index| Some((index, self.spot(index)?))) else { continue };
+            let from = spot.from.max(health.free_at);
+            if now < from {
+                wake = Some(wake.map_or(from, |wake| wake.min(from)));
+            } else if best.is_none_or(|best| (self.rank(spot, now), index) < best) {
+                best = Some((self.rank(spot, now), index));
             }
         }
         match (best, wake) {
@@ -118,7 +141,9 @@ impl Schedule {
         }
     }
 
-    fn due(&self, index: usize, poll: &Pending, now: Timestamp) -> Option<Due> {
+    /// When a poll may be read, its device's gap aside; `None`: not at all.
+    fn spot(&self, index: usize) -> Option<Spot> {
+        let poll = &self.polls[index];
         let health = &self.devices[poll.place];
         let (from, deadline) = if let Some(probe_at) = health.probe_at {
             // A device that does not answer is asked with its first block only; who has waited longest goes first.
@@ -128,15 +153,32 @@ impl Schedule {
             let from = poll.wanted()?.max(health.rests_until).max(poll.not_before);
             (from, poll.deadline(self.pace_of(poll))?)
         };
-        let starves = || from + STARVED_AFTER <= now;
-        let (from, tier) = match (self.overload.load(), poll.class) {
-            (Load::Normal, _) => (from, 1),
-            (Load::Overload { .. }, Class::Hard) => (from, 1),
-            (Load::Overload { .. }, Class::Soft | Class::Idle) if !self.fed && starves() => (from, STARVED),
-            (Load::Overload { .. }, Class::Soft) => (from, 2),
-            (Load::Overload { .. }, Class::Idle) => (from + STARVED_AFTER, 3),
-        };
-        Some(Due { from, rank: (tier, deadline) })
+        let starves_at = Some(from + STARVED_AFTER);
+        Some(match (self.overload.load(), poll.class) {
+            (Load::Normal, _) | (Load::Overload { .. }, Class::Hard) => {
+                Spot { from, tier: 1, deadline, starves_at: None }
+            }
+            (Load::Overload { .. }, Class::Soft) => Spot { from, tier: 2, deadline, starves_at },
+            (Load::Overload { .. }, Class::Idle) => Spot { from: from + STARVED_AFTER, tier: 3, deadline, starves_at },
+        })
+    }
+
+    /// The place in the queue, where polls of devices that do not answer have none.
+    fn queued(&self, index: usize) -> Option<Spot> {
+        let answers = self.devices[self.polls[index].place].probe_at.is_none();
+        if answers { self.spot(index) } else { None }
+    }
+
+    fn requeue(&mut self, index: usize) {
+        if !self.stale {
+            let spot = self.queued(index);
+            self.queue.put(index, spot);
+        }
+    }
+
+    fn rank(&self, spot: Spot, now: Timestamp) -> (u8, Timestamp) {
+        let starves = !self.fed && spot.starves_at.is_some_and(|starves_at| starves_at <= now);
+        (if starves { STARVED } else { spot.tier }, spot.deadline)
     }
 
     fn pace_of(&self, poll: &Pending) -> Pace {
@@ -170,18 +212,22 @@ impl Schedule {
     /// the read began and what was missed, for the counters.
     pub fn done(&mut self, index: usize, started: Timestamp, now: Timestamp) -> Served {
         let pace = self.pace_of(&self.polls[index]);
-        let rank = self.due(index, &self.polls[index], started).map(|due| due.rank.0);
-        self.fed = rank == Some(STARVED);
+        self.fed = self.spot(index).is_some_and(|spot| self.rank(spot, started).0 == STARVED);
         let rests_until = self.devices[self.polls[index].place].rests_until;
         let poll = &mut self.polls[index];
         let free = rests_until.max(poll.not_before);
         let served = poll.serve(pace, free, started, now);
-        let late = poll.class == Class::Hard && poll.is_late();
-        self.judge(late, now);
+        self.late |= poll.class == Class::Hard && poll.is_late();
+        self.requeue(index);
+        let urgent = self.late && self.overload.load() == Load::Normal;
+        if urgent || self.judged_at + JUDGE_EVERY <= now {
+            self.judge(now);
+        }
         served
     }
 
-    fn judge(&mut self, late: bool, now: Timestamp) {
+    /// Looks at every poll, so not at every read.
+    fn judge(&mut self, now: Timestamp) {
         let mut demand = Demand::default();
         for poll in self.polls.iter().filter(|poll| self.devices[poll.place].probe_at.is_none()) {
             let share = match poll.class {
@@ -191,7 +237,12 @@ impl Schedule {
             };
             *share += poll.demand();
         }
-        if self.overload.judge(demand, late, now) && self.overload.load() == Load::Normal {
+        self.judged_at = now;
+        if !self.overload.judge(demand, std::mem::take(&mut self.late), now) {
+            return;
+        }
+        self.stale = true;
+        if self.overload.load() == Load::Normal {
             let soft = self.polls.iter_mut().filter(|poll| poll.class == Class::Soft);
             soft.for_each(|poll| poll.back_on_grid(self.origin, now));
         }
@@ -207,12 +258,14 @@ impl Schedule {
         let poll = &mut self.polls[index];
         if poll.period.is_none() {
             poll.release = Some(now + ONCE_WITHIN);
+            self.requeue(index);
         }
     }
 
     /// The block is read again at `until`, and not before; its grid stays.
     pub fn later(&mut self, index: usize, until: Timestamp) {
         self.polls[index].later(until);
+        self.requeue(index);
     }
 
     /// The block was answered with an exception; call it after [`Schedule::done`]. 05: it is read again in a second; 06: after
@@ -230,6 +283,7 @@ impl Schedule {
         let failing = self.devices[place].probe_at.is_some();
         let was_down = self.devices[place].answered(reply);
         if failing {
+            self.stale = true;
             let polls = self.polls.iter_mut().filter(|poll| poll.place == place);
             polls.for_each(|poll| poll.back_on_grid(self.origin, now));
         }
@@ -250,6 +304,7 @@ impl Schedule {
     pub fn failed(&mut self, device: DeviceId, sent: Timestamp, spent: Duration, now: Timestamp) -> bool {
         let Some(place) = self.place_of(device) else { return false };
         self.probes.spent(spent, now);
+        self.stale |= self.devices[place].probe_at.is_none();
         self.devices[place].failed(sent, now, self.probes.allows(now))
     }
 
@@ -263,6 +318,12 @@ impl Schedule {
         let Some(place) = self.place_of(device) else { return };
         let health = &mut self.devices[place];
         health.rests_until = health.rests_until.max(until);
+        self.stale = true;
+    }
+
+    /// The gap that the device wants between two requests ends at `until`: the others need not wait for it.
+    pub fn keep_gap(&mut self, index: usize, until: Timestamp) {
+        self.devices[self.polls[index].place].free_at = until;
     }
 
     /// Everything of a device is due now; its grid stays. A device that does not answer is asked at once.
@@ -274,6 +335,7 @@ impl Schedule {
     }
 
     fn due_now(&mut self, device: DeviceId, now: Timestamp) {
+        self.stale = true;
         let place = self.place_of(device);
         for poll in self.polls.iter_mut().filter(|poll| Some(poll.place) == place) {
             poll.urgent = Some(now);

@@ -77,6 +77,8 @@ pub struct Link {
     timeout: Duration,
     idle: Duration,
     turnaround: Duration,
+    /// Units that are not to be asked before a moment.
+    gaps: Vec<(u8, Instant)>,
     /// What the driver of the port counts.
     uart: Option<CountUart>,
     /// The adapter gives back what it sends.
@@ -97,6 +99,7 @@ impl Link {
         Link {
             transaction: 0,
             asked: None,
+            gaps: Vec::new(),
             timeout: line.timeout,
             idle: wire.silence.max(line.idle),
             turnaround: clock.real_span(line.turnaround),
@@ -192,6 +195,7 @@ impl Link {
             self.transaction = self.transaction.wrapping_add(1);
             frames.push(frame::with_mbap(self.transaction, message).into());
         }
+        messages.iter().for_each(|message| self.keep_gap(message.first().copied()));
         let sent_at = match &frames[..] {
             [frame] => self.wire.send(frame).await?,
             many => self.wire.send(&many.concat()).await?,
@@ -272,6 +276,7 @@ impl Link {
 
     /// Sends the frame of a message; until its answer is taken it may be given up.
     async fn send(&mut self, message: &[u8], frame: &[u8]) -> Result<Instant, Trouble> {
+        self.keep_gap(message.first().copied());
         self.asked = Some(message.to_vec());
         self.wire.send(frame).await
     }
@@ -322,6 +327,20 @@ impl Link {
     /// See [`crate::bus::debt::Debts::forget`].
     pub fn forget_debt(&mut self, unit: u8) -> Option<Duration> {
         self.wire.debts.forget(unit, self.wire.age())
+    }
+
+    /// Nothing is sent to a unit for this long (plant time): it wants a gap between two requests.
+    pub fn rest_unit(&mut self, unit: u8, plant: Duration) {
+        let now = Instant::now();
+        self.gaps.retain(|(other, until)| *other != unit && now < *until);
+        self.gaps.push((unit, now + self.wire.clock().real_span(plant)));
+    }
+
+    /// What is sent next waits for the end of its unit's gap.
+    fn keep_gap(&mut self, unit: Option<u8>) {
+        if let Some((_, until)) = self.gaps.iter().find(|(resting, _)| Some(*resting) == unit) {
+            self.wire.rest(until.saturating_duration_since(Instant::now()));
+        }
     }
 
     /// Nothing is sent for this long (plant time), for devices that need it.

@@ -42,6 +42,8 @@ pub(super) struct Health {
     pub probe: Option<usize>,
     /// Not to be asked before this moment.
     pub rests_until: Timestamp,
+    /// The gap after its last request ends here.
+    pub free_at: Timestamp,
     answers: u32,
     /// The longest time that an answer has taken (real time).
     slowest: Duration,
@@ -60,6 +62,7 @@ impl Health {
             thorough: false,
             probe: None,
             rests_until: now,
+            free_at: now,
             answers: 0,
             slowest: Duration::ZERO,
         }

@@ -152,6 +152,18 @@ fn a_device_at_rest_is_not_asked() {
 }
 
 #[test]
+fn the_gap_of_one_device_does_not_hold_the_others() {
+    let mut schedule = Schedule::new(&[block(0, every(100)), block(1, every(100))], at(0));
+    schedule.done(0, at(0), at(10));
+    schedule.keep_gap(0, at(150));
+    assert_eq!(schedule.next(at(100)), Next::Run(1));
+    schedule.done(1, at(100), at(110));
+    assert_eq!(schedule.next(at(110)), Next::WaitUntil(at(150)), "its own next request waits");
+    schedule.done(1, at(110), at(120));
+    assert_eq!(schedule.next(at(150)), Next::Run(0));
+}
+
+#[test]
 fn a_busy_device_is_asked_again_after_waits_that_grow_and_end() {
     let mut schedule = Schedule::new(&[block(0, every(60_000)), block(1, every(60_000))], at(0));
     let (mut now, mut waits) = (0, Vec::new());
@@ -272,6 +284,26 @@ fn five_hundred_polls_have_each_their_turn() {
     assert_eq!(seen, (0..500).collect::<Vec<_>>());
 }
 
+/// The schedule without its queue, as it was first: looks at every poll.
+fn by_scan(schedule: &Schedule, now: Timestamp) -> Next {
+    let mut best: Option<((u8, Timestamp), usize)> = None;
+    let mut wake: Option<Timestamp> = None;
+    for index in 0..schedule.polls.len() {
+        let Some(spot) = schedule.spot(index) else { continue };
+        let from = spot.from.max(schedule.devices[schedule.polls[index].place].free_at);
+        if now < from {
+            wake = Some(wake.map_or(from, |wake| wake.min(from)));
+        } else if best.is_none_or(|(rank, _)| schedule.rank(spot, now) < rank) {
+            best = Some((schedule.rank(spot, now), index));
+        }
+    }
+    match (best, wake) {
+        (Some((_, index)), _) => Next::Run(index),
+        (None, Some(at)) => Next::WaitUntil(at),
+        (None, None) => Next::Idle,
+    }
+}
+
 /// Periods and costs of polls, in ms.
 fn polls(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<(u64, i64)>> {
     proptest::collection::vec((50u64..2000, 1i64..80), count)
@@ -280,6 +312,56 @@ fn polls(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<(u64, i64)>
 proptest! {
     // Few random sets of polls are just short of what a line can carry.
     #![proptest_config(ProptestConfig { cases: 64, max_global_rejects: 65_536, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_queue_decides_as_a_look_at_every_poll_does(
+        load in polls(1..12),
+        classes in proptest::collection::vec((0usize..3, 0u16..4, 0u8..8), 12),
+        deeds in proptest::collection::vec((0u8..40, 0i64..700), 1..60),
+    ) {
+        let block_of = |n: usize| {
+            let (class, device, once) = classes[n];
+            let poll = if once == 0 { Poll::Once } else { every(load[n].0) };
+            Block { address: n as u16, ..classed(device, poll, [Class::Hard, Class::Soft, Class::Idle][class]) }
+        };
+        let blocks: Vec<Block> = (0..load.len()).map(block_of).collect();
+        let mut schedule = Schedule::new(&blocks, at(0));
+        let mut now = 0;
+        for turn in 0..3_000 {
+            let (deed, ms) = deeds[turn % deeds.len()];
+            let (device, expect) = (DeviceId(classes[turn % 12].1), by_scan(&schedule, at(now)));
+            match (schedule.next(at(now)), expect) {
+                (Next::Run(index), Next::Run(same)) => {
+                    prop_assert_eq!(index, same, "turn {} at {} ms", turn, now);
+                    let (began, device) = (now, blocks[index].device);
+                    now += load[index].1;
+                    schedule.done(index, at(began), at(now));
+                    match deed {
+                        0 | 1 => { schedule.failed(device, at(began), Duration::from_millis(300), at(now)); }
+                        2 => { schedule.excused(index, ExceptionCode(6), at(now)); }
+                        3 => { schedule.again(index, at(now)); }
+                        4..8 => schedule.keep_gap(index, at(now + ms)),
+                        _ => {
+                            schedule.answered(device, Some(Duration::from_millis(20)), at(now));
+                            schedule.spent(index, Duration::from_millis(load[index].1 as u64));
+                        }
+                    }
+                }
+                // It may look again earlier than it need.
+                (Next::WaitUntil(until), Next::WaitUntil(due)) => {
+                    prop_assert!(at(now) < until && until <= due, "turn {} at {} ms", turn, now);
+                    now = until.as_millisecond().max(now + 1);
+                }
+                (next, expect) => prop_assert_eq!(next, expect, "turn {} at {} ms", turn, now),
+            }
+            match deed {
+                37 => schedule.rest(device, at(now + ms)),
+                38 => schedule.refresh(device, at(now)),
+                39 => schedule.replan(&blocks, at(now)),
+                _ => {}
+            }
+        }
+    }
 
     #[test]
     fn nobody_starves_whatever_the_classes(load in polls(1..12), classes in proptest::collection::vec(0usize..3, 12)) {

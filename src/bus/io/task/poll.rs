@@ -63,7 +63,11 @@ impl Task<'_> {
         let served = schedule.done(index, began, ended);
         self.note_served(index, served);
         self.note_late(link, schedule);
-        link.rest(self.def.device(block.device).gap);
+        let gap = self.def.device(block.device).gap;
+        if !gap.is_zero() {
+            schedule.keep_gap(index, ended + gap);
+            link.rest_unit(block.unit, gap);
+        }
         let answer = match read {
             Ok(answer) => Ok(answer),
             Err(Trouble::Fault(fault)) => Err(fault),
@@ -72,7 +76,7 @@ impl Task<'_> {
         // Nothing new was sent when patience was the only way.
         let exchange = link.last.clone().filter(|last| sent.as_ref().is_none_or(|sent| !Arc::ptr_eq(sent, last)));
         let took = Duration::try_from(ended.duration_since(began)).unwrap_or_default();
-        self.settle(link, schedule, &block, Outcome { began, ended, took, answer, exchange }).await?;
+        self.settle(link, schedule, (index, &block), Outcome { began, ended, took, answer, exchange }).await?;
         Ok(self.still_there(link))
     }
 
@@ -108,8 +112,8 @@ impl Task<'_> {
             next = schedule.next(started);
         }
         // What one of them tells may change the plan: the places of the others no longer hold then.
-        let taken: Vec<Block> = taken.into_iter().map(|index| self.blocks[index].clone()).collect();
-        let requests: Vec<[u8; 6]> = taken.iter().map(Block::request).collect();
+        let taken: Vec<(usize, Block)> = taken.into_iter().map(|index| (index, self.blocks[index].clone())).collect();
+        let requests: Vec<[u8; 6]> = taken.iter().map(|(_, block)| block.request()).collect();
         let messages: Vec<&[u8]> = requests.iter().map(|request| &request[..]).collect();
         let answers = match link.exchange_all(&messages).await {
             Ok(answers) => answers,
@@ -120,10 +124,10 @@ impl Task<'_> {
         let (began, ended) = (started, self.clock.now());
         // They share the time.
         let took = Duration::try_from(ended.duration_since(began)).unwrap_or_default() / requests.len().max(1) as u32;
-        for (block, answered) in taken.iter().zip(answers) {
+        for ((index, block), answered) in taken.iter().zip(answers) {
             let answer = answered.answer.and_then(|answer| parse(block, answer));
             let exchange = Some(answered.exchange);
-            self.settle(link, schedule, block, Outcome { began, ended, took, answer, exchange }).await?;
+            self.settle(link, schedule, (*index, block), Outcome { began, ended, took, answer, exchange }).await?;
         }
         Ok(self.still_there(link))
     }
@@ -142,10 +146,15 @@ impl Task<'_> {
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
-        block: &Block,
+        (planned_at, block): (usize, &Block),
         Outcome { began, ended: at, took, answer, exchange }: Outcome,
     ) -> Result<(), Ended> {
-        let index = self.blocks.iter().position(|planned| planned == block);
+        // Another answer may have changed the plan meanwhile.
+        let index = if self.blocks.get(planned_at).is_some_and(|planned| planned == block) {
+            Some(planned_at)
+        } else {
+            self.blocks.iter().position(|planned| planned == block)
+        };
         let reply = exchange.as_ref().and_then(|exchange| exchange.reply);
         if let Some(exchange) = &exchange {
             let outcome = answer.as_ref().map(drop).map_err(|fault| *fault);
