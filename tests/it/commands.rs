@@ -223,6 +223,19 @@ fn the_headless_demo_does_the_whole_job() {
     let (code, out, _) = run(&["report", "tank", "--history", &history, "--from", &from, "--to", &to, "--out", "-"]);
     assert_eq!(code, Some(0));
     assert!(out == one, "standard output and file differ");
+
+    // What ran ahead of time is reported up to its own end, also where that has not come yet here.
+    let ahead = (started + jiff::SignedDuration::from_mins(5)).to_string();
+    let (code, out, err) = run(&["report", "tank", "--history", &history, "--from", &ahead, "--out", "-"]);
+    assert_eq!(code, Some(0), "{err}");
+    let pv = out.lines().find(|line| line.starts_with("TIC-1.PV,°C,")).expect("PV is in the report");
+    assert!(!pv.contains(",°C,,"), "it has figures: {pv}");
+    let export = ["export", "tank", "--history", &history, "--from", &ahead, "--tags", "TIC-1.PV", "--every", "10s"];
+    let (code, out, err) = run(&export);
+    assert_eq!(code, Some(0), "{err}");
+    let lines: Vec<&str> = out.lines().collect();
+    assert_eq!(lines[0], "time,TIC-1.PV °C,TIC-1.PV quality");
+    assert!(lines.len() > 20 && lines[1..20].iter().all(|line| line.ends_with(",good")), "{out}");
 }
 
 #[test]

@@ -238,7 +238,7 @@ fn connect(path: &Path, mode: AccessMode) -> duckdb::Result<Connection> {
     let config = Config::default()
         .access_mode(mode)?
         .threads(1)?
-        .max_memory("128MB")?
+        .max_memory("96MB")?
         .with("temp_directory", temporary.to_string_lossy())?
         .with("max_temp_directory_size", "512MB")?
         .with("checkpoint_threshold", "4MB")?

@@ -1,6 +1,6 @@
 //! How good the alarm system was: the journal, day by day, through the meter that also measures the running plant.
 
-use std::time::Duration;
+use std::{collections::BTreeSet, time::Duration};
 
 use duckdb::params;
 use jiff::Timestamp;
@@ -24,6 +24,10 @@ use crate::{
 
 /// The journal in memory at a time.
 const CHUNK: Duration = Duration::from_secs(86_400);
+/// A window of the meter, in microseconds.
+const WINDOW: i64 = 600_000_000;
+/// Windows that are looked into one by one: two days.
+const LOOKED_INTO_MAX: i64 = 288;
 /// Steps of alarms behind the figures of one answer: years of a plant that is run well.
 const STEPS_MAX: u64 = 2_000_000;
 
@@ -47,14 +51,7 @@ impl Store {
         let known = from.checked_sub(LEAD).unwrap_or(Timestamp::MIN);
         let mut meter = Meter::of_period(from, until);
         self.standing_at(known)?.iter().for_each(|step| meter.already(step));
-        let watched = match self.watched(from, until) {
-            Err(error) if is_damage(&error) => {
-                let span = params![utc(from), utc(until), ROWS_MAX + 1];
-                self.whole_list(sql::WATCHED_BY_LINES, span, |row| row.get(0))?
-            }
-            watched => watched?,
-        };
-        watched.into_iter().for_each(|window| meter.watched(window));
+        self.watched(from, until)?.into_iter().for_each(|window| meter.watched(window));
         let journaled = |row: &duckdb::Row| Ok((row.get(0)?, row.get(1)?));
         let (first, last): (Option<i64>, Option<i64>) =
             self.db.query_row(sql::JOURNALED, [], journaled).map_err(engine)?;
@@ -80,12 +77,45 @@ impl Store {
             return Ok(Recent::default());
         }
         let (active, steps) = (self.standing_at(since)?, self.steps(since, now)?);
-        Ok(Recent { active, steps, watched: self.watched(since, now)? })
+        Ok(Recent { active, steps, watched: self.watched(since, now)?.into_iter().collect() })
     }
 
-    /// The windows in which anything was stored.
-    fn watched(&self, from: Timestamp, to: Timestamp) -> Result<Vec<i64>, HistoryError> {
-        self.whole_list(sql::WATCHED, params![utc(from), utc(to), ROWS_MAX + 1], |row| row.get(0))
+    /// The windows in which anything was stored. Lines have a row every minute; where there is none, single windows are
+    /// looked into for samples, and many are read at once.
+    fn watched(&self, from: Timestamp, to: Timestamp) -> Result<BTreeSet<i64>, HistoryError> {
+        let span = params![utc(from), utc(to), ROWS_MAX + 1];
+        let list = |sql| self.whole_list(sql, span, |row| row.get::<_, i64>(0));
+        let mut watched: BTreeSet<i64> = list(sql::WATCHED_BY_LINES)?.into_iter().collect();
+        let (first, last) = (from.as_microsecond().div_euclid(WINDOW), (to.as_microsecond() - 1).div_euclid(WINDOW));
+        if last - first - watched.len() as i64 >= LOOKED_INTO_MAX {
+            match list(sql::WATCHED_BY_SAMPLES) {
+                // Then not all at once.
+                Err(error) if is_damage(&error) => {}
+                windows => {
+                    watched.extend(windows?);
+                    return Ok(watched);
+                }
+            }
+        }
+        for window in first..=last {
+            if !watched.contains(&window) && self.has_samples(window, from, to)? {
+                watched.insert(window);
+            }
+        }
+        Ok(watched)
+    }
+
+    fn has_samples(&self, window: i64, from: Timestamp, to: Timestamp) -> Result<bool, HistoryError> {
+        let (Some(begin), Some(end)) = (instant(window * WINDOW), instant((window + 1) * WINDOW)) else {
+            return Ok(false);
+        };
+        let params = params![utc(begin.max(from)), utc(end.min(to))];
+        match self.list(sql::ANY_SAMPLE, params, |row| row.get::<_, i32>(0)) {
+            Ok(rows) => Ok(!rows.is_empty()),
+            // What cannot be read was stored all the same.
+            Err(error) if is_damage(&error) => Ok(true),
+            Err(error) => Err(error),
+        }
     }
 
     /// The raising steps of the alarms that were active at an instant and not put aside: what is aside is not stale.

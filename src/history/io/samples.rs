@@ -25,7 +25,9 @@ use crate::{
 };
 
 /// Rows of a piece that are aimed at; twice as many are held at most.
-pub(super) const PIECE: usize = 1 << 18;
+pub(super) const PIECE: usize = 1 << 17;
+/// Rows that one statement looks at, about, however few of them are asked for: a checkpoint waits for it.
+const LOOKED_AT: f64 = 3e6;
 /// Of a period with unreadable blocks at most this share, in parts, is given up with each of them; and this long at the
 /// least, in microseconds.
 const GAP_PARTS: i64 = 500;
@@ -64,9 +66,11 @@ impl Store {
         let mut next = from.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN).as_microsecond();
         let end = to.as_microsecond();
         let gap_min = ((end - next) / GAP_PARTS).max(GAP_MIN);
-        let (mut span, mut rows, mut gaps) = (end - next, Vec::new(), Vec::<Gap>::new());
+        let (mut span, mut span_max) = (end - next, end - next);
+        let (mut rows, mut gaps) = (Vec::new(), Vec::<Gap>::new());
         if let Some(rows_a_micro) = self.density(to).filter(|density| *density > 0.0) {
             span = span.min((self.piece as f64 / rows_a_micro) as i64).max(1);
+            span_max = ((LOOKED_AT / rows_a_micro) as i64).max(1);
         }
         while next < end {
             let to = next.saturating_add(span).min(end);
@@ -81,7 +85,7 @@ impl Store {
                     }
                     rows.iter().for_each(|row| row.hand_to(&mut each));
                     next = to;
-                    span = if rows.len() < self.piece / 8 { span.saturating_mul(8) } else { span };
+                    span = if rows.len() < self.piece / 8 { span.saturating_mul(8).min(span_max) } else { span };
                 }
                 Err(error) if is_damage(&error) && to - next > gap_min => span = ((to - next) / 8).max(gap_min),
                 Err(error) if is_damage(&error) => {

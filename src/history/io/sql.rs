@@ -107,18 +107,17 @@ pub const FIRST_STORED: &str = "SELECT epoch_us(utc) FROM sample LIMIT 1";
 /// The first and the last instant of the journal.
 pub const JOURNALED: &str = "SELECT min(utc), max(utc) FROM alarm_journal";
 
-/// The windows of ten minutes, by their number since 1970, in which anything was stored: in these a station ran.
-pub const WATCHED: &str = "SELECT DISTINCT epoch_us(utc) // 600000000 FROM (
-        SELECT utc FROM sample WHERE utc >= $1 AND utc < $2
-        UNION ALL SELECT utc FROM alarm_journal WHERE utc >= $1 AND utc < $2
-        UNION ALL SELECT utc - INTERVAL 1 MINUTE FROM line_minute WHERE utc >= $1 AND utc < $2)
-    ORDER BY 1 LIMIT $3";
-
-/// The same where samples cannot be read; a line has a row every minute.
+/// The windows of ten minutes, by their number since 1970, in which a line or an alarm did anything: in these a station ran.
 pub const WATCHED_BY_LINES: &str = "SELECT DISTINCT epoch_us(utc) // 600000000 FROM (
         SELECT utc FROM alarm_journal WHERE utc >= $1 AND utc < $2
         UNION ALL SELECT utc - INTERVAL 1 MINUTE FROM line_minute WHERE utc >= $1 AND utc < $2)
     ORDER BY 1 LIMIT $3";
+
+/// The same by the samples, which are far more rows.
+pub const WATCHED_BY_SAMPLES: &str =
+    "SELECT DISTINCT epoch_us(utc) // 600000000 FROM sample WHERE utc >= $1 AND utc < $2 ORDER BY 1 LIMIT $3";
+/// A row if there is any sample in a span.
+pub const ANY_SAMPLE: &str = "SELECT 1 FROM sample WHERE utc >= ? AND utc < ? LIMIT 1";
 
 /// Steps of alarms in a span, newest first.
 pub fn journal_newest() -> String {

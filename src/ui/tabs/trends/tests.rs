@@ -261,15 +261,30 @@ fn nothing_is_asked_while_the_tab_is_not_shown() {
 fn an_answer_to_an_older_question_is_ignored() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     let old = std::mem::take(&mut stand.asked);
+    stand.press("+");
     stand.live(20, |_| Some(60.0));
-    assert_eq!(kinds(&stand.asked), "curves alarms hour", "the answer is overdue");
+    assert_eq!(kinds(&stand.asked), "curves alarms", "the answers are overdue, and to another view");
     let before = stand.screen();
-    for (id, question) in old {
+    for (id, question) in old.into_iter().take(2) {
         let answer = stand.history(&question);
         stand.send(Msg::Answer(id, Ok(answer)));
     }
     assert_eq!(stand.screen(), before);
     stand.answer();
+    assert_ne!(stand.screen(), before);
+}
+
+#[test]
+fn a_late_answer_is_waited_for_and_shown() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    let asked = std::mem::take(&mut stand.asked);
+    stand.live(40, |_| Some(60.0));
+    assert_eq!(kinds(&stand.asked), "", "not asked again while the history is busy with it");
+    let before = stand.screen();
+    for (id, question) in asked {
+        let answer = stand.history(&question);
+        stand.send(Msg::Answer(id, Ok(answer)));
+    }
     assert_ne!(stand.screen(), before);
 }
 
