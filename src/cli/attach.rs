@@ -23,5 +23,5 @@ pub fn main(args: Args) -> Result<(), CliError> {
 /// The same, where the station is known.
 pub async fn at(place: &Found) -> Result<(), CliError> {
     let session = connect(&place.path).await.map_err(|error| CliError::Failed(error.to_string()))?;
-    Ok(ui::io::run(session, ui::io::Options::default()).await?)
+    Ok(ui::io::run(session, ui::io::Options::new(ui::Leaving::Terminal)).await?)
 }

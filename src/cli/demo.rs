@@ -93,7 +93,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
             headless(session, clock, args.duration.or(drill), &args).await
         } else {
             tokio::select! {
-                result = ui::io::run(session, ui::io::Options::default()) => result.map_err(CliError::from),
+                result = ui::io::run(session, ui::io::Options::new(ui::Leaving::Demo)) => result.map_err(CliError::from),
                 () = run::over(clock, args.duration) => Ok(()),
             }
         };

@@ -118,7 +118,7 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
         let mut serving = Serving::new(listener, station);
         let session = serving.station.session(&paths::operator());
         let result = tokio::select! {
-            result = ui::io::run(session, ui::io::Options::default()) => result,
+            result = ui::io::run(session, ui::io::Options::new(ui::Leaving::Station)) => result,
             _ = serving.told(|| Err(CliError::Usage("leave this terminal and start it again".to_owned()))) => Ok(()),
         };
         serving.stop().await?;

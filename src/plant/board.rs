@@ -252,8 +252,11 @@ impl Board {
         self.set(tag, Sample::bad(cause, at));
     }
 
+    /// A value that stays bad for the same reason has been so since it became it.
     fn set(&mut self, tag: TagId, sample: Sample) {
-        self.samples[tag.index()] = sample;
+        let before = self.samples[tag.index()];
+        let lasts = sample.quality.is_bad() && sample.quality == before.quality;
+        self.samples[tag.index()] = if lasts { Sample { at: before.at, ..sample } } else { sample };
         self.touched.push(tag);
     }
 
@@ -367,6 +370,17 @@ mod tests {
         board.read(&[(FAULT, 2.0)], at(3));
         assert_eq!(board.sample(PV).quality, Quality::Bad(Cause::SensorFault));
         assert_eq!(board.sample(PV).value, None);
+    }
+
+    #[test]
+    fn a_value_that_stays_bad_keeps_the_time_since_when() {
+        let mut board = board();
+        for second in [3, 30, 60] {
+            board.read(&[(PV, 724.0), (FAULT, 2.0)], at(second));
+            assert_eq!(board.sample(PV), Sample::bad(Cause::SensorFault, at(3)), "read at {second} s");
+        }
+        board.read(&[(PV, 724.0), (FAULT, 0.0)], at(61));
+        assert_eq!(board.sample(PV), Sample::good(72.4, at(61)));
     }
 
     #[test]

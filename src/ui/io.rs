@@ -19,7 +19,7 @@ use tokio::{
     time::{Instant, MissedTickBehavior, interval, sleep_until},
 };
 
-use super::{AskId, Effect, Model, Msg, tabs::Tab, theme::Theme, update, view};
+use super::{AskId, Effect, Leaving, Model, Msg, tabs::Tab, theme::Theme, update, view};
 use crate::{
     access::Wish,
     history::{HistoryError, Question, io::Query},
@@ -43,12 +43,14 @@ const INBOX: usize = 32;
 pub struct Options {
     /// How things look.
     pub theme: Theme,
+    /// What ends with it.
+    pub leaving: Leaving,
 }
 
-impl Default for Options {
+impl Options {
     /// Looks chosen by the environment.
-    fn default() -> Options {
-        Options { theme: Theme::detect(|name| std::env::var(name).ok()) }
+    pub fn new(leaving: Leaving) -> Options {
+        Options { theme: Theme::detect(|name| std::env::var(name).ok()), leaving }
     }
 }
 
@@ -80,6 +82,7 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     let snapshot = session.snapshots.borrow_and_update().clone();
     let standing = session.standing.borrow_and_update().clone();
     let mut model = Model::new(snapshot, options.theme, session.terminal, standing);
+    model.leaving = options.leaving;
     model.drill = session.drill.as_mut().map(|port| port.status.borrow_and_update().clone());
     let screen = Screen::raise()?;
     Loop { session, model, screen, outbox, redraw_at: None, drawn_at: None, heard_at: Instant::now() }.run(inbox).await

@@ -176,7 +176,7 @@ pub const GLOBAL: &[Key<Global>] = &[
     Key {
         chord: char('q'),
         label: "quit",
-        help: "quit (asks first); polling and alarms stop with it",
+        help: "quit (asks first, and says what stops with it)",
         action: Global::Quit,
     },
     Key { chord: char('?'), label: "help", help: "all keys", action: Global::Help },

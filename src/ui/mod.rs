@@ -35,7 +35,7 @@ use crate::{
 use drawn::Drawn;
 use keys::Global;
 use modal::{Confirm, Modal};
-pub use msg::{Act, AskId, Effect, Msg};
+pub use msg::{Act, AskId, Effect, Leaving, Msg};
 use presence::Presence;
 use tabs::{Tab, Tabs, alarms::deeds};
 use theme::Theme;
@@ -79,6 +79,8 @@ pub struct Model {
     pub drawn: Option<Drawn>,
     /// Why the last key did nothing; until the next one.
     pub note: Option<&'static str>,
+    /// What ends when its operator leaves.
+    pub leaving: Leaving,
 }
 
 /// The terminal's sense of time, fed by ticks.
@@ -145,6 +147,7 @@ impl Model {
             drill: None,
             drawn: None,
             note: None,
+            leaving: Leaving::default(),
         };
         update(&mut model, Msg::Standing(standing));
         model
@@ -274,6 +277,14 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
         return Vec::new();
     }
     let past = presence::is_past_unlock(model, event);
+    if let Some(show @ Global::Show(tab)) = keys::find(keys::GLOBAL, event)
+        && model.modal.as_ref().is_some_and(|modal| !modal.takes_text())
+        && Tab::offered(&model.cx()).contains(&tab)
+    {
+        // The number of a tab leads there from every window that has no use for it.
+        model.modal = None;
+        return on_global(model, show);
+    }
     if let Some(modal) = model.modal.take_if(|_| !past) {
         let Model { snapshot, theme, clock, drill, standing, screen, tabs, .. } = model;
         let cx = cx_of(snapshot, theme, *clock, *screen, drill, standing);
@@ -307,7 +318,7 @@ fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
         Global::Previous => vec![Act::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), -1))],
         Global::Lock => presence::lock(model),
         Global::Help => vec![Act::Open(Modal::Help(0))],
-        Global::Quit => vec![Act::Open(Modal::Confirm(Confirm::quit()))],
+        Global::Quit => vec![Act::Leave],
         Global::Acknowledge => drawn::acknowledge(model),
         Global::AcknowledgeAll => {
             let cx = model.cx();
@@ -405,6 +416,7 @@ fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
                 }
                 effects.push(Effect::Wish(AskId { tab, number }, wish));
             }
+            Act::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
             Act::Do(effect) => effects.push(effect),
         }
     }
@@ -418,6 +430,7 @@ fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     let effects = asked.into_iter().filter_map(|act| match act {
         Act::Do(effect) => Some(effect),
         Act::Open(_)
+        | Act::Leave
         | Act::Show(_)
         | Act::ShowDevice(_)
         | Act::ShowParameter(_)

@@ -107,8 +107,22 @@ pub enum Act {
     Confirmed(Confirmed),
     /// Wish something of the station; the answer goes to the window that waits for one, else to this tab.
     Wish(Tab, Wish),
+    /// Ask whether to leave.
+    Leave,
     /// Pass on an effect as it is.
     Do(Effect),
+}
+
+/// What ends when an operator leaves the terminal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Leaving {
+    /// The station too: it runs in this process.
+    #[default]
+    Station,
+    /// The station and the simulated plant.
+    Demo,
+    /// Nothing else: the terminal is attached.
+    Terminal,
 }
 
 impl Act {

@@ -166,6 +166,7 @@ pub(super) fn hold_back(model: &mut Model, acts: Vec<Act>) -> Vec<Act> {
             | Act::Wish(_, Wish::Exported { .. })
             | Act::Do(Effect::SaveReport { .. } | Effect::Drill(_)) => held = held.or(Some(None)),
             Act::Open(_)
+            | Act::Leave
             | Act::Show(_)
             | Act::ShowDevice(_)
             | Act::ShowParameter(_)

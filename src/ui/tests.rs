@@ -3,6 +3,7 @@
 mod keys;
 mod people;
 mod screens;
+mod windows;
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::{Terminal, backend::TestBackend, buffer::Buffer};

@@ -52,7 +52,9 @@ fn on_the_pty() {
             }
         });
         let session = Session { snapshots, standing, requests, terminal: 1, drill: None };
-        run(session, Options { theme: Theme::FULL }).await.expect("left by its operator or a signal");
+        run(session, Options { theme: Theme::FULL, leaving: Leaving::Station })
+            .await
+            .expect("left by its operator or a signal");
     });
 }
 

@@ -21,7 +21,7 @@ use crate::{
         tool::Tool,
     },
     ui::{
-        Act, Confirmed, Cx, Effect, guard, keys, rights,
+        Act, Confirmed, Cx, Effect, Leaving, guard, keys, rights,
         tabs::mimic,
         widgets::{
             text::{Canvas, width, wrap},
@@ -58,10 +58,14 @@ pub enum Intent {
 }
 
 impl Confirm {
-    /// Leave?
-    pub fn quit() -> Confirm {
-        let notes = ["Quit?", "Polling and alarms stop too: the station runs in this terminal."];
-        Confirm::new(Intent::Quit, "quit", notes.map(str::to_owned).to_vec())
+    /// Leave? Says what ends with it.
+    pub fn quit(leaving: Leaving) -> Confirm {
+        let ends = match leaving {
+            Leaving::Station => "Polling and alarms stop too: the station runs in this terminal.",
+            Leaving::Demo => "The demonstration ends: its simulated plant, polling and alarms stop.",
+            Leaving::Terminal => "Only this terminal closes. Polling and alarms go on.",
+        };
+        Confirm::new(Intent::Quit, "quit", vec!["Quit?".to_owned(), ends.to_owned()])
     }
 
     fn new(intent: Intent, title: impl Into<String>, notes: Vec<String>) -> Confirm {
@@ -237,6 +241,11 @@ impl Confirm {
             Some(back) => Next::Both(Modal::Faceplate(back), vec![act]),
             None => Next::Do(vec![act]),
         }
+    }
+
+    /// Is a name or password typed into it?
+    pub(super) fn takes_text(&self) -> bool {
+        self.sign.is_some()
     }
 
     /// Is the station's word on a signature waited for?

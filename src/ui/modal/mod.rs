@@ -6,6 +6,7 @@ pub mod deed;
 pub mod entry;
 pub mod faceplate;
 pub mod form;
+pub mod guidance;
 pub mod help;
 pub mod line;
 pub mod notice;
@@ -25,6 +26,7 @@ pub use confirm::Confirm;
 pub use deed::Deed;
 pub use entry::Entry;
 pub use faceplate::Faceplate;
+pub use guidance::Guidance;
 pub use notice::Notice;
 pub use prompt::Prompt;
 pub use reason::Reason;
@@ -59,6 +61,8 @@ pub enum Modal {
     Faceplate(Faceplate),
     /// Words to be read: why something cannot be done now.
     Notice(Notice),
+    /// What to do about an alarm.
+    Guidance(Box<Guidance>),
     /// Why a value is what it is.
     Why(Why),
     /// How a line communicates.
@@ -108,7 +112,7 @@ impl Modal {
             return (back, Vec::new());
         }
         if keys::ctrl('c').is(event) {
-            return (Some(Modal::Confirm(Confirm::quit())), Vec::new());
+            return (Some(self), vec![Act::Leave]);
         }
         let next = match self {
             Modal::Help(row) => help::on_key(row, event),
@@ -119,6 +123,7 @@ impl Modal {
             Modal::Reason(reason) => reason.on_key(cx, event),
             Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
             Modal::Notice(notice) => notice.on_key(event),
+            Modal::Guidance(guidance) => guidance.on_key(cx, event),
             Modal::Why(why) => why.on_key(event),
             Modal::Settings(settings) => settings.on_key(cx, event),
             Modal::Bus(window) => window.on_key(cx, tabs, event),
@@ -138,10 +143,31 @@ impl Modal {
         matches!(self, Modal::Confirm(confirm) if confirm.is_quit())
     }
 
+    /// Is something typed into it, so that a digit is one?
+    pub fn takes_text(&self) -> bool {
+        match self {
+            Modal::Confirm(confirm) => confirm.takes_text(),
+            Modal::Choice(_) => false,
+            Modal::Entry(_) | Modal::Prompt(_) | Modal::Reason(_) | Modal::Settings(_) | Modal::Sheet(_) => true,
+            Modal::Help(_)
+            | Modal::Notice(_)
+            | Modal::Guidance(_)
+            | Modal::Why(_)
+            | Modal::Faceplate(_)
+            | Modal::Deed(_)
+            | Modal::Bus(_) => !self.only_shows(),
+        }
+    }
+
     /// Does it only show, so that a locked terminal may have it?
     pub fn only_shows(&self) -> bool {
         match self {
-            Modal::Help(_) | Modal::Notice(_) | Modal::Why(_) | Modal::Faceplate(_) | Modal::Deed(_) => true,
+            Modal::Help(_)
+            | Modal::Notice(_)
+            | Modal::Guidance(_)
+            | Modal::Why(_)
+            | Modal::Faceplate(_)
+            | Modal::Deed(_) => true,
             Modal::Confirm(confirm) => confirm.is_quit(),
             Modal::Bus(window) => window.only_shows(),
             Modal::Entry(_)
@@ -166,6 +192,7 @@ impl Modal {
             | Modal::Choice(_)
             | Modal::Faceplate(_)
             | Modal::Notice(_)
+            | Modal::Guidance(_)
             | Modal::Deed(_)
             | Modal::Why(_) => {}
             Modal::Bus(window) => window.on_paste(text),
@@ -185,6 +212,7 @@ impl Modal {
             Modal::Reason(reason) => reason.hints().into_iter().map(|(key, label)| hint(key, label)).collect(),
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
             Modal::Notice(_) => vec![hint("Esc", "close")],
+            Modal::Guidance(guidance) => guidance.hints(),
             Modal::Why(why) => why.hints(),
             Modal::Settings(settings) => settings.hints(),
             Modal::Bus(window) => window.hints(),
@@ -204,6 +232,7 @@ impl Modal {
             Modal::Reason(reason) => reason.view(cx, frame, body),
             Modal::Faceplate(faceplate) => faceplate.view(cx, frame, body),
             Modal::Notice(notice) => notice.view(cx, frame, body),
+            Modal::Guidance(guidance) => guidance.view(cx, frame, body),
             Modal::Why(why) => why.view(cx, frame, body),
             Modal::Settings(settings) => settings.view(cx, frame, body),
             Modal::Bus(window) => window.view(cx, frame, body),

@@ -5,9 +5,9 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, window};
 use crate::{
-    plant::{def::DeviceId, event::LineState, snapshot::DeviceState},
+    plant::{command::Command, def::DeviceId, event::LineState, snapshot::DeviceState},
     ui::{
-        Cx,
+        Act, Cx, rights,
         widgets::text::{clock, width, wrap},
     },
 };
@@ -45,6 +45,15 @@ impl Notice {
             }
         };
         Some(why)
+    }
+
+    /// Opens a window whose work ends in this command, or says why whoever sits here may not give it: before anything is
+    /// filled in.
+    pub fn or(cx: &Cx, title: &str, command: &Command, window: Modal) -> Act {
+        Act::Open(match rights::missing(cx, command) {
+            Some(why) => Modal::Notice(Notice::new(title, vec![why])),
+            None => window,
+        })
     }
 
     /// Words to be read, the first line as the worry.

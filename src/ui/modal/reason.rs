@@ -12,10 +12,7 @@ use crate::{
         command::Command,
         def::AlarmId,
     },
-    ui::{
-        Act, Confirmed, Cx, keys, rights,
-        widgets::text::{fit_words, wrap},
-    },
+    ui::{Act, Confirmed, Cx, keys, rights, widgets::text::wrap},
 };
 
 /// The window.
@@ -27,6 +24,8 @@ pub struct Reason {
     /// What is done, one for each time that can be chosen; never empty.
     choices: Vec<(String, Command)>,
     chosen: usize,
+    /// The time that is typed where none of the choices is wanted: the last one then.
+    time: Option<Time>,
     line: Line,
     /// Nothing is done without words.
     needed: bool,
@@ -40,41 +39,93 @@ impl Reason {
     pub fn new(title: &str, verb: &'static str, notes: Vec<String>, command: Command, needed: bool) -> Reason {
         let choices = vec![(String::new(), command)];
         let (title, line) = (title.to_owned(), Line::long("", WORDS_MAX));
-        Reason { title, notes, choices, chosen: 0, line, needed, verb, problem: None }
+        Reason { title, notes, choices, chosen: 0, time: None, line, needed, verb, problem: None }
     }
 
-    /// Shelve an alarm for one of these times, each with its words; `None` if there is none.
-    pub fn shelve(notes: Vec<String>, alarm: AlarmId, times: Vec<(String, Duration)>) -> Option<Reason> {
+    /// Shelve an alarm for one of these times, each with its words, or for any other up to `max`.
+    pub fn shelve(notes: Vec<String>, alarm: AlarmId, times: Vec<(String, Duration)>, max: Duration) -> Reason {
         let command = |lasts| Command::Alarm(AlarmCommand::Shelve { alarm, lasts });
-        let choices: Vec<_> = times.into_iter().map(|(words, lasts)| (words, command(lasts))).collect();
-        let first = choices.first()?.1.clone();
-        Some(Reason { choices, ..Reason::new("shelve an alarm", "shelve", notes, first, true) })
+        let mut choices: Vec<_> = times.into_iter().map(|(words, lasts)| (words, command(lasts))).collect();
+        choices.push(("other:".to_owned(), command(max)));
+        let time = Some(Time { alarm, max, line: Line::default(), typing: choices.len() == 1 });
+        let first = choices[0].1.clone();
+        Reason { choices, time, ..Reason::new("shelve an alarm", "shelve", notes, first, true) }
     }
 
     /// The keys of the moment.
     pub fn hints(&self) -> Vec<(&'static str, &'static str)> {
         let choose = (1 < self.choices.len()).then_some(("↑↓", "time"));
-        [("⏎", self.verb)].into_iter().chain(choose).chain([("Esc", "leave it as it is")]).collect()
+        let other = self.other().map(|time| ("Tab", if time.typing { "reason" } else { "time" }));
+        [("⏎", self.verb)].into_iter().chain(choose).chain(other).chain([("Esc", "leave it as it is")]).collect()
     }
 
     pub(super) fn paste(&mut self, text: &str) {
-        self.line.paste(text);
+        match self.time.as_mut().filter(|time| time.typing) {
+            Some(time) => time.line.paste(text),
+            None => self.line.paste(text),
+        }
+    }
+
+    /// The time that is typed, where that is what is chosen.
+    fn other(&self) -> Option<&Time> {
+        self.time.as_ref().filter(|_| self.chosen + 1 == self.choices.len())
+    }
+
+    /// What is done, once a time that is typed is one.
+    fn command(&self) -> Result<Command, String> {
+        match self.other() {
+            Some(time) => {
+                let lasts = typed_time(&time.line.text(), time.max)?;
+                Ok(Command::Alarm(AlarmCommand::Shelve { alarm: time.alarm, lasts }))
+            }
+            None => Ok(self.choices[self.chosen].1.clone()),
+        }
     }
 
     pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
         let last = self.choices.len() - 1;
         match event.code {
             KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => return self.finish(cx),
-            KeyCode::Up => self.chosen = self.chosen.saturating_sub(1),
-            KeyCode::Down => self.chosen = (self.chosen + 1).min(last),
-            _ if self.line.on_key(event) => self.problem = None,
-            _ => {}
+            KeyCode::Up => self.choose(self.chosen.saturating_sub(1)),
+            KeyCode::Down => self.choose((self.chosen + 1).min(last)),
+            KeyCode::Tab if self.other().is_some() => {
+                if let Some(time) = &mut self.time {
+                    time.typing = !time.typing;
+                }
+            }
+            _ => {
+                let line = match self.time.as_mut().filter(|time| time.typing) {
+                    Some(time) => &mut time.line,
+                    None => &mut self.line,
+                };
+                if line.on_key(event) {
+                    self.problem = None;
+                }
+            }
         }
         Next::Stay(Modal::Reason(Box::new(self)))
     }
 
+    /// A time to be typed is typed first.
+    fn choose(&mut self, chosen: usize) {
+        self.chosen = chosen;
+        let typing = self.other().is_some();
+        if let Some(time) = &mut self.time {
+            time.typing = typing;
+        }
+    }
+
     fn finish(mut self, cx: &Cx) -> Next {
-        let command = self.choices[self.chosen].1.clone();
+        let command = match self.command() {
+            Ok(command) => command,
+            Err(why) => {
+                self.problem = Some(why);
+                return Next::Stay(Modal::Reason(Box::new(self)));
+            }
+        };
+        if let Some(time) = &mut self.time {
+            time.typing = false;
+        }
         let words = self.line.text().trim().to_owned();
         self.problem = if self.line.missed() {
             Some("not all of it was taken; Ctrl-U empties the line".to_owned())
@@ -94,8 +145,8 @@ impl Reason {
         let theme = cx.theme;
         let room = body.width.saturating_sub(8).min(72);
         let notes: Vec<String> = self.notes.iter().flat_map(|note| wrap(note, room)).collect();
-        let times = if 1 < self.choices.len() { self.choices.len() as u16 } else { 0 };
-        let height = notes.len() as u16 + times + 5;
+        let times = if 1 < self.choices.len() || self.time.is_some() { self.choices.len() as u16 } else { 0 };
+        let height = notes.len() as u16 + times + 6;
         let mut canvas = window(cx, frame, body, &self.title, (room, height));
         for (y, note) in notes.iter().enumerate() {
             canvas.text(0, y as u16, note, theme.normal());
@@ -104,15 +155,96 @@ impl Reason {
         for (n, (words, _)) in self.choices.iter().enumerate().filter(|_| times > 0) {
             let style = if n == self.chosen { theme.focus() } else { theme.normal() };
             canvas.text(0, y, if n == self.chosen { "▸ " } else { "  " }, theme.strong());
-            canvas.text(2, y, words, style);
+            let x = canvas.text(2, y, words, style);
+            if let Some(time) = self.time.as_ref().filter(|_| n + 1 == self.choices.len()) {
+                let x = match self.other() {
+                    Some(_) => time.line.view(theme, &mut canvas, x + 1, y),
+                    None => x,
+                };
+                canvas.text(x + 2, y, &format!("45 min, 1.5 h, 1:30; at most {}", spelled(time.max)), theme.dim());
+            }
             y += 1;
         }
         canvas.text(0, y, if self.needed { "reason:" } else { "note, if there is one:" }, theme.dim());
         self.line.view(theme, &mut canvas, 0, y + 1);
         let problem = self.problem.clone().or_else(|| rights::missing(cx, &self.choices[self.chosen].1));
-        canvas.text(0, y + 2, &fit_words(&problem.unwrap_or_default(), room), theme.trouble());
+        for (n, line) in wrap(&problem.unwrap_or_default(), room).iter().take(2).enumerate() {
+            canvas.text(0, y + 2 + n as u16, line, theme.trouble());
+        }
         let keys: Vec<String> = self.hints().iter().map(|(key, label)| format!("{key} {label}")).collect();
         let keys = theme.enter(&keys.join("   "));
         canvas.text(0, canvas.height().saturating_sub(1), &keys, theme.strong());
+    }
+}
+
+/// A time that is typed.
+#[derive(Debug, Clone, PartialEq)]
+struct Time {
+    alarm: AlarmId,
+    /// The longest that the plant allows.
+    max: Duration,
+    line: Line,
+    /// What is typed goes here, not into the reason.
+    typing: bool,
+}
+
+/// `45`, `45 min`, `1.5 h`, `1:30`: a time of at most `max`, a bare number in minutes.
+fn typed_time(text: &str, max: Duration) -> Result<Duration, String> {
+    let text = text.trim();
+    let wrong = || format!("\"{text}\" is no time: 45 min, 1.5 h or 1:30");
+    let number = |text: &str| text.trim().replacen(',', ".", 1).parse::<f64>().ok();
+    let minutes = match text.split_once(':') {
+        Some((hours, minutes)) => {
+            let minutes = minutes.parse::<u8>().ok().filter(|minutes| *minutes < 60);
+            hours.parse::<u16>().ok().zip(minutes).map(|(hours, minutes)| f64::from(hours) * 60.0 + f64::from(minutes))
+        }
+        None => match text.strip_suffix('h') {
+            Some(hours) => number(hours).map(|hours| hours * 60.0),
+            None => number(text.strip_suffix("min").or(text.strip_suffix('m')).unwrap_or(text)),
+        },
+    };
+    let lasts =
+        minutes.and_then(|minutes| Duration::try_from_secs_f64((minutes * 60.0).round()).ok()).ok_or_else(wrong)?;
+    match (lasts.is_zero(), lasts <= max) {
+        (true, _) => Err(wrong()),
+        (false, true) => Ok(lasts),
+        (false, false) => Err(format!("at most {}", spelled(max))),
+    }
+}
+
+/// `90 min`, `8 h`.
+pub fn spelled(span: Duration) -> String {
+    match span.as_secs() / 60 {
+        minutes if minutes % 60 == 0 => format!("{} h", minutes / 60),
+        minutes => format!("{minutes} min"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_is_typed_in_minutes_hours_or_both() {
+        let max = Duration::from_secs(8 * 3_600);
+        let minutes = |minutes: u64| Ok(Duration::from_secs(minutes * 60));
+        for (text, lasts) in [
+            ("45", minutes(45)),
+            ("45 min", minutes(45)),
+            ("1.5 h", minutes(90)),
+            ("1,5h", minutes(90)),
+            ("1:30", minutes(90)),
+            (" 0:05 ", minutes(5)),
+            ("8h", minutes(480)),
+            ("9h", Err("at most 8 h".to_owned())),
+            ("1:75", Err("\"1:75\" is no time: 45 min, 1.5 h or 1:30".to_owned())),
+            ("0", Err("\"0\" is no time: 45 min, 1.5 h or 1:30".to_owned())),
+            ("-5", Err("\"-5\" is no time: 45 min, 1.5 h or 1:30".to_owned())),
+            ("1e9", Err("at most 8 h".to_owned())),
+            ("NaN", Err("\"NaN\" is no time: 45 min, 1.5 h or 1:30".to_owned())),
+            ("", Err("\"\" is no time: 45 min, 1.5 h or 1:30".to_owned())),
+        ] {
+            assert_eq!(typed_time(text, max), lasts, "{text}");
+        }
     }
 }

@@ -3,7 +3,7 @@
 
 pub mod deeds;
 mod filter;
-mod guidance;
+pub mod guidance;
 mod handover;
 mod journal;
 mod keys;
@@ -30,11 +30,12 @@ use crate::{
         Act, Cx,
         drawn::Rows,
         keys::{Hint, find},
-        modal::{Faceplate, Modal, Prompt, Why, faceplate::device_words},
+        modal::{Faceplate, Guidance, Modal, Prompt, Why, faceplate::device_words},
     },
 };
 use filter::Filter;
 use handover::Handover;
+pub use handover::aside_words;
 use journal::Journal;
 use keys::Action;
 #[cfg(test)]
@@ -366,7 +367,7 @@ impl Alarms {
             (Subject::Tag(tag), Action::Why) => Why::open(Why::new(vec![tag], 0)),
             (Subject::Device(device), Action::Why) => Why::open(Why::of_device(cx, device)),
             (subject, Action::Open) => {
-                faceplate(cx, subject).map(|plate| Act::Open(Modal::Faceplate(plate))).into_iter().collect()
+                vec![Act::Open(Modal::Guidance(Box::new(Guidance::new(id, faceplate(cx, subject)))))]
             }
             (Subject::Tag(_) | Subject::Device(_) | Subject::Line(_) | Subject::Station, _) => Vec::new(),
         }

@@ -36,7 +36,7 @@ use crate::{
         Act, Cx,
         drawn::Rows,
         keys::{self, Hint, Key, char, code},
-        modal::{Modal, Settings},
+        modal::{Modal, Notice, Settings},
         widgets::{
             line_trend::{self, line_trend},
             text::{Canvas, between, fit_words, running, width},
@@ -198,6 +198,7 @@ impl Bus {
         let action = keys::find(page_keys(self.page), event).or_else(|| keys::find(KEYS, event));
         let (Some(action), Some(at)) = (action, Place::of(cx, self.line)) else { return Vec::new() };
         let screen = isize::try_from(self.room(cx)).unwrap_or(1).max(2) - 1;
+        self.frames.dismiss();
         match action {
             Action::Turn(by) => {
                 let place = Page::ALL.iter().position(|page| *page == self.page).unwrap_or(0) as isize;
@@ -216,10 +217,20 @@ impl Bus {
             Action::Try(tried) => return self.test.open(cx, &at, tried),
             Action::Again => return test::again(cx, &at),
             Action::Stop => return test::stop(&at),
-            Action::Settings => return vec![Act::Open(Modal::Settings(Box::new(Settings::new(cx, self.line))))],
             Action::Retry => return retry(cx, Some(self.line)),
+            Action::Settings => {
+                let command = Command::Configure(Box::new(at.settings.clone()));
+                let window = Modal::Settings(Box::new(Settings::new(cx, self.line)));
+                return vec![Notice::or(cx, "settings of the line", &command, window)];
+            }
         }
         self.on_snapshot(cx)
+    }
+
+    /// Esc: frames that were held still run on, `false` where there is no step back.
+    pub fn back(&mut self, cx: &Cx) -> bool {
+        self.frames.dismiss();
+        Place::of(cx, self.line).is_some_and(|at| self.page == Page::Frames && self.frames.back(cx, &at))
     }
 
     /// The list that keys act on.

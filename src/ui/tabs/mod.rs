@@ -184,7 +184,10 @@ impl Tabs {
             Tab::Trends => act(trends::KEYS, event, |action| self.trends.on_key(cx, action)),
             Tab::Alarms => self.alarms.on_key(cx, event),
             Tab::Controllers => self.controllers.on_key(cx, event),
-            Tab::Reports => act(reports::KEYS, event, |action| self.reports.on_key(cx, action)),
+            Tab::Reports => {
+                self.reports.dismiss();
+                act(reports::KEYS, event, |action| self.reports.on_key(cx, action))
+            }
             Tab::Bus => self.bus.on_key(cx, event),
             Tab::Users => self.users.on_key(cx, event),
             Tab::Faults => act(faults::KEYS, event, |action| self.faults.on_key(cx, action)),
@@ -225,7 +228,8 @@ impl Tabs {
             Tab::Controllers => self.controllers.back(cx),
             Tab::Users => self.users.back(),
             Tab::Alarms => self.alarms.back(),
-            Tab::Login | Tab::Mimic | Tab::Trends | Tab::Reports | Tab::Bus | Tab::Faults => false,
+            Tab::Bus => self.bus.back(cx),
+            Tab::Login | Tab::Mimic | Tab::Trends | Tab::Reports | Tab::Faults => false,
         }
     }
 

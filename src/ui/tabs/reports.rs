@@ -159,6 +159,13 @@ impl Reports {
         self.ask(cx)
     }
 
+    /// What became of a file has been read.
+    pub fn dismiss(&mut self) {
+        if matches!(self.export, Export::Done(_) | Export::Failed(_)) {
+            self.export = Export::Not;
+        }
+    }
+
     /// News, or time has passed.
     pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
         if self.follow {

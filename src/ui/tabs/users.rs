@@ -15,7 +15,7 @@ use crate::{
         Act, Cx,
         drawn::Rows,
         keys::{self, Hint, Key, char, code},
-        modal::{Modal, Sheet, sheet::Purpose},
+        modal::{Modal, Notice, Sheet, sheet::Purpose},
     },
 };
 
@@ -115,7 +115,16 @@ impl Users {
                 self.audit = Some(Audit::new(self.asked));
                 return self.on_snapshot(cx);
             }
-            (Action::Add, _) => Some(Sheet::new(Purpose::Add)),
+            // Whoever sees this page is a Supervisor: a station with users has at least him.
+            (Action::Add, None) => {
+                let words = [
+                    "This station keeps no users.",
+                    "A demonstration asks nobody who he is; a station started with `sightglass run` does.",
+                ];
+                let notice = Notice::new("add a user", words.map(str::to_owned).to_vec());
+                return vec![Act::Open(Modal::Notice(notice))];
+            }
+            (Action::Add, Some(_)) => Some(Sheet::new(Purpose::Add)),
             (Action::Role, Some(row)) => Some(Sheet::role_of(row)),
             (Action::Disable, Some(row)) => {
                 let locked_out = row.locked_until.is_some_and(|until| until > cx.now);

@@ -12,13 +12,13 @@ use crate::{
     },
     ui::{
         Act, Cx,
-        modal::{Confirm, Modal, Notice, Reason, confirm::subject},
+        modal::{Confirm, Modal, Notice, Reason, confirm::subject, reason::spelled},
         widgets::text::{clock, running},
     },
 };
 
 /// Times that are offered for the shelf, minutes.
-const SHELVE_MIN: [u64; 3] = [15, 60, 240];
+const SHELVE_MIN: [u64; 4] = [15, 30, 60, 240];
 /// Alarms that a question names.
 const NAMED: usize = 6;
 
@@ -80,29 +80,25 @@ pub fn acknowledge_all<'a>(cx: &Cx, alarms: impl Iterator<Item = &'a ActiveAlarm
 /// Asks for how long an alarm is put aside, and why.
 pub fn shelve(cx: &Cx, alarm: AlarmId) -> Vec<Act> {
     let max = cx.def().alarm_rules.shelve_max;
-    let minutes = |span: Duration| match span.as_secs() / 60 {
-        minutes if minutes % 60 == 0 => format!("{} h", minutes / 60),
-        minutes => format!("{minutes} min"),
-    };
     let fixed = SHELVE_MIN.map(|minutes| Duration::from_secs(minutes * 60));
-    let mut times: Vec<_> = fixed.into_iter().filter(|span| *span <= max).map(|span| (minutes(span), span)).collect();
+    let mut times: Vec<_> = fixed.into_iter().filter(|span| *span <= max).map(|span| (spelled(span), span)).collect();
     let shift = period::at(cx.def(), cx.now).filter(|_| !cx.def().shifts.is_empty());
     let rest = shift.and_then(|shift| Duration::try_from(shift.to.duration_since(cx.now)).ok());
     if let Some(rest) = rest.filter(|rest| !rest.is_zero() && *rest <= max) {
         times.push((format!("rest of the shift, {}", running(rest)), rest));
     }
-    if times.is_empty() {
-        times.push((minutes(max), max));
-    }
     let notes = vec![name(cx, alarm), "It is not annunciated for this time, and comes back by itself:".to_owned()];
-    Reason::shelve(notes, alarm, times).map_or_else(Vec::new, |reason| open(Modal::Reason(Box::new(reason))))
+    let command = Command::Alarm(AlarmCommand::Shelve { alarm, lasts: max });
+    let window = Modal::Reason(Box::new(Reason::shelve(notes, alarm, times, max)));
+    vec![Notice::or(cx, "shelve an alarm", &command, window)]
 }
 
 /// Asks why an alarm is put aside until somebody puts it back.
 pub fn out_of_service(cx: &Cx, alarm: AlarmId) -> Vec<Act> {
     let notes = vec![name(cx, alarm), "It is not annunciated until somebody puts it back in service.".to_owned()];
     let command = Command::Alarm(AlarmCommand::OutOfService(alarm));
-    open(Modal::Reason(Box::new(Reason::new("out of service", "put out of service", notes, command, true))))
+    let reason = Reason::new("out of service", "put out of service", notes, command.clone(), true);
+    vec![Notice::or(cx, "out of service", &command, Modal::Reason(Box::new(reason)))]
 }
 
 /// Asks whether to let go an alarm that latches.
@@ -143,8 +139,9 @@ pub fn put_back(cx: &Cx, aside: &AsideAlarm) -> Vec<Act> {
         | AlarmState::LatchedAcknowledged => return Vec::new(),
     };
     let holds = aside.active.then(|| "Its condition holds: it will be annunciated at once.".to_owned());
-    let confirm = Confirm::order(title, name(cx, aside.id), Command::Alarm(command));
-    open(Modal::Confirm(confirm.with_notes(holds)))
+    let command = Command::Alarm(command);
+    let confirm = Confirm::order(title, name(cx, aside.id), command.clone());
+    vec![Notice::or(cx, title, &command, Modal::Confirm(confirm.with_notes(holds)))]
 }
 
 /// Asks for what the next shift should know.

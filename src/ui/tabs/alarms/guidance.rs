@@ -15,6 +15,7 @@ use crate::{
             confirm::subject,
             faceplate::{device_words, line_state_words},
         },
+        rights,
         widgets::{
             text::{self, Canvas, between, clock, fit_words, running, wrap},
             value,
@@ -22,43 +23,76 @@ use crate::{
     },
 };
 
-/// Draws it for a listed alarm.
-pub fn view(cx: &Cx, alarm: &ActiveAlarm, canvas: &mut Canvas) {
+/// Columns of the names at the left, and a blank at the right.
+const NAMES: u16 = 10;
+
+/// All there is to say about a listed alarm.
+pub fn rows(cx: &Cx, alarm: &ActiveAlarm) -> [(&'static str, String); 4] {
     let def = cx.def().alarm(alarm.id);
     let guidance = &def.guidance;
-    let go = go_words(cx, def, Some(alarm));
-    let rows = [
+    [
         ("now", now_words(cx, def, alarm)),
         ("cause", or_dash(&guidance.cause).to_owned()),
         ("effect", or_dash(&guidance.effect).to_owned()),
         ("action", or_dash(&guidance.action).to_owned()),
-    ];
+    ]
+}
+
+/// The same for one that is not in a list.
+pub fn rows_of_any(cx: &Cx, alarm: AlarmId, now: String) -> [(&'static str, String); 4] {
+    let guidance = &cx.def().alarm(alarm).guidance;
+    [
+        ("now", now),
+        ("cause", or_dash(&guidance.cause).to_owned()),
+        ("effect", or_dash(&guidance.effect).to_owned()),
+        ("action", or_dash(&guidance.action).to_owned()),
+    ]
+}
+
+/// The rows of the screen that all of it needs, with its title and the way on.
+pub fn height(rows: &[(&str, String)], width: u16) -> u16 {
+    let room = width.saturating_sub(NAMES);
+    rows.iter().map(|(_, text)| wrap(text, room).len() as u16).sum::<u16>() + 2
+}
+
+/// Draws it for a listed alarm.
+pub fn view(cx: &Cx, alarm: &ActiveAlarm, canvas: &mut Canvas) {
+    let def = cx.def().alarm(alarm.id);
+    let go = go_words(cx, def, Some(alarm));
+    let rows = rows(cx, alarm);
     let respond = respond_words(cx, def, alarm)
         .map(|(words, overdue)| (format!(" {words} "), if overdue { cx.theme.trouble() } else { cx.theme.strong() }));
-    let cut = title(cx, def, respond, canvas);
+    let cut = title(cx, def, Some(alarm), respond, canvas);
     draw(cx, cut.as_deref(), &rows, &go, canvas);
 }
 
 /// Draws what there is to know of any alarm, with words of its own at the top.
 pub fn view_any(cx: &Cx, alarm: AlarmId, now: String, canvas: &mut Canvas) {
     let def = cx.def().alarm(alarm);
-    let rows = [
-        ("now", now),
-        ("effect", or_dash(&def.guidance.effect).to_owned()),
-        ("action", or_dash(&def.guidance.action).to_owned()),
-    ];
-    let cut = title(cx, def, None, canvas);
+    let rows = rows_of_any(cx, alarm, now);
+    let cut = title(cx, def, None, None, canvas);
     draw(cx, cut.as_deref(), &rows, &go_words(cx, def, None), canvas);
 }
 
 /// Which alarm it is about; at the right how long there is to respond. Its whole name, where there was no room for that.
-fn title(cx: &Cx, def: &AlarmDef, respond: Option<(String, Style)>, canvas: &mut Canvas) -> Option<String> {
+fn title(
+    cx: &Cx,
+    def: &AlarmDef,
+    listed: Option<&ActiveAlarm>,
+    respond: Option<(String, Style)>,
+    canvas: &mut Canvas,
+) -> Option<String> {
     let (width, theme) = (canvas.width(), cx.theme);
     canvas.run(0, 0, width, '─', theme.dim());
     let (words, style) = respond.unwrap_or_default();
     let end = width.saturating_sub(1);
     canvas.text_right(end, 0, &words, style);
-    let name = format!(" {} {} {}", theme.priority_tag(def.priority), subject(cx, def.id), def.text);
+    // On this tab `a` is for this alarm, which need not be the one of the banner.
+    let mine = listed.is_some_and(|alarm| {
+        alarm.state.needs_acknowledgement() && rights::missing(cx, &alarm.acknowledge()).is_none()
+    });
+    let ack = if mine { "a ack " } else { "" };
+    let name = format!(" {ack}{} {} {}", theme.priority_tag(def.priority), subject(cx, def.id), def.text);
     let whole = format!("{name} {}", condition_words(cx, def.id));
     let room = end.saturating_sub(text::width(&words) + 3);
     let shown =
@@ -71,7 +105,7 @@ fn title(cx: &Cx, def: &AlarmDef, respond: Option<(String, Style)>, canvas: &mut
 fn draw(cx: &Cx, name: Option<&str>, rows: &[(&str, String)], go: &str, canvas: &mut Canvas) {
     let theme = cx.theme;
     let (width, height) = (canvas.width(), canvas.height());
-    let room = width.saturating_sub(10);
+    let room = width.saturating_sub(NAMES);
     let mut y = 1;
     for line in name.iter().flat_map(|name| wrap(name, width.saturating_sub(2))) {
         canvas.text(1, y, &line, theme.strong());
@@ -136,7 +170,7 @@ fn now_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
 }
 
 /// `respond within 10 min, 09:19 left`, and whether that time is over; nothing where the plant file gives no time.
-fn respond_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(String, bool)> {
+pub fn respond_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(String, bool)> {
     let respond = def.guidance.respond?;
     let within = format!("respond within {} min", respond.as_secs().div_ceil(60));
     let gone = between(alarm.raised_at, cx.now);
@@ -156,7 +190,7 @@ fn respond_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(String
 }
 
 /// The keys that lead from an alarm to what it watches.
-fn go_words(cx: &Cx, def: &AlarmDef, alarm: Option<&ActiveAlarm>) -> String {
+pub fn go_words(cx: &Cx, def: &AlarmDef, alarm: Option<&ActiveAlarm>) -> String {
     let at = alarm.map(|alarm| format!(" at {}", clock(alarm.raised_at, &cx.def().time_zone))).unwrap_or_default();
     let journal = format!("j journal of {}", journal_of(cx, def.subject));
     match def.subject {

@@ -16,7 +16,7 @@ pub enum Action {
     View(isize),
     /// The bell rings for new alarms, or not.
     Bell,
-    /// Open the faceplate of what the alarm watches.
+    /// Open the guidance of the alarm, whole.
     Open,
     /// Fold or unfold the burst of the alarm.
     Fold,
@@ -106,7 +106,12 @@ const GO: [Row; 6] = [
     row(char('c'), "", "go to the controller of the alarm", Action::Controller),
     row(char('j'), "journal", "journal of what the alarm watches", Action::Journal),
     row(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why),
-    row(code(KeyCode::Enter), "open", "faceplate of what the alarm watches", Action::Open),
+    row(
+        code(KeyCode::Enter),
+        "open",
+        "the guidance in full; ⏎ again: the faceplate of what the alarm watches",
+        Action::Open,
+    ),
 ];
 
 const BACK: [Row; 1] = [row(char('u'), "put back", "take it back: from the shelf, or into service", Action::PutBack)];

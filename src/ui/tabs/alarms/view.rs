@@ -144,7 +144,10 @@ fn list(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
             canvas.text(1, y, &mark, theme.alarm(priority, row.alarm.state, cx.flash()));
         }
     }
-    let guide = guide(height + 1);
+    // Rows that the list leaves empty belong to the guidance, as far as it needs them.
+    let free = height.saturating_sub(2 + rows.len().min(room) as u16);
+    let needs = guidance::height(&guidance::rows(cx, rows[place].alarm), width);
+    let guide = guide(height + 1).max(needs.min(free));
     let mut below = canvas.part(0, height.saturating_sub(guide), width, guide);
     guidance::view(cx, rows[place].alarm, &mut below);
 }
@@ -208,8 +211,12 @@ fn aside(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
         let end = width.saturating_sub(1);
         canvas.text_right(end, 0, &format!("{} more below", all.len() - first - room), theme.strong());
     }
+    let now = aside_words(cx, &all[place]);
+    let free = height.saturating_sub(1 + all.len().min(room) as u16);
+    let needs = guidance::height(&guidance::rows_of_any(cx, all[place].id, now.clone()), width);
+    let guide = guide.max(needs.min(free));
     let mut below = canvas.part(0, height.saturating_sub(guide), width, guide);
-    guidance::view_any(cx, all[place].id, aside_words(cx, &all[place]), &mut below);
+    guidance::view_any(cx, all[place].id, now, &mut below);
 }
 
 /// Widths of the columns between time and state; wider screens give room to tag, words and who acknowledged.

@@ -86,6 +86,20 @@ impl Ring {
         }
     }
 
+    /// Frames that were held still run on; `false` if they ran.
+    pub fn back(&mut self, cx: &Cx, at: &Place) -> bool {
+        let held = !self.runs;
+        if held {
+            self.toggle(cx, at);
+        }
+        held
+    }
+
+    /// What became of files has been read.
+    pub fn dismiss(&mut self) {
+        self.saved.clear();
+    }
+
     /// Moves the selection; looking back holds still.
     pub fn scroll(&mut self, cx: &Cx, at: &Place, by: isize) {
         if self.taken.is_none() {
@@ -100,9 +114,8 @@ impl Ring {
     /// The selected frame, byte by byte.
     pub fn open(&mut self, at: &Place) -> Option<Act> {
         let shown = self.shown();
+        // Frames that run go on below the window, which has this one for itself.
         let frame = (*shown.get(self.place(&shown))?).clone();
-        self.selected = Some(frame.number);
-        self.runs = false;
         let before: Vec<Frame> = self.before(frame.number).take(16).cloned().collect();
         let shown = Shown::Frame { line: at.settings.name.clone(), frame: Box::new(frame), before };
         Some(Act::Open(Modal::Bus(Box::new(Window::Sheet(Sheet::new(shown))))))
@@ -194,7 +207,7 @@ impl Ring {
         let newest = self.held.iter().next_back().map_or(String::new(), |frame| clock(frame.at, zone));
         let state = match self.runs {
             true => format!("running, newest {newest} below"),
-            false => format!("HELD STILL at {newest}, space lets it run"),
+            false => format!("HELD STILL at {newest}, Esc lets it run"),
         };
         let style = if self.runs { cx.theme.dim() } else { cx.theme.strong() };
         (format!("{count} of {} frames, {state}{filter}", self.held.len().max(count)), style)

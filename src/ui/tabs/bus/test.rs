@@ -26,7 +26,7 @@ use crate::{
     },
     ui::{
         Act, Cx, keys,
-        modal::{Confirm, Modal, Next, line::Line},
+        modal::{Confirm, Modal, Next, Notice, line::Line},
         widgets::text::{Canvas, fit, fit_words, pad, wrap},
     },
 };
@@ -106,7 +106,12 @@ impl Bench {
                 Window::Form(last.unwrap_or_else(|| Form::new(cx, at, tried)))
             }
         };
-        vec![Act::Open(Modal::Bus(Box::new(window)))]
+        // What is sent as it was typed may be a write.
+        let tool = match tried {
+            Tried::Bytes | Tried::Request => Tool::Send(Vec::new()),
+            Tried::Registers | Tried::Loopback | Tried::Identify | Tried::Scan => Tool::Identify { unit: 1 },
+        };
+        vec![Notice::or(cx, "test", &Command::Test(at.id, tool), Modal::Bus(Box::new(window)))]
     }
 
     /// Single rows move the selection; screens scroll the results.

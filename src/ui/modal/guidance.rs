@@ -1,0 +1,104 @@
+//! What to do about an alarm, whole: the tab below it has less room.
+
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame, layout::Rect};
+
+use super::{Faceplate, Modal, Next, window};
+use crate::{
+    plant::def::AlarmId,
+    ui::{
+        Act, Cx,
+        keys::{self, Hint},
+        modal::confirm::subject,
+        tabs::alarms::{aside_words, guidance},
+        widgets::text::{pad, wrap},
+    },
+};
+
+/// Columns of the names at the left.
+const NAMES: u16 = 9;
+
+/// The window.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Guidance {
+    alarm: AlarmId,
+    /// The faceplate of what the alarm watches, which Enter opens.
+    plate: Option<Faceplate>,
+    /// The first row that is shown.
+    first: u16,
+}
+
+impl Guidance {
+    /// From the top.
+    pub fn new(alarm: AlarmId, plate: Option<Faceplate>) -> Guidance {
+        Guidance { alarm, plate, first: 0 }
+    }
+
+    /// The keys of the moment.
+    pub fn hints(&self) -> Vec<Hint> {
+        let hint = |key: &str, label: &str| Hint::new(key, label, "");
+        let plate = self.plate.is_some().then(|| hint("⏎", "faceplate"));
+        plate.into_iter().chain([hint("↑↓", "scroll"), hint("Esc", "close")]).collect()
+    }
+
+    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+        match event.code {
+            KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => {
+                return match self.plate {
+                    Some(plate) => Next::Do(vec![Act::Open(Modal::Faceplate(plate))]),
+                    None => Next::Close,
+                };
+            }
+            KeyCode::Char('q') => return Next::Close,
+            KeyCode::Up => self.first = self.first.saturating_sub(1),
+            KeyCode::Down => {
+                let lines = self.lines(cx, room(cx.area)).len() as u16;
+                self.first = (self.first + 1).min(lines.saturating_sub(cx.area.height.saturating_sub(4)));
+            }
+            _ => {}
+        }
+        Next::Stay(Modal::Guidance(Box::new(self)))
+    }
+
+    /// Every row, wrapped, with its name before the first line.
+    fn lines(&self, cx: &Cx, room: u16) -> Vec<(&'static str, String)> {
+        let listed = cx.snapshot.alarms.iter().find(|alarm| alarm.id == self.alarm);
+        let aside = cx.snapshot.aside.iter().find(|aside| aside.id == self.alarm);
+        let now = aside.map_or("no longer active".to_owned(), |aside| aside_words(cx, aside));
+        let mut rows = match listed {
+            Some(alarm) => guidance::rows(cx, alarm),
+            None => guidance::rows_of_any(cx, self.alarm, now),
+        }
+        .to_vec();
+        let respond = listed.and_then(|alarm| guidance::respond_words(cx, cx.def().alarm(self.alarm), alarm));
+        rows.splice(0..0, respond.map(|(words, _)| ("time", words)));
+        let lines = |(name, text): (&'static str, String)| {
+            let names = std::iter::once(name).chain(std::iter::repeat(""));
+            names.zip(wrap(&text, room)).collect::<Vec<_>>()
+        };
+        rows.into_iter().flat_map(lines).collect()
+    }
+
+    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+        let theme = cx.theme;
+        let room = room(body);
+        let lines = self.lines(cx, room);
+        let def = cx.def().alarm(self.alarm);
+        let condition = guidance::condition_words(cx, def.id);
+        let title = format!("{} {} {} {condition}", theme.priority_tag(def.priority), subject(cx, def.id), def.text);
+        let mut canvas = window(cx, frame, body, title.trim_end(), (room + NAMES, lines.len() as u16 + 2));
+        let rows = canvas.height().saturating_sub(2);
+        let first = usize::from(self.first.min((lines.len() as u16).saturating_sub(rows)));
+        for (y, (name, text)) in lines.iter().skip(first).take(usize::from(rows)).enumerate() {
+            canvas.text(0, y as u16, &pad(name, NAMES), theme.dim());
+            canvas.text(NAMES, y as u16, text, theme.normal());
+        }
+        let keys: Vec<String> = self.hints().iter().map(|hint| format!("{} {}", hint.key, hint.label)).collect();
+        canvas.text(0, canvas.height().saturating_sub(1), &theme.enter(&keys.join("   ")), theme.strong());
+    }
+}
+
+/// Columns for the words of a row.
+fn room(body: Rect) -> u16 {
+    body.width.saturating_sub(8).min(76).saturating_sub(NAMES).max(1)
+}
