@@ -134,9 +134,11 @@ fn listen(def: &PlantDef) -> Result<serve::Listener, CliError> {
     serve::listen(&path).map_err(CliError::from)
 }
 
-async fn loaded(load: impl FnOnce() -> Result<Plant, CliError> + Send + 'static) -> Result<Plant, CliError> {
-    let loaded = tokio::task::spawn_blocking(load).await;
-    loaded.unwrap_or_else(|_| Err(CliError::Failed("the plant file cannot be read, see the log".to_owned())))
+/// Loads a plant file beside the station: however long it takes, and even if it fails badly. `Err` says why in words.
+async fn loaded(load: impl FnOnce() -> Result<Plant, CliError> + Send + 'static) -> Result<Plant, String> {
+    // Drawing many errors takes its time as well.
+    let loaded = tokio::task::spawn_blocking(|| load().map_err(|error| error.to_string())).await;
+    loaded.unwrap_or_else(|_| Err("the plant file cannot be read, see the log".to_owned()))
 }
 
 /// A station and its socket.
@@ -166,7 +168,6 @@ impl Serving {
                     tokio::time::sleep(ANSWER).await;
                     return None;
                 }
-                // Beside the station: however long a file takes to read, and even if reading it fails badly, it goes on.
                 Some(Command::Reload(reply)) => match loaded(load.clone()).await {
                     Ok(plant) => {
                         // A terminal that has left needs no answer.
@@ -174,7 +175,7 @@ impl Serving {
                         tokio::time::sleep(ANSWER).await;
                         return Some(plant);
                     }
-                    Err(error) => drop(reply.send(Err(error.to_string()))),
+                    Err(why) => drop(reply.send(Err(why))),
                 },
             }
         }
@@ -262,5 +263,37 @@ pub async fn signalled() {
         () = wait(SignalKind::interrupt()) => {}
         () = wait(SignalKind::terminate()) => {}
         () = wait(SignalKind::hangup()) => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_plant_file_that_cannot_even_be_refused_leaves_the_station_as_it_is() {
+        assert!(loaded(|| panic!("a mistake in the loader")).await.is_err_and(|why| why.contains("see the log")));
+        let why = loaded(|| Err(CliError::Usage("no such plant".to_owned()))).await.err();
+        assert_eq!(why.as_deref(), Some("no such plant"));
+    }
+
+    #[tokio::test]
+    async fn what_runs_goes_on_while_a_plant_file_is_loaded() {
+        let (begun, begins) = std::sync::mpsc::channel();
+        let (end, ends) = std::sync::mpsc::channel::<()>();
+        let loading = loaded(move || {
+            begun.send(()).expect("the test waits");
+            ends.recv().expect("the test ends it");
+            Err(CliError::Usage("refused".to_owned()))
+        });
+        // On the only thread of this test: it could not end what it waits for if the loader ran on it.
+        let other = async {
+            while begins.try_recv().is_err() {
+                tokio::task::yield_now().await;
+            }
+            end.send(()).expect("the loader waits");
+        };
+        let (why, ()) = tokio::join!(loading, other);
+        assert_eq!(why.err().as_deref(), Some("refused"));
     }
 }

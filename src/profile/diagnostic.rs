@@ -12,6 +12,10 @@ const SHOWN_MAX: usize = 40;
 const KEPT_MAX: usize = 1_000;
 /// A longer line is not drawn, only named: it was not written by a person.
 const LINE_BYTES_MAX: usize = 1_000;
+/// Most words that are compared for a suggestion.
+const KNOWN_MAX: usize = 5_000;
+/// Nothing of a longer text is drawn: each drawing reads all of it.
+const DRAWN_BYTES_MAX: usize = 256 << 10;
 
 /// Everything that is wrong with a plant file and its profiles, or everything that could be better, in the order of the
 /// files.
@@ -50,7 +54,14 @@ impl Errors {
     pub(crate) fn unreadable(message: String, help: String) -> Errors {
         Errors {
             sources: Vec::new(),
-            list: vec![Problem { message, help: Some(help), at: None, label: String::new(), also: None }],
+            list: vec![Problem {
+                message,
+                help: Some(help),
+                at: None,
+                label: String::new(),
+                also: None,
+                surplus: false,
+            }],
             severity: Severity::Error,
         }
     }
@@ -144,6 +155,8 @@ pub(crate) struct Problem {
     label: String,
     also: Option<(Span, String)>,
     help: Option<String>,
+    /// One of so many that it may not be kept: no work is worth it.
+    surplus: bool,
 }
 
 impl Problem {
@@ -164,7 +177,10 @@ impl Problem {
     }
     /// Offers the nearest of the known words, or all of them if they are few and none is near.
     pub fn suggest<'a>(&mut self, word: &str, known: impl IntoIterator<Item = &'a str>) -> &mut Self {
-        let known: Vec<&str> = known.into_iter().collect();
+        if self.surplus {
+            return self;
+        }
+        let known: Vec<&str> = known.into_iter().take(KNOWN_MAX).collect();
         match nearest(word, &known) {
             Some(near) => self.help(format!("did you mean `{near}`?")),
             None if known.is_empty() || known.len() > 12 => self,
@@ -177,7 +193,7 @@ impl Problem {
         diagnostic.help = self.help.as_deref().map(shown);
         let Some(at) = self.at else { return Report::new(diagnostic) };
         let source = &sources[at.source];
-        if LINE_BYTES_MAX < source.line_bytes(at.start) {
+        if DRAWN_BYTES_MAX < source.text.len() || LINE_BYTES_MAX < source.line_bytes(at.start) {
             let (line, column) = source.position(at.start);
             diagnostic.message = format!("[{}:{line}:{column}] {}", shown(&source.file), diagnostic.message);
             return Report::new(diagnostic);
@@ -248,7 +264,8 @@ impl Problems {
 fn push(list: &mut Vec<Problem>, at: Span, message: String) -> &mut Problem {
     // Beyond the limit the last one gives up its place.
     list.truncate(KEPT_MAX - 1);
-    list.push(Problem { at: Some(at), message, label: String::new(), also: None, help: None });
+    let surplus = list.len() == KEPT_MAX - 1;
+    list.push(Problem { at: Some(at), message, label: String::new(), also: None, help: None, surplus });
     list.last_mut().expect("it was pushed one line above")
 }
 
