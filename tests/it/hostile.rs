@@ -3,6 +3,7 @@
 use std::{
     io::{Read, Write},
     net::TcpListener,
+    os::unix::fs::PermissionsExt,
     process::Stdio,
 };
 
@@ -119,4 +120,22 @@ fn no_answer_of_a_device_acts_on_the_terminal() {
     check(&["probe", &address, "--timeout", "100", "--verbose"], "");
     check(&["raw", &address, "--timeout", "100", "01 2B 0E 01 00"], "");
     check(&["scan", &address, "--timeout", "20", "--units", "1-2"], "");
+}
+
+#[test]
+fn what_the_program_writes_is_for_user_and_group_only() {
+    let folder = folder();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (history, report, log) = (file("h.duckdb"), file("r.csv"), file("s.log"));
+    let args = ["demo", "--headless", "--for", "20s", "--speed", "100"];
+    let files = ["--history", &history, "--report", &report, "--log", &log];
+    let status = sightglass().args(args).args(files).stdout(Stdio::null()).status().unwrap();
+    assert!(status.success());
+    let mut found = 0;
+    for entry in std::fs::read_dir(folder.path()).unwrap().flatten() {
+        let mode = entry.metadata().unwrap().permissions().mode();
+        assert_eq!(mode & 0o027, 0, "{:?} has mode {mode:o}", entry.file_name());
+        found += 1;
+    }
+    assert!(found >= 3, "{found} files");
 }
