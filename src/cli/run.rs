@@ -200,9 +200,11 @@ fn start(
     history: PathBuf,
     file: Option<PlantFile>,
 ) -> Result<station::Station, CliError> {
-    if let Some(folder) = history.parent() {
-        std::fs::create_dir_all(folder)
-            .map_err(|error| CliError::Io { what: format!("cannot make {}", folder.display()), error })?;
+    // A disk that takes nothing is no reason not to poll: the station says what it cannot write, and tries again.
+    if let Some(folder) = history.parent()
+        && let Err(error) = std::fs::create_dir_all(folder)
+    {
+        say(&format!("cannot make {}: {error}", folder.display()));
     }
     let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
     Ok(station::start_guarded(station::Options { def: def.clone(), clock, history, connectors, file })?)

@@ -299,6 +299,18 @@ pub struct AsideAlarm {
     pub active: bool,
 }
 
+impl HistoryStatus {
+    /// What is wrong with it and how many records wait: `not recording: 1234 records waiting (12 %); disk full`.
+    pub fn words(&self) -> Option<String> {
+        let trouble = self.trouble.as_ref()?;
+        if self.failing.is_none() {
+            return Some(trouble.clone());
+        }
+        let share = self.waiting * 100 / self.waiting_max.max(1);
+        Some(format!("not recording: {} records waiting ({share} %); {trouble}", self.waiting))
+    }
+}
+
 /// The history store as it stands.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct HistoryStatus {

@@ -25,6 +25,7 @@ use crate::{
 use super::{
     deeds::Deeds,
     door::{self, Door, Entrance, Ways},
+    past::Past,
     plant_task::{KEPT_FOR_STOPS, Keeping, PlantTask},
     session::Session,
     sets, supervisor,
@@ -69,7 +70,7 @@ pub struct Station {
     tasks: Vec<JoinHandle<()>>,
 }
 
-/// Starts history, links and plant, in this order: a store that cannot be opened stops the start. Nobody is asked who he
+/// Starts history, links and plant; lines are polled whether or not the store opens. Nobody is asked who he
 /// is: whoever has started the station, or could, may everything. For demonstrations and drills.
 pub fn start(options: Options) -> Result<Station, HistoryError> {
     start_told(options, None)
@@ -106,29 +107,19 @@ fn begin(
 ) -> Result<Station, HistoryError> {
     let Options { def, clock, history: path, connectors, file } = options;
     let sets = sets::folder(&path, &def.name);
-    let history = history::start(&path, def.clone(), clock)?;
+    let mut history = history::start(&path, def.clone(), clock)?;
     let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
-    let recent = &history.recent;
-    plant.remeasure(&recent.active, &recent.steps, &recent.watched, clock.now());
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
     let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the audit log: {error}"));
     let recorder = recorder::start(&path, clock, records.clone()).map_err(no_thread)?;
     let mut deeds = Deeds::new(&recorder);
-    match &recorder.alarms.steps {
-        Some(steps) => plant.restore(steps),
-        None => {
-            // The first start with such a file, or one after it was damaged.
-            tracing::info!(steps = history.restored.len(), "the state of the alarms is taken from the journal");
-            plant.restore(&history.restored);
-            deeds.put(Vec::new(), history.restored.clone());
-        }
-    }
-    if let Some(seals) = &history.seals {
-        deeds.stored(seals.clone());
-    }
+    // Without such a file, at the first start or after it was damaged, the journal tells.
+    let from_journal = recorder.alarms.steps.is_none();
+    recorder.alarms.steps.iter().for_each(|steps| plant.restore(steps));
     let users = guarded.as_ref().and_then(|(gate, _)| gate.people_digest());
     deeds.started(&def.name, file.as_ref(), users, clock.now());
-    let keeping = Keeping { records: Some(records), store, book: Some(deeds), sets: Some(sets), listener };
+    let past = Some(Past::new(history.restored.take(), from_journal));
+    let keeping = Keeping { records: Some(records), store, past, book: Some(deeds), sets: Some(sets), listener };
     let threads = Threads { queries, history: Some(history), book: Some(recorder.join) };
     Ok(assemble(def, clock, connectors, plant, file, keeping, threads, guarded))
 }
@@ -139,7 +130,7 @@ pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, li
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
-    let keeping = Keeping { records: None, store, book: None, sets: None, listener: Some(listener) };
+    let keeping = Keeping { records: None, store, past: None, book: None, sets: None, listener: Some(listener) };
     let threads = Threads { queries, history: None, book: None };
     assemble(def, clock, connectors, plant, None, keeping, threads, None)
 }

@@ -7,6 +7,7 @@
 pub mod session;
 mod deeds;
 mod door;
+mod past;
 mod plant_task;
 pub mod pulse;
 mod sets;

@@ -11,11 +11,12 @@ use tokio::{
 
 use super::{
     deeds::{self, Deeds, Paper},
+    past::{self, Past},
     sets,
 };
 use crate::{
     bus::io::clock::Clock,
-    history::io::thread::offer,
+    history::io::{open::Restored, thread::offer},
     plant::{
         Effects, Plant, SetWork, Snapshot,
         command::{BusRequest, Order, OrderId},
@@ -44,6 +45,8 @@ const TICK_MIN: Duration = Duration::from_millis(20);
 pub(super) struct Keeping {
     pub records: Option<mpsc::Sender<Vec<Record>>>,
     pub store: watch::Receiver<HistoryStatus>,
+    /// What is still to come from the history; `None` once it is known.
+    pub past: Option<Past>,
     /// Deeds and the state of the alarms go there first.
     pub book: Option<Deeds>,
     /// The folder of parameter sets.
@@ -123,6 +126,11 @@ impl PlantTask {
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
         // Changed since the last snapshot, and when the next one may go out.
         let (mut changed, mut next) = (false, Instant::now());
+        if self.keeping.past.as_ref().is_some_and(|past| past.from_journal) {
+            // Events wait in their queue; the lines are polled meanwhile.
+            let known = tokio::time::timeout(past::WAIT_MAX, Past::known(&mut self.keeping.past)).await;
+            known.into_iter().for_each(|restored| self.take_up(restored));
+        }
         loop {
             // What a snapshot shows as done is on disk, or marked.
             let due = self.keeping.book.as_ref().map_or(next, |book| book.due(next));
@@ -145,6 +153,10 @@ impl PlantTask {
                 }
                 done = filed(&mut self.filing) => {
                     self.take_filed(done);
+                    changed = true;
+                }
+                restored = Past::known(&mut self.keeping.past) => {
+                    self.take_up(restored);
                     changed = true;
                 }
                 Ok(()) = self.keeping.store.changed() => {
@@ -206,6 +218,21 @@ impl PlantTask {
             book.mark(&mut snapshot);
         }
         self.publish.send_replace(Arc::new(snapshot));
+    }
+
+    /// Takes up what the history knows of the time before the start.
+    fn take_up(&mut self, restored: Restored) {
+        let Some(past) = self.keeping.past.take() else { return };
+        let Restored { steps, recent, seals } = past.join(restored);
+        if let (Some(seals), Some(book)) = (seals, &mut self.keeping.book) {
+            book.stored(seals);
+        }
+        if !steps.is_empty() {
+            tracing::info!(steps = steps.len(), "the state of the alarms is taken from the journal");
+            self.plant.restore(&steps);
+            self.write_down(Vec::new(), steps);
+        }
+        self.plant.remeasure(&recent.active, &recent.steps, &recent.watched, self.clock.now());
     }
 
     fn take_paper(&mut self, paper: Paper) {
@@ -355,6 +382,7 @@ impl PlantTask {
             match record {
                 Record::Action(deed) => deeds.push(deed),
                 Record::Alarm(step) => {
+                    self.keeping.past.iter_mut().for_each(|past| past.note(&step));
                     steps.push(step.clone());
                     others.push(Record::Alarm(step));
                 }

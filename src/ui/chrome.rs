@@ -169,7 +169,10 @@ fn header_parts(model: &Model, cx: &Cx, role: bool) -> Vec<(usize, String, Style
     if history.lost > 0 {
         parts.push((1, format!("{} records lost", history.lost), theme.trouble()));
     }
-    if history.trouble.is_some() {
+    if history.failing.is_some() {
+        let share = history.waiting * 100 / history.waiting_max.max(1);
+        parts.push((2, format!("not recording, buffer {share} %"), theme.trouble()));
+    } else if history.trouble.is_some() {
         parts.push((2, "history: see 3".to_owned(), theme.trouble()));
     }
     for line in cx.def().lines.iter().rev() {

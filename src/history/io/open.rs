@@ -14,7 +14,10 @@ use super::{
 };
 use crate::{
     history::HistoryError,
-    plant::{def::PlantDef, record::AlarmRecord},
+    plant::{
+        def::PlantDef,
+        record::{AlarmRecord, Seal},
+    },
 };
 
 /// A store as it was opened, and what the operator should know about that.
@@ -34,6 +37,8 @@ pub struct Restored {
     pub steps: Vec<AlarmRecord>,
     /// What the quality meter of the alarms must know of the last day.
     pub recent: Recent,
+    /// The latest entries of the audit log that the store holds; `None` where they cannot be read.
+    pub seals: Option<Vec<Seal>>,
 }
 
 impl Store {
@@ -51,7 +56,9 @@ impl Store {
                 }
                 recent => recent?,
             };
-            Ok(Restored { steps, recent })
+            let seals =
+                store.seals().inspect_err(|error| tracing::warn!(%error, "not compared with the audit log")).ok();
+            Ok(Restored { steps, recent, seals })
         })
     }
 

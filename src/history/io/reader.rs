@@ -58,6 +58,8 @@ impl Reader {
     /// Answers until the writer has ended; what cannot be answered any more is dropped with its reply.
     pub async fn run(mut self, mut queries: mpsc::Receiver<Query>) {
         let mut store: Option<Store> = None;
+        // Questions wait until the first opening has ended, well or not.
+        let mut tried = false;
         let (mut opened, _) = watch::channel(());
         let mut running = JoinSet::new();
         loop {
@@ -67,10 +69,10 @@ impl Reader {
                     // Questions to the old store end now: its file closes with their connections.
                     opened = watch::channel(()).0;
                     let Some(handed) = handed else { break };
-                    store = handed;
+                    (store, tried) = (handed, true);
                 }
                 Some(_) = running.join_next() => {}
-                Some(query) = queries.recv(), if running.len() < QUESTIONS_MAX => {
+                Some(query) = queries.recv(), if tried && running.len() < QUESTIONS_MAX => {
                     match store.as_ref().ok_or(HistoryError::NotOpen).and_then(Store::try_clone) {
                         Ok(own) => drop(running.spawn(self.ask(own, query, opened.subscribe()))),
                         // An asker that has left needs no answer.

@@ -3,13 +3,14 @@
 use std::{path::Path, sync::Arc, thread::JoinHandle, time::Duration};
 
 use tokio::{
-    sync::{mpsc, watch},
+    sync::{mpsc, oneshot, watch},
+    task::spawn_blocking,
     time::MissedTickBehavior,
 };
 
 use super::{
-    Query,
-    quality::Recent,
+    Query, files,
+    open::{Opened, Restored},
     reader::{Answerer, QUESTIONS_MAX, Reader, Request},
     store::Store,
     writer::Writer,
@@ -17,11 +18,7 @@ use super::{
 use crate::{
     bus::io::clock::Clock,
     history::HistoryError,
-    plant::{
-        def::PlantDef,
-        record::{AlarmRecord, Record, Seal},
-        snapshot::HistoryStatus,
-    },
+    plant::{def::PlantDef, record::Record, snapshot::HistoryStatus},
 };
 
 /// Batches of records on their way to the thread; see [`offer`].
@@ -46,12 +43,8 @@ pub struct Handle {
     pub status: watch::Receiver<HistoryStatus>,
     /// Steps of alarms by operators that are committed; told before `status` is.
     pub settled: watch::Receiver<u64>,
-    /// The alarm steps that the plant restores at its start.
-    pub restored: Vec<AlarmRecord>,
-    /// What the quality meter of the alarms must know of the last day.
-    pub recent: Recent,
-    /// The latest entries of the audit log that the store holds; `None` where they cannot be read.
-    pub seals: Option<Vec<Seal>>,
+    /// What the plant takes up from its history, as soon as it is open for the first time.
+    pub restored: Option<oneshot::Receiver<Restored>>,
     /// The thread.
     pub join: JoinHandle<()>,
 }
@@ -59,7 +52,7 @@ pub struct Handle {
 impl Handle {
     /// Drops this end and waits until everything is stored. Blocks for as long as other senders of records exist.
     pub fn stop(self) {
-        let Handle { records, queries, status, settled, restored: _, recent: _, seals: _, join } = self;
+        let Handle { records, queries, status, settled, restored: _, join } = self;
         drop((records, queries, status, settled));
         // A panic of the thread has already been reported by the panic hook.
         let _ = join.join();
@@ -77,7 +70,8 @@ pub fn offer(queue: &mpsc::Sender<Vec<Record>>, mut records: Vec<Record>) -> u64
     if kept == 0 || queue.try_send(records).is_ok() { (all - kept) as u64 } else { all as u64 }
 }
 
-/// Opens the store and starts its threads. Errors as [`Store::open`].
+/// Starts the threads, which open the store while the station already polls. [`HistoryError::Foreign`] for a file that is
+/// something else; what can change, such as a full disk, is retried and shown.
 pub fn start(path: &Path, def: Arc<PlantDef>, clock: Clock) -> Result<Handle, HistoryError> {
     start_with(path, def, clock, Arc::new(Store::answer))
 }
@@ -89,34 +83,32 @@ pub(super) fn start_with(
     clock: Clock,
     answer: Answerer,
 ) -> Result<Handle, HistoryError> {
-    let mut writer = Writer::open(path.to_owned(), def, clock.utc())?;
-    let restored = writer.restore()?;
-    // A plant must start even if its journal is too long to be measured.
-    let recent = writer.recent(clock.utc()).unwrap_or_else(|error| {
-        tracing::warn!(%error, "the quality meter of the alarms begins anew");
-        Recent::default()
-    });
-    let seals = writer.store().and_then(Store::seals);
-    let seals = seals.inspect_err(|error| tracing::warn!(%error, "not compared with the audit log")).ok();
+    files::refuse_foreign(path)?;
+    let mut writer = Writer::new(path.to_owned(), def, clock.utc());
     let (records, records_in) = mpsc::channel(RECORDS_MAX);
     let (queries, queries_in) = mpsc::channel(QUERIES_MAX);
     let (status_out, status) = watch::channel(writer.status().clone());
     let (settled_out, settled) = watch::channel(0);
-    let tell = Tell { settled: settled_out, status: status_out };
+    let (restored_out, restored) = oneshot::channel();
+    let mut tell = Tell { settled: settled_out, status: status_out, restored: Some(restored_out) };
     let trouble = |error: std::io::Error| HistoryError::Engine(format!("thread: {error}"));
     let (requests, requests_in) = mpsc::channel(REQUESTS_MAX);
     let reader = Reader { stores: writer.stores(), writer: requests, clock, answer };
     let reading = spawn("history-reader", || reader.run(queries_in)).map_err(trouble)?;
     let writing = move || async move {
-        run(&mut writer, clock, records_in, requests_in, &tell).await;
+        let opening = run(&mut writer, clock, records_in, requests_in, &mut tell).await;
         writer.end_reading();
         // A panic of the thread has already been reported by the panic hook.
         let _ = reading.join();
+        if let Some(opening) = opening {
+            // A log that is replayed just now is waited for: what waits would be lost.
+            writer.opened(ended(opening.await), clock.utc());
+        }
         writer.finish(clock.utc());
-        tell.tell(&writer);
+        tell.tell(&mut writer);
     };
     let join = spawn("history", writing).map_err(trouble)?;
-    Ok(Handle { records, queries, status, settled, restored, recent, seals, join })
+    Ok(Handle { records, queries, status, settled, restored: Some(restored), join })
 }
 
 /// A thread with a runtime of its own, only to wait for queues and times at once.
@@ -133,10 +125,17 @@ fn spawn<F: Future<Output = ()>>(
 struct Tell {
     settled: watch::Sender<u64>,
     status: watch::Sender<HistoryStatus>,
+    restored: Option<oneshot::Sender<Restored>>,
 }
 
 impl Tell {
-    fn tell(&self, writer: &Writer) {
+    fn tell(&mut self, writer: &mut Writer) {
+        if let Some(restored) = writer.take_restored()
+            && let Some(station) = self.restored.take()
+        {
+            // A station that has ended takes up nothing.
+            let _ = station.send(restored);
+        }
         self.settled.send_replace(writer.settled());
         self.status.send_replace(writer.status().clone());
     }
@@ -147,11 +146,15 @@ async fn run(
     clock: Clock,
     mut records: mpsc::Receiver<Vec<Record>>,
     mut requests: mpsc::Receiver<Request>,
-    tell: &Tell,
-) {
+    tell: &mut Tell,
+) -> Option<Opening> {
+    let mut opening = None;
     let mut tick = tokio::time::interval(COMMIT_EVERY);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
+        if opening.is_none() && writer.wants_store() {
+            opening = Some(spawn_blocking(writer.opener(clock.utc())));
+        }
         tokio::select! {
             // In this order: a question sees the records before it.
             biased;
@@ -159,8 +162,12 @@ async fn run(
                 writer.commit(clock.utc());
                 tell.tell(writer);
             }
+            result = opened(&mut opening) => {
+                writer.opened(result, clock.utc());
+                tell.tell(writer);
+            }
             batch = records.recv() => {
-                let Some(batch) = batch else { break };
+                let Some(batch) = batch else { return opening };
                 if writer.accept(batch) {
                     writer.commit(clock.utc());
                     tell.tell(writer);
@@ -180,4 +187,22 @@ async fn run(
             }
         }
     }
+}
+
+/// The store on its way, opened on a thread of its own: records are taken in meanwhile.
+type Opening = tokio::task::JoinHandle<Result<Opened<Restored>, HistoryError>>;
+
+/// Waits for the end of an opening; for ever without one.
+async fn opened(opening: &mut Option<Opening>) -> Result<Opened<Restored>, HistoryError> {
+    let Some(work) = opening else { return std::future::pending().await };
+    let result = ended(work.await);
+    *opening = None;
+    result
+}
+
+/// A panic of the opening has been reported by the panic hook; the next attempt may go better.
+fn ended(
+    result: Result<Result<Opened<Restored>, HistoryError>, tokio::task::JoinError>,
+) -> Result<Opened<Restored>, HistoryError> {
+    result.unwrap_or_else(|_| Err(HistoryError::Engine("internal error while it was opened, see the log".into())))
 }

@@ -9,10 +9,14 @@ use std::{
 use jiff::Timestamp;
 use tokio::sync::mpsc;
 
-use super::{files, open::Opened, quality::Recent, store::Store};
+use super::{
+    files,
+    open::{Opened, Restored},
+    store::Store,
+};
 use crate::{
     history::HistoryError,
-    plant::{def::PlantDef, record::AlarmRecord, record::Record, snapshot::HistoryStatus},
+    plant::{def::PlantDef, record::Record, snapshot::HistoryStatus},
 };
 
 /// Records kept while the store cannot take them: more than half an hour of a hundred a second.
@@ -22,22 +26,28 @@ const CHECKPOINT_EVERY: u32 = 300;
 /// A clock that is behind the last record by more than this has been set back or lost its time. The end of the curves
 /// of a dead station alone may lie a second ahead.
 const CLOCK_STEP: Duration = Duration::from_secs(5);
-/// Failed commits between two attempts to open the store anew.
-const REOPEN_EVERY: u32 = 10;
+/// Commits until the first one.
+const CHECKPOINT_FIRST: u32 = 10;
+/// Between two attempts to open the store pass 1, 2, 4 and at most 8 commits.
+const RETRY_SHIFT_MAX: u32 = 3;
 /// Stores on their way to the reader, which takes them at once: one is handed over at an opening, and taken back before
-/// the next, which is ten failed commits later.
+/// the next.
 const STORES_MAX: usize = 8;
 
 /// The writing side of a store.
 pub struct Writer {
-    /// Gone while it could not be opened again after a fatal error.
+    /// Gone while it is not open: before the first opening, after a fatal error, while another process has it.
     store: Option<Store>,
+    /// What the station takes up from the store, until it is taken.
+    restored: Option<Restored>,
     /// Where the reader is told of every store that is opened or about to be closed.
     reader: Option<mpsc::Sender<Option<Store>>>,
     /// The store that was closed: readers may still have connections to it.
     closed: Weak<()>,
     path: PathBuf,
     def: Arc<PlantDef>,
+    /// When the station started.
+    started: Timestamp,
     pending: Vec<Record>,
     /// Steps of alarms by operators: taken so far, and how many of them are settled, see [`Writer::settled`].
     steps: u64,
@@ -53,40 +63,50 @@ pub struct Writer {
     unchecked: Option<String>,
     /// What a question could not read; stays until the station ends.
     unreadable: Option<String>,
-    failures: u32,
-    /// Failures at which the store may be opened anew.
-    retry_at: u32,
+    /// A store was open before.
+    was_open: bool,
+    /// Attempts to open it that failed in a row, and commits until the next.
+    attempts: u32,
+    wait: u32,
     /// Since the last checkpoint.
     commits: u32,
 }
 
 impl Writer {
-    /// Opens the store. Errors as [`Store::open`].
-    pub fn open(path: PathBuf, def: Arc<PlantDef>, now: Timestamp) -> Result<Writer, HistoryError> {
-        let Opened { store, trouble, .. } = Store::open(&path, &def, now)?;
-        store.end_curves_left_behind(now)?;
-        let ahead = store.extent().map(|(_, last)| last).filter(|last| *last > now + CLOCK_STEP);
-        let clock = ahead.map(|last| format!("the clock is behind the last record, {last:.0}: is it right?"));
+    /// A writer without a store yet: records wait until one is open.
+    pub fn new(path: PathBuf, def: Arc<PlantDef>, started: Timestamp) -> Writer {
         let mut writer = Writer {
-            store: Some(store),
+            store: None,
+            restored: None,
             reader: None,
             closed: Weak::new(),
             path,
             def,
+            started,
             pending: Vec::new(),
             steps: 0,
             settled: 0,
             status: HistoryStatus::default(),
-            damaged: trouble,
-            clock,
+            damaged: None,
+            clock: None,
             failing: None,
             unchecked: None,
             unreadable: None,
-            failures: 0,
-            retry_at: 0,
+            was_open: false,
+            attempts: 0,
+            wait: 0,
             commits: 0,
         };
         writer.describe();
+        writer
+    }
+
+    /// A writer with an open store. Errors as [`Store::open`].
+    #[cfg(test)]
+    pub fn open(path: PathBuf, def: Arc<PlantDef>, now: Timestamp) -> Result<Writer, HistoryError> {
+        let mut writer = Writer::new(path, def, now);
+        let opened = (writer.opener(now))();
+        writer.opened(Ok(opened?), now);
         Ok(writer)
     }
 
@@ -95,14 +115,57 @@ impl Writer {
         &self.status
     }
 
-    /// The alarm steps to restore, see [`Store::restore`].
-    pub fn restore(&self) -> Result<Vec<AlarmRecord>, HistoryError> {
-        self.store()?.restore()
+    /// What a station takes up from its history, once after it was opened for the first time.
+    pub fn take_restored(&mut self) -> Option<Restored> {
+        self.restored.take()
     }
 
-    /// What the quality meter of the alarms must know of the last day, see [`Store::recent`].
-    pub fn recent(&self, now: Timestamp) -> Result<Recent, HistoryError> {
-        self.store()?.recent(now)
+    /// Whether a store should be opened now: there is none, all connections to the last one are closed, and the last
+    /// attempt is long enough ago.
+    pub fn wants_store(&self) -> bool {
+        // Two stores of one process on one file would not see each other's locks.
+        self.store.is_none() && self.closed.strong_count() == 0 && self.wait == 0
+    }
+
+    /// The work of opening the store, for a thread that may wait: replaying a log takes seconds.
+    pub fn opener(&self, now: Timestamp) -> impl FnOnce() -> Result<Opened<Restored>, HistoryError> + Send + use<> {
+        let (path, def, started, again) = (self.path.clone(), Arc::clone(&self.def), self.started, self.was_open);
+        move || match again {
+            false => Store::open_at_start(&path, &def, started),
+            true => Store::open(&path, &def, now).map(|Opened { store, trouble, read: () }| Opened {
+                store,
+                trouble,
+                read: Restored::default(),
+            }),
+        }
+    }
+
+    /// Takes the store that was opened and stores what waits, or notes why there is none.
+    pub fn opened(&mut self, result: Result<Opened<Restored>, HistoryError>, now: Timestamp) {
+        match result {
+            Ok(Opened { store, trouble, read }) => {
+                if !self.was_open {
+                    let ahead = store.extent().map(|(_, last)| last).filter(|last| *last > self.started + CLOCK_STEP);
+                    let words = |last| format!("the clock is behind the last record, {last:.0}: is it right?");
+                    self.clock = ahead.map(words);
+                    self.restored = Some(read);
+                }
+                self.damaged = trouble.or(self.damaged.take());
+                (self.store, self.was_open, self.attempts, self.failing) = (Some(store), true, 0, None);
+                // The first checkpoint soon: a block that it cannot read is found while little depends on it.
+                self.commits = CHECKPOINT_EVERY - CHECKPOINT_FIRST;
+                self.hand_over();
+                self.commit(now);
+            }
+            Err(error) => {
+                self.wait = 1 << self.attempts.min(RETRY_SHIFT_MAX);
+                self.attempts += 1;
+                tracing::warn!(%error, retry_after_s = self.wait, "the history is not open");
+                self.failing = Some(error.to_string());
+                self.hand_over();
+                self.describe();
+            }
+        }
     }
 
     /// Steps of alarms by operators that nobody need wait for any more: committed, or lost and counted as such.
@@ -126,43 +189,54 @@ impl Writer {
 
     /// Stores what is pending, all or nothing; what could not be stored stays pending. Called once a second.
     pub fn commit(&mut self, now: Timestamp) {
-        self.commits += 1;
-        let result = match self.pending.is_empty() {
-            true if self.failing.is_none() => Ok(()),
-            _ => self.store().and_then(|store| store.append(&self.pending)),
-        };
-        match result {
-            Ok(()) => {
-                if !self.pending.is_empty() {
-                    self.status.rows += self.pending.len() as u64;
-                    self.status.committed_at = Some(now);
-                    tracing::debug!(rows = self.pending.len(), total = self.status.rows, "committed");
-                    self.pending.clear();
+        self.commits = self.commits.wrapping_add(1);
+        self.wait = self.wait.saturating_sub(1);
+        if self.store.as_ref().is_some_and(|store| !store.is_in_place()) {
+            self.damaged = Some(format!("{} was removed or replaced while the station ran", self.path.display()));
+            self.close();
+        }
+        match &self.store {
+            None if self.failing.is_none() && 1 < self.commits => self.failing = Some("is being opened".into()),
+            None => {}
+            Some(_) if self.pending.is_empty() && self.failing.is_none() => self.stored(now),
+            Some(store) => match store.append(&self.pending) {
+                Ok(()) => self.stored(now),
+                Err(error) => {
+                    if is_fatal(&error) {
+                        self.close();
+                    }
+                    self.failing = Some(error.to_string());
                 }
-                self.settled = self.steps;
-                self.failures = 0;
-                self.retry_at = 0;
-                self.failing = None;
-                if self.commits >= CHECKPOINT_EVERY {
-                    self.checkpoint();
-                }
-            }
-            Err(error) => {
-                self.failures += 1;
-                if is_fatal(&error) || self.store.is_none() {
-                    self.reopen(now);
-                }
-                self.failing = Some(error.to_string());
-            }
+            },
         }
         self.describe();
+    }
+
+    /// All that waited is stored.
+    fn stored(&mut self, now: Timestamp) {
+        let rows = self.pending.len() as u64;
+        if rows > 0 {
+            self.status.rows += rows;
+            self.status.committed_at = Some(now);
+            tracing::debug!(rows, total = self.status.rows, "committed");
+            self.pending.clear();
+        }
+        self.settled = self.steps;
+        self.failing = None;
+        // A log that was removed by hand would take its commits with it: they go into the file at once.
+        let no_log = rows > 0 && !files::has_log(&self.path);
+        if no_log || self.commits >= CHECKPOINT_EVERY {
+            self.checkpoint();
+        }
     }
 
     /// The stores that questions are answered from: this one, and each that is opened after it.
     pub fn stores(&mut self) -> mpsc::Receiver<Option<Store>> {
         let (reader, stores) = mpsc::channel(STORES_MAX);
         self.reader = Some(reader);
-        self.hand_over();
+        if self.store.is_some() {
+            self.hand_over();
+        }
         stores
     }
 
@@ -190,6 +264,10 @@ impl Writer {
     /// The orderly end: everything stored, every curve ended, the log written into the file.
     pub fn finish(&mut self, now: Timestamp) {
         // Some tries, because this is the last chance; what still fails is lost, and said so.
+        if self.wants_store() || 0 < self.wait {
+            let opened = (self.opener(now))();
+            self.opened(opened, now);
+        }
         for _ in 0..3 {
             self.commit(now);
             if self.pending.is_empty() {
@@ -223,37 +301,24 @@ impl Writer {
     }
 
     /// After a fatal error DuckDB answers nothing more until the file is opened anew.
-    pub(super) fn reopen(&mut self, now: Timestamp) {
+    pub(super) fn close(&mut self) {
         if let Some(store) = self.store.take() {
             self.closed = store.alive();
-            self.hand_over();
-        }
-        // Not before all its connections are closed: two stores of one process on one file would not see each other's
-        // locks.
-        if self.closed.strong_count() > 0 || self.failures < self.retry_at {
-            return;
-        }
-        self.retry_at = self.failures + REOPEN_EVERY;
-        if let Ok(Opened { store, trouble, .. }) = Store::open(&self.path, &self.def, now) {
-            self.store = Some(store);
-            self.damaged = trouble.or(self.damaged.take());
             self.hand_over();
         }
     }
 
     fn describe(&mut self) {
-        let (waiting, max) = (self.pending.len(), PENDING_MAX);
         let lost = (self.status.lost > 0).then(|| format!("{} records lost", self.status.lost));
-        let failing = self.failing.as_ref();
-        let failing = failing.map(|why| format!("{why}; {waiting} records waiting ({} %)", waiting * 100 / max));
         let damaged: Vec<&str> = [&self.unreadable, &self.damaged].into_iter().flatten().map(String::as_str).collect();
         let damaged = (!damaged.is_empty()).then(|| damaged.join("; "));
-        let parts: Vec<String> = [failing, self.unchecked.clone(), lost, damaged.clone(), self.clock.clone()]
-            .into_iter()
-            .flatten()
-            .collect();
+        let parts: Vec<String> =
+            [self.failing.clone(), self.unchecked.clone(), lost, damaged.clone(), self.clock.clone()]
+                .into_iter()
+                .flatten()
+                .collect();
         self.status.trouble = (!parts.is_empty()).then(|| parts.join("; "));
-        (self.status.waiting, self.status.waiting_max) = (waiting as u64, max as u64);
+        (self.status.waiting, self.status.waiting_max) = (self.pending.len() as u64, PENDING_MAX as u64);
         self.status.failing.clone_from(&self.failing);
         self.status.damaged = damaged;
         self.status.clock.clone_from(&self.clock);
@@ -301,7 +366,11 @@ fn is_fatal(error: &HistoryError) -> bool {
 mod tests {
     use super::*;
     use crate::{
-        plant::{def::Priority, def::TagId, record::AlarmStep, sample::Sample},
+        plant::{
+            def::{Priority, TagId},
+            record::{AlarmRecord, AlarmStep},
+            sample::Sample,
+        },
         report::testing::sec,
     };
 

@@ -1,6 +1,7 @@
 //! The store: what goes in comes out, over restarts and failures.
 #![allow(clippy::unwrap_used)]
 
+mod absent;
 mod damage;
 mod flips;
 mod quality;
@@ -381,8 +382,8 @@ fn records_wait_while_the_store_fails_and_nothing_is_lost_when_it_recovers() {
     writer.commit(sec(1));
     writer.accept(vec![good(PV, 1, 28.0)]);
     writer.commit(sec(2));
-    let trouble = writer.status().trouble.clone().unwrap();
-    assert!(trouble.contains("2 records waiting"), "{trouble}");
+    let words = writer.status().words().unwrap();
+    assert!(words.starts_with("not recording: 2 records waiting (0 %); "), "{words}");
     assert_eq!((writer.status().rows, writer.status().lost, writer.status().committed_at), (0, 0, None));
     sql(&writer, "ALTER TABLE hidden RENAME TO sample");
     writer.commit(sec(3));
@@ -410,8 +411,8 @@ fn a_clock_that_went_back_is_reported_and_the_old_curve_still_ends() {
 fn a_stopped_station_leaves_every_curve_ended_and_a_running_one_answers() {
     let (_folder, db) = folder();
     let clock = Clock::starting_at(sec(10), 1.0);
-    let handle = thread::start(&db, def(), clock).unwrap();
-    assert_eq!(handle.restored, []);
+    let mut handle = thread::start(&db, def(), clock).unwrap();
+    assert_eq!(handle.restored.take().unwrap().blocking_recv().unwrap().steps, []);
     handle.records.blocking_send(vec![good(PV, 5, 27.0), Record::Alarm(step(6, "high", AlarmStep::Raised))]).unwrap();
     let (reply, answer) = tokio::sync::oneshot::channel();
     let period = Period { name: "period".into(), from: sec(0), to: sec(10) };

@@ -120,6 +120,7 @@ async fn without_a_store_a_question_is_answered_with_the_reason() {
         reader.queries.send(query).await.unwrap();
         answer.await.unwrap()
     };
+    reader.stores.send(None).await.unwrap();
     assert_eq!(ask().await, Err(HistoryError::NotOpen));
     reader.stores.send(Some(open(&db, 0))).await.unwrap();
     assert_eq!(ask().await, Ok(Answer::Journal(vec![])));
@@ -151,11 +152,14 @@ fn a_store_is_opened_anew_only_when_the_last_question_to_the_old_one_has_ended()
     let mut writer = Writer::open(db, def(), sec(0)).unwrap();
     let mut stores = writer.stores();
     let asked = stores.try_recv().unwrap().unwrap();
-    writer.reopen(sec(1));
+    writer.close();
     assert!(stores.try_recv().unwrap().is_none(), "taken back");
     assert!(matches!(writer.store(), Err(HistoryError::NotOpen)));
+    assert!(!writer.wants_store());
     drop(asked);
-    writer.reopen(sec(2));
+    assert!(writer.wants_store());
+    let opened = writer.opener(sec(2))();
+    writer.opened(opened, sec(2));
     let fresh = stores.try_recv().unwrap().unwrap();
     assert_eq!(fresh.restore(), Ok(vec![]));
     writer.accept(vec![good(PV, 3, 27.0)]);

@@ -1,0 +1,90 @@
+//! What a station takes up from its history, which may open long after the lines are polled.
+
+use std::{collections::HashSet, time::Duration};
+
+use tokio::sync::oneshot;
+
+use crate::{history::io::open::Restored, plant::record::AlarmRecord};
+
+/// Where the journal alone knows the state of the alarms, the plant waits so long for it before it judges any.
+pub const WAIT_MAX: Duration = Duration::from_millis(500);
+/// Steps of alarms that are kept for the figures of the last day until the history is open.
+const EARLY_MAX: usize = 10_000;
+
+/// What is still to come of the time before the start.
+#[derive(Debug)]
+pub struct Past {
+    /// Gone once it will never come.
+    restored: Option<oneshot::Receiver<Restored>>,
+    /// The state of the alarms comes from the journal.
+    pub from_journal: bool,
+    /// Steps of alarms since the start.
+    early: Vec<AlarmRecord>,
+}
+
+impl Past {
+    /// Everything is still to come.
+    pub fn new(restored: Option<oneshot::Receiver<Restored>>, from_journal: bool) -> Past {
+        Past { restored, from_journal, early: Vec::new() }
+    }
+
+    /// A step of an alarm, before the past is known.
+    pub fn note(&mut self, step: &AlarmRecord) {
+        if self.early.len() < EARLY_MAX {
+            self.early.push(step.clone());
+        }
+    }
+
+    /// Waits until the past is known; for ever where it never will be.
+    pub async fn known(past: &mut Option<Past>) -> Restored {
+        let waited = past.as_mut().and_then(|past| past.restored.as_mut());
+        let Some(receiver) = waited else { return std::future::pending().await };
+        match receiver.await {
+            Ok(restored) => restored,
+            Err(_) => {
+                *past = None;
+                std::future::pending().await
+            }
+        }
+    }
+
+    /// Joins the past with what has happened since: the steps to restore leave out alarms that have changed meanwhile.
+    pub fn join(self, mut restored: Restored) -> Restored {
+        let name = |step: &AlarmRecord| (step.subject.clone(), step.text.clone());
+        let changed: HashSet<_> = self.early.iter().map(name).collect();
+        restored.steps.retain(|step| self.from_journal && !changed.contains(&name(step)));
+        restored.recent.steps.extend(self.early);
+        restored
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use jiff::Timestamp;
+
+    use super::*;
+    use crate::{
+        history::io::quality::Recent,
+        plant::{def::Priority, record::AlarmStep},
+    };
+
+    fn step(second: i64, text: &str, step: AlarmStep) -> AlarmRecord {
+        AlarmRecord::new(Timestamp::from_second(second).unwrap(), "TIC-1.PV", text, Priority::High, step)
+    }
+
+    #[test]
+    fn a_past_that_comes_late_changes_no_alarm_that_has_moved_since() {
+        let before = vec![step(1, "high", AlarmStep::Raised), step(2, "low", AlarmStep::Raised)];
+        let recent = Recent { steps: before.clone(), ..Recent::default() };
+        let restored = Restored { steps: before.clone(), recent, seals: None };
+        let now = step(9, "low", AlarmStep::Returned);
+        for from_journal in [true, false] {
+            let mut past = Past::new(None, from_journal);
+            past.note(&now);
+            let joined = past.join(restored.clone());
+            assert_eq!(joined.steps, if from_journal { vec![before[0].clone()] } else { vec![] });
+            assert_eq!(joined.recent.steps, [before[0].clone(), before[1].clone(), now.clone()], "all are counted");
+        }
+    }
+}
