@@ -11,8 +11,9 @@
 
 use crate::plant::tag::{Kind, Order, Point};
 
-/// The number that the words of a point hold; `None` for what is no number: BCD with a digit above 9, NaN, infinity,
-/// or a 64-bit integer beyond 2^53, which an `f64` cannot carry exactly. `words` has [`Point::len`] words.
+/// The number that the words of a point hold; `None` for what is no number: BCD with a digit above 9, NaN, infinity.
+/// A 64-bit integer beyond 2^53 is rounded to the nearest `f64`, by one part in 10^16 at most. `words` has [`Point::len`]
+/// words.
 pub fn decode(point: Point, words: &[u16]) -> Option<f64> {
     let bytes = to_bytes(point.order, words);
     let bits = bytes.iter().fold(0u64, |bits, byte| (bits << 8) | u64::from(*byte));
@@ -25,8 +26,8 @@ pub fn decode(point: Point, words: &[u16]) -> Option<f64> {
         Kind::U16 => Some(f64::from(bits as u16)),
         Kind::I32 => Some(f64::from(bits as u32 as i32)),
         Kind::U32 => Some(f64::from(bits as u32)),
-        Kind::I64 => exact(i128::from(bits as i64)),
-        Kind::U64 => exact(i128::from(bits)),
+        Kind::I64 => Some(bits as i64 as f64),
+        Kind::U64 => Some(bits as f64),
         Kind::F32 => Some(f64::from(f32::from_bits(bits as u32))).filter(|value| value.is_finite()),
         Kind::F64 => Some(f64::from_bits(bits)).filter(|value| value.is_finite()),
         Kind::Bcd16 => from_bcd(bits, 4),
@@ -111,12 +112,8 @@ pub fn field_masks(point: Point, value: f64) -> Option<(u16, u16)> {
     Some((!on_wire(field << low), on_wire((value as u64) << low)))
 }
 
-/// Whole numbers up to here an `f64` carries exactly.
-const EXACT: f64 = 9_007_199_254_740_992.0;
-
-fn exact(value: i128) -> Option<f64> {
-    (value.unsigned_abs() <= EXACT as u128).then_some(value as f64)
-}
+/// Whole numbers up to here an `f64` carries exactly, and no other rounds to one of them.
+const EXACT: f64 = 9_007_199_254_740_991.0;
 
 fn mask(width: u8) -> u64 {
     u64::MAX.checked_shr(64 - u32::from(width)).unwrap_or(0)
@@ -187,9 +184,20 @@ mod tests {
             (Kind::Bcd32, &[0x1234, 0xF000]),
             (Kind::F32, &[0x7FC0, 0x0000]),
             (Kind::F32, &[0x7F80, 0x0000]),
-            (Kind::U64, &[0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF]),
         ] {
             assert_eq!(decode(point(kind, Order::Abcd), words), None, "{kind:?} {words:04X?}");
+        }
+    }
+
+    #[test]
+    fn a_counter_beyond_what_a_double_holds_exactly_is_a_rounded_value() {
+        for (kind, words, expect) in [
+            (Kind::U64, [0xFFFF; 4], 18_446_744_073_709_551_615.0),
+            (Kind::U64, [0x0020, 0, 0, 1], 9_007_199_254_740_992.0),
+            (Kind::U64, [0x0020, 0, 0, 3], 9_007_199_254_740_996.0),
+            (Kind::I64, [0x8000, 0, 0, 0], -9_223_372_036_854_775_808.0),
+        ] {
+            assert_eq!(decode(point(kind, Order::Abcd), &words), Some(expect), "{kind:?} {words:04X?}");
         }
     }
 
@@ -304,8 +312,12 @@ mod tests {
             let point = point(kind, order);
             let words = &words[..usize::from(kind.words())];
             if let Some(value) = decode(point, words) {
-                // −0.0 and 0.0 are one value with two patterns; every other number has exactly one.
-                if value != 0.0 {
+                // −0.0 and 0.0 are one value with two patterns, what is rounded is never written; every other number has
+                // exactly one.
+                let is_rounded = matches!(kind, Kind::I64 | Kind::U64) && EXACT < value.abs();
+                if is_rounded {
+                    prop_assert_eq!(encode(point, value), None);
+                } else if value != 0.0 {
                     prop_assert_eq!(encode(point, value), Some(words.to_vec()));
                 }
             }

@@ -112,6 +112,17 @@ pub fn mbap(buffer: &[u8]) -> Mbap {
     Mbap::Whole { transaction: u16::from_be_bytes([header[0], header[1]]), end: 6 + length }
 }
 
+/// Does a TCP stream go on with anything but whole frames and the beginning of one?
+pub fn is_out_of_step(mut stream: &[u8]) -> bool {
+    loop {
+        match mbap(stream) {
+            Mbap::Whole { end, .. } => stream = &stream[end..],
+            Mbap::Incomplete => return stream.get(2..4).is_some_and(|protocol| protocol != [0, 0]),
+            Mbap::Broken => return true,
+        }
+    }
+}
+
 /// Length of the answer message (unit and PDU) that begins in `received`; `None` while too little has come to tell, or
 /// for a function whose length only silence can tell.
 pub fn answer_length(received: &[u8]) -> Option<usize> {
@@ -334,6 +345,11 @@ mod tests {
         }
         assert_eq!(mbap(&[0, 1, 9, 9, 0, 5]), Mbap::Broken);
         assert_eq!(mbap(&[0, 1, 0, 0, 255, 255]), Mbap::Broken);
+        let two = [&frame[..], &frame].concat();
+        for cut in 0..two.len() {
+            assert!(!is_out_of_step(&two[..cut]), "cut at {cut}");
+        }
+        assert!(is_out_of_step(&[&frame[..], &[0, 1, 9, 9]].concat()));
     }
 
     #[test]

@@ -151,9 +151,9 @@ pub enum Outcome {
     /// Not done, and certainly without effect on what was to be written; a key that was sent before it has a line of its own
     /// in the journal.
     Refused(Refusal),
-    /// The device accepted it but the read-back differs or failed.
+    /// A write that may or may not have taken effect, or has taken another one than was ordered.
     NotConfirmed(NotConfirmed),
-    /// No valid answer: it may or may not have taken effect.
+    /// No answer to what is no write.
     Failed(Fault),
 }
 
@@ -242,9 +242,15 @@ pub enum Refusal {
     Alarm(AlarmRefusal),
 }
 
-/// Why a write that the device accepted is not confirmed.
+/// Why a write is not confirmed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum NotConfirmed {
+    /// No valid answer: it may or may not have taken effect.
+    #[error("{0}; it may have taken effect")]
+    NotAnswered(Fault),
+    /// No valid answer, and the device holds another value.
+    #[error("no answer, not applied: the device holds {0}")]
+    NotApplied(f64),
     /// Read back, and different.
     #[error("read back {0}")]
     Different(f64),

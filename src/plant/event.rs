@@ -109,6 +109,8 @@ pub enum Event {
 pub enum WriteResult {
     /// The device accepted it; then it was read back: this raw number.
     ReadBack(f64),
+    /// No valid answer; read once the unit was in step again, the device holds this raw number.
+    Held(f64),
     /// The device accepted it, but the read-back failed.
     NotRead(Fault),
     /// The device accepted it; the profile wants no read-back.

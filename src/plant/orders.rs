@@ -137,10 +137,10 @@ impl Desk {
         let (key, tag) = (self.def.tag(key), self.def.tag(*tag));
         let outcome = match result {
             WriteResult::Refused(code) => Outcome::Refused(Refusal::Exception(*code)),
-            WriteResult::Lost(fault) => Outcome::Failed(*fault),
+            WriteResult::Lost(fault) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(*fault)),
             WriteResult::NotSent(fault) => Outcome::Refused(Refusal::NotSent(*fault)),
             WriteResult::Overtaken => Outcome::Refused(Refusal::Overtaken),
-            WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::NotRead(_) => {
+            WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::Held(_) | WriteResult::NotRead(_) => {
                 Outcome::NotConfirmed(NotConfirmed::NoReadBack)
             }
         };
@@ -163,16 +163,17 @@ impl Desk {
         let index = self.writes.iter().position(|write| write.0 == id)?;
         let (_, order, tag, raw) = self.writes.swap_remove(index);
         let def = self.def.tag(tag);
+        let value = |back| scale::to_value(def, back, board.scaling_decimals(def).unwrap_or(0));
         let outcome = match result {
-            WriteResult::ReadBack(back) if scale::same_raw(def, raw, back) => Outcome::Verified,
-            WriteResult::ReadBack(back) => {
-                let decimals = board.scaling_decimals(def).unwrap_or(0);
-                Outcome::NotConfirmed(NotConfirmed::Different(scale::to_value(def, back, decimals)))
+            WriteResult::ReadBack(back) | WriteResult::Held(back) if scale::same_raw(def, raw, back) => {
+                Outcome::Verified
             }
+            WriteResult::ReadBack(back) => Outcome::NotConfirmed(NotConfirmed::Different(value(back))),
+            WriteResult::Held(back) => Outcome::NotConfirmed(NotConfirmed::NotApplied(value(back))),
             WriteResult::NotRead(fault) => Outcome::NotConfirmed(NotConfirmed::NotRead(fault)),
             WriteResult::Accepted => Outcome::NotConfirmed(NotConfirmed::NoReadBack),
             WriteResult::Refused(code) => Outcome::Refused(Refusal::Exception(code)),
-            WriteResult::Lost(fault) => Outcome::Failed(fault),
+            WriteResult::Lost(fault) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(fault)),
             WriteResult::NotSent(fault) => Outcome::Refused(Refusal::NotSent(fault)),
             WriteResult::Overtaken => Outcome::Refused(Refusal::Overtaken),
         };
@@ -234,7 +235,14 @@ impl Desk {
         };
         let ids: Vec<OrderId> = self.orders.iter().filter(|status| late(status)).map(|status| status.id).collect();
         self.writes.retain(|write| !ids.contains(&write.1));
-        ids.into_iter().filter_map(|id| self.close(id, Outcome::Failed(Fault::Timeout), board)).collect()
+        let outcome_of = |id: OrderId| match self.orders.iter().find(|status| status.id == id) {
+            Some(status) if status.command.written().is_some() => {
+                Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout))
+            }
+            Some(_) | None => Outcome::Failed(Fault::Timeout),
+        };
+        let given_up: Vec<(OrderId, Outcome)> = ids.into_iter().map(|id| (id, outcome_of(id))).collect();
+        given_up.into_iter().filter_map(|(id, outcome)| self.close(id, outcome, board)).collect()
     }
 
     /// The station ends: nobody can answer for what is still under way.

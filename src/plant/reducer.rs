@@ -304,9 +304,11 @@ impl Plant {
     fn wrote(&mut self, id: WriteId, result: WriteResult, at: Timestamp) -> Option<ActionRecord> {
         let in_doubt = match &result {
             WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => self.desk.tag_of(id),
-            WriteResult::ReadBack(_) | WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Overtaken => {
-                None
-            }
+            WriteResult::ReadBack(_)
+            | WriteResult::Held(_)
+            | WriteResult::Refused(_)
+            | WriteResult::NotSent(_)
+            | WriteResult::Overtaken => None,
         };
         if let Some(tag) = in_doubt {
             self.board.failed(&[tag], Fault::Timeout, at);

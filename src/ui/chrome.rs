@@ -337,7 +337,11 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
         Outcome::NotConfirmed(NotConfirmed::NoReadBack) => ("accepted (cannot be read back)".to_owned(), false),
         Outcome::NotConfirmed(NotConfirmed::Partly(how)) => (format!("STOPPED: {how}"), true),
         Outcome::NotConfirmed(
-            why @ (NotConfirmed::Different(_) | NotConfirmed::NotRead(_) | NotConfirmed::StationStopped),
+            why @ (NotConfirmed::NotAnswered(_)
+            | NotConfirmed::NotApplied(_)
+            | NotConfirmed::Different(_)
+            | NotConfirmed::NotRead(_)
+            | NotConfirmed::StationStopped),
         ) => (format!("NOT CONFIRMED: {why}"), true),
         Outcome::Failed(fault) => (format!("FAILED, may have taken effect: {fault}"), true),
     }

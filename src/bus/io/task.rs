@@ -1,5 +1,6 @@
 //! The task of one line: opens the port, keeps the schedule, serves operators and tools, and tells the plant what came of it.
 
+mod confirm;
 mod poll;
 mod test;
 mod write;
@@ -53,6 +54,7 @@ pub async fn run(
         hunt: Hunt::default(),
         budget: Budget::new(WRITE_SHARE, clock.now()),
         waiting: VecDeque::new(),
+        unconfirmed: Vec::new(),
         memory: Memory::new(def.line(line), clock).expect(&blocks),
         settings: def.line(line).clone(),
         clock,
@@ -108,6 +110,8 @@ struct Task<'a> {
     waiting: VecDeque<BusRequest>,
     /// Counters and debts, from one opening to the next.
     memory: Memory,
+    /// Writes whose fate is not known yet.
+    unconfirmed: Vec<confirm::Unconfirmed>,
     /// What has ended a test, to be served next.
     put_back: Option<BusRequest>,
     /// When the books were last told what the link has counted.
@@ -142,6 +146,9 @@ impl Task<'_> {
                 }
                 Err(why) => Leave::Lost(why),
             };
+            if !matches!(leave, Leave::Reopen) {
+                self.give_up_unconfirmed().await?;
+            }
             match leave {
                 Leave::Reopen => backoff.reset(),
                 Leave::Test => {
@@ -245,6 +252,7 @@ impl Task<'_> {
             let Ok(request) = self.next_request(next, now) else { break Err(Ended) };
             let turn = match (request, next) {
                 (Some(request), _) => self.serve_request(&mut link, &mut schedule, request).await?,
+                (None, _) if self.is_turn_of_confirm(now) => self.confirm(&mut link, &mut schedule).await?,
                 (None, next) if self.is_turn_of_test(next) => self.test_step(&mut link).await?,
                 (None, Next::Run(index)) => self.poll(&mut link, &mut schedule, index).await?,
                 (None, Next::WaitUntil(at)) => self.listen(&mut link, &mut schedule, at.min(report_at)).await?,

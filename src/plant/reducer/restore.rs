@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use super::{Effects, Plant};
 use crate::plant::{
     board::Board,
-    command::{BusRequest, Command, Order, OrderId, Outcome, Refusal},
+    command::{BusRequest, Command, NotConfirmed, Order, OrderId, Outcome, Refusal},
     def::{DeviceId, LineId, TagId},
     parameter_set::{self, Problem, StoredSet},
     record::{ActionRecord, Record},
@@ -172,7 +172,9 @@ impl Plant {
                     Some(Outcome::Pending) => return,
                     Some(ended) => run.take(ended.clone()),
                     // It cannot be followed any more, so nobody can say that it was written.
-                    None => run.take(Outcome::Failed(crate::plant::event::Fault::Timeout)),
+                    None => {
+                        run.take(Outcome::NotConfirmed(NotConfirmed::NotAnswered(crate::plant::event::Fault::Timeout)))
+                    }
                 }
             }
             let (by, line_changed, numbers) = (run.by.clone(), run.line_changed, &mut self.numbers);

@@ -80,7 +80,14 @@ fn a_write_is_verified_only_by_its_own_read_back() {
             Some(725.0),
         ),
         (72.5, WriteResult::Refused(ExceptionCode(3)), refused(Refusal::Exception(ExceptionCode(3))), Some(725.0)),
-        (72.5, WriteResult::Lost(Fault::Timeout), Outcome::Failed(Fault::Timeout), Some(725.0)),
+        (
+            72.5,
+            WriteResult::Lost(Fault::Timeout),
+            Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)),
+            Some(725.0),
+        ),
+        (72.5, WriteResult::Held(725.0), Outcome::Verified, Some(725.0)),
+        (72.5, WriteResult::Held(700.0), Outcome::NotConfirmed(NotConfirmed::NotApplied(70.0)), Some(725.0)),
         (70.0, WriteResult::Accepted, Outcome::Unchanged, None),
         (100.1, WriteResult::Accepted, refused(Refusal::OutOfRange { min: "0.0".into(), max: "100.0".into() }), None),
         (
@@ -185,7 +192,8 @@ fn a_second_write_waits_for_the_first_and_a_lost_one_is_given_up() {
     plant.on_order(shown(&plant, 2, SV, 72.0), at(2));
     assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::UnderWay));
     let effects = plant.on_tick(at(122));
-    assert_eq!(plant.snapshot().orders[1].outcome, Outcome::Failed(Fault::Timeout));
+    let outcome = plant.snapshot().orders[1].outcome.clone();
+    assert_eq!(outcome, Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)));
     assert!(effects.records.iter().any(|record| matches!(record, Record::Action(_))), "failures are on record too");
 }
 

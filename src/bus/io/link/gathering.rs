@@ -140,7 +140,12 @@ impl Link {
                 }
             }
         }
-        // What stands behind the last answer nobody has asked for.
+        // What stands behind the last answer nobody has asked for. If it is no header, what stood before it may be no answer.
+        self.wire.receive_waiting(&mut buffer);
+        if frame::is_out_of_step(&buffer[start..]) {
+            self.wire.record(false, buffer[start..].into(), Cow::Borrowed("no MBAP header"));
+            return Err(Trouble::Gone("the stream is out of step".into()));
+        }
         self.wire.drop_stale(&buffer[start..]);
         let missing = || Gathered::nothing(Err(Fault::Timeout));
         Ok(gathered.into_iter().map(|slot| slot.unwrap_or_else(missing)).collect())

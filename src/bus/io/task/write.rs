@@ -83,9 +83,15 @@ impl Task<'_> {
             }
             // Perhaps the key is no longer as it was read.
             WriteResult::Refused(_) if tag.write_unlock.is_some() => schedule.refresh(tag.device, self.clock.now()),
-            WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Overtaken => {}
+            WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Overtaken | WriteResult::Held(_) => {}
         }
-        self.tell_wrote(id, result).await?;
+        match result {
+            // A stop may be ordered again at once.
+            WriteResult::Lost(fault) | WriteResult::NotRead(fault) if wish.verify && !wish.urgent => {
+                self.confirm_later(id, tag.id, result, fault).await?;
+            }
+            result => self.tell_wrote(id, result).await?,
+        }
         if unanswered {
             // It may still lie in this machine or on the way; a closed connection takes it back.
             return Ok(Err(Leave::Reopen));

@@ -126,6 +126,8 @@ pub enum Deed {
     Cut(usize),
     BadCheck,
     Noise(Vec<u8>),
+    /// These bytes behind the answer.
+    Trailing(Vec<u8>),
     /// These message bytes instead of the answer, with a good check.
     Instead(Vec<u8>),
     Exception(u8),
@@ -182,6 +184,7 @@ async fn slave(mut stream: DuplexStream, mode: Mode, mut script: impl FnMut(usiz
                 spoiled
             }
             Deed::Noise(noise) => noise.into_iter().chain(answer).collect(),
+            Deed::Trailing(bytes) => answer.into_iter().chain(bytes).collect(),
             Deed::Instead(message) => framed(&message),
             Deed::Exception(code) => framed(&[message[0], message[1] | 0x80, code]),
         };

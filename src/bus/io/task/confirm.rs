@@ -1,0 +1,104 @@
+//! Writes whose fate is not known: what the device holds is read as soon as the unit is in step, never written again.
+
+use std::time::Duration;
+
+use jiff::{SignedDuration, Timestamp};
+
+use super::{Ended, Leave, Task, Turn, poll::value_of};
+use crate::{
+    bus::{
+        backoff::Backoff,
+        io::link::{Link, Trouble},
+        plan,
+        schedule::Schedule,
+    },
+    plant::{
+        command::WriteId,
+        def::TagId,
+        event::{Event, Fault, WriteResult},
+    },
+};
+
+/// What cannot be read for so long (plant time) stays unconfirmed.
+const CONFIRM_MAX: SignedDuration = SignedDuration::from_secs(30);
+
+/// A write that was not answered, or not read back. The plant has no more than one under way for a tag.
+pub(super) struct Unconfirmed {
+    id: WriteId,
+    tag: TagId,
+    /// How it has ended unless the tag can be read.
+    result: WriteResult,
+    /// When it is read next, and when that is given up.
+    next: Timestamp,
+    until: Timestamp,
+    backoff: Backoff,
+}
+
+impl Task<'_> {
+    /// Remembers a write whose fate is not known; what was read before it is in doubt.
+    pub(super) async fn confirm_later(
+        &mut self,
+        id: WriteId,
+        tag: TagId,
+        result: WriteResult,
+        fault: Fault,
+    ) -> Result<(), Ended> {
+        let now = self.clock.now();
+        let until = now.checked_add(CONFIRM_MAX).unwrap_or(Timestamp::MAX);
+        self.unconfirmed.push(Unconfirmed { id, tag, result, next: now, until, backoff: Backoff::default() });
+        self.tell_failed(now, self.def.tag(tag).device, vec![tag], fault, None).await
+    }
+
+    /// Is it time to read one of them?
+    pub(super) fn is_turn_of_confirm(&self, now: Timestamp) -> bool {
+        self.unconfirmed.iter().any(|write| write.next <= now)
+    }
+
+    /// Reads the tag of the first that is due, and tells how its write has ended if that is known now.
+    pub(super) async fn confirm(&mut self, link: &mut Link, schedule: &mut Schedule) -> Turn {
+        let now = self.clock.now();
+        let Some(index) = self.unconfirmed.iter().position(|write| write.next <= now) else { return Ok(Ok(())) };
+        let def = self.def.clone();
+        let tag = def.tag(self.unconfirmed[index].tag);
+        let block = plan::single(def.device(tag.device), tag);
+        let back = match self.in_step(link, &block).await {
+            Ok(()) => self.read_twice(link, &block, None).await,
+            Err(trouble) => Err(trouble),
+        };
+        let at = self.clock.now();
+        let raw = match back {
+            Ok(values) => value_of(tag, &block, &values),
+            Err(Trouble::Fault(_)) => None,
+            Err(Trouble::Gone(why)) => return Ok(Err(Leave::Lost(why))),
+        };
+        let Some(raw) = raw else {
+            let write = &mut self.unconfirmed[index];
+            let wait = SignedDuration::try_from(write.backoff.fail()).unwrap_or(CONFIRM_MAX);
+            write.next = at.checked_add(wait).unwrap_or(Timestamp::MAX);
+            if write.until < write.next {
+                let write = self.unconfirmed.remove(index);
+                self.tell_wrote(write.id, write.result).await?;
+            }
+            return Ok(Ok(()));
+        };
+        let exchange = link.last.clone();
+        let reply = exchange.as_ref().and_then(|exchange| exchange.reply).unwrap_or_default();
+        schedule.answered(tag.device, Some(reply).filter(|reply| *reply > Duration::ZERO), at);
+        let (device, values) = (tag.device, vec![(tag.id, raw)]);
+        self.tell(Event::Read { at, device, values, texts: Vec::new(), reply, exchange }).await?;
+        let write = self.unconfirmed.remove(index);
+        let result = match write.result {
+            WriteResult::NotRead(_) => WriteResult::ReadBack(raw),
+            _ => WriteResult::Held(raw),
+        };
+        self.tell_wrote(write.id, result).await.map(Ok)
+    }
+
+    /// The port is left: nothing more can be learned of them in time.
+    pub(super) async fn give_up_unconfirmed(&mut self) -> Result<(), Ended> {
+        for write in std::mem::take(&mut self.unconfirmed) {
+            self.tell_wrote(write.id, write.result).await?;
+        }
+        Ok(())
+    }
+}
