@@ -30,6 +30,8 @@ use tokio::sync::{mpsc, watch};
 
 const BLOCKS: u16 = 10;
 const WORDS: u16 = 10;
+/// The first second opens ports and files.
+const WARM: Duration = Duration::from_secs(1);
 /// Blocks of the plans that are read over TCP.
 const PLANS: [u16; 4] = [100, 1_000, 3_000, 10_000];
 /// Blocks of one device there.
@@ -66,7 +68,7 @@ fn cycle(libmodbus: Option<&Path>) {
         let over = minimum * 20;
         let (path, slave) = PacedSlave::start(baud);
         let def = plant(vec![Transport::rtu(path.to_str().unwrap(), serial)], 1, BLOCKS, Duration::from_millis(1), 1);
-        let ((from, to), seconds) = measured_station(def, over, || slave.served());
+        let ((from, to), seconds) = measured_station(def, WARM, over, || slave.served());
         let ours = seconds / ((to - from) as f64 / f64::from(BLOCKS)) / minimum.as_secs_f64();
         let hasty = slave.hasty();
         let theirs = libmodbus.map(|program| {
@@ -82,18 +84,25 @@ fn cycle(libmodbus: Option<&Path>) {
     }
 }
 
-/// Rate of seven units while the eighth is dead, over their rate while it lives.
+/// Rate of the living of eight units after others have died, over their rate before.
 fn dead() {
-    let serial = Serial::USUAL;
-    let rate = |dead: Option<u8>| {
-        let (path, slave) = PacedSlave::start_on(serial, dead);
-        let def = plant(vec![Transport::rtu(path.to_str().unwrap(), serial)], 8, 1, Duration::from_secs(1), 1);
-        let ((from, to), seconds) = measured_station(def, Duration::from_secs(30), || slave.served());
-        (to - from) as f64 / seconds
-    };
-    let (all, seven) = (rate(None), rate(Some(8)));
-    println!("one of eight units dead at 9600 baud, 10 registers a second each, timeout 300 ms:");
-    println!("  the other seven keep {:.1} % of their rate", seven / (all * 7.0 / 8.0) * 100.0);
+    let serial = Serial { baud: 19_200, ..Serial::USUAL };
+    println!("eight units at 19200 baud, 10 registers each 250 ms, timeout 1 s; the living keep of their rate:");
+    for (over, dying) in [(20, &[8][..]), (60, &[8]), (20, &[3, 5, 8]), (60, &[3, 5, 8])] {
+        let (path, slave) = PacedSlave::start_on(serial);
+        let transport = Transport::rtu(path.to_str().unwrap(), serial);
+        let mut def = PlantDef::clone(&plant(vec![transport], 8, 1, Duration::from_millis(250), 1));
+        def.lines[0].timeout = Duration::from_secs(1);
+        let look = || {
+            dying.iter().for_each(|unit| slave.kill(*unit));
+            slave.served()
+        };
+        // A unit is known after 32 answers.
+        let warm = Duration::from_secs(12);
+        let ((from, to), seconds) = measured_station(Arc::new(def), warm, Duration::from_secs(over), look);
+        let kept = (to - from) as f64 / seconds / (4.0 * (8 - dying.len()) as f64);
+        println!("  {} dead, first {over} s: {:.1} %", dying.len(), kept * 100.0);
+    }
 }
 
 /// Transactions a second and CPU for each, over loopback: the line task alone, events drained.
@@ -131,7 +140,7 @@ fn whole_station() {
         let def = plant(lines, devices, BLOCKS, period, 1);
         let tags = def.tags.len();
         let ((before, after), seconds) =
-            measured_station(def, Duration::from_secs(10), || (cpu(ClockId::ProcessCPUTime), wakeups()));
+            measured_station(def, WARM, Duration::from_secs(10), || (cpu(ClockId::ProcessCPUTime), wakeups()));
         let (cpu, wakeups) = (after.0 - before.0, after.1.saturating_sub(before.1));
         println!("station with {what}, {tags} tags:");
         println!("  {:.2} % of a core, {:.0} wake-ups a second", cpu / seconds * 100.0, wakeups as f64 / seconds);
@@ -189,9 +198,9 @@ fn plant(lines: Vec<Transport>, devices: u16, blocks: u16, period: Duration, in_
     Arc::new(def)
 }
 
-/// Runs a whole station with history and a terminal for a while; gives what `look` sees at the beginning and at the end of
+/// Runs a whole station with history and a terminal for a while after a time `warm`; gives what `look` sees at the beginning and at the end of
 /// it, and the seconds.
-fn measured_station<T>(def: Arc<PlantDef>, over: Duration, look: impl Fn() -> T) -> ((T, T), f64) {
+fn measured_station<T>(def: Arc<PlantDef>, warm: Duration, over: Duration, look: impl Fn() -> T) -> ((T, T), f64) {
     let folder = tempfile::tempdir().unwrap();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
     runtime.block_on(async {
@@ -200,8 +209,7 @@ fn measured_station<T>(def: Arc<PlantDef>, over: Duration, look: impl Fn() -> T)
         let options = station::Options { def, clock: Clock::real(), history, connectors, file: None };
         let running = station::start(options).unwrap();
         let mut session = running.session("bench");
-        // The first second opens ports and files.
-        tokio::time::sleep(Duration::from_secs(1)).await;
+        tokio::time::sleep(warm).await;
         let (from, start) = (look(), Instant::now());
         // A terminal that takes every snapshot.
         let terminal = async { while session.snapshots.changed().await.is_ok() {} };

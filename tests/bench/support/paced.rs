@@ -37,16 +37,18 @@ pub struct PacedSlave {
     _port: File,
     served: Arc<AtomicU64>,
     hasty: Arc<AtomicU64>,
+    /// A bit for each unit that does not answer.
+    dead: Arc<AtomicU64>,
 }
 
 impl PacedSlave {
     /// Serves at so many baud with 8N1. The path is the port for a master to open.
     pub fn start(baud: u32) -> (PathBuf, PacedSlave) {
-        PacedSlave::start_on(Serial { baud, ..Serial::USUAL }, None)
+        PacedSlave::start_on(Serial { baud, ..Serial::USUAL })
     }
 
-    /// Serves with other bits to a character; one unit never answers.
-    pub fn start_on(serial: Serial, dead: Option<u8>) -> (PathBuf, PacedSlave) {
+    /// Serves with other bits to a character.
+    pub fn start_on(serial: Serial) -> (PathBuf, PacedSlave) {
         let line = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
         grantpt(&line).unwrap();
         unlockpt(&line).unwrap();
@@ -55,10 +57,15 @@ impl PacedSlave {
         let mut raw = tcgetattr(&port).unwrap();
         raw.make_raw();
         tcsetattr(&port, OptionalActions::Now, &raw).unwrap();
-        let slave = PacedSlave { _port: port, served: Arc::default(), hasty: Arc::default() };
-        let (served, hasty) = (slave.served.clone(), slave.hasty.clone());
-        thread::spawn(move || serve(File::from(line), serial, dead, &served, &hasty));
+        let slave = PacedSlave { _port: port, served: Arc::default(), hasty: Arc::default(), dead: Arc::default() };
+        let (served, hasty, dead) = (slave.served.clone(), slave.hasty.clone(), slave.dead.clone());
+        thread::spawn(move || serve(File::from(line), serial, &dead, &served, &hasty));
         (path, slave)
+    }
+
+    /// From now on a unit below 64 does not answer.
+    pub fn kill(&self, unit: u8) {
+        self.dead.fetch_or(1 << unit, Ordering::Relaxed);
     }
 
     /// Requests answered so far.
@@ -72,7 +79,7 @@ impl PacedSlave {
     }
 }
 
-fn serve(mut line: File, serial: Serial, dead: Option<u8>, served: &AtomicU64, hasty: &AtomicU64) {
+fn serve(mut line: File, serial: Serial, dead: &AtomicU64, served: &AtomicU64, hasty: &AtomicU64) {
     let character = serial.char_time();
     let (mut receiver, mut bytes) = (Receiver::default(), [0; 512]);
     let (mut began, mut latest, mut quiet) = (Instant::now(), Instant::now(), Instant::now());
@@ -91,7 +98,11 @@ fn serve(mut line: File, serial: Serial, dead: Option<u8>, served: &AtomicU64, h
         while let Some(request) = receiver.take() {
             let over = (began + character * request.len() as u32).max(now);
             began = over;
-            let heard = Some(&request[..request.len() - 2]).filter(|message| message.first().copied() != dead);
+            let heard = Some(&request[..request.len() - 2]).filter(|message| {
+                let is_dead =
+                    |unit: &u8| dead.load(Ordering::Relaxed) & 1u64.checked_shl((*unit).into()).unwrap_or(0) != 0;
+                !message.first().is_some_and(is_dead)
+            });
             let Some(answer) = heard.and_then(super::answer) else { continue };
             let Ok(end) = say(&mut line, &with_crc(&answer), over + serial.silence(), character) else { return };
             quiet = end + serial.silence();

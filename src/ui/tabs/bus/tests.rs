@@ -13,6 +13,8 @@ use crate::{
         def::{Framing, LineId, Serial},
         event::{ExceptionCode, Fault, LineState},
         line_minute::LineMinute,
+        ne107::Reason,
+        snapshot::DeviceState,
         tag::Table,
         tool::{Finding, Scan, Tool, ToolRun, ToolState},
         traffic::Exchange,
@@ -69,6 +71,26 @@ fn every_page_well_and_in_trouble() {
                 insta::assert_snapshot!(format!("{page}_{mood}_{width}x{height}"), screen(&mut model, width, height));
             }
         }
+    }
+}
+
+#[test]
+fn a_silent_device_shows_when_it_is_asked_next_and_r_asks_it_now() {
+    let mut fixture = Fixture::traffic();
+    let device = fixture.def.devices[0].id;
+    fixture.devices[0].state = DeviceState::Down { since: now() - jiff::SignedDuration::from_secs(75) };
+    fixture.devices[0].diagnosis = Some(Reason::Down);
+    let mut report = fixture.line.report.as_deref().cloned().expect("the line has reported");
+    report.retries = vec![(device, now() + jiff::SignedDuration::from_secs(12))];
+    fixture.line.report = Some(Arc::new(report));
+    for (width, height) in [(80, 24), (120, 40)] {
+        let mut model = bus(&fixture, Theme::FULL, "L");
+        let shown = screen(&mut model, width, height);
+        assert!(shown.contains("retry in 12 s"), "{shown}");
+        assert_eq!(order_of(&type_keys(&mut model, "r")), Some(&Command::Refresh(device)));
+        type_keys(&mut model, "4⏎");
+        let shown = screen(&mut model, width, height);
+        assert!(shown.contains("not answering, retry in 12 s"), "{shown}");
     }
 }
 
