@@ -16,7 +16,7 @@ use crate::{
         keys::{self, Hint, Key, char, code},
         modal::{Choice, Confirm, Faceplate, Modal, Notice, Why},
         widgets::{
-            mimic::{Stretch, panel, pipe, place, tags, tank::Tank, title, trend, unit},
+            mimic::{Stretch, list, panel, pipe, place, tags, tank::Tank, title, trend, unit},
             text::{Canvas, fit},
         },
     },
@@ -180,6 +180,9 @@ impl Mimic {
     pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let items = &cx.def().mimic.items;
+        if area.width < cx.def().mimic.size.0 {
+            return list::view(cx, &mut canvas, self.selected);
+        }
         let stretch = stretch(cx, area);
         for (n, item) in items.iter().enumerate() {
             self.item(cx, &mut canvas, item, n, stretch);

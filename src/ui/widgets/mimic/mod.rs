@@ -1,5 +1,6 @@
 //! The parts of the process picture, on a canvas of nominal cells that is stretched to the screen.
 
+pub mod list;
 pub mod panel;
 pub mod pipe;
 pub mod tank;
