@@ -21,7 +21,10 @@ use crate::{
     },
 };
 
-use super::{CliError, StationArgs, client, in_runtime, load, put_out, report::dialect, say, source::Source, span};
+use super::{
+    CliError, StationArgs, client, in_runtime, load, own_files, put_out, report::dialect, run::history_file, say,
+    source::Source, span,
+};
 
 /// Rows of one file.
 const ROWS_MAX: u128 = 2_000_000;
@@ -71,6 +74,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 
 async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     let tags = tags(&def, &args.tags)?;
+    own_files::refuse(&args.out, &history_file(&def, &args.station))?;
     let source = Source::open(&def, &args.station, &args.login).await?;
     let period = source.period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref())?;
     let rows = rows(period.from, period.to, args.every, tags.len())?;

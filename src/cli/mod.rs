@@ -14,6 +14,7 @@ mod export;
 mod frame;
 mod init;
 mod log;
+mod own_files;
 mod paths;
 mod profiles;
 mod report;

@@ -9,7 +9,9 @@ use crate::{
     report::csv,
 };
 
-use super::{CliError, StationArgs, client, in_runtime, load, put_out, say, source::Source};
+use super::{
+    CliError, StationArgs, client, in_runtime, load, own_files, put_out, run::history_file, say, source::Source,
+};
 
 /// Arguments of `report`.
 #[derive(Debug, clap::Args)]
@@ -50,6 +52,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
 }
 
 async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
+    if let Some(out) = &args.out {
+        own_files::refuse(out, &history_file(&def, &args.station))?;
+    }
     let source = Source::open(&def, &args.station, &args.login).await?;
     let period = source.period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref())?;
     let Answer::Report(report) = source.ask(Question::Report { period }).await? else {

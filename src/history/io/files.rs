@@ -17,6 +17,10 @@ use crate::history::HistoryError;
 /// Opens that never ended before the log is set aside, as the part that is replayed; after one more, the file too.
 pub const FAILED_OPENS_MAX: u32 = 2;
 
+/// A disk is nearly full with less than this free, in bytes and in percent.
+const FREE_MIN: u64 = 1 << 30;
+const FREE_PERCENT_MIN: u64 = 10;
+
 /// A file beside the database that exists only while it is being opened. Replaying a damaged log can abort the whole
 /// process: then the file stays behind and counts.
 pub struct Opening {
@@ -135,6 +139,20 @@ pub fn inode(path: &Path) -> Option<(u64, u64)> {
     fs::metadata(path).ok().map(|meta| (meta.dev(), meta.ino()))
 }
 
+/// How little is left of the disk that a history lies on, where both less than a tenth and less than 1 GiB are free: a
+/// tenth of a large disk is plenty, and a small disk never has 1 GiB.
+pub fn disk_nearly_full(db: &Path) -> Option<String> {
+    let folder = db.ancestors().skip(1).find(|folder| folder.is_dir())?;
+    let disk = rustix::fs::statvfs(folder).ok()?;
+    nearly_full(disk.f_bavail.saturating_mul(disk.f_frsize), disk.f_blocks.saturating_mul(disk.f_frsize))
+}
+
+fn nearly_full(free: u64, all: u64) -> Option<String> {
+    let full = free < FREE_MIN && free < all / 100 * FREE_PERCENT_MIN;
+    // In steps, so that the words do not change with every record.
+    full.then(|| format!("{} MiB of the disk are free ({} %)", free >> 20 >> 3 << 3, free * 100 / all.max(1)))
+}
+
 /// The path with something appended: DuckDB itself names its log so.
 pub fn beside(db: &Path, suffix: &str) -> PathBuf {
     let mut name = OsString::from(db.as_os_str());
@@ -208,6 +226,22 @@ fn holder(message: &str) -> String {
 mod tests {
     use super::*;
     use crate::report::testing::at;
+
+    #[test]
+    fn a_disk_is_nearly_full_when_little_is_free_in_bytes_and_in_percent() {
+        const GIB: u64 = 1 << 30;
+        for (free, all, expect) in [
+            (50 * GIB, 1000 * GIB, None),
+            (GIB - 1, 1000 * GIB, Some("1016 MiB of the disk are free (0 %)")),
+            (GIB / 2, 4 * GIB, None),
+            (GIB / 4, 4 * GIB, Some("256 MiB of the disk are free (6 %)")),
+            (0, 4 * GIB, Some("0 MiB of the disk are free (0 %)")),
+            (0, 0, None),
+        ] {
+            assert_eq!(nearly_full(free, all).as_deref(), expect, "{free} of {all}");
+        }
+        assert_eq!(disk_nearly_full(Path::new("/proc/none/x.duckdb")), nearly_full(0, 0), "no disk at all");
+    }
 
     #[test]
     fn the_holder_of_a_lock_is_named() {

@@ -1,0 +1,61 @@
+//! The files that a station keeps are no place to write a report or an export to.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use crate::{
+    access::io::{book, users_beside},
+    history::io::{alarm_file, files},
+};
+
+use super::CliError;
+
+/// Refuses to write to the history, its log and notes, the audit log, the users file or the alarm-state file, under
+/// whatever name they are reached.
+pub fn refuse(out: &Path, history: &Path) -> Result<(), CliError> {
+    let beside = ["", ".wal", ".last", ".opening"].map(|suffix| files::beside(history, suffix));
+    let others = [book::beside(history), users_beside(history), alarm_file::beside(history)];
+    let same = |own: &PathBuf| {
+        let is_one_file = files::inode(own).is_some() && files::inode(own) == files::inode(out);
+        is_one_file || resolved(own).is_some() && resolved(own) == resolved(out)
+    };
+    match beside.iter().chain(&others).find(|own| same(own)) {
+        Some(own) => Err(CliError::Usage(format!("{} belongs to the station: choose another file", own.display()))),
+        None => Ok(()),
+    }
+}
+
+/// The path without links and dots, also of a file that is not there yet.
+fn resolved(path: &Path) -> Option<PathBuf> {
+    let absolute = std::path::absolute(path).ok()?;
+    fs::canonicalize(&absolute)
+        .ok()
+        .or_else(|| Some(fs::canonicalize(absolute.parent()?).ok()?.join(path.file_name()?)))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_never_goes_over_a_file_of_the_station() {
+        let folder = tempfile::tempdir().unwrap();
+        let history = folder.path().join("tank.duckdb");
+        fs::write(&history, "history").unwrap();
+        let link = folder.path().join("link.csv");
+        std::os::unix::fs::symlink(&history, &link).unwrap();
+        let hard = folder.path().join("hard.csv");
+        fs::hard_link(&history, &hard).unwrap();
+        let dotted = folder.path().join("./tank.duckdb.wal");
+        let [log, users, alarms] = [book::beside(&history), users_beside(&history), alarm_file::beside(&history)];
+        for own in [&history, &link, &hard, &dotted, &log, &users, &alarms] {
+            assert!(refuse(own, &history).is_err(), "{}", own.display());
+        }
+        for other in [folder.path().join("report.csv"), folder.path().join("none/report.csv"), PathBuf::from("-")] {
+            assert!(refuse(&other, &history).is_ok(), "{}", other.display());
+        }
+    }
+}
