@@ -86,6 +86,8 @@ pub struct Gate {
     def: Arc<PlantDef>,
     /// `None` where nobody is asked who he is: in a demonstration.
     people: Option<Users>,
+    /// Why nobody can log in: the users are not known.
+    closed: Option<Arc<str>>,
     /// The user of the operating system that the station runs as.
     host: Option<Arc<str>>,
     seats: BTreeMap<u32, Seat>,
@@ -109,6 +111,7 @@ impl Gate {
         Gate {
             def,
             people: None,
+            closed: None,
             host,
             seats: BTreeMap::new(),
             tries: Tries::default(),
@@ -127,9 +130,22 @@ impl Gate {
         Gate { people: Some(people), ..Gate::new(def, host) }
     }
 
-    /// The [`Users::digest`] of those it lets in; `None` where nobody is asked who he is.
+    /// A gate that nobody can log in at, because the file of users is damaged; `why` is told to whoever tries.
+    pub fn closed(def: Arc<PlantDef>, why: &str, host: Option<Arc<str>>) -> Gate {
+        Gate {
+            closed: Some(format!("login is closed: {why}").into()),
+            ..Gate::with_people(def, Users::default(), host)
+        }
+    }
+
+    /// The [`Users::digest`] of those it lets in; `None` where nobody is asked who he is, or they are not known.
     pub fn people_digest(&self) -> Option<String> {
-        self.people.as_ref().map(Users::digest)
+        self.people.as_ref().filter(|_| self.closed.is_none()).map(Users::digest)
+    }
+
+    /// Why nobody can log in, if that is so.
+    pub fn is_closed(&self) -> Option<&Arc<str>> {
+        self.closed.as_ref()
     }
 
     /// A terminal has attached.

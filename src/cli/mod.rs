@@ -159,7 +159,6 @@ impl From<StartError> for CliError {
     fn from(error: StartError) -> CliError {
         match error {
             StartError::History(error) => CliError::History(error),
-            StartError::Users(error) => CliError::Users(error),
         }
     }
 }

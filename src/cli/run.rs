@@ -9,7 +9,10 @@ use tokio::{
 };
 
 use crate::{
-    access::io::{users, users_beside},
+    access::{
+        book::hex,
+        io::{users, users_beside},
+    },
     attach::io::{find, serve},
     bus::io::{clock::Clock, transport::Connector},
     plant::{PlantDef, Snapshot},
@@ -218,6 +221,7 @@ pub async fn follow(
     duration: Option<Duration>,
 ) -> Result<Arc<Snapshot>, CliError> {
     let mut before = snapshots.borrow_and_update().clone();
+    let mut anchored = None;
     let mut watchdog = init::Watchdog::new();
     let end = over(clock, duration);
     tokio::pin!(end);
@@ -237,11 +241,25 @@ pub async fn follow(
                 for line in teller::changes(&before, &after) {
                     say(&format!("{time} {line}"));
                 }
+                let hour = after.at.as_second().div_euclid(3_600);
+                if after.history.audit.is_some() && anchored.replace(hour) != Some(hour) {
+                    say_anchor(&after);
+                }
                 before = after;
             }
         }
     }
-    Ok(snapshots.borrow().clone())
+    let last = snapshots.borrow().clone();
+    say_anchor(&last);
+    Ok(last)
+}
+
+/// The last entry of the audit log, for the journal of the system: who changes the log afterwards, from the first line to
+/// the last, must change the journal as well.
+fn say_anchor(snapshot: &Snapshot) {
+    if let Some(seal) = snapshot.history.audit {
+        say(&format!("audit log: entry {} {}", seal.number, hex(&seal.hash)));
+    }
 }
 
 /// Returns when a span of plant time is over; never without one.

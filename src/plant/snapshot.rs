@@ -17,7 +17,7 @@ use super::{
     line_report::LineReport,
     ne107,
     parameter_set::StoredSet,
-    record::Burst,
+    record::{Burst, Seal},
     restore::Restore,
     sample::{Cause, Sample},
     scale,
@@ -332,6 +332,8 @@ pub struct HistoryStatus {
     pub disk: Option<String>,
     /// The clock was behind the last record at the start.
     pub clock: Option<String>,
+    /// The last entry of the audit log that is on disk.
+    pub audit: Option<Seal>,
     /// All that is wrong with it, in words for the operator.
     pub trouble: Option<String>,
     /// Size of the file, bytes.

@@ -48,6 +48,13 @@ pub enum FaultState {
     Cleared,
 }
 
+impl FaultState {
+    /// It lasts as long as there are words for it.
+    pub fn lasting(words: Option<String>) -> FaultState {
+        words.map_or(FaultState::Cleared, |words| FaultState::Active(words.into()))
+    }
+}
+
 impl StationFault {
     /// Every fault.
     pub const ALL: [StationFault; 9] = [

@@ -249,6 +249,11 @@ impl Deeds {
         }
     }
 
+    /// The last entry of the audit log that is on disk.
+    pub fn last(&self) -> Option<Seal> {
+        self.recorded.borrow().last
+    }
+
     /// Deeds that are lost, and what is wrong with the audit log and with the alarm-state file, in words for the operator.
     pub fn trouble(&mut self) -> (u64, Option<String>, Option<String>) {
         let ended = self.recorded.has_changed().is_err();

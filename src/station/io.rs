@@ -9,15 +9,20 @@ use tokio::{
 
 use crate::{
     access::{
-        Gate, Peer,
-        io::{own_user, recorder, users, users_beside},
+        Gate, Peer, Users,
+        io::{book::Opened, own_user, recorder, users, users_beside},
     },
     bus::io::{clock::Clock, transport::Connector},
     history::{
         HistoryError,
         io::{Query, thread as history},
     },
-    plant::{Plant, PlantDef, command::Order, snapshot::HistoryStatus},
+    plant::{
+        Plant, PlantDef,
+        command::Order,
+        snapshot::HistoryStatus,
+        station::{FaultState, StationFault},
+    },
     profile::PlantFile,
     sim::io::Listener,
 };
@@ -84,8 +89,15 @@ pub fn start_told(options: Options, listener: Option<Listener>) -> Result<Statio
 /// The same for a plant whose people are kept beside its history: everybody must log in.
 pub fn start_guarded(options: Options) -> Result<Station, StartError> {
     let path = users_beside(&options.history);
-    let people = users::read(&path)?;
-    let gate = Gate::with_people(options.def.clone(), people, Some(own_user().into()));
+    let (def, host) = (options.def.clone(), Some(own_user().into()));
+    let gate = match users::read(&path) {
+        Ok(people) => Gate::with_people(def, people, host),
+        // Nobody can log in, and it is never taken for nobody; values and alarms go on.
+        Err(error) => {
+            tracing::error!(%error, "login is closed");
+            Gate::closed(def, &error.to_string(), host)
+        }
+    };
     Ok(begin(options, None, Some((gate, path)))?)
 }
 
@@ -95,9 +107,6 @@ pub enum StartError {
     /// The history cannot be used.
     #[error(transparent)]
     History(#[from] HistoryError),
-    /// The users are not known.
-    #[error(transparent)]
-    Users(#[from] users::UsersError),
 }
 
 fn begin(
@@ -117,11 +126,25 @@ fn begin(
     let from_journal = recorder.alarms.steps.is_none();
     recorder.alarms.steps.iter().for_each(|steps| plant.restore(steps));
     let users = guarded.as_ref().and_then(|(gate, _)| gate.people_digest());
+    if let Some(state) = guarded.as_ref().and_then(|(gate, _)| users_fault(gate, &recorder.opened)) {
+        plant.on_fault(StationFault::UsersFile, state);
+    }
     deeds.started(&def.name, file.as_ref(), users, clock.now());
     let past = Some(Past::new(history.restored.take(), from_journal));
     let keeping = Keeping { records: Some(records), store, past, book: Some(deeds), sets: Some(sets), listener };
     let threads = Threads { queries, history: Some(history), book: Some(recorder.join) };
     Ok(assemble(def, clock, connectors, plant, file, keeping, threads, guarded))
+}
+
+/// What is wrong with the file of users: it is damaged, or it is missing although the audit log knows of users.
+fn users_fault(gate: &Gate, log: &Opened) -> Option<FaultState> {
+    if let Some(why) = gate.is_closed() {
+        return Some(FaultState::Active(why.clone()));
+    }
+    let nobody = Users::default().digest();
+    let had_users = log.users_file.as_ref().is_some_and(|recorded| **recorded != *nobody);
+    let words = "the users file is missing although there were users: bring it back from a copy";
+    (had_users && gate.people_digest() == Some(nobody)).then(|| FaultState::Occurred(words.into()))
 }
 
 /// A station that keeps nothing, for drills in virtual time, where no other thread may take part. Questions to the history

@@ -422,10 +422,11 @@ impl PlantTask {
         if let Some(book) = &mut self.keeping.book {
             let (lost, log, alarms) = book.trouble();
             status.lost += lost;
+            status.audit = book.last();
             let parts: Vec<String> = [&status.trouble, &log, &alarms].into_iter().flatten().cloned().collect();
             status.trouble = (!parts.is_empty()).then(|| parts.join("; "));
-            self.plant.on_fault(StationFault::AuditLog, log);
-            self.plant.on_fault(StationFault::AlarmState, alarms);
+            self.plant.on_fault(StationFault::AuditLog, FaultState::lasting(log));
+            self.plant.on_fault(StationFault::AlarmState, FaultState::lasting(alarms));
         }
         self.plant.on_history(status);
     }

@@ -3,7 +3,7 @@
 
 use std::{path::Path, sync::Arc};
 
-use super::io::{Options, StartError, start_guarded};
+use super::io::{Options, start_guarded};
 use crate::{
     access::{
         Wish,
@@ -11,7 +11,7 @@ use crate::{
     },
     bus::io::{clock::Clock, transport::Connector},
     history::{Answer, Question, io::Query},
-    plant::{command::Command, fixture, record::ActionRecord},
+    plant::{command::Command, def::AlarmId, fixture, record::ActionRecord, station::StationFault},
 };
 
 fn options(history: &Path) -> Options {
@@ -79,7 +79,46 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
         "{text}"
     );
     assert!(!text.contains("horses"), "a password is never written down");
+}
 
-    std::fs::write(users_beside(&history), "").unwrap();
-    assert!(matches!(start_guarded(options(&history)), Err(StartError::Users(_))), "a damaged file is not nobody");
+/// Whether the station says so with an alarm, and what whoever tries to log in hears.
+async fn without_users(history: &Path) -> (bool, Result<(), String>, Result<(), String>) {
+    let mut options = options(history);
+    let mut def = fixture::plant();
+    let own = def.alarms.len();
+    def.alarms.extend((own..).zip(StationFault::ALL).map(|(id, fault)| fault.alarm(AlarmId(id as u16))));
+    options.def = Arc::new(def);
+    let station = start_guarded(options).unwrap();
+    let mut session = station.session("whoever");
+    let login = session.wish(Wish::Login { user: "anna".into(), password: "four wet horses in a tank".into() }).await;
+    let second: Wish = Wish::FirstSupervisor { user: "eve".into(), password: "eight wet horses in a tank".into() };
+    let first = session.wish(second).await;
+    // A tick judges the alarms, whatever they are.
+    let at = session.snapshots.borrow().at;
+    let ticked = session.snapshots.wait_for(|snapshot| at < snapshot.at).await.unwrap().clone();
+    let alarmed =
+        ticked.alarms.iter().any(|alarm| ticked.def.alarm(alarm.id).text == StationFault::UsersFile.message());
+    drop(session);
+    station.stop().await;
+    (alarmed, login, first)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_damaged_users_file_closes_the_login_and_nothing_else_and_a_missing_one_is_alarmed() {
+    let folder = tempfile::tempdir().unwrap();
+    let history = folder.path().join("fixture.duckdb");
+    let users = users_beside(&history);
+    let (alarmed, _, first) = without_users(&history).await;
+    assert!(!alarmed && first.is_ok(), "a new plant has no users yet: {first:?}");
+    let good = std::fs::read(&users).unwrap();
+    std::fs::write(&users, &good[..good.len() / 2]).unwrap();
+    let (alarmed, login, first) = without_users(&history).await;
+    assert!(alarmed, "polling and alarms go on");
+    assert!(login.is_err_and(|why| why.starts_with("login is closed: ")), "a damaged file is not nobody");
+    assert!(first.is_err_and(|why| why.starts_with("login is closed: ")), "and nobody makes himself a Supervisor");
+    assert_eq!(std::fs::read(&users).unwrap(), good[..good.len() / 2], "it is left as it is");
+    std::fs::remove_file(&users).unwrap();
+    let (alarmed, login, first) = without_users(&history).await;
+    assert!(alarmed && login.is_err());
+    assert!(first.is_ok(), "by the station's own user: {first:?}");
 }

@@ -28,6 +28,9 @@ impl Gate {
         at: Timestamp,
     ) -> Vec<Effect> {
         let Some(people) = &self.people else { return reply(ticket, NOBODY_ASKED) };
+        if let Some(why) = &self.closed {
+            return reply(ticket, why);
+        }
         if people.is_empty() {
             return reply(ticket, "there are no users yet: whoever has started the station makes the first supervisor");
         }

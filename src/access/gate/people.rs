@@ -44,6 +44,10 @@ impl Gate {
             return reply(ticket, "this station keeps no users");
         }
         let (action, target) = words(&wish);
+        if let Some(why) = self.closed.clone() {
+            // What is in the damaged file is not to be written over.
+            return self.not_changed(terminal, ticket, action, &target, &why, at);
+        }
         let result = match wish {
             Wish::FirstSupervisor { user, password } => self.first(terminal, ticket, user.into(), password),
             Wish::ChangePassword { old, new } => self.change_own(terminal, ticket, old, new, at),

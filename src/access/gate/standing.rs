@@ -26,7 +26,9 @@ impl Gate {
             who: seat.who.clone(),
             locked: seat.locked,
             view: rules.view || seat.who.is_some(),
-            first: self.people.as_ref().is_some_and(Users::is_empty) && self.is_host(&seat.peer),
+            first: self.closed.is_none()
+                && self.people.as_ref().is_some_and(Users::is_empty)
+                && self.is_host(&seat.peer),
             notice,
             password_chars_min: rules.password_chars_min,
             idle_lock,

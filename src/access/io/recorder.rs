@@ -60,6 +60,8 @@ pub struct Recorded {
     pub waiting: u64,
     /// Actions that the history had no room for.
     pub lost: u64,
+    /// The last entry of the log.
+    pub last: Option<Seal>,
     /// What is wrong with the log, in words for the operator.
     pub log: Option<String>,
     /// What is wrong with the alarm-state file.
@@ -320,6 +322,7 @@ impl Recorder {
             batches: self.recorded,
             waiting: self.taken - self.recorded,
             lost: self.lost,
+            last: self.book.as_ref().map(Book::last),
             log: all(log, &self.found),
             alarms: all(alarms, self.alarms_found.as_slice()),
         }

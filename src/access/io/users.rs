@@ -19,7 +19,7 @@ const BYTES_MAX: u64 = 256 << 10;
 /// The first words of the file.
 const HEAD: &str = "# The users of this plant. Written by the station: change it there, in the tab Users.\n";
 
-/// Why the users are not known. The station does not start then: it must not take a damaged file for nobody.
+/// Why the users are not known. Nobody can log in then: a damaged file must not be taken for nobody.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum UsersError {
     /// It is there, and cannot be read.
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_file_stops_the_start_and_is_never_taken_for_nobody() {
+    fn a_damaged_file_is_never_taken_for_nobody() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tank.users.toml");
         let good = text(&two());

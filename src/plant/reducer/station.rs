@@ -7,9 +7,8 @@ use crate::plant::{
 };
 
 impl Plant {
-    /// What is wrong with a part of the station, if anything is. The alarm follows with the next tick.
-    pub fn on_fault(&mut self, fault: StationFault, words: Option<String>) {
-        let state = words.map_or(FaultState::Cleared, |words| FaultState::Active(words.into()));
+    /// How a part of the station stands. The alarm follows with the next tick.
+    pub fn on_fault(&mut self, fault: StationFault, state: FaultState) {
         self.faults.set(fault, state);
     }
 
