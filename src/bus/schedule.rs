@@ -218,6 +218,7 @@ impl Schedule {
         let free = rests_until.max(poll.not_before);
         let served = poll.serve(pace, free, started, now);
         self.late |= poll.class == Class::Hard && poll.is_late();
+        self.devices[self.polls[index].place].tried(now);
         self.requeue(index);
         let urgent = self.late && self.overload.load() == Load::Normal;
         if urgent || self.judged_at + JUDGE_EVERY <= now {

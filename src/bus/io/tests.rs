@@ -593,3 +593,17 @@ async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
     assert_eq!(line.until(&def, told).await, (None, WriteResult::Refused(ExceptionCode(3))));
     line.until(&def, holds).await;
 }
+
+/// A try that was not even sent, because the unit is out of step, is not made again at once and for ever.
+#[tokio::test(start_paused = true)]
+async fn a_silent_unit_that_is_out_of_step_is_read_again() {
+    let script = |number, _: &[u8]| match number {
+        0 | 2 => Deed::Silent,
+        1 => Deed::Late(1_681 * MS),
+        4 => Deed::Late(332 * MS),
+        5 => Deed::Torn(0, Duration::ZERO),
+        _ => Deed::Answer,
+    };
+    let (good, failed) = poll(Mode::Ascii, 60, script).await;
+    assert!(failed < good, "{good} good, {failed} failed");
+}

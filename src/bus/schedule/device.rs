@@ -24,6 +24,9 @@ const PATIENCE_MIN: Duration = Duration::from_millis(100);
 /// Every so many-th try in a row waits for the whole timeout: the device may have become slow.
 const WHOLE_TIMEOUT_EVERY: u32 = 4;
 
+/// A device of which nothing was heard, not even that it failed, is asked again after this time.
+const TRIED_AGAIN: Duration = Duration::from_secs(1);
+
 #[derive(Debug, Clone)]
 pub(super) struct Health {
     pub device: DeviceId,
@@ -87,6 +90,13 @@ impl Health {
     /// An answer came after it had been given up: from now on the device has the whole timeout.
     pub fn answered_late(&mut self) {
         self.slowest = Duration::MAX;
+    }
+
+    /// It was asked; what came of it is told later, or never if nothing could be sent: then it is asked again in a while.
+    pub fn tried(&mut self, now: Timestamp) {
+        if let Some(probe_at) = &mut self.probe_at {
+            (*probe_at, self.prompt) = (now + TRIED_AGAIN, false);
+        }
     }
 
     /// It did not answer a request that was sent at `sent`; `affordable`: the line has time for another try. `true` if it is
