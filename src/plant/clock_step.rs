@@ -77,7 +77,8 @@ impl Snapshot {
         Arc::make_mut(&mut self.aside).iter_mut().for_each(|alarm| alarm.shift(by));
         self.alarm_quality.flood_since.iter_mut().for_each(|since| shift(since, by));
         let day = Arc::make_mut(&mut self.alarm_quality.day);
-        (shift(&mut day.from, by), shift(&mut day.until, by));
+        shift(&mut day.from, by);
+        shift(&mut day.until, by);
         self.orders.iter_mut().for_each(|order| {
             shift(&mut order.at, by);
             order.command.unshift(-by);
