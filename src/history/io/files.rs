@@ -128,6 +128,16 @@ pub fn set_aside(db: &Path, part: Part, now: Timestamp) -> Result<PathBuf, Histo
     Ok(target)
 }
 
+/// Removes a database that was never more than begun, as a full disk leaves it.
+pub fn remove(db: &Path) {
+    for suffix in LOGS.into_iter().chain([""]) {
+        let path = beside(db, suffix);
+        if path.is_file() {
+            let _ = fs::remove_file(path);
+        }
+    }
+}
+
 /// Bytes of the database and its log.
 pub fn size(db: &Path) -> u64 {
     let bytes = |suffix| fs::metadata(beside(db, suffix)).map_or(0, |meta| meta.len());

@@ -81,6 +81,11 @@ impl Store {
         files::refuse_foreign(path)?;
         let opening = Opening::begin(path)?;
         let noted = last::read(path);
+        // An empty file is what is left of a creation that failed: nothing is in it, and it is not damaged.
+        let fresh = files::size(path) == 0;
+        if fresh {
+            files::remove(path);
+        }
         let mut trouble = None;
         let mut set_aside = |part: Part, why: &str| -> Result<(), HistoryError> {
             let target = files::set_aside(path, part, now)?;
@@ -114,9 +119,14 @@ impl Store {
                 opened = try_open();
             }
         }
-        let (store, read) = opened.map_err(|failure| match failure {
-            Failure::Obstacle(error) => error,
-            Failure::Damaged(why) => HistoryError::Engine(why),
+        let (store, read) = opened.map_err(|failure| {
+            if fresh {
+                files::remove(path);
+            }
+            match failure {
+                Failure::Obstacle(error) => error,
+                Failure::Damaged(why) => HistoryError::Engine(why),
+            }
         })?;
         let missing = missing(&noted, &store.last_commit(), trouble.is_some());
         trouble = match (trouble, missing) {

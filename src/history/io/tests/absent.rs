@@ -140,6 +140,16 @@ fn a_log_removed_under_the_station_takes_nothing_with_it() {
 }
 
 #[test]
+fn what_a_full_disk_leaves_of_a_new_file_is_no_damage() {
+    let (folder, db) = folder();
+    fs::write(&db, "").unwrap();
+    let writer = Writer::open(db, def(), sec(0)).unwrap();
+    assert_eq!(writer.status().damaged, None);
+    let names = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    assert_eq!(names.filter(|name| name.contains("damaged")).count(), 0);
+}
+
+#[test]
 fn a_history_removed_while_the_station_was_off_is_said() {
     let (_folder, db) = folder();
     open(&db, 0).append(&[good(PV, 0, 27.0)]).unwrap();
