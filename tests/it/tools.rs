@@ -16,7 +16,7 @@ fn peer(work: impl Fn(TcpStream) + Send + 'static) -> String {
 }
 
 fn serve(listener: TcpListener, work: impl Fn(TcpStream) + Send + 'static) {
-    std::thread::spawn(move || listener.incoming().flatten().for_each(|stream| work(stream)));
+    std::thread::spawn(move || listener.incoming().flatten().for_each(work));
 }
 
 /// A peer that gives this for every request it gets.
