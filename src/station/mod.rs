@@ -3,6 +3,26 @@
 //! There is exactly one awaited send (link → plant). Everything else is `try_send` or `watch`, so the plant task never
 //! blocks. Shutdown runs downstream: the links stop, the plant ends because nobody can send any more, the history
 //! thread drains, flushes and ends.
+//!
+//! # When a resource fails
+//!
+//! Polling and alarms go on in every row, at the start as in the middle. Faults of history, disk, audit log, alarm-state
+//! file, users file, clock and line tasks are alarms of the station: [`StationFault`](crate::plant::station::StationFault).
+//!
+//! | resource | what happens | how it ends |
+//! |---|---|---|
+//! | history: disk full, read-only, locked, not there | records wait in a bounded buffer, samples are dropped first; its fill is shown | retried after 1, 2, 4, 8 s; then caught up |
+//! | history: damaged at the start | set aside, never deleted; a new file is begun; lost commits are counted and dated | acknowledged |
+//! | history: a block cannot be read later | the report names the span and leaves it out | acknowledged |
+//! | history: removed or replaced | noticed at the next commit, a new file is begun | acknowledged |
+//! | disk nearly full | alarm before the first failure | space is free again |
+//! | audit log, alarm-state file | what is done is shown as "not recorded" | retried each second; then recorded |
+//! | users file: damaged, missing | login is closed; for a missing one only the station's own user makes the first Supervisor | restored, and the station restarted |
+//! | system clock: set | followed at once, recorded; ages, delays and shelvings do not move | acknowledged |
+//! | memory, CPU: too many questions | two at a time, 20 s each, on connections of their own; a full queue of samples is counted as lost | the queue empties |
+//! | line: cable, port | its values become bad, the port is opened again with backoff; a line alarm | answers come |
+//! | line: too much to do | process values are stretched alike, alarm inputs keep their period; the header says so | demand falls |
+//! | a line's task panics | started again after 1, 2, 5 s; the other lines do not notice | acknowledged |
 
 pub mod session;
 mod deeds;

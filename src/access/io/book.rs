@@ -3,7 +3,7 @@
 use std::{
     collections::VecDeque,
     ffi::OsStr,
-    fs::{File, OpenOptions},
+    fs::{File, OpenOptions, TryLockError},
     io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write},
     os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt},
     path::{Path, PathBuf},
@@ -15,6 +15,9 @@ use crate::{
     history::io::seals::SEALS_MAX,
     plant::record::{ActionRecord, Seal},
 };
+
+/// Why the files beside a history that another process has are left alone.
+pub const IN_USE: &str = "another process records to this history";
 
 /// The book beside a history: `tank.audit.jsonl` beside `tank.duckdb`.
 pub fn beside(history: &Path) -> PathBuf {
@@ -120,8 +123,13 @@ pub struct Opened {
 impl Book {
     /// Opens a book, or begins one. Nothing in it is ever changed or removed: a torn last line is put beside, and behind
     /// lines that were tampered with it goes on from the last seal that the station knows.
+    /// [`io::ErrorKind::WouldBlock`] while another process writes it: two writers would break the chain.
     pub fn open(path: &Path) -> io::Result<(Book, Opened)> {
         let mut file = own(OpenOptions::new().read(true).append(true).create(true), path)?;
+        file.try_lock().map_err(|error| match error {
+            TryLockError::WouldBlock => io::Error::new(io::ErrorKind::WouldBlock, IN_USE),
+            TryLockError::Error(error) => error,
+        })?;
         let mut opened = Opened::default();
         let head = read_head(path)?;
         let mut check = Check::new(head, &[]);

@@ -11,7 +11,7 @@ use std::{
 
 use tokio::sync::{mpsc, watch};
 
-use super::book::{self, Book, Opened};
+use super::book::{self, Book, IN_USE, Opened};
 use crate::{
     access::book::{Comparison, START, compare, fit},
     bus::io::clock::Clock,
@@ -120,6 +120,8 @@ struct Recorder {
     /// Why the log and the alarm-state file cannot be written now.
     log_fault: Option<String>,
     alarm_fault: Option<String>,
+    /// Another process writes both files.
+    in_use: bool,
     opened_at: Instant,
     /// Actions that are in the history without a seal, since the last fault.
     unsealed: u64,
@@ -144,6 +146,7 @@ impl Recorder {
             alarms_found: found.trouble.clone(),
             log_fault: None,
             alarm_fault: None,
+            in_use: false,
             opened_at: Instant::now(),
             unsealed: 0,
             taken: 0,
@@ -211,7 +214,7 @@ impl Recorder {
             self.open();
         }
         self.write_log();
-        let written = self.alarms.write();
+        let written = if self.in_use { Err(io::Error::other(IN_USE)) } else { self.alarms.write() };
         self.alarm_fault = written.err().map(|error| error.to_string());
         if self.pending.is_empty() && self.alarm_fault.is_none() {
             self.recorded = self.taken;
@@ -223,7 +226,7 @@ impl Recorder {
         self.opened_at = Instant::now();
         match Book::open(&self.path) {
             Ok((book, opened)) => {
-                self.book = Some(book);
+                (self.book, self.in_use) = (Some(book), false);
                 let broken: Vec<_> = opened.wrong.iter().filter(|wrong| wrong.contains("broken")).cloned().collect();
                 if !broken.is_empty() {
                     self.found.push(format!("the audit trail was tampered with: {}", broken.join("; ")));
@@ -239,6 +242,7 @@ impl Recorder {
                 opened
             }
             Err(error) => {
+                self.in_use = error.kind() == io::ErrorKind::WouldBlock;
                 self.fail(&error);
                 Opened::default()
             }

@@ -251,3 +251,26 @@ fn a_history_that_lacks_entries_of_the_log_is_completed_and_one_that_differs_is_
     let (_, log) = compared([&all[..], &[ahead]].concat());
     assert!(log.unwrap().contains("lacks 1 entries that the history holds, from 99 on"));
 }
+
+#[test]
+fn files_that_another_process_writes_are_left_alone_until_it_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let history_file = folder.path().join("tank.duckdb");
+    life(&history_file, &["start"]);
+    let state = alarm_file::beside(&history_file);
+    let (log, alarms) = (fs::read(beside(&history_file)).unwrap(), fs::read(&state).ok());
+    let (other, _) = Book::open(&beside(&history_file)).unwrap();
+    let (history, _rows) = mpsc::channel(64);
+    let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
+    recorder.open();
+    recorder.take(batch(&["acknowledge"], &[AlarmStep::Raised, AlarmStep::Acknowledged]));
+    recorder.write();
+    let status = recorder.status();
+    assert!(status.log.unwrap().contains(IN_USE) && status.alarms.unwrap().contains(IN_USE));
+    assert_eq!((fs::read(beside(&history_file)).unwrap(), fs::read(&state).ok()), (log, alarms));
+    drop(other);
+    recorder.opened_at -= REOPEN;
+    recorder.write();
+    assert_eq!((recorder.status().log, recorder.status().alarms), (None, None));
+    assert_eq!(verify(&beside(&history_file), &[]).unwrap().entries, 2);
+}
