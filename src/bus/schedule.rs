@@ -306,7 +306,10 @@ impl Schedule {
         let Some(place) = self.place_of(device) else { return false };
         self.probes.spent(spent, now);
         self.stale |= self.devices[place].probe_at.is_none();
-        self.devices[place].failed(sent, now, self.probes.allows(now))
+        // Those that wait for their second or third try come first: nobody fails for long before it is given up.
+        let waiting = self.devices.iter().filter(|other| other.device != device && other.is_failing()).count();
+        let affordable = self.probes.affords(spent * waiting as u32, now);
+        self.devices[place].failed(sent, now, affordable)
     }
 
     /// How long the answer to a block is waited for (real time), at most the `timeout` of the line.

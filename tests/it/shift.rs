@@ -5,7 +5,6 @@ use std::{path::Path, process::Command, sync::Arc, time::Duration};
 
 use jiff::{Timestamp, civil::date, tz::TimeZone};
 use sightglass::{
-    access::OrderRequest,
     bus::io::{clock::Clock, transport::Connector},
     history::{
         Answer, Question,
@@ -13,7 +12,7 @@ use sightglass::{
     },
     plant::{
         PlantDef,
-        command::{Command as Wish, OrderId, Outcome},
+        command::{Command as Wish, Outcome},
         def::{CsvDialect, LineId},
     },
     profile::{self, Search},
@@ -23,7 +22,7 @@ use sightglass::{
         rig::Rig,
         world::World,
     },
-    station::{self, Request, Session},
+    station::{self, Session},
 };
 use tokio::sync::{mpsc, oneshot};
 
@@ -156,8 +155,7 @@ async fn write(session: &Session, def: &PlantDef, tag: &str, value: f64, number:
 
 /// Sends an order and waits for its good end.
 async fn order(session: &Session, command: Wish, number: u32) {
-    let id = OrderId { terminal: session.terminal, number };
-    session.send(Request::Order(OrderRequest::new(id, command))).unwrap();
+    let id = session.order(number, command).unwrap();
     let mut snapshots = session.snapshots.clone();
     let outcome = loop {
         let status = snapshots.borrow_and_update().orders.iter().find(|order| order.id == id).cloned();

@@ -31,7 +31,12 @@ impl Budget {
 
     /// May some of the line's time be spent now?
     pub fn allows(&self, now: Timestamp) -> bool {
-        0.0 < self.saved_at(now)
+        self.affords(Duration::ZERO, now)
+    }
+
+    /// May more of the line's time be spent now than this?
+    pub fn affords(&self, time: Duration, now: Timestamp) -> bool {
+        time.as_secs_f64() < self.saved_at(now)
     }
 
     /// From when on it allows spending, if nothing more is spent.

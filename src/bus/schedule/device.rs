@@ -1,7 +1,7 @@
 //! What a schedule knows of a device: whether it answers, how fast, and when it may be asked.
 //!
 //! ```text
-//!             no answer               no answer, 3 in a row, or the line has no time for another try
+//!             no answer               3 in a row, or it has never answered, or no time for another try
 //!   answering ─────────> failing ───────────────────────────────────────────────────────────> down
 //!             <─────────         second try at once, third after 1 s: only its first block
 //!               an answer                                                                   probed with that
@@ -13,7 +13,7 @@ use jiff::Timestamp;
 
 use crate::{bus::backoff::Backoff, plant::def::DeviceId};
 
-/// Failures in a row after which a device is given up and only probed.
+/// Failures in a row after which a device that has answered before is given up and only probed.
 pub const FAILURES_MAX: u32 = 3;
 /// After so many answers it is known how fast a device answers.
 const ANSWERS_MIN: u32 = 32;
@@ -76,6 +76,11 @@ impl Health {
         self.down
     }
 
+    /// Does it not answer, without being given up yet?
+    pub fn is_failing(&self) -> bool {
+        0 < self.failures && !self.down
+    }
+
     /// It has answered, `reply` after the request. `true` if it was given up before.
     pub fn answered(&mut self, reply: Option<Duration>) -> bool {
         if let Some(reply) = reply {
@@ -110,7 +115,9 @@ impl Health {
         // A device that has answered until now may have lost one frame.
         self.prompt = self.failures == 1 && 0 < self.answers;
         self.thorough = false;
-        let goes_down = !self.down && (FAILURES_MAX <= self.failures || !(affordable || self.prompt));
+        // One that has never answered has nothing to lose: without a second try it is known at once who is there.
+        let tries = if self.answers == 0 { 1 } else { FAILURES_MAX };
+        let goes_down = !self.down && (tries <= self.failures || !(affordable || self.prompt));
         self.down |= goes_down;
         self.probe_at = Some(if self.prompt { now } else { now + self.backoff.fail() });
         goes_down

@@ -144,6 +144,26 @@ fn a_refresh_asks_a_device_that_is_down_at_once_and_its_waits_begin_anew() {
 }
 
 #[test]
+fn units_that_never_answer_are_all_given_up_within_seconds() {
+    let blocks: Vec<Block> = (0..5).map(|device| block(device, every(500))).collect();
+    let mut schedule = Schedule::new(&blocks, at(0));
+    let (mut now, mut given_up) = (0, 0);
+    while now < 5_000 {
+        match schedule.next(at(now)) {
+            Next::Run(index) => {
+                schedule.done(index, at(now), at(now + 300));
+                let spent = Duration::from_millis(300);
+                given_up += u32::from(schedule.failed(DeviceId(index as u16), at(now), spent, at(now + 300)));
+                now += 300;
+            }
+            Next::WaitUntil(until) => now = until.as_millisecond().max(now + 1),
+            Next::Idle => break,
+        }
+    }
+    assert_eq!(given_up, 5, "none fails for minutes because the tries of others use up their share of the line");
+}
+
+#[test]
 fn a_try_of_which_nothing_is_told_is_not_made_again_at_once() {
     let mut schedule = Schedule::new(&[block(0, every(1000))], at(0));
     schedule.answered(DeviceId(0), Some(Duration::from_millis(10)), at(0));
@@ -214,6 +234,7 @@ fn a_new_plan_keeps_the_grid_of_what_stays_and_the_health_of_devices() {
     let stays = block(0, every(1000));
     let mut schedule = Schedule::new(&[block(1, every(500)), stays.clone()], at(0));
     play(&mut schedule, 0, 300, |_, _| 10);
+    schedule.answered(DeviceId(1), Some(Duration::from_millis(10)), at(10));
     let fail = |now| schedule.failed(DeviceId(1), at(now), Duration::from_millis(300), at(now));
     assert_eq!([300; 3].map(fail), [false, false, true]);
     let new = Block { address: 7, ..stays.clone() };
