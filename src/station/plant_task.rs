@@ -36,6 +36,8 @@ pub(super) const KEPT_FOR_STOPS: usize = 4;
 const SNAPSHOT_EVERY: Duration = Duration::from_millis(100);
 /// At the end the papers of the door are waited for so long: more than it takes itself to end.
 const PAPERS_MAX: Duration = Duration::from_secs(3);
+/// At the end a history that is still being opened is waited for so long.
+const HISTORY_MAX: Duration = Duration::from_secs(2);
 /// At the end the folder of parameter sets is waited for so long.
 const FILING_MAX: Duration = Duration::from_secs(2);
 /// Real time between two ticks at the least; one second of plant time otherwise.
@@ -184,6 +186,12 @@ impl PlantTask {
                     changed = true;
                 }
             }
+        }
+        if self.keeping.past.is_some()
+            && let Ok(restored) = tokio::time::timeout(HISTORY_MAX, Past::known(&mut self.keeping.past)).await
+        {
+            // A station that ends as soon as it has started completes its history all the same.
+            self.take_up(restored);
         }
         // What the door had begun is on record as well; it ends soon after the links.
         while let Ok(Some(paper)) = tokio::time::timeout(PAPERS_MAX, papers.recv()).await {
