@@ -3,7 +3,7 @@
 //! A transaction cannot be pre-empted, so this is non-preemptive EDF: whatever is released and has the nearest deadline
 //! (release + period) goes first. A release that is missed is counted and skipped, never piled up. On a line with too much
 //! to do (see [`overload`]) idle polls are shed, hard polls go before soft ones, and soft ones share what is left. A device
-//! that does not answer ([`device`]) is asked with one block only, within a small share of the line's time for all of them.
+//! that does not answer (`device`) is asked with one block only, within a small share of the line's time for all of them.
 
 pub mod budget;
 pub mod overload;

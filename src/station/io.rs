@@ -51,7 +51,7 @@ pub struct Options {
     pub clock: Clock,
     /// The file of the history.
     pub history: PathBuf,
-    /// How each line is opened, by [`LineId`].
+    /// How each line is opened, by [`LineId`](crate::plant::def::LineId).
     pub connectors: Vec<Connector>,
     /// The file that settings are saved into; `None` for a plant that has none of its own.
     pub file: Option<PlantFile>,
