@@ -8,8 +8,7 @@ use crate::{
     access::OrderRequest,
     plant::{
         Snapshot,
-        command::{OrderId, OrderStatus, Outcome, Refusal},
-        event::Fault,
+        command::{NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
         tool::ToolRun,
     },
 };
@@ -86,7 +85,7 @@ impl Own {
     pub fn gone(&mut self) {
         self.connected = false;
         while let Some(order) = self.sent.pop_front() {
-            let outcome = Outcome::Failed(Fault::NotConnected);
+            let outcome = Outcome::NotConfirmed(NotConfirmed::ConnectionLost);
             push(&mut self.lost, OrderStatus { outcome, ..order }, ORDERS_MAX);
         }
     }

@@ -263,6 +263,9 @@ pub enum NotConfirmed {
     /// The station was stopped before anybody answered for it.
     #[error("the station stopped; it may have taken effect")]
     StationStopped,
+    /// The terminal has lost the station before it knew the outcome.
+    #[error("connection to the station lost; it may have taken effect")]
+    ConnectionLost,
     /// The profile wants no read-back.
     #[error("accepted, not read back")]
     NoReadBack,

@@ -341,7 +341,8 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
             | NotConfirmed::NotApplied(_)
             | NotConfirmed::Different(_)
             | NotConfirmed::NotRead(_)
-            | NotConfirmed::StationStopped),
+            | NotConfirmed::StationStopped
+            | NotConfirmed::ConnectionLost),
         ) => (format!("NOT CONFIRMED: {why}"), true),
         Outcome::Failed(fault) => (format!("FAILED, may have taken effect: {fault}"), true),
     }

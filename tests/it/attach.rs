@@ -25,9 +25,8 @@ use sightglass::{
     plant::alarm::AlarmCommand,
     plant::{
         PlantDef, Snapshot,
-        command::{Command, OrderId, OrderStatus, Outcome, Refusal},
+        command::{Command, NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
         def::TagId,
-        event::Fault,
         sample::{Cause, Sample},
     },
     profile::{self, Search},
@@ -308,7 +307,7 @@ async fn an_order_on_its_way_when_the_station_goes_is_called_uncertain() {
     until(&mut session, "an outcome", |snapshot| !snapshot.orders.is_empty()).await;
     let outcome = of(&session, 1).unwrap();
     let honest = [
-        Outcome::Failed(Fault::NotConnected),
+        Outcome::NotConfirmed(NotConfirmed::ConnectionLost),
         Outcome::Refused(Refusal::NotPermitted("station has gone".into())),
         Outcome::Refused(Refusal::NotPermitted("station has ended".into())),
     ];

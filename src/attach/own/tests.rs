@@ -7,6 +7,8 @@ use super::*;
 use crate::plant::alarm::AlarmCommand;
 use crate::{plant::command::Command, ui::fixture::Fixture};
 
+const NOT_CONFIRMED: Outcome = Outcome::NotConfirmed(NotConfirmed::ConnectionLost);
+
 fn request(terminal: u32, number: u32) -> OrderRequest {
     OrderRequest::new(OrderId { terminal, number }, Command::Alarm(AlarmCommand::Silence))
 }
@@ -39,7 +41,7 @@ fn own_orders_keep_their_number_and_nobody_elses_are_taken_for_own() {
     own.welcomed(2, 1);
     assert_eq!(send(&mut own, 2), OrderId { terminal: 1, number: 2 });
     let orders = [(1, 2, Outcome::Verified), (3, 9, Outcome::Verified), (4, 7, Outcome::Verified)];
-    let lost = (3, 1, Outcome::Failed(Fault::NotConnected));
+    let lost = (3, 1, NOT_CONFIRMED);
     let expected = [lost, (3, 2, Outcome::Verified), (1, 9, Outcome::Verified), (4, 7, Outcome::Verified)];
     assert_eq!(seen(&mut own, &orders), expected);
 }
@@ -49,7 +51,7 @@ fn the_outcome_of_an_order_from_before_a_break_is_found_again() {
     let mut own = Own::new(1, 3);
     send(&mut own, 1);
     own.gone();
-    assert_eq!(seen(&mut own, &[]), [(3, 1, Outcome::Failed(Fault::NotConnected))], "nobody knows yet");
+    assert_eq!(seen(&mut own, &[]), [(3, 1, NOT_CONFIRMED)], "nobody knows yet");
     own.welcomed(1, 5);
     assert_eq!(seen(&mut own, &[(3, 1, Outcome::Verified)]), [(3, 1, Outcome::Verified)]);
     assert_eq!(send(&mut own, 2), OrderId { terminal: 5, number: 2 });
@@ -59,7 +61,7 @@ fn the_outcome_of_an_order_from_before_a_break_is_found_again() {
 #[test]
 fn an_order_under_way_when_the_station_goes_is_uncertain_until_the_same_station_tells_more() {
     let under_way = [(3, 1, Outcome::Pending), (2, 1, Outcome::Verified)];
-    let uncertain = [(3, 1, Outcome::Failed(Fault::NotConnected)), (2, 1, Outcome::Verified)];
+    let uncertain = [(3, 1, NOT_CONFIRMED), (2, 1, Outcome::Verified)];
     let begun = || {
         let mut own = Own::new(1, 3);
         send(&mut own, 1);
