@@ -11,13 +11,13 @@ use tokio::{
 use crate::{
     bus::{
         backoff::Backoff,
-        io::{clock::Clock, task, transport::Connector},
+        io::{clock::Clock, requests::Requests, task, transport::Connector},
     },
     plant::{
         PlantDef,
         command::BusRequest,
         def::LineId,
-        event::{Event, LineState},
+        event::{Event, Fault, LineState, WriteResult},
         station::{FaultState, StationFault},
     },
 };
@@ -32,14 +32,14 @@ pub(super) async fn run(
     clock: Clock,
     mut connector: Connector,
     events: mpsc::Sender<Event>,
-    mut requests: mpsc::Receiver<BusRequest>,
+    requests: mpsc::Receiver<BusRequest>,
     mut stopped: watch::Receiver<bool>,
 ) {
-    let mut backoff = Backoff::for_ports();
+    let (mut backoff, mut requests) = (Backoff::for_ports(), Requests::new(requests));
     loop {
         let started = Instant::now();
         let link = task::run(def.clone(), line, clock, &mut connector, events.clone(), &mut requests, stopped.clone());
-        // Nothing outlives the panic but the port's description and the queue, which it cannot leave half changed.
+        // Nothing outlives the panic but the port's description and the requests, which it cannot leave half changed.
         if AssertUnwindSafe(link).catch_unwind().await.is_ok() || *stopped.borrow() {
             return;
         }
@@ -53,7 +53,10 @@ pub(super) async fn run(
         let (fault, occurred) = (StationFault::LineTask, FaultState::Occurred(words.into()));
         // Without a plant task there is nobody to tell, and nothing to start again for.
         let at = clock.now();
-        for event in [Event::Station { at, fault, state: occurred }, Event::Line { at, line, state }] {
+        let states = [Event::Station { at, fault, state: occurred }, Event::Line { at, line, state }];
+        // It cannot be known how far these writes had come.
+        let lost = |id| Event::Wrote { at, id, result: WriteResult::Lost(Fault::NotConnected) };
+        for event in requests.take_under_way().into_iter().map(lost).chain(states) {
             if events.send(event).await.is_err() {
                 return;
             }
@@ -87,12 +90,16 @@ mod tests {
         for _ in 0..3 {
             let (ours, _theirs) = tokio::io::duplex(64);
             ports.try_send(ours).expect("room for a port");
-            let (mut states, mut alarms) = (Vec::new(), 0);
+            let (mut states, mut alarms, mut ended) = (Vec::new(), 0, Vec::new());
             while !states.iter().any(|state| matches!(state, LineState::Waiting { .. })) {
                 let state = match events.recv().await.expect("the station has not ended") {
                     Event::Line { state, .. } => state,
                     Event::Station { fault: StationFault::LineTask, state: FaultState::Occurred(_), .. } => {
                         alarms += 1;
+                        continue;
+                    }
+                    Event::Wrote { id, result, .. } => {
+                        ended.push((id, result));
                         continue;
                     }
                     _ => continue,
@@ -103,6 +110,8 @@ mod tests {
                 states.push(state);
             }
             assert_eq!(alarms, 1);
+            // What had been sent of it is not known.
+            assert_eq!(ended, [(WriteId(1), WriteResult::Lost(Fault::NotConnected))]);
             let why = "internal error, see the log".to_owned();
             let told = |state: &LineState| matches!(state, LineState::Waiting { why: words, .. } if *words == why);
             assert_eq!(states[..2], [LineState::Connecting, LineState::Connected]);

@@ -16,7 +16,7 @@ use std::{
 use jiff::Timestamp;
 use rustix::time::{ClockId, clock_gettime};
 use sightglass::{
-    bus::io::{clock::Clock, task, transport::Connector},
+    bus::io::{clock::Clock, requests::Requests, task, transport::Connector},
     plant::{
         PlantDef,
         def::{DeviceDef, DeviceId, Limits, LineDef, LineId, Serial, TagId, Transport},
@@ -229,12 +229,12 @@ fn line_task(in_flight: u16, blocks: u16) -> (f64, f64) {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     runtime.block_on(async {
         let (sender, mut events) = mpsc::channel(256);
-        let (_requests, mut queue) = mpsc::channel(1);
+        let (_requests, queue) = mpsc::channel(1);
         let (_stop, stopped) = watch::channel(false);
         let clock = Clock::starting_at(Timestamp::now(), 1.0);
         tokio::spawn(async move {
             let mut connector = Connector::Real(transport);
-            task::run(def, LineId(0), clock, &mut connector, sender, &mut queue, stopped).await;
+            task::run(def, LineId(0), clock, &mut connector, sender, &mut Requests::new(queue), stopped).await;
         });
         // A task of its own hears what is told, as in the station: to wake the future of `block_on` costs a system call.
         let drain = async move {

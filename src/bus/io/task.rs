@@ -5,7 +5,7 @@ mod poll;
 mod test;
 mod write;
 
-use std::{collections::VecDeque, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use tokio::sync::{mpsc, watch};
@@ -13,6 +13,7 @@ use tokio::sync::{mpsc, watch};
 use super::{
     clock::Clock,
     link::Link,
+    requests::{Closed, Requests},
     transport::{Connector, Opened},
     wire::Memory,
 };
@@ -43,7 +44,7 @@ pub async fn run(
     clock: Clock,
     connector: &mut Connector,
     events: mpsc::Sender<Event>,
-    requests: &mut mpsc::Receiver<BusRequest>,
+    requests: &mut Requests,
     stop: watch::Receiver<bool>,
 ) {
     let holes = Holes::default();
@@ -53,7 +54,6 @@ pub async fn run(
         holes,
         hunt: Hunt::default(),
         budget: Budget::new(WRITE_SHARE, clock.now()),
-        waiting: VecDeque::new(),
         unconfirmed: Vec::new(),
         memory: Memory::new(def.line(line), clock).expect(&blocks),
         settings: def.line(line).clone(),
@@ -63,7 +63,6 @@ pub async fn run(
         requests,
         stop,
         blocks,
-        put_back: None,
         closed_at: clock.now(),
         job: None,
         polls_since_test: 0,
@@ -76,6 +75,12 @@ pub async fn run(
 
 /// The station is ending.
 struct Ended;
+
+impl From<Closed> for Ended {
+    fn from(Closed: Closed) -> Ended {
+        Ended
+    }
+}
 
 /// Why a port is left.
 enum Leave {
@@ -97,23 +102,19 @@ struct Task<'a> {
     clock: Clock,
     connector: &'a mut Connector,
     events: mpsc::Sender<Event>,
-    requests: &'a mut mpsc::Receiver<BusRequest>,
+    requests: &'a mut Requests,
     stop: watch::Receiver<bool>,
     /// The read plan; a block that is refused is split while the search for the culprit goes on.
     blocks: Vec<Block>,
     /// What the devices do not have, as far as found.
     holes: Holes,
     hunt: Hunt,
-    /// The share of the line's time that writes may take from polls, and the writes that wait for it: the plant has no more
-    /// than one under way for a tag. Beside them what came during a step of a test, one refresh for a device.
+    /// The share of the line's time that writes may take from polls.
     budget: Budget,
-    waiting: VecDeque<BusRequest>,
     /// Counters and debts, from one opening to the next.
     memory: Memory,
     /// Writes whose fate is not known yet.
     unconfirmed: Vec<confirm::Unconfirmed>,
-    /// What has ended a test, to be served next.
-    put_back: Option<BusRequest>,
     /// When the books were last told what the link has counted.
     closed_at: Timestamp,
     books: Books,
@@ -183,13 +184,11 @@ impl Task<'_> {
                     None => std::future::pending().await,
                 }
             };
-            let request = match self.put_back.take() {
-                Some(request) => request,
-                None => tokio::select! {
-                    _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
-                    () = pause => return Ok(()),
-                    request = self.requests.recv() => request.ok_or(Ended)?,
-                },
+            let request = tokio::select! {
+                biased;
+                _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
+                request = self.requests.recv() => request?,
+                () = pause => return Ok(()),
             };
             match request {
                 BusRequest::Write { id, .. } => self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?,
@@ -249,7 +248,9 @@ impl Task<'_> {
             }
             self.tell_doubts(&mut link).await?;
             let next = schedule.next(now);
-            let Ok(request) = self.next_request(next, now) else { break Err(Ended) };
+            // Writes have only their share of the time while polls are due.
+            let may_write = !matches!(next, Next::Run(_)) || self.budget.allows(now);
+            let Ok(request) = self.requests.next(may_write) else { break Err(Ended) };
             let turn = match (request, next) {
                 (Some(request), _) => self.serve_request(&mut link, &mut schedule, request).await?,
                 (None, _) if self.is_turn_of_confirm(now) => self.confirm(&mut link, &mut schedule).await?,
@@ -268,46 +269,10 @@ impl Task<'_> {
         leave
     }
 
-    /// What operators want goes first; writes only within their share of the time while polls are due. A stop goes before
-    /// all of them: it waits for nothing but the transaction under way.
-    fn next_request(&mut self, next: Next, now: Timestamp) -> Result<Option<BusRequest>, Ended> {
-        if let Some(request) = self.put_back.take() {
-            return Ok(Some(request));
-        }
-        loop {
-            match self.requests.try_recv() {
-                Ok(stop @ BusRequest::Write { urgent: true, .. }) => return Ok(Some(stop)),
-                Ok(write @ BusRequest::Write { .. }) => self.waiting.push_back(write),
-                Ok(other) => return Ok(Some(other)),
-                Err(mpsc::error::TryRecvError::Disconnected) => return Err(Ended),
-                Err(mpsc::error::TryRecvError::Empty) => break,
-            }
-        }
-        let may_write = !matches!(next, Next::Run(_)) || self.budget.allows(now);
-        let may_go = |request: &BusRequest| may_write || !matches!(request, BusRequest::Write { .. });
-        Ok(self.waiting.iter().position(may_go).and_then(|index| self.waiting.remove(index)))
-    }
-
     /// The port is left: what still waits was never sent.
     async fn refuse_waiting(&mut self) -> Result<(), Ended> {
-        for request in std::mem::take(&mut self.waiting) {
-            if let BusRequest::Write { id, .. } = request {
-                self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
-            }
-        }
-        Ok(())
-    }
-
-    /// A stop has come: what was ordered before it and still waits for this tag would undo it.
-    async fn refuse_overtaken(&mut self, stopped: TagId) -> Result<(), Ended> {
-        let is_overtaken = |request: &BusRequest| matches!(request, BusRequest::Write { tag, .. } if *tag == stopped);
-        let (overtaken, waiting): (VecDeque<_>, _) =
-            std::mem::take(&mut self.waiting).into_iter().partition(is_overtaken);
-        self.waiting = waiting;
-        for request in overtaken {
-            if let BusRequest::Write { id, .. } = request {
-                self.tell_wrote(id, WriteResult::Overtaken).await?;
-            }
+        for id in self.requests.take_waiting() {
+            self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
         }
         Ok(())
     }
@@ -318,7 +283,7 @@ impl Task<'_> {
             // What comes at one moment is taken in this order, so that a rehearsal ends as the one before.
             biased;
             _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
-            request = self.requests.recv() => request.ok_or(Ended)?,
+            request = self.requests.recv() => request?,
             why = link.idle() => return Ok(Err(Leave::Lost(why))),
             () = self.clock.sleep_until(until) => return Ok(Ok(())),
         };
@@ -347,8 +312,10 @@ impl Task<'_> {
             }
             BusRequest::StopTest => self.stop_test().await.map(Ok),
             BusRequest::Write { id, tag, raw, unlock, verify, urgent } => {
-                if urgent {
-                    self.refuse_overtaken(tag).await?;
+                // What was ordered before a stop and still waits for this tag would undo it.
+                let overtaken = if urgent { self.requests.take_writes_of(tag) } else { Vec::new() };
+                for id in overtaken {
+                    self.tell_wrote(id, WriteResult::Overtaken).await?;
                 }
                 let def = self.def.clone();
                 let (tag, unlock) = (def.tag(tag), unlock.map(|(tag, raw)| (def.tag(tag), raw)));
@@ -424,6 +391,7 @@ impl Task<'_> {
     }
 
     async fn tell_wrote(&mut self, id: WriteId, result: WriteResult) -> Result<(), Ended> {
+        self.requests.ended(id);
         self.tell(Event::Wrote { at: self.clock.now(), id, result }).await
     }
 

@@ -2,6 +2,7 @@
 //! shows the address it came from.
 
 mod slave;
+mod stops;
 mod strangers;
 mod tools;
 

@@ -61,15 +61,13 @@ impl Task<'_> {
         let def = self.def.clone();
         let tag = def.tag(self.unconfirmed[index].tag);
         let block = plan::single(def.device(tag.device), tag);
-        let back = match self.in_step(link, &block).await {
-            Ok(()) => self.read_twice(link, &block, None).await,
-            Err(trouble) => Err(trouble),
-        };
+        let back = self.read_unless_stopped(link, &block, None).await;
         let at = self.clock.now();
         let raw = match back {
-            Ok(values) => value_of(tag, &block, &values),
-            Err(Trouble::Fault(_)) => None,
-            Err(Trouble::Gone(why)) => return Ok(Err(Leave::Lost(why))),
+            Some(Ok(values)) => value_of(tag, &block, &values),
+            Some(Err(Trouble::Fault(_))) => None,
+            Some(Err(Trouble::Gone(why))) => return Ok(Err(Leave::Lost(why))),
+            None => return Ok(Ok(())),
         };
         let Some(raw) = raw else {
             let write = &mut self.unconfirmed[index];

@@ -54,10 +54,7 @@ impl Task<'_> {
         if link.framing() != Framing::Mbap {
             link.set_timeout(schedule.patience(index, timeout));
         }
-        let read = match self.in_step(link, &block).await {
-            Ok(()) => self.read_twice(link, &block, Some(index)).await,
-            Err(trouble) => Err(trouble),
-        };
+        let read = self.read_unless_stopped(link, &block, Some(index)).await;
         link.set_timeout(timeout);
         let ended = self.clock.now();
         let served = schedule.done(index, began, ended);
@@ -69,9 +66,14 @@ impl Task<'_> {
             link.rest_unit(block.unit, gap);
         }
         let answer = match read {
-            Ok(answer) => Ok(answer),
-            Err(Trouble::Fault(fault)) => Err(fault),
-            Err(Trouble::Gone(why)) => return Ok(Err(Leave::Lost(why))),
+            Some(Ok(answer)) => Ok(answer),
+            Some(Err(Trouble::Fault(fault))) => Err(fault),
+            Some(Err(Trouble::Gone(why))) => return Ok(Err(Leave::Lost(why))),
+            // Nothing was learned of the device.
+            None => {
+                schedule.again(index, ended);
+                return Ok(Ok(()));
+            }
         };
         // Nothing new was sent when patience was the only way.
         let exchange = link.last.clone().filter(|last| sent.as_ref().is_none_or(|sent| !Arc::ptr_eq(sent, last)));
@@ -115,13 +117,18 @@ impl Task<'_> {
         let taken: Vec<(usize, Block)> = taken.into_iter().map(|index| (index, self.blocks[index].clone())).collect();
         let requests: Vec<[u8; 6]> = taken.iter().map(|(_, block)| block.request()).collect();
         let messages: Vec<&[u8]> = requests.iter().map(|request| &request[..]).collect();
-        let answers = match link.exchange_all(&messages).await {
-            Ok(answers) => answers,
-            Err(Trouble::Gone(why)) => return Ok(Err(Leave::Lost(why))),
-            // The connection stands, so every message has its own outcome.
-            Err(Trouble::Fault(_)) => return Ok(Ok(())),
-        };
+        let answers = self.requests.unless_stopped(link.exchange_all(&messages)).await;
         let (began, ended) = (started, self.clock.now());
+        let answers = match answers {
+            Some(Ok(answers)) => answers,
+            Some(Err(Trouble::Gone(why))) => return Ok(Err(Leave::Lost(why))),
+            // The connection stands, so every message has its own outcome.
+            Some(Err(Trouble::Fault(_))) => return Ok(Ok(())),
+            None => {
+                taken.iter().for_each(|(index, _)| schedule.again(*index, ended));
+                return Ok(Ok(()));
+            }
+        };
         // They share the time.
         let took = Duration::try_from(ended.duration_since(began)).unwrap_or_default() / requests.len().max(1) as u32;
         for ((index, block), answered) in taken.iter().zip(answers) {
@@ -214,52 +221,27 @@ impl Task<'_> {
         }
     }
 
-    /// Makes sure that the answer to a block cannot be mistaken for one that the unit still owes: by a read of another
-    /// shape if there is one, else by a loopback, else by patience.
-    pub(super) async fn in_step(&self, link: &mut Link, block: &Block) -> Result<(), Trouble> {
-        if !link.is_ambiguous(&block.request()) {
-            return Ok(());
-        }
-        if link.is_unsettled(block.unit) {
-            return Err(Fault::OutOfStep.into());
-        }
-        let own = std::iter::once(block);
-        let others = self.blocks.iter().filter(|other| other.device == block.device && *other != block);
-        if let Some(probe) = link.debt(block.unit).probe(own.chain(others)) {
-            match link.exchange(&probe).await {
-                // The device does not read parts of a block, or this answers an older request: neither proves anything.
-                Err(Trouble::Fault(Fault::Exception(_))) => {}
-                Ok(_) => return proven(link, block),
-                Err(trouble) => return Err(trouble),
-            }
-        }
-        match link.loopback(block.unit).await {
-            Err(Trouble::Fault(_)) if link.forget_debt(block.unit).is_none() => Ok(()),
-            Ok(()) => proven(link, block),
-            Err(trouble) => Err(trouble),
-        }
-    }
-
-    /// Reads a block; a spoiled answer is asked for once more. It counts as owed, so the unit is brought into step first.
-    pub(super) async fn read_twice(
+    /// Reads a block once the unit is in step. `None`: a stop has come, and what was on the wire is given up for it.
+    pub(super) async fn read_unless_stopped(
         &mut self,
         link: &mut Link,
         block: &Block,
         index: Option<usize>,
-    ) -> Result<Answer, Trouble> {
-        match read(link, block).await {
-            Err(Trouble::Fault(fault)) if fault.is_corrupt() => {
-                // A retry that cures it must not hide it.
-                self.books.polled(index, block.device, Err(fault), None, 1);
-                self.in_step(link, block).await?;
-                let second = read(link, block).await;
-                if let Some(last) = &mut link.last {
-                    Arc::make_mut(last).tries = 2;
-                }
-                second
-            }
-            other => other,
+    ) -> Option<Result<Answer, Trouble>> {
+        let mut cured = None;
+        let read = if self.requests.stop_waits() {
+            None
+        } else {
+            self.requests.unless_stopped(read_in_step(&self.blocks, link, block, &mut cured)).await
+        };
+        // A retry that cures it must not hide it.
+        if let Some(fault) = cured {
+            self.books.polled(index, block.device, Err(fault), None, 1);
         }
+        if read.is_none() {
+            link.abandon();
+        }
+        read
     }
 
     /// Makes the plan anew when the search for what a device does not have has come to an end, or knowledge was `wrong`.
@@ -320,6 +302,55 @@ fn proven(link: &Link, block: &Block) -> Result<(), Trouble> {
 pub(super) enum Answer {
     Bits(Vec<bool>),
     Words(Vec<u16>),
+}
+
+/// Makes sure that the answer to a block cannot be mistaken for one that the unit still owes: by a read of another shape,
+/// part of this block or of one of `blocks`, if there is one, else by a loopback, else by patience.
+async fn bring_into_step(blocks: &[Block], link: &mut Link, block: &Block) -> Result<(), Trouble> {
+    if !link.is_ambiguous(&block.request()) {
+        return Ok(());
+    }
+    if link.is_unsettled(block.unit) {
+        return Err(Fault::OutOfStep.into());
+    }
+    let own = std::iter::once(block);
+    let others = blocks.iter().filter(|other| other.device == block.device && *other != block);
+    if let Some(probe) = link.debt(block.unit).probe(own.chain(others)) {
+        match link.exchange(&probe).await {
+            // The device does not read parts of a block, or this answers an older request: neither proves anything.
+            Err(Trouble::Fault(Fault::Exception(_))) => {}
+            Ok(_) => return proven(link, block),
+            Err(trouble) => return Err(trouble),
+        }
+    }
+    match link.loopback(block.unit).await {
+        Err(Trouble::Fault(_)) if link.forget_debt(block.unit).is_none() => Ok(()),
+        Ok(()) => proven(link, block),
+        Err(trouble) => Err(trouble),
+    }
+}
+
+/// Reads a block from a unit that is in step. A `spoiled` answer is asked for once more; it counts as owed, so the unit is
+/// brought into step before.
+async fn read_in_step(
+    blocks: &[Block],
+    link: &mut Link,
+    block: &Block,
+    spoiled: &mut Option<Fault>,
+) -> Result<Answer, Trouble> {
+    bring_into_step(blocks, link, block).await?;
+    match read(link, block).await {
+        Err(Trouble::Fault(fault)) if fault.is_corrupt() => {
+            *spoiled = Some(fault);
+            bring_into_step(blocks, link, block).await?;
+            let second = read(link, block).await;
+            if let Some(last) = &mut link.last {
+                Arc::make_mut(last).tries = 2;
+            }
+            second
+        }
+        other => other,
+    }
 }
 
 async fn read(link: &mut Link, block: &Block) -> Result<Answer, Trouble> {

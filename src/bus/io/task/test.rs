@@ -2,8 +2,6 @@
 
 use std::{pin::pin, sync::Arc};
 
-use tokio::sync::mpsc::error::TryRecvError;
-
 use super::{Ended, Leave, Task, Turn};
 use crate::{
     bus::{
@@ -64,7 +62,7 @@ impl Task<'_> {
                     biased;
                     _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
                     came = &mut came => return Ok(Some(came)),
-                    request = self.requests.recv() => request.ok_or(Ended)?,
+                    request = self.requests.recv() => request?,
                 };
                 if !self.hear_while_testing(request, alone).await? {
                     break;
@@ -80,15 +78,11 @@ impl Task<'_> {
         let mut open: Option<Link> = None;
         let mut settings = self.settings.clone();
         while let Some(step) = self.job.as_ref().and_then(|job| job.next().cloned()) {
-            match self.requests.try_recv() {
-                Ok(request) => {
-                    if self.hear_while_testing(request, true).await? {
-                        continue;
-                    }
-                    break;
+            if let Some(request) = self.requests.try_recv()? {
+                if self.hear_while_testing(request, true).await? {
+                    continue;
                 }
-                Err(TryRecvError::Disconnected) => return Err(Ended),
-                Err(TryRecvError::Empty) => {}
+                break;
             }
             let wanted = testing::settings_for(&self.settings, &step);
             let mut link = match open.take().filter(|_| wanted == settings) {
@@ -127,21 +121,13 @@ impl Task<'_> {
                 Ok(true)
             }
             BusRequest::Refresh { .. } if alone => Ok(true),
-            BusRequest::Write { urgent: false, .. } => {
-                self.waiting.push_back(request);
-                Ok(true)
-            }
-            BusRequest::Refresh { device, .. } => {
-                let same =
-                    |other: &BusRequest| matches!(other, BusRequest::Refresh { device: it, .. } if *it == device);
-                if !self.waiting.iter().any(same) {
-                    self.waiting.push_back(request);
-                }
+            BusRequest::Write { urgent: false, .. } | BusRequest::Refresh { .. } => {
+                self.requests.put_off(request);
                 Ok(true)
             }
             BusRequest::Write { urgent: true, .. } => {
                 self.end_test("ended by an urgent stop").await?;
-                self.put_back = Some(request);
+                self.requests.put_first(request);
                 Ok(false)
             }
             BusRequest::StopTest => {
@@ -150,7 +136,7 @@ impl Task<'_> {
             }
             BusRequest::Connect(_) | BusRequest::Test { .. } | BusRequest::Configure(_) => {
                 self.stop_test().await?;
-                self.put_back = Some(request);
+                self.requests.put_first(request);
                 Ok(false)
             }
         }

@@ -13,7 +13,7 @@ use crate::{
         schedule::Schedule,
     },
     plant::{
-        command::WriteId,
+        command::{BusRequest, WriteId},
         def::{ActionDef, DeviceDef, Framing},
         event::{Event, Fault, WriteResult},
         scale,
@@ -31,6 +31,13 @@ pub(super) struct Wish<'a> {
     pub verify: bool,
     /// A stop.
     pub urgent: bool,
+}
+
+impl Wish<'_> {
+    fn request(&self, id: WriteId) -> BusRequest {
+        let &Wish { tag, raw, unlock, verify, urgent } = self;
+        BusRequest::Write { id, tag: tag.id, raw, unlock: unlock.map(|(key, raw)| (key.id, raw)), verify, urgent }
+    }
 }
 
 impl Task<'_> {
@@ -58,6 +65,11 @@ impl Task<'_> {
             Err(why) => Err((WriteResult::NotSent as fn(Fault) -> _, why)),
         };
         let result = match result {
+            // It waits again, unless the stop is one of its tag.
+            Ok(WriteResult::Overtaken) => {
+                self.requests.put_off(wish.request(id));
+                return Ok(Ok(()));
+            }
             Ok(result) => result,
             Err((told, why)) => {
                 // The port went away: under the write, which may or may not have arrived, or before it.
@@ -65,10 +77,8 @@ impl Task<'_> {
                 return Ok(Err(Leave::Lost(why)));
             }
         };
-        let tcp = self.settings.transport.serial().is_none();
         // The key is lost where its write was not sent for want of an answer.
-        let unanswered =
-            tcp && matches!(result, WriteResult::Lost(Fault::Timeout) | WriteResult::NotSent(Fault::Timeout));
+        let unanswered = matches!(result, WriteResult::Lost(Fault::Timeout) | WriteResult::NotSent(Fault::Timeout));
         match result {
             WriteResult::ReadBack(raw) => {
                 let (device, values) = (tag.device, vec![(tag.id, raw)]);
@@ -92,11 +102,10 @@ impl Task<'_> {
             }
             result => self.tell_wrote(id, result).await?,
         }
-        if unanswered {
-            // It may still lie in this machine or on the way; a closed connection takes it back.
-            return Ok(Err(Leave::Reopen));
-        }
-        Ok(Ok(()))
+        // It may still lie in this machine or on the way; a closed connection takes it back. A stop that waits does not wait
+        // for another connection, and comes behind it on this one.
+        let tcp = self.settings.transport.serial().is_none();
+        Ok(if tcp && unanswered && !self.requests.stop_waits() { Err(Leave::Reopen) } else { Ok(()) })
     }
 
     /// Writes the key, tells it and has it read again. `Some` is how the write ends that needs it, unless it may now be sent;
@@ -114,7 +123,7 @@ impl Task<'_> {
             return Ok(Ok(Some(WriteResult::NotSent(Fault::NotANumber))));
         }
         let sent = self.send_number(link, schedule, key, raw, wish.urgent).await;
-        if let Ok(WriteResult::NotSent(_)) = &sent {
+        if let Ok(WriteResult::NotSent(_) | WriteResult::Overtaken) = &sent {
             return Ok(sent.map(Some));
         }
         let result = sent.clone().unwrap_or(WriteResult::Lost(Fault::NotConnected));
@@ -122,13 +131,15 @@ impl Task<'_> {
         schedule.refresh(key.device, self.clock.now());
         Ok(sent.map(|result| match result {
             WriteResult::Accepted => None,
+            // A stop is tried all the same: what was not answered may have been heard.
+            WriteResult::Lost(_) if wish.urgent => None,
             // The value itself was never on the wire.
             WriteResult::Lost(fault) => Some(WriteResult::NotSent(fault)),
             refused => Some(refused),
         }))
     }
 
-    /// Sends one number: accepted, refused, lost or not sent. `Err` when the port is gone.
+    /// Sends one number: accepted, refused, lost, not sent, or overtaken by a stop of any tag. `Err` when the port is gone.
     async fn send_number(
         &mut self,
         link: &mut Link,
@@ -139,14 +150,20 @@ impl Task<'_> {
     ) -> Result<WriteResult, String> {
         let def = self.def.clone();
         let device = def.device(tag.device);
-        if schedule.is_down(tag.device) || schedule.is_resting(tag.device, self.clock.now()) {
+        // A stop is sent in any case: a device that is silent may still hear it.
+        let rests = schedule.is_down(tag.device) || schedule.is_resting(tag.device, self.clock.now());
+        if rests && !urgent {
             return Ok(WriteResult::NotSent(Fault::Resting));
         }
         // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
         let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
         // A stop is not kept waiting for the sake of a clear answer: its refusal may then be told as a loss.
         let own = (urgent && is_clear(link, device)) || (!urgent && self.owes_nothing(link, device).await?);
-        match self.send_write(link, device, request).await {
+        // Nothing else goes out before a stop that waits.
+        if !urgent && self.requests.stop_waits() {
+            return Ok(WriteResult::Overtaken);
+        }
+        match self.send_write(link, device, request, urgent && !rests).await {
             Ok(()) => {
                 schedule.answered(tag.device, None, self.clock.now());
                 Ok(WriteResult::Accepted)
@@ -179,41 +196,54 @@ impl Task<'_> {
             return Ok(WriteResult::Accepted);
         }
         let block = plan::single(device, tag);
-        let back = match self.in_step(link, &block).await {
-            Ok(()) => self.read_twice(link, &block, None).await,
-            Err(trouble) => Err(trouble),
-        };
-        match back {
-            Ok(values) => Ok(match value_of(tag, &block, &values) {
+        Ok(match self.read_unless_stopped(link, &block, None).await {
+            Some(Ok(values)) => match value_of(tag, &block, &values) {
                 Some(back) => WriteResult::ReadBack(back),
                 None => WriteResult::NotRead(Fault::NotANumber),
-            }),
+            },
             // The device has accepted it; that the port is gone shows itself at the next request.
-            Err(Trouble::Gone(_)) => Ok(WriteResult::NotRead(Fault::NotConnected)),
-            Err(Trouble::Fault(fault)) => Ok(WriteResult::NotRead(fault)),
-        }
+            Some(Err(Trouble::Gone(_))) => WriteResult::NotRead(Fault::NotConnected),
+            Some(Err(Trouble::Fault(fault))) => WriteResult::NotRead(fault),
+            None => WriteResult::NotRead(Fault::Timeout),
+        })
     }
 
     /// An exception names no address: only from a unit that owes nothing is it certainly the answer to what was sent. `Err`
     /// when the port is gone.
-    async fn owes_nothing(&self, link: &mut Link, device: &DeviceDef) -> Result<bool, String> {
+    async fn owes_nothing(&mut self, link: &mut Link, device: &DeviceDef) -> Result<bool, String> {
         if is_clear(link, device) {
             return Ok(true);
         }
-        match link.loopback(device.unit).await {
-            Ok(()) => Ok(true),
-            Err(Trouble::Fault(_)) => Ok(link.debt(device.unit).is_clear()),
-            Err(Trouble::Gone(why)) => Err(why),
+        match self.requests.unless_stopped(link.loopback(device.unit)).await {
+            Some(Ok(())) => Ok(true),
+            Some(Err(Trouble::Fault(_))) => Ok(link.debt(device.unit).is_clear()),
+            Some(Err(Trouble::Gone(why))) => Err(why),
+            None => {
+                link.abandon();
+                Ok(false)
+            }
         }
     }
 
-    async fn send_write(&mut self, link: &mut Link, device: &DeviceDef, request: Request<'_>) -> Result<(), Trouble> {
-        let sent = link.call(device.unit, request).await.map(drop);
+    /// Sends a write. Unless it `keeps` the line, it waits for its answer no longer than a stop behind it allows.
+    async fn send_write(
+        &mut self,
+        link: &mut Link,
+        device: &DeviceDef,
+        request: Request<'_>,
+        keeps: bool,
+    ) -> Result<(), Trouble> {
+        let sent = link.call(device.unit, request);
+        let sent = if keeps { Some(sent.await) } else { self.requests.unless_stopped(sent).await };
         link.rest(device.write_gap);
+        let Some(sent) = sent else {
+            link.abandon();
+            return Err(Fault::Timeout.into());
+        };
         if let Some(last) = &link.last {
             self.books.asked(device.id, last.outcome, last.reply);
         }
-        sent
+        sent.map(drop)
     }
 }
 

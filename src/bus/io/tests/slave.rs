@@ -11,7 +11,7 @@ use tokio::{
 use crate::{
     bus::{
         frame::{self, Mbap},
-        io::{clock::Clock, task, transport::Connector},
+        io::{clock::Clock, requests::Requests, task, transport::Connector},
     },
     plant::{
         PlantDef,
@@ -204,13 +204,13 @@ pub struct Line {
 
 pub fn line(def: PlantDef) -> Line {
     let (sender, events) = mpsc::channel(64);
-    let (requests, mut queue) = mpsc::channel(4);
+    let (requests, queue) = mpsc::channel(4);
     let (ports, streams) = mpsc::channel(8);
     let (stop, stopped) = watch::channel(false);
     let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
     tokio::spawn(async move {
         let mut connector = Connector::Memory(streams);
-        task::run(Arc::new(def), LineId(0), clock, &mut connector, sender, &mut queue, stopped).await;
+        task::run(Arc::new(def), LineId(0), clock, &mut connector, sender, &mut Requests::new(queue), stopped).await;
     });
     Line { events, requests, ports, _stop: stop }
 }
@@ -263,4 +263,9 @@ impl Line {
     pub async fn read(&mut self, def: &PlantDef) {
         self.until(def, |event| matches!(event, Event::Read { .. }).then_some(())).await;
     }
+}
+
+/// Goes on until the line has been silent for three seconds: it waits for the answer of a unit that is not there.
+pub async fn until_silent(line: &mut Line, def: &PlantDef) {
+    while tokio::time::timeout(Duration::from_secs(3), line.next(def)).await.is_ok() {}
 }

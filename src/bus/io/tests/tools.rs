@@ -7,9 +7,8 @@ use tokio::{
     time::Instant,
 };
 
-use super::slave::{Deed, Line, MS, Mode, line, plant};
+use super::slave::{Deed, Line, MS, Mode, line, plant, until_silent};
 use crate::plant::{
-    PlantDef,
     command::{BusRequest, OrderId, WriteId},
     def::{Serial, TagId},
     event::{Event, LineState, WriteResult},
@@ -92,11 +91,6 @@ async fn stop_during_scan(serials: Vec<Serial>) -> (Duration, WriteResult, ToolS
         }
     }
     (asked.elapsed(), result.expect("told"), state.expect("told"))
-}
-
-/// Goes on until the line has been silent for three seconds: it waits for the answer of a unit that is not there.
-async fn until_silent(line: &mut Line, def: &PlantDef) {
-    while tokio::time::timeout(Duration::from_secs(3), line.next(def)).await.is_ok() {}
 }
 
 #[tokio::test(start_paused = true)]

@@ -1,0 +1,203 @@
+//! The requests to one line: in which order they are served, and which writes among them have not ended.
+
+use std::{collections::VecDeque, pin::pin, time::Duration};
+
+use tokio::{
+    sync::mpsc::{self, error::TryRecvError},
+    time::Instant,
+};
+
+use crate::plant::{
+    command::{BusRequest, WriteId},
+    def::TagId,
+};
+
+/// A stop waits no longer than this (real time) for what is on the wire: a device that answers at all has mostly answered by
+/// then, and an answer that is just coming in would collide with the stop.
+const STOP_WAIT: Duration = Duration::from_millis(500);
+/// More requests that are served first than this stay in their queue, where the plant sees that it is full.
+const FIRST_MAX: usize = 64;
+
+/// The requests to one line. They outlive a task that panics.
+#[derive(Debug)]
+pub struct Requests {
+    queue: mpsc::Receiver<BusRequest>,
+    /// Served before all others: stops, then what is neither a write nor a refresh.
+    first: VecDeque<BusRequest>,
+    /// Writes that wait for their share of the line's time, and one refresh for each device. The plant has no more than one
+    /// write under way for a tag.
+    waiting: VecDeque<BusRequest>,
+    /// Writes that were handed out and have not ended.
+    under_way: Vec<WriteId>,
+}
+
+/// The station is ending.
+#[derive(Debug)]
+pub struct Closed;
+
+impl Requests {
+    /// All of `queue`.
+    pub fn new(queue: mpsc::Receiver<BusRequest>) -> Requests {
+        Requests { queue, first: VecDeque::new(), waiting: VecDeque::new(), under_way: Vec::new() }
+    }
+
+    /// The next request as they come; may be dropped before there is one.
+    pub async fn recv(&mut self) -> Result<BusRequest, Closed> {
+        let request = match self.first.pop_front() {
+            Some(first) => first,
+            None => self.queue.recv().await.ok_or(Closed)?,
+        };
+        Ok(self.hand_out(request))
+    }
+
+    /// The next request, if one has come.
+    pub fn try_recv(&mut self) -> Result<Option<BusRequest>, Closed> {
+        let request = match self.first.pop_front() {
+            Some(first) => Some(first),
+            None => self.from_queue()?,
+        };
+        Ok(request.map(|request| self.hand_out(request)))
+    }
+
+    /// The request to serve now: a stop before all others, writes last and only if they `may_write`.
+    pub fn next(&mut self, may_write: bool) -> Result<Option<BusRequest>, Closed> {
+        self.fetch()?;
+        let is_write = |request: &BusRequest| matches!(request, BusRequest::Write { .. });
+        let request = self.first.pop_front().or_else(|| {
+            let refresh = self.waiting.iter().position(|request| !is_write(request));
+            self.waiting.remove(refresh.or(may_write.then_some(0))?)
+        });
+        Ok(request.map(|request| self.hand_out(request)))
+    }
+
+    /// Is a stop waiting?
+    pub fn stop_waits(&mut self) -> bool {
+        // That the station ends shows itself at the next request.
+        let _ = self.fetch();
+        self.has_stop()
+    }
+
+    /// Serves this before all others.
+    pub fn put_first(&mut self, request: BusRequest) {
+        self.take_back(&request);
+        self.first.push_front(request);
+    }
+
+    /// Serves a write or a refresh later. One refresh of a device is as good as two.
+    pub fn put_off(&mut self, request: BusRequest) {
+        self.take_back(&request);
+        let same = |other: &BusRequest| match (other, &request) {
+            (BusRequest::Refresh { device, .. }, BusRequest::Refresh { device: wanted, .. }) => device == wanted,
+            _ => false,
+        };
+        if !self.waiting.iter().any(same) {
+            self.waiting.push_back(request);
+        }
+    }
+
+    /// Waits for what is on the wire, but with a stop waiting no longer than [`STOP_WAIT`]: `None`, and the stop is next.
+    pub async fn unless_stopped<T>(&mut self, work: impl Future<Output = T>) -> Option<T> {
+        let mut work = pin!(work);
+        let mut closed = false;
+        let mut until = self.has_stop().then(later);
+        loop {
+            let listens = !closed && until.is_none() && self.first.len() < FIRST_MAX;
+            let request = tokio::select! {
+                biased;
+                done = &mut work => return Some(done),
+                () = tokio::time::sleep_until(until.unwrap_or_else(later)), if until.is_some() => return None,
+                request = self.queue.recv(), if listens => request,
+            };
+            match request {
+                Some(request) => self.sort(request),
+                None => closed = true,
+            }
+            until = self.has_stop().then(later);
+        }
+    }
+
+    /// The writes of a tag that still wait, taken out: they were ordered before a stop, and would undo it.
+    pub fn take_writes_of(&mut self, stopped: TagId) -> Vec<WriteId> {
+        self.take_writes(|tag| tag == stopped)
+    }
+
+    /// Takes the writes and refreshes that wait; gives the writes.
+    pub fn take_waiting(&mut self) -> Vec<WriteId> {
+        let writes = self.take_writes(|_| true);
+        self.waiting.clear();
+        writes
+    }
+
+    /// A write has ended.
+    pub fn ended(&mut self, id: WriteId) {
+        self.under_way.retain(|write| *write != id);
+    }
+
+    /// The task of the line is gone: the writes that it had begun and not ended.
+    pub fn take_under_way(&mut self) -> Vec<WriteId> {
+        std::mem::take(&mut self.under_way)
+    }
+
+    fn has_stop(&self) -> bool {
+        self.first.front().is_some_and(is_stop)
+    }
+
+    /// Looks through the queue for what goes first.
+    fn fetch(&mut self) -> Result<(), Closed> {
+        while !self.has_stop() && self.first.len() < FIRST_MAX {
+            let Some(request) = self.from_queue()? else { break };
+            self.sort(request);
+        }
+        Ok(())
+    }
+
+    fn from_queue(&mut self) -> Result<Option<BusRequest>, Closed> {
+        match self.queue.try_recv() {
+            Ok(request) => Ok(Some(request)),
+            Err(TryRecvError::Empty) => Ok(None),
+            Err(TryRecvError::Disconnected) => Err(Closed),
+        }
+    }
+
+    fn sort(&mut self, request: BusRequest) {
+        match request {
+            stop if is_stop(&stop) => self.first.push_front(stop),
+            BusRequest::Write { .. } | BusRequest::Refresh { .. } => self.put_off(request),
+            other => self.first.push_back(other),
+        }
+    }
+
+    fn hand_out(&mut self, request: BusRequest) -> BusRequest {
+        if let BusRequest::Write { id, .. } = request {
+            self.under_way.push(id);
+        }
+        request
+    }
+
+    /// It was handed out, and is not begun.
+    fn take_back(&mut self, request: &BusRequest) {
+        if let BusRequest::Write { id, .. } = request {
+            self.ended(*id);
+        }
+    }
+
+    fn take_writes(&mut self, of: impl Fn(TagId) -> bool) -> Vec<WriteId> {
+        let mut taken = Vec::new();
+        self.waiting.retain(|request| match request {
+            BusRequest::Write { id, tag, .. } if of(*tag) => {
+                taken.push(*id);
+                false
+            }
+            _ => true,
+        });
+        taken
+    }
+}
+
+fn is_stop(request: &BusRequest) -> bool {
+    matches!(request, BusRequest::Write { urgent: true, .. })
+}
+
+fn later() -> Instant {
+    Instant::now() + STOP_WAIT
+}
