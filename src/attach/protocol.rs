@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// The number of this protocol; goes up with every change of a message.
-pub const PROTOCOL: u32 = 1;
+pub const PROTOCOL: u32 = 2;
 /// The version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Longest hello, bytes.
@@ -224,7 +224,7 @@ fn other_version(terminal: (&str, u32), station: (&str, u32)) -> Option<String> 
         let (stations, speaks) = (one_line(station.0, WORD_CHARS_MAX), station.1);
         format!(
             "this terminal is version {version} (protocol {protocol}), the station is version {stations} (protocol \
-             {speaks}): log in again after the update"
+             {speaks}): both must be the same version; restart the older one after an update"
         )
     })
 }

@@ -417,7 +417,7 @@ async fn an_old_terminal_is_told_in_words_what_to_do() {
     stream.write_all(&protocol::encode_first(&old, Some(&()), HELLO_BYTES_MAX).unwrap()).await.unwrap();
     let bytes = until_closed(&mut stream).await;
     let why = protocol::welcome(&bytes[LENGTH_BYTES..]).unwrap().unwrap_err();
-    assert!(why.contains("0.0.9 (protocol 0)") && why.contains("log in again"), "{why}");
+    assert!(why.contains("0.0.9 (protocol 0)") && why.contains("restart the older one"), "{why}");
 }
 
 #[tokio::test(start_paused = true)]

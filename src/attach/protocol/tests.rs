@@ -39,14 +39,14 @@ fn a_terminal_says_where_it_is_and_is_told_the_plant() {
 }
 
 #[test]
-fn an_old_terminal_is_told_to_log_in_again_after_the_update() {
+fn a_terminal_and_a_station_of_two_versions_say_so_and_what_to_do() {
     let old = Greeting { protocol: PROTOCOL + 1, version: "9.9".into(), ..Greeting::own() };
     // Whatever else that version says is never looked at.
     let bytes = body(encode_first(&old, Some(&vec![0xFFu8; 40]), HELLO_BYTES_MAX).unwrap());
     let Err(ProtocolError::OtherVersion(why)) = hello(&bytes) else { panic!("taken for one of ours") };
     let expected =
         format!("this terminal is version 9.9 (protocol {}), the station is version {VERSION}", PROTOCOL + 1);
-    assert!(why.starts_with(&expected) && why.ends_with("log in again after the update"), "{why}");
+    assert!(why.starts_with(&expected) && why.ends_with("restart the older one after an update"), "{why}");
     let Err(ProtocolError::OtherVersion(why)) = welcome(&bytes) else { panic!("taken for one of ours") };
     assert!(why.starts_with(&format!("this terminal is version {VERSION}")), "{why}");
     let other_build = Greeting { version: "0.0.1".into(), ..Greeting::own() };
