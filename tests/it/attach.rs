@@ -534,3 +534,24 @@ async fn a_removed_socket_is_made_again_and_who_is_attached_stays() {
     stand.set(1.0);
     sees(&mut session, 1.0).await;
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_removed_folder_of_the_socket_is_made_again_with_its_rights() {
+    let folder = folder();
+    std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(0o750)).unwrap();
+    let mut stand = Stand::start_in(folder);
+    let mut session = stand.session().await;
+    std::fs::remove_dir_all(stand.folder.path()).unwrap();
+    let began = tokio::time::Instant::now();
+    while !std::fs::exists(stand.path()).unwrap() {
+        assert!(began.elapsed() < PATIENCE);
+        tokio::time::advance(Duration::from_secs(1)).await;
+    }
+    let mode = std::fs::metadata(stand.folder.path()).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o750, "group may enter, others may not");
+    let _another = stand.session().await;
+    stand.until_present(2).await;
+    assert!(matches!(listen(&stand.path()), Err(ListenError::Running { .. })), "its lock is back too");
+    stand.set(1.0);
+    sees(&mut session, 1.0).await;
+}

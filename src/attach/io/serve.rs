@@ -1,9 +1,9 @@
-//! The listener: one socket a station, no patience with whoever does not say hello, and made again when it is removed.
+//! The listener: one socket a station, made again when it is removed. Connections that do not say hello are dropped.
 
 use std::{
-    fs::{File, OpenOptions, Permissions},
+    fs::{DirBuilder, File, OpenOptions, Permissions},
     io,
-    os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt},
+    os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt},
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -37,8 +37,8 @@ pub const HELLO_MAX: Duration = Duration::from_secs(2);
 /// Pause after the system had no connection to give.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// So often it is looked whether the socket is still there.
-const LOOK_EVERY: Duration = Duration::from_secs(2);
+/// How often the listener checks that its socket is still there.
+const CHECK_EVERY: Duration = Duration::from_secs(2);
 
 /// Why a station cannot listen.
 #[derive(Debug, thiserror::Error)]
@@ -68,25 +68,61 @@ pub struct Listener {
     lock: File,
     /// Tells the file of the socket from another one at its place.
     file: Option<(u64, u64)>,
+    folder: Folder,
     /// It could not be made again, and that is logged.
     troubled: bool,
 }
 
+/// The folder of a socket: its owner, and its rights.
+#[derive(Debug, Clone, Copy)]
+struct Folder {
+    owner: u32,
+    mode: u32,
+}
+
+impl Folder {
+    fn of(socket: &Path) -> Result<Folder, ListenError> {
+        let folder = parent(socket);
+        let about = std::fs::metadata(folder).map_err(failed(folder))?;
+        Ok(Folder { owner: about.uid(), mode: about.mode() & 0o7777 })
+    }
+
+    /// Makes it again if it was removed. A folder of another user at its place is not used.
+    fn restore(self, socket: &Path) -> Result<(), ListenError> {
+        let folder = parent(socket);
+        match DirBuilder::new().mode(0o700).create(folder) {
+            // Set afterwards: the umask takes rights from what `create` is given.
+            Ok(()) => std::fs::set_permissions(folder, Permissions::from_mode(self.mode)).map_err(failed(folder))?,
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(failed(folder)(error)),
+        }
+        match Folder::of(socket)? {
+            found if found.owner == self.owner => Ok(()),
+            _ => Err(failed(folder)(io::Error::new(io::ErrorKind::PermissionDenied, "belongs to another user now"))),
+        }
+    }
+}
+
+fn parent(socket: &Path) -> &Path {
+    socket.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 /// Listens at this path, whose folder is there. What a dead station has left is replaced.
 pub fn listen(path: &Path) -> Result<Listener, ListenError> {
+    let folder = Folder::of(path)?;
     let lock = lock(path)?;
     let socket = bind(path)?;
-    Ok(Listener { socket, path: path.to_owned(), lock, file: file_at(path), troubled: false })
+    Ok(Listener { socket, path: path.to_owned(), lock, file: file_at(path), folder, troubled: false })
 }
 
 fn lock(path: &Path) -> Result<File, ListenError> {
     let lock = beside(path, ".lock");
     let file =
-        OpenOptions::new().create(true).truncate(false).write(true).mode(0o600).open(&lock).map_err(told(&lock))?;
+        OpenOptions::new().create(true).truncate(false).write(true).mode(0o600).open(&lock).map_err(failed(&lock))?;
     match flock(&file, FlockOperation::NonBlockingLockExclusive) {
         Ok(()) => Ok(file),
         Err(rustix::io::Errno::WOULDBLOCK) => Err(ListenError::Running { process: process_at(path) }),
-        Err(error) => Err(told(&lock)(error.into())),
+        Err(error) => Err(failed(&lock)(error.into())),
     }
 }
 
@@ -94,12 +130,12 @@ fn lock(path: &Path) -> Result<File, ListenError> {
 fn bind(path: &Path) -> Result<UnixListener, ListenError> {
     let new = beside(path, ".new");
     match std::fs::remove_file(&new) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(told(&new)(error)),
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(failed(&new)(error)),
         Ok(()) | Err(_) => {}
     }
-    let socket = UnixListener::bind(&new).map_err(told(&new))?;
-    std::fs::set_permissions(&new, Permissions::from_mode(0o660)).map_err(told(&new))?;
-    std::fs::rename(&new, path).map_err(told(path))?;
+    let socket = UnixListener::bind(&new).map_err(failed(&new))?;
+    std::fs::set_permissions(&new, Permissions::from_mode(0o660)).map_err(failed(&new))?;
+    std::fs::rename(&new, path).map_err(failed(path))?;
     Ok(socket)
 }
 
@@ -109,7 +145,7 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-fn told(path: &Path) -> impl FnOnce(io::Error) -> ListenError + use<> {
+fn failed(path: &Path) -> impl FnOnce(io::Error) -> ListenError + use<> {
     let path = path.to_owned();
     move |error| ListenError::Io { path, error }
 }
@@ -161,10 +197,10 @@ struct Left {
     why: seat::Ended,
 }
 
-/// Everybody who is there.
-struct House<'a> {
+/// All connections to one run of the station.
+struct Connections<'a> {
     entrance: &'a Entrance,
-    /// A number that another run does not have: terminals are counted anew in each.
+    /// A number that another run does not have: terminals are numbered from 1 in each.
     run: u64,
     began: Instant,
     callers: Callers,
@@ -183,9 +219,9 @@ impl Listener {
     /// Lets terminals in until the station behind this entrance has ended. Can be called again with another station.
     pub async fn serve(&mut self, entrance: &Entrance) {
         let mut snapshots = entrance.snapshots.clone();
-        let mut look = interval(LOOK_EVERY);
+        let mut look = interval(CHECK_EVERY);
         look.set_missed_tick_behavior(MissedTickBehavior::Skip);
-        let mut house = House {
+        let mut connections = Connections {
             entrance,
             run: Timestamp::now().as_microsecond() as u64,
             began: Instant::now(),
@@ -198,14 +234,14 @@ impl Listener {
             tokio::select! {
                 biased;
                 ended = snapshots.changed() => if ended.is_err() { break },
-                Some(greeted) = house.strangers.join_next() => if let Ok(greeted) = greeted { house.seat(greeted) },
-                Some(left) = house.seats.join_next() => if let Ok(left) = left { house.left(left) },
+                Some(greeted) = connections.strangers.join_next() => if let Ok(greeted) = greeted { connections.on_greeted(greeted) },
+                Some(left) = connections.seats.join_next() => if let Ok(left) = left { connections.on_left(left) },
                 _ = look.tick() => {
                     self.keep();
-                    house.tell_unlogged();
+                    connections.log_left_out();
                 }
                 accepted = self.socket.accept() => match accepted {
-                    Ok((stream, _)) => house.comes(stream),
+                    Ok((stream, _)) => connections.on_connection(stream),
                     Err(error) => {
                         tracing::error!(%error, "no connection could be taken");
                         tokio::time::sleep(ACCEPT_PAUSE).await;
@@ -215,7 +251,7 @@ impl Listener {
         }
     }
 
-    /// Makes the socket, and its lock, again if they are not there any more. Who is attached stays attached.
+    /// Makes the socket, its lock and their folder again if they were removed. Attached terminals stay attached.
     fn keep(&mut self) {
         let locked = is_at(&self.lock, &beside(&self.path, ".lock"));
         if locked && self.file.is_some() && file_at(&self.path) == self.file {
@@ -235,6 +271,7 @@ impl Listener {
     }
 
     fn again(&mut self, locked: bool) -> Result<(), ListenError> {
+        self.folder.restore(&self.path)?;
         // Without it a second station could start.
         if !locked {
             self.lock = lock(&self.path)?;
@@ -245,13 +282,13 @@ impl Listener {
     }
 }
 
-impl House<'_> {
+impl Connections<'_> {
     fn now(&self) -> Duration {
         self.began.elapsed()
     }
 
     /// A connection that has said nothing yet.
-    fn comes(&mut self, stream: UnixStream) {
+    fn on_connection(&mut self, stream: UnixStream) {
         let Ok(credentials) = stream.peer_cred() else { return };
         self.waiting.retain(|(_, stranger)| !stranger.is_finished());
         let users: Vec<u32> = self.waiting.iter().map(|(user, _)| *user).collect();
@@ -262,7 +299,7 @@ impl House<'_> {
         self.waiting.push((credentials.uid(), self.strangers.spawn(greet(stream, credentials))));
     }
 
-    fn seat(&mut self, Greeted { user, guest }: Greeted) {
+    fn on_greeted(&mut self, Greeted { user, guest }: Greeted) {
         let now = self.now();
         let Guest { read, write, peer } = match guest {
             Some(Ok(guest)) => guest,
@@ -278,7 +315,7 @@ impl House<'_> {
                 if self.callers.may_log(user, now) {
                     tracing::warn!(%from, why, "a terminal was sent away");
                 }
-                // It has been told nothing yet, so the system has room for one line.
+                // Nothing was sent before, so the socket has room for one line.
                 let _ = write.try_write(&sorry(why));
                 return;
             }
@@ -294,14 +331,14 @@ impl House<'_> {
         });
     }
 
-    fn left(&mut self, Left { user, counted_as, terminal, from, why }: Left) {
+    fn on_left(&mut self, Left { user, counted_as, terminal, from, why }: Left) {
         self.callers.detach(counted_as);
         if self.callers.may_log(user, self.now()) {
             tracing::info!(terminal, %from, %why, "a terminal has gone");
         }
     }
 
-    fn tell_unlogged(&mut self) {
+    fn log_left_out(&mut self) {
         for (user, lines) in self.callers.unlogged(self.now()) {
             tracing::warn!(user, lines, "connections of this user: lines were left out");
         }
@@ -317,7 +354,7 @@ async fn greet(stream: UnixStream, credentials: UCred) -> Greeted {
         Ok(Err(WireError::Closed)) | Err(_) => return Greeted { user, guest: None },
         Ok(Err(error)) => {
             if let WireError::Protocol(ProtocolError::OtherVersion(why)) = &error {
-                // It has been told nothing yet, so the system has room for one line.
+                // Nothing was sent before, so the socket has room for one line.
                 let _ = write.try_write(&sorry(why.clone()));
             }
             return Greeted { user, guest: Some(Err(error)) };
