@@ -1,22 +1,24 @@
-//! Who connects: each user of the operating system has places, a rate and lines in the log of its own, so that none keeps out others.
+//! Connections by user of the operating system: each has its own places, rate and log lines, so that none keeps out others.
 
 use std::{collections::BTreeMap, time::Duration};
 
 /// Terminals of all users at once.
 pub const TERMINALS_MAX: usize = 64;
-/// Terminals of one user at once, unless it runs the station.
+/// Terminals of one user at once, except root and the user who runs the station.
 const TERMINALS_OF_USER_MAX: usize = TERMINALS_MAX / 2;
+/// So many are kept for these two.
+const TERMINALS_KEPT: usize = 4;
 /// Connections of one user that have not said hello; one more, and the oldest of them is dropped.
 pub const STRANGERS_MAX: usize = 8;
-/// The same of all users: the oldest of whoever has most is dropped.
+/// The same of all users: the oldest one of the user with the most is dropped.
 const STRANGERS_OF_ALL_MAX: usize = 64;
 /// Terminals of one user that may attach: so many at once, and one more each time.
 const ATTACHES: Rate = Rate { burst: 128, every: Duration::from_millis(125) };
 /// Lines about one user in the log.
 const LINES: Rate = Rate { burst: 20, every: Duration::from_secs(2) };
-/// What was not logged is counted, and told so often.
-const TOLD_EVERY: Duration = Duration::from_secs(60);
-/// Users that are told apart; what more there are share one count.
+/// Lines that were left out are counted, and the count is logged so often.
+const COUNT_EVERY: Duration = Duration::from_secs(60);
+/// Users that are counted each by itself; further ones share one count.
 const USERS_MAX: usize = 256;
 /// Stands for all the others.
 const OTHERS: u32 = u32::MAX;
@@ -52,25 +54,25 @@ struct Caller {
     attaches: Allowance,
     lines: Allowance,
     unlogged: u64,
-    told: Duration,
+    counted: Duration,
 }
 
-/// Everybody who has connected, by the number of the user.
+/// All users that have connected, by uid.
 #[derive(Debug)]
 pub struct Callers {
-    /// Who runs the station, and root: they get the last places.
+    /// Root, and the user who runs the station: the last places are theirs.
     hosts: [u32; 2],
     users: BTreeMap<u32, Caller>,
 }
 
 impl Callers {
-    /// Nobody yet. `own` is the user that the station runs as.
+    /// No connections yet. `own` is the user that the station runs as.
     pub fn new(own: u32) -> Callers {
         Callers { hosts: [0, own], users: BTreeMap::new() }
     }
 
-    /// A connection that has said hello wants to be a terminal. Gives whom it is counted for, which [`Callers::detach`] needs;
-    /// `Err` says in words for its operator why it may not.
+    /// A connection that has said hello becomes a terminal. Returns the user it is counted for, which [`Callers::detach`]
+    /// needs; `Err` says in words for its operator why it may not attach.
     pub fn attach(&mut self, user: u32, now: Duration) -> Result<u32, String> {
         let all: usize = self.users.values().map(|caller| caller.terminals).sum();
         let host = self.hosts.contains(&user);
@@ -82,8 +84,9 @@ impl Callers {
         if TERMINALS_OF_USER_MAX <= caller.terminals && !host {
             return Err(format!("this user has {TERMINALS_OF_USER_MAX} terminals, no more can attach"));
         }
-        if TERMINALS_MAX <= all {
-            return Err(format!("the station has {TERMINALS_MAX} terminals, no more can attach"));
+        let most = if host { TERMINALS_MAX } else { TERMINALS_MAX - TERMINALS_KEPT };
+        if most <= all {
+            return Err(format!("the station has {all} terminals, no more can attach"));
         }
         caller.terminals += 1;
         Ok(user)
@@ -109,13 +112,13 @@ impl Callers {
 
     /// Users about whom so many lines were not logged, each at most once a minute.
     pub fn unlogged(&mut self, now: Duration) -> Vec<(u32, u64)> {
-        let due = |caller: &Caller| caller.unlogged > 0 && TOLD_EVERY <= now.saturating_sub(caller.told);
+        let due = |caller: &Caller| caller.unlogged > 0 && COUNT_EVERY <= now.saturating_sub(caller.counted);
         let callers = self.users.iter_mut().filter(|(_, caller)| due(caller));
-        let told = callers.map(|(user, caller)| {
-            caller.told = now;
+        let counts = callers.map(|(user, caller)| {
+            caller.counted = now;
             (*user, std::mem::take(&mut caller.unlogged))
         });
-        told.collect()
+        counts.collect()
     }
 
     fn counted_as(&mut self, user: u32, now: Duration) -> u32 {
@@ -167,7 +170,7 @@ mod tests {
             strangers.push(user);
             assert!(strangers.len() <= STRANGERS_OF_ALL_MAX);
         }
-        assert!(strangers.contains(&PANEL), "whoever has most makes room");
+        assert!(strangers.contains(&PANEL), "the user with the most makes room");
     }
 
     #[test]
@@ -175,10 +178,11 @@ mod tests {
         let mut callers = Callers::new(500);
         let attached = (0..10_000).filter(|_| callers.attach(EVE, seconds(1)).is_ok()).count();
         assert_eq!(attached, TERMINALS_OF_USER_MAX);
-        for (user, most) in [(PANEL, TERMINALS_MAX - TERMINALS_OF_USER_MAX), (500, 0)] {
+        let rest = TERMINALS_MAX - TERMINALS_OF_USER_MAX - TERMINALS_KEPT;
+        for (user, most) in [(PANEL, rest), (500, TERMINALS_KEPT)] {
             assert_eq!((0..100).filter(|_| callers.attach(user, seconds(2)).is_ok()).count(), most);
         }
-        (0..4).for_each(|_| callers.detach(PANEL));
+        (0..8).for_each(|_| callers.detach(PANEL));
         assert_eq!(callers.attach(0, seconds(3)), Ok(0));
         // Attaching and leaving again and again.
         callers.detach(EVE);
@@ -190,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_about_one_user_are_bounded_in_rate_and_what_was_left_out_is_told() {
+    fn lines_about_one_user_are_bounded_in_rate_and_the_rest_is_counted() {
         let mut callers = Callers::new(500);
         let mut logged = 0;
         for second in 0..600 {
