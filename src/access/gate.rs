@@ -86,7 +86,7 @@ pub struct Gate {
     def: Arc<PlantDef>,
     /// `None` where nobody is asked who he is: in a demonstration.
     people: Option<Users>,
-    /// Why nobody can log in: the users are not known.
+    /// Why login is closed: the users file could not be read.
     closed: Option<Arc<str>>,
     /// The user of the operating system that the station runs as.
     host: Option<Arc<str>>,
@@ -130,7 +130,7 @@ impl Gate {
         Gate { people: Some(people), ..Gate::new(def, host) }
     }
 
-    /// A gate that nobody can log in at, because the file of users is damaged; `why` is told to whoever tries.
+    /// Login is closed because the users file is damaged; `why` is the reply to each attempt.
     pub fn closed(def: Arc<PlantDef>, why: &str, host: Option<Arc<str>>) -> Gate {
         Gate {
             closed: Some(format!("login is closed: {why}").into()),
@@ -138,12 +138,12 @@ impl Gate {
         }
     }
 
-    /// The [`Users::digest`] of those it lets in; `None` where nobody is asked who he is, or they are not known.
+    /// The [`Users::digest`] of its users; `None` in a demonstration, or while login is closed.
     pub fn people_digest(&self) -> Option<String> {
         self.people.as_ref().filter(|_| self.closed.is_none()).map(Users::digest)
     }
 
-    /// Why nobody can log in, if that is so.
+    /// Why login is closed, if it is.
     pub fn is_closed(&self) -> Option<&Arc<str>> {
         self.closed.as_ref()
     }

@@ -1,4 +1,4 @@
-//! Wrong passwords: counted for each name by the user of the operating system who tried it, so that nobody can lock out others.
+//! Wrong passwords: counted for each name and each user of the operating system who tried it, so that no user locks out another.
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -16,9 +16,9 @@ const NAMES: u32 = 8;
 /// What wrong passwords are counted by.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Key {
-    /// Who tries: the user of the operating system, which nobody can make up, or one terminal where somebody is in already.
+    /// The user of the operating system, as the kernel reports it; or one terminal, where a user is logged in already.
     pub origin: Arc<str>,
-    /// The [`super::user::key`] of the name that was typed, known or not; `None` for what is no name at all.
+    /// The [`super::user::key`] of the typed name, known or not; `None` for an invalid name.
     pub account: Option<String>,
     /// Root and the station's own user wait, but are never locked out.
     pub never_locked: bool,
@@ -153,7 +153,7 @@ mod tests {
         assert_eq!(tries.locked_until("anna", &rules, at(now)), None, "it is over as configured");
         assert_eq!(tries.wait(&anna, &rules, at(now)), None);
         tries.wrong(&anna, &rules, at(now));
-        assert_eq!(tries.wait(&anna, &rules, at(now)), Some(Duration::from_secs(1)), "and counts anew");
+        assert_eq!(tries.wait(&anna, &rules, at(now)), Some(Duration::from_secs(1)), "and counting starts again");
     }
 
     #[test]
@@ -182,7 +182,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn nobody_has_more_tries_than_permitted_in_a_lock_out(
+        fn no_origin_has_more_tries_than_permitted_in_a_lock_out(
             tries_max in 1u16..8, steps in prop::collection::vec((0usize..2, 0usize..20, 0i64..40), 1..400)
         ) {
             let rules = AccessDef { tries_max, ..AccessDef::default() };

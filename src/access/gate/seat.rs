@@ -75,7 +75,7 @@ impl Seat {
         self.undelivered.push_back((id, why.into()));
     }
 
-    /// Somebody sits there now.
+    /// A user has logged in.
     pub fn enter(&mut self, who: Who, at: Timestamp) {
         (self.who, self.locked, self.trusted, self.active) = (Some(who), false, false, at);
         self.session += 1;
@@ -92,7 +92,7 @@ fn origin(peer: &Peer) -> Arc<str> {
     match &peer.unix_user {
         _ if peer.own => "this process".into(),
         Some(user) => user.clone(),
-        None => "nobody".into(),
+        None => "unknown".into(),
     }
 }
 

@@ -7,15 +7,15 @@ use jiff::Timestamp;
 use super::{Effect, Gate, people::Hashing};
 use crate::access::{OrderRequest, Secret, password, tries::Key, user};
 
-/// Passwords of all users of the operating system that may be under way or wait; more are told to come back.
+/// Passwords of all users of the operating system that may be checked or wait; more are refused as [`BUSY`].
 pub(super) const JOBS_MAX: usize = 64;
 /// So many of one user: the others still have room.
 pub(super) const JOBS_OF_USER_MAX: usize = 24;
 /// So many places are kept for root and the station's own user.
 const JOBS_KEPT: usize = 8;
-/// Said when there are more.
+/// The reply when there are more.
 pub(super) const BUSY: &str = "the station is busy with other logins, try again";
-/// Said when a password was right, and what it was right for is no more.
+/// The reply when a password was right, but the session or the stored hash has changed since.
 const CHANGED: &str = "the login here or the password was changed meanwhile, try again";
 
 /// Number of a piece of work.
@@ -64,10 +64,10 @@ pub(super) struct Errand {
     session: u64,
     /// The user of the operating system whose jobs it belongs to.
     user: Arc<str>,
-    /// What a wrong password counts for, even when the terminal has gone. One of each origin is looked at at a time, so that
-    /// none has more tries than it may.
+    /// What a wrong password counts for, even when the terminal has gone. One of each origin is checked at a time, so that
+    /// parallel attempts are counted too.
     key: Key,
-    /// What is kept of the password of whom it is about, when the work was begun.
+    /// The stored hash of that user when the work began.
     stored: Option<Arc<str>>,
     what: What,
 }
@@ -96,8 +96,8 @@ pub(super) struct Wrong {
 }
 
 impl Gate {
-    /// Has a password looked at that was given for this name. A name that nobody has must not be seen from the time it takes.
-    /// `Err` says in words for the operator why it is not looked at.
+    /// Has the password for this name checked. The time that takes must not tell whether the name exists.
+    /// `Err` says in words for the operator why it is not checked.
     pub(super) fn look_at(
         &mut self,
         terminal: u32,
@@ -149,7 +149,7 @@ impl Gate {
         Ok(Errand { terminal, session: seat.session, user: seat.origin.clone(), key, stored: None, what })
     }
 
-    /// Begins what has waited for the one before it, or for its time.
+    /// Begins the checks that have waited for the one before them, or for their time.
     pub(super) fn begin_waiting(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = Vec::new();
         for (errand, password) in std::mem::take(&mut self.waiting) {
@@ -176,7 +176,7 @@ impl Gate {
         vec![Effect::Work(self.last_job, work)]
     }
 
-    /// What is kept of the password of whom this is about.
+    /// The stored hash of the user that this is about.
     fn stored(&self, what: &What) -> Option<Arc<str>> {
         Some(self.people.as_ref()?.get(what.whose()?)?.hash.clone())
     }
@@ -211,7 +211,7 @@ impl Gate {
         let Errand { terminal, key, what, .. } = errand;
         let mut effects = Vec::new();
         let wrong = match self.why_not(&what, right) {
-            // It was no guess.
+            // Right when it was checked: it does not count as a wrong attempt.
             None if stale => Some(Wrong { why: "changed meanwhile", told: CHANGED.to_owned() }),
             None => {
                 self.tries.right(&key);
@@ -270,7 +270,7 @@ impl Gate {
         }
     }
 
-    /// What an operator is told of a wrong attempt: the same whatever was wrong, and how long the next one must wait.
+    /// The reply to a wrong attempt: the same whatever was wrong, and how long the next one must wait.
     fn wrong(&self, key: &Key, at: Timestamp) -> String {
         match self.tries.wait(key, &self.def.access, at) {
             Some(wait) => format!("{WRONG}; wait {} s", wait.as_secs_f64().ceil()),
@@ -284,7 +284,7 @@ fn not_checked(wait: Duration) -> String {
 }
 
 impl What {
-    /// Whose password it is, or will be; `None` for a name that nobody has.
+    /// Whose password it is, or will be; `None` for an unknown name.
     fn whose(&self) -> Option<&Arc<str>> {
         match self {
             What::Login { user, .. } => user.as_ref(),
@@ -305,5 +305,5 @@ impl What {
     }
 }
 
-/// The one message for a wrong name, a wrong password, and somebody disabled.
+/// The one message for a wrong name, a wrong password and a disabled user.
 pub(super) const WRONG: &str = "wrong name or password";

@@ -1,4 +1,4 @@
-//! What a password check or a hash is worth when it ends later than something else that was done meanwhile.
+//! Password checks and hashes that end after the session or the stored hash has changed.
 
 use super::*;
 
