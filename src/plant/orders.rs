@@ -233,16 +233,14 @@ impl Desk {
                 && !matches!(status.command, Command::Restore(_))
                 && PENDING_MAX.mul_f64(speed) < Duration::try_from(at.duration_since(status.at)).unwrap_or_default()
         };
-        let ids: Vec<OrderId> = self.orders.iter().filter(|status| late(status)).map(|status| status.id).collect();
-        self.writes.retain(|write| !ids.contains(&write.1));
-        let outcome_of = |id: OrderId| match self.orders.iter().find(|status| status.id == id) {
-            Some(status) if status.command.written().is_some() => {
-                Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout))
-            }
-            Some(_) | None => Outcome::Failed(Fault::Timeout),
+        let outcome = |status: &OrderStatus| match status.command.written() {
+            Some(_) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)),
+            None => Outcome::Failed(Fault::Timeout),
         };
-        let given_up: Vec<(OrderId, Outcome)> = ids.into_iter().map(|id| (id, outcome_of(id))).collect();
-        given_up.into_iter().filter_map(|(id, outcome)| self.close(id, outcome, board)).collect()
+        let late = self.orders.iter().filter(|status| late(status)).map(|status| (status.id, outcome(status)));
+        let late: Vec<(OrderId, Outcome)> = late.collect();
+        self.writes.retain(|write| late.iter().all(|(id, _)| *id != write.1));
+        late.into_iter().filter_map(|(id, outcome)| self.close(id, outcome, board)).collect()
     }
 
     /// The station ends: nobody can answer for what is still under way.

@@ -140,8 +140,7 @@ impl Snapshot {
             Decimals::From(_) => self.decimals[tag.index()],
         }
     }
-    /// The value that stands before a reader's eyes of the tag that a command writes; `None` where it writes none or none is
-    /// shown.
+    /// The displayed value of the tag that a command writes; `None` where it writes none, or none is displayed.
     pub fn seen(&self, command: &Command) -> Option<f64> {
         let (tag, _) = command.written()?;
         self.samples.get(tag.index())?.value

@@ -109,7 +109,7 @@ fn alarm_word(old: AlarmState, new: AlarmState) -> &'static str {
             AlarmState::Normal | AlarmState::Returned,
         ) => "reset",
         (AlarmState::Shelved | AlarmState::Suppressed | AlarmState::OutOfService, AlarmState::Normal) => {
-            "no longer put aside"
+            "no longer suppressed"
         }
         (
             AlarmState::Normal

@@ -134,7 +134,7 @@ impl Book {
     }
 
     /// The suppression ends: what holds then begins its on-delay, because a pump that has just started has its time to bring
-    /// the flow up. Without a delay it is raised anew.
+    /// the flow up. Without a delay it is raised again.
     fn release(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
         if self.machine(alarm.id).suppressed().is_none() || !self.is_released(alarm, facts) {
             return;
@@ -143,8 +143,8 @@ impl Book {
         let machine = self.machine(alarm.id);
         let holds = machine.is_active() || machine.is_pending();
         if machine.is_active() {
-            let anew = if machine.state().is_aside() { AlarmStep::RaisedQuietly } else { AlarmStep::Raised };
-            let step = if alarm.on_delay.is_zero() { anew } else { AlarmStep::ReturnedQuietly };
+            let raised = if machine.state().is_aside() { AlarmStep::RaisedQuietly } else { AlarmStep::Raised };
+            let step = if alarm.on_delay.is_zero() { raised } else { AlarmStep::ReturnedQuietly };
             records.push(self.step(alarm, step, at, facts.value));
         }
         if holds {

@@ -245,8 +245,8 @@ impl Machine {
             AlarmStep::RaisedQuietly => {
                 (self.active, self.pending_since) = (true, None);
                 if latch && self.suppressed.is_none() {
-                    // Nobody is told now, but what latches must be seen by somebody once it is back. What came while it was
-                    // suppressed by design was no fault.
+                    // It is not annunciated now, but what latches must be acknowledged once it is back. What came while it
+                    // was suppressed by design was no fault.
                     (self.latched, self.unacknowledged) = (true, true);
                     (self.raised_at, self.returned_at, self.acknowledged) = (Some(step.at), None, None);
                     (self.annunciated_at, self.value) = (Some(step.at), step.value);
@@ -281,8 +281,8 @@ impl Machine {
         }
     }
 
-    /// What is put aside is raised anew if it is active once it is back; what latches comes back as it was, because to put it
-    /// aside is no acknowledgement.
+    /// An alarm that comes back from the shelf or into service is raised again if it is active; a latched one comes back as it
+    /// was, because shelving is no acknowledgement.
     fn keep_latched(&mut self) {
         self.unacknowledged &= self.latched;
     }

@@ -261,7 +261,7 @@ fn shelving_and_out_of_service_acknowledge_no_latched_alarm() {
             journal.extend(book.out_of_service(HIGH, Some(&why()), at(2), &by()));
             book.in_service(HIGH, None, at(3), &by())
         };
-        journal.extend(back.expect("it is put aside"));
+        journal.extend(back.expect("it is suppressed"));
         assert_eq!(state(&book), AlarmState::LatchedUnacknowledged, "shelved: {shelved}");
         let mut again = Book::new(book.def.clone());
         again.restore(&journal);
