@@ -87,6 +87,9 @@ impl Mimic {
     pub fn on_key(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
         let items = &cx.def().mimic.items;
         match action {
+            Action::Move(dx, dy) if list::is_shown(cx, cx.area) => {
+                self.selected = list::neighbour(items, self.selected, (dx, dy));
+            }
             Action::Move(dx, dy) => self.selected = neighbour(items, self.selected, (dx, dy)),
             Action::Motion => self.motion = !self.motion,
             Action::Actuators => {
@@ -180,7 +183,7 @@ impl Mimic {
     pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let items = &cx.def().mimic.items;
-        if area.width < cx.def().mimic.size.0 {
+        if list::is_shown(cx, area) {
             return list::view(cx, &mut canvas, self.selected);
         }
         let stretch = stretch(cx, area);

@@ -1,4 +1,6 @@
-//! The items of the picture as a list of values, on a screen that is narrower than the picture.
+//! The items of the picture as a list of values, on a screen that is too small for the picture.
+
+use ratatui::layout::Rect;
 
 use super::{label_style, place, put_value, tags, title};
 use crate::{
@@ -12,31 +14,63 @@ use crate::{
     },
 };
 
-/// Columns for the name of an item.
-const NAMES: u16 = 11;
+/// Columns of half a row for a value with its unit and its alarm mark.
+const VALUE: u16 = 18;
 
-/// Every item with its values, in two columns where one is too short; the page with the selected one.
-pub fn view(cx: &Cx, canvas: &mut Canvas, selected: Option<usize>) {
-    let items = cx.def().mimic.items.iter().enumerate();
-    let items: Vec<(usize, &MimicItem)> = items.filter(|(_, item)| place(item).is_some()).collect();
-    // Controllers and tanks have more to tell than half a row takes.
+/// Is the list shown, because the picture does not fit? Tanks and curves that are cut at the bottom still tell their values.
+pub fn is_shown(cx: &Cx, area: Rect) -> bool {
+    let picture = &cx.def().mimic;
+    let bottom = |item: &MimicItem| {
+        let Some(place) = place(item) else { return 0 };
+        let rows = match item {
+            MimicItem::Tank { .. } | MimicItem::Trend { .. } => place.height.min(2 + tags(cx, item).len() as u16),
+            _ => place.height.max(1),
+        };
+        place.y.saturating_add(rows)
+    };
+    let cut = || picture.items.iter().any(|item| area.height < bottom(item));
+    area.width < picture.size.0 || area.height < picture.size.1 && cut()
+}
+
+/// The items of each row: two in a row where one is short.
+fn rows(items: &[MimicItem]) -> Vec<Vec<usize>> {
+    let all = items.iter().enumerate().filter(|(_, item)| place(item).is_some());
+    // Controllers and tanks have more values than fit into half a row.
     let (wide, narrow): (Vec<_>, Vec<_>) =
-        items.into_iter().partition(|(_, item)| matches!(item, MimicItem::Controller { .. } | MimicItem::Tank { .. }));
+        all.partition(|(_, item)| matches!(item, MimicItem::Controller { .. } | MimicItem::Tank { .. }));
+    let row = |row: &[(usize, &MimicItem)]| row.iter().map(|(n, _)| *n).collect();
+    wide.chunks(1).map(row).chain(narrow.chunks(2).map(row)).collect()
+}
+
+/// The item that an arrow key leads to; the first one when none is selected; the same when there is none further on.
+pub fn neighbour(items: &[MimicItem], selected: Option<usize>, (dx, dy): (i32, i32)) -> Option<usize> {
+    let rows = rows(items);
+    let at = |n: usize| rows.iter().enumerate().find_map(|(y, row)| Some((row.iter().position(|of| *of == n)?, y)));
+    let Some((x, y)) = selected.and_then(at) else { return rows.first().map(|row| row[0]) };
+    let moved = |place: usize, by: i32, last: usize| place.saturating_add_signed(by as isize).min(last);
+    let row = &rows[moved(y, dy, rows.len() - 1)];
+    Some(row[moved(x, dx, row.len() - 1)])
+}
+
+/// Every item with its values; the page with the selected one.
+pub fn view(cx: &Cx, canvas: &mut Canvas, selected: Option<usize>) {
+    let items = &cx.def().mimic.items;
     let (all, half) = (canvas.width(), canvas.width() / 2);
-    let rows: Vec<Vec<_>> = wide.chunks(1).chain(narrow.chunks(2)).map(|row| row.to_vec()).collect();
+    let rows = rows(items);
+    let names = half.saturating_sub(VALUE).clamp(11, 24);
     let room = usize::from(canvas.height()).max(1);
-    let place = rows.iter().position(|row| row.iter().any(|(n, _)| Some(*n) == selected)).unwrap_or(0);
+    let place = rows.iter().position(|row| row.iter().any(|n| Some(*n) == selected)).unwrap_or(0);
     for (y, row) in rows.iter().skip(place / room * room).take(room).enumerate() {
-        for (column, (n, item)) in row.iter().enumerate() {
+        for (column, n) in row.iter().enumerate() {
             let length = if row.len() == 1 { all } else { half };
             let mut cell = canvas.part(column as u16 * half, y as u16, length, 1);
-            self::item(cx, &mut cell, item, selected == Some(*n));
+            item(cx, &mut cell, &items[*n], names, selected == Some(*n));
         }
     }
 }
 
 /// `TIC-1  PV 72.4 °C  SV 70.0 °C`: as many values as fit whole.
-fn item(cx: &Cx, canvas: &mut Canvas, item: &MimicItem, selected: bool) {
+fn item(cx: &Cx, canvas: &mut Canvas, item: &MimicItem, names: u16, selected: bool) {
     let (name, tags): (String, Vec<TagId>) = match item {
         MimicItem::Controller { device, .. } => {
             let device = cx.def().device(*device);
@@ -47,8 +81,8 @@ fn item(cx: &Cx, canvas: &mut Canvas, item: &MimicItem, selected: bool) {
         _ => (title(cx, item), tags(cx, item)),
     };
     let end = canvas.width();
-    canvas.text(1, 0, &fit(&name, NAMES), label_style(cx, selected));
-    let mut x = NAMES + 2;
+    canvas.text(1, 0, &fit(&name, names), label_style(cx, selected));
+    let mut x = names + 2;
     for tag in &tags {
         let label = if tags.len() > 1 { format!("{} ", cx.def().tag(*tag).short) } else { String::new() };
         let shown = value::show(cx, *tag);
@@ -57,5 +91,30 @@ fn item(cx: &Cx, canvas: &mut Canvas, item: &MimicItem, selected: bool) {
         }
         let from = canvas.text(x, 0, &label, cx.theme.dim());
         x = put_value(cx, canvas, from, 0, *tag, end.saturating_sub(from + 1)) + 2;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ui::fixture::Fixture;
+
+    #[test]
+    fn arrows_move_by_rows_and_columns_of_the_list() {
+        let items = Fixture::normal().def.mimic.items;
+        let rows = rows(&items);
+        assert_eq!(neighbour(&items, None, (0, 1)), Some(rows[0][0]));
+        let mut selected = Some(rows[0][0]);
+        for row in &rows[1..] {
+            selected = neighbour(&items, selected, (0, 1));
+            assert_eq!(selected, Some(row[0]), "one row down");
+        }
+        assert_eq!(neighbour(&items, selected, (0, 1)), selected, "the last row");
+        let pair = rows.iter().find(|row| row.len() == 2).expect("two short items stand in one row");
+        assert_eq!(neighbour(&items, Some(pair[0]), (1, 0)), Some(pair[1]));
+        assert_eq!(neighbour(&items, Some(pair[1]), (1, 0)), Some(pair[1]), "the last column");
+        assert_eq!(neighbour(&items, Some(pair[1]), (-1, 0)), Some(pair[0]));
+        let listed = items.iter().filter(|item| place(item).is_some()).count();
+        assert_eq!(rows.iter().map(Vec::len).sum::<usize>(), listed, "every item has its place");
     }
 }
