@@ -54,6 +54,17 @@ pub fn type_keys(model: &mut Model, keys: &str) -> Vec<Effect> {
     keys.chars().flat_map(press).filter(told).collect()
 }
 
+/// A key for a row that changed after it was drawn does nothing and says so; once the change is drawn, it acts.
+pub fn acts_only_on_what_was_drawn(model: &mut Model, change: impl FnOnce(&mut Model), key: &str) {
+    screen(model, 80, 24);
+    change(model);
+    assert_eq!((type_keys(model, key), &model.modal), (Vec::new(), &None), "{key} acts on a row that was not drawn");
+    let shown = screen(model, 80, 24);
+    assert!(shown.contains("The list has changed, press again"), "{shown}");
+    let effects = type_keys(model, key);
+    assert!(!effects.is_empty() || model.modal.is_some(), "{key} does nothing once the change is drawn");
+}
+
 pub fn order_of(effects: &[Effect]) -> Option<&Command> {
     effects.iter().find_map(|effect| match effect {
         Effect::Order(order) => Some(&order.command),

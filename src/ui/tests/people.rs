@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
-use super::{model, order_of, screen, type_keys};
+use super::{acts_only_on_what_was_drawn, model, order_of, screen, type_keys};
 use crate::{
     access::{
         OrderRequest, Standing, Who, Wish,
@@ -580,4 +580,42 @@ fn the_audit_list_is_searched_by_the_history_and_read_whole() {
         asked(&update(&mut model, Msg::Tick { silent: Duration::ZERO })).expect("a question")
     };
     assert_eq!((words.as_str(), by.as_str()), ("pump", "to"));
+}
+
+#[test]
+fn keys_for_users_act_only_on_the_user_that_was_drawn() {
+    type Change = fn(&mut Vec<UserRow>);
+    let removed: Change = |users| users.retain(|row| &*row.user != "boris");
+    let other_state: Change = |users| users[1].disabled = true;
+    for (change, keys) in [(removed, ["r", "d", "p", "x"]), (other_state, ["r", "d", "p", "x"])] {
+        for key in keys {
+            let mut model = with(&Fixture::normal(), supervisor());
+            type_keys(&mut model, "7↓");
+            let change = |model: &mut Model| {
+                stand(model, |standing| change(Arc::make_mut(&mut standing.users)));
+            };
+            acts_only_on_what_was_drawn(&mut model, change, key);
+        }
+    }
+}
+
+#[test]
+fn an_audit_entry_is_opened_only_as_it_was_drawn() {
+    let mut model = with(&Fixture::normal(), supervisor());
+    let asked = |effects: &[Effect]| {
+        effects.iter().find_map(|effect| match effect {
+            Effect::Ask(id, Question::Audit { .. }) => Some(*id),
+            _ => None,
+        })
+    };
+    let row = |number| deed(number, "anna", "write", "TIC-1.SV", ("70.0 °C", "65.0 °C"), "verified");
+    let first = asked(&type_keys(&mut model, "7j")).expect("a question");
+    update(&mut model, Msg::Answer(first, Ok(Answer::Actions(vec![row(37), row(36)]))));
+    let mut later = (*Fixture::normal().snapshot()).clone();
+    later.at += jiff::SignedDuration::from_secs(11);
+    let again = asked(&update(&mut model, Msg::Snapshot(Arc::new(later)))).expect("the list is read again");
+    let newer = |model: &mut Model| {
+        update(model, Msg::Answer(again, Ok(Answer::Actions(vec![row(38), row(37), row(36)]))));
+    };
+    acts_only_on_what_was_drawn(&mut model, newer, "⏎");
 }

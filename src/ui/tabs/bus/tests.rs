@@ -24,7 +24,7 @@ use crate::{
         fixture::{Fixture, now},
         modal::Modal,
         tabs::Tab,
-        tests::{model, order_of, screen, type_keys},
+        tests::{acts_only_on_what_was_drawn, model, order_of, screen, type_keys},
         theme::Theme,
         update,
     },
@@ -92,6 +92,28 @@ fn a_silent_device_shows_when_it_is_asked_next_and_r_asks_it_now() {
         let shown = screen(&mut model, width, height);
         assert!(shown.contains("not answering, retry in 12 s"), "{shown}");
     }
+}
+
+#[test]
+fn a_frame_or_a_block_is_opened_only_as_it_was_drawn() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "F");
+    let newer = |model: &mut Model| {
+        let mut fixture = Fixture::traffic();
+        crate::ui::fixture::more_frames(&mut fixture);
+        update(model, Msg::Snapshot(fixture.snapshot()));
+        // The page takes new frames in every other second.
+        (0..4).for_each(|_| drop(update(model, Msg::Tick { silent: Duration::ZERO })));
+    };
+    acts_only_on_what_was_drawn(&mut model, newer, "⏎");
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "P");
+    let other_plan = |model: &mut Model| {
+        let mut fixture = Fixture::traffic();
+        let mut report = fixture.line.report.as_deref().cloned().expect("the line has reported");
+        report.polls.reverse();
+        fixture.line.report = Some(Arc::new(report));
+        update(model, Msg::Snapshot(fixture.snapshot()));
+    };
+    acts_only_on_what_was_drawn(&mut model, other_plan, "⏎");
 }
 
 #[test]

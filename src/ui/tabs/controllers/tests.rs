@@ -431,3 +431,19 @@ fn thirty_one_devices_can_all_be_reached() {
     type_keys(&mut model, "→");
     assert!(screen(&mut model, 80, 24).contains("‹ TIC-1 ›"), "around the end");
 }
+
+#[test]
+fn a_key_for_a_set_acts_only_on_the_set_that_was_drawn() {
+    let mut fixture = with_sets();
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "4⏎s↓");
+    // A colleague saves a set that comes before the selected one.
+    fixture.sets.insert(0, set(&fixture, "autumn", &[("SV", 90.0)]));
+    screen(&mut model, 80, 24);
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    type_keys(&mut model, "⏎");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("The list has changed, press again") && shown.contains("parameter sets of"), "{shown}");
+    type_keys(&mut model, "↓⏎");
+    assert!(screen(&mut model, 80, 24).contains("set winter → TIC-1"));
+}

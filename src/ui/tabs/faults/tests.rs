@@ -15,7 +15,7 @@ use crate::{
         Effect, Model, Msg,
         fixture::{self, Fixture},
         tabs::Tab,
-        tests::{model, screen, type_keys},
+        tests::{acts_only_on_what_was_drawn, model, screen, type_keys},
         theme::Theme,
         update,
     },
@@ -123,6 +123,17 @@ fn devices_that_do_not_answer_are_asked_at_once_when_their_faults_are_cleared() 
     assert_eq!(retried(type_keys(&mut model, "m")), [DeviceId(0)]);
     assert_eq!(retried(type_keys(&mut model, "↓⏎")), [DeviceId(0)], "also when one fault is cleared");
     assert_eq!(retried(type_keys(&mut model, "↓⏎")), [], "not when one is set");
+}
+
+#[test]
+fn a_fault_is_switched_only_as_it_was_drawn() {
+    let fixture = Fixture::normal();
+    let mut model = with(&fixture, status(&fixture), Theme::FULL);
+    // Another operator of the demonstration sets it first: Enter, meant to set it, would clear it.
+    let mut set = status(&fixture);
+    set.in_force.push(InForce { place: Place::Line(L1), fault: Fault::Noise(10), since: fixture::now() });
+    let set = |model: &mut Model| drop(update(model, Msg::Drill(Arc::new(set))));
+    acts_only_on_what_was_drawn(&mut model, set, "⏎");
 }
 
 #[test]
