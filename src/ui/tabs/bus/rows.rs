@@ -24,6 +24,11 @@ pub fn draw(cx: &Cx, canvas: &mut Canvas, rows: &[Row], first: usize) {
     for (y, row) in rows.iter().skip(first).take(room).enumerate() {
         let mut x = 1;
         for (text, style) in row {
+            // A gap at the end of a row is nothing that is cut.
+            if text.trim().is_empty() {
+                x += width(text);
+                continue;
+            }
             let text = fit_words(text, canvas.width().saturating_sub(x));
             x = canvas.text(x, y as u16, if text == "…" { "" } else { &text }, *style);
         }
@@ -127,7 +132,10 @@ pub fn bar(cx: &Cx, share: f64, cells: usize) -> String {
 
 #[cfg(test)]
 mod tests {
+    use ratatui::{buffer::Buffer, layout::Rect};
+
     use super::*;
+    use crate::ui::fixture::{Fixture, with_cx};
 
     #[test]
     fn a_table_without_room_leaves_out_whole_columns() {
@@ -151,5 +159,16 @@ mod tests {
         let rows: Vec<String> =
             flow.rows().iter().map(|row| row.iter().map(|(text, _)| text.as_str()).collect::<String>()).collect();
         assert_eq!(rows, ["bytes     sent 1 200   ", "          received 48 000   x   "]);
+    }
+
+    #[test]
+    fn a_gap_at_the_end_of_a_row_is_not_marked_as_cut() {
+        with_cx(&Fixture::normal().snapshot(), |cx| {
+            let mut buffer = Buffer::empty(Rect::new(0, 0, 13, 1));
+            let row = vec![("sent 1 200".to_owned(), Style::new()), ("   ".to_owned(), Style::new())];
+            draw(cx, &mut Canvas::new(&mut buffer, Rect::new(0, 0, 13, 1)), &[row], 0);
+            let shown: String = buffer.content.iter().map(|cell| cell.symbol()).collect();
+            assert_eq!(shown, " sent 1 200  ");
+        });
     }
 }
