@@ -21,6 +21,7 @@ use crate::plant::{
     event::LineState,
     orders::alarm_words as alarm_words_of,
     role::Role,
+    snapshot::LineStatus,
 };
 use crate::sim::drill::{Progress, Status};
 
@@ -177,8 +178,9 @@ fn header_parts(model: &Model, cx: &Cx, role: bool) -> Vec<(usize, String, Style
     }
     for line in cx.def().lines.iter().rev() {
         let (text, style) = line_words(cx, line);
-        let connected = cx.snapshot.line(line.id).state == LineState::Connected;
-        parts.push((if connected { 10 + line.id.index() } else { 3 }, text, style));
+        let status = cx.snapshot.line(line.id);
+        let well = status.state == LineState::Connected && !is_overloaded(status);
+        parts.push((if well { 10 + line.id.index() } else { 3 }, text, style));
     }
     parts
 }
@@ -232,7 +234,7 @@ fn line_words(cx: &Cx, line: &LineDef) -> (String, Style) {
             let tx = if recent(counters.last_tx) { "tx" } else { "--" };
             let rx = if recent(counters.last_rx) { "rx" } else { "--" };
             let busy = counters.utilisation * 100.0;
-            let overloaded = status.report.as_ref().is_some_and(|report| report.strain.is_some());
+            let overloaded = is_overloaded(status);
             let style = if rx == "rx" && !overloaded { cx.theme.normal() } else { cx.theme.trouble() };
             let overload = if overloaded { " OVERLOADED" } else { "" };
             (format!("{} {} {tx} {rx} {busy:.0} %{overload}", line.name, cx.theme.pick("▪", "*")), style)
@@ -245,6 +247,10 @@ fn line_words(cx: &Cx, line: &LineDef) -> (String, Style) {
         LineState::Disconnected => (format!("{} DISCONNECTED", line.name), cx.theme.trouble()),
         LineState::Testing => (format!("{} TEST", line.name), cx.theme.trouble()),
     }
+}
+
+fn is_overloaded(line: &LineStatus) -> bool {
+    line.report.as_ref().is_some_and(|report| report.strain.is_some())
 }
 
 fn tab_bar(model: &Model, cx: &Cx, canvas: &mut Canvas) {

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::plant::{def::AlarmId, snapshot::ActiveAlarm};
 
-/// Said where a key was not taken.
+/// Shown where a key was not taken.
 const CHANGED: &str = "The list has changed, press again";
 
 /// The rows of a list that keys act on, each with its state, and the selected one.
@@ -50,7 +50,7 @@ pub struct Drawn {
     alarm: Option<(AlarmId, Timestamp)>,
     /// Something has come from the station since.
     news: bool,
-    /// The selection was moved over rows that are not those of the frame: nobody can tell what was meant.
+    /// The selection was moved over rows that are not those of the frame: what a key means is unknown.
     astray: bool,
 }
 
@@ -114,7 +114,7 @@ impl Model {
         self.tabs.shown == Tab::Alarms && !self.small()
     }
 
-    /// The alarm that whoever presses `a` has seen, exactly as it was annunciated; `Err` if there is another one by now.
+    /// The alarm that `a` was drawn for, exactly as it was annunciated; `Err` if there is another one by now.
     fn alarm_seen(&self) -> Result<Option<&ActiveAlarm>, &'static str> {
         let now = self.alarm_to_acknowledge();
         let Some(drawn) = self.drawn else { return Ok(now) };

@@ -202,8 +202,8 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
     Some(Effect::Wish(AskId { tab: Tab::Login, number: 0 }, Wish::Active))
 }
 
-/// The station's answer to a wish: for the window that waits for it, also one that a lock has taken away, else for the tab,
-/// of which only the last wish is waited for.
+/// The station's answer to a request: for the window that waits for it, also one that a lock has hidden, else for the tab,
+/// which waits for its last request only.
 pub(super) fn on_granted(model: &mut Model, id: AskId, answer: Result<(), String>) -> Vec<Act> {
     if matches!(id.tab, Tab::Reports | Tab::Bus) {
         // A file that waits to be written waits for its own answer, whatever was wished since.

@@ -6,7 +6,7 @@ use crate::pty::Terminal;
 fn every_tab_opens_and_q_asks_before_leaving() {
     let mut terminal = Terminal::start(80, 24, &["demo", "--speed", "10"]);
     terminal.wait_for("TK-1");
-    for (key, text) in [("2", "window"), ("3", "put aside"), ("4", "FUJI"), ("5", "RUNNING"), ("1", "TK-2")] {
+    for (key, text) in [("2", "window"), ("3", "suppressed"), ("4", "FUJI"), ("5", "RUNNING"), ("1", "TK-2")] {
         terminal.keys(key);
         terminal.wait_for(text);
     }

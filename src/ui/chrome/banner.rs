@@ -83,13 +83,13 @@ fn worry_words(model: &Model, cx: &Cx) -> String {
     format!("{blind}{flood}")
 }
 
-/// `3 put aside`; empty where nobody has put anything aside. What is suppressed by design is as it should be, and stands
+/// `3 suppressed`: shelved or out of service. What is suppressed by design is as it should be, and stands
 /// on the alarms tab only.
 fn aside_words(cx: &Cx) -> String {
     let by_somebody = cx.snapshot.aside.iter().filter(|aside| aside.state != AlarmState::Suppressed);
     match by_somebody.count() {
         0 => String::new(),
-        many => format!("{many} put aside"),
+        many => format!("{many} suppressed"),
     }
 }
 

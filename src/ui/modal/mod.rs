@@ -37,7 +37,7 @@ pub use why::Why;
 use super::{
     Act, Cx,
     keys::{self, Hint},
-    tabs::{Tabs, bus},
+    tabs::{Tab, Tabs, bus},
     widgets::text::{Canvas, fit, width},
 };
 use crate::plant::def::TagId;
@@ -202,7 +202,7 @@ impl Modal {
     /// The keys of the moment.
     pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
-        match self {
+        let mut hints = match self {
             Modal::Help(_) => vec![hint("↑↓", "scroll"), hint("Esc", "close")],
             Modal::Confirm(confirm) if confirm.is_refused(cx) => vec![hint("Esc", confirm.escape())],
             Modal::Confirm(confirm) => vec![hint("⏎", confirm.verb()), hint("Esc", confirm.escape())],
@@ -218,7 +218,12 @@ impl Modal {
             Modal::Bus(window) => window.hints(),
             Modal::Sheet(sheet) => sheet.hints().into_iter().chain([hint("Esc", "leave")]).collect(),
             Modal::Deed(_) => vec![hint("Esc", "close")],
+        };
+        // A digit is typed here: the tabs are one key further away.
+        if let Some(last) = Tab::offered(cx).last().filter(|_| self.takes_text()) {
+            hints.push(hint(&format!("Esc, 0-{}", last.number()), "another tab"));
         }
+        hints
     }
 
     /// Draws it in the middle of the body.

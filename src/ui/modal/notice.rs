@@ -47,8 +47,7 @@ impl Notice {
         Some(why)
     }
 
-    /// Opens a window whose work ends in this command, or says why whoever sits here may not give it: before anything is
-    /// filled in.
+    /// Opens a form that ends in this command, or says why the present user may not give it, before anything is filled in.
     pub fn or(cx: &Cx, title: &str, command: &Command, window: Modal) -> Act {
         Act::Open(match rights::missing(cx, command) {
             Some(why) => Modal::Notice(Notice::new(title, vec![why])),

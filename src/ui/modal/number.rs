@@ -36,7 +36,9 @@ pub fn check(cx: &Cx, tag: TagId, text: &str) -> Result<f64, String> {
     }
     let value = match number {
         Number::Whole(value) => value,
-        Number::Step(by) => stepped(cx, tag, by).ok_or("the present value is not known: type the whole number")?,
+        Number::Step(by) => {
+            stepped(cx, tag, by).ok_or("the present value is not known: type the new value without a sign")?
+        }
     };
     let Some((min, max)) = cx.snapshot.range(tag) else { return Ok(value) };
     let inside = |value| scale::is_inside(Some(min), Some(max), value);
@@ -58,8 +60,8 @@ pub fn relative_words(cx: &Cx, tag: TagId, text: &str) -> Option<String> {
 /// How to type a change.
 pub fn help(cx: &Cx, tag: TagId) -> String {
     match cx.snapshot.range(tag) {
-        Some((min, _)) if min < 0.0 => "+5 adds 5, -5 takes 5 away, =-5 is minus 5".to_owned(),
-        Some(_) | None => "+5 adds 5, -5 takes 5 away".to_owned(),
+        Some((min, _)) if min < 0.0 => "+5 adds 5, -5 subtracts 5, =-5 sets -5".to_owned(),
+        Some(_) | None => "+5 adds 5, -5 subtracts 5".to_owned(),
     }
 }
 
@@ -209,12 +211,15 @@ mod tests {
             assert_eq!((relative_words(cx, sv, "5"), relative_words(cx, sv, "+")), (None, None));
         });
         fixture.samples[sv.index()] = Sample::bad(Cause::Timeout, now());
-        assert_eq!(checked(&fixture, "+5"), Err("the present value is not known: type the whole number".to_owned()));
+        assert_eq!(
+            checked(&fixture, "+5"),
+            Err("the present value is not known: type the new value without a sign".to_owned())
+        );
         assert_eq!(checked(&fixture, "75"), Ok(75.0));
     }
 
     #[test]
-    fn rounding_beyond_a_limit_is_told_before_it_is_sent() {
+    fn rounding_beyond_a_limit_is_refused_before_it_is_sent() {
         let mut fixture = Fixture::normal();
         let sv = fixture.tag("TIC-1.SV");
         let def = &mut fixture.def.tags[sv.index()];

@@ -54,8 +54,8 @@ impl Reason {
 
     /// The keys of the moment.
     pub fn hints(&self) -> Vec<(&'static str, &'static str)> {
-        let choose = (1 < self.choices.len()).then_some(("↑↓", "time"));
-        let other = self.other().map(|time| ("Tab", if time.typing { "reason" } else { "time" }));
+        let choose = (1 < self.choices.len()).then_some(("↑↓", "select"));
+        let other = self.other().map(|time| ("Tab", if time.typing { "type the reason" } else { "type the time" }));
         [("⏎", self.verb)].into_iter().chain(choose).chain(other).chain([("Esc", "leave it as it is")]).collect()
     }
 

@@ -55,7 +55,7 @@ pub struct Sheet {
     form: Form,
     /// The wish is on its way.
     waiting: bool,
-    /// The number of that wish; 0 before it has one.
+    /// The number of that request; 0 before it has one.
     number: u32,
     /// Why the last Enter led to nothing, and at which tick that was told.
     problem: Option<(String, u32)>,
@@ -107,14 +107,14 @@ impl Sheet {
         self.waiting
     }
 
-    /// The wish has this number.
+    /// The request has this number.
     pub fn sent(&mut self, number: u32) {
         if self.waiting && self.number == 0 {
             self.number = number;
         }
     }
 
-    /// Does it wait for the answer to the wish of this number?
+    /// Does it wait for the answer to the request of this number?
     pub fn waits_for(&self, number: u32) -> bool {
         self.waiting && self.number == number
     }
@@ -232,7 +232,7 @@ impl Sheet {
     /// What Enter does at the end.
     fn verb(&self) -> &'static str {
         match &self.purpose {
-            Purpose::First => "become Supervisor",
+            Purpose::First => "create",
             Purpose::Login => "log in",
             Purpose::Change(_) => "change it",
             Purpose::Unlock(_) => "unlock",
@@ -287,7 +287,7 @@ impl Sheet {
         };
         match &self.purpose {
             Purpose::First => vec![
-                "Nobody is known here yet. The first person is a Supervisor: may do everything, and adds the others."
+                "No users exist. Create the first Supervisor account: it may do everything, and adds the others."
                     .to_owned(),
                 rule,
             ],

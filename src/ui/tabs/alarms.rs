@@ -68,7 +68,7 @@ impl Page {
     pub fn title(self) -> &'static str {
         match self {
             Page::Active => "active",
-            Page::Aside => "put aside",
+            Page::Aside => "suppressed",
             Page::System => "system",
             Page::Journal => "journal",
             Page::Quality => "quality",

@@ -151,7 +151,7 @@ fn rows(status: &Status) -> Vec<(Place, Fault)> {
     status.offers.iter().flat_map(|offer| offer.faults.iter().map(|fault| (offer.place, *fault))).collect()
 }
 
-/// What was silent may answer again: the station asks at once, where whoever sits here may order that.
+/// A silent device may answer again: it is asked at once, if the present user may do that.
 fn cleared(cx: &Cx, order: Order) -> Vec<Act> {
     let allowed = |act: &Act| matches!(act, Act::Order(command) if rights::missing(cx, command).is_none());
     wish(order).into_iter().chain(bus::retry(cx, None).into_iter().filter(allowed)).collect()

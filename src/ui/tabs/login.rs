@@ -158,7 +158,7 @@ impl Login {
     /// The keys of the moment.
     pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
         let Some(sheet) = &self.sheet else { return keys::hints(KEYS) };
-        let leads = if self.changing || cx.standing.view || cx.standing.locked { "back" } else { "empty it" };
+        let leads = if self.changing || cx.standing.view || cx.standing.locked { "back" } else { "clear" };
         let quit = Hint::new("Ctrl-C", "quit", "");
         sheet.hints().into_iter().chain([Hint::new("Esc", leads, ""), quit]).collect()
     }

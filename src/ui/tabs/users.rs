@@ -115,11 +115,11 @@ impl Users {
                 self.audit = Some(Audit::new(self.asked));
                 return self.on_snapshot(cx);
             }
-            // Whoever sees this page is a Supervisor: a station with users has at least him.
+            // Only a Supervisor sees this page: a station with users has at least one.
             (Action::Add, None) => {
                 let words = [
                     "This station keeps no users.",
-                    "A demonstration asks nobody who he is; a station started with `sightglass run` does.",
+                    "A demonstration needs no login; a station started with `sightglass run` has users.",
                 ];
                 let notice = Notice::new("add a user", words.map(str::to_owned).to_vec());
                 return vec![Act::Open(Modal::Notice(notice))];

@@ -725,7 +725,7 @@ fn rows_that_move_between_two_frames_take_no_key_meant_for_another() {
     fixture.alarms.insert(0, newest);
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     for keys in ["z", "↓a", "o"] {
-        // To move on is possible, but what was meant by that nobody can tell until it is drawn.
+        // Moving the selection is possible, but what a key means then is unknown until it is drawn.
         assert_eq!(order_of(&type_keys(&mut model, keys)), None, "{keys}");
         assert_eq!(model.modal, None, "{keys}");
     }

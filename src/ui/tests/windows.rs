@@ -54,7 +54,7 @@ fn the_number_of_a_tab_leads_out_of_windows_without_a_text() {
 }
 
 #[test]
-fn a_form_is_not_opened_for_who_may_not_send_it() {
+fn a_form_is_not_opened_for_a_user_who_may_not_send_it() {
     let mut fixture = Fixture::traffic();
     fixture.alarms = Fixture::alarm().alarms;
     for (keys, role) in
@@ -170,7 +170,7 @@ fn an_alarm_is_shelved_for_half_an_hour_or_for_any_time_typed() {
 }
 
 #[test]
-fn what_became_of_a_file_leaves_with_the_next_key() {
+fn the_message_about_a_file_leaves_with_the_next_key() {
     let mut model = model(&Fixture::traffic(), Theme::FULL);
     type_keys(&mut model, "6F");
     update(&mut model, Msg::Saved(Tab::Bus, Ok("L1.txt".into())));

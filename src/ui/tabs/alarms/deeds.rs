@@ -77,7 +77,7 @@ pub fn acknowledge_all<'a>(cx: &Cx, alarms: impl Iterator<Item = &'a ActiveAlarm
     open(Modal::Confirm(Confirm::order(title, asked, command).with_notes(notes)))
 }
 
-/// Asks for how long an alarm is put aside, and why.
+/// Asks for how long an alarm is shelved, and why.
 pub fn shelve(cx: &Cx, alarm: AlarmId) -> Vec<Act> {
     let max = cx.def().alarm_rules.shelve_max;
     let fixed = SHELVE_MIN.map(|minutes| Duration::from_secs(minutes * 60));
@@ -93,9 +93,9 @@ pub fn shelve(cx: &Cx, alarm: AlarmId) -> Vec<Act> {
     vec![Notice::or(cx, "shelve an alarm", &command, window)]
 }
 
-/// Asks why an alarm is put aside until somebody puts it back.
+/// Asks why an alarm is taken out of service.
 pub fn out_of_service(cx: &Cx, alarm: AlarmId) -> Vec<Act> {
-    let notes = vec![name(cx, alarm), "It is not annunciated until somebody puts it back in service.".to_owned()];
+    let notes = vec![name(cx, alarm), "It is not annunciated until it is put back in service.".to_owned()];
     let command = Command::Alarm(AlarmCommand::OutOfService(alarm));
     let reason = Reason::new("out of service", "put out of service", notes, command.clone(), true);
     vec![Notice::or(cx, "out of service", &command, Modal::Reason(Box::new(reason)))]

@@ -28,14 +28,7 @@ const NAMES: u16 = 10;
 
 /// All there is to say about a listed alarm.
 pub fn rows(cx: &Cx, alarm: &ActiveAlarm) -> [(&'static str, String); 4] {
-    let def = cx.def().alarm(alarm.id);
-    let guidance = &def.guidance;
-    [
-        ("now", now_words(cx, def, alarm)),
-        ("cause", or_dash(&guidance.cause).to_owned()),
-        ("effect", or_dash(&guidance.effect).to_owned()),
-        ("action", or_dash(&guidance.action).to_owned()),
-    ]
+    rows_of_any(cx, alarm.id, now_words(cx, cx.def().alarm(alarm.id), alarm))
 }
 
 /// The same for one that is not in a list.

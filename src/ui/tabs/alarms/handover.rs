@@ -162,7 +162,7 @@ impl Handover {
             let rows = rows.into_iter().map(|row| (format!("  {}", fit_words(row.trim_start(), room)), theme.normal()));
             lines.extend(rows);
         };
-        section("put aside", cx.snapshot.aside.iter().map(|aside| aside_words(cx, aside)).collect(), true);
+        section("suppressed", cx.snapshot.aside.iter().map(|aside| aside_words(cx, aside)).collect(), true);
         section("not as usual: closed, in manual, on trial", unusual(cx), true);
         section("values in doubt", doubtful(cx), true);
         if self.answered {

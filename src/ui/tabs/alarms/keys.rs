@@ -76,22 +76,22 @@ const MOVE: [Row; 6] = [
 ];
 
 const VIEWS: [Row; 3] = [
-    row(char('v'), "view", "next view: active, put aside, system, journal, quality, handover", Action::View(1)),
+    row(char('v'), "view", "next view: active, suppressed, system, journal, quality, handover", Action::View(1)),
     row(char('V'), "", "view before", Action::View(-1)),
     row(char('b'), "", "bell for new alarms on or off", Action::Bell),
 ];
 
 const DEEDS: [Row; 9] = [
     row(char('n'), "note", "acknowledge with a note", Action::Note),
-    row(char('z'), "shelve", "put the alarm aside for a time, with a reason", Action::Shelve),
+    row(char('z'), "shelve", "shelve the alarm for a time, with a reason", Action::Shelve),
     row(char('/'), "filter", "show only alarms with these words; Esc shows all again", Action::Words),
     row(char('p'), "page", "acknowledge all on this page of the list (asks first)", Action::AcknowledgePage),
     row(char(' '), "unfold", "show or fold away the consequences of a burst", Action::Fold),
-    row(char('r'), "reset", "let go a latched alarm whose cause is gone (asks first)", Action::Reset),
+    row(char('r'), "reset", "reset a latched alarm whose cause is gone (asks first)", Action::Reset),
     row(
         char('o'),
         "out of service",
-        "put the alarm aside until somebody puts it back, with a reason",
+        "take the alarm out of service until it is put back, with a reason",
         Action::OutOfService,
     ),
     row(char('f'), "", "filter: next priority", Action::Priority),
@@ -100,18 +100,19 @@ const DEEDS: [Row; 9] = [
 
 const AREA: [Row; 1] = [row(char('g'), "", "filter: next area", Action::Area)];
 
-const GO: [Row; 6] = [
+const OPEN: [Row; 1] = [row(
+    code(KeyCode::Enter),
+    "guidance",
+    "the guidance in full; ⏎ again: the faceplate of what the alarm watches",
+    Action::Open,
+)];
+
+const GO: [Row; 5] = [
     row(char('m'), "", "go to the mimic, with what the alarm watches selected", Action::Mimic),
     row(char('t'), "", "go to the trend at the moment of the alarm", Action::Trend),
     row(char('c'), "", "go to the controller of the alarm", Action::Controller),
     row(char('j'), "journal", "journal of what the alarm watches", Action::Journal),
     row(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why),
-    row(
-        code(KeyCode::Enter),
-        "open",
-        "the guidance in full; ⏎ again: the faceplate of what the alarm watches",
-        Action::Open,
-    ),
 ];
 
 const BACK: [Row; 1] = [row(char('u'), "put back", "take it back: from the shelf, or into service", Action::PutBack)];
@@ -135,8 +136,8 @@ const HANDOVER: [Row; 2] = [
 /// The keys of a page, the most wanted ones first.
 pub fn table(page: Page) -> Vec<Row> {
     let parts: &[&[Row]] = match page {
-        Page::Active | Page::System => &[&DEEDS, &VIEWS, &MOVE, &GO, &AREA],
-        Page::Aside => &[&BACK, &VIEWS, &MOVE, &GO],
+        Page::Active | Page::System => &[&OPEN, &DEEDS, &VIEWS, &MOVE, &GO, &AREA],
+        Page::Aside => &[&BACK, &OPEN, &VIEWS, &MOVE, &GO],
         Page::Journal => &[&SEARCH, &SHIFT, &VIEWS, &MOVE],
         Page::Quality => &[&SHIFT, &VIEWS, &MOVE],
         Page::Handover => &[&HANDOVER, &SHIFT, &VIEWS, &MOVE],

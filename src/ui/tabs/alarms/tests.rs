@@ -23,7 +23,7 @@ use crate::{
         fixture::{self, Fixture, now},
         modal::Modal,
         tabs::Tab,
-        tests::{model, order_of, screen, type_keys},
+        tests::{acts_only_on_what_was_drawn, model, order_of, screen, type_keys},
         theme::{Colours, Glyphs, Theme},
         update,
     },
@@ -161,12 +161,12 @@ fn a_storm_is_folded_and_counted() {
 fn what_is_put_aside_is_listed_and_counted_on_every_page() {
     pictures("aside", &put_aside(), "v");
     let mut model = shown(&put_aside(), Theme::FULL, "");
-    assert!(screen(&mut model, 120, 40).contains("put aside 3"));
+    assert!(screen(&mut model, 120, 40).contains("suppressed 3"));
     let mut quiet = put_aside();
     quiet.alarms.clear();
     let mut model = super::super::super::tests::model(&quiet, Theme::FULL);
     let banner = screen(&mut model, 80, 24).lines().nth(2).map(str::to_owned).unwrap_or_default();
-    assert!(banner.contains("no alarms") && banner.contains("2 put aside"), "{banner}");
+    assert!(banner.contains("no alarms") && banner.contains("2 suppressed"), "{banner}");
 }
 
 #[test]
@@ -328,7 +328,7 @@ fn an_alarm_is_shelved_for_a_chosen_time_with_a_reason() {
     let mut model = shown(&fixture, Theme::FULL, "z");
     insta::assert_snapshot!("window_shelve", screen(&mut model, 80, 24));
     type_keys(&mut model, "⏎");
-    assert!(screen(&mut model, 80, 24).contains("say why"), "nothing is put aside without a reason");
+    assert!(screen(&mut model, 80, 24).contains("say why"), "nothing is shelved without a reason");
     let effects = type_keys(&mut model, "↓↓sensor is cleaned⏎");
     let Some(Effect::Order(order)) = effects.last() else { panic!("{effects:?}") };
     let shelve = AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(3_600) };
@@ -484,5 +484,20 @@ fn in_a_storm_every_alarm_is_counted_and_every_key_works() {
             let seen = screen(&mut model, 120, 40);
             assert!(seen.contains(&format!("active {active} ({active} unack)")), "{key}: {seen}");
         }
+    }
+}
+
+#[test]
+fn a_suppressed_alarm_is_put_back_only_as_it_was_drawn() {
+    type Change = fn(&mut Vec<AsideAlarm>);
+    let first_left: Change = |aside| drop(aside.remove(0));
+    // Back in service and shelved by a colleague: the same alarm, for another reason.
+    let shelved_again: Change = |aside| aside[0].deed.at = now();
+    for change in [first_left, shelved_again] {
+        let mut fixture = put_aside();
+        let mut model = shown(&fixture, Theme::FULL, "v");
+        change(&mut fixture.aside);
+        let change = |model: &mut Model| drop(update(model, Msg::Snapshot(fixture.snapshot())));
+        acts_only_on_what_was_drawn(&mut model, change, "u");
     }
 }

@@ -189,9 +189,9 @@ fn aside(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
     let theme = cx.theme;
     let (width, height) = (canvas.width(), canvas.height());
     let all: &[AsideAlarm] = &cx.snapshot.aside;
-    canvas.text(1, 0, "Judged and put on record, but not annunciated. u takes back.", theme.dim());
+    canvas.text(1, 0, "Evaluated and journaled, but not annunciated. u puts back.", theme.dim());
     if all.is_empty() {
-        canvas.text(6, 2, "Nothing is put aside.", theme.normal());
+        canvas.text(6, 2, "No alarm is suppressed.", theme.normal());
         return;
     }
     let place = tab.aside(cx).and_then(|aside| all.iter().position(|other| other.id == aside.id)).unwrap_or(0);

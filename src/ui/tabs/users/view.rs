@@ -44,7 +44,7 @@ fn users(cx: &Cx, place: usize, canvas: &mut Canvas) {
         canvas.text(0, y as u16 + 1, &pad(&fit(&text, width), width), style);
     }
     if all.is_empty() {
-        canvas.text(1, 2, "Nobody has a name and a password here yet; n adds somebody.", theme.dim());
+        canvas.text(1, 2, "No users: a demonstration needs no login.", theme.dim());
     }
 }
 
