@@ -158,7 +158,7 @@ impl Recorder {
 
     fn run(mut self, queue: &queue::Receiver<Message>, told: &watch::Sender<Recorded>) {
         loop {
-            let next = match self.recorded == self.taken {
+            let next = match self.is_written() {
                 true => queue.recv().map_err(|_| queue::RecvTimeoutError::Disconnected),
                 false => queue.recv_timeout(AGAIN),
             };
@@ -178,6 +178,9 @@ impl Recorder {
         }
         // The last chance of what could not be written until now.
         self.write();
+        if !self.pending.is_empty() {
+            tracing::error!(actions = self.pending.len(), "the station ends, and these are not in the audit log");
+        }
         told.send_replace(self.status());
     }
 
@@ -208,7 +211,7 @@ impl Recorder {
         self.store(missing);
     }
 
-    /// The log first: an alarm that is acknowledged on disk without a trace of who did it would be worse than one that is not.
+    /// The log first: a loss of power between the two leaves no acknowledged alarm without a trace of who did it.
     fn write(&mut self) {
         if self.book.is_none() && REOPEN <= self.opened_at.elapsed() {
             self.open();
@@ -216,9 +219,14 @@ impl Recorder {
         self.write_log();
         let written = if self.in_use { Err(io::Error::other(IN_USE)) } else { self.alarms.write() };
         self.alarm_fault = written.err().map(|error| error.to_string());
-        if self.pending.is_empty() && self.alarm_fault.is_none() {
+        if self.is_written() {
             self.recorded = self.taken;
         }
+    }
+
+    /// Everything that was taken, and what is said of the log itself, is on disk.
+    fn is_written(&self) -> bool {
+        self.pending.is_empty() && self.alarm_fault.is_none()
     }
 
     /// Opens the log; what is found is put on record in it.
@@ -231,11 +239,7 @@ impl Recorder {
                 if !broken.is_empty() {
                     self.found.push(format!("the audit trail was tampered with: {}", broken.join("; ")));
                 }
-                let mut notes: Vec<_> = opened.wrong.iter().map(|wrong| self.note(wrong)).collect();
-                if self.unsealed > 0 {
-                    notes.push(self.note(&format!("{} actions before this one are not in it", self.unsealed)));
-                    self.unsealed = 0;
-                }
+                let notes: Vec<_> = opened.wrong.iter().map(|wrong| self.note(wrong)).collect();
                 // In front of what waits.
                 self.pending.splice(0..0, notes.into_iter().map(|action| Pending { action, stored: false }));
                 self.write_log();
@@ -251,14 +255,17 @@ impl Recorder {
 
     /// Into the log, and on to the history; without a seal while the log cannot be written.
     fn write_log(&mut self) {
-        let mut actions: Vec<ActionRecord> = self.pending.iter().map(|pending| pending.action.clone()).collect();
+        let lacks = format!("{} actions before this one are not in it", self.unsealed);
+        let lacks = (self.unsealed > 0).then(|| self.note(&lacks));
+        let waiting = self.pending.iter().map(|pending| pending.action.clone());
+        let mut actions: Vec<ActionRecord> = lacks.into_iter().chain(waiting).collect();
         if actions.is_empty() {
             return;
         }
         match self.book.as_mut().map(|book| book.append(&mut actions)) {
             Some(Ok(())) => {
                 self.pending.clear();
-                self.log_fault = None;
+                (self.unsealed, self.log_fault) = (0, None);
                 return self.store(actions);
             }
             Some(Err(error)) => self.fail(&error),

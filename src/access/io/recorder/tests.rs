@@ -207,6 +207,41 @@ fn a_log_that_cannot_be_written_for_long_keeps_the_latest_actions_and_says_how_m
 }
 
 #[test]
+fn a_full_disk_that_outlasts_the_waiting_actions_leaves_a_trace_in_the_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let history_file = folder.path().join("tank.duckdb");
+    let path = beside(&history_file);
+    let (history, _rows) = mpsc::channel(64);
+    let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
+    recorder.open();
+    // The file stays as it is and takes nothing, so it is not opened again.
+    recorder.book.as_mut().unwrap().set_file(fs::File::open(&path).unwrap());
+    recorder.take(batch(&vec!["write"; PENDING_MAX + 7], &[]));
+    recorder.write();
+    assert!(recorder.status().log.unwrap().contains(&format!("{} actions are not in it", PENDING_MAX + 7)));
+    recorder.book.as_mut().unwrap().set_file(OpenOptions::new().append(true).open(&path).unwrap());
+    recorder.write();
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.lines().next().unwrap().contains("7 actions before this one are not in it"));
+    assert_eq!(verify(&path, &[]).unwrap().entries, PENDING_MAX as u64 + 1);
+}
+
+#[test]
+fn what_is_said_of_the_log_itself_waits_for_the_disk_like_every_action() {
+    let folder = tempfile::tempdir().unwrap();
+    let history_file = folder.path().join("tank.duckdb");
+    life(&history_file, &["start"]);
+    let (history, _rows) = mpsc::channel(64);
+    let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
+    recorder.tail = recorder.open().tail;
+    assert!(recorder.is_written());
+    recorder.book.as_mut().unwrap().set_file(fs::File::open(beside(&history_file)).unwrap());
+    recorder.compare(&[]);
+    recorder.write();
+    assert!(!recorder.is_written(), "it is tried again each second");
+}
+
+#[test]
 fn what_was_acknowledged_is_found_by_the_next_station_without_any_history() {
     let folder = tempfile::tempdir().unwrap();
     let history_file = folder.path().join("tank.duckdb");
