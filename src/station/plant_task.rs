@@ -38,8 +38,8 @@ const SNAPSHOT_EVERY: Duration = Duration::from_millis(100);
 const PAPERS_MAX: Duration = Duration::from_secs(3);
 /// At the end a history that is still being opened is waited for so long.
 const HISTORY_MAX: Duration = Duration::from_secs(2);
-/// At the end the folder of parameter sets is waited for so long.
-const FILING_MAX: Duration = Duration::from_secs(2);
+/// At the end the plant file and the folder of parameter sets are waited for so long, each.
+const FILES_MAX: Duration = Duration::from_secs(2);
 /// Real time between two ticks at the least; one second of plant time otherwise.
 const TICK_MIN: Duration = Duration::from_millis(20);
 
@@ -198,13 +198,13 @@ impl PlantTask {
             self.take_paper(paper);
         }
         if self.saving.is_some() {
-            // What was begun is ended: half a second of a disk at the most.
-            let saved = saved(&mut self.saving).await;
-            self.take_saved(saved);
+            match tokio::time::timeout(FILES_MAX, saved(&mut self.saving)).await {
+                Ok(saved) => self.take_saved(saved),
+                Err(_) => tracing::error!("the disk of the plant file does not answer: left behind"),
+            }
         }
         if self.filing.is_some() {
-            // A disk that hangs keeps nobody from leaving.
-            match tokio::time::timeout(FILING_MAX, filed(&mut self.filing)).await {
+            match tokio::time::timeout(FILES_MAX, filed(&mut self.filing)).await {
                 Ok(done) => self.take_filed(done),
                 Err(_) => tracing::error!("the folder of the parameter sets does not answer: left behind"),
             }
