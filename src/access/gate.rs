@@ -17,7 +17,7 @@ use std::{
     time::Duration,
 };
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 
 use self::{
     paper::{clean, deed, record, seat_name, words},
@@ -84,6 +84,8 @@ pub enum Effect {
 #[derive(Debug)]
 pub struct Gate {
     def: Arc<PlantDef>,
+    /// What its times lack of UTC.
+    behind_utc: SignedDuration,
     /// `None` where nobody is asked who he is: in a demonstration.
     people: Option<Users>,
     /// Why login is closed: the users file could not be read.
@@ -110,6 +112,7 @@ impl Gate {
     pub fn new(def: Arc<PlantDef>, host: Option<Arc<str>>) -> Gate {
         Gate {
             def,
+            behind_utc: SignedDuration::ZERO,
             people: None,
             closed: None,
             host,
@@ -386,6 +389,19 @@ impl Gate {
             effects.extend(self.save_logins());
         }
         effects
+    }
+
+    /// The system clock was set, or not: what leaves the gate is in UTC, its own times are steady.
+    pub fn follow_clock(&mut self, behind_utc: SignedDuration) -> Vec<Effect> {
+        if self.behind_utc == behind_utc {
+            return Vec::new();
+        }
+        self.behind_utc = behind_utc;
+        self.seats.keys().copied().map(Effect::Standing).collect()
+    }
+
+    fn utc(&self, at: Timestamp) -> Timestamp {
+        at.checked_add(self.behind_utc).unwrap_or(at)
     }
 
     /// Who sits here, if he may do what needs this role. `Err` says in words for him why not.

@@ -160,7 +160,8 @@ impl Door {
                     }
                     // Who has left waits for no answer any more.
                     self.tickets.retain(|_, reply| !reply.is_closed());
-                    let effects = self.gate.tick(self.clock.now());
+                    let mut effects = self.gate.follow_clock(self.clock.behind_utc());
+                    effects.extend(self.gate.tick(self.clock.now()));
                     self.carry_out(effects);
                 }
             }

@@ -65,10 +65,11 @@ impl Gate {
     pub(super) fn sit_down(&mut self, terminal: u32, who: Who, at: Timestamp) -> Vec<Effect> {
         let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
         let name = who.user.clone();
+        let utc = at.checked_add(self.behind_utc).unwrap_or(at);
         seat.enter(who, at);
         let mut effects = vec![deed(seat, "login", &name, "done", at)];
         if let Some(people) = &mut self.people {
-            people.logged_in(&name, at);
+            people.logged_in(&name, utc);
             self.unsaved = true;
         }
         self.tell(terminal, &mut effects);

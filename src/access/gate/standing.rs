@@ -45,7 +45,7 @@ impl Gate {
             user: user.name.clone(),
             role: user.role,
             disabled: user.disabled,
-            locked_until: self.tries.locked_until(&user::key(&user.name), &self.def.access, at),
+            locked_until: self.tries.locked_until(&user::key(&user.name), &self.def.access, at).map(|at| self.utc(at)),
             must_change: user.must_change,
             last_login: user.last_login,
         });
@@ -57,7 +57,7 @@ impl Gate {
             terminal: *terminal,
             user: seat.who.as_ref().map(|who| who.user.clone()),
             from: seat.peer.from.clone(),
-            since: seat.since,
+            since: self.utc(seat.since),
             locked: seat.locked,
         });
         rows.collect()

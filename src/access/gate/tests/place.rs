@@ -39,3 +39,19 @@ fn who_guesses_at_a_locked_terminal_waits_as_long_as_anywhere_else() {
     bench.later(300);
     bench.wish(1, Wish::Unlock(TECH.into())).unwrap();
 }
+
+#[test]
+fn after_the_clock_was_set_the_lists_of_a_supervisor_are_in_utc_and_lock_outs_go_on() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "10.0.0.5");
+    bench.open(2, "10.0.0.6");
+    bench.login(1, "boss", BOSS).unwrap();
+    let years = jiff::SignedDuration::from_hours(24 * 365 * 56);
+    assert_eq!(bench.gate.follow_clock(years), [Effect::Standing(1), Effect::Standing(2)]);
+    assert_eq!(bench.gate.follow_clock(years), [], "once");
+    bench.login(2, "tech", TECH).unwrap();
+    let standing = bench.gate.standing(1, bench.now);
+    assert!(standing.sessions.iter().all(|row| row.since == bench.now + years));
+    let tech = standing.users.iter().find(|row| &*row.user == "tech").unwrap();
+    assert_eq!(tech.last_login, Some(bench.now + years));
+}
