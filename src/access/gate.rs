@@ -46,6 +46,9 @@ pub use work::{Job, Outcome, Work};
 /// Said where a terminal asks more than it may.
 const TOO_MANY: &str = "too many requests from this terminal, wait a moment";
 
+/// Said of an order that was made before the station was started again, with the same plant file or with another.
+const OTHER_RUN: &str = "the station was started again since this was shown: look and confirm again";
+
 /// Where a terminal is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Peer {
@@ -84,6 +87,8 @@ pub enum Effect {
 #[derive(Debug)]
 pub struct Gate {
     def: Arc<PlantDef>,
+    /// The run of the station: orders made in another one are refused.
+    run: u64,
     /// What its times lack of UTC.
     behind_utc: SignedDuration,
     /// `None` where nobody is asked who he is: in a demonstration.
@@ -112,6 +117,7 @@ impl Gate {
     pub fn new(def: Arc<PlantDef>, host: Option<Arc<str>>) -> Gate {
         Gate {
             def,
+            run: 0,
             behind_utc: SignedDuration::ZERO,
             people: None,
             closed: None,
@@ -139,6 +145,11 @@ impl Gate {
             closed: Some(format!("login is closed: {why}").into()),
             ..Gate::with_people(def, Users::default(), host)
         }
+    }
+
+    /// The same gate in this run of the station.
+    pub fn in_run(self, run: u64) -> Gate {
+        Gate { run, ..self }
     }
 
     /// The [`Users::digest`] of its users; `None` in a demonstration, or while login is closed.
@@ -212,6 +223,10 @@ impl Gate {
         let stops = request.command.written().is_some_and(|(tag, value)| guard::is_stop(&self.def, tag, value));
         if !self.heard(terminal, at) && !stops {
             return self.undelivered(request.id, TOO_MANY);
+        }
+        if request.run != self.run {
+            // On record it would name what the plant file of this run has in its place.
+            return self.undelivered(request.id, OTHER_RUN);
         }
         let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
         let number = request.id.number;

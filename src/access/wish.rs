@@ -6,6 +6,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use crate::plant::{
+    Snapshot,
     command::{Command, OrderId},
     role::Role,
 };
@@ -120,6 +121,9 @@ pub struct Signature {
 pub struct OrderRequest {
     /// Chosen by the terminal.
     pub id: OrderId,
+    /// The run of the station whose snapshot it was made on, see [`Snapshot::run`]. The ids in the command mean nothing in
+    /// another run: the plant file may have changed.
+    pub run: u64,
     /// What.
     pub command: Command,
     /// The value of the tag that the operator saw when he confirmed.
@@ -131,9 +135,14 @@ pub struct OrderRequest {
 }
 
 impl OrderRequest {
-    /// An order without note and signature.
-    pub fn new(id: OrderId, command: Command) -> OrderRequest {
-        OrderRequest { id, command, seen: None, note: None, sign: None }
+    /// An order without seen value, note and signature.
+    pub fn new(run: u64, id: OrderId, command: Command) -> OrderRequest {
+        OrderRequest { id, run, command, seen: None, note: None, sign: None }
+    }
+
+    /// An order made on what a snapshot shows.
+    pub fn on(snapshot: &Snapshot, id: OrderId, command: Command) -> OrderRequest {
+        OrderRequest { seen: snapshot.seen(&command), ..OrderRequest::new(snapshot.run, id, command) }
     }
 }
 

@@ -147,7 +147,7 @@ impl Own {
 }
 
 fn status(request: &OrderRequest, by: Arc<str>, at: Timestamp, outcome: Outcome) -> OrderStatus {
-    let OrderRequest { id, command, seen, note, sign: _ } = request.clone();
+    let OrderRequest { id, run: _, command, seen, note, sign: _ } = request.clone();
     OrderStatus { id, by, from: "".into(), note, command, at, old: seen, outcome, recorded: true }
 }
 

@@ -56,7 +56,8 @@ pub struct Place {
 /// What the station tells a terminal that may stay; it follows the greeting of the station.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Welcome {
-    /// Which run of the station this is: another one counts terminals anew.
+    /// Which run of the station this is, see [`Snapshot::run`](crate::plant::Snapshot::run): another one counts terminals
+    /// from 1 again.
     pub run: u64,
     /// The number of this terminal.
     pub terminal: u32,

@@ -14,6 +14,8 @@ use crate::plant::{
 pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
     let Snapshot {
         at,
+        run,
+        stepped,
         def,
         decimals,
         lines,
@@ -40,6 +42,8 @@ pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
     };
     Snapshot {
         at: *at,
+        run: *run,
+        stepped: *stepped,
         samples: vec![Sample::bad(Cause::Withheld, *at); def.tags.len()],
         texts: Arc::new(vec![None; def.tags.len()]),
         decimals: decimals.clone(),

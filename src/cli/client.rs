@@ -132,10 +132,9 @@ pub async fn ordered(
     let sign = sign::needed(&session.snapshots.borrow().def, &command) == Some(Sign::Password);
     let sign = password.filter(|_| sign).map(|password| Signature { user: None, password });
     let request = crate::access::OrderRequest {
-        seen: session.snapshots.borrow().seen(&command),
         sign,
         note: note.map(Into::into),
-        ..crate::access::OrderRequest::new(id, command)
+        ..crate::access::OrderRequest::on(&session.snapshots.borrow(), id, command)
     };
     session.send(crate::station::Request::Order(request)).map_err(|why| CliError::Failed(why.to_owned()))?;
     let ended = |snapshot: &Snapshot| {

@@ -69,6 +69,7 @@ impl Snapshot {
         if by.is_zero() {
             return;
         }
+        self.stepped = self.stepped.saturating_add(by);
         shift(&mut self.at, by);
         self.samples.iter_mut().for_each(|sample| shift(&mut sample.at, by));
         self.lines.iter_mut().for_each(|line| line.shift(by));

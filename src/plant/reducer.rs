@@ -11,7 +11,7 @@ mod tests;
 
 use std::{mem::discriminant, sync::Arc};
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 
 use super::{
     alarm::{AlarmQuality, Book, Meter, command::check_words},
@@ -53,6 +53,8 @@ pub struct Effects {
 pub struct Plant {
     def: Arc<PlantDef>,
     at: Timestamp,
+    /// Which run of the station, by the instant at which it began.
+    run: u64,
     board: Board,
     book: Book,
     /// Counts the steps of alarms; `quality` is what it said last.
@@ -103,6 +105,7 @@ impl Plant {
             programs: vec![ProgramWatch::default(); def.devices.len()],
             def,
             at,
+            run: at.as_microsecond() as u64,
             speed,
         }
     }
@@ -264,6 +267,8 @@ impl Plant {
         let lists = self.book.lists();
         Snapshot {
             at: self.at,
+            run: self.run,
+            stepped: SignedDuration::ZERO,
             def: self.def.clone(),
             samples: self.board.samples().to_vec(),
             texts: self.board.texts().clone(),

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -33,6 +33,10 @@ use super::{
 pub struct Snapshot {
     /// The instant.
     pub at: Timestamp,
+    /// Which run of the station: another one may have another plant file.
+    pub run: u64,
+    /// What the system clock was set by since the run began: without it, `at` is steady time.
+    pub stepped: SignedDuration,
     /// What never changes.
     pub def: Arc<PlantDef>,
     /// Samples, by [`TagId`].
@@ -81,6 +85,8 @@ impl Snapshot {
         let (tags, devices) = (def.tags.len(), def.devices.len());
         Snapshot {
             at: Timestamp::UNIX_EPOCH,
+            run: 0,
+            stepped: SignedDuration::ZERO,
             samples: vec![Sample::bad(Cause::NotRead, Timestamp::UNIX_EPOCH); tags],
             texts: Arc::new(vec![None; tags]),
             decimals: vec![0; tags],

@@ -197,7 +197,9 @@ fn assemble(
             stopped,
         )));
     }
-    let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
+    let first = plant.snapshot();
+    let run = first.run;
+    let (publish, snapshots) = watch::channel(Arc::new(first));
     let desk = PlantTask::new(plant, clock, links, file, keeping, publish);
     let (deeds, deed_queue) = mpsc::channel(ORDERS);
     tasks.push(tokio::spawn(desk.run(event_queue, order_queue, deed_queue)));
@@ -207,7 +209,7 @@ fn assemble(
     let open = guarded.is_none();
     let (gate, users) =
         guarded.map_or_else(|| (Gate::new(def, Some(own_user().into())), None), |(gate, users)| (gate, Some(users)));
-    let door = Door::new(gate, clock, ways, users);
+    let door = Door::new(gate.in_run(run), clock, ways, users);
     tasks.push(tokio::spawn(door.run(knocks, requests, stopped)));
     Station { entrance, orders, commands, history, book, open, stop, tasks }
 }

@@ -58,8 +58,8 @@ impl Session {
     /// Gives an order without note and signature; its outcome is seen in a later snapshot.
     pub fn order(&self, number: u32, command: Command) -> Result<OrderId, &'static str> {
         let id = OrderId { terminal: self.terminal, number };
-        let seen = self.snapshots.borrow().seen(&command);
-        self.send(Request::Order(OrderRequest { seen, ..OrderRequest::new(id, command) }))?;
+        let request = OrderRequest::on(&self.snapshots.borrow(), id, command);
+        self.send(Request::Order(request))?;
         Ok(id)
     }
 

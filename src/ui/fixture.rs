@@ -172,6 +172,8 @@ impl Fixture {
             texts: Arc::new(vec![None; self.def.tags.len()]),
             evidence: Arc::new(self.evidence.clone()),
             at: now(),
+            run: 7,
+            stepped: SignedDuration::ZERO,
             samples: self.samples.clone(),
             decimals: decimals.collect(),
             lines: vec![self.line.clone()],

@@ -75,8 +75,8 @@ impl Model {
         let undelivered = self.standing.gone.as_ref().map(|_| "the station has gone");
         let changed_at = self.clock.phase;
         self.watch = Some(Watch { id, command: command.clone(), status: None, changed_at, undelivered });
-        let seen = seen.or_else(|| self.snapshot.seen(&command));
-        let request = OrderRequest { seen, sign, note, ..OrderRequest::new(id, command) };
+        let request = OrderRequest::on(&self.snapshot, id, command);
+        let request = OrderRequest { seen: seen.or(request.seen), sign, note, ..request };
         undelivered.is_none().then_some(Effect::Order(request))
     }
 

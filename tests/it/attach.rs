@@ -426,8 +426,9 @@ async fn an_order_with_the_number_of_another_terminal_or_of_no_tag_never_arrives
     let mut stream = UnixStream::connect(stand.path()).await.unwrap();
     stream.write_all(&hello()).await.unwrap();
     let own = protocol::welcome(&next(&mut stream).await).unwrap().unwrap().terminal;
-    let order =
-        |terminal, command| asked(&Asked::Order(Box::new(OrderRequest::new(OrderId { terminal, number: 1 }, command))));
+    let order = |terminal, command| {
+        asked(&Asked::Order(Box::new(OrderRequest::new(0, OrderId { terminal, number: 1 }, command))))
+    };
     for (bytes, expected) in [
         (order(own + 1, Command::Alarm(AlarmCommand::Silence)), "this is terminal"),
         (order(own, Command::Write { tag: TagId(u16::MAX), value: 1.0 }), "tag number 65535"),

@@ -196,13 +196,12 @@ fn everybody() -> Users {
 }
 
 pub async fn login(session: &Session, user: &str, password: &str) -> Result<(), String> {
-    session.wish(Wish::Login { user: user.into(), password: password.into() }).await
+    session.wish(Wish::Login { user: user.into(), password: password.into() }).await.map(drop)
 }
 
 /// An order of this terminal.
 pub fn request(session: &Session, number: u32, command: Command) -> OrderRequest {
-    let seen = session.snapshots.borrow().seen(&command);
-    OrderRequest { seen, ..OrderRequest::new(OrderId { terminal: session.terminal, number }, command) }
+    OrderRequest::on(&session.snapshots.borrow(), OrderId { terminal: session.terminal, number }, command)
 }
 
 /// Waits until a snapshot is so, and gives it.

@@ -1,10 +1,12 @@
 //! Settings of a line: tried out on a running station, saved into its plant file, and what is said where that cannot be.
+//! Orders made before a reload of the plant file.
 
 use std::{fs, path::Path, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use sightglass::{
     access::OrderRequest,
+    attach::io::{connect::connect, serve::listen},
     bus::io::{clock::Clock, transport::Connector},
     plant::{
         PlantDef, Snapshot,
@@ -28,7 +30,11 @@ const L1: LineId = LineId(0);
 
 /// The tank on a simulated rig whose port can be opened three times.
 fn start(def: &Arc<PlantDef>, file: Option<PlantFile>, history: &Path) -> station::io::Station {
-    let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
+    start_at(Timestamp::UNIX_EPOCH, def, file, history)
+}
+
+fn start_at(base: Timestamp, def: &Arc<PlantDef>, file: Option<PlantFile>, history: &Path) -> station::io::Station {
+    let clock = Clock::starting_at(base, 1.0);
     let (ports, streams) = mpsc::channel(3);
     let world = WorldHandle::spawn(World::tank(Rig::demo()), clock);
     for _ in 0..3 {
@@ -56,7 +62,8 @@ async fn until(session: &mut Session, what: &str, so: impl Fn(&Snapshot) -> bool
 
 async fn order(session: &mut Session, number: u32, command: Command) -> Outcome {
     let id = OrderId { terminal: session.terminal, number };
-    session.send(Request::Order(OrderRequest::new(id, command))).unwrap();
+    let request = OrderRequest::on(&session.snapshots.borrow(), id, command);
+    session.send(Request::Order(request)).unwrap();
     let of = move |snapshot: &Snapshot| snapshot.orders.iter().find(|order| order.id == id).cloned();
     until(session, "the order has ended", |snapshot| {
         of(snapshot).is_some_and(|order| order.outcome != Outcome::Pending)
@@ -121,6 +128,56 @@ async fn a_plant_without_a_file_says_that_nothing_can_be_saved() {
     let outcome = order(&mut session, 1, Command::SaveSettings(L1)).await;
     let Outcome::Refused(Refusal::NotSaved(why)) = outcome else { panic!("{outcome:?}") };
     assert!(why.contains("part of the program"), "{why}");
+    drop(session);
+    station.stop().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_order_that_was_made_before_a_reload_is_refused_and_writes_nothing() {
+    let folder = folder();
+    let (socket, history) = (folder.path().join("tank.sock"), folder.path().join("tank.duckdb"));
+    let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
+    let write = |snapshot: &Snapshot, number| {
+        let command = Command::Write { tag: snapshot.def.tag_named("TIC-1.SV").unwrap(), value: 61.0 };
+        OrderRequest::on(snapshot, OrderId { terminal: 1, number }, command)
+    };
+    let mut listener = listen(&socket).unwrap();
+    let station = start(&def, None, &history);
+    let entrance = station.entrance().clone();
+    let serving = tokio::spawn(async move {
+        listener.serve(&entrance).await;
+        listener
+    });
+    let mut session = connect(&socket).await.unwrap();
+    until(&mut session, "all answer", all_answer).await;
+    // The confirmation is open while the plant file is reloaded.
+    let open = write(&session.snapshots.borrow(), 1);
+    station.stop().await;
+    let mut listener = serving.await.unwrap();
+    let changed = Arc::new(PlantDef { title: "Another tank".to_owned(), ..PlantDef::clone(&def) });
+    let base = Timestamp::UNIX_EPOCH + jiff::SignedDuration::from_hours(1);
+    let station = start_at(base, &changed, None, &history);
+    let entrance = station.entrance().clone();
+    tokio::spawn(async move { listener.serve(&entrance).await });
+    until(&mut session, "the other plant", |snapshot| snapshot.def.title == "Another tank" && all_answer(snapshot))
+        .await;
+
+    let (id, before) = (open.id, session.snapshots.borrow().sample(changed.tag_named("TIC-1.SV").unwrap()).value);
+    session.send(Request::Order(open)).unwrap();
+    let of = |snapshot: &Snapshot, id| snapshot.orders.iter().find(|order| order.id == id).cloned();
+    let ended = |snapshot: &Snapshot, id| of(snapshot, id).is_some_and(|order| order.outcome != Outcome::Pending);
+    until(&mut session, "an outcome", |snapshot| ended(snapshot, id)).await;
+    let outcome = of(&session.snapshots.borrow(), id).unwrap().outcome;
+    let Outcome::Refused(Refusal::NotPermitted(why)) = outcome else { panic!("{outcome:?}") };
+    assert!(why.contains("started again since this was shown"), "{why}");
+
+    // What is made on the new plant is done, so the refused one had its time.
+    let again = write(&session.snapshots.borrow(), 2);
+    assert_eq!(again.seen, before, "nothing was written");
+    let id = again.id;
+    session.send(Request::Order(again)).unwrap();
+    until(&mut session, "an outcome", |snapshot| ended(snapshot, id)).await;
+    assert_eq!(of(&session.snapshots.borrow(), id).unwrap().outcome, Outcome::Verified);
     drop(session);
     station.stop().await;
 }

@@ -116,7 +116,7 @@ impl Bench {
     fn order(&mut self, terminal: u32, command: Command, sign: Option<Signature>) -> Option<(Order, Option<Refusal>)> {
         self.last_order += 1;
         let id = OrderId { terminal, number: self.last_order };
-        let request = OrderRequest { sign, note: Some("why".into()), ..OrderRequest::new(id, command) };
+        let request = OrderRequest { sign, note: Some("why".into()), ..OrderRequest::new(0, id, command) };
         let effects = self.gate.order(terminal, request, self.now);
         let effects = self.work(effects);
         let order = effects.into_iter().find_map(|effect| match effect {

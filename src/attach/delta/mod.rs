@@ -10,7 +10,7 @@ mod tests;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use serde::{Deserialize, Serialize};
 
 use crate::plant::{
@@ -32,6 +32,8 @@ use readings::{Evidence, Readings};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Delta {
     at: Timestamp,
+    run: Option<u64>,
+    stepped: Option<SignedDuration>,
     samples: Vec<Readings>,
     texts: List<Option<Arc<str>>>,
     decimals: List<u8>,
@@ -70,6 +72,8 @@ impl Delta {
         // Taken apart, so that nobody adds a field and forgets it here.
         let Snapshot {
             at,
+            run,
+            stepped,
             def,
             samples,
             texts,
@@ -96,6 +100,8 @@ impl Delta {
             lines.filter_map(|(place, (def, (old, new)))| Some((place as u16, LineDelta::between(def, old, new)?)));
         Delta {
             at: *at,
+            run: (old.run != *run).then_some(*run),
+            stepped: (old.stepped != *stepped).then_some(*stepped),
             samples: readings::between(&old.samples, samples),
             texts: shared(&old.texts, texts),
             decimals: List::between(&old.decimals, decimals),
@@ -122,6 +128,12 @@ impl Delta {
     /// Makes the old snapshot the new one. After an error the snapshot is good for nothing.
     pub fn apply(self, snapshot: &mut Snapshot) -> Result<(), Unfit> {
         snapshot.at = self.at;
+        if let Some(run) = self.run {
+            snapshot.run = run;
+        }
+        if let Some(stepped) = self.stepped {
+            snapshot.stepped = stepped;
+        }
         readings::apply(self.samples, &mut snapshot.samples)?;
         if let Some(texts) = self.texts.made_of(&snapshot.texts)? {
             snapshot.texts = Arc::new(texts);

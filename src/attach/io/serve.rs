@@ -8,7 +8,6 @@ use std::{
     time::Duration,
 };
 
-use jiff::Timestamp;
 use rustix::fs::{FlockOperation, flock};
 use tokio::{
     net::{
@@ -200,7 +199,7 @@ struct Left {
 /// All connections to one run of the station.
 struct Connections<'a> {
     entrance: &'a Entrance,
-    /// A number that another run does not have: terminals are numbered from 1 in each.
+    /// Which run of the station: each counts its terminals from 1.
     run: u64,
     began: Instant,
     callers: Callers,
@@ -223,7 +222,7 @@ impl Listener {
         look.set_missed_tick_behavior(MissedTickBehavior::Skip);
         let mut connections = Connections {
             entrance,
-            run: Timestamp::now().as_microsecond() as u64,
+            run: snapshots.borrow().run,
             began: Instant::now(),
             callers: Callers::new(rustix::process::getuid().as_raw()),
             strangers: JoinSet::new(),

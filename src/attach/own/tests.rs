@@ -10,7 +10,7 @@ use crate::{plant::command::Command, ui::fixture::Fixture};
 const NOT_CONFIRMED: Outcome = Outcome::NotConfirmed(NotConfirmed::ConnectionLost);
 
 fn request(terminal: u32, number: u32) -> OrderRequest {
-    OrderRequest::new(OrderId { terminal, number }, Command::Alarm(AlarmCommand::Silence))
+    OrderRequest::new(1, OrderId { terminal, number }, Command::Alarm(AlarmCommand::Silence))
 }
 
 fn snapshot(orders: &[(u32, u32, Outcome)]) -> Arc<Snapshot> {

@@ -76,7 +76,7 @@ fn what_a_terminal_says_of_itself_cannot_disturb_a_screen_or_say_who_it_is() {
 
 #[test]
 fn requests_and_news_survive_the_way() {
-    let order = OrderRequest::new(OrderId { terminal: 1, number: 2 }, Command::Write { tag: TagId(0), value: 0.1 });
+    let order = OrderRequest::new(7, OrderId { terminal: 1, number: 2 }, Command::Write { tag: TagId(0), value: 0.1 });
     let asked = [
         Asked::Order(Box::new(order)),
         Asked::Ask { ticket: 1, question: Question::Journal { from: now(), to: now(), limit: 5 } },
@@ -178,7 +178,7 @@ proptest! {
         let order = OrderRequest {
             note: Some("because".into()),
             sign: Some(signature),
-            ..OrderRequest::new(OrderId { terminal: 1, number: 2 }, Command::Write { tag: TagId(3), value: 7.5 })
+            ..OrderRequest::new(7, OrderId { terminal: 1, number: 2 }, Command::Write { tag: TagId(3), value: 7.5 })
         };
         let mut bytes = body(encode(&Asked::Order(Box::new(order)), REQUEST_BYTES_MAX).unwrap());
         let place = place % bytes.len();

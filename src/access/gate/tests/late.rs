@@ -78,7 +78,7 @@ fn an_unlock_or_a_signature_counts_only_in_the_session_it_was_given_in() {
     bench.login(2, "tech", TECH).unwrap();
     let sign = Some(Signature { user: Some("boss".to_owned()), password: BOSS.into() });
     let id = OrderId { terminal: 2, number: 50 };
-    let effects = bench.gate.order(2, OrderRequest { sign, ..OrderRequest::new(id, SV) }, bench.now);
+    let effects = bench.gate.order(2, OrderRequest { sign, ..OrderRequest::new(0, id, SV) }, bench.now);
     bench.wish(2, Wish::Logout).unwrap();
     let effects = bench.gate.done(under_way(&effects), Outcome::Verified(true), bench.now);
     let given = effects.iter().any(|effect| matches!(effect, Effect::Order(Order { refused: None, .. })));
