@@ -11,4 +11,4 @@ pub mod io;
 
 pub use gate::{Effect, Gate, Peer};
 pub use user::Users;
-pub use wish::{OrderRequest, Secret, SessionRow, Signature, Standing, UserRow, Who, Wish};
+pub use wish::{Durability, OrderRequest, Secret, SessionRow, Signature, Standing, UserRow, Who, Wish};

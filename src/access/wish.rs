@@ -107,6 +107,15 @@ pub enum Wish {
     Reload,
 }
 
+/// Whether what was granted is in the audit log, on disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Durability {
+    /// It is, or nothing had to be recorded.
+    Recorded,
+    /// It was done, and the disk has not taken the record yet: a loss of power loses it.
+    NotRecorded,
+}
+
 /// What is given again for a tag that asks for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Signature {

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::delta::Delta;
 use crate::{
-    access::{OrderRequest, Standing, Wish},
+    access::{Durability, OrderRequest, Standing, Wish},
     history::{Answer, HistoryError, Question},
     plant::{PlantDef, command::OrderId, visible::acts},
 };
@@ -105,7 +105,7 @@ pub enum Told {
         /// Of the wish.
         ticket: u64,
         /// Done, or why not.
-        answer: Result<(), String>,
+        answer: Result<Durability, String>,
     },
     /// An order did not reach the plant.
     Undelivered {

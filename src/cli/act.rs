@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::plant::{
     Snapshot,
     alarm::book::subject_name,
-    command::{Command, OrderStatus, Outcome},
+    command::{Command, Outcome},
     def::TagId,
     orders::outcome_words,
 };
@@ -65,7 +65,7 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
         // What the station says that the device holds, which need not be what was typed.
         let new = status.command.written().map(|(_, held)| held);
         let (old, new, unit) = (words(status.old), words(new), snapshot.unit(tag));
-        let recorded = recorded_words(&status);
+        let recorded = client::recorded_words(status.recorded);
         let line = format!("{} {old} → {new} {unit}: {}{recorded}", args.tag, outcome_words(&status.outcome));
         match status.outcome {
             Outcome::Verified | Outcome::Unchanged => {
@@ -105,18 +105,13 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
             if status.outcome != Outcome::Verified {
                 return Err(CliError::Failed(line + &outcome_words(&status.outcome)));
             }
-            say(&(line + "acknowledged" + recorded_words(&status)));
+            say(&(line + "acknowledged" + client::recorded_words(status.recorded)));
         }
         if waiting.is_empty() {
             say("nothing to acknowledge");
         }
         Ok(())
     })
-}
-
-/// Said behind an outcome that the disk of the station has not taken.
-fn recorded_words(status: &OrderStatus) -> &'static str {
-    if status.recorded { "" } else { " (not recorded: the disk of the station does not take it)" }
 }
 
 /// A word of the tag, or a number. The station checks range and decimals.

@@ -3,7 +3,7 @@
 use std::{io::IsTerminal, time::Duration};
 
 use crate::{
-    access::{Signature, Wish, gate::sign, wish::Secret},
+    access::{Durability, Signature, Wish, gate::sign, wish::Secret},
     attach::io::{connect, find},
     plant::{
         Snapshot,
@@ -67,7 +67,8 @@ async fn attach_with_password(plant: Option<&str>, login: &Login) -> Result<(Ses
     let mut session = open(plant).await?;
     let Some(user) = login.user.clone() else { return Ok((session, None)) };
     let password = Secret(password(&user)?);
-    session.wish(Wish::Login { user, password: password.clone() }).await.map_err(CliError::Failed)?;
+    let granted = session.wish(Wish::Login { user, password: password.clone() }).await.map_err(CliError::Failed)?;
+    warn_not_recorded("logged in", granted);
     let settled = async {
         // The answer may come before the standing, and the standing before the picture that belongs to it.
         let _ = session.standing.wait_for(|standing| standing.who.is_some()).await;
@@ -93,6 +94,18 @@ pub async fn attach_to_act(plant: Option<&str>, login: &Login) -> Result<(Sessio
         return Err(CliError::Failed("log in to act: --user NAME asks for the password".to_owned()));
     }
     Ok((session, password))
+}
+
+/// Said behind an outcome that the disk of the station has not taken.
+pub fn recorded_words(recorded: bool) -> &'static str {
+    if recorded { "" } else { " (not recorded: the disk of the station does not take it)" }
+}
+
+/// Warns of what the station has granted and its disk has not taken.
+pub fn warn_not_recorded(what: &str, durability: Durability) {
+    if durability == Durability::NotRecorded {
+        super::say_error(&format!("{what}{}", recorded_words(false)));
+    }
 }
 
 /// Attaches to a station.

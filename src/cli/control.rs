@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::{
-    access::Wish,
+    access::{Durability, Wish},
     attach::io::find::{self, Found},
 };
 
@@ -58,8 +58,8 @@ async fn gone(place: &Found) -> Result<(), CliError> {
 pub fn reload(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let session = client::attach(args.plant.as_deref(), &args.login).await?;
-        session.wish(Wish::Reload).await.map_err(CliError::Usage)?;
-        say("reloaded");
+        let durability = session.wish(Wish::Reload).await.map_err(CliError::Usage)?;
+        say(&format!("reloaded{}", client::recorded_words(durability == Durability::Recorded)));
         Ok(())
     })
 }

@@ -82,6 +82,9 @@ impl Source {
     pub async fn exported(&self, file: &str, bytes: &[u8]) -> Result<(), CliError> {
         let Source::Station(session) = self else { return Ok(()) };
         let sha256 = crate::access::book::sha256(bytes);
-        session.wish(crate::access::Wish::Exported { file: file.to_owned(), sha256 }).await.map_err(CliError::Failed)
+        let wish = crate::access::Wish::Exported { file: file.to_owned(), sha256 };
+        let durability = session.wish(wish).await.map_err(CliError::Failed)?;
+        client::warn_not_recorded(&format!("exported to {file}"), durability);
+        Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! The way of actions and alarms to the disk, and what the station itself puts there: start, stop, plant file, steps of the clock.
 
 use std::{
-    collections::VecDeque,
+    collections::{HashMap, VecDeque},
     sync::{Arc, mpsc as queue},
     time::Duration,
 };
@@ -14,20 +14,23 @@ use tokio::{
 
 use crate::{
     access::{
+        Durability,
         book::{PLANT_FILE, USERS_FILE, sha256},
         io::recorder::{Batch, Handle, Message, Recorded},
     },
     history::alarm_state::LatestSteps,
     plant::{
         Snapshot,
+        alarm::book::subject_name,
         command::{OrderId, OrderStatus, Outcome},
+        def::AlarmId,
         record::{ActionRecord, AlarmRecord, Seal},
     },
     profile::PlantFile,
 };
 
-/// A snapshot that shows an outcome, and the answer to a wish, wait so long for the disk; after that the outcome is shown as
-/// not recorded until it is.
+/// A snapshot that shows an outcome, and the answer to a request of a terminal, wait so long for the disk; after that both
+/// say that it is not recorded.
 const WAIT_MAX: Duration = Duration::from_secs(1);
 /// Actions that wait for a place in the queue; the oldest of more go to the history alone.
 const BACKLOG_MAX: usize = 1_000;
@@ -41,8 +44,9 @@ const ANSWERS_MAX: usize = 64;
 pub enum Paper {
     /// Put this into the book.
     Deed(ActionRecord),
-    /// Tell this once the book has what came before it: nobody is told that something is done which a loss of power undoes.
-    Answer(oneshot::Sender<Result<(), String>>, Result<(), String>),
+    /// Send this once the log has what came before it, or say that it has not: what is reported as recorded survives a loss
+    /// of power.
+    Answer(oneshot::Sender<Result<Durability, String>>, Result<(), String>),
     /// So many deeds found no room on this way.
     Lost(u64),
 }
@@ -52,14 +56,15 @@ pub enum Paper {
 struct Answer {
     batches: u64,
     since: Instant,
-    reply: oneshot::Sender<Result<(), String>>,
+    reply: oneshot::Sender<Result<Durability, String>>,
     answer: Result<(), String>,
 }
 
 impl Answer {
-    /// Whoever has left needs no answer.
-    fn tell(self) {
-        let _ = self.reply.send(self.answer);
+    /// Sends it, while the disk has so many batches. A terminal that has left needs none.
+    fn send(self, recorded: u64) {
+        let durability = if self.batches <= recorded { Durability::Recorded } else { Durability::NotRecorded };
+        let _ = self.reply.send(self.answer.map(|()| durability));
     }
 }
 
@@ -77,6 +82,8 @@ pub struct Deeds {
     behind: Instant,
     /// Orders that have ended, and the batch with the action of each.
     ended: VecDeque<(OrderId, u64)>,
+    /// Alarms, by subject and text, with the batch of the last step of an operator that is not on disk.
+    steps: HashMap<(Arc<str>, Arc<str>), u64>,
     /// Actions that the queue had no room for: they are in the history only.
     left_out: u64,
     /// Deeds that did not even come here.
@@ -101,6 +108,7 @@ impl Deeds {
             needed: 0,
             behind: Instant::now(),
             ended: VecDeque::new(),
+            steps: HashMap::new(),
             left_out: 0,
             lost: 0,
             answers: VecDeque::new(),
@@ -144,6 +152,8 @@ impl Deeds {
             }
             self.needed = self.sent + 1;
         }
+        let by_operators = steps.iter().filter(|step| step.by.is_some());
+        self.steps.extend(by_operators.map(|step| ((step.subject.clone(), step.text.clone()), self.needed)));
         self.backlog.extend(actions);
         steps.into_iter().for_each(|step| self.backlog_steps.take(step));
         self.send()
@@ -182,29 +192,30 @@ impl Deeds {
         self.lost += count;
     }
 
-    /// Tells an answer once all that was put here before it is on disk; see [`Deeds::tell`].
-    pub fn answer(&mut self, reply: oneshot::Sender<Result<(), String>>, answer: Result<(), String>) {
+    /// Sends an answer once all that was put here before it is on disk; see [`Deeds::tell`].
+    pub fn answer(&mut self, reply: oneshot::Sender<Result<Durability, String>>, answer: Result<(), String>) {
         self.answers.push_back(Answer { batches: self.needed, since: Instant::now(), reply, answer });
         let _ = self.tell();
     }
 
-    /// Tells the answers whose deeds are on disk, and those that have waited too long: what is not recorded is said by
-    /// [`Deeds::trouble`] meanwhile. Gives back actions as [`Deeds::put`].
+    /// Sends the answers whose actions are on disk, and those that have waited too long as not recorded. Gives back actions
+    /// as [`Deeds::put`].
     pub fn tell(&mut self) -> Vec<ActionRecord> {
         let (recorded, alive) = (self.recorded.borrow().batches, self.recorded.has_changed().is_ok());
         let is_due = |answer: &Answer| !alive || answer.batches <= recorded || WAIT_MAX <= answer.since.elapsed();
         while let Some(answer) = self.answers.pop_front_if(|answer| is_due(answer)) {
-            answer.tell();
+            answer.send(recorded);
         }
         while ANSWERS_MAX < self.answers.len() {
-            self.answers.pop_front().into_iter().for_each(Answer::tell);
+            self.answers.pop_front().into_iter().for_each(|answer| answer.send(recorded));
         }
         self.send()
     }
 
-    /// The station ends: what it has begun to write is written, so nobody need wait.
+    /// The station ends: no answer waits any longer.
     pub fn tell_all(&mut self) {
-        self.answers.drain(..).for_each(Answer::tell);
+        let recorded = self.recorded.borrow().batches;
+        self.answers.drain(..).for_each(|answer| answer.send(recorded));
     }
 
     /// When a snapshot may go out that could have gone at `next`: not before the disk has what it shows. After [`WAIT_MAX`]
@@ -215,7 +226,7 @@ impl Deeds {
         if alive && self.recorded.borrow().batches < self.needed { next.max(self.behind + WAIT_MAX) } else { next }
     }
 
-    /// Marks the orders of a snapshot whose actions are not on disk.
+    /// Marks in a snapshot what is not on disk: ended orders, and what operators did with alarms.
     pub fn mark(&mut self, snapshot: &mut Snapshot) {
         let (recorded, needed) = (self.recorded.borrow().batches, self.needed);
         let has_ended = |order: &&mut OrderStatus| order.outcome != Outcome::Pending;
@@ -229,6 +240,21 @@ impl Deeds {
         }
         let excess = self.ended.len().saturating_sub(ORDERS_MAX);
         self.ended.drain(..excess);
+        self.steps.retain(|_, batch| recorded < *batch);
+        if self.steps.is_empty() {
+            return;
+        }
+        let is_recorded = |id: AlarmId| {
+            let alarm = snapshot.def.alarm(id);
+            let name = (subject_name(&snapshot.def, alarm.subject).into(), alarm.text.as_str().into());
+            !self.steps.contains_key(&name)
+        };
+        for alarm in Arc::make_mut(&mut snapshot.alarms) {
+            alarm.acknowledged.iter_mut().for_each(|deed| deed.recorded = is_recorded(alarm.id));
+        }
+        for alarm in Arc::make_mut(&mut snapshot.aside) {
+            alarm.deed.recorded = is_recorded(alarm.id);
+        }
     }
 
     /// Waits until the disk has taken something.

@@ -12,6 +12,7 @@ use std::{
 
 use tokio::{
     sync::{mpsc, oneshot, watch},
+    task::JoinSet,
     time::MissedTickBehavior,
 };
 
@@ -21,7 +22,7 @@ use super::{
     toil::{Done, Toil},
 };
 use crate::{
-    access::{Effect, Gate, Peer, Standing},
+    access::{Durability, Effect, Gate, Peer, Standing},
     bus::io::clock::Clock,
     history::{HistoryError, io::Query},
     plant::{Snapshot, command::Order},
@@ -101,13 +102,26 @@ impl Entrance {
     }
 }
 
+/// What became of the record of something that is answered.
+#[derive(Clone, Copy, PartialEq)]
+enum Record {
+    /// There is none.
+    None,
+    /// It is on its way to the log.
+    Sent,
+    /// There was no room for it.
+    Lost,
+}
+
 /// Sole owner of the gate.
 pub struct Door {
     gate: Gate,
     clock: Clock,
     ways: Ways,
     terminals: BTreeMap<u32, watch::Sender<Arc<Standing>>>,
-    tickets: BTreeMap<u64, oneshot::Sender<Result<(), String>>>,
+    tickets: BTreeMap<u64, oneshot::Sender<Result<Durability, String>>>,
+    /// Reloads whose outcome is awaited, with their tickets.
+    reloads: JoinSet<(u64, Result<(), String>)>,
     last_ticket: u64,
     toil: Toil,
     /// Deeds that did not reach the book, not told yet.
@@ -117,8 +131,17 @@ pub struct Door {
 impl Door {
     /// A door that nobody has come to. `users` is the file that they are kept in.
     pub fn new(gate: Gate, clock: Clock, ways: Ways, users: Option<PathBuf>) -> Door {
-        let (terminals, tickets) = (BTreeMap::new(), BTreeMap::new());
-        Door { gate, clock, ways, terminals, tickets, last_ticket: 0, toil: Toil::new(users), lost: 0 }
+        Door {
+            gate,
+            clock,
+            ways,
+            terminals: BTreeMap::new(),
+            tickets: BTreeMap::new(),
+            reloads: JoinSet::new(),
+            last_ticket: 0,
+            toil: Toil::new(users),
+            lost: 0,
+        }
     }
 
     /// Runs until the station stops.
@@ -146,6 +169,7 @@ impl Door {
                     };
                     self.carry_out(effects);
                 }
+                Some(Ok((ticket, answer))) = self.reloads.join_next() => self.reply(ticket, answer, Record::Sent),
                 Some((terminal, request)) = requests.recv() => self.take(terminal, request),
                 _ = tick.tick() => {
                     let gone: Vec<u32> =
@@ -204,8 +228,8 @@ impl Door {
     }
 
     fn carry_out(&mut self, effects: Vec<Effect>) {
-        // What is answered is in the book before.
-        let is_deed = effects.iter().any(|effect| matches!(effect, Effect::Record(_)));
+        // An answer follows its record on the way to the log.
+        let mut record = Record::None;
         let mut answers = Vec::new();
         for effect in effects {
             match effect {
@@ -218,10 +242,12 @@ impl Door {
                     }
                 }
                 Effect::Record(deed) => {
-                    if let Err(error) = self.ways.deeds.try_send(Paper::Deed(deed)) {
-                        tracing::error!(%error, "a deed did not reach the book");
+                    let sent = self.ways.deeds.try_send(Paper::Deed(deed));
+                    if let Err(error) = &sent {
+                        tracing::error!(%error, "an action did not reach the audit log");
                         self.lost += 1;
                     }
+                    record = if sent.is_ok() && record != Record::Lost { Record::Sent } else { Record::Lost };
                 }
                 Effect::Reply(ticket, answer) => answers.push((ticket, answer)),
                 Effect::Standing(terminal) => {
@@ -233,9 +259,10 @@ impl Door {
                 Effect::Save(users) => self.toil.save(users),
                 Effect::Stop => self.command(Command::Stop),
                 Effect::Reload(ticket) => {
-                    if let Some(reply) = self.tickets.remove(&ticket) {
-                        self.command(Command::Reload(reply));
-                    }
+                    let (reply, answer) = oneshot::channel();
+                    let ended = || Err("the station has ended".to_owned());
+                    self.reloads.spawn(async move { (ticket, answer.await.unwrap_or_else(|_| ended())) });
+                    self.command(Command::Reload(reply));
                 }
                 Effect::HangUp(terminal, why) => {
                     // The audit log holds it, in bounded rate; whoever comes without end must not fill this one.
@@ -247,22 +274,24 @@ impl Door {
             }
         }
         for (ticket, answer) in answers {
-            self.reply(ticket, answer, is_deed);
+            self.reply(ticket, answer, record);
         }
     }
 
-    fn reply(&mut self, ticket: u64, answer: Result<(), String>, is_deed: bool) {
+    fn reply(&mut self, ticket: u64, answer: Result<(), String>, record: Record) {
         let Some(reply) = self.tickets.remove(&ticket) else { return };
-        let late = match is_deed {
-            true => self.ways.deeds.try_send(Paper::Answer(reply, answer)).err(),
-            // A terminal that has left needs no answer.
-            false => return drop(reply.send(answer)),
+        // A terminal that has left needs no answer.
+        let (reply, answer, durability) = match record {
+            Record::None => (reply, answer, Durability::Recorded),
+            Record::Lost => (reply, answer, Durability::NotRecorded),
+            Record::Sent => {
+                match self.ways.deeds.try_send(Paper::Answer(reply, answer)).map_err(|error| error.into_inner()) {
+                    Err(Paper::Answer(reply, answer)) => (reply, answer, Durability::NotRecorded),
+                    Ok(()) | Err(_) => return,
+                }
+            }
         };
-        if let Some(error) = late
-            && let Paper::Answer(reply, answer) = error.into_inner()
-        {
-            let _ = reply.send(answer);
-        }
+        let _ = reply.send(answer.map(|()| durability));
     }
 
     fn command(&mut self, command: Command) {

@@ -15,6 +15,7 @@ use super::{
     sets,
 };
 use crate::{
+    access::Durability,
     bus::io::clock::Clock,
     history::io::{open::Restored, thread::offer},
     plant::{
@@ -197,6 +198,7 @@ impl PlantTask {
         while let Ok(Some(paper)) = tokio::time::timeout(PAPERS_MAX, papers.recv()).await {
             self.take_paper(paper);
         }
+        // What was begun is ended, but a disk that hangs does not keep the station from ending.
         if self.saving.is_some() {
             match tokio::time::timeout(FILES_MAX, saved(&mut self.saving)).await {
                 Ok(saved) => self.take_saved(saved),
@@ -247,8 +249,8 @@ impl PlantTask {
         match (paper, &mut self.keeping.book) {
             (Paper::Deed(deed), _) => self.keep(vec![Record::Action(deed)]),
             (Paper::Answer(reply, answer), Some(book)) => book.answer(reply, answer),
-            // Whoever has left needs no answer.
-            (Paper::Answer(reply, answer), None) => drop(reply.send(answer)),
+            // A terminal that has left needs no answer.
+            (Paper::Answer(reply, answer), None) => drop(reply.send(answer.map(|()| Durability::NotRecorded))),
             (Paper::Lost(count), Some(book)) => book.lost(count),
             (Paper::Lost(_), None) => {}
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::{
-    access::{OrderRequest, Standing, Wish},
+    access::{Durability, OrderRequest, Standing, Wish},
     history::io::Query,
     plant::{
         Snapshot,
@@ -40,7 +40,7 @@ pub enum Request {
     /// A question to the history.
     Ask(Query),
     /// A wish about people or the station.
-    Wish(Wish, oneshot::Sender<Result<(), String>>),
+    Wish(Wish, oneshot::Sender<Result<Durability, String>>),
 }
 
 impl Session {
@@ -69,7 +69,7 @@ impl Session {
     }
 
     /// Wishes, and waits for the answer.
-    pub async fn wish(&self, wish: Wish) -> Result<(), String> {
+    pub async fn wish(&self, wish: Wish) -> Result<Durability, String> {
         let (reply, answer) = oneshot::channel();
         self.send(Request::Wish(wish, reply))?;
         answer.await.unwrap_or_else(|_| Err("the station has ended".to_owned()))

@@ -100,7 +100,7 @@ async fn without_users(history: &Path) -> (bool, Result<(), String>, Result<(), 
         ticked.alarms.iter().any(|alarm| ticked.def.alarm(alarm.id).text == StationFault::UsersFile.message());
     drop(session);
     station.stop().await;
-    (alarmed, login, first)
+    (alarmed, login.map(drop), first.map(drop))
 }
 
 #[tokio::test(flavor = "multi_thread")]

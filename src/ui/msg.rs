@@ -7,7 +7,7 @@ use jiff::Timestamp;
 
 use super::{Confirmed, modal::Modal, tabs::Tab};
 use crate::{
-    access::{OrderRequest, Standing, Wish},
+    access::{Durability, OrderRequest, Standing, Wish},
     history::{Answer, HistoryError, Question},
     plant::{
         command::{Command, OrderId},
@@ -31,7 +31,7 @@ pub enum Msg {
     /// News of who sits here.
     Standing(Arc<Standing>),
     /// A wish was granted, or why not.
-    Granted(AskId, Result<(), String>),
+    Granted(AskId, Result<Durability, String>),
     /// News of the simulation.
     Drill(Arc<drill::Status>),
     /// The history answered.

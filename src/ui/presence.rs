@@ -12,7 +12,7 @@ use super::{
     with_tabs,
 };
 use crate::{
-    access::{Standing, Wish},
+    access::{Durability, Standing, Wish},
     plant::snapshot::Snapshot,
 };
 
@@ -20,6 +20,9 @@ use crate::{
 const ACTIVE_TICKS: u32 = 60;
 /// The same once the station has said that it will lock.
 const WARNED_TICKS: u32 = 4;
+
+/// Said of what the station has done and its disk has not taken.
+const NOT_RECORDED: &str = "Done, but NOT RECORDED: the disk of the station does not take it";
 
 /// What the terminal remembers of the station's dealings with whoever sits here, in ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -204,7 +207,11 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
 
 /// The station's answer to a request: for the window that waits for it, also one that a lock has hidden, else for the tab,
 /// which waits for its last request only.
-pub(super) fn on_granted(model: &mut Model, id: AskId, answer: Result<(), String>) -> Vec<Act> {
+pub(super) fn on_granted(model: &mut Model, id: AskId, answer: Result<Durability, String>) -> Vec<Act> {
+    if answer == Ok(Durability::NotRecorded) {
+        model.note = Some(NOT_RECORDED);
+    }
+    let answer = answer.map(drop);
     if matches!(id.tab, Tab::Reports | Tab::Bus) {
         // A file that waits to be written waits for its own answer, whatever was wished since.
         return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));

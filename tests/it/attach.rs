@@ -9,7 +9,7 @@ use std::{
 };
 
 use sightglass::{
-    access::{OrderRequest, Standing, Wish},
+    access::{Durability, OrderRequest, Standing, Wish},
     attach::{
         callers::TERMINALS_MAX,
         io::{
@@ -154,7 +154,7 @@ fn answer(request: Request, orders: &watch::Sender<Arc<Snapshot>>) {
             snapshot.orders.truncate(32);
         }),
         Request::Ask(query) => drop(query.reply.send(Err(HistoryError::EmptyPeriod))),
-        Request::Wish(Wish::Stop, reply) => drop(reply.send(Ok(()))),
+        Request::Wish(Wish::Stop, reply) => drop(reply.send(Ok(Durability::Recorded))),
         Request::Wish(_, reply) => drop(reply.send(Err("not yet".into()))),
     }
 }
@@ -221,7 +221,7 @@ async fn a_terminal_sees_the_plant_gives_orders_and_is_told_where_it_is() {
     session.order(7, Command::Alarm(AlarmCommand::Silence)).unwrap();
     until(&mut session, "the order has an outcome", |snapshot| !snapshot.orders.is_empty()).await;
     assert_eq!(of(&session, 7), Some(Outcome::Verified));
-    assert_eq!(session.wish(Wish::Stop).await, Ok(()));
+    assert_eq!(session.wish(Wish::Stop).await, Ok(Durability::Recorded));
     assert_eq!(session.wish(Wish::Logout).await, Err("not yet".to_owned()));
     let (reply, answer) = oneshot::channel();
     let at = session.snapshots.borrow().at;

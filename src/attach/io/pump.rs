@@ -13,7 +13,7 @@ use super::{
     wire::{self, WireError},
 };
 use crate::{
-    access::Standing,
+    access::{Durability, Standing},
     attach::{
         own::{GONE, Own},
         protocol::{self, Asked, NEWS_BYTES_MAX, Place, REQUEST_BYTES_MAX, Told, Welcome},
@@ -35,7 +35,7 @@ const IN: usize = 4;
 /// A question or wish that waits for its answer.
 enum Waiting {
     Ask(oneshot::Sender<Result<Answer, HistoryError>>),
-    Wish(oneshot::Sender<Result<(), String>>),
+    Wish(oneshot::Sender<Result<Durability, String>>),
 }
 
 impl Waiting {

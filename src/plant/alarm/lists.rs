@@ -92,7 +92,7 @@ fn put_aside(id: AlarmId, machine: &Machine) -> Option<AsideAlarm> {
     let deed = match state {
         AlarmState::OutOfService => machine.out_of_service()?.clone(),
         AlarmState::Shelved => machine.shelved()?.deed.clone(),
-        AlarmState::Suppressed => Deed { at: machine.suppressed()?, by: None, reason: None },
+        AlarmState::Suppressed => Deed { at: machine.suppressed()?, by: None, reason: None, recorded: true },
         AlarmState::Normal
         | AlarmState::Unacknowledged
         | AlarmState::Acknowledged

@@ -94,6 +94,8 @@ pub struct Deed {
     pub by: Option<Arc<str>>,
     /// The note or reason.
     pub reason: Option<Arc<str>>,
+    /// It is on disk.
+    pub recorded: bool,
 }
 
 /// An alarm that is shelved.
@@ -232,7 +234,7 @@ impl Machine {
     /// Takes a step: one that was just decided, or one that the journal remembers after a restart. Both end in the same
     /// state, because this is the only place where it changes.
     pub fn apply(&mut self, step: &AlarmRecord, latch: bool) {
-        let deed = || Deed { at: step.at, by: step.by.clone(), reason: step.reason.clone() };
+        let deed = || Deed { at: step.at, by: step.by.clone(), reason: step.reason.clone(), recorded: true };
         match step.step {
             AlarmStep::Raised => {
                 (self.active, self.unacknowledged, self.pending_since) = (true, true, None);
@@ -389,7 +391,7 @@ mod tests {
     #[test]
     fn a_shelving_is_never_longer_than_it_was_given_for() {
         let at = |second| Timestamp::from_second(second).expect("a small number");
-        let deed = Deed { at: at(1_000), by: None, reason: None };
+        let deed = Deed { at: at(1_000), by: None, reason: None, recorded: true };
         let shelving = Shelving { deed, until: at(1_600) };
         assert_eq!(shelving.moved(at(1_500)), None);
         assert_eq!(shelving.moved(at(100)), Some(at(700)));

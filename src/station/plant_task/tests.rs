@@ -27,7 +27,7 @@ struct Station {
     task: JoinHandle<()>,
     recorder: std::thread::JoinHandle<()>,
     _blocked: mpsc::Receiver<Vec<Record>>,
-    _papers: mpsc::Sender<Paper>,
+    papers: mpsc::Sender<Paper>,
     _requests: mpsc::Receiver<BusRequest>,
 }
 
@@ -56,16 +56,8 @@ impl Station {
         let task = PlantTask::new(plant, clock, vec![request], None, keeping, publish);
         let task = tokio::spawn(task.run(event_queue, order_queue, paper_queue));
         let recorder = recorder.join;
-        let station = Station {
-            events,
-            orders,
-            snapshots,
-            task,
-            recorder,
-            _blocked: blocked,
-            _papers: papers,
-            _requests: requests,
-        };
+        let station =
+            Station { events, orders, snapshots, task, recorder, _blocked: blocked, papers, _requests: requests };
         let tags: Vec<TagId> = def.tags_of(fixture::TIC).map(|tag| tag.id).collect();
         let silent =
             Event::Failed { at: clock.now(), device: fixture::TIC, tags, fault: Fault::Resting, exchange: None };
@@ -93,8 +85,8 @@ impl Station {
     }
 
     async fn stop(self) {
-        let Station { events, task, recorder, _papers, .. } = self;
-        drop((events, _papers));
+        let Station { events, task, recorder, papers, .. } = self;
+        drop((events, papers));
         task.await.unwrap();
         tokio::task::spawn_blocking(move || recorder.join()).await.unwrap().unwrap();
     }
@@ -134,12 +126,41 @@ async fn what_the_disk_does_not_take_is_done_and_shown_as_not_recorded_until_it_
     assert!(!snapshot.orders[0].recorded, "it is done, and nobody is told that it is recorded");
     let silent = snapshot.alarms.iter().find(|alarm| alarm.id == fixture::SILENT).unwrap();
     assert!(!silent.state.needs_acknowledgement());
+    assert!(!silent.acknowledged.as_ref().unwrap().recorded, "and the alarm says so");
     let trouble = station.snapshots.wait_for(|snapshot| snapshot.history.trouble.is_some()).await.unwrap().clone();
     let trouble = trouble.history.trouble.as_ref().unwrap();
     assert!(trouble.contains("the state of the alarms cannot be written"), "{trouble}");
     fs::remove_dir(&obstacle).unwrap();
-    station.told(|recorded| recorded).await;
+    let snapshot = station.told(|recorded| recorded).await;
+    let silent = snapshot.alarms.iter().find(|alarm| alarm.id == fixture::SILENT).unwrap();
+    assert!(silent.acknowledged.as_ref().unwrap().recorded);
     assert_eq!(steps(&history), [AlarmStep::Raised, AlarmStep::Acknowledged]);
+    station.stop().await;
+}
+
+#[tokio::test]
+async fn a_login_is_reported_as_not_recorded_while_the_disk_takes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let history = folder.path().join("fixture.duckdb");
+    let obstacle = alarm_file::beside(&history);
+    fs::create_dir(&obstacle).unwrap();
+    let mut station = Station::start(&history).await;
+    let answer = |papers: &mpsc::Sender<Paper>| {
+        let (reply, answer) = tokio::sync::oneshot::channel();
+        papers.try_send(Paper::Deed(deeds::stopped("login", jiff::Timestamp::UNIX_EPOCH))).unwrap();
+        papers.try_send(Paper::Answer(reply, Ok(()))).unwrap();
+        answer
+    };
+    let unwritten = |snapshot: &Arc<Snapshot>| {
+        let trouble = snapshot.history.trouble.as_ref();
+        trouble.is_some_and(|trouble| trouble.contains("the state of the alarms cannot be written"))
+    };
+    station.snapshots.wait_for(unwritten).await.unwrap();
+    assert_eq!(answer(&station.papers).await.unwrap(), Ok(Durability::NotRecorded));
+    fs::remove_dir(&obstacle).unwrap();
+    // A slow disk may need more than one.
+    let recorded = async { while answer(&station.papers).await.unwrap() != Ok(Durability::Recorded) {} };
+    tokio::time::timeout(Duration::from_secs(60), recorded).await.unwrap();
     station.stop().await;
 }
 

@@ -7,7 +7,7 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use super::{acts_only_on_what_was_drawn, model, order_of, screen, type_keys};
 use crate::{
     access::{
-        OrderRequest, Standing, Who, Wish,
+        Durability, OrderRequest, Standing, Who, Wish,
         wish::{SessionRow, UserRow},
     },
     history::{Answer, Question},
@@ -66,7 +66,7 @@ fn wish(effects: &[Effect]) -> Option<&Wish> {
 
 fn answer(model: &mut Model, answer: Result<(), &str>) {
     let id = AskId { tab: Tab::Login, number: model.presence.wished };
-    update(model, Msg::Granted(id, answer.map_err(str::to_owned)));
+    update(model, Msg::Granted(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
 }
 
 fn shows(model: &mut Model, words: &str) {
@@ -239,7 +239,7 @@ fn a_form_that_waits_when_the_terminal_is_locked_takes_its_answer() {
         let Some(Effect::Wish(id, Wish::SetRole { .. })) = effects.last().cloned() else { panic!("{effects:?}") };
         ctrl(&mut model, 'k');
         stand(&mut model, |standing| standing.locked = true);
-        update(&mut model, Msg::Granted(id, answer.map_err(str::to_owned)));
+        update(&mut model, Msg::Granted(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
         stand(&mut model, |standing| standing.locked = false);
         match left {
             Some(words) => shows(&mut model, words),
@@ -501,7 +501,7 @@ fn the_users_and_what_can_be_done_with_them() {
         let id = AskId { tab: Tab::Users, number: model.presence.wished };
         update(&mut model, Msg::Granted(id, Err("at least one Supervisor must remain".to_owned())));
         shows(&mut model, "at least one Supervisor must remain");
-        update(&mut model, Msg::Granted(id, Ok(())));
+        update(&mut model, Msg::Granted(id, Ok(Durability::Recorded)));
     };
     let user = "boris".to_owned();
     let password = || "correct horse battery".into();

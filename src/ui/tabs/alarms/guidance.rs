@@ -155,6 +155,9 @@ fn now_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
     if let Some(deed) = &alarm.acknowledged {
         let by = deed.by.as_deref().unwrap_or("the station");
         words += &format!(", acknowledged {} by {by}", clock(deed.at, zone));
+        if !deed.recorded {
+            words += " (NOT RECORDED)";
+        }
         if let Some(note) = &deed.reason {
             words += &format!(": {note}");
         }

@@ -61,7 +61,7 @@ fn storm() -> Fixture {
         if n == 2 {
             alarm.state = AlarmState::Acknowledged;
             let reason = Some("pump is looked at".into());
-            alarm.acknowledged = Some(Deed { at: ago(20), by: Some("anna".into()), reason });
+            alarm.acknowledged = Some(Deed { at: ago(20), by: Some("anna".into()), reason, recorded: true });
         }
         if n == 4 {
             (alarm.state, alarm.returned_at) = (AlarmState::LatchedUnacknowledged, Some(ago(9)));
@@ -84,6 +84,7 @@ fn put_aside() -> Fixture {
         at: ago(seconds),
         by: by.map(Arc::from),
         reason: reason.map(Arc::from),
+        recorded: true,
     };
     let (until, aside) = (Some(now() + SignedDuration::from_secs(2_460)), &mut fixture.aside);
     aside.push(AsideAlarm {
@@ -415,7 +416,7 @@ fn every_priority_in_every_state_looks_different_without_colour() {
             }
             let mut fixture = Fixture::alarm();
             fixture.def.alarms[0].priority = priority;
-            let deed = Deed { at: now(), by: None, reason: None };
+            let deed = Deed { at: now(), by: None, reason: None, recorded: true };
             if state.is_aside() {
                 fixture.alarms.clear();
                 fixture.aside = vec![AsideAlarm { id: AlarmId(0), state, deed, until: None, active: true }];

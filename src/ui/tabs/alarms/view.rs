@@ -271,7 +271,9 @@ fn cells(cx: &Cx, row: &Row, what: u16) -> [String; 9] {
 
 /// `1st temperature high > 72.0 +14 more, 3 unack`: how many are folded under it is never cut off.
 fn what_words(cx: &Cx, row: &Row, room: u16) -> String {
+    let unrecorded = row.alarm.acknowledged.as_ref().is_some_and(|deed| !deed.recorded);
     let mark = match (row.first, row.under) {
+        _ if unrecorded => "ack NOT RECORDED: ",
         (true, _) => "1st ",
         (false, true) => cx.theme.pick("└ ", "` "),
         (false, false) => "",

@@ -5,7 +5,7 @@ use ratatui::{Terminal, backend::TestBackend};
 
 use super::*;
 use crate::{
-    access::Wish,
+    access::{Durability, Wish},
     plant::{
         def::Priority,
         record::{ActionRecord, AlarmRecord, AlarmStep},
@@ -24,13 +24,13 @@ struct Stand {
     asked: Vec<(AskId, Question)>,
     saved: Vec<(PathBuf, Vec<u8>)>,
     /// What the station says to an export.
-    granted: Result<(), String>,
+    granted: Result<Durability, String>,
 }
 
 impl Stand {
     fn new(theme: Theme, width: u16, height: u16) -> Stand {
         let model = Model::new(Fixture::normal().snapshot(), theme, 1, crate::ui::fixture::standing());
-        let mut stand = Stand { model, asked: Vec::new(), saved: Vec::new(), granted: Ok(()) };
+        let mut stand = Stand { model, asked: Vec::new(), saved: Vec::new(), granted: Ok(Durability::Recorded) };
         stand.send(Msg::Resize(width, height));
         stand.press("5");
         stand
