@@ -120,6 +120,10 @@ impl<'a> Cx<'a> {
     pub fn flash(&self) -> bool {
         self.phase % 4 < 2
     }
+    /// The time that no setting of a clock moves: for what is asked again after a while.
+    pub fn steady(&self) -> Timestamp {
+        self.now.checked_sub(self.snapshot.stepped).unwrap_or(self.now)
+    }
     /// Age of a tag's sample now.
     pub fn age(&self, tag: crate::plant::def::TagId) -> Duration {
         Duration::try_from(self.now.duration_since(self.snapshot.sample(tag).at)).unwrap_or_default()

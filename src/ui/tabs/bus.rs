@@ -263,17 +263,17 @@ impl Bus {
         if let (Page::Frames, Some(at)) = (self.page, Place::of(cx, self.line)) {
             self.frames.follow(cx, &at);
         }
-        if self.page != Page::Line || !self.errand.due(cx.now, ASK_EVERY, PATIENCE) {
+        if self.page != Page::Line || !self.errand.due(cx.steady(), ASK_EVERY, PATIENCE) {
             return Vec::new();
         }
         self.asked = self.asked.wrapping_add(1);
-        self.errand.asked(self.asked, cx.now);
+        self.errand.asked(self.asked, cx.steady());
         vec![Act::ask(Tab::Bus, self.asked, line_trend::question(self.line, cx.now))]
     }
 
     /// The history has answered. Without an answer the day before is left as it was.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
-        if let (Some(_), Ok(Answer::LineMinutes(minutes))) = (self.errand.answered(number, cx.now), answer) {
+        if let (Some(_), Ok(Answer::LineMinutes(minutes))) = (self.errand.answered(number, cx.steady()), answer) {
             self.minutes = minutes;
         }
     }

@@ -360,11 +360,11 @@ impl Controllers {
     pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
         let plate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
         let Some(plate) = plate.filter(|_| self.page == Page::Device) else { return Vec::new() };
-        if !self.errand.due(cx.now, TREND_EVERY, PATIENCE) {
+        if !self.errand.due(cx.steady(), TREND_EVERY, PATIENCE) {
             return Vec::new();
         }
         self.asked = self.asked.wrapping_add(1);
-        self.errand.asked(self.asked, cx.now);
+        self.errand.asked(self.asked, cx.steady());
         let from = cx.now.checked_sub(plate::WINDOW).unwrap_or(cx.now);
         let question = Question::Series { tags: vec![plate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
         vec![Act::ask(Tab::Controllers, self.asked, question)]
@@ -372,7 +372,7 @@ impl Controllers {
 
     /// The history has answered.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
-        if let (Some(_), Ok(Answer::Series(series))) = (self.errand.answered(number, cx.now), answer) {
+        if let (Some(_), Ok(Answer::Series(series))) = (self.errand.answered(number, cx.steady()), answer) {
             self.trend = series.into_iter().next();
         }
     }

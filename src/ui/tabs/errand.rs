@@ -8,7 +8,7 @@ const REST: i32 = 4;
 /// where it cannot.
 const LOST: i32 = 4;
 
-/// One kind of question of a tab.
+/// One kind of question of a tab. All times are steady, see [`Cx::steady`](crate::ui::Cx::steady).
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Errand {
     on_way: Option<(u32, Timestamp)>,
@@ -22,8 +22,8 @@ impl Errand {
     /// While one is on its way, its answer is waited for; only where it is no longer what is wanted not longer than
     /// `patience`, so that fast keys never pile up questions before the history.
     pub fn due(&self, now: Timestamp, every: SignedDuration, patience: SignedDuration) -> bool {
-        // A clock that was set back must not silence the question for good; a small step back is only the difference
-        // between the time of a snapshot and what was guessed before it came.
+        // A station that was started again with a clock set back must not silence the question for good; a small step back
+        // is only the difference between the time of a snapshot and what was guessed before it came.
         let set_back = |at: Timestamp| at.duration_since(now) >= patience;
         let every = every.max(self.took * REST);
         match self.on_way {

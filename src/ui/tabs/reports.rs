@@ -179,7 +179,7 @@ impl Reports {
 
     /// The history answered question `number`; an answer for another period than the one shown is ignored.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
-        if self.errand.answered(number, cx.now).is_none() {
+        if self.errand.answered(number, cx.steady()).is_none() {
             return Vec::new();
         }
         match answer {
@@ -259,9 +259,9 @@ impl Reports {
         let settled = self.report.as_ref().is_some_and(|report| report.until >= report.period.to);
         let every = if settled && !self.is_running(cx.now) { SignedDuration::MAX } else { real(EVERY_S) };
         match &self.period {
-            Some(period) if self.errand.due(cx.now, every, real(PATIENCE_S)) => {
+            Some(period) if self.errand.due(cx.steady(), every, real(PATIENCE_S)) => {
                 self.number = self.number.wrapping_add(1);
-                self.errand.asked(self.number, cx.now);
+                self.errand.asked(self.number, cx.steady());
                 vec![Act::ask(Tab::Reports, self.number, Question::Report { period: period.clone() })]
             }
             Some(_) | None => Vec::new(),

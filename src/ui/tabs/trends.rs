@@ -170,9 +170,9 @@ impl Trends {
 
     /// The history answered question `number`; an answer to an older question is ignored.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
-        let errands = &mut self.errands;
-        let curves = errands.curves.answered(number, cx.now);
-        let (hours, raised) = (errands.hours.answered(number, cx.now), errands.raised.answered(number, cx.now));
+        let (errands, steady) = (&mut self.errands, cx.steady());
+        let curves = errands.curves.answered(number, steady);
+        let (hours, raised) = (errands.hours.answered(number, steady), errands.raised.answered(number, steady));
         let answer = match answer {
             Ok(answer) => answer,
             Err(error) => {
@@ -186,7 +186,8 @@ impl Trends {
             Answer::Series(series) => {
                 if let Some(asked) = curves {
                     self.data.trouble = None;
-                    self.take_curves(cx, series, asked);
+                    // Asked at a steady time, about times in UTC.
+                    self.take_curves(cx, series, asked.checked_add(cx.snapshot.stepped).unwrap_or(asked));
                 } else if hours.is_some() {
                     self.data.trouble = None;
                     self.data.hours = series.into_iter().map(|series| (series.tag, series)).collect();
@@ -407,10 +408,11 @@ impl Trends {
         let series = |tags: &[TagId], from, to, buckets| Question::Series { tags: tags.to_vec(), from, to, buckets };
         let mut acts = Vec::new();
         let Errands { curves, hours, raised, number } = &mut self.errands;
+        let steady = cx.steady();
         let mut due = |errand: &mut Errand, every, question: Question| {
-            if errand.due(now, every, patience) {
+            if errand.due(steady, every, patience) {
                 *number = number.wrapping_add(1);
-                errand.asked(*number, now);
+                errand.asked(*number, steady);
                 acts.push(Act::ask(Tab::Trends, *number, question));
             }
         };

@@ -99,7 +99,7 @@ impl Handover {
             return Vec::new();
         }
         *number = number.wrapping_add(1);
-        self.errand.asked(*number, cx.now);
+        self.errand.asked(*number, cx.steady());
         // What the shift before wrote down is for this one.
         let from = period::before(cx.def(), &shown).map_or(shown.from, |before| before.from);
         vec![Act::ask(Tab::Alarms, *number, Question::Actions { from, to: shown.to, limit: ROWS })]
@@ -107,7 +107,7 @@ impl Handover {
 
     /// The history answered.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self.errand.answered(number, cx.now).is_none() {
+        if self.errand.answered(number, cx.steady()).is_none() {
             return;
         }
         match answer {

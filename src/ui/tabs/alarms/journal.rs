@@ -110,7 +110,7 @@ impl Journal {
         let mut due = |errand: &mut Errand, question| {
             if span::due(cx, errand, EVERY_S, self.period.as_ref()) {
                 *number = number.wrapping_add(1);
-                errand.asked(*number, cx.now);
+                errand.asked(*number, cx.steady());
                 acts.push(Act::ask(Tab::Alarms, *number, question));
             }
         };
@@ -121,7 +121,7 @@ impl Journal {
 
     /// The history answered.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self.steps.answered(number, cx.now).or_else(|| self.deeds.answered(number, cx.now)).is_none() {
+        if self.steps.answered(number, cx.steady()).or_else(|| self.deeds.answered(number, cx.steady())).is_none() {
             return;
         }
         self.answered = true;

@@ -67,13 +67,13 @@ impl Quality {
             return Vec::new();
         }
         *number = number.wrapping_add(1);
-        self.errand.asked(*number, cx.now);
+        self.errand.asked(*number, cx.steady());
         vec![Act::ask(Tab::Alarms, *number, Question::AlarmQuality { from: period.from, to: period.to })]
     }
 
     /// The history answered.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self.errand.answered(number, cx.now).is_none() {
+        if self.errand.answered(number, cx.steady()).is_none() {
             return;
         }
         match answer {

@@ -25,7 +25,7 @@ pub fn later(cx: &Cx, shown: Option<&Period>) -> Option<Period> {
 pub fn due(cx: &Cx, errand: &Errand, seconds: f64, shown: Option<&Period>) -> bool {
     let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
     let past = shown.is_some_and(|shown| shown.to <= cx.now);
-    errand.due(cx.now, real(if past { 20.0 * seconds } else { seconds }), real(PATIENCE_S))
+    errand.due(cx.steady(), real(if past { 20.0 * seconds } else { seconds }), real(PATIENCE_S))
 }
 
 /// `morning 2026-11-21 06:00–14:00`; a period without a name of its own has its times in it already.

@@ -1,5 +1,7 @@
 //! The reports tab in the whole terminal, with a made-up report behind it.
 
+use std::sync::Arc;
+
 use crossterm::event::{KeyEvent, KeyModifiers};
 use ratatui::{Terminal, backend::TestBackend};
 
@@ -277,4 +279,19 @@ fn why_goes_through_the_values_of_the_report() {
     stand.answer(true);
     stand.press("w");
     assert!(stand.screen().contains("why TIC-1.PV"), "{}", stand.screen());
+}
+
+#[test]
+fn a_clock_that_is_set_back_does_not_keep_a_report_waiting() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    let later = |by: i64, seconds: i64| {
+        let (snapshot, by) = (Fixture::normal().snapshot(), SignedDuration::from_secs(by));
+        let at = snapshot.at + by + SignedDuration::from_secs(seconds);
+        Msg::Snapshot(Arc::new(Snapshot { at, stepped: by, ..(*snapshot).clone() }))
+    };
+    stand.answer(true);
+    stand.send(later(-50, 29));
+    assert_eq!(stand.asked, [], "the figures are not old yet");
+    stand.send(later(-50, 31));
+    assert_eq!(stand.asked.len(), 1);
 }

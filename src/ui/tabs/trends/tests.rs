@@ -407,3 +407,17 @@ fn a_snapshot_a_little_older_than_the_guessed_time_changes_nothing() {
     assert_eq!(kinds(&stand.asked), "");
     assert!(!stand.model.tabs.trends.data.traces[&TagId(0)].past().is_none_or(|past| past.buckets.is_empty()));
 }
+
+#[test]
+fn the_figures_of_a_trend_are_those_of_its_times_in_utc_after_the_clock_was_set() {
+    let screen = |by| {
+        let mut stand = Stand::new(Theme::FULL, 80, 24);
+        stand.answer();
+        let snapshot = Snapshot { stepped: by, ..(*stand.model.snapshot).clone() };
+        stand.send(Msg::Snapshot(Arc::new(snapshot)));
+        stand.press("-");
+        stand.answer();
+        stand.screen()
+    };
+    assert_eq!(screen(SignedDuration::from_hours(24 * 365 * 56)), screen(SignedDuration::ZERO));
+}

@@ -103,7 +103,7 @@ fn draw_title(trends: &Trends, cx: &Cx, canvas: &mut Canvas) {
 /// What is wrong with the history, or that it keeps us waiting.
 fn trouble(trends: &Trends, cx: &Cx) -> Option<String> {
     let errands = [&trends.errands.curves, &trends.errands.hours];
-    let slow = errands.iter().filter_map(|errand| errand.waiting(cx.now)).any(|time| time >= super::real(cx, 2.0));
+    let slow = errands.iter().filter_map(|errand| errand.waiting(cx.steady())).any(|time| time >= super::real(cx, 2.0));
     trends.data.trouble.clone().or_else(|| slow.then(|| "waiting for the history".to_owned()))
 }
 

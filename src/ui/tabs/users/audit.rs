@@ -166,11 +166,11 @@ impl Audit {
     /// Asks the history when it is time to.
     pub fn ask(&mut self, cx: &Cx) -> Vec<Act> {
         let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
-        if !self.errand.due(cx.now, real(EVERY_S), real(PATIENCE_S)) {
+        if !self.errand.due(cx.steady(), real(EVERY_S), real(PATIENCE_S)) {
             return Vec::new();
         }
         self.number = self.number.wrapping_add(1);
-        self.errand.asked(self.number, cx.now);
+        self.errand.asked(self.number, cx.steady());
         let until = cx.now + SignedDuration::from_secs(1);
         let (from, to) = self.period.as_ref().map_or((until - SPAN, until), |period| (period.from, period.to));
         let (words, by, action) = (self.words.clone(), self.who.clone(), self.action.clone());
@@ -180,7 +180,7 @@ impl Audit {
     /// The history answered question `number`.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
         // An answer to a search that is no longer meant is not shown.
-        if self.errand.answered(number, cx.now).is_none() || self.errand.is_wanted() {
+        if self.errand.answered(number, cx.steady()).is_none() || self.errand.is_wanted() {
             return;
         }
         self.answered = true;
