@@ -1,34 +1,49 @@
-//! Stations killed during writes, shelvings and logins: whatever a terminal was told is in the audit log, which is whole; the
-//! alarms are as they were, the station starts again, and its history is completed from the log.
+//! Stations killed during writes, acknowledgements, shelvings and logins, while shift reports are asked for without pause:
+//! whatever was reported as done is in the audit log, which is whole; the alarms are as they were, the station starts again,
+//! and its history is completed from the log.
 
 use std::{
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Duration,
 };
 
-use tokio::sync::watch;
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    net::{TcpListener, TcpStream},
+    sync::watch,
+};
 
 use sightglass::{
     access::{
-        OrderRequest, Users, Wish,
+        Durability, OrderRequest, Users, Wish,
         book::{Check, Entry},
         io::{book, users, users_beside},
         user::Change,
     },
     attach::io::connect::connect,
-    history::io::{
-        alarm_file::{self, AlarmFile},
-        store::Store,
+    history::{
+        Question,
+        io::{
+            Query,
+            alarm_file::{self, AlarmFile},
+            store::Store,
+        },
     },
     plant::{
+        Snapshot,
         alarm::AlarmCommand,
         command::{Command, OrderId, Outcome},
         def::AlarmId,
-        record::AlarmStep,
+        record::{AlarmRecord, AlarmStep},
         role::Role,
+        snapshot::ActiveAlarm,
     },
     profile::{self, Search},
+    report::Period,
     station::{Request, Session},
 };
 
@@ -39,33 +54,87 @@ use crate::{
 
 /// Rounds, unless `SIGHTGLASS_KILLS` says how many.
 const ROUNDS: u64 = 10;
-/// Set values that are written in turn, in tenths of a degree.
-const VALUES: std::ops::Range<u64> = 500..700;
+/// Set values are written in turn below and above the limit of [`ALARM`], in tenths of a degree, within so many tenths.
+const VALUES: [u64; 2] = [500, 610];
+const SPREAD: u64 = 90;
+/// An alarm that half of the writes raise.
+const ALARM: &str = "set value above 60";
+const ALARM_TOML: &str = r#"
+[[alarm]]
+tag = "TIC-1.SV"
+high = 60.0
+deadband = 0.1
+on_delay = "0s"
+priority = "low"
+text = "set value above 60"
+cause = "a write of this test"
+effect = "none"
+action = "acknowledge"
+"#;
+
+/// In every third round each answer of the devices takes so much longer.
+const REPLY: Duration = Duration::from_millis(400);
+const SLOW_EVERY: u64 = 3;
 
 /// What terminals were told before the station was killed.
 #[derive(Default)]
 struct Told {
     /// Notes of writes that were verified.
     writes: Vec<String>,
-    /// The last shelving that was told as recorded, by its number.
+    /// Notes of acknowledgements that were reported as recorded.
+    acknowledged: Vec<String>,
+    /// The last shelving, and the last acknowledgement, that was reported as recorded, by its number.
     shelved: u32,
-    /// Logins and logouts that were granted.
+    last_acknowledged: u32,
+    /// Logins and logouts that were granted and recorded.
     logins: u64,
     logouts: u64,
+    /// Shift reports that were answered.
+    reports: u64,
 }
 
 struct Place {
     folder: tempfile::TempDir,
     sockets: PathBuf,
-    /// Where the simulated devices are.
+    /// Where the simulated devices are, and whether they are slow.
     port: String,
+    slow: Arc<AtomicBool>,
     _sim: Process,
 }
 
+/// Passes requests on to the devices, and their answers back, which take [`REPLY`] longer while they are slow.
+async fn pass_on(listener: TcpListener, devices: String, slow: Arc<AtomicBool>) {
+    while let Ok((station, _)) = listener.accept().await {
+        let (devices, slow) = (TcpStream::connect(&devices).await.unwrap(), slow.clone());
+        tokio::spawn(async move {
+            let (mut from_station, mut to_station) = station.into_split();
+            let (mut from_devices, mut to_devices) = devices.into_split();
+            let answers = async {
+                let mut buffer = [0; 512];
+                while let Ok(count @ 1..) = from_devices.read(&mut buffer).await {
+                    if slow.load(Ordering::Relaxed) {
+                        tokio::time::sleep(REPLY).await;
+                    }
+                    if to_station.write_all(&buffer[..count]).await.is_err() {
+                        break;
+                    }
+                }
+            };
+            tokio::select! {
+                _ = tokio::io::copy(&mut from_station, &mut to_devices) => {}
+                () = answers => {}
+            }
+        });
+    }
+}
+
 impl Place {
-    fn new() -> Place {
+    async fn new() -> Place {
         let (folder, sockets) = (folder(), sockets());
-        let (sim, port) = simulated_tank();
+        let (sim, devices) = simulated_tank();
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let (port, slow) = (listener.local_addr().unwrap().to_string(), Arc::default());
+        tokio::spawn(pass_on(listener, devices, Arc::clone(&slow)));
         let hash: Arc<str> = sightglass::access::password::hash(PASSWORD, [3; 16]).unwrap().into();
         let mut people = Users::default();
         for (user, change) in [
@@ -76,8 +145,14 @@ impl Place {
             let (user, hash, must_change) = (user.into(), hash.clone(), false);
             people = people.with(&Change::Password { user, hash, must_change }).unwrap();
         }
+        let text = profile::text_of("tank", &Search::shipped()).unwrap();
+        std::fs::write(folder.path().join("tank.toml"), text + ALARM_TOML).unwrap();
         users::write(&users_beside(&folder.path().join("tank.duckdb")), &people).unwrap();
-        Place { folder, sockets, port, _sim: sim }
+        Place { folder, sockets, port, slow, _sim: sim }
+    }
+
+    fn plant(&self) -> PathBuf {
+        self.folder.path().join("tank.toml")
     }
 
     fn history(&self) -> PathBuf {
@@ -91,7 +166,9 @@ impl Place {
     fn station(&self) -> Process {
         let mut station = Process::start(
             sightglass()
-                .args(["run", "tank", "--log", "-", "--port", &format!("L1={}", self.port), "--history"])
+                .arg("run")
+                .arg(self.plant())
+                .args(["--log", "-", "--port", &format!("L1={}", self.port), "--history"])
                 .arg(self.history())
                 .env("XDG_RUNTIME_DIR", &self.sockets)
                 .env("XDG_STATE_HOME", self.folder.path())
@@ -112,28 +189,31 @@ fn entries(book: &Path) -> Vec<Entry> {
     text.lines().filter_map(|line| check.line(line.as_bytes())).collect()
 }
 
-/// Writes again and again, each with a note of its own, until the station goes.
-async fn write_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> (Vec<String>, u32) {
-    let (mut told, mut shelved) = (Vec::new(), 0);
-    // The place of its terminal counts for its password, so it waits for the other one to be looked at.
-    while login(&session, "tom", PASSWORD).await.is_err() {
-        if session.standing.borrow().gone.is_some() {
-            return (told, shelved);
-        }
+/// Logs in, or gives up when the station goes. Passwords of one origin are checked one after the other.
+async fn log_in(session: &Session, user: &str) {
+    while session.standing.borrow().gone.is_none() && login(session, user, PASSWORD).await.is_err() {
         tokio::task::yield_now().await;
     }
+}
+
+/// Writes, acknowledges and shelves again and again, each with a note of its own, until the station goes.
+async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> Told {
+    let (mut told, mut writes) = (Told::default(), 0);
+    log_in(&session, "tom").await;
     let tag = session.snapshots.borrow().def.tag_named("TIC-1.SV").unwrap();
     for number in 1.. {
-        let note = format!("write {number} of round {round}");
-        let value = (VALUES.start + (round * 37 + u64::from(number)) % (VALUES.end - VALUES.start)) as f64 / 10.0;
+        let note = format!("action {number} of round {round}");
+        let value = (VALUES[writes % 2] + (round * 37 + u64::from(number)) % SPREAD) as f64 / 10.0;
         let id = OrderId { terminal: session.terminal, number };
-        let shelves = number % 2 == 0;
-        let command = match shelves {
-            true => Command::Alarm(AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(1_800) }),
-            false => Command::Write { tag, value },
+        let shelve = AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(1_800) };
+        let command = match to_acknowledge(&session.snapshots.borrow()) {
+            Some(acknowledge) => acknowledge,
+            None if number % 2 == 0 => Command::Alarm(shelve),
+            None => Command::Write { tag, value },
         };
-        let seen = session.snapshots.borrow().seen(&command);
-        let order = OrderRequest { seen, note: Some(note.as_str().into()), ..OrderRequest::new(id, command) };
+        writes += usize::from(command.written().is_some());
+        let order = OrderRequest::on(&session.snapshots.borrow(), id, command.clone());
+        let order = OrderRequest { note: Some(note.as_str().into()), ..order };
         if session.send(Request::Order(order)).is_err() {
             break;
         }
@@ -147,23 +227,59 @@ async fn write_on(mut session: Session, done: watch::Sender<u64>, round: u64) ->
         let ended = tokio::time::timeout(PATIENCE, ended).await;
         assert!(ended.is_ok_and(|ended| ended.is_ok()), "`{note}` never had an outcome");
         match outcome {
-            Some(Outcome::Verified) if shelves => shelved = number,
-            Some(Outcome::Verified) => told.push(note),
+            Some(Outcome::Verified) => match command {
+                Command::Alarm(AlarmCommand::Shelve { .. }) => told.shelved = number,
+                Command::Alarm(_) => {
+                    told.last_acknowledged = number;
+                    told.acknowledged.push(note);
+                }
+                _ => told.writes.push(note),
+            },
             // It had gone, or has refused: too many at once, a value that stood there already.
             Some(_) | None if session.standing.borrow().gone.is_some() => break,
             Some(_) | None => {}
         }
         done.send_modify(|done| *done += 1);
     }
-    (told, shelved)
+    told
 }
 
-/// Why the first alarm is shelved, as the next station will find it.
-fn shelved_for(history: &Path) -> Option<Arc<str>> {
+/// The command to acknowledge [`ALARM`], if it waits for that.
+fn to_acknowledge(snapshot: &Snapshot) -> Option<Command> {
+    let is_it = |alarm: &&ActiveAlarm| snapshot.def.alarm(alarm.id).text == ALARM;
+    let alarm = snapshot.alarms.iter().find(is_it).filter(|alarm| alarm.state.needs_acknowledgement())?;
+    Some(alarm.acknowledge())
+}
+
+/// Asks for a shift report without pause until the station goes.
+async fn report_on(session: Session) -> u64 {
+    let mut reports = 0;
+    log_in(&session, "tom").await;
+    while session.standing.borrow().gone.is_none() {
+        let to = session.snapshots.borrow().at;
+        let period = Period { name: "shift".into(), from: to - jiff::SignedDuration::from_hours(8), to };
+        let (reply, answer) = tokio::sync::oneshot::channel();
+        if session.ask(Query { question: Question::Report { period }, reply }).is_ok() {
+            reports += u64::from(answer.await.is_ok_and(|answer| answer.is_ok()));
+        }
+        tokio::task::yield_now().await;
+    }
+    reports
+}
+
+/// The number of an action of this round from its note; 0 for an action of another round.
+fn number_in(round: u64, note: Option<Arc<str>>) -> u32 {
+    let number = |note: &str| note.strip_prefix("action ")?.split(' ').next()?.parse::<u32>().ok();
+    note.filter(|note| note.ends_with(&format!("of round {round}"))).and_then(|note| number(&note)).unwrap_or(0)
+}
+
+/// The reason of the last step of this kind, as the next station will find it.
+fn reason_of(history: &Path, kind: AlarmStep, text: Option<&str>) -> Option<Arc<str>> {
     let (_, found) = AlarmFile::open(&alarm_file::beside(history), jiff::Timestamp::UNIX_EPOCH);
     assert_eq!(found.trouble, None);
     let steps = found.steps.unwrap_or_default();
-    steps.iter().find(|step| step.step == AlarmStep::Shelved).and_then(|step| step.reason.clone())
+    let is_it = |step: &&AlarmRecord| step.step == kind && text.is_none_or(|text| &*step.text == text);
+    steps.iter().find(is_it).and_then(|step| step.reason.clone())
 }
 
 /// Logs in and out again and again until the station goes.
@@ -171,10 +287,11 @@ async fn log_in_on(session: Session, done: watch::Sender<u64>) -> Told {
     let mut told = Told::default();
     while session.standing.borrow().gone.is_none() {
         // Refused while the password of the other terminal is looked at.
-        if login(&session, "sue", PASSWORD).await.is_ok() {
-            told.logins += 1;
+        let enter = Wish::Login { user: "sue".into(), password: PASSWORD.into() };
+        if let Ok(durability) = session.wish(enter).await {
+            told.logins += u64::from(durability == Durability::Recorded);
             done.send_modify(|done| *done += 1);
-            told.logouts += u64::from(session.wish(Wish::Logout).await.is_ok());
+            told.logouts += u64::from(session.wish(Wish::Logout).await == Ok(Durability::Recorded));
         }
         tokio::task::yield_now().await;
     }
@@ -183,13 +300,14 @@ async fn log_in_on(session: Session, done: watch::Sender<u64>) -> Told {
 
 /// One life of a station: ends with a kill after so many deeds that were answered, and so long after the last of them.
 async fn live(place: &Place, round: u64, deeds: u64, late: Duration) -> Told {
-    let before = shelved_for(&place.history());
+    let before = reason_of(&place.history(), AlarmStep::Shelved, None);
     let mut station = place.station();
     let (done, mut count) = watch::channel(0);
     let session = place.terminal().await;
     let aside = session.snapshots.borrow().aside.iter().find_map(|alarm| alarm.deed.reason.clone());
     assert_eq!(aside, before, "round {round}: the alarms are as they were");
-    let writing = tokio::spawn(write_on(session, done.clone(), round));
+    let acting = tokio::spawn(act_on(session, done.clone(), round));
+    let reporting = tokio::spawn(report_on(place.terminal().await));
     let logging = tokio::spawn(log_in_on(place.terminal().await, done));
     let enough = tokio::time::timeout(PATIENCE, count.wait_for(|done| deeds <= *done)).await;
     assert!(enough.is_ok_and(|count| count.is_ok()), "round {round}: nothing goes on; {:?}", station.said);
@@ -197,47 +315,53 @@ async fn live(place: &Place, round: u64, deeds: u64, late: Duration) -> Told {
     tokio::time::sleep(late).await;
     station.signal("KILL");
     assert_eq!(station.end(), None);
-    let ((writes, shelved), told) = (writing.await.unwrap(), logging.await.unwrap());
-    Told { writes, shelved, ..told }
+    let (told, logins) = (acting.await.unwrap(), logging.await.unwrap());
+    let reports = reporting.await.unwrap();
+    Told { logins: logins.logins, logouts: logins.logouts, reports, ..told }
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn whatever_a_terminal_was_told_is_in_the_book_of_a_station_that_is_killed_and_starts_again() {
     let rounds = std::env::var("SIGHTGLASS_KILLS").map_or(ROUNDS, |rounds| rounds.parse().unwrap());
-    let place = Place::new();
+    let place = Place::new().await;
     let mut sum = Told::default();
     for round in 0..rounds {
+        place.slow.store(round % SLOW_EVERY == 0, Ordering::Relaxed);
         let before = entries_or_none(&place.book());
         let told = live(&place, round, 4 + round % 7, Duration::from_micros(round * 1_733 % 40_000)).await;
         let whole = book::verify(&place.book(), &[]).unwrap_or_else(|error| panic!("round {round}: {error}"));
         let all = entries(&place.book());
         assert_eq!(all.len() as u64, whole.entries, "round {round}");
         let lived = &all[before..];
-        for note in &told.writes {
-            let line = lived.iter().find(|line| &*line.action == "write" && line.note.as_deref() == Some(note));
+        let writes = told.writes.iter().map(|note| ("write", note));
+        for (action, note) in writes.chain(told.acknowledged.iter().map(|note| ("acknowledge", note))) {
+            let line = lived.iter().find(|line| &*line.action == action && line.note.as_deref() == Some(note));
             assert!(
                 line.is_some_and(|line| &*line.outcome == "verified"),
                 "round {round}: `{note}` is not in the book: {line:?}"
             );
         }
-        let reason = shelved_for(&place.history()).unwrap_or_default();
-        let number = |reason: &str| reason.strip_prefix("write ")?.split(' ').next()?.parse::<u32>().ok();
-        let kept = number(&reason).filter(|_| reason.ends_with(&format!("of round {round}"))).unwrap_or(0);
-        assert!(told.shelved <= kept, "round {round}: shelving {} was told, the file has `{reason}`", told.shelved);
+        let kept = |kind, text| number_in(round, reason_of(&place.history(), kind, text));
+        let (shelved, acknowledged) = (kept(AlarmStep::Shelved, None), kept(AlarmStep::Acknowledged, Some(ALARM)));
+        assert!(told.shelved <= shelved, "round {round}: shelving {}, the file has {shelved}", told.shelved);
+        let last = told.last_acknowledged;
+        assert!(last <= acknowledged, "round {round}: acknowledgement {last}, the file has {acknowledged}");
         let count =
             |action: &str| lived.iter().filter(|line| &*line.action == action && &*line.target == "sue").count() as u64;
         let (logins, logouts) = (count("login"), count("logout"));
         assert!(told.logins <= logins, "round {round}: {} logins were granted, {logins} are in the book", told.logins);
         assert!(told.logouts <= logouts, "round {round}: {} logouts, {logouts} in the book", told.logouts);
         sum.writes.extend(told.writes);
-        sum.logins += told.logins;
+        sum.acknowledged.extend(told.acknowledged);
+        (sum.logins, sum.reports) = (sum.logins + told.logins, sum.reports + told.reports);
     }
+    let (writes, acknowledged) = (sum.writes.len(), sum.acknowledged.len());
     println!(
-        "{rounds} kills: {} writes were told verified and {} logins granted, all of them in the book",
-        sum.writes.len(),
-        sum.logins
+        "{rounds} kills: {writes} writes verified, {acknowledged} alarms acknowledged, {} logins granted, all of them in the \
+         audit log; {} shift reports",
+        sum.logins, sum.reports
     );
-    assert!(!sum.writes.is_empty() && 0 < sum.logins, "nothing was done");
+    assert!(0 < writes && 0 < acknowledged && 0 < sum.logins && 0 < sum.reports, "nothing was done");
     // What a kill has left is taken up, and a clean end is a clean end.
     let mut station = place.station();
     station.signal("TERM");
@@ -245,7 +369,7 @@ async fn whatever_a_terminal_was_told_is_in_the_book_of_a_station_that_is_killed
     let last = entries(&place.book()).pop().unwrap();
     assert_eq!(&*last.action, "stop station");
     // Each start has completed the history by what the log held before it.
-    let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
+    let def = profile::load(&place.plant(), &Search::shipped()).unwrap();
     let seals = Store::open_read_only(&place.history(), &def).unwrap().seals().unwrap();
     let summary = book::verify(&place.book(), &seals).unwrap();
     assert_eq!((summary.compared, seals.len() as u64), (summary.entries.min(5_000), summary.entries.min(5_000)));

@@ -13,12 +13,12 @@
 //! | `devices` | every shipped profile and plant against its simulated devices: a minute, every fault, golden frames |
 //! | `rights` | every command, wish and question through the socket, by everybody who may be at a terminal |
 //! | `people` | wrong passwords, lock-out, idle lock, second persons, two operators at once |
-//! | `kills` | stations killed during writes and logins: what somebody was told is in the book, which is whole |
+//! | `kills` | stations killed during writes, acknowledgements, logins and reports: what was reported as done is in the audit log |
 //! | `tampering` | the book changed by hand: what `sightglass audit verify` says |
 //! | `hostile` | text of others, by every command: nothing of it acts on a terminal |
 //! | `tools` | the tools for a line against peers that echo, chatter and lie |
 //! | `endings` | every way in which a terminal or its station can end, in a pseudo-terminal |
-//! | `settings` | settings of a line: tried out, saved into the plant file |
+//! | `settings` | settings of a line: tried out, saved into the plant file; orders made before a reload |
 //! | `durability` | killed, unplugged, locked, damaged |
 //! | `guarded` | a station whose people must log in, for `rights` and `people` |
 //! | `pty` | the program in a pseudo-terminal, for `terminal` and `endings` |
