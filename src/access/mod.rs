@@ -7,6 +7,7 @@ pub mod user;
 pub mod tries;
 pub mod gate;
 pub mod book;
+pub mod sealing;
 pub mod io;
 
 pub use gate::{Effect, Gate, Peer};

@@ -1,13 +1,20 @@
-//! `sightglass audit verify`: is the book of deeds as it was written, line by line, and does the history agree?
+//! `sightglass audit`: verifies the audit log line by line, against the history and its seals; makes the key of the seals.
 
-use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{self, Read},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use jiff::Timestamp;
 
 use crate::{
     access::{
         book::{Summary, hex},
-        io::book,
+        io::{book, sealing},
+        sealing::{Sealed, VerificationKey},
     },
     history::{Answer, Question},
     plant::{PlantDef, record::Seal},
@@ -20,6 +27,9 @@ const MICROSECOND: jiff::SignedDuration = jiff::SignedDuration::from_micros(1);
 /// Deeds that one question is answered with.
 const PAGE: usize = 10_000;
 
+/// A verification key is a line and some comments; whatever is longer is something else.
+const KEY_BYTES_MAX: u64 = 4 << 10;
+
 /// Arguments of `audit`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -30,8 +40,19 @@ pub struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     /// Reads the whole audit log and names the first line that is not as it was written: exit code 1 if there is one, 5 if
-    /// every line is sound but could not be compared with the history
+    /// every line is sound but could not be compared with the history, or with the present sealing key
     Verify(VerifyArgs),
+    /// Makes the sealing key of a plant's audit log, once, and prints the verification key: keep it off this machine, it is
+    /// not shown again. From then on the station seals the log each hour and when it stops
+    Key(KeyArgs),
+}
+
+#[derive(Debug, clap::Args)]
+struct KeyArgs {
+    /// A plant file, or the name of a shipped plant
+    plant: String,
+    #[command(flatten)]
+    station: StationArgs,
 }
 
 #[derive(Debug, clap::Args)]
@@ -41,6 +62,9 @@ struct VerifyArgs {
     /// The book [default: the plant's own, beside its history]
     #[arg(long, value_name = "FILE")]
     book: Option<PathBuf>,
+    /// Check the seals too, with the verification key in this file; `-` for standard input
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
     #[command(flatten)]
     login: client::Login,
     #[command(flatten)]
@@ -51,36 +75,91 @@ struct VerifyArgs {
 pub fn main(args: Args) -> Result<(), CliError> {
     match args.command {
         Command::Verify(args) => verify(args),
+        Command::Key(args) => make_key(&args),
     }
+}
+
+fn make_key(args: &KeyArgs) -> Result<(), CliError> {
+    let def = load(&args.plant, &args.station)?;
+    let log = book::beside(&run::history_file(&def, &args.station));
+    let key = sealing::make(&log, Timestamp::now());
+    let path = sealing::beside(&log);
+    let key = key.map_err(|error| CliError::Io { what: format!("cannot make {}", path.display()), error })?;
+    say(&format!("# Verifies the seals of {}.", log.display()));
+    say("# Keep it off this machine: whoever has it can forge them. It is not shown again.");
+    say(key.text().trim_end());
+    Ok(())
+}
+
+/// Reads a verification key.
+fn read_key(path: &Path) -> Result<VerificationKey, CliError> {
+    let failed = |error| CliError::Io { what: format!("cannot read {}", path.display()), error };
+    let from: Box<dyn Read> = match path == Path::new("-") {
+        true => Box::new(io::stdin()),
+        false => Box::new(File::open(path).map_err(failed)?),
+    };
+    let mut text = String::new();
+    from.take(KEY_BYTES_MAX).read_to_string(&mut text).map_err(failed)?;
+    let wrong = || CliError::Usage(format!("{}: expected the key that `sightglass audit key` printed", path.display()));
+    VerificationKey::parse(&text).ok_or_else(wrong)
 }
 
 fn verify(args: VerifyArgs) -> Result<(), CliError> {
     let def = Arc::new(load(&args.plant, &args.station)?);
+    let key = args.key.as_deref().map(read_key).transpose()?;
     // A book that lies somewhere else has no history to compare with.
     let (path, rows) = match &args.book {
         Some(path) => (path.clone(), None),
         None => (book::beside(&run::history_file(&def, &args.station)), Some(in_runtime(seals(&def, &args)))),
     };
-    let (seals, not_compared) = match rows {
-        None => (Vec::new(), None),
-        Some(Ok(seals)) => (seals, None),
-        Some(Err(error)) => (Vec::new(), Some(error)),
+    let mut not_compared = Vec::new();
+    let seals = rows.unwrap_or(Ok(Vec::new())).unwrap_or_else(|error| {
+        not_compared.push(format!("it was not compared with the history: {error}"));
+        Vec::new()
+    });
+    let failed = |error: book::VerifyError| CliError::Failed(error.to_string());
+    let (summary, sealed) = match &key {
+        None => (book::verify(&path, &seals).map_err(failed)?, None),
+        Some(key) => {
+            let (summary, sealed, is_compared) = sealing::verify(&path, &seals, key).map_err(failed)?;
+            if !is_compared {
+                let present = sealing::beside(&path);
+                not_compared
+                    .push(format!("it may have been cut behind the last seal: {} is missing", present.display()));
+            }
+            (summary, Some(sealed))
+        }
     };
-    let summary = book::verify(&path, &seals).map_err(|error| CliError::Failed(error.to_string()))?;
     let found = if summary.entries == 0 { "empty: no deed was ever recorded in it" } else { "whole" };
     say(&format!("{}: {found}", path.display()));
     summary_lines(&summary, &def).iter().for_each(|line| say(line));
-    not_compared.map_or(Ok(()), |why| Err(CliError::NotCompared(why.to_string())))
+    sealed.iter().for_each(|sealed| say(&sealed_line(sealed, &def)));
+    if not_compared.is_empty() { Ok(()) } else { Err(CliError::NotCompared(not_compared.join("; "))) }
+}
+
+fn sealed_line(sealed: &Sealed, def: &PlantDef) -> String {
+    match sealed.last {
+        None => format!("sealed     nothing yet; {} entries are not sealed", sealed.unsealed),
+        Some((entry, at)) => format!(
+            "sealed     up to entry {entry} of {} by {} seals; {} entries behind it are not sealed yet",
+            local(at, def),
+            sealed.seals,
+            sealed.unsealed
+        ),
+    }
+}
+
+fn local(at: Timestamp, def: &PlantDef) -> String {
+    at.to_zoned(def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S").to_string()
 }
 
 fn summary_lines(summary: &Summary, def: &PlantDef) -> Vec<String> {
-    let local = |at: Timestamp| at.to_zoned(def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S").to_string();
     let mut lines = vec![
         format!("lines      {}", summary.entries),
         format!("last seal  {} {}", summary.last.number, hex(&summary.last.hash)),
         format!("history    {} of {} entries compared", summary.compared, summary.entries),
     ];
-    lines.extend(summary.span.map(|(first, last)| format!("from       {} to {}", local(first), local(last))));
+    lines.extend(summary.span.map(|(first, last)| format!("from       {} to {}", local(first, def), local(last, def))));
     if summary.torn {
         lines.push("torn       behind the last line stands the beginning of another one".to_owned());
     }

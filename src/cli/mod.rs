@@ -45,7 +45,7 @@ Exit codes:
   2  wrong arguments, errors in a profile, or bytes that cannot be read
   3  the history is in use by another process
   4  no station runs here
-  5  the audit log is sound, but could not be compared with the history";
+  5  the audit log is sound, but could not be compared with the history or with its sealing key";
 
 /// The control room of a small plant in a terminal: process mimic, trends, alarms, controllers and shift reports over
 /// Modbus RTU and TCP.
@@ -76,7 +76,7 @@ enum Command {
     Ack(act::AckArgs),
     /// Writes a tag at the running station and waits until it is verified
     Write(act::WriteArgs),
-    /// Checks the book of deeds: `audit verify` names the first line that was changed
+    /// Verifies the audit log: `audit verify` names the first line that was changed, `audit key` has it sealed
     Audit(audit::Args),
     /// Ends the running station
     Stop(control::Args),
@@ -147,7 +147,7 @@ enum CliError {
     Failed(String),
     #[error("{0}\nstart one: `sightglass run PLANT`; or try it out: `sightglass demo`")]
     NotRunning(String),
-    #[error("the chain is whole, but it was not compared with the history: {0}")]
+    #[error("the chain is whole, but {0}")]
     NotCompared(String),
     #[error("the station has ended by itself, see the log")]
     StationGone,

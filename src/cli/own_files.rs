@@ -6,17 +6,18 @@ use std::{
 };
 
 use crate::{
-    access::io::{book, users_beside},
+    access::io::{book, sealing, users_beside},
     history::io::{alarm_file, files},
 };
 
 use super::CliError;
 
-/// Refuses to write to the history, its log and notes, the audit log, the users file or the alarm-state file, under
+/// Refuses to write to the history, its log and notes, the audit log and its key, the users file or the alarm-state file, under
 /// whatever name they are reached.
 pub fn refuse(out: &Path, history: &Path) -> Result<(), CliError> {
     let beside = ["", ".wal", ".last", ".opening"].map(|suffix| files::beside(history, suffix));
-    let others = [book::beside(history), users_beside(history), alarm_file::beside(history)];
+    let log = book::beside(history);
+    let others = [sealing::beside(&log), log, users_beside(history), alarm_file::beside(history)];
     let same = |own: &PathBuf| {
         let is_one_file = files::inode(own).is_some() && files::inode(own) == files::inode(out);
         is_one_file || resolved(own).is_some() && resolved(own) == resolved(out)
@@ -51,7 +52,8 @@ mod tests {
         fs::hard_link(&history, &hard).unwrap();
         let dotted = folder.path().join("./tank.duckdb.wal");
         let [log, users, alarms] = [book::beside(&history), users_beside(&history), alarm_file::beside(&history)];
-        for own in [&history, &link, &hard, &dotted, &log, &users, &alarms] {
+        let key = sealing::beside(&log);
+        for own in [&history, &link, &hard, &dotted, &log, &key, &users, &alarms] {
             assert!(refuse(own, &history).is_err(), "{}", own.display());
         }
         for other in [folder.path().join("report.csv"), folder.path().join("none/report.csv"), PathBuf::from("-")] {

@@ -174,10 +174,14 @@ pub struct ActionRecord {
 /// The word on record for a write that is about to be sent; its outcome has a line of its own.
 pub const ORDER: &str = "order";
 
+/// The word on record for a seal over the entries of the audit log.
+pub const SEAL_LOG: &str = "seal audit log";
+
 /// Deeds that are not at the plant but about people, terminals and the station: for the book and the list of a Supervisor,
 /// not for shift reports and curves. So it is with the intent of a write, whose outcome is there already.
-pub const ELSEWHERE: [&str; 25] = [
+pub const ELSEWHERE: [&str; 26] = [
     ORDER,
+    SEAL_LOG,
     "attach",
     "detach",
     "login",

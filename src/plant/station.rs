@@ -25,7 +25,7 @@ pub enum StationFault {
     HistoryDamaged,
     /// The disk of the history is nearly full.
     DiskSpace,
-    /// The audit log cannot be written, or is damaged.
+    /// The audit log cannot be written or sealed, or is damaged.
     AuditLog,
     /// The alarm state cannot be saved.
     AlarmState,
@@ -76,7 +76,7 @@ impl StationFault {
             StationFault::RecordsLost => "history records lost",
             StationFault::HistoryDamaged => "history damaged",
             StationFault::DiskSpace => "disk nearly full",
-            StationFault::AuditLog => "audit log not written",
+            StationFault::AuditLog => "audit log fault",
             StationFault::AlarmState => "alarm state not saved",
             StationFault::UsersFile => "users file unusable",
             StationFault::Clock => "clock wrong or stepped",
@@ -129,9 +129,9 @@ impl StationFault {
                 "move old reports and set-aside files away, or give the history a larger disk",
             ],
             StationFault::AuditLog => [
-                "the disk is full or read-only, or the file was changed, moved or removed by hand",
-                "actions of operators are carried out, but are not on record until it is repaired",
-                "free the disk; run `sightglass audit verify`",
+                "the disk is full or read-only, or the file or its sealing key was changed, moved or removed by hand",
+                "actions are carried out, but are not on record, or could be changed unnoticed, until it is repaired",
+                "free the disk; run `sightglass audit verify`; restore the sealing key, or make one with `audit key`",
             ],
             StationFault::AlarmState => [
                 "the disk is full or read-only",

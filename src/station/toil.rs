@@ -7,7 +7,7 @@ use tokio::task::{JoinHandle, JoinSet};
 use crate::access::{
     Users,
     gate::{Job, Outcome, Work},
-    io::{salt, users},
+    io::{random, users},
 };
 
 /// Passwords that are hashed at the same time, 19 MiB each; the gate bounds those that wait.
@@ -61,7 +61,7 @@ impl Toil {
             && let Some((job, work)) = self.waiting.pop_front()
         {
             let begun = self.working.spawn_blocking(move || {
-                let outcome = salt().map_or_else(Outcome::Failed, |salt| work.done(salt));
+                let outcome = random().map_or_else(Outcome::Failed, |salt| work.done(salt));
                 (job, outcome)
             });
             self.jobs.push((begun.id(), job));

@@ -5,6 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use sightglass::access::book::{Check, Entry, START, head_text, line};
+
 use crate::support::{Process, folder, sightglass};
 
 /// A book as a station leaves it: several lives of it, each with its start and stop.
@@ -133,4 +135,102 @@ fn a_station_goes_on_after_a_book_that_was_changed_and_says_where_it_is_broken()
     assert!(after.len() > good.len() && after.contains("it is broken at line 1"), "{after}");
     let (code, said) = verify(folder.path(), &["--book", book.to_str().unwrap()]);
     assert!(code == Some(1) && said.contains("line 1: "), "{said}");
+}
+
+/// Makes the sealing key and keeps what is printed: elsewhere, for the test.
+fn make_key(folder: &Path, name: &str) -> (Option<i32>, PathBuf) {
+    let mut command = sightglass();
+    command.args(["audit", "key", "tank", "--history"]).arg(folder.join("tank.duckdb"));
+    let output = command.env("XDG_STATE_HOME", folder).output().unwrap();
+    let path = folder.join(name);
+    fs::write(&path, output.stdout).unwrap();
+    (output.status.code(), path)
+}
+
+/// Writes a log with its chain and its note computed again, as who owns the files can.
+fn rewrite(book: &Path, entries: &[Entry]) {
+    let (mut text, mut last) = (String::new(), START);
+    for entry in entries {
+        let (line, seal) = line(last, &entry.clone().sealed(last));
+        (text, last) = (text + &line, seal);
+    }
+    fs::write(book, text).unwrap();
+    fs::write(book.with_extension("head"), head_text(last)).unwrap();
+}
+
+#[test]
+fn a_sealed_log_that_was_rewritten_with_its_chain_or_cut_with_its_seals_is_found() {
+    let folder = folder();
+    let (code, key) = make_key(folder.path(), "kept");
+    assert_eq!(code, Some(0), "{}", fs::read_to_string(&key).unwrap());
+    assert_eq!(make_key(folder.path(), "refused").0, Some(1), "once");
+    let book = written(folder.path());
+    let history = folder.path().join("tank.duckdb");
+    let verify = |extra: &[&str]| verify(folder.path(), &[&["--book", book.to_str().unwrap()], extra].concat());
+    let (code, said) =
+        self::verify(folder.path(), &["--history", history.to_str().unwrap(), "--key", key.to_str().unwrap()]);
+    assert!(code == Some(0) && said.contains("; 0 entries behind it are not sealed yet"), "{said}");
+    let mut check = Check::new(None, &[]);
+    let text = fs::read_to_string(&book).unwrap();
+    let good: Vec<Entry> = text.lines().map(|line| check.line(line.as_bytes()).unwrap()).collect();
+    let seals: Vec<usize> = (0..good.len()).filter(|place| &*good[*place].action == "seal audit log").collect();
+    assert!(3 <= seals.len() && seals.last() == Some(&(good.len() - 1)), "at the end of each life: {text}");
+    let key = key.to_str().unwrap();
+    let found = |entries: &[Entry], line: usize, why: &str| {
+        rewrite(&book, entries);
+        assert_eq!(verify(&[]).0, Some(0), "the chain is whole");
+        let (code, said) = verify(&["--key", key]);
+        assert!(code == Some(1) && said.contains(&format!("line {line}: ")) && said.contains(why), "{said}");
+    };
+    let mut other = good.clone();
+    other[seals[1] - 1].outcome = "undone".into();
+    found(&other, seals[1] + 1, "seal 1 is wrong: entries before it were changed");
+    other.clone_from(&good);
+    other.remove(seals[1]);
+    (0..).zip(&mut other).for_each(|(place, entry)| entry.n = place + 1);
+    found(&other, seals[2], "found seal 2, expected seal 1");
+    found(
+        &good[..seals[1]],
+        seals[1] + 1,
+        &format!("the log was cut here: seals 1 to {} are missing", seals.len() - 1),
+    );
+    found(&good[..1], 2, "seals 0 to ");
+
+    // What nobody can know: entries behind the last seal, and a cut there. It is said how far the seals reach.
+    rewrite(&book, &[&good[..], &[Entry { n: good.len() as u64 + 1, ..good[0].clone() }]].concat());
+    let (code, said) = verify(&["--key", key]);
+    assert!(code == Some(0) && said.contains(&format!("up to entry {} of", good.len())), "{said}");
+    assert!(said.contains("; 1 entries behind it are not sealed yet"), "{said}");
+    rewrite(&book, &good);
+    assert_eq!(fs::read_to_string(&book).unwrap(), text, "as it was");
+
+    let present = book.with_extension("key");
+    fs::write(folder.path().join("garbage"), "garbage").unwrap();
+    assert_eq!(verify(&["--key", folder.path().join("garbage").to_str().unwrap()]).0, Some(2));
+    fs::rename(&present, folder.path().join("moved")).unwrap();
+    let (code, said) = verify(&["--key", key]);
+    assert!(code == Some(5) && said.contains("it may have been cut behind the last seal"), "{said}");
+    let (_, other) = make_key(folder.path(), "other");
+    let (code, said) = verify(&["--key", key]);
+    assert!(code == Some(1) && said.contains("the station has a key that never followed this one"), "{said}");
+    fs::remove_file(&present).unwrap();
+    let (code, said) = verify(&["--key", other.to_str().unwrap()]);
+    assert!(code == Some(5) && said.contains("nothing yet"), "seals of an earlier key: {said}");
+}
+
+#[test]
+fn a_station_whose_sealing_key_is_missing_says_so_and_goes_on() {
+    let folder = folder();
+    make_key(folder.path(), "kept");
+    let book = written(folder.path());
+    fs::remove_file(book.with_extension("key")).unwrap();
+    let mut station = Process::start(
+        sightglass()
+            .args(["run", "tank", "--port", "L1=/dev/none", "--history"])
+            .arg(folder.path().join("tank.duckdb"))
+            .env("XDG_STATE_HOME", folder.path()),
+    );
+    station.wait_for("the sealing key is missing");
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0), "{:?}", station.said);
 }

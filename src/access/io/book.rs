@@ -10,8 +10,13 @@ use std::{
     sync::Arc,
 };
 
+use jiff::Timestamp;
+
 use crate::{
-    access::book::{self, Check, FirstBad, PLANT_FILE, Summary, USERS_FILE},
+    access::{
+        book::{self, Check, FirstBad, PLANT_FILE, Summary, USERS_FILE},
+        sealing::{self, Key},
+    },
     history::io::seals::SEALS_MAX,
     plant::record::{ActionRecord, Seal},
 };
@@ -53,12 +58,21 @@ pub enum VerifyError {
 /// Reads a book from its beginning and finds the first line that is not as it was written. `rows` are the seals that the
 /// history holds; empty to look at the book alone. Safe while a station writes.
 pub fn verify(path: &Path, rows: &[Seal]) -> Result<Summary, VerifyError> {
+    verify_each(path, rows, |_, _| {})
+}
+
+/// As [`verify`], and hands out each sound entry.
+pub(super) fn verify_each(
+    path: &Path,
+    rows: &[Seal],
+    mut each: impl FnMut(&book::Entry, Seal),
+) -> Result<Summary, VerifyError> {
     let failed = |error| VerifyError::Io { path: path.display().to_string(), error };
     // The note first: the book may be ahead of it, never behind.
     let head = read_head(path).map_err(failed)?;
     let file = File::open(path).map_err(failed)?;
     let mut check = Check::new(head, rows);
-    let scanned = scan(file, &mut check, |_, _| {}).map_err(failed)?;
+    let scanned = scan(file, &mut check, |entry, seal| each(&entry, seal)).map_err(failed)?;
     check.end(scanned.torn).map_err(|bad| VerifyError::Bad { path: path.display().to_string(), bad })
 }
 
@@ -98,6 +112,13 @@ fn scan(file: File, check: &mut Check, mut each: impl FnMut(book::Entry, Seal)) 
     }
 }
 
+/// The number of the last seal in a log.
+pub(super) fn last_seal(log: File) -> io::Result<Option<u64>> {
+    let mut last = None;
+    scan(log, &mut Check::new(None, &[]), |entry, _| last = sealing::number(&entry).or(last))?;
+    Ok(last)
+}
+
 /// A book that can be written.
 #[derive(Debug)]
 pub struct Book {
@@ -105,6 +126,8 @@ pub struct Book {
     head: File,
     last: Seal,
     bytes: u64,
+    /// The number of the last seal over it, and of its entry.
+    last_seal: Option<(u64, u64)>,
 }
 
 /// What was found when the book was opened.
@@ -133,12 +156,14 @@ impl Book {
         let mut opened = Opened::default();
         let head = read_head(path)?;
         let mut check = Check::new(head, &[]);
+        let mut last_seal = None;
         let Scanned { bytes, torn } = scan(file.try_clone()?, &mut check, |entry, seal| {
             if &*entry.action == PLANT_FILE {
                 opened.plant_file.clone_from(&entry.new);
             } else if &*entry.action == USERS_FILE {
                 opened.users_file.clone_from(&entry.new);
             }
+            last_seal = sealing::number(&entry).map(|number| (number, entry.n)).or(last_seal);
             opened.tail.push_back(entry.sealed(seal));
             if SEALS_MAX < opened.tail.len() {
                 opened.tail.pop_front();
@@ -153,7 +178,7 @@ impl Book {
             opened.wrong.push(format!("it is broken at {bad}; it goes on after entry {}", last.number));
         }
         let head = own(OpenOptions::new().write(true).create(true).truncate(false), &head_of(path))?;
-        let book = Book { file, head, last, bytes };
+        let book = Book { file, head, last, bytes, last_seal };
         book.note(last)?;
         book.head.sync_all()?;
         // The names must outlive a loss of power too.
@@ -176,6 +201,25 @@ impl Book {
     /// The seal of the last line.
     pub fn last(&self) -> Seal {
         self.last
+    }
+
+    /// The number of the last seal over it.
+    pub fn last_seal(&self) -> Option<u64> {
+        self.last_seal.map(|(number, _)| number)
+    }
+
+    /// Is nothing behind the last seal?
+    pub fn is_sealed(&self) -> bool {
+        self.last_seal.is_some_and(|(_, entry)| entry == self.last.number)
+    }
+
+    /// Appends a seal over everything before it.
+    pub fn seal(&mut self, key: &Key, at: Timestamp) -> io::Result<ActionRecord> {
+        let mut entry = [key.entry(self.last, at)];
+        self.append(&mut entry)?;
+        self.last_seal = Some((key.number, self.last.number));
+        let [entry] = entry;
+        Ok(entry)
     }
 
     /// Writes deeds, all or none, and seals them. When this returns they are on disk.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 pub mod book;
 pub mod recorder;
+pub mod sealing;
 pub mod users;
 
 /// The file of users beside a history: `tank.users.toml` beside `tank.duckdb`.
@@ -11,12 +12,12 @@ pub fn users_beside(history: &Path) -> PathBuf {
     history.with_extension("users.toml")
 }
 
-/// Random bytes of the system, for a salt.
-pub fn salt() -> Result<[u8; super::password::SALT_BYTES], String> {
-    let mut salt = [0; super::password::SALT_BYTES];
-    let filled = rustix::rand::getrandom(&mut salt, rustix::rand::GetRandomFlags::empty());
+/// Random bytes of the system, for a salt or a key.
+pub fn random<const BYTES: usize>() -> Result<[u8; BYTES], String> {
+    let mut random = [0; BYTES];
+    let filled = rustix::rand::getrandom(&mut random, rustix::rand::GetRandomFlags::empty());
     match filled {
-        Ok(bytes) if bytes == salt.len() => Ok(salt),
+        Ok(bytes) if bytes == BYTES => Ok(random),
         Ok(_) => Err("the system gives no random numbers".to_owned()),
         Err(error) => Err(format!("the system gives no random numbers: {error}")),
     }

@@ -9,11 +9,18 @@ use std::{
     time::{Duration, Instant},
 };
 
+use jiff::Timestamp;
 use tokio::sync::{mpsc, watch};
 
-use super::book::{self, Book, IN_USE, Opened};
+use super::{
+    book::{self, Book, IN_USE, Opened},
+    sealing,
+};
 use crate::{
-    access::book::{Comparison, START, compare, fit},
+    access::{
+        book::{Comparison, START, compare, fit},
+        sealing::is_due,
+    },
     bus::io::clock::Clock,
     history::io::{
         alarm_file::{self, AlarmFile, Found},
@@ -30,6 +37,8 @@ const GROUP_MAX: usize = 64;
 const PENDING_MAX: usize = 10_000;
 /// What could not be written is tried again so often.
 const AGAIN: Duration = Duration::from_secs(1);
+/// So long the thread waits for something to write before it looks whether a seal is due.
+const LOOK: Duration = Duration::from_secs(60);
 /// A log that cannot be opened is tried again so often: it is read from its beginning.
 const REOPEN: Duration = Duration::from_secs(10);
 
@@ -120,6 +129,9 @@ struct Recorder {
     /// Why the log and the alarm-state file cannot be written now.
     log_fault: Option<String>,
     alarm_fault: Option<String>,
+    /// Why the log cannot be sealed, and when that was tried last, with or without success.
+    seal_fault: Option<String>,
+    seal_tried: Option<(Timestamp, bool)>,
     /// Another process writes both files.
     in_use: bool,
     opened_at: Instant,
@@ -146,6 +158,8 @@ impl Recorder {
             alarms_found: found.trouble.clone(),
             log_fault: None,
             alarm_fault: None,
+            seal_fault: None,
+            seal_tried: None,
             in_use: false,
             opened_at: Instant::now(),
             unsealed: 0,
@@ -158,11 +172,8 @@ impl Recorder {
 
     fn run(mut self, queue: &queue::Receiver<Message>, told: &watch::Sender<Recorded>) {
         loop {
-            let next = match self.is_written() {
-                true => queue.recv().map_err(|_| queue::RecvTimeoutError::Disconnected),
-                false => queue.recv_timeout(AGAIN),
-            };
-            match next {
+            let wait = if self.is_written() { LOOK } else { AGAIN };
+            match queue.recv_timeout(wait) {
                 Ok(message) => {
                     let more = queue.try_iter().take(GROUP_MAX - 1);
                     [message].into_iter().chain(more).for_each(|message| match message {
@@ -175,12 +186,18 @@ impl Recorder {
             }
             self.write();
             told.send_replace(self.status());
+            let now = self.clock.utc();
+            if is_due(self.seal_tried, now) {
+                self.seal(now);
+                told.send_replace(self.status());
+            }
         }
         // The last chance of what could not be written until now.
         self.write();
         if !self.pending.is_empty() {
             tracing::error!(actions = self.pending.len(), "the station ends, and these are not in the audit log");
         }
+        self.seal(self.clock.utc());
         told.send_replace(self.status());
     }
 
@@ -283,6 +300,19 @@ impl Recorder {
         self.unsealed += excess as u64;
     }
 
+    /// Seals what the log holds, if it has a key.
+    fn seal(&mut self, now: Timestamp) {
+        let Some(book) = &mut self.book else { return };
+        let (entry, sealed) = sealing::seal(book, &self.path, now);
+        self.seal_tried = Some((now, sealed.is_ok()));
+        let fault = sealed.err();
+        if let Some(why) = fault.as_ref().filter(|_| fault != self.seal_fault) {
+            tracing::error!("{why}");
+        }
+        self.seal_fault = fault;
+        self.store(entry.into_iter().collect());
+    }
+
     fn store(&mut self, actions: Vec<ActionRecord>) {
         let records: Vec<Record> = actions.into_iter().map(Record::Action).collect();
         if !records.is_empty()
@@ -334,7 +364,7 @@ impl Recorder {
             waiting: self.taken - self.recorded,
             lost: self.lost,
             last: self.book.as_ref().map(Book::last),
-            log: all(log, &self.found),
+            log: all(log.or_else(|| self.seal_fault.clone()), &self.found),
             alarms: all(alarms, self.alarms_found.as_slice()),
         }
     }

@@ -1,0 +1,118 @@
+//! The sealing key beside the audit log: made once, replaced after each seal, and the check of all seals.
+
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{self, Read},
+    os::unix::fs::{FileExt, MetadataExt, fchown},
+    path::{Path, PathBuf},
+};
+
+use jiff::Timestamp;
+
+use super::{
+    book::{self, Book, VerifyError, verify_each},
+    random,
+};
+use crate::{
+    access::{
+        book::Summary,
+        sealing::{Key, SealCheck, Sealed, VerificationKey},
+    },
+    plant::record::{ActionRecord, Seal},
+    profile::io::atomic::{self, write_atomic},
+};
+
+/// The key beside a log: `tank.audit.key` beside `tank.audit.jsonl`.
+pub fn beside(log: &Path) -> PathBuf {
+    log.with_extension("key")
+}
+
+/// Reads the present key; `None` where there is none.
+pub fn read(path: &Path) -> io::Result<Option<Key>> {
+    match File::open(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(error),
+        Ok(file) => {
+            let mut text = String::new();
+            file.take(1_000).read_to_string(&mut text)?;
+            let damaged = || io::Error::new(io::ErrorKind::InvalidData, "it is damaged");
+            Key::parse(&text).map(Some).ok_or_else(damaged)
+        }
+    }
+}
+
+/// Makes the first key of a log, for the user who owns the log; [`io::ErrorKind::AlreadyExists`] if there is a key. Where a
+/// log has seals of an earlier key the numbers go on.
+pub fn make(log: &Path, made: Timestamp) -> io::Result<VerificationKey> {
+    let path = beside(log);
+    let last = match File::open(log) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+        file => book::last_seal(file?)?,
+    };
+    let bytes = random().map_err(io::Error::other)?;
+    let first = Key::new(last.map_or(0, |last| last + 1), bytes);
+    let new = atomic::beside(&path);
+    let file = atomic::write_beside(&new, first.text().as_bytes(), 0o600)?;
+    let owner = fs::metadata(log).or_else(|_| fs::metadata(path.parent().unwrap_or(Path::new("."))))?;
+    let own = file.metadata()?.uid();
+    // Unlike a rename, a link never replaces a key that is there.
+    let placed =
+        if own == 0 && owner.uid() != own { fchown(&file, Some(owner.uid()), Some(owner.gid())) } else { Ok(()) }
+            .and_then(|()| fs::hard_link(&new, &path));
+    fs::remove_file(&new)?;
+    placed?;
+    atomic::sync_folder(&path)?;
+    Ok(VerificationKey { first, made })
+}
+
+/// Seals a log as far as it goes, if it has a key. Gives the entry that was appended, and why it failed, in words for the
+/// operator: both if the key could not be replaced behind the seal.
+///
+/// The seal is on disk before its key is replaced, and a key that the log has a seal of is replaced before the next one: a
+/// process that is killed in between leaves neither a gap nor two seals of one key.
+pub fn seal(book: &mut Book, log: &Path, at: Timestamp) -> (Option<ActionRecord>, Result<(), String>) {
+    let path = beside(log);
+    let failed = |why: &str| Err(format!("the audit log is not sealed: {}: {why}", path.display()));
+    let present = match read(&path) {
+        Ok(Some(key)) => key,
+        Ok(None) if book.last_seal().is_none() => return (None, Ok(())),
+        Ok(None) => return (None, failed("the sealing key is missing")),
+        Err(error) => return (None, failed(&error.to_string())),
+    };
+    let Some(key) = present.after(book.last_seal()) else {
+        return (None, failed("the sealing key is older than the last seal"));
+    };
+    if key != present
+        && let Err(error) = replace(&path, &key)
+    {
+        return (None, failed(&error.to_string()));
+    }
+    if book.is_sealed() {
+        return (None, Ok(()));
+    }
+    match book.seal(&key, at) {
+        Ok(entry) => (Some(entry), replace(&path, &key.next()).or_else(|error| failed(&error.to_string()))),
+        Err(error) => (None, Err(format!("the audit log is not sealed: {error}"))),
+    }
+}
+
+/// Replaces the key on disk and overwrites the old one, which would else stay readable in free blocks of the disk.
+fn replace(path: &Path, key: &Key) -> io::Result<()> {
+    let old = OpenOptions::new().write(true).open(path)?;
+    write_atomic(path, key.text().as_bytes(), 0o600)?;
+    old.write_all_at(&vec![0; key.text().len()], 0)?;
+    old.sync_data()
+}
+
+/// Reads a log as [`book::verify`] does, and checks its seals. `None` for the second where nothing stands beside the log
+/// that a cut behind its last seal would be seen by.
+pub fn verify(log: &Path, rows: &[Seal], key: &VerificationKey) -> Result<(Summary, Sealed, bool), VerifyError> {
+    let path = beside(log);
+    // Before the log, which may be ahead of it. Once more where the station replaces it at this moment.
+    let present = read(&path).or_else(|_| read(&path));
+    let present = present.map_err(|error| VerifyError::Io { path: path.display().to_string(), error })?;
+    let mut check = SealCheck::new(key);
+    let summary = verify_each(log, rows, |entry, seal| check.entry(entry, seal))?;
+    let sealed = check.end(present).map_err(|bad| VerifyError::Bad { path: log.display().to_string(), bad })?;
+    Ok((summary, sealed, present.is_some()))
+}
