@@ -21,7 +21,8 @@ use sightglass::{
     access::{
         Durability, OrderRequest, Users, Wish,
         book::{Check, Entry},
-        io::{book, users, users_beside},
+        io::{book, sealing, users, users_beside},
+        sealing::VerificationKey,
         user::Change,
     },
     attach::io::connect::connect,
@@ -38,7 +39,7 @@ use sightglass::{
         alarm::AlarmCommand,
         command::{Command, OrderId, Outcome},
         def::AlarmId,
-        record::{AlarmRecord, AlarmStep},
+        record::{AlarmRecord, AlarmStep, SEAL_LOG},
         role::Role,
         snapshot::ActiveAlarm,
     },
@@ -99,6 +100,8 @@ struct Place {
     /// Where the simulated devices are, and whether they are slow.
     port: String,
     slow: Arc<AtomicBool>,
+    /// Verifies the seals of the audit log.
+    key: VerificationKey,
     _sim: Process,
 }
 
@@ -148,7 +151,8 @@ impl Place {
         let text = profile::text_of("tank", &Search::shipped()).unwrap();
         std::fs::write(folder.path().join("tank.toml"), text + ALARM_TOML).unwrap();
         users::write(&users_beside(&folder.path().join("tank.duckdb")), &people).unwrap();
-        Place { folder, sockets, port, slow, _sim: sim }
+        let key = sealing::make(&book::beside(&folder.path().join("tank.duckdb")), jiff::Timestamp::UNIX_EPOCH);
+        Place { folder, sockets, port, slow, key: key.unwrap(), _sim: sim }
     }
 
     fn plant(&self) -> PathBuf {
@@ -329,7 +333,9 @@ async fn whatever_a_terminal_was_told_is_in_the_book_of_a_station_that_is_killed
         place.slow.store(round % SLOW_EVERY == 0, Ordering::Relaxed);
         let before = entries_or_none(&place.book());
         let told = live(&place, round, 4 + round % 7, Duration::from_micros(round * 1_733 % 40_000)).await;
-        let whole = book::verify(&place.book(), &[]).unwrap_or_else(|error| panic!("round {round}: {error}"));
+        let verified = sealing::verify(&place.book(), &[], &place.key);
+        let (whole, sealed, _) = verified.unwrap_or_else(|error| panic!("round {round}: {error}"));
+        assert!(round < sealed.seals, "round {round}: each start has its seal, found {}", sealed.seals);
         let all = entries(&place.book());
         assert_eq!(all.len() as u64, whole.entries, "round {round}");
         let lived = &all[before..];
@@ -366,8 +372,8 @@ async fn whatever_a_terminal_was_told_is_in_the_book_of_a_station_that_is_killed
     let mut station = place.station();
     station.signal("TERM");
     assert_eq!(station.end(), Some(0), "{:?}", station.said);
-    let last = entries(&place.book()).pop().unwrap();
-    assert_eq!(&*last.action, "stop station");
+    let actions: Vec<_> = entries(&place.book()).into_iter().map(|entry| entry.action).collect();
+    assert!(actions.ends_with(&["stop station".into(), SEAL_LOG.into()]), "{:?}", actions.last());
     // Each start has completed the history by what the log held before it.
     let def = profile::load(&place.plant(), &Search::shipped()).unwrap();
     let seals = Store::open_read_only(&place.history(), &def).unwrap().seals().unwrap();
