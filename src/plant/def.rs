@@ -48,6 +48,8 @@ pub struct PlantDef {
     pub shifts: Vec<ShiftDef>,
     /// What reports contain and where they go.
     pub report: ReportDef,
+    /// What the history needs of its disk.
+    pub history: HistoryDef,
     /// The simulated process that `demo` and `sim` serve for this plant, by name (`tank`).
     pub simulation: Option<String>,
 }
@@ -360,6 +362,22 @@ pub struct ReportDef {
     pub record: Option<(DeviceId, Duration)>,
     /// How CSV is written.
     pub csv: CsvDialect,
+}
+
+/// How little of its disk may be free before the history warns: less than both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HistoryDef {
+    /// Share of the disk, percent.
+    pub disk_free_percent_min: u8,
+    /// MiB.
+    pub disk_free_mib_min: u32,
+}
+
+impl Default for HistoryDef {
+    /// A tenth of a large disk is plenty, and a small disk never has 1 GiB free.
+    fn default() -> HistoryDef {
+        HistoryDef { disk_free_percent_min: 10, disk_free_mib_min: 1_024 }
+    }
 }
 
 /// How CSV is written.

@@ -107,6 +107,7 @@ pub fn plant() -> PlantDef {
         mimic: MimicDef::default(),
         trends: Vec::new(),
         shifts: Vec::new(),
+        history: Default::default(),
         report: ReportDef { folder: "reports".into(), tags: Vec::new(), record: None, csv: Default::default() },
         simulation: None,
     }

@@ -2,7 +2,11 @@
 
 use std::{ops::RangeInclusive, time::Duration};
 
-use super::{diagnostic::Problems, reader::At, schema::AccessTable};
+use super::{
+    diagnostic::Problems,
+    reader::{At, within},
+    schema::AccessTable,
+};
 use crate::plant::role::{AccessDef, Role};
 
 /// Passwords shorter than this are nobody's business to permit (NIST SP 800-63B rev 4, 8 with a second factor).
@@ -16,7 +20,7 @@ const LOCK_OUT: RangeInclusive<Duration> = Duration::from_secs(10)..=Duration::f
 pub(super) fn access(table: Option<&AccessTable>, problems: &mut Problems) -> AccessDef {
     let usual = AccessDef::default();
     let Some(table) = table else { return usual };
-    let chars = number(table.password_chars_min, CHARS_LEAST, 64, usual.password_chars_min, problems);
+    let chars = within(table.password_chars_min, CHARS_LEAST..=64, usual.password_chars_min, problems);
     let mut trusted: Vec<(String, Role)> = Vec::new();
     for table in &table.trusted {
         let (Some(user), Some(role)) = (&table.value.user, table.value.role) else { continue };
@@ -30,10 +34,10 @@ pub(super) fn access(table: Option<&AccessTable>, problems: &mut Problems) -> Ac
         notice: table.notice.as_ref().map(|notice| notice.value.clone()),
         view: table.view.map_or(usual.view, |view| view.value),
         password_chars_min: chars,
-        tries_max: number(table.tries_max, 1, TRIES_MOST, usual.tries_max, problems),
+        tries_max: within(table.tries_max, 1..=TRIES_MOST, usual.tries_max, problems),
         lock_out: lock_out(table.lock_out, usual.lock_out, problems),
         idle_lock: table.idle_lock.map_or(usual.idle_lock, |span| span.value),
-        sessions_max: number(table.sessions_max, 1, 256, usual.sessions_max, problems),
+        sessions_max: within(table.sessions_max, 1..=256, usual.sessions_max, problems),
         trusted,
     }
 }
@@ -43,17 +47,6 @@ fn lock_out(given: Option<At<Duration>>, usual: Duration, problems: &mut Problem
     let Some(given) = given else { return usual };
     if !LOCK_OUT.contains(&given.value) {
         problems.add(given.at, format!("{:?} cannot be used here", given.value)).label("expected 10s … 1h");
-        return usual;
-    }
-    given.value
-}
-
-fn number(given: Option<At<u16>>, least: u16, most: u16, usual: u16, problems: &mut Problems) -> u16 {
-    let Some(given) = given else { return usual };
-    if !(least..=most).contains(&given.value) {
-        problems
-            .add(given.at, format!("{} cannot be used here", given.value))
-            .label(format!("expected {least} … {most}"));
         return usual;
     }
     given.value

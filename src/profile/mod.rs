@@ -19,6 +19,7 @@ pub(crate) mod diagnostic;
 mod edit;
 mod expr;
 mod guard;
+mod history;
 pub(crate) mod io;
 pub mod line;
 mod lint;

@@ -7,7 +7,7 @@ use jiff::tz::TimeZone;
 use super::{
     access, alarm, device,
     diagnostic::{Errors, Problems},
-    guard, line, lint,
+    guard, history, line, lint,
     names::{Defs, Names, Unique, check_name},
     picture, program, reader,
     reader::{At, Node, Raw, text},
@@ -78,6 +78,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let trends = picture::trends(&file.trends, &defs, problems);
     let shifts = report::shifts(&file.shifts, problems);
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, problems);
+    let history = history::history(file.history.as_ref().map(|history| &history.value), problems);
     let classes = class::classes(&tags, &alarms, &classes);
     tags.iter_mut().zip(classes).for_each(|(tag, class)| tag.class = class);
     Some(PlantDef {
@@ -93,6 +94,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         trends,
         shifts,
         report,
+        history,
         simulation: file.simulation.as_ref().map(|simulation| simulation.value.clone()),
         devices,
         tags,

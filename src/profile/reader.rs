@@ -3,7 +3,7 @@
 //! serde stops at the first error and forgets where values stood. Here each value keeps its [`Span`], and a table may
 //! have several [`Raw`] layers: a plant file's row lies on the row of the device profile, which lies on its defaults.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{collections::BTreeMap, fmt::Display, ops::RangeInclusive, time::Duration};
 
 use jiff::{SignedDuration, civil::Time};
 use toml::{
@@ -436,6 +436,22 @@ impl Value for Choice {
             _ => wrong_type(value, at, "a number or a word", problems),
         }
     }
+}
+
+/// A number that must lie in a range; the usual one where it does not or is not written.
+pub(crate) fn within<T: PartialOrd + Display + Copy>(
+    given: Option<At<T>>,
+    range: RangeInclusive<T>,
+    usual: T,
+    problems: &mut Problems,
+) -> T {
+    let Some(given) = given else { return usual };
+    if !range.contains(&given.value) {
+        let expected = format!("expected {} … {}", range.start(), range.end());
+        problems.add(given.at, format!("{} cannot be used here", given.value)).label(expected);
+        return usual;
+    }
+    given.value
 }
 
 /// The words of an optional string; empty if it is not there.

@@ -33,6 +33,7 @@ table!(
         list "trend" trends: TrendTable,
         list "shift" shifts: ShiftTable,
         opt "report" report: ReportTable,
+        opt "history" history: HistoryTable,
     }
 );
 
@@ -451,6 +452,14 @@ table!(
         list "tags" tags: String,
         opt "record" record: RecordTable,
         opt "csv" csv: CsvTable,
+    }
+);
+
+table!(
+    /// How little of the disk may be free.
+    HistoryTable, "the history" {
+        opt "disk_free_percent_min" disk_free_percent_min: u8,
+        opt "disk_free_mib_min" disk_free_mib_min: u32,
     }
 );
 

@@ -8,7 +8,7 @@ use super::{
     plant::{Library, Text, build},
 };
 use crate::plant::{
-    def::{Condition, PlantDef, Subject},
+    def::{Condition, HistoryDef, PlantDef, Subject},
     guard::Blocking,
     station::StationFault,
     tag::{Bound, Class, Kind},
@@ -286,6 +286,29 @@ fn a_value_of_the_wrong_kind_is_named() {
     );
     check("name = \"OUT\"", "", &["a tag needs `name`"]);
     check("line = \"L1\"\nunit = 2", "unit = 2", &["a device needs `line`"]);
+}
+
+#[test]
+fn the_disk_space_that_the_history_needs_is_read_and_checked() {
+    let with =
+        |keys: &str| load(PLANT.replace("\n[mimic]", &format!("\n[history]\n{keys}\n[mimic]")).as_bytes(), METER, PLC);
+    let read = |keys: &str| with(keys).unwrap_or_else(|errors| panic!("{errors}")).history;
+    let usual = HistoryDef { disk_free_percent_min: 10, disk_free_mib_min: 1_024 };
+    assert_eq!(load(PLANT.as_bytes(), METER, PLC).unwrap().history, usual, "without the table");
+    assert_eq!(read("disk_free_percent_min = 5"), HistoryDef { disk_free_percent_min: 5, ..usual });
+    assert_eq!(read("disk_free_mib_min = 0"), HistoryDef { disk_free_mib_min: 0, ..usual });
+    for (key, expect) in [
+        ("disk_free_percent_min = 51", ["[small.toml:32:25]", "51 cannot be used here", "expected 0 … 50"]),
+        ("disk_free_mib_min = 1048577", ["[small.toml:32:21]", "1048577 cannot be used here", "expected 0 … 1048576"]),
+        ("disk_free_mib_min = \"1 GiB\"", ["[small.toml:32:21]", "found a string", "expected a whole number"]),
+        (
+            "disk_free_percent = 5",
+            ["[small.toml:32:1]", "unknown key `disk_free_percent` in the history", "disk_free_percent_min"],
+        ),
+    ] {
+        let text = with(key).expect_err(key).to_string();
+        expect.iter().for_each(|piece| assert!(text.contains(piece), "{key}: no `{piece}` in\n{text}"));
+    }
 }
 
 /// A tag that holds text, added to the small plant's meter.

@@ -75,6 +75,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
             .iter()
             .map(|&(name, hour, minute)| ShiftDef { name: name.into(), start: time(hour, minute, 0, 0) })
             .collect(),
+        history: Default::default(),
         report: ReportDef {
             folder: "reports".into(),
             tags: Vec::new(),

@@ -46,6 +46,7 @@ fn tank() -> Arc<PlantDef> {
         mimic: MimicDef::default(),
         trends: Vec::new(),
         shifts: Vec::new(),
+        history: Default::default(),
         report: ReportDef { folder: "reports".into(), tags: Vec::new(), record: None, csv: CsvDialect::default() },
         simulation: None,
     })

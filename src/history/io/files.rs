@@ -12,14 +12,10 @@ use std::{
 
 use jiff::{Timestamp, tz::TimeZone};
 
-use crate::history::HistoryError;
+use crate::{history::HistoryError, plant::def::HistoryDef};
 
 /// Opens that never ended before the log is set aside, as the part that is replayed; after one more, the file too.
 pub const FAILED_OPENS_MAX: u32 = 2;
-
-/// A disk is nearly full with less than this free, in bytes and in percent.
-const FREE_MIN: u64 = 1 << 30;
-const FREE_PERCENT_MIN: u64 = 10;
 
 /// A file beside the database that exists only while it is being opened. Replaying a damaged log can abort the whole
 /// process: then the file stays behind and counts.
@@ -149,16 +145,16 @@ pub fn inode(path: &Path) -> Option<(u64, u64)> {
     fs::metadata(path).ok().map(|meta| (meta.dev(), meta.ino()))
 }
 
-/// How little is left of the disk that a history lies on, where both less than a tenth and less than 1 GiB are free: a
-/// tenth of a large disk is plenty, and a small disk never has 1 GiB.
-pub fn disk_nearly_full(db: &Path) -> Option<String> {
+/// How little is free of the disk that a history lies on, where that is less than both thresholds.
+pub fn disk_nearly_full(db: &Path, least: HistoryDef) -> Option<String> {
     let folder = db.ancestors().skip(1).find(|folder| folder.is_dir())?;
     let disk = rustix::fs::statvfs(folder).ok()?;
-    nearly_full(disk.f_bavail.saturating_mul(disk.f_frsize), disk.f_blocks.saturating_mul(disk.f_frsize))
+    nearly_full(disk.f_bavail.saturating_mul(disk.f_frsize), disk.f_blocks.saturating_mul(disk.f_frsize), least)
 }
 
-fn nearly_full(free: u64, all: u64) -> Option<String> {
-    let full = free < FREE_MIN && free < all / 100 * FREE_PERCENT_MIN;
+fn nearly_full(free: u64, all: u64, least: HistoryDef) -> Option<String> {
+    let full =
+        free < u64::from(least.disk_free_mib_min) << 20 && free < all / 100 * u64::from(least.disk_free_percent_min);
     // In steps, so that the words do not change with every record.
     full.then(|| format!("{} MiB of the disk are free ({} %)", free >> 20 >> 3 << 3, free * 100 / all.max(1)))
 }
@@ -248,9 +244,16 @@ mod tests {
             (0, 4 * GIB, Some("0 MiB of the disk are free (0 %)")),
             (0, 0, None),
         ] {
-            assert_eq!(nearly_full(free, all).as_deref(), expect, "{free} of {all}");
+            assert_eq!(nearly_full(free, all, HistoryDef::default()).as_deref(), expect, "{free} of {all}");
         }
-        assert_eq!(disk_nearly_full(Path::new("/proc/none/x.duckdb")), nearly_full(0, 0), "no disk at all");
+        let least = |percent, mib| HistoryDef { disk_free_percent_min: percent, disk_free_mib_min: mib };
+        for (least, expect) in
+            [(least(6, 512), false), (least(7, 512), true), (least(7, 256), false), (least(0, 1), false)]
+        {
+            assert_eq!(nearly_full(GIB / 4, 4 * GIB, least).is_some(), expect, "{least:?}");
+        }
+        let no_disk = disk_nearly_full(Path::new("/proc/none/x.duckdb"), HistoryDef::default());
+        assert_eq!(no_disk, nearly_full(0, 0, HistoryDef::default()));
     }
 
     #[test]
