@@ -41,8 +41,6 @@ pub struct Handle {
     pub queries: mpsc::Sender<Query>,
     /// How the store stands, after every commit.
     pub status: watch::Receiver<HistoryStatus>,
-    /// Steps of alarms by operators that are committed; told before `status` is.
-    pub settled: watch::Receiver<u64>,
     /// What the plant takes up from its history, as soon as it is open for the first time.
     pub restored: Option<oneshot::Receiver<Restored>>,
     /// The thread.
@@ -52,8 +50,8 @@ pub struct Handle {
 impl Handle {
     /// Drops this end and waits until everything is stored. Blocks for as long as other senders of records exist.
     pub fn stop(self) {
-        let Handle { records, queries, status, settled, restored: _, join } = self;
-        drop((records, queries, status, settled));
+        let Handle { records, queries, status, restored: _, join } = self;
+        drop((records, queries, status));
         // A panic of the thread has already been reported by the panic hook.
         let _ = join.join();
     }
@@ -88,15 +86,14 @@ pub(super) fn start_with(
     let (records, records_in) = mpsc::channel(RECORDS_MAX);
     let (queries, queries_in) = mpsc::channel(QUERIES_MAX);
     let (status_out, status) = watch::channel(writer.status().clone());
-    let (settled_out, settled) = watch::channel(0);
     let (restored_out, restored) = oneshot::channel();
-    let mut tell = Tell { settled: settled_out, status: status_out, restored: Some(restored_out) };
+    let mut outputs = Outputs { status: status_out, restored: Some(restored_out) };
     let trouble = |error: std::io::Error| HistoryError::Engine(format!("thread: {error}"));
     let (requests, requests_in) = mpsc::channel(REQUESTS_MAX);
     let reader = Reader { stores: writer.stores(), writer: requests, clock, answer };
     let reading = spawn("history-reader", || reader.run(queries_in)).map_err(trouble)?;
     let writing = move || async move {
-        let opening = run(&mut writer, clock, records_in, requests_in, &mut tell).await;
+        let opening = run(&mut writer, clock, records_in, requests_in, &mut outputs).await;
         writer.end_reading();
         // A panic of the thread has already been reported by the panic hook.
         let _ = reading.join();
@@ -105,10 +102,10 @@ pub(super) fn start_with(
             writer.opened(ended(opening.await), clock.utc());
         }
         writer.finish(clock.utc());
-        tell.tell(&mut writer);
+        outputs.publish(&mut writer);
     };
     let join = spawn("history", writing).map_err(trouble)?;
-    Ok(Handle { records, queries, status, settled, restored: Some(restored), join })
+    Ok(Handle { records, queries, status, restored: Some(restored), join })
 }
 
 /// A thread with a runtime of its own, only to wait for queues and times at once.
@@ -121,22 +118,20 @@ fn spawn<F: Future<Output = ()>>(
     std::thread::Builder::new().name(name.into()).spawn(move || runtime.block_on(work()))
 }
 
-/// Where the thread tells how it stands.
-struct Tell {
-    settled: watch::Sender<u64>,
+/// What the thread publishes.
+struct Outputs {
     status: watch::Sender<HistoryStatus>,
     restored: Option<oneshot::Sender<Restored>>,
 }
 
-impl Tell {
-    fn tell(&mut self, writer: &mut Writer) {
+impl Outputs {
+    fn publish(&mut self, writer: &mut Writer) {
         if let Some(restored) = writer.take_restored()
             && let Some(station) = self.restored.take()
         {
             // A station that has ended takes up nothing.
             let _ = station.send(restored);
         }
-        self.settled.send_replace(writer.settled());
         self.status.send_replace(writer.status().clone());
     }
 }
@@ -146,7 +141,7 @@ async fn run(
     clock: Clock,
     mut records: mpsc::Receiver<Vec<Record>>,
     mut requests: mpsc::Receiver<Request>,
-    tell: &mut Tell,
+    outputs: &mut Outputs,
 ) -> Option<Opening> {
     let mut opening = None;
     let mut tick = tokio::time::interval(COMMIT_EVERY);
@@ -160,29 +155,29 @@ async fn run(
             biased;
             _ = tick.tick() => {
                 writer.commit(clock.utc());
-                tell.tell(writer);
+                outputs.publish(writer);
             }
             result = opened(&mut opening) => {
                 writer.opened(result, clock.utc());
-                tell.tell(writer);
+                outputs.publish(writer);
             }
             batch = records.recv() => {
                 let Some(batch) = batch else { return opening };
                 if writer.accept(batch) {
                     writer.commit(clock.utc());
-                    tell.tell(writer);
+                    outputs.publish(writer);
                 }
             }
             Some(request) = requests.recv() => match request {
                 Request::Commit(done) => {
                     writer.commit(clock.utc());
-                    tell.tell(writer);
-                    // A question that waits no longer needs no word.
+                    outputs.publish(writer);
+                    // The question may have been cancelled meanwhile.
                     let _ = done.send(());
                 }
                 Request::Unreadable(what) => {
                     writer.unreadable(what);
-                    tell.tell(writer);
+                    outputs.publish(writer);
                 }
             }
         }

@@ -49,9 +49,6 @@ pub struct Writer {
     /// When the station started.
     started: Timestamp,
     pending: Vec<Record>,
-    /// Steps of alarms by operators: taken so far, and how many of them are settled, see [`Writer::settled`].
-    steps: u64,
-    settled: u64,
     status: HistoryStatus,
     /// What was found damaged when the store was opened; stays until the station ends.
     damaged: Option<String>,
@@ -84,8 +81,6 @@ impl Writer {
             def,
             started,
             pending: Vec::new(),
-            steps: 0,
-            settled: 0,
             status: HistoryStatus::default(),
             damaged: None,
             clock: None,
@@ -168,23 +163,17 @@ impl Writer {
         }
     }
 
-    /// Steps of alarms by operators that nobody need wait for any more: committed, or lost and counted as such.
-    pub fn settled(&self) -> u64 {
-        self.settled
-    }
-
-    /// Takes records to be stored with the next commit. `true` if that should be now: an operator has done something with an
-    /// alarm, and no loss of power is to undo what he was told.
+    /// Takes records to be stored with the next commit; drops and counts the oldest samples where too much waits. `true`
+    /// if that commit should be now: what an operator has done with an alarm is not to be missing in the journal.
     pub fn accept(&mut self, records: Vec<Record>) -> bool {
-        let steps = by_operators(&records);
-        self.steps += steps;
+        let now = records.iter().any(|record| matches!(record, Record::Alarm(step) if step.by.is_some()));
         self.pending.extend(records);
         let lost = shed(&mut self.pending, PENDING_MAX);
         if lost > 0 {
             self.status.lost += lost;
             self.describe();
         }
-        steps > 0
+        now
     }
 
     /// Stores what is pending, all or nothing; what could not be stored stays pending. Called once a second.
@@ -221,7 +210,6 @@ impl Writer {
             tracing::debug!(rows, total = self.status.rows, "committed");
             self.pending.clear();
         }
-        self.settled = self.steps;
         self.failing = None;
         // A log that was removed by hand would take its commits with it: they go into the file at once.
         let no_log = rows > 0 && !files::has_log(&self.path);
@@ -342,12 +330,6 @@ fn shed(pending: &mut Vec<Record>, max: usize) -> u64 {
     });
     pending.drain(..excess);
     lost
-}
-
-/// Steps of alarms that an operator has made.
-pub fn by_operators(records: &[Record]) -> u64 {
-    let step = |record: &&Record| matches!(record, Record::Alarm(step) if step.by.is_some());
-    records.iter().filter(step).count() as u64
 }
 
 fn is_fatal(error: &HistoryError) -> bool {

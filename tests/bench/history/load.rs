@@ -21,12 +21,7 @@ use sightglass::{
         Answer, Question,
         io::{Query, store::Store, thread as history},
     },
-    plant::{
-        PlantDef,
-        def::{Priority, TagId},
-        record::{AlarmRecord, AlarmStep, Record},
-        sample::Sample,
-    },
+    plant::{PlantDef, def::TagId, record::Record, sample::Sample},
     report::Period,
 };
 use tokio::sync::oneshot;
@@ -34,12 +29,10 @@ use tokio::sync::oneshot;
 const TAGS: u16 = 1_000;
 /// Batches that the samples of a second come in.
 const BATCHES: u16 = 100;
-/// Time between two steps of an operator.
-const STEP_EVERY: Duration = Duration::from_millis(200);
 /// Where the history begins: some day at midnight.
 const BEGIN: i64 = 1_790_000_000;
 
-/// Tells what it found. `words` are those of the command line behind `load`.
+/// Prints what it measured. `words` are those of the command line behind `load`.
 pub fn main(words: &[String]) {
     let number = |place: usize, default: i64| words.get(place).and_then(|word| word.parse().ok()).unwrap_or(default);
     if words.first().is_some_and(|word| word == "fill") {
@@ -85,6 +78,7 @@ struct Counts {
     stop: AtomicBool,
     refused: AtomicU64,
     rss_max_kb: AtomicU64,
+    log_max: AtomicU64,
 }
 
 fn run(path: &Path, seconds: i64, hours: i64) {
@@ -94,31 +88,34 @@ fn run(path: &Path, seconds: i64, hours: i64) {
     let handle = history::start(path, def(), clock).expect("started");
     println!("opened in {:.0} ms, {} MB resident", began.elapsed().as_secs_f64() * 1e3, rss_kb() / 1_000);
     let counts = Counts::default();
-    let (mut steps, mut asked) = (Vec::new(), Vec::new());
+    let (mut times, mut asked) = (Vec::new(), Vec::new());
     thread::scope(|scope| {
         scope.spawn(|| record(&handle, clock, &counts));
         let askers = [report(now), trend(now, hours)].map(|(name, question)| {
             let (handle, counts) = (&handle, &counts);
             scope.spawn(move || (name, ask(handle, &question, counts)))
         });
-        let stepper = scope.spawn(|| step(&handle, clock, &counts));
+        let watcher = scope.spawn(|| commits(&handle, clock, &counts));
         for _ in 0..seconds {
             thread::sleep(Duration::from_secs(1));
             counts.rss_max_kb.fetch_max(rss_kb(), Ordering::Relaxed);
+            let log = std::fs::metadata(path.with_extension("duckdb.wal")).map_or(0, |log| log.len());
+            counts.log_max.fetch_max(log, Ordering::Relaxed);
         }
         counts.stop.store(true, Ordering::Relaxed);
-        steps = stepper.join().expect("steps");
+        times = watcher.join().expect("times");
         asked.extend(askers.into_iter().map(|asker| asker.join().expect("answers")));
     });
     let status = handle.status.borrow().clone();
     println!("{} rows in {seconds} s, lost {}, refused {}", status.rows, status.lost, counts.refused.into_inner());
     println!("trouble: {}", status.trouble.as_deref().unwrap_or("none"));
-    spread("operator's step until it is on disk", steps);
+    spread("commit", times);
     for (name, (times, failed)) in asked {
         spread(name, times);
         failed.iter().for_each(|why| println!("  failed: {why}"));
     }
-    println!("{} MB resident at most", counts.rss_max_kb.into_inner() / 1_000);
+    let log_max = counts.log_max.into_inner() as f64 / 1e6;
+    println!("{} MB resident at most, log {log_max:.1} MB at most", counts.rss_max_kb.into_inner() / 1_000);
     handle.stop();
 }
 
@@ -140,21 +137,17 @@ fn record(handle: &history::Handle, clock: Clock, counts: &Counts) {
     }
 }
 
-/// Acknowledges an alarm again and again; how long each took to be on disk.
-fn step(handle: &history::Handle, clock: Clock, counts: &Counts) -> Vec<Duration> {
+/// How long each commit took, with the checkpoint behind some of them.
+fn commits(handle: &history::Handle, clock: Clock, counts: &Counts) -> Vec<Duration> {
     let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
-    let (mut settled, mut times) = (handle.settled.clone(), Vec::new());
+    let (mut status, mut times, mut last) = (handle.status.clone(), Vec::new(), None);
     while !counts.stop.load(Ordering::Relaxed) {
-        thread::sleep(STEP_EVERY);
-        let step = AlarmRecord::new(clock.now(), "TIC-1.T1", "high", Priority::High, AlarmStep::Acknowledged);
-        let began = Instant::now();
-        handle
-            .records
-            .blocking_send(vec![Record::Alarm(AlarmRecord { by: Some("anna".into()), ..step })])
-            .expect("sent");
-        let number = times.len() as u64 + 1;
-        runtime.block_on(settled.wait_for(|settled| *settled == number)).expect("stored");
-        times.push(began.elapsed());
+        runtime.block_on(status.changed()).expect("the thread runs");
+        let began = status.borrow_and_update().committed_at;
+        if began != last {
+            times.extend(began.and_then(|began| Duration::try_from(clock.utc().duration_since(began)).ok()));
+            last = began;
+        }
     }
     times
 }
