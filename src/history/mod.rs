@@ -2,6 +2,7 @@
 
 pub mod series;
 pub mod alarm_state;
+pub mod words;
 pub mod io;
 
 use std::time::Duration;
@@ -162,8 +163,8 @@ pub enum HistoryError {
         /// `process 1234 (sightglass)`.
         by: String,
     },
-    /// The engine failed.
-    #[error("history: {0}")]
+    /// The engine failed; in its own words, of which an operator reads only [`words::plain`].
+    #[error("history: {}", words::plain(.0))]
     Engine(String),
     /// The file is something else: it is left alone.
     #[error("{path} is not a history, and is left alone: give another name, best one that ends in .duckdb")]
@@ -197,4 +198,20 @@ pub enum HistoryError {
         /// That time.
         seconds: u64,
     },
+}
+
+impl HistoryError {
+    /// The same where it is already said that it is about the history: `in use by process 1234 (sightglass)`.
+    pub fn words(&self) -> String {
+        match self {
+            HistoryError::Locked { by, .. } => format!("in use by {by}"),
+            HistoryError::Engine(message) => words::plain(message),
+            HistoryError::Foreign { .. }
+            | HistoryError::Missing { .. }
+            | HistoryError::TooManyRows { .. }
+            | HistoryError::EmptyPeriod
+            | HistoryError::NotOpen
+            | HistoryError::TooLong { .. } => self.to_string(),
+        }
+    }
 }

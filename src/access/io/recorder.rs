@@ -22,9 +22,12 @@ use crate::{
         sealing::is_due,
     },
     bus::io::clock::Clock,
-    history::io::{
-        alarm_file::{self, AlarmFile, Found},
-        seals::SEALS_MAX,
+    history::{
+        io::{
+            alarm_file::{self, AlarmFile, Found},
+            seals::SEALS_MAX,
+        },
+        words::plain,
     },
     plant::record::{ActionRecord, AlarmRecord, Record, Seal},
 };
@@ -353,8 +356,9 @@ impl Recorder {
         let log = self
             .log_fault
             .as_ref()
-            .map(|why| format!("the audit trail cannot be written: {why}; {waiting} actions are not in it"));
-        let alarms = self.alarm_fault.as_ref().map(|why| format!("the state of the alarms cannot be written: {why}"));
+            .map(|why| format!("the audit trail cannot be written: {}; {waiting} actions are not in it", plain(why)));
+        let alarms =
+            self.alarm_fault.as_ref().map(|why| format!("the state of the alarms cannot be written: {}", plain(why)));
         let all = |fault: Option<String>, found: &[String]| {
             let parts: Vec<String> = fault.into_iter().chain(found.iter().cloned()).collect();
             (!parts.is_empty()).then(|| parts.join("; "))

@@ -13,7 +13,7 @@ use super::{
     store::{Store, after, engine},
 };
 use crate::{
-    history::HistoryError,
+    history::{HistoryError, words::plain},
     plant::{
         def::PlantDef,
         record::{AlarmRecord, Seal},
@@ -88,12 +88,13 @@ impl Store {
         }
         let mut trouble = None;
         let mut set_aside = |part: Part, why: &str| -> Result<(), HistoryError> {
+            tracing::error!(why, ?part, "the history is damaged");
             let target = files::set_aside(path, part, now)?;
             let what = match part {
                 Part::Log => "the last minutes of the history are",
                 Part::Everything => "the history is",
             };
-            trouble = Some(format!("{what} damaged ({why}) and set aside as {}", target.display()));
+            trouble = Some(format!("{what} damaged ({}) and set aside as {}", plain(why), target.display()));
             Ok(())
         };
         match opening.failed {

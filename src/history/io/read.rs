@@ -1,4 +1,4 @@
-//! What the store answers: curves, values, journal, deeds, and the alarms to restore.
+//! What the store answers: curves, values, journal, operator actions, and the alarms to restore.
 
 use std::{collections::HashMap, sync::Arc, time::Duration};
 
@@ -35,7 +35,7 @@ impl Store {
         if let Err(error) = &answer
             && is_damage(error)
         {
-            self.unreadable.replace(Some(error.to_string()));
+            self.unreadable.replace(Some(format!("it cannot be read: {}", error.words())));
         }
         answer
     }

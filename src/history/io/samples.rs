@@ -89,13 +89,13 @@ impl Store {
                 }
                 Err(error) if is_damage(&error) && to - next > gap_min => span = ((to - next) / 8).max(gap_min),
                 Err(error) if is_damage(&error) => {
-                    tracing::error!(%error, "a part of the history cannot be read");
+                    tracing::error!(?error, "a part of the history cannot be read");
                     let (Some(from), Some(until)) = (instant(next), instant(to)) else { return Err(error) };
                     (0..tags.len()).for_each(|place| each(place, Sample::bad(Cause::Unreadable, from)));
-                    self.unreadable.replace(Some(format!("{from:.0} to {until:.0} cannot be read: {error}")));
+                    self.unreadable.replace(Some(format!("{from:.0} to {until:.0} cannot be read: {}", error.words())));
                     match gaps.last_mut().filter(|last| last.to == from) {
                         Some(last) => last.to = until,
-                        None => gaps.push(Gap { from, to: until, why: error.to_string() }),
+                        None => gaps.push(Gap { from, to: until, why: error.words() }),
                     }
                     next = to;
                 }

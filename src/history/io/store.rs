@@ -47,7 +47,7 @@ pub struct Store {
     pub(super) ended: Option<Timestamp>,
     /// Rows that are read at a time.
     pub(super) piece: usize,
-    /// What could not be read of the file, said once to whoever asks.
+    /// What could not be read of the file, until it is reported.
     pub(super) unreadable: RefCell<Option<String>>,
     /// Shared with every clone, and dropped after their connections: while one is left, the file is not closed.
     alive: Arc<()>,
@@ -312,7 +312,7 @@ pub(super) fn instant(micros: i64) -> Option<Timestamp> {
     Timestamp::from_microsecond(micros).ok()
 }
 
-/// Any failure of the engine, in one line.
+/// Any failure of the engine, in its own words, one line.
 pub(super) fn engine(error: duckdb::Error) -> HistoryError {
     HistoryError::Engine(files::first_line(&error.to_string()))
 }

@@ -40,7 +40,7 @@ pub struct Writer {
     store: Option<Store>,
     /// What the station takes up from the store, until it is taken.
     restored: Option<Restored>,
-    /// Where the reader is told of every store that is opened or about to be closed.
+    /// Where each store goes that is opened, and `None` before one is closed.
     reader: Option<mpsc::Sender<Option<Store>>>,
     /// The store that was closed: readers may still have connections to it.
     closed: Weak<()>,
@@ -146,7 +146,8 @@ impl Writer {
                     self.restored = Some(read);
                 }
                 self.damaged = trouble.or(self.damaged.take());
-                (self.store, self.was_open, self.attempts, self.failing) = (Some(store), true, 0, None);
+                (self.store, self.was_open, self.attempts) = (Some(store), true, 0);
+                (self.failing, self.unchecked) = (None, None);
                 // The first checkpoint soon: a block that it cannot read is found while little depends on it.
                 self.commits = CHECKPOINT_EVERY - CHECKPOINT_FIRST;
                 self.hand_over();
@@ -155,8 +156,7 @@ impl Writer {
             Err(error) => {
                 self.wait = 1 << self.attempts.min(RETRY_SHIFT_MAX);
                 self.attempts += 1;
-                tracing::warn!(%error, retry_after_s = self.wait, "the history is not open");
-                self.failing = Some(error.to_string());
+                self.fail(&error);
                 self.hand_over();
                 self.describe();
             }
@@ -194,11 +194,20 @@ impl Writer {
                     if is_fatal(&error) {
                         self.close();
                     }
-                    self.failing = Some(error.to_string());
+                    self.fail(&error);
                 }
             },
         }
         self.describe();
+    }
+
+    /// Notes why it takes no records, in words for the operator; those of the engine go to the log, once.
+    fn fail(&mut self, error: &HistoryError) {
+        let words = Some(error.words());
+        if self.failing != words {
+            tracing::error!(?error, "the history takes no records");
+        }
+        self.failing = words;
     }
 
     /// All that waited is stored.
@@ -262,10 +271,13 @@ impl Writer {
                 break;
             }
         }
+        if !self.pending.is_empty() {
+            tracing::error!(records = self.pending.len(), "the history took nothing until the end: records lost");
+        }
         self.status.lost += self.pending.len() as u64;
         self.pending.clear();
         if let Err(error) = self.store().and_then(|store| store.end_curves(now)) {
-            self.failing = Some(error.to_string());
+            self.fail(&error);
         }
         self.checkpoint();
         self.describe();
@@ -276,19 +288,23 @@ impl Writer {
     }
 
     fn checkpoint(&mut self) {
-        self.unchecked = match self.store().and_then(Store::checkpoint) {
+        let Some(store) = &self.store else { return };
+        self.unchecked = match store.checkpoint() {
             // A question stood in the way: with the next commit again, and said only when that goes on for long.
             Err(HistoryError::Engine(why))
                 if why.contains("Cannot CHECKPOINT") && self.commits < 2 * CHECKPOINT_EVERY =>
             {
                 return;
             }
-            result => result.err().map(|error| format!("checkpoint: {error}")),
+            result => result.err().map(|error| {
+                tracing::error!(?error, "the log of the history is not written into its file");
+                format!("its log grows: {}", error.words())
+            }),
         };
         self.commits = 0;
     }
 
-    /// After a fatal error DuckDB answers nothing more until the file is opened anew.
+    /// After a fatal error DuckDB answers nothing more until the file is opened again.
     pub(super) fn close(&mut self) {
         if let Some(store) = self.store.take() {
             self.closed = store.alive();
@@ -316,7 +332,7 @@ impl Writer {
 }
 
 /// Brings a list down to three quarters of `max` if it is longer: the oldest samples go first, then the oldest of all.
-/// Steps of alarms and deeds of operators are worth more than any sample. Returns how many went.
+/// Alarm steps and operator actions are worth more than any sample. Returns how many went.
 fn shed(pending: &mut Vec<Record>, max: usize) -> u64 {
     if pending.len() <= max {
         return 0;

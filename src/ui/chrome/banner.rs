@@ -137,9 +137,7 @@ fn silent_words(model: &Model) -> Option<String> {
 
 /// `history: disk full`; nothing while the history is well.
 pub fn history_words(cx: &Cx) -> Option<String> {
-    let trouble = cx.snapshot.history.words()?;
-    // An error of the history names it already.
-    Some(format!("history: {}", trouble.trim_start_matches("history: ")))
+    cx.snapshot.history.words().map(|words| format!("history: {words}"))
 }
 
 /// `UNACK 00:41  TIC-1.PV temperature high  72.4 °C`.

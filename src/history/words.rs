@@ -1,0 +1,71 @@
+//! What an operator reads of a failure: its cause in plain words. Those of the engine and of the system are for the log.
+
+/// What stands in the way, by the words of the engine or of the system: the first that is found counts.
+const CAUSES: [(&str, &str); 12] = [
+    ("No space left", "the disk is full"),
+    ("Disk quota exceeded", "the disk quota is used up"),
+    ("Read-only file system", "the disk is read-only"),
+    ("Permission denied", "no permission for its files"),
+    ("Too many open files", "too many files are open"),
+    ("Input/output error", "the disk reports a read or write error"),
+    ("No such file", "its folder or file is missing"),
+    ("Out of Memory", "not enough memory"),
+    ("Cannot allocate memory", "not enough memory"),
+    ("checksum", "a damaged block, its checksum is wrong"),
+    ("INTERRUPT", "interrupted"),
+    ("invalidated", "the database has stopped after an error"),
+];
+
+/// Longest words for an operator, characters.
+const CHARS_MAX: usize = 160;
+
+/// The cause of a failure in one short line.
+pub fn plain(message: &str) -> String {
+    if let Some((_, words)) = CAUSES.iter().find(|(cause, _)| message.contains(cause)) {
+        return (*words).to_owned();
+    }
+    // DuckDB puts the kind of the error before it, and advice and stack traces behind it.
+    let line = message.lines().next().unwrap_or_default().trim();
+    let kind = line.split_once(": ").filter(|(kind, _)| kind.ends_with(" Error") && kind.len() < 40);
+    let words = kind.map_or(line, |(_, rest)| rest);
+    match words.char_indices().nth(CHARS_MAX) {
+        Some((end, _)) => format!("{}…", words[..end].trim_end()),
+        None => words.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_operator_reads_names_the_cause_and_nothing_of_the_engine() {
+        for (message, words) in [
+            (
+                "TransactionContext Error: Failed to commit: Could not write file \"/x/tank.duckdb.wal\": No space left on device",
+                "the disk is full",
+            ),
+            ("/x/tank.duckdb.opening: Read-only file system (os error 30)", "the disk is read-only"),
+            ("Permission denied (os error 13)", "no permission for its files"),
+            (
+                "FATAL Error: Failed: database has been invalidated because of a previous fatal error.\nOriginal error: \"No space left on device\"",
+                "the disk is full",
+            ),
+            (
+                "IO Error: Corrupt database file: computed checksum 1 does not match stored checksum 2 in block at location 3",
+                "a damaged block, its checksum is wrong",
+            ),
+            (
+                "IO Error: The file \"x\" exists, but it is not a valid DuckDB database file!\nmore",
+                "The file \"x\" exists, but it is not a valid DuckDB database file!",
+            ),
+            ("too busy, ask again", "too busy, ask again"),
+            ("line L1: a name with a colon", "line L1: a name with a colon"),
+            ("", ""),
+        ] {
+            assert_eq!(plain(message), words, "{message}");
+        }
+        let long = plain(&format!("Binder Error: {}", "ä".repeat(500)));
+        assert_eq!(long, format!("{}…", "ä".repeat(CHARS_MAX)));
+    }
+}
