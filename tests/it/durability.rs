@@ -1,13 +1,15 @@
 //! Killed, unplugged, locked, damaged.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use jiff::Timestamp;
 use sightglass::{
     history::{HistoryError, io::store::Store},
+    plant::{record::AlarmStep, station::StationFault},
     profile::{self, Search},
 };
 
-use crate::support::{Cable, Process, folder, have, sightglass};
+use crate::support::{Cable, Process, SmallDisk, folder, have, sightglass, simulated_tank};
 
 /// Every row whose commit was acknowledged is there after kill -9, and the program starts again, twenty times over.
 #[test]
@@ -110,4 +112,135 @@ fn a_mute_line_is_not_a_missing_one() {
     station.wait_for("RAISED: TIC-1");
     station.signal("INT");
     assert_eq!(station.end(), Some(0));
+}
+
+/// What stands in the way of a station whose files all lie on one small disk.
+struct Outage {
+    begin: fn(&SmallDisk),
+    end: fn(&SmallDisk),
+    /// What the operator reads of it.
+    words: &'static str,
+    /// The alarms that it raises.
+    faults: &'static [StationFault],
+}
+
+const FULL: Outage = Outage {
+    begin: SmallDisk::fill,
+    end: SmallDisk::free,
+    words: "history: the disk is full",
+    faults: &[StationFault::NotRecording, StationFault::DiskSpace],
+};
+const PROTECTED: Outage = Outage {
+    begin: SmallDisk::protect,
+    end: SmallDisk::unprotect,
+    words: "history: the disk is read-only",
+    faults: &[StationFault::NotRecording],
+};
+
+/// A station, with its log beside its history as it is installed, or on standard error.
+fn station_on(disk: &SmallDisk, port: &str, log: &[&str]) -> Process {
+    let port = format!("L1={port}");
+    Process::start(sightglass().args(["run", "tank", "--port", &port]).args(log).env("XDG_STATE_HOME", disk.path()))
+}
+
+/// While the outage lasts: its alarms are raised, the line is polled, and the loss of a device is alarmed. Then it ends, and
+/// all that waited is stored. Returns when it ended, and the devices that answer now.
+fn survive(station: &mut Process, sim: Process, port: &str, disk: &SmallDisk, outage: &Outage) -> (Timestamp, Process) {
+    station.expect(outage.words);
+    outage.faults.iter().for_each(|fault| station.expect(&format!("RAISED: station {}", fault.message())));
+    station.expect("TIC-1 (unit 1): answers");
+    drop(sim);
+    station.wait_for("line L1: not connected");
+    station.wait_for("RAISED: TIC-1 gives no values");
+    let mut sim = Process::start(sightglass().args(["sim", "tank", "--tcp", port]));
+    sim.wait_for(" on 127.0.0.1:");
+    station.wait_for("TIC-1 (unit 1): answers");
+    let ended = Timestamp::now();
+    (outage.end)(disk);
+    station.wait_for("history: recovered");
+    let lost: Vec<&String> = station.said.iter().filter(|line| line.contains("lost")).collect();
+    assert!(lost.is_empty(), "{lost:?}");
+    (ended, sim)
+}
+
+/// What was recorded between two instants: samples, raised alarms of the station, and rows that are there twice.
+fn recorded(disk: &SmallDisk, from: Timestamp, to: Timestamp) -> (u64, u64, u64) {
+    let db = duckdb::Connection::open(history_on(disk)).unwrap();
+    let within =
+        format!("utc BETWEEN make_timestamp({}) AND make_timestamp({})", from.as_microsecond(), to.as_microsecond());
+    let count = |sql: &str| db.query_row(sql, [], |row| row.get(0)).unwrap();
+    let (raised, station) = (AlarmStep::Raised.word(), StationFault::NotRecording.message());
+    let samples = count(&format!("SELECT count(*) FROM sample WHERE {within}"));
+    let steps = count(&format!(
+        "SELECT count(*) FROM alarm_journal WHERE {within} AND step = '{raised}' AND text = '{station}'"
+    ));
+    let twice = count(
+        "SELECT (SELECT count(*) - count(DISTINCT (utc, tag, value, quality)) FROM sample)
+              + (SELECT count(*) - count(DISTINCT (utc, subject, text, step)) FROM alarm_journal)
+              + (SELECT count(number) - count(DISTINCT number) FROM operator_action)",
+    );
+    (samples, steps, twice)
+}
+
+fn history_on(disk: &SmallDisk) -> PathBuf {
+    disk.path().join("sightglass/tank.duckdb")
+}
+
+/// The disk takes nothing when the station starts, and is mended while it runs.
+fn an_outage_at_the_start(outage: &Outage) {
+    let Some(disk) = SmallDisk::mount() else { return };
+    (outage.begin)(&disk);
+    let (sim, port) = simulated_tank();
+    let began = Timestamp::now();
+    let mut station = station_on(&disk, &port, &[]);
+    let (ended, _sim) = survive(&mut station, sim, &port, &disk, outage);
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0), "{}", station.said.join("\n"));
+    let (samples, steps, twice) = recorded(&disk, began, ended);
+    assert!(0 < samples && steps == 1 && twice == 0, "{samples} samples, {steps} alarms, {twice} rows twice");
+    let mut verify = sightglass();
+    verify.args(["audit", "verify", "tank"]).env("XDG_STATE_HOME", disk.path());
+    let verified = verify.output().unwrap();
+    assert!(verified.status.success(), "{verified:?}");
+}
+
+/// The same for a station that has recorded before, and is killed after. A disk that is read-only is noticed with the first
+/// checkpoint, some seconds after the start: until then what is open is written.
+fn an_outage_in_the_middle(outage: &Outage) {
+    let Some(disk) = SmallDisk::mount() else { return };
+    let (sim, port) = simulated_tank();
+    let mut station = station_on(&disk, &port, &["--log", "-"]);
+    station.wait_for("committed");
+    (outage.begin)(&disk);
+    let began = Timestamp::now();
+    let (ended, _sim) = survive(&mut station, sim, &port, &disk, outage);
+    station.wait_for("committed");
+    station.signal("KILL");
+    assert_eq!(station.end(), None);
+    let (samples, steps, twice) = recorded(&disk, began, ended);
+    assert!(0 < samples && steps == 1 && twice == 0, "{samples} samples, {steps} alarms, {twice} rows twice");
+    let committed = station.said.iter().filter_map(|line| number(line, "total=")).max().unwrap();
+    let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
+    let rows = Store::open_read_only(&history_on(&disk), &def).unwrap().count_rows().unwrap();
+    assert!(committed <= rows, "{committed} rows were said to be committed, {rows} are there");
+}
+
+#[test]
+fn a_disk_that_is_full_at_the_start_costs_no_record() {
+    an_outage_at_the_start(&FULL);
+}
+
+#[test]
+fn a_disk_that_fills_up_costs_no_record() {
+    an_outage_in_the_middle(&FULL);
+}
+
+#[test]
+fn a_disk_that_is_read_only_at_the_start_costs_no_record() {
+    an_outage_at_the_start(&PROTECTED);
+}
+
+#[test]
+fn a_disk_that_becomes_read_only_costs_no_record() {
+    an_outage_in_the_middle(&PROTECTED);
 }

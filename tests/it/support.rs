@@ -1,9 +1,10 @@
 //! What the tests share: processes that cannot outlive their test, output with deadlines, peers and their installation.
 
 use std::{
-    io::{BufRead, BufReader, Read},
+    fs::File,
+    io::{BufRead, BufReader, Read, Write},
     net::TcpListener,
-    os::unix::fs::DirBuilderExt,
+    os::unix::fs::{DirBuilderExt, MetadataExt},
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     sync::{
@@ -86,6 +87,13 @@ impl Process {
         }
     }
 
+    /// Waits for a line with this text, unless it was said before.
+    pub fn expect(&mut self, text: &str) {
+        if !self.said.iter().any(|line| line.contains(text)) {
+            self.wait_for(text);
+        }
+    }
+
     /// Sends a signal by name.
     pub fn signal(&self, name: &str) {
         let sent = Command::new("kill").args([&format!("-{name}"), &self.child.id().to_string()]).status().unwrap();
@@ -123,6 +131,70 @@ pub fn simulated_tank() -> (Process, String) {
 /// A TCP port that was free a moment ago.
 pub fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}
+
+/// A disk of 16 MiB, to be filled and write-protected.
+pub struct SmallDisk {
+    folder: tempfile::TempDir,
+}
+
+impl SmallDisk {
+    /// `None`, after saying so, where this user may not mount; root must be able to under CI.
+    pub fn mount() -> Option<SmallDisk> {
+        let disk = SmallDisk { folder: folder() };
+        let mounted = disk.try_mount(&["-t", "tmpfs", "-o", "size=16m", "tmpfs"]);
+        let is_root = std::fs::metadata("/proc/self").unwrap().uid() == 0;
+        assert!(mounted || !is_root || std::env::var_os("CI").is_none(), "under CI root must be able to mount a tmpfs");
+        if !mounted {
+            eprintln!("SKIPPED: mounting a tmpfs is not permitted; run this test as root");
+        }
+        mounted.then_some(disk)
+    }
+
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Takes all that is free.
+    pub fn fill(&self) {
+        let mut ballast = File::create(self.path().join("ballast")).unwrap();
+        while ballast.write_all(&[0xA5; 4096]).is_ok() {}
+    }
+
+    /// Gives back what [`SmallDisk::fill`] took.
+    pub fn free(&self) {
+        std::fs::remove_file(self.path().join("ballast")).unwrap();
+    }
+
+    /// Lets nothing be opened for writing any more; files that are open stay as they are.
+    pub fn protect(&self) {
+        let place = self.path().to_str().unwrap();
+        assert!(self.try_mount(&["--bind", place]) && self.try_mount(&["-o", "remount,bind,ro"]));
+    }
+
+    /// Ends [`SmallDisk::protect`].
+    pub fn unprotect(&self) {
+        assert!(self.try_unmount());
+    }
+
+    fn try_mount(&self, args: &[&str]) -> bool {
+        run_quietly(Command::new("mount").args(args).arg(self.path()))
+    }
+
+    fn try_unmount(&self) -> bool {
+        run_quietly(Command::new("umount").arg("--lazy").arg(self.path()))
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        // Also where a test failed between `protect` and `unprotect`.
+        while self.try_unmount() {}
+    }
+}
+
+fn run_quietly(command: &mut Command) -> bool {
+    command.stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok_and(|status| status.success())
 }
 
 /// A pair of pseudo-terminals joined by socat, as a cable that can be pulled.
