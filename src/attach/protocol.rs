@@ -77,6 +77,11 @@ pub enum Asked {
         /// The question.
         question: Question,
     },
+    /// The answer to a question is not needed any more; none comes, unless it is on its way.
+    Cancel {
+        /// Of the question.
+        ticket: u64,
+    },
     /// A wish about people or the station.
     Wish {
         /// Comes back with the answer.

@@ -63,7 +63,7 @@ pub struct Ways {
     /// To the plant.
     pub orders: mpsc::Sender<Order>,
     /// To the history.
-    pub queries: mpsc::Sender<Query>,
+    pub queries: mpsc::Sender<(u32, Query)>,
     /// To the book of deeds.
     pub deeds: mpsc::Sender<Paper>,
     /// To whoever has started the station.
@@ -207,8 +207,8 @@ impl Door {
             }
             Request::Ask(query) => match self.gate.may_ask(terminal, &query.question, now) {
                 Ok(()) => {
-                    if let Err(error) = self.ways.queries.try_send(query) {
-                        let (mpsc::error::TrySendError::Full(query) | mpsc::error::TrySendError::Closed(query)) = error;
+                    if let Err(error) = self.ways.queries.try_send((terminal, query)) {
+                        let (_, query) = error.into_inner();
                         let _ = query.reply.send(Err(HistoryError::Engine("too busy, ask again".to_owned())));
                     }
                 }

@@ -160,7 +160,7 @@ pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, li
 
 /// What runs beside the tasks.
 struct Threads {
-    queries: mpsc::Sender<Query>,
+    queries: mpsc::Sender<(u32, Query)>,
     history: Option<history::Handle>,
     book: Option<std::thread::JoinHandle<()>>,
 }

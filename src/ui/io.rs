@@ -16,6 +16,7 @@ use futures_util::StreamExt;
 use tokio::{
     signal::unix::{SignalKind, signal},
     sync::{mpsc, oneshot},
+    task::AbortHandle,
     time::{Instant, MissedTickBehavior, interval, sleep_until},
 };
 
@@ -85,7 +86,10 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     model.leaving = options.leaving;
     model.drill = session.drill.as_mut().map(|port| port.status.borrow_and_update().clone());
     let screen = Screen::raise()?;
-    Loop { session, model, screen, outbox, redraw_at: None, drawn_at: None, heard_at: Instant::now() }.run(inbox).await
+    let heard_at = Instant::now();
+    Loop { session, model, screen, outbox, asked: Vec::new(), redraw_at: None, drawn_at: None, heard_at }
+        .run(inbox)
+        .await
 }
 
 struct Loop {
@@ -94,6 +98,8 @@ struct Loop {
     screen: Screen,
     /// For answers and saved reports, which come from other tasks, with the plant (its count) that they were asked of.
     outbox: mpsc::Sender<(u32, Msg)>,
+    /// Questions on their way, and what waits for their answers.
+    asked: Vec<(AskId, AbortHandle)>,
     /// When the next frame is due; `None` while the screen is up to date.
     redraw_at: Option<Instant>,
     drawn_at: Option<Instant>,
@@ -172,6 +178,7 @@ impl Loop {
         let effects = own(|| update(&mut self.model, msg));
         let due = self.drawn_at.map_or_else(Instant::now, |at| at + pause);
         self.redraw_at = Some(self.redraw_at.map_or(due, |planned| planned.min(due)));
+        self.cancel();
         for effect in effects {
             match effect {
                 Effect::Order(order) => {
@@ -197,11 +204,18 @@ impl Loop {
         Ok(false)
     }
 
-    fn ask(&self, id: AskId, question: Question) {
+    /// Cancels the questions whose answers no tab waits for any more.
+    fn cancel(&mut self) {
+        let tabs = &self.model.tabs;
+        self.asked.extract_if(.., |(id, _)| !tabs.awaits(*id)).for_each(|(_, waiting)| waiting.abort());
+        self.asked.retain(|(_, waiting)| !waiting.is_finished());
+    }
+
+    fn ask(&mut self, id: AskId, question: Question) {
         let (reply, answer) = oneshot::channel();
         let sent = self.session.ask(Query { question, reply });
         let (outbox, plants) = (self.outbox.clone(), self.model.plants);
-        tokio::spawn(async move {
+        let waiting = tokio::spawn(async move {
             let answer = match sent {
                 Ok(()) => answer.await.unwrap_or_else(|_| Err(HistoryError::Engine("the store has gone".to_owned()))),
                 Err(_) => Err(HistoryError::Engine("too busy, asked again later".to_owned())),
@@ -209,6 +223,7 @@ impl Loop {
             // A terminal that has left needs no answer.
             let _ = outbox.send((plants, Msg::Answer(id, answer))).await;
         });
+        self.asked.push((id, waiting.abort_handle()));
     }
 
     fn wish(&self, id: AskId, wish: Wish) {

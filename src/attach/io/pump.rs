@@ -115,6 +115,7 @@ impl Pump {
         let (out, go) = mpsc::channel(OUT);
         let conversation = async {
             loop {
+                self.cancel(&out);
                 tokio::select! {
                     Some(told) = told.recv() => if let Err(why) = self.take(told) { break Over::Gone(why) },
                     request = requests.recv() => match request {
@@ -200,6 +201,15 @@ impl Pump {
         match hand_over(asked, out) {
             Ok(()) => drop(self.waiting.insert(ticket, waiting)),
             Err(why) => waiting.refuse(&why),
+        }
+    }
+
+    /// Cancels the questions whose answers are not waited for any more. Called with every message of either side.
+    fn cancel(&mut self, out: &mpsc::Sender<Vec<u8>>) {
+        let given_up = |waiting: &Waiting| matches!(waiting, Waiting::Ask(reply) if reply.is_closed());
+        for (ticket, _) in self.waiting.extract_if(|_, waiting| given_up(waiting)) {
+            // A station that is too busy for it answers in vain.
+            let _ = hand_over(&Asked::Cancel { ticket }, out);
         }
     }
 
@@ -298,4 +308,42 @@ async fn speak(mut write: OwnedWriteHalf, mut go: mpsc::Receiver<Vec<u8>>) -> Wi
         }
     }
     WireError::Closed
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use jiff::Timestamp;
+    use tokio::net::UnixStream;
+
+    use super::*;
+    use crate::{history::Question, plant::fixture};
+
+    #[tokio::test]
+    async fn a_question_whose_answer_is_not_waited_for_is_cancelled_at_the_station() {
+        let (publish, _snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
+        let (stand, _standing) = watch::channel(Arc::new(Standing::default()));
+        let mut pump = Pump::new(PathBuf::new(), Place::default(), Own::new(1, 1), publish, stand);
+        let (near, mut far) = UnixStream::pair().unwrap();
+        let (read, write) = near.into_split();
+        let (asks, mut requests) = mpsc::channel(4);
+        tokio::spawn(async move { pump.attend(read, write, &mut requests).await });
+        let question = Question::Journal { from: Timestamp::UNIX_EPOCH, to: Timestamp::UNIX_EPOCH, limit: 1 };
+        let ask = async || {
+            let (reply, answer) = oneshot::channel();
+            asks.send((1, Request::Ask(Query { question: question.clone(), reply }))).await.unwrap();
+            answer
+        };
+        let mut asked = async || {
+            protocol::decode::<Asked>(&wire::read(&mut far, REQUEST_BYTES_MAX).await.unwrap(), "message").unwrap()
+        };
+        let first = ask().await;
+        assert_eq!(asked().await, Asked::Ask { ticket: 1, question: question.clone() });
+        drop(first);
+        let _second = ask().await;
+        assert_eq!(asked().await, Asked::Ask { ticket: 2, question: question.clone() });
+        assert_eq!(asked().await, Asked::Cancel { ticket: 1 }, "the second is waited for");
+        let _third = ask().await;
+        assert_eq!(asked().await, Asked::Ask { ticket: 3, question: question.clone() }, "cancelled once");
+    }
 }

@@ -1,10 +1,11 @@
 //! One attached terminal: what it asks goes in, what it may see goes out, and neither waits for the other.
 
-use std::{sync::Arc, time::Duration};
+use std::{collections::HashMap, sync::Arc, time::Duration};
 
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot},
+    task::{AbortHandle, JoinSet},
     time::{Instant, sleep_until, timeout},
 };
 
@@ -54,7 +55,8 @@ where
     let (replies, answered) = mpsc::channel(IN_FLIGHT_MAX);
     let in_flight = Arc::new(Semaphore::new(IN_FLIGHT_MAX));
     let asked = Arc::new(Semaphore::new(ANSWERS_MAX));
-    let asking = Asking { session: session.clone(), def: def.clone(), replies, in_flight, asked };
+    let (questions, tickets) = (JoinSet::new(), HashMap::new());
+    let asking = Asking { session: session.clone(), def: def.clone(), replies, in_flight, asked, questions, tickets };
     let telling = Telling { write, session, def };
     tokio::select! {
         Err(ended) = asking.run(read) => ended,
@@ -90,11 +92,15 @@ struct Asking {
     replies: mpsc::Sender<Reply>,
     in_flight: Arc<Semaphore>,
     asked: Arc<Semaphore>,
+    /// Questions that wait for their answers; they are cancelled when the terminal leaves.
+    questions: JoinSet<()>,
+    /// The same by their tickets.
+    tickets: HashMap<u64, AbortHandle>,
 }
 
 impl Asking {
     /// Takes one message after the other, no faster than a person asks. What waits, waits in the terminal.
-    async fn run(self, mut read: impl AsyncRead + Unpin) -> Result<Never, Ended> {
+    async fn run(mut self, mut read: impl AsyncRead + Unpin) -> Result<Never, Ended> {
         let mut pace = Pace::new();
         loop {
             let bytes = wire::read(&mut read, REQUEST_BYTES_MAX).await?;
@@ -103,6 +109,7 @@ impl Asking {
             match asked {
                 Asked::Order(order) => self.order(*order).await,
                 Asked::Ask { ticket, question } => self.ask(ticket, question).await,
+                Asked::Cancel { ticket } => self.cancel(ticket),
                 Asked::Wish { ticket, wish } => self.wish(ticket, wish).await,
             }
         }
@@ -122,18 +129,17 @@ impl Asking {
         }
     }
 
-    async fn ask(&self, ticket: u64, question: Question) {
+    async fn ask(&mut self, ticket: u64, question: Question) {
         let Ok(place) = self.in_flight.clone().acquire_owned().await else { return };
         let sent = check::question(&self.def, &question);
         let (reply, answer) = oneshot::channel();
         let query = Query { question, reply };
         let (session, replies, asked) = (self.session.clone(), self.replies.clone(), self.asked.clone());
-        tokio::spawn(async move {
+        while self.questions.try_join_next().is_some() {}
+        self.tickets.retain(|_, question| !question.is_finished());
+        let question = self.questions.spawn(async move {
             // A question waits here for those before it, so that what comes behind it, an order perhaps, does not.
             let Ok(turn) = asked.acquire_owned().await else { return };
-            if replies.is_closed() {
-                return;
-            }
             let sent = sent.and_then(|()| session.ask(query).map_err(str::to_owned));
             // The station takes a terminal for gone when nobody holds its session any more.
             drop(session);
@@ -144,6 +150,14 @@ impl Asking {
             // Only a terminal that has ended does not hear it.
             let _ = replies.send((Told::Answer { ticket, answer }, vec![place, turn])).await;
         });
+        self.tickets.insert(ticket, question);
+    }
+
+    /// The history stops working on a question when nothing waits for its answer.
+    fn cancel(&mut self, ticket: u64) {
+        if let Some(question) = self.tickets.remove(&ticket) {
+            question.abort();
+        }
     }
 
     async fn wish(&self, ticket: u64, wish: Wish) {
@@ -247,5 +261,85 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
     async fn write(&mut self, bytes: &[u8], max: Duration) -> Result<(), Ended> {
         timeout(max, wire::write(&mut self.write, bytes)).await.map_err(|_| Ended::Stuck(max))??;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use jiff::Timestamp;
+    use tokio::{
+        io::{AsyncWriteExt, DuplexStream},
+        sync::watch,
+        task::JoinHandle,
+    };
+
+    use super::*;
+    use crate::{access::Peer, plant::fixture, station::Entrance};
+
+    /// A terminal that is served: what it writes to, and what the station is asked.
+    fn serving() -> (DuplexStream, mpsc::Receiver<(u32, Request)>, JoinHandle<Ended>) {
+        let (publish, snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
+        let (entrance, knocks, requests) = Entrance::new(snapshots);
+        let session = entrance.attach(Peer { from: "test".into(), unix_user: None, own: false });
+        let (near, far) = tokio::io::duplex(REQUEST_BYTES_MAX);
+        let (read, write) = tokio::io::split(near);
+        let served = tokio::spawn(async move {
+            let _station = (publish, knocks);
+            serve(read, write, session, 1).await
+        });
+        (far, requests, served)
+    }
+
+    async fn say(far: &mut DuplexStream, asked: &Asked) {
+        far.write_all(&protocol::encode(asked, REQUEST_BYTES_MAX).unwrap()).await.unwrap();
+    }
+
+    fn question(ticket: u64) -> Asked {
+        let (from, to) = (Timestamp::UNIX_EPOCH, Timestamp::from_second(9).unwrap());
+        Asked::Ask { ticket, question: Question::Journal { from, to, limit: 1 } }
+    }
+
+    async fn next_question(requests: &mut mpsc::Receiver<(u32, Request)>) -> Query {
+        let Some((_, Request::Ask(query))) = requests.recv().await else { panic!("no question") };
+        query
+    }
+
+    async fn is_cancelled(query: &mut Query) -> bool {
+        timeout(Duration::from_secs(60), query.reply.closed()).await.is_ok()
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn questions_of_a_terminal_that_has_left_are_cancelled() {
+        let (mut far, mut requests, served) = serving();
+        say(&mut far, &question(1)).await;
+        let mut query = next_question(&mut requests).await;
+        drop(far);
+        assert!(is_cancelled(&mut query).await, "the history still works on it");
+        assert!(matches!(served.await.unwrap(), Ended::Wire(_)));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_cancelled_question_makes_room_for_another() {
+        let (mut far, mut requests, _served) = serving();
+        let last = ANSWERS_MAX as u64 + 1;
+        for ticket in 1..=last {
+            say(&mut far, &question(ticket)).await;
+        }
+        let mut asked = Vec::new();
+        for _ in 1..last {
+            asked.push(next_question(&mut requests).await);
+        }
+        assert!(
+            timeout(Duration::from_secs(60), requests.recv()).await.is_err(),
+            "more than a terminal may ask at a time"
+        );
+        // One that was never asked, and one that is being answered.
+        say(&mut far, &Asked::Cancel { ticket: 99 }).await;
+        say(&mut far, &Asked::Cancel { ticket: 2 }).await;
+        assert!(is_cancelled(&mut asked[1]).await, "the history still works on it");
+        assert!(!asked[0].reply.is_closed() && !asked[2].reply.is_closed(), "others are not touched");
+        let mut next = next_question(&mut requests).await;
+        assert!(!is_cancelled(&mut next).await);
     }
 }

@@ -80,6 +80,7 @@ fn requests_and_news_survive_the_way() {
     let asked = [
         Asked::Order(Box::new(order)),
         Asked::Ask { ticket: 1, question: Question::Journal { from: now(), to: now(), limit: 5 } },
+        Asked::Cancel { ticket: 1 },
         Asked::Wish { ticket: 2, wish: Wish::Login { user: "anna".into(), password: "long and secret".into() } },
         Asked::Wish { ticket: 3, wish: Wish::SetRole { user: "anna".into(), role: Role::Technician } },
     ];

@@ -1,4 +1,5 @@
-//! Answers questions beside the recording: each on a connection of its own, few at a time, each for a bounded time.
+//! Answers questions beside the recording: each on a connection of its own, few at a time, each for a bounded time, and
+//! never all places for one terminal.
 //!
 //! ```text
 //!   Query ──> queue ──> run ──┬── question, connection, time limit ──> answer
@@ -6,7 +7,11 @@
 //!   writer: a fresh store after every opening ──>   <── "commit first", "this cannot be read"
 //! ```
 
-use std::{sync::Arc, time::Duration};
+use std::{
+    collections::{HashMap, VecDeque},
+    sync::Arc,
+    time::Duration,
+};
 
 use jiff::Timestamp;
 use tokio::{
@@ -21,8 +26,12 @@ use crate::{
     history::{Answer, HistoryError, Question},
 };
 
-/// Questions that are answered at a time; the others wait in their queue.
-pub const QUESTIONS_MAX: usize = 2;
+/// Questions that are answered at a time; the others wait.
+pub const QUESTIONS_MAX: usize = 3;
+/// Of these of one terminal: the others find a place at once.
+pub const QUESTIONS_OF_ONE_MAX: usize = QUESTIONS_MAX - 1;
+/// Questions that wait here; those behind them wait in the queue, which refuses when it is full.
+const WAITING_MAX: usize = 64;
 /// Real time for one question.
 pub const TIME_MAX: Duration = Duration::from_secs(20);
 /// How long a question waits for the commit of what is pending.
@@ -38,7 +47,7 @@ pub type Answerer = Arc<dyn Fn(&Store, &Question, Timestamp) -> Result<Answer, H
 pub enum Request {
     /// Store what is pending, and say when that is done.
     Commit(oneshot::Sender<()>),
-    /// Tell the operator what cannot be read.
+    /// Report to the operator what cannot be read.
     Unreadable(String),
 }
 
@@ -56,13 +65,29 @@ pub struct Reader {
 
 impl Reader {
     /// Answers until the writer has ended; what cannot be answered any more is dropped with its reply.
-    pub async fn run(mut self, mut queries: mpsc::Receiver<Query>) {
+    pub async fn run(mut self, mut queries: mpsc::Receiver<(u32, Query)>) {
         let mut store: Option<Store> = None;
         // Questions wait until the first opening has ended, well or not.
         let mut tried = false;
         let (mut opened, _) = watch::channel(());
         let mut running = JoinSet::new();
+        let mut waiting = VecDeque::new();
+        // The terminal of each question that is being answered.
+        let mut terminals = HashMap::new();
         loop {
+            // A question that was cancelled needs no place.
+            waiting.retain(|(_, query): &(u32, Query)| !query.reply.is_closed());
+            if tried && let Some((terminal, query)) = next(&mut waiting, terminals.values()) {
+                match store.as_ref().ok_or(HistoryError::NotOpen).and_then(Store::try_clone) {
+                    Ok(own) => {
+                        let task = running.spawn(self.ask(own, query, opened.subscribe()));
+                        terminals.insert(task.id(), terminal);
+                    }
+                    // The question may have been cancelled meanwhile.
+                    Err(error) => drop(query.reply.send(Err(error))),
+                }
+                continue;
+            }
             tokio::select! {
                 biased;
                 handed = self.stores.recv() => {
@@ -71,21 +96,17 @@ impl Reader {
                     let Some(handed) = handed else { break };
                     (store, tried) = (handed, true);
                 }
-                Some(_) = running.join_next() => {}
-                Some(query) = queries.recv(), if tried && running.len() < QUESTIONS_MAX => {
-                    match store.as_ref().ok_or(HistoryError::NotOpen).and_then(Store::try_clone) {
-                        Ok(own) => drop(running.spawn(self.ask(own, query, opened.subscribe()))),
-                        // An asker that has left needs no answer.
-                        Err(error) => drop(query.reply.send(Err(error))),
-                    }
+                Some(ended) = running.join_next_with_id() => {
+                    terminals.remove(&ended.map_or_else(|panic| panic.id(), |(id, ())| id));
                 }
+                Some(asked) = queries.recv(), if waiting.len() < WAITING_MAX => waiting.push_back(asked),
             }
         }
         drop((store, opened));
         while running.join_next().await.is_some() {}
     }
 
-    /// Answers a question until its time is over, its asker has left or the store closes.
+    /// Answers a question until its time is over, it is cancelled (its reply is dropped) or the store closes.
     fn ask(&self, store: Store, query: Query, mut opened: watch::Receiver<()>) -> impl Future<Output = ()> + use<> {
         let (writer, clock, answer) = (self.writer.clone(), self.clock, Arc::clone(&self.answer));
         let Query { question, mut reply } = query;
@@ -107,8 +128,11 @@ impl Reader {
             let answer = match ended {
                 Ok(Ok((answer, unreadable))) => {
                     if let Some(what) = unreadable {
-                        // A writer that is too busy hears of it from the next question.
+                        // If the writer is too busy, the next question reports it.
                         let _ = writer.try_send(Request::Unreadable(what));
+                    }
+                    if let Err(error @ HistoryError::Engine(_)) = &answer {
+                        tracing::warn!(?error, "a question is not answered");
                     }
                     answer
                 }
@@ -123,10 +147,25 @@ impl Reader {
                     Err(why)
                 }
             };
-            // An asker that has left needs no answer.
+            // The question may have been cancelled meanwhile.
             let _ = reply.send(answer);
         }
     }
+}
+
+/// Takes the question that is answered next, if there is a place for one: that of the terminal with the fewest being
+/// answered, and of those the one that waits longest.
+fn next<'a, T>(
+    waiting: &mut VecDeque<(u32, T)>,
+    answered: impl ExactSizeIterator<Item = &'a u32> + Clone,
+) -> Option<(u32, T)> {
+    if answered.len() >= QUESTIONS_MAX {
+        return None;
+    }
+    let of_its_terminal = |place: &usize| answered.clone().filter(|terminal| **terminal == waiting[*place].0).count();
+    let fitting = (0..waiting.len()).filter(|place| of_its_terminal(place) < QUESTIONS_OF_ONE_MAX);
+    let place = fitting.min_by_key(of_its_terminal)?;
+    waiting.remove(place)
 }
 
 /// Does a figure of the answer lack what is not committed yet?
@@ -156,6 +195,32 @@ async fn stop<T>(work: &mut JoinHandle<T>, interrupt: impl Fn()) {
         interrupt();
         if timeout(INTERRUPT_EVERY, &mut *work).await.is_ok() {
             break;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Which of the waiting questions (their terminals) is next, by its place.
+    fn place(waiting: &[u32], answered: &[u32]) -> Option<usize> {
+        let mut waiting = waiting.iter().copied().zip(0..).collect();
+        next(&mut waiting, answered.iter()).map(|(_, place)| place)
+    }
+
+    #[test]
+    fn one_terminal_never_has_all_places_and_those_that_wait_take_turns() {
+        for (waiting, answered, expect) in [
+            (&[][..], &[][..], None),
+            (&[7, 7], &[], Some(0)),
+            (&[7, 7], &[7], Some(0)),
+            (&[7, 7], &[7, 7], None),
+            (&[7, 7, 8], &[7, 7], Some(2)),
+            (&[7, 8, 8], &[7, 9], Some(1)),
+            (&[7, 8], &[7, 8, 7], None),
+        ] {
+            assert_eq!(place(waiting, answered), expect, "{waiting:?} while {answered:?} are answered");
         }
     }
 }

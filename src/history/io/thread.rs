@@ -37,8 +37,8 @@ const COMMIT_EVERY: Duration = Duration::from_secs(1);
 pub struct Handle {
     /// Records to store. When the last sender is dropped the thread stores what it has and ends.
     pub records: mpsc::Sender<Vec<Record>>,
-    /// Questions; those that can no longer be answered are dropped with their reply.
-    pub queries: mpsc::Sender<Query>,
+    /// Questions, each with the number of its terminal; those that can no longer be answered are dropped with their reply.
+    pub queries: mpsc::Sender<(u32, Query)>,
     /// How the store stands, after every commit.
     pub status: watch::Receiver<HistoryStatus>,
     /// What the plant takes up from its history, as soon as it is open for the first time.

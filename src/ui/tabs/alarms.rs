@@ -234,6 +234,11 @@ impl Alarms {
         }
     }
 
+    /// Is the answer to question `number` waited for?
+    pub fn awaits(&self, number: u32) -> bool {
+        self.journal.awaits(number) || self.quality.awaits(number) || self.handover.awaits(number)
+    }
+
     /// The history answered question `number`; an answer to an older one is ignored.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
         self.journal.on_answer(cx, number, &answer);

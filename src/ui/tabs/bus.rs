@@ -271,6 +271,11 @@ impl Bus {
         vec![Act::ask(Tab::Bus, self.asked, line_trend::question(self.line, cx.now))]
     }
 
+    /// Is the answer to question `number` waited for?
+    pub fn awaits(&self, number: u32) -> bool {
+        self.errand.awaits(number)
+    }
+
     /// The history has answered. Without an answer the day before is left as it was.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
         if let (Some(_), Ok(Answer::LineMinutes(minutes))) = (self.errand.answered(number, cx.steady()), answer) {

@@ -370,6 +370,11 @@ impl Controllers {
         vec![Act::ask(Tab::Controllers, self.asked, question)]
     }
 
+    /// Is the answer to question `number` waited for?
+    pub fn awaits(&self, number: u32) -> bool {
+        self.errand.awaits(number)
+    }
+
     /// The history has answered.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
         if let (Some(_), Ok(Answer::Series(series))) = (self.errand.answered(number, cx.steady()), answer) {

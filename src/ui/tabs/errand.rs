@@ -52,6 +52,11 @@ impl Errand {
         Some(at)
     }
 
+    /// Does the answer to this question count? The history need not work on another.
+    pub fn awaits(&self, number: u32) -> bool {
+        self.on_way.is_some_and(|(on_way, _)| on_way == number)
+    }
+
     /// Has what is shown changed since the last question went out?
     pub fn is_wanted(&self) -> bool {
         self.wanted
@@ -84,6 +89,7 @@ mod tests {
         assert!(!due(&errand, 5), "while one is on its way");
         assert!(due(&errand, 10), "when it is not what is wanted any more");
         errand.asked(2, at(10));
+        assert!(errand.awaits(2) && !errand.awaits(1), "an older question can be cancelled");
         assert_eq!(errand.answered(1, at(10)), None, "an older answer");
         assert_eq!(errand.answered(2, at(10)), Some(at(10)));
         assert_eq!(errand.answered(2, at(10)), None, "twice");

@@ -158,6 +158,11 @@ impl Mimic {
         asks.collect()
     }
 
+    /// Is the answer to question `number` waited for?
+    pub fn awaits(&self, number: u32) -> bool {
+        (number.wrapping_sub(self.asked.wrapping_mul(self.trends.len() as u32)) as usize) < self.trends.len()
+    }
+
     /// The history answered question `number`.
     pub fn on_answer(&mut self, _cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
         let first = self.asked.wrapping_mul(self.trends.len() as u32);

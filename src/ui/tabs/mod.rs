@@ -247,6 +247,20 @@ impl Tabs {
         }
     }
 
+    /// Does the tab that asked still wait for the answer?
+    pub fn awaits(&self, id: AskId) -> bool {
+        match id.tab {
+            Tab::Mimic => self.mimic.awaits(id.number),
+            Tab::Trends => self.trends.awaits(id.number),
+            Tab::Alarms => self.alarms.awaits(id.number),
+            Tab::Controllers => self.controllers.awaits(id.number),
+            Tab::Reports => self.reports.awaits(id.number),
+            Tab::Bus => self.bus.awaits(id.number),
+            Tab::Users => self.users.awaits(id.number),
+            Tab::Login | Tab::Faults => false,
+        }
+    }
+
     /// An answer goes to the tab that asked, shown or not.
     pub fn on_answer(&mut self, cx: &Cx, id: AskId, answer: Result<Answer, HistoryError>) -> Vec<Act> {
         match id.tab {

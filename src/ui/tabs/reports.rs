@@ -177,6 +177,11 @@ impl Reports {
         self.ask(cx)
     }
 
+    /// Is the answer to question `number` waited for?
+    pub fn awaits(&self, number: u32) -> bool {
+        self.errand.awaits(number)
+    }
+
     /// The history answered question `number`; an answer for another period than the one shown is ignored.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
         if self.errand.answered(number, cx.steady()).is_none() {

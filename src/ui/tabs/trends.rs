@@ -168,6 +168,12 @@ impl Trends {
         self.ask(cx)
     }
 
+    /// Is the answer to question `number` waited for?
+    pub fn awaits(&self, number: u32) -> bool {
+        let Errands { curves, hours, raised, number: _ } = &self.errands;
+        [curves, hours, raised].iter().any(|errand| errand.awaits(number))
+    }
+
     /// The history answered question `number`; an answer to an older question is ignored.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
         let (errands, steady) = (&mut self.errands, cx.steady());

@@ -164,6 +164,11 @@ impl Users {
         acts
     }
 
+    /// Is the answer to question `number` waited for?
+    pub fn awaits(&self, number: u32) -> bool {
+        self.audit.as_ref().is_some_and(|audit| audit.awaits(number))
+    }
+
     /// The history answered question `number`.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
         if let Some(audit) = &mut self.audit {

@@ -169,7 +169,7 @@ fn ask(handle: &history::Handle, question: &Question, counts: &Counts) -> (Vec<D
     while !counts.stop.load(Ordering::Relaxed) {
         let (reply, answer) = oneshot::channel();
         let began = Instant::now();
-        handle.queries.blocking_send(Query { question: question.clone(), reply }).expect("asked");
+        handle.queries.blocking_send((1, Query { question: question.clone(), reply })).expect("asked");
         match answer.blocking_recv().expect("answered") {
             Ok(Answer::Series(series)) => assert!(series[0].good > 0.9, "{}", series[0].good),
             Ok(Answer::Report(report)) => assert_eq!(report.tags.len(), usize::from(TAGS)),

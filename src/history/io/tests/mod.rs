@@ -422,7 +422,7 @@ fn a_stopped_station_leaves_every_curve_ended_and_a_running_one_answers() {
     handle.records.blocking_send(vec![good(PV, 5, 27.0), Record::Alarm(step(6, "high", AlarmStep::Raised))]).unwrap();
     let (reply, answer) = tokio::sync::oneshot::channel();
     let period = Period { name: "period".into(), from: sec(0), to: sec(10) };
-    handle.queries.blocking_send(Query { question: Question::Report { period }, reply }).unwrap();
+    handle.queries.blocking_send((1, Query { question: Question::Report { period }, reply })).unwrap();
     let Ok(Ok(Answer::Report(report))) = answer.blocking_recv() else { panic!("no report") };
     assert_eq!(report.tags[0].last, Some(27.0));
     assert_eq!(handle.status.borrow().lost, 0);

@@ -98,7 +98,7 @@ fn a_damaged_block_costs_the_period_of_its_rows_and_is_named() {
     let handle = thread::start(&db, def(), Clock::starting_at(sec(rows), 1.0)).unwrap();
     let (reply, answer) = tokio::sync::oneshot::channel();
     let period = Period { name: "period".into(), from: sec(0), to: sec(rows) };
-    handle.queries.blocking_send(Query { question: Question::Report { period }, reply }).unwrap();
+    handle.queries.blocking_send((1, Query { question: Question::Report { period }, reply })).unwrap();
     let answer = answer.blocking_recv().unwrap();
     let Ok(Answer::Report(report)) = answer else { panic!("{answer:?}") };
     let lost: i64 = report.unreadable.iter().map(|gap| gap.to.duration_since(gap.from).as_secs()).sum();
@@ -106,13 +106,13 @@ fn a_damaged_block_costs_the_period_of_its_rows_and_is_named() {
     assert!(report.unreadable[0].why.contains("checksum"), "{:?}", report.unreadable);
     let good = 1.0 - lost as f64 / rows as f64;
     assert!((report.tags[0].good - good).abs() < 0.01, "{} {good}", report.tags[0].good);
-    // The operator is told, and recording goes on.
+    // It is shown to the operator, and recording goes on.
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     let mut status = handle.status.clone();
-    let told = |status: &crate::plant::snapshot::HistoryStatus| {
+    let reported = |status: &crate::plant::snapshot::HistoryStatus| {
         status.trouble.as_ref().is_some_and(|words| words.contains("cannot be read"))
     };
-    runtime.block_on(status.wait_for(told)).unwrap();
+    runtime.block_on(status.wait_for(reported)).unwrap();
     handle.records.blocking_send(vec![good_at(rows + 5)]).unwrap();
     runtime.block_on(status.wait_for(|status| status.rows == 1)).unwrap();
     handle.stop();

@@ -1,13 +1,13 @@
-//! Questions beside the recording: they neither hold it up nor outlive their askers, and end when their time is over.
+//! Questions beside the recording: they do not delay it, and end when they are cancelled or their time is over.
 
 use std::sync::mpsc as std_mpsc;
 
 use tokio::sync::{mpsc, oneshot};
 
 use super::*;
-use crate::history::io::reader::{Answerer, QUESTIONS_MAX, Reader, Request, TIME_MAX};
+use crate::history::io::reader::{Answerer, QUESTIONS_MAX, QUESTIONS_OF_ONE_MAX, Reader, Request, TIME_MAX};
 
-/// Answers that never end by themselves. Tells when one has begun, and how it ended.
+/// Answers that never end by themselves, and two queues that say when one has begun and how it ended.
 fn endless() -> (Answerer, std_mpsc::Receiver<()>, std_mpsc::Receiver<String>) {
     let ((begins, begun), (ends, ended)) = (std_mpsc::channel(), std_mpsc::channel());
     let answer = move |store: &Store, _: &Question, _: Timestamp| {
@@ -30,10 +30,10 @@ fn records_are_committed_while_a_question_runs() {
     let (_folder, db) = folder();
     let (answer, begun, ended) = endless();
     let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), answer).unwrap();
-    let questions: Vec<_> = (0..QUESTIONS_MAX).map(|_| query()).collect();
+    let questions: Vec<_> = (0..QUESTIONS_MAX as u32).map(|terminal| (terminal, query())).collect();
     let mut answers = Vec::new();
-    for (query, answer) in questions {
-        handle.queries.blocking_send(query).unwrap();
+    for (terminal, (query, answer)) in questions {
+        handle.queries.blocking_send((terminal, query)).unwrap();
         begun.recv().unwrap();
         answers.push(answer);
     }
@@ -43,10 +43,37 @@ fn records_are_committed_while_a_question_runs() {
     let committed =
         async { tokio::time::timeout(Duration::from_secs(30), status.wait_for(|status| status.rows == 1)).await };
     assert!(runtime.block_on(committed).is_ok(), "no commit while questions run");
-    // Whoever has left is not worked for any longer.
+    // A cancelled question is not worked on any longer.
     drop(answers);
     assert!((0..QUESTIONS_MAX).all(|_| ended.recv().unwrap().contains("INTERRUPT")));
     handle.stop();
+}
+
+#[test]
+fn a_terminal_that_asks_without_pause_keeps_no_other_waiting() {
+    let (_folder, db) = folder();
+    let (answer, begun, ended) = endless();
+    let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), answer).unwrap();
+    let ask = |terminal: u32| {
+        let (query, answer) = query();
+        handle.queries.blocking_send((terminal, query)).unwrap();
+        answer
+    };
+    let mut greedy: Vec<_> = (0..10).map(|_| ask(1)).collect();
+    let other = ask(2);
+    // Two of the first terminal, and the one of the second, though nine were before it.
+    (0..QUESTIONS_MAX).for_each(|_| begun.recv().unwrap());
+    drop(other);
+    assert!(ended.recv().unwrap().contains("INTERRUPT"));
+    // Another one of the first terminal does not take its place: only when one of its own has ended.
+    assert!(begun.try_recv().is_err());
+    greedy.remove(0);
+    assert!(ended.recv().unwrap().contains("INTERRUPT"));
+    begun.recv().unwrap();
+    // What was cancelled before its turn is never begun.
+    greedy.into_iter().rev().for_each(drop);
+    handle.stop();
+    assert_eq!((begun.try_iter().count(), ended.try_iter().count()), (0, QUESTIONS_OF_ONE_MAX));
 }
 
 #[test]
@@ -55,7 +82,7 @@ fn a_station_that_stops_ends_the_questions_and_closes_the_file() {
     let (answer, begun, ended) = endless();
     let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), answer).unwrap();
     let (query, answer) = query();
-    handle.queries.blocking_send(query).unwrap();
+    handle.queries.blocking_send((1, query)).unwrap();
     begun.recv().unwrap();
     handle.stop();
     assert!(ended.recv().unwrap().contains("INTERRUPT"));
@@ -85,7 +112,7 @@ fn alarms_and_actions_have_room_when_samples_have_filled_the_queue() {
 /// A reader by itself: where stores are handed over, and where questions go.
 struct Alone {
     stores: mpsc::Sender<Option<Store>>,
-    queries: mpsc::Sender<Query>,
+    queries: mpsc::Sender<(u32, Query)>,
     requests: mpsc::Receiver<Request>,
 }
 
@@ -104,7 +131,7 @@ async fn a_question_that_takes_too_long_is_ended_and_says_so() {
     let reader = alone(answer);
     reader.stores.send(Some(open(&db, 0))).await.unwrap();
     let (query, answer) = query();
-    reader.queries.send(query).await.unwrap();
+    reader.queries.send((1, query)).await.unwrap();
     tokio::task::spawn_blocking(move || begun.recv().unwrap()).await.unwrap();
     tokio::time::advance(TIME_MAX + Duration::from_secs(1)).await;
     // Virtual time stands still while a thread works; an interruption that comes before the statement is repeated.
@@ -126,7 +153,7 @@ async fn without_a_store_a_question_is_answered_with_the_reason() {
     let reader = alone(Arc::new(Store::answer));
     let ask = async || {
         let (query, answer) = query();
-        reader.queries.send(query).await.unwrap();
+        reader.queries.send((1, query)).await.unwrap();
         answer.await.unwrap()
     };
     reader.stores.send(None).await.unwrap();
@@ -145,7 +172,7 @@ async fn a_report_waits_for_the_commit_but_not_for_ever() {
     for answers in [true, false] {
         let (reply, mut answer) = oneshot::channel();
         let period = Period { name: "period".into(), from: sec(0), to: sec(10) };
-        reader.queries.send(Query { question: Question::Report { period }, reply }).await.unwrap();
+        reader.queries.send((1, Query { question: Question::Report { period }, reply })).await.unwrap();
         let Some(Request::Commit(done)) = reader.requests.recv().await else { panic!("no commit asked for") };
         assert!(answer.try_recv().is_err(), "answered before the commit");
         if answers {
@@ -175,6 +202,45 @@ fn a_store_is_opened_anew_only_when_the_last_question_to_the_old_one_has_ended()
     writer.commit(sec(3));
     assert_eq!(writer.status().rows, 1);
     assert_eq!(means(&fresh, PV, 3, 4, 1), [Some(27.0)]);
+}
+
+#[test]
+fn a_checkpoint_finds_its_moment_between_questions_without_pause() {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    let (_folder, db) = folder();
+    let mut writer = Writer::open(db.clone(), def(), sec(0)).unwrap();
+    let rows = 300_000;
+    writer.store().unwrap().append(&(0..rows).map(|at| good(PV, at, at as f64)).collect::<Vec<_>>()).unwrap();
+    let readers: Vec<Store> = (0..QUESTIONS_MAX).map(|_| writer.store().unwrap().try_clone().unwrap()).collect();
+    let (answered, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    std::thread::scope(|scope| {
+        for reader in readers {
+            let (answered, done) = (&answered, &done);
+            scope.spawn(move || {
+                let question = Question::Series { tags: vec![PV], from: sec(0), to: sec(rows), buckets: 100 };
+                while done.load(Ordering::Relaxed) == 0 {
+                    assert!(matches!(reader.answer(&question, sec(rows)), Ok(Answer::Series(_))));
+                    answered.fetch_add(1, Ordering::Relaxed);
+                }
+            });
+        }
+        let mut logged = 0;
+        for at in rows..rows + 600 {
+            // As many questions as commits: they overlap, and none of them pauses.
+            while answered.load(Ordering::Relaxed) < (at - rows) as usize / 10 {
+                std::thread::yield_now();
+            }
+            writer.accept(vec![good(PV, at, 27.0)]);
+            writer.commit(sec(at));
+            logged = if files::has_log(&db) { logged + 1 } else { 0 };
+            if logged > 320 || writer.status().trouble.is_some() {
+                break;
+            }
+        }
+        done.store(1, Ordering::Relaxed);
+        assert!(logged <= 320, "{logged} commits without a checkpoint");
+    });
+    assert_eq!(writer.status().trouble, None);
 }
 
 #[test]

@@ -105,6 +105,11 @@ impl Handover {
         vec![Act::ask(Tab::Alarms, *number, Question::Actions { from, to: shown.to, limit: ROWS })]
     }
 
+    /// Is the answer to question `number` waited for?
+    pub fn awaits(&self, number: u32) -> bool {
+        self.errand.awaits(number)
+    }
+
     /// The history answered.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: &Result<Answer, HistoryError>) {
         if self.errand.answered(number, cx.steady()).is_none() {

@@ -119,6 +119,11 @@ impl Journal {
         acts
     }
 
+    /// Is the answer to question `number` waited for?
+    pub fn awaits(&self, number: u32) -> bool {
+        self.steps.awaits(number) || self.deeds.awaits(number)
+    }
+
     /// The history answered.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: &Result<Answer, HistoryError>) {
         if self.steps.answered(number, cx.steady()).or_else(|| self.deeds.answered(number, cx.steady())).is_none() {

@@ -71,6 +71,11 @@ impl Quality {
         vec![Act::ask(Tab::Alarms, *number, Question::AlarmQuality { from: period.from, to: period.to })]
     }
 
+    /// Is the answer to question `number` waited for?
+    pub fn awaits(&self, number: u32) -> bool {
+        self.errand.awaits(number)
+    }
+
     /// The history answered.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: &Result<Answer, HistoryError>) {
         if self.errand.answered(number, cx.steady()).is_none() {

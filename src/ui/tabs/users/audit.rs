@@ -177,6 +177,11 @@ impl Audit {
         vec![Act::ask(Tab::Users, self.number, Question::Audit { from, to, words, by, action, limit: ROWS })]
     }
 
+    /// Is the answer to question `number` waited for?
+    pub fn awaits(&self, number: u32) -> bool {
+        self.errand.awaits(number) && !self.errand.is_wanted()
+    }
+
     /// The history answered question `number`.
     pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
         // An answer to a search that is no longer meant is not shown.
