@@ -84,30 +84,19 @@ fn checksum(text: &str) -> String {
     digits
 }
 
-/// What a file says.
-#[derive(Debug, Clone, Default)]
-pub struct Parsed {
-    /// The steps.
-    pub steps: LatestSteps,
-    /// Behind the last whole line stands the beginning of another one, which was never confirmed to anybody.
-    pub torn: bool,
-}
-
-/// Reads a file. `Err` names what is damaged.
-pub fn parse(bytes: &[u8]) -> Result<Parsed, String> {
+/// Reads a file. `Err` names what is damaged. The beginning of a line at the end was never confirmed: it is left out.
+pub fn parse(bytes: &[u8]) -> Result<LatestSteps, String> {
     let end = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |place| place + 1);
-    let (whole, rest) = bytes.split_at(end);
-    let mut parsed = Parsed { torn: !rest.is_empty(), ..Parsed::default() };
-    let mut lines = whole.split_inclusive(|byte| *byte == b'\n');
+    let mut steps = LatestSteps::default();
+    let mut lines = bytes[..end].split_inclusive(|byte| *byte == b'\n');
     let header = lines.next().unwrap_or_default();
     if header != HEADER.as_bytes() {
         return Err(format!("line 1 is not `{}`", HEADER.trim_end()));
     }
     for (number, line) in (2..).zip(lines) {
-        let step = step_of(line).ok_or_else(|| format!("line {number} is not as it was written"))?;
-        parsed.steps.take(step);
+        steps.take(step_of(line).ok_or_else(|| format!("line {number} is not as it was written"))?);
     }
-    Ok(parsed)
+    Ok(steps)
 }
 
 fn step_of(line: &[u8]) -> Option<AlarmRecord> {
@@ -150,16 +139,13 @@ mod tests {
             let mut text = HEADER.to_owned();
             journal.iter().for_each(|step| text += &line(step));
             let parsed = parse(text.as_bytes()).unwrap();
-            prop_assert!(!parsed.torn);
             let later = |place: usize, step: &AlarmRecord| journal[place + 1..].iter().any(|other| key(other) == key(step));
             let expected = journal.iter().enumerate().filter(|(place, step)| !later(*place, step)).map(|(_, step)| step);
-            prop_assert_eq!(parsed.steps.iter().collect::<Vec<_>>(), expected.collect::<Vec<_>>());
+            prop_assert_eq!(parsed.iter().collect::<Vec<_>>(), expected.collect::<Vec<_>>());
             // A loss of power leaves whole lines and at most the beginning of one.
             let cut = &text.as_bytes()[..(HEADER.len() + cut).min(text.len())];
             let whole = cut.iter().filter(|byte| **byte == b'\n').count() - 1;
-            let short = parse(cut).unwrap();
-            prop_assert_eq!(short.torn, !cut.ends_with(b"\n"));
-            prop_assert_eq!(short.steps.next as usize, whole);
+            prop_assert_eq!(parse(cut).unwrap().next as usize, whole);
         }
 
         #[test]
@@ -177,6 +163,6 @@ mod tests {
     fn a_file_of_a_later_version_and_no_file_at_all_are_not_read_as_no_alarms() {
         assert!(parse(b"").is_err_and(|why| why.contains("line 1")));
         assert!(parse(b"sightglass alarm state 2\n").is_err_and(|why| why.contains("line 1")));
-        assert!(parse(HEADER.as_bytes()).unwrap().steps.is_empty());
+        assert!(parse(HEADER.as_bytes()).unwrap().is_empty());
     }
 }

@@ -1,4 +1,5 @@
-//! The alarm-state file beside a history: appended to and synced before an operator is told, written anew when it has grown.
+//! The alarm-state file beside a history: appended to and synced before an acknowledgement is confirmed, rewritten
+//! when it has grown.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -16,7 +17,7 @@ use crate::{
 
 /// Largest file that is read: many times what a station writes.
 const BYTES_MAX: u64 = 64 << 20;
-/// A file is written anew when it has more lines than twice those that count, and this many more.
+/// The file is rewritten when it has this many lines more than twice those that count.
 const SPARE_LINES: usize = 1_000;
 
 /// The file beside a history: `tank.alarms.state` beside `tank.duckdb`.
@@ -27,7 +28,8 @@ pub fn beside(history: &Path) -> PathBuf {
 /// What was found when it was opened.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Found {
-    /// The steps to restore, oldest first; `None` where the file cannot tell: then the journal of the history serves.
+    /// The steps to restore, oldest first; `None` where the file does not say: the journal of the history is used
+    /// then.
     pub steps: Option<Vec<AlarmRecord>>,
     /// What is wrong with it, in words for the operator.
     pub trouble: Option<String>,
@@ -60,9 +62,9 @@ impl AlarmFile {
         let found = match read(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Found::default(),
             Err(error) => Found { steps: None, trouble: Some(format!("{name} cannot be read: {error}")) },
-            Ok(bytes) => match parse(&bytes) {
-                Ok(parsed) => {
-                    alarms.steps = parsed.steps;
+            Ok(bytes) => match parse_whole(&bytes) {
+                Ok(steps) => {
+                    alarms.steps = steps;
                     Found { steps: Some(alarms.steps.iter().cloned().collect()), trouble: None }
                 }
                 Err(why) => {
@@ -101,7 +103,7 @@ impl AlarmFile {
         Ok(())
     }
 
-    /// Whoever loses power now finds the old file or the new one.
+    /// A power failure leaves the old file or the new one.
     fn write_whole(&self) -> io::Result<Written> {
         let beside = self.path.with_extension("new");
         let text: String = std::iter::once(HEADER.to_owned()).chain(self.steps.iter().map(line)).collect();
@@ -112,7 +114,7 @@ impl AlarmFile {
             Ok(file)
         });
         if written.is_err() {
-            // What was begun is of no use to anybody.
+            // An incomplete file is of no use.
             let _ = fs::remove_file(&beside);
         }
         let file = written?;
@@ -140,13 +142,22 @@ impl Written {
     }
 }
 
+/// The beginning of a file that is too large to be read is not taken for all of it.
+fn parse_whole(bytes: &[u8]) -> Result<LatestSteps, String> {
+    if BYTES_MAX < bytes.len() as u64 {
+        return Err(format!("it is larger than {} MiB", BYTES_MAX >> 20));
+    }
+    parse(bytes)
+}
+
+/// At most one byte more than the largest file has.
 fn read(path: &Path) -> io::Result<Vec<u8>> {
     let file = File::open(path)?;
     if !file.metadata()?.is_file() {
         return Err(io::Error::other("it is no file"));
     }
     let mut bytes = Vec::new();
-    file.take(BYTES_MAX).read_to_end(&mut bytes)?;
+    file.take(BYTES_MAX + 1).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
@@ -242,6 +253,13 @@ mod tests {
         assert_eq!(steps, None);
         assert!(trouble.unwrap().contains("line 2 is not as it was written"));
         assert!(!path.exists() && folder.path().join("tank.alarms.damaged-19700112T134640Z").exists());
+        // A part of a file is never taken for all of it.
+        let large = File::options().write(true).create(true).truncate(true).open(&path).unwrap();
+        (&large).write_all(text.as_bytes()).unwrap();
+        large.set_len(BYTES_MAX + 1).unwrap();
+        let Found { steps, trouble } = found(&path);
+        assert_eq!(steps, None);
+        assert!(trouble.unwrap().contains("larger than 64 MiB"));
         // The beginning of a line that was never confirmed is no damage.
         fs::write(&path, &text[..text.len() - 9]).unwrap();
         let Found { steps, trouble } = found(&path);
