@@ -140,7 +140,7 @@ impl StationFault {
             ],
             StationFault::UsersFile => [
                 "the file is damaged, missing, or not readable for the station",
-                "nobody can log in; polling and alarms go on",
+                "login is closed; polling and alarms go on",
                 "restore the users file from a backup and reload the station",
             ],
             StationFault::Clock => [

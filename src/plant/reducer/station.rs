@@ -14,12 +14,8 @@ impl Plant {
 
     /// The store says how it stands. Alarms follow with the next tick.
     pub fn on_history(&mut self, status: HistoryStatus) {
-        let lasting = |words: &Option<String>| match words {
-            Some(words) => FaultState::Active(words.as_str().into()),
-            None => FaultState::Cleared,
-        };
-        self.faults.set(StationFault::NotRecording, lasting(&status.failing));
-        self.faults.set(StationFault::DiskSpace, lasting(&status.disk));
+        self.faults.set(StationFault::NotRecording, FaultState::lasting(status.failing.clone()));
+        self.faults.set(StationFault::DiskSpace, FaultState::lasting(status.disk.clone()));
         if self.history.lost < status.lost {
             let words = format!("{} records lost since the start", status.lost);
             self.faults.set(StationFault::RecordsLost, FaultState::Occurred(words.into()));
@@ -74,7 +70,7 @@ mod tests {
         let mut plant = plant();
         let failing = HistoryStatus { failing: Some("no space left".into()), ..HistoryStatus::default() };
         plant.on_history(failing);
-        assert_eq!(tick(&mut plant, 1), [], "one failed commit alarms nobody");
+        assert_eq!(tick(&mut plant, 1), [], "one failed commit raises no alarm");
         let raised = tick(&mut plant, 4);
         assert_eq!((raised.len(), &*raised[0].text), (1, "history not recording"));
         assert_eq!((raised[0].step, raised[0].reason.as_deref()), (AlarmStep::Raised, Some("no space left")));

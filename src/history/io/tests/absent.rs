@@ -111,7 +111,7 @@ fn a_file_removed_or_replaced_under_the_station_is_noticed_and_recording_goes_on
         }
         writer.accept(vec![good(PV, 2, 28.0)]);
         writer.commit(sec(2));
-        assert_eq!(writer.status().waiting, 1, "it is not written into a file that nobody sees");
+        assert_eq!(writer.status().waiting, 1, "it is not written into the file that was removed");
         retry(&mut writer, 2);
         assert_eq!((writer.status().rows, writer.status().lost, writer.status().waiting), (2, 0, 0));
         let damaged = writer.status().damaged.clone().unwrap();
@@ -171,8 +171,8 @@ fn a_history_in_use_is_named_waited_for_and_caught_up() {
     handle.records.blocking_send(vec![good(PV, 10, 27.0)]).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     let mut status = handle.status.clone();
-    let told = runtime.block_on(status.wait_for(|status| status.failing.is_some() && status.waiting == 1));
-    let failing = told.unwrap().failing.clone().unwrap();
+    let waiting = runtime.block_on(status.wait_for(|status| status.failing.is_some() && status.waiting == 1));
+    let failing = waiting.unwrap().failing.clone().unwrap();
     assert!(failing.contains(&format!("in use by process {}", holder.id())), "{failing}");
     drop(holder.stdin.take());
     holder.wait().unwrap();

@@ -148,7 +148,7 @@ fn value(i: i64) -> f64 {
     (i as f64 * 0.37).sin() * 40.0 + 60.0
 }
 
-/// Starts a station on these files, records, and tells what it was told and what is there.
+/// Starts a station on these files and records; returns what it reports and what is missing.
 fn survive(db: &Path) -> String {
     let now = FILED + LOGGED + 10;
     let records = [good(PV, now, 1.0), Record::Alarm(step(now, "high", AlarmStep::Raised)), Record::Action(deed(now))];
@@ -156,13 +156,13 @@ fn survive(db: &Path) -> String {
         let opened = Store::open_at_start(db, &def(), sec(now)).unwrap();
         opened.store.append(&records).and_then(|()| opened.store.checkpoint()).map(|()| opened)
     };
-    // A checkpoint that fails is answered by opening the file anew.
+    // A checkpoint that fails is answered by opening the file again.
     let opened = match record().or_else(|_| record()) {
         Ok(opened) => opened,
         Err(error) => return format!("WRONG: does not record: {error}"),
     };
     let store = &opened.store;
-    let mut told = match &opened.trouble {
+    let mut report = match &opened.trouble {
         Some(trouble) => format!("trouble: {}", trouble.replace('\n', " ")),
         None => "no trouble".to_owned(),
     };
@@ -177,14 +177,14 @@ fn survive(db: &Path) -> String {
     });
     let sum = (0..FILED + LOGGED).map(value).sum::<f64>() + FILED as f64 * 70.0;
     match read {
-        Err(error) => told += &format!("; unreadable: {}", error.to_string().lines().next().unwrap_or_default()),
+        Err(error) => report += &format!("; unreadable: {}", error.to_string().lines().next().unwrap_or_default()),
         Ok((rows, total, journal, deeds)) => {
             let whole = (rows, journal, deeds) == (2 * FILED + LOGGED, 500 + LOGGED, 500) && (total - sum).abs() < 1e-3;
             if !whole && opened.trouble.is_none() {
-                told +=
+                report +=
                     &format!("; WRONG: {rows} rows, sum {total} instead of {sum}, {journal} steps, {deeds} actions");
             }
         }
     }
-    told
+    report
 }
