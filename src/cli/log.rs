@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use tracing_appender::{non_blocking::WorkerGuard, rolling};
+use tracing_appender::{
+    non_blocking::WorkerGuard,
+    rolling::{self, RollingFileAppender},
+};
 use tracing_subscriber::{EnvFilter, fmt};
 
 use super::{CliError, paths};
@@ -15,45 +18,74 @@ use crate::plant::visible::visible;
 const DAYS: usize = 7;
 
 /// Starts logging; the guard writes what is left when it is dropped. `SIGHTGLASS_LOG` sets the level (`debug`);
-/// the file `-` is standard error, for an init system that keeps it.
+/// the file `-` is standard error, for an init system that keeps it. A disk that does not take the log is no error: a
+/// station must poll all the same.
 pub fn start(file: Option<&Path>) -> Result<WorkerGuard, CliError> {
-    let failed = |folder: &Path, error: std::io::Error| CliError::Io {
+    let (writer, guard) = match file {
+        Some(file) if file.as_os_str() == "-" => tracing_appender::non_blocking(Visible(io::stderr())),
+        _ => tracing_appender::non_blocking(Visible(LogFile::open(file)?)),
+    };
+    init(writer);
+    Ok(guard)
+}
+
+/// The file of the log, or none while it cannot be opened: lines are dropped then, and each tries again.
+struct LogFile {
+    path: Option<PathBuf>,
+    file: Option<RollingFileAppender>,
+}
+
+impl LogFile {
+    fn open(path: Option<&Path>) -> Result<LogFile, CliError> {
+        let file = match appender(path) {
+            Err(error @ CliError::Io { .. }) => {
+                // Without standard error there is no place to say it.
+                let _ = writeln!(io::stderr(), "sightglass: {error}; there is no log until that works");
+                None
+            }
+            opened => Some(opened?),
+        };
+        Ok(LogFile { path: path.map(Path::to_path_buf), file })
+    }
+}
+
+impl Write for LogFile {
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        if self.file.is_none() {
+            self.file = appender(self.path.as_deref()).ok();
+        }
+        self.file.as_mut().map_or(Ok(line.len()), |file| file.write(line))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.as_mut().map_or(Ok(()), Write::flush)
+    }
+}
+
+/// Opens the file: this one, or one a day in the folder of the state.
+fn appender(path: Option<&Path>) -> Result<RollingFileAppender, CliError> {
+    let failed = |folder: &Path, error: io::Error| CliError::Io {
         what: format!("cannot write a log in {}", folder.display()),
         error,
     };
-    if file.is_some_and(|file| file.as_os_str() == "-") {
-        let (writer, guard) = tracing_appender::non_blocking(Visible(std::io::stderr()));
-        init(writer);
-        return Ok(guard);
-    }
-    let writer = match file {
-        Some(file) => {
-            let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let (folder, builder) = match path {
+        Some(path) => {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
             let folder = folder.map_or_else(|| PathBuf::from("."), Path::to_path_buf);
-            let name = file.file_name().ok_or_else(|| CliError::Usage("--log: expected a file name".into()))?;
+            let name = path.file_name().ok_or_else(|| CliError::Usage("--log: expected a file name".into()))?;
             if !folder.is_dir() {
                 return Err(CliError::Usage(format!("--log: no folder {}", folder.display())));
             }
-            rolling::Builder::new()
-                .filename_prefix(name.to_string_lossy())
-                .build(&folder)
-                .map_err(|error| failed(&folder, std::io::Error::other(error)))?
+            (folder, rolling::Builder::new().filename_prefix(name.to_string_lossy()))
         }
         None => {
             let folder = paths::state_folder();
             std::fs::create_dir_all(&folder).map_err(|error| failed(&folder, error))?;
-            rolling::Builder::new()
-                .rotation(rolling::Rotation::DAILY)
-                .filename_prefix("sightglass")
-                .filename_suffix("log")
-                .max_log_files(DAYS)
-                .build(&folder)
-                .map_err(|error| failed(&folder, std::io::Error::other(error)))?
+            let builder = rolling::Builder::new().rotation(rolling::Rotation::DAILY).filename_prefix("sightglass");
+            (folder, builder.filename_suffix("log").max_log_files(DAYS))
         }
     };
-    let (writer, guard) = tracing_appender::non_blocking(Visible(writer));
-    init(writer);
-    Ok(guard)
+    builder.build(&folder).map_err(|error| failed(&folder, io::Error::other(error)))
 }
 
 /// Whoever reads the log in a terminal must not be played tricks by what stands in it. A line is written at a time.
