@@ -213,9 +213,11 @@ impl Schedule {
     pub fn done(&mut self, index: usize, started: Timestamp, now: Timestamp) -> Served {
         let pace = self.pace_of(&self.polls[index]);
         self.fed = self.spot(index).is_some_and(|spot| self.rank(spot, started).0 == STARVED);
-        let rests_until = self.devices[self.polls[index].place].rests_until;
+        let device = &self.devices[self.polls[index].place];
+        let (rests_until, probed) = (device.rests_until, device.probe_at.is_some());
         let poll = &mut self.polls[index];
-        let free = rests_until.max(poll.not_before);
+        // A probe begins late because its device does not answer, not because the line has no time.
+        let free = if probed { started } else { rests_until.max(poll.not_before) };
         let served = poll.serve(pace, free, started, now);
         self.late |= poll.class == Class::Hard && poll.is_late();
         self.devices[self.polls[index].place].tried(now);

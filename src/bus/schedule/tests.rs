@@ -280,6 +280,34 @@ fn overload_sheds_idle_then_stretches_soft_and_returns_when_it_is_over() {
 }
 
 #[test]
+fn a_device_that_does_not_answer_does_not_overload_its_line() {
+    let (hard, idle) = (|device| classed(device, every(1_000), Class::Hard), classed(1, every(10_000), Class::Idle));
+    let mut schedule = Schedule::new(&[hard(0), hard(1), idle], at(0));
+    let mut now = 0;
+    while now < 120_000 {
+        match schedule.next(at(now)) {
+            Next::Run(index) => {
+                let silent = index == 0 && 10_000 < now;
+                let spent = if silent { 520 } else { 40 };
+                let (began, ended, took) = (at(now), at(now + spent), Duration::from_millis(spent as u64));
+                schedule.done(index, began, ended);
+                if silent {
+                    schedule.failed(DeviceId(0), began, took, ended);
+                } else {
+                    schedule.answered(DeviceId(index.min(1) as u16), Some(took), ended);
+                    schedule.spent(index, took);
+                }
+                now += spent;
+            }
+            Next::WaitUntil(until) => now = until.as_millisecond().max(now + 1),
+            Next::Idle => break,
+        }
+        assert_eq!(schedule.load(), Load::Normal, "at {now} ms");
+    }
+    assert!(schedule.devices[0].is_down());
+}
+
+#[test]
 fn identification_is_read_even_on_a_line_that_is_always_too_full() {
     let blocks = [classed(0, every(100), Class::Hard), classed(1, Poll::Once, Class::Idle), block(2, every(100))];
     let mut schedule = Schedule::new(&blocks, at(0));
