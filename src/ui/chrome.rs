@@ -322,6 +322,12 @@ pub fn watch_words(cx: &Cx, watch: &Watch) -> (String, Style) {
         // Whether they are the right ones only the devices can tell.
         (Command::Configure(_), Outcome::Verified) => ("in use".to_owned(), false),
         (Command::SaveSettings(_), Outcome::Verified) => ("written into the plant file".to_owned(), false),
+        // The line has been asked to; only the device tells whether it answers.
+        (Command::Refresh(_), Outcome::Verified) => ("requested".to_owned(), false),
+        // Nothing was written that could be read back.
+        (Command::Alarm(_) | Command::HandOver | Command::TakeOver | Command::Connect(..), Outcome::Verified) => {
+            ("done".to_owned(), false)
+        }
         (_, outcome) => outcome_words(outcome),
     };
     let at = clock(status.at, &cx.def().time_zone);
