@@ -18,9 +18,10 @@ use crate::{
         snapshot::DeviceState,
     },
     ui::{
-        Effect, Model, Msg,
+        Act, Effect, Model, Msg,
         fixture::{self, Fixture},
         modal::{Faceplate, Modal},
+        perform,
         tabs::Tab,
         theme::Theme,
         update,
@@ -596,6 +597,33 @@ fn the_outcome_of_an_order_is_told_until_it_is_dismissed() {
     check(Outcome::NotConfirmed(NotConfirmed::Different(65.0)), "NOT CONFIRMED: read back 65");
     check(Outcome::NotConfirmed(NotConfirmed::NoReadBack), "accepted (cannot be read back)");
     check(Outcome::Failed(Fault::Timeout), "FAILED, may have taken effect");
+}
+
+#[test]
+fn only_what_was_read_back_is_called_verified() {
+    let fixture = Fixture::alarm();
+    let device = fixture.def.devices[0].id;
+    let check = |command: Command, expect: &str| {
+        let mut model = model(&fixture, Theme::FULL);
+        perform(&mut model, vec![Act::Order(command.clone())]);
+        let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
+        snapshot.orders = vec![OrderStatus {
+            from: "".into(),
+            note: None,
+            id: model.watch.as_ref().expect("the order is watched").id,
+            by: Arc::from("tech1"),
+            command,
+            at: snapshot.at,
+            old: None,
+            outcome: Outcome::Verified,
+            recorded: true,
+        }];
+        update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains(expect), "{expect} is missing:\n{shown}");
+    };
+    check(Command::Refresh(device), "refresh TIC-1  requested 14:02:31");
+    check(fixture.alarms[0].acknowledge(), "temperature high  done 14:02:31");
 }
 
 #[test]
