@@ -1,6 +1,6 @@
 //! Alarms: one condition each, on a tag, device or line; "gives no values" for every device; the faults of the station.
 
-use std::time::Duration;
+use std::{collections::HashMap, time::Duration};
 
 use super::{
     condition,
@@ -131,21 +131,30 @@ fn class_of(subject: Subject, condition: Condition) -> AlarmClass {
     }
 }
 
-/// Limits of one tag that stand in the wrong order, such as a high above the high-high.
+/// The levels of a limit, from the lowest.
+const LEVELS: [&str; 4] = ["low_low", "low", "high", "high_high"];
+
+/// Limits of a tag that are not below the lowest of a higher level, such as a high above the high-high.
 fn check_order(tables: &[At<AlarmTable>], problems: &mut Problems) {
-    let limit_of = |table: &AlarmTable| {
-        let levels =
-            [(table.low_low, "low_low"), (table.low, "low"), (table.high, "high"), (table.high_high, "high_high")];
-        let rank = levels.iter().position(|(limit, _)| limit.is_some())?;
-        Some((table.tag.as_ref()?.value.clone(), rank, levels[rank].0?, levels[rank].1))
+    let limit_of = |table: &'_ AlarmTable| {
+        let limits = [table.low_low, table.low, table.high, table.high_high];
+        let (rank, limit) = limits.into_iter().enumerate().find_map(|(rank, limit)| Some((rank, limit?)))?;
+        Some((table.tag.as_ref()?.value.clone(), rank, limit))
     };
     let limits: Vec<_> = tables.iter().filter_map(|table| limit_of(&table.value)).collect();
-    for (tag, rank, limit, word) in &limits {
-        let lower = limits.iter().filter(|(other, below, ..)| other == tag && below < rank);
-        for (_, _, wrong, below) in lower.filter(|(_, _, lower, _)| lower.value >= limit.value) {
-            let problem =
-                problems.add(wrong.at, format!("{below} {} is not below {word} {} of {tag}", wrong.value, limit.value));
-            problem.label("out of order").also(limit.at, *word);
+    let mut lowest: HashMap<&str, [Option<At<f64>>; LEVELS.len()]> = HashMap::new();
+    for (tag, rank, limit) in &limits {
+        let known = &mut lowest.entry(tag).or_default()[*rank];
+        if known.is_none_or(|known| limit.value < known.value) {
+            *known = Some(*limit);
+        }
+    }
+    for (tag, rank, limit) in &limits {
+        for (higher, word) in lowest[tag.as_str()].iter().zip(LEVELS).skip(rank + 1) {
+            let Some(higher) = higher.filter(|higher| higher.value <= limit.value) else { continue };
+            let level = LEVELS[*rank];
+            let message = format!("{level} {} is not below {word} {} of {tag}", limit.value, higher.value);
+            problems.add(limit.at, message).label("out of order").also(higher.at, word);
         }
     }
 }

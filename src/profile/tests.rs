@@ -531,6 +531,17 @@ fn what_enables_an_alarm_is_read_and_every_slip_is_shown_at_its_place() {
 fn limits_of_one_tag_stand_in_order() {
     let second = "[[alarm]]\ntag = \"D1.T\"\nhigh_high = 70.0\ndeadband = 1.0\npriority = \"critical\"\ntext = \"very hot\"\n[mimic]";
     check("[mimic]", second, &["[small.toml:26:8]", "high 80 is not below high_high 70 of D1.T"]);
+    // However many there are, each is named once for each level above it.
+    let alarm = |level: &str, limit: f64, n: i32| {
+        format!(
+            "[[alarm]]\ntag = \"D1.T\"\n{level} = {limit:.1}\ndeadband = 1.0\npriority = \"low\"\ntext = \"{level} {n}\"\n"
+        )
+    };
+    let many =
+        (0..50).map(|n| alarm("low", 90.0, n) + &alarm("high_high", 85.0, n) + &alarm("high_high", 95.0, n + 50));
+    let text = PLANT.replace("[mimic]", &(many.collect::<String>() + "[mimic]"));
+    let errors = load(text.as_bytes(), METER, PLC).expect_err("50 are above the high and the high high");
+    assert_eq!(errors.count(), 100, "{errors}");
 }
 
 #[test]
