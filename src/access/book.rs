@@ -12,7 +12,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::plant::record::{ActionRecord, Seal};
+use crate::plant::record::{ActionRecord, Seal, hex};
 
 /// What the first line is tied to.
 pub const START: Seal = Seal { number: 0, hash: *b"sightglass, the book of deeds, 1" };
@@ -264,11 +264,6 @@ fn split(text: &str) -> Option<(&str, [u8; 32])> {
     Some((body, unhex(&digits[place..])?))
 }
 
-/// The hash as text.
-pub fn hex(hash: &[u8]) -> String {
-    hash.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
 pub(super) fn unhex(text: &str) -> Option<[u8; 32]> {
     let mut hash = [0; 32];
     if text.len() != DIGITS || !text.bytes().all(|digit| matches!(digit, b'0'..=b'9' | b'a'..=b'f')) {
@@ -287,7 +282,7 @@ pub fn sha256(bytes: &[u8]) -> String {
 
 /// What is noted of the last entry, beside the book: always of the same length, so that it is written in one piece.
 pub fn head_text(seal: Seal) -> String {
-    format!("{:020} {}\n", seal.number, hex(&seal.hash))
+    format!("{:020} {}\n", seal.number, seal.hash_hex())
 }
 
 /// The seal of such a note.

@@ -11,8 +11,8 @@ use std::cmp::Ordering;
 use jiff::Timestamp;
 use sha2::{Digest, Sha256};
 
-use super::book::{Entry, FirstBad, START, hex, unhex};
-use crate::plant::record::{ActionRecord, SEAL_LOG, Seal};
+use super::book::{Entry, FirstBad, START, unhex};
+use crate::plant::record::{ActionRecord, SEAL_LOG, Seal, hex};
 
 /// Seconds between two seals of a station that runs.
 const INTERVAL: i64 = 3_600;

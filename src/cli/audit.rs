@@ -12,7 +12,7 @@ use jiff::Timestamp;
 
 use crate::{
     access::{
-        book::{Summary, hex},
+        book::Summary,
         io::{book, sealing},
         sealing::{Sealed, VerificationKey},
     },
@@ -156,7 +156,7 @@ fn local(at: Timestamp, def: &PlantDef) -> String {
 fn summary_lines(summary: &Summary, def: &PlantDef) -> Vec<String> {
     let mut lines = vec![
         format!("lines      {}", summary.entries),
-        format!("last seal  {} {}", summary.last.number, hex(&summary.last.hash)),
+        format!("last seal  {}", summary.last),
         format!("history    {} of {} entries compared", summary.compared, summary.entries),
     ];
     lines.extend(summary.span.map(|(first, last)| format!("from       {} to {}", local(first, def), local(last, def))));

@@ -9,10 +9,7 @@ use tokio::{
 };
 
 use crate::{
-    access::{
-        book::hex,
-        io::{users, users_beside},
-    },
+    access::io::{users, users_beside},
     attach::io::{find, serve},
     bus::io::{clock::Clock, transport::Connector},
     plant::{PlantDef, Snapshot},
@@ -254,11 +251,11 @@ pub async fn follow(
     Ok(last)
 }
 
-/// The last entry of the audit log, for the journal of the system: who changes the log afterwards, from the first line to
-/// the last, must change the journal as well.
+/// Prints the last entry of the audit log, for the journal of the system: whoever changes the log later, and all hashes
+/// behind the change, must change the journal as well.
 fn say_anchor(snapshot: &Snapshot) {
     if let Some(seal) = snapshot.history.audit {
-        say(&format!("audit log: entry {} {}", seal.number, hex(&seal.hash)));
+        say(&format!("audit log: entry {seal}"));
     }
 }
 

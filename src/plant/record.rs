@@ -1,6 +1,6 @@
 //! What the plant leaves behind for the history: samples, steps of alarms, deeds of operators, minutes of lines.
 
-use std::sync::Arc;
+use std::{fmt, sync::Arc};
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -215,4 +215,23 @@ pub struct Seal {
     pub number: u64,
     /// SHA-256 over the line and the seal before it.
     pub hash: [u8; 32],
+}
+
+impl Seal {
+    /// The hash in hexadecimal digits.
+    pub fn hash_hex(&self) -> String {
+        hex(&self.hash)
+    }
+}
+
+/// Number and hash: `17 5f0c…`.
+impl fmt::Display for Seal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.number, self.hash_hex())
+    }
+}
+
+/// Bytes in hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

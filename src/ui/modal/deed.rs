@@ -33,7 +33,7 @@ impl Deed {
         let told = |words: &Option<std::sync::Arc<str>>| words.as_deref().unwrap_or_default().to_owned();
         let at = deed.at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S %:z").to_string();
         let seal = deed.seal.map_or((String::new(), "not in the chained book".to_owned()), |seal| {
-            (seal.number.to_string(), seal.hash.iter().map(|byte| format!("{byte:02x}")).collect())
+            (seal.number.to_string(), seal.hash_hex())
         });
         let lines = [
             ("number", seal.0),
