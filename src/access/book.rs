@@ -12,7 +12,10 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::plant::record::{ActionRecord, Seal, hex};
+use crate::plant::{
+    record::{ActionRecord, Seal, hex},
+    visible::acts,
+};
 
 /// What the first line is tied to.
 pub const START: Seal = Seal { number: 0, hash: *b"sightglass, the book of deeds, 1" };
@@ -113,15 +116,11 @@ pub fn fit(mut deed: ActionRecord) -> ActionRecord {
 }
 
 fn fit_text(text: &mut Arc<str>) {
-    let moves = |letter: char| {
-        let turns = matches!(letter, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-        letter.is_control() || turns
-    };
     if TEXT_MAX < text.len() {
         *text = format!("{}{CUT}", &text[..text.floor_char_boundary(TEXT_MAX - CUT.len())]).into();
     }
-    if text.contains(moves) {
-        *text = text.chars().map(|letter| if moves(letter) { ' ' } else { letter }).collect::<String>().into();
+    if text.contains(acts) {
+        *text = text.chars().map(|letter| if acts(letter) { ' ' } else { letter }).collect::<String>().into();
     }
 }
 

@@ -9,7 +9,10 @@
 //!  DCBA    3333    6643      little-endian
 //! ```
 
-use crate::plant::tag::{Kind, Order, Point};
+use crate::plant::{
+    tag::{Kind, Order, Point},
+    visible::is_printable,
+};
 
 /// The number that the words of a point hold; `None` for what is no number: BCD with a digit above 9, NaN, infinity.
 /// A 64-bit integer beyond 2^53 is rounded to the nearest `f64`, by one part in 10^16 at most. `words` has [`Point::len`]
@@ -65,14 +68,6 @@ pub fn encode_text(point: Point, text: &str) -> Option<Vec<u16>> {
     let mut bytes = text.as_bytes().to_vec();
     bytes.resize(usize::from(point.kind.words()) * 2, 0);
     fits.then(|| from_bytes(point.order, &bytes))
-}
-
-/// Not a control, nor one of the marks that hide, turn round or stand for no character at all.
-fn is_printable(letter: char) -> bool {
-    !letter.is_control()
-        && !matches!(letter, '\u{AD}' | '\u{061C}' | '\u{180E}' | '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}')
-        && !matches!(letter, '\u{2060}'..='\u{206F}' | '\u{FEFF}' | '\u{E000}'..='\u{F8FF}' | '\u{FFF0}'..='\u{FFFF}')
-        && letter < '\u{E0000}'
 }
 
 /// The words to write for a number; `None` if it does not fit the type, is no whole number where one is needed, or the

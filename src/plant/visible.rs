@@ -10,6 +10,13 @@ pub fn acts(letter: char) -> bool {
         || matches!(letter, '\u{2060}'..='\u{206F}' | '\u{FEFF}')
 }
 
+/// Is it shown as one character by itself: it does not act, join or hide, and every font has the same for it?
+pub fn is_printable(letter: char) -> bool {
+    !acts(letter)
+        && !matches!(letter, '\u{AD}' | '\u{180E}' | '\u{200C}' | '\u{200D}' | '\u{E000}'..='\u{F8FF}')
+        && !matches!(letter, '\u{FFF0}'..='\u{FFFF}' | '\u{E0000}'..)
+}
+
 /// The text with such characters as `\u{202e}`; ends of lines and tabs stay.
 pub fn visible(text: &str) -> Cow<'_, str> {
     let is_hidden = |letter: char| acts(letter) && !matches!(letter, '\n' | '\t');

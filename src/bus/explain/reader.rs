@@ -3,7 +3,10 @@
 use std::ops::Range;
 
 use super::Field;
-use crate::bus::{frame, names};
+use crate::{
+    bus::{frame, names},
+    plant::visible::acts,
+};
 
 /// The reading of one message as a request or as an answer.
 pub(super) struct Reader<'a> {
@@ -154,7 +157,7 @@ pub(super) fn bit_words(bits: &[bool]) -> String {
 /// Text as it stands, anything else escaped.
 pub(super) fn text(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
-        Ok(text) if !text.chars().any(char::is_control) => format!("\"{text}\""),
+        Ok(text) if !text.contains(acts) => format!("\"{text}\""),
         Ok(_) | Err(_) => format!("\"{}\"", bytes.escape_ascii()),
     }
 }

@@ -140,6 +140,7 @@ fn a_name_can_be_a_file() {
         "a\nb",
         "a\0b",
         "a\u{7f}",
+        "a\u{202e}b",
         &"x".repeat(33),
     ] {
         assert!(check_name(bad).is_err(), "{bad}");
