@@ -17,7 +17,8 @@ use crate::plant::{
 pub fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u8> {
     let zone = &def.time_zone;
     let mut table = Table::default();
-    table.section("shift report", &["plant", "shift", "from", "to", "until", "program"]);
+    let header = ["plant", "shift", "from", "to", "until", "program", "audit entry", "audit hash"];
+    table.section("shift report", &header);
     table.row(vec![
         text(&def.title),
         text(&report.period.name),
@@ -25,6 +26,8 @@ pub fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> V
         plain(iso(zone, report.period.to)),
         plain(iso(zone, report.until)),
         plain(concat!("sightglass ", env!("CARGO_PKG_VERSION"))),
+        plain(report.audit.map(|entry| entry.number.to_string()).unwrap_or_default()),
+        plain(report.audit.map(|entry| entry.hash_hex()).unwrap_or_default()),
     ]);
     table.section("tags", &["tag", "unit", "min", "mean", "max", "last", "minutes in alarm", "good %", "difference"]);
     report.tags.iter().for_each(|tag| table.row(tag_row(tag, dialect)));
@@ -270,9 +273,12 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::report::{
-        Period,
-        testing::{THREE, at, plant},
+    use crate::{
+        plant::record::Seal,
+        report::{
+            Period,
+            testing::{THREE, at, plant},
+        },
     };
 
     fn report() -> ShiftReport {
@@ -280,6 +286,7 @@ mod tests {
         ShiftReport {
             period: Period { name: "morning 2026-11-21".into(), from, to: at("2026-11-21T14:00+07") },
             until: at("2026-11-21T13:59:30+07"),
+            audit: Some(Seal { number: 17, hash: [0xA5; 32] }),
             unreadable: vec![Gap {
                 from: from + Duration::from_secs(3_600),
                 to: from + Duration::from_secs(3_720),
@@ -374,8 +381,8 @@ mod tests {
         let csv = String::from_utf8(shift_csv(&report(), &def, CsvDialect::default())).unwrap();
         let expect = "\
 shift report,,,,,,,,
-plant,shift,from,to,until,program,,,
-Water tank,morning 2026-11-21,2026-11-21T06:00:00+07:00,2026-11-21T14:00:00+07:00,2026-11-21T13:59:30+07:00,sightglass VERSION,,,
+plant,shift,from,to,until,program,audit entry,audit hash,
+Water tank,morning 2026-11-21,2026-11-21T06:00:00+07:00,2026-11-21T14:00:00+07:00,2026-11-21T13:59:30+07:00,sightglass VERSION,17,a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5,
 ,,,,,,,,
 tags,,,,,,,,
 tag,unit,min,mean,max,last,minutes in alarm,good %,difference

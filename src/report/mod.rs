@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::plant::{
     alarm::Figures,
     def::Priority,
-    record::{ActionRecord, AlarmRecord},
+    record::{ActionRecord, AlarmRecord, Seal},
 };
 
 /// Decimals to print where the device has not said how many there are.
@@ -54,6 +54,8 @@ pub struct ShiftReport {
     pub period: Period,
     /// Up to when data were there: the end of the period, or earlier for a running shift.
     pub until: Timestamp,
+    /// The last entry of the audit log before `until`: whoever changes the log later must change every copy of the report.
+    pub audit: Option<Seal>,
     /// Where stored values could not be read: there, none is counted.
     pub unreadable: Vec<Gap>,
     /// One row a tag.

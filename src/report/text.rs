@@ -16,6 +16,7 @@ pub fn shift_text(report: &ShiftReport, def: &PlantDef) -> String {
     if report.until < report.period.to {
         lines.push(format!("still running: figures until {}", iso(zone, report.until)));
     }
+    lines.extend(report.audit.map(|entry| format!("audit log: entry {entry}")));
     for gap in &report.unreadable {
         lines.push(format!("not readable, not counted: {} to {}", iso(zone, gap.from), iso(zone, gap.to)));
     }
@@ -74,9 +75,12 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::report::{
-        Period,
-        testing::{THREE, at, plant},
+    use crate::{
+        plant::record::Seal,
+        report::{
+            Period,
+            testing::{THREE, at, plant},
+        },
     };
 
     #[test]
@@ -88,6 +92,7 @@ mod tests {
                 to: at("2026-11-21T14:00+07"),
             },
             until: at("2026-11-21T09:00+07"),
+            audit: Some(Seal { number: 7, hash: [0xA5; 32] }),
             unreadable: Vec::new(),
             tags: vec![TagFigures {
                 tag: "TIC-1.PV".into(),
@@ -113,6 +118,7 @@ mod tests {
 Water tank, morning 2026-11-21
 2026-11-21T06:00:00+07:00 to 2026-11-21T14:00:00+07:00
 still running: figures until 2026-11-21T09:00:00+07:00
+audit log: entry 7 a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5
 
 tag             min     mean/+        max       last  alarm/m  good %  unit
 TIC-1.PV       27.0      54.32       71.2          —      1.5    50.0  °C

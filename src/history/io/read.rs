@@ -229,8 +229,8 @@ pub(super) fn action(row: &Row) -> duckdb::Result<ActionRecord> {
     })
 }
 
-/// The seal of a deed; `None` for one that never came into the book.
-fn seal(number: Option<u64>, hash: Option<Vec<u8>>) -> Option<Seal> {
+/// Number and hash of an entry; `None` for an action that the audit log does not have.
+pub(super) fn seal(number: Option<u64>, hash: Option<Vec<u8>>) -> Option<Seal> {
     Some(Seal { number: number?, hash: hash?.try_into().ok()? })
 }
 

@@ -7,7 +7,7 @@ use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
-    read::{ROWS_MAX, SAMPLES_MAX, action, check_span, within},
+    read::{ROWS_MAX, SAMPLES_MAX, action, check_span, seal, within},
     sql,
     store::{Store, utc},
 };
@@ -61,6 +61,8 @@ impl Store {
         let alarms = self.steps(from, until)?;
         let suppressed = figures::suppressed(&active, &self.standing_at(from)?, &alarms, from, until);
         let actions = self.whole_list(&sql::actions_oldest(), params![utc(from), utc(until), ROWS_MAX + 1], action)?;
+        let audit = self.list(sql::LAST_ENTRY, params![utc(until)], |row| Ok(seal(row.get(0)?, row.get(1)?)))?;
+        let audit = audit.into_iter().flatten().next();
         let gather = |tag: &TagId| Gathered {
             figures: reported.contains(tag).then(|| Figures::new(from, until)),
             record: recorded
@@ -95,7 +97,19 @@ impl Store {
         let tags = reported.iter().filter_map(row).collect();
         let quality = self.alarm_quality(from, until, now)?;
         let period = period.clone();
-        Ok(ShiftReport { period, until, unreadable, tags, suppressed, alarms, quality, actions, record, record_of })
+        Ok(ShiftReport {
+            period,
+            until,
+            audit,
+            unreadable,
+            tags,
+            suppressed,
+            alarms,
+            quality,
+            actions,
+            record,
+            record_of,
+        })
     }
 
     /// The controller of the record and the instants of its rows.

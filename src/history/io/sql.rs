@@ -200,6 +200,10 @@ pub fn actions_oldest() -> String {
     format!("SELECT {DEED} FROM operator_action WHERE utc >= ? AND utc < ? AND {plant} ORDER BY utc, rowid LIMIT ?")
 }
 
+/// Number and hash of the last entry of the audit log before an instant.
+pub const LAST_ENTRY: &str = "SELECT number, hash FROM operator_action WHERE utc < ? AND number IS NOT NULL
+    ORDER BY number DESC LIMIT 1";
+
 /// Minutes of a line in a span, oldest first; of more than the limit the latest.
 pub const LINE_MINUTES: &str = "SELECT * FROM (
     SELECT utc, line, requests, ok, timeouts, corrupt, exceptions, retries, late, missed, sent_bytes, received_bytes,

@@ -29,7 +29,7 @@ use crate::{
     plant::{
         def::{LineDef, LineId, PlantDef, Priority, TagId, Transport},
         line_minute::LineMinute,
-        record::{ActionRecord, AlarmRecord, AlarmStep, Burst, Record},
+        record::{ActionRecord, AlarmRecord, AlarmStep, Burst, Record, Seal},
         sample::{Cause, Sample},
     },
     report::{
@@ -364,6 +364,27 @@ fn the_report_of_a_shift_has_its_figures_alarms_deeds_and_record() {
     assert_eq!((report.record[0].at, report.record[0].er), (sec(20), Some(48.0)));
     let future = Question::Report { period: Period { name: "period".into(), from: sec(300), to: sec(400) } };
     assert_eq!(store.answer(&future, sec(100)), Err(HistoryError::EmptyPeriod));
+}
+
+#[test]
+fn a_report_has_the_last_entry_of_the_audit_log_before_its_end() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    let entry = |at: i64, number: u64| {
+        let seal = Some(Seal { number, hash: [number as u8; 32] });
+        Record::Action(ActionRecord { seal, ..deed(at) })
+    };
+    // The clock went back between 3 and 4, 6 was written after the period, and one action is not in the log.
+    let log = [entry(10, 1), entry(30, 2), entry(50, 3), entry(40, 4), entry(45, 5), entry(100, 6)];
+    store.append(&log.into_iter().chain([Record::Action(deed(60))]).collect::<Vec<_>>()).unwrap();
+    let audit = |from: i64, to: i64| {
+        let period = Period { name: "period".into(), from: sec(from), to: sec(to) };
+        store.report(&period, sec(1_000)).unwrap().audit.map(|entry| (entry.number, entry.hash[0]))
+    };
+    assert_eq!(audit(20, 100), Some((5, 5)));
+    assert_eq!(audit(20, 40), Some((2, 2)));
+    assert_eq!(audit(70, 101), Some((6, 6)));
+    assert_eq!(audit(0, 10), None, "nothing was in the log then");
 }
 
 #[test]

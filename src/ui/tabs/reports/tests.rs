@@ -10,7 +10,7 @@ use crate::{
     access::{Durability, Wish},
     plant::{
         def::Priority,
-        record::{ActionRecord, AlarmRecord, AlarmStep},
+        record::{ActionRecord, AlarmRecord, AlarmStep, Seal},
     },
     report::TagFigures,
     ui::{
@@ -143,6 +143,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
     ShiftReport {
         period,
         until,
+        audit: full.then_some(Seal { number: 1_042, hash: [0xA5; 32] }),
         unreadable: Vec::new(),
         tags: vec![
             tag("TIC-1.PV", "°C", 1, 26.8, 58.31, 72.6, Some(72.4), 41, 0.989_99),

@@ -140,6 +140,11 @@ pub fn lines(cx: &Cx, report: &ShiftReport) -> Vec<Line<'static>> {
     lines.extend(report.tags.iter().map(|tag| figures(cx, tag)));
     lines.push(Line::default());
     lines.push(counts(cx, report));
+    if let Some(entry) = report.audit {
+        // The CSV has the whole hash.
+        let words = fit(&format!("  audit log: entry {entry}"), cx.area.width);
+        lines.push(Line::from(Span::styled(words, theme.dim())));
+    }
     for gap in &report.unreadable {
         let time = |at: Timestamp| local(at, &cx.def().time_zone, "%m-%d %H:%M");
         let words = format!("  not readable, not counted: {} to {}", time(gap.from), time(gap.to));
