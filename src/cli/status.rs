@@ -71,12 +71,8 @@ pub fn tag_lines(snapshot: &Snapshot) -> Vec<String> {
         let sample = snapshot.sample(tag.id);
         let value =
             snapshot.text(tag.id).map_or_else(|| "----".into(), |text| format!("{text} {}", snapshot.unit(tag.id)));
-        let quality = match sample.quality {
-            Quality::Good => "good".to_owned(),
-            Quality::Uncertain(cause) => format!("uncertain: {}", cause.words()),
-            Quality::Bad(cause) => format!("bad: {}", cause.words()),
-        };
-        format!("{:20} {:>14}  {quality}  {:.1} s", tag.name, value.trim_end(), snapshot.age(tag.id).as_secs_f64())
+        let (value, age) = (value.trim_end(), snapshot.age(tag.id).as_secs_f64());
+        format!("{:20} {value:>14}  {}  {age:.1} s", tag.name, sample.quality)
     };
     snapshot.def.tags.iter().map(row).collect()
 }

@@ -1,5 +1,7 @@
 //! A value never travels alone: number, quality and time are one thing.
 
+use std::fmt;
+
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
@@ -44,6 +46,17 @@ pub enum Cause {
     Withheld = 12,
     /// It was stored, but the file is damaged there. Never stored.
     Unreadable = 13,
+}
+
+/// `good`, `uncertain: too old`, `bad: no answer in time`.
+impl fmt::Display for Quality {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Quality::Good => f.write_str("good"),
+            Quality::Uncertain(cause) => write!(f, "uncertain: {}", cause.words()),
+            Quality::Bad(cause) => write!(f, "bad: {}", cause.words()),
+        }
+    }
 }
 
 impl Cause {

@@ -187,7 +187,7 @@ fn record_decimals(report: &ShiftReport, def: &PlantDef) -> u8 {
 
 /// Rows of cells, made equally wide when written.
 #[derive(Default)]
-pub(super) struct Table(Vec<Vec<String>>);
+struct Table(Vec<Vec<String>>);
 
 impl Table {
     fn section(&mut self, title: &str, header: &[&str]) {
@@ -198,25 +198,33 @@ impl Table {
         self.0.push(header.iter().map(|word| plain(*word)).collect());
     }
 
-    pub(super) fn row(&mut self, cells: Vec<String>) {
+    fn row(&mut self, cells: Vec<String>) {
         self.0.push(cells);
     }
 
-    pub(super) fn write(mut self, dialect: CsvDialect) -> Vec<u8> {
+    fn write(self, dialect: CsvDialect) -> Vec<u8> {
         let width = self.0.iter().map(Vec::len).max().unwrap_or(0);
-        let mut bytes = if dialect.bom { "\u{feff}".as_bytes().to_vec() } else { Vec::new() };
-        let mut writer = csv::WriterBuilder::new()
-            .delimiter(u8::try_from(dialect.separator).unwrap_or(b','))
-            .terminator(csv::Terminator::CRLF)
-            .from_writer(&mut bytes);
-        for row in &mut self.0 {
+        let widened = |mut row: Vec<String>| {
             row.resize(width, String::new());
-            writer.write_record(row).expect("rows are equally wide and memory does not fail to write");
-        }
-        writer.flush().expect("memory does not fail to write");
-        drop(writer);
-        bytes
+            row
+        };
+        write(self.0.into_iter().map(widened), dialect)
     }
+}
+
+/// A table of equally wide rows.
+pub(super) fn write(rows: impl Iterator<Item = Vec<String>>, dialect: CsvDialect) -> Vec<u8> {
+    let mut bytes = if dialect.bom { "\u{feff}".as_bytes().to_vec() } else { Vec::new() };
+    let mut writer = csv::WriterBuilder::new()
+        .delimiter(u8::try_from(dialect.separator).unwrap_or(b','))
+        .terminator(csv::Terminator::CRLF)
+        .from_writer(&mut bytes);
+    for row in rows {
+        writer.write_record(row).expect("rows are equally wide and memory does not fail to write");
+    }
+    writer.flush().expect("memory does not fail to write");
+    drop(writer);
+    bytes
 }
 
 /// A cell of text from outside. A spreadsheet runs a cell that begins with one of these as a formula: an apostrophe

@@ -5,13 +5,10 @@ use std::time::Duration;
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    csv::{Table, iso_millis, number, plain, text},
+    csv::{self, iso_millis, number, plain, text},
     hold::Stood,
 };
-use crate::plant::{
-    def::{CsvDialect, PlantDef},
-    sample::Quality,
-};
+use crate::plant::def::{CsvDialect, PlantDef};
 
 /// A tag to export.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,9 +23,9 @@ pub struct Column {
     pub values: Vec<Option<Stood>>,
 }
 
-/// The table: time with offset, then of each tag the value, with its unit in the header, and the quality. A value that is
-/// not good is left out; its quality says why. The first row stands one interval after
-/// `from`: a value belongs to the instant that it was known at.
+/// The table: time with offset, then of each tag the value, with its unit in the header, and the quality: `good`,
+/// `bad: no answer in time`, or `none` where nothing was stored. A value that is not good is left out. The first row is one
+/// interval after `from`: a value belongs to the instant at which it was known.
 pub fn export_csv(
     def: &PlantDef,
     from: Timestamp,
@@ -36,7 +33,6 @@ pub fn export_csv(
     columns: &[Column],
     dialect: CsvDialect,
 ) -> Vec<u8> {
-    let mut table = Table::default();
     let head = |column: &Column| {
         let value = match column.unit.is_empty() {
             true => text(&column.tag),
@@ -47,26 +43,16 @@ pub fn export_csv(
     let cells = |column: &Column, row: usize| {
         let stood = column.values.get(row).copied().flatten();
         let good = stood.filter(|stood| stood.quality.is_good()).and_then(|stood| stood.value);
-        [number(good, column.decimals, dialect), plain(quality(stood))]
+        let quality = stood.map_or_else(|| "none".to_owned(), |stood| stood.quality.to_string());
+        [number(good, column.decimals, dialect), plain(quality)]
     };
-    table.row(std::iter::once(plain("time")).chain(columns.iter().flat_map(head)).collect());
-    let rows = columns.iter().map(|column| column.values.len()).max().unwrap_or(0);
-    for row in 0..rows {
-        let Some(at) = instant(from, every, row + 1) else { break };
-        let cells = columns.iter().flat_map(|column| cells(column, row));
-        table.row(std::iter::once(plain(iso_millis(&def.time_zone, at))).chain(cells).collect());
-    }
-    table.write(dialect)
-}
-
-/// `good`, `bad: no answer in time`; `none` where nothing was stored.
-fn quality(stood: Option<Stood>) -> String {
-    match stood.map(|stood| stood.quality) {
-        Some(Quality::Good) => "good".into(),
-        Some(Quality::Uncertain(cause)) => format!("uncertain: {}", cause.words()),
-        Some(Quality::Bad(cause)) => format!("bad: {}", cause.words()),
-        None => "none".into(),
-    }
+    let header = std::iter::once(plain("time")).chain(columns.iter().flat_map(head)).collect();
+    let count = columns.iter().map(|column| column.values.len()).max().unwrap_or(0);
+    let rows = (0..count).map_while(|row| {
+        let at = plain(iso_millis(&def.time_zone, instant(from, every, row + 1)?));
+        Some(std::iter::once(at).chain(columns.iter().flat_map(|column| cells(column, row))).collect())
+    });
+    csv::write(std::iter::once(header).chain(rows), dialect)
 }
 
 /// Each instant is computed from the start, so that no rounding adds up.

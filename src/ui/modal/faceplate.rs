@@ -8,7 +8,6 @@ use crate::{
     plant::{
         def::TagId,
         event::LineState,
-        sample::Quality,
         snapshot::DeviceState,
         tag::{Access, Poll},
     },
@@ -157,11 +156,9 @@ fn wrapped(rows: Vec<(&'static str, String, Style)>, room: u16) -> Vec<(&'static
 /// What is known about one tag: (label, words, style).
 fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)> {
     let (theme, def, sample) = (cx.theme, cx.def().tag(tag), cx.snapshot.sample(tag));
-    let quality = match sample.quality {
-        _ if def.access == Access::Write => "none: write only".to_owned(),
-        Quality::Good => "good".to_owned(),
-        Quality::Uncertain(cause) => format!("uncertain: {}", cause.words()),
-        Quality::Bad(cause) => format!("bad: {}", cause.words()),
+    let quality = match def.access {
+        Access::Write => "none: write only".to_owned(),
+        Access::Read | Access::ReadWrite => sample.quality.to_string(),
     };
     let read = match def.access {
         Access::Write => "never".to_owned(),
