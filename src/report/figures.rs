@@ -36,7 +36,7 @@ const COUNTED: [&str; 12] = ["Wh", "kWh", "MWh", "GWh", "varh", "kvarh", "Mvarh"
 
 impl Label {
     /// Name, unit and decimals of a tag, where the device may have chosen the last two: `latest` has the latest good values
-    /// of the tags that tell.
+    /// of the tags that hold them.
     pub fn at(def: &TagDef, latest: &HashMap<TagId, f64>) -> Label {
         let decimals = match def.decimals {
             Decimals::Fixed(decimals) => decimals,
@@ -55,7 +55,7 @@ impl Label {
     }
 }
 
-/// The tags that tell unit and decimals of a tag.
+/// The tags that hold decimals and unit of a tag.
 pub fn choosers(def: &TagDef) -> impl Iterator<Item = TagId> + use<> {
     let decimals = match def.decimals {
         Decimals::From(tag) => Some(tag),
@@ -64,7 +64,7 @@ pub fn choosers(def: &TagDef) -> impl Iterator<Item = TagId> + use<> {
     decimals.into_iter().chain(def.unit_from.as_ref().map(|(tag, _)| *tag))
 }
 
-/// The figures of one tag over a period on their way. The samples come in order of time and begin
+/// Computes the figures of one tag over a period. The samples come in order of time and begin
 /// [`HOLD_MAX`](super::hold::HOLD_MAX) before it.
 pub struct Figures {
     seconds: f64,
@@ -89,10 +89,10 @@ impl Figures {
 
     fn add(&mut self, span: Held) {
         let last = self.tally.map_or(span.value, |tally| tally.last);
-        // A counter that shows less than half of what it did was reset or has run over: it counts from zero. One that
-        // goes back by less is a balance, as of energy taken and fed back.
-        let anew = span.value < last / 2.0;
-        self.counted += if anew { span.value } else { span.value - last };
+        // A counter that shows less than half of its last value, but not less than nothing, was reset or has rolled over:
+        // it counts from zero. Any other step back is that of a balance, as of energy taken and fed back.
+        let reset = (0.0..last / 2.0).contains(&span.value);
+        self.counted += if reset { span.value } else { span.value - last };
         Tally::add(&mut self.tally, span);
     }
 
@@ -202,7 +202,7 @@ pub fn suppressed(
     ended.filter(|found| found.raised > 0 || !found.active.is_zero()).collect()
 }
 
-/// An alarm on its way through a period.
+/// Follows an alarm through a period.
 struct Quiet {
     active: bool,
     quiet: bool,
@@ -311,8 +311,10 @@ mod tests {
             (vec![(-10, 100.0), (20, 101.5), (60, 104.0), (110, 200.0)], Some(4.0)),
             // Reset between 7 and 2: 5 before it, 2 and 1 after it.
             (vec![(0, 2.0), (20, 7.0), (40, 2.0), (60, 3.0)], Some(8.0)),
-            // A balance goes back a little.
+            // A balance goes back a little, and below zero.
             (vec![(0, 50.0), (20, 49.5)], Some(-0.5)),
+            (vec![(0, -10.0), (20, -11.0), (40, -9.0)], Some(1.0)),
+            (vec![(0, 1.0), (20, -1.0), (40, 1.0)], Some(0.0)),
         ] {
             let mut figures = Figures::new(sec(0), sec(100));
             readings.iter().for_each(|(at, value)| figures.next(Sample::good(*value, sec(*at))));
