@@ -9,13 +9,14 @@ use crate::{
     bus::io::{clock::Clock, transport::Connector},
     history::{Answer, HistoryError, Question, io::Query},
     plant::Snapshot,
+    profile::io::atomic::write_atomic,
     report::{Period, ShiftReport, csv},
     sim,
     station::{Session, io as station},
     ui,
 };
 
-use super::{CliError, StationArgs, drill, in_runtime, load, log, paths, run, say, span, speed};
+use super::{CliError, StationArgs, drill, in_runtime, load, log, own_files, paths, run, say, span, speed};
 
 /// Arguments of `demo`.
 #[derive(Debug, clap::Args)]
@@ -57,7 +58,10 @@ pub fn main(args: Args) -> Result<(), CliError> {
     if !args.headless {
         ui::io::require_terminal()?;
     }
-    let _log = log::start(args.station.log.as_deref())?;
+    if let (Some(report), Some(history)) = (&args.report, &args.station.history) {
+        own_files::refuse(report, history)?;
+    }
+    let _log = log::start(args.station.log.as_deref(), args.station.history.as_deref())?;
     // A history of its own, gone with the demonstration, unless the user wants to keep one.
     let scratch = Scratch::new(&args.station)?;
     in_runtime(async {
@@ -123,7 +127,7 @@ async fn headless(session: Session, clock: Clock, duration: Option<Duration>, ar
     }
     if let Some(path) = &args.report {
         let bytes = csv::shift_csv(&report, &last.def, last.def.report.csv);
-        std::fs::write(path, bytes)
+        write_atomic(path, &bytes, 0o640)
             .map_err(|error| CliError::Io { what: format!("cannot write {}", path.display()), error })?;
         say(&format!("report written: {}", path.display()));
     }

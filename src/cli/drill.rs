@@ -40,7 +40,7 @@ pub struct Args {
 pub fn main(args: Args) -> Result<(), CliError> {
     let Some(path) = &args.scenario else { return list() };
     let (scenario, def) = load(path)?;
-    let _log = log::start(None)?;
+    let _log = log::start(None, None)?;
     let scenario = Arc::new(scenario);
     let tell = |line: &str| {
         if !args.quiet {

@@ -11,7 +11,7 @@ use tracing_appender::{
 };
 use tracing_subscriber::{EnvFilter, fmt};
 
-use super::{CliError, paths};
+use super::{CliError, own_files, paths};
 use crate::plant::visible::visible;
 
 /// Days of logs that are kept.
@@ -19,8 +19,11 @@ const DAYS: usize = 7;
 
 /// Starts logging; the guard writes what is left when it is dropped. `SIGHTGLASS_LOG` sets the level (`debug`);
 /// the file `-` is standard error, for an init system that keeps it. A disk that does not take the log is no error: a
-/// station must poll all the same.
-pub fn start(file: Option<&Path>) -> Result<WorkerGuard, CliError> {
+/// station must poll all the same. Refuses the files of the station with this history.
+pub fn start(file: Option<&Path>, history: Option<&Path>) -> Result<WorkerGuard, CliError> {
+    if let (Some(file), Some(history)) = (file, history) {
+        own_files::refuse(file, history)?;
+    }
     let (writer, guard) = match file {
         Some(file) if file.as_os_str() == "-" => tracing_appender::non_blocking(Visible(io::stderr())),
         _ => tracing_appender::non_blocking(Visible(LogFile::open(file)?)),
@@ -88,7 +91,7 @@ fn appender(path: Option<&Path>) -> Result<RollingFileAppender, CliError> {
     builder.build(&folder).map_err(|error| failed(&folder, io::Error::other(error)))
 }
 
-/// Whoever reads the log in a terminal must not be played tricks by what stands in it. A line is written at a time.
+/// Writes a line at a time; nothing in it acts on the terminal in which the log is read.
 struct Visible<W>(W);
 
 impl<W: Write> Write for Visible<W> {

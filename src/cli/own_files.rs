@@ -1,4 +1,4 @@
-//! The files that a station keeps are no place to write a report or an export to.
+//! The files of a station: no report, export or log is written into them.
 
 use std::{
     fs,
@@ -12,17 +12,18 @@ use crate::{
 
 use super::CliError;
 
-/// Refuses to write to the history, its log and notes, the audit log and its key, the users file or the alarm-state file, under
-/// whatever name they are reached.
+/// Refuses to write to the history, its log and notes, the audit log, its note and its key, the users file or the
+/// alarm-state file, under whatever name they are reached.
 pub fn refuse(out: &Path, history: &Path) -> Result<(), CliError> {
     let beside = ["", ".wal", ".last", ".opening"].map(|suffix| files::beside(history, suffix));
     let log = book::beside(history);
-    let others = [sealing::beside(&log), log, users_beside(history), alarm_file::beside(history)];
+    let of_log = [book::head_of(&log), sealing::beside(&log), log];
+    let others = [users_beside(history), alarm_file::beside(history)];
     let same = |own: &PathBuf| {
         let is_one_file = files::inode(own).is_some() && files::inode(own) == files::inode(out);
         is_one_file || resolved(own).is_some() && resolved(own) == resolved(out)
     };
-    match beside.iter().chain(&others).find(|own| same(own)) {
+    match beside.iter().chain(&of_log).chain(&others).find(|own| same(own)) {
         Some(own) => Err(CliError::Usage(format!("{} belongs to the station: choose another file", own.display()))),
         None => Ok(()),
     }
@@ -52,8 +53,8 @@ mod tests {
         fs::hard_link(&history, &hard).unwrap();
         let dotted = folder.path().join("./tank.duckdb.wal");
         let [log, users, alarms] = [book::beside(&history), users_beside(&history), alarm_file::beside(&history)];
-        let key = sealing::beside(&log);
-        for own in [&history, &link, &hard, &dotted, &log, &key, &users, &alarms] {
+        let (key, note) = (sealing::beside(&log), folder.path().join("tank.audit.head"));
+        for own in [&history, &link, &hard, &dotted, &log, &key, &note, &users, &alarms] {
             assert!(refuse(own, &history).is_err(), "{}", own.display());
         }
         for other in [folder.path().join("report.csv"), folder.path().join("none/report.csv"), PathBuf::from("-")] {

@@ -44,7 +44,7 @@ pub struct Args {
 /// Runs the station until it is told to stop; says on standard output what changes.
 pub fn main(args: Args) -> Result<(), CliError> {
     let plant = load_with_file(&args.plant, &args.station)?;
-    let _log = log::start(args.station.log.as_deref())?;
+    let _log = log::start(args.station.log.as_deref(), Some(&history_file(&plant.0, &args.station)))?;
     in_runtime(async {
         let over = over(Clock::real(), args.duration);
         tokio::pin!(over);
@@ -112,7 +112,7 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
         {
             return attach::at(&place).await;
         }
-        let _log = log::start(args.log.as_deref())?;
+        let _log = log::start(args.log.as_deref(), Some(&history_file(&def, args)))?;
         let listener = listen(&def)?;
         let station = start(&def, Clock::real(), history_file(&def, args), file)?;
         let mut serving = Serving::new(listener, station);

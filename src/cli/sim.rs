@@ -63,7 +63,7 @@ impl From<ModeArg> for Mode {
 pub fn main(args: Args) -> Result<(), CliError> {
     let def = load(&args.plant, &StationArgs::default())?;
     let services = services(&def, &args)?;
-    let _log = log::start(args.log.as_deref())?;
+    let _log = log::start(args.log.as_deref(), None)?;
     runtime()?.block_on(async {
         let clock = Clock::starting_at(jiff::Timestamp::now(), args.speed);
         let serving = serve(&def, clock, &services).await.map_err(simulation_error)?;

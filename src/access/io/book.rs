@@ -30,7 +30,7 @@ pub fn beside(history: &Path) -> PathBuf {
 }
 
 /// Where the last seal is noted: `tank.audit.head` beside `tank.audit.jsonl`.
-fn head_of(book: &Path) -> PathBuf {
+pub fn head_of(book: &Path) -> PathBuf {
     book.with_extension("head")
 }
 

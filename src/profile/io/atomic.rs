@@ -21,7 +21,7 @@ pub fn write_atomic(path: &Path, bytes: &[u8], mode: u32) -> io::Result<()> {
     let beside = beside(path);
     let written = write_beside(&beside, bytes, mode).and_then(|_| fs::rename(&beside, path));
     if written.is_err() {
-        // What was begun is of no use to anybody.
+        // A part of a file is of no use.
         let _ = fs::remove_file(&beside);
     }
     written?;
@@ -48,7 +48,7 @@ fn is_gone(process: i32) -> bool {
     process.is_none_or(|process| process::test_kill_process(process) == Err(Errno::SRCH))
 }
 
-/// Writes and syncs a new file. Never through a link that somebody has put there.
+/// Writes and syncs a new file, never through a link.
 pub fn write_beside(path: &Path, bytes: &[u8], mode: u32) -> io::Result<File> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),

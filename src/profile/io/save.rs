@@ -80,17 +80,11 @@ impl PlantFile {
 
 /// Writes a new file with the mode of `old`, and its owner and group where that is permitted: `false` if it is not.
 fn write_whole(path: &Path, bytes: &[u8], old: &fs::Metadata) -> std::io::Result<bool> {
-    // Never through a link that somebody has put there; what an earlier try has left is of no use.
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
-        Ok(()) | Err(_) => {}
-    }
-    let mut file = File::create_new(path)?;
+    let file = atomic::write_beside(path, bytes, 0o600)?;
     let new = file.metadata()?;
     let (other_user, other_group) = (new.uid() != old.uid(), new.gid() != old.gid());
     let given = fchown(&file, other_user.then(|| old.uid()), other_group.then(|| old.gid()));
     file.set_permissions(old.permissions())?;
-    file.write_all(bytes)?;
     file.sync_all()?;
     Ok(given.is_ok())
 }
