@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{
     signal::unix::{SignalKind, signal},
-    sync::watch,
+    sync::{mpsc, watch},
     task::JoinHandle,
 };
 
@@ -22,6 +22,9 @@ use super::{CliError, StationArgs, attach, client, in_runtime, init, load_with_f
 
 /// So long an answer takes at most to leave the station before its socket closes.
 const ANSWER: Duration = Duration::from_millis(200);
+
+/// Why a station that is one process with its terminal is not reloaded.
+const LEAVE: &str = "leave this terminal and start it again";
 
 /// A plant that is checked, and the file that its settings can be saved into.
 type Plant = (PlantDef, Option<PlantFile>);
@@ -63,7 +66,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
             let ended = tokio::select! {
                 ended = follow(snapshots.clone(), clock, None) => ended.map(|_| None),
                 () = &mut over => Ok(None),
-                next = serving.told(checked(&args)) => Ok(next),
+                next = commanded(&mut serving.station.commands, checked(&args)) => Ok(next),
             };
             let last = snapshots.borrow().clone();
             drop(snapshots);
@@ -71,12 +74,11 @@ pub fn main(args: Args) -> Result<(), CliError> {
                 Ok(Some(_)) => init::reloading(),
                 Ok(None) | Err(_) => init::stopping(),
             }
-            let socket = serving.stop().await?;
+            // A plant goes by the name of its file, so the socket stays the same.
+            listener = serving.stop().await?;
             match ended? {
                 Some(next) => {
-                    say("the plant file is taken up anew");
-                    // A plant of another name has another socket.
-                    listener = if next.0.name == def.name { socket } else { listen(&next.0)? };
+                    say("plant file reloaded");
                     plant = next;
                 }
                 None => {
@@ -119,7 +121,7 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
         let session = serving.station.session(&paths::operator());
         let result = tokio::select! {
             result = ui::io::run(session, ui::io::Options::new(ui::Leaving::Station)) => result,
-            _ = serving.told(|| Err(CliError::Usage("leave this terminal and start it again".to_owned()))) => Ok(()),
+            _ = commanded(&mut serving.station.commands, || Err(CliError::Usage(LEAVE.to_owned()))) => Ok(()),
         };
         serving.stop().await?;
         Ok(result?)
@@ -132,6 +134,40 @@ fn listen(def: &PlantDef) -> Result<serve::Listener, CliError> {
         .socket(&def.name)
         .map_err(|error| CliError::Io { what: "cannot make a socket".into(), error })?;
     serve::listen(&path).map_err(CliError::from)
+}
+
+/// Waits until a terminal stops the station (`None`) or reloads its plant file (`Some`, already checked). A file with errors
+/// is refused, and the station goes on as it is.
+async fn commanded(
+    commands: &mut mpsc::Receiver<Command>,
+    load: impl Fn() -> Result<Plant, CliError> + Clone + Send + 'static,
+) -> Option<Plant> {
+    loop {
+        let Command::Reload(reply) = commands.recv().await? else { break };
+        let loaded = tokio::select! {
+            loaded = loaded(load.clone()) => loaded,
+            // The disk of the plant file may hang: the station can be stopped all the same.
+            () = stopped(commands) => break,
+        };
+        match loaded {
+            Ok(plant) => {
+                // A terminal that has left needs no answer.
+                let _ = reply.send(Ok(()));
+                tokio::time::sleep(ANSWER).await;
+                return Some(plant);
+            }
+            Err(why) => drop(reply.send(Err(why))),
+        }
+    }
+    tokio::time::sleep(ANSWER).await;
+    None
+}
+
+/// Waits for the end of the station while a plant file is loaded.
+async fn stopped(commands: &mut mpsc::Receiver<Command>) {
+    while let Some(Command::Reload(reply)) = commands.recv().await {
+        drop(reply.send(Err("the plant file is being loaded already".to_owned())));
+    }
 }
 
 /// Loads a plant file beside the station: however long it takes, and even if it fails badly. `Err` says why in words.
@@ -156,29 +192,6 @@ impl Serving {
             listener
         });
         Serving { station, socket }
-    }
-
-    /// Waits until a terminal has it stopped (`None`) or the plant file taken up anew (`Some`, already checked). A file
-    /// with errors is refused, and everything goes on as it is.
-    async fn told(&mut self, load: impl Fn() -> Result<Plant, CliError> + Clone + Send + 'static) -> Option<Plant> {
-        loop {
-            match self.station.commands.recv().await {
-                None => return None,
-                Some(Command::Stop) => {
-                    tokio::time::sleep(ANSWER).await;
-                    return None;
-                }
-                Some(Command::Reload(reply)) => match loaded(load.clone()).await {
-                    Ok(plant) => {
-                        // A terminal that has left needs no answer.
-                        let _ = reply.send(Ok(()));
-                        tokio::time::sleep(ANSWER).await;
-                        return Some(plant);
-                    }
-                    Err(why) => drop(reply.send(Err(why))),
-                },
-            }
-        }
     }
 
     /// Ends the station; its terminals hear of it by its silence. Gives the socket back.
@@ -285,6 +298,8 @@ pub async fn signalled() {
 
 #[cfg(test)]
 mod tests {
+    use tokio::sync::oneshot;
+
     use super::*;
 
     #[tokio::test]
@@ -292,6 +307,37 @@ mod tests {
         assert!(loaded(|| panic!("a mistake in the loader")).await.is_err_and(|why| why.contains("see the log")));
         let why = loaded(|| Err(CliError::Usage("no such plant".to_owned()))).await.err();
         assert_eq!(why.as_deref(), Some("no such plant"));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_station_whose_plant_file_cannot_be_read_to_its_end_can_be_stopped() {
+        let (begun, begins) = std::sync::mpsc::channel();
+        // The loader ends with this test, not before.
+        let (_end, ends) = std::sync::mpsc::channel::<()>();
+        let ends = Arc::new(std::sync::Mutex::new(ends));
+        let load = move || {
+            begun.send(()).expect("the test waits");
+            let _ = ends.lock().expect("one loader").recv();
+            Err(CliError::Usage("refused".to_owned()))
+        };
+        let (sender, mut commands) = mpsc::channel(4);
+        let (reply, _answer) = oneshot::channel();
+        let (second, refused) = oneshot::channel();
+        let terminals = async {
+            sender.send(Command::Reload(reply)).await.expect("the station listens");
+            while begins.try_recv().is_err() {
+                tokio::task::yield_now().await;
+            }
+            sender.send(Command::Reload(second)).await.expect("the station listens");
+            assert!(refused.await.is_ok_and(|answer| answer.is_err_and(|why| why.contains("loaded already"))));
+            sender.send(Command::Stop).await.expect("the station listens");
+            while sender.capacity() < sender.max_capacity() {
+                tokio::task::yield_now().await;
+            }
+            tokio::time::advance(ANSWER).await;
+        };
+        let (next, ()) = tokio::join!(commanded(&mut commands, load), terminals);
+        assert!(next.is_none());
     }
 
     #[tokio::test]
