@@ -10,6 +10,7 @@
 //! | `masters` | our simulated slaves, and those of the benches, against masters that we did not write: mbpoll, pymodbus, minimalmodbus |
 //! | `capture` | saved traffic, opened by Wireshark's own reader |
 //! | `shift` | a whole shift in virtual time, and its report read by an independent reader |
+//! | `reports` | reports and exports as a user gets them: damaged history, suppressed alarms, a running station |
 //! | `devices` | every shipped profile and plant against its simulated devices: a minute, every fault, golden frames |
 //! | `rights` | every command, wish and question through the socket, by everybody who may be at a terminal |
 //! | `people` | wrong passwords, lock-out, idle lock, second persons, two operators at once |
@@ -41,6 +42,7 @@ mod owed;
 mod peers;
 mod people;
 mod pty;
+mod reports;
 mod rights;
 mod settings;
 mod shift;

@@ -1,0 +1,274 @@
+//! Reports and exports as a user gets them: from a damaged history, with suppressed alarms, beside a running station.
+
+use std::{path::Path, process::Output, sync::Arc, time::Instant};
+
+use jiff::{SignedDuration, Timestamp};
+use sightglass::{
+    access::io::own_user,
+    history::io::store::Store,
+    plant::{
+        PlantDef,
+        def::Priority,
+        record::{AlarmRecord, AlarmStep, Record},
+        sample::Sample,
+    },
+    profile::{self, Search},
+};
+
+use crate::support::{PATIENCE, Process, folder, sightglass, sockets};
+
+/// The instant of the first record.
+const START: &str = "2026-03-02T06:00:00Z";
+
+/// Exit code, standard output and standard error of a command about a history file.
+fn run(command: &str, history: &Path, args: &[&str]) -> (Option<i32>, String, String) {
+    let Output { status, stdout, stderr } =
+        sightglass().args([command, "tank"]).args(args).arg("--history").arg(history).output().unwrap();
+    (status.code(), String::from_utf8(stdout).unwrap(), String::from_utf8(stderr).unwrap())
+}
+
+/// A closed history of the tank with these records.
+fn history(path: &Path, records: impl Fn(&PlantDef, Timestamp) -> Vec<Record>) {
+    let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
+    let start: Timestamp = START.parse().unwrap();
+    let store = Store::open(path, &def, start).unwrap().store;
+    for part in records(&def, start).chunks(50_000) {
+        store.append(part).unwrap();
+    }
+    store.checkpoint().unwrap();
+}
+
+/// Rows of a CSV file as cells.
+fn cells(text: &str) -> Vec<Vec<String>> {
+    let reader = csv::ReaderBuilder::new().has_headers(false).flexible(false).from_reader(text.as_bytes());
+    reader.into_records().map(|row| row.unwrap().iter().map(str::to_owned).collect()).collect()
+}
+
+#[test]
+fn a_report_over_a_damaged_span_names_it_and_has_the_rest() {
+    let folder = folder();
+    let path = folder.path().join("tank.duckdb");
+    let seconds = 400_000;
+    history(&path, |def, start| {
+        let pv = def.tag_named("TIC-1.PV").unwrap();
+        // Numbers that do not compress: many blocks.
+        let value = |at: i64| f64::from((at as u32).wrapping_mul(2_654_435_761)) / 7.0;
+        let sample = |at: i64| Record::Sample(pv, Sample::good(value(at), start + SignedDuration::from_secs(at)));
+        (0..seconds).map(sample).collect()
+    });
+    let mut bytes = std::fs::read(&path).unwrap();
+    let middle = bytes.len() / 2 + 1_000;
+    bytes[middle] ^= 4;
+    std::fs::write(&path, bytes).unwrap();
+
+    let end = (START.parse::<Timestamp>().unwrap() + SignedDuration::from_secs(seconds)).to_string();
+    let period = ["--from", START, "--to", &end];
+    let (code, out, err) = run("report", &path, &[&period[..], &["--out", "-"]].concat());
+    assert_eq!(code, Some(0), "{err}");
+    assert!(err.contains("the history cannot be read from 2026-03-0") && err.contains("checksum"), "{err}");
+    let rows = cells(&out);
+    let section = rows.iter().position(|row| row[0] == "not readable, not counted").expect("the gap has a section");
+    let at = |cell: &str| cell.parse::<Timestamp>().unwrap();
+    let gaps = rows[section + 2..].iter().take_while(|row| !row[0].is_empty());
+    let lost: i64 = gaps.map(|row| at(&row[1]).duration_since(at(&row[0])).as_secs()).sum();
+    assert!(0 < lost && lost < seconds / 2, "{lost} s in\n{out}");
+    let pv = rows.iter().find(|row| row[0] == "TIC-1.PV").expect("PV is in the report");
+    let good = 100.0 - lost as f64 / seconds as f64 * 100.0;
+    assert!((pv[7].parse::<f64>().unwrap() - good).abs() < 1.0, "{pv:?}, expected {good} % good");
+
+    let (code, out, err) = run("export", &path, &[&period[..], &["--tags", "TIC-1.PV", "--every", "1min"]].concat());
+    assert_eq!(code, Some(0), "{err}");
+    let minutes = out.lines().filter(|line| line.ends_with(",,bad: history damaged")).count() as i64;
+    assert!((minutes - lost / 60).abs() <= 2, "{minutes} minutes of {lost} s");
+    let (code, _, err) = run("alarms", &path, &[&period[..], &["--stats"]].concat());
+    assert_eq!(code, Some(0), "{err}");
+}
+
+#[test]
+fn alarms_that_were_suppressed_are_counted_beside_those_that_were_annunciated() {
+    let folder = folder();
+    let path = folder.path().join("tank.duckdb");
+    history(&path, |_, start| {
+        use AlarmStep::{Raised, RaisedQuietly, Released, Returned, ReturnedQuietly, Suppressed};
+        let steps = [
+            (10, "temperature high", Raised),
+            (70, "temperature high", Returned),
+            (100, "level low", Suppressed),
+            (120, "level low", RaisedQuietly),
+            (420, "level low", ReturnedQuietly),
+            (500, "level low", RaisedQuietly),
+            (560, "level low", ReturnedQuietly),
+            (600, "level low", Released),
+        ];
+        let record = |(at, text, step)| {
+            let at = start + SignedDuration::from_secs(at);
+            Record::Alarm(AlarmRecord::new(at, "TIC-1.PV", text, Priority::High, step))
+        };
+        steps.map(record).into()
+    });
+    let period = ["--from", START, "--to", "2026-03-02T08:00:00Z"];
+    let (code, out, err) = run("alarms", &path, &[&period[..], &["--stats"]].concat());
+    assert_eq!(code, Some(0), "{err}");
+    assert!(out.contains(": 1 alarms, 2 more while suppressed"), "{out}");
+    let (code, out, err) = run("alarms", &path, &[&period[..], &["--stats", "--json"]].concat());
+    assert_eq!(code, Some(0), "{err}");
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((json["raised"].as_u64(), json["suppressed"].as_u64()), (Some(1), Some(2)), "{out}");
+    let (code, out, err) = run("report", &path, &[&period[..], &["--out", "-"]].concat());
+    assert_eq!(code, Some(0), "{err}");
+    let row = |first: &str, second: &str| cells(&out).into_iter().find(|row| row[0] == first && row[1] == second);
+    assert!(row("high", "1").is_some_and(|row| row[2] == "2"), "{out}");
+    let suppressed = row("high", "TIC-1.PV").expect("a row of suppressed alarms");
+    assert_eq!(suppressed[2..5], ["level low", "2", "6.0"], "{out}");
+}
+
+#[test]
+fn a_report_has_number_and_hash_of_the_last_entry_of_the_audit_log() {
+    let folder = folder();
+    let path = folder.path().join("tank.duckdb");
+    let begun = Timestamp::now();
+    let mut station = Process::start(
+        sightglass()
+            .args(["run", "tank", "--for", "1s", "--port", "L1=/dev/none", "--history"])
+            .arg(&path)
+            .env("XDG_STATE_HOME", folder.path()),
+    );
+    assert_eq!(station.end(), Some(0), "{:?}", station.said);
+    let log = std::fs::read_to_string(folder.path().join("tank.audit.jsonl")).unwrap();
+    let last: serde_json::Value = serde_json::from_str(log.lines().last().unwrap()).unwrap();
+    let from = (begun - SignedDuration::from_secs(1)).to_string();
+    let (code, out, err) = run("report", &path, &["--from", &from, "--out", "-"]);
+    assert_eq!(code, Some(0), "{err}");
+    let rows = cells(&out);
+    assert_eq!(rows[1][6..8], ["audit entry", "audit hash"]);
+    assert_eq!(rows[2][6], last["n"].to_string(), "{log}");
+    assert_eq!(Some(&*rows[2][7]), last["hash"].as_str(), "{log}");
+}
+
+#[test]
+fn no_command_writes_a_report_an_export_or_a_log_into_the_history() {
+    let folder = folder();
+    let path = folder.path().join("tank.duckdb");
+    history(&path, |_, _| Vec::new());
+    let before = std::fs::read(&path).unwrap();
+    let own = path.to_str().unwrap();
+    for args in [
+        &["report", "tank", "--from", START, "--out", own][..],
+        &["export", "tank", "--from", START, "--out", own],
+        &["run", "tank", "--for", "1s", "--port", "L1=/dev/none", "--log", own],
+        &["demo", "--headless", "--for", "1s", "--log", own],
+        &["demo", "--headless", "--for", "1s", "--report", own],
+    ] {
+        let mut command = sightglass();
+        command.args(args).args(["--history", own]).env("XDG_STATE_HOME", folder.path());
+        let output = command.output().unwrap();
+        let err = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {err}");
+        assert!(err.contains("tank.duckdb belongs to the station: choose another file"), "{args:?}: {err}");
+        assert!(std::fs::read(&path).unwrap() == before, "{args:?} changed the history");
+    }
+}
+
+/// Two simulated controllers; the first shows °F with two decimals, the second °C with one.
+const TWO: &str = r#"
+title = "Two controllers"
+time_zone = "UTC"
+
+[[line]]
+name = "L1"
+mode = "tcp"
+host = "127.0.0.1"
+
+[[device]]
+name = "TIC-1"
+profile = "fuji_pxr"
+line = "L1"
+unit = 1
+fast = "500ms"
+slow = "1s"
+tag = [{ name = "P-F", simulate = { start = "°F" } }, { name = "P-DP", simulate = { start = 2 } }]
+
+[[device]]
+name = "TIC-2"
+profile = "fuji_pxr"
+line = "L1"
+unit = 2
+fast = "500ms"
+slow = "1s"
+"#;
+
+/// The simulated devices, a station on them, and the folders of both.
+struct Running {
+    folder: tempfile::TempDir,
+    sockets: std::path::PathBuf,
+    def: Arc<PlantDef>,
+    _processes: [Process; 2],
+}
+
+impl Running {
+    fn start(plant: &str) -> Running {
+        let (folder, sockets) = (folder(), sockets());
+        let file = folder.path().join("two.toml");
+        let rules = format!("\n[[access.trusted]]\nuser = \"{}\"\nrole = \"technician\"\n", own_user());
+        std::fs::write(&file, plant.to_owned() + &rules).unwrap();
+        let def = profile::load(&file, &Search::shipped()).unwrap();
+        let mut sim = Process::start(sightglass().arg("sim").arg(&file).args(["--tcp", "127.0.0.1:0"]));
+        let port = sim.wait_for(" on 127.0.0.1:").rsplit(' ').next().unwrap().to_owned();
+        let mut station = Process::start(
+            sightglass()
+                .arg("run")
+                .arg(&file)
+                .args(["--port", &format!("L1={port}")])
+                .env("XDG_RUNTIME_DIR", &sockets)
+                .env("XDG_STATE_HOME", folder.path()),
+        );
+        station.wait_for("TIC-2 (unit 2): answers");
+        Running { folder, sockets, def, _processes: [sim, station] }
+    }
+
+    fn run(&self, args: &[&str]) -> (Option<i32>, String, String) {
+        let file = self.folder.path().join("two.toml");
+        let mut command = sightglass();
+        command.arg(args[0]).arg(file).args(&args[1..]);
+        let output = command.env("XDG_RUNTIME_DIR", &self.sockets).env("XDG_STATE_HOME", self.folder.path()).output();
+        let Output { status, stdout, stderr } = output.unwrap();
+        (status.code(), String::from_utf8(stdout).unwrap(), String::from_utf8(stderr).unwrap())
+    }
+}
+
+#[test]
+fn a_running_station_exports_more_tags_than_one_question_takes_in_the_units_of_its_devices() {
+    let running = Running::start(TWO);
+    let stored: Vec<&str> = running.def.tags.iter().filter(|tag| tag.store).map(|tag| &*tag.name).collect();
+    assert!(64 < stored.len(), "{} tags fit into one question", stored.len());
+    let from = (Timestamp::now() - SignedDuration::from_secs(5)).to_string();
+    let end = Instant::now() + PATIENCE;
+    // Until every tag has been read and its value is on disk.
+    let rows = loop {
+        let (code, out, err) = running.run(&["export", "--from", &from, "--every", "500ms"]);
+        assert_eq!(code, Some(0), "{err}");
+        let rows = cells(&out);
+        let missing = rows.last().unwrap()[2..].iter().step_by(2).filter(|quality| *quality != "good").count();
+        if missing == 0 {
+            break rows;
+        }
+        assert!(Instant::now() < end, "{missing} tags have no good value in\n{out}");
+    };
+    let [header, .., last] = &rows[..] else { panic!("{rows:?}") };
+    assert_eq!(header.len(), 1 + 2 * stored.len());
+    for (name, cell) in stored.iter().zip(header[1..].iter().step_by(2)) {
+        assert!(cell.starts_with(name), "{cell} is not {name}");
+    }
+    let value = |head: &str| {
+        let column = header.iter().position(|cell| cell == head).unwrap_or_else(|| panic!("no {head} in {header:?}"));
+        &*last[column]
+    };
+    assert_eq!((value("TIC-1.SV °F"), value("TIC-2.SV °C")), ("70.00", "70.0"));
+
+    // The report has the same units and decimals.
+    let (code, out, err) = running.run(&["report", "--from", &from, "--out", "-"]);
+    assert_eq!(code, Some(0), "{err}");
+    let row = |tag: &str| cells(&out).into_iter().find(|row| row[0] == tag).unwrap_or_else(|| panic!("{out}"));
+    assert_eq!(row("TIC-1.SV")[1..6], ["°F", "70.00", "70.000", "70.00", "70.00"]);
+    assert_eq!(row("TIC-2.SV")[1..6], ["°C", "70.0", "70.00", "70.0", "70.0"]);
+}
