@@ -1,4 +1,4 @@
-//! `sightglass write` and `sightglass ack`: deeds at a running station, with rights, checks and records as on the screen.
+//! `sightglass write` and `sightglass ack`: actions at a running station, with rights, checks and records as on the screen.
 
 use std::sync::Arc;
 

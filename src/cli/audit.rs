@@ -39,7 +39,7 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
-    /// Reads the whole audit log and names the first line that is not as it was written: exit code 1 if there is one, 5 if
+    /// Reads the whole audit log and names the first line that was changed: exit code 1 if there is one, 5 if
     /// every line is sound but could not be compared with the history, or with the present sealing key
     Verify(VerifyArgs),
     /// Makes the sealing key of a plant's audit log, once, and prints the verification key: keep it off this machine, it is
@@ -59,7 +59,7 @@ struct KeyArgs {
 struct VerifyArgs {
     /// A plant file, or the name of a shipped plant
     plant: String,
-    /// The book [default: the plant's own, beside its history]
+    /// The audit log [default: the plant's own, beside its history]
     #[arg(long, value_name = "FILE")]
     book: Option<PathBuf>,
     /// Check the seals too, with the verification key in this file; `-` for standard input
@@ -130,7 +130,7 @@ fn verify(args: VerifyArgs) -> Result<(), CliError> {
             (summary, Some(sealed))
         }
     };
-    let found = if summary.entries == 0 { "empty: no deed was ever recorded in it" } else { "whole" };
+    let found = if summary.entries == 0 { "empty: nothing was ever recorded in it" } else { "whole" };
     say(&format!("{}: {found}", path.display()));
     summary_lines(&summary, &def).iter().for_each(|line| say(line));
     sealed.iter().for_each(|sealed| say(&sealed_line(sealed, &def)));

@@ -54,7 +54,7 @@ async fn gone(place: &Found) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Has the station take up its plant file anew; a bad file changes nothing.
+/// Reloads the plant file of the station; a bad file changes nothing.
 pub fn reload(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let session = client::attach(args.plant.as_deref(), &args.login).await?;

@@ -106,7 +106,7 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     Ok(())
 }
 
-/// The latest good values of the tags that tell unit and decimals of others.
+/// The latest good values of the tags that hold unit and decimals of others.
 async fn latest(
     source: &Source,
     def: &PlantDef,
@@ -125,7 +125,7 @@ async fn latest(
     Ok(latest)
 }
 
-/// Where each question about so many tags begins, and how many rows it is about.
+/// Start and number of rows of each question about this many tags.
 fn pieces(from: Timestamp, every: Duration, rows: usize, tags: usize) -> impl Iterator<Item = (Timestamp, usize)> {
     let piece = (COLUMNS_MAX / tags.max(1)).clamp(1, BUCKETS_MAX);
     (0..rows).step_by(piece).map(move |begin| (instant(from, every, begin), piece.min(rows - begin)))

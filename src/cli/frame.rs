@@ -60,7 +60,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     lines(std::io::stdin().lock(), framing)
 }
 
-/// Tells frames as their lines come. An answer behind its request gets its addresses.
+/// Explains frames as their lines come. An answer behind its request gets its addresses.
 fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> {
     let (mut frames, mut spoiled, mut wrong) = (0, 0, 0);
     let mut asked: Option<Explained> = None;

@@ -41,9 +41,9 @@ use crate::{
 const EXIT_CODES: &str = "\
 Exit codes:
   0  done, or left by the operator
-  1  failed while running, or what was looked at is wrong (the message says why)
+  1  failed while running, or what was checked is wrong (the message says why)
   2  wrong arguments, errors in a profile, or bytes that cannot be read
-  3  the history is in use by another process
+  3  the history is in use by another process, or a station of this plant runs already
   4  no station runs here
   5  the audit log is sound, but could not be compared with the history or with its sealing key";
 
@@ -80,7 +80,7 @@ enum Command {
     Audit(audit::Args),
     /// Ends the running station
     Stop(control::Args),
-    /// Has the running station take up its plant file anew; a file with errors changes nothing
+    /// Reloads the plant file of the running station; a file with errors changes nothing
     Reload(control::Args),
     /// Prints the systemd unit that runs stations on a panel PC
     Unit,
@@ -147,7 +147,7 @@ enum CliError {
     Failed(String),
     #[error("{0}\nstart one: `sightglass run PLANT`; or try it out: `sightglass demo`")]
     NotRunning(String),
-    #[error("the chain is whole, but {0}")]
+    #[error("the audit log is whole, but {0}")]
     NotCompared(String),
     #[error("the station has ended by itself, see the log")]
     StationGone,

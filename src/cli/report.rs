@@ -10,7 +10,8 @@ use crate::{
 };
 
 use super::{
-    CliError, StationArgs, client, in_runtime, load, own_files, put_out, run::history_file, say, source::Source,
+    CliError, StationArgs, client, in_runtime, load, own_files, put_out, run::history_file, say, say_error,
+    source::Source,
 };
 
 /// Arguments of `report`.
@@ -60,13 +61,17 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     let Answer::Report(report) = source.ask(Question::Report { period }).await? else {
         return Err(CliError::History(HistoryError::Engine("answered another question".into())));
     };
+    for gap in &report.unreadable {
+        let [from, to] = [gap.from, gap.to].map(|at| at.to_zoned(def.time_zone.clone()).strftime("%F %T"));
+        say_error(&format!("the history cannot be read from {from} to {to}, nothing is counted there: {}", gap.why));
+    }
     let dialect = dialect(def.report.csv, args.separator.as_deref(), args.bom);
     let bytes = match args.record {
         true => csv::record_csv(&report, &def, dialect),
         false => csv::shift_csv(&report, &def, dialect),
     };
     let path = args.out.unwrap_or_else(|| def.report.folder.join(csv::file_name(&def, &report.period, report.until)));
-    // Asked before anything is written: not everybody may take data away.
+    // Before anything is written: an export needs a right.
     source.exported(&path.display().to_string(), &bytes).await?;
     let failed = |error| CliError::Io { what: format!("cannot write {}", path.display()), error };
     if path.as_os_str() == "-" {

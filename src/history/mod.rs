@@ -90,13 +90,13 @@ pub enum Question {
         /// To.
         to: Timestamp,
     },
-    /// What stood at equal distances; one column a tag, in the order asked.
+    /// The values in force at equal intervals; one column a tag, in the order asked.
     Values {
         /// Which tags.
         tags: Vec<TagId>,
-        /// The first instant is one distance later.
+        /// The first instant is one interval later.
         from: Timestamp,
-        /// The distance.
+        /// The interval.
         every: Duration,
         /// Instants.
         count: usize,
@@ -118,7 +118,7 @@ pub enum Answer {
     Report(Box<ShiftReport>),
     /// The figures of the alarm system.
     AlarmQuality(Box<Figures>),
-    /// By tag what stood at each instant; `None` where nothing is stored, or nothing recent enough.
+    /// By tag the value in force at each instant; `None` where nothing is stored, or nothing recent enough.
     Values(Vec<Vec<Option<Stood>>>),
 }
 

@@ -21,7 +21,7 @@ pub struct Span {
     pub until: Timestamp,
 }
 
-/// A curve of at most `buckets` columns on its way. The samples come in order of time and begin
+/// Computes a curve of at most `buckets` columns. The samples come in order of time and begin
 /// [`HOLD_MAX`](crate::report::hold::HOLD_MAX) before the span, so that the value standing at its start is known.
 pub struct Curve {
     tag: TagId,

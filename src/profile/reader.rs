@@ -14,7 +14,7 @@ use toml::{
 use super::diagnostic::{Problems, Span};
 use crate::plant::visible::first_hidden;
 
-/// Most unknown keys of one table that are told.
+/// Most unknown keys of one table that are reported.
 const UNKNOWN_MAX: usize = 40;
 
 /// A value and where it stands.
@@ -95,7 +95,7 @@ fn hidden(text: &str, source: usize, problems: &mut Problems) -> bool {
     let found = first_hidden(body);
     if let Some((at, letter)) = found {
         let start = text.len() - body.len() + at;
-        tell_hidden(letter, Span { source, start, end: start + letter.len_utf8() }, problems);
+        report_hidden(letter, Span { source, start, end: start + letter.len_utf8() }, problems);
     }
     found.is_some()
 }
@@ -119,11 +119,11 @@ fn check_node(node: &At<Node>, problems: &mut Problems) {
 
 fn check_text(text: &str, at: Span, problems: &mut Problems) {
     if let Some((_, letter)) = first_hidden(text) {
-        tell_hidden(letter, at, problems);
+        report_hidden(letter, at, problems);
     }
 }
 
-fn tell_hidden(letter: char, at: Span, problems: &mut Problems) {
+fn report_hidden(letter: char, at: Span, problems: &mut Problems) {
     let message = format!("the character U+{:04X} is not shown, or turns the direction of writing", u32::from(letter));
     problems.add(at, message).label("expected only characters that are seen");
 }

@@ -761,13 +761,13 @@ fn a_plant_that_is_too_large_is_refused_before_it_is_made() {
         text.full_lines().next().unwrap()
     };
     let device = |n: usize| format!("[[device]]\nname = \"M{n}\"\nprofile = \"meter\"\nline = \"L1\"\nunit = 3\n");
-    let told = large(&(0..20_000).map(device).collect::<String>());
-    assert!(told.starts_with("small.toml:") && told.contains("20002 times [[device]]"), "{told}");
-    assert!(told.ends_with("(expected at most 2000)"), "{told}");
-    let told = large(&"[[alarm]]\ntag = \"D1.T\"\n".repeat(10_000));
-    assert!(told.contains("10001 times [[alarm]]"), "{told}");
-    let told = large(&"[[line]]\nname = \"L\"\n".repeat(70));
-    assert!(told.contains("71 times [[line]]"), "{told}");
+    let errors = large(&(0..20_000).map(device).collect::<String>());
+    assert!(errors.starts_with("small.toml:") && errors.contains("20002 times [[device]]"), "{errors}");
+    assert!(errors.ends_with("(expected at most 2000)"), "{errors}");
+    let errors = large(&"[[alarm]]\ntag = \"D1.T\"\n".repeat(10_000));
+    assert!(errors.contains("10001 times [[alarm]]"), "{errors}");
+    let errors = large(&"[[line]]\nname = \"L\"\n".repeat(70));
+    assert!(errors.contains("71 times [[line]]"), "{errors}");
 
     // Few devices of a profile with many tags.
     let tag = |n: usize| format!("[[tag]]\nname = \"R{n}\"\ntable = \"holding\"\naddress = {n}\ntype = \"uint16\"\n");
@@ -778,17 +778,17 @@ fn a_plant_that_is_too_large_is_refused_before_it_is_made() {
 }
 
 #[test]
-fn a_line_without_end_and_problems_without_end_are_told_in_bounded_words() {
+fn endless_lines_and_problems_are_reported_in_bounded_text() {
     let long = format!("{PLANT}\n[x]\na = [{}]\n", "[],".repeat(100_000));
     let keys: String = (0..50_000).map(|n| format!("k{n} = 1\n")).collect();
     let devices = "[[device]]\nname = \"\"\n".repeat(1_900);
     for text in [long, format!("{keys}\n{PLANT}"), format!("{PLANT}\n{devices}")] {
-        let told = load(text.as_bytes(), METER, PLC).expect_err("it is refused");
+        let errors = load(text.as_bytes(), METER, PLC).expect_err("it is refused");
         assert!(
-            told.count() <= 1_000 && told.to_string().len() < 100_000,
+            errors.count() <= 1_000 && errors.to_string().len() < 100_000,
             "{} {}",
-            told.count(),
-            told.to_string().len()
+            errors.count(),
+            errors.to_string().len()
         );
     }
 }

@@ -12,8 +12,9 @@ use crate::plant::{
     tag::Decimals,
 };
 
-/// The whole report: facts, tags, what could not be read, alarm counts, suppressed alarms, alarm quality, alarm list, operator actions, raw record. Every section has a title row,
-/// a header row and its rows; every row has as many columns as the widest. The same report gives the same bytes.
+/// The whole report: facts, tags, what could not be read, alarm counts, suppressed alarms, alarm quality, alarm list,
+/// operator actions, raw record. Every section has a title row, a header row and its rows; every row has as many columns
+/// as the widest. The same report gives the same bytes.
 pub fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u8> {
     let zone = &def.time_zone;
     let mut table = Table::default();

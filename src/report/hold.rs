@@ -70,7 +70,8 @@ impl Holding {
     }
 }
 
-/// What stood at rising instants. The samples come in order of time and should begin [`HOLD_MAX`] before the first.
+/// Finds the sample in force at rising instants. The samples come in order of time and should begin [`HOLD_MAX`] before
+/// the first.
 #[derive(Debug, Clone)]
 pub struct AsOf {
     instants: Arc<[Timestamp]>,
@@ -90,7 +91,7 @@ impl AsOf {
         self.current = Some(sample);
     }
 
-    /// By instant the sample that stood there; `None` if there was none, or it was too old.
+    /// By instant the sample in force; `None` if there was none, or it was too old.
     pub fn end(mut self) -> Vec<Option<Sample>> {
         self.up_to(Timestamp::MAX);
         self.stood

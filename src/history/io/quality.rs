@@ -123,7 +123,7 @@ impl Store {
         self.whole_list(&sql::standing_at(), params![utc(at), ROWS_MAX + 1], alarm)
     }
 
-    /// The raising steps of the alarms that were active at an instant, also of those that were put aside.
+    /// The raising steps of the alarms that were active at an instant, also of those that were suppressed.
     pub(super) fn active_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
         self.whole_list(&sql::active_at(), params![utc(at), ROWS_MAX + 1], alarm)
     }

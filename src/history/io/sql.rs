@@ -131,28 +131,25 @@ pub fn journal_oldest() -> String {
     format!("SELECT {step} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc, rowid LIMIT ?")
 }
 
-/// The raising steps of the alarms that were active at an instant, also of those that were put aside.
+/// The raising steps of the alarms that were active at an instant, also of those that were suppressed.
 pub fn active_at() -> String {
-    let step = STEP_COLUMNS.join(", ");
-    format!(
-        "SELECT {step} FROM (
-            SELECT *, rowid AS place FROM alarm_journal
-            WHERE utc < ? AND step IN ('raised', 'raised quietly', 'returned', 'returned quietly')
-            QUALIFY row_number() OVER (PARTITION BY subject, text ORDER BY utc DESC, rowid DESC) = 1)
-         WHERE step IN ('raised', 'raised quietly') ORDER BY utc, place LIMIT ?"
-    )
+    raised_at("", "step IN ('raised', 'raised quietly')")
 }
 
-/// The raising steps of the alarms that stood before the operator at an instant: active, and not put aside since.
+/// The raising steps of the alarms that were active at an instant and have not been suppressed since.
 pub fn standing_at() -> String {
+    raised_at(", 'shelved', 'suppressed', 'out of service'", "step = 'raised'")
+}
+
+/// The alarms whose latest step before an instant fulfils `is`. Steps that raise or end an alarm count, and `others`.
+fn raised_at(others: &str, is: &str) -> String {
     let step = STEP_COLUMNS.join(", ");
     format!(
         "SELECT {step} FROM (
             SELECT *, rowid AS place FROM alarm_journal
-            WHERE utc < ? AND step IN ('raised', 'raised quietly', 'returned', 'returned quietly', 'shelved',
-                'suppressed', 'out of service')
+            WHERE utc < ? AND step IN ('raised', 'raised quietly', 'returned', 'returned quietly'{others})
             QUALIFY row_number() OVER (PARTITION BY subject, text ORDER BY utc DESC, rowid DESC) = 1)
-         WHERE step = 'raised' ORDER BY utc, place LIMIT ?"
+         WHERE {is} ORDER BY utc, place LIMIT ?"
     )
 }
 
