@@ -77,8 +77,9 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     own_files::refuse(&args.out, &history_file(&def, &args.station))?;
     let source = Source::open(&def, &args.station, &args.login).await?;
     let period = source.period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref())?;
-    let rows = rows(period.from, period.to, args.every, tags.len())?;
-    let latest = latest(&source, &def, &tags, period.from, period.to).await?;
+    let to = period.to.min(source.now());
+    let rows = rows(period.from, to, args.every, tags.len())?;
+    let latest = latest(&source, &def, &tags, period.from, to).await?;
     let mut columns = Vec::new();
     for group in tags.chunks(SERIES_MAX) {
         let label = |tag: &TagId| Label::at(def.tag(*tag), &latest);

@@ -51,7 +51,15 @@ impl Source {
         Ok(Source::File { store: Box::new(store), until })
     }
 
-    /// The period that was asked for. Now is the time of the plant: a demonstration may have run ahead of time.
+    /// The time of the plant: a demonstration may have run ahead of time.
+    pub fn now(&self) -> Timestamp {
+        match self {
+            Source::Station(session) => session.snapshots.borrow().at,
+            Source::File { until, .. } => *until,
+        }
+    }
+
+    /// The period that was asked for.
     pub fn period(
         &self,
         def: &PlantDef,
@@ -59,11 +67,7 @@ impl Source {
         from: Option<&str>,
         to: Option<&str>,
     ) -> Result<Period, CliError> {
-        let now = match self {
-            Source::Station(session) => session.snapshots.borrow().at,
-            Source::File { until, .. } => *until,
-        };
-        ask::period(def, shift, from, to, now).map_err(|error| CliError::Usage(error.to_string()))
+        ask::period(def, shift, from, to, self.now()).map_err(|error| CliError::Usage(error.to_string()))
     }
 
     /// Asks.

@@ -169,6 +169,19 @@ fn no_command_writes_a_report_an_export_or_a_log_into_the_history() {
     }
 }
 
+#[test]
+fn an_export_has_no_rows_beyond_the_present() {
+    let folder = folder();
+    let path = folder.path().join("tank.duckdb");
+    history(&path, |_, _| Vec::new());
+    let period = ["--from", "2020-01-01T00:00Z", "--to", "2099-01-01T00:00Z", "--every", "24h"];
+    let (code, out, err) = run("export", &path, &[&period[..], &["--tags", "TIC-1.PV"]].concat());
+    assert_eq!(code, Some(0), "{err}");
+    let last = cells(&out).pop().unwrap()[0].parse::<Timestamp>().unwrap();
+    let now = Timestamp::now();
+    assert!(now - SignedDuration::from_hours(25) < last && last <= now, "{last}");
+}
+
 /// Two simulated controllers; the first shows °F with two decimals, the second °C with one.
 const TWO: &str = r#"
 title = "Two controllers"
