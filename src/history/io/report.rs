@@ -1,7 +1,11 @@
 //! The report of a period: every sample is read once, for the figures of its tag, for the names and units that a device
 //! chooses, and for the record.
 
-use std::{collections::HashMap, sync::Arc, time::Duration};
+use std::{
+    collections::{HashMap, HashSet},
+    sync::Arc,
+    time::Duration,
+};
 
 use duckdb::params;
 use jiff::Timestamp;
@@ -63,8 +67,9 @@ impl Store {
         let actions = self.whole_list(&sql::actions_oldest(), params![utc(from), utc(until), ROWS_MAX + 1], action)?;
         let audit = self.list(sql::LAST_ENTRY, params![utc(until)], |row| Ok(seal(row.get(0)?, row.get(1)?)))?;
         let audit = audit.into_iter().flatten().next();
+        let shown: HashSet<TagId> = reported.iter().copied().collect();
         let gather = |tag: &TagId| Gathered {
-            figures: reported.contains(tag).then(|| Figures::new(from, until)),
+            figures: shown.contains(tag).then(|| Figures::new(from, until)),
             record: recorded
                 .as_ref()
                 .filter(|recorded| [recorded.sv, recorded.pv].contains(tag))
@@ -135,7 +140,7 @@ fn reported_tags(def: &PlantDef) -> Vec<TagId> {
         [] => def.tags.iter().filter(|tag| tag.store && !tag.unit.is_empty()).map(|tag| tag.id).collect(),
         tags => tags.to_vec(),
     };
-    let mut seen = std::collections::HashSet::new();
+    let mut seen = HashSet::new();
     tags.retain(|tag| seen.insert(*tag));
     tags
 }
