@@ -91,7 +91,11 @@ impl Store {
                 Err(error) if is_damage(&error) => {
                     tracing::error!(?error, "a part of the history cannot be read");
                     let (Some(from), Some(until)) = (instant(next), instant(to)) else { return Err(error) };
-                    (0..tags.len()).for_each(|place| each(place, Sample::bad(Cause::Unreadable, from)));
+                    // Each is in force no longer than any other sample.
+                    let bad = std::iter::successors(Some(from), |at| at.checked_add(HOLD_MAX).ok());
+                    for at in bad.take_while(|at| *at < until) {
+                        (0..tags.len()).for_each(|place| each(place, Sample::bad(Cause::Unreadable, at)));
+                    }
                     self.unreadable.replace(Some(format!("{from:.0} to {until:.0} cannot be read: {}", error.words())));
                     match gaps.last_mut().filter(|last| last.to == from) {
                         Some(last) => last.to = until,
