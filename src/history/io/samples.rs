@@ -68,9 +68,10 @@ impl Store {
         let gap_min = ((end - next) / GAP_PARTS).max(GAP_MIN);
         let (mut span, mut span_max) = (end - next, end - next);
         let (mut rows, mut gaps) = (Vec::new(), Vec::<Gap>::new());
-        if let Some(rows_a_micro) = self.density(to).filter(|density| *density > 0.0) {
-            span = span.min((self.piece as f64 / rows_a_micro) as i64).max(1);
-            span_max = ((LOOKED_AT / rows_a_micro) as i64).max(1);
+        if let Some((stored, micros)) = self.spread(to) {
+            // Few rows need one piece, however close together they are: those of a start have one time.
+            let of = |rows: f64| if rows < stored { ((rows / stored * micros) as i64).max(1) } else { i64::MAX };
+            (span, span_max) = (span.min(of(self.piece as f64)), of(LOOKED_AT));
         }
         while next < end {
             let to = next.saturating_add(span).min(end);
@@ -167,10 +168,10 @@ impl Store {
         within((self.rows_about()? as f64 * share * tags.min(1.0)).ceil() as u64, max)
     }
 
-    /// Rows a microsecond, about, up to an instant; `None` if that is not known.
-    fn density(&self, to: Timestamp) -> Option<f64> {
+    /// The rows up to an instant and the microseconds that they lie in, about; `None` if that is not known.
+    fn spread(&self, to: Timestamp) -> Option<(f64, f64)> {
         let (first, last) = self.period(to).ok()??;
-        Some(self.rows_about().ok()? as f64 / (last - first).max(1) as f64)
+        Some((self.rows_about().ok()? as f64, (last - first).max(1) as f64))
     }
 
     /// Rows of the table of samples, as the engine believes.

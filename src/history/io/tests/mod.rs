@@ -400,6 +400,16 @@ fn a_period_of_a_century_is_answered_at_once_and_a_record_of_millions_of_rows_re
 }
 
 #[test]
+fn a_period_before_the_samples_of_a_start_is_answered_at_once() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.append(&(0..100).map(|value| good(PV, 1_000, f64::from(value))).collect::<Vec<_>>()).unwrap();
+    let century = 3_000_000_000;
+    assert_eq!(means(&store, PV, -century, 900, 3), [None; 3]);
+    assert_eq!(series(&store, PV, -century, 1_001, 3).buckets.last().unwrap().unwrap().last, 99.0);
+}
+
+#[test]
 fn records_wait_while_the_store_fails_and_nothing_is_lost_when_it_recovers() {
     let (_folder, db) = folder();
     let mut writer = Writer::open(db, def(), sec(0)).unwrap();
