@@ -55,7 +55,11 @@ fn in_words(snapshot: &Snapshot) -> Vec<String> {
         lines.push("alarm    none".to_owned());
     }
     let trouble = snapshot.history.words().unwrap_or_else(|| "good".into());
-    lines.push(format!("history  {trouble}, {} rows, {} lost", snapshot.history.rows, snapshot.history.lost));
+    let epoch = match snapshot.history.epoch {
+        0 => String::new(),
+        times => format!(", epoch {times}"),
+    };
+    lines.push(format!("history  {trouble}, {} rows, {} lost{epoch}", snapshot.history.rows, snapshot.history.lost));
     lines.extend(snapshot.aside.iter().map(|alarm| format!("aside    {}", aside_words(snapshot, alarm))));
     if client::is_withheld(snapshot) {
         lines.push("tag      values are shown after a login: --user NAME".to_owned());
@@ -170,7 +174,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
         "tags": told.then(|| tags.collect::<Vec<_>>()),
         "history": {
             "rows": snapshot.history.rows, "lost": snapshot.history.lost, "trouble": snapshot.history.trouble,
-            "recording": snapshot.history.failing.is_none(),
+            "epoch": snapshot.history.epoch, "recording": snapshot.history.failing.is_none(),
             "waiting": snapshot.history.waiting, "waiting_max": snapshot.history.waiting_max,
             "committed_at": snapshot.history.committed_at.map(|at| at.to_string()),
         },

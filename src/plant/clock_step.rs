@@ -30,6 +30,7 @@ impl Record {
             Record::Alarm(step) => step.shift(by),
             Record::Action(action) => shift(&mut action.at, by),
             Record::Line(minute) => shift(&mut minute.at, by),
+            Record::ClockSet => {}
         }
     }
 }

@@ -22,6 +22,8 @@ pub enum Record {
     Action(ActionRecord),
     /// A minute of a line.
     Line(LineMinute),
+    /// The system clock was set: what follows is of the next epoch, whatever its times say.
+    ClockSet,
 }
 
 /// A step in the life of an alarm. Names, not ids: a journal outlives the plant file.

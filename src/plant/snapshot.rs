@@ -337,6 +337,8 @@ pub struct HistoryStatus {
     pub disk: Option<String>,
     /// The clock was behind the last record at the start.
     pub clock: Option<String>,
+    /// How often the clock was set while this history was written; stored with each record.
+    pub epoch: u16,
     /// The last entry of the audit log that is on disk.
     pub audit: Option<Seal>,
     /// All that is wrong with it, in words for the operator.

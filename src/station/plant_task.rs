@@ -269,6 +269,7 @@ impl PlantTask {
     }
 
     fn clock_stepped(&mut self, old: Timestamp, new: Timestamp) {
+        self.store(vec![Record::ClockSet]);
         self.write_down(vec![deeds::clock_step(old, new)], Vec::new());
         let words = format!("the clock was set from {old:.0} to {new:.0}; times follow it from here on");
         tracing::warn!("{words}");
@@ -396,7 +397,7 @@ impl PlantTask {
                     steps.push(step.clone());
                     others.push(Record::Alarm(step));
                 }
-                Record::Sample(..) | Record::Line(_) => others.push(record),
+                Record::Sample(..) | Record::Line(_) | Record::ClockSet => others.push(record),
             }
         }
         self.write_down(deeds, steps);

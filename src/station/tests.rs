@@ -122,3 +122,17 @@ async fn a_damaged_users_file_closes_the_login_and_nothing_else_and_a_missing_on
     assert!(alarmed && login.is_err());
     assert!(first.is_ok(), "by the station's own user: {first:?}");
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_recorded_after_the_clock_was_set_is_of_the_next_epoch() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = options(&folder.path().join("fixture.duckdb"));
+    // Two years ahead of the system clock, which is as if that was set back as soon as the station runs.
+    let years = std::time::Duration::from_secs(2 * 365 * 86_400);
+    options.clock.follow_at(std::time::SystemTime::now() + years, std::time::Instant::now()).unwrap();
+    let station = start_guarded(options).unwrap();
+    let mut session = station.session("whoever");
+    session.snapshots.wait_for(|snapshot| snapshot.history.epoch == 1).await.unwrap();
+    drop(session);
+    station.stop().await;
+}

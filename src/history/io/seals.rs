@@ -38,7 +38,7 @@ impl Store {
     pub(super) fn remove_unsealed(&self, records: &[Record]) -> duckdb::Result<()> {
         let mut sealed = records.iter().filter_map(|record| match record {
             Record::Action(action) => action.seal.and(Some(action)),
-            Record::Sample(..) | Record::Alarm(_) | Record::Line(_) => None,
+            Record::Sample(..) | Record::Alarm(_) | Record::Line(_) | Record::ClockSet => None,
         });
         let Some(first) = sealed.next() else { return Ok(()) };
         if self.db.query_row(UNSEALED, [], |row| row.get::<_, u64>(0))? == 0 {

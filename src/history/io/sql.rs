@@ -12,8 +12,11 @@ use crate::plant::record::ELSEWHERE;
 /// `last_commit` has one row: who the file is, how many commits it has, the first and last instant stored; each commit
 /// changes it. So a start need not scan the file, and sees what is missing, see `last`.
 ///
+/// `epoch` counts how often the clock was set while this history was written: rows of one epoch are in the order of their
+/// times, rows of two need not be.
+///
 /// `utc` of `line_minute` is the end of the minute; a line goes by its name, as everything that outlives the plant file.
-pub const MIGRATIONS: [&str; 5] = [
+pub const MIGRATIONS: [&str; 6] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -49,9 +52,16 @@ CREATE TABLE last_commit (
 INSERT INTO last_commit SELECT (random() * 9007199254740992)::UBIGINT, 0, min(a), max(z) FROM (
     SELECT min(utc) AS a, max(utc) AS z FROM sample UNION ALL SELECT min(utc), max(utc) FROM alarm_journal);
 ",
+    "
+ALTER TABLE sample ADD COLUMN epoch USMALLINT DEFAULT 0;
+ALTER TABLE alarm_journal ADD COLUMN epoch USMALLINT DEFAULT 0;
+ALTER TABLE operator_action ADD COLUMN epoch USMALLINT DEFAULT 0;
+ALTER TABLE line_minute ADD COLUMN epoch USMALLINT DEFAULT 0;
+ALTER TABLE last_commit ADD COLUMN epoch USMALLINT DEFAULT 0;
+",
 ];
 
-/// Columns of an alarm step, in the order that it is appended and read.
+/// Columns of an alarm step, in the order that it is read.
 pub const STEP_COLUMNS: [&str; 12] = [
     "utc",
     "subject",
@@ -78,17 +88,17 @@ pub const SET_VERSION: &str = "INSERT INTO schema_version VALUES (?)";
 pub const TAGS: &str = "SELECT id, name, unit FROM tag";
 
 /// The last commit.
-pub const LAST_COMMIT: &str = "SELECT identity, number, first_utc, last_utc FROM last_commit";
+pub const LAST_COMMIT: &str = "SELECT identity, number, first_utc, last_utc, epoch FROM last_commit";
 /// The next one.
-pub const SET_LAST_COMMIT: &str = "UPDATE last_commit SET number = ?, first_utc = ?, last_utc = ?";
+pub const SET_LAST_COMMIT: &str = "UPDATE last_commit SET number = ?, first_utc = ?, last_utc = ?, epoch = ?";
 
 /// Rows of all tables.
 pub const COUNT_ROWS: &str = "SELECT (SELECT count(*) FROM sample) + (SELECT count(*) FROM alarm_journal)
     + (SELECT count(*) FROM operator_action) + (SELECT count(*) FROM line_minute)";
 
-/// Ends every curve: a row (time, no value, quality) for each tag whose last row since an instant has a value.
+/// Ends every curve: a row (time, no value, quality, epoch) for each tag whose last row since an instant has a value.
 pub const END_CURVES: &str = "INSERT INTO sample
-    SELECT ?, tag, NULL, ? FROM (SELECT tag, arg_max(quality, rowid) AS last FROM sample WHERE utc >= ? GROUP BY tag)
+    SELECT ?, tag, NULL, ?, ? FROM (SELECT tag, arg_max(quality, rowid) AS last FROM sample WHERE utc >= ? GROUP BY tag)
     WHERE last < 128";
 
 /// Samples in a span, of some stored numbers of tags or of all, in the order in which they were written.

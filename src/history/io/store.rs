@@ -37,8 +37,9 @@ pub struct Store {
     path: PathBuf,
     /// The first and last instant stored, kept because reading them scans the whole file.
     extent: Cell<Option<(Timestamp, Timestamp)>>,
-    /// The last commit, as the database itself has it.
+    /// The last commit, as the database itself has it, and the epoch that it ended in.
     last: Cell<LastCommit>,
+    epoch: Cell<u16>,
     /// Device and number of the file as it was opened.
     file: Option<(u64, u64)>,
     /// The stored number of each tag, by `TagId`; `None` for a tag that the file does not know (only when read-only).
@@ -58,7 +59,8 @@ impl Store {
     pub fn try_clone(&self) -> Result<Store, HistoryError> {
         let db = self.db.try_clone().map_err(engine)?;
         let mut own = Store { alive: Arc::clone(&self.alive), ..Store::around(db, &self.path, &self.def) };
-        (own.extent, own.last, own.file) = (self.extent.clone(), self.last.clone(), self.file);
+        (own.extent, own.last, own.epoch, own.file) =
+            (self.extent.clone(), self.last.clone(), self.epoch.clone(), self.file);
         (own.ids, own.ended, own.piece) = (self.ids.clone(), self.ended, self.piece);
         Ok(own)
     }
@@ -78,14 +80,19 @@ impl Store {
         let stored = records.iter().filter_map(|record| match record {
             Record::Sample(_, sample) => Some(sample.at),
             Record::Alarm(alarm) => Some(alarm.at),
-            Record::Action(_) | Record::Line(_) => None,
+            Record::Action(_) | Record::Line(_) | Record::ClockSet => None,
         });
-        self.commit(stored, || {
-            self.append_samples(records)?;
-            self.append_alarms(records)?;
-            self.remove_unsealed(records)?;
-            self.append_actions(records)?;
-            self.append_lines(records)?;
+        let begun = records.iter().filter(|record| is_clock_set(record)).count();
+        let epoch = |passed: usize| self.epoch.get().saturating_add(u16::try_from(passed).unwrap_or(u16::MAX));
+        self.commit(stored, epoch(begun), || {
+            for (passed, records) in records.split(is_clock_set).enumerate() {
+                let epoch = epoch(passed);
+                self.append_samples(records, epoch)?;
+                self.append_alarms(records, epoch)?;
+                self.remove_unsealed(records)?;
+                self.append_actions(records, epoch)?;
+                self.append_lines(records, epoch)?;
+            }
             Ok(true)
         })
     }
@@ -95,11 +102,10 @@ impl Store {
         let Some((_, last)) = self.extent() else { return Ok(()) };
         // A tag without a row for so long has no value any more anyway.
         let since = last.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN);
-        let off = Quality::Bad(Cause::StationOff).code();
-        self.commit(
-            std::iter::once(at),
-            || Ok(self.db.execute(sql::END_CURVES, params![utc(at), off, utc(since)])? > 0),
-        )
+        let (off, epoch) = (Quality::Bad(Cause::StationOff).code(), self.epoch.get());
+        self.commit(std::iter::once(at), epoch, || {
+            Ok(self.db.execute(sql::END_CURVES, params![utc(at), off, epoch, utc(since)])? > 0)
+        })
     }
 
     /// Ends the curves that a station left behind when it died, one second after the last row of all. To be called
@@ -136,7 +142,25 @@ impl Store {
         let (extent, last) = (Cell::new(None), Cell::new(LastCommit { identity: 0, number: 0, at: None }));
         let file = files::inode(&path);
         let (unreadable, alive) = (RefCell::default(), Arc::default());
-        Store { db, def, path, extent, last, file, ids: Vec::new(), ended: None, piece: PIECE, unreadable, alive }
+        Store {
+            db,
+            def,
+            path,
+            extent,
+            last,
+            epoch: Cell::new(0),
+            file,
+            ids: Vec::new(),
+            ended: None,
+            piece: PIECE,
+            unreadable,
+            alive,
+        }
+    }
+
+    /// The epoch of what was stored last: how often the clock was set while this history was written.
+    pub(super) fn epoch(&self) -> u16 {
+        self.epoch.get()
     }
 
     /// The last commit, as the database itself has it.
@@ -159,19 +183,21 @@ impl Store {
     pub(super) fn read_last_commit(&self) -> duckdb::Result<()> {
         let row = |row: &duckdb::Row| {
             let time = |column| Ok::<_, duckdb::Error>(row.get::<_, Option<i64>>(column)?.and_then(instant));
-            Ok((LastCommit { identity: row.get(0)?, number: row.get(1)?, at: time(3)? }, time(2)?))
+            Ok((LastCommit { identity: row.get(0)?, number: row.get(1)?, at: time(3)? }, time(2)?, row.get(4)?))
         };
-        let (last, first) = self.db.query_row(sql::LAST_COMMIT, [], row)?;
+        let (last, first, epoch) = self.db.query_row(sql::LAST_COMMIT, [], row)?;
         self.last.set(last);
+        self.epoch.set(epoch);
         self.extent.set(first.zip(last.at));
         Ok(())
     }
 
-    /// Stores what `work` appends, all of it or nothing, as the next commit; `stored` are the instants in it. Without
-    /// any row (`false`) there is no commit.
+    /// Stores what `work` appends, all of it or nothing, as the next commit; `stored` are the instants in it, `epoch` is
+    /// the last one. Without any row (`false`) there is no commit.
     fn commit(
         &self,
         stored: impl Iterator<Item = Timestamp>,
+        epoch: u16,
         work: impl FnOnce() -> duckdb::Result<bool>,
     ) -> Result<(), HistoryError> {
         let wider = |extent: Option<(Timestamp, Timestamp)>, at: Timestamp| {
@@ -184,13 +210,14 @@ impl Store {
                 return Ok(false);
             }
             let (first, last) = extent.map_or((Value::Null, Value::Null), |(first, last)| (utc(first), utc(last)));
-            self.db.prepare_cached(sql::SET_LAST_COMMIT)?.execute(params![number, first, last])?;
+            self.db.prepare_cached(sql::SET_LAST_COMMIT)?.execute(params![number, first, last, epoch])?;
             Ok(true)
         })?;
         if !stored {
             return Ok(());
         }
         self.extent.set(extent);
+        self.epoch.set(epoch);
         self.last.set(LastCommit { number, at: extent.map(|(_, last)| last), ..self.last.get() });
         self.note_last_commit();
         Ok(())
@@ -206,26 +233,26 @@ impl Store {
         })
     }
 
-    fn append_samples(&self, records: &[Record]) -> duckdb::Result<()> {
+    fn append_samples(&self, records: &[Record], epoch: u16) -> duckdb::Result<()> {
         let mut rows = records.iter().filter_map(|record| match record {
             Record::Sample(tag, sample) => Some((self.ids.get(tag.index()).copied().flatten()?, sample)),
-            Record::Alarm(_) | Record::Action(_) | Record::Line(_) => None,
+            Record::Alarm(_) | Record::Action(_) | Record::Line(_) | Record::ClockSet => None,
         });
         let Some(first) = rows.next() else { return Ok(()) };
         let mut appender = self.db.appender("sample")?;
         for (id, &Sample { at, value, quality }) in std::iter::once(first).chain(rows) {
-            appender.append_row((utc(at), id, value, quality.code()))?;
+            appender.append_row((utc(at), id, value, quality.code(), epoch))?;
         }
         appender.flush()
     }
 
-    fn append_alarms(&self, records: &[Record]) -> duckdb::Result<()> {
+    fn append_alarms(&self, records: &[Record], epoch: u16) -> duckdb::Result<()> {
         let mut rows = records.iter().filter_map(|record| match record {
             Record::Alarm(alarm) => Some(alarm),
-            Record::Sample(..) | Record::Action(_) | Record::Line(_) => None,
+            Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::ClockSet => None,
         });
         let Some(first) = rows.next() else { return Ok(()) };
-        let mut appender = self.db.appender_with_columns("alarm_journal", &sql::STEP_COLUMNS)?;
+        let mut appender = self.db.appender("alarm_journal")?;
         for alarm in std::iter::once(first).chain(rows) {
             let AlarmRecord { at, subject, text, priority, step, value, limit, by, reason, until, burst } = alarm;
             let (until, began) = (until.map(utc), burst.map(|burst| utc(burst.began)));
@@ -242,31 +269,45 @@ impl Store {
                 reason,
                 until,
                 began,
-                rank
+                rank,
+                epoch
             ])?;
         }
         appender.flush()
     }
 
-    fn append_actions(&self, records: &[Record]) -> duckdb::Result<()> {
+    fn append_actions(&self, records: &[Record], epoch: u16) -> duckdb::Result<()> {
         let mut rows = records.iter().filter_map(|record| match record {
             Record::Action(action) => Some(action),
-            Record::Sample(..) | Record::Alarm(_) | Record::Line(_) => None,
+            Record::Sample(..) | Record::Alarm(_) | Record::Line(_) | Record::ClockSet => None,
         });
         let Some(first) = rows.next() else { return Ok(()) };
         let mut appender = self.db.appender("operator_action")?;
         for deed in std::iter::once(first).chain(rows) {
             let ActionRecord { at, by, from, action, target, old, new, outcome, note, seal } = deed;
             let (number, hash) = (seal.map(|seal| seal.number), seal.map(|seal| seal.hash.to_vec()));
-            appender.append_row(params![utc(*at), by, action, target, old, new, outcome, from, note, number, hash])?;
+            appender.append_row(params![
+                utc(*at),
+                by,
+                action,
+                target,
+                old,
+                new,
+                outcome,
+                from,
+                note,
+                number,
+                hash,
+                epoch
+            ])?;
         }
         appender.flush()
     }
 
-    fn append_lines(&self, records: &[Record]) -> duckdb::Result<()> {
+    fn append_lines(&self, records: &[Record], epoch: u16) -> duckdb::Result<()> {
         let mut rows = records.iter().filter_map(|record| match record {
             Record::Line(minute) => Some(minute),
-            Record::Sample(..) | Record::Alarm(_) | Record::Action(_) => None,
+            Record::Sample(..) | Record::Alarm(_) | Record::Action(_) | Record::ClockSet => None,
         });
         let Some(first) = rows.next() else { return Ok(()) };
         let mut appender = self.db.appender("line_minute")?;
@@ -290,11 +331,16 @@ impl Store {
                 small(*received_bytes),
                 utilisation,
                 reply_p99_ms,
-                reply_max_ms
+                reply_max_ms,
+                epoch
             ])?;
         }
         appender.flush()
     }
+}
+
+fn is_clock_set(record: &Record) -> bool {
+    matches!(record, Record::ClockSet)
 }
 
 /// A count as the column holds it; more than four thousand million in a minute is no count.

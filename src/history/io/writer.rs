@@ -143,6 +143,9 @@ impl Writer {
                     let ahead = store.extent().map(|(_, last)| last).filter(|last| *last > self.started + CLOCK_STEP);
                     let words = |last| format!("the clock is behind the last record, {last:.0}: is it right?");
                     self.clock = ahead.map(words);
+                    if self.clock.is_some() {
+                        self.pending.insert(0, Record::ClockSet);
+                    }
                     self.restored = Some(read);
                 }
                 self.damaged = trouble.or(self.damaged.take());
@@ -322,6 +325,7 @@ impl Writer {
                 .flatten()
                 .collect();
         self.status.trouble = (!parts.is_empty()).then(|| parts.join("; "));
+        self.status.epoch = self.store.as_ref().map_or(self.status.epoch, Store::epoch);
         (self.status.waiting, self.status.waiting_max) = (self.pending.len() as u64, PENDING_MAX as u64);
         self.status.failing.clone_from(&self.failing);
         self.status.damaged = damaged;

@@ -28,7 +28,7 @@ impl Plant {
         for record in records {
             match record {
                 Record::Alarm(step) => self.meter.take(step),
-                Record::Sample(..) | Record::Action(_) | Record::Line(_) => {}
+                Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::ClockSet => {}
             }
         }
         self.quality = self.meter.quality();
@@ -56,7 +56,7 @@ mod tests {
         let event = Event::Read { at: at(second), device, values, texts, reply, exchange: None };
         let steps = plant.on_event(event).records.into_iter().filter_map(|record| match record {
             Record::Alarm(step) => Some(step),
-            Record::Sample(..) | Record::Action(_) | Record::Line(_) => None,
+            Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::ClockSet => None,
         });
         steps.collect()
     }

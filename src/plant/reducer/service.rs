@@ -144,7 +144,7 @@ mod tests {
                 deed.new.as_deref().unwrap_or("").to_owned(),
                 deed.outcome.to_string(),
             )),
-            Record::Sample(..) | Record::Alarm(_) | Record::Line(_) => None,
+            Record::Sample(..) | Record::Alarm(_) | Record::Line(_) | Record::ClockSet => None,
         };
         effects.records.iter().filter_map(deed).collect()
     }

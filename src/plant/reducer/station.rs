@@ -60,7 +60,7 @@ mod tests {
     fn tick(plant: &mut Plant, second: i64) -> Vec<AlarmRecord> {
         let steps = plant.on_tick(at(second)).records.into_iter().filter_map(|record| match record {
             Record::Alarm(step) => Some(step),
-            Record::Sample(..) | Record::Action(_) | Record::Line(_) => None,
+            Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::ClockSet => None,
         });
         steps.collect()
     }

@@ -62,7 +62,7 @@ fn fill(path: &Path, hours: i64) {
     for hour in 0..hours {
         let (from, to) = (hour * 3_600 * i64::from(TAGS), (hour + 1) * 3_600 * i64::from(TAGS));
         db.execute_batch(&format!(
-            "INSERT INTO sample SELECT make_timestamp({BEGIN}000000 + s * 1000000 + k * 997), k::USMALLINT,
+            "INSERT INTO sample (utc, tag, value, quality) SELECT make_timestamp({BEGIN}000000 + s * 1000000 + k * 997), k::USMALLINT,
                 round(60 + 10 * sin(s / (300.0 + 4 * k)) + (hash(i) % 5)::DOUBLE / 10 - 0.2, 1), 0
              FROM (SELECT i, i // {TAGS} AS s, i % {TAGS} AS k FROM range({from}, {to}) t(i)); CHECKPOINT"
         ))

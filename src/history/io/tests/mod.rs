@@ -318,6 +318,43 @@ fn a_history_of_an_older_program_gets_the_new_table_and_keeps_its_rows() {
     assert_eq!(store.count_rows().unwrap(), 4);
 }
 
+/// The epoch of each row, in the order in which they were written.
+fn epochs(store: &Store, table: &str) -> Vec<u16> {
+    let mut statement = store.db.prepare(&format!("SELECT epoch FROM {table} ORDER BY rowid")).unwrap();
+    statement.query_map([], |row| row.get(0)).unwrap().map(Result::unwrap).collect()
+}
+
+#[test]
+fn each_record_has_the_epoch_of_its_clock() {
+    let (_folder, db) = folder();
+    let raised = |at| Record::Alarm(step(at, "high", AlarmStep::Raised));
+    let store = open(&db, 0);
+    store.append(&[good(PV, 10, 1.0), raised(10), Record::ClockSet, good(PV, 5, 2.0)]).unwrap();
+    store.append(&[Record::ClockSet, Record::ClockSet]).unwrap();
+    drop(store);
+    let store = open(&db, 20);
+    store.append(&[raised(21), Record::Action(deed(21)), Record::Line(minute("L1", 60, 60))]).unwrap();
+    // The last sample is the end of the curve, which is written at the start.
+    assert_eq!(epochs(&store, "sample"), [0, 1, 3]);
+    assert_eq!(epochs(&store, "alarm_journal"), [0, 3]);
+    assert_eq!((epochs(&store, "operator_action"), epochs(&store, "line_minute")), (vec![3], vec![3]));
+}
+
+#[test]
+fn a_start_before_the_last_record_begins_an_epoch() {
+    let (_folder, db) = folder();
+    let run = |from: i64| {
+        let mut writer = Writer::open(db.clone(), def(), sec(from)).unwrap();
+        writer.accept(vec![good(PV, from, 1.0)]);
+        writer.commit(sec(from));
+        let rows = epochs(writer.store().unwrap(), "sample");
+        (writer.status().epoch, *rows.last().unwrap())
+    };
+    assert_eq!(run(1_000), (0, 0));
+    assert_eq!(run(2_000), (0, 0));
+    assert_eq!(run(500), (1, 1));
+}
+
 #[test]
 fn the_alarms_of_before_the_restart_are_restored_with_their_acknowledgements() {
     use AlarmStep::{Acknowledged, Raised, Returned};

@@ -119,7 +119,7 @@ fn end(plant: &mut Plant, effects: &Effects, result: fn(f64) -> WriteResult) -> 
 fn deeds(effects: &Effects) -> Vec<String> {
     let deed = |record: &Record| match record {
         Record::Action(deed) => Some(format!("{} {} {} {}", deed.by, deed.action, deed.target, deed.outcome)),
-        Record::Sample(..) | Record::Alarm(_) | Record::Line(_) => None,
+        Record::Sample(..) | Record::Alarm(_) | Record::Line(_) | Record::ClockSet => None,
     };
     effects.records.iter().filter_map(deed).collect()
 }

@@ -159,6 +159,10 @@ impl Journal {
         if self.alarms.len() >= self.limit() || self.actions.len() >= self.limit() {
             what.push("the oldest left out".to_owned());
         }
+        if let times @ 1.. = cx.snapshot.history.epoch {
+            let often = if times == 1 { "once".to_owned() } else { format!("{times} times") };
+            what.push(format!("clock set {often} (epoch {times})"));
+        }
         let x = canvas.text(x, 0, &what.join(", "), theme.normal());
         if let Some(trouble) = &self.trouble {
             canvas.text(x + 2, 0, trouble, theme.trouble());
