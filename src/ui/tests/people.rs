@@ -99,6 +99,16 @@ fn the_login_page_in_every_mood() {
 }
 
 #[test]
+fn what_was_granted_and_is_not_on_disk_is_shown_as_not_recorded() {
+    let mut model = with(&Fixture::normal(), person("anna", Role::Supervisor));
+    let id = AskId { tab: Tab::Users, number: model.presence.wished };
+    update(&mut model, Msg::Granted(id, Ok(Durability::Recorded)));
+    assert!(!screen(&mut model, 80, 24).contains("RECORDED"));
+    update(&mut model, Msg::Granted(id, Ok(Durability::NotRecorded)));
+    shows(&mut model, "Done, but NOT RECORDED: the disk of the station does not take it");
+}
+
+#[test]
 fn a_password_is_sent_and_never_seen_and_a_wrong_one_is_told_with_its_wait() {
     let mut model = with(&Fixture::normal(), closed());
     let effects = type_keys(&mut model, "anna⏎horse 1q?⏎");

@@ -159,6 +159,25 @@ fn a_storm_is_folded_and_counted() {
 }
 
 #[test]
+fn an_acknowledgement_that_is_not_on_disk_is_marked_in_list_and_guidance() {
+    let mut fixture = storm();
+    fixture.alarms.iter_mut().filter_map(|alarm| alarm.acknowledged.as_mut()).for_each(|deed| deed.recorded = false);
+    let mut model = shown(&fixture, Theme::FULL, " ");
+    let mut picture = |_| {
+        type_keys(&mut model, "↓");
+        [(80, 24), (160, 40)].map(|(width, height)| screen(&mut model, width, height))
+    };
+    let pictures: Vec<[String; 2]> = (0..14).map(&mut picture).collect();
+    for size in 0..2 {
+        let rows = pictures.iter().flat_map(|picture| picture[size].lines()).filter(|row| row.contains("acked"));
+        let rows: Vec<&str> = rows.collect();
+        assert!(!rows.is_empty() && rows.iter().all(|row| row.contains("NOT RECORDED")), "{rows:?}");
+    }
+    let guidance = pictures.iter().filter(|picture| picture[1].contains("by anna (NOT RECORDED)"));
+    assert_eq!(guidance.count(), 1, "{}", pictures[13][1]);
+}
+
+#[test]
 fn what_is_put_aside_is_listed_and_counted_on_every_page() {
     pictures("aside", &put_aside(), "v");
     let mut model = shown(&put_aside(), Theme::FULL, "");

@@ -269,11 +269,10 @@ fn cells(cx: &Cx, row: &Row, what: u16) -> [String; 9] {
     ]
 }
 
-/// `1st temperature high > 72.0 +14 more, 3 unack`: how many are folded under it is never cut off.
+/// `1st temperature high > 72.0 +14 more, 3 unack`: how many are folded under it, and an acknowledgement that is not on
+/// disk, are never cut off.
 fn what_words(cx: &Cx, row: &Row, room: u16) -> String {
-    let unrecorded = row.alarm.acknowledged.as_ref().is_some_and(|deed| !deed.recorded);
     let mark = match (row.first, row.under) {
-        _ if unrecorded => "ack NOT RECORDED: ",
         (true, _) => "1st ",
         (false, true) => cx.theme.pick("└ ", "` "),
         (false, false) => "",
@@ -283,6 +282,9 @@ fn what_words(cx: &Cx, row: &Row, room: u16) -> String {
         (true, more, 0) => (format!(" +{more} more"), format!(" +{more}")),
         (true, more, waiting) => (format!(" +{more} more, {waiting} unack"), format!(" +{more} ({waiting})")),
     };
+    let unrecorded = row.alarm.acknowledged.as_ref().is_some_and(|deed| !deed.recorded);
+    let unrecorded = if unrecorded { " NOT RECORDED" } else { "" };
+    let (long, short) = (long + unrecorded, short + unrecorded);
     let name = format!("{mark}{}", cx.def().alarm(row.alarm.id).text);
     let text = format!("{name} {}", guidance::condition_words(cx, row.alarm.id));
     let text = text.trim_end();
