@@ -290,7 +290,7 @@ impl Deeds {
         } else if status.log.is_some() {
             status.log
         } else if self.left_out + self.lost > 0 {
-            Some(format!("{} deeds are not in the audit trail: it was too slow", self.left_out + self.lost))
+            Some(format!("{} actions are not in the audit trail: the disk is too slow", self.left_out + self.lost))
         } else {
             let slow = late && status.alarms.is_none();
             slow.then(|| "the disk is slow: what was done last is not recorded yet".to_owned())

@@ -260,7 +260,7 @@ impl Door {
                 Effect::Stop => self.command(Command::Stop),
                 Effect::Reload(ticket) => {
                     let (reply, answer) = oneshot::channel();
-                    let ended = || Err("the station has ended".to_owned());
+                    let ended = || Err("not reloaded: the station ends, or is too busy".to_owned());
                     self.reloads.spawn(async move { (ticket, answer.await.unwrap_or_else(|_| ended())) });
                     self.command(Command::Reload(reply));
                 }

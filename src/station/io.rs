@@ -129,7 +129,7 @@ fn begin(
     if let Some(state) = guarded.as_ref().and_then(|(gate, _)| users_fault(gate, &recorder.opened)) {
         plant.on_fault(StationFault::UsersFile, state);
     }
-    deeds.started(&def.name, file.as_ref(), users, clock.now());
+    deeds.started(&def.name, file.as_ref(), users, clock.utc());
     let past = Some(Past::new(history.restored.take(), from_journal));
     let keeping = Keeping { records: Some(records), store, past, book: Some(deeds), sets: Some(sets), listener };
     let threads = Threads { queries, history: Some(history), book: Some(recorder.join) };
