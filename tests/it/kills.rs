@@ -256,7 +256,7 @@ fn to_acknowledge(snapshot: &Snapshot) -> Option<Command> {
 }
 
 /// Asks for a shift report without pause until the station goes.
-async fn report_on(session: Session) -> u64 {
+async fn report_on(session: Session, asked: watch::Sender<bool>) -> u64 {
     let mut reports = 0;
     log_in(&session, "tom").await;
     while session.standing.borrow().gone.is_none() {
@@ -264,6 +264,7 @@ async fn report_on(session: Session) -> u64 {
         let period = Period { name: "shift".into(), from: to - jiff::SignedDuration::from_hours(8), to };
         let (reply, answer) = tokio::sync::oneshot::channel();
         if session.ask(Query { question: Question::Report { period }, reply }).is_ok() {
+            asked.send_replace(true);
             reports += u64::from(answer.await.is_ok_and(|answer| answer.is_ok()));
         }
         tokio::task::yield_now().await;
@@ -287,14 +288,13 @@ fn reason_of(history: &Path, kind: AlarmStep, text: Option<&str>) -> Option<Arc<
 }
 
 /// Logs in and out again and again until the station goes.
-async fn log_in_on(session: Session, done: watch::Sender<u64>) -> Told {
+async fn log_in_on(session: Session) -> Told {
     let mut told = Told::default();
     while session.standing.borrow().gone.is_none() {
         // Refused while the password of the other terminal is looked at.
         let enter = Wish::Login { user: "sue".into(), password: PASSWORD.into() };
         if let Ok(durability) = session.wish(enter).await {
             told.logins += u64::from(durability == Durability::Recorded);
-            done.send_modify(|done| *done += 1);
             told.logouts += u64::from(session.wish(Wish::Logout).await == Ok(Durability::Recorded));
         }
         tokio::task::yield_now().await;
@@ -302,19 +302,22 @@ async fn log_in_on(session: Session, done: watch::Sender<u64>) -> Told {
     told
 }
 
-/// One life of a station: ends with a kill after so many deeds that were answered, and so long after the last of them.
-async fn live(place: &Place, round: u64, deeds: u64, late: Duration) -> Told {
+/// One life of a station: ends with a kill after so many actions that were answered, and so long after the last of them.
+async fn live(place: &Place, round: u64, actions: u64, late: Duration) -> Told {
     let before = reason_of(&place.history(), AlarmStep::Shelved, None);
     let mut station = place.station();
-    let (done, mut count) = watch::channel(0);
+    let ((done, mut count), (asked, mut report)) = (watch::channel(0), watch::channel(false));
     let session = place.terminal().await;
     let aside = session.snapshots.borrow().aside.iter().find_map(|alarm| alarm.deed.reason.clone());
     assert_eq!(aside, before, "round {round}: the alarms are as they were");
-    let acting = tokio::spawn(act_on(session, done.clone(), round));
-    let reporting = tokio::spawn(report_on(place.terminal().await));
-    let logging = tokio::spawn(log_in_on(place.terminal().await, done));
-    let enough = tokio::time::timeout(PATIENCE, count.wait_for(|done| deeds <= *done)).await;
-    assert!(enough.is_ok_and(|count| count.is_ok()), "round {round}: nothing goes on; {:?}", station.said);
+    let acting = tokio::spawn(act_on(session, done, round));
+    let reporting = tokio::spawn(report_on(place.terminal().await, asked));
+    let logging = tokio::spawn(log_in_on(place.terminal().await));
+    let enough = async {
+        count.wait_for(|done| actions <= *done).await.is_ok() && report.wait_for(|asked| *asked).await.is_ok()
+    };
+    let enough = tokio::time::timeout(PATIENCE, enough).await;
+    assert!(enough == Ok(true), "round {round}: nothing goes on; {:?}", station.said);
     // Another moment of whatever is under way each time.
     tokio::time::sleep(late).await;
     station.signal("KILL");
@@ -332,7 +335,7 @@ async fn whatever_a_terminal_was_told_is_in_the_book_of_a_station_that_is_killed
     for round in 0..rounds {
         place.slow.store(round % SLOW_EVERY == 0, Ordering::Relaxed);
         let before = entries_or_none(&place.book());
-        let told = live(&place, round, 4 + round % 7, Duration::from_micros(round * 1_733 % 40_000)).await;
+        let told = live(&place, round, 2 + round % 5, Duration::from_micros(round * 1_733 % 40_000)).await;
         let verified = sealing::verify(&place.book(), &[], &place.key);
         let (whole, sealed, _) = verified.unwrap_or_else(|error| panic!("round {round}: {error}"));
         assert!(round < sealed.seals, "round {round}: each start has its seal, found {}", sealed.seals);
