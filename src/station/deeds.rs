@@ -36,18 +36,18 @@ const WAIT_MAX: Duration = Duration::from_secs(1);
 const BACKLOG_MAX: usize = 1_000;
 /// Ended orders whose place on disk is remembered: twice what a snapshot shows.
 const ORDERS_MAX: usize = 64;
-/// Answers that wait for the book; one more, and the oldest waits no longer.
+/// Answers that wait for the audit log; one more, and the oldest waits no longer.
 const ANSWERS_MAX: usize = 64;
 
 /// What comes from the door, in its order.
 #[derive(Debug)]
 pub enum Paper {
-    /// Put this into the book.
+    /// Put this into the audit log.
     Deed(ActionRecord),
     /// Send this once the log has what came before it, or say that it has not: what is reported as recorded survives a loss
     /// of power.
     Answer(oneshot::Sender<Result<Durability, String>>, Result<(), String>),
-    /// So many deeds found no room on this way.
+    /// So many actions found no room on this way.
     Lost(u64),
 }
 
@@ -86,7 +86,7 @@ pub struct Deeds {
     steps: HashMap<(Arc<str>, Arc<str>), u64>,
     /// Actions that the queue had no room for: they are in the history only.
     left_out: u64,
-    /// Deeds that did not even come here.
+    /// Actions that did not even come here.
     lost: u64,
     answers: VecDeque<Answer>,
     /// The hash of the plant file that was recorded last.
@@ -117,7 +117,7 @@ impl Deeds {
         }
     }
 
-    /// The first deeds of a station: that it has started, and the plant file and the users if they are others than the last
+    /// The first actions of a station: that it has started, and the plant file and the users if they are others than the last
     /// time. `users` is their [`crate::access::Users::digest`], `None` where nobody is asked who he is.
     pub fn started(&mut self, plant: &str, file: Option<&PlantFile>, users: Option<String>, at: Timestamp) {
         let version = concat!("sightglass ", env!("CARGO_PKG_VERSION"));
@@ -187,7 +187,7 @@ impl Deeds {
         self.backlog.drain(..excess).collect()
     }
 
-    /// So many deeds never came here: they are nowhere.
+    /// So many actions never came here: they are nowhere.
     pub fn lost(&mut self, count: u64) {
         self.lost += count;
     }
@@ -280,7 +280,7 @@ impl Deeds {
         self.recorded.borrow().last
     }
 
-    /// Deeds that are lost, and what is wrong with the audit log and with the alarm-state file, in words for the operator.
+    /// Actions that are lost, and what is wrong with the audit log and with the alarm-state file, in words for the operator.
     pub fn trouble(&mut self) -> (u64, Option<String>, Option<String>) {
         let ended = self.recorded.has_changed().is_err();
         let status = self.recorded.borrow_and_update().clone();
@@ -309,7 +309,7 @@ pub fn clock_step(old: Timestamp, new: Timestamp) -> ActionRecord {
     }
 }
 
-/// The last deed of a station.
+/// The last action of a station.
 pub fn stopped(plant: &str, at: Timestamp) -> ActionRecord {
     own(at, "stop station", plant, "done")
 }

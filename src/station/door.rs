@@ -124,7 +124,7 @@ pub struct Door {
     reloads: JoinSet<(u64, Result<(), String>)>,
     last_ticket: u64,
     toil: Toil,
-    /// Deeds that did not reach the book, not told yet.
+    /// Actions that did not reach the audit log, not reported yet.
     lost: u64,
 }
 
@@ -265,7 +265,7 @@ impl Door {
                     self.command(Command::Reload(reply));
                 }
                 Effect::HangUp(terminal, why) => {
-                    // The audit log holds it, in bounded rate; whoever comes without end must not fill this one.
+                    // The audit log holds it, in bounded rate; attempts without end must not fill this one.
                     tracing::debug!(terminal, why, "a terminal was sent away");
                     if let Some(end) = self.terminals.remove(&terminal) {
                         end.send_replace(Arc::new(Standing { gone: Some(why.into()), ..Standing::default() }));

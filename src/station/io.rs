@@ -92,7 +92,7 @@ pub fn start_guarded(options: Options) -> Result<Station, StartError> {
     let (def, host) = (options.def.clone(), Some(own_user().into()));
     let gate = match users::read(&path) {
         Ok(people) => Gate::with_people(def, people, host),
-        // Nobody can log in, and it is never taken for nobody; values and alarms go on.
+        // Login is closed: a damaged file is not an empty one. Values and alarms go on.
         Err(error) => {
             tracing::error!(%error, "login is closed");
             Gate::closed(def, &error.to_string(), host)
@@ -122,7 +122,7 @@ fn begin(
     let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the audit log: {error}"));
     let recorder = recorder::start(&path, clock, records.clone()).map_err(no_thread)?;
     let mut deeds = Deeds::new(&recorder);
-    // Without such a file, at the first start or after it was damaged, the journal tells.
+    // Without such a file, at the first start or after it was damaged, the journal has the state.
     let from_journal = recorder.alarms.steps.is_none();
     recorder.alarms.steps.iter().for_each(|steps| plant.restore(steps));
     let users = guarded.as_ref().and_then(|(gate, _)| gate.people_digest());

@@ -404,7 +404,7 @@ impl PlantTask {
         self.store(others);
     }
 
-    /// To the disk, and deeds from there to the history; straight there where there is no room.
+    /// To the disk, and actions from there to the history; straight there where there is no room.
     fn write_down(&mut self, deeds: Vec<ActionRecord>, steps: Vec<AlarmRecord>) {
         if deeds.is_empty() && steps.is_empty() {
             return;

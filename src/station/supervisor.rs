@@ -51,7 +51,7 @@ pub(super) async fn run(
         let state = LineState::Waiting { why: "internal error, see the log".to_owned(), retry_at };
         let words = format!("line {} was started again; see the log", def.line(line).name);
         let (fault, occurred) = (StationFault::LineTask, FaultState::Occurred(words.into()));
-        // Without a plant task there is nobody to tell, and nothing to start again for.
+        // Without a plant task there is nothing to report to, and nothing to start again for.
         let at = clock.now();
         let states = [Event::Station { at, fault, state: occurred }, Event::Line { at, line, state }];
         // It cannot be known how far these writes had come.

@@ -81,7 +81,7 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
     assert!(!text.contains("horses"), "a password is never written down");
 }
 
-/// Whether the station says so with an alarm, and what whoever tries to log in hears.
+/// Whether the station raises an alarm, and the answers to a login and to a first Supervisor.
 async fn without_users(history: &Path) -> (bool, Result<(), String>, Result<(), String>) {
     let mut options = options(history);
     let mut def = fixture::plant();

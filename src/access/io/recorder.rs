@@ -1,4 +1,4 @@
-//! The one thread that brings to disk what operators are told is done: the audit log first, then the state of the alarms.
+//! The one thread that writes actions and alarm state to disk before they are reported as recorded: the audit log first.
 
 use std::{
     collections::VecDeque,
@@ -32,7 +32,7 @@ use crate::{
     plant::record::{ActionRecord, AlarmRecord, Record, Seal},
 };
 
-/// Batches on their way to the thread; a full queue is the sender's to tell.
+/// Batches on their way to the thread; the sender handles a full queue.
 const BATCHES_MAX: usize = 256;
 /// Batches that are written with one sync.
 const GROUP_MAX: usize = 64;
@@ -103,8 +103,8 @@ pub fn start(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record
     let mut opened = recorder.open();
     recorder.tail = std::mem::take(&mut opened.tail);
     recorder.last_at_start = recorder.tail.back().and_then(|entry| entry.seal).unwrap_or(START);
-    let (told, recorded) = watch::channel(recorder.status());
-    let join = std::thread::Builder::new().name("recorder".into()).spawn(move || recorder.run(&queue, &told))?;
+    let (status, recorded) = watch::channel(recorder.status());
+    let join = std::thread::Builder::new().name("recorder".into()).spawn(move || recorder.run(&queue, &status))?;
     Ok(Handle { batches, recorded, opened, alarms, join })
 }
 
@@ -173,7 +173,7 @@ impl Recorder {
         (recorder, found)
     }
 
-    fn run(mut self, queue: &queue::Receiver<Message>, told: &watch::Sender<Recorded>) {
+    fn run(mut self, queue: &queue::Receiver<Message>, status: &watch::Sender<Recorded>) {
         loop {
             let wait = if self.is_written() { LOOK } else { AGAIN };
             match queue.recv_timeout(wait) {
@@ -188,11 +188,11 @@ impl Recorder {
                 Err(queue::RecvTimeoutError::Disconnected) => break,
             }
             self.write();
-            told.send_replace(self.status());
+            status.send_replace(self.status());
             let now = self.clock.utc();
             if is_due(self.seal_tried, now) {
                 self.seal(now);
-                told.send_replace(self.status());
+                status.send_replace(self.status());
             }
         }
         // The last chance of what could not be written until now.
@@ -201,7 +201,7 @@ impl Recorder {
             tracing::error!(actions = self.pending.len(), "the station ends, and these are not in the audit log");
         }
         self.seal(self.clock.utc());
-        told.send_replace(self.status());
+        status.send_replace(self.status());
     }
 
     fn take(&mut self, Batch { actions, steps }: Batch) {

@@ -1,4 +1,4 @@
-//! What an operator is told when the disk or the history does not take what he did.
+//! What is shown of an action while the disk or the history does not take its record.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};
@@ -76,7 +76,7 @@ impl Station {
     }
 
     /// The first snapshot in which the acknowledgement has its end, recorded or not.
-    async fn told(&mut self, recorded: impl Fn(bool) -> bool) -> Arc<Snapshot> {
+    async fn ended(&mut self, recorded: impl Fn(bool) -> bool) -> Arc<Snapshot> {
         let ended = |snapshot: &Arc<Snapshot>| {
             let own = snapshot.orders.iter().find(|order| order.id == ORDER);
             own.is_some_and(|order| order.outcome == Outcome::Verified && recorded(order.recorded))
@@ -104,7 +104,7 @@ async fn an_acknowledgement_that_is_shown_is_on_disk_also_while_the_history_take
     let history = folder.path().join("fixture.duckdb");
     let mut station = Station::start(&history).await;
     station.acknowledge().await;
-    let snapshot = station.told(|_| true).await;
+    let snapshot = station.ended(|_| true).await;
     assert!(snapshot.orders[0].recorded);
     // A kill at this very moment leaves these files.
     assert_eq!(steps(&history), [AlarmStep::Raised, AlarmStep::Acknowledged]);
@@ -122,8 +122,8 @@ async fn what_the_disk_does_not_take_is_done_and_shown_as_not_recorded_until_it_
     fs::create_dir(&obstacle).unwrap();
     let mut station = Station::start(&history).await;
     station.acknowledge().await;
-    let snapshot = station.told(|_| true).await;
-    assert!(!snapshot.orders[0].recorded, "it is done, and nobody is told that it is recorded");
+    let snapshot = station.ended(|_| true).await;
+    assert!(!snapshot.orders[0].recorded, "it is done, and not shown as recorded");
     let silent = snapshot.alarms.iter().find(|alarm| alarm.id == fixture::SILENT).unwrap();
     assert!(!silent.state.needs_acknowledgement());
     assert!(!silent.acknowledged.as_ref().unwrap().recorded, "and the alarm says so");
@@ -131,7 +131,7 @@ async fn what_the_disk_does_not_take_is_done_and_shown_as_not_recorded_until_it_
     let trouble = trouble.history.trouble.as_ref().unwrap();
     assert!(trouble.contains("the state of the alarms cannot be written"), "{trouble}");
     fs::remove_dir(&obstacle).unwrap();
-    let snapshot = station.told(|recorded| recorded).await;
+    let snapshot = station.ended(|recorded| recorded).await;
     let silent = snapshot.alarms.iter().find(|alarm| alarm.id == fixture::SILENT).unwrap();
     assert!(silent.acknowledged.as_ref().unwrap().recorded);
     assert_eq!(steps(&history), [AlarmStep::Raised, AlarmStep::Acknowledged]);
@@ -182,7 +182,7 @@ async fn a_clock_that_is_set_while_the_station_runs_is_followed_recorded_and_ala
     assert!(off(snapshot.at) < jiff::SignedDuration::from_secs(60), "{} is not {right}", snapshot.at);
     assert!(snapshot.alarms.iter().all(|alarm| off(alarm.raised_at) < jiff::SignedDuration::from_secs(60)));
     station.acknowledge().await;
-    let snapshot = station.told(|_| true).await;
+    let snapshot = station.ended(|_| true).await;
     assert!(off(snapshot.orders[0].at) < jiff::SignedDuration::from_secs(60));
     station.stop().await;
     let log = fs::read_to_string(book::beside(&history)).unwrap();
