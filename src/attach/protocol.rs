@@ -226,8 +226,8 @@ fn greeted<'a>(bytes: &'a [u8], expected: &'static str) -> Result<(Greeting, &'a
 /// Two versions of the program do not talk: what one of them calls a value might be another to the other.
 fn other_version(terminal: (&str, u32), station: (&str, u32)) -> Option<String> {
     (terminal != station).then(|| {
-        let (version, protocol) = (one_line(terminal.0, WORD_CHARS_MAX), terminal.1);
-        let (stations, speaks) = (one_line(station.0, WORD_CHARS_MAX), station.1);
+        let (version, protocol) = (word(terminal.0), terminal.1);
+        let (stations, speaks) = (word(station.0), station.1);
         format!(
             "this terminal is version {version} (protocol {protocol}), the station is version {stations} (protocol \
              {speaks}): both must be the same version; restart the older one after an update"
@@ -238,15 +238,15 @@ fn other_version(terminal: (&str, u32), station: (&str, u32)) -> Option<String> 
 impl Place {
     /// With no word longer than a station takes.
     pub fn short(self) -> Place {
-        let short = |word: Option<String>| word.map(|word| one_line(&word, WORD_CHARS_MAX));
+        let short = |text: Option<String>| text.map(|text| word(&text));
         Place { tty: short(self.tty), ssh: short(self.ssh), term: short(self.term) }
     }
 
     /// `pts/3 from 10.0.0.5, user panel, process 123`: what the terminal says, without what could disturb a screen, and
     /// what the system says.
     pub fn words(&self, unix_user: Option<&str>, process: Option<u32>) -> String {
-        let said = |word: &Option<String>| {
-            let word = one_line(word.as_deref().unwrap_or_default(), WORD_CHARS_MAX);
+        let said = |text: &Option<String>| {
+            let word = word(text.as_deref().unwrap_or_default());
             (!word.is_empty()).then_some(word)
         };
         let mut words = said(&self.tty).unwrap_or_else(|| "no terminal".to_owned());
@@ -254,7 +254,7 @@ impl Place {
             words += &format!(" from {ssh}");
         }
         if let Some(user) = unix_user {
-            words += &format!(", user {}", one_line(user, WORD_CHARS_MAX));
+            words += &format!(", user {}", word(user));
         }
         if let Some(process) = process {
             words += &format!(", process {process}");
@@ -263,14 +263,14 @@ impl Place {
     }
 }
 
-/// Text of somebody else on one line: only what is seen, and not too much of it.
+/// Text from the other end on one line: only visible characters, and not too many.
 fn one_line(text: &str, chars_max: usize) -> String {
-    // What says where it is must not be able to say who it is.
-    text.chars()
-        .filter(|letter| !acts(*letter))
-        .map(|letter| if letter == ',' { '.' } else { letter })
-        .take(chars_max)
-        .collect()
+    text.chars().filter(|letter| !acts(*letter)).take(chars_max).collect()
+}
+
+/// One word of it, without a comma: what says where it is must not be able to say who it is.
+fn word(text: &str) -> String {
+    one_line(text, WORD_CHARS_MAX).replace(',', ".")
 }
 
 #[cfg(test)]
