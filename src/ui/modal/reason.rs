@@ -131,6 +131,9 @@ impl Reason {
             Some("not all of it was taken; Ctrl-U empties the line".to_owned())
         } else if self.needed && words.is_empty() {
             Some("say why, in some words".to_owned())
+        } else if self.time.as_ref().is_some_and(|time| typed_time(&words, time.max).is_ok()) {
+            // Typed for the time, while another one was selected.
+            Some("a time is no reason: select \"other\" to type a time".to_owned())
         } else {
             rights::missing(cx, &command)
         };
