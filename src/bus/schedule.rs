@@ -32,7 +32,11 @@ use self::{
     queue::{Queue, Spot},
 };
 use super::plan::Block;
-use crate::plant::{def::DeviceId, event::ExceptionCode, tag::Class};
+use crate::plant::{
+    def::{DeviceId, LineDef},
+    event::ExceptionCode,
+    tag::Class,
+};
 
 /// On an overloaded line even what is shed or always comes last is read once it has waited so long. Only a line that its
 /// hard polls alone fill to the brim gets that far.
@@ -141,9 +145,12 @@ impl Schedule {
         }
     }
 
-    /// When a poll may be read, its device's gap aside; `None`: not at all.
+    /// When a poll may be read, its device's gap aside; `None`: not at all, or not before its answer has come.
     fn spot(&self, index: usize) -> Option<Spot> {
         let poll = &self.polls[index];
+        if poll.under_way {
+            return None;
+        }
         let health = &self.devices[poll.place];
         let (from, deadline) = if let Some(probe_at) = health.probe_at {
             // A device that does not answer is asked with its first block only; who has waited longest goes first.
@@ -207,12 +214,26 @@ impl Schedule {
         }
     }
 
+    /// The request for this block is sent; it is not due again before [`Schedule::done`]. Needed only where others are sent
+    /// before its answer comes.
+    pub fn begin(&mut self, index: usize, now: Timestamp) {
+        self.fed = self.has_starved(index, now);
+        self.polls[index].under_way = true;
+        self.requeue(index);
+    }
+
+    fn has_starved(&self, index: usize, now: Timestamp) -> bool {
+        self.spot(index).is_some_and(|spot| self.rank(spot, now).0 == STARVED)
+    }
+
     /// The block has been read, well or not, from `started` to `now`: that served its releases up to `started`. What was
     /// released and is over by now is missed; the next release is the first point of its grid that is not. Says how late
     /// the read began and what was missed, for the counters.
     pub fn done(&mut self, index: usize, started: Timestamp, now: Timestamp) -> Served {
         let pace = self.pace_of(&self.polls[index]);
-        self.fed = self.spot(index).is_some_and(|spot| self.rank(spot, started).0 == STARVED);
+        if !std::mem::take(&mut self.polls[index].under_way) {
+            self.fed = self.has_starved(index, started);
+        }
         let device = &self.devices[self.polls[index].place];
         let (rests_until, probed) = (device.rests_until, device.probe_at.is_some());
         let poll = &mut self.polls[index];
@@ -314,9 +335,9 @@ impl Schedule {
         self.devices[place].failed(sent, now, affordable)
     }
 
-    /// How long the answer to a block is waited for (real time), at most the `timeout` of the line.
-    pub fn patience(&self, index: usize, timeout: Duration) -> Duration {
-        self.devices[self.polls[index].place].patience(timeout)
+    /// How long the answer to a block is waited for (real time), at most the timeout of its line.
+    pub fn patience(&self, index: usize, line: &LineDef) -> Duration {
+        self.devices[self.polls[index].place].patience(line)
     }
 
     /// The device is not to be asked before `until`.
@@ -328,8 +349,10 @@ impl Schedule {
     }
 
     /// The gap that the device wants between two requests ends at `until`: the others need not wait for it.
-    pub fn keep_gap(&mut self, index: usize, until: Timestamp) {
-        self.devices[self.polls[index].place].free_at = until;
+    pub fn keep_gap(&mut self, device: DeviceId, until: Timestamp) {
+        if let Some(place) = self.place_of(device) {
+            self.devices[place].free_at = until;
+        }
     }
 
     /// Everything of a device is due now; its grid stays. A device that does not answer is asked at once.

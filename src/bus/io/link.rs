@@ -3,13 +3,14 @@
 //! ```text
 //!  call(Request) ─> tokio-modbus ─> pipe ─> message ─┐
 //!  exchange(message) ────────────────────────────────┼─> wire    RTU, ASCII: check, silences, debts; one at a time
-//!  exchange_all(messages) ───────────────────────────┘           MBAP: transaction ids; several under way
+//!  submit(message), flush() ─────────────────────────┘           MBAP: transaction ids; several under way
 //! ```
 //!
 //! PDUs are made and read by tokio-modbus, with a fresh context for every request on one end of a pipe; what travels on
 //! the port is ours.
 
 mod gathering;
+mod transactions;
 
 use std::{borrow::Cow, sync::Arc, time::Duration};
 
@@ -24,7 +25,11 @@ use tokio_modbus::{
     slave::Slave,
 };
 
-use self::gathering::{GATHER_MAX, Gathered};
+pub use self::transactions::Ended;
+use self::{
+    gathering::{GATHER_MAX, Gathered},
+    transactions::Transactions,
+};
 use super::{
     clock::Clock,
     transport::{CountUart, Opened},
@@ -59,21 +64,15 @@ impl From<Fault> for Trouble {
     }
 }
 
-/// A request with what came back; the message of a good answer is in `answer`.
-#[derive(Debug, Clone)]
-pub struct Answered {
-    /// Unit and PDU of the answer, or why there is none.
-    pub answer: Result<Vec<u8>, Fault>,
-    /// Both as they were on the wire.
-    pub exchange: Arc<Exchange>,
-}
-
 /// The link on one open port.
 pub struct Link {
     wire: Wire,
-    transaction: u16,
+    /// Those under way over Modbus TCP.
+    transactions: Transactions,
     /// The request under way: its caller may give it up.
     asked: Option<Vec<u8>>,
+    /// The same over Modbus TCP.
+    asked_id: Option<u16>,
     timeout: Duration,
     idle: Duration,
     turnaround: Duration,
@@ -88,7 +87,7 @@ pub struct Link {
     /// What the last exchange was; `None` before the first.
     pub last: Option<Arc<Exchange>>,
     /// Real time in which the line was busy.
-    pub busy: Duration,
+    busy: Duration,
 }
 
 impl Link {
@@ -97,8 +96,9 @@ impl Link {
         let uart = opened.uart;
         let wire = Wire::new(opened.stream, opened.pause, line, clock, memory);
         Link {
-            transaction: 0,
+            transactions: Transactions::new(),
             asked: None,
+            asked_id: None,
             gaps: Vec::new(),
             timeout: line.timeout,
             idle: wire.silence.max(line.idle),
@@ -148,9 +148,7 @@ impl Link {
     /// Sends a message (unit and PDU) and gives the checked answer message. Sent once, never repeated.
     pub async fn exchange(&mut self, message: &[u8]) -> Result<Vec<u8>, Trouble> {
         if self.framing() == Framing::Mbap {
-            let mut answers = self.exchange_all(&[message]).await?;
-            let answered = answers.pop().map_or(Err(Fault::Timeout), |answered| answered.answer);
-            return answered.map_err(Trouble::Fault);
+            return self.exchange_mbap(message).await;
         }
         // An answer proves that nothing older is to come only if it could not itself have been older.
         let proof = !self.wire.debts.is_ambiguous(message);
@@ -183,44 +181,14 @@ impl Link {
             Err(fault) => self.account(message, *fault),
         }
         self.note_silence(matches!(gathered.answer, Err(Fault::Timeout)));
-        self.keep(frame, gathered, sent_at).answer.map_err(Trouble::Fault)
-    }
-
-    /// Sends several messages at once over Modbus TCP and gives their answers in the same order: they may overtake each
-    /// other on the way. `Err` only when the connection is gone or out of step.
-    pub async fn exchange_all(&mut self, messages: &[&[u8]]) -> Result<Vec<Answered>, Trouble> {
-        let first = self.transaction.wrapping_add(1);
-        let mut frames: Vec<Arc<[u8]>> = Vec::with_capacity(messages.len());
-        for message in messages {
-            self.transaction = self.transaction.wrapping_add(1);
-            frames.push(frame::with_mbap(self.transaction, message).into());
-        }
-        messages.iter().for_each(|message| self.keep_gap(message.first().copied()));
-        let sent_at = match &frames[..] {
-            [frame] => self.wire.send(frame).await?,
-            many => self.wire.send(&many.concat()).await?,
-        };
-        for frame in &frames {
-            self.note_sent(frame.clone());
-        }
-        let gathered = self.gather_mbap(messages, first, sent_at).await?;
-        self.busy += sent_at.elapsed();
-        self.wire.rest(self.wire.silence);
-        self.note_silence(gathered.iter().all(|gathered| matches!(gathered.answer, Err(Fault::Timeout))));
-        let mut answers = Vec::with_capacity(messages.len());
-        for ((message, frame), gathered) in messages.iter().zip(frames).zip(gathered) {
-            match &gathered.answer {
-                Ok(_) => self.wire.counters.ok += 1,
-                Err(fault) => self.account(message, *fault),
-            }
-            answers.push(self.keep(frame, gathered, sent_at));
-        }
-        Ok(answers)
+        self.keep(frame, gathered, sent_at).map_err(Trouble::Fault)
     }
 
     /// Sends bytes as they are and gives everything that comes back until the line is silent: for tests of the line.
     pub async fn send_raw(&mut self, bytes: &[u8]) -> Result<(Vec<u8>, Option<Duration>), Trouble> {
         let framing = self.framing();
+        // What comes next would be shown as the answer.
+        self.finish_all().await?;
         let request = frame::unwrap(framing, bytes).unwrap_or_default();
         let sent_at = self.send(&request, bytes).await?;
         self.note_sent(bytes.into());
@@ -262,6 +230,7 @@ impl Link {
 
     /// The caller of the exchange under way has given it up, for something that cannot wait. Its answer may still come.
     pub fn abandon(&mut self) {
+        self.abandon_mbap();
         let Some(message) = self.asked.take() else { return };
         if self.framing() != Framing::Mbap && !message.is_empty() {
             self.wire.debts.failed(&message, self.wire.age());
@@ -338,9 +307,15 @@ impl Link {
 
     /// What is sent next waits for the end of its unit's gap.
     fn keep_gap(&mut self, unit: Option<u8>) {
-        if let Some((_, until)) = self.gaps.iter().find(|(resting, _)| Some(*resting) == unit) {
+        if let Some(until) = unit.and_then(|unit| self.gap_of(unit)) {
             self.wire.rest(until.saturating_duration_since(Instant::now()));
         }
+    }
+
+    /// The end of the gap that a unit is kept in now.
+    fn gap_of(&self, unit: u8) -> Option<Instant> {
+        let now = Instant::now();
+        self.gaps.iter().find(|(resting, until)| *resting == unit && now < *until).map(|(_, until)| *until)
     }
 
     /// Nothing is sent for this long (plant time), for devices that need it.
@@ -348,9 +323,12 @@ impl Link {
         self.wire.rest(self.wire.clock().real_span(plant));
     }
 
-    /// Reads and drops what comes while nobody has asked; returns only when the port is gone.
-    pub async fn idle(&mut self) -> String {
-        self.wire.idle().await
+    /// Takes what comes while nothing is sent. Returns when a request under way has ended, or an error when the port is gone.
+    pub async fn idle(&mut self) -> Result<(), Trouble> {
+        match self.framing() {
+            Framing::Mbap => self.idle_mbap().await,
+            Framing::Rtu | Framing::Ascii => Err(self.wire.idle().await),
+        }
     }
 
     /// Asks the driver of the port what it has counted.
@@ -403,8 +381,8 @@ impl Link {
         self.wire.record(true, frame, Cow::Borrowed("sent"));
     }
 
-    fn keep(&mut self, request: Arc<[u8]>, gathered: Gathered, sent_at: Instant) -> Answered {
-        let exchange = Arc::new(Exchange {
+    fn keep(&mut self, request: Arc<[u8]>, gathered: Gathered, sent_at: Instant) -> Result<Vec<u8>, Fault> {
+        self.last = Some(Arc::new(Exchange {
             at: self.wire.clock().to_utc(self.wire.clock().at(sent_at)),
             framing: self.framing(),
             request,
@@ -412,9 +390,8 @@ impl Link {
             outcome: gathered.answer.as_ref().map(drop).map_err(|fault| *fault),
             reply: gathered.reply,
             tries: 1,
-        });
-        self.last = Some(exchange.clone());
-        Answered { answer: gathered.answer, exchange }
+        }));
+        gathered.answer
     }
 
     /// Counts a fault. On a line without transaction ids the unit owes the answer, and the line rests until the longest

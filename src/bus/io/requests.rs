@@ -14,7 +14,7 @@ use crate::plant::{
 
 /// A stop waits no longer than this (real time) for what is on the wire: a device that answers at all has mostly answered by
 /// then, and an answer that is just coming in would collide with the stop.
-const STOP_WAIT: Duration = Duration::from_millis(500);
+pub const STOP_WAIT: Duration = Duration::from_millis(500);
 /// More requests that are served first than this stay in their queue, where the plant sees that it is full.
 const FIRST_MAX: usize = 64;
 

@@ -12,7 +12,7 @@ use tokio::sync::{mpsc, watch};
 
 use super::{
     clock::Clock,
-    link::Link,
+    link::{Link, Trouble},
     requests::{Closed, Requests},
     transport::{Connector, Opened},
     wire::Memory,
@@ -55,6 +55,7 @@ pub async fn run(
         hunt: Hunt::default(),
         budget: Budget::new(WRITE_SHARE, clock.now()),
         unconfirmed: Vec::new(),
+        under_way: Vec::new(),
         memory: Memory::new(def.line(line), clock).expect(&blocks),
         settings: def.line(line).clone(),
         clock,
@@ -94,6 +95,16 @@ enum Leave {
     Test,
 }
 
+impl From<Trouble> for Leave {
+    /// Trouble of a request without a caller: only the end of the port matters.
+    fn from(trouble: Trouble) -> Leave {
+        match trouble {
+            Trouble::Gone(why) => Leave::Lost(why),
+            Trouble::Fault(fault) => Leave::Lost(fault.to_string()),
+        }
+    }
+}
+
 struct Task<'a> {
     def: Arc<PlantDef>,
     line: LineId,
@@ -115,6 +126,8 @@ struct Task<'a> {
     memory: Memory,
     /// Writes whose fate is not known yet.
     unconfirmed: Vec<confirm::Unconfirmed>,
+    /// Reads that are under way over Modbus TCP, no more than a device takes at once.
+    under_way: Vec<poll::UnderWay>,
     /// When the books were last told what the link has counted.
     closed_at: Timestamp,
     books: Books,
@@ -231,6 +244,9 @@ impl Task<'_> {
     async fn serve(&mut self, opened: Opened) -> Result<Leave, Ended> {
         let mut link = Link::new(opened, &self.settings, self.clock, self.memory.clone());
         let mut schedule = Schedule::new(&self.blocks, self.clock.now());
+        self.under_way.clear();
+        let on_line = self.def.devices.iter().filter(|device| device.line == self.line);
+        on_line.for_each(|device| link.allow(device.unit, device.limits.in_flight_max));
         let mut report_at = self.clock.now() + REPORT_EVERY;
         self.closed_at = self.clock.now();
         // Other settings show at once.
@@ -238,6 +254,11 @@ impl Task<'_> {
         let leave = loop {
             if *self.stop.borrow() {
                 break Err(Ended);
+            }
+            // Before the second is closed: the schedule, too, learns of answers that came late.
+            let taken = self.take_answers(&mut link, &mut schedule).await?;
+            if let Err(leave) = taken.and_then(|()| self.still_there(&link)) {
+                break Ok(leave);
             }
             let now = self.clock.now();
             if report_at <= now {
@@ -284,7 +305,7 @@ impl Task<'_> {
             biased;
             _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
             request = self.requests.recv() => request?,
-            why = link.idle() => return Ok(Err(Leave::Lost(why))),
+            ended = link.idle() => return Ok(ended.map_err(Leave::from)),
             () = self.clock.sleep_until(until) => return Ok(Ok(())),
         };
         self.serve_request(link, schedule, request).await
@@ -318,6 +339,17 @@ impl Task<'_> {
                     self.tell_wrote(id, WriteResult::Overtaken).await?;
                 }
                 let def = self.def.clone();
+                match self.clear_way(link, schedule, def.tag(tag).device, urgent).await? {
+                    Ok(true) => {}
+                    Ok(false) => {
+                        self.requests.put_off(BusRequest::Write { id, tag, raw, unlock, verify, urgent });
+                        return Ok(Ok(()));
+                    }
+                    Err(leave) => {
+                        self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
+                        return Ok(Err(leave));
+                    }
+                }
                 let (tag, unlock) = (def.tag(tag), unlock.map(|(tag, raw)| (def.tag(tag), raw)));
                 let started = self.clock.now();
                 let wish = write::Wish { tag, raw, unlock, verify, urgent };
@@ -341,7 +373,7 @@ impl Task<'_> {
     fn close_second(&mut self, link: &mut Link) {
         let now = self.clock.now();
         let over = Duration::try_from(now.duration_since(self.closed_at)).unwrap_or_default();
-        let busy = std::mem::take(&mut link.busy).as_secs_f32();
+        let busy = link.take_busy().as_secs_f32();
         self.books.spent(busy / self.clock.real_span(over).as_secs_f32().max(1e-6), over);
         self.books.late(&self.def, &link.take_late());
         self.books.take(link.take_frames(), link.counters());

@@ -4,6 +4,7 @@
 mod slave;
 mod stops;
 mod strangers;
+mod together;
 mod tools;
 
 use std::{

@@ -135,6 +135,11 @@ impl Wire {
         self.quiet_until = self.quiet_until.max(Instant::now() + real);
     }
 
+    /// Until when nothing is to be sent, if that is not over.
+    pub fn rests_until(&self) -> Option<Instant> {
+        Some(self.quiet_until).filter(|until| Instant::now() < *until)
+    }
+
     /// Nothing is sent for this long (real time) after the last byte sent has left.
     pub fn rest_after_sending(&mut self, real: Duration) {
         self.quiet_until = self.quiet_until.max(self.left_at.max(Instant::now()) + real);
@@ -151,6 +156,11 @@ impl Wire {
         if self.framing != Framing::Mbap {
             self.drain()?;
         }
+        self.put(bytes).await
+    }
+
+    /// Sends bytes now, and gives the moment when the last of them has left.
+    pub async fn put(&mut self, bytes: &[u8]) -> Result<Instant, Trouble> {
         // No flush: on a serial port that waits for the last byte to leave, and blocks the thread while it does.
         // What the system takes at once, as a rule all of it, costs no timer.
         self.left_at = Instant::now() + self.char_time * bytes.len() as u32;
@@ -196,15 +206,23 @@ impl Wire {
     }
 
     /// Reads and drops what comes while nobody has asked; returns only when the port is gone.
-    pub async fn idle(&mut self) -> String {
+    pub async fn idle(&mut self) -> Trouble {
         let mut buffer = Vec::new();
         loop {
             match self.receive(Instant::now() + Duration::from_secs(3_600), &mut buffer).await {
                 Ok(_) => self.drop_stale(&std::mem::take(&mut buffer)),
-                Err(Trouble::Gone(why)) => return why,
-                Err(Trouble::Fault(fault)) => return fault.to_string(),
+                Err(trouble) => return trouble,
             }
         }
+    }
+
+    /// The answer of a unit to a request that was given up.
+    pub fn drop_late(&mut self, unit: u8, frame: &[u8]) {
+        self.counters.stale += 1;
+        self.counters.late += 1;
+        self.late.push(unit);
+        tracing::debug!(unit, bytes = %frame::hex(frame), "late answer dropped");
+        self.record(false, frame.into(), Cow::Borrowed("late, dropped"));
     }
 
     /// Bytes that nobody waits for, or not any more: on record, and on the account of the unit that owed them.

@@ -11,7 +11,10 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 
-use crate::{bus::backoff::Backoff, plant::def::DeviceId};
+use crate::{
+    bus::backoff::Backoff,
+    plant::def::{DeviceId, LineDef},
+};
 
 /// Failures in a row after which a device that has answered before is given up and only probed.
 pub const FAILURES_MAX: u32 = 3;
@@ -19,8 +22,10 @@ pub const FAILURES_MAX: u32 = 3;
 const ANSWERS_MIN: u32 = 32;
 /// A device that has always answered faster is waited for so many times its slowest answer …
 const SLOWER_MAX: u32 = 4;
-/// … but not less than this: systems, adapters and serial servers pause now and then.
+/// … but not less than this: systems and adapters pause now and then …
 const PATIENCE_MIN: Duration = Duration::from_millis(100);
+/// … and what is lost on a network is sent again after 200 to 300 ms.
+const NETWORK_PATIENCE_MIN: Duration = Duration::from_millis(500);
 /// Every so many-th try in a row waits for the whole timeout: the device may have become slow.
 const WHOLE_TIMEOUT_EVERY: u32 = 4;
 
@@ -131,12 +136,14 @@ impl Health {
         }
     }
 
-    /// How long an answer is waited for (real time), at most the `timeout` of the line.
-    pub fn patience(&self, timeout: Duration) -> Duration {
+    /// How long an answer is waited for (real time), at most the timeout of the line.
+    pub fn patience(&self, line: &LineDef) -> Duration {
+        let timeout = line.timeout;
+        let least = if line.transport.serial().is_some() { PATIENCE_MIN } else { NETWORK_PATIENCE_MIN };
         let whole = self.thorough || self.failures % WHOLE_TIMEOUT_EVERY == WHOLE_TIMEOUT_EVERY - 1;
         if whole || self.answers < ANSWERS_MIN {
             return timeout;
         }
-        self.slowest.saturating_mul(SLOWER_MAX).max(PATIENCE_MIN).min(timeout)
+        self.slowest.saturating_mul(SLOWER_MAX).max(least).min(timeout)
     }
 }

@@ -3,12 +3,9 @@
 
 use super::{tests::at, *};
 use crate::plant::{
-    def::TagId,
+    def::{LineId, Serial, TagId, Transport},
     tag::{Poll, Table},
 };
-
-/// How long an answer is waited for by default.
-const TIMEOUT: Duration = Duration::from_secs(1);
 
 /// One unit with one poll.
 #[derive(Debug, Clone)]
@@ -26,6 +23,7 @@ fn unit(period: i64, cost: i64) -> Unit {
 }
 
 struct Model {
+    line: LineDef,
     units: Vec<Unit>,
     schedule: Schedule,
     now: i64,
@@ -50,7 +48,8 @@ impl Model {
         };
         let blocks: Vec<Block> = units.iter().enumerate().map(block).collect();
         let reads = vec![Vec::new(); units.len()];
-        Model { schedule: Schedule::new(&blocks, at(0)), units, now: 0, reads, busy: Vec::new() }
+        let line = LineDef::new(LineId(0), "L1", Transport::rtu("memory", Serial::USUAL));
+        Model { line, schedule: Schedule::new(&blocks, at(0)), units, now: 0, reads, busy: Vec::new() }
     }
 
     fn play(&mut self, until: i64) {
@@ -65,7 +64,7 @@ impl Model {
             };
             let (unit, started) = (&self.units[index], self.now);
             let (device, dead) = (DeviceId(index as u16), unit.dead.contains(&started));
-            let patience = self.schedule.patience(index, TIMEOUT);
+            let patience = self.schedule.patience(index, &self.line);
             let took = if dead { patience } else { Duration::from_millis(unit.cost as u64) };
             self.now += took.as_millis() as i64;
             self.schedule.done(index, at(started), at(self.now));

@@ -75,6 +75,8 @@ pub(super) struct Pending {
     pub urgent: Option<Timestamp>,
     /// Put off until then.
     pub not_before: Timestamp,
+    /// Sent, and not yet answered or given up.
+    pub under_way: bool,
     pub missed: u64,
     /// Measured time of an answered read in seconds, smoothed.
     cost: Option<f64>,
@@ -98,6 +100,7 @@ impl Pending {
             release: Some(release),
             urgent: None,
             not_before: now,
+            under_way: false,
             missed: 0,
             cost: None,
             late: 0,
@@ -134,7 +137,8 @@ impl Pending {
 
     /// See [`super::Schedule::done`]. `free`: since when its device could be asked at all.
     pub fn serve(&mut self, pace: Pace, free: Timestamp, started: Timestamp, now: Timestamp) -> Served {
-        self.urgent = None;
+        // What was asked for while it was under way is still to be done.
+        self.urgent = self.urgent.filter(|urgent| started < *urgent);
         if !std::mem::take(&mut self.excused) {
             self.excuses = 0;
         }

@@ -186,7 +186,7 @@ fn a_device_at_rest_is_not_asked() {
 fn the_gap_of_one_device_does_not_hold_the_others() {
     let mut schedule = Schedule::new(&[block(0, every(100)), block(1, every(100))], at(0));
     schedule.done(0, at(0), at(10));
-    schedule.keep_gap(0, at(150));
+    schedule.keep_gap(DeviceId(0), at(150));
     assert_eq!(schedule.next(at(100)), Next::Run(1));
     schedule.done(1, at(100), at(110));
     assert_eq!(schedule.next(at(110)), Next::WaitUntil(at(150)), "its own next request waits");
@@ -400,7 +400,7 @@ proptest! {
                         0 | 1 => { schedule.failed(device, at(began), Duration::from_millis(300), at(now)); }
                         2 => { schedule.excused(index, ExceptionCode(6), at(now)); }
                         3 => { schedule.again(index, at(now)); }
-                        4..8 => schedule.keep_gap(index, at(now + ms)),
+                        4..8 => schedule.keep_gap(device, at(now + ms)),
                         _ => {
                             schedule.answered(device, Some(Duration::from_millis(20)), at(now));
                             schedule.spent(index, Duration::from_millis(load[index].1 as u64));

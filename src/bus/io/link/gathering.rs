@@ -7,7 +7,7 @@ use tokio::time::Instant;
 use super::{Link, Trouble};
 use crate::{
     bus::{
-        frame::{self, Mbap, Shape},
+        frame::{self, Shape},
         gather::{self, Verdict},
     },
     plant::{def::Framing, event::Fault},
@@ -88,67 +88,6 @@ impl Link {
             }
             return Ok(Gathered { answer: Err(fault), frame, reply });
         }
-    }
-
-    /// Gathers the answers to the transactions that begin with `first`; others are late answers and are dropped.
-    pub(super) async fn gather_mbap(
-        &mut self,
-        messages: &[&[u8]],
-        first: u16,
-        sent_at: Instant,
-    ) -> Result<Vec<Gathered>, Trouble> {
-        let deadline = sent_at + self.timeout;
-        let mut gathered: Vec<Option<Gathered>> = vec![None; messages.len()];
-        let (mut buffer, mut start, mut open): (Vec<u8>, usize, usize) = (Vec::new(), 0, messages.len());
-        while 0 < open {
-            match frame::mbap(&buffer[start..]) {
-                Mbap::Incomplete => {
-                    buffer.drain(..start);
-                    start = 0;
-                    if self.wire.receive(deadline, &mut buffer).await? {
-                        continue;
-                    }
-                    if !buffer.is_empty() {
-                        self.wire.record(false, buffer.into(), Cow::Borrowed("cut short"));
-                        // The rest may come later and would stand before the next header.
-                        return Err(Trouble::Gone("an answer was cut short, the stream is out of step".into()));
-                    }
-                    break;
-                }
-                Mbap::Broken => {
-                    self.wire.record(false, buffer[start..].into(), Cow::Borrowed("no MBAP header"));
-                    return Err(Trouble::Gone("the stream is out of step".into()));
-                }
-                Mbap::Whole { transaction, end } => {
-                    let frame: Arc<[u8]> = buffer[start..start + end].into();
-                    start += end;
-                    let index = usize::from(transaction.wrapping_sub(first));
-                    let Some(slot) = gathered.get_mut(index).filter(|slot| slot.is_none()) else {
-                        self.wire.drop_stale(&frame);
-                        continue;
-                    };
-                    let answer = frame[6..].to_vec();
-                    let answer = frame::check_answer(messages[index], &answer).map(|()| answer);
-                    let reply = Some(sent_at.elapsed());
-                    open -= 1;
-                    let verdict = match &answer {
-                        Ok(_) | Err(Fault::Exception(_)) => Cow::Borrowed("ok"),
-                        Err(fault) => Cow::Owned(fault.to_string()),
-                    };
-                    *slot = Some(Gathered { answer, frame: frame.clone(), reply });
-                    self.wire.record(false, frame, verdict);
-                }
-            }
-        }
-        // What stands behind the last answer nobody has asked for. If it is no header, what stood before it may be no answer.
-        self.wire.receive_waiting(&mut buffer);
-        if frame::is_out_of_step(&buffer[start..]) {
-            self.wire.record(false, buffer[start..].into(), Cow::Borrowed("no MBAP header"));
-            return Err(Trouble::Gone("the stream is out of step".into()));
-        }
-        self.wire.drop_stale(&buffer[start..]);
-        let missing = || Gathered::nothing(Err(Fault::Timeout));
-        Ok(gathered.into_iter().map(|slot| slot.unwrap_or_else(missing)).collect())
     }
 
     /// Could the sent bytes come back from the adapter? A read cannot be answered by itself, so its echo gives the adapter

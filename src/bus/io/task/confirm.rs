@@ -60,6 +60,11 @@ impl Task<'_> {
         let Some(index) = self.unconfirmed.iter().position(|write| write.next <= now) else { return Ok(Ok(())) };
         let def = self.def.clone();
         let tag = def.tag(self.unconfirmed[index].tag);
+        match self.clear_way(link, schedule, tag.device, false).await? {
+            Ok(true) => {}
+            Ok(false) => return Ok(Ok(())),
+            Err(leave) => return Ok(Err(leave)),
+        }
         let block = plan::single(def.device(tag.device), tag);
         let back = self.read_unless_stopped(link, &block, None).await;
         let at = self.clock.now();

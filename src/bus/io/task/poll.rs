@@ -1,8 +1,9 @@
-//! Reading blocks: one at a time, or several under way over Modbus TCP; what came is judged and told.
+//! Reading blocks: one at a time, or several under way over Modbus TCP; what came is evaluated and sent to the plant.
 
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use tokio::time::Instant;
 use tokio_modbus::{
     Response,
     bytes::{Buf, Bytes},
@@ -12,12 +13,15 @@ use super::{Ended, Leave, Task, Turn};
 use crate::{
     bus::{
         codec,
-        io::link::{Link, Trouble},
+        io::{
+            link::{Ended as Answered, Link, Trouble},
+            requests::STOP_WAIT,
+        },
         plan::{self, Block},
-        schedule::{Next, Schedule, Served},
+        schedule::{Next, Schedule},
     },
     plant::{
-        def::Framing,
+        def::{DeviceId, Framing},
         event::{Event, ExceptionCode, Fault},
         tag::TagDef,
         traffic::Exchange,
@@ -38,33 +42,37 @@ struct Outcome {
     exchange: Option<Arc<Exchange>>,
 }
 
+/// A read that is under way over Modbus TCP.
+pub(super) struct UnderWay {
+    /// Its transaction.
+    id: u16,
+    /// Where its block stood in the plan.
+    index: usize,
+    block: Block,
+    began: Timestamp,
+    /// Which try this is.
+    tries: u8,
+}
+
 impl Task<'_> {
-    /// Reads the block that is due, and with it others where several requests may be under way.
+    /// Reads the block that is due; over Modbus TCP also others that are, and without waiting for their answers.
     pub(super) async fn poll(&mut self, link: &mut Link, schedule: &mut Schedule, index: usize) -> Turn {
         self.polls_since_test += 1;
-        let in_flight = self.in_flight(index);
-        if 1 < in_flight {
-            return self.poll_many(link, schedule, index, in_flight).await;
+        if link.framing() == Framing::Mbap {
+            return self.poll_tcp(link, schedule, index).await;
         }
         let block = self.blocks[index].clone();
         let began = self.clock.now();
         let sent = link.last.clone();
         let timeout = link.timeout();
-        // Only where a late answer is known as one can a device be found to need more time than it did.
-        if link.framing() != Framing::Mbap {
-            link.set_timeout(schedule.patience(index, timeout));
-        }
+        link.set_timeout(schedule.patience(index, &self.settings));
         let read = self.read_unless_stopped(link, &block, Some(index)).await;
         link.set_timeout(timeout);
         let ended = self.clock.now();
         let served = schedule.done(index, began, ended);
-        self.note_served(index, served);
+        self.books.served(index, served.jitter, served.missed);
         self.note_late(link, schedule);
-        let gap = self.def.device(block.device).gap;
-        if !gap.is_zero() {
-            schedule.keep_gap(index, ended + gap);
-            link.rest_unit(block.unit, gap);
-        }
+        self.keep_gap(link, schedule, &block, ended);
         let answer = match read {
             Some(Ok(answer)) => Ok(answer),
             Some(Err(Trouble::Fault(fault))) => Err(fault),
@@ -77,9 +85,9 @@ impl Task<'_> {
         };
         // Nothing new was sent when patience was the only way.
         let exchange = link.last.clone().filter(|last| sent.as_ref().is_none_or(|sent| !Arc::ptr_eq(sent, last)));
-        let took = Duration::try_from(ended.duration_since(began)).unwrap_or_default();
-        self.settle(link, schedule, (index, &block), Outcome { began, ended, took, answer, exchange }).await?;
-        Ok(self.still_there(link))
+        let took = span(began, ended);
+        self.settle(link, schedule, Some(index), &block, Outcome { began, ended, took, answer, exchange }).await?;
+        Ok(Ok(()))
     }
 
     /// Answers that had been given up have come: their devices need more time than they used to.
@@ -93,59 +101,148 @@ impl Task<'_> {
     }
 
     /// A peer may have forgotten a connection, or hold it without ever answering: only a new one tells.
-    fn still_there(&self, link: &Link) -> Result<(), Leave> {
+    pub(super) fn still_there(&self, link: &Link) -> Result<(), Leave> {
         if self.settings.transport.serial().is_some() || link.unanswered < UNANSWERED_MAX {
             return Ok(());
         }
         Err(Leave::Lost(format!("no answer to {} requests over this connection", link.unanswered)))
     }
 
-    /// Reads all blocks that are due now, at most `in_flight` at once. Transaction ids tell their answers apart.
-    async fn poll_many(&mut self, link: &mut Link, schedule: &mut Schedule, first: usize, in_flight: usize) -> Turn {
-        let started = self.clock.now();
-        let (mut taken, mut next) = (Vec::new(), Next::Run(first));
-        while let Next::Run(index) = next {
-            if taken.len() == in_flight || taken.contains(&index) || self.in_flight(index) <= taken.len() {
-                break;
+    /// Sends what is due over Modbus TCP, as far as there is room. If there is none for more, waits for an answer.
+    async fn poll_tcp(&mut self, link: &mut Link, schedule: &mut Schedule, first: usize) -> Turn {
+        let now = self.clock.now();
+        let mut next = Next::Run(first);
+        let full = loop {
+            let Next::Run(index) = next else { break false };
+            if !link.has_room(self.blocks[index].unit) {
+                break true;
             }
-            taken.push(index);
-            let served = schedule.done(index, started, started);
-            self.note_served(index, served);
-            next = schedule.next(started);
-        }
-        // What one of them tells may change the plan: the places of the others no longer hold then.
-        let taken: Vec<(usize, Block)> = taken.into_iter().map(|index| (index, self.blocks[index].clone())).collect();
-        let requests: Vec<[u8; 6]> = taken.iter().map(|(_, block)| block.request()).collect();
-        let messages: Vec<&[u8]> = requests.iter().map(|request| &request[..]).collect();
-        let answers = self.requests.unless_stopped(link.exchange_all(&messages)).await;
-        let (began, ended) = (started, self.clock.now());
-        let answers = match answers {
-            Some(Ok(answers)) => answers,
-            Some(Err(Trouble::Gone(why))) => return Ok(Err(Leave::Lost(why))),
-            // The connection stands, so every message has its own outcome.
-            Some(Err(Trouble::Fault(_))) => return Ok(Ok(())),
-            None => {
-                taken.iter().for_each(|(index, _)| schedule.again(*index, ended));
-                return Ok(Ok(()));
+            self.begin(link, schedule, (index, self.blocks[index].clone()), now, 1);
+            schedule.begin(index, now);
+            if link.is_full() {
+                break true;
             }
+            next = schedule.next(now);
         };
-        // They share the time.
-        let took = Duration::try_from(ended.duration_since(began)).unwrap_or_default() / requests.len().max(1) as u32;
-        for ((index, block), answered) in taken.iter().zip(answers) {
-            let answer = answered.answer.and_then(|answer| parse(block, answer));
-            let exchange = Some(answered.exchange);
-            self.settle(link, schedule, (*index, block), Outcome { began, ended, took, answer, exchange }).await?;
-        }
-        Ok(self.still_there(link))
+        self.send(link, schedule, full).await
     }
 
-    /// How many requests may be under way when this block is among them.
-    fn in_flight(&self, index: usize) -> usize {
-        let device = self.def.device(self.blocks[index].device);
-        match self.settings.transport.framing() {
-            Framing::Mbap => usize::from(device.limits.in_flight_max),
-            Framing::Rtu | Framing::Ascii => 1,
+    /// Sends what was submitted, and waits for an answer if there is no room for more; all of it is given up for a stop.
+    async fn send(&mut self, link: &mut Link, schedule: &mut Schedule, full: bool) -> Turn {
+        let sent = async {
+            link.flush().await?;
+            if full { link.wait_for_answer().await } else { Ok(()) }
+        };
+        let sent = self.requests.unless_stopped(sent).await;
+        if sent.is_none() {
+            self.give_up_reads(link, schedule);
         }
+        Ok(sent.unwrap_or(Ok(())).map_err(Leave::from))
+    }
+
+    /// What is under way is read later: a stop cannot wait for it.
+    fn give_up_reads(&mut self, link: &mut Link, schedule: &mut Schedule) {
+        link.give_up_all();
+        let now = self.clock.now();
+        for UnderWay { index, block, began, .. } in std::mem::take(&mut self.under_way) {
+            if let Some(index) = self.place_of(index, &block) {
+                let served = schedule.done(index, began, now);
+                self.books.served(index, served.jitter, served.missed);
+                schedule.again(index, now);
+            }
+        }
+    }
+
+    fn begin(
+        &mut self,
+        link: &mut Link,
+        schedule: &Schedule,
+        (index, block): (usize, Block),
+        began: Timestamp,
+        tries: u8,
+    ) {
+        let patience = schedule.patience(index, &self.settings);
+        let id = link.submit(&block.request(), patience);
+        self.under_way.push(UnderWay { id, index, block, began, tries });
+    }
+
+    /// Takes what has come of the requests under way.
+    pub(super) async fn take_answers(&mut self, link: &mut Link, schedule: &mut Schedule) -> Turn {
+        for Answered { id, answer, at, mut exchange } in link.take_ended() {
+            let Some(place) = self.under_way.iter().position(|read| read.id == id) else { continue };
+            let UnderWay { index, block, began, tries, .. } = self.under_way.swap_remove(place);
+            let index = self.place_of(index, &block);
+            let answer = answer.and_then(|answer| parse(&block, answer));
+            if let (Err(fault), Some(index), 1) = (&answer, index, tries)
+                && fault.is_corrupt()
+                && link.has_room(block.unit)
+            {
+                // A retry that cures it must not hide it.
+                self.books.polled(Some(index), block.device, Err(*fault), None, 1);
+                self.begin(link, schedule, (index, block), self.clock.now(), 2);
+                continue;
+            }
+            Arc::make_mut(&mut exchange).tries = tries;
+            let ended = self.clock.at(at);
+            let device = self.def.device(block.device);
+            // It has taken one of the places that there are.
+            let took = span(began, ended) / u32::from(device.limits.in_flight_max.max(1));
+            if let Some(index) = index {
+                let served = schedule.done(index, began, ended);
+                self.books.served(index, served.jitter, served.missed);
+                self.keep_gap(link, schedule, &block, ended);
+            }
+            let outcome = Outcome { began, ended, took, answer, exchange: Some(exchange) };
+            self.settle(link, schedule, index, &block, outcome).await?;
+        }
+        self.note_late(link, schedule);
+        self.send(link, schedule, false).await
+    }
+
+    /// Waits until nothing of a device is under way, so that no value that was read before what comes next is shown after it.
+    /// For an `urgent` one what does not end soon is given up; another one gives way to a stop: `false`.
+    pub(super) async fn clear_way(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        device: DeviceId,
+        urgent: bool,
+    ) -> Result<Result<bool, Leave>, Ended> {
+        let (unit, until) = (self.def.device(device).unit, Instant::now() + STOP_WAIT);
+        while !link.is_free(unit) {
+            let answer = link.wait_for_answer();
+            let waited = match urgent {
+                true => tokio::time::timeout_at(until, answer).await.ok(),
+                false => self.requests.unless_stopped(answer).await,
+            };
+            let Some(waited) = waited else {
+                self.give_up_reads(link, schedule);
+                return Ok(Ok(urgent));
+            };
+            if let Err(trouble) = waited {
+                return Ok(Err(Leave::from(trouble)));
+            }
+            if let Err(leave) = self.take_answers(link, schedule).await? {
+                return Ok(Err(leave));
+            }
+        }
+        Ok(Ok(true))
+    }
+
+    fn keep_gap(&self, link: &mut Link, schedule: &mut Schedule, block: &Block, ended: Timestamp) {
+        let gap = self.def.device(block.device).gap;
+        if !gap.is_zero() {
+            schedule.keep_gap(block.device, ended + gap);
+            link.rest_unit(block.unit, gap);
+        }
+    }
+
+    /// Where a block stands that stood at `planned_at`: another answer may have changed the plan meanwhile.
+    fn place_of(&self, planned_at: usize, block: &Block) -> Option<usize> {
+        if self.blocks.get(planned_at).is_some_and(|planned| planned == block) {
+            return Some(planned_at);
+        }
+        self.blocks.iter().position(|planned| planned == block)
     }
 
     /// Judges what came of a block and tells it.
@@ -153,15 +250,10 @@ impl Task<'_> {
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
-        (planned_at, block): (usize, &Block),
+        index: Option<usize>,
+        block: &Block,
         Outcome { began, ended: at, took, answer, exchange }: Outcome,
     ) -> Result<(), Ended> {
-        // Another answer may have changed the plan meanwhile.
-        let index = if self.blocks.get(planned_at).is_some_and(|planned| planned == block) {
-            Some(planned_at)
-        } else {
-            self.blocks.iter().position(|planned| planned == block)
-        };
         let reply = exchange.as_ref().and_then(|exchange| exchange.reply);
         if let Some(exchange) = &exchange {
             let outcome = answer.as_ref().map(drop).map_err(|fault| *fault);
@@ -263,10 +355,6 @@ impl Task<'_> {
         self.blocks = blocks;
     }
 
-    fn note_served(&mut self, index: usize, served: Served) {
-        self.books.served(index, served.jitter, served.missed);
-    }
-
     async fn tell_values(
         &mut self,
         at: Timestamp,
@@ -302,6 +390,10 @@ fn proven(link: &Link, block: &Block) -> Result<(), Trouble> {
 pub(super) enum Answer {
     Bits(Vec<bool>),
     Words(Vec<u16>),
+}
+
+fn span(from: Timestamp, to: Timestamp) -> Duration {
+    Duration::try_from(to.duration_since(from)).unwrap_or_default()
 }
 
 /// Makes sure that the answer to a block cannot be mistaken for one that the unit still owes: by a read of another shape,

@@ -6,6 +6,7 @@ use jiff::Timestamp;
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
     sync::{mpsc, watch},
+    time::Instant,
 };
 
 use crate::{
@@ -119,6 +120,8 @@ pub enum Deed {
     Answer,
     /// Answers after this time; the next request waits for its turn, as behind a gateway.
     Late(Duration),
+    /// Answers after this time; the next requests are answered meanwhile.
+    Meanwhile(Duration),
     Silent,
     /// The answer in two pieces, cut here, the second piece after this time.
     Torn(usize, Duration),
@@ -147,6 +150,7 @@ pub fn correct(message: &[u8]) -> Vec<u8> {
 /// Serves until the stream closes; `script(n, message)` says what to do with the n-th request.
 async fn slave(mut stream: DuplexStream, mode: Mode, mut script: impl FnMut(usize, &[u8]) -> Deed) {
     let mut buffer = Vec::new();
+    let mut slow: Vec<(Instant, Vec<u8>)> = Vec::new();
     for number in 0.. {
         let (transaction, message) = loop {
             if let Some(end) = mode.end(&buffer) {
@@ -155,8 +159,19 @@ async fn slave(mut stream: DuplexStream, mode: Mode, mut script: impl FnMut(usiz
                 let message = frame::unwrap(mode.framing(), &frame).expect("the master sends good frames");
                 break (transaction, message);
             }
+            slow.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
+            let due = slow.last().map(|(at, _)| *at);
             let mut chunk = [0; 256];
-            match stream.read(&mut chunk).await {
+            let read = tokio::select! {
+                read = stream.read(&mut chunk) => read,
+                () = tokio::time::sleep_until(due.unwrap_or_else(Instant::now)), if due.is_some() => {
+                    if let Some((_, answer)) = slow.pop() {
+                        let _ = stream.write_all(&answer).await;
+                    }
+                    continue;
+                }
+            };
+            match read {
                 Ok(0) | Err(_) => return,
                 Ok(count) => buffer.extend_from_slice(&chunk[..count]),
             }
@@ -168,6 +183,10 @@ async fn slave(mut stream: DuplexStream, mode: Mode, mut script: impl FnMut(usiz
             Deed::Late(delay) => {
                 tokio::time::sleep(delay).await;
                 answer
+            }
+            Deed::Meanwhile(delay) => {
+                slow.push((Instant::now() + delay, answer));
+                continue;
             }
             Deed::Silent => continue,
             Deed::Torn(at, pause) => {
@@ -265,7 +284,12 @@ impl Line {
     }
 }
 
-/// Goes on until the line has been silent for three seconds: it waits for the answer of a unit that is not there.
+/// Goes on until nothing has come of the first unit for three seconds: the line waits for its answer.
 pub async fn until_silent(line: &mut Line, def: &PlantDef) {
-    while tokio::time::timeout(Duration::from_secs(3), line.next(def)).await.is_ok() {}
+    let mut last = Instant::now();
+    while let Ok(event) = tokio::time::timeout_at(last + Duration::from_secs(3), line.next(def)).await {
+        if matches!(event, Event::Read { device: DeviceId(0), .. } | Event::Failed { device: DeviceId(0), .. }) {
+            last = Instant::now();
+        }
+    }
 }

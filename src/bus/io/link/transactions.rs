@@ -1,0 +1,384 @@
+//! Modbus TCP: several requests under way at once, told apart by their transaction ids; no answer waits for a slower one.
+//!
+//! ```text
+//!  submit ─> flush ─> under way ──answer──────────> ended ─> take_ended
+//!                          └──────timeout─> given up ──late answer: dropped, its unit is noted
+//! ```
+
+use std::{borrow::Cow, collections::VecDeque, sync::Arc, time::Duration};
+
+use tokio::time::Instant;
+
+use super::{Link, Trouble};
+use crate::{
+    bus::frame::{self, Mbap},
+    plant::{def::Framing, event::Fault, traffic::Exchange},
+};
+
+/// Ids of requests that were given up are remembered, and not used again, as long as there are no more than these.
+const GIVEN_UP_MAX: usize = 256;
+/// Looked at again after this time at the latest.
+const LOOK_AGAIN: Duration = Duration::from_secs(3_600);
+
+/// A request with what came back.
+#[derive(Debug, Clone)]
+pub struct Ended {
+    /// Its transaction id.
+    pub id: u16,
+    /// Unit and PDU of the answer, or why there is none.
+    pub answer: Result<Vec<u8>, Fault>,
+    /// When the answer came, or was given up.
+    pub at: Instant,
+    /// Both as they were on the wire.
+    pub exchange: Arc<Exchange>,
+}
+
+/// A request that is under way.
+#[derive(Debug)]
+struct Transaction {
+    id: u16,
+    /// Unit and PDU.
+    message: Vec<u8>,
+    frame: Arc<[u8]>,
+    timeout: Duration,
+    /// `None` until it is flushed.
+    sent_at: Option<Instant>,
+}
+
+impl Transaction {
+    fn is_to(&self, unit: u8) -> bool {
+        self.message.first() == Some(&unit)
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        Some(self.sent_at? + self.timeout)
+    }
+}
+
+/// Whose answer a transaction id announces.
+#[derive(Debug)]
+enum Owner {
+    UnderWay(Transaction),
+    /// The request to this unit was given up.
+    Late(u8),
+    Unknown,
+}
+
+/// The requests under way on one connection.
+#[derive(Debug)]
+pub(super) struct Transactions {
+    last_id: u16,
+    under_way: Vec<Transaction>,
+    /// The latest that were not answered in time: id and unit.
+    given_up: VecDeque<(u16, u8)>,
+    /// By unit: how many may be under way beside one to this unit, that one included.
+    limits: [u16; 256],
+    /// Bytes of a frame that has not come as a whole.
+    inbox: Vec<u8>,
+    /// Requests that wait for their place in the next write.
+    outbox: Vec<u8>,
+    /// A write has begun and has not ended.
+    sending: bool,
+    ended: Vec<Ended>,
+    /// Since when the line is busy.
+    busy_since: Option<Instant>,
+    /// When the last silence was counted: what was under way then adds nothing.
+    silence_at: Option<Instant>,
+}
+
+impl Transactions {
+    pub fn new() -> Transactions {
+        Transactions {
+            last_id: 0,
+            under_way: Vec::new(),
+            given_up: VecDeque::new(),
+            limits: [1; 256],
+            inbox: Vec::new(),
+            outbox: Vec::new(),
+            sending: false,
+            ended: Vec::new(),
+            busy_since: None,
+            silence_at: None,
+        }
+    }
+
+    /// The most that may be under way now.
+    fn limit(&self) -> usize {
+        let units = self.under_way.iter().filter_map(|request| request.message.first());
+        units.map(|unit| usize::from(self.limits[usize::from(*unit)])).min().unwrap_or(usize::MAX)
+    }
+
+    fn has_room(&self, unit: u8) -> bool {
+        self.under_way.len() < self.limit().min(self.limits[usize::from(unit)].into())
+    }
+
+    fn begin(&mut self, message: &[u8], timeout: Duration) -> u16 {
+        self.last_id = self.last_id.wrapping_add(1);
+        while self.under_way.iter().any(|request| request.id == self.last_id)
+            || self.given_up.iter().any(|(id, _)| *id == self.last_id)
+        {
+            self.last_id = self.last_id.wrapping_add(1);
+        }
+        let (id, frame) = (self.last_id, frame::with_mbap(self.last_id, message));
+        self.outbox.extend_from_slice(&frame);
+        self.under_way.push(Transaction { id, message: message.to_vec(), frame: frame.into(), timeout, sent_at: None });
+        id
+    }
+
+    fn take(&mut self, id: u16) -> Owner {
+        if let Some(place) = self.under_way.iter().position(|request| request.id == id) {
+            return Owner::UnderWay(self.under_way.swap_remove(place));
+        }
+        let place = self.given_up.iter().position(|(given_up, _)| *given_up == id);
+        place.and_then(|place| self.given_up.remove(place)).map_or(Owner::Unknown, |(_, unit)| Owner::Late(unit))
+    }
+
+    /// Those whose time is over; their answers may still come.
+    fn expire(&mut self, now: Instant) -> Vec<Transaction> {
+        let is_over = |request: &mut Transaction| request.deadline().is_some_and(|deadline| deadline <= now);
+        let expired: Vec<Transaction> = self.under_way.extract_if(.., is_over).collect();
+        for request in &expired {
+            if self.given_up.len() == GIVEN_UP_MAX {
+                self.given_up.pop_front();
+            }
+            self.given_up.extend(request.message.first().map(|unit| (request.id, *unit)));
+        }
+        expired
+    }
+
+    /// Has a frame begun that answers nothing under way?
+    fn is_cut_short(&self) -> bool {
+        let id = self.inbox.first_chunk::<2>().map(|id| u16::from_be_bytes(*id));
+        !self.inbox.is_empty() && !self.under_way.iter().any(|request| Some(request.id) == id)
+    }
+}
+
+impl Link {
+    /// How many requests a unit takes at once, over Modbus TCP.
+    pub fn allow(&mut self, unit: u8, in_flight_max: u16) {
+        self.transactions.limits[usize::from(unit)] = in_flight_max.max(1);
+    }
+
+    /// May another request be sent, to this unit, beside those that are under way?
+    pub fn has_room(&self, unit: u8) -> bool {
+        self.transactions.has_room(unit)
+    }
+
+    /// Is there no room for any other request?
+    pub fn is_full(&self) -> bool {
+        self.transactions.limit() <= self.transactions.under_way.len()
+    }
+
+    /// Is nothing of this unit under way, and room for a request to it?
+    pub fn is_free(&self, unit: u8) -> bool {
+        self.has_room(unit) && !self.transactions.under_way.iter().any(|request| request.is_to(unit))
+    }
+
+    /// Puts a message (unit and PDU) among those that the next [`Link::flush`] sends; gives its transaction id.
+    pub fn submit(&mut self, message: &[u8], timeout: Duration) -> u16 {
+        self.transactions.begin(message, timeout)
+    }
+
+    /// Sends what was submitted in one write, once the line has rested long enough.
+    pub async fn flush(&mut self) -> Result<(), Trouble> {
+        if self.transactions.outbox.is_empty() {
+            return Ok(());
+        }
+        while let Some(rests_until) = self.wire.rests_until() {
+            self.collect(rests_until).await?;
+        }
+        let bytes = std::mem::take(&mut self.transactions.outbox);
+        if std::mem::replace(&mut self.transactions.sending, true) {
+            return Err(Trouble::Gone("a request was cut short, the stream is out of step".into()));
+        }
+        let sent_at = self.wire.put(&bytes).await?;
+        self.transactions.sending = false;
+        self.transactions.busy_since.get_or_insert(sent_at);
+        for place in 0..self.transactions.under_way.len() {
+            let request = &mut self.transactions.under_way[place];
+            if request.sent_at.is_none() {
+                request.sent_at = Some(sent_at);
+                let frame = request.frame.clone();
+                self.note_sent(frame);
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns when a request has ended, or none is under way.
+    pub async fn wait_for_answer(&mut self) -> Result<(), Trouble> {
+        while self.transactions.ended.is_empty() && !self.transactions.under_way.is_empty() {
+            self.collect(Instant::now() + LOOK_AGAIN).await?;
+        }
+        Ok(())
+    }
+
+    /// Takes what comes unasked; returns when a request has ended.
+    pub(super) async fn idle_mbap(&mut self) -> Result<(), Trouble> {
+        while self.transactions.ended.is_empty() {
+            self.collect(Instant::now() + LOOK_AGAIN).await?;
+        }
+        Ok(())
+    }
+
+    /// The requests that have ended since this was last asked.
+    pub fn take_ended(&mut self) -> Vec<Ended> {
+        std::mem::take(&mut self.transactions.ended)
+    }
+
+    /// Sends a message and waits for its own answer; what else ends meanwhile is kept. Nothing else of the unit is under way.
+    pub(super) async fn exchange_mbap(&mut self, message: &[u8]) -> Result<Vec<u8>, Trouble> {
+        let unit = message.first().copied().unwrap_or_default();
+        while !self.is_free(unit) {
+            self.collect(Instant::now() + LOOK_AGAIN).await?;
+        }
+        while let Some(until) = self.gap_of(unit) {
+            self.collect(until).await?;
+        }
+        let id = self.submit(message, self.timeout);
+        self.asked_id = Some(id);
+        self.flush().await?;
+        loop {
+            let ended = &mut self.transactions.ended;
+            if let Some(place) = ended.iter().position(|ended| ended.id == id) {
+                let Ended { answer, exchange, .. } = ended.remove(place);
+                (self.asked_id, self.last) = (None, Some(exchange));
+                return answer.map_err(Trouble::Fault);
+            }
+            self.collect(Instant::now() + LOOK_AGAIN).await?;
+        }
+    }
+
+    /// Waits until nothing is under way; what ends meanwhile is kept.
+    pub(super) async fn finish_all(&mut self) -> Result<(), Trouble> {
+        while !self.transactions.under_way.is_empty() {
+            self.collect(Instant::now() + LOOK_AGAIN).await?;
+        }
+        Ok(())
+    }
+
+    /// No request is waited for any longer; what was not sent is not sent. Whose answers come all the same is not late.
+    pub fn give_up_all(&mut self) {
+        self.transactions.outbox.clear();
+        self.transactions.under_way.clear();
+        self.transactions.ended.clear();
+        self.close_busy(Instant::now());
+    }
+
+    /// The request under way is not waited for any longer.
+    pub(super) fn abandon_mbap(&mut self) {
+        let Some(id) = self.asked_id.take() else { return };
+        if let Owner::UnderWay(request) = self.transactions.take(id) {
+            if request.sent_at.is_none() {
+                self.transactions.outbox.clear();
+            }
+        }
+        self.transactions.ended.retain(|ended| ended.id != id);
+        self.close_busy(Instant::now());
+    }
+
+    /// Real time in which the line was busy since this was last asked.
+    pub fn take_busy(&mut self) -> Duration {
+        if let Some(since) = &mut self.transactions.busy_since {
+            self.busy += since.elapsed();
+            *since = Instant::now();
+        }
+        std::mem::take(&mut self.busy)
+    }
+
+    fn close_busy(&mut self, now: Instant) {
+        if self.transactions.under_way.is_empty()
+            && let Some(since) = self.transactions.busy_since.take()
+        {
+            self.busy += now.saturating_duration_since(since);
+        }
+    }
+
+    /// Takes what comes until `until`, or until the first time for an answer is over. May be dropped while it waits.
+    async fn collect(&mut self, until: Instant) -> Result<(), Trouble> {
+        let deadlines = self.transactions.under_way.iter().filter_map(Transaction::deadline);
+        let until = deadlines.fold(until, Instant::min);
+        if self.wire.receive(until, &mut self.transactions.inbox).await? {
+            // What stands behind an answer shows whether it was one.
+            self.wire.receive_waiting(&mut self.transactions.inbox);
+            self.take_frames_mbap()?;
+        }
+        let now = Instant::now();
+        let expired = self.transactions.expire(now);
+        if !expired.is_empty() && self.transactions.is_cut_short() {
+            self.wire.record(false, self.transactions.inbox[..].into(), Cow::Borrowed("cut short"));
+            // The rest may come later and would stand before the next header.
+            return Err(Trouble::Gone("an answer was cut short, the stream is out of step".into()));
+        }
+        for request in expired {
+            if self.transactions.silence_at <= request.sent_at {
+                (self.transactions.silence_at, self.unanswered) = (Some(now), self.unanswered.saturating_add(1));
+            }
+            let ended = self.end(request, Err(Fault::Timeout), Arc::default(), now);
+            self.transactions.ended.push(ended);
+        }
+        self.close_busy(now);
+        Ok(())
+    }
+
+    /// Assigns the whole frames that have come to their requests. If what stands behind them is no header, none of them is an
+    /// answer: each may be a piece of something else.
+    fn take_frames_mbap(&mut self) -> Result<(), Trouble> {
+        let (mut bytes, mut start, now) = (std::mem::take(&mut self.transactions.inbox), 0, Instant::now());
+        if frame::is_out_of_step(&bytes) {
+            self.wire.record(false, bytes.into(), Cow::Borrowed("no MBAP header"));
+            return Err(Trouble::Gone("the stream is out of step".into()));
+        }
+        while let Mbap::Whole { transaction, end } = frame::mbap(&bytes[start..]) {
+            let frame = &bytes[start..start + end];
+            start += end;
+            match self.transactions.take(transaction) {
+                Owner::Unknown => self.wire.drop_stale(frame),
+                Owner::Late(unit) => {
+                    self.wire.drop_late(unit, frame);
+                    // It is slower than it was: what else it was asked has the whole timeout.
+                    let others = self.transactions.under_way.iter_mut().filter(|request| request.is_to(unit));
+                    others.for_each(|request| request.timeout = request.timeout.max(self.timeout));
+                }
+                Owner::UnderWay(request) => {
+                    let answer = frame[6..].to_vec();
+                    let answer = frame::check_answer(&request.message, &answer).map(|()| answer);
+                    self.unanswered = 0;
+                    let ended = self.end(request, answer, frame.into(), now);
+                    self.transactions.ended.push(ended);
+                }
+            }
+        }
+        bytes.drain(..start);
+        self.transactions.inbox = bytes;
+        Ok(())
+    }
+
+    /// Counts and records how a request has ended.
+    fn end(&mut self, request: Transaction, answer: Result<Vec<u8>, Fault>, frame: Arc<[u8]>, now: Instant) -> Ended {
+        let sent_at = request.sent_at.unwrap_or(now);
+        match &answer {
+            Ok(_) => self.wire.counters.ok += 1,
+            Err(fault) => self.account(&request.message, *fault),
+        }
+        let reply = (!frame.is_empty()).then(|| now.saturating_duration_since(sent_at));
+        if reply.is_some() {
+            let verdict = match &answer {
+                Ok(_) | Err(Fault::Exception(_)) => Cow::Borrowed("ok"),
+                Err(fault) => Cow::Owned(fault.to_string()),
+            };
+            self.wire.record(false, frame.clone(), verdict);
+        }
+        self.wire.rest(self.wire.silence);
+        let exchange = Exchange {
+            at: self.wire.clock().to_utc(self.wire.clock().at(sent_at)),
+            framing: Framing::Mbap,
+            request: request.frame,
+            answer: frame,
+            outcome: answer.as_ref().map(drop).map_err(|fault| *fault),
+            reply,
+            tries: 1,
+        };
+        Ended { id: request.id, answer, at: now, exchange: Arc::new(exchange) }
+    }
+}
