@@ -241,6 +241,8 @@ impl Link {
     /// A stop is sent next: it waits for what is just coming in, not for what may still come.
     pub fn hurry(&mut self) {
         self.wire.rest_at_most(self.idle);
+        let latest = Instant::now() + self.idle;
+        self.gaps.iter_mut().for_each(|(_, until)| *until = (*until).min(latest));
     }
 
     /// Sends the frame of a message; until its answer is taken it may be given up.

@@ -163,7 +163,9 @@ impl Task<'_> {
         if !urgent && self.requests.stop_waits() {
             return Ok(WriteResult::Overtaken);
         }
-        match self.send_write(link, device, request, urgent && !rests).await {
+        let sent = self.send_write(link, device, request, urgent && !rests).await;
+        self.keep_write_gap(link, schedule, device);
+        match sent {
             Ok(()) => {
                 schedule.answered(tag.device, None, self.clock.now());
                 Ok(WriteResult::Accepted)
@@ -225,6 +227,16 @@ impl Task<'_> {
         }
     }
 
+    /// The device is left alone for a while after a write; the others are not, unless it was a broadcast.
+    fn keep_write_gap(&self, link: &mut Link, schedule: &mut Schedule, device: &DeviceDef) {
+        if device.unit == 0 {
+            link.rest(device.write_gap);
+        } else if !device.write_gap.is_zero() {
+            schedule.keep_gap(device.id, self.clock.now() + device.write_gap);
+            link.rest_unit(device.unit, device.write_gap);
+        }
+    }
+
     /// Sends a write. Unless it `keeps` the line, it waits for its answer no longer than a stop behind it allows.
     async fn send_write(
         &mut self,
@@ -235,7 +247,6 @@ impl Task<'_> {
     ) -> Result<(), Trouble> {
         let sent = link.call(device.unit, request);
         let sent = if keeps { Some(sent.await) } else { self.requests.unless_stopped(sent).await };
-        link.rest(device.write_gap);
         let Some(sent) = sent else {
             link.abandon();
             return Err(Fault::Timeout.into());

@@ -125,6 +125,35 @@ async fn a_stop_does_not_wait_for_the_answers_of_other_units() {
     assert!(waited < 50, "{waited} ms");
 }
 
+/// A unit that wants to be left alone after a write does not hold the others; it is asked again when its gap is over.
+#[tokio::test(start_paused = true)]
+async fn the_gap_of_a_unit_after_a_write_does_not_hold_the_others() {
+    for mode in Mode::ALL {
+        let mut def = plant(mode);
+        def.devices[0].write_gap = 700 * MS;
+        for tag in &mut def.tags {
+            tag.poll = if tag.point.address == 10 { Poll::Every(100 * MS) } else { Poll::Never };
+        }
+        let mut line = line(def.clone());
+        line.plug(mode, |_, _| Deed::Answer);
+        let first = |event: &Event| matches!(event, Event::Read { device: DeviceId(1), .. }).then_some(());
+        line.until(&def, first).await;
+        let request =
+            BusRequest::Write { id: WriteId(1), tag: TagId(0), raw: 10.0, unlock: None, verify: false, urgent: false };
+        line.requests.send(request).await.expect("the line runs");
+        line.until(&def, |event| matches!(event, Event::Wrote { .. }).then_some(())).await;
+        let mut others = 0;
+        loop {
+            match line.next(&def).await {
+                Event::Read { device: DeviceId(0), .. } => break,
+                Event::Read { .. } => others += 1,
+                _ => {}
+            }
+        }
+        assert!((5..=7).contains(&others), "{mode:?}: {others} reads of the other unit in 0.7 s");
+    }
+}
+
 /// A unit of a network that has always answered at once is not waited for the whole timeout of 2 s once it is silent.
 #[tokio::test(start_paused = true)]
 async fn a_fast_unit_that_dies_is_not_waited_for_long_over_tcp() {
