@@ -66,7 +66,7 @@ pub struct Schedule {
     polls: Vec<Pending>,
     /// Those of devices that answer, as they come.
     queue: Queue,
-    /// What the places of many polls depend on has changed: the queue is filled anew before it is looked at.
+    /// What the places of many polls depend on has changed: the queue is rebuilt before it is looked at.
     stale: bool,
     devices: Vec<Health>,
     overload: Overload,
@@ -329,7 +329,7 @@ impl Schedule {
         let Some(place) = self.place_of(device) else { return false };
         self.probes.spent(spent, now);
         self.stale |= self.devices[place].probe_at.is_none();
-        // Those that wait for their second or third try come first: nobody fails for long before it is given up.
+        // Those that wait for their second or third try come first: none fails for long before it is given up.
         let waiting = self.devices.iter().filter(|other| other.device != device && other.is_failing()).count();
         let affordable = self.probes.affords(spent * waiting as u32, now);
         self.devices[place].failed(sent, now, affordable)
@@ -337,7 +337,8 @@ impl Schedule {
 
     /// How long the answer to a block is waited for (real time), at most the timeout of its line.
     pub fn patience(&self, index: usize, line: &LineDef) -> Duration {
-        self.devices[self.polls[index].place].patience(line)
+        let neighbour = || self.devices.iter().filter_map(Health::slowest).max();
+        self.devices[self.polls[index].place].patience(line, neighbour)
     }
 
     /// The device is not to be asked before `until`.

@@ -1,7 +1,7 @@
 //! What a schedule knows of a device: whether it answers, how fast, and when it may be asked.
 //!
 //! ```text
-//!             no answer               3 in a row, or it has never answered, or no time for another try
+//!             no answer               3 in a row (2 if it has never answered), or no time for a third try
 //!   answering ─────────> failing ───────────────────────────────────────────────────────────> down
 //!             <─────────         second try at once, third after 1 s: only its first block
 //!               an answer                                                                   probed with that
@@ -18,6 +18,8 @@ use crate::{
 
 /// Failures in a row after which a device that has answered before is given up and only probed.
 pub const FAILURES_MAX: u32 = 3;
+/// The same for one that has never answered: it may have lost its first frame, and has no values to lose.
+const FIRST_FAILURES_MAX: u32 = 2;
 /// After so many answers it is known how fast a device answers.
 const ANSWERS_MIN: u32 = 32;
 /// A device that has always answered faster is waited for so many times its slowest answer …
@@ -102,7 +104,7 @@ impl Health {
         self.slowest = Duration::MAX;
     }
 
-    /// It was asked; what came of it is told later, or never if nothing could be sent: then it is asked again in a while.
+    /// It was asked; the outcome follows, or never comes if nothing could be sent: then it is asked again after a while.
     pub fn tried(&mut self, now: Timestamp) {
         if let Some(probe_at) = &mut self.probe_at {
             (*probe_at, self.prompt) = (now + TRIED_AGAIN, false);
@@ -117,18 +119,17 @@ impl Health {
             return false;
         }
         (self.failed_at, self.failures) = (now, self.failures.saturating_add(1));
-        // A device that has answered until now may have lost one frame.
-        self.prompt = self.failures == 1 && 0 < self.answers;
+        // One frame may have been lost.
+        self.prompt = self.failures == 1;
         self.thorough = false;
-        // One that has never answered has nothing to lose: without a second try it is known at once who is there.
-        let tries = if self.answers == 0 { 1 } else { FAILURES_MAX };
+        let tries = if self.answers == 0 { FIRST_FAILURES_MAX } else { FAILURES_MAX };
         let goes_down = !self.down && (tries <= self.failures || !(affordable || self.prompt));
         self.down |= goes_down;
         self.probe_at = Some(if self.prompt { now } else { now + self.backoff.fail() });
         goes_down
     }
 
-    /// It is asked again at once, and the waits between tries begin anew.
+    /// It is asked again at once, and the waits between tries start from the shortest.
     pub fn retry(&mut self, now: Timestamp) {
         if self.probe_at.is_some() {
             self.backoff.reset();
@@ -136,14 +137,25 @@ impl Health {
         }
     }
 
-    /// How long an answer is waited for (real time), at most the timeout of the line.
-    pub fn patience(&self, line: &LineDef) -> Duration {
+    /// The slowest answer so far; `None` before the first.
+    pub fn slowest(&self) -> Option<Duration> {
+        (0 < self.answers).then_some(self.slowest)
+    }
+
+    /// How long an answer is waited for (real time), at most the timeout of the line. One that has never answered is waited
+    /// for so long once; then as if it were as slow as the slowest `neighbour` that answers, if there is one.
+    pub fn patience(&self, line: &LineDef, neighbour: impl FnOnce() -> Option<Duration>) -> Duration {
         let timeout = line.timeout;
         let least = if line.transport.serial().is_some() { PATIENCE_MIN } else { NETWORK_PATIENCE_MIN };
         let whole = self.thorough || self.failures % WHOLE_TIMEOUT_EVERY == WHOLE_TIMEOUT_EVERY - 1;
-        if whole || self.answers < ANSWERS_MIN {
-            return timeout;
+        let slowest = match self.answers {
+            0 if 0 < self.failures => neighbour().map(|neighbour| neighbour.max(self.slowest)),
+            ANSWERS_MIN.. => Some(self.slowest),
+            _ => None,
+        };
+        match slowest {
+            Some(slowest) if !whole => slowest.saturating_mul(SLOWER_MAX).max(least).min(timeout),
+            _ => timeout,
         }
-        self.slowest.saturating_mul(SLOWER_MAX).max(least).min(timeout)
     }
 }

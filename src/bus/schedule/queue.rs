@@ -35,7 +35,7 @@ pub(super) struct Queue {
 }
 
 impl Queue {
-    /// All of them anew.
+    /// Replaces all of them.
     pub fn fill(&mut self, spots: impl Iterator<Item = Option<Spot>>) {
         *self = Queue { spots: spots.collect(), ..Queue::default() };
         let from = |(index, spot): (usize, &Option<Spot>)| Some((spot.as_ref()?.from, index));
