@@ -1,4 +1,5 @@
-//! Alarms: one condition each, on a tag, device or line; "gives no values" for every device; the faults of the station.
+//! Alarms: one condition each, on a tag, device or line; "gives no values" for every device, "line overloaded" for every
+//! line; the faults of the station.
 
 use std::{collections::HashMap, time::Duration};
 
@@ -11,7 +12,7 @@ use super::{
     schema::{AlarmTable, Need, PlantFile},
 };
 use crate::plant::{
-    def::{AlarmClass, AlarmDef, AlarmId, AlarmRules, Condition, DeviceDef, Guidance, Priority, Subject},
+    def::{AlarmClass, AlarmDef, AlarmId, AlarmRules, Condition, DeviceDef, Guidance, LineDef, Priority, Subject},
     station::StationFault,
 };
 
@@ -22,8 +23,11 @@ const SHELVE_MIN: Duration = Duration::from_secs(60);
 
 /// The name of the alarm that every device has.
 const NO_VALUES: &str = "gives no values";
+/// The name of the alarm that every line has.
+const OVERLOADED: &str = "line overloaded";
 
-/// The alarms of a plant file, one for each device that does not have its own "gives no values", and those of the station.
+/// The alarms of a plant file, one for each device that does not have its own "gives no values" and for each line that does
+/// not have its own "line overloaded", and those of the station.
 pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Problems) -> Vec<AlarmDef> {
     let mut alarms = Vec::new();
     for table in tables.iter().map(|table| &table.value) {
@@ -34,13 +38,12 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
     }
     check_names(tables, problems);
     check_order(tables, problems);
-    for device in defs.devices {
-        let own = |alarm: &AlarmDef| {
-            alarm.subject == Subject::Device(device.id) && alarm.condition == Condition::NotAnswering
-        };
-        if !alarms.iter().any(own) {
-            check_generated(tables, device, problems);
-            alarms.push(not_answering(AlarmId(alarms.len() as u16), device));
+    let of_devices = defs.devices.iter().map(|device| (&device.name, not_answering(device)));
+    let of_lines = defs.lines.iter().map(|line| (&line.name, overloaded(line)));
+    for (name, alarm) in of_devices.chain(of_lines) {
+        if !alarms.iter().any(|own| (own.subject, own.condition) == (alarm.subject, alarm.condition)) {
+            check_generated(tables, name, &alarm.text, problems);
+            alarms.push(AlarmDef { id: AlarmId(alarms.len() as u16), ..alarm });
         }
     }
     for fault in StationFault::ALL {
@@ -63,14 +66,14 @@ fn check_names(tables: &[At<AlarmTable>], problems: &mut Problems) {
     }
 }
 
-/// The same where the other one is not in the file: the alarm that every device has.
-fn check_generated(tables: &[At<AlarmTable>], device: &DeviceDef, problems: &mut Problems) {
+/// The same where the other one is not in the file: the alarm that every device or line has.
+fn check_generated(tables: &[At<AlarmTable>], name: &str, generated: &str, problems: &mut Problems) {
     for table in tables.iter().map(|table| &table.value) {
         let subject = table.tag.as_ref().or(table.device.as_ref()).or(table.line.as_ref());
-        let same = subject.is_some_and(|subject| subject.value == device.name);
-        if let Some(text) = table.text.as_ref().filter(|text| same && text.value == NO_VALUES) {
-            let problem = problems.add(text.at, format!("duplicate alarm `{NO_VALUES}` of {}", device.name));
-            problem.label("the device has one of this name of its own: expected another text");
+        let same = subject.is_some_and(|subject| subject.value == name);
+        if let Some(text) = table.text.as_ref().filter(|text| same && text.value == generated) {
+            let problem = problems.add(text.at, format!("duplicate alarm `{generated}` of {name}"));
+            problem.label("the station adds one of this name by itself: expected another text");
         }
     }
 }
@@ -159,7 +162,7 @@ fn check_order(tables: &[At<AlarmTable>], problems: &mut Problems) {
     }
 }
 
-fn not_answering(id: AlarmId, device: &DeviceDef) -> AlarmDef {
+fn not_answering(device: &DeviceDef) -> AlarmDef {
     AlarmDef {
         class: AlarmClass::System,
         // The link has already asked more than once; the delay keeps a single lost frame quiet.
@@ -173,6 +176,22 @@ fn not_answering(id: AlarmId, device: &DeviceDef) -> AlarmDef {
             action: "look at the device itself; then at supply, cable, terminator and the Bus tab".to_owned(),
             respond: Some(Duration::from_secs(600)),
         },
-        ..AlarmDef::new(id, Subject::Device(device.id), Condition::NotAnswering, NO_VALUES)
+        ..AlarmDef::new(AlarmId(0), Subject::Device(device.id), Condition::NotAnswering, NO_VALUES)
+    }
+}
+
+fn overloaded(line: &LineDef) -> AlarmDef {
+    AlarmDef {
+        priority: Priority::Low,
+        class: AlarmClass::System,
+        // The schedule has already seen more than a short peak.
+        on_delay: Duration::from_secs(10),
+        guidance: Guidance {
+            cause: format!("{} is polled more often than it can carry, or its devices answer more slowly", line.name),
+            effect: "alarm inputs are read on time, other values less often; no device is at fault".to_owned(),
+            action: "see the Bus tab; poll less often, raise the baud rate, or divide the line".to_owned(),
+            respond: None,
+        },
+        ..AlarmDef::new(AlarmId(0), Subject::Line(line.id), Condition::Overloaded, OVERLOADED)
     }
 }

@@ -20,6 +20,9 @@ const CHANGES_MAX: u32 = 100;
 
 /// What an alarm watches, and for what.
 pub(super) fn subject(table: &AlarmTable, defs: &Defs, problems: &mut Problems) -> Option<(Subject, Condition)> {
+    if let Some(overloaded) = table.overloaded.filter(|overloaded| table.line.is_none() || !overloaded.value) {
+        problems.add(overloaded.at, "only a `line` can be overloaded").label("expected `true`, beside `line`");
+    }
     match (&table.tag, &table.device, &table.line) {
         (Some(tag), None, None) => {
             let tag = defs.tag(tag, problems)?;
@@ -37,8 +40,10 @@ pub(super) fn subject(table: &AlarmTable, defs: &Defs, problems: &mut Problems) 
         }
         (None, None, Some(line)) => {
             let id = defs.line(line, problems)?;
-            no_condition(table, "line", "not connected", problems);
-            Some((Subject::Line(id), Condition::NotConnected))
+            no_condition(table, "line", "not connected, or with `overloaded` too much to do", problems);
+            let overloaded = table.overloaded.is_some_and(|overloaded| overloaded.value);
+            let condition = if overloaded { Condition::Overloaded } else { Condition::NotConnected };
+            Some((Subject::Line(id), condition))
         }
         (None, None, None) => {
             problems.add(table.at, "an alarm needs `tag`, `device` or `line`").label("here");

@@ -308,6 +308,8 @@ table!(
         opt "changes" changes: u32,
         opt "within" within: Duration,
         opt "line" line: String,
+        /// With `line`: it has too much to do, instead of not connected.
+        opt "overloaded" overloaded: bool,
         /// `F`, `C`, `S` or `M`.
         opt "ne107" ne107: Signal,
         opt "enabled_when" enabled_when: String,

@@ -8,7 +8,7 @@ use super::{
     plant::{Library, Text, build},
 };
 use crate::plant::{
-    def::{Condition, HistoryDef, PlantDef, Subject},
+    def::{Condition, HistoryDef, LineId, PlantDef, Subject},
     guard::Blocking,
     station::StationFault,
     tag::{Bound, Class, Kind},
@@ -146,9 +146,10 @@ fn the_small_plant_is_right() {
     let plant = load(PLANT.as_bytes(), METER, PLC).unwrap_or_else(|errors| panic!("{errors}"));
     assert_eq!(plant.name, "small");
     let own = plant.alarms.iter().filter(|alarm| alarm.subject != Subject::Station).count();
-    assert_eq!(own, 3, "one written, and not answering for two devices");
-    assert_eq!(plant.alarms.len(), 3 + StationFault::ALL.len(), "and the faults of the station");
+    assert_eq!(own, 4, "one written, not answering for two devices, and overloaded for the line");
+    assert_eq!(plant.alarms.len(), 4 + StationFault::ALL.len(), "and the faults of the station");
     assert!(matches!(plant.alarms[1].condition, Condition::NotAnswering));
+    assert!(matches!(plant.alarms[3].condition, Condition::Overloaded));
     assert_eq!(plant.trends.len(), 1, "a group of pens is made up");
 }
 
@@ -459,6 +460,18 @@ fn an_alarm_that_could_never_come_or_never_go_is_refused() {
     check("high = 80.0\n", "", &["an alarm needs a condition"]);
     check("decimals_from", "poll = \"fast\"\nquality_from = \"Q\"\ndecimals_from", &["unknown tag `Q`"]);
     check("address = 1004", "address = 1004\npoll = \"never\"", &["D1.DP is never read, so D1.T can never be shown"]);
+}
+
+#[test]
+fn the_alarm_of_an_overloaded_line_may_be_written() {
+    let own = "[[alarm]]\nline = \"L1\"\noverloaded = true\npriority = \"high\"\ntext = \"slow\"\n[mimic]";
+    let plant = load(PLANT.replacen("[mimic]", own, 1).as_bytes(), METER, PLC).expect("a good plant");
+    let found: Vec<_> = plant.alarms.iter().filter(|alarm| alarm.condition == Condition::Overloaded).collect();
+    assert!(matches!(found[..], [alarm] if alarm.text == "slow" && alarm.subject == Subject::Line(LineId(0))));
+    check("[mimic]", &own.replace("true", "false"), &["only a `line` can be overloaded", "expected `true`"]);
+    check("[mimic]", &own.replace("line = \"L1\"", "device = \"D1\""), &["only a `line` can be overloaded"]);
+    let own = own.replace("overloaded = true\n", "").replace("slow", "line overloaded");
+    check("[mimic]", &own, &["duplicate alarm `line overloaded` of L1", "expected another text"]);
 }
 
 #[test]

@@ -135,9 +135,11 @@ pub fn holds(condition: Condition, facts: Facts, active: bool, memory: &mut Memo
             let watched = within <= now.saturating_sub(*memory.since.get_or_insert(now));
             (busy || !active || watched).then_some(busy)
         }
-        Condition::NotAnswering | Condition::Health { .. } | Condition::NotConnected | Condition::Station(_) => {
-            facts.ill
-        }
+        Condition::NotAnswering
+        | Condition::Health { .. }
+        | Condition::NotConnected
+        | Condition::Overloaded
+        | Condition::Station(_) => facts.ill,
     }
 }
 
@@ -160,6 +162,7 @@ pub fn limit_of(condition: Condition) -> Option<f64> {
         | Condition::NotAnswering
         | Condition::Health { .. }
         | Condition::NotConnected
+        | Condition::Overloaded
         | Condition::Station(_) => None,
     }
 }

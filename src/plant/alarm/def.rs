@@ -184,6 +184,8 @@ pub enum Condition {
     },
     /// The line is not connected although it should be.
     NotConnected,
+    /// The line has no time for all of its polls: some are read less often.
+    Overloaded,
     /// The station has this fault.
     Station(StationFault),
 }
@@ -203,6 +205,7 @@ impl Condition {
             | Condition::NotAnswering
             | Condition::Health { .. }
             | Condition::NotConnected
+            | Condition::Overloaded
             | Condition::Station(_) => false,
         }
     }
@@ -221,6 +224,7 @@ impl Condition {
             | Condition::NotAnswering
             | Condition::Health { .. }
             | Condition::NotConnected
+            | Condition::Overloaded
             | Condition::Station(_) => None,
         }
     }
@@ -239,6 +243,7 @@ impl Condition {
             | Condition::NotAnswering
             | Condition::Health { .. }
             | Condition::NotConnected
+            | Condition::Overloaded
             | Condition::Station(_) => None,
         }
     }

@@ -77,6 +77,7 @@ impl Plant {
                 let no_values = report.is_some_and(|report| report.gives_no_values(device));
                 answers(devices[device.index()].state, no_values).map(|answers| !answers)
             }
+            (Subject::Line(line), Condition::Overloaded) => is_overloaded(&lines[line.index()]),
             (Subject::Line(line), _) => is_lost(&lines[line.index()]),
             (Subject::Station, Condition::Station(fault)) => Some(faults.is_active(fault)),
             (Subject::Tag(_) | Subject::Station, _) => None,
@@ -138,6 +139,12 @@ fn is_lost(line: &LineStatus) -> Option<bool> {
         LineState::Waiting { .. } => Some(true),
         LineState::Connecting => line.lost_since.is_some().then_some(true),
     }
+}
+
+/// A line that is not polled has no load that could be judged.
+fn is_overloaded(line: &LineStatus) -> Option<bool> {
+    let report = line.report.as_ref().filter(|_| line.state == LineState::Connected);
+    report.map(|report| report.strain.is_some())
 }
 
 /// What came of several wishes at once: the steps, and an outcome that hides none that was refused.

@@ -6,7 +6,7 @@ use super::*;
 use crate::plant::{
     alarm::AlarmState,
     command::{NotConfirmed, OrderId, Refusal},
-    def::ActionDef,
+    def::{ActionDef, AlarmDef, AlarmId, Condition, Subject},
     event::ExceptionCode,
     fixture::{self, DP, FAULT, PLC, PV, RUN, SILENT, SV, TIC},
     guard::{Blocking, InterlockDef},
@@ -256,6 +256,31 @@ fn a_device_that_refuses_everything_raises_the_alarm_of_a_silent_one() {
     assert!(!says(&mut plant, 1, Ok(())));
     assert!(says(&mut plant, 20, Err(Fault::Exception(ExceptionCode(4)))));
     assert!(!says(&mut plant, 40, Ok(())));
+}
+
+#[test]
+fn an_overloaded_line_is_said_once_and_no_device_is_at_fault() {
+    let mut def = fixture::plant();
+    let overloaded = AlarmId(def.alarms.len() as u16);
+    let alarm = AlarmDef::new(overloaded, Subject::Line(L1), Condition::Overloaded, "line overloaded");
+    def.alarms.push(AlarmDef { on_delay: Duration::from_secs(10), ..alarm });
+    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+    plant.on_event(Event::Line { at: at(0), line: L1, state: LineState::Connected });
+    let mut raised = 0;
+    let mut report = |plant: &mut Plant, second: i64, strain: Option<&str>| {
+        let report = LineReport { strain: strain.map(str::to_owned), ..LineReport::new(plant.def().line(L1).clone()) };
+        let mut records = plant.on_event(Event::Report { at: at(second), line: L1, report: Arc::new(report) }).records;
+        records.extend(plant.on_event(read(second, &[(PV, 700.0), (SV, 700.0), (DP, 1.0), (FAULT, 0.0)])).records);
+        let is_raise = |record: &Record| matches!(record, Record::Alarm(step) if step.step == AlarmStep::Raised);
+        raised += records.iter().chain(&plant.on_tick(at(second)).records).filter(|record| is_raise(record)).count();
+        plant.snapshot().alarms.iter().map(|alarm| (alarm.id, alarm.state)).collect::<Vec<_>>()
+    };
+    let strained = Some("process values every 1.5 periods");
+    (1..=9).for_each(|second| assert_eq!(report(&mut plant, second, strained), [], "a peak of {second} s"));
+    let states: Vec<_> = (10..60).map(|second| report(&mut plant, second, strained)).collect();
+    assert_eq!(states[49], [(overloaded, AlarmState::Unacknowledged)], "the line's alarm only");
+    assert_eq!(report(&mut plant, 60, None), [(overloaded, AlarmState::Returned)]);
+    assert_eq!(raised, 1);
 }
 
 #[test]

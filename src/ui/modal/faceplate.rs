@@ -248,9 +248,13 @@ pub fn retry_words(cx: &Cx, device: crate::plant::def::DeviceId) -> String {
 
 /// How a line stands, in words.
 pub fn line_state_words(cx: &Cx, line: crate::plant::def::LineId) -> String {
-    match &cx.snapshot.line(line).state {
+    let status = cx.snapshot.line(line);
+    match &status.state {
         LineState::Connecting => "connecting".to_owned(),
-        LineState::Connected => "connected".to_owned(),
+        LineState::Connected => match status.report.as_ref().and_then(|report| report.strain.as_deref()) {
+            Some(strain) => strain.trim_start_matches("line overloaded: ").to_owned(),
+            None => "connected".to_owned(),
+        },
         LineState::Disconnected => "closed by an operator".to_owned(),
         LineState::Testing => "a test has it".to_owned(),
         LineState::Waiting { why, .. } => format!("not connected: {why}"),

@@ -227,6 +227,7 @@ pub fn condition_words(cx: &Cx, alarm: AlarmId) -> String {
         | Condition::NotAnswering
         | Condition::Health { .. }
         | Condition::NotConnected
+        | Condition::Overloaded
         | Condition::Station(_) => String::new(),
     }
 }
