@@ -1,8 +1,10 @@
 //! How close the bus comes to the wire, against a bare libmodbus loop in C on the same slaves; prints ratios of one run.
 //!
-//! `cargo bench --bench bus` runs all parts, `cargo bench --bench bus -- cycle` (dead, tcp, station) one of them.
+//! `cargo bench --bench bus` runs all parts, `cargo bench --bench bus -- dead overload tcp` these (others: cycle, station).
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
 
+#[path = "bus/limits.rs"]
+mod limits;
 mod support;
 
 use std::{
@@ -48,7 +50,10 @@ fn main() {
         cycle(libmodbus.as_deref());
     }
     if part("dead") {
-        dead();
+        limits::dead(libmodbus.as_deref());
+    }
+    if part("overload") {
+        limits::overload(libmodbus.as_deref());
     }
     if part("tcp") {
         tcp(libmodbus.as_deref());
@@ -81,27 +86,6 @@ fn cycle(libmodbus: Option<&Path>) {
             "  {baud:6} baud: minimum {:.1} ms, sightglass {ours:.3} ({hasty} too hasty), libmodbus {theirs}",
             minimum.as_secs_f64() * 1e3
         );
-    }
-}
-
-/// Rate of the living of eight units after others have died, over their rate before.
-fn dead() {
-    let serial = Serial { baud: 19_200, ..Serial::USUAL };
-    println!("eight units at 19200 baud, 10 registers each 250 ms, timeout 1 s; the living keep of their rate:");
-    for (over, dying) in [(20, &[8][..]), (60, &[8]), (20, &[3, 5, 8]), (60, &[3, 5, 8])] {
-        let (path, slave) = PacedSlave::start_on(serial);
-        let transport = Transport::rtu(path.to_str().unwrap(), serial);
-        let mut def = PlantDef::clone(&plant(vec![transport], 8, 1, Duration::from_millis(250), 1));
-        def.lines[0].timeout = Duration::from_secs(1);
-        let look = || {
-            dying.iter().for_each(|unit| slave.kill(*unit));
-            slave.served()
-        };
-        // A unit is known after 32 answers.
-        let warm = Duration::from_secs(12);
-        let ((from, to), seconds) = measured_station(Arc::new(def), warm, Duration::from_secs(over), look);
-        let kept = (to - from) as f64 / seconds / (4.0 * (8 - dying.len()) as f64);
-        println!("  {} dead, first {over} s: {:.1} %", dying.len(), kept * 100.0);
     }
 }
 
@@ -198,9 +182,19 @@ fn plant(lines: Vec<Transport>, devices: u16, blocks: u16, period: Duration, in_
     Arc::new(def)
 }
 
-/// Runs a whole station with history and a terminal for a while after a time `warm`; gives what `look` sees at the beginning and at the end of
-/// it, and the seconds.
+/// Runs a whole station for a while after a time `warm`; gives what `look` sees at the beginning and at the end of it, and the
+/// seconds.
 fn measured_station<T>(def: Arc<PlantDef>, warm: Duration, over: Duration, look: impl Fn() -> T) -> ((T, T), f64) {
+    with_station(def, || {
+        std::thread::sleep(warm);
+        let (from, start) = (look(), Instant::now());
+        std::thread::sleep(over);
+        ((from, look()), start.elapsed().as_secs_f64())
+    })
+}
+
+/// Runs a whole station with history and a terminal until `during` returns.
+fn with_station<T>(def: Arc<PlantDef>, during: impl FnOnce() -> T) -> T {
     let folder = tempfile::tempdir().unwrap();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
     runtime.block_on(async {
@@ -209,12 +203,10 @@ fn measured_station<T>(def: Arc<PlantDef>, warm: Duration, over: Duration, look:
         let options = station::Options { def, clock: Clock::real(), history, connectors, file: None };
         let running = station::start(options).unwrap();
         let mut session = running.session("bench");
-        tokio::time::sleep(warm).await;
-        let (from, start) = (look(), Instant::now());
         // A terminal that takes every snapshot.
-        let terminal = async { while session.snapshots.changed().await.is_ok() {} };
-        let _ = tokio::time::timeout(over, terminal).await;
-        let result = ((from, look()), start.elapsed().as_secs_f64());
+        let terminal = tokio::spawn(async move { while session.snapshots.changed().await.is_ok() {} });
+        let result = tokio::task::block_in_place(during);
+        terminal.abort();
         running.stop().await;
         result
     })

@@ -35,7 +35,8 @@ const SILENCE: Duration = Duration::from_millis(20);
 /// Keeps the line open. The slave's thread ends once this is dropped and every client has closed the port.
 pub struct PacedSlave {
     _port: File,
-    served: Arc<AtomicU64>,
+    /// By unit.
+    served: Arc<[AtomicU64; 64]>,
     hasty: Arc<AtomicU64>,
     /// A bit for each unit that does not answer.
     dead: Arc<AtomicU64>,
@@ -57,7 +58,8 @@ impl PacedSlave {
         let mut raw = tcgetattr(&port).unwrap();
         raw.make_raw();
         tcsetattr(&port, OptionalActions::Now, &raw).unwrap();
-        let slave = PacedSlave { _port: port, served: Arc::default(), hasty: Arc::default(), dead: Arc::default() };
+        let served = Arc::new(std::array::from_fn(|_| AtomicU64::new(0)));
+        let slave = PacedSlave { _port: port, served, hasty: Arc::default(), dead: Arc::default() };
         let (served, hasty, dead) = (slave.served.clone(), slave.hasty.clone(), slave.dead.clone());
         thread::spawn(move || serve(File::from(line), serial, &dead, &served, &hasty));
         (path, slave)
@@ -70,7 +72,12 @@ impl PacedSlave {
 
     /// Requests answered so far.
     pub fn served(&self) -> u64 {
-        self.served.load(Ordering::Relaxed)
+        self.served_by_unit().iter().sum()
+    }
+
+    /// The same by unit.
+    pub fn served_by_unit(&self) -> [u64; 64] {
+        std::array::from_fn(|unit| self.served[unit].load(Ordering::Relaxed))
     }
 
     /// Requests that began before the answer was followed by its 3.5 characters of silence: on a real line they are lost.
@@ -79,7 +86,7 @@ impl PacedSlave {
     }
 }
 
-fn serve(mut line: File, serial: Serial, dead: &AtomicU64, served: &AtomicU64, hasty: &AtomicU64) {
+fn serve(mut line: File, serial: Serial, dead: &AtomicU64, served: &[AtomicU64; 64], hasty: &AtomicU64) {
     let character = serial.char_time();
     let (mut receiver, mut bytes) = (Receiver::default(), [0; 512]);
     let (mut began, mut latest, mut quiet) = (Instant::now(), Instant::now(), Instant::now());
@@ -106,7 +113,7 @@ fn serve(mut line: File, serial: Serial, dead: &AtomicU64, served: &AtomicU64, h
             let Some(answer) = heard.and_then(super::answer) else { continue };
             let Ok(end) = say(&mut line, &with_crc(&answer), over + serial.silence(), character) else { return };
             quiet = end + serial.silence();
-            served.fetch_add(1, Ordering::Relaxed);
+            served[usize::from(answer[0] % 64)].fetch_add(1, Ordering::Relaxed);
         }
     }
 }
