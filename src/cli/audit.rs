@@ -84,7 +84,12 @@ fn make_key(args: &KeyArgs) -> Result<(), CliError> {
     let log = book::beside(&run::history_file(&def, &args.station));
     let key = sealing::make(&log, Timestamp::now());
     let path = sealing::beside(&log);
-    let key = key.map_err(|error| CliError::Io { what: format!("cannot make {}", path.display()), error })?;
+    let key = key.map_err(|error| match error.kind() {
+        io::ErrorKind::AlreadyExists => {
+            CliError::Failed(format!("{} is there already: the station seals its audit log with it", path.display()))
+        }
+        _ => CliError::Io { what: format!("cannot make {}", path.display()), error },
+    })?;
     say(&format!("# Verifies the seals of {}.", log.display()));
     say("# Keep it off this machine: whoever has it can forge them. It is not shown again.");
     say(key.text().trim_end());

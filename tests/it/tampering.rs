@@ -163,7 +163,9 @@ fn a_sealed_log_that_was_rewritten_with_its_chain_or_cut_with_its_seals_is_found
     let folder = folder();
     let (code, key) = make_key(folder.path(), "kept");
     assert_eq!(code, Some(0), "{}", fs::read_to_string(&key).unwrap());
+    let text = fs::read(folder.path().join("tank.audit.key")).unwrap();
     assert_eq!(make_key(folder.path(), "refused").0, Some(1), "once");
+    assert_eq!(fs::read(folder.path().join("tank.audit.key")).unwrap(), text, "the key that was there is left alone");
     let book = written(folder.path());
     let history = folder.path().join("tank.duckdb");
     let verify = |extra: &[&str]| verify(folder.path(), &[&["--book", book.to_str().unwrap()], extra].concat());

@@ -104,8 +104,8 @@ fn replace(path: &Path, key: &Key) -> io::Result<()> {
     old.sync_data()
 }
 
-/// Reads a log as [`book::verify`] does, and checks its seals. `None` for the second where nothing stands beside the log
-/// that a cut behind its last seal would be seen by.
+/// Reads a log as [`book::verify`] does, and checks its seals. `false` if the present key is missing: then a log that was cut
+/// with its last seals is not found.
 pub fn verify(log: &Path, rows: &[Seal], key: &VerificationKey) -> Result<(Summary, Sealed, bool), VerifyError> {
     let path = beside(log);
     // Before the log, which may be ahead of it. Once more where the station replaces it at this moment.
