@@ -398,8 +398,10 @@ fn a_log_that_can_no_longer_be_sealed_is_said_and_goes_on() {
     let (history_file, log) = (folder.path().join("tank.duckdb"), folder.path().join("tank.audit.jsonl"));
     let (path, verification) = (sealing::beside(&log), sealing::make(&log, at(0)).unwrap());
     let first = fs::read(&path).unwrap();
+    fs::hard_link(&path, folder.path().join("first")).unwrap();
     life(&history_file, &["start"]);
     life(&history_file, &["start"]);
+    assert_eq!(fs::read(folder.path().join("first")).unwrap(), vec![0; first.len()], "not left in free blocks");
     let present = fs::read(&path).unwrap();
     for (what, text) in [("missing", None), ("older than the last seal", Some(&first[..])), ("damaged", Some(b"7"))] {
         fs::remove_file(&path).unwrap();
@@ -440,4 +442,20 @@ fn a_key_that_cannot_be_replaced_is_said_and_makes_no_other_seal() {
     assert_eq!((recorder.status().log, sealed(&log, &verification)), (None, (2, 0)));
     let present = sealing::read(&sealing::beside(&log)).unwrap().unwrap();
     assert!(present == verification.first.next().next());
+}
+
+#[test]
+fn a_seal_that_cannot_be_written_leaves_its_key_for_the_next_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (history_file, log) = (folder.path().join("tank.duckdb"), folder.path().join("tank.audit.jsonl"));
+    let verification = sealing::make(&log, at(0)).unwrap();
+    let (history, _rows) = mpsc::channel(64);
+    let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
+    recorder.open();
+    recorder.take(batch(&["start"], &[]));
+    recorder.write();
+    fs::remove_file(&log).unwrap();
+    recorder.seal(at(60));
+    assert!(recorder.status().log.unwrap().starts_with("the audit log is not sealed: "));
+    assert!(sealing::read(&sealing::beside(&log)).unwrap() == Some(verification.first));
 }
