@@ -101,7 +101,10 @@ pub fn main(args: Args) -> Result<(), CliError> {
                 () = run::over(clock, args.duration) => Ok(()),
             }
         };
-        station.stop().await;
+        let last = station.stop().await;
+        if args.headless {
+            run::say_anchor(last);
+        }
         drop(simulated);
         let verdict = drilled.borrow().scenario.as_ref().map(|progress| progress.verdict.clone());
         if let Some(verdict) = &verdict {

@@ -12,7 +12,7 @@ use crate::{
     access::io::{users, users_beside},
     attach::io::{find, serve},
     bus::io::{clock::Clock, transport::Connector},
-    plant::{PlantDef, Snapshot},
+    plant::{PlantDef, Snapshot, record::Seal},
     profile::PlantFile,
     station::{Command, io as station, teller},
     ui,
@@ -74,8 +74,10 @@ pub fn main(args: Args) -> Result<(), CliError> {
                 Ok(Some(_)) => init::reloading(),
                 Ok(None) | Err(_) => init::stopping(),
             }
+            let (socket, last_entry) = serving.stop().await?;
+            say_anchor(last_entry);
             // A plant goes by the name of its file, so the socket stays the same.
-            listener = serving.stop().await?;
+            listener = socket;
             match ended? {
                 Some(next) => {
                     say("plant file reloaded");
@@ -194,10 +196,11 @@ impl Serving {
         Serving { station, socket }
     }
 
-    /// Ends the station; its terminals hear of it by its silence. Gives the socket back.
-    async fn stop(self) -> Result<serve::Listener, CliError> {
-        self.station.stop().await;
-        self.socket.await.map_err(|error| CliError::Failed(format!("the socket ended badly: {error}")))
+    /// Ends the station; its terminals hear of it by its silence. Gives the socket back, and the last entry of the audit log.
+    async fn stop(self) -> Result<(serve::Listener, Option<Seal>), CliError> {
+        let last = self.station.stop().await;
+        let socket = self.socket.await;
+        Ok((socket.map_err(|error| CliError::Failed(format!("the socket ended badly: {error}")))?, last))
     }
 }
 
@@ -253,21 +256,20 @@ pub async fn follow(
                 }
                 let hour = after.at.as_second().div_euclid(3_600);
                 if after.history.audit.is_some() && anchored.replace(hour) != Some(hour) {
-                    say_anchor(&after);
+                    say_anchor(after.history.audit);
                 }
                 before = after;
             }
         }
     }
     let last = snapshots.borrow().clone();
-    say_anchor(&last);
     Ok(last)
 }
 
 /// Prints the last entry of the audit log, for the journal of the system: whoever changes the log later, and all hashes
 /// behind the change, must change the journal as well.
-fn say_anchor(snapshot: &Snapshot) {
-    if let Some(seal) = snapshot.history.audit {
+pub fn say_anchor(last: Option<Seal>) {
+    if let Some(seal) = last {
         say(&format!("audit log: entry {seal}"));
     }
 }

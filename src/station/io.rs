@@ -20,6 +20,7 @@ use crate::{
     plant::{
         Plant, PlantDef,
         command::Order,
+        record::Seal,
         snapshot::HistoryStatus,
         station::{FaultState, StationFault},
     },
@@ -68,7 +69,7 @@ pub struct Station {
     /// `None` for a rehearsal, which keeps nothing.
     history: Option<history::Handle>,
     /// The thread of the book, which ends before the history.
-    book: Option<std::thread::JoinHandle<()>>,
+    book: Option<std::thread::JoinHandle<Option<Seal>>>,
     /// Nobody is asked who he is.
     open: bool,
     stop: watch::Sender<bool>,
@@ -162,7 +163,7 @@ pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, li
 struct Threads {
     queries: mpsc::Sender<(u32, Query)>,
     history: Option<history::Handle>,
-    book: Option<std::thread::JoinHandle<()>>,
+    book: Option<std::thread::JoinHandle<Option<Seal>>>,
 }
 
 // Everything that a station is made of, each once.
@@ -227,8 +228,8 @@ impl Station {
         self.entrance.attach(Peer { from: "this process".into(), unix_user: Some(user.into()), own: true })
     }
 
-    /// Stops downstream and waits until the last record is on disk.
-    pub async fn stop(self) {
+    /// Stops downstream and waits until the last record is on disk. Gives the last entry of the audit log.
+    pub async fn stop(self) -> Option<Seal> {
         let Station { entrance, orders, commands, history, book, open: _, stop, tasks } = self;
         // Links may have ended already; then nobody listens, which is fine.
         let _ = stop.send(true);
@@ -239,14 +240,17 @@ impl Station {
             }
         }
         // The last records are on their way; each thread ends when it has stored them, the book before the history.
-        let Some(history) = history else { return };
+        let history = history?;
         let ended = move || {
             // A panic of the thread has already been reported by the panic hook.
-            let _ = book.map(std::thread::JoinHandle::join);
+            let last = book.and_then(|book| book.join().ok().flatten());
             history.stop();
+            last
         };
-        if let Err(error) = tokio::task::spawn_blocking(ended).await {
+        let ended = tokio::task::spawn_blocking(ended).await;
+        ended.unwrap_or_else(|error| {
             tracing::error!(%error, "the history did not end well");
-        }
+            None
+        })
     }
 }

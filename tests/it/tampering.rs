@@ -11,6 +11,7 @@ use crate::support::{Process, folder, sightglass};
 
 /// A book as a station leaves it: several lives of it, each with its start and stop.
 fn written(folder: &Path) -> PathBuf {
+    let book = folder.join("tank.audit.jsonl");
     for _ in 0..3 {
         let mut station = Process::start(
             sightglass()
@@ -19,8 +20,11 @@ fn written(folder: &Path) -> PathBuf {
                 .env("XDG_STATE_HOME", folder),
         );
         assert_eq!(station.end(), Some(0), "{:?}", station.said);
+        let text = fs::read_to_string(&book).unwrap();
+        let last: serde_json::Value = serde_json::from_str(text.lines().last().unwrap()).unwrap();
+        let anchor = format!("audit log: entry {} {}", last["n"], last["hash"].as_str().unwrap());
+        assert!(station.said.contains(&anchor), "the end has its anchor: {:?}", station.said);
     }
-    let book = folder.join("tank.audit.jsonl");
     assert!(4 < fs::read_to_string(&book).unwrap().lines().count());
     book
 }

@@ -91,8 +91,8 @@ pub struct Handle {
     pub opened: Opened,
     /// What was found when the alarm-state file was opened.
     pub alarms: Found,
-    /// The thread.
-    pub join: JoinHandle<()>,
+    /// The thread; ends with the last entry of the log.
+    pub join: JoinHandle<Option<Seal>>,
 }
 
 /// Opens both files beside a history and starts the thread. A file that cannot be opened is trouble, and no reason not to
@@ -173,7 +173,7 @@ impl Recorder {
         (recorder, found)
     }
 
-    fn run(mut self, queue: &queue::Receiver<Message>, status: &watch::Sender<Recorded>) {
+    fn run(mut self, queue: &queue::Receiver<Message>, status: &watch::Sender<Recorded>) -> Option<Seal> {
         loop {
             let wait = if self.is_written() { LOOK } else { AGAIN };
             match queue.recv_timeout(wait) {
@@ -202,6 +202,7 @@ impl Recorder {
         }
         self.seal(self.clock.utc());
         status.send_replace(self.status());
+        self.status().last
     }
 
     fn take(&mut self, Batch { actions, steps }: Batch) {

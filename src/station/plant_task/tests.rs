@@ -13,7 +13,7 @@ use crate::{
         def::{AlarmId, TagId},
         event::Fault,
         fixture,
-        record::AlarmStep,
+        record::{AlarmStep, Seal},
     },
 };
 
@@ -25,7 +25,7 @@ struct Station {
     orders: mpsc::Sender<Order>,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     task: JoinHandle<()>,
-    recorder: std::thread::JoinHandle<()>,
+    recorder: std::thread::JoinHandle<Option<Seal>>,
     _blocked: mpsc::Receiver<Vec<Record>>,
     papers: mpsc::Sender<Paper>,
     _requests: mpsc::Receiver<BusRequest>,
