@@ -9,7 +9,7 @@ use crate::{
     bus::io::{clock::Clock, transport::Connector},
     history::{Answer, HistoryError, Question, io::Query},
     plant::Snapshot,
-    profile::io::atomic::write_atomic,
+    profile::io::atomic::write_for_user,
     report::{Period, ShiftReport, csv},
     sim,
     station::{Session, io as station},
@@ -130,7 +130,7 @@ async fn headless(session: Session, clock: Clock, duration: Option<Duration>, ar
     }
     if let Some(path) = &args.report {
         let bytes = csv::shift_csv(&report, &last.def, last.def.report.csv);
-        write_atomic(path, &bytes, 0o640)
+        write_for_user(path, &bytes)
             .map_err(|error| CliError::Io { what: format!("cannot write {}", path.display()), error })?;
         say(&format!("report written: {}", path.display()));
     }

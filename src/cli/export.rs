@@ -13,7 +13,6 @@ use crate::{
     attach::check::{BUCKETS_MAX, COLUMNS_MAX, SERIES_MAX},
     history::{Answer, HistoryError, Question},
     plant::{PlantDef, def::TagId},
-    profile::io::atomic::write_atomic,
     report::{
         export,
         figures::{self, Label},
@@ -22,8 +21,8 @@ use crate::{
 };
 
 use super::{
-    CliError, StationArgs, client, in_runtime, load, own_files, put_out, report::dialect, run::history_file, say,
-    source::Source, span,
+    CliError, StationArgs, client, in_runtime, load, own_files, report::dialect, run::history_file, source::Source,
+    span,
 };
 
 /// Rows of one file.
@@ -97,14 +96,7 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     }
     let dialect = dialect(def.report.csv, args.separator.as_deref(), args.bom);
     let bytes = export::export_csv(&def, period.from, args.every, &columns, dialect);
-    source.exported(&args.out.display().to_string(), &bytes).await?;
-    let failed = |error| CliError::Io { what: format!("cannot write {}", args.out.display()), error };
-    if args.out.as_os_str() == "-" {
-        return put_out(&bytes).map_err(failed);
-    }
-    write_atomic(&args.out, &bytes, 0o640).map_err(failed)?;
-    say(&args.out.display().to_string());
-    Ok(())
+    source.export(&args.out, &bytes).await
 }
 
 /// The latest good values of the tags that hold unit and decimals of others.

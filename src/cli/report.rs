@@ -5,14 +5,10 @@ use std::{path::PathBuf, sync::Arc};
 use crate::{
     history::{Answer, HistoryError, Question},
     plant::{PlantDef, def::CsvDialect},
-    profile::io::atomic::write_atomic,
     report::csv,
 };
 
-use super::{
-    CliError, StationArgs, client, in_runtime, load, own_files, put_out, run::history_file, say, say_error,
-    source::Source,
-};
+use super::{CliError, StationArgs, client, in_runtime, load, own_files, run::history_file, say_error, source::Source};
 
 /// Arguments of `report`.
 #[derive(Debug, clap::Args)]
@@ -71,18 +67,7 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
         false => csv::shift_csv(&report, &def, dialect),
     };
     let path = args.out.unwrap_or_else(|| def.report.folder.join(csv::file_name(&def, &report.period, report.until)));
-    // Before anything is written: an export needs a right.
-    source.exported(&path.display().to_string(), &bytes).await?;
-    let failed = |error| CliError::Io { what: format!("cannot write {}", path.display()), error };
-    if path.as_os_str() == "-" {
-        return put_out(&bytes).map_err(failed);
-    }
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder).map_err(failed)?;
-    }
-    write_atomic(&path, &bytes, 0o640).map_err(failed)?;
-    say(&path.display().to_string());
-    Ok(())
+    source.export(&path, &bytes).await
 }
 
 pub(super) fn dialect(plant: CsvDialect, separator: Option<&str>, bom: bool) -> CsvDialect {

@@ -1,21 +1,26 @@
 //! Where a command reads the history: from the station while it runs, else from the file.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use jiff::Timestamp;
 use tokio::sync::oneshot;
 
 use crate::{
+    access::{Wish, book::sha256},
     history::{
         Answer, HistoryError, Question,
         io::{Query, store::Store},
     },
     plant::PlantDef,
+    profile::io::atomic::write_for_user,
     report::{Period, ask},
     station::Session,
 };
 
-use super::{CliError, StationArgs, client, run};
+use super::{CliError, StationArgs, client, put_out, run, say};
 
 /// A history that can be asked.
 pub enum Source {
@@ -82,13 +87,21 @@ impl Source {
         }
     }
 
-    /// Tells the station that a file was written out of what it holds; a history without a station has nobody to tell.
-    pub async fn exported(&self, file: &str, bytes: &[u8]) -> Result<(), CliError> {
-        let Source::Station(session) = self else { return Ok(()) };
-        let sha256 = crate::access::book::sha256(bytes);
-        let wish = crate::access::Wish::Exported { file: file.to_owned(), sha256 };
-        let durability = session.wish(wish).await.map_err(CliError::Failed)?;
-        client::warn_not_recorded(&format!("exported to {file}"), durability);
+    /// Writes a file with what the history holds, `-` to standard output. The station has it recorded before anything is
+    /// written, or refuses: an export needs a right.
+    pub async fn export(&self, path: &Path, bytes: &[u8]) -> Result<(), CliError> {
+        if let Source::Station(session) = self {
+            let (file, sha256) = (path.display().to_string(), sha256(bytes));
+            let exported = format!("exported to {file}");
+            let durability = session.wish(Wish::Exported { file, sha256 }).await.map_err(CliError::Failed)?;
+            client::warn_not_recorded(&exported, durability);
+        }
+        let failed = |error| CliError::Io { what: format!("cannot write {}", path.display()), error };
+        if path.as_os_str() == "-" {
+            return put_out(bytes).map_err(failed);
+        }
+        write_for_user(path, bytes).map_err(failed)?;
+        say(&path.display().to_string());
         Ok(())
     }
 }

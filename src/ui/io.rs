@@ -24,7 +24,7 @@ use super::{AskId, Effect, Leaving, Model, Msg, tabs::Tab, theme::Theme, update,
 use crate::{
     access::Wish,
     history::{HistoryError, Question, io::Query},
-    profile::io::atomic::write_atomic,
+    profile::io::atomic::write_for_user,
     sim::{drill, io::Port},
     station::{Request, Session},
 };
@@ -263,9 +263,6 @@ async fn drilled(port: &mut Option<Port>) -> Option<Arc<drill::Status>> {
 
 /// A half-written report never has the name of a whole one.
 fn save(path: &Path, bytes: &[u8]) -> io::Result<PathBuf> {
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder)?;
-    }
-    write_atomic(path, bytes, 0o640)?;
+    write_for_user(path, bytes)?;
     std::path::absolute(path)
 }

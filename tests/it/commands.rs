@@ -196,7 +196,7 @@ fn the_demo_without_a_terminal_says_so() {
 fn the_headless_demo_does_the_whole_job() {
     let (folder, started) = (folder(), jiff::Timestamp::now());
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let (report, history) = (path("report.csv"), path("demo.duckdb"));
+    let (report, history) = (path("reports/demo.csv"), path("demo.duckdb"));
     let (code, out, err) =
         run(&["demo", "--headless", "--for", "10m", "--speed", "60", "--report", &report, "--history", &history]);
     assert_eq!(code, Some(0), "{out}\n{err}");

@@ -28,6 +28,12 @@ pub fn write_atomic(path: &Path, bytes: &[u8], mode: u32) -> io::Result<()> {
     sync_folder(path)
 }
 
+/// The same for a file of the user; its folder is made if it is not there.
+pub fn write_for_user(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    fs::create_dir_all(folder(path))?;
+    write_atomic(path, bytes, 0o640)
+}
+
 /// Where a file is written before it takes the place of `path`. What killed processes have left there is removed.
 pub fn beside(path: &Path) -> PathBuf {
     let mut start = path.file_name().map(OsString::from).unwrap_or_default();
