@@ -26,7 +26,7 @@ const CHECKPOINT_EVERY: u32 = 300;
 /// A clock that is behind the last record by more than this has been set back or lost its time. The end of the curves
 /// of a dead station alone may lie a second ahead.
 const CLOCK_STEP: Duration = Duration::from_secs(5);
-/// Commits until the first one.
+/// Commits until the first one, and until the next after one that failed.
 const CHECKPOINT_FIRST: u32 = 10;
 /// Between two attempts to open the store pass 1, 2, 4 and at most 8 commits.
 const RETRY_SHIFT_MAX: u32 = 3;
@@ -292,19 +292,18 @@ impl Writer {
 
     fn checkpoint(&mut self) {
         let Some(store) = &self.store else { return };
-        self.unchecked = match store.checkpoint() {
+        match store.checkpoint() {
+            Ok(()) => (self.unchecked, self.commits) = (None, 0),
             // A question stood in the way: with the next commit again, and said only when that goes on for long.
-            Err(HistoryError::Engine(why))
-                if why.contains("Cannot CHECKPOINT") && self.commits < 2 * CHECKPOINT_EVERY =>
-            {
-                return;
+            Err(error) if is_of_questions(&error) && self.commits < 2 * CHECKPOINT_EVERY => {}
+            Err(error) => {
+                let words = Some(format!("its log grows: {}", error.words()));
+                if self.unchecked != words {
+                    tracing::error!(?error, "the log of the history is not written into its file");
+                }
+                (self.unchecked, self.commits) = (words, CHECKPOINT_EVERY - CHECKPOINT_FIRST);
             }
-            result => result.err().map(|error| {
-                tracing::error!(?error, "the log of the history is not written into its file");
-                format!("its log grows: {}", error.words())
-            }),
-        };
-        self.commits = 0;
+        }
     }
 
     /// After a fatal error DuckDB answers nothing more until the file is opened again.
@@ -350,6 +349,12 @@ fn shed(pending: &mut Vec<Record>, max: usize) -> u64 {
     });
     pending.drain(..excess);
     lost
+}
+
+/// A checkpoint failed because questions are answered at the same time: they read, or have all the memory.
+fn is_of_questions(error: &HistoryError) -> bool {
+    let busy = |words: &str| words.contains("Cannot CHECKPOINT") || words.contains("Out of Memory");
+    matches!(error, HistoryError::Engine(words) if busy(words) && !is_fatal(error))
 }
 
 fn is_fatal(error: &HistoryError) -> bool {
