@@ -224,11 +224,14 @@ impl Store {
     }
 
     fn transaction<T>(&self, work: impl FnOnce() -> duckdb::Result<T>) -> Result<T, HistoryError> {
-        let done = self.db.execute_batch("BEGIN").and_then(|()| work());
+        let rollback = || self.db.execute_batch("ROLLBACK");
+        let begin = || self.db.execute_batch("BEGIN");
+        // A rollback that had no memory has left the last transaction open.
+        let done = begin().or_else(|_| rollback().and_then(|()| begin())).and_then(|()| work());
         let done = done.and_then(|done| self.db.execute_batch("COMMIT").map(|()| done));
         done.map_err(|error| {
             // A transaction that DuckDB has already given up cannot be rolled back: the first error is the one that counts.
-            let _ = self.db.execute_batch("ROLLBACK");
+            let _ = rollback();
             engine(error)
         })
     }
