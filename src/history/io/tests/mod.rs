@@ -116,7 +116,7 @@ fn the_engine_is_the_one_that_was_vetted_and_set_as_decided() {
     assert_eq!(store.db.version().unwrap(), "v1.5.6");
     for (name, expect) in [
         ("threads", "1"),
-        ("max_memory", "91.5 MiB"),
+        ("max_memory", "61.0 MiB"),
         ("autoinstall_known_extensions", "false"),
         ("autoload_known_extensions", "false"),
         ("disabled_compression_methods", "bitpacking"),

@@ -5,7 +5,10 @@ use std::sync::mpsc as std_mpsc;
 use tokio::sync::{mpsc, oneshot};
 
 use super::*;
-use crate::history::io::reader::{Answerer, QUESTIONS_MAX, QUESTIONS_OF_ONE_MAX, Reader, Request, TIME_MAX};
+use crate::history::io::{
+    read::ROWS_MAX,
+    reader::{Answerer, QUESTIONS_MAX, QUESTIONS_OF_ONE_MAX, Reader, Request, TIME_MAX},
+};
 
 /// Answers that never end by themselves, and two queues that say when one has begun and how it ended.
 fn endless() -> (Answerer, std_mpsc::Receiver<()>, std_mpsc::Receiver<String>) {
@@ -264,4 +267,47 @@ fn a_question_that_takes_all_memory_costs_no_record() {
     let status = writer.status();
     assert_eq!((status.rows, status.lost, &status.trouble), (2 * at as u64, 0, &None));
     assert_eq!(means(&reader, PV, at, at + 1, 1), [Some(27.0)]);
+}
+
+#[test]
+fn a_transaction_that_was_left_open_does_not_stop_the_recording() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.db.execute_batch("BEGIN").unwrap();
+    assert!(store.db.execute_batch("INSERT INTO schema_version VALUES (NULL)").is_err(), "now it is aborted");
+    store.append(&[good(PV, 1, 27.0)]).unwrap();
+    assert_eq!(means(&store, PV, 1, 2, 1), [Some(27.0)]);
+}
+
+#[test]
+fn the_longest_lists_that_are_answered_fit_in_the_memory_of_the_engine() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    let rows = format!(
+        "INSERT INTO alarm_journal
+            SELECT make_timestamp(i * 100000), 'UNIT-' || i % 1000 || '.PV', 'temperature high for long, heater off',
+                1 + i % 4, ['raised', 'acknowledged', 'returned'][1 + i % 3], i / 7, 70, 'anna', 'seen, waits for spare part',
+                NULL, NULL, NULL
+            FROM range({ROWS_MAX}) t(i);
+        INSERT INTO operator_action
+            SELECT make_timestamp(i * 100000), 'anna', 'write', 'UNIT-' || i % 1000 || '.SV', '70.0 °C', '75.0 °C',
+                'done: verified', 'pts/3 from 10.0.0.5, user panel', 'asked for by the laboratory', i, NULL
+            FROM range({ROWS_MAX}) t(i)"
+    );
+    store.db.execute_batch(&rows).unwrap();
+    let (from, to) = (sec(0), sec(8 * 3_600));
+    let period = Period { name: "period".into(), from, to };
+    let Ok(Answer::Report(report)) = store.answer(&Question::Report { period }, to) else { panic!("no report") };
+    assert_eq!((report.alarms.len() as u64, report.actions.len() as u64), (ROWS_MAX, ROWS_MAX));
+    let lists = [
+        Question::AlarmQuality { from, to },
+        Question::Journal { from, to, limit: ROWS_MAX as usize },
+        Question::Actions { from, to, limit: ROWS_MAX as usize },
+    ];
+    for list in lists {
+        let answer = store.answer(&list, to);
+        assert!(answer.is_ok(), "{:?}", answer.err());
+    }
+    assert_eq!(store.restore().unwrap().len(), 3_000, "three steps of each alarm");
+    store.recent(to).unwrap();
 }
