@@ -78,6 +78,7 @@ struct Counts {
     stop: AtomicBool,
     refused: AtomicU64,
     rss_max_kb: AtomicU64,
+    anonymous_max_kb: AtomicU64,
     log_max: AtomicU64,
 }
 
@@ -86,7 +87,7 @@ fn run(path: &Path, seconds: i64, hours: i64) {
     let clock = Clock::starting_at(now, 1.0);
     let began = Instant::now();
     let handle = history::start(path, def(), clock).expect("started");
-    println!("opened in {:.0} ms, {} MB resident", began.elapsed().as_secs_f64() * 1e3, rss_kb() / 1_000);
+    println!("opened in {:.0} ms, {} MB resident", began.elapsed().as_secs_f64() * 1e3, memory_kb("VmRSS") / 1_000);
     let counts = Counts::default();
     let (mut times, mut asked) = (Vec::new(), Vec::new());
     thread::scope(|scope| {
@@ -98,7 +99,8 @@ fn run(path: &Path, seconds: i64, hours: i64) {
         let watcher = scope.spawn(|| commits(&handle, clock, &counts));
         for _ in 0..seconds {
             thread::sleep(Duration::from_secs(1));
-            counts.rss_max_kb.fetch_max(rss_kb(), Ordering::Relaxed);
+            counts.rss_max_kb.fetch_max(memory_kb("VmRSS"), Ordering::Relaxed);
+            counts.anonymous_max_kb.fetch_max(memory_kb("RssAnon"), Ordering::Relaxed);
             let log = std::fs::metadata(path.with_extension("duckdb.wal")).map_or(0, |log| log.len());
             counts.log_max.fetch_max(log, Ordering::Relaxed);
         }
@@ -115,7 +117,8 @@ fn run(path: &Path, seconds: i64, hours: i64) {
         failed.iter().for_each(|why| println!("  failed: {why}"));
     }
     let log_max = counts.log_max.into_inner() as f64 / 1e6;
-    println!("{} MB resident at most, log {log_max:.1} MB at most", counts.rss_max_kb.into_inner() / 1_000);
+    let (all, anonymous) = (counts.rss_max_kb.into_inner() / 1_000, counts.anonymous_max_kb.into_inner() / 1_000);
+    println!("{all} MB resident at most, {anonymous} MB without files; log {log_max:.1} MB at most");
     handle.stop();
 }
 
@@ -189,8 +192,8 @@ fn spread(name: &str, mut times: Vec<Duration>) {
     println!("{name}: {} times, p50 {half:.1} ms, p99 {most:.1} ms, worst {worst:.1} ms", times.len());
 }
 
-fn rss_kb() -> u64 {
+fn memory_kb(of: &str) -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find(|line| line.starts_with("VmRSS"));
+    let line = status.lines().find(|line| line.starts_with(of));
     line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok()).unwrap_or(0)
 }
