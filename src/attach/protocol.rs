@@ -213,7 +213,10 @@ pub fn welcome(bytes: &[u8]) -> Result<Result<Welcome, String>, ProtocolError> {
     if let Some(why) = other_version((VERSION, PROTOCOL), (&greeting.version, greeting.protocol)) {
         return Err(ProtocolError::OtherVersion(why));
     }
-    Ok(Ok(decode(rest, "welcome of a station")?))
+    // Of the same version, but not of the same build.
+    let other_build =
+        |_| ProtocolError::OtherVersion(format!("the station is another build of version {VERSION}: restart it"));
+    Ok(Ok(decode(rest, "welcome of a station").map_err(other_build)?))
 }
 
 fn greeted<'a>(bytes: &'a [u8], expected: &'static str) -> Result<(Greeting, &'a [u8]), ProtocolError> {

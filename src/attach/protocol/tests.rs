@@ -52,6 +52,9 @@ fn a_terminal_and_a_station_of_two_versions_say_so_and_what_to_do() {
     let other_build = Greeting { version: "0.0.1".into(), ..Greeting::own() };
     let bytes = body(encode_first(&other_build, Some(&place()), HELLO_BYTES_MAX).unwrap());
     assert!(matches!(hello(&bytes), Err(ProtocolError::OtherVersion(_))));
+    let bytes = body(encode_first(&Greeting::own(), Some(&vec![0xFFu8; 40]), HELLO_BYTES_MAX).unwrap());
+    let Err(ProtocolError::OtherVersion(why)) = welcome(&bytes) else { panic!("taken for one of ours") };
+    assert!(why.ends_with("restart it"), "{why}");
     let bytes = body(encode_first(&Greeting::sorry("full, wait\x1b[2J"), None::<&()>, HELLO_BYTES_MAX).unwrap());
     assert_eq!(welcome(&bytes).unwrap().unwrap_err(), "full, wait[2J");
 }
