@@ -1,4 +1,4 @@
-//! What the plant is told: values read, requests that failed, states of lines, outcomes of writes, faults of the station.
+//! Events for the plant: values read, requests that failed, states of lines, outcomes of writes, faults of the station.
 
 use std::time::Duration;
 
@@ -185,7 +185,7 @@ pub enum Fault {
     /// The echo of a write names another address or value.
     #[error("echo of the write differs from the request")]
     WrongEcho,
-    /// Frames came that nobody had asked for: the answer may be one of them.
+    /// Unsolicited frames came: the answer may be one of them.
     #[error("frames that were not asked for: answers cannot be trusted")]
     OutOfStep,
     /// The answer is good, but the registers hold no number of the tag's type (a BCD digit above 9, NaN).

@@ -16,7 +16,7 @@ const OUTCOME_TICKS: u32 = 120;
 pub struct Confirmed {
     /// What.
     pub command: Command,
-    /// The value of the tag to be written that stood before his eyes; `None` where it was not known.
+    /// The displayed value of the tag to be written; `None` where it was not known.
     pub seen: Option<f64>,
     /// What a tag asks for again.
     pub sign: Option<Signature>,

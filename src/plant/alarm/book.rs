@@ -98,9 +98,9 @@ impl Book {
         &self.machines[id.index()]
     }
 
-    /// What enables the alarm has become false: what was told returns, and once nobody has to answer to it any more nobody
-    /// is told again. What was annunciated, or waits for a reset, never leaves the list by itself. What cannot be told
-    /// suppresses nothing.
+    /// The condition that enables the alarm has become false: an active alarm returns, and is suppressed once it is
+    /// acknowledged. One that was annunciated, or waits for a reset, never leaves the list by itself. While the condition is
+    /// unknown, nothing is suppressed.
     fn suppress(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
         if !is_disabled(alarm, facts) || self.machine(alarm.id).suppressed().is_some() {
             return;

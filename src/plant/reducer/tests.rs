@@ -47,7 +47,7 @@ fn order(number: u32, command: Command) -> Order {
     Order::new(OrderId { terminal: 1, number }, "anna", command)
 }
 
-/// A write by an operator who has the plant's present values before him.
+/// A write by an operator who sees the plant's present values.
 fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> Order {
     let command = Command::Write { tag, value };
     Order { seen: plant.snapshot().seen(&command), ..order(number, command) }
