@@ -1,5 +1,6 @@
 //! The task of one line: opens the port, keeps the schedule, serves operators and tools, and tells the plant what came of it.
 
+mod concurrent;
 mod confirm;
 mod poll;
 mod test;
@@ -127,7 +128,7 @@ struct Task<'a> {
     /// Writes whose fate is not known yet.
     unconfirmed: Vec<confirm::Unconfirmed>,
     /// Reads that are under way over Modbus TCP, no more than a device takes at once.
-    under_way: Vec<poll::UnderWay>,
+    under_way: Vec<concurrent::UnderWay>,
     /// When the books were last told what the link has counted.
     closed_at: Timestamp,
     books: Books,

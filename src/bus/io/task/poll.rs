@@ -1,9 +1,8 @@
-//! Reading blocks: one at a time, or several under way over Modbus TCP; what came is evaluated and sent to the plant.
+//! Reading blocks: one at a time, or over Modbus TCP several (`concurrent`); what came is evaluated and sent to the plant.
 
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use tokio::time::Instant;
 use tokio_modbus::{
     Response,
     bytes::{Buf, Bytes},
@@ -13,15 +12,12 @@ use super::{Ended, Leave, Task, Turn};
 use crate::{
     bus::{
         codec,
-        io::{
-            link::{Ended as Answered, Link, Trouble},
-            requests::STOP_WAIT,
-        },
+        io::link::{Link, Trouble},
         plan::{self, Block},
-        schedule::{Next, Schedule},
+        schedule::Schedule,
     },
     plant::{
-        def::{DeviceId, Framing},
+        def::Framing,
         event::{Event, ExceptionCode, Fault},
         tag::TagDef,
         traffic::Exchange,
@@ -32,26 +28,14 @@ use crate::{
 const UNANSWERED_MAX: u32 = 5;
 
 /// How a read has ended.
-struct Outcome {
-    began: Timestamp,
-    ended: Timestamp,
+pub(super) struct Outcome {
+    pub began: Timestamp,
+    pub ended: Timestamp,
     /// The time of the line that it took.
-    took: Duration,
-    answer: Result<Answer, Fault>,
+    pub took: Duration,
+    pub answer: Result<Answer, Fault>,
     /// The evidence.
-    exchange: Option<Arc<Exchange>>,
-}
-
-/// A read that is under way over Modbus TCP.
-pub(super) struct UnderWay {
-    /// Its transaction.
-    id: u16,
-    /// Where its block stood in the plan.
-    index: usize,
-    block: Block,
-    began: Timestamp,
-    /// Which try this is.
-    tries: u8,
+    pub exchange: Option<Arc<Exchange>>,
 }
 
 impl Task<'_> {
@@ -91,7 +75,7 @@ impl Task<'_> {
     }
 
     /// Answers that had been given up have come: their devices need more time than they used to.
-    fn note_late(&mut self, link: &mut Link, schedule: &mut Schedule) {
+    pub(super) fn note_late(&mut self, link: &mut Link, schedule: &mut Schedule) {
         let late = link.take_late();
         self.books.late(&self.def, &late);
         for unit in late {
@@ -108,128 +92,7 @@ impl Task<'_> {
         Err(Leave::Lost(format!("no answer to {} requests over this connection", link.unanswered)))
     }
 
-    /// Sends what is due over Modbus TCP, as far as there is room. If there is none for more, waits for an answer.
-    async fn poll_tcp(&mut self, link: &mut Link, schedule: &mut Schedule, first: usize) -> Turn {
-        let now = self.clock.now();
-        let mut next = Next::Run(first);
-        let full = loop {
-            let Next::Run(index) = next else { break false };
-            if !link.has_room(self.blocks[index].unit) {
-                break true;
-            }
-            self.begin(link, schedule, (index, self.blocks[index].clone()), now, 1);
-            schedule.begin(index, now);
-            if link.is_full() {
-                break true;
-            }
-            next = schedule.next(now);
-        };
-        self.send(link, schedule, full).await
-    }
-
-    /// Sends what was submitted, and waits for an answer if there is no room for more; all of it is given up for a stop.
-    async fn send(&mut self, link: &mut Link, schedule: &mut Schedule, full: bool) -> Turn {
-        let sent = async {
-            link.flush().await?;
-            if full { link.wait_for_answer().await } else { Ok(()) }
-        };
-        let sent = self.requests.unless_stopped(sent).await;
-        if sent.is_none() {
-            self.give_up_reads(link, schedule);
-        }
-        Ok(sent.unwrap_or(Ok(())).map_err(Leave::from))
-    }
-
-    /// What is under way is read later: a stop cannot wait for it.
-    fn give_up_reads(&mut self, link: &mut Link, schedule: &mut Schedule) {
-        link.give_up_all();
-        let now = self.clock.now();
-        for UnderWay { index, block, began, .. } in std::mem::take(&mut self.under_way) {
-            if let Some(index) = self.place_of(index, &block) {
-                let served = schedule.done(index, began, now);
-                self.books.served(index, served.jitter, served.missed);
-                schedule.again(index, now);
-            }
-        }
-    }
-
-    fn begin(
-        &mut self,
-        link: &mut Link,
-        schedule: &Schedule,
-        (index, block): (usize, Block),
-        began: Timestamp,
-        tries: u8,
-    ) {
-        let patience = schedule.patience(index, &self.settings);
-        let id = link.submit(&block.request(), patience);
-        self.under_way.push(UnderWay { id, index, block, began, tries });
-    }
-
-    /// Takes what has come of the requests under way.
-    pub(super) async fn take_answers(&mut self, link: &mut Link, schedule: &mut Schedule) -> Turn {
-        for Answered { id, answer, at, mut exchange } in link.take_ended() {
-            let Some(place) = self.under_way.iter().position(|read| read.id == id) else { continue };
-            let UnderWay { index, block, began, tries, .. } = self.under_way.swap_remove(place);
-            let index = self.place_of(index, &block);
-            let answer = answer.and_then(|answer| parse(&block, answer));
-            if let (Err(fault), Some(index), 1) = (&answer, index, tries)
-                && fault.is_corrupt()
-                && link.has_room(block.unit)
-            {
-                // A retry that cures it must not hide it.
-                self.books.polled(Some(index), block.device, Err(*fault), None, 1);
-                self.begin(link, schedule, (index, block), self.clock.now(), 2);
-                continue;
-            }
-            Arc::make_mut(&mut exchange).tries = tries;
-            let ended = self.clock.at(at);
-            let device = self.def.device(block.device);
-            // It has taken one of the places that there are.
-            let took = span(began, ended) / u32::from(device.limits.in_flight_max.max(1));
-            if let Some(index) = index {
-                let served = schedule.done(index, began, ended);
-                self.books.served(index, served.jitter, served.missed);
-                self.keep_gap(link, schedule, &block, ended);
-            }
-            let outcome = Outcome { began, ended, took, answer, exchange: Some(exchange) };
-            self.settle(link, schedule, index, &block, outcome).await?;
-        }
-        self.note_late(link, schedule);
-        self.send(link, schedule, false).await
-    }
-
-    /// Waits until nothing of a device is under way, so that no value that was read before what comes next is shown after it.
-    /// For an `urgent` one what does not end soon is given up; another one gives way to a stop: `false`.
-    pub(super) async fn clear_way(
-        &mut self,
-        link: &mut Link,
-        schedule: &mut Schedule,
-        device: DeviceId,
-        urgent: bool,
-    ) -> Result<Result<bool, Leave>, Ended> {
-        let (unit, until) = (self.def.device(device).unit, Instant::now() + STOP_WAIT);
-        while !link.is_free(unit) {
-            let answer = link.wait_for_answer();
-            let waited = match urgent {
-                true => tokio::time::timeout_at(until, answer).await.ok(),
-                false => self.requests.unless_stopped(answer).await,
-            };
-            let Some(waited) = waited else {
-                self.give_up_reads(link, schedule);
-                return Ok(Ok(urgent));
-            };
-            if let Err(trouble) = waited {
-                return Ok(Err(Leave::from(trouble)));
-            }
-            if let Err(leave) = self.take_answers(link, schedule).await? {
-                return Ok(Err(leave));
-            }
-        }
-        Ok(Ok(true))
-    }
-
-    fn keep_gap(&self, link: &mut Link, schedule: &mut Schedule, block: &Block, ended: Timestamp) {
+    pub(super) fn keep_gap(&self, link: &mut Link, schedule: &mut Schedule, block: &Block, ended: Timestamp) {
         let gap = self.def.device(block.device).gap;
         if !gap.is_zero() {
             schedule.keep_gap(block.device, ended + gap);
@@ -237,16 +100,8 @@ impl Task<'_> {
         }
     }
 
-    /// Where a block stands that stood at `planned_at`: another answer may have changed the plan meanwhile.
-    fn place_of(&self, planned_at: usize, block: &Block) -> Option<usize> {
-        if self.blocks.get(planned_at).is_some_and(|planned| planned == block) {
-            return Some(planned_at);
-        }
-        self.blocks.iter().position(|planned| planned == block)
-    }
-
     /// Judges what came of a block and tells it.
-    async fn settle(
+    pub(super) async fn settle(
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
@@ -392,7 +247,7 @@ pub(super) enum Answer {
     Words(Vec<u16>),
 }
 
-fn span(from: Timestamp, to: Timestamp) -> Duration {
+pub(super) fn span(from: Timestamp, to: Timestamp) -> Duration {
     Duration::try_from(to.duration_since(from)).unwrap_or_default()
 }
 
@@ -451,7 +306,7 @@ async fn read(link: &mut Link, block: &Block) -> Result<Answer, Trouble> {
 }
 
 /// The values in a checked answer message.
-fn parse(block: &Block, answer: Vec<u8>) -> Result<Answer, Fault> {
+pub(super) fn parse(block: &Block, answer: Vec<u8>) -> Result<Answer, Fault> {
     let (count, got) = (usize::from(block.count), answer.len() as u16);
     let mut pdu = Bytes::from(answer);
     pdu.advance(1.min(pdu.len()));

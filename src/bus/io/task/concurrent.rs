@@ -1,0 +1,165 @@
+//! Reading blocks over Modbus TCP: several requests are under way at once, and each answer is taken as it comes.
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+use tokio::time::Instant;
+
+use super::{
+    Ended, Leave, Task, Turn,
+    poll::{Outcome, parse, span},
+};
+use crate::{
+    bus::{
+        io::{
+            link::{Ended as Answered, Link},
+            requests::STOP_WAIT,
+        },
+        plan::Block,
+        schedule::{Next, Schedule},
+    },
+    plant::def::DeviceId,
+};
+
+/// A read that is under way over Modbus TCP.
+pub(super) struct UnderWay {
+    /// Its transaction.
+    id: u16,
+    /// Where its block stood in the plan.
+    index: usize,
+    block: Block,
+    began: Timestamp,
+    /// Which try this is.
+    tries: u8,
+}
+
+impl Task<'_> {
+    /// Sends what is due over Modbus TCP, as far as there is room. If there is none for more, waits for an answer.
+    pub(super) async fn poll_tcp(&mut self, link: &mut Link, schedule: &mut Schedule, first: usize) -> Turn {
+        let now = self.clock.now();
+        let mut next = Next::Run(first);
+        let full = loop {
+            let Next::Run(index) = next else { break false };
+            if !link.has_room(self.blocks[index].unit) {
+                break true;
+            }
+            self.begin(link, schedule, (index, self.blocks[index].clone()), now, 1);
+            schedule.begin(index, now);
+            if link.is_full() {
+                break true;
+            }
+            next = schedule.next(now);
+        };
+        self.send(link, schedule, full).await
+    }
+
+    /// Sends what was submitted, and waits for an answer if there is no room for more; all of it is given up for a stop.
+    async fn send(&mut self, link: &mut Link, schedule: &mut Schedule, full: bool) -> Turn {
+        let sent = async {
+            link.flush().await?;
+            if full { link.wait_for_answer().await } else { Ok(()) }
+        };
+        let sent = self.requests.unless_stopped(sent).await;
+        if sent.is_none() {
+            self.give_up_reads(link, schedule);
+        }
+        Ok(sent.unwrap_or(Ok(())).map_err(Leave::from))
+    }
+
+    /// What is under way is read later: a stop cannot wait for it.
+    fn give_up_reads(&mut self, link: &mut Link, schedule: &mut Schedule) {
+        link.give_up_all();
+        let now = self.clock.now();
+        for UnderWay { index, block, began, .. } in std::mem::take(&mut self.under_way) {
+            if let Some(index) = self.place_of(index, &block) {
+                let served = schedule.done(index, began, now);
+                self.books.served(index, served.jitter, served.missed);
+                schedule.again(index, now);
+            }
+        }
+    }
+
+    fn begin(
+        &mut self,
+        link: &mut Link,
+        schedule: &Schedule,
+        (index, block): (usize, Block),
+        began: Timestamp,
+        tries: u8,
+    ) {
+        let patience = schedule.patience(index, &self.settings);
+        let id = link.submit(&block.request(), patience);
+        self.under_way.push(UnderWay { id, index, block, began, tries });
+    }
+
+    /// Takes what has come of the requests under way.
+    pub(super) async fn take_answers(&mut self, link: &mut Link, schedule: &mut Schedule) -> Turn {
+        for Answered { id, answer, at, mut exchange } in link.take_ended() {
+            let Some(place) = self.under_way.iter().position(|read| read.id == id) else { continue };
+            let UnderWay { index, block, began, tries, .. } = self.under_way.swap_remove(place);
+            let index = self.place_of(index, &block);
+            let answer = answer.and_then(|answer| parse(&block, answer));
+            if let (Err(fault), Some(index), 1) = (&answer, index, tries)
+                && fault.is_corrupt()
+                && link.has_room(block.unit)
+            {
+                // A retry that cures it must not hide it.
+                self.books.polled(Some(index), block.device, Err(*fault), None, 1);
+                self.begin(link, schedule, (index, block), self.clock.now(), 2);
+                continue;
+            }
+            Arc::make_mut(&mut exchange).tries = tries;
+            let ended = self.clock.at(at);
+            let device = self.def.device(block.device);
+            // It has taken one of the places that there are.
+            let took = span(began, ended) / u32::from(device.limits.in_flight_max.max(1));
+            if let Some(index) = index {
+                let served = schedule.done(index, began, ended);
+                self.books.served(index, served.jitter, served.missed);
+                self.keep_gap(link, schedule, &block, ended);
+            }
+            let outcome = Outcome { began, ended, took, answer, exchange: Some(exchange) };
+            self.settle(link, schedule, index, &block, outcome).await?;
+        }
+        self.note_late(link, schedule);
+        self.send(link, schedule, false).await
+    }
+
+    /// Waits until nothing of a device is under way, so that no value that was read before what comes next is shown after it.
+    /// For an `urgent` one what does not end soon is given up; another one gives way to a stop: `false`.
+    pub(super) async fn clear_way(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        device: DeviceId,
+        urgent: bool,
+    ) -> Result<Result<bool, Leave>, Ended> {
+        let (unit, until) = (self.def.device(device).unit, Instant::now() + STOP_WAIT);
+        while !link.is_free(unit) {
+            let answer = link.wait_for_answer();
+            let waited = match urgent {
+                true => tokio::time::timeout_at(until, answer).await.ok(),
+                false => self.requests.unless_stopped(answer).await,
+            };
+            let Some(waited) = waited else {
+                self.give_up_reads(link, schedule);
+                return Ok(Ok(urgent));
+            };
+            if let Err(trouble) = waited {
+                return Ok(Err(Leave::from(trouble)));
+            }
+            if let Err(leave) = self.take_answers(link, schedule).await? {
+                return Ok(Err(leave));
+            }
+        }
+        Ok(Ok(true))
+    }
+
+    /// Where a block stands that stood at `planned_at`: another answer may have changed the plan meanwhile.
+    fn place_of(&self, planned_at: usize, block: &Block) -> Option<usize> {
+        if self.blocks.get(planned_at).is_some_and(|planned| planned == block) {
+            return Some(planned_at);
+        }
+        self.blocks.iter().position(|planned| planned == block)
+    }
+}
