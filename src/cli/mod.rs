@@ -98,9 +98,9 @@ enum Command {
     Report(report::Args),
     /// Writes stored values of tags at a fixed interval as CSV
     Export(export::Args),
-    /// Tells how good the alarm system was in a shift or period: rates, floods, chattering, stale, against their targets
+    /// Shows how good the alarm system was in a shift or period: rates, floods, chattering, stale, against their targets
     Alarms(alarms::Args),
-    /// Tells a Modbus frame in words: every byte, CRC and LRC, what is wrong with it
+    /// Explains a Modbus frame: every byte, CRC and LRC, what is wrong with it
     Frame(frame::Args),
     /// Looks for units on a line: addresses, baud rates, parities
     Scan(tools::scan::Args),
