@@ -35,7 +35,7 @@ pub fn read(path: &Path) -> io::Result<Option<Key>> {
         Ok(file) => {
             let mut text = String::new();
             file.take(1_000).read_to_string(&mut text)?;
-            let damaged = || io::Error::new(io::ErrorKind::InvalidData, "it is damaged");
+            let damaged = || io::Error::new(io::ErrorKind::InvalidData, "the sealing key is damaged");
             Key::parse(&text).map(Some).ok_or_else(damaged)
         }
     }
@@ -72,7 +72,7 @@ pub fn make(log: &Path, made: Timestamp) -> io::Result<VerificationKey> {
 /// process that is killed in between leaves neither a gap nor two seals of one key.
 pub fn seal(book: &mut Book, log: &Path, at: Timestamp) -> (Option<ActionRecord>, Result<(), String>) {
     let path = beside(log);
-    let failed = |why: &str| Err(format!("the audit log is not sealed: {}: {why}", path.display()));
+    let failed = |why: &str| Err(format!("the audit log is not sealed: {why}: {}", path.display()));
     let present = match read(&path) {
         Ok(Some(key)) => key,
         Ok(None) if book.last_seal().is_none() => return (None, Ok(())),
