@@ -212,7 +212,7 @@ fn a_checkpoint_finds_its_moment_between_questions_without_pause() {
     use std::sync::atomic::{AtomicUsize, Ordering};
     let (_folder, db) = folder();
     let mut writer = Writer::open(db.clone(), def(), sec(0)).unwrap();
-    let rows = 300_000;
+    let rows = 30_000;
     writer.store().unwrap().append(&(0..rows).map(|at| good(PV, at, at as f64)).collect::<Vec<_>>()).unwrap();
     let readers: Vec<Store> = (0..QUESTIONS_MAX).map(|_| writer.store().unwrap().try_clone().unwrap()).collect();
     let (answered, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
