@@ -105,7 +105,7 @@ fn frames(buffer: &[u8]) -> impl Iterator<Item = Range<usize>> {
 }
 
 /// The beginning of a frame that has not ended.
-fn open_frame(buffer: &[u8]) -> Option<&[u8]> {
+pub fn open_frame(buffer: &[u8]) -> Option<&[u8]> {
     let start = buffer.iter().rposition(|byte| *byte == b':')?;
     let rest = &buffer[start..];
     (!rest.windows(END.len()).any(|pair| pair == END)).then_some(rest)

@@ -101,7 +101,7 @@ impl Link {
             asked_id: None,
             gaps: Vec::new(),
             timeout: line.timeout,
-            idle: wire.silence.max(line.idle),
+            idle: wire.idle,
             turnaround: clock.real_span(line.turnaround),
             uart,
             echoes: false,

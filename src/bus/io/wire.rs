@@ -11,6 +11,7 @@ use tokio::{
 use super::{clock::Clock, link::Trouble, pause::Pause, transport::Stream};
 use crate::{
     bus::{
+        ascii,
         debt::Debts,
         frame::{self, Unasked},
         plan::Block,
@@ -21,6 +22,9 @@ use crate::{
         traffic::{FRAMES_MAX, Frame},
     },
 };
+
+/// More stray bytes are judged without waiting for silence.
+const STRAY_MAX: usize = 4 * frame::MESSAGE_MAX;
 
 /// What a line remembers from one opening of its port to the next.
 #[derive(Debug, Clone)]
@@ -64,6 +68,10 @@ pub struct Wire {
     born: Instant,
     /// What each unit owes.
     pub debts: Debts,
+    /// Bytes that no request waits for, until silence shows that their frame has ended.
+    stray: Vec<u8>,
+    /// Bytes that are further apart than this (real time) are of two frames.
+    pub idle: Duration,
     /// Frames since they were last taken.
     frames: Vec<Frame>,
     /// Units whose answers came late since this was last taken.
@@ -100,6 +108,8 @@ impl Wire {
             left_at: Instant::now(),
             born,
             debts,
+            stray: Vec::new(),
+            idle: clock.real_span(silence).max(line.idle),
             frames: Vec::new(),
             late: Vec::new(),
             unasked: Vec::new(),
@@ -154,8 +164,15 @@ impl Wire {
     pub async fn send(&mut self, bytes: &[u8]) -> Result<Instant, Trouble> {
         self.wait_for_silence().await;
         if self.framing != Framing::Mbap {
+            // What is just coming in is heard to its end: it may be what the unit owes.
             self.drain()?;
+            if self.has_begun() {
+                self.rest(self.idle);
+                self.wait_for_silence().await;
+                self.drain()?;
+            }
         }
+        self.drop_stray();
         self.put(bytes).await
     }
 
@@ -207,11 +224,13 @@ impl Wire {
 
     /// Reads and drops what comes while nobody has asked; returns only when the port is gone.
     pub async fn idle(&mut self) -> Trouble {
-        let mut buffer = Vec::new();
         loop {
-            match self.receive(Instant::now() + Duration::from_secs(3_600), &mut buffer).await {
-                Ok(_) => self.drop_stale(&std::mem::take(&mut buffer)),
-                Err(trouble) => return trouble,
+            let pause = if self.stray.is_empty() { Duration::from_secs(3_600) } else { self.idle };
+            self.stray.reserve(frame::MESSAGE_MAX);
+            match tokio::time::timeout(pause, self.port.read_buf(&mut self.stray)).await.map(received) {
+                Err(_) => self.drop_stray(),
+                Ok(Ok(count)) => self.took_stray(count),
+                Ok(Err(trouble)) => return trouble,
             }
         }
     }
@@ -223,6 +242,21 @@ impl Wire {
         self.late.push(unit);
         tracing::debug!(unit, bytes = %frame::hex(frame), "late answer dropped");
         self.record(false, frame.into(), Cow::Borrowed("late, dropped"));
+    }
+
+    /// So many stray bytes have come.
+    fn took_stray(&mut self, count: usize) {
+        self.counters.received_bytes += count as u64;
+        self.counters.last_rx = Some(self.clock.utc());
+        if STRAY_MAX <= self.stray.len() {
+            self.drop_stray();
+        }
+    }
+
+    /// The line is silent, or something is sent.
+    fn drop_stray(&mut self) {
+        let bytes = std::mem::take(&mut self.stray);
+        self.drop_stale(&bytes);
     }
 
     /// Bytes that nobody waits for, or not any more: on record, and on the account of the unit that owed them.
@@ -292,35 +326,40 @@ impl Wire {
             return;
         }
         let limit = self.quiet_until + self.timeout;
-        let mut buffer = Vec::new();
         while Instant::now() < self.quiet_until.min(limit) {
             let until = self.quiet_until.min(limit);
-            buffer.clear();
+            self.stray.reserve(frame::MESSAGE_MAX);
             let read = tokio::select! {
                 () = self.pause.until(until) => break,
-                read = self.port.read_buf(&mut buffer) => read,
+                read = self.port.read_buf(&mut self.stray) => read,
             };
             // A gone port shows itself at the write that follows.
             let Ok(count @ 1..) = read else {
                 self.pause.until(until).await;
                 break;
             };
-            self.counters.received_bytes += count as u64;
-            self.drop_stale(&buffer[..count]);
-            self.rest(self.silence);
+            self.took_stray(count);
+            self.rest(if self.has_begun() { self.idle } else { self.silence });
         }
         self.quiet_until = self.quiet_until.min(limit);
     }
 
-    /// Drops what lies in the kernel: it was sent before we asked. (Over Modbus TCP the transaction id tells.)
+    /// Takes what lies in the kernel: it was sent before we asked. (Over Modbus TCP the transaction id tells.)
     fn drain(&mut self) -> Result<(), Trouble> {
-        let mut buffer = [0; 512];
-        while let Some(read) = self.port.read(&mut buffer).now_or_never() {
-            let count = received(read)?;
-            self.counters.received_bytes += count as u64;
-            self.drop_stale(&buffer[..count]);
+        loop {
+            self.stray.reserve(frame::MESSAGE_MAX);
+            let Some(read) = self.port.read_buf(&mut self.stray).now_or_never() else { return Ok(()) };
+            self.took_stray(received(read)?);
         }
-        Ok(())
+    }
+
+    /// Is a stray frame just coming in? A single byte is noise, as drivers make it when they let go of a line.
+    fn has_begun(&self) -> bool {
+        match self.framing {
+            Framing::Mbap => false,
+            Framing::Ascii => ascii::open_frame(&self.stray).is_some(),
+            Framing::Rtu => 1 < self.stray.len() && frame::unasked(self.framing, &self.stray).is_empty(),
+        }
     }
 }
 
