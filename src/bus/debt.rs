@@ -5,6 +5,9 @@
 //! whose answer cannot be mistaken for an owed one. A serial device answers in order; a valid answer to such a request
 //! therefore proves that nothing older is still to come, and the debt is cleared.
 //!
+//! A unit whose owed answer comes after such a proof does not answer in order: from then on only the owed answer itself, or
+//! patience, clears what it owes.
+//!
 //! A unit that was never asked before may owe an answer to an earlier process that was killed, and one that sends what it was
 //! not asked for may do so again: both are *unproven*, and are first asked something that is no usual block of theirs.
 
@@ -59,6 +62,11 @@ impl Debt {
     pub fn is_ambiguous(&self, shape: Shape) -> bool {
         let usual = self.unproven && (self.usual.contains(&shape) || self.usual.len() == USUAL_MAX);
         !shape.is_loopback() && (usual || self.owed.contains(&shape) || self.owed.len() == OWED_MAX)
+    }
+
+    /// Is an answer of this shape owed?
+    fn owes(&self, shape: Shape) -> bool {
+        self.owed.contains(&shape)
     }
 
     /// Does the refusal of a loopback (exception 01, by devices that do not have it) prove as much as its echo?
@@ -126,12 +134,61 @@ struct Unit {
     /// Its last good answer, and whether that came again.
     answer: Vec<u8>,
     repeats: bool,
+    /// Owed shapes of which one has come late.
+    paid: Vec<Shape>,
+    /// What had not come, and since when it was owed, when it proved to be in step: from a unit that answers in order, it
+    /// never comes.
+    disproved: Vec<(Shape, Duration)>,
+    /// It does not answer in order.
+    overtakes: bool,
+    /// More than one answer of a shape may be under way: only patience clears what it owes.
+    is_unsure: bool,
 }
 
 impl Unit {
     fn in_step(&mut self) {
         self.debt.clear();
-        (self.failed_at, self.unasked_at) = (None, None);
+        self.paid.clear();
+        (self.failed_at, self.unasked_at, self.is_unsure) = (None, None, false);
+    }
+
+    /// It has given an answer that cannot have been an older one.
+    fn prove(&mut self, patience: Duration, now: Duration) {
+        let (owed, paid) = (std::mem::take(&mut self.debt.owed), std::mem::take(&mut self.paid));
+        let (failed_at, is_unsure) = (self.failed_at, self.is_unsure);
+        self.in_step();
+        let Some(failed_at) = failed_at else { return };
+        if self.overtakes {
+            (self.debt.owed, self.failed_at, self.is_unsure) = (owed, Some(failed_at), is_unsure);
+            return;
+        }
+        self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < patience);
+        let missing = owed.into_iter().filter(|shape| !paid.contains(shape)).map(|shape| (shape, failed_at));
+        self.disproved.extend(missing.take(OWED_MAX.saturating_sub(self.disproved.len())));
+    }
+
+    /// An answer has come late. `true` if it shows that answers overtake each other: nothing of its shape is owed but what
+    /// cannot come any more from a unit that answers in order. All of that may still come now.
+    fn overtook(&mut self, message: &[u8], patience: Duration, now: Duration) -> bool {
+        let fits = |shape: &&Shape| shape.fits(message);
+        if let Some(shape) = self.debt.owed.iter().find(fits).filter(|shape| !self.paid.contains(shape)) {
+            self.paid.push(*shape);
+            return false;
+        }
+        self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < patience);
+        let Some(place) = self.disproved.iter().position(|(shape, _)| shape.fits(message)) else { return false };
+        self.disproved.swap_remove(place);
+        (self.overtakes, self.is_unsure) = (true, !self.disproved.is_empty() || !self.debt.owed.is_empty());
+        for (shape, failed_at) in std::mem::take(&mut self.disproved) {
+            self.debt.owe(shape);
+            self.failed_at = self.failed_at.max(Some(failed_at));
+        }
+        true
+    }
+
+    /// It rests so long for each answer that it owes, where nothing can prove that it is in step.
+    fn patience(&self, timeout: Duration) -> Duration {
+        (2 * self.late_max).max(10 * timeout)
     }
 }
 
@@ -162,9 +219,10 @@ impl Debts {
     pub fn answered(&mut self, request: &[u8], answer: &[u8], proof: bool, now: Duration) {
         let Some(unit) = request.first().map(|unit| usize::from(*unit)) else { return };
         let unsettled = self.is_unsettled(unit as u8, now);
+        let timeout = self.timeout;
         let unit = &mut self.units[unit];
         if proof && !unsettled {
-            unit.in_step();
+            unit.prove(unit.patience(timeout), now);
         }
         answer.clone_into(&mut unit.answer);
         let is_usual = shape_of(request).is_some_and(|shape| unit.debt.usual.contains(&shape));
@@ -229,8 +287,10 @@ impl Debts {
     }
 
     /// Nothing older than its last answer can come from this unit any more.
-    pub fn clear(&mut self, unit: u8) {
-        self.units[usize::from(unit)].in_step();
+    pub fn clear(&mut self, unit: u8, now: Duration) {
+        let timeout = self.timeout;
+        let unit = &mut self.units[usize::from(unit)];
+        unit.prove(unit.patience(timeout), now);
     }
 
     /// A request was not answered, or only by something spoiled.
@@ -248,13 +308,31 @@ impl Debts {
         }
     }
 
-    /// Bytes of this unit came that nobody waits for. `true` if it owed them.
-    pub fn came_late(&mut self, unit: u8, now: Duration) -> bool {
+    /// An answer of this unit came that was not waited for any more. `true` if it owed one.
+    pub fn came_late(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
         let timeout = self.timeout;
         let unit = &mut self.units[usize::from(unit)];
         let Some(failed_at) = unit.failed_at.filter(|_| !unit.debt.is_clear()) else { return false };
         unit.late_max = unit.late_max.max(now.saturating_sub(failed_at) + timeout);
+        if unit.overtakes && !unit.is_unsure {
+            unit.debt.owed.retain(|shape| !shape.fits(message));
+        }
         true
+    }
+
+    /// An answer of this unit came that was not waited for any more. `true` if it shows for the first time that its answers overtake
+    /// each other: what was read of it while it seemed to be in step is in doubt.
+    pub fn overtook(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
+        let timeout = self.timeout;
+        let unit = &mut self.units[usize::from(unit)];
+        let is_repeated = unit.answer == message;
+        !unit.overtakes && !is_repeated && unit.overtook(message, unit.patience(timeout), now)
+    }
+
+    /// Can only time, or the owed answer, make sure that the answer to this message is no older one?
+    pub fn must_wait(&self, message: &[u8]) -> bool {
+        let Some(unit) = message.first().map(|unit| &self.units[usize::from(*unit)]) else { return false };
+        unit.overtakes && shape_of(message).is_some_and(|shape| unit.debt.owes(shape))
     }
 
     /// The next loopback of a unit, with a number of its own.
@@ -267,9 +345,9 @@ impl Debts {
     /// `None` once it is forgotten. For each answer that it owes it rests twice as long as it has ever been late, ten
     /// timeouts at the least: patience, not proof, and needed only for devices that do not answer a loopback at all.
     pub fn forget(&mut self, unit: u8, now: Duration) -> Option<Duration> {
+        let timeout = self.timeout;
         let unit = &mut self.units[usize::from(unit)];
-        let each = (2 * unit.late_max).max(10 * self.timeout);
-        let rest = (each * unit.debt.count().max(1) as u32).min(REST_MAX);
+        let rest = (unit.patience(timeout) * unit.debt.count().max(1) as u32).min(REST_MAX);
         let waited = unit.failed_at.map_or(rest, |failed_at| now.saturating_sub(failed_at));
         if waited < rest {
             return Some(rest - waited);
@@ -281,75 +359,4 @@ impl Debts {
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
-mod tests {
-    use super::*;
-    use crate::{
-        bus::plan,
-        plant::{def::LineId, fixture},
-    };
-
-    #[test]
-    fn a_probe_is_never_of_an_owed_shape() {
-        let blocks = plan::blocks(&fixture::plant(), LineId(0), &plan::Holes::default());
-        let inputs = &blocks[0];
-        let mut debt = Debt::default();
-        assert!(debt.is_clear());
-        let mut asked = Vec::new();
-        // Every probe in vain is owed too; each next one differs until the block has no more shapes to offer.
-        debt.owe(shape_of(&inputs.request()).unwrap());
-        assert!(debt.is_ambiguous(shape_of(&inputs.request()).unwrap()));
-        while let Some(probe) = debt.probe([inputs].into_iter()) {
-            assert!(!asked.contains(&probe));
-            assert!(probe[5] < inputs.count as u8);
-            debt.owe(shape_of(&probe).unwrap());
-            asked.push(probe);
-        }
-        assert_eq!(asked.len(), 7, "one to seven of eight registers");
-        debt.clear();
-        assert!(!debt.is_ambiguous(shape_of(&inputs.request()).unwrap()));
-    }
-
-    #[test]
-    fn a_unit_that_owes_too_much_is_asked_nothing() {
-        let mut debt = Debt::default();
-        for count in 1..=OWED_MAX as u8 {
-            debt.owe(shape_of(&[1, 3, 0, 0, 0, count]).unwrap());
-        }
-        assert!(debt.is_ambiguous(shape_of(&[1, 4, 0, 0, 0, 99]).unwrap()));
-    }
-
-    #[test]
-    fn a_loopback_is_never_ambiguous_and_its_first_refusal_is_proof() {
-        let mut debt = Debt::default();
-        let shape = |number| shape_of(&loopback(1, number)).unwrap();
-        assert!(debt.refusal_proves());
-        debt.owe(shape(7));
-        assert!(!debt.is_clear() && !debt.refusal_proves());
-        assert!(!debt.is_ambiguous(shape(8)));
-        debt.clear();
-        assert!(debt.is_clear() && debt.refusal_proves());
-    }
-
-    #[test]
-    fn writes_are_told_apart_by_their_echo() {
-        let mut debt = Debt::default();
-        debt.owe(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap());
-        assert!(!debt.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 6]).unwrap()));
-        assert!(debt.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap()));
-    }
-
-    #[test]
-    fn a_unit_that_was_late_must_rest_longer() {
-        let s = Duration::from_secs;
-        let mut debts = Debts::new(s(1), 0);
-        let request = [1, 3, 0, 0, 0, 2];
-        assert_eq!(debts.forget(1, s(0)), None, "who owes nothing has nothing to forget");
-        debts.failed(&request, s(100));
-        assert!(debts.is_ambiguous(&request) && !debts.is_ambiguous(&[2, 3, 0, 0, 0, 2]));
-        assert_eq!(debts.forget(1, s(104)), Some(s(6)), "ten timeouts");
-        assert!(debts.came_late(1, s(108)) && !debts.came_late(2, s(108)));
-        assert_eq!(debts.forget(1, s(110)), Some(s(8)), "twice the 9 s that it was late");
-        assert_eq!(debts.forget(1, s(118)), None);
-        assert!(!debts.is_ambiguous(&request));
-    }
-}
+mod tests;

@@ -262,6 +262,11 @@ impl Link {
         self.framing() != Framing::Mbap && self.wire.debts.is_ambiguous(message)
     }
 
+    /// See [`crate::bus::debt::Debts::must_wait`].
+    pub fn must_wait(&self, message: &[u8]) -> bool {
+        self.wire.debts.must_wait(message)
+    }
+
     /// How long an answer may take.
     pub fn timeout(&self) -> Duration {
         self.timeout
@@ -285,7 +290,7 @@ impl Link {
             Ok(_) => Ok(()),
             Err(Trouble::Fault(Fault::Exception(_))) if proves => {
                 if !self.is_unsettled(unit) {
-                    self.wire.debts.clear(unit);
+                    self.wire.debts.clear(unit, self.wire.age());
                 }
                 Ok(())
             }

@@ -2,6 +2,7 @@
 //! shows the address it came from.
 
 mod slave;
+mod slow;
 mod stops;
 mod strangers;
 mod together;

@@ -273,13 +273,14 @@ impl Wire {
             let (Unasked::Answer(message) | Unasked::Request(message)) = &unasked;
             let Some(unit) = message.first().copied() else { continue };
             let asks = matches!(unasked, Unasked::Request(_));
-            if !asks && self.debts.came_late(unit, age) {
+            let overtook = !asks && self.debts.overtook(unit, message, age);
+            let pays = !asks && !overtook && self.debts.came_late(unit, message, age);
+            if pays {
                 late = true;
                 self.counters.late += 1;
                 self.late.push(unit);
-                continue;
             }
-            if self.debts.unasked(unit, message, age) {
+            if overtook || (!pays && self.debts.unasked(unit, message, age)) {
                 self.unasked.push(unit);
             }
             if asks {

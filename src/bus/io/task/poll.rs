@@ -260,6 +260,9 @@ async fn bring_into_step(blocks: &[Block], link: &mut Link, block: &Block) -> Re
     if link.is_unsettled(block.unit) {
         return Err(Fault::OutOfStep.into());
     }
+    if link.must_wait(&block.request()) {
+        return if link.forget_debt(block.unit).is_none() { Ok(()) } else { Err(Fault::OutOfStep.into()) };
+    }
     let own = std::iter::once(block);
     let others = blocks.iter().filter(|other| other.device == block.device && *other != block);
     if let Some(probe) = link.debt(block.unit).probe(own.chain(others)) {

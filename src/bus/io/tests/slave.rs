@@ -218,6 +218,7 @@ pub struct Line {
     pub events: mpsc::Receiver<Event>,
     pub requests: mpsc::Sender<BusRequest>,
     pub ports: mpsc::Sender<DuplexStream>,
+    task: tokio::task::JoinHandle<()>,
     _stop: watch::Sender<bool>,
 }
 
@@ -227,14 +228,19 @@ pub fn line(def: PlantDef) -> Line {
     let (ports, streams) = mpsc::channel(8);
     let (stop, stopped) = watch::channel(false);
     let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
-    tokio::spawn(async move {
+    let task = tokio::spawn(async move {
         let mut connector = Connector::Memory(streams);
         task::run(Arc::new(def), LineId(0), clock, &mut connector, sender, &mut Requests::new(queue), stopped).await;
     });
-    Line { events, requests, ports, _stop: stop }
+    Line { events, requests, ports, task, _stop: stop }
 }
 
 impl Line {
+    /// Ends it as a kill of its process does: at once, whatever is under way.
+    pub fn kill(self) {
+        self.task.abort();
+    }
+
     pub fn plug(
         &self,
         mode: Mode,

@@ -1,0 +1,90 @@
+use super::*;
+use crate::{
+    bus::plan,
+    plant::{def::LineId, fixture},
+};
+
+#[test]
+fn a_probe_is_never_of_an_owed_shape() {
+    let blocks = plan::blocks(&fixture::plant(), LineId(0), &plan::Holes::default());
+    let inputs = &blocks[0];
+    let mut debt = Debt::default();
+    assert!(debt.is_clear());
+    let mut asked = Vec::new();
+    // Every probe in vain is owed too; each next one differs until the block has no more shapes to offer.
+    debt.owe(shape_of(&inputs.request()).unwrap());
+    assert!(debt.is_ambiguous(shape_of(&inputs.request()).unwrap()));
+    while let Some(probe) = debt.probe([inputs].into_iter()) {
+        assert!(!asked.contains(&probe));
+        assert!(probe[5] < inputs.count as u8);
+        debt.owe(shape_of(&probe).unwrap());
+        asked.push(probe);
+    }
+    assert_eq!(asked.len(), 7, "one to seven of eight registers");
+    debt.clear();
+    assert!(!debt.is_ambiguous(shape_of(&inputs.request()).unwrap()));
+}
+
+#[test]
+fn a_unit_that_owes_too_much_is_asked_nothing() {
+    let mut debt = Debt::default();
+    for count in 1..=OWED_MAX as u8 {
+        debt.owe(shape_of(&[1, 3, 0, 0, 0, count]).unwrap());
+    }
+    assert!(debt.is_ambiguous(shape_of(&[1, 4, 0, 0, 0, 99]).unwrap()));
+}
+
+#[test]
+fn a_loopback_is_never_ambiguous_and_its_first_refusal_is_proof() {
+    let mut debt = Debt::default();
+    let shape = |number| shape_of(&loopback(1, number)).unwrap();
+    assert!(debt.refusal_proves());
+    debt.owe(shape(7));
+    assert!(!debt.is_clear() && !debt.refusal_proves());
+    assert!(!debt.is_ambiguous(shape(8)));
+    debt.clear();
+    assert!(debt.is_clear() && debt.refusal_proves());
+}
+
+#[test]
+fn writes_are_told_apart_by_their_echo() {
+    let mut debt = Debt::default();
+    debt.owe(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap());
+    assert!(!debt.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 6]).unwrap()));
+    assert!(debt.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap()));
+}
+
+#[test]
+fn a_unit_that_was_late_must_rest_longer() {
+    let s = Duration::from_secs;
+    let mut debts = Debts::new(s(1), 0);
+    let request = [1, 3, 0, 0, 0, 2];
+    assert_eq!(debts.forget(1, s(0)), None, "who owes nothing has nothing to forget");
+    debts.failed(&request, s(100));
+    assert!(debts.is_ambiguous(&request) && !debts.is_ambiguous(&[2, 3, 0, 0, 0, 2]));
+    assert_eq!(debts.forget(1, s(104)), Some(s(6)), "ten timeouts");
+    let answer = |unit| [unit, 3, 4, 0, 1, 0, 2];
+    assert!(debts.came_late(1, &answer(1), s(108)) && !debts.came_late(2, &answer(2), s(108)));
+    assert_eq!(debts.forget(1, s(110)), Some(s(8)), "twice the 9 s that it was late");
+    assert_eq!(debts.forget(1, s(118)), None);
+    assert!(!debts.is_ambiguous(&request));
+}
+
+#[test]
+fn a_unit_whose_answers_overtake_each_other_proves_nothing_by_a_later_one() {
+    let s = Duration::from_secs;
+    let mut debts = Debts::new(s(1), 0);
+    let (request, answer) = ([1, 3, 0, 0, 0, 2], [1, 3, 4, 0, 1, 0, 2]);
+    let (probe, probed) = ([1, 3, 0, 0, 0, 1], [1, 3, 2, 0, 1]);
+    debts.failed(&request, s(100));
+    debts.answered(&probe, &probed, true, s(101));
+    assert!(!debts.is_ambiguous(&request), "units are taken to answer in order");
+    assert!(debts.overtook(1, &answer, s(102)) && !debts.overtook(1, &answer, s(103)));
+    debts.failed(&request, s(200));
+    debts.answered(&probe, &probed, true, s(201));
+    assert!(debts.is_ambiguous(&request) && debts.must_wait(&request) && !debts.must_wait(&probe));
+    assert!(debts.came_late(1, &answer, s(202)));
+    assert!(!debts.is_ambiguous(&request), "what was owed has come");
+    debts.failed(&request, s(300));
+    assert_eq!((debts.forget(1, s(305)), debts.forget(1, s(310))), (Some(s(5)), None), "or it never comes");
+}
