@@ -193,7 +193,7 @@ impl Unit {
 }
 
 impl Debts {
-    /// Nobody owes anything. The numbers of loopbacks begin behind `seed`, which differs from process to process.
+    /// No unit owes anything. The numbers of loopbacks begin behind `seed`, which differs from process to process.
     pub fn new(timeout: Duration, seed: u16) -> Debts {
         Debts { units: vec![Unit::default(); 256], timeout, loopbacks: seed }
     }
@@ -232,7 +232,7 @@ impl Debts {
         }
     }
 
-    /// A good frame of this unit came that nobody had asked for. `true` if that puts what was read of it into doubt.
+    /// An unsolicited good frame of this unit came. `true` if that puts what was read of it into doubt.
     pub fn unasked(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
         let unit = &mut self.units[usize::from(unit)];
         if unit.answer == message {

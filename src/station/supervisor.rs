@@ -113,9 +113,9 @@ mod tests {
             // What had been sent of it is not known.
             assert_eq!(ended, [(WriteId(1), WriteResult::Lost(Fault::NotConnected))]);
             let why = "internal error, see the log".to_owned();
-            let told = |state: &LineState| matches!(state, LineState::Waiting { why: words, .. } if *words == why);
+            let waits = |state: &LineState| matches!(state, LineState::Waiting { why: words, .. } if *words == why);
             assert_eq!(states[..2], [LineState::Connecting, LineState::Connected]);
-            assert!(states.last().is_some_and(told), "{states:?}");
+            assert!(states.last().is_some_and(waits), "{states:?}");
         }
     }
 }

@@ -51,7 +51,7 @@ fn the_outcome_of_an_order_from_before_a_break_is_found_again() {
     let mut own = Own::new(1, 3);
     send(&mut own, 1);
     own.gone();
-    assert_eq!(seen(&mut own, &[]), [(3, 1, NOT_CONFIRMED)], "nobody knows yet");
+    assert_eq!(seen(&mut own, &[]), [(3, 1, NOT_CONFIRMED)], "not known yet");
     own.welcomed(1, 5);
     assert_eq!(seen(&mut own, &[(3, 1, Outcome::Verified)]), [(3, 1, Outcome::Verified)]);
     assert_eq!(send(&mut own, 2), OrderId { terminal: 5, number: 2 });

@@ -20,7 +20,7 @@ pub struct Clock {
     base: Timestamp,
     start: Instant,
     speed: f64,
-    /// `None` for a clock that is nobody's wall clock: faster than real time, or virtual.
+    /// `None` for a clock that is no wall clock: faster than real time, or virtual.
     system: Option<System>,
 }
 
@@ -136,6 +136,6 @@ mod tests {
         assert_eq!(clock.follow_at(wall + seconds(8) - two_years, steady + seconds(8)), Some(-years - years));
         assert_eq!(clock.behind_utc(), -years);
         let demo = Clock::starting_at(Timestamp::UNIX_EPOCH, 60.0);
-        assert_eq!((demo.follow(), demo.behind_utc()), (None, SignedDuration::ZERO), "nobody's wall clock");
+        assert_eq!((demo.follow(), demo.behind_utc()), (None, SignedDuration::ZERO), "no wall clock");
     }
 }

@@ -160,7 +160,7 @@ impl Link {
             Some(0) => Gathered::nothing(Ok(vec![])),
             _ => self.gather(message, &frame, sent_at).await?,
         };
-        // Something came meanwhile that nobody had asked for: so may have this.
+        // Something unsolicited came meanwhile: this may be unsolicited too.
         if proof && gathered.answer.is_ok() && self.wire.debts.is_ambiguous(message) {
             gathered.answer = Err(Fault::OutOfStep);
         }

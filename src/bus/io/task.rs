@@ -386,7 +386,7 @@ impl Task<'_> {
         let (def, line) = (self.def.clone(), self.line);
         for unit in link.take_unasked() {
             for device in def.devices.iter().filter(|device| device.line == line && device.unit == unit) {
-                tracing::warn!(device = device.name, "frames that nobody asked for: its values are in doubt");
+                tracing::warn!(device = device.name, "unsolicited frames: its values are in doubt");
                 let tags = def.tags_of(device.id).map(|tag| tag.id).collect();
                 self.tell_failed(self.clock.now(), device.id, tags, Fault::OutOfStep, None).await?;
             }

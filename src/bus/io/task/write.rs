@@ -157,7 +157,7 @@ impl Task<'_> {
         }
         // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
         let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
-        // A stop is not kept waiting for the sake of a clear answer: its refusal may then be told as a loss.
+        // A stop is not kept waiting for the sake of a clear answer: its refusal may then be reported as a missing answer.
         let own = (urgent && is_clear(link, device)) || (!urgent && self.owes_nothing(link, device).await?);
         // Nothing else goes out before a stop that waits.
         if !urgent && self.requests.stop_waits() {

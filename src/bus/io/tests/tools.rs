@@ -36,7 +36,7 @@ async fn a_line_can_be_closed_while_a_scan_has_it_for_itself() {
     line.until(&def, |event| matches!(event, Event::Line { state: LineState::Disconnected, .. }).then_some(())).await;
 }
 
-/// Bytes that are no request are sent as they are, and whatever comes back is told.
+/// Bytes that are no request are sent as they are, and whatever comes back is reported.
 #[tokio::test(start_paused = true)]
 async fn nonsense_is_sent_and_nonsense_is_told() {
     for mode in [Mode::Rtu, Mode::Tcp] {
@@ -68,7 +68,7 @@ async fn nonsense_is_sent_and_nonsense_is_told() {
     }
 }
 
-/// Sends a stop while nobody answers a scan that waits ten seconds for each unit; gives how long it took, and how the scan ended.
+/// Sends a stop while no unit answers a scan that waits ten seconds for each unit; gives how long it took, and how the scan ended.
 async fn stop_during_scan(serials: Vec<Serial>) -> (Duration, WriteResult, ToolState) {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
