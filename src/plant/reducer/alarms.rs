@@ -67,7 +67,7 @@ impl Plant {
         let asks_health = |alarm: &AlarmDef| matches!(alarm.condition, Condition::Health { .. });
         let diagnosed = if self.def.alarms.iter().any(asks_health) { self.diagnosed() } else { Vec::new() };
         let (def, board, lines, devices) = (&self.def, &self.board, &self.lines, &self.devices);
-        let faults = &self.faults;
+        let (faults, speed) = (&self.faults, self.speed);
         let ill = |alarm: &AlarmDef| match (alarm.subject, alarm.condition) {
             (Subject::Device(device), Condition::Health { signal }) => {
                 diagnosed.get(device.index()).and_then(|status| has_signal(status, signal))
@@ -77,6 +77,8 @@ impl Plant {
                 let no_values = report.is_some_and(|report| report.gives_no_values(device));
                 answers(devices[device.index()].state, no_values).map(|answers| !answers)
             }
+            // A plant that is played faster overloads the machine that plays it, not its lines.
+            (Subject::Line(_), Condition::Overloaded) if 1.0 < speed => Some(false),
             (Subject::Line(line), Condition::Overloaded) => is_overloaded(&lines[line.index()]),
             (Subject::Line(line), _) => is_lost(&lines[line.index()]),
             (Subject::Station, Condition::Station(fault)) => Some(faults.is_active(fault)),

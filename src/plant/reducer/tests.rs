@@ -264,7 +264,8 @@ fn an_overloaded_line_is_said_once_and_no_device_is_at_fault() {
     let overloaded = AlarmId(def.alarms.len() as u16);
     let alarm = AlarmDef::new(overloaded, Subject::Line(L1), Condition::Overloaded, "line overloaded");
     def.alarms.push(AlarmDef { on_delay: Duration::from_secs(10), ..alarm });
-    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+    let def = Arc::new(def);
+    let mut plant = Plant::new(def.clone(), at(0), 1.0);
     plant.on_event(Event::Line { at: at(0), line: L1, state: LineState::Connected });
     let mut raised = 0;
     let mut report = |plant: &mut Plant, second: i64, strain: Option<&str>| {
@@ -280,6 +281,9 @@ fn an_overloaded_line_is_said_once_and_no_device_is_at_fault() {
     let states: Vec<_> = (10..60).map(|second| report(&mut plant, second, strained)).collect();
     assert_eq!(states[49], [(overloaded, AlarmState::Unacknowledged)], "the line's alarm only");
     assert_eq!(report(&mut plant, 60, None), [(overloaded, AlarmState::Returned)]);
+    let mut fast = Plant::new(def, at(0), 60.0);
+    fast.on_event(Event::Line { at: at(0), line: L1, state: LineState::Connected });
+    (1..60).for_each(|second| assert_eq!(report(&mut fast, second, strained), [], "only the machine is busy"));
     assert_eq!(raised, 1);
 }
 
