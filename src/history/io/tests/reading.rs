@@ -287,11 +287,11 @@ fn the_longest_lists_that_are_answered_fit_in_the_memory_of_the_engine() {
         "INSERT INTO alarm_journal
             SELECT make_timestamp(i * 100000), 'UNIT-' || i % 1000 || '.PV', 'temperature high for long, heater off',
                 1 + i % 4, ['raised', 'acknowledged', 'returned'][1 + i % 3], i / 7, 70, 'anna', 'seen, waits for spare part',
-                NULL, NULL, NULL
+                NULL, NULL, NULL, 0
             FROM range({ROWS_MAX}) t(i);
         INSERT INTO operator_action
             SELECT make_timestamp(i * 100000), 'anna', 'write', 'UNIT-' || i % 1000 || '.SV', '70.0 °C', '75.0 °C',
-                'done: verified', 'pts/3 from 10.0.0.5, user panel', 'asked for by the laboratory', i, NULL
+                'done: verified', 'pts/3 from 10.0.0.5, user panel', 'asked for by the laboratory', i, NULL, 0
             FROM range({ROWS_MAX}) t(i)"
     );
     store.db.execute_batch(&rows).unwrap();
