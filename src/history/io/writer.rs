@@ -215,12 +215,11 @@ impl Writer {
 
     /// All that waited is stored.
     fn stored(&mut self, now: Timestamp) {
-        let rows = self.pending.len() as u64;
+        let rows = self.pending.drain(..).filter(|record| !matches!(record, Record::ClockSet)).count() as u64;
         if rows > 0 {
             self.status.rows += rows;
             self.status.committed_at = Some(now);
             tracing::debug!(rows, total = self.status.rows, "committed");
-            self.pending.clear();
         }
         self.failing = None;
         // A log that was removed by hand would take its commits with it: they go into the file at once.

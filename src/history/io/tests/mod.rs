@@ -548,6 +548,16 @@ fn what_an_operator_does_with_an_alarm_is_committed_at_once() {
 }
 
 #[test]
+fn a_step_of_the_clock_is_not_counted_as_a_row() {
+    let (_folder, db) = folder();
+    let mut writer = Writer::open(db, def(), sec(0)).unwrap();
+    writer.accept(vec![Record::ClockSet, good(PV, 1, 27.0), Record::ClockSet]);
+    writer.commit(sec(1));
+    let stored = writer.store().unwrap().count_rows().unwrap();
+    assert_eq!((writer.status().rows, writer.status().waiting, stored), (1, 0, 1));
+}
+
+#[test]
 fn migrations_are_numbered_and_run_once() {
     let (_folder, db) = folder();
     for _ in 0..2 {
