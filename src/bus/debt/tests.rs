@@ -1,3 +1,5 @@
+//! What a unit owes, and what proves that it owes nothing.
+
 use super::*;
 use crate::{
     bus::plan,
