@@ -401,6 +401,17 @@ fn a_user_whom_the_operating_system_knows_is_in_without_a_password() {
 }
 
 #[test]
+fn the_stations_own_user_stops_it_also_where_a_lesser_role_is_given_without_a_password() {
+    let trusted = vec![("panel".to_owned(), Role::Technician), ("sight".to_owned(), Role::Technician)];
+    let mut bench = Bench::new(AccessDef { trusted, ..AccessDef::default() });
+    bench.open(1, "10.0.0.1");
+    let own = Peer { from: "here".into(), unix_user: Some("sight".into()), own: false };
+    bench.gate.open(2, own, bench.now);
+    assert!(bench.wish(1, Wish::Stop).is_err());
+    assert_eq!(bench.wish(2, Wish::Stop), Ok(()));
+}
+
+#[test]
 fn no_more_terminals_come_in_than_permitted_but_the_stations_own_always_does() {
     let mut bench = Bench::new(AccessDef { sessions_max: 4, ..AccessDef::default() });
     bench.open(1, "a");
