@@ -88,6 +88,10 @@ fn make_key(args: &KeyArgs) -> Result<(), CliError> {
         io::ErrorKind::AlreadyExists => {
             CliError::Failed(format!("{} is there already: the station seals its audit log with it", path.display()))
         }
+        io::ErrorKind::NotFound => CliError::Failed(format!(
+            "{} cannot be made: its folder is made by the first start of the station, so start that first",
+            path.display()
+        )),
         _ => CliError::Io { what: format!("cannot make {}", path.display()), error },
     })?;
     say(&format!("# Verifies the seals of {}.", log.display()));

@@ -54,7 +54,7 @@ impl Requests {
     pub fn try_recv(&mut self) -> Result<Option<BusRequest>, Closed> {
         let request = match self.first.pop_front() {
             Some(first) => Some(first),
-            None => self.from_queue()?,
+            None => self.take_queued()?,
         };
         Ok(request.map(|request| self.hand_out(request)))
     }
@@ -145,13 +145,13 @@ impl Requests {
     /// Looks through the queue for what goes first.
     fn fetch(&mut self) -> Result<(), Closed> {
         while !self.has_stop() && self.first.len() < FIRST_MAX {
-            let Some(request) = self.from_queue()? else { break };
+            let Some(request) = self.take_queued()? else { break };
             self.sort(request);
         }
         Ok(())
     }
 
-    fn from_queue(&mut self) -> Result<Option<BusRequest>, Closed> {
+    fn take_queued(&mut self) -> Result<Option<BusRequest>, Closed> {
         match self.queue.try_recv() {
             Ok(request) => Ok(Some(request)),
             Err(TryRecvError::Empty) => Ok(None),
