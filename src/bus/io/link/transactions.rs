@@ -268,10 +268,10 @@ impl Link {
     /// The request under way is not waited for any longer.
     pub(super) fn abandon_mbap(&mut self) {
         let Some(id) = self.asked_id.take() else { return };
-        if let Owner::UnderWay(request) = self.transactions.take(id) {
-            if request.sent_at.is_none() {
-                self.transactions.outbox.clear();
-            }
+        if let Owner::UnderWay(request) = self.transactions.take(id)
+            && request.sent_at.is_none()
+        {
+            self.transactions.outbox.clear();
         }
         self.transactions.ended.retain(|ended| ended.id != id);
         self.close_busy(Instant::now());

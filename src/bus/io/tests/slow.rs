@@ -68,7 +68,7 @@ impl Device {
         let chance = number.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407) >> 33;
         let late = match self.late {
             Late::Never => false,
-            Late::Some => chance % 5 == 0,
+            Late::Some => chance.is_multiple_of(5),
             Late::InTurns => (since.as_secs() / 20) % 2 == 1,
         };
         if late { self.by } else { 5 * MS + Duration::from_millis(chance % 20) }
@@ -181,7 +181,8 @@ fn take(came: &mut Came, event: &Event, born: Duration) {
     match event {
         Event::Read { values, exchange: Some(exchange), .. } => {
             came.good += 1;
-            let sent = exchange.at.duration_since(Timestamp::UNIX_EPOCH) + SignedDuration::try_from(born).unwrap();
+            let sent = exchange.at.duration_since(Timestamp::UNIX_EPOCH)
+                + SignedDuration::try_from(born).expect("a time of the test");
             for (_, raw) in values {
                 let held = SignedDuration::from_millis(*raw as i64 * STEP.as_millis() as i64);
                 if let Ok(older) = Duration::try_from(sent - held)
