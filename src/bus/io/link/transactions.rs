@@ -69,8 +69,8 @@ enum Owner {
 pub(super) struct Transactions {
     last_id: u16,
     under_way: Vec<Transaction>,
-    /// The latest that were not answered in time: id and unit.
-    given_up: VecDeque<(u16, u8)>,
+    /// The latest that are not waited for any longer: id, and the unit if it did not answer in time.
+    given_up: VecDeque<(u16, Option<u8>)>,
     /// By unit: how many may be under way beside one to this unit, that one included.
     limits: [u16; 256],
     /// Bytes of a frame that has not come as a whole.
@@ -130,7 +130,8 @@ impl Transactions {
             return Owner::UnderWay(self.under_way.swap_remove(place));
         }
         let place = self.given_up.iter().position(|(given_up, _)| *given_up == id);
-        place.and_then(|place| self.given_up.remove(place)).map_or(Owner::Unknown, |(_, unit)| Owner::Late(unit))
+        let unit = place.and_then(|place| self.given_up.remove(place)).and_then(|(_, unit)| unit);
+        unit.map_or(Owner::Unknown, Owner::Late)
     }
 
     /// Those whose time is over; their answers may still come.
@@ -138,12 +139,33 @@ impl Transactions {
         let is_over = |request: &mut Transaction| request.deadline().is_some_and(|deadline| deadline <= now);
         let expired: Vec<Transaction> = self.under_way.extract_if(.., is_over).collect();
         for request in &expired {
-            if self.given_up.len() == GIVEN_UP_MAX {
-                self.given_up.pop_front();
-            }
-            self.given_up.extend(request.message.first().map(|unit| (request.id, *unit)));
+            self.keep_id(request.id, request.message.first().copied());
         }
         expired
+    }
+
+    /// Nothing is waited for any longer, and what was not sent is not sent. An answer that comes all the same is not late.
+    fn give_up_all(&mut self) {
+        self.outbox.clear();
+        self.ended.clear();
+        for request in std::mem::take(&mut self.under_way) {
+            self.give_up(&request);
+        }
+    }
+
+    /// This one is not waited for any longer.
+    fn give_up(&mut self, request: &Transaction) {
+        if request.sent_at.is_some() {
+            self.keep_id(request.id, None);
+        }
+    }
+
+    /// The answer may still come, and must not be taken for that of a later request.
+    fn keep_id(&mut self, id: u16, unit: Option<u8>) {
+        if self.given_up.len() == GIVEN_UP_MAX {
+            self.given_up.pop_front();
+        }
+        self.given_up.push_back((id, unit));
     }
 
     /// Has a frame begun that answers nothing under way?
@@ -259,19 +281,18 @@ impl Link {
 
     /// No request is waited for any longer; what was not sent is not sent. Whose answers come all the same is not late.
     pub fn give_up_all(&mut self) {
-        self.transactions.outbox.clear();
-        self.transactions.under_way.clear();
-        self.transactions.ended.clear();
+        self.transactions.give_up_all();
         self.close_busy(Instant::now());
     }
 
     /// The request under way is not waited for any longer.
     pub(super) fn abandon_mbap(&mut self) {
         let Some(id) = self.asked_id.take() else { return };
-        if let Owner::UnderWay(request) = self.transactions.take(id)
-            && request.sent_at.is_none()
-        {
-            self.transactions.outbox.clear();
+        if let Owner::UnderWay(request) = self.transactions.take(id) {
+            self.transactions.give_up(&request);
+            if request.sent_at.is_none() {
+                self.transactions.outbox.clear();
+            }
         }
         self.transactions.ended.retain(|ended| ended.id != id);
         self.close_busy(Instant::now());
@@ -380,5 +401,24 @@ impl Link {
             tries: 1,
         };
         Ended { id: request.id, answer, at: now, exchange: Arc::new(exchange) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_id_of_a_request_that_was_given_up_for_a_stop_names_no_later_one() {
+        let mut transactions = Transactions::new();
+        let id = transactions.begin(&[1, 3, 0, 0, 0, 1], Duration::from_secs(1));
+        transactions.under_way[0].sent_at = Some(Instant::now());
+        transactions.give_up_all();
+        for _ in 0..=u16::MAX {
+            let later = transactions.begin(&[1, 3, 0, 9, 0, 1], Duration::from_secs(1));
+            assert_ne!(later, id, "its answer is still owed");
+            transactions.under_way.clear();
+        }
+        assert!(matches!(transactions.take(id), Owner::Unknown), "it is not late: no time was given to it");
     }
 }
