@@ -257,13 +257,13 @@ fn a_running_station_exports_more_tags_than_one_question_takes_in_the_units_of_i
     assert!(64 < stored.len(), "{} tags fit into one question", stored.len());
     let from = (Timestamp::now() - SignedDuration::from_secs(5)).to_string();
     let end = Instant::now() + PATIENCE;
-    // Until every tag has been read and its value is on disk.
+    // Until every tag has been read, its value is on disk, and the first device has told its unit.
     let rows = loop {
         let (code, out, err) = running.run(&["export", "--from", &from, "--every", "500ms"]);
         assert_eq!(code, Some(0), "{err}");
         let rows = cells(&out);
         let missing = rows.last().unwrap()[2..].iter().step_by(2).filter(|quality| *quality != "good").count();
-        if missing == 0 {
+        if missing == 0 && rows[0].iter().any(|cell| cell == "TIC-1.SV °F") {
             break rows;
         }
         assert!(Instant::now() < end, "{missing} tags have no good value in\n{out}");
