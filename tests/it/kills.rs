@@ -77,9 +77,9 @@ action = "acknowledge"
 const REPLY: Duration = Duration::from_millis(400);
 const SLOW_EVERY: u64 = 3;
 
-/// What terminals were told before the station was killed.
+/// What was reported to terminals as done before the station was killed.
 #[derive(Default)]
-struct Told {
+struct Reported {
     /// Notes of writes that were verified.
     writes: Vec<String>,
     /// Notes of acknowledgements that were reported as recorded.
@@ -201,8 +201,8 @@ async fn log_in(session: &Session, user: &str) {
 }
 
 /// Writes, acknowledges and shelves again and again, each with a note of its own, until the station goes.
-async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> Told {
-    let (mut told, mut writes) = (Told::default(), 0);
+async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> Reported {
+    let (mut reported, mut writes) = (Reported::default(), 0);
     log_in(&session, "tom").await;
     let tag = session.snapshots.borrow().def.tag_named("TIC-1.SV").unwrap();
     for number in 1.. {
@@ -232,12 +232,12 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> T
         assert!(ended.is_ok_and(|ended| ended.is_ok()), "`{note}` never had an outcome");
         match outcome {
             Some(Outcome::Verified) => match command {
-                Command::Alarm(AlarmCommand::Shelve { .. }) => told.shelved = number,
+                Command::Alarm(AlarmCommand::Shelve { .. }) => reported.shelved = number,
                 Command::Alarm(_) => {
-                    told.last_acknowledged = number;
-                    told.acknowledged.push(note);
+                    reported.last_acknowledged = number;
+                    reported.acknowledged.push(note);
                 }
-                _ => told.writes.push(note),
+                _ => reported.writes.push(note),
             },
             // It had gone, or has refused: too many at once, a value that stood there already.
             Some(_) | None if session.standing.borrow().gone.is_some() => break,
@@ -245,7 +245,7 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> T
         }
         done.send_modify(|done| *done += 1);
     }
-    told
+    reported
 }
 
 /// The command to acknowledge [`ALARM`], if it waits for that.
@@ -288,22 +288,22 @@ fn reason_of(history: &Path, kind: AlarmStep, text: Option<&str>) -> Option<Arc<
 }
 
 /// Logs in and out again and again until the station goes.
-async fn log_in_on(session: Session) -> Told {
-    let mut told = Told::default();
+async fn log_in_on(session: Session) -> Reported {
+    let mut reported = Reported::default();
     while session.standing.borrow().gone.is_none() {
         // Refused while the password of the other terminal is looked at.
         let enter = Wish::Login { user: "sue".into(), password: PASSWORD.into() };
         if let Ok(durability) = session.wish(enter).await {
-            told.logins += u64::from(durability == Durability::Recorded);
-            told.logouts += u64::from(session.wish(Wish::Logout).await == Ok(Durability::Recorded));
+            reported.logins += u64::from(durability == Durability::Recorded);
+            reported.logouts += u64::from(session.wish(Wish::Logout).await == Ok(Durability::Recorded));
         }
         tokio::task::yield_now().await;
     }
-    told
+    reported
 }
 
 /// One life of a station: ends with a kill after so many actions that were answered, and so long after the last of them.
-async fn live(place: &Place, round: u64, actions: u64, late: Duration) -> Told {
+async fn live(place: &Place, round: u64, actions: u64, late: Duration) -> Reported {
     let before = reason_of(&place.history(), AlarmStep::Shelved, None);
     let mut station = place.station();
     let ((done, mut count), (asked, mut report)) = (watch::channel(0), watch::channel(false));
@@ -322,28 +322,28 @@ async fn live(place: &Place, round: u64, actions: u64, late: Duration) -> Told {
     tokio::time::sleep(late).await;
     station.signal("KILL");
     assert_eq!(station.end(), None);
-    let (told, logins) = (acting.await.unwrap(), logging.await.unwrap());
+    let (reported, logins) = (acting.await.unwrap(), logging.await.unwrap());
     let reports = reporting.await.unwrap();
-    Told { logins: logins.logins, logouts: logins.logouts, reports, ..told }
+    Reported { logins: logins.logins, logouts: logins.logouts, reports, ..reported }
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn whatever_a_terminal_was_told_is_in_the_book_of_a_station_that_is_killed_and_starts_again() {
+async fn what_was_reported_as_done_survives_the_kill_of_a_station() {
     let rounds = std::env::var("SIGHTGLASS_KILLS").map_or(ROUNDS, |rounds| rounds.parse().unwrap());
     let place = Place::new().await;
-    let mut sum = Told::default();
+    let mut sum = Reported::default();
     for round in 0..rounds {
         place.slow.store(round % SLOW_EVERY == 0, Ordering::Relaxed);
         let before = entries_or_none(&place.book());
-        let told = live(&place, round, 2 + round % 5, Duration::from_micros(round * 1_733 % 40_000)).await;
+        let reported = live(&place, round, 2 + round % 5, Duration::from_micros(round * 1_733 % 40_000)).await;
         let verified = sealing::verify(&place.book(), &[], &place.key);
         let (whole, sealed, _) = verified.unwrap_or_else(|error| panic!("round {round}: {error}"));
         assert!(round < sealed.seals, "round {round}: each start has its seal, found {}", sealed.seals);
         let all = entries(&place.book());
         assert_eq!(all.len() as u64, whole.entries, "round {round}");
         let lived = &all[before..];
-        let writes = told.writes.iter().map(|note| ("write", note));
-        for (action, note) in writes.chain(told.acknowledged.iter().map(|note| ("acknowledge", note))) {
+        let writes = reported.writes.iter().map(|note| ("write", note));
+        for (action, note) in writes.chain(reported.acknowledged.iter().map(|note| ("acknowledge", note))) {
             let line = lived.iter().find(|line| &*line.action == action && line.note.as_deref() == Some(note));
             assert!(
                 line.is_some_and(|line| &*line.outcome == "verified"),
@@ -352,17 +352,21 @@ async fn whatever_a_terminal_was_told_is_in_the_book_of_a_station_that_is_killed
         }
         let kept = |kind, text| number_in(round, reason_of(&place.history(), kind, text));
         let (shelved, acknowledged) = (kept(AlarmStep::Shelved, None), kept(AlarmStep::Acknowledged, Some(ALARM)));
-        assert!(told.shelved <= shelved, "round {round}: shelving {}, the file has {shelved}", told.shelved);
-        let last = told.last_acknowledged;
+        assert!(reported.shelved <= shelved, "round {round}: shelving {}, the file has {shelved}", reported.shelved);
+        let last = reported.last_acknowledged;
         assert!(last <= acknowledged, "round {round}: acknowledgement {last}, the file has {acknowledged}");
         let count =
             |action: &str| lived.iter().filter(|line| &*line.action == action && &*line.target == "sue").count() as u64;
         let (logins, logouts) = (count("login"), count("logout"));
-        assert!(told.logins <= logins, "round {round}: {} logins were granted, {logins} are in the book", told.logins);
-        assert!(told.logouts <= logouts, "round {round}: {} logouts, {logouts} in the book", told.logouts);
-        sum.writes.extend(told.writes);
-        sum.acknowledged.extend(told.acknowledged);
-        (sum.logins, sum.reports) = (sum.logins + told.logins, sum.reports + told.reports);
+        assert!(
+            reported.logins <= logins,
+            "round {round}: {} logins were granted, {logins} are in the book",
+            reported.logins
+        );
+        assert!(reported.logouts <= logouts, "round {round}: {} logouts, {logouts} in the book", reported.logouts);
+        sum.writes.extend(reported.writes);
+        sum.acknowledged.extend(reported.acknowledged);
+        (sum.logins, sum.reports) = (sum.logins + reported.logins, sum.reports + reported.reports);
     }
     let (writes, acknowledged) = (sum.writes.len(), sum.acknowledged.len());
     println!(

@@ -257,7 +257,7 @@ fn a_running_station_exports_more_tags_than_one_question_takes_in_the_units_of_i
     assert!(64 < stored.len(), "{} tags fit into one question", stored.len());
     let from = (Timestamp::now() - SignedDuration::from_secs(5)).to_string();
     let end = Instant::now() + PATIENCE;
-    // Until every tag has been read, its value is on disk, and the first device has told its unit.
+    // Until every tag has been read, its value is on disk, and the unit of the first device is known.
     let rows = loop {
         let (code, out, err) = running.run(&["export", "--from", &from, "--every", "500ms"]);
         assert_eq!(code, Some(0), "{err}");

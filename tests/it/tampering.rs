@@ -202,7 +202,7 @@ fn a_sealed_log_that_was_rewritten_with_its_chain_or_cut_with_its_seals_is_found
     );
     found(&good[..1], 2, "seals 0 to ");
 
-    // What nobody can know: entries behind the last seal, and a cut there. It is said how far the seals reach.
+    // Not detectable: changes and cuts behind the last seal. The output says how far the seals reach.
     rewrite(&book, &[&good[..], &[Entry { n: good.len() as u64 + 1, ..good[0].clone() }]].concat());
     let (code, said) = verify(&["--key", key]);
     assert!(code == Some(0) && said.contains(&format!("up to entry {} of", good.len())), "{said}");

@@ -173,7 +173,7 @@ fn the_grid_follows_the_local_clock_over_its_changes() {
     );
     let autumn = grid("Europe/Berlin", 1800, "2026-10-25T02:00+02", "2026-10-25T03:30+01");
     assert_eq!(autumn, ["02:00+02:00", "02:30+02:00", "02:00+01:00", "02:30+01:00", "03:00+01:00"]);
-    // An interval that does not divide the day starts anew at midnight.
+    // An interval that does not divide the day starts again at midnight.
     assert_eq!(
         grid("Asia/Bangkok", 7 * 3600, "2026-01-01T20:00+07", "2026-01-02T08:00+07"),
         ["21:00+07:00", "00:00+07:00", "07:00+07:00"]

@@ -1,4 +1,4 @@
-//! Modbus TCP: several requests under way at once, told apart by their transaction ids; no answer waits for a slower one.
+//! Modbus TCP: several requests under way at once, identified by their transaction ids; no answer waits for a slower one.
 //!
 //! ```text
 //!  submit ─> flush ─> under way ──answer──────────> ended ─> take_ended

@@ -68,7 +68,7 @@ async fn a_dead_unit_does_not_hold_the_answers_of_the_others() {
     assert!(1_780 <= reads[&DeviceId(1)], "of 1,800 reads of the living unit: {reads:?}");
 }
 
-/// What was read before a write is not told after it: the screen would show the old value once more.
+/// What was read before a write is not reported after it: the screen would show the old value once more.
 #[tokio::test(start_paused = true)]
 async fn no_value_that_was_read_before_a_write_is_told_after_it() {
     let def = gateway();
@@ -94,7 +94,7 @@ async fn no_value_that_was_read_before_a_write_is_told_after_it() {
             let Event::Read { device: DeviceId(1), exchange: Some(exchange), .. } = line.next(&def).await else {
                 continue;
             };
-            assert!(wrote_at <= exchange.at, "asked at {}, told after the write of {wrote_at}", exchange.at);
+            assert!(wrote_at <= exchange.at, "asked at {}, reported after the write of {wrote_at}", exchange.at);
         }
     }
 }
