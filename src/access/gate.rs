@@ -295,7 +295,7 @@ impl Gate {
         if needed != Role::Viewer
             && let Some(seat) = self.seats.remove(&terminal)
         {
-            effects = self.refused(&seat, "read audit trail", "", &why, at);
+            effects = self.refused(&seat, "read audit log", "", &why, at);
             self.seats.insert(terminal, seat);
         }
         Err((why, effects))

@@ -28,6 +28,8 @@ pub fn plain(message: &str) -> String {
     let line = message.lines().next().unwrap_or_default().trim();
     let kind = line.split_once(": ").filter(|(kind, _)| kind.ends_with(" Error") && kind.len() < 40);
     let words = kind.map_or(line, |(_, rest)| rest);
+    // The number of a system error.
+    let words = words.rsplit_once(" (os error ").map_or(words, |(text, _)| text);
     match words.char_indices().nth(CHARS_MAX) {
         Some((end, _)) => format!("{}…", words[..end].trim_end()),
         None => words.to_owned(),
@@ -59,6 +61,7 @@ mod tests {
                 "IO Error: The file \"x\" exists, but it is not a valid DuckDB database file!\nmore",
                 "The file \"x\" exists, but it is not a valid DuckDB database file!",
             ),
+            ("File exists (os error 17)", "File exists"),
             ("too busy, ask again", "too busy, ask again"),
             ("line L1: a name with a colon", "line L1: a name with a colon"),
             ("", ""),

@@ -286,11 +286,11 @@ impl Deeds {
         let status = self.recorded.borrow_and_update().clone();
         let late = status.batches < self.needed && WAIT_MAX <= self.behind.elapsed();
         let log = if ended {
-            Some("the audit trail has ended by itself, see the log".to_owned())
+            Some("the audit log has ended by itself, see the log".to_owned())
         } else if status.log.is_some() {
             status.log
         } else if self.left_out + self.lost > 0 {
-            Some(format!("{} actions are not in the audit trail: the disk is too slow", self.left_out + self.lost))
+            Some(format!("{} actions are not in the audit log: the disk is too slow", self.left_out + self.lost))
         } else {
             let slow = late && status.alarms.is_none();
             slow.then(|| "the disk is slow: what was done last is not recorded yet".to_owned())

@@ -338,7 +338,7 @@ fn of_question(question: &Question) -> Row {
         Question::Values { .. } => look("", "-VTSL-"),
         Question::AlarmQuality { .. } => look("", "-VTSL-"),
         Question::Report { .. } => look("", "-VTSL-"),
-        Question::Audit { .. } => look("read audit trail", "---S--"),
+        Question::Audit { .. } => look("read audit log", "---S--"),
     }
 }
 

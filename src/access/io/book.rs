@@ -246,7 +246,7 @@ impl Book {
         }
         // The deeds are safe already; a note that is behind is no fault, and no reason to write them twice.
         if let Err(error) = self.note(last) {
-            tracing::warn!(%error, "the last entry of the audit trail could not be noted");
+            tracing::warn!(%error, "the last entry of the audit log could not be noted");
         }
         Ok(())
     }

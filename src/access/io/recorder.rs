@@ -227,8 +227,7 @@ impl Recorder {
         let completed = (!missing.is_empty()).then(|| format!("{} entries were missing in the history", missing.len()));
         let notes: Vec<ActionRecord> = wrong.iter().chain(&completed).map(|words| self.note(words)).collect();
         self.pending.extend(notes.into_iter().map(|action| Pending { action, stored: false }));
-        self.found
-            .extend(wrong.iter().map(|words| format!("the audit trail does not agree with the history: {words}")));
+        self.found.extend(wrong.iter().map(|words| format!("the audit log does not agree with the history: {words}")));
         self.store(missing);
     }
 
@@ -258,7 +257,7 @@ impl Recorder {
                 (self.book, self.in_use) = (Some(book), false);
                 let broken: Vec<_> = opened.wrong.iter().filter(|wrong| wrong.contains("broken")).cloned().collect();
                 if !broken.is_empty() {
-                    self.found.push(format!("the audit trail was tampered with: {}", broken.join("; ")));
+                    self.found.push(format!("the audit log was tampered with: {}", broken.join("; ")));
                 }
                 let notes: Vec<_> = opened.wrong.iter().map(|wrong| self.note(wrong)).collect();
                 // In front of what waits.
@@ -329,7 +328,7 @@ impl Recorder {
     fn fail(&mut self, error: &io::Error) {
         let why = error.to_string();
         if self.log_fault.as_ref() != Some(&why) {
-            tracing::error!(%error, path = %self.path.display(), "the audit trail cannot be written");
+            tracing::error!(%error, path = %self.path.display(), "the audit log cannot be written");
         }
         // One that is as it was left is tried again at once, another one must be read first.
         self.book = self.book.take().filter(Book::is_intact);
@@ -342,7 +341,7 @@ impl Recorder {
             at: self.clock.utc(),
             by: "station".into(),
             from: "".into(),
-            action: "audit trail".into(),
+            action: "audit log".into(),
             target: self.path.display().to_string().into(),
             old: None,
             new: None,
@@ -357,7 +356,7 @@ impl Recorder {
         let log = self
             .log_fault
             .as_ref()
-            .map(|why| format!("the audit trail cannot be written: {}; {waiting} actions are not in it", plain(why)));
+            .map(|why| format!("the audit log cannot be written: {}; {waiting} actions are not in it", plain(why)));
         let alarms =
             self.alarm_fault.as_ref().map(|why| format!("the state of the alarms cannot be written: {}", plain(why)));
         let all = |fault: Option<String>, found: &[String]| {

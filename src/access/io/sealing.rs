@@ -18,6 +18,7 @@ use crate::{
         book::Summary,
         sealing::{Key, SealCheck, Sealed, VerificationKey},
     },
+    history::words::plain,
     plant::record::{ActionRecord, Seal},
     profile::io::atomic::{self, write_atomic},
 };
@@ -77,7 +78,7 @@ pub fn seal(book: &mut Book, log: &Path, at: Timestamp) -> (Option<ActionRecord>
         Ok(Some(key)) => key,
         Ok(None) if book.last_seal().is_none() => return (None, Ok(())),
         Ok(None) => return (None, failed("the sealing key is missing")),
-        Err(error) => return (None, failed(&error.to_string())),
+        Err(error) => return (None, failed(&plain(&error.to_string()))),
     };
     let Some(key) = present.after(book.last_seal()) else {
         return (None, failed("the sealing key is older than the last seal"));
@@ -85,14 +86,14 @@ pub fn seal(book: &mut Book, log: &Path, at: Timestamp) -> (Option<ActionRecord>
     if key != present
         && let Err(error) = replace(&path, &key)
     {
-        return (None, failed(&error.to_string()));
+        return (None, failed(&plain(&error.to_string())));
     }
     if book.is_sealed() {
         return (None, Ok(()));
     }
     match book.seal(&key, at) {
-        Ok(entry) => (Some(entry), replace(&path, &key.next()).or_else(|error| failed(&error.to_string()))),
-        Err(error) => (None, Err(format!("the audit log is not sealed: {error}"))),
+        Ok(entry) => (Some(entry), replace(&path, &key.next()).or_else(|error| failed(&plain(&error.to_string())))),
+        Err(error) => (None, Err(format!("the audit log is not sealed: {}", plain(&error.to_string())))),
     }
 }
 
