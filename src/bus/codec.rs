@@ -10,7 +10,7 @@
 //! ```
 
 use crate::plant::{
-    tag::{Kind, Order, Point},
+    tag::{ByteOrder, Kind, Point},
     visible::is_printable,
 };
 
@@ -125,23 +125,23 @@ fn to_bcd(value: i64) -> u64 {
 }
 
 /// The bytes A B C D … of the value, most significant first.
-fn to_bytes(order: Order, words: &[u16]) -> Vec<u8> {
+fn to_bytes(order: ByteOrder, words: &[u16]) -> Vec<u8> {
     let in_order: Vec<u16> = match order {
-        Order::Abcd | Order::Badc => words.to_vec(),
-        Order::Cdab | Order::Dcba => words.iter().rev().copied().collect(),
+        ByteOrder::Abcd | ByteOrder::Badc => words.to_vec(),
+        ByteOrder::Cdab | ByteOrder::Dcba => words.iter().rev().copied().collect(),
     };
-    let swapped = matches!(order, Order::Badc | Order::Dcba);
+    let swapped = matches!(order, ByteOrder::Badc | ByteOrder::Dcba);
     in_order.into_iter().flat_map(|word| if swapped { word.to_le_bytes() } else { word.to_be_bytes() }).collect()
 }
 
-fn from_bytes(order: Order, bytes: &[u8]) -> Vec<u16> {
-    let swapped = matches!(order, Order::Badc | Order::Dcba);
+fn from_bytes(order: ByteOrder, bytes: &[u8]) -> Vec<u16> {
+    let swapped = matches!(order, ByteOrder::Badc | ByteOrder::Dcba);
     let word = |pair: &[u8]| {
         let pair = [pair[0], pair[1]];
         if swapped { u16::from_le_bytes(pair) } else { u16::from_be_bytes(pair) }
     };
     let mut words: Vec<u16> = bytes.chunks_exact(2).map(word).collect();
-    if matches!(order, Order::Cdab | Order::Dcba) {
+    if matches!(order, ByteOrder::Cdab | ByteOrder::Dcba) {
         words.reverse();
     }
     words
@@ -154,7 +154,7 @@ mod tests {
     use super::*;
     use crate::plant::tag::Table;
 
-    fn point(kind: Kind, order: Order) -> Point {
+    fn point(kind: Kind, order: ByteOrder) -> Point {
         Point { table: Table::Holding, address: 0, kind, order, field: None }
     }
 
@@ -162,10 +162,10 @@ mod tests {
     fn the_same_voltage_in_four_orders() {
         let value = f64::from(230.2f32);
         for (order, words) in [
-            (Order::Abcd, [0x4366, 0x3333]),
-            (Order::Cdab, [0x3333, 0x4366]),
-            (Order::Badc, [0x6643, 0x3333]),
-            (Order::Dcba, [0x3333, 0x6643]),
+            (ByteOrder::Abcd, [0x4366, 0x3333]),
+            (ByteOrder::Cdab, [0x3333, 0x4366]),
+            (ByteOrder::Badc, [0x6643, 0x3333]),
+            (ByteOrder::Dcba, [0x3333, 0x6643]),
         ] {
             assert_eq!(decode(point(Kind::F32, order), &words), Some(value), "{order:?}");
             assert_eq!(encode(point(Kind::F32, order), value).as_deref(), Some(&words[..]), "{order:?}");
@@ -180,7 +180,7 @@ mod tests {
             (Kind::F32, &[0x7FC0, 0x0000]),
             (Kind::F32, &[0x7F80, 0x0000]),
         ] {
-            assert_eq!(decode(point(kind, Order::Abcd), words), None, "{kind:?} {words:04X?}");
+            assert_eq!(decode(point(kind, ByteOrder::Abcd), words), None, "{kind:?} {words:04X?}");
         }
     }
 
@@ -192,7 +192,7 @@ mod tests {
             (Kind::U64, [0x0020, 0, 0, 3], 9_007_199_254_740_996.0),
             (Kind::I64, [0x8000, 0, 0, 0], -9_223_372_036_854_775_808.0),
         ] {
-            assert_eq!(decode(point(kind, Order::Abcd), &words), Some(expect), "{kind:?} {words:04X?}");
+            assert_eq!(decode(point(kind, ByteOrder::Abcd), &words), Some(expect), "{kind:?} {words:04X?}");
         }
     }
 
@@ -208,7 +208,7 @@ mod tests {
             (Kind::F64, f64::NAN),
             (Kind::I64, 1e17),
         ] {
-            assert_eq!(encode(point(kind, Order::Abcd), value), None, "{kind:?} {value}");
+            assert_eq!(encode(point(kind, ByteOrder::Abcd), value), None, "{kind:?} {value}");
         }
     }
 
@@ -217,8 +217,8 @@ mod tests {
         let check = |bytes: &[u8], count: u8, expect: &str| {
             let mut bytes = bytes.to_vec();
             bytes.resize(bytes.len().next_multiple_of(2), 0xFF);
-            let words = from_bytes(Order::Abcd, &bytes);
-            let text = decode_text(point(Kind::Text(count), Order::Abcd), &words);
+            let words = from_bytes(ByteOrder::Abcd, &bytes);
+            let text = decode_text(point(Kind::Text(count), ByteOrder::Abcd), &words);
             assert_eq!(text.as_deref(), Some(expect), "{bytes:02X?}");
         };
         check(b"PXR4TAY1", 8, "PXR4TAY1");
@@ -234,14 +234,14 @@ mod tests {
         check("AB\u{202E}C".as_bytes(), 6, "AB·C");
         check(b"\x01\xFF\0\0", 4, "01 FF");
         check(b"\x01 \xFF\0", 4, "01 20 FF");
-        assert_eq!(decode_text(point(Kind::U16, Order::Abcd), &[0x4142]), None);
-        assert_eq!(decode_text(point(Kind::Text(4), Order::Abcd), &[0x4142]), None, "too few words");
-        assert_eq!(decode(point(Kind::Text(2), Order::Abcd), &[0x3432]), None, "words are no number");
+        assert_eq!(decode_text(point(Kind::U16, ByteOrder::Abcd), &[0x4142]), None);
+        assert_eq!(decode_text(point(Kind::Text(4), ByteOrder::Abcd), &[0x4142]), None, "too few words");
+        assert_eq!(decode(point(Kind::Text(2), ByteOrder::Abcd), &[0x3432]), None, "words are no number");
     }
 
     #[test]
     fn a_text_with_swapped_bytes_reads_the_same() {
-        let swapped = point(Kind::Text(5), Order::Badc);
+        let swapped = point(Kind::Text(5), ByteOrder::Badc);
         assert_eq!(decode_text(swapped, &[0x5850, 0x3452, 0x0041]).as_deref(), Some("PXR4A"));
         assert_eq!(encode_text(swapped, "PXR4A"), Some(vec![0x5850, 0x3452, 0x0041]));
         for text in ["PXR4TA", "PXR4 ", "P\nX"] {
@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn a_field_of_bits_is_read_and_never_written() {
-        let field = Point { field: Some((4, 2)), ..point(Kind::U16, Order::Abcd) };
+        let field = Point { field: Some((4, 2)), ..point(Kind::U16, ByteOrder::Abcd) };
         assert_eq!(decode(field, &[0x0020]), Some(2.0));
         assert_eq!(encode(field, 2.0), None);
         assert_eq!(decode(Point { field: Some((0, 16)), ..field }, &[0xFFFF]), Some(65_535.0));
@@ -259,10 +259,10 @@ mod tests {
 
     #[test]
     fn a_field_of_bits_is_set_without_touching_the_others() {
-        let field = Point { field: Some((4, 2)), ..point(Kind::U16, Order::Abcd) };
+        let field = Point { field: Some((4, 2)), ..point(Kind::U16, ByteOrder::Abcd) };
         assert_eq!(field_masks(field, 2.0), Some((0xFFCF, 0x0020)));
         assert_eq!(field_masks(field, 4.0), None, "two bits hold 0 to 3");
-        let swapped = Point { order: Order::Badc, ..field };
+        let swapped = Point { order: ByteOrder::Badc, ..field };
         assert_eq!(field_masks(swapped, 2.0), Some((0xCFFF, 0x2000)));
         for (word, value) in [(0x1234u16, 3.0), (0xFFFF, 0.0), (0, 1.0)] {
             let (and, or) = field_masks(field, value).expect("it fits");
@@ -270,13 +270,13 @@ mod tests {
             assert_eq!(decode(field, &[set]), Some(value));
             assert_eq!(set & !0x30, word & !0x30);
         }
-        assert_eq!(field_masks(point(Kind::U16, Order::Abcd), 1.0), None);
+        assert_eq!(field_masks(point(Kind::U16, ByteOrder::Abcd), 1.0), None);
     }
 
     proptest! {
         #[test]
         fn text_reads_back_as_written(
-            text in "[ -~°ก-๙]{0,40}", spare in 0u8..8, order in prop::sample::select(vec![Order::Abcd, Order::Badc]),
+            text in "[ -~°ก-๙]{0,40}", spare in 0u8..8, order in prop::sample::select(vec![ByteOrder::Abcd, ByteOrder::Badc]),
         ) {
             let text = text.trim_end_matches(' ');
             let count = u8::try_from(text.len()).unwrap_or(u8::MAX).saturating_add(spare).max(1);
@@ -292,7 +292,7 @@ mod tests {
 
         #[test]
         fn no_bytes_break_a_screen(words in prop::collection::vec(any::<u16>(), 8)) {
-            let text = decode_text(point(Kind::Text(16), Order::Abcd), &words);
+            let text = decode_text(point(Kind::Text(16), ByteOrder::Abcd), &words);
             prop_assert!(text.is_some_and(|text| text.chars().all(is_printable)));
         }
 
@@ -301,7 +301,7 @@ mod tests {
             kind in prop::sample::select(vec![
                 Kind::I16, Kind::U16, Kind::I32, Kind::U32, Kind::I64, Kind::U64, Kind::F32, Kind::F64, Kind::Bcd16, Kind::Bcd32,
             ]),
-            order in prop::sample::select(vec![Order::Abcd, Order::Cdab, Order::Badc, Order::Dcba]),
+            order in prop::sample::select(vec![ByteOrder::Abcd, ByteOrder::Cdab, ByteOrder::Badc, ByteOrder::Dcba]),
             words in prop::array::uniform4(any::<u16>()),
         ) {
             let point = point(kind, order);

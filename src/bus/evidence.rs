@@ -91,7 +91,7 @@ mod tests {
     use super::*;
     use crate::{
         bus::frame,
-        plant::tag::{Order, Table},
+        plant::tag::{ByteOrder, Table},
     };
 
     fn exchange(framing: Framing, request: &[u8], answer: &[u8]) -> Exchange {
@@ -107,7 +107,7 @@ mod tests {
     }
 
     fn point(table: Table, address: u16, kind: Kind) -> Point {
-        Point { table, address, kind, order: Order::Abcd, field: None }
+        Point { table, address, kind, order: ByteOrder::Abcd, field: None }
     }
 
     /// Three registers from 1000: 724, and 230.2 V as a float.

@@ -184,8 +184,8 @@ pub struct Point {
     pub address: u16,
     /// Type of the raw value.
     pub kind: Kind,
-    /// Order of bytes and words.
-    pub order: Order,
+    /// Byte and word order.
+    pub order: ByteOrder,
     /// A field of bits inside a word: (lowest bit, number of bits).
     pub field: Option<(u8, u8)>,
 }
@@ -298,7 +298,7 @@ impl Kind {
 
 /// Order of the bytes A B C D (A most significant) on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-pub enum Order {
+pub enum ByteOrder {
     /// Big-endian, the default of the Modbus world.
     #[default]
     Abcd,

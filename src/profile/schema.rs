@@ -12,7 +12,7 @@ use super::{
 use crate::plant::{
     def::{AlarmClass, Parity, Priority, Role, Rs485, Sign},
     ne107::Signal,
-    tag::{Access, Class, Confidence, Kind, Order, Table},
+    tag::{Access, ByteOrder, Class, Confidence, Kind, Table},
 };
 
 table!(
@@ -135,7 +135,7 @@ table!(
         need "address" address: Location,
         opt "modicon" modicon: Modicon,
         opt "type" kind: TypeName,
-        opt "order" order: Order,
+        opt "order" order: ByteOrder,
         opt "field" field: Choice,
         opt "scale" scale: f64,
         opt "offset" offset: f64,
@@ -490,8 +490,8 @@ words!(Table, "table" {
     "coil" => Table::Coil, "discrete" => Table::Discrete, "input" => Table::Input, "holding" => Table::Holding,
 });
 
-words!(Order, "order" {
-    "ABCD" => Order::Abcd, "CDAB" => Order::Cdab, "BADC" => Order::Badc, "DCBA" => Order::Dcba,
+words!(ByteOrder, "order" {
+    "ABCD" => ByteOrder::Abcd, "CDAB" => ByteOrder::Cdab, "BADC" => ByteOrder::Badc, "DCBA" => ByteOrder::Dcba,
 });
 
 words!(Access, "access" { "r" => Access::Read, "rw" => Access::ReadWrite, "w" => Access::Write, });

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceId, Limits, TagId},
-    tag::{Access, Bound, Class, Confidence, Decimals, Kind, Order, Point, Poll, Table, TagDef},
+    tag::{Access, Bound, ByteOrder, Class, Confidence, Decimals, Kind, Point, Poll, Table, TagDef},
 };
 
 /// What a tag must know of its device.
@@ -122,7 +122,8 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
 }
 
 /// Stands in for an address that is wrong; it never leaves the loader.
-const NOWHERE: Point = Point { table: Table::Holding, address: 0, kind: Kind::U16, order: Order::Abcd, field: None };
+const NOWHERE: Point =
+    Point { table: Table::Holding, address: 0, kind: Kind::U16, order: ByteOrder::Abcd, field: None };
 
 /// The other tags that a row names.
 struct Links {
@@ -362,7 +363,7 @@ fn check_text(row: &TagTable, point: Point, problems: &mut Problems) {
     for (at, key) in for_numbers.into_iter().flatten() {
         problems.add(at, format!("`{key}` is for numbers, this is a text")).label("leave it out");
     }
-    if let Some(order) = row.order.filter(|order| matches!(order.value, Order::Cdab | Order::Dcba)) {
+    if let Some(order) = row.order.filter(|order| matches!(order.value, ByteOrder::Cdab | ByteOrder::Dcba)) {
         let problem = problems.add(order.at, "the words of a text are never reversed");
         problem.label("expected \"ABCD\", high byte first, or \"BADC\", low byte first");
     }

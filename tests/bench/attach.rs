@@ -26,7 +26,7 @@ use sightglass::{
         def::{DeviceDef, DeviceId, Framing, LineId, TagId},
         event::{Event, LineState},
         line_report::{LineReport, PollReport},
-        tag::{Class, Kind, Order, Point, Poll, Table, TagDef},
+        tag::{ByteOrder, Class, Kind, Point, Poll, Table, TagDef},
         tally::Tally,
         traffic::{Exchange, Frame},
     },
@@ -215,7 +215,7 @@ fn plant() -> Arc<PlantDef> {
                 table: Table::Holding,
                 address: address as u16,
                 kind: Kind::U16,
-                order: Order::Abcd,
+                order: ByteOrder::Abcd,
                 field: None,
             };
             let poll = Poll::Every(Duration::from_secs(1));

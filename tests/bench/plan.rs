@@ -17,7 +17,7 @@ use sightglass::{
         def::{
             CsvDialect, DeviceDef, DeviceId, Limits, LineDef, LineId, MimicDef, ReportDef, Serial, TagId, Transport,
         },
-        tag::{Kind, Order, Point, Table, TagDef},
+        tag::{ByteOrder, Kind, Point, Table, TagDef},
     },
 };
 
@@ -65,7 +65,7 @@ fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
         let address = next[place][half] as u16;
         next[place][half] += u64::from(kind.words());
         let point =
-            Point { table: [Table::Holding, Table::Input][half], address, kind, order: Order::Abcd, field: None };
+            Point { table: [Table::Holding, Table::Input][half], address, kind, order: ByteOrder::Abcd, field: None };
         TagDef::new(TagId(id), DeviceId(place as u16), &format!("D-{place}.T{id}"), point)
     };
     let tags = (0..tags).map(tag).collect();

@@ -6,7 +6,7 @@ use crate::{
     cli::{CliError, say},
     plant::{
         event::Fault,
-        tag::{Kind, Order, Point, Table},
+        tag::{ByteOrder, Kind, Point, Table},
         tool::{Finding, Tool},
     },
 };
@@ -79,7 +79,8 @@ fn value_lines(table: Table, address: u16, words: &[u16]) -> Vec<String> {
             let point = Point { table, address: at, kind: Kind::F32, order, field: None };
             pair.and_then(|pair| codec::decode(point, pair)).map_or("–".into(), |value| short(value as f32))
         };
-        let floats = [Order::Abcd, Order::Cdab, Order::Badc, Order::Dcba].map(|order| format!("{:>10}", float(order)));
+        let floats = [ByteOrder::Abcd, ByteOrder::Cdab, ByteOrder::Badc, ByteOrder::Dcba]
+            .map(|order| format!("{:>10}", float(order)));
         format!("{:6} / {at:04X}  {word:04X}  {word:6} {:6} {}", table.modicon(at), *word as i16, floats.join(" "))
     };
     std::iter::once(heads.to_owned()).chain(words.iter().enumerate().map(row)).collect()

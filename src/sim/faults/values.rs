@@ -204,11 +204,11 @@ mod tests {
     use super::*;
     use crate::plant::{
         def::{DeviceId, TagId},
-        tag::{Kind, Order},
+        tag::{ByteOrder, Kind},
     };
 
     fn tag(table: Table, address: u16, kind: Kind, access: Access) -> TagDef {
-        let point = Point { table, address, kind, order: Order::Abcd, field: None };
+        let point = Point { table, address, kind, order: ByteOrder::Abcd, field: None };
         TagDef { access, bad_if: vec![0x7FFF], ..TagDef::new(TagId(0), DeviceId(0), "D-1.T", point) }
     }
 

@@ -299,12 +299,12 @@ mod tests {
     use super::*;
     use crate::plant::{
         def::{DeviceId, TagId},
-        tag::{Kind, Order, Point},
+        tag::{ByteOrder, Kind, Point},
     };
 
     /// The bytes of the request after the function code, as tokio-modbus would send them, told by its own words.
     fn request(kind: Kind, field: Option<(u8, u8)>, write_fc: Option<u8>, raw: f64) -> Option<Request<'static>> {
-        let point = Point { table: Table::Holding, address: 100, kind, order: Order::Abcd, field };
+        let point = Point { table: Table::Holding, address: 100, kind, order: ByteOrder::Abcd, field };
         write_request(&TagDef { write_fc, ..TagDef::new(TagId(0), DeviceId(0), "D.T", point) }, raw)
     }
 
@@ -325,7 +325,7 @@ mod tests {
 
     #[test]
     fn coils_are_written_one_by_one_unless_the_profile_says_otherwise() {
-        let point = Point { table: Table::Coil, address: 5, kind: Kind::Bool, order: Order::Abcd, field: None };
+        let point = Point { table: Table::Coil, address: 5, kind: Kind::Bool, order: ByteOrder::Abcd, field: None };
         let coil = TagDef::new(TagId(0), DeviceId(0), "D.C", point);
         assert_eq!(write_request(&coil, 1.0), Some(Request::WriteSingleCoil(5, true)));
         let fifteen = TagDef { write_fc: Some(15), ..coil };

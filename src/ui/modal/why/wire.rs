@@ -12,7 +12,7 @@ use crate::{
     plant::{
         def::DeviceDef,
         event::LineState,
-        tag::{Access, Kind, Order, Poll, TagDef},
+        tag::{Access, ByteOrder, Kind, Poll, TagDef},
         traffic::Exchange,
     },
     ui::{
@@ -125,13 +125,13 @@ pub(super) fn point(def: &TagDef) -> String {
     };
     let order = match (point.table.is_bits(), point.order) {
         (true, _) => "",
-        (false, Order::Abcd | Order::Cdab) if point.kind.words() == 1 => "",
-        (false, Order::Abcd) if def.is_text() => " ABCD (high byte first)",
-        (false, Order::Abcd) => " ABCD (high word first)",
-        (false, Order::Cdab) => " CDAB (low word first)",
-        (false, Order::Badc) if def.is_text() => " BADC (low byte first)",
-        (false, Order::Badc) => " BADC (bytes swapped)",
-        (false, Order::Dcba) => " DCBA (little-endian)",
+        (false, ByteOrder::Abcd | ByteOrder::Cdab) if point.kind.words() == 1 => "",
+        (false, ByteOrder::Abcd) if def.is_text() => " ABCD (high byte first)",
+        (false, ByteOrder::Abcd) => " ABCD (high word first)",
+        (false, ByteOrder::Cdab) => " CDAB (low word first)",
+        (false, ByteOrder::Badc) if def.is_text() => " BADC (low byte first)",
+        (false, ByteOrder::Badc) => " BADC (bytes swapped)",
+        (false, ByteOrder::Dcba) => " DCBA (little-endian)",
     };
     let address = point.address;
     format!("{function}  {} / 0x{address:04X}  {what}{order}", point.table.modicon(address))

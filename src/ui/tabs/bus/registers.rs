@@ -10,7 +10,7 @@ use crate::{
     bus::codec,
     plant::{
         def::LineId,
-        tag::{Kind, Order, Point, Table},
+        tag::{ByteOrder, Kind, Point, Table},
         tool::{Finding, Tool, ToolState},
     },
     ui::{
@@ -191,11 +191,11 @@ const BITS_WIDTH: u16 = 69;
 /// Fewer registers than this at once are no list.
 const ROWS_MIN: u16 = 4;
 
-const ORDERS: [(&str, Order); 4] =
-    [("ABCD", Order::Abcd), ("CDAB", Order::Cdab), ("BADC", Order::Badc), ("DCBA", Order::Dcba)];
+const ORDERS: [(&str, ByteOrder); 4] =
+    [("ABCD", ByteOrder::Abcd), ("CDAB", ByteOrder::Cdab), ("BADC", ByteOrder::Badc), ("DCBA", ByteOrder::Dcba)];
 
 /// `  4294901760       -65536  -1.5`.
-fn pair_words(words: [u16; 2], order: Order) -> String {
+fn pair_words(words: [u16; 2], order: ByteOrder) -> String {
     let point = |kind| Point { table: Table::Holding, address: 0, kind, order, field: None };
     let number = |kind| codec::decode(point(kind), &words);
     let whole = |kind| number(kind).map_or("–".to_owned(), |value| format!("{value:.0}"));
@@ -214,10 +214,10 @@ mod tests {
     #[test]
     fn a_pair_is_read_in_all_four_orders() {
         let check = |order, expect: &str| assert_eq!(pair_words([0x42C8, 0x0000], order).trim_start(), expect);
-        check(Order::Abcd, "1120403456   1120403456  100");
-        check(Order::Cdab, "17096        17096  2.3957e-41");
-        check(Order::Badc, "3359768576   -935198720  -198656");
-        check(Order::Dcba, "51266        51266  7.1839e-41");
-        assert!(pair_words([0x7FC0, 0], Order::Abcd).ends_with("no number"));
+        check(ByteOrder::Abcd, "1120403456   1120403456  100");
+        check(ByteOrder::Cdab, "17096        17096  2.3957e-41");
+        check(ByteOrder::Badc, "3359768576   -935198720  -198656");
+        check(ByteOrder::Dcba, "51266        51266  7.1839e-41");
+        assert!(pair_words([0x7FC0, 0], ByteOrder::Abcd).ends_with("no number"));
     }
 }
