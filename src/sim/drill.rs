@@ -1,4 +1,4 @@
-//! What a terminal may know and wish of a simulated plant: faults on offer and in force, what is really so, the drill at work.
+//! What a terminal may know and change of a simulated plant: faults on offer and in force, what is really so, the drill at work.
 
 use std::{sync::Arc, time::Duration};
 
@@ -7,9 +7,9 @@ use super::{
     scenario::judge::{Truths, Verdict},
 };
 
-/// A wish about faults.
+/// A command to the simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
+pub enum SimCommand {
     /// This goes wrong, or goes wrong in another measure.
     Set(Place, Fault),
     /// This is mended, whatever its measure.

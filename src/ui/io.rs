@@ -189,10 +189,10 @@ impl Loop {
                 }
                 Effect::Wish(id, wish) => self.wish(id, wish),
                 Effect::Ask(id, question) => self.ask(id, question),
-                Effect::Drill(order) => {
+                Effect::Drill(command) => {
                     if let Some(port) = &self.session.drill {
                         // What is in force is seen in the next status; a wish that was lost changes nothing there.
-                        let _ = port.orders.try_send(order);
+                        let _ = port.commands.try_send(command);
                     }
                 }
                 Effect::SaveReport { tab, path, bytes } => self.save(tab, path, bytes),

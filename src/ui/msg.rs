@@ -59,7 +59,7 @@ pub enum Effect {
     /// Ask the history.
     Ask(AskId, Question),
     /// Let something go wrong in the simulation, or mend it.
-    Drill(drill::Order),
+    Drill(drill::SimCommand),
     /// Write a report or a capture; answered by [`Msg::Saved`].
     SaveReport {
         /// The tab that wants it.

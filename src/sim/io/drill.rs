@@ -19,7 +19,7 @@ use crate::{
         record::Record,
     },
     sim::{
-        drill::{Order, Progress, Status},
+        drill::{Progress, SimCommand, Status},
         faults::{Offer, offers},
         scenario::{
             Cue, Event, Scenario,
@@ -29,7 +29,7 @@ use crate::{
 };
 
 /// Wishes that may wait; more are not heard, and what is in force tells so.
-const ORDERS_MAX: usize = 32;
+const COMMANDS_MAX: usize = 32;
 /// Steps that may wait for the judge, counted as they were told.
 const STEPS_MAX: usize = 4096;
 /// The number of the terminal by which the operator of a scenario gives orders; real terminals count from 1.
@@ -78,8 +78,8 @@ impl Listener {
 /// What a terminal holds of a simulation.
 #[derive(Debug, Clone)]
 pub struct Port {
-    /// Wishes about faults.
-    pub orders: mpsc::Sender<Order>,
+    /// Commands to the simulation.
+    pub commands: mpsc::Sender<SimCommand>,
     /// The simulation as it stands.
     pub status: watch::Receiver<Arc<Status>>,
 }
@@ -106,7 +106,7 @@ pub struct Trainer {
 impl Trainer {
     /// Starts the task. It ends when the station does, or in a drill without a person when the drill is over.
     pub fn spawn(self) -> (Port, tokio::task::JoinHandle<Option<Verdict>>) {
-        let (orders, inbox) = mpsc::channel(ORDERS_MAX);
+        let (commands, inbox) = mpsc::channel(COMMANDS_MAX);
         let began = self.world.clock().now();
         let judge = self.scenario.clone().map(|scenario| Judge::new(scenario, self.def.clone(), began));
         let cues = self.scenario.as_ref().map(|scenario| scenario.cues(self.operator.is_some())).unwrap_or_default();
@@ -114,7 +114,7 @@ impl Trainer {
         let task = Task { cues: cues.into(), judge, began, offers, trainer: self, ordered: 0 };
         let (publish, status) = watch::channel(Arc::new(task.status(Vec::new(), Default::default(), began)));
         let work = tokio::spawn(task.run(inbox, publish));
-        (Port { orders, status }, work)
+        (Port { commands, status }, work)
     }
 }
 
@@ -128,7 +128,11 @@ struct Task {
 }
 
 impl Task {
-    async fn run(mut self, mut inbox: mpsc::Receiver<Order>, publish: watch::Sender<Arc<Status>>) -> Option<Verdict> {
+    async fn run(
+        mut self,
+        mut inbox: mpsc::Receiver<SimCommand>,
+        publish: watch::Sender<Arc<Status>>,
+    ) -> Option<Verdict> {
         let clock = self.trainer.world.clock();
         loop {
             let cue =
@@ -141,9 +145,9 @@ impl Task {
                         self.perform(cue).await;
                     }
                 }
-                Some(order) = inbox.recv() => {
+                Some(command) = inbox.recv() => {
                     if publish.borrow().is_open() {
-                        self.obey(order).await;
+                        self.apply_command(command).await;
                     }
                 }
                 Some(records) = self.trainer.journal.steps.recv() => {
@@ -199,11 +203,11 @@ impl Task {
         }
     }
 
-    async fn obey(&self, order: Order) {
-        match order {
-            Order::Set(place, fault) => self.trainer.world.set(place, fault).await,
-            Order::Clear(place, fault) => self.trainer.world.clear(place, fault).await,
-            Order::AllWell => self.trainer.world.all_well().await,
+    async fn apply_command(&self, command: SimCommand) {
+        match command {
+            SimCommand::Set(place, fault) => self.trainer.world.set(place, fault).await,
+            SimCommand::Clear(place, fault) => self.trainer.world.clear(place, fault).await,
+            SimCommand::AllWell => self.trainer.world.all_well().await,
         }
     }
 

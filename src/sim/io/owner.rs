@@ -20,8 +20,8 @@ use crate::{
     },
 };
 
-/// Orders that may wait; a full queue makes the sender wait, and the task always drains it.
-const ORDERS_MAX: usize = 64;
+/// Requests that may wait; a full queue makes the sender wait, and the task always drains it.
+const REQUESTS_MAX: usize = 64;
 /// The world is brought up to date this often when nobody asks (plant time), but not oftener than the real interval.
 const IDLE: Duration = Duration::from_secs(1);
 const IDLE_REAL_MIN: Duration = Duration::from_millis(50);
@@ -31,7 +31,7 @@ const CATCH_UP_MAX: Duration = Duration::from_secs(3600);
 /// Speaks to the task that owns the world. The task ends when the last handle is gone.
 #[derive(Debug, Clone)]
 pub struct WorldHandle {
-    orders: mpsc::Sender<Order>,
+    requests: mpsc::Sender<SimRequest>,
     clock: Clock,
     units: Arc<BTreeSet<(LineId, u8)>>,
 }
@@ -56,7 +56,7 @@ pub struct Report {
 type Reply<T> = oneshot::Sender<T>;
 
 #[derive(Debug)]
-enum Order {
+enum SimRequest {
     Ask { line: LineId, unit: u8, pdu: Vec<u8>, reply: Reply<Option<Answer>> },
     Tell(Told, Reply<()>),
     Truth(Reply<Option<Truth>>),
@@ -88,10 +88,10 @@ impl WorldHandle {
     }
 
     fn start(world: World, clock: Clock, faults: Faults, lens: Lens) -> WorldHandle {
-        let (orders, inbox) = mpsc::channel(ORDERS_MAX);
+        let (requests, inbox) = mpsc::channel(REQUESTS_MAX);
         let units = Arc::new(world.addresses().collect());
         tokio::spawn(run(world, clock, (faults, lens), clock.now(), inbox));
-        WorldHandle { orders, clock, units }
+        WorldHandle { requests, clock, units }
     }
 
     /// The clock of the world.
@@ -112,7 +112,7 @@ impl WorldHandle {
     /// Puts a request to a unit of a line. `None`: nothing comes back, now or ever.
     pub async fn ask(&self, line: LineId, unit: u8, pdu: &[u8]) -> Option<Answer> {
         let pdu = pdu.to_vec();
-        self.put(|reply| Order::Ask { line, unit, pdu, reply }).await.flatten()
+        self.put(|reply| SimRequest::Ask { line, unit, pdu, reply }).await.flatten()
     }
 
     /// Makes a unit of a line faulty.
@@ -137,7 +137,7 @@ impl WorldHandle {
 
     /// What is wrong and what is really so now; `None` once the task has ended.
     pub async fn report(&self) -> Option<Report> {
-        self.put(Order::Report).await
+        self.put(SimRequest::Report).await
     }
 
     /// Breaks or repairs the wire of the temperature sensor in the tank rig.
@@ -157,29 +157,29 @@ impl WorldHandle {
 
     /// What is really so in the tank rig now; `None` if the world has no rig, or once its task has ended.
     pub async fn truth(&self) -> Option<Truth> {
-        self.put(Order::Truth).await.flatten()
+        self.put(SimRequest::Truth).await.flatten()
     }
 
     /// What a modelled device holds for a tag now, in the tag's unit; `None` for a tag of the rig.
     pub async fn value(&self, tag: TagId) -> Option<f64> {
-        self.put(|reply| Order::Value(tag, reply)).await.flatten()
+        self.put(|reply| SimRequest::Value(tag, reply)).await.flatten()
     }
 
     /// Puts a value into the registers of a modelled device, as if the device had found it so: a fault code, a reading.
     /// `false` if it cannot hold it.
     pub async fn set_value(&self, tag: TagId, value: f64) -> bool {
-        self.put(|reply| Order::SetValue(tag, value, reply)).await.unwrap_or(false)
+        self.put(|reply| SimRequest::SetValue(tag, value, reply)).await.unwrap_or(false)
     }
 
     /// Returns when it is in force. The task lives as long as this handle, except while its runtime shuts down; then
     /// there is nobody to tell.
     async fn tell(&self, told: Told) {
-        self.put(|reply| Order::Tell(told, reply)).await;
+        self.put(|reply| SimRequest::Tell(told, reply)).await;
     }
 
-    async fn put<T>(&self, order: impl FnOnce(Reply<T>) -> Order) -> Option<T> {
+    async fn put<T>(&self, request: impl FnOnce(Reply<T>) -> SimRequest) -> Option<T> {
         let (reply, answer) = oneshot::channel();
-        self.orders.send(order(reply)).await.ok()?;
+        self.requests.send(request(reply)).await.ok()?;
         answer.await.ok()
     }
 }
@@ -211,15 +211,15 @@ async fn run(
     clock: Clock,
     (mut faults, lens): (Faults, Lens),
     mut reached: Timestamp,
-    mut inbox: mpsc::Receiver<Order>,
+    mut inbox: mpsc::Receiver<SimRequest>,
 ) {
     let idle = IDLE.max(IDLE_REAL_MIN.mul_f64(clock.speed()));
     loop {
-        let order = tokio::select! {
+        let request = tokio::select! {
             // A replay must come to the same end.
             biased;
-            order = inbox.recv() => match order {
-                Some(order) => Some(order),
+            request = inbox.recv() => match request {
+                Some(request) => Some(request),
                 None => return,
             },
             () = clock.sleep(idle) => None,
@@ -227,31 +227,31 @@ async fn run(
         let now = clock.now();
         world.advance(Duration::try_from(now.duration_since(reached)).unwrap_or_default().min(CATCH_UP_MAX));
         reached = now;
-        if let Some(order) = order {
-            obey(&mut world, &mut faults, &lens, now, order);
+        if let Some(request) = request {
+            handle_request(&mut world, &mut faults, &lens, now, request);
         }
     }
 }
 
 /// Who asked may have gone meanwhile; an answer that nobody waits for is dropped.
-fn obey(world: &mut World, faults: &mut Faults, lens: &Lens, now: Timestamp, order: Order) {
-    match order {
-        Order::Ask { line, unit, pdu, reply } => {
+fn handle_request(world: &mut World, faults: &mut Faults, lens: &Lens, now: Timestamp, request: SimRequest) {
+    match request {
+        SimRequest::Ask { line, unit, pdu, reply } => {
             reply.send(faults.answer(world, line, unit, &pdu)).ok();
         }
-        Order::Truth(reply) => {
+        SimRequest::Truth(reply) => {
             reply.send(world.rig().map(Rig::truth)).ok();
         }
-        Order::Value(tag, reply) => {
+        SimRequest::Value(tag, reply) => {
             reply.send(world.value(tag)).ok();
         }
-        Order::SetValue(tag, value, reply) => {
+        SimRequest::SetValue(tag, value, reply) => {
             reply.send(world.set_value(tag, value)).ok();
         }
-        Order::Report(reply) => {
+        SimRequest::Report(reply) => {
             reply.send(Report { in_force: faults.list().to_vec(), truths: lens.look(world) }).ok();
         }
-        Order::Tell(told, done) => {
+        SimRequest::Tell(told, done) => {
             follow(world, faults, now, told);
             done.send(()).ok();
         }

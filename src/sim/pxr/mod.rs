@@ -21,7 +21,7 @@ use std::time::Duration;
 
 use alarm::{Alarm, Setup};
 use control::{Control, Law, Settings};
-use program::{Command, Mode, Plan, Program, Segment};
+use program::{Mode, Plan, Program, ProgramCommand, Segment};
 use rule::Found;
 use selftune::SelfTuner;
 use tuning::{Tuner, Verdict};
@@ -77,7 +77,7 @@ pub struct Pxr {
     tuner: Option<Tuner>,
     self_tuner: Option<SelfTuner>,
     program: Program,
-    command: Command,
+    command: ProgramCommand,
 }
 
 impl Pxr {
@@ -103,7 +103,7 @@ impl Pxr {
             tuner: None,
             self_tuner: None,
             program: Program::default(),
-            command: Command::Off,
+            command: ProgramCommand::Off,
         }
     }
 
@@ -198,21 +198,21 @@ impl Pxr {
     /// The programme moves SV while it runs; in standby it stands still.
     fn set_value(&mut self) -> f64 {
         let command = match self.settings[map::PROGRAM] {
-            1 if self.standby() => Command::Halt,
-            1 => Command::Run,
-            2 => Command::Halt,
-            3 => Command::End,
-            _ => Command::Off,
+            1 if self.standby() => ProgramCommand::Halt,
+            1 => ProgramCommand::Run,
+            2 => ProgramCommand::Halt,
+            3 => ProgramCommand::End,
+            _ => ProgramCommand::Off,
         };
         let mode = self.mode();
         let before = std::mem::replace(&mut self.command, command);
         let plan = self.plan(mode);
         let moving_c = self.program.step(SAMPLE_S, command, &plan, self.pv_c);
-        let ended = self.program.ended() && command == Command::Run;
+        let ended = self.program.ended() && command == ProgramCommand::Run;
         if ended {
             self.settings[map::PROGRAM] = 3;
         }
-        let switched_off = command == Command::Off && before != Command::Off;
+        let switched_off = command == ProgramCommand::Off && before != ProgramCommand::Off;
         if ended && mode.standby_at_end || switched_off && mode.standby_at_off {
             self.settings[map::STANDBY] = 1;
         }

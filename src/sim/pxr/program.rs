@@ -2,7 +2,7 @@
 
 /// What register 41082 asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Command {
+pub enum ProgramCommand {
     /// No programme: the SV of the face holds.
     Off,
     /// Run from the beginning, or on from a halt.
@@ -70,15 +70,15 @@ const END: u16 = 17;
 
 impl Program {
     /// The set value in use, or `None` when the SV of the face holds. The first ramp begins at PV.
-    pub fn step(&mut self, dt_s: f64, command: Command, plan: &Plan, pv_c: f64) -> Option<f64> {
+    pub fn step(&mut self, dt_s: f64, command: ProgramCommand, plan: &Plan, pv_c: f64) -> Option<f64> {
         match command {
-            Command::Off => *self = Program::default(),
-            Command::Run if self.position == 0 || self.ended() => {
+            ProgramCommand::Off => *self = Program::default(),
+            ProgramCommand::Run if self.position == 0 || self.ended() => {
                 *self = Program { position: 1, elapsed_s: 0.0, start_c: pv_c, sv_c: pv_c };
                 self.advance(dt_s, plan);
             }
-            Command::Run => self.advance(dt_s, plan),
-            Command::Halt | Command::End => {}
+            ProgramCommand::Run => self.advance(dt_s, plan),
+            ProgramCommand::Halt | ProgramCommand::End => {}
         }
         (self.position != 0).then_some(self.sv_c)
     }
@@ -138,7 +138,7 @@ mod tests {
         let mut program = Program::default();
         let mut sv_c = None;
         for _ in 0..(at_s / 0.5) as usize {
-            let command = if program.ended() { Command::End } else { Command::Run };
+            let command = if program.ended() { ProgramCommand::End } else { ProgramCommand::Run };
             sv_c = program.step(0.5, command, &plan, 20.0);
         }
         let sv_c = sv_c.expect("a running programme has a set value");
@@ -159,9 +159,9 @@ mod tests {
         let plan =
             Plan { first: 0, segments: vec![Segment { target_c: 50.0, ramp_s: 60.0, soak_s: 0.0 }], repeat: false };
         let mut program = Program::default();
-        let running = program.step(0.5, Command::Run, &plan, 20.0);
-        assert_eq!(program.step(0.5, Command::Halt, &plan, 20.0), running);
-        assert_eq!(program.step(0.5, Command::Off, &plan, 20.0), None);
+        let running = program.step(0.5, ProgramCommand::Run, &plan, 20.0);
+        assert_eq!(program.step(0.5, ProgramCommand::Halt, &plan, 20.0), running);
+        assert_eq!(program.step(0.5, ProgramCommand::Off, &plan, 20.0), None);
     }
 
     #[test]
@@ -173,7 +173,7 @@ mod tests {
             let mut seen = [0; 3];
             for place in &mut seen {
                 for _ in 0..84 {
-                    program.step(0.5, Command::Run, &plan, 20.0);
+                    program.step(0.5, ProgramCommand::Run, &plan, 20.0);
                 }
                 *place = program.position();
             }

@@ -12,7 +12,7 @@ use ratatui::{Frame, layout::Rect};
 
 use crate::{
     sim::{
-        drill::{Order, Status},
+        drill::{SimCommand, Status},
         faults::{Fault, Place},
     },
     ui::{
@@ -95,17 +95,17 @@ impl Faults {
                 self.selected =
                     rows.iter().skip(self.selected).position(|row| row.0 != place).map_or(0, |by| self.selected + by);
             }
-            Action::Toggle if in_force => return cleared(cx, Order::Clear(place, fault)),
-            Action::Toggle => return wish(Order::Set(place, fault)),
+            Action::Toggle if in_force => return cleared(cx, SimCommand::Clear(place, fault)),
+            Action::Toggle => return send(SimCommand::Set(place, fault)),
             Action::Less | Action::More => {
                 let other = fault.step(action == Action::More);
                 self.numbers.insert((place, fault.word()), other);
                 // What is in force changes at once.
                 if in_force && other != fault {
-                    return wish(Order::Set(place, other));
+                    return send(SimCommand::Set(place, other));
                 }
             }
-            Action::AllWell => return cleared(cx, Order::AllWell),
+            Action::AllWell => return cleared(cx, SimCommand::AllWell),
             Action::Verdict => self.verdict = !self.verdict && status.scenario.is_some(),
         }
         Vec::new()
@@ -152,11 +152,11 @@ fn rows(status: &Status) -> Vec<(Place, Fault)> {
 }
 
 /// A silent device may answer again: it is asked at once, if the present user may do that.
-fn cleared(cx: &Cx, order: Order) -> Vec<Act> {
+fn cleared(cx: &Cx, command: SimCommand) -> Vec<Act> {
     let allowed = |act: &Act| matches!(act, Act::Order(command) if rights::missing(cx, command).is_none());
-    wish(order).into_iter().chain(bus::retry(cx, None).into_iter().filter(allowed)).collect()
+    send(command).into_iter().chain(bus::retry(cx, None).into_iter().filter(allowed)).collect()
 }
 
-fn wish(order: Order) -> Vec<Act> {
-    vec![Act::Do(Effect::Drill(order))]
+fn send(command: SimCommand) -> Vec<Act> {
+    vec![Act::Do(Effect::Drill(command))]
 }

@@ -7,7 +7,7 @@ use jiff::SignedDuration;
 use crate::{
     plant::def::LineId,
     sim::{
-        drill::{Order, Progress, Status},
+        drill::{Progress, SimCommand, Status},
         faults::{Fault, InForce, Offer, Place, Target},
         scenario::judge::{Row, Standing, Verdict},
     },
@@ -84,9 +84,9 @@ fn with(fixture: &Fixture, status: Status, theme: Theme) -> Model {
     model
 }
 
-fn press(model: &mut Model, keys: &str) -> Vec<Order> {
+fn press(model: &mut Model, keys: &str) -> Vec<SimCommand> {
     let order = |effect| match effect {
-        Effect::Drill(order) => Some(order),
+        Effect::Drill(command) => Some(command),
         _ => None,
     };
     type_keys(model, keys).into_iter().filter_map(order).collect()
@@ -96,14 +96,14 @@ fn press(model: &mut Model, keys: &str) -> Vec<Order> {
 fn faults_go_on_and_off_by_enter_with_their_numbers() {
     let fixture = Fixture::normal();
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
-    assert_eq!(press(&mut model, "⏎"), [Order::Set(Place::Line(L1), Fault::Noise(10))]);
-    assert_eq!(press(&mut model, "→→⏎"), [Order::Set(Place::Line(L1), Fault::Noise(50))]);
-    assert_eq!(press(&mut model, "↓⏎"), [Order::Clear(TIC, Fault::Silent)], "what is on goes off");
+    assert_eq!(press(&mut model, "⏎"), [SimCommand::Set(Place::Line(L1), Fault::Noise(10))]);
+    assert_eq!(press(&mut model, "→→⏎"), [SimCommand::Set(Place::Line(L1), Fault::Noise(50))]);
+    assert_eq!(press(&mut model, "↓⏎"), [SimCommand::Clear(TIC, Fault::Silent)], "what is on goes off");
     let late = Fault::Late(Duration::from_secs(1));
-    assert_eq!(press(&mut model, "↓←⏎"), [Order::Set(TIC, late)], "a number is set before it is on");
-    assert_eq!(press(&mut model, "m"), [Order::AllWell]);
+    assert_eq!(press(&mut model, "↓←⏎"), [SimCommand::Set(TIC, late)], "a number is set before it is on");
+    assert_eq!(press(&mut model, "m"), [SimCommand::AllWell]);
     assert_eq!(press(&mut model, "↑↑↑↑↑"), []);
-    assert_eq!(press(&mut model, "⏎"), [Order::Set(Place::Line(L1), Fault::Noise(50))]);
+    assert_eq!(press(&mut model, "⏎"), [SimCommand::Set(Place::Line(L1), Fault::Noise(50))]);
 }
 
 #[test]
@@ -145,8 +145,8 @@ fn the_number_of_a_fault_in_force_changes_at_once() {
         Fault::ALL.into_iter().position(|fault| fault.target() == Target::Process).expect("faults of the process");
     let units = 2 * (process - 1);
     press(&mut model, &"↓".repeat(1 + units + leak - process));
-    assert_eq!(press(&mut model, "→"), [Order::Set(Place::Process, Fault::Leak(1_000))]);
-    assert_eq!(press(&mut model, "←"), [Order::Set(Place::Process, Fault::Leak(200))]);
+    assert_eq!(press(&mut model, "→"), [SimCommand::Set(Place::Process, Fault::Leak(1_000))]);
+    assert_eq!(press(&mut model, "←"), [SimCommand::Set(Place::Process, Fault::Leak(200))]);
 }
 
 #[test]
