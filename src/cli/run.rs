@@ -14,7 +14,7 @@ use crate::{
     bus::io::{clock::Clock, transport::Connector},
     plant::{PlantDef, Snapshot, record::Seal},
     profile::PlantFile,
-    station::{Command, io as station, teller},
+    station::{LifecycleRequest, io as station, teller},
     ui,
 };
 
@@ -66,7 +66,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
             let ended = tokio::select! {
                 ended = follow(snapshots.clone(), clock, None) => ended.map(|_| None),
                 () = &mut over => Ok(None),
-                next = commanded(&mut serving.station.commands, checked(&args)) => Ok(next),
+                next = handle_lifecycle(&mut serving.station.lifecycle, checked(&args)) => Ok(next),
             };
             let last = snapshots.borrow().clone();
             drop(snapshots);
@@ -123,7 +123,7 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
         let session = serving.station.session(&paths::operator());
         let result = tokio::select! {
             result = ui::io::run(session, ui::io::Options::new(ui::Leaving::Station)) => result,
-            _ = commanded(&mut serving.station.commands, || Err(CliError::Usage(LEAVE.to_owned()))) => Ok(()),
+            _ = handle_lifecycle(&mut serving.station.lifecycle, || Err(CliError::Usage(LEAVE.to_owned()))) => Ok(()),
         };
         serving.stop().await?;
         Ok(result?)
@@ -140,16 +140,16 @@ fn listen(def: &PlantDef) -> Result<serve::Listener, CliError> {
 
 /// Waits until a terminal stops the station (`None`) or reloads its plant file (`Some`, already checked). A file with errors
 /// is refused, and the station goes on as it is.
-async fn commanded(
-    commands: &mut mpsc::Receiver<Command>,
+async fn handle_lifecycle(
+    lifecycle: &mut mpsc::Receiver<LifecycleRequest>,
     load: impl Fn() -> Result<Plant, CliError> + Clone + Send + 'static,
 ) -> Option<Plant> {
     loop {
-        let Command::Reload(reply) = commands.recv().await? else { break };
+        let LifecycleRequest::Reload(reply) = lifecycle.recv().await? else { break };
         let loaded = tokio::select! {
             loaded = loaded(load.clone()) => loaded,
             // The disk of the plant file may hang: the station can be stopped all the same.
-            () = stopped(commands) => break,
+            () = stopped(lifecycle) => break,
         };
         match loaded {
             Ok(plant) => {
@@ -166,8 +166,8 @@ async fn commanded(
 }
 
 /// Waits for the end of the station while a plant file is loaded.
-async fn stopped(commands: &mut mpsc::Receiver<Command>) {
-    while let Some(Command::Reload(reply)) = commands.recv().await {
+async fn stopped(lifecycle: &mut mpsc::Receiver<LifecycleRequest>) {
+    while let Some(LifecycleRequest::Reload(reply)) = lifecycle.recv().await {
         drop(reply.send(Err("the plant file is being loaded already".to_owned())));
     }
 }
@@ -322,23 +322,23 @@ mod tests {
             let _ = ends.lock().expect("one loader").recv();
             Err(CliError::Usage("refused".to_owned()))
         };
-        let (sender, mut commands) = mpsc::channel(4);
+        let (sender, mut lifecycle) = mpsc::channel(4);
         let (reply, _answer) = oneshot::channel();
         let (second, refused) = oneshot::channel();
         let terminals = async {
-            sender.send(Command::Reload(reply)).await.expect("the station listens");
+            sender.send(LifecycleRequest::Reload(reply)).await.expect("the station listens");
             while begins.try_recv().is_err() {
                 tokio::task::yield_now().await;
             }
-            sender.send(Command::Reload(second)).await.expect("the station listens");
+            sender.send(LifecycleRequest::Reload(second)).await.expect("the station listens");
             assert!(refused.await.is_ok_and(|answer| answer.is_err_and(|why| why.contains("loaded already"))));
-            sender.send(Command::Stop).await.expect("the station listens");
+            sender.send(LifecycleRequest::Stop).await.expect("the station listens");
             while sender.capacity() < sender.max_capacity() {
                 tokio::task::yield_now().await;
             }
             tokio::time::advance(ANSWER).await;
         };
-        let (next, ()) = tokio::join!(commanded(&mut commands, load), terminals);
+        let (next, ()) = tokio::join!(handle_lifecycle(&mut lifecycle, load), terminals);
         assert!(next.is_none());
     }
 

@@ -33,7 +33,7 @@ const REQUESTS: usize = 256;
 /// Terminals that may come at once.
 const KNOCKS: usize = 16;
 /// Wishes for the station as a whole that may wait.
-pub const COMMANDS: usize = 4;
+pub const LIFECYCLE_REQUESTS_MAX: usize = 4;
 /// Real time between two looks at the clock: idle terminals, ends of lock-outs, terminals that have gone.
 const TICK: Duration = Duration::from_millis(500);
 
@@ -50,7 +50,7 @@ pub struct Knock {
 
 /// What a terminal has wished of the station as a whole.
 #[derive(Debug)]
-pub enum Command {
+pub enum LifecycleRequest {
     /// To end.
     Stop,
     /// To take up the plant file anew, and where the outcome is told.
@@ -67,7 +67,7 @@ pub struct Ways {
     /// To the book of deeds.
     pub deeds: mpsc::Sender<Paper>,
     /// To whoever has started the station.
-    pub commands: mpsc::Sender<Command>,
+    pub lifecycle: mpsc::Sender<LifecycleRequest>,
 }
 
 /// Where terminals come in: cheap to clone, for whoever listens for them.
@@ -257,12 +257,12 @@ impl Door {
                 }
                 Effect::Work(job, work) => self.toil.put(job, work),
                 Effect::Save(users) => self.toil.save(users),
-                Effect::Stop => self.command(Command::Stop),
+                Effect::Stop => self.send_lifecycle(LifecycleRequest::Stop),
                 Effect::Reload(ticket) => {
                     let (reply, answer) = oneshot::channel();
                     let ended = || Err("not reloaded: the station ends, or is too busy".to_owned());
                     self.reloads.spawn(async move { (ticket, answer.await.unwrap_or_else(|_| ended())) });
-                    self.command(Command::Reload(reply));
+                    self.send_lifecycle(LifecycleRequest::Reload(reply));
                 }
                 Effect::HangUp(terminal, why) => {
                     // The audit log holds it, in bounded rate; attempts without end must not fill this one.
@@ -294,8 +294,8 @@ impl Door {
         let _ = reply.send(answer.map(|()| durability));
     }
 
-    fn command(&mut self, command: Command) {
-        if let Err(error) = self.ways.commands.try_send(command) {
+    fn send_lifecycle(&mut self, request: LifecycleRequest) {
+        if let Err(error) = self.ways.lifecycle.try_send(request) {
             tracing::error!(%error, "nobody carries out the wish for the station");
         }
     }

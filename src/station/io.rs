@@ -65,7 +65,7 @@ pub struct Station {
     /// Past the gate: for the operator of a drill, who is part of the program.
     pub orders: mpsc::Sender<Order>,
     /// What terminals wish of the station as a whole.
-    pub commands: mpsc::Receiver<door::Command>,
+    pub lifecycle: mpsc::Receiver<door::LifecycleRequest>,
     /// `None` for a rehearsal, which keeps nothing.
     history: Option<history::Handle>,
     /// The thread of the book, which ends before the history.
@@ -204,15 +204,15 @@ fn assemble(
     let desk = PlantTask::new(plant, clock, links, file, keeping, publish);
     let (deeds, deed_queue) = mpsc::channel(ORDERS);
     tasks.push(tokio::spawn(desk.run(event_queue, order_queue, deed_queue)));
-    let (command, commands) = mpsc::channel(door::COMMANDS);
-    let ways = Ways { orders: orders.clone(), queries, deeds, commands: command };
+    let (lifecycle_sender, lifecycle) = mpsc::channel(door::LIFECYCLE_REQUESTS_MAX);
+    let ways = Ways { orders: orders.clone(), queries, deeds, lifecycle: lifecycle_sender };
     let (entrance, knocks, requests) = Entrance::new(snapshots);
     let open = guarded.is_none();
     let (gate, users) =
         guarded.map_or_else(|| (Gate::new(def, Some(own_user().into())), None), |(gate, users)| (gate, Some(users)));
     let door = Door::new(gate.in_run(run), clock, ways, users);
     tasks.push(tokio::spawn(door.run(knocks, requests, stopped)));
-    Station { entrance, orders, commands, history, book, open, stop, tasks }
+    Station { entrance, orders, lifecycle, history, book, open, stop, tasks }
 }
 
 impl Station {
@@ -230,10 +230,10 @@ impl Station {
 
     /// Stops downstream and waits until the last record is on disk. Gives the last entry of the audit log.
     pub async fn stop(self) -> Option<Seal> {
-        let Station { entrance, orders, commands, history, book, open: _, stop, tasks } = self;
+        let Station { entrance, orders, lifecycle, history, book, open: _, stop, tasks } = self;
         // Links may have ended already; then nobody listens, which is fine.
         let _ = stop.send(true);
-        drop((entrance, orders, commands));
+        drop((entrance, orders, lifecycle));
         for task in tasks {
             if let Err(error) = task.await {
                 tracing::error!(%error, "a task of the station ended badly");

@@ -39,5 +39,5 @@ pub mod io;
 #[cfg(test)]
 mod tests;
 
-pub use door::{Command, Entrance};
+pub use door::{Entrance, LifecycleRequest};
 pub use session::{Request, Session};

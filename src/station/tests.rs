@@ -64,7 +64,7 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
     other.wish(Wish::Login { user: "ANNA".into(), password: password.into() }).await.unwrap();
     let rows = deeds(&other, "unlock failed").await;
     other.wish(Wish::Stop).await.unwrap();
-    assert!(matches!(station.commands.recv().await, Some(super::Command::Stop)));
+    assert!(matches!(station.lifecycle.recv().await, Some(super::LifecycleRequest::Stop)));
     drop((session, other));
     station.stop().await;
 

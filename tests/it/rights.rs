@@ -267,17 +267,17 @@ fn wishes() -> Vec<Wish> {
 #[tokio::test(flavor = "multi_thread")]
 async fn every_wish_is_granted_or_refused_as_the_table_says_and_is_on_record() {
     let mut guarded = Guarded::start(|_| {}).await;
-    let mut asked = std::mem::replace(&mut guarded.station.commands, mpsc::channel(1).1);
+    let mut asked = std::mem::replace(&mut guarded.station.lifecycle, mpsc::channel(1).1);
     // What the command line does when a terminal wishes something of the station as a whole, but for the doing.
     let heard = tokio::spawn(async move {
         let mut heard = Vec::new();
         while let Some(command) = asked.recv().await {
             match command {
-                station::Command::Reload(reply) => {
+                station::LifecycleRequest::Reload(reply) => {
                     heard.push("reload");
                     reply.send(Ok(())).unwrap();
                 }
-                station::Command::Stop => heard.push("stop"),
+                station::LifecycleRequest::Stop => heard.push("stop"),
             }
         }
         heard
