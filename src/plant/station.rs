@@ -163,7 +163,7 @@ impl StationFault {
             priority: self.priority(),
             class: AlarmClass::System,
             on_delay: self.on_delay(),
-            guidance: Guidance { cause, effect, action, respond: Some(Duration::from_secs(600)) },
+            guidance: Guidance { cause, effect, action, response_time: Some(Duration::from_secs(600)) },
             ..AlarmDef::new(id, Subject::Station, Condition::Station(self), self.message())
         }
     }

@@ -119,7 +119,7 @@ fn alarm(
             cause: text(&table.cause),
             effect: text(&table.effect),
             action: text(&table.action),
-            respond: table.respond.map(|respond| respond.value),
+            response_time: table.response_time.map(|time| time.value),
         },
         ..AlarmDef::new(id, subject, condition, text(&table.text))
     }
@@ -174,7 +174,7 @@ fn not_answering(device: &DeviceDef) -> AlarmDef {
             ),
             effect: "its values are unknown and it cannot be operated from here".to_owned(),
             action: "look at the device itself; then at supply, cable, terminator and the Bus tab".to_owned(),
-            respond: Some(Duration::from_secs(600)),
+            response_time: Some(Duration::from_secs(600)),
         },
         ..AlarmDef::new(AlarmId(0), Subject::Device(device.id), Condition::NotAnswering, NO_VALUES)
     }
@@ -190,7 +190,7 @@ fn overloaded(line: &LineDef) -> AlarmDef {
             cause: format!("{} is polled more often than it can carry, or its devices answer more slowly", line.name),
             effect: "alarm inputs are read on time, other values less often; no device is at fault".to_owned(),
             action: "see the Bus tab; poll less often, raise the baud rate, or divide the line".to_owned(),
-            respond: None,
+            response_time: None,
         },
         ..AlarmDef::new(AlarmId(0), Subject::Line(line.id), Condition::Overloaded, OVERLOADED)
     }

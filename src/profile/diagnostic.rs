@@ -160,6 +160,11 @@ pub(crate) struct Problem {
 }
 
 impl Problem {
+    /// Says it in other words.
+    pub fn message(&mut self, text: impl Into<String>) -> &mut Self {
+        self.message = text.into();
+        self
+    }
     /// What stands at the caret.
     pub fn label(&mut self, text: impl Into<String>) -> &mut Self {
         self.label = text.into();

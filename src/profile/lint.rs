@@ -1,6 +1,6 @@
 //! The lint of alarms: what an alarm lacks that can be used but would not help an operator.
 //!
-//! An alarm is complete with cause, effect, action, time to respond and priority (ISA-18.2); one without an action is
+//! An alarm is complete with cause, effect, action, response time and priority (ISA-18.2); one without an action is
 //! none. What is plainly wrong, such as a limit without a deadband or two alarms of one name, is an error elsewhere.
 
 use std::collections::BTreeMap;
@@ -37,7 +37,7 @@ fn incomplete(table: &AlarmTable, problems: &mut Problems) {
         ("`cause`", empty(&table.cause)),
         ("`effect`", empty(&table.effect)),
         ("`action`", empty(&table.action)),
-        ("`respond`", table.respond.is_none()),
+        ("`response_time`", table.response_time.is_none()),
     ]
     .into_iter()
     .filter_map(|(key, missing)| missing.then_some(key))
@@ -56,16 +56,16 @@ fn incomplete(table: &AlarmTable, problems: &mut Problems) {
 /// A limit without a delay, or with one that leaves no time.
 fn delay(table: &AlarmTable, problems: &mut Problems) {
     let analog = [table.high_high, table.high, table.low, table.low_low, table.deviation].into_iter().flatten().next();
-    match (analog, table.on_delay, table.respond) {
+    match (analog, table.on_delay, table.response_time) {
         (Some(limit), None, _) => {
             let problem = problems.warn(limit.at, format!("{} has no `on_delay`", name(table)));
             problem.label("a single peak raises it").help(
                 "usual: flow and pressure 15s, level and temperature 60s; write on_delay = \"0s\" where it must come at once",
             );
         }
-        (_, Some(delay), Some(respond)) if respond.value < delay.value => {
+        (_, Some(delay), Some(time)) if time.value < delay.value => {
             let problem = problems.warn(delay.at, format!("{} comes later than it must be answered", name(table)));
-            problem.label("longer than `respond`").also(respond.at, "the time to respond");
+            problem.label("longer than `response_time`").also(time.at, "the response time");
         }
         (Some(_) | None, _, _) => {}
     }
@@ -136,7 +136,7 @@ mod tests {
     /// A complete alarm with other keys.
     fn alarm(keys: &str) -> String {
         format!(
-            "[[alarm]]\n{keys}\ncause = \"a fault\"\neffect = \"a loss\"\naction = \"stop it\"\nrespond = \"10min\"\n"
+            "[[alarm]]\n{keys}\ncause = \"a fault\"\neffect = \"a loss\"\naction = \"stop it\"\nresponse_time = \"10min\"\n"
         )
     }
 
@@ -176,9 +176,9 @@ mod tests {
     #[test]
     fn what_an_operator_would_have_to_guess_is_named_with_its_place() {
         let bare = format!("[[alarm]]\n{HOT}\n");
-        check(&bare, &["small.toml:30:8: the alarm `hot` of D1.T has no `cause`, `effect`, `action`, `respond`"]);
+        check(&bare, &["small.toml:30:8: the alarm `hot` of D1.T has no `cause`, `effect`, `action`, `response_time`"]);
         check(&alarm(HOT).replace("stop it", " "), &["has no `action` (not complete; an alarm that nobody can do"]);
-        check(&alarm(HOT).replace("respond = \"10min\"\n", ""), &["has no `respond`"]);
+        check(&alarm(HOT).replace("response_time = \"10min\"\n", ""), &["has no `response_time`"]);
     }
 
     #[test]
@@ -189,7 +189,10 @@ mod tests {
         );
         check(&alarm(&HOT.replace("5s", "0s")), &[]);
         check(&alarm(&HOT.replace("5s", "10min")), &[]);
-        check(&alarm(&HOT.replace("5s", "11min")), &["comes later than it must be answered (longer than `respond`)"]);
+        check(
+            &alarm(&HOT.replace("5s", "11min")),
+            &["comes later than it must be answered (longer than `response_time`)"],
+        );
     }
 
     #[test]

@@ -28,6 +28,7 @@ mod picture;
 mod plant;
 mod program;
 pub(crate) mod reader;
+pub(crate) mod renamed;
 mod report;
 mod schema;
 mod simulate;

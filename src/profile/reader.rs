@@ -11,7 +11,10 @@ use toml::{
     de::{DeTable, DeValue},
 };
 
-use super::diagnostic::{Problems, Span};
+use super::{
+    diagnostic::{Problems, Span},
+    renamed,
+};
 use crate::plant::visible::first_hidden;
 
 /// Most unknown keys of one table that are reported.
@@ -168,10 +171,8 @@ impl<'a> Fields<'a> {
         for layer in layers {
             let unknown = layer.table.iter().filter(|(word, _)| !known.contains(&word.as_str()));
             for (word, (at, _)) in unknown.take(UNKNOWN_MAX) {
-                problems
-                    .add(*at, format!("unknown key `{word}` in {what}"))
-                    .label("not known here")
-                    .suggest(word, known.iter().copied());
+                let problem = problems.add(*at, format!("unknown key `{word}` in {what}")).label("not known here");
+                renamed::offer(problem, what, word, known);
             }
         }
         Fields { layers, what }
@@ -182,8 +183,8 @@ impl<'a> Fields<'a> {
     }
     /// A value that must be there.
     pub fn need<T: Value>(&self, key: &str, problems: &mut Problems) -> Option<At<T>> {
-        if self.find(key).is_none() {
-            let what = self.what;
+        let what = self.what;
+        if self.find(key).is_none() && !renamed::has_old_name(self.layers, what, key) {
             problems.add(self.at(), format!("{what} needs `{key}`")).label("missing here");
         }
         self.opt(key, problems)
@@ -280,9 +281,9 @@ macro_rules! words {
                 match word.as_str() {
                     $($word => Some($value),)*
                     _ => {
-                        let known = [$($word),*];
-                        problems.add(at, format!(concat!("unknown ", $what, " `{}`"), word))
-                            .label(concat!("not a ", $what)).suggest(&word, known);
+                        let problem = problems.add(at, format!(concat!("unknown ", $what, " `{}`"), word))
+                            .label(concat!("not a ", $what));
+                        $crate::profile::renamed::offer(problem, $what, &word, &[$($word),*]);
                         None
                     }
                 }

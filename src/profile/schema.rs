@@ -326,7 +326,7 @@ table!(
         opt "cause" cause: String,
         opt "effect" effect: String,
         opt "action" action: String,
-        opt "respond" respond: Duration,
+        opt "response_time" response_time: Duration,
     }
 );
 

@@ -75,7 +75,7 @@ fn an_alarm_that_would_not_help_is_a_warning_and_strictly_a_refusal() {
     let folder = folder();
     let file = folder.path().join("plant.toml");
     let (_, text, _) = run(&["profiles", "tank"]);
-    let changed = text.replacen("respond = \"2min\"\n", "", 1);
+    let changed = text.replacen("response_time = \"2min\"\n", "", 1);
     assert_ne!(changed, text);
     fs::write(&file, changed).unwrap();
     let file = file.to_str().unwrap();

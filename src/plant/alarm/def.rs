@@ -306,5 +306,5 @@ pub struct Guidance {
     /// What to do.
     pub action: String,
     /// How soon.
-    pub respond: Option<Duration>,
+    pub response_time: Option<Duration>,
 }

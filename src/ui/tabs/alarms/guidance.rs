@@ -167,7 +167,7 @@ fn now_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
 
 /// `respond within 10 min, 09:19 left`, and whether that time is over; nothing where the plant file gives no time.
 pub fn respond_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(String, bool)> {
-    let respond = def.guidance.respond?;
+    let respond = def.guidance.response_time?;
     let within = format!("respond within {} min", respond.as_secs().div_ceil(60));
     let gone = between(alarm.raised_at, cx.now);
     Some(match alarm.state {

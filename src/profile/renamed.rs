@@ -1,0 +1,52 @@
+//! Keys and keywords of earlier versions, each with the name it has now.
+
+use super::{diagnostic::Problem, reader::Raw};
+
+/// Table as its messages name it (of a keyword: the kind of keyword), old spelling, new spelling.
+const RENAMED: &[(&str, &str, &str)] = &[("an alarm", "respond", "response_time")];
+
+/// The name that a key or keyword has now, if it had another one.
+pub(super) fn new_name(table: &str, old: &str) -> Option<&'static str> {
+    RENAMED.iter().find(|row| row.0 == table && row.1 == old).map(|row| row.2)
+}
+
+/// Whether the layers still use the old name of a key.
+pub(super) fn has_old_name(layers: &[Raw], table: &str, new: &str) -> bool {
+    let mut old = RENAMED.iter().filter(|row| row.0 == table && row.2 == new).map(|row| row.1);
+    old.any(|old| layers.iter().any(|layer| layer.table.contains_key(old)))
+}
+
+/// Offers the new name of an old key or keyword, otherwise the nearest of the known ones.
+pub(crate) fn offer(problem: &mut Problem, table: &str, word: &str, known: &[&str]) {
+    match new_name(table, word) {
+        Some(new) => problem.message(format!("`{word}` is now `{new}`")).label(format!("write `{new}`")),
+        None => problem.suggest(word, known.iter().copied()),
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::tests::{METER, PLANT, PLC, load},
+        *,
+    };
+
+    #[test]
+    fn an_old_key_is_answered_with_the_new_one() {
+        let plant = PLANT.replace("deadband = 1.0", "respond = \"5 min\"");
+        let errors = load(plant.as_bytes(), METER, PLC).expect_err("the key is an old one");
+        let lines: Vec<String> = errors.full_lines().collect();
+        assert_eq!(lines, ["small.toml:27:1: `respond` is now `response_time` (write `response_time`)"]);
+    }
+
+    #[test]
+    fn every_renamed_key_of_the_schema_has_its_new_name_there() {
+        let schema = include_str!("schema.rs");
+        for (table, old, new) in RENAMED {
+            let Some((_, keys)) = schema.split_once(&format!("\"{table}\" {{")) else { continue };
+            let keys = keys.split("\n\n").next().expect("a split has a first part");
+            assert!(keys.contains(&format!("\"{new}\" ")), "{table} has no `{new}`");
+            assert!(!keys.contains(&format!("\"{old}\" ")), "{table} still has `{old}`");
+        }
+    }
+}
