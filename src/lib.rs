@@ -33,10 +33,10 @@
 //!    loss counted  ▼   ▼   latest only          │
 //!  book ──> history     door ────────────── Session      one per terminal: channels, or the
 //!  thread   thread  <─── Query / Answer        │          socket of `attach` with deltas
-//!  (chain)  DuckDB       Gate: who may      terminal (ui)
+//!  (chain)  DuckDB       AccessControl      terminal (ui)
 //! ```
 //!
-//! Everything that a terminal asks goes through the **door**: the task around [`access::Gate`], the reducer of people, which
+//! Every request of a terminal goes through the **session server**, the task around [`access::AccessControl`], which
 //! alone decides what is permitted. What it refuses goes on to the plant as a refused order, so that it is seen and on
 //! record like any other. Actions are in the audit log and alarms in their state file, on disk, before a snapshot shows an
 //! outcome as recorded; the history follows within a second.
@@ -52,7 +52,7 @@
 //!    file, the terminal only what its operator looks at.
 //! 2. **One way.** device → [`bus`] → [`plant`] → snapshot → ([`history`], terminals). Back only as orders, whose
 //!    outcome comes back inside a later snapshot.
-//! 3. **Three pure reducers**: [`plant::Plant`] for facts, [`access::Gate`] for people, [`ui::update`] for the view.
+//! 3. **Three pure reducers**: [`plant::Plant`] for facts, [`access::AccessControl`] for users and sessions, [`ui::update`] for the view.
 //!    Everything asynchronous is a thin loop around one of them.
 //! 4. **The outside world is spelled `io`.** Only `io` files, the station and the command line may name tokio, DuckDB,
 //!    files, sockets, the terminal or a clock. Time is an argument everywhere else.

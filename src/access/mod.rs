@@ -5,11 +5,11 @@ pub mod wish;
 pub mod password;
 pub mod user;
 pub mod tries;
-pub mod gate;
+pub mod control;
 pub mod book;
 pub mod sealing;
 pub mod io;
 
-pub use gate::{Effect, Gate, Peer};
+pub use control::{AccessControl, Effect, Peer};
 pub use user::Users;
 pub use wish::{Durability, OrderRequest, Secret, SessionRow, Signature, Standing, UserRow, Who, Wish};

@@ -97,7 +97,7 @@ pub fn needs_for_question(question: &Question) -> Role {
     right.role()
 }
 
-/// The least role that may have a wish; `None` where it is about oneself, so that the gate decides by who one is.
+/// The least role that may have a wish; `None` where it is about oneself, so that access control decides by who one is.
 pub fn needs_for_wish(wish: &Wish) -> Option<Role> {
     let right = match wish {
         Wish::Login { .. }

@@ -3,7 +3,7 @@
 use std::{io::IsTerminal, time::Duration};
 
 use crate::{
-    access::{Durability, Signature, Wish, gate::sign, wish::Secret},
+    access::{Durability, Signature, Wish, control::sign, wish::Secret},
     attach::io::{connect, find},
     plant::{
         Snapshot,

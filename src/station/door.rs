@@ -1,4 +1,4 @@
-//! The task between terminals and plant: lets through what the gate permits, and tells every terminal how it stands.
+//! The task between terminals and plant: lets through what access control permits, and tells every terminal how it stands.
 
 use std::{
     collections::BTreeMap,
@@ -22,7 +22,7 @@ use super::{
     toil::{Done, Toil},
 };
 use crate::{
-    access::{Durability, Effect, Gate, Peer, Standing},
+    access::{AccessControl, Durability, Effect, Peer, Standing},
     bus::io::clock::Clock,
     history::{HistoryError, io::Query},
     plant::{Snapshot, command::Order},
@@ -113,9 +113,9 @@ enum Record {
     Lost,
 }
 
-/// Sole owner of the gate.
+/// Sole owner of access control.
 pub struct Door {
-    gate: Gate,
+    access: AccessControl,
     clock: Clock,
     ways: Ways,
     terminals: BTreeMap<u32, watch::Sender<Arc<Standing>>>,
@@ -130,9 +130,9 @@ pub struct Door {
 
 impl Door {
     /// A door that nobody has come to. `users` is the file that they are kept in.
-    pub fn new(gate: Gate, clock: Clock, ways: Ways, users: Option<PathBuf>) -> Door {
+    pub fn new(access: AccessControl, clock: Clock, ways: Ways, users: Option<PathBuf>) -> Door {
         Door {
-            gate,
+            access,
             clock,
             ways,
             terminals: BTreeMap::new(),
@@ -159,13 +159,13 @@ impl Door {
                 _ = stopped.wait_for(|stopped| *stopped) => break,
                 Some(knock) = knocks.recv() => {
                     self.terminals.insert(knock.terminal, knock.standing);
-                    let effects = self.gate.open(knock.terminal, knock.peer, self.clock.now());
+                    let effects = self.access.open(knock.terminal, knock.peer, self.clock.now());
                     self.carry_out(effects);
                 }
                 done = self.toil.next() => {
                     let effects = match done {
-                        Done::Work(job, outcome) => self.gate.done(job, outcome, self.clock.now()),
-                        Done::Saved(result) => self.gate.saved(result, self.clock.now()),
+                        Done::Work(job, outcome) => self.access.done(job, outcome, self.clock.now()),
+                        Done::Saved(result) => self.access.saved(result, self.clock.now()),
                     };
                     self.carry_out(effects);
                 }
@@ -176,7 +176,7 @@ impl Door {
                         self.terminals.iter().filter(|(_, end)| end.is_closed()).map(|(id, _)| *id).collect();
                     for terminal in gone {
                         self.terminals.remove(&terminal);
-                        let effects = self.gate.close(terminal, self.clock.now());
+                        let effects = self.access.close(terminal, self.clock.now());
                         self.carry_out(effects);
                     }
                     if self.lost > 0 && self.ways.deeds.try_send(Paper::Lost(self.lost)).is_ok() {
@@ -184,15 +184,15 @@ impl Door {
                     }
                     // Who has left waits for no answer any more.
                     self.tickets.retain(|_, reply| !reply.is_closed());
-                    let mut effects = self.gate.follow_clock(self.clock.behind_utc());
-                    effects.extend(self.gate.tick(self.clock.now()));
+                    let mut effects = self.access.follow_clock(self.clock.behind_utc());
+                    effects.extend(self.access.tick(self.clock.now()));
                     self.carry_out(effects);
                 }
             }
         }
         // The users are written by now, so the book must say so: nothing else is begun any more.
         if let Some(result) = self.toil.end().await {
-            let mut effects = self.gate.saved(result, self.clock.now());
+            let mut effects = self.access.saved(result, self.clock.now());
             effects.retain(|effect| matches!(effect, Effect::Record(_) | Effect::Reply(..)));
             self.carry_out(effects);
         }
@@ -202,10 +202,10 @@ impl Door {
         let now = self.clock.now();
         match request {
             Request::Order(order) => {
-                let effects = self.gate.order(terminal, order, now);
+                let effects = self.access.order(terminal, order, now);
                 self.carry_out(effects);
             }
-            Request::Ask(query) => match self.gate.may_ask(terminal, &query.question, now) {
+            Request::Ask(query) => match self.access.may_ask(terminal, &query.question, now) {
                 Ok(()) => {
                     if let Err(error) = self.ways.queries.try_send((terminal, query)) {
                         let (_, query) = error.into_inner();
@@ -221,7 +221,7 @@ impl Door {
             Request::Wish(wish, reply) => {
                 self.last_ticket += 1;
                 self.tickets.insert(self.last_ticket, reply);
-                let effects = self.gate.wish(terminal, self.last_ticket, wish, now);
+                let effects = self.access.wish(terminal, self.last_ticket, wish, now);
                 self.carry_out(effects);
             }
         }
@@ -237,7 +237,7 @@ impl Door {
                     if let Err(error) = self.ways.orders.try_send(order) {
                         tracing::error!(%error, "an order did not reach the plant");
                         let (mpsc::error::TrySendError::Full(order) | mpsc::error::TrySendError::Closed(order)) = error;
-                        let told = self.gate.undelivered(order.id, "station too busy");
+                        let told = self.access.undelivered(order.id, "station too busy");
                         self.carry_out(told);
                     }
                 }
@@ -252,7 +252,7 @@ impl Door {
                 Effect::Reply(ticket, answer) => answers.push((ticket, answer)),
                 Effect::Standing(terminal) => {
                     if let Some(end) = self.terminals.get(&terminal) {
-                        end.send_replace(Arc::new(self.gate.standing(terminal, self.clock.now())));
+                        end.send_replace(Arc::new(self.access.standing(terminal, self.clock.now())));
                     }
                 }
                 Effect::Work(job, work) => self.toil.put(job, work),

@@ -9,7 +9,7 @@ use tokio::{
 
 use crate::{
     access::{
-        Gate, Peer, Users,
+        AccessControl, Peer, Users,
         io::{book::Opened, own_user, recorder, users, users_beside},
     },
     bus::io::{clock::Clock, transport::Connector},
@@ -62,7 +62,7 @@ pub struct Options {
 #[derive(Debug)]
 pub struct Station {
     entrance: Entrance,
-    /// Past the gate: for the operator of a drill, who is part of the program.
+    /// Bypasses access control: for the scripted operator of a drill.
     pub orders: mpsc::Sender<Order>,
     /// What terminals wish of the station as a whole.
     pub lifecycle: mpsc::Receiver<door::LifecycleRequest>,
@@ -91,15 +91,15 @@ pub fn start_told(options: Options, listener: Option<Listener>) -> Result<Statio
 pub fn start_guarded(options: Options) -> Result<Station, StartError> {
     let path = users_beside(&options.history);
     let (def, host) = (options.def.clone(), Some(own_user().into()));
-    let gate = match users::read(&path) {
-        Ok(people) => Gate::with_people(def, people, host),
+    let access = match users::read(&path) {
+        Ok(people) => AccessControl::with_people(def, people, host),
         // Login is closed: a damaged file is not an empty one. Values and alarms go on.
         Err(error) => {
             tracing::error!(%error, "login is closed");
-            Gate::closed(def, &error.to_string(), host)
+            AccessControl::closed(def, &error.to_string(), host)
         }
     };
-    Ok(begin(options, None, Some((gate, path)))?)
+    Ok(begin(options, None, Some((access, path)))?)
 }
 
 /// Why a station did not start.
@@ -113,7 +113,7 @@ pub enum StartError {
 fn begin(
     options: Options,
     listener: Option<Listener>,
-    guarded: Option<(Gate, PathBuf)>,
+    guarded: Option<(AccessControl, PathBuf)>,
 ) -> Result<Station, HistoryError> {
     let Options { def, clock, history: path, connectors, file } = options;
     let sets = sets::folder(&path, &def.name);
@@ -126,8 +126,8 @@ fn begin(
     // Without such a file, at the first start or after it was damaged, the journal has the state.
     let from_journal = recorder.alarms.steps.is_none();
     recorder.alarms.steps.iter().for_each(|steps| plant.restore(steps));
-    let users = guarded.as_ref().and_then(|(gate, _)| gate.people_digest());
-    if let Some(state) = guarded.as_ref().and_then(|(gate, _)| users_fault(gate, &recorder.opened)) {
+    let users = guarded.as_ref().and_then(|(access, _)| access.people_digest());
+    if let Some(state) = guarded.as_ref().and_then(|(access, _)| users_fault(access, &recorder.opened)) {
         plant.on_fault(StationFault::UsersFile, state);
     }
     deeds.started(&def.name, file.as_ref(), users, clock.utc());
@@ -138,14 +138,14 @@ fn begin(
 }
 
 /// What is wrong with the file of users: it is damaged, or it is missing although the audit log knows of users.
-fn users_fault(gate: &Gate, log: &Opened) -> Option<FaultState> {
-    if let Some(why) = gate.is_closed() {
+fn users_fault(access: &AccessControl, log: &Opened) -> Option<FaultState> {
+    if let Some(why) = access.is_closed() {
         return Some(FaultState::Active(why.clone()));
     }
     let nobody = Users::default().digest();
     let had_users = log.users_file.as_ref().is_some_and(|recorded| **recorded != *nobody);
     let words = "the users file is missing although there were users: bring it back from a copy";
-    (had_users && gate.people_digest() == Some(nobody)).then(|| FaultState::Occurred(words.into()))
+    (had_users && access.people_digest() == Some(nobody)).then(|| FaultState::Occurred(words.into()))
 }
 
 /// A station that keeps nothing, for drills in virtual time, where no other thread may take part. Questions to the history
@@ -176,7 +176,7 @@ fn assemble(
     file: Option<PlantFile>,
     keeping: Keeping,
     threads: Threads,
-    guarded: Option<(Gate, PathBuf)>,
+    guarded: Option<(AccessControl, PathBuf)>,
 ) -> Station {
     let Threads { queries, history, book } = threads;
     let (stop, stopped) = watch::channel(false);
@@ -208,9 +208,11 @@ fn assemble(
     let ways = Ways { orders: orders.clone(), queries, deeds, lifecycle: lifecycle_sender };
     let (entrance, knocks, requests) = Entrance::new(snapshots);
     let open = guarded.is_none();
-    let (gate, users) =
-        guarded.map_or_else(|| (Gate::new(def, Some(own_user().into())), None), |(gate, users)| (gate, Some(users)));
-    let door = Door::new(gate.in_run(run), clock, ways, users);
+    let (access, users) = guarded.map_or_else(
+        || (AccessControl::new(def, Some(own_user().into())), None),
+        |(access, users)| (access, Some(users)),
+    );
+    let door = Door::new(access.in_run(run), clock, ways, users);
     tasks.push(tokio::spawn(door.run(knocks, requests, stopped)));
     Station { entrance, orders, lifecycle, history, book, open, stop, tasks }
 }

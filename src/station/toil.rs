@@ -6,11 +6,11 @@ use tokio::task::{JoinHandle, JoinSet};
 
 use crate::access::{
     Users,
-    gate::{Job, Outcome, Work},
+    control::{Job, Outcome, Work},
     io::{random, users},
 };
 
-/// Passwords that are hashed at the same time, 19 MiB each; the gate bounds those that wait.
+/// Passwords that are hashed at the same time, 19 MiB each; access control bounds those that wait.
 const AT_ONCE: usize = 2;
 /// At the end the file of users is waited for so long.
 const SAVING_MAX: Duration = Duration::from_secs(2);
@@ -47,7 +47,7 @@ impl Toil {
         self.begin();
     }
 
-    /// Writes the users down. The gate never wishes it while it is being done.
+    /// Writes the users down. Access control never wishes it while it is being done.
     pub fn save(&mut self, people: Users) {
         let path = self.path.clone();
         self.saving = Some(tokio::task::spawn_blocking(move || match path {

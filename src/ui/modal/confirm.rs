@@ -11,7 +11,7 @@ use super::{
     window,
 };
 use crate::{
-    access::{Signature, gate::sign},
+    access::{Signature, control::sign},
     plant::{
         alarm::{AlarmCommand, book::subject_name},
         command::Command,

@@ -1,7 +1,7 @@
 //! A typed number: what it means, whether it can be written, and why to ask again before it is.
 
 use crate::{
-    access::gate::sign,
+    access::control::sign,
     plant::{
         command::Command,
         def::{Condition, Level, Subject, TagId},

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{Effect, Gate, passed, seat::Seat};
+use super::{AccessControl, Effect, passed, seat::Seat};
 use crate::{
     access::{SessionRow, Standing, UserRow, Users, user},
     plant::role::Role,
@@ -13,7 +13,7 @@ use crate::{
 /// A lock for want of keys is announced so long before.
 pub(super) const LOCK_NEAR: Duration = Duration::from_secs(60);
 
-impl Gate {
+impl AccessControl {
     /// How a terminal stands.
     pub fn standing(&self, terminal: u32, at: Timestamp) -> Standing {
         let rules = &self.def.access;

@@ -7,19 +7,19 @@ use crate::access::book::USERS_FILE;
 fn each_change_of_the_users_is_tied_to_the_one_before_and_a_login_changes_nothing() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "a");
-    let start = bench.gate.people_digest().unwrap();
+    let start = bench.access.people_digest().unwrap();
     bench.login(1, "boss", BOSS).unwrap();
     bench.later(1);
-    assert_eq!(bench.gate.people_digest().unwrap(), start);
+    assert_eq!(bench.access.people_digest().unwrap(), start);
     let mut last = start;
     for role in [Role::Technician, Role::Viewer] {
-        let effects = bench.gate.wish(1, 99, Wish::SetRole { user: "tech".into(), role }, bench.now);
+        let effects = bench.access.wish(1, 99, Wish::SetRole { user: "tech".into(), role }, bench.now);
         let effects = bench.work(effects);
         let file = effects.iter().find_map(|effect| match effect {
             Effect::Record(record) if &*record.action == USERS_FILE => Some(record),
             _ => None,
         });
-        let now = bench.gate.people_digest().unwrap();
+        let now = bench.access.people_digest().unwrap();
         let Some(file) = file else {
             assert_eq!(now, last, "nothing has changed");
             continue;

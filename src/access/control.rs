@@ -1,4 +1,4 @@
-//! The reducer of people: what a terminal asks comes in, what is permitted goes out. The only place where rights are decided.
+//! The access-control state machine: takes the requests of terminals and returns what is permitted. Rights are decided here only.
 
 mod login;
 mod paper;
@@ -71,9 +71,9 @@ pub enum Effect {
     Reply(u64, Result<(), String>),
     /// The standing of this terminal has changed.
     Standing(u32),
-    /// Do this beside, and tell [`Gate::done`]. At most `JOBS_MAX` are under way or wait.
+    /// Do this beside, and tell [`AccessControl::done`]. At most `JOBS_MAX` are under way or wait.
     Work(Job, Work),
-    /// Write the people down, and tell [`Gate::saved`]. Never two at a time.
+    /// Write the people down, and tell [`AccessControl::saved`]. Never two at a time.
     Save(Users),
     /// End the station.
     Stop,
@@ -85,7 +85,7 @@ pub enum Effect {
 
 /// All that is known of people.
 #[derive(Debug)]
-pub struct Gate {
+pub struct AccessControl {
     def: Arc<PlantDef>,
     /// The run of the station: orders made in another one are refused.
     run: u64,
@@ -111,11 +111,11 @@ pub struct Gate {
     unsaved: bool,
 }
 
-impl Gate {
-    /// A gate that asks nobody: whoever has started the station, or could, may everything. `host` is the user of the operating
+impl AccessControl {
+    /// Access control without login: root, the user of the station and its own process may do everything. `host` is the user of the operating
     /// system that the station runs as.
-    pub fn new(def: Arc<PlantDef>, host: Option<Arc<str>>) -> Gate {
-        Gate {
+    pub fn new(def: Arc<PlantDef>, host: Option<Arc<str>>) -> AccessControl {
+        AccessControl {
             def,
             run: 0,
             behind_utc: SignedDuration::ZERO,
@@ -134,22 +134,22 @@ impl Gate {
         }
     }
 
-    /// A gate that lets these people in. `host` is the user of the operating system that the station runs as.
-    pub fn with_people(def: Arc<PlantDef>, people: Users, host: Option<Arc<str>>) -> Gate {
-        Gate { people: Some(people), ..Gate::new(def, host) }
+    /// Access control with these users. `host` is the user of the operating system that the station runs as.
+    pub fn with_people(def: Arc<PlantDef>, people: Users, host: Option<Arc<str>>) -> AccessControl {
+        AccessControl { people: Some(people), ..AccessControl::new(def, host) }
     }
 
     /// Login is closed because the users file is damaged; `why` is the reply to each attempt.
-    pub fn closed(def: Arc<PlantDef>, why: &str, host: Option<Arc<str>>) -> Gate {
-        Gate {
+    pub fn closed(def: Arc<PlantDef>, why: &str, host: Option<Arc<str>>) -> AccessControl {
+        AccessControl {
             closed: Some(format!("login is closed: {why}").into()),
-            ..Gate::with_people(def, Users::default(), host)
+            ..AccessControl::with_people(def, Users::default(), host)
         }
     }
 
-    /// The same gate in this run of the station.
-    pub fn in_run(self, run: u64) -> Gate {
-        Gate { run, ..self }
+    /// The same, in this run of the station.
+    pub fn in_run(self, run: u64) -> AccessControl {
+        AccessControl { run, ..self }
     }
 
     /// The [`Users::digest`] of its users; `None` in a demonstration, or while login is closed.
@@ -406,7 +406,7 @@ impl Gate {
         effects
     }
 
-    /// The system clock was set, or not: what leaves the gate is in UTC, its own times are steady.
+    /// The system clock was set, or not: effects carry UTC, internal times are monotonic.
     pub fn follow_clock(&mut self, behind_utc: SignedDuration) -> Vec<Effect> {
         if self.behind_utc == behind_utc {
             return Vec::new();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use jiff::Timestamp;
 
 use super::{
-    Effect, Gate, right,
+    AccessControl, Effect, right,
     work::{What, Wrong},
 };
 use crate::{
@@ -18,7 +18,7 @@ use crate::{
     },
 };
 
-impl Gate {
+impl AccessControl {
     /// Lets an order through whose role is enough, once it is signed as its tag asks.
     pub(super) fn signed(&mut self, terminal: u32, mut request: OrderRequest, at: Timestamp) -> Vec<Effect> {
         let needed = needed(&self.def, &request.command).filter(|_| self.people.is_some());

@@ -1,19 +1,19 @@
 //! Wrong passwords: who is delayed and locked out, and who never is.
 
 use super::*;
-use crate::access::gate::work::{BUSY, JOBS_MAX, JOBS_OF_USER_MAX, WRONG};
+use crate::access::control::work::{BUSY, JOBS_MAX, JOBS_OF_USER_MAX, WRONG};
 
 impl Bench {
     /// A terminal of this user of the operating system.
     fn open_as(&mut self, terminal: u32, user: &str) {
         let peer = Peer { from: format!("script, user {user}").into(), unix_user: Some(user.into()), own: false };
-        self.gate.open(terminal, peer, self.now);
+        self.access.open(terminal, peer, self.now);
     }
 
     /// The answer to a login, if there is one yet.
     fn answer(&mut self, terminal: u32, ticket: u64, user: &str, password: &str) -> Option<Result<(), String>> {
         let wish = Wish::Login { user: user.into(), password: password.into() };
-        let effects = self.gate.wish(terminal, ticket, wish, self.now);
+        let effects = self.access.wish(terminal, ticket, wish, self.now);
         let effects = self.work(effects);
         answer_in(&effects, ticket)
     }
@@ -38,7 +38,7 @@ fn wrong_passwords_of_one_system_user_lock_no_other_out() {
     bench.login(2, "boss", BOSS).unwrap();
     let told = bench.login(1, "boss", BOSS).unwrap_err();
     assert!(told.starts_with("password not checked after wrong ones; wait"), "{told}");
-    let rows = bench.gate.standing(2, bench.now).users;
+    let rows = bench.access.standing(2, bench.now).users;
     assert!(rows.iter().any(|row| &*row.user == "boss" && row.locked_until.is_some()), "a supervisor sees it");
     bench.wish(2, Wish::Disable { user: "boss".into(), disabled: false }).unwrap();
     bench.login(1, "boss", BOSS).unwrap();
@@ -68,7 +68,7 @@ fn six_right_logins_at_once_all_succeed() {
     for terminal in 1..=6 {
         bench.open_as(terminal, "panel");
         let login = Wish::Login { user: "tech".into(), password: TECH.into() };
-        begun.extend(bench.gate.wish(terminal, u64::from(terminal), login, bench.now));
+        begun.extend(bench.access.wish(terminal, u64::from(terminal), login, bench.now));
     }
     bench.work(begun);
     assert!((1..=6).all(|terminal| bench.who(terminal).as_deref() == Some("tech")));
@@ -83,12 +83,12 @@ fn too_many_logins_at_once_are_refused_as_busy() {
         for ticket in 0..4 {
             let login = Wish::Login { user: "tech".into(), password: "guess".into() };
             let ticket = u64::from(terminal) * 4 + ticket;
-            told.extend(answer_in(&bench.gate.wish(terminal, ticket, login, bench.now), ticket));
+            told.extend(answer_in(&bench.access.wish(terminal, ticket, login, bench.now), ticket));
         }
     }
     assert_eq!(told.len(), 80 - JOBS_OF_USER_MAX);
     assert!(told.iter().all(|answer| *answer == Err(BUSY.to_owned())), "{told:?}");
-    assert!(bench.gate.errands.len() + bench.gate.waiting.len() <= JOBS_MAX);
+    assert!(bench.access.errands.len() + bench.access.waiting.len() <= JOBS_MAX);
     // The others are not touched.
     bench.open_as(30, "panel");
     bench.login(30, "tech", TECH).unwrap();

@@ -1,4 +1,4 @@
-//! What somebody at a terminal sees of the gate: logins, lock-outs, locks, roles, signatures, in plain time.
+//! What somebody at a terminal sees of access control: logins, lock-outs, locks, roles, signatures, in plain time.
 #![allow(clippy::unwrap_used)]
 
 use proptest::prelude::*;
@@ -18,9 +18,9 @@ const BOSS: &str = "boss is a wet horse";
 const TECH: &str = "tech is a wet horse";
 const VIEW: &str = "view is a wet horse";
 
-/// A gate whose work is done at once, with a hash that is the password itself.
+/// Access control whose jobs are done at once; the hash of a password is the password itself.
 struct Bench {
-    gate: Gate,
+    access: AccessControl,
     now: Timestamp,
     last_ticket: u64,
     last_order: u32,
@@ -42,12 +42,12 @@ impl Bench {
         };
         let people = add(people, "tech", Role::Technician, TECH);
         let people = add(people, "view", Role::Viewer, VIEW);
-        Bench::of(Gate::with_people(Arc::new(def), people, Some("sight".into())))
+        Bench::of(AccessControl::with_people(Arc::new(def), people, Some("sight".into())))
     }
 
-    fn of(gate: Gate) -> Bench {
+    fn of(access: AccessControl) -> Bench {
         let now = Timestamp::from_second(1_000_000).unwrap();
-        Bench { gate, now, last_ticket: 0, last_order: 0, kept: None, disk_full: false, records: Vec::new() }
+        Bench { access, now, last_ticket: 0, last_order: 0, kept: None, disk_full: false, records: Vec::new() }
     }
 
     fn open(&mut self, terminal: u32, host: &str) -> Vec<Effect> {
@@ -56,13 +56,13 @@ impl Bench {
             unix_user: Some("panel".into()),
             own: false,
         };
-        let effects = self.gate.open(terminal, peer, self.now);
+        let effects = self.access.open(terminal, peer, self.now);
         self.work(effects)
     }
 
     fn later(&mut self, seconds: i64) -> Vec<Effect> {
         self.now += jiff::SignedDuration::from_secs(seconds);
-        let effects = self.gate.tick(self.now);
+        let effects = self.access.tick(self.now);
         self.work(effects)
     }
 
@@ -73,15 +73,15 @@ impl Bench {
             for effect in std::mem::take(&mut to_do) {
                 match effect {
                     Effect::Work(job, Work::Verify { password, hash }) => {
-                        to_do.extend(self.gate.done(job, Outcome::Verified(*password.0 == *hash), self.now));
+                        to_do.extend(self.access.done(job, Outcome::Verified(*password.0 == *hash), self.now));
                     }
                     Effect::Work(job, Work::Hash(password)) => {
-                        to_do.extend(self.gate.done(job, Outcome::Hashed(Ok(password.0)), self.now));
+                        to_do.extend(self.access.done(job, Outcome::Hashed(Ok(password.0)), self.now));
                     }
                     Effect::Save(users) => {
                         let result = if self.disk_full { Err("disk full".to_owned()) } else { Ok(()) };
                         self.kept = Some(users).filter(|_| result.is_ok());
-                        to_do.extend(self.gate.saved(result, self.now));
+                        to_do.extend(self.access.saved(result, self.now));
                     }
                     Effect::Record(record) => {
                         let ActionRecord { by, action, target, outcome, .. } = &record;
@@ -97,7 +97,7 @@ impl Bench {
 
     fn wish(&mut self, terminal: u32, wish: Wish) -> Result<(), String> {
         self.last_ticket += 1;
-        let effects = self.gate.wish(terminal, self.last_ticket, wish, self.now);
+        let effects = self.access.wish(terminal, self.last_ticket, wish, self.now);
         let effects = self.work(effects);
         let answers = effects.into_iter().filter_map(|effect| match effect {
             Effect::Reply(ticket, answer) if ticket == self.last_ticket => Some(answer),
@@ -117,7 +117,7 @@ impl Bench {
         self.last_order += 1;
         let id = OrderId { terminal, number: self.last_order };
         let request = OrderRequest { sign, note: Some("why".into()), ..OrderRequest::new(0, id, command) };
-        let effects = self.gate.order(terminal, request, self.now);
+        let effects = self.access.order(terminal, request, self.now);
         let effects = self.work(effects);
         let order = effects.into_iter().find_map(|effect| match effect {
             Effect::Order(order) => Some(order),
@@ -128,7 +128,7 @@ impl Bench {
     }
 
     fn who(&self, terminal: u32) -> Option<String> {
-        self.gate.standing(terminal, self.now).who.map(|who| who.user.to_string())
+        self.access.standing(terminal, self.now).who.map(|who| who.user.to_string())
     }
 
     fn last(&self) -> (&str, &str, &str) {
@@ -178,7 +178,7 @@ fn five_wrong_passwords_lock_the_name_out_for_that_system_user_and_who_is_in_sta
     let told = bench.login(1, "tech", TECH).unwrap_err();
     assert!(told.contains("wait 284 s"), "{told}");
     assert!(bench.login(3, "TECH", TECH).is_err(), "the right password elsewhere does not help");
-    assert!(bench.gate.standing(1, bench.now).view, "alarms and process stay to be seen");
+    assert!(bench.access.standing(1, bench.now).view, "alarms and process stay to be seen");
     assert_eq!(bench.who(2).as_deref(), Some("tech"));
     assert_eq!(bench.order(2, RUN, None).unwrap().1, None, "who is in goes on working");
     bench.wish(2, Wish::Lock).unwrap();
@@ -195,7 +195,7 @@ fn a_supervisor_ends_a_lock_out() {
     bench.open(3, "10.0.0.3");
     bench.login(2, "boss", BOSS).unwrap();
     bench.login(1, "tech", "guess").unwrap_err();
-    let rows = bench.gate.standing(2, bench.now).users;
+    let rows = bench.access.standing(2, bench.now).users;
     assert!(rows.iter().any(|row| &*row.user == "tech" && row.locked_until.is_some()));
     bench.wish(2, Wish::Disable { user: "tech".into(), disabled: false }).unwrap();
     bench.login(3, "tech", TECH).unwrap();
@@ -230,9 +230,9 @@ fn without_a_login_the_history_is_answered_only_where_the_plant_may_be_seen() {
     for view in [false, true] {
         let mut bench = Bench::new(AccessDef { view, ..AccessDef::default() });
         bench.open(1, "here");
-        assert_eq!(bench.gate.may_ask(1, &question, bench.now).is_ok(), view);
+        assert_eq!(bench.access.may_ask(1, &question, bench.now).is_ok(), view);
         bench.login(1, "view", VIEW).unwrap();
-        assert_eq!(bench.gate.may_ask(1, &question, bench.now), Ok(()));
+        assert_eq!(bench.access.may_ask(1, &question, bench.now), Ok(()));
     }
 }
 
@@ -243,13 +243,13 @@ fn the_audit_trail_is_for_a_supervisor_at_an_unlocked_terminal_and_who_else_asks
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "here");
     bench.login(1, "tech", TECH).unwrap();
-    let (why, effects) = bench.gate.may_ask(1, &question, bench.now).unwrap_err();
+    let (why, effects) = bench.access.may_ask(1, &question, bench.now).unwrap_err();
     assert_eq!(why, "this is for a supervisor, you are technician");
     assert!(matches!(&effects[..], [Effect::Record(deed)] if &*deed.by == "tech" && deed.outcome.ends_with(&why)));
     bench.login(1, "boss", BOSS).unwrap();
-    assert_eq!(bench.gate.may_ask(1, &question, bench.now), Ok(()));
+    assert_eq!(bench.access.may_ask(1, &question, bench.now), Ok(()));
     bench.wish(1, Wish::Lock).unwrap();
-    assert!(bench.gate.may_ask(1, &question, bench.now).unwrap_err().0.contains("locked"));
+    assert!(bench.access.may_ask(1, &question, bench.now).unwrap_err().0.contains("locked"));
 }
 
 #[test]
@@ -258,13 +258,13 @@ fn an_untouched_terminal_is_locked_shows_it_and_may_only_look_until_the_password
     bench.open(1, "here");
     bench.login(1, "tech", TECH).unwrap();
     bench.later(850);
-    let standing = bench.gate.standing(1, bench.now);
+    let standing = bench.access.standing(1, bench.now);
     assert_eq!((standing.locked, standing.locks_in), (false, Some(Duration::from_secs(50))));
     bench.order(1, RUN, None).unwrap();
     bench.later(899);
-    assert!(!bench.gate.standing(1, bench.now).locked, "an order is a sign of life");
+    assert!(!bench.access.standing(1, bench.now).locked, "an order is a sign of life");
     bench.later(1);
-    let standing = bench.gate.standing(1, bench.now);
+    let standing = bench.access.standing(1, bench.now);
     assert!(standing.locked && standing.view);
     assert!(bench.order(1, RUN, None).unwrap().1.is_some());
     assert!(bench.wish(1, Wish::Unlock("guess".into())).is_err());
@@ -278,15 +278,16 @@ fn an_untouched_terminal_is_locked_shows_it_and_may_only_look_until_the_password
 
 #[test]
 fn the_first_supervisor_is_made_once_and_only_by_whoever_could_start_the_station() {
-    let mut bench = Bench::of(Gate::with_people(Arc::new(fixture::plant()), Users::default(), Some("sight".into())));
+    let mut bench =
+        Bench::of(AccessControl::with_people(Arc::new(fixture::plant()), Users::default(), Some("sight".into())));
     let first = || Wish::FirstSupervisor { user: "anna".into(), password: "a horse in a tank of water".into() };
     bench.open(1, "10.0.0.1");
-    assert!(!bench.gate.standing(1, bench.now).first);
+    assert!(!bench.access.standing(1, bench.now).first);
     bench.wish(1, first()).unwrap_err();
     bench.login(1, "anna", "").unwrap_err();
     let peer = Peer { from: "pts/0".into(), unix_user: Some("sight".into()), own: false };
-    bench.gate.open(2, peer, bench.now);
-    assert!(bench.gate.standing(2, bench.now).first);
+    bench.access.open(2, peer, bench.now);
+    assert!(bench.access.standing(2, bench.now).first);
     assert!(bench.wish(2, Wish::FirstSupervisor { user: "anna".into(), password: "short".into() }).is_err());
     bench.wish(2, first()).unwrap();
     assert_eq!(bench.who(2).as_deref(), Some("anna"));
@@ -295,7 +296,7 @@ fn the_first_supervisor_is_made_once_and_only_by_whoever_could_start_the_station
             .wish(2, Wish::FirstSupervisor { user: "bert".into(), password: "a horse in a tank of water".into() })
             .is_err()
     );
-    assert!(!bench.gate.standing(2, bench.now).first);
+    assert!(!bench.access.standing(2, bench.now).first);
 }
 
 #[test]
@@ -350,12 +351,12 @@ fn a_change_that_comes_while_last_logins_are_written_waits_for_them() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "10.0.0.1");
     bench.login(1, "boss", BOSS).unwrap();
-    let writing = bench.gate.tick(bench.now);
+    let writing = bench.access.tick(bench.now);
     assert!(matches!(&writing[..], [Effect::Save(users)] if users.get("boss").unwrap().last_login.is_some()));
     let wish = |user: &str| Wish::DeleteUser { user: user.into() };
-    assert_eq!(bench.gate.wish(1, 71, wish("view"), bench.now), [], "not answered yet");
+    assert_eq!(bench.access.wish(1, 71, wish("view"), bench.now), [], "not answered yet");
     assert!(bench.wish(1, wish("tech")).is_err(), "one at a time");
-    let effects = bench.gate.saved(Ok(()), bench.now);
+    let effects = bench.access.saved(Ok(()), bench.now);
     let effects = bench.work(effects);
     assert!(effects.contains(&Effect::Reply(71, Ok(()))));
     let kept = bench.kept.unwrap();
@@ -396,7 +397,7 @@ fn a_user_whom_the_operating_system_knows_is_in_without_a_password() {
     assert_eq!(bench.who(1).as_deref(), Some("panel"));
     assert_eq!(bench.order(1, RUN, None).unwrap().1, None);
     bench.later(5000);
-    assert!(!bench.gate.standing(1, bench.now).locked, "he would have no password to unlock it with");
+    assert!(!bench.access.standing(1, bench.now).locked, "he would have no password to unlock it with");
     assert!(bench.wish(1, Wish::Lock).is_err());
 }
 
@@ -406,7 +407,7 @@ fn the_stations_own_user_stops_it_also_where_a_lesser_role_is_given_without_a_pa
     let mut bench = Bench::new(AccessDef { trusted, ..AccessDef::default() });
     bench.open(1, "10.0.0.1");
     let own = Peer { from: "here".into(), unix_user: Some("sight".into()), own: false };
-    bench.gate.open(2, own, bench.now);
+    bench.access.open(2, own, bench.now);
     assert!(bench.wish(1, Wish::Stop).is_err());
     assert_eq!(bench.wish(2, Wish::Stop), Ok(()));
 }
@@ -419,8 +420,8 @@ fn no_more_terminals_come_in_than_permitted_but_the_stations_own_always_does() {
     let sent_away = bench.open(3, "c");
     assert!(matches!(sent_away.last(), Some(Effect::HangUp(3, why)) if why.contains("2 terminals")));
     let own = Peer { from: "this process".into(), unix_user: None, own: true };
-    assert!(bench.gate.open(4, own, bench.now).iter().all(|effect| !matches!(effect, Effect::HangUp(..))));
-    bench.gate.close(1, bench.now);
+    assert!(bench.access.open(4, own, bench.now).iter().all(|effect| !matches!(effect, Effect::HangUp(..))));
+    bench.access.close(1, bench.now);
     assert!(bench.open(5, "c").iter().all(|effect| !matches!(effect, Effect::HangUp(..))));
 }
 
@@ -446,7 +447,7 @@ fn a_hostile_terminal_can_neither_flood_the_plant_nor_fill_the_book() {
             .iter()
             .filter(|effect| matches!(effect, Effect::Record(_)))
             .count();
-        bench.gate.close(terminal, bench.now);
+        bench.access.close(terminal, bench.now);
     }
     assert!(coming <= 20, "{coming}");
 }
@@ -457,8 +458,8 @@ fn a_terminal_that_hangs_up_before_the_answer_has_had_its_try() {
     for terminal in 1..=2 {
         bench.open(terminal, "evil");
         let wish = Wish::Login { user: "tech".into(), password: "guess".into() };
-        let effects = bench.gate.wish(terminal, 1, wish, bench.now);
-        bench.gate.close(terminal, bench.now);
+        let effects = bench.access.wish(terminal, 1, wish, bench.now);
+        bench.access.close(terminal, bench.now);
         bench.work(effects);
         bench.later(2);
     }
@@ -468,9 +469,9 @@ fn a_terminal_that_hangs_up_before_the_answer_has_had_its_try() {
 
 #[test]
 fn a_demonstration_asks_nobody() {
-    let mut bench = Bench::of(Gate::new(Arc::new(fixture::plant()), Some("sight".into())));
+    let mut bench = Bench::of(AccessControl::new(Arc::new(fixture::plant()), Some("sight".into())));
     let own = Peer { from: "this process".into(), unix_user: Some("anna".into()), own: true };
-    bench.gate.open(1, own, bench.now);
+    bench.access.open(1, own, bench.now);
     assert_eq!(bench.who(1).as_deref(), Some("anna"));
     assert_eq!(bench.order(1, RUN, None).unwrap().1, None);
     bench.open(2, "10.0.0.1");
@@ -501,7 +502,7 @@ proptest! {
                 (wrong, locked_at) = (0, None);
             }
             let key = Key { origin: "panel".into(), account: Some("tech".to_owned()), never_locked: false };
-            let looked_at = bench.gate.tries.wait(&key, &bench.gate.def.access, bench.now).is_none();
+            let looked_at = bench.access.tries.wait(&key, &bench.access.def.access, bench.now).is_none();
             let came_in = bench.login(terminal, "tech", if right { TECH } else { "guess" }).is_ok();
             prop_assert_eq!(came_in, right && looked_at && locked_at.is_none());
             if came_in {

@@ -1,4 +1,4 @@
-//! One terminal as the gate knows it, and how much it may ask for.
+//! One terminal as access control knows it, and how much it may ask for.
 
 use std::{collections::VecDeque, sync::Arc};
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use jiff::Timestamp;
 
 use super::{
-    Effect, Gate, Peer, enough,
+    AccessControl, Effect, Peer, enough,
     login::reply,
     paper::{deed, record, words},
     right,
@@ -38,7 +38,7 @@ pub(super) struct Saving {
     wish: Option<(u64, Change, Box<ActionRecord>)>,
 }
 
-impl Gate {
+impl AccessControl {
     pub(super) fn wish_of_people(&mut self, terminal: u32, ticket: u64, wish: Wish, at: Timestamp) -> Vec<Effect> {
         if self.people.is_none() {
             return reply(ticket, "this station keeps no users");

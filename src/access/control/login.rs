@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
-    Effect, Gate, LOG_IN_FIRST, Seat,
+    AccessControl, Effect, LOG_IN_FIRST, Seat,
     paper::deed,
     passed,
     standing::LOCK_NEAR,
@@ -18,7 +18,7 @@ const NOBODY_ASKED: &str = "this station asks nobody for a password";
 /// Said where one is known without a password.
 const NO_PASSWORD: &str = "the operating system says who you are here, there is no password to ask for";
 
-impl Gate {
+impl AccessControl {
     pub(super) fn login(
         &mut self,
         terminal: u32,
@@ -165,8 +165,8 @@ impl Gate {
     /// Locks terminals that nobody has touched for long, and tells those of which this is near.
     pub(super) fn lock_idle(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = Vec::new();
-        let idle = |gate: &Gate, seat: &Seat| {
-            let left = gate.idle_lock(seat)?.saturating_sub(passed(seat.active, at));
+        let idle = |access: &AccessControl, seat: &Seat| {
+            let left = access.idle_lock(seat)?.saturating_sub(passed(seat.active, at));
             (seat.acting().is_some() && left <= LOCK_NEAR).then_some(left)
         };
         let near: Vec<_> = self.seats.iter().filter_map(|(id, seat)| Some((*id, idle(self, seat)?))).collect();

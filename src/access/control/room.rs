@@ -4,14 +4,14 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 
-use super::{Effect, Gate, passed, seat::Seat};
+use super::{AccessControl, Effect, passed, seat::Seat};
 
 /// A terminal where nobody is logged in and nobody has asked anything for so long makes room for another.
 const IDLE: Duration = Duration::from_secs(600);
 /// One of so many seats is kept for those who run the station: they must get in when all others are taken.
 const KEPT: usize = 8;
 
-impl Gate {
+impl AccessControl {
     /// Is there a seat for this one? One user of the operating system gets half of them at most. `Ok` says what must happen
     /// because of it, `Err` why there is none.
     pub(super) fn make_room(&mut self, new: &Seat, at: Timestamp) -> Result<Vec<Effect>, String> {

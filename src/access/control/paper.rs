@@ -1,11 +1,11 @@
-//! What the gate puts on record, in which words, and how much of it: nobody fills the book by asking for what he may not.
+//! What access control puts on record, in which words, and how much of it: nobody fills the book by asking for what he may not.
 
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
 use super::{
-    Effect, Gate, passed,
+    AccessControl, Effect, passed,
     seat::{Refusals, Seat},
 };
 use crate::{
@@ -20,7 +20,7 @@ const ORIGINS_MAX: usize = 512;
 /// What was refused too often to be told each time is told so often.
 const TOLD_EVERY: Duration = Duration::from_secs(60);
 
-impl Gate {
+impl AccessControl {
     /// Is a request of this terminal listened to?
     pub(super) fn heard(&mut self, terminal: u32, at: Timestamp) -> bool {
         let Some(seat) = self.seats.get_mut(&terminal) else { return false };

@@ -1,10 +1,10 @@
-//! What the gate has others do, because it takes as long as a hash: which password is looked at for what, and what then.
+//! What access control has others do, because it takes as long as a hash: which password is looked at for what, and what then.
 
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{Effect, Gate, people::Hashing};
+use super::{AccessControl, Effect, people::Hashing};
 use crate::access::{OrderRequest, Secret, password, tries::Key, user};
 
 /// Passwords of all users of the operating system that may be checked or wait; more are refused as [`BUSY`].
@@ -95,7 +95,7 @@ pub(super) struct Wrong {
     pub told: String,
 }
 
-impl Gate {
+impl AccessControl {
     /// Has the password for this name checked. The time that takes must not tell whether the name exists.
     /// `Err` says in words for the operator why it is not checked.
     pub(super) fn look_at(

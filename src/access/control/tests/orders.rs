@@ -6,7 +6,7 @@ use crate::plant::def::ActionDef;
 impl Bench {
     /// The orders of a terminal that did not reach the plant, and why.
     fn undelivered(&self, terminal: u32) -> Vec<(u32, String)> {
-        let told = self.gate.standing(terminal, self.now).undelivered;
+        let told = self.access.standing(terminal, self.now).undelivered;
         told.iter().map(|(id, why)| (id.number, why.to_string())).collect()
     }
 }
@@ -51,12 +51,12 @@ fn every_order_of_a_terminal_that_asks_too_fast_reaches_the_plant_or_is_told_to_
 #[test]
 fn a_stop_is_never_one_request_too_many() {
     let mut bench = Bench::new(AccessDef::default());
-    let mut def = PlantDef::clone(&bench.gate.def);
+    let mut def = PlantDef::clone(&bench.access.def);
     let device = def.tag(fixture::RUN).device.index();
     let (name, confirm, settle) = ("STOP".into(), String::new(), Duration::ZERO);
     let stop = ActionDef { name, confirm, settle, tag: fixture::RUN, value: 0.0, stop: true, saves: false };
     def.devices[device].actions.push(stop);
-    bench.gate.def = Arc::new(def);
+    bench.access.def = Arc::new(def);
     bench.open(1, "a");
     bench.login(1, "tech", TECH).unwrap();
     for _ in 0..100 {

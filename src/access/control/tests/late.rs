@@ -24,14 +24,14 @@ fn two_at_work() -> Bench {
 fn a_change_of_password_under_way_does_not_undo_a_reset() {
     let mut bench = two_at_work();
     let change = Wish::ChangePassword { old: TECH.into(), new: "mine for ever and ever".into() };
-    let job = under_way(&bench.gate.wish(2, 9_000, change, bench.now));
+    let job = under_way(&bench.access.wish(2, 9_000, change, bench.now));
     bench.wish(1, Wish::ResetPassword { user: "tech".into(), password: "fresh horse for tech".into() }).unwrap();
     assert_eq!(bench.who(2), None, "the reset has ended the session");
     // The old password was right when it was checked.
-    let effects = bench.gate.done(job, Outcome::Verified(true), bench.now);
+    let effects = bench.access.done(job, Outcome::Verified(true), bench.now);
     let effects = bench.work(effects);
     assert!(matches!(effects[..], [.., Effect::Reply(9_000, Err(_))]), "{effects:?}");
-    let tech = bench.gate.people.as_ref().unwrap().get("tech").unwrap();
+    let tech = bench.access.people.as_ref().unwrap().get("tech").unwrap();
     assert_eq!((&*tech.hash, tech.must_change), ("fresh horse for tech", true));
 }
 
@@ -39,14 +39,14 @@ fn a_change_of_password_under_way_does_not_undo_a_reset() {
 fn a_new_password_being_hashed_does_not_undo_a_reset() {
     let mut bench = two_at_work();
     let change = Wish::ChangePassword { old: TECH.into(), new: "mine for ever and ever".into() };
-    let verifying = under_way(&bench.gate.wish(2, 9_000, change, bench.now));
-    let hashing = under_way(&bench.gate.done(verifying, Outcome::Verified(true), bench.now));
+    let verifying = under_way(&bench.access.wish(2, 9_000, change, bench.now));
+    let hashing = under_way(&bench.access.done(verifying, Outcome::Verified(true), bench.now));
     bench.wish(1, Wish::ResetPassword { user: "tech".into(), password: "fresh horse for tech".into() }).unwrap();
     // Logged in again with the password of the reset: the same person, another session.
     bench.login(2, "tech", "fresh horse for tech").unwrap();
-    let effects = bench.gate.done(hashing, Outcome::Hashed(Ok("mine for ever and ever".to_owned())), bench.now);
+    let effects = bench.access.done(hashing, Outcome::Hashed(Ok("mine for ever and ever".to_owned())), bench.now);
     bench.work(effects);
-    let tech = bench.gate.people.as_ref().unwrap().get("tech").unwrap();
+    let tech = bench.access.people.as_ref().unwrap().get("tech").unwrap();
     assert_eq!((&*tech.hash, tech.must_change), ("fresh horse for tech", true));
 }
 
@@ -55,9 +55,9 @@ fn a_login_with_a_password_changed_meanwhile_fails_and_is_no_guess() {
     let mut bench = two_at_work();
     bench.open(3, "10.0.0.3");
     let login = Wish::Login { user: "tech".into(), password: TECH.into() };
-    let job = under_way(&bench.gate.wish(3, 9_000, login, bench.now));
+    let job = under_way(&bench.access.wish(3, 9_000, login, bench.now));
     bench.wish(2, Wish::ChangePassword { old: TECH.into(), new: "a new horse for tech".into() }).unwrap();
-    let effects = bench.gate.done(job, Outcome::Verified(true), bench.now);
+    let effects = bench.access.done(job, Outcome::Verified(true), bench.now);
     bench.work(effects);
     assert_eq!(bench.who(3), None);
     assert_eq!(bench.last(), ("not logged in (panel) login failed", "tech", "refused: changed meanwhile"));
@@ -68,19 +68,19 @@ fn a_login_with_a_password_changed_meanwhile_fails_and_is_no_guess() {
 fn an_unlock_or_a_signature_counts_only_in_the_session_it_was_given_in() {
     let mut bench = two_at_work();
     bench.wish(2, Wish::Lock).unwrap();
-    let unlock = under_way(&bench.gate.wish(2, 9_000, Wish::Unlock(TECH.into()), bench.now));
+    let unlock = under_way(&bench.access.wish(2, 9_000, Wish::Unlock(TECH.into()), bench.now));
     bench.login(2, "tech", TECH).unwrap();
     bench.wish(2, Wish::Lock).unwrap();
-    let effects = bench.gate.done(unlock, Outcome::Verified(true), bench.now);
+    let effects = bench.access.done(unlock, Outcome::Verified(true), bench.now);
     bench.work(effects);
-    assert!(bench.gate.standing(2, bench.now).locked, "the unlock belonged to the session before");
+    assert!(bench.access.standing(2, bench.now).locked, "the unlock belonged to the session before");
 
     bench.login(2, "tech", TECH).unwrap();
     let sign = Some(Signature { user: Some("boss".to_owned()), password: BOSS.into() });
     let id = OrderId { terminal: 2, number: 50 };
-    let effects = bench.gate.order(2, OrderRequest { sign, ..OrderRequest::new(0, id, SV) }, bench.now);
+    let effects = bench.access.order(2, OrderRequest { sign, ..OrderRequest::new(0, id, SV) }, bench.now);
     bench.wish(2, Wish::Logout).unwrap();
-    let effects = bench.gate.done(under_way(&effects), Outcome::Verified(true), bench.now);
+    let effects = bench.access.done(under_way(&effects), Outcome::Verified(true), bench.now);
     let given = effects.iter().any(|effect| matches!(effect, Effect::Order(Order { refused: None, .. })));
     assert!(!given, "{effects:?}");
 }
