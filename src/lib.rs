@@ -31,7 +31,7 @@
 //!    Record        │   │   └────────────────────┐
 //!    mpsc,         │   │ watch<Arc<Snapshot>>   │
 //!    loss counted  ▼   ▼   latest only          │
-//!  book ──> history     door ────────────── Session      one per terminal: channels, or the
+//!  book ──> history     session server ──── Session      one per terminal: channels, or the
 //!  thread   thread  <─── Query / Answer        │          socket of `attach` with deltas
 //!  (chain)  DuckDB       AccessControl      terminal (ui)
 //! ```

@@ -61,7 +61,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
             let mut serving = Serving::new(listener, station);
             let lines = if def.lines.len() == 1 { "line" } else { "lines" };
             say(&format!("{}: {} tags on {} {lines}", def.title, def.tags.len(), def.lines.len()));
-            let snapshots = serving.station.entrance().snapshots.clone();
+            let snapshots = serving.station.acceptor().snapshots.clone();
             init::ready(&def.title);
             let ended = tokio::select! {
                 ended = follow(snapshots.clone(), clock, None) => ended.map(|_| None),
@@ -188,9 +188,9 @@ struct Serving {
 
 impl Serving {
     fn new(mut listener: serve::Listener, station: station::Station) -> Serving {
-        let entrance = station.entrance().clone();
+        let acceptor = station.acceptor().clone();
         let socket = tokio::spawn(async move {
-            listener.serve(&entrance).await;
+            listener.serve(&acceptor).await;
             listener
         });
         Serving { station, socket }

@@ -39,7 +39,7 @@ const ORDERS_MAX: usize = 64;
 /// Answers that wait for the audit log; one more, and the oldest waits no longer.
 const ANSWERS_MAX: usize = 64;
 
-/// What comes from the door, in its order.
+/// What comes from the session server, in its order.
 #[derive(Debug)]
 pub enum Paper {
     /// Put this into the audit log.

@@ -30,10 +30,10 @@ use crate::{
 
 use super::{
     deeds::Deeds,
-    door::{self, Door, Entrance, Ways},
     past::Past,
     plant_task::{KEPT_FOR_STOPS, Keeping, PlantTask},
     session::Session,
+    session_server::{self, Outputs, SessionAcceptor, SessionServer},
     sets, supervisor,
 };
 
@@ -61,11 +61,11 @@ pub struct Options {
 /// A running station.
 #[derive(Debug)]
 pub struct Station {
-    entrance: Entrance,
+    acceptor: SessionAcceptor,
     /// Bypasses access control: for the scripted operator of a drill.
     pub orders: mpsc::Sender<Order>,
     /// What terminals wish of the station as a whole.
-    pub lifecycle: mpsc::Receiver<door::LifecycleRequest>,
+    pub lifecycle: mpsc::Receiver<session_server::LifecycleRequest>,
     /// `None` for a rehearsal, which keeps nothing.
     history: Option<history::Handle>,
     /// The thread of the book, which ends before the history.
@@ -204,38 +204,38 @@ fn assemble(
     let desk = PlantTask::new(plant, clock, links, file, keeping, publish);
     let (deeds, deed_queue) = mpsc::channel(ORDERS);
     tasks.push(tokio::spawn(desk.run(event_queue, order_queue, deed_queue)));
-    let (lifecycle_sender, lifecycle) = mpsc::channel(door::LIFECYCLE_REQUESTS_MAX);
-    let ways = Ways { orders: orders.clone(), queries, deeds, lifecycle: lifecycle_sender };
-    let (entrance, knocks, requests) = Entrance::new(snapshots);
+    let (lifecycle_sender, lifecycle) = mpsc::channel(session_server::LIFECYCLE_REQUESTS_MAX);
+    let outputs = Outputs { orders: orders.clone(), queries, deeds, lifecycle: lifecycle_sender };
+    let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
     let open = guarded.is_none();
     let (access, users) = guarded.map_or_else(
         || (AccessControl::new(def, Some(own_user().into())), None),
         |(access, users)| (access, Some(users)),
     );
-    let door = Door::new(access.in_run(run), clock, ways, users);
-    tasks.push(tokio::spawn(door.run(knocks, requests, stopped)));
-    Station { entrance, orders, lifecycle, history, book, open, stop, tasks }
+    let server = SessionServer::new(access.in_run(run), clock, outputs, users);
+    tasks.push(tokio::spawn(server.run(attach_requests, requests, stopped)));
+    Station { acceptor, orders, lifecycle, history, book, open, stop, tasks }
 }
 
 impl Station {
-    /// Where terminals come in.
-    pub fn entrance(&self) -> &Entrance {
-        &self.entrance
+    /// Opens sessions.
+    pub fn acceptor(&self) -> &SessionAcceptor {
+        &self.acceptor
     }
 
     /// Attaches a terminal of this very process.
     pub fn session(&self, operator: &str) -> Session {
         // What somebody calls himself counts only where nobody is asked.
         let user = if self.open { operator.to_owned() } else { own_user() };
-        self.entrance.attach(Peer { from: "this process".into(), unix_user: Some(user.into()), own: true })
+        self.acceptor.attach(Peer { from: "this process".into(), unix_user: Some(user.into()), own: true })
     }
 
     /// Stops downstream and waits until the last record is on disk. Gives the last entry of the audit log.
     pub async fn stop(self) -> Option<Seal> {
-        let Station { entrance, orders, lifecycle, history, book, open: _, stop, tasks } = self;
+        let Station { acceptor, orders, lifecycle, history, book, open: _, stop, tasks } = self;
         // Links may have ended already; then nobody listens, which is fine.
         let _ = stop.send(true);
-        drop((entrance, orders, lifecycle));
+        drop((acceptor, orders, lifecycle));
         for task in tasks {
             if let Err(error) = task.await {
                 tracing::error!(%error, "a task of the station ended badly");

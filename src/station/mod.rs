@@ -26,7 +26,7 @@
 
 pub mod session;
 mod deeds;
-mod door;
+mod session_server;
 mod past;
 mod plant_task;
 pub mod pulse;
@@ -39,5 +39,5 @@ pub mod io;
 #[cfg(test)]
 mod tests;
 
-pub use door::{Entrance, LifecycleRequest};
 pub use session::{Request, Session};
+pub use session_server::{LifecycleRequest, SessionAcceptor};

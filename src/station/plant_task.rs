@@ -35,7 +35,7 @@ use crate::{
 pub(super) const KEPT_FOR_STOPS: usize = 4;
 /// Real time between two snapshots: what a person can follow.
 const SNAPSHOT_EVERY: Duration = Duration::from_millis(100);
-/// At the end the papers of the door are waited for so long: more than it takes itself to end.
+/// At the end the papers of the session server are waited for so long: more than it takes itself to end.
 const PAPERS_MAX: Duration = Duration::from_secs(3);
 /// At the end a history that is still being opened is waited for so long.
 const HISTORY_MAX: Duration = Duration::from_secs(2);
@@ -194,7 +194,7 @@ impl PlantTask {
             // A station that ends as soon as it has started completes its history all the same.
             self.take_up(restored);
         }
-        // What the door had begun is on record as well; it ends soon after the links.
+        // What the session server had begun is on record as well; it ends soon after the links.
         while let Ok(Some(paper)) = tokio::time::timeout(PAPERS_MAX, papers.recv()).await {
             self.take_paper(paper);
         }

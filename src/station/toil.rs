@@ -1,4 +1,4 @@
-//! What takes too long for the door: hashes of passwords and the file of users, done on threads beside it.
+//! What takes too long for the session server: hashes of passwords and the file of users, done on threads beside it.
 
 use std::{collections::VecDeque, path::PathBuf, time::Duration};
 

@@ -31,7 +31,7 @@ use sightglass::{
         traffic::{Exchange, Frame},
     },
     profile::{self, Search},
-    station::Entrance,
+    station::SessionAcceptor,
 };
 use tokio::{sync::watch, time::interval};
 
@@ -73,14 +73,14 @@ fn station() {
         let def = plant();
         let plant = Plant::new(def.clone(), Timestamp::now(), 1.0);
         let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
-        let (entrance, mut knocks, _requests) = Entrance::new(snapshots);
+        let (acceptor, mut attach_requests, _requests) = SessionAcceptor::new(snapshots);
         let mut listener = listen(&path).unwrap();
-        tokio::spawn(async move { listener.serve(&entrance).await });
+        tokio::spawn(async move { listener.serve(&acceptor).await });
         tokio::spawn(async move {
             let mut there = Vec::new();
-            while let Some(knock) = knocks.recv().await {
-                knock.standing.send_replace(Arc::new(Standing { view: true, ..Standing::default() }));
-                there.push(knock.standing);
+            while let Some(request) = attach_requests.recv().await {
+                request.standing.send_replace(Arc::new(Standing { view: true, ..Standing::default() }));
+                there.push(request.standing);
             }
         });
         tokio::spawn(live(plant, def, publish));

@@ -30,7 +30,7 @@ use sightglass::{
         sample::{Cause, Sample},
     },
     profile::{self, Search},
-    station::{Entrance, Request, Session},
+    station::{Request, Session, SessionAcceptor},
 };
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
@@ -69,20 +69,20 @@ impl Stand {
         let (view, may) = watch::channel(true);
         let (count, present) = watch::channel(0);
         let (ask, asked) = watch::channel(0);
-        let (entrance, mut knocks, mut requests) = Entrance::new(snapshots);
+        let (acceptor, mut attach_requests, mut requests) = SessionAcceptor::new(snapshots);
         let mut listener = listen(&folder.path().join("tank.sock")).unwrap();
-        let serving = tokio::spawn(async move { listener.serve(&entrance).await });
+        let serving = tokio::spawn(async move { listener.serve(&acceptor).await });
         let orders = publish.clone();
-        let door = tokio::spawn(async move {
+        let server = tokio::spawn(async move {
             let mut may = may;
             let mut terminals = Vec::new();
             let mut tick = tokio::time::interval(Duration::from_millis(100));
             loop {
                 tokio::select! {
-                    Some(knock) = knocks.recv() => {
+                    Some(request) = attach_requests.recv() => {
                         let view = *may.borrow();
-                        knock.standing.send_replace(Arc::new(Standing { view, notice: Some(knock.peer.from), ..Standing::default() }));
-                        terminals.push(knock.standing);
+                        request.standing.send_replace(Arc::new(Standing { view, notice: Some(request.peer.from), ..Standing::default() }));
+                        terminals.push(request.standing);
                     }
                     Some((_, request)) = requests.recv() => {
                         answer(request, &orders);
@@ -99,7 +99,7 @@ impl Stand {
                 count.send_replace(terminals.len());
             }
         });
-        Stand { folder, def, publish, view, present, asked, tasks: [serving, door] }
+        Stand { folder, def, publish, view, present, asked, tasks: [serving, server] }
     }
 
     fn path(&self) -> PathBuf {

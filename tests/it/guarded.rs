@@ -80,9 +80,9 @@ impl Guarded {
         let options = Options { def: def.clone(), clock, history: history.clone(), connectors, file: None };
         let station = start_guarded(options).unwrap();
         let path = folder.path().join("tank.sock");
-        let (mut listener, entrance) = (listen(&path).unwrap(), station.entrance().clone());
-        let mut truth = entrance.snapshots.clone();
-        let socket = tokio::spawn(async move { listener.serve(&entrance).await });
+        let (mut listener, acceptor) = (listen(&path).unwrap(), station.acceptor().clone());
+        let mut truth = acceptor.snapshots.clone();
+        let socket = tokio::spawn(async move { listener.serve(&acceptor).await });
         let sv = def.tag_named("TIC-1.SV").unwrap();
         let known = |snapshot: &Arc<Snapshot>| {
             let answers = snapshot.devices.iter().all(|device| device.state == DeviceState::Answering);
@@ -112,7 +112,7 @@ impl Guarded {
     /// A terminal as the socket makes it of a host far away.
     pub fn far(&self, user: &str) -> Session {
         let from = format!("pts/9 from 10.0.0.9, user {user}, process 1").into();
-        self.station.entrance().attach(Peer { from, unix_user: Some(user.into()), own: false })
+        self.station.acceptor().attach(Peer { from, unix_user: Some(user.into()), own: false })
     }
 
     /// Plant time goes on for so long.

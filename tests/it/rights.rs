@@ -312,7 +312,7 @@ async fn every_wish_is_granted_or_refused_as_the_table_says_and_is_on_record() {
     // Another user of the operating system who has not logged in either.
     let from = "pts/7, user stranger, process 1".into();
     let peer = Peer { from, unix_user: Some("stranger".into()), own: false };
-    let stranger = guarded.station.entrance().attach(peer);
+    let stranger = guarded.station.acceptor().attach(peer);
     for wish in [Wish::Reload, Wish::Stop] {
         assert_eq!(stranger.wish(wish).await, Err(LOG_IN.to_owned()));
         let line = guarded.entries().pop().unwrap();

@@ -143,9 +143,9 @@ async fn an_order_that_was_made_before_a_reload_is_refused_and_writes_nothing() 
     };
     let mut listener = listen(&socket).unwrap();
     let station = start(&def, None, &history);
-    let entrance = station.entrance().clone();
+    let acceptor = station.acceptor().clone();
     let serving = tokio::spawn(async move {
-        listener.serve(&entrance).await;
+        listener.serve(&acceptor).await;
         listener
     });
     let mut session = connect(&socket).await.unwrap();
@@ -157,8 +157,8 @@ async fn an_order_that_was_made_before_a_reload_is_refused_and_writes_nothing() 
     let changed = Arc::new(PlantDef { title: "Another tank".to_owned(), ..PlantDef::clone(&def) });
     let base = Timestamp::UNIX_EPOCH + jiff::SignedDuration::from_hours(1);
     let station = start_at(base, &changed, None, &history);
-    let entrance = station.entrance().clone();
-    tokio::spawn(async move { listener.serve(&entrance).await });
+    let acceptor = station.acceptor().clone();
+    tokio::spawn(async move { listener.serve(&acceptor).await });
     until(&mut session, "the other plant", |snapshot| snapshot.def.title == "Another tank" && all_answer(snapshot))
         .await;
 

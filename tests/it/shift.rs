@@ -139,7 +139,7 @@ async fn wait(session: &Session, clock: Clock, seconds: u64) {
         let (reply, answer) = oneshot::channel();
         let question = Question::Journal { from: Timestamp::UNIX_EPOCH, to: Timestamp::MAX, limit: 1 };
         session.ask(Query { question, reply }).unwrap();
-        // The question goes through the door, a task of this very runtime, before the thread can answer it.
+        // The question goes through the session server, a task of this very runtime, before the thread can answer it.
         for _ in 0..100 {
             tokio::task::yield_now().await;
         }

@@ -275,17 +275,17 @@ mod tests {
     };
 
     use super::*;
-    use crate::{access::Peer, plant::fixture, station::Entrance};
+    use crate::{access::Peer, plant::fixture, station::SessionAcceptor};
 
     /// A terminal that is served: what it writes to, and what the station is asked.
     fn serving() -> (DuplexStream, mpsc::Receiver<(u32, Request)>, JoinHandle<Ended>) {
         let (publish, snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
-        let (entrance, knocks, requests) = Entrance::new(snapshots);
-        let session = entrance.attach(Peer { from: "test".into(), unix_user: None, own: false });
+        let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
+        let session = acceptor.attach(Peer { from: "test".into(), unix_user: None, own: false });
         let (near, far) = tokio::io::duplex(REQUEST_BYTES_MAX);
         let (read, write) = tokio::io::split(near);
         let served = tokio::spawn(async move {
-            let _station = (publish, knocks);
+            let _station = (publish, attach_requests);
             serve(read, write, session, 1).await
         });
         (far, requests, served)

@@ -28,7 +28,7 @@ use crate::{
         callers::{Callers, makes_room},
         protocol::{self, Greeting, HELLO_BYTES_MAX, Place, ProtocolError},
     },
-    station::Entrance,
+    station::SessionAcceptor,
 };
 
 /// A connection says hello within this time.
@@ -198,7 +198,7 @@ struct Left {
 
 /// All connections to one run of the station.
 struct Connections<'a> {
-    entrance: &'a Entrance,
+    acceptor: &'a SessionAcceptor,
     /// Which run of the station: each counts its terminals from 1.
     run: u64,
     began: Instant,
@@ -215,13 +215,13 @@ impl Listener {
         &self.path
     }
 
-    /// Lets terminals in until the station behind this entrance has ended. Can be called again with another station.
-    pub async fn serve(&mut self, entrance: &Entrance) {
-        let mut snapshots = entrance.snapshots.clone();
+    /// Lets terminals in until the station behind this acceptor has ended. Can be called again with another station.
+    pub async fn serve(&mut self, acceptor: &SessionAcceptor) {
+        let mut snapshots = acceptor.snapshots.clone();
         let mut look = interval(CHECK_EVERY);
         look.set_missed_tick_behavior(MissedTickBehavior::Skip);
         let mut connections = Connections {
-            entrance,
+            acceptor,
             run: snapshots.borrow().run,
             began: Instant::now(),
             callers: Callers::new(rustix::process::getuid().as_raw()),
@@ -319,7 +319,7 @@ impl Connections<'_> {
                 return;
             }
         };
-        let session = self.entrance.attach(peer);
+        let session = self.acceptor.attach(peer);
         let (terminal, run) = (session.terminal, self.run);
         if self.callers.may_log(user, now) {
             tracing::info!(terminal, %from, "a terminal has attached");

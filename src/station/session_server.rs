@@ -1,4 +1,4 @@
-//! The task between terminals and plant: lets through what access control permits, and tells every terminal how it stands.
+//! The task between terminals and plant: owns the sessions and routes what access control permits.
 
 use std::{
     collections::BTreeMap,
@@ -30,16 +30,16 @@ use crate::{
 
 /// Requests of all terminals that may wait; more are refused.
 const REQUESTS: usize = 256;
-/// Terminals that may come at once.
-const KNOCKS: usize = 16;
+/// Attach requests that may wait.
+const ATTACH_QUEUE_MAX: usize = 16;
 /// Wishes for the station as a whole that may wait.
 pub const LIFECYCLE_REQUESTS_MAX: usize = 4;
 /// Real time between two looks at the clock: idle terminals, ends of lock-outs, terminals that have gone.
 const TICK: Duration = Duration::from_millis(500);
 
-/// A terminal comes.
+/// A terminal asks to attach.
 #[derive(Debug)]
-pub struct Knock {
+pub struct AttachRequest {
     /// Its number.
     pub terminal: u32,
     /// Where it is.
@@ -57,9 +57,9 @@ pub enum LifecycleRequest {
     Reload(oneshot::Sender<Result<(), String>>),
 }
 
-/// The ways out of the door.
+/// Where the server sends.
 #[derive(Debug)]
-pub struct Ways {
+pub struct Outputs {
     /// To the plant.
     pub orders: mpsc::Sender<Order>,
     /// To the history.
@@ -70,31 +70,31 @@ pub struct Ways {
     pub lifecycle: mpsc::Sender<LifecycleRequest>,
 }
 
-/// Where terminals come in: cheap to clone, for whoever listens for them.
+/// Opens sessions; cheap to clone.
 #[derive(Debug, Clone)]
-pub struct Entrance {
+pub struct SessionAcceptor {
     /// The latest snapshot only.
     pub snapshots: watch::Receiver<Arc<Snapshot>>,
-    knocks: mpsc::Sender<Knock>,
+    attach_requests: mpsc::Sender<AttachRequest>,
     requests: mpsc::Sender<(u32, Request)>,
     terminals: Arc<AtomicU32>,
 }
 
-impl Entrance {
-    /// The entrance, and what comes in by it.
+impl SessionAcceptor {
+    /// The acceptor, and the queues of attach requests and of requests.
     pub fn new(
         snapshots: watch::Receiver<Arc<Snapshot>>,
-    ) -> (Entrance, mpsc::Receiver<Knock>, mpsc::Receiver<(u32, Request)>) {
-        let (knocks, knocked) = mpsc::channel(KNOCKS);
+    ) -> (SessionAcceptor, mpsc::Receiver<AttachRequest>, mpsc::Receiver<(u32, Request)>) {
+        let (attach_requests, attach_queue) = mpsc::channel(ATTACH_QUEUE_MAX);
         let (requests, requested) = mpsc::channel(REQUESTS);
-        (Entrance { snapshots, knocks, requests, terminals: Arc::default() }, knocked, requested)
+        (SessionAcceptor { snapshots, attach_requests, requests, terminals: Arc::default() }, attach_queue, requested)
     }
 
     /// Attaches a terminal. Until it hears how it stands it may nothing; where too many come at once it never will.
     pub fn attach(&self, peer: Peer) -> Session {
         let terminal = self.terminals.fetch_add(1, Ordering::Relaxed) + 1;
         let (told, standing) = watch::channel(Arc::new(Standing::default()));
-        if let Err(error) = self.knocks.try_send(Knock { terminal, peer, standing: told }) {
+        if let Err(error) = self.attach_requests.try_send(AttachRequest { terminal, peer, standing: told }) {
             tracing::error!(%error, "a terminal was not let in");
         }
         let (snapshots, requests) = (self.snapshots.clone(), self.requests.clone());
@@ -114,10 +114,10 @@ enum Record {
 }
 
 /// Sole owner of access control.
-pub struct Door {
+pub struct SessionServer {
     access: AccessControl,
     clock: Clock,
-    ways: Ways,
+    outputs: Outputs,
     terminals: BTreeMap<u32, watch::Sender<Arc<Standing>>>,
     tickets: BTreeMap<u64, oneshot::Sender<Result<Durability, String>>>,
     /// Reloads whose outcome is awaited, with their tickets.
@@ -128,13 +128,13 @@ pub struct Door {
     lost: u64,
 }
 
-impl Door {
-    /// A door that nobody has come to. `users` is the file that they are kept in.
-    pub fn new(access: AccessControl, clock: Clock, ways: Ways, users: Option<PathBuf>) -> Door {
-        Door {
+impl SessionServer {
+    /// A server without sessions. `users` is the path of the users file.
+    pub fn new(access: AccessControl, clock: Clock, outputs: Outputs, users: Option<PathBuf>) -> SessionServer {
+        SessionServer {
             access,
             clock,
-            ways,
+            outputs,
             terminals: BTreeMap::new(),
             tickets: BTreeMap::new(),
             reloads: JoinSet::new(),
@@ -147,7 +147,7 @@ impl Door {
     /// Runs until the station stops.
     pub async fn run(
         mut self,
-        mut knocks: mpsc::Receiver<Knock>,
+        mut attach_requests: mpsc::Receiver<AttachRequest>,
         mut requests: mpsc::Receiver<(u32, Request)>,
         mut stopped: watch::Receiver<bool>,
     ) {
@@ -157,9 +157,9 @@ impl Door {
             tokio::select! {
                 biased;
                 _ = stopped.wait_for(|stopped| *stopped) => break,
-                Some(knock) = knocks.recv() => {
-                    self.terminals.insert(knock.terminal, knock.standing);
-                    let effects = self.access.open(knock.terminal, knock.peer, self.clock.now());
+                Some(request) = attach_requests.recv() => {
+                    self.terminals.insert(request.terminal, request.standing);
+                    let effects = self.access.open(request.terminal, request.peer, self.clock.now());
                     self.carry_out(effects);
                 }
                 done = self.toil.next() => {
@@ -179,7 +179,7 @@ impl Door {
                         let effects = self.access.close(terminal, self.clock.now());
                         self.carry_out(effects);
                     }
-                    if self.lost > 0 && self.ways.deeds.try_send(Paper::Lost(self.lost)).is_ok() {
+                    if self.lost > 0 && self.outputs.deeds.try_send(Paper::Lost(self.lost)).is_ok() {
                         self.lost = 0;
                     }
                     // Who has left waits for no answer any more.
@@ -207,7 +207,7 @@ impl Door {
             }
             Request::Ask(query) => match self.access.may_ask(terminal, &query.question, now) {
                 Ok(()) => {
-                    if let Err(error) = self.ways.queries.try_send((terminal, query)) {
+                    if let Err(error) = self.outputs.queries.try_send((terminal, query)) {
                         let (_, query) = error.into_inner();
                         let _ = query.reply.send(Err(HistoryError::Engine("too busy, ask again".to_owned())));
                     }
@@ -234,7 +234,7 @@ impl Door {
         for effect in effects {
             match effect {
                 Effect::Order(order) => {
-                    if let Err(error) = self.ways.orders.try_send(order) {
+                    if let Err(error) = self.outputs.orders.try_send(order) {
                         tracing::error!(%error, "an order did not reach the plant");
                         let (mpsc::error::TrySendError::Full(order) | mpsc::error::TrySendError::Closed(order)) = error;
                         let told = self.access.undelivered(order.id, "station too busy");
@@ -242,7 +242,7 @@ impl Door {
                     }
                 }
                 Effect::Record(deed) => {
-                    let sent = self.ways.deeds.try_send(Paper::Deed(deed));
+                    let sent = self.outputs.deeds.try_send(Paper::Deed(deed));
                     if let Err(error) = &sent {
                         tracing::error!(%error, "an action did not reach the audit log");
                         self.lost += 1;
@@ -285,7 +285,7 @@ impl Door {
             Record::None => (reply, answer, Durability::Recorded),
             Record::Lost => (reply, answer, Durability::NotRecorded),
             Record::Sent => {
-                match self.ways.deeds.try_send(Paper::Answer(reply, answer)).map_err(|error| error.into_inner()) {
+                match self.outputs.deeds.try_send(Paper::Answer(reply, answer)).map_err(|error| error.into_inner()) {
                     Err(Paper::Answer(reply, answer)) => (reply, answer, Durability::NotRecorded),
                     Ok(()) | Err(_) => return,
                 }
@@ -295,7 +295,7 @@ impl Door {
     }
 
     fn send_lifecycle(&mut self, request: LifecycleRequest) {
-        if let Err(error) = self.ways.lifecycle.try_send(request) {
+        if let Err(error) = self.outputs.lifecycle.try_send(request) {
             tracing::error!(%error, "nobody carries out the wish for the station");
         }
     }
