@@ -4,7 +4,7 @@ mod login;
 mod paper;
 mod people;
 mod room;
-mod seat;
+mod session;
 pub mod sign;
 mod standing;
 #[cfg(test)]
@@ -20,9 +20,9 @@ use std::{
 use jiff::{SignedDuration, Timestamp};
 
 use self::{
-    paper::{clean, deed, record, seat_name, words},
+    paper::{actor_name, clean, deed, record, words},
     people::Saving,
-    seat::{Refusals, Seat},
+    session::{Refusals, SessionState},
     work::Errand,
 };
 use super::{
@@ -97,7 +97,7 @@ pub struct AccessControl {
     closed: Option<Arc<str>>,
     /// The user of the operating system that the station runs as.
     host: Option<Arc<str>>,
-    seats: BTreeMap<u32, Seat>,
+    sessions: BTreeMap<u32, SessionState>,
     tries: Tries,
     refusals: BTreeMap<Arc<str>, Refusals>,
     errands: BTreeMap<Job, Errand>,
@@ -122,7 +122,7 @@ impl AccessControl {
             people: None,
             closed: None,
             host,
-            seats: BTreeMap::new(),
+            sessions: BTreeMap::new(),
             tries: Tries::default(),
             refusals: BTreeMap::new(),
             errands: BTreeMap::new(),
@@ -165,26 +165,26 @@ impl AccessControl {
     /// A terminal has attached.
     pub fn open(&mut self, terminal: u32, peer: Peer, at: Timestamp) -> Vec<Effect> {
         let peer = Peer { from: clean(&peer.from).into(), ..peer };
-        let (own, mut seat) = (peer.own, Seat::new(peer, at));
-        let mut effects = match self.make_room(&seat, at) {
+        let (own, mut session) = (peer.own, SessionState::new(peer, at));
+        let mut effects = match self.make_room(&session, at) {
             Ok(effects) => effects,
             Err(why) => {
-                let mut effects = self.refused(&seat, "attach", "", &why, at);
+                let mut effects = self.refused(&session, "attach", "", &why, at);
                 effects.push(Effect::HangUp(terminal, why));
                 return effects;
             }
         };
-        seat.who = self.known(&seat.peer);
-        seat.trusted = seat.who.is_some();
-        if !own && self.may_record(&seat.origin.clone(), at) {
-            effects.push(deed(&seat, "attach", "", "done", at));
+        session.who = self.known(&session.peer);
+        session.trusted = session.who.is_some();
+        if !own && self.may_record(&session.origin.clone(), at) {
+            effects.push(deed(&session, "attach", "", "done", at));
         }
-        if let Some(who) = &seat.who
+        if let Some(who) = &session.who
             && self.people.is_some()
         {
-            effects.push(deed(&seat, "login", &who.user, "done: known to the operating system", at));
+            effects.push(deed(&session, "login", &who.user, "done: known to the operating system", at));
         }
-        self.seats.insert(terminal, seat);
+        self.sessions.insert(terminal, session);
         self.tell(terminal, &mut effects);
         effects
     }
@@ -206,9 +206,9 @@ impl AccessControl {
     /// A terminal has gone.
     pub fn close(&mut self, terminal: u32, at: Timestamp) -> Vec<Effect> {
         let mut effects = self.sent_out(terminal, "done: the terminal has gone", at);
-        let Some(seat) = self.seats.remove(&terminal) else { return effects };
-        if !seat.peer.own && self.may_record(&seat.origin, at) {
-            effects.push(deed(&seat, "detach", "", "done", at));
+        let Some(session) = self.sessions.remove(&terminal) else { return effects };
+        if !session.peer.own && self.may_record(&session.origin, at) {
+            effects.push(deed(&session, "detach", "", "done", at));
         }
         self.tell(terminal, &mut effects);
         effects
@@ -228,15 +228,15 @@ impl AccessControl {
             // On record it would name what the plant file of this run has in its place.
             return self.undelivered(request.id, OTHER_RUN);
         }
-        let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
+        let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let number = request.id.number;
-        if seat.last_order.is_some_and(|last| number <= last) {
+        if session.last_order.is_some_and(|last| number <= last) {
             // Its outcome would be taken for that of the order that had the number first.
             return self.undelivered(request.id, "this order has the number of an earlier one, give it again");
         }
-        seat.last_order = Some(number);
-        if !seat.locked {
-            seat.active = at;
+        session.last_order = Some(number);
+        if !session.locked {
+            session.active = at;
         }
         match self.may(terminal, Some(right::needs(&request.command))) {
             Err(why) => self.refuse_order(terminal, request, Refusal::NotPermitted(why), at),
@@ -246,29 +246,29 @@ impl AccessControl {
 
     /// The role is enough, and so is the signature.
     fn let_through(&self, terminal: u32, request: OrderRequest, signer: Option<&str>) -> Vec<Effect> {
-        let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
+        let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
         let note = match (request.note, signer) {
             (note, None) => note,
             (None, Some(signer)) => Some(format!("signed by {signer}").into()),
             (Some(note), Some(signer)) => Some(format!("{note}; signed by {signer}").into()),
         };
         let OrderRequest { id, command, seen, .. } = request;
-        let (by, from) = (seat_name(seat), seat.peer.from.clone());
+        let (by, from) = (actor_name(session), session.peer.from.clone());
         vec![Effect::Order(Order { id, by, from, command, seen, note, refused: None })]
     }
 
     /// An order did not reach the plant: no snapshot tells its outcome, so its terminal is told with how it stands.
     pub fn undelivered(&mut self, id: OrderId, why: &str) -> Vec<Effect> {
-        let Some(seat) = self.seats.get_mut(&id.terminal) else { return Vec::new() };
-        seat.undelivered(id, why);
+        let Some(session) = self.sessions.get_mut(&id.terminal) else { return Vec::new() };
+        session.undelivered(id, why);
         vec![Effect::Standing(id.terminal)]
     }
 
     /// The plant puts it on record and into the snapshot, so that whoever gave the order sees what became of it. Too many of
     /// them are only told.
     fn refuse_order(&mut self, terminal: u32, request: OrderRequest, why: Refusal, at: Timestamp) -> Vec<Effect> {
-        let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
-        let (origin, own) = (seat.origin.clone(), seat.peer.own);
+        let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
+        let (origin, own) = (session.origin.clone(), session.peer.own);
         if !own && !self.may_record(&origin, at) {
             return self.undelivered(request.id, &why.to_string());
         }
@@ -293,16 +293,16 @@ impl AccessControl {
         // Who may not look is told so; who wants to know what others did is put on record.
         let mut effects = Vec::new();
         if needed != Role::Viewer
-            && let Some(seat) = self.seats.remove(&terminal)
+            && let Some(session) = self.sessions.remove(&terminal)
         {
-            effects = self.refused(&seat, "read audit log", "", &why, at);
-            self.seats.insert(terminal, seat);
+            effects = self.refused(&session, "read audit log", "", &why, at);
+            self.sessions.insert(terminal, session);
         }
         Err((why, effects))
     }
 
     fn may_look(&self, terminal: u32) -> Result<(), String> {
-        match &self.seats.get(&terminal).ok_or("this terminal is not attached")?.who {
+        match &self.sessions.get(&terminal).ok_or("this terminal is not attached")?.who {
             // Locked or not: the picture stays, and so does what lies behind it.
             Some(who) if who.must_change => Err(CHANGE_FIRST.to_owned()),
             Some(_) => Ok(()),
@@ -322,8 +322,8 @@ impl AccessControl {
         {
             return self.refuse_wish(terminal, ticket, &wish, why, at);
         }
-        if let Some(seat) = self.seats.get_mut(&terminal).filter(|seat| !seat.locked) {
-            seat.active = at;
+        if let Some(session) = self.sessions.get_mut(&terminal).filter(|session| !session.locked) {
+            session.active = at;
         }
         match wish {
             Wish::Login { user, password } => self.login(terminal, ticket, &user, password, at),
@@ -360,9 +360,9 @@ impl AccessControl {
     /// Stopping the station or reloading its plant file needs no login of those who can do so with the means of the operating
     /// system (its init system, for one), whatever role they have here without a password. Who logged in acts as that user.
     fn could_anyway(&self, terminal: u32, wish: &Wish) -> bool {
-        let without_login = |seat: &&Seat| (seat.who.is_none() || seat.trusted) && !seat.peer.own;
-        let seat = self.seats.get(&terminal).filter(without_login);
-        matches!(wish, Wish::Stop | Wish::Reload) && seat.is_some_and(|seat| self.is_host(&seat.peer))
+        let without_login = |session: &&SessionState| (session.who.is_none() || session.trusted) && !session.peer.own;
+        let session = self.sessions.get(&terminal).filter(without_login);
+        matches!(wish, Wish::Stop | Wish::Reload) && session.is_some_and(|session| self.is_host(&session.peer))
     }
 
     fn plant_name(&self) -> Arc<str> {
@@ -379,18 +379,18 @@ impl AccessControl {
         new: Option<Arc<str>>,
         at: Timestamp,
     ) -> Vec<Effect> {
-        let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
+        let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
         // What becomes of a stop or a reload is seen by the stop and the start of the station behind it.
         let outcome = if new.is_some() { "done" } else { "permitted" };
-        let record = ActionRecord { new, ..record(seat, action, target, outcome, at) };
+        let record = ActionRecord { new, ..record(session, action, target, outcome, at) };
         vec![Effect::Record(record), Effect::Reply(ticket, Ok(()))]
     }
 
     fn refuse_wish(&mut self, terminal: u32, ticket: u64, wish: &Wish, why: String, at: Timestamp) -> Vec<Effect> {
-        let Some(seat) = self.seats.remove(&terminal) else { return vec![Effect::Reply(ticket, Err(why))] };
+        let Some(session) = self.sessions.remove(&terminal) else { return vec![Effect::Reply(ticket, Err(why))] };
         let (action, target) = words(wish);
-        let mut effects = self.refused(&seat, action, &target, &why, at);
-        self.seats.insert(terminal, seat);
+        let mut effects = self.refused(&session, action, &target, &why, at);
+        self.sessions.insert(terminal, session);
         effects.push(Effect::Reply(ticket, Err(why)));
         effects
     }
@@ -412,7 +412,7 @@ impl AccessControl {
             return Vec::new();
         }
         self.behind_utc = behind_utc;
-        self.seats.keys().copied().map(Effect::Standing).collect()
+        self.sessions.keys().copied().map(Effect::Standing).collect()
     }
 
     fn utc(&self, at: Timestamp) -> Timestamp {
@@ -421,9 +421,9 @@ impl AccessControl {
 
     /// Who sits here, if he may do what needs this role. `Err` says in words for him why not.
     fn may(&self, terminal: u32, needed: Option<Role>) -> Result<&Who, String> {
-        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
-        let who = seat.who.as_ref().ok_or(LOG_IN_FIRST)?;
-        if seat.locked {
+        let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
+        let who = session.who.as_ref().ok_or(LOG_IN_FIRST)?;
+        if session.locked {
             return Err("this terminal is locked".to_owned());
         }
         if who.must_change {

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
-    AccessControl, Effect, LOG_IN_FIRST, Seat,
+    AccessControl, Effect, LOG_IN_FIRST, SessionState,
     paper::deed,
     passed,
     standing::LOCK_NEAR,
@@ -51,7 +51,7 @@ impl AccessControl {
             return self.failed(terminal, ticket, "login failed", user.as_deref(), wrong, at);
         }
         let Some(user) = user.and_then(|user| self.people.as_ref()?.get(&user).cloned()) else { return Vec::new() };
-        if !self.seats.contains_key(&terminal) {
+        if !self.sessions.contains_key(&terminal) {
             return Vec::new();
         }
         let mut effects = self.sent_out(terminal, "done: somebody else logs in", at);
@@ -63,11 +63,11 @@ impl AccessControl {
 
     /// Somebody sits down here.
     pub(super) fn sit_down(&mut self, terminal: u32, who: Who, at: Timestamp) -> Vec<Effect> {
-        let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
+        let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let name = who.user.clone();
         let utc = at.checked_add(self.behind_utc).unwrap_or(at);
-        seat.enter(who, at);
-        let mut effects = vec![deed(seat, "login", &name, "done", at)];
+        session.enter(who, at);
+        let mut effects = vec![deed(session, "login", &name, "done", at)];
         if let Some(people) = &mut self.people {
             people.logged_in(&name, utc);
             self.unsaved = true;
@@ -87,8 +87,8 @@ impl AccessControl {
         at: Timestamp,
     ) -> Vec<Effect> {
         let mut effects = Vec::new();
-        if let Some(seat) = self.seats.get(&terminal) {
-            effects.push(deed(seat, action, user.unwrap_or("unknown user"), &format!("refused: {why}"), at));
+        if let Some(session) = self.sessions.get(&terminal) {
+            effects.push(deed(session, action, user.unwrap_or("unknown user"), &format!("refused: {why}"), at));
         }
         effects.push(Effect::Reply(ticket, Err(told)));
         effects
@@ -107,31 +107,32 @@ impl AccessControl {
     /// Whoever sits there leaves; nothing where nobody does.
     pub(super) fn sent_out(&mut self, terminal: u32, outcome: &str, at: Timestamp) -> Vec<Effect> {
         let asked = self.people.is_some();
-        let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
-        let Some(who) = &seat.who else { return Vec::new() };
-        let effects = if asked { vec![deed(seat, "logout", &who.user, outcome, at)] } else { Vec::new() };
-        seat.leave();
+        let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
+        let Some(who) = &session.who else { return Vec::new() };
+        let effects = if asked { vec![deed(session, "logout", &who.user, outcome, at)] } else { Vec::new() };
+        session.leave();
         effects
     }
 
     pub(super) fn lock(&mut self, terminal: u32, ticket: u64, at: Timestamp) -> Vec<Effect> {
-        match self.seats.get_mut(&terminal) {
-            Some(seat) if seat.acting().is_some() && seat.trusted => reply(ticket, NO_PASSWORD),
-            Some(seat) if seat.acting().is_some() => {
-                seat.locked = true;
-                let target = seat.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
-                let mut effects = vec![deed(seat, "lock terminal", &target, "done", at), Effect::Reply(ticket, Ok(()))];
+        match self.sessions.get_mut(&terminal) {
+            Some(session) if session.acting().is_some() && session.trusted => reply(ticket, NO_PASSWORD),
+            Some(session) if session.acting().is_some() => {
+                session.locked = true;
+                let target = session.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
+                let mut effects =
+                    vec![deed(session, "lock terminal", &target, "done", at), Effect::Reply(ticket, Ok(()))];
                 self.tell(terminal, &mut effects);
                 effects
             }
-            Some(seat) if seat.locked => reply(ticket, "this terminal is locked already"),
+            Some(session) if session.locked => reply(ticket, "this terminal is locked already"),
             Some(_) | None => reply(ticket, LOG_IN_FIRST),
         }
     }
 
     pub(super) fn unlock(&mut self, terminal: u32, ticket: u64, password: Secret, at: Timestamp) -> Vec<Effect> {
-        let seat = self.seats.get(&terminal).filter(|seat| seat.locked);
-        let Some(user) = seat.and_then(|seat| seat.who.as_ref()).map(|who| who.user.clone()) else {
+        let session = self.sessions.get(&terminal).filter(|session| session.locked);
+        let Some(user) = session.and_then(|session| session.who.as_ref()).map(|who| who.user.clone()) else {
             return reply(ticket, "this terminal is not locked");
         };
         let looked_at = self.look_at(terminal, &user.clone(), password, What::Unlock { ticket, user }, at);
@@ -149,32 +150,32 @@ impl AccessControl {
         if let Some(wrong) = wrong {
             return self.failed(terminal, ticket, "unlock failed", Some(&user), wrong, at);
         }
-        let Some(seat) = self.seats.get_mut(&terminal) else { return Vec::new() };
-        (seat.locked, seat.active) = (false, at);
-        let mut effects = vec![deed(seat, "unlock terminal", &user, "done", at), Effect::Reply(ticket, Ok(()))];
+        let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
+        (session.locked, session.active) = (false, at);
+        let mut effects = vec![deed(session, "unlock terminal", &user, "done", at), Effect::Reply(ticket, Ok(()))];
         self.tell(terminal, &mut effects);
         effects
     }
 
     /// After how long without a key this terminal is locked; never where there is no password to unlock it with.
-    pub(super) fn idle_lock(&self, seat: &Seat) -> Option<Duration> {
+    pub(super) fn idle_lock(&self, session: &SessionState) -> Option<Duration> {
         let span = self.def.access.idle_lock;
-        (!span.is_zero() && self.people.is_some() && !seat.trusted).then_some(span)
+        (!span.is_zero() && self.people.is_some() && !session.trusted).then_some(span)
     }
 
     /// Locks terminals that nobody has touched for long, and tells those of which this is near.
     pub(super) fn lock_idle(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = Vec::new();
-        let idle = |access: &AccessControl, seat: &Seat| {
-            let left = access.idle_lock(seat)?.saturating_sub(passed(seat.active, at));
-            (seat.acting().is_some() && left <= LOCK_NEAR).then_some(left)
+        let idle = |access: &AccessControl, session: &SessionState| {
+            let left = access.idle_lock(session)?.saturating_sub(passed(session.active, at));
+            (session.acting().is_some() && left <= LOCK_NEAR).then_some(left)
         };
-        let near: Vec<_> = self.seats.iter().filter_map(|(id, seat)| Some((*id, idle(self, seat)?))).collect();
+        let near: Vec<_> = self.sessions.iter().filter_map(|(id, session)| Some((*id, idle(self, session)?))).collect();
         for (terminal, left) in near {
-            if let Some(seat) = self.seats.get_mut(&terminal).filter(|_| left.is_zero()) {
-                seat.locked = true;
-                let name = seat.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
-                effects.push(deed(seat, "lock terminal", &name, "done: nobody has touched it", at));
+            if let Some(session) = self.sessions.get_mut(&terminal).filter(|_| left.is_zero()) {
+                session.locked = true;
+                let name = session.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
+                effects.push(deed(session, "lock terminal", &name, "done: nobody has touched it", at));
                 self.tell(terminal, &mut effects);
             } else {
                 effects.push(Effect::Standing(terminal));
@@ -192,10 +193,12 @@ impl AccessControl {
         at: Timestamp,
     ) -> Vec<Effect> {
         let key = user::key(name);
-        let here = |seat: &Seat| !seat.trusted && seat.who.as_ref().is_some_and(|who| user::key(&who.user) == key);
-        let seats: Vec<u32> = self.seats.iter().filter(|(_, seat)| here(seat)).map(|(id, _)| *id).collect();
+        let here = |session: &SessionState| {
+            !session.trusted && session.who.as_ref().is_some_and(|who| user::key(&who.user) == key)
+        };
+        let sessions: Vec<u32> = self.sessions.iter().filter(|(_, session)| here(session)).map(|(id, _)| *id).collect();
         let mut effects = Vec::new();
-        for terminal in seats.into_iter().filter(|terminal| Some(*terminal) != except) {
+        for terminal in sessions.into_iter().filter(|terminal| Some(*terminal) != except) {
             effects.extend(self.sent_out(terminal, why, at));
             effects.push(Effect::Standing(terminal));
         }

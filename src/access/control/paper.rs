@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::{
     AccessControl, Effect, passed,
-    seat::{Refusals, Seat},
+    session::{Refusals, SessionState},
 };
 use crate::{
     access::{Wish, user},
@@ -23,12 +23,12 @@ const TOLD_EVERY: Duration = Duration::from_secs(60);
 impl AccessControl {
     /// Is a request of this terminal listened to?
     pub(super) fn heard(&mut self, terminal: u32, at: Timestamp) -> bool {
-        let Some(seat) = self.seats.get_mut(&terminal) else { return false };
+        let Some(session) = self.sessions.get_mut(&terminal) else { return false };
         // The station's own process shares its fate anyway.
-        if seat.peer.own || seat.requests.take(at) {
+        if session.peer.own || session.requests.take(at) {
             return true;
         }
-        let origin = seat.origin.clone();
+        let origin = session.origin.clone();
         self.refusals_of(&origin, at).untold += 1;
         false
     }
@@ -48,9 +48,16 @@ impl AccessControl {
     }
 
     /// The record of a refusal, unless there are too many of them.
-    pub(super) fn refused(&mut self, seat: &Seat, action: &str, target: &str, why: &str, at: Timestamp) -> Vec<Effect> {
-        let told = self.may_record(&seat.origin, at);
-        told.then(|| deed(seat, action, target, &format!("refused: {why}"), at)).into_iter().collect()
+    pub(super) fn refused(
+        &mut self,
+        session: &SessionState,
+        action: &str,
+        target: &str,
+        why: &str,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        let told = self.may_record(&session.origin, at);
+        told.then(|| deed(session, action, target, &format!("refused: {why}"), at)).into_iter().collect()
     }
 
     /// What was refused too often to be told each time, a line a minute for each place.
@@ -102,19 +109,19 @@ pub(super) fn words(wish: &Wish) -> (&'static str, Arc<str>) {
     }
 }
 
-pub(super) fn seat_name(seat: &Seat) -> Arc<str> {
-    match (&seat.who, &seat.peer.unix_user) {
+pub(super) fn actor_name(session: &SessionState) -> Arc<str> {
+    match (&session.who, &session.peer.unix_user) {
         (Some(who), _) => who.user.clone(),
         (None, Some(user)) => format!("not logged in ({user})").into(),
         (None, None) => "not logged in".into(),
     }
 }
 
-pub(super) fn record(seat: &Seat, action: &str, target: &str, outcome: &str, at: Timestamp) -> ActionRecord {
+pub(super) fn record(session: &SessionState, action: &str, target: &str, outcome: &str, at: Timestamp) -> ActionRecord {
     ActionRecord {
         at,
-        by: seat_name(seat),
-        from: seat.peer.from.clone(),
+        by: actor_name(session),
+        from: session.peer.from.clone(),
         action: action.into(),
         target: target.into(),
         old: None,
@@ -125,8 +132,8 @@ pub(super) fn record(seat: &Seat, action: &str, target: &str, outcome: &str, at:
     }
 }
 
-pub(super) fn deed(seat: &Seat, action: &str, target: &str, outcome: &str, at: Timestamp) -> Effect {
-    Effect::Record(record(seat, action, target, outcome, at))
+pub(super) fn deed(session: &SessionState, action: &str, target: &str, outcome: &str, at: Timestamp) -> Effect {
+    Effect::Record(record(session, action, target, outcome, at))
 }
 
 /// Words of a terminal as they may stand on record: not endless, and nothing that moves a cursor or hides in the text.

@@ -86,9 +86,9 @@ impl AccessControl {
         at: Timestamp,
     ) -> Vec<Effect> {
         let mut effects = reply(ticket, why);
-        let Some(seat) = self.seats.get(&terminal) else { return effects };
-        let record = deed(seat, action, target, &format!("refused: {why}"), at);
-        let origin = seat.origin.clone();
+        let Some(session) = self.sessions.get(&terminal) else { return effects };
+        let record = deed(session, action, target, &format!("refused: {why}"), at);
+        let origin = session.origin.clone();
         if self.may_record(&origin, at) {
             effects.push(record);
         }
@@ -102,8 +102,8 @@ impl AccessControl {
     }
 
     fn first(&mut self, terminal: u32, ticket: u64, user: Arc<str>, password: Secret) -> Result<Vec<Effect>, String> {
-        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
-        if !self.is_host(&seat.peer) {
+        let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
+        if !self.is_host(&session.peer) {
             return Err("only whoever has started the station makes the first supervisor".to_owned());
         }
         if self.people.as_ref().is_none_or(|people| !people.is_empty()) {
@@ -120,11 +120,11 @@ impl AccessControl {
         new: Secret,
         at: Timestamp,
     ) -> Result<Vec<Effect>, String> {
-        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
-        if seat.trusted {
+        let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
+        if session.trusted {
             return Err("the operating system says who you are here, there is no password to change".to_owned());
         }
-        let user = seat.acting().ok_or("log in, or unlock this terminal, first")?.user.clone();
+        let user = session.acting().ok_or("log in, or unlock this terminal, first")?.user.clone();
         password::check(&new.0, &user, self.def.access.password_chars_min)?;
         if password::one_form(&new.0) == password::one_form(&old.0) {
             return Err("this is the present password, choose another one".to_owned());
@@ -187,7 +187,7 @@ impl AccessControl {
 
     /// Begins a change: it is true when it is on disk. Rights are looked at once more, as a hash has taken its time.
     fn change(&mut self, terminal: u32, ticket: u64, change: Change, at: Timestamp) -> Result<Vec<Effect>, String> {
-        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
+        let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
         match &change {
             Change::First { .. } | Change::Password { must_change: false, .. } => {}
             Change::Add { .. }
@@ -195,7 +195,7 @@ impl AccessControl {
             | Change::Disable(..)
             | Change::Delete(_)
             | Change::Password { must_change: true, .. } => {
-                let who = seat.acting().ok_or(super::LOG_IN_FIRST)?;
+                let who = session.acting().ok_or(super::LOG_IN_FIRST)?;
                 enough(who.role, right::Right::People.role())?;
             }
         }
@@ -211,7 +211,7 @@ impl AccessControl {
         let (action, old, new) = self.told(&change);
         let name = self.people.as_ref().and_then(|people| people.get(change.user())).map(|user| user.name.clone());
         let target = name.unwrap_or_else(|| change.user().clone());
-        let record = ActionRecord { old, new, ..record(seat, action, &target, "done", at) };
+        let record = ActionRecord { old, new, ..record(session, action, &target, "done", at) };
         self.saving = Some(Saving { terminal, wish: Some((ticket, change, Box::new(record))) });
         Ok(vec![Effect::Save(after)])
     }
@@ -310,7 +310,7 @@ impl AccessControl {
             }
             Change::Password { must_change: false, .. } => {
                 let effects = out("done: has another password now", Some(terminal));
-                if let Some(who) = self.seats.get_mut(&terminal).and_then(|seat| seat.who.as_mut()) {
+                if let Some(who) = self.sessions.get_mut(&terminal).and_then(|session| session.who.as_mut()) {
                     who.must_change = false;
                 }
                 effects

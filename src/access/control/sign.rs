@@ -23,17 +23,19 @@ impl AccessControl {
     pub(super) fn signed(&mut self, terminal: u32, mut request: OrderRequest, at: Timestamp) -> Vec<Effect> {
         let needed = needed(&self.def, &request.command).filter(|_| self.people.is_some());
         let sign = request.sign.take();
-        let (Some(needed), Some(seat)) = (needed, self.seats.get(&terminal)) else {
+        let (Some(needed), Some(session)) = (needed, self.sessions.get(&terminal)) else {
             return self.let_through(terminal, request, None);
         };
-        let Some(by) = seat.who.as_ref().map(|who| who.user.clone()) else { return Vec::new() };
+        let Some(by) = session.who.as_ref().map(|who| who.user.clone()) else { return Vec::new() };
         let own = |name: &str| user::key(name) == user::key(&by);
         let why = match (needed, &sign) {
             (Sign::Password, None) => Some("this tag asks for your password again"),
             (Sign::Password, Some(Signature { user: Some(user), .. })) if !own(user) => {
                 Some("this tag asks for your own password")
             }
-            (Sign::Password, Some(_)) if seat.trusted => Some("this tag asks for a password, and you have none here"),
+            (Sign::Password, Some(_)) if session.trusted => {
+                Some("this tag asks for a password, and you have none here")
+            }
             (Sign::SecondPerson, None | Some(Signature { user: None, .. })) => {
                 Some("this tag asks for a second person")
             }
@@ -65,9 +67,9 @@ impl AccessControl {
     ) -> Vec<Effect> {
         if let Some(Wrong { why, told }) = wrong {
             let mut effects = Vec::new();
-            if let Some(seat) = self.seats.get(&terminal) {
+            if let Some(session) = self.sessions.get(&terminal) {
                 let signer = signer.as_deref().unwrap_or("unknown user");
-                effects.push(super::paper::deed(seat, "signature failed", signer, &format!("refused: {why}"), at));
+                effects.push(super::paper::deed(session, "signature failed", signer, &format!("refused: {why}"), at));
             }
             effects.extend(self.not_signed(terminal, request, told, at));
             return effects;

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{AccessControl, Effect, passed, seat::Seat};
+use super::{AccessControl, Effect, passed, session::SessionState};
 use crate::{
     access::{SessionRow, Standing, UserRow, Users, user},
     plant::role::Role,
@@ -18,24 +18,24 @@ impl AccessControl {
     pub fn standing(&self, terminal: u32, at: Timestamp) -> Standing {
         let rules = &self.def.access;
         let notice = rules.notice.as_deref().map(Arc::from);
-        let Some(seat) = self.seats.get(&terminal) else { return Standing { notice, ..Standing::default() } };
-        let supervisor = seat.acting().is_some_and(|who| who.role == Role::Supervisor && !who.must_change);
-        let idle_lock = self.idle_lock(seat);
-        let left = idle_lock.map(|span| span.saturating_sub(passed(seat.active, at)));
+        let Some(session) = self.sessions.get(&terminal) else { return Standing { notice, ..Standing::default() } };
+        let supervisor = session.acting().is_some_and(|who| who.role == Role::Supervisor && !who.must_change);
+        let idle_lock = self.idle_lock(session);
+        let left = idle_lock.map(|span| span.saturating_sub(passed(session.active, at)));
         Standing {
-            who: seat.who.clone(),
-            locked: seat.locked,
-            view: rules.view || seat.who.is_some(),
+            who: session.who.clone(),
+            locked: session.locked,
+            view: rules.view || session.who.is_some(),
             first: self.closed.is_none()
                 && self.people.as_ref().is_some_and(Users::is_empty)
-                && self.is_host(&seat.peer),
+                && self.is_host(&session.peer),
             notice,
             password_chars_min: rules.password_chars_min,
             idle_lock,
-            locks_in: left.filter(|left| *left <= LOCK_NEAR && seat.acting().is_some()),
+            locks_in: left.filter(|left| *left <= LOCK_NEAR && session.acting().is_some()),
             users: Arc::new(if supervisor { self.user_rows(at) } else { Vec::new() }),
             sessions: Arc::new(if supervisor { self.session_rows() } else { Vec::new() }),
-            undelivered: seat.undelivered.iter().cloned().collect(),
+            undelivered: session.undelivered.iter().cloned().collect(),
             gone: None,
         }
     }
@@ -53,21 +53,21 @@ impl AccessControl {
     }
 
     fn session_rows(&self) -> Vec<SessionRow> {
-        let rows = self.seats.iter().map(|(terminal, seat)| SessionRow {
+        let rows = self.sessions.iter().map(|(terminal, session)| SessionRow {
             terminal: *terminal,
-            user: seat.who.as_ref().map(|who| who.user.clone()),
-            from: seat.peer.from.clone(),
-            since: self.utc(seat.since),
-            locked: seat.locked,
+            user: session.who.as_ref().map(|who| who.user.clone()),
+            from: session.peer.from.clone(),
+            since: self.utc(session.since),
+            locked: session.locked,
         });
         rows.collect()
     }
 
     /// This terminal and all that see the lists hear how they stand.
     pub(super) fn tell(&self, terminal: u32, effects: &mut Vec<Effect>) {
-        let sees = |seat: &Seat| seat.acting().is_some_and(|who| who.role == Role::Supervisor);
-        let others = self.seats.iter().filter(|(id, seat)| **id != terminal && sees(seat)).map(|(id, _)| *id);
-        let own = self.seats.contains_key(&terminal).then_some(terminal);
+        let sees = |session: &SessionState| session.acting().is_some_and(|who| who.role == Role::Supervisor);
+        let others = self.sessions.iter().filter(|(id, session)| **id != terminal && sees(session)).map(|(id, _)| *id);
+        let own = self.sessions.contains_key(&terminal).then_some(terminal);
         effects.extend(own.into_iter().chain(others).map(Effect::Standing));
     }
 }

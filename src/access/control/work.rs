@@ -61,7 +61,7 @@ pub enum Outcome {
 pub(super) struct Errand {
     pub terminal: u32,
     /// Of the terminal, when it was asked for.
-    session: u64,
+    login_number: u64,
     /// The user of the operating system whose jobs it belongs to.
     user: Arc<str>,
     /// What a wrong password counts for, even when the terminal has gone. One of each origin is checked at a time, so that
@@ -106,12 +106,12 @@ impl AccessControl {
         what: What,
         at: Timestamp,
     ) -> Result<Vec<Effect>, String> {
-        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
-        let inside = || format!("{} at terminal {terminal}", seat.origin).into();
+        let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
+        let inside = || format!("{} at terminal {terminal}", session.origin).into();
         let key = Key {
-            origin: if what.comes_from_outside() { seat.origin.clone() } else { inside() },
+            origin: if what.comes_from_outside() { session.origin.clone() } else { inside() },
             account: user::check_name(name).is_ok().then(|| user::key(name)),
-            never_locked: self.is_host(&seat.peer),
+            never_locked: self.is_host(&session.peer),
         };
         let errand = self.errand(terminal, key, what)?;
         if let Some(wait) = self.tries.wait(&errand.key, &self.def.access, at)
@@ -131,22 +131,29 @@ impl AccessControl {
         password: Secret,
         hashing: Hashing,
     ) -> Result<Vec<Effect>, String> {
-        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
+        let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
         let origin = format!("hash for terminal {terminal}").into();
-        let key = Key { origin, account: None, never_locked: self.is_host(&seat.peer) };
+        let key = Key { origin, account: None, never_locked: self.is_host(&session.peer) };
         let errand = self.errand(terminal, key, What::Hash { ticket, hashing })?;
         Ok(self.send_off(errand, Work::Hash(password)))
     }
 
     /// `Err` where too many are under way.
     fn errand(&self, terminal: u32, key: Key, what: What) -> Result<Errand, String> {
-        let seat = self.seats.get(&terminal).ok_or("this terminal is not attached")?;
+        let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
         let users = || self.errands.values().chain(self.waiting.iter().map(|(errand, _)| errand)).map(|job| &job.user);
         let most = if key.never_locked { JOBS_MAX } else { JOBS_MAX - JOBS_KEPT };
-        if most <= users().count() || JOBS_OF_USER_MAX <= users().filter(|user| **user == seat.origin).count() {
+        if most <= users().count() || JOBS_OF_USER_MAX <= users().filter(|user| **user == session.origin).count() {
             return Err(BUSY.to_owned());
         }
-        Ok(Errand { terminal, session: seat.session, user: seat.origin.clone(), key, stored: None, what })
+        Ok(Errand {
+            terminal,
+            login_number: session.login_number,
+            user: session.origin.clone(),
+            key,
+            stored: None,
+            what,
+        })
     }
 
     /// Begins the checks that have waited for the one before them, or for their time.
@@ -155,7 +162,7 @@ impl AccessControl {
         for (errand, password) in std::mem::take(&mut self.waiting) {
             let busy = self.errands.values().any(|other| other.key.origin == errand.key.origin);
             match self.tries.wait(&errand.key, &self.def.access, at) {
-                _ if !self.seats.contains_key(&errand.terminal) => {}
+                _ if !self.sessions.contains_key(&errand.terminal) => {}
                 None if !busy => {
                     let hash = self.stored(&errand.what).unwrap_or_else(|| password::DUMMY.into());
                     effects.extend(self.send_off(errand, Work::Verify { password, hash }));
@@ -182,8 +189,8 @@ impl AccessControl {
     }
 
     fn is_stale(&self, errand: &Errand) -> bool {
-        let session = self.seats.get(&errand.terminal).map(|seat| seat.session);
-        session != Some(errand.session) || self.stored(&errand.what) != errand.stored
+        let login_number = self.sessions.get(&errand.terminal).map(|session| session.login_number);
+        login_number != Some(errand.login_number) || self.stored(&errand.what) != errand.stored
     }
 
     /// A piece of work is done.
@@ -246,16 +253,16 @@ impl AccessControl {
     fn count_wrong(&mut self, terminal: u32, key: &Key, user: Option<Arc<str>>, at: Timestamp) -> Vec<Effect> {
         let locked = self.tries.wrong(key, &self.def.access, at);
         let (seconds, origin) = (self.def.access.lock_out.as_secs(), &key.origin);
-        let Some(seat) = self.seats.get(&terminal) else { return Vec::new() };
+        let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
         let mut effects = Vec::new();
         if let (true, Some(user)) = (locked.account, user) {
             let outcome = format!("done: for {seconds} s, system user {origin}");
-            effects.push(super::paper::deed(seat, "lock-out", &user, &outcome, at));
+            effects.push(super::paper::deed(session, "lock-out", &user, &outcome, at));
             self.tell(terminal, &mut effects);
         }
         if locked.origin {
             let outcome = format!("done: for up to {seconds} s");
-            effects.push(super::paper::deed(seat, "lock-out", &format!("system user {origin}"), &outcome, at));
+            effects.push(super::paper::deed(session, "lock-out", &format!("system user {origin}"), &outcome, at));
         }
         effects
     }

@@ -1,4 +1,4 @@
-//! One terminal as access control knows it, and how much it may ask for.
+//! The state of one attached terminal: its user, its lock, its request rate.
 
 use std::{collections::VecDeque, sync::Arc};
 
@@ -15,9 +15,9 @@ const REFUSALS: (f64, f64) = (0.5, 20.0);
 /// Orders that did not reach the plant and are remembered for their terminal: as many as may come at once.
 const UNDELIVERED_MAX: usize = 64;
 
-/// A terminal.
+/// The session of a terminal.
 #[derive(Debug)]
-pub struct Seat {
+pub struct SessionState {
     /// Where it is.
     pub peer: Peer,
     /// What is counted together: the user of the operating system, as the system says, not what the terminal says of itself.
@@ -27,7 +27,7 @@ pub struct Seat {
     /// Who sits there.
     pub who: Option<Who>,
     /// Goes up with each login and logout here.
-    pub session: u64,
+    pub login_number: u64,
     /// He is known without a password, so none can be asked of him.
     pub trusted: bool,
     /// Only looking until the password is given.
@@ -42,17 +42,17 @@ pub struct Seat {
     pub undelivered: VecDeque<(OrderId, Arc<str>)>,
 }
 
-impl Seat {
-    /// A terminal that has just come.
-    pub fn new(peer: Peer, at: Timestamp) -> Seat {
+impl SessionState {
+    /// A terminal that has just attached.
+    pub fn new(peer: Peer, at: Timestamp) -> SessionState {
         let origin = origin(&peer);
         let requests = Bucket::full(REQUESTS, at);
-        Seat {
+        SessionState {
             peer,
             origin,
             since: at,
             who: None,
-            session: 0,
+            login_number: 0,
             trusted: false,
             locked: false,
             active: at,
@@ -78,13 +78,13 @@ impl Seat {
     /// A user has logged in.
     pub fn enter(&mut self, who: Who, at: Timestamp) {
         (self.who, self.locked, self.trusted, self.active) = (Some(who), false, false, at);
-        self.session += 1;
+        self.login_number += 1;
     }
 
     /// Nobody sits there any more.
     pub fn leave(&mut self) {
         (self.who, self.locked, self.trusted) = (None, false, false);
-        self.session += 1;
+        self.login_number += 1;
     }
 }
 
