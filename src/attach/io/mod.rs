@@ -4,6 +4,6 @@ pub mod connect;
 pub mod find;
 mod pace;
 mod pump;
-mod seat;
+mod connection;
 pub mod serve;
 mod wire;

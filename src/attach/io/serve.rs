@@ -19,7 +19,7 @@ use tokio::{
 };
 
 use super::{
-    seat,
+    connection,
     wire::{self, WireError},
 };
 use crate::{
@@ -193,7 +193,7 @@ struct Left {
     counted_as: u32,
     terminal: u32,
     from: std::sync::Arc<str>,
-    why: seat::Ended,
+    why: connection::ConnectionEnd,
 }
 
 /// All connections to one run of the station.
@@ -206,7 +206,7 @@ struct Connections<'a> {
     strangers: JoinSet<Greeted>,
     /// Those that have not said hello, the oldest first.
     waiting: Vec<(u32, AbortHandle)>,
-    seats: JoinSet<Left>,
+    serving: JoinSet<Left>,
 }
 
 impl Listener {
@@ -227,14 +227,14 @@ impl Listener {
             callers: Callers::new(rustix::process::getuid().as_raw()),
             strangers: JoinSet::new(),
             waiting: Vec::new(),
-            seats: JoinSet::new(),
+            serving: JoinSet::new(),
         };
         loop {
             tokio::select! {
                 biased;
                 ended = snapshots.changed() => if ended.is_err() { break },
                 Some(greeted) = connections.strangers.join_next() => if let Ok(greeted) = greeted { connections.on_greeted(greeted) },
-                Some(left) = connections.seats.join_next() => if let Ok(left) = left { connections.on_left(left) },
+                Some(left) = connections.serving.join_next() => if let Ok(left) = left { connections.on_left(left) },
                 _ = look.tick() => {
                     self.keep();
                     connections.log_left_out();
@@ -324,8 +324,8 @@ impl Connections<'_> {
         if self.callers.may_log(user, now) {
             tracing::info!(terminal, %from, "a terminal has attached");
         }
-        self.seats.spawn(async move {
-            let why = seat::serve(read, write, session, run).await;
+        self.serving.spawn(async move {
+            let why = connection::serve(read, write, session, run).await;
             Left { user, counted_as, terminal, from, why }
         });
     }

@@ -46,7 +46,7 @@ type Never = std::convert::Infallible;
 type Reply = (Told, Vec<OwnedSemaphorePermit>);
 
 /// Serves a terminal until either side ends; says why it ended.
-pub async fn serve<R, W>(read: R, write: W, session: Session, run: u64) -> Ended
+pub async fn serve<R, W>(read: R, write: W, session: Session, run: u64) -> ConnectionEnd
 where
     R: AsyncRead + Unpin,
     W: AsyncWrite + Unpin,
@@ -61,13 +61,13 @@ where
     tokio::select! {
         Err(ended) = asking.run(read) => ended,
         Err(ended) = telling.run(run, answered) => ended,
-        else => Ended::StationGone,
+        else => ConnectionEnd::StationGone,
     }
 }
 
 /// Why a terminal is no longer served.
 #[derive(Debug, thiserror::Error)]
-pub enum Ended {
+pub enum ConnectionEnd {
     /// It closed, or broke the rules.
     #[error("{0}")]
     Wire(#[from] WireError),
@@ -100,7 +100,7 @@ struct Asking {
 
 impl Asking {
     /// Takes one message after the other, no faster than a person asks. What waits, waits in the terminal.
-    async fn run(mut self, mut read: impl AsyncRead + Unpin) -> Result<Never, Ended> {
+    async fn run(mut self, mut read: impl AsyncRead + Unpin) -> Result<Never, ConnectionEnd> {
         let mut pace = Pace::new();
         loop {
             let bytes = wire::read(&mut read, REQUEST_BYTES_MAX).await?;
@@ -185,10 +185,10 @@ struct Telling<W> {
 
 impl<W: AsyncWrite + Unpin> Telling<W> {
     /// Welcome, standing, and then the latest snapshot again and again, but never faster than the terminal reads.
-    async fn run(mut self, run: u64, mut answered: mpsc::Receiver<Reply>) -> Result<Never, Ended> {
+    async fn run(mut self, run: u64, mut answered: mpsc::Receiver<Reply>) -> Result<Never, ConnectionEnd> {
         match timeout(STANDING_MAX, self.session.standing.changed()).await {
             Ok(Ok(())) => {}
-            Ok(Err(_)) => return Err(Ended::SentAway),
+            Ok(Err(_)) => return Err(ConnectionEnd::SentAway),
             Err(_) => tracing::warn!(terminal = self.session.terminal, "a terminal does not hear how it stands"),
         }
         let welcome = Welcome { run, terminal: self.session.terminal, def: self.def.clone() };
@@ -202,12 +202,12 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
                 biased;
                 Some((told, _places)) = answered.recv() => self.tell(&told).await?,
                 changed = self.session.standing.changed() => {
-                    changed.map_err(|_| Ended::SentAway)?;
+                    changed.map_err(|_| ConnectionEnd::SentAway)?;
                     self.tell_standing().await?;
                     due = Some(Instant::now());
                 }
                 changed = self.session.snapshots.changed() => {
-                    changed.map_err(|_| Ended::StationGone)?;
+                    changed.map_err(|_| ConnectionEnd::StationGone)?;
                     let snapshot = self.session.snapshots.borrow_and_update().clone();
                     due = Some(if self.has_news_of_own(&sent, &snapshot) { Instant::now() } else { next });
                 }
@@ -230,10 +230,10 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
     }
 
     /// Tells the latest snapshot, as far as the terminal may see it; gives it back as what was sent.
-    async fn tell_snapshot(&mut self, sent: &Snapshot) -> Result<Arc<Snapshot>, Ended> {
+    async fn tell_snapshot(&mut self, sent: &Snapshot) -> Result<Arc<Snapshot>, ConnectionEnd> {
         let snapshot = self.session.snapshots.borrow_and_update().clone();
         if !Arc::ptr_eq(&snapshot.def, &self.def) {
-            return Err(Ended::OtherPlant);
+            return Err(ConnectionEnd::OtherPlant);
         }
         let view = self.session.standing.borrow().view;
         let seen = if view { snapshot } else { Arc::new(sight::alarms_only(&snapshot)) };
@@ -241,12 +241,12 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
         Ok(seen)
     }
 
-    async fn tell_standing(&mut self) -> Result<(), Ended> {
+    async fn tell_standing(&mut self) -> Result<(), ConnectionEnd> {
         let standing: Standing = self.session.standing.borrow_and_update().as_ref().clone();
         self.tell(&Told::Standing(Box::new(standing))).await
     }
 
-    async fn tell(&mut self, told: &Told) -> Result<(), Ended> {
+    async fn tell(&mut self, told: &Told) -> Result<(), ConnectionEnd> {
         let bytes = match (protocol::encode(told, NEWS_BYTES_MAX), told) {
             (Err(error @ ProtocolError::TooLong { .. }), Told::Answer { ticket, .. }) => {
                 let answer = Err(HistoryError::Engine(format!("{error}; choose a shorter period")));
@@ -258,8 +258,8 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
         self.write(&bytes.map_err(WireError::from)?, max).await
     }
 
-    async fn write(&mut self, bytes: &[u8], max: Duration) -> Result<(), Ended> {
-        timeout(max, wire::write(&mut self.write, bytes)).await.map_err(|_| Ended::Stuck(max))??;
+    async fn write(&mut self, bytes: &[u8], max: Duration) -> Result<(), ConnectionEnd> {
+        timeout(max, wire::write(&mut self.write, bytes)).await.map_err(|_| ConnectionEnd::Stuck(max))??;
         Ok(())
     }
 }
@@ -278,7 +278,7 @@ mod tests {
     use crate::{access::Peer, plant::fixture, station::SessionAcceptor};
 
     /// A terminal that is served: what it writes to, and what the station is asked.
-    fn serving() -> (DuplexStream, mpsc::Receiver<(u32, Request)>, JoinHandle<Ended>) {
+    fn serving() -> (DuplexStream, mpsc::Receiver<(u32, Request)>, JoinHandle<ConnectionEnd>) {
         let (publish, snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
         let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
         let session = acceptor.attach(Peer { from: "test".into(), unix_user: None, own: false });
@@ -316,7 +316,7 @@ mod tests {
         let mut query = next_question(&mut requests).await;
         drop(far);
         assert!(is_cancelled(&mut query).await, "the history still works on it");
-        assert!(matches!(served.await.unwrap(), Ended::Wire(_)));
+        assert!(matches!(served.await.unwrap(), ConnectionEnd::Wire(_)));
     }
 
     #[tokio::test(start_paused = true)]
