@@ -3,7 +3,7 @@
 mod login;
 mod paper;
 mod people;
-mod room;
+mod session_limit;
 mod session;
 pub mod sign;
 mod standing;
@@ -166,7 +166,7 @@ impl AccessControl {
     pub fn open(&mut self, terminal: u32, peer: Peer, at: Timestamp) -> Vec<Effect> {
         let peer = Peer { from: clean(&peer.from).into(), ..peer };
         let (own, mut session) = (peer.own, SessionState::new(peer, at));
-        let mut effects = match self.make_room(&session, at) {
+        let mut effects = match self.admit(&session, at) {
             Ok(effects) => effects,
             Err(why) => {
                 let mut effects = self.refused(&session, "attach", "", &why, at);

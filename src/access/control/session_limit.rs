@@ -1,4 +1,4 @@
-//! Room for terminals: how many may be attached, and which one goes so that another can come.
+//! How many terminals may be attached, and which idle one is closed to admit another.
 
 use std::time::Duration;
 
@@ -6,15 +6,14 @@ use jiff::Timestamp;
 
 use super::{AccessControl, Effect, passed, session::SessionState};
 
-/// A terminal where nobody is logged in and nobody has asked anything for so long makes room for another.
+/// A terminal without login and without a request for so long is closed when another needs its place.
 const IDLE: Duration = Duration::from_secs(600);
-/// One of so many sessions is kept for those who run the station: they must get in when all others are taken.
+/// One of so many sessions is kept for root and the user of the station.
 const KEPT: usize = 8;
 
 impl AccessControl {
-    /// Is there a seat for this one? One user of the operating system gets half of them at most. `Ok` says what must happen
-    /// because of it, `Err` why there is none.
-    pub(super) fn make_room(&mut self, new: &SessionState, at: Timestamp) -> Result<Vec<Effect>, String> {
+    /// Admits a session. One user of the operating system gets at most half of all. `Ok`: the effects; `Err`: why not.
+    pub(super) fn admit(&mut self, new: &SessionState, at: Timestamp) -> Result<Vec<Effect>, String> {
         if new.peer.own {
             return Ok(Vec::new());
         }
@@ -22,18 +21,18 @@ impl AccessControl {
         let host = self.is_host(&new.peer);
         let all = if host { most } else { most - most / KEPT };
         let mut effects = Vec::new();
-        // His own first: who gets no session takes none from others.
+        // Sessions of the same user first: a user at the limit closes none of others.
         if !host {
             let user = &new.origin;
-            let his = |session: &SessionState| session.origin == *user;
-            effects.extend(self.room_among(his, most.div_ceil(2), &format!(" of {user}"), at)?);
+            let of_user = |session: &SessionState| session.origin == *user;
+            effects.extend(self.limit_among(of_user, most.div_ceil(2), &format!(" of {user}"), at)?);
         }
-        effects.extend(self.room_among(|_| true, all, "", at)?);
+        effects.extend(self.limit_among(|_| true, all, "", at)?);
         Ok(effects)
     }
 
-    /// Less than so many of these, after the one that was idle longest has gone if need be.
-    fn room_among(
+    /// Keeps these below `most`: closes the one that was idle longest if necessary.
+    fn limit_among(
         &mut self,
         counts: impl Fn(&SessionState) -> bool,
         most: usize,
@@ -50,7 +49,7 @@ impl AccessControl {
             return Err(format!("{there} terminals{whose} are attached, no more may be"));
         };
         let mut effects = self.close(longest, at);
-        let why = "nobody was logged in here for long, and another terminal needed the room".to_owned();
+        let why = "closed: no login here for a long time, and another terminal needed the session".to_owned();
         effects.push(Effect::HangUp(longest, why));
         Ok(effects)
     }
