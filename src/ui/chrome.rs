@@ -8,7 +8,7 @@ use banner::banner;
 pub use banner::{alarm_words, counts, history_words};
 
 use super::{
-    Cx, Model, SILENCE, Watch,
+    Model, SILENCE, ViewContext, Watch,
     keys::{self, Hint},
     modal::Modal,
     rights,
@@ -79,7 +79,7 @@ pub fn layout(screen: Rect) -> Layout {
 }
 
 /// Draws the whole screen.
-pub fn view(model: &Model, cx: &Cx, frame: &mut Frame) {
+pub fn view(model: &Model, cx: &ViewContext, frame: &mut Frame) {
     let parts = layout(frame.area());
     banner(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.banner));
     if parts.small {
@@ -106,7 +106,7 @@ pub fn view(model: &Model, cx: &Cx, frame: &mut Frame) {
 }
 
 /// All that is left below the banner of a small screen: its size and how to leave.
-fn too_small(model: &Model, cx: &Cx, frame: &mut Frame) {
+fn too_small(model: &Model, cx: &ViewContext, frame: &mut Frame) {
     let area = frame.area();
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (width, height) = SIZE_MIN;
@@ -127,7 +127,7 @@ fn too_small(model: &Model, cx: &Cx, frame: &mut Frame) {
     }
 }
 
-fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {
+fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
     let x = canvas.text(1, 0, "sightglass", theme.dim());
     let start = canvas.text(x + 2, 0, &fit(&cx.def().title, canvas.width() / 3), theme.strong()) + 2;
@@ -149,7 +149,7 @@ fn header(model: &Model, cx: &Cx, canvas: &mut Canvas) {
 
 /// What the header tells, from the right, each with its need: the greatest number is the first to be left out.
 /// The role of who sits here is told where there is room for everything.
-fn header_parts(model: &Model, cx: &Cx, role: bool) -> Vec<(usize, String, Style)> {
+fn header_parts(model: &Model, cx: &ViewContext, role: bool) -> Vec<(usize, String, Style)> {
     let theme = cx.theme;
     let time = if let Some(gone) = model.gone() {
         (0, format!("STATION GONE {} s: reconnecting", gone.as_secs()), theme.trouble())
@@ -186,7 +186,7 @@ fn header_parts(model: &Model, cx: &Cx, role: bool) -> Vec<(usize, String, Style
 }
 
 /// Who sits here: `tech1 TECHNICIAN`, `LOCKED by anna`, and when it will be locked.
-fn who_words(model: &Model, cx: &Cx, role: bool) -> (usize, String, Style) {
+fn who_words(model: &Model, cx: &ViewContext, role: bool) -> (usize, String, Style) {
     let theme = cx.theme;
     let Some(who) = &model.standing.who else { return (9, "not logged in".to_owned(), theme.strong()) };
     let user = fit(&who.user, 12);
@@ -199,7 +199,7 @@ fn who_words(model: &Model, cx: &Cx, role: bool) -> (usize, String, Style) {
 }
 
 /// That nothing here is real, and how much of it is wrong on purpose; an exam does not tell.
-fn demo_words(cx: &Cx, status: &Status) -> (usize, String, Style) {
+fn demo_words(cx: &ViewContext, status: &Status) -> (usize, String, Style) {
     match (status.is_open(), status.in_force.len()) {
         (false, _) => {
             let left = |progress: &Progress| running(progress.duration.saturating_sub(progress.elapsed));
@@ -213,7 +213,7 @@ fn demo_words(cx: &Cx, status: &Status) -> (usize, String, Style) {
 }
 
 /// How the drill ended, once it has.
-fn over_words(cx: &Cx, status: &Status) -> Option<(usize, String, Style)> {
+fn over_words(cx: &ViewContext, status: &Status) -> Option<(usize, String, Style)> {
     let verdict = status.scenario.as_ref().map(|progress| &progress.verdict).filter(|verdict| verdict.over)?;
     Some(if verdict.passed() {
         (5, "drill PASSED: see 8".to_owned(), cx.theme.strong())
@@ -223,7 +223,7 @@ fn over_words(cx: &Cx, status: &Status) -> Option<(usize, String, Style)> {
 }
 
 /// A line in the header: `L1 ▪ tx rx 62 %`, or why it is not connected and when it is tried again.
-fn line_words(cx: &Cx, line: &LineDef) -> (String, Style) {
+fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
     let status = cx.snapshot.line(line.id);
     let counters = &status.counters;
     let recent = |at: Option<jiff::Timestamp>| {
@@ -253,7 +253,7 @@ fn is_overloaded(line: &LineStatus) -> bool {
     line.report.as_ref().is_some_and(|report| report.strain.is_some())
 }
 
-fn tab_bar(model: &Model, cx: &Cx, canvas: &mut Canvas) {
+fn tab_bar(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let name = |tab: Tab| {
         let count = if tab == Tab::Alarms { cx.snapshot.alarms.len() } else { 0 };
         let count = if count > 0 { format!(" {count}") } else { String::new() };
@@ -283,7 +283,7 @@ fn tab_bar(model: &Model, cx: &Cx, canvas: &mut Canvas) {
     }
 }
 
-fn status(model: &Model, cx: &Cx, canvas: &mut Canvas) {
+fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let length = canvas.width();
     canvas.run(0, 0, length, '─', cx.theme.dim());
     if let Some(note) = model.note {
@@ -304,7 +304,7 @@ fn status(model: &Model, cx: &Cx, canvas: &mut Canvas) {
 }
 
 /// An order and how it stands: `TIC-1.SV 60.0 → 70.0 °C verified 13:40:02`.
-pub fn watch_words(cx: &Cx, watch: &Watch) -> (String, Style) {
+pub fn watch_words(cx: &ViewContext, watch: &Watch) -> (String, Style) {
     let theme = cx.theme;
     // As the station took it: a write of what the device can hold.
     let (command, old) = watch.status.as_ref().map_or((&watch.command, None), |status| (&status.command, status.old));
@@ -361,7 +361,7 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
 }
 
 /// What was wished, in words: `TIC-1.SV 60.0 → 70.0 °C`.
-pub fn order_words(cx: &Cx, command: &Command, old: Option<f64>) -> String {
+pub fn order_words(cx: &ViewContext, command: &Command, old: Option<f64>) -> String {
     match command {
         Command::Write { tag, value } => {
             let old = old.map_or("?".to_owned(), |old| cx.snapshot.format(*tag, old));
@@ -397,7 +397,7 @@ pub fn order_words(cx: &Cx, command: &Command, old: Option<f64>) -> String {
 
 /// As many keys as fit; those of every tab stand at the right end.
 /// What whoever sits here may not do stands behind the role that it needs, all of it dim.
-fn footer(cx: &Cx, canvas: &mut Canvas, hints: &[Hint], refused: Option<(Role, Vec<Hint>)>, global: bool) {
+fn footer(cx: &ViewContext, canvas: &mut Canvas, hints: &[Hint], refused: Option<(Role, Vec<Hint>)>, global: bool) {
     let tail: Vec<Hint> = if global {
         keys::hints(keys::GLOBAL).into_iter().filter(|hint| !hint.label.is_empty()).collect()
     } else {
@@ -437,7 +437,7 @@ fn pair(before: &Hint, hint: &Hint) -> Option<Hint> {
     together.then(|| Hint { key: format!("{}{}", before.key, hint.key), ..hint.clone() })
 }
 
-fn key(cx: &Cx, canvas: &mut Canvas, x: u16, hint: &Hint) -> u16 {
+fn key(cx: &ViewContext, canvas: &mut Canvas, x: u16, hint: &Hint) -> u16 {
     let x = canvas.text(x, 0, &hint.key, cx.theme.strong());
     canvas.text(x + 1, 0, &hint.label, cx.theme.dim()) + 2
 }

@@ -10,7 +10,7 @@ use jiff::{SignedDuration, Timestamp};
 
 pub use traffic::more_frames;
 
-use super::{Cx, theme::Theme};
+use super::{ViewContext, theme::Theme};
 use crate::plant::{
     alarm::{AlarmQuality, AlarmState},
     def::*,
@@ -196,9 +196,17 @@ impl Fixture {
 }
 
 /// Calls with a context over this snapshot, at 80x24 in full looks.
-pub fn with_cx<T>(snapshot: &Snapshot, call: impl FnOnce(&Cx) -> T) -> T {
+pub fn with_cx<T>(snapshot: &Snapshot, call: impl FnOnce(&ViewContext) -> T) -> T {
     let area = ratatui::layout::Rect::new(0, 4, 80, 18);
-    call(&Cx { snapshot, theme: &Theme::FULL, now: snapshot.at, phase: 0, area, drill: None, standing: &standing() })
+    call(&ViewContext {
+        snapshot,
+        theme: &Theme::FULL,
+        now: snapshot.at,
+        phase: 0,
+        area,
+        drill: None,
+        standing: &standing(),
+    })
 }
 
 fn start(tag: &str) -> f64 {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use ratatui::style::Style;
 
 use super::{
-    Cx,
+    ViewContext,
     modal::Notice,
     widgets::{text::age, value},
 };
@@ -23,7 +23,7 @@ const DONE_S: f64 = 5.0;
 const FAILED_S: f64 = 60.0;
 
 /// The other of two states, if the tag has two and is in one of them for certain.
-pub fn other_state(cx: &Cx, tag: TagId) -> Option<f64> {
+pub fn other_state(cx: &ViewContext, tag: TagId) -> Option<f64> {
     let (one, other) = two_states(cx.def().tag(tag))?;
     match cx.snapshot.sample(tag).trusted()? {
         now if now == one => Some(other),
@@ -41,12 +41,12 @@ fn two_states(def: &TagDef) -> Option<(f64, f64)> {
 }
 
 /// Is this value of a tag certainly without effect, so that it is not to be sent?
-pub fn is_refused(cx: &Cx, tag: TagId, value: f64) -> bool {
+pub fn is_refused(cx: &ViewContext, tag: TagId, value: f64) -> bool {
     cx.def().guards.refusal(tag, cx.snapshot.held(tag, value), |tag| cx.snapshot.sample(tag)).is_some()
 }
 
 /// All there is to say before a value is written, with its look.
-pub fn before_write(cx: &Cx, tag: TagId, value: f64) -> Vec<(String, Style)> {
+pub fn before_write(cx: &ViewContext, tag: TagId, value: f64) -> Vec<(String, Style)> {
     let gone = Notice::why_unreachable(cx, cx.def().tag(tag).device);
     let gone = gone.map(|why| (format!("! Nothing can be written now. {why}"), cx.theme.trouble()));
     let locks =
@@ -65,7 +65,7 @@ pub fn before_write(cx: &Cx, tag: TagId, value: f64) -> Vec<(String, Style)> {
 }
 
 /// `First TIC-2.UNLOCK := ON; it stays so.`, where a write needs a key that is not certainly turned.
-pub fn key_words(cx: &Cx, tag: TagId) -> Option<String> {
+pub fn key_words(cx: &ViewContext, tag: TagId) -> Option<String> {
     let (key, turned) = cx.def().tag(tag).write_unlock?;
     if cx.snapshot.sample(key).trusted() == Some(turned) {
         return None;
@@ -74,7 +74,7 @@ pub fn key_words(cx: &Cx, tag: TagId) -> Option<String> {
 }
 
 /// `⊘ no heating below 5 cm of water: PLC-1.LT-1 is 3.2 cm`; `None` while it does not block.
-pub fn interlock_words(cx: &Cx, lock: &InterlockDef) -> Option<(String, Style)> {
+pub fn interlock_words(cx: &ViewContext, lock: &InterlockDef) -> Option<(String, Style)> {
     let mark = cx.theme.pick("⊘", "(/)");
     let name = &cx.def().tag(lock.of).name;
     match (lock.standing(cx.snapshot.sample(lock.of)), lock.when) {
@@ -94,12 +94,12 @@ pub fn interlock_words(cx: &Cx, lock: &InterlockDef) -> Option<(String, Style)> 
 }
 
 /// The first state that a command needs and that is not there: the tag, and the state.
-pub fn unmet(cx: &Cx, actuator: &ActuatorDef) -> Option<(TagId, f64)> {
+pub fn unmet(cx: &ViewContext, actuator: &ActuatorDef) -> Option<(TagId, f64)> {
     actuator.needs.iter().find(|(tag, state)| cx.snapshot.sample(*tag).trusted() != Some(*state)).copied()
 }
 
 /// `acts in MANUAL only, and PLC-1.AUTO is AUTO`, for the command of an actuator.
-pub fn unmet_words(cx: &Cx, tag: TagId) -> Option<String> {
+pub fn unmet_words(cx: &ViewContext, tag: TagId) -> Option<String> {
     let actuator = &cx.def().guards.actuators.iter().find(|actuator| actuator.command == tag)?;
     let (need, state) = unmet(cx, actuator)?;
     let now = match cx.snapshot.sample(need).trusted() {
@@ -110,7 +110,7 @@ pub fn unmet_words(cx: &Cx, tag: TagId) -> Option<String> {
 }
 
 /// What starting or stopping a sequence does.
-fn sequence_words(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
+fn sequence_words(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let sequences = &cx.def().guards.sequences;
     if let Some(sequence) = sequences.iter().find(|sequence| sequence.auto == Some((tag, value))) {
         return vec![match (value::is_on(cx, sequence.run), cx.snapshot.text(sequence.step)) {
@@ -140,7 +140,7 @@ fn sequence_words(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
 }
 
 /// `Off go: pump RUN, fill valve OPEN.`
-fn switched_off(cx: &Cx) -> String {
+fn switched_off(cx: &ViewContext) -> String {
     let outputs = cx.def().guards.actuators.iter().map(|actuator| actuator.output);
     let (mut on, mut unknown) = (Vec::new(), Vec::new());
     for output in outputs {
@@ -163,7 +163,7 @@ fn switched_off(cx: &Cx) -> String {
 }
 
 /// What the commands by hand will change at once when this value lets them act.
-fn taken_over(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
+fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let sample = |tag: TagId| cx.snapshot.sample(tag).trusted();
     let acts = |actuator: &&ActuatorDef| {
         let needs =
@@ -198,13 +198,13 @@ fn taken_over(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
 }
 
 /// The latest order for a command.
-fn last_order<'a>(cx: &Cx<'a>, command: TagId) -> Option<&'a OrderStatus> {
+fn last_order<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<&'a OrderStatus> {
     let of_command = |status: &&OrderStatus| status.command.written().is_some_and(|(tag, _)| tag == command);
     cx.snapshot.orders.iter().find(of_command)
 }
 
 /// The latest order for a command, while how it ended is news, and whether it went well.
-fn news<'a>(cx: &Cx<'a>, command: TagId) -> Option<(&'a Outcome, Option<bool>)> {
+fn news<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<(&'a Outcome, Option<bool>)> {
     let status = last_order(cx, command)?;
     let real = Duration::try_from(cx.now.duration_since(status.at)).unwrap_or_default().as_secs_f64();
     let passed = real / cx.snapshot.speed.clamp(0.01, 1e6);
@@ -219,7 +219,7 @@ fn news<'a>(cx: &Cx<'a>, command: TagId) -> Option<(&'a Outcome, Option<bool>)> 
 }
 
 /// The mark of an actuator in the picture, by its output: what does not obey, how the last command went, what is blocked.
-pub fn mark(cx: &Cx, output: TagId) -> Option<(String, Style)> {
+pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
     let theme = cx.theme;
     let guards = &cx.def().guards;
     let (place, actuator) = guards.actuator(output).filter(|(_, actuator)| actuator.output == output)?;
@@ -253,13 +253,13 @@ pub fn mark(cx: &Cx, output: TagId) -> Option<(String, Style)> {
 }
 
 /// Is the output certainly as commanded? One that need not follow its command counts as such.
-fn obeys(cx: &Cx, actuator: &ActuatorDef) -> bool {
+fn obeys(cx: &ViewContext, actuator: &ActuatorDef) -> bool {
     let command = cx.snapshot.sample(actuator.command).trusted().map(|command| command != actuator.off);
     actuator.travel.is_none() || (command.is_some() && value::is_on(cx, actuator.output) == command)
 }
 
 /// What a faceplate says of an actuator: (label, words, look).
-pub fn facts(cx: &Cx, tag: TagId) -> Vec<(&'static str, String, Style)> {
+pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)> {
     let theme = cx.theme;
     let guards = &cx.def().guards;
     let Some((place, actuator)) = guards.actuator(tag) else { return Vec::new() };
@@ -288,6 +288,6 @@ pub fn facts(cx: &Cx, tag: TagId) -> Vec<(&'static str, String, Style)> {
     rows
 }
 
-fn guards_disobeyed(cx: &Cx, place: usize) -> Option<Duration> {
+fn guards_disobeyed(cx: &ViewContext, place: usize) -> Option<Duration> {
     cx.snapshot.watch.disobeys(&cx.def().guards, place, cx.snapshot.at)
 }

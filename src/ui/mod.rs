@@ -94,7 +94,7 @@ pub struct Clock {
 
 /// What every tab, window and widget may read.
 #[derive(Debug, Clone, Copy)]
-pub struct Cx<'a> {
+pub struct ViewContext<'a> {
     /// The plant.
     pub snapshot: &'a Snapshot,
     /// The looks.
@@ -111,7 +111,7 @@ pub struct Cx<'a> {
     pub standing: &'a Standing,
 }
 
-impl<'a> Cx<'a> {
+impl<'a> ViewContext<'a> {
     /// The plant's definition.
     pub fn def(&self) -> &'a PlantDef {
         &self.snapshot.def
@@ -158,7 +158,7 @@ impl Model {
     }
 
     /// What the parts of the terminal may read.
-    pub fn cx(&self) -> Cx<'_> {
+    pub fn cx(&self) -> ViewContext<'_> {
         context(self, self.screen)
     }
 
@@ -246,30 +246,30 @@ pub fn view(model: &Model, frame: &mut Frame) {
 }
 
 /// What the parts of a terminal of this size may read.
-fn context(model: &Model, screen: Rect) -> Cx<'_> {
+fn context(model: &Model, screen: Rect) -> ViewContext<'_> {
     let Model { snapshot, theme, clock, drill, standing, .. } = model;
-    cx_of(snapshot, theme, *clock, screen, drill, standing)
+    view_context(snapshot, theme, *clock, screen, drill, standing)
 }
 
 /// The same of parts of a model, while others of it change.
-fn cx_of<'a>(
+fn view_context<'a>(
     snapshot: &'a Snapshot,
     theme: &'a Theme,
     clock: Clock,
     screen: Rect,
     drill: &'a Option<Arc<drill::Status>>,
     standing: &'a Standing,
-) -> Cx<'a> {
+) -> ViewContext<'a> {
     let ahead = jiff::SignedDuration::from_secs_f64(clock.silent.as_secs_f64() * snapshot.speed.clamp(0.0, 1e6));
     let now = snapshot.at.checked_add(ahead).unwrap_or(snapshot.at);
     let area = chrome::layout(screen).body;
-    Cx { snapshot, theme, now, phase: clock.phase, area, drill: drill.as_deref(), standing }
+    ViewContext { snapshot, theme, now, phase: clock.phase, area, drill: drill.as_deref(), standing }
 }
 
 /// Lets the tabs change while they read the rest of the model.
-fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &Cx) -> Vec<Act>) -> Vec<Act> {
+fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &ViewContext) -> Vec<Act>) -> Vec<Act> {
     let Model { snapshot, theme, clock, drill, standing, screen, tabs, .. } = model;
-    change(tabs, &cx_of(snapshot, theme, *clock, *screen, drill, standing))
+    change(tabs, &view_context(snapshot, theme, *clock, *screen, drill, standing))
 }
 
 fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
@@ -291,7 +291,7 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
     }
     if let Some(modal) = model.modal.take_if(|_| !past) {
         let Model { snapshot, theme, clock, drill, standing, screen, tabs, .. } = model;
-        let cx = cx_of(snapshot, theme, *clock, *screen, drill, standing);
+        let cx = view_context(snapshot, theme, *clock, *screen, drill, standing);
         let (rest, acts) = modal.on_key(&cx, tabs, event);
         model.modal = rest;
         return acts;

@@ -1,6 +1,6 @@
 //! Rights as courtesy: what the one who sits here may not do is said before it is tried. The station decides.
 
-use super::{Cx, keys::Hint, tabs::Tab};
+use super::{ViewContext, keys::Hint, tabs::Tab};
 use crate::{
     access::right,
     plant::{command::Command, role::Role},
@@ -25,12 +25,12 @@ pub fn words(role: Role) -> &'static str {
 }
 
 /// Why whoever sits here may not give this command: `needs Technician, tom is Viewer`.
-pub fn missing(cx: &Cx, command: &Command) -> Option<String> {
+pub fn missing(cx: &ViewContext, command: &Command) -> Option<String> {
     lacks(cx, right::needs(command))
 }
 
 /// The same for a role.
-pub fn lacks(cx: &Cx, role: Role) -> Option<String> {
+pub fn lacks(cx: &ViewContext, role: Role) -> Option<String> {
     match &cx.standing.who {
         None => Some(format!("needs {}; nobody is logged in", title(role))),
         Some(who) if who.role < role => Some(format!("needs {}; {} is {}", title(role), who.user, title(who.role))),
@@ -39,7 +39,7 @@ pub fn lacks(cx: &Cx, role: Role) -> Option<String> {
 }
 
 /// The role that a key of a tab needs, where whoever sits here has a lesser one.
-pub fn of_key(cx: &Cx, tab: Tab, hint: &Hint) -> Option<Role> {
+pub fn of_key(cx: &ViewContext, tab: Tab, hint: &Hint) -> Option<Role> {
     let plants = |hint: &Hint| cx.def().mimic.commands.iter().any(|command| hint.key == command.key.to_string());
     let acts = match tab {
         Tab::Mimic => plants(hint),

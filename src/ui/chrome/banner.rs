@@ -1,6 +1,6 @@
 //! The line of alarms that is on every tab: the most urgent one, how many there are, and why some might not be seen.
 
-use super::{Canvas, Cx, Model, SILENCE, between, fit_words, running, width};
+use super::{Canvas, Model, SILENCE, ViewContext, between, fit_words, running, width};
 use crate::{
     plant::{
         alarm::AlarmState,
@@ -21,7 +21,7 @@ use crate::{
 
 /// The most urgent alarm that waits for an acknowledgement, else trouble of the history, else the most urgent alarm; and
 /// the counts by priority. "No alarms" is said only when alarms could be seen.
-pub(super) fn banner(model: &Model, cx: &Cx, canvas: &mut Canvas) {
+pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let alarms = &cx.snapshot.alarms;
     let urgent = alarms.iter().find(|alarm| alarm.state.needs_acknowledgement());
     let trouble = history_words(cx);
@@ -77,7 +77,7 @@ pub(super) fn banner(model: &Model, cx: &Cx, canvas: &mut Canvas) {
 }
 
 /// Why more may be wrong than can be seen: the station judges nothing, or there is a flood.
-fn worry_words(model: &Model, cx: &Cx) -> String {
+fn worry_words(model: &Model, cx: &ViewContext) -> String {
     let blind = if silent_words(model).is_some() { "alarms not judged   " } else { "" };
     let flood = if cx.snapshot.alarm_quality.flood_since.is_some() { "FLOOD   " } else { "" };
     format!("{blind}{flood}")
@@ -85,7 +85,7 @@ fn worry_words(model: &Model, cx: &Cx) -> String {
 
 /// `3 suppressed`: shelved or out of service. What is suppressed by design is as it should be, and stands
 /// on the alarms tab only.
-fn aside_words(cx: &Cx) -> String {
+fn aside_words(cx: &ViewContext) -> String {
     let by_somebody = cx.snapshot.aside.iter().filter(|aside| aside.state != AlarmState::Suppressed);
     match by_somebody.count() {
         0 => String::new(),
@@ -94,13 +94,13 @@ fn aside_words(cx: &Cx) -> String {
 }
 
 /// Something is active and unacknowledged, and somebody has silenced it.
-fn is_silenced(cx: &Cx) -> bool {
+fn is_silenced(cx: &ViewContext) -> bool {
     let sounds = |alarm: &ActiveAlarm| alarm.state == AlarmState::Unacknowledged;
     !cx.snapshot.sound && cx.snapshot.alarms.iter().any(sounds)
 }
 
 /// Why alarms may be there without being seen: `alarms not judged: L1 disconnected`.
-fn blind_words(model: &Model, cx: &Cx) -> Option<String> {
+fn blind_words(model: &Model, cx: &ViewContext) -> Option<String> {
     let snapshot = cx.snapshot;
     let silent = silent_words(model);
     let lines = cx.def().lines.iter().filter_map(|line| match snapshot.line(line.id).state {
@@ -136,18 +136,18 @@ fn silent_words(model: &Model) -> Option<String> {
 }
 
 /// `history: disk full`; nothing while the history is well.
-pub fn history_words(cx: &Cx) -> Option<String> {
+pub fn history_words(cx: &ViewContext) -> Option<String> {
     cx.snapshot.history.words().map(|words| format!("history: {words}"))
 }
 
 /// `UNACK 00:41  TIC-1.PV temperature high  72.4 °C`.
-pub fn alarm_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
+pub fn alarm_words(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
     let (text, value) = what_words(cx, alarm);
     format!("{}  {text}  {value}", state_words(cx, alarm))
 }
 
 /// `TIC-1.PV temperature high` and `72.4 °C`.
-fn what_words(cx: &Cx, alarm: &ActiveAlarm) -> (String, String) {
+fn what_words(cx: &ViewContext, alarm: &ActiveAlarm) -> (String, String) {
     use crate::plant::def::Subject;
     let def = cx.def().alarm(alarm.id);
     let now = match def.subject {
@@ -160,7 +160,7 @@ fn what_words(cx: &Cx, alarm: &ActiveAlarm) -> (String, String) {
 }
 
 /// `UNACK 00:41`: the state and how long it lasts.
-fn state_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
+fn state_words(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
     let since = match alarm.state {
         AlarmState::Returned | AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
             alarm.returned_at.unwrap_or(alarm.raised_at)
@@ -176,7 +176,7 @@ fn state_words(cx: &Cx, alarm: &ActiveAlarm) -> String {
 }
 
 /// How many of each priority: `[1]!1 (3)2`.
-pub fn counts(cx: &Cx) -> String {
+pub fn counts(cx: &ViewContext) -> String {
     let all =
         [Priority::Critical, Priority::High, Priority::Medium, Priority::Low].into_iter().filter_map(|priority| {
             let count = cx.snapshot.alarms.iter().filter(|alarm| cx.def().alarm(alarm.id).priority == priority).count();

@@ -7,7 +7,7 @@ use super::{Confirm, Modal, Next, confirm::wire_words, window};
 use crate::{
     plant::def::{DeviceId, TagId},
     ui::{
-        Cx, keys,
+        ViewContext, keys,
         widgets::{text::width, value},
     },
 };
@@ -30,7 +30,7 @@ struct Row {
 
 impl Choice {
     /// The values of an enumeration, the present one selected.
-    pub fn values(cx: &Cx, tag: TagId) -> Choice {
+    pub fn values(cx: &ViewContext, tag: TagId) -> Choice {
         let def = cx.def().tag(tag);
         // A state that the device only reports is no choice.
         let range = cx.snapshot.range(tag);
@@ -46,7 +46,7 @@ impl Choice {
     }
 
     /// The actions of a device; `None` if it has none.
-    pub fn actions(cx: &Cx, device: DeviceId) -> Option<Choice> {
+    pub fn actions(cx: &ViewContext, device: DeviceId) -> Option<Choice> {
         let def = cx.def().device(device);
         let rows = def.actions.iter().map(|action| {
             let next = Confirm::action(cx, action.tag, action.value, &action.name, &action.confirm);
@@ -56,7 +56,7 @@ impl Choice {
         (!rows.is_empty()).then(|| Choice { title: format!("actions of {}", def.name), rows, selected: 0 })
     }
 
-    pub(super) fn on_key(mut self, _cx: &Cx, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, _cx: &ViewContext, event: KeyEvent) -> Next {
         let last = self.rows.len().saturating_sub(1);
         match event.code {
             KeyCode::Up => self.selected = self.selected.saturating_sub(1),
@@ -71,7 +71,7 @@ impl Choice {
         Next::Stay(Modal::Choice(self))
     }
 
-    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let shown = usize::from(body.height.saturating_sub(6)).clamp(1, self.rows.len().max(1));
         let first = self.selected.saturating_sub(shown - 1);
         let inner = self.rows.iter().map(|row| width(&row.text)).max().unwrap_or(0).max(46);

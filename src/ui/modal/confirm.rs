@@ -21,7 +21,7 @@ use crate::{
         tool::Tool,
     },
     ui::{
-        Act, Confirmed, Cx, Effect, Leaving, guard, keys, rights,
+        Act, Confirmed, Effect, Leaving, ViewContext, guard, keys, rights,
         tabs::mimic,
         widgets::{
             text::{Canvas, width, wrap},
@@ -88,7 +88,7 @@ impl Confirm {
 
     /// Write this value, as the device will hold it? Old and new value are drawn from the intent, so they cannot differ from
     /// what is sent.
-    pub fn write(cx: &Cx, tag: TagId, value: f64) -> Confirm {
+    pub fn write(cx: &ViewContext, tag: TagId, value: f64) -> Confirm {
         let def = cx.def().tag(tag);
         let rounded = rounded_words(cx, tag, value);
         let value = if rounded.is_some() { cx.snapshot.held(tag, value) } else { value };
@@ -99,14 +99,14 @@ impl Confirm {
     }
 
     /// The same, asked from a faceplate, with words of its own above all others.
-    pub fn from_faceplate(cx: &Cx, tag: TagId, value: f64, words: Option<String>, back: Faceplate) -> Confirm {
+    pub fn from_faceplate(cx: &ViewContext, tag: TagId, value: f64, words: Option<String>, back: Faceplate) -> Confirm {
         let confirm = Confirm::write(cx, tag, value);
         let notes = words.into_iter().chain(confirm.notes).collect();
         Confirm { notes, back: Some(back), ..confirm }
     }
 
     /// A write with words of its own (an action of a device).
-    pub fn action(cx: &Cx, tag: TagId, value: f64, name: &str, words: &str) -> Confirm {
+    pub fn action(cx: &ViewContext, tag: TagId, value: f64, name: &str, words: &str) -> Confirm {
         let confirm = Confirm::write(cx, tag, value);
         let notes = [words.to_owned()].into_iter().chain(confirm.notes).collect();
         Confirm { title: format!("{name} {}", cx.def().device(cx.def().tag(tag).device).name), notes, ..confirm }
@@ -118,7 +118,7 @@ impl Confirm {
     }
 
     /// The same with a signature, where a tag that it writes asks for one.
-    pub fn signed(self, cx: &Cx) -> Confirm {
+    pub fn signed(self, cx: &ViewContext) -> Confirm {
         let sign = match &self.intent {
             Intent::Order(command) => sign::needed(cx.def(), command).map(sign_form),
             Intent::Quit => None,
@@ -179,14 +179,14 @@ impl Confirm {
     }
 
     /// Is it certainly without effect now?
-    pub(super) fn is_refused(&self, cx: &Cx) -> bool {
+    pub(super) fn is_refused(&self, cx: &ViewContext) -> bool {
         match &self.intent {
             Intent::Order(Command::Write { tag, value }) => guard::is_refused(cx, *tag, *value),
             Intent::Order(_) | Intent::Quit => false,
         }
     }
 
-    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         let enter = keys::code(KeyCode::Enter).is(event) && !self.wants_y();
         if self.waiting {
             return Next::Stay(Modal::Confirm(self));
@@ -215,7 +215,7 @@ impl Confirm {
     }
 
     /// Does it, unless something has changed, is missing, or makes it useless.
-    fn yes(mut self, cx: &Cx) -> Next {
+    fn yes(mut self, cx: &ViewContext) -> Next {
         let refused = self.is_refused(cx);
         if refused || self.seen.as_mut().is_some_and(|seen| seen.changed(cx)) {
             return Next::Stay(Modal::Confirm(self));
@@ -272,7 +272,7 @@ impl Confirm {
     }
 
     /// What of the window is below the words: rows of the form and of what is wrong with it.
-    fn view_sign(&self, cx: &Cx, canvas: &mut Canvas, y: u16) {
+    fn view_sign(&self, cx: &ViewContext, canvas: &mut Canvas, y: u16) {
         if let Some(form) = &self.sign {
             form.view(cx, canvas, y);
             let y = y + form.rows();
@@ -286,7 +286,7 @@ impl Confirm {
         }
     }
 
-    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let room = body.width.saturating_sub(8).min(68);
         let mut rows: Vec<(String, Style)> = Vec::new();
         if let Intent::Order(Command::Write { tag, value }) = &self.intent {
@@ -344,7 +344,7 @@ fn signature(form: &Form) -> Signature {
 }
 
 /// `old 60.0 °C → new 70.0 °C`; an unknown old value is said to be unknown.
-pub(super) fn old_and_new(cx: &Cx, tag: TagId, new: f64) -> String {
+pub(super) fn old_and_new(cx: &ViewContext, tag: TagId, new: f64) -> String {
     let new = format!("{} {}", cx.snapshot.format(tag, new), cx.snapshot.unit(tag));
     match cx.def().tag(tag).access {
         Access::Write => format!("writes {}", new.trim_end()),
@@ -371,6 +371,6 @@ pub(super) fn write_notes(def: &TagDef) -> Vec<String> {
 }
 
 /// The name of what an alarm watches.
-pub fn subject(cx: &Cx, alarm: crate::plant::def::AlarmId) -> String {
+pub fn subject(cx: &ViewContext, alarm: crate::plant::def::AlarmId) -> String {
     subject_name(cx.def(), cx.def().alarm(alarm).subject).to_owned()
 }

@@ -7,7 +7,7 @@ use super::{Modal, Next, window};
 use crate::{
     plant::record::ActionRecord,
     ui::{
-        Cx,
+        ViewContext,
         widgets::text::{pad, wrap},
     },
 };
@@ -28,7 +28,7 @@ impl Deed {
     }
 
     /// Name and words of every line that says something.
-    fn lines(&self, cx: &Cx) -> Vec<(&'static str, String)> {
+    fn lines(&self, cx: &ViewContext) -> Vec<(&'static str, String)> {
         let deed = &self.0;
         let told = |words: &Option<std::sync::Arc<str>>| words.as_deref().unwrap_or_default().to_owned();
         let at = deed.at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S %:z").to_string();
@@ -51,7 +51,7 @@ impl Deed {
         lines.into_iter().filter(|(_, words)| !words.is_empty()).collect()
     }
 
-    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let room = body.width.saturating_sub(8).min(76).saturating_sub(NAMES).max(1);
         let lines = self.lines(cx).into_iter().map(|(name, words)| (name, broken(&words, room)));
         let lines: Vec<(&str, Vec<String>)> = lines.collect();

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     plant::{command::Command, def::TagId},
     ui::{
-        Act, Confirmed, Cx, guard, keys, rights,
+        Act, Confirmed, ViewContext, guard, keys, rights,
         widgets::{
             text::{width, wrap},
             value,
@@ -37,11 +37,11 @@ pub struct Entry {
 
 impl Entry {
     /// An empty entry.
-    pub fn new(cx: &Cx, tag: TagId) -> Entry {
+    pub fn new(cx: &ViewContext, tag: TagId) -> Entry {
         Entry { tag, line: Line::default(), problem: None, seen: Seen::new(cx, tag) }
     }
 
-    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Enter).is(event) {
             let checked = match self.line.missed() {
                 true => Err("not all of it was taken; Ctrl-U empties the line".to_owned()),
@@ -84,7 +84,7 @@ impl Entry {
         self.problem = Some(format!("{named} is no part of a number; Ctrl-U empties the line"));
     }
 
-    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let theme = cx.theme;
         let def = cx.def().tag(self.tag);
         let room = body.width.saturating_sub(8).min(64);

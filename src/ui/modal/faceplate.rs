@@ -12,7 +12,7 @@ use crate::{
         tag::{Access, Poll},
     },
     ui::{
-        Cx, guard, keys,
+        ViewContext, guard, keys,
         keys::Hint,
         tabs::mimic,
         widgets::{
@@ -36,7 +36,7 @@ impl Faceplate {
         (!tags.is_empty()).then(|| Faceplate { title: title.into(), tags, selected: 0 })
     }
 
-    pub(super) fn hints(&self, cx: &Cx) -> Vec<Hint> {
+    pub(super) fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         let mut hints = Vec::new();
         if self.tags.len() > 1 {
@@ -58,7 +58,7 @@ impl Faceplate {
         hints
     }
 
-    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         match event.code {
             KeyCode::Up => self.selected = self.selected.saturating_sub(1),
             KeyCode::Down => self.selected = (self.selected + 1).min(self.tags.len() - 1),
@@ -80,14 +80,14 @@ impl Faceplate {
     }
 
     /// The other state of the selected actuator: its command, and the value.
-    fn toggle(&self, cx: &Cx) -> Option<(TagId, f64)> {
+    fn toggle(&self, cx: &ViewContext) -> Option<(TagId, f64)> {
         let command = cx.def().guards.actuator(self.tag())?.1.command;
         Some((command, guard::other_state(cx, command)?))
     }
 
     /// The question for the other state; where the command would have no effect, the question for the state that it needs
     /// comes first, as a step of its own.
-    fn asked(self, cx: &Cx) -> Option<Modal> {
+    fn asked(self, cx: &ViewContext) -> Option<Modal> {
         let (_, actuator) = cx.def().guards.actuator(self.tag())?;
         if let Some(notice) = Notice::unreachable(cx, cx.def().tag(actuator.command).device) {
             return Some(Modal::Notice(notice));
@@ -111,7 +111,7 @@ impl Faceplate {
         Some(Modal::Confirm(confirm))
     }
 
-    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let names = self.tags.iter().map(|tag| width(&cx.def().tag(*tag).name)).max().unwrap_or(0);
         let room = body.width.saturating_sub(8).min(64);
         let details = wrapped(details(cx, self.tag(), room), room.saturating_sub(9));
@@ -154,7 +154,7 @@ fn wrapped(rows: Vec<(&'static str, String, Style)>, room: u16) -> Vec<(&'static
 }
 
 /// What is known about one tag: (label, words, style).
-fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)> {
+fn details(cx: &ViewContext, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)> {
     let (theme, def, sample) = (cx.theme, cx.def().tag(tag), cx.snapshot.sample(tag));
     let quality = match def.access {
         Access::Write => "none: write only".to_owned(),
@@ -210,18 +210,18 @@ fn details(cx: &Cx, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)>
 }
 
 /// What Enter writes for a tag: itself, or the command of an output that is only read.
-fn command_tag(cx: &Cx, tag: TagId) -> Option<TagId> {
+fn command_tag(cx: &ViewContext, tag: TagId) -> Option<TagId> {
     if cx.def().tag(tag).writable() { Some(tag) } else { command_of(cx, tag) }
 }
 
 /// The command of an output that is only read.
-fn command_of(cx: &Cx, tag: TagId) -> Option<TagId> {
+fn command_of(cx: &ViewContext, tag: TagId) -> Option<TagId> {
     let (_, actuator) = cx.def().guards.actuator(tag)?;
     (actuator.output == tag).then_some(actuator.command)
 }
 
 /// How a device stands, in words.
-pub fn device_words(cx: &Cx, device: crate::plant::def::DeviceId) -> String {
+pub fn device_words(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
     let status = cx.snapshot.device(device);
     match status.state {
         DeviceState::Unknown => "not asked yet".to_owned(),
@@ -237,7 +237,7 @@ pub fn device_words(cx: &Cx, device: crate::plant::def::DeviceId) -> String {
 }
 
 /// `, retry in 12 s` for a device that does not answer.
-pub fn retry_words(cx: &Cx, device: crate::plant::def::DeviceId) -> String {
+pub fn retry_words(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
     let report = cx.snapshot.line(cx.def().device(device).line).report.as_ref();
     match report.and_then(|report| report.retry_at(device)) {
         Some(at) if cx.now < at => format!(", retry in {} s", between(cx.now, at).as_secs_f64().ceil()),
@@ -247,7 +247,7 @@ pub fn retry_words(cx: &Cx, device: crate::plant::def::DeviceId) -> String {
 }
 
 /// How a line stands, in words.
-pub fn line_state_words(cx: &Cx, line: crate::plant::def::LineId) -> String {
+pub fn line_state_words(cx: &ViewContext, line: crate::plant::def::LineId) -> String {
     let status = cx.snapshot.line(line);
     match &status.state {
         LineState::Connecting => "connecting".to_owned(),

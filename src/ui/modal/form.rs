@@ -9,7 +9,7 @@ use crate::{
     access::Secret,
     plant::role::Role,
     ui::{
-        Cx, keys,
+        ViewContext, keys,
         widgets::text::{Canvas, pad, width},
     },
 };
@@ -189,7 +189,7 @@ impl Form {
     }
 
     /// Draws it from row `y` on. The line that is typed into has the mark and the cursor.
-    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, y: u16) {
+    pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas, y: u16) {
         let theme = cx.theme;
         for (n, field) in self.fields.iter().enumerate() {
             let (y, here) = (y + n as u16, n == self.at);
@@ -212,7 +212,7 @@ impl Form {
     }
 }
 
-fn draw(cx: &Cx, canvas: &mut Canvas, (x, y): (u16, u16), line: &Line, here: bool) {
+fn draw(cx: &ViewContext, canvas: &mut Canvas, (x, y): (u16, u16), line: &Line, here: bool) {
     if here {
         line.view(cx.theme, canvas, x, y);
     } else if line.text().is_empty() {

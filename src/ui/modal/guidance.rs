@@ -7,7 +7,7 @@ use super::{Faceplate, Modal, Next, window};
 use crate::{
     plant::def::AlarmId,
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         keys::{self, Hint},
         modal::confirm::subject,
         tabs::alarms::{aside_words, guidance},
@@ -41,7 +41,7 @@ impl Guidance {
         plate.into_iter().chain([hint("↑↓", "scroll"), hint("Esc", "close")]).collect()
     }
 
-    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         match event.code {
             KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => {
                 return match self.plate {
@@ -61,7 +61,7 @@ impl Guidance {
     }
 
     /// Every row, wrapped, with its name before the first line.
-    fn lines(&self, cx: &Cx, room: u16) -> Vec<(&'static str, String)> {
+    fn lines(&self, cx: &ViewContext, room: u16) -> Vec<(&'static str, String)> {
         let listed = cx.snapshot.alarms.iter().find(|alarm| alarm.id == self.alarm);
         let aside = cx.snapshot.aside.iter().find(|aside| aside.id == self.alarm);
         let now = aside.map_or("no longer active".to_owned(), |aside| aside_words(cx, aside));
@@ -79,7 +79,7 @@ impl Guidance {
         rows.into_iter().flat_map(lines).collect()
     }
 
-    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let theme = cx.theme;
         let room = room(body);
         let lines = self.lines(cx, room);

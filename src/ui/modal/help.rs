@@ -5,7 +5,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, window};
 use crate::ui::{
-    Cx, keys,
+    ViewContext, keys,
     keys::{Global, Hint},
     tabs::{Tab, Tabs},
     widgets::text::{pad, width},
@@ -22,7 +22,7 @@ pub(super) fn on_key(row: u16, event: KeyEvent) -> Next {
     }
 }
 
-pub(super) fn view(row: u16, cx: &Cx, tabs: &Tabs, frame: &mut Frame, body: Rect) {
+pub(super) fn view(row: u16, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, body: Rect) {
     let own = tabs.hints(cx);
     let offered = Tab::offered(cx);
     let there = keys::GLOBAL.iter().filter(|key| !matches!(key.action, Global::Show(tab) if !offered.contains(&tab)));

@@ -35,7 +35,7 @@ pub use sheet::Sheet;
 pub use why::Why;
 
 use super::{
-    Act, Cx,
+    Act, ViewContext,
     keys::{self, Hint},
     tabs::{Tab, Tabs, bus},
     widgets::text::{Canvas, fit, width},
@@ -91,7 +91,7 @@ pub enum Next {
 impl Modal {
     /// The window in which an operator writes this tag: a list for an enumeration, else a number; `None` if it is
     /// read-only. Where the device cannot be reached the window says so, before anything is typed.
-    pub fn write(cx: &Cx, tag: TagId) -> Option<Modal> {
+    pub fn write(cx: &ViewContext, tag: TagId) -> Option<Modal> {
         let def = cx.def().tag(tag);
         match (def.writable(), Notice::unreachable(cx, def.device), def.labels.is_empty()) {
             (false, ..) => None,
@@ -102,7 +102,7 @@ impl Modal {
     }
 
     /// A key: what is left of the window, and what is to be done.
-    pub fn on_key(self, cx: &Cx, tabs: &mut Tabs, event: KeyEvent) -> (Option<Modal>, Vec<Act>) {
+    pub fn on_key(self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> (Option<Modal>, Vec<Act>) {
         if keys::code(KeyCode::Esc).is(event) {
             let back = match self {
                 Modal::Confirm(confirm) => confirm.back().map(Modal::Faceplate),
@@ -200,7 +200,7 @@ impl Modal {
     }
 
     /// The keys of the moment.
-    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         let mut hints = match self {
             Modal::Help(_) => vec![hint("↑↓", "scroll"), hint("Esc", "close")],
@@ -227,7 +227,7 @@ impl Modal {
     }
 
     /// Draws it in the middle of the body.
-    pub fn view(&self, cx: &Cx, tabs: &Tabs, frame: &mut Frame, body: Rect) {
+    pub fn view(&self, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, body: Rect) {
         match self {
             Modal::Help(row) => help::view(*row, cx, tabs, frame, body),
             Modal::Confirm(confirm) => confirm.view(cx, frame, body),
@@ -248,7 +248,13 @@ impl Modal {
 }
 
 /// A cleared, framed window of this inner size in the middle of the body; drawn smaller where there is no room.
-pub(super) fn window<'a>(cx: &Cx, frame: &'a mut Frame, body: Rect, title: &str, inner: (u16, u16)) -> Canvas<'a> {
+pub(super) fn window<'a>(
+    cx: &ViewContext,
+    frame: &'a mut Frame,
+    body: Rect,
+    title: &str,
+    inner: (u16, u16),
+) -> Canvas<'a> {
     let width = inner.0.max(width(title) + 4).saturating_add(4).min(body.width);
     let height = inner.1.saturating_add(2).min(body.height);
     let area = Rect::new(body.x + (body.width - width) / 2, body.y + (body.height - height) / 2, width, height);

@@ -7,7 +7,7 @@ use super::{Modal, Next, window};
 use crate::{
     plant::{command::Command, def::DeviceId, event::LineState, snapshot::DeviceState},
     ui::{
-        Act, Cx, rights,
+        Act, ViewContext, rights,
         widgets::text::{clock, width, wrap},
     },
 };
@@ -21,7 +21,7 @@ pub struct Notice {
 
 impl Notice {
     /// Why nothing can be written to this device now; `None` if it can be tried.
-    pub fn unreachable(cx: &Cx, device: DeviceId) -> Option<Notice> {
+    pub fn unreachable(cx: &ViewContext, device: DeviceId) -> Option<Notice> {
         let def = cx.def().device(device);
         let why = Notice::why_unreachable(cx, device)?;
         let words = vec![format!("{} is not answering", def.name), why, "Nothing can be written now.".to_owned()];
@@ -29,7 +29,7 @@ impl Notice {
     }
 
     /// The same as one sentence.
-    pub fn why_unreachable(cx: &Cx, device: DeviceId) -> Option<String> {
+    pub fn why_unreachable(cx: &ViewContext, device: DeviceId) -> Option<String> {
         let def = cx.def().device(device);
         let line = &cx.def().line(def.line).name;
         let why = match (&cx.snapshot.line(def.line).state, cx.snapshot.device(device).state) {
@@ -48,7 +48,7 @@ impl Notice {
     }
 
     /// Opens a form that ends in this command, or says why the present user may not give it, before anything is filled in.
-    pub fn or(cx: &Cx, title: &str, command: &Command, window: Modal) -> Act {
+    pub fn or(cx: &ViewContext, title: &str, command: &Command, window: Modal) -> Act {
         Act::Open(match rights::missing(cx, command) {
             Some(why) => Modal::Notice(Notice::new(title, vec![why])),
             None => window,
@@ -67,7 +67,7 @@ impl Notice {
         }
     }
 
-    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let room = body.width.saturating_sub(8).min(64);
         let rows: Vec<String> = self.words.iter().flat_map(|words| wrap(words, room)).collect();
         let inner = rows.iter().map(|row| width(row)).max().unwrap_or(0);

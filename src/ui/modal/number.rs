@@ -7,7 +7,7 @@ use crate::{
         def::{Condition, Level, Subject, TagId},
         scale,
     },
-    ui::{Cx, modal::confirm::subject},
+    ui::{ViewContext, modal::confirm::subject},
 };
 
 /// A step over this share of the range is asked again: more than an operator usually changes at once.
@@ -19,7 +19,7 @@ pub fn is_numeric(c: char) -> bool {
 }
 
 /// The number that is meant if it can be written; else what is wrong with it. Courtesy: the station checks again.
-pub fn check(cx: &Cx, tag: TagId, text: &str) -> Result<f64, String> {
+pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
     let text = text.trim();
     if text.is_empty() {
         return Err("type a number".to_owned());
@@ -51,14 +51,14 @@ pub fn check(cx: &Cx, tag: TagId, text: &str) -> Result<f64, String> {
 }
 
 /// `70.0 → 75.0`, while a number with a sign is typed.
-pub fn relative_words(cx: &Cx, tag: TagId, text: &str) -> Option<String> {
+pub fn relative_words(cx: &ViewContext, tag: TagId, text: &str) -> Option<String> {
     let (Number::Step(by), _) = parse(text.trim())? else { return None };
     let text = |value| cx.snapshot.format(tag, value);
     Some(format!("{} → {}", text(cx.snapshot.sample(tag).trusted()?), text(stepped(cx, tag, by)?)))
 }
 
 /// How to type a change.
-pub fn help(cx: &Cx, tag: TagId) -> String {
+pub fn help(cx: &ViewContext, tag: TagId) -> String {
     match cx.snapshot.range(tag) {
         Some((min, _)) if min < 0.0 => "+5 adds 5, -5 subtracts 5, =-5 sets -5".to_owned(),
         Some(_) | None => "+5 adds 5, -5 subtracts 5".to_owned(),
@@ -66,7 +66,7 @@ pub fn help(cx: &Cx, tag: TagId) -> String {
 }
 
 /// Is a number for this tag asked again in a window of its own? What must be signed is.
-pub fn asks(cx: &Cx, tag: TagId, value: f64) -> bool {
+pub fn asks(cx: &ViewContext, tag: TagId, value: f64) -> bool {
     cx.def().tag(tag).confirm.is_some()
         || sign::needed(cx.def(), &Command::Write { tag, value }).is_some()
         || rounded_words(cx, tag, value).is_some()
@@ -74,7 +74,7 @@ pub fn asks(cx: &Cx, tag: TagId, value: f64) -> bool {
 }
 
 /// `72.3 → the device holds steps of 0.5: 72.5`; `None` where it holds what was typed.
-pub fn rounded_words(cx: &Cx, tag: TagId, value: f64) -> Option<String> {
+pub fn rounded_words(cx: &ViewContext, tag: TagId, value: f64) -> Option<String> {
     let held = cx.snapshot.held(tag, value);
     // A single-precision register is as good as exact.
     let same = (held - value).abs() <= 1e-6 * value.abs().max(1.0);
@@ -83,7 +83,7 @@ pub fn rounded_words(cx: &Cx, tag: TagId, value: f64) -> Option<String> {
 }
 
 /// Why a number that is allowed may still not be what its author meant.
-pub fn worries(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
+pub fn worries(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let text =
         |value: f64| format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)).trim_end().to_owned();
     let step = cx.snapshot.sample(tag).value.map(|now| (value - now).abs());
@@ -107,7 +107,7 @@ pub fn worries(cx: &Cx, tag: TagId, value: f64) -> Vec<String> {
 }
 
 /// The permitted range in words.
-pub fn range_words(cx: &Cx, tag: TagId) -> String {
+pub fn range_words(cx: &ViewContext, tag: TagId) -> String {
     let labels = &cx.def().tag(tag).labels;
     if !labels.is_empty() {
         return format!("range one of {}", labels.len());
@@ -124,7 +124,7 @@ pub fn range_words(cx: &Cx, tag: TagId) -> String {
 }
 
 /// The present value and a step from it.
-fn stepped(cx: &Cx, tag: TagId, by: f64) -> Option<f64> {
+fn stepped(cx: &ViewContext, tag: TagId, by: f64) -> Option<f64> {
     let now = cx.snapshot.sample(tag).trusted()?;
     // As many decimals as are shown: 0.1 + 0.2 is 0.3.
     format!("{:.*}", usize::from(cx.snapshot.decimals[tag.index()]), now + by).parse().ok()

@@ -4,7 +4,7 @@ use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, line::Line, window};
-use crate::ui::{Cx, keys, tabs::Tabs, widgets::text::width};
+use crate::ui::{ViewContext, keys, tabs::Tabs, widgets::text::width};
 
 /// A question with one line for the answer; the shown tab's `on_text` takes it.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +25,7 @@ impl Prompt {
         Prompt { title: title.into(), hint: hint.into(), line: Line::new(text), problem: None }
     }
 
-    pub(super) fn on_key(mut self, cx: &Cx, tabs: &mut Tabs, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Enter).is(event) {
             match tabs.on_text(cx, &self.line.text()) {
                 Ok(acts) => return Next::Do(acts),
@@ -37,7 +37,7 @@ impl Prompt {
         Next::Stay(Modal::Prompt(self))
     }
 
-    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let problem = self.problem.clone().unwrap_or_default();
         let inner = width(&self.hint).max(width(&problem)).max(width(&self.line.text()) + 1).max(40);
         let mut canvas = window(cx, frame, body, &self.title, (inner, 5));

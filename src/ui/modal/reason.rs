@@ -12,7 +12,7 @@ use crate::{
         command::Command,
         def::AlarmId,
     },
-    ui::{Act, Confirmed, Cx, keys, rights, widgets::text::wrap},
+    ui::{Act, Confirmed, ViewContext, keys, rights, widgets::text::wrap},
 };
 
 /// The window.
@@ -82,7 +82,7 @@ impl Reason {
         }
     }
 
-    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         let last = self.choices.len() - 1;
         match event.code {
             KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => return self.finish(cx),
@@ -115,7 +115,7 @@ impl Reason {
         }
     }
 
-    fn finish(mut self, cx: &Cx) -> Next {
+    fn finish(mut self, cx: &ViewContext) -> Next {
         let command = match self.command() {
             Ok(command) => command,
             Err(why) => {
@@ -144,7 +144,7 @@ impl Reason {
         Next::Do(vec![Act::Confirmed(Confirmed { note, ..command.into() })])
     }
 
-    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let theme = cx.theme;
         let room = body.width.saturating_sub(8).min(72);
         let notes: Vec<String> = self.notes.iter().flat_map(|note| wrap(note, room)).collect();

@@ -2,7 +2,7 @@
 
 use crate::{
     plant::{command::Outcome, def::TagId},
-    ui::{Cx, widgets::text::clock},
+    ui::{ViewContext, widgets::text::clock},
 };
 
 /// A value that changes again and again moves by itself (a program, a tuning): to ask for ever would only be in the way.
@@ -20,12 +20,12 @@ pub struct Seen {
 
 impl Seen {
     /// The tag as it stands.
-    pub fn new(cx: &Cx, tag: TagId) -> Seen {
+    pub fn new(cx: &ViewContext, tag: TagId) -> Seen {
         Seen { tag, value: cx.snapshot.sample(tag).value, before: None, asked: 0 }
     }
 
     /// Is it another value than was seen? Then that is what was seen from now on, and its author should be asked again.
-    pub fn changed(&mut self, cx: &Cx) -> bool {
+    pub fn changed(&mut self, cx: &ViewContext) -> bool {
         let now = cx.snapshot.sample(self.tag).trusted();
         // What has become unknown is not another value: the window shows it, and the station checks.
         if now.is_none() || now == self.value || self.asked >= ASKED_MAX {
@@ -38,13 +38,13 @@ impl Seen {
 
     /// The value that a write confirmed now is meant to replace: the one that was shown, also where it is in doubt or gone
     /// by now; the present one where it moves by itself.
-    pub fn shown(&self, cx: &Cx) -> Option<f64> {
+    pub fn shown(&self, cx: &ViewContext) -> Option<f64> {
         let now = cx.snapshot.sample(self.tag).value;
         if self.asked < ASKED_MAX { self.value.or(now) } else { now.or(self.value) }
     }
 
     /// What the window says of a change that its reader may not have noticed; `None` while it is as he saw it.
-    pub fn news(&self, cx: &Cx) -> Option<String> {
+    pub fn news(&self, cx: &ViewContext) -> Option<String> {
         let now = cx.snapshot.sample(self.tag).trusted();
         let other = now.is_some() && now != self.value && self.asked < ASKED_MAX;
         match (other, self.asked) {
@@ -55,7 +55,7 @@ impl Seen {
     }
 
     /// `changed to 65.0 °C by anna 14:02:31 (was 70.0)`.
-    fn words(&self, cx: &Cx, before: Option<f64>, now: Option<f64>) -> String {
+    fn words(&self, cx: &ViewContext, before: Option<f64>, now: Option<f64>) -> String {
         let text = |value: Option<f64>| value.map_or("unknown".to_owned(), |value| cx.snapshot.format(self.tag, value));
         let unit = cx.snapshot.unit(self.tag);
         let by = cx.snapshot.orders.iter().find(|order| {

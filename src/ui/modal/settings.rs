@@ -16,7 +16,7 @@ use crate::{
         snapshot::DeviceState,
     },
     ui::{
-        Act, Cx, keys,
+        Act, ViewContext, keys,
         keys::Hint,
         widgets::text::{Canvas, fit, fit_words, wrap},
     },
@@ -45,7 +45,7 @@ enum Deed {
 
 impl Settings {
     /// The settings in use of a line, to be changed.
-    pub fn new(cx: &Cx, line: LineId) -> Settings {
+    pub fn new(cx: &ViewContext, line: LineId) -> Settings {
         // The speed is what differs most often.
         Settings { line, draft: Draft::of(in_use(cx, line)), row: 2, asking: None, problem: None }.in_range()
     }
@@ -67,7 +67,7 @@ impl Settings {
         hints
     }
 
-    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         let enter = keys::code(KeyCode::Enter).is(event);
         if let Some(deed) = self.asking.take() {
             let yes = enter || keys::char('y').is(event);
@@ -104,7 +104,7 @@ impl Settings {
         }
     }
 
-    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let theme = cx.theme;
         let used = in_use(cx, self.line);
         let fields = self.draft.fields();
@@ -140,7 +140,15 @@ impl Settings {
     }
 
     /// The new value of a field: a text with its cursor, or a choice between arrows; bold where it differs.
-    fn value(&self, cx: &Cx, canvas: &mut Canvas, (x, y): (u16, u16), field: Field, selected: bool, differs: bool) {
+    fn value(
+        &self,
+        cx: &ViewContext,
+        canvas: &mut Canvas,
+        (x, y): (u16, u16),
+        field: Field,
+        selected: bool,
+        differs: bool,
+    ) {
         let theme = cx.theme;
         let words = self.draft.words(field);
         let style = if differs { theme.strong() } else { theme.normal() };
@@ -159,7 +167,7 @@ impl Settings {
     }
 
     /// How the line does with what it uses, and what can be taken back.
-    fn status(&self, cx: &Cx, used: &LineDef, room: u16) -> Vec<(String, Style)> {
+    fn status(&self, cx: &ViewContext, used: &LineDef, room: u16) -> Vec<(String, Style)> {
         let theme = cx.theme;
         let (answer, well) = answers(cx, self.line);
         let style = if well { theme.normal() } else { theme.trouble() };
@@ -175,7 +183,7 @@ impl Settings {
     }
 
     /// The question, or what is wrong; and the keys.
-    fn pinned(&self, cx: &Cx, used: &LineDef, room: u16) -> Vec<(String, Style)> {
+    fn pinned(&self, cx: &ViewContext, used: &LineDef, room: u16) -> Vec<(String, Style)> {
         let theme = cx.theme;
         let (words, style) = match (&self.asking, &self.problem) {
             (Some(deed), _) => (self.question(cx, used, deed), theme.strong()),
@@ -191,7 +199,7 @@ impl Settings {
         rows.chain([(fit_words(keys, room), theme.strong())]).collect()
     }
 
-    fn question(&self, cx: &Cx, used: &LineDef, deed: &Deed) -> String {
+    fn question(&self, cx: &ViewContext, used: &LineDef, deed: &Deed) -> String {
         let restart = "Polling starts anew; values are bad until the devices answer.";
         match deed {
             Deed::Use(new) => format!("Use {}? {restart}", difference(used, new)),
@@ -212,7 +220,7 @@ impl Settings {
         }
     }
 
-    fn ask_use(&self, cx: &Cx) -> Result<Option<Deed>, String> {
+    fn ask_use(&self, cx: &ViewContext) -> Result<Option<Deed>, String> {
         let (used, new) = (in_use(cx, self.line), self.draft.settings()?);
         if new == *used {
             return Err("these are the settings in use; change one first".to_owned());
@@ -220,14 +228,14 @@ impl Settings {
         Ok(Some(Deed::Use(Box::new(new))))
     }
 
-    fn ask_take_back(&mut self, cx: &Cx) -> Result<Option<Deed>, String> {
+    fn ask_take_back(&mut self, cx: &ViewContext) -> Result<Option<Deed>, String> {
         let before = cx.snapshot.line(self.line).settings_before.as_ref();
         let before = before.ok_or("nothing to take back: nobody has tried other settings")?;
         self.draft = Draft::of(before);
         Ok(Some(Deed::TakeBack(Box::new(LineDef::clone(before)))))
     }
 
-    fn ask_save(&self, cx: &Cx) -> Result<Option<Deed>, String> {
+    fn ask_save(&self, cx: &ViewContext) -> Result<Option<Deed>, String> {
         let used = in_use(cx, self.line);
         if self.draft.settings()? != *used {
             return Err("only what is in use is saved: use these settings first (⏎)".to_owned());
@@ -259,7 +267,7 @@ impl Settings {
 const NAME: u16 = 13;
 
 /// The settings that a line works with now.
-fn in_use<'a>(cx: &Cx<'a>, line: LineId) -> &'a LineDef {
+fn in_use<'a>(cx: &ViewContext<'a>, line: LineId) -> &'a LineDef {
     cx.snapshot.line(line).report.as_ref().map_or(cx.def().line(line), |report| &report.settings)
 }
 
@@ -281,7 +289,7 @@ fn whole(settings: &LineDef) -> String {
 }
 
 /// Whether the devices of a line answer, in words, and whether that is well.
-fn answers(cx: &Cx, line: LineId) -> (String, bool) {
+fn answers(cx: &ViewContext, line: LineId) -> (String, bool) {
     let name = &cx.def().line(line).name;
     match &cx.snapshot.line(line).state {
         LineState::Connecting => (format!("{name} is being connected"), true),
@@ -300,7 +308,7 @@ fn answers(cx: &Cx, line: LineId) -> (String, bool) {
 }
 
 /// Why the last wish to save the settings of a line was refused, in full.
-fn not_saved(cx: &Cx, line: LineId) -> Option<String> {
+fn not_saved(cx: &ViewContext, line: LineId) -> Option<String> {
     let saved = cx.snapshot.orders.iter().find(|order| order.command == Command::SaveSettings(line))?;
     match &saved.outcome {
         Outcome::Refused(why) => Some(format!("! {why}")),

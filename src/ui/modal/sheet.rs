@@ -17,7 +17,7 @@ use crate::{
     },
     plant::role::Role,
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         keys::{self, Hint},
         tabs::Tab,
         widgets::text::{Canvas, width, wrap},
@@ -120,7 +120,7 @@ impl Sheet {
     }
 
     /// A key: the wish, once the form is finished and nothing is wrong with it.
-    pub fn press(&mut self, cx: &Cx, event: KeyEvent) -> Option<Wish> {
+    pub fn press(&mut self, cx: &ViewContext, event: KeyEvent) -> Option<Wish> {
         if self.waiting {
             return None;
         }
@@ -147,7 +147,7 @@ impl Sheet {
     }
 
     /// The station's answer; `true` if the sheet has done its work.
-    pub fn answered(&mut self, cx: &Cx, answer: Result<(), String>) -> bool {
+    pub fn answered(&mut self, cx: &ViewContext, answer: Result<(), String>) -> bool {
         (self.waiting, self.number) = (false, 0);
         match answer {
             Ok(()) => return true,
@@ -160,7 +160,7 @@ impl Sheet {
     }
 
     /// What is wished, or what is wrong with the form.
-    fn wish(&mut self, cx: &Cx) -> Result<Wish, String> {
+    fn wish(&mut self, cx: &ViewContext) -> Result<Wish, String> {
         if let Some(why) = self.form.lacking() {
             return Err(why);
         }
@@ -187,7 +187,7 @@ impl Sheet {
     }
 
     /// The password in line `n`, which must stand in the next line too. Courtesy: the station judges it again.
-    fn new_password(&self, cx: &Cx, n: usize) -> Result<Secret, String> {
+    fn new_password(&self, cx: &ViewContext, n: usize) -> Result<Secret, String> {
         let (password, again) = (self.form.secret(n), self.form.secret(n + 1));
         let (chars, least) = (password.0.chars().count(), cx.standing.password_chars_min);
         if password != again {
@@ -199,7 +199,7 @@ impl Sheet {
         Ok(password)
     }
 
-    pub(super) fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         if matches!(self.purpose, Purpose::Unlock(_)) && keys::ctrl('o').is(event) {
             return Next::Do(vec![Act::Show(Tab::Login)]);
         }
@@ -277,7 +277,7 @@ impl Sheet {
         }
     }
 
-    fn words(&self, cx: &Cx) -> Vec<String> {
+    fn words(&self, cx: &ViewContext) -> Vec<String> {
         let least = cx.standing.password_chars_min;
         let rule = format!("A password has at least {least} characters. A phrase is good, in any language, Thai too.");
         let first = "It must be changed at the first login.".to_owned();
@@ -314,12 +314,12 @@ impl Sheet {
     }
 
     /// Seconds that one must still wait, as the station has said.
-    fn wait(&self, cx: &Cx) -> u32 {
+    fn wait(&self, cx: &ViewContext) -> u32 {
         let told = self.problem.as_ref().and_then(|(words, at)| Some((seconds(words)?.1, *at)));
         told.map_or(0, |(wait, at)| wait.saturating_sub(cx.phase.wrapping_sub(at) / 2))
     }
 
-    fn problem_words(&self, cx: &Cx) -> Option<String> {
+    fn problem_words(&self, cx: &ViewContext) -> Option<String> {
         if self.waiting {
             return Some("asking the station …".to_owned());
         }
@@ -336,18 +336,18 @@ impl Sheet {
     }
 
     /// Rows of a sheet in so many columns.
-    fn rows(&self, cx: &Cx, room: u16) -> Vec<(String, Style)> {
+    fn rows(&self, cx: &ViewContext, room: u16) -> Vec<(String, Style)> {
         let told = self.words(cx).into_iter().flat_map(|words| wrap(&words, room));
         told.map(|words| (words, cx.theme.normal())).collect()
     }
 
     /// Rows that all of it takes in so many columns.
-    pub fn height(&self, cx: &Cx, room: u16) -> u16 {
+    pub fn height(&self, cx: &ViewContext, room: u16) -> u16 {
         self.rows(cx, room).len() as u16 + self.form.rows() + 1
     }
 
     /// Draws words, form and answer; returns the rows that it took.
-    pub fn draw(&self, cx: &Cx, canvas: &mut Canvas) -> u16 {
+    pub fn draw(&self, cx: &ViewContext, canvas: &mut Canvas) -> u16 {
         let mut y = 0;
         // Where there is no room for all of it, what must be filled in comes before what there is to read.
         let most = canvas.height().saturating_sub(self.form.rows() + 1);
@@ -366,7 +366,7 @@ impl Sheet {
         y
     }
 
-    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let keys: Vec<String> = self.hints().iter().map(|hint| format!("{} {}", hint.key, hint.label)).collect();
         let keys = cx.theme.enter(&format!("{}   Esc leave", keys.join("   ")));
         let inner = self.form.width().max(width(&keys)).clamp(40, body.width.saturating_sub(8).clamp(40, 72));

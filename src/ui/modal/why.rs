@@ -16,7 +16,7 @@ use super::{Modal, Next, window};
 use crate::{
     plant::def::{DeviceId, TagId},
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         keys::Hint,
         widgets::text::{Canvas, fit_words, width, wrap},
     },
@@ -46,13 +46,13 @@ impl Why {
     }
 
     /// About the tags of something, beginning with the first that is not good.
-    pub fn of_all(cx: &Cx, tags: Vec<TagId>) -> Option<Why> {
+    pub fn of_all(cx: &ViewContext, tags: Vec<TagId>) -> Option<Why> {
         let doubtful = tags.iter().position(|tag| !cx.snapshot.sample(*tag).quality.is_good());
         Why::new(tags, doubtful.unwrap_or(0))
     }
 
     /// About a device as a whole: its first tag that is not good.
-    pub fn of_device(cx: &Cx, device: DeviceId) -> Option<Why> {
+    pub fn of_device(cx: &ViewContext, device: DeviceId) -> Option<Why> {
         Why::of_all(cx, cx.def().tags_of(device).map(|tag| tag.id).collect())
     }
 
@@ -83,7 +83,7 @@ impl Why {
         Next::Stay(Modal::Why(self))
     }
 
-    pub(super) fn view(&self, cx: &Cx, frame: &mut Frame, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let tag = self.tags[self.at];
         let def = cx.def().tag(tag);
         let room = body.width.saturating_sub(4).min(WIDTH_MAX);

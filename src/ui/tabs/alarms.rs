@@ -27,7 +27,7 @@ use crate::{
         snapshot::{ActiveAlarm, AsideAlarm, Snapshot},
     },
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         drawn::Rows,
         keys::{Hint, find},
         modal::{Faceplate, Guidance, Modal, Prompt, Why, faceplate::device_words},
@@ -102,13 +102,13 @@ impl Alarms {
     }
 
     /// The selected alarm of the list: the chosen one while it is there, else the first; none on other pages.
-    pub fn selected<'a>(&self, cx: &Cx<'a>) -> Option<&'a ActiveAlarm> {
+    pub fn selected<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a ActiveAlarm> {
         let rows = self.rows(cx);
         rows.get(self.place(&rows)).map(|row| row.alarm)
     }
 
     /// The list that keys act on.
-    pub fn drawn_rows(&self, cx: &Cx) -> Rows {
+    pub fn drawn_rows(&self, cx: &ViewContext) -> Rows {
         match self.page {
             Page::Active | Page::System => {
                 let rows = self.rows(cx);
@@ -131,13 +131,13 @@ impl Alarms {
     }
 
     /// The alarms that the filter lets through, in order of urgency; `None` on pages without a list of them.
-    pub fn listed<'a>(&self, cx: &Cx<'a>) -> Option<Vec<&'a ActiveAlarm>> {
+    pub fn listed<'a>(&self, cx: &ViewContext<'a>) -> Option<Vec<&'a ActiveAlarm>> {
         let list = matches!(self.page, Page::Active | Page::System);
         list.then(|| self.of_page(cx).filter(|alarm| self.filter.holds(cx, alarm)).collect())
     }
 
     /// A key of the page.
-    pub fn on_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
         let Some(action) = find(&keys::table(self.page), event) else { return Vec::new() };
         let alarm = self.selected(cx);
         match action {
@@ -176,7 +176,7 @@ impl Alarms {
     }
 
     /// The words that were typed.
-    pub fn on_text(&mut self, cx: &Cx, text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<Act>, String> {
         match self.page {
             Page::Active | Page::System => self.filter.type_words(text),
             Page::Journal => self.journal.search(cx, text)?,
@@ -196,7 +196,7 @@ impl Alarms {
     }
 
     /// The keys of the page; what cannot be done with the selected row is left to the help.
-    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let alarm = self.selected(cx);
         let can = |label: &str| match label {
             "reset" => alarm.is_some_and(|alarm| {
@@ -221,7 +221,7 @@ impl Alarms {
     }
 
     /// News, or time has passed: the page that needs the history asks for it.
-    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
         let there = |began: &Timestamp| {
             cx.snapshot.alarms.iter().any(|alarm| alarm.burst.is_some_and(|burst| burst.began == *began))
         };
@@ -240,7 +240,7 @@ impl Alarms {
     }
 
     /// The history answered question `number`; an answer to an older one is ignored.
-    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
         self.journal.on_answer(cx, number, &answer);
         self.quality.on_answer(cx, number, &answer);
         self.handover.on_answer(cx, number, &answer);
@@ -248,19 +248,19 @@ impl Alarms {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         view::draw(self, cx, frame, area);
     }
 }
 
 impl Alarms {
     /// The alarms that the page is about.
-    fn of_page<'a>(&self, cx: &Cx<'a>) -> impl Iterator<Item = &'a ActiveAlarm> {
+    fn of_page<'a>(&self, cx: &ViewContext<'a>) -> impl Iterator<Item = &'a ActiveAlarm> {
         let (def, page, snapshot) = (cx.def(), self.page, cx.snapshot);
         snapshot.alarms.iter().filter(move |alarm| is_on(page, def.alarm(alarm.id)))
     }
 
-    fn rows<'a>(&self, cx: &Cx<'a>) -> Vec<list::Row<'a>> {
+    fn rows<'a>(&self, cx: &ViewContext<'a>) -> Vec<list::Row<'a>> {
         let listed = self.listed(cx).unwrap_or_default();
         list::rows(cx.def(), listed.into_iter(), &self.unfolded)
     }
@@ -270,7 +270,7 @@ impl Alarms {
     }
 
     /// Rows of the list that the screen has room for.
-    fn page_rows(&self, cx: &Cx) -> usize {
+    fn page_rows(&self, cx: &ViewContext) -> usize {
         match self.page {
             Page::Active | Page::System | Page::Aside => view::room(cx, cx.area.width, cx.area.height),
             Page::Journal | Page::Quality | Page::Handover => usize::from(cx.area.height.saturating_sub(3)).max(1),
@@ -278,25 +278,25 @@ impl Alarms {
     }
 
     /// The alarms whose rows are on the screen.
-    fn seen<'a>(&self, cx: &Cx<'a>) -> Vec<&'a ActiveAlarm> {
+    fn seen<'a>(&self, cx: &ViewContext<'a>) -> Vec<&'a ActiveAlarm> {
         let rows = self.rows(cx);
         let room = self.page_rows(cx);
         let first = view::first(self.place(&rows), room);
         rows.into_iter().skip(first).take(room).map(|row| row.alarm).collect()
     }
 
-    fn aside<'a>(&self, cx: &Cx<'a>) -> Option<&'a AsideAlarm> {
+    fn aside<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a AsideAlarm> {
         let snapshot = cx.snapshot;
         let place = snapshot.aside.iter().position(|aside| Some(aside.id) == self.selected).unwrap_or(0);
         snapshot.aside.get(place).filter(|_| self.page == Page::Aside)
     }
 
     /// The alarm that the keys of the page are about.
-    fn target(&self, cx: &Cx) -> Option<AlarmId> {
+    fn target(&self, cx: &ViewContext) -> Option<AlarmId> {
         self.selected(cx).map(|alarm| alarm.id).or_else(|| self.aside(cx).map(|aside| aside.id))
     }
 
-    fn step(&mut self, cx: &Cx, by: isize) {
+    fn step(&mut self, cx: &ViewContext, by: isize) {
         let ids: Vec<AlarmId> = match self.page {
             Page::Active | Page::System => self.rows(cx).iter().map(|row| row.alarm.id).collect(),
             Page::Aside => cx.snapshot.aside.iter().map(|aside| aside.id).collect(),
@@ -314,7 +314,7 @@ impl Alarms {
     }
 
     /// Shows what is folded under the selected alarm, or folds the burst that it belongs to.
-    fn fold(&mut self, cx: &Cx) {
+    fn fold(&mut self, cx: &ViewContext) {
         let Some(burst) = self.selected(cx).and_then(|alarm| alarm.burst) else { return };
         match self.unfolded.iter().position(|began| *began == burst.began) {
             Some(place) => drop(self.unfolded.remove(place)),
@@ -328,7 +328,7 @@ impl Alarms {
         }
     }
 
-    fn shift(&mut self, cx: &Cx, by: isize) {
+    fn shift(&mut self, cx: &ViewContext, by: isize) {
         match self.page {
             Page::Journal => self.journal.shift(cx, by),
             Page::Quality => self.quality.shift(cx, by),
@@ -337,7 +337,7 @@ impl Alarms {
         }
     }
 
-    fn turn_to_journal(&mut self, cx: &Cx) {
+    fn turn_to_journal(&mut self, cx: &ViewContext) {
         if self.page == Page::Journal {
             self.page = Page::Active;
             return;
@@ -358,7 +358,7 @@ impl Alarms {
     }
 
     /// Leads to what the alarm watches.
-    fn go(&self, cx: &Cx, action: Action) -> Vec<Act> {
+    fn go(&self, cx: &ViewContext, action: Action) -> Vec<Act> {
         let Some(id) = self.target(cx) else { return Vec::new() };
         let raised = self.selected(cx).map_or(cx.now, |alarm| alarm.raised_at);
         match (cx.def().alarm(id).subject, action) {
@@ -392,7 +392,7 @@ fn is_on(page: Page, def: &crate::plant::def::AlarmDef) -> bool {
     }
 }
 
-fn faceplate(cx: &Cx, subject: Subject) -> Option<Faceplate> {
+fn faceplate(cx: &ViewContext, subject: Subject) -> Option<Faceplate> {
     match subject {
         Subject::Tag(tag) => Faceplate::new(cx.def().tag(tag).label.clone(), vec![tag]),
         Subject::Device(device) => {

@@ -33,7 +33,7 @@ use crate::{
         snapshot::{DeviceState, LineStatus, Snapshot},
     },
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         drawn::Rows,
         keys::{self, Hint, Key, char, code},
         modal::{Modal, Notice, Settings},
@@ -194,7 +194,7 @@ impl Bus {
     }
 
     /// Any key: first those of the page, then those of every page.
-    pub fn on_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
         let action = keys::find(page_keys(self.page), event).or_else(|| keys::find(KEYS, event));
         let (Some(action), Some(at)) = (action, Place::of(cx, self.line)) else { return Vec::new() };
         let screen = isize::try_from(self.room(cx)).unwrap_or(1).max(2) - 1;
@@ -228,13 +228,13 @@ impl Bus {
     }
 
     /// Esc: frames that were held still run on, `false` where there is no step back.
-    pub fn back(&mut self, cx: &Cx) -> bool {
+    pub fn back(&mut self, cx: &ViewContext) -> bool {
         self.frames.dismiss();
         Place::of(cx, self.line).is_some_and(|at| self.page == Page::Frames && self.frames.back(cx, &at))
     }
 
     /// The list that keys act on.
-    pub fn drawn_rows(&self, cx: &Cx) -> Rows {
+    pub fn drawn_rows(&self, cx: &ViewContext) -> Rows {
         match (self.page, Place::of(cx, self.line)) {
             (Page::Plan, Some(at)) => self.plan.drawn_rows(&at),
             (Page::Frames, Some(_)) => self.frames.drawn_rows(),
@@ -243,7 +243,7 @@ impl Bus {
     }
 
     /// The keys of the moment.
-    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let mut hints = keys::hints(page_keys(self.page));
         if self.page == Page::Test && !Place::of(cx, self.line).is_some_and(|at| at.is_testing()) {
             for hint in hints.iter_mut().filter(|hint| hint.label == "stop") {
@@ -259,7 +259,7 @@ impl Bus {
     }
 
     /// News: frames that run are taken in now and then.
-    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
         if let (Page::Frames, Some(at)) = (self.page, Place::of(cx, self.line)) {
             self.frames.follow(cx, &at);
         }
@@ -277,14 +277,14 @@ impl Bus {
     }
 
     /// The history has answered. Without an answer the day before is left as it was.
-    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
         if let (Some(_), Ok(Answer::LineMinutes(minutes))) = (self.errand.answered(number, cx.steady()), answer) {
             self.minutes = minutes;
         }
     }
 
     /// A filter was typed.
-    pub fn on_text(&mut self, _cx: &Cx, text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, _cx: &ViewContext, text: &str) -> Result<Vec<Act>, String> {
         self.frames.set_filter(text).map(|()| Vec::new())
     }
 
@@ -299,7 +299,7 @@ impl Bus {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let Some(at) = Place::of(cx, self.line) else {
             canvas.text(1, 1, "this plant has no lines", cx.theme.normal());
@@ -323,12 +323,12 @@ impl Bus {
 
 impl Bus {
     /// Rows that a page has below the heading.
-    fn room(&self, cx: &Cx) -> usize {
+    fn room(&self, cx: &ViewContext) -> usize {
         usize::from(cx.area.height.saturating_sub(1))
     }
 
     /// How the line did over the last day, below the rows where there is room for it.
-    fn day(&self, cx: &Cx, page: &mut Canvas, rows: u16) {
+    fn day(&self, cx: &ViewContext, page: &mut Canvas, rows: u16) {
         let (width, height) = (page.width(), page.height());
         if height < rows + DAY_HEIGHT {
             return;
@@ -339,7 +339,7 @@ impl Bus {
     }
 
     /// So many lines on, around the end.
-    fn choose_line(&mut self, cx: &Cx, by: isize) {
+    fn choose_line(&mut self, cx: &ViewContext, by: isize) {
         let count = cx.def().lines.len().max(1) as isize;
         self.line = LineId((self.line.index() as isize + by).rem_euclid(count) as u16);
         (self.first, self.plan) = (0, plan::Plan::default());
@@ -349,7 +349,7 @@ impl Bus {
         self.errand = Errand::default();
     }
 
-    fn scroll(&mut self, cx: &Cx, at: &Place, by: isize) {
+    fn scroll(&mut self, cx: &ViewContext, at: &Place, by: isize) {
         match self.page {
             Page::Line if by.abs() == 1 && 1 < cx.def().lines.len() => self.choose_line(cx, by),
             Page::Line => {
@@ -362,7 +362,7 @@ impl Bus {
         }
     }
 
-    fn open(&mut self, cx: &Cx, at: &Place) -> Vec<Act> {
+    fn open(&mut self, cx: &ViewContext, at: &Place) -> Vec<Act> {
         match self.page {
             Page::Line => Vec::new(),
             Page::Plan => self.plan.open(at).into_iter().collect(),
@@ -372,7 +372,7 @@ impl Bus {
     }
 
     /// The pages, and the line with its state.
-    fn heading(&self, cx: &Cx, at: &Place, canvas: &mut Canvas) {
+    fn heading(&self, cx: &ViewContext, at: &Place, canvas: &mut Canvas) {
         let mut x = 1;
         for page in Page::ALL {
             let shown = page == self.page;
@@ -405,7 +405,7 @@ pub struct Place<'a> {
 }
 
 impl<'a> Place<'a> {
-    fn of(cx: &Cx<'a>, id: LineId) -> Option<Place<'a>> {
+    fn of(cx: &ViewContext<'a>, id: LineId) -> Option<Place<'a>> {
         let def = cx.def().lines.get(id.index())?;
         let status = cx.snapshot.lines.get(id.index())?;
         let report = status.report.as_deref();
@@ -419,7 +419,7 @@ impl<'a> Place<'a> {
 }
 
 /// The devices that do not answer are asked at once: those of a line, or of all.
-pub fn retry(cx: &Cx, line: Option<LineId>) -> Vec<Act> {
+pub fn retry(cx: &ViewContext, line: Option<LineId>) -> Vec<Act> {
     let silent = |device: &&DeviceDef| match cx.snapshot.device(device.id).state {
         DeviceState::Failing(_) | DeviceState::Down { .. } => line.is_none_or(|line| line == device.line),
         DeviceState::Unknown | DeviceState::Answering => false,
@@ -428,7 +428,7 @@ pub fn retry(cx: &Cx, line: Option<LineId>) -> Vec<Act> {
 }
 
 /// `connected since 13:02:11`, `DOWN 00:12: No such file or directory, next try in 4s`.
-fn state_words(cx: &Cx, at: &Place) -> String {
+fn state_words(cx: &ViewContext, at: &Place) -> String {
     let zone = &cx.def().time_zone;
     let since = at
         .status

@@ -40,7 +40,7 @@ use crate::{
         snapshot::Snapshot,
     },
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         drawn::Rows,
         keys::{Hint, find, hints},
         modal::{Confirm, Faceplate, Modal, Prompt},
@@ -128,14 +128,14 @@ impl Controllers {
     }
 
     /// Shows the device of a tag with the tag selected.
-    pub fn show_parameter(&mut self, cx: &Cx, tag: TagId) {
+    pub fn show_parameter(&mut self, cx: &ViewContext, tag: TagId) {
         let device = cx.def().tag(tag).device;
         self.show(device);
         self.table.selected = self.table.rows(cx, device).iter().position(|row| row.id == tag).unwrap_or(0);
     }
 
     /// Esc: a step back, `false` where there is none.
-    pub fn back(&mut self, cx: &Cx) -> bool {
+    pub fn back(&mut self, cx: &ViewContext) -> bool {
         let page = std::mem::replace(&mut self.page, Page::List);
         let alone = cx.def().devices.len() <= 1;
         self.page = match page {
@@ -159,7 +159,7 @@ impl Controllers {
     }
 
     /// The list that keys act on: devices, parameters and steps stand where the plant file has them, sets come and go.
-    pub fn drawn_rows(&self, cx: &Cx) -> Rows {
+    pub fn drawn_rows(&self, cx: &ViewContext) -> Rows {
         match (&self.page, cx.def().devices.get(self.device.index())) {
             (Page::Sets, Some(device)) => {
                 Rows::of(sets::sources(cx, device).iter().map(|source| source.words(cx)), self.set)
@@ -171,7 +171,7 @@ impl Controllers {
     }
 
     /// A key of the page.
-    pub fn on_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
         let Some(action) = find(page_keys(&self.page), event) else { return Vec::new() };
         let Some(device) = cx.def().devices.get(self.device.index()) else { return Vec::new() };
         match action {
@@ -248,14 +248,14 @@ impl Controllers {
         }
     }
 
-    fn step_device(&mut self, cx: &Cx, by: isize) -> Vec<Act> {
+    fn step_device(&mut self, cx: &ViewContext, by: isize) -> Vec<Act> {
         let count = cx.def().devices.len() as isize;
         let next = DeviceId((self.device.0 as isize + by).rem_euclid(count) as u16);
         self.show(next);
         self.on_snapshot(cx)
     }
 
-    fn move_by(&mut self, cx: &Cx, device: &DeviceDef, by: isize) -> Vec<Act> {
+    fn move_by(&mut self, cx: &ViewContext, device: &DeviceDef, by: isize) -> Vec<Act> {
         match &mut self.page {
             Page::List => {
                 let last = cx.def().devices.len().saturating_sub(1);
@@ -278,7 +278,7 @@ impl Controllers {
     }
 
     /// Enter: what is selected is opened, edited or written.
-    fn open(&mut self, cx: &Cx, device: &DeviceDef) -> Vec<Act> {
+    fn open(&mut self, cx: &ViewContext, device: &DeviceDef) -> Vec<Act> {
         match &self.page {
             Page::List => {
                 self.show(device.id);
@@ -309,7 +309,7 @@ impl Controllers {
         }
     }
 
-    fn in_compare(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+    fn in_compare(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
         let Page::Compare(compare) = &mut self.page else { return Vec::new() };
         match (action, &compare.source) {
             (Action::All, _) => compare.all = !compare.all,
@@ -328,7 +328,7 @@ impl Controllers {
     }
 
     /// The keys of the moment.
-    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let mut hints = hints(page_keys(&self.page));
         let device = cx.def().devices.get(self.device.index());
         let lacks = |label: &str| {
@@ -357,7 +357,7 @@ impl Controllers {
     }
 
     /// News, or time has passed: the small trend is asked for now and then.
-    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
         let plate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
         let Some(plate) = plate.filter(|_| self.page == Page::Device) else { return Vec::new() };
         if !self.errand.due(cx.steady(), TREND_EVERY, PATIENCE) {
@@ -376,14 +376,14 @@ impl Controllers {
     }
 
     /// The history has answered.
-    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
         if let (Some(_), Ok(Answer::Series(series))) = (self.errand.answered(number, cx.steady()), answer) {
             self.trend = series.into_iter().next();
         }
     }
 
     /// Words to find, or the name of a set.
-    pub fn on_text(&mut self, cx: &Cx, text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<Act>, String> {
         let text = text.trim();
         match self.asked_for {
             Asked::Filter => {
@@ -408,7 +408,7 @@ impl Controllers {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let Some(device) = cx.def().devices.get(self.device.index()) else {
             canvas.text(1, 1, "this plant has no devices", cx.theme.normal());

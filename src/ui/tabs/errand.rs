@@ -8,7 +8,7 @@ const REST: i32 = 4;
 /// where it cannot.
 const LOST: i32 = 4;
 
-/// One kind of question of a tab. All times are steady, see [`Cx::steady`](crate::ui::Cx::steady).
+/// One kind of question of a tab. All times are steady, see [`ViewContext::steady`](crate::ui::ViewContext::steady).
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Errand {
     on_way: Option<(u32, Timestamp)>,

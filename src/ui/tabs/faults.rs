@@ -16,7 +16,7 @@ use crate::{
         faults::{Fault, Place},
     },
     ui::{
-        Act, Cx, Effect,
+        Act, Effect, ViewContext,
         drawn::Rows,
         keys::{self, Hint, Key, char, code},
         rights,
@@ -80,7 +80,7 @@ pub const KEYS: &[Key<Action>] = &[
 
 impl Faults {
     /// A key.
-    pub fn on_key(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
         let Some(status) = open(cx) else { return Vec::new() };
         let rows = rows(status);
         let Some((place, offered)) = rows.get(self.selected.min(rows.len().saturating_sub(1))).copied() else {
@@ -112,7 +112,7 @@ impl Faults {
     }
 
     /// The list that keys act on, and what of it is in force.
-    pub fn drawn_rows(&self, cx: &Cx) -> Rows {
+    pub fn drawn_rows(&self, cx: &ViewContext) -> Rows {
         let Some(status) = open(cx) else { return Rows::default() };
         let rows = rows(status);
         let seen = |(place, fault): &(Place, Fault)| {
@@ -130,20 +130,20 @@ impl Faults {
     }
 
     /// Its keys; points are there only in a drill.
-    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let drill = cx.drill.is_some_and(|status| status.scenario.is_some());
         let there = KEYS.iter().filter(|key| drill || key.action != Action::Verdict).copied();
         keys::hints(&there.collect::<Vec<_>>())
     }
 
     /// Draws.
-    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         view::view(self, cx, frame, area);
     }
 }
 
 /// What may be told of the simulation, if anything may.
-fn open<'a>(cx: &Cx<'a>) -> Option<&'a Status> {
+fn open<'a>(cx: &ViewContext<'a>) -> Option<&'a Status> {
     cx.drill.filter(|status| status.is_open())
 }
 
@@ -152,7 +152,7 @@ fn rows(status: &Status) -> Vec<(Place, Fault)> {
 }
 
 /// A silent device may answer again: it is asked at once, if the present user may do that.
-fn cleared(cx: &Cx, command: SimCommand) -> Vec<Act> {
+fn cleared(cx: &ViewContext, command: SimCommand) -> Vec<Act> {
     let allowed = |act: &Act| matches!(act, Act::Order(command) if rights::missing(cx, command).is_none());
     send(command).into_iter().chain(bus::retry(cx, None).into_iter().filter(allowed)).collect()
 }

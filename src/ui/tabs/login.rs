@@ -12,7 +12,7 @@ use super::Tab;
 use crate::{
     access::{Standing, Wish, wish::Secret},
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         keys::{self, Hint, Key, char},
         modal::sheet::{Purpose, Sheet},
     },
@@ -58,7 +58,7 @@ pub struct Login {
 
 impl Login {
     /// A key: the form has all of them while there is one.
-    pub fn on_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
         let Some(sheet) = &mut self.sheet else {
             return keys::find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default();
         };
@@ -69,7 +69,7 @@ impl Login {
         vec![Act::Wish(Tab::Login, wish)]
     }
 
-    fn act(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
         if cx.standing.who.is_none() {
             return Vec::new();
         }
@@ -106,7 +106,7 @@ impl Login {
     }
 
     /// Somebody came, went, or has something else to do here.
-    pub fn on_standing(&mut self, cx: &Cx) {
+    pub fn on_standing(&mut self, cx: &ViewContext) {
         let standing = cx.standing;
         let user = standing.who.as_ref().map(|who| &who.user);
         if self.since.as_ref().map(|(user, _)| user) != user {
@@ -136,7 +136,7 @@ impl Login {
     }
 
     /// The station's answer to the last wish.
-    pub fn on_granted(&mut self, cx: &Cx, answer: Result<(), String>) {
+    pub fn on_granted(&mut self, cx: &ViewContext, answer: Result<(), String>) {
         match &mut self.sheet {
             Some(sheet) if sheet.is_waiting() => {
                 if answer.is_err() {
@@ -156,7 +156,7 @@ impl Login {
     }
 
     /// The keys of the moment.
-    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let Some(sheet) = &self.sheet else { return keys::hints(KEYS) };
         let leads = if self.changing || cx.standing.view || cx.standing.locked { "back" } else { "clear" };
         let quit = Hint::new("Ctrl-C", "quit", "");
@@ -164,7 +164,7 @@ impl Login {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         view::draw(self, cx, frame, area);
     }
 }

@@ -12,7 +12,7 @@ use crate::{
         snapshot::Snapshot,
     },
     ui::{
-        Act, Cx, guard,
+        Act, ViewContext, guard,
         keys::{self, Hint, Key, char, code},
         modal::{Choice, Confirm, Faceplate, Modal, Notice, Why},
         widgets::{
@@ -84,7 +84,7 @@ impl Mimic {
     }
 
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
         let items = &cx.def().mimic.items;
         match action {
             Action::Move(dx, dy) if list::is_shown(cx, cx.area) => {
@@ -112,18 +112,18 @@ impl Mimic {
     }
 
     /// Selects the first item that shows one of these tags; none if the picture has none of them.
-    pub fn select(&mut self, cx: &Cx, wanted: &[TagId]) {
+    pub fn select(&mut self, cx: &ViewContext, wanted: &[TagId]) {
         let shows = |item: &MimicItem| tags(cx, item).iter().any(|tag| wanted.contains(tag));
         self.selected = cx.def().mimic.items.iter().position(shows);
     }
 
     /// A key that the plant file defines: a window with the finished intent.
-    pub fn on_command_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+    pub fn on_command_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
         command_of(cx, event).map(Act::Open).into_iter().collect()
     }
 
     /// The plant's keys first: they are what the tab is for.
-    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let commands = cx.def().mimic.commands.iter();
         let commands =
             commands.map(|command| Hint::new(command.key, &command.label, format!("{} (asks first)", command.label)));
@@ -131,7 +131,7 @@ impl Mimic {
     }
 
     /// News, or time has passed: the small trends are asked again now and then.
-    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
         if self.trends.is_empty() || self.asked_at.is_some_and(|at| cx.phase.wrapping_sub(at) < TREND_TICKS) {
             return Vec::new();
         }
@@ -164,7 +164,7 @@ impl Mimic {
     }
 
     /// The history answered question `number`.
-    pub fn on_answer(&mut self, _cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+    pub fn on_answer(&mut self, _cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
         let first = self.asked.wrapping_mul(self.trends.len() as u32);
         let place = number.wrapping_sub(first) as usize;
         if let Some((_, series)) = self.trends.get_mut(place) {
@@ -185,7 +185,7 @@ impl Mimic {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let items = &cx.def().mimic.items;
         if list::is_shown(cx, area) {
@@ -223,7 +223,7 @@ impl Mimic {
         }
     }
 
-    fn item(&self, cx: &Cx, canvas: &mut Canvas, item: &MimicItem, n: usize, stretch: Stretch) {
+    fn item(&self, cx: &ViewContext, canvas: &mut Canvas, item: &MimicItem, n: usize, stretch: Stretch) {
         let selected = self.selected == Some(n);
         let motion = self.motion && cx.theme.motion;
         match item {
@@ -261,19 +261,19 @@ impl Mimic {
     }
 }
 
-fn stretch(cx: &Cx, area: Rect) -> Stretch {
+fn stretch(cx: &ViewContext, area: Rect) -> Stretch {
     Stretch::new(cx.def().mimic.size, (area.width, area.height))
 }
 
 /// The window of the plant's command on this key. Other windows ask too, so that a stop never waits for one to close.
-pub fn command_of(cx: &Cx, event: KeyEvent) -> Option<Modal> {
+pub fn command_of(cx: &ViewContext, event: KeyEvent) -> Option<Modal> {
     let command = cx.def().mimic.commands.iter().find(|command| char(command.key).is(event))?;
     intent(cx, command)
 }
 
 /// The window of a plant command, or why it cannot be given: a fixed value or the other of two states is asked at once; a toggle of a state that
 /// nobody knows becomes a list, and anything else is entered.
-fn intent(cx: &Cx, command: &MimicCommand) -> Option<Modal> {
+fn intent(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
     let tag = command.tag;
     let def = cx.def().tag(tag);
     if let Some(notice) = Notice::unreachable(cx, def.device) {

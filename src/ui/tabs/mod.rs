@@ -20,7 +20,7 @@ use crossterm::event::KeyEvent;
 use ratatui::{Frame, layout::Rect};
 
 use super::{
-    Act, AskId, Cx, Effect,
+    Act, AskId, Effect, ViewContext,
     drawn::Rows,
     keys::{self, Hint},
     presence,
@@ -90,7 +90,7 @@ impl Tab {
 
     /// Those that there are here. Before a login only the login page, unless the plant file lets everybody look; users
     /// only for a Supervisor; faults only where the plant is simulated, and not in an exam.
-    pub fn offered(cx: &Cx) -> Vec<Tab> {
+    pub fn offered(cx: &ViewContext) -> Vec<Tab> {
         let closed = presence::is_closed(cx.standing);
         let supervisor = cx.standing.who.as_ref().is_some_and(|who| who.role == Role::Supervisor);
         let there = |tab: &Tab| match tab {
@@ -171,7 +171,7 @@ impl Tabs {
     }
 
     /// A key for the shown tab; one that is in no table does nothing.
-    pub fn on_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
         fn act<A: Copy>(table: &[keys::Key<A>], event: KeyEvent, on_key: impl FnOnce(A) -> Vec<Act>) -> Vec<Act> {
             keys::find(table, event).map(on_key).unwrap_or_default()
         }
@@ -195,7 +195,7 @@ impl Tabs {
     }
 
     /// The list of the shown tab whose rows keys act on, each row with what an operator should have seen of it.
-    pub fn rows(&self, cx: &Cx) -> Rows {
+    pub fn rows(&self, cx: &ViewContext) -> Rows {
         match self.shown {
             Tab::Alarms => self.alarms.drawn_rows(cx),
             Tab::Controllers => self.controllers.drawn_rows(cx),
@@ -208,7 +208,7 @@ impl Tabs {
     }
 
     /// The keys of the shown tab.
-    pub fn hints(&self, cx: &Cx) -> Vec<Hint> {
+    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         match self.shown {
             Tab::Login => self.login.hints(cx),
             Tab::Mimic => self.mimic.hints(cx),
@@ -223,7 +223,7 @@ impl Tabs {
     }
 
     /// Esc on the shown tab: a step back, `false` where there is none.
-    pub fn back(&mut self, cx: &Cx) -> bool {
+    pub fn back(&mut self, cx: &ViewContext) -> bool {
         match self.shown {
             Tab::Controllers => self.controllers.back(cx),
             Tab::Users => self.users.back(),
@@ -234,7 +234,7 @@ impl Tabs {
     }
 
     /// News, or time has passed, or the tab was just shown.
-    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
         match self.shown {
             Tab::Mimic => self.mimic.on_snapshot(cx),
             Tab::Trends => self.trends.on_snapshot(cx),
@@ -262,7 +262,7 @@ impl Tabs {
     }
 
     /// An answer goes to the tab that asked, shown or not.
-    pub fn on_answer(&mut self, cx: &Cx, id: AskId, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+    pub fn on_answer(&mut self, cx: &ViewContext, id: AskId, answer: Result<Answer, HistoryError>) -> Vec<Act> {
         match id.tab {
             Tab::Mimic => self.mimic.on_answer(cx, id.number, answer),
             Tab::Trends => self.trends.on_answer(cx, id.number, answer),
@@ -285,7 +285,7 @@ impl Tabs {
     }
 
     /// A wish goes to the tab that wished, shown or not.
-    pub fn on_granted(&mut self, cx: &Cx, id: AskId, answer: Result<(), String>) -> Vec<Act> {
+    pub fn on_granted(&mut self, cx: &ViewContext, id: AskId, answer: Result<(), String>) -> Vec<Act> {
         match id.tab {
             Tab::Login => self.login.on_granted(cx, answer),
             Tab::Reports => return self.reports.on_granted(answer),
@@ -296,7 +296,7 @@ impl Tabs {
     }
 
     /// The text that was entered in a window which the shown tab had opened; `Err` keeps the window open and says why.
-    pub fn on_text(&mut self, cx: &Cx, text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<Act>, String> {
         match self.shown {
             Tab::Trends => self.trends.on_text(cx, text),
             Tab::Reports => self.reports.on_text(cx, text),
@@ -309,7 +309,7 @@ impl Tabs {
     }
 
     /// A file was written, or why not: told to the tab that wanted it, shown or not.
-    pub fn on_saved(&mut self, cx: &Cx, tab: Tab, result: Result<PathBuf, String>) -> Vec<Act> {
+    pub fn on_saved(&mut self, cx: &ViewContext, tab: Tab, result: Result<PathBuf, String>) -> Vec<Act> {
         match tab {
             Tab::Reports => return self.reports.on_saved(cx, result),
             Tab::Bus => self.bus.on_saved(result),
@@ -319,7 +319,7 @@ impl Tabs {
     }
 
     /// Draws the shown tab.
-    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         match self.shown {
             Tab::Login => self.login.view(cx, frame, area),
             Tab::Mimic => self.mimic.view(cx, frame, area),

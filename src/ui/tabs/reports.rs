@@ -21,7 +21,7 @@ use crate::{
         csv::{file_name, shift_csv},
     },
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         keys::{Key, char, code},
         modal::{Modal, Prompt, Why},
     },
@@ -128,7 +128,7 @@ impl Reports {
     }
 
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
         let page = usize::from(cx.area.height.saturating_sub(3)).max(1);
         match action {
             Action::Before => self.step(cx, period::before),
@@ -167,7 +167,7 @@ impl Reports {
     }
 
     /// News, or time has passed.
-    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
         if self.follow {
             let running = period::at(cx.def(), cx.now);
             if running != self.period {
@@ -183,7 +183,7 @@ impl Reports {
     }
 
     /// The history answered question `number`; an answer for another period than the one shown is ignored.
-    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
         if self.errand.answered(number, cx.steady()).is_none() {
             return Vec::new();
         }
@@ -201,7 +201,7 @@ impl Reports {
     }
 
     /// The period that was typed.
-    pub fn on_text(&mut self, cx: &Cx, text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<Act>, String> {
         let typed = period::typed(cx.def(), text, cx.now)?;
         self.show(Some(typed));
         Ok(self.ask(cx))
@@ -220,7 +220,7 @@ impl Reports {
     }
 
     /// A report was written, or why not.
-    pub fn on_saved(&mut self, _cx: &Cx, result: Result<PathBuf, String>) -> Vec<Act> {
+    pub fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<Act> {
         self.export = match result {
             Ok(path) => Export::Done(path),
             Err(why) => Export::Failed(why),
@@ -229,7 +229,7 @@ impl Reports {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         view::draw(self, cx, frame, area);
     }
 }
@@ -242,13 +242,13 @@ impl Reports {
         self.errand.want();
     }
 
-    fn step(&mut self, cx: &Cx, to: impl Fn(&crate::plant::def::PlantDef, &Period) -> Option<Period>) {
+    fn step(&mut self, cx: &ViewContext, to: impl Fn(&crate::plant::def::PlantDef, &Period) -> Option<Period>) {
         if let Some(next) = self.period.as_ref().and_then(|shown| to(cx.def(), shown)) {
             self.show(Some(next));
         }
     }
 
-    fn scroll(&mut self, cx: &Cx, by: usize) {
+    fn scroll(&mut self, cx: &ViewContext, by: usize) {
         let rows = usize::from(cx.area.height.saturating_sub(3)).max(1);
         let lines = self.report.as_ref().map_or(0, |report| view::lines(cx, report).len());
         self.first = (self.first + by).min(lines.saturating_sub(rows));
@@ -258,7 +258,7 @@ impl Reports {
         self.period.as_ref().is_some_and(|period| now < period.to)
     }
 
-    fn ask(&mut self, cx: &Cx) -> Vec<Act> {
+    fn ask(&mut self, cx: &ViewContext) -> Vec<Act> {
         let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
         // The past stays as it is; but a report that was read while its shift still ran is not the last word.
         let settled = self.report.as_ref().is_some_and(|report| report.until >= report.period.to);
@@ -274,7 +274,7 @@ impl Reports {
     }
 
     /// Writes exactly the figures that are shown.
-    fn export(&mut self, cx: &Cx) -> Vec<Act> {
+    fn export(&mut self, cx: &ViewContext) -> Vec<Act> {
         let Some(report) = &self.report else {
             self.export = Export::Failed("nothing to write yet".to_owned());
             return Vec::new();
@@ -289,7 +289,7 @@ impl Reports {
         vec![wish]
     }
 
-    fn path(&self, cx: &Cx, report: &ShiftReport) -> PathBuf {
+    fn path(&self, cx: &ViewContext, report: &ShiftReport) -> PathBuf {
         cx.def().report.folder.join(file_name(cx.def(), &report.period, report.until))
     }
 }

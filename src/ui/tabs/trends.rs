@@ -24,7 +24,7 @@ use crate::{
         snapshot::Snapshot,
     },
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         modal::Why,
         widgets::chart::{self, trace::Trace},
     },
@@ -111,7 +111,7 @@ impl Trends {
     }
 
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
         match (self.values, action) {
             (Some(_), Action::Up) => self.select_value(cx, -1),
             (Some(_), Action::Down) => self.select_value(cx, 1),
@@ -154,7 +154,7 @@ impl Trends {
     }
 
     /// News, or time has passed: takes in live values and asks what is due.
-    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
         // Either way: the time of a snapshot may lie a little before what was guessed until it came.
         let away = |seen: Timestamp| cx.now.duration_since(seen).abs() > real(cx, UNSEEN_S);
         let unseen = self.data.seen.is_none_or(away);
@@ -175,7 +175,7 @@ impl Trends {
     }
 
     /// The history answered question `number`; an answer to an older question is ignored.
-    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
         let (errands, steady) = (&mut self.errands, cx.steady());
         let curves = errands.curves.answered(number, steady);
         let (hours, raised) = (errands.hours.answered(number, steady), errands.raised.answered(number, steady));
@@ -213,12 +213,12 @@ impl Trends {
     }
 
     /// No entry window is opened here.
-    pub fn on_text(&mut self, _cx: &Cx, _text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, _cx: &ViewContext, _text: &str) -> Result<Vec<Act>, String> {
         Ok(Vec::new())
     }
 
     /// Shows the curve of a tag with the cursor at a moment, and a quarter of the window after it.
-    pub fn show(&mut self, cx: &Cx, tag: TagId, at: Timestamp) {
+    pub fn show(&mut self, cx: &ViewContext, tag: TagId, at: Timestamp) {
         self.open_tag(cx, tag);
         let after = SignedDuration::from_secs(WINDOWS[self.window]) / 4;
         let end = at.checked_add(after).ok().filter(|end| *end < cx.now);
@@ -227,25 +227,25 @@ impl Trends {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         view::draw(self, cx, frame, area);
     }
 }
 
 impl Trends {
     /// The pens of the shown group, at most eight; behind the plant's groups comes the tag picked from the list.
-    fn pens(&self, cx: &Cx) -> Vec<Pen> {
+    fn pens(&self, cx: &ViewContext) -> Vec<Pen> {
         let picked = || self.picked.map(|tag| Pen { tag, scale: None }).into_iter().collect();
         cx.def().trends.get(self.group).map_or_else(picked, |group| group.pens.iter().take(8).copied().collect())
     }
 
     /// The pens that are switched on, with their place in the group.
-    fn drawn(&self, cx: &Cx) -> Vec<(usize, Pen)> {
+    fn drawn(&self, cx: &ViewContext) -> Vec<(usize, Pen)> {
         self.pens(cx).into_iter().enumerate().filter(|(_, pen)| !self.off.contains(&pen.tag)).collect()
     }
 
     /// What the chart shows now.
-    fn span(&self, cx: &Cx) -> View {
+    fn span(&self, cx: &ViewContext) -> View {
         let units = self.drawn(cx).iter().map(|(_, pen)| cx.snapshot.unit(pen.tag)).collect::<BTreeSet<_>>();
         let columns = chart::dots(cx.theme, cx.area.width, units.len());
         match (self.accumulate, self.end) {
@@ -258,14 +258,14 @@ impl Trends {
     }
 
     /// The cursor, kept on the screen.
-    fn cursor(&self, cx: &Cx) -> Option<Timestamp> {
+    fn cursor(&self, cx: &ViewContext) -> Option<Timestamp> {
         let view = self.span(cx);
         let last = view.to.min(cx.now).checked_sub(SignedDuration::from_micros(1)).unwrap_or(view.to);
         self.cursor.map(|at| at.min(last).max(view.from))
     }
 
     /// A step to the side: of the cursor by one cell, or of the view by a quarter.
-    fn step(&mut self, cx: &Cx, by: i32) {
+    fn step(&mut self, cx: &ViewContext, by: i32) {
         let Some(at) = self.cursor(cx) else { return self.pan(cx, by) };
         let view = self.span(cx);
         let cell = view.width() / i32::from(cx.area.width.saturating_sub(12).max(10));
@@ -278,7 +278,7 @@ impl Trends {
     }
 
     /// Moves the view by quarters; a view of the whole day becomes a window.
-    fn pan(&mut self, cx: &Cx, quarters: i32) {
+    fn pan(&mut self, cx: &ViewContext, quarters: i32) {
         let end = self.end.unwrap_or(cx.now);
         if self.accumulate {
             self.window = nearest(self.span(cx).width());
@@ -289,7 +289,7 @@ impl Trends {
         self.moved();
     }
 
-    fn zoom(&mut self, cx: &Cx, by: isize) {
+    fn zoom(&mut self, cx: &ViewContext, by: isize) {
         if self.accumulate {
             self.window = nearest(self.span(cx).width());
             self.accumulate = false;
@@ -299,7 +299,7 @@ impl Trends {
         self.moved();
     }
 
-    fn toggle(&mut self, cx: &Cx) {
+    fn toggle(&mut self, cx: &ViewContext) {
         let Some(pen) = self.pens(cx).get(self.selected).copied() else { return };
         match self.off.iter().position(|off| *off == pen.tag) {
             Some(place) => drop(self.off.remove(place)),
@@ -308,12 +308,12 @@ impl Trends {
         self.errands.curves.want();
     }
 
-    fn next_group(&mut self, cx: &Cx) {
+    fn next_group(&mut self, cx: &ViewContext) {
         let count = cx.def().trends.len() + usize::from(self.picked.is_some());
         self.show_group(cx, (self.group + 1) % count.max(1), 0);
     }
 
-    fn show_group(&mut self, cx: &Cx, group: usize, selected: usize) {
+    fn show_group(&mut self, cx: &ViewContext, group: usize, selected: usize) {
         (self.group, self.selected, self.since) = (group, selected, None);
         let tags: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         self.data.traces.retain(|tag, _| tags.contains(tag));
@@ -330,11 +330,11 @@ impl Trends {
     }
 
     /// Rows that the list of values has room for.
-    fn rows(&self, cx: &Cx) -> usize {
+    fn rows(&self, cx: &ViewContext) -> usize {
         usize::from(cx.area.height.saturating_sub(2)).max(1)
     }
 
-    fn select_value(&mut self, cx: &Cx, by: isize) {
+    fn select_value(&mut self, cx: &ViewContext, by: isize) {
         let Some((first, row)) = self.values else { return };
         let row = row.saturating_add_signed(by).min(stored(cx).len().saturating_sub(1));
         let first_now = first.clamp((row + 1).saturating_sub(self.rows(cx)), row);
@@ -345,13 +345,13 @@ impl Trends {
     }
 
     /// Shows the curve of a value: in the group of the plant that has it, or alone.
-    fn open(&mut self, cx: &Cx, row: usize) {
+    fn open(&mut self, cx: &ViewContext, row: usize) {
         if let Some(tag) = stored(cx).get(row).copied() {
             self.open_tag(cx, tag);
         }
     }
 
-    fn open_tag(&mut self, cx: &Cx, tag: TagId) {
+    fn open_tag(&mut self, cx: &ViewContext, tag: TagId) {
         let groups = &cx.def().trends;
         let place = |group: &TrendGroup| group.pens.iter().take(8).position(|pen| pen.tag == tag);
         let found = groups.iter().enumerate().find_map(|(n, group)| Some((n, place(group)?)));
@@ -365,7 +365,7 @@ impl Trends {
     }
 
     /// Appends what the snapshot knows to the curves of the shown group.
-    fn push_live(&mut self, cx: &Cx) {
+    fn push_live(&mut self, cx: &ViewContext) {
         for pen in self.pens(cx) {
             let sample = cx.snapshot.sample(pen.tag);
             let value = sample.trusted();
@@ -376,7 +376,7 @@ impl Trends {
 
     /// Takes curves of the history in. Figures, and where the day's data begin, are taken only from an answer for what
     /// is shown now; a curve carries its own times and is right in any view.
-    fn take_curves(&mut self, cx: &Cx, series: Vec<Series>, asked: Timestamp) {
+    fn take_curves(&mut self, cx: &ViewContext, series: Vec<Series>, asked: Timestamp) {
         if !self.errands.curves.is_wanted() {
             self.data.figures = series.iter().map(|series| (series.tag, figures(series, asked))).collect();
             if self.accumulate && self.end.is_none() {
@@ -401,7 +401,7 @@ impl Trends {
     }
 
     /// Asks what is due.
-    fn ask(&mut self, cx: &Cx) -> Vec<Act> {
+    fn ask(&mut self, cx: &ViewContext) -> Vec<Act> {
         let (now, patience, view) = (cx.now, real(cx, PATIENCE_S), self.span(cx));
         let group: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         let rate = real(cx, RATES[self.rate] as f64 / 1_000.0);
@@ -454,11 +454,11 @@ fn figures(series: &Series, asked: Timestamp) -> Figures {
 }
 
 /// All stored tags, in the order of the plant.
-fn stored(cx: &Cx) -> Vec<TagId> {
+fn stored(cx: &ViewContext) -> Vec<TagId> {
     cx.def().tags.iter().filter(|tag| tag.store).map(|tag| tag.id).collect()
 }
 
 /// Seconds of the operator's time as plant time, which runs faster in demonstrations.
-fn real(cx: &Cx, seconds: f64) -> SignedDuration {
+fn real(cx: &ViewContext, seconds: f64) -> SignedDuration {
     SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6))
 }

@@ -12,7 +12,7 @@ use crate::{
     access::UserRow,
     history::{Answer, HistoryError},
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         drawn::Rows,
         keys::{self, Hint, Key, char, code},
         modal::{Modal, Notice, Sheet, sheet::Purpose},
@@ -83,7 +83,7 @@ pub struct Users {
 
 impl Users {
     /// A key.
-    pub fn on_key(&mut self, cx: &Cx, event: KeyEvent) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
         match &mut self.audit {
             Some(audit) => match keys::find(AUDIT, event) {
                 Some(AuditAction::Back) => {
@@ -101,7 +101,7 @@ impl Users {
         }
     }
 
-    fn act(&mut self, cx: &Cx, action: Action) -> Vec<Act> {
+    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
         let users = &cx.standing.users;
         let place = self.place(cx);
         let row = users.get(place);
@@ -139,7 +139,7 @@ impl Users {
     }
 
     /// The list that keys act on.
-    pub fn drawn_rows(&self, cx: &Cx) -> Rows {
+    pub fn drawn_rows(&self, cx: &ViewContext) -> Rows {
         match &self.audit {
             Some(audit) => audit.drawn_rows(),
             None => Rows::of(cx.standing.users.iter().map(|row| (&row.user, state(cx, row))), self.place(cx)),
@@ -147,7 +147,7 @@ impl Users {
     }
 
     /// The place of the selected user.
-    fn place(&self, cx: &Cx) -> usize {
+    fn place(&self, cx: &ViewContext) -> usize {
         cx.standing.users.iter().position(|row| Some(&row.user) == self.selected.as_ref()).unwrap_or(0)
     }
 
@@ -157,7 +157,7 @@ impl Users {
     }
 
     /// News, or time has passed.
-    pub fn on_snapshot(&mut self, cx: &Cx) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
         let Some(audit) = &mut self.audit else { return Vec::new() };
         let acts = audit.ask(cx);
         self.asked = audit.asked();
@@ -170,14 +170,14 @@ impl Users {
     }
 
     /// The history answered question `number`.
-    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
         if let Some(audit) = &mut self.audit {
             audit.on_answer(cx, number, answer);
         }
     }
 
     /// What was typed in a window that the audit list had opened.
-    pub fn on_text(&mut self, cx: &Cx, text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<Act>, String> {
         let Some(audit) = &mut self.audit else { return Ok(Vec::new()) };
         audit.on_text(cx, text)?;
         Ok(self.on_snapshot(cx))
@@ -189,7 +189,7 @@ impl Users {
     }
 
     /// Draws the page.
-    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         match &self.audit {
             Some(audit) => audit.view(cx, frame, area),
             None => view::draw(cx, self.place(cx), frame, area),
@@ -198,7 +198,7 @@ impl Users {
 }
 
 /// How a user stands: `must change password`.
-fn state(cx: &Cx, row: &UserRow) -> String {
+fn state(cx: &ViewContext, row: &UserRow) -> String {
     let locked = row.locked_until.filter(|until| *until > cx.now);
     match (row.disabled, locked, row.must_change) {
         (true, ..) => "disabled".to_owned(),

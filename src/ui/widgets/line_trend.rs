@@ -9,7 +9,7 @@ use super::{
 use crate::{
     history::Question,
     plant::{def::LineId, line_minute::LineMinute},
-    ui::Cx,
+    ui::ViewContext,
 };
 
 /// How far it reaches back.
@@ -59,7 +59,7 @@ pub fn columns(minutes: &[LineMinute], now: Timestamp, count: usize) -> Vec<Opti
 }
 
 /// Draws three rows: errors, busy, the time. Says so where nothing is known.
-pub fn line_trend(cx: &Cx, canvas: &mut Canvas, minutes: &[LineMinute]) {
+pub fn line_trend(cx: &ViewContext, canvas: &mut Canvas, minutes: &[LineMinute]) {
     let theme = cx.theme;
     let room = canvas.width().saturating_sub(NAME + FIGURES);
     let columns = columns(minutes, cx.now, usize::from(room));

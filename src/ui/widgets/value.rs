@@ -9,7 +9,7 @@ use crate::{
         sample::{Cause, Quality},
         tag::Access,
     },
-    ui::Cx,
+    ui::ViewContext,
 };
 
 /// The parts of a shown value, to be arranged as there is room.
@@ -28,7 +28,7 @@ pub struct Shown {
 }
 
 /// A tag as it stands.
-pub fn show(cx: &Cx, tag: TagId) -> Shown {
+pub fn show(cx: &ViewContext, tag: TagId) -> Shown {
     let sample = cx.snapshot.sample(tag);
     let style = cx.theme.quality(sample.quality);
     let def = cx.def().tag(tag);
@@ -53,7 +53,7 @@ pub fn show(cx: &Cx, tag: TagId) -> Shown {
 }
 
 /// The value in words; a status word as the names of its set bits.
-fn words(cx: &Cx, tag: TagId) -> Option<String> {
+fn words(cx: &ViewContext, tag: TagId) -> Option<String> {
     let def = cx.def().tag(tag);
     if def.is_text() {
         return cx.snapshot.text(tag);
@@ -94,7 +94,7 @@ impl Shown {
 }
 
 /// `on` for a good value that is not zero; `None` when nobody can say.
-pub fn is_on(cx: &Cx, tag: TagId) -> Option<bool> {
+pub fn is_on(cx: &ViewContext, tag: TagId) -> Option<bool> {
     cx.snapshot.sample(tag).trusted().map(|value| value != 0.0)
 }
 

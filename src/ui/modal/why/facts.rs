@@ -12,11 +12,11 @@ use crate::{
         event::Fault,
         tag::TagDef,
     },
-    ui::Cx,
+    ui::ViewContext,
 };
 
 /// All rows about a tag.
-pub(super) fn rows(cx: &Cx, tag: TagId, room: u16) -> Vec<Row> {
+pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
     let def = cx.def().tag(tag);
     let device = cx.def().device(def.device);
     let exchange = cx.snapshot.evidence[tag.index()].as_deref();
@@ -42,7 +42,7 @@ pub(super) fn row(label: &'static str, text: impl Into<String>, style: Style) ->
     Row { label, text: text.into(), style, wraps: true }
 }
 
-pub(super) fn settings<'a>(cx: &Cx<'a>, def: &TagDef) -> &'a LineDef {
+pub(super) fn settings<'a>(cx: &ViewContext<'a>, def: &TagDef) -> &'a LineDef {
     let line = cx.def().device(def.device).line;
     cx.snapshot.line(line).report.as_ref().map_or(cx.def().line(line), |report| &report.settings)
 }

@@ -16,14 +16,14 @@ use crate::{
         traffic::Exchange,
     },
     ui::{
-        Cx,
+        ViewContext,
         modal::faceplate::device_words,
         widgets::text::{age, between, running},
     },
 };
 
 /// How the device stands, how fast it answers, what went wrong last; and its line, if that is not well.
-pub(super) fn device_rows(cx: &Cx, def: &TagDef, device: &DeviceDef, exchange: Option<&Exchange>) -> Vec<Row> {
+pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, exchange: Option<&Exchange>) -> Vec<Row> {
     let theme = cx.theme;
     let status = cx.snapshot.device(device.id);
     let line = cx.snapshot.line(device.line);
@@ -53,7 +53,7 @@ pub(super) fn device_rows(cx: &Cx, def: &TagDef, device: &DeviceDef, exchange: O
 }
 
 /// When it is read, with whom, and whether that works out.
-pub(super) fn poll_rows(cx: &Cx, def: &TagDef) -> Vec<Row> {
+pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
     let line = cx.snapshot.line(cx.def().device(def.device).line);
     let Some(report) = &line.report else { return Vec::new() };
     if report.refused.contains(&def.id) {
@@ -87,7 +87,7 @@ pub(super) fn poll_rows(cx: &Cx, def: &TagDef) -> Vec<Row> {
 }
 
 /// What is the matter with a line; `None` while it is connected.
-pub(super) fn line_words(cx: &Cx, state: &LineState) -> Option<String> {
+pub(super) fn line_words(cx: &ViewContext, state: &LineState) -> Option<String> {
     match state {
         LineState::Connected => None,
         LineState::Connecting => Some("being connected".to_owned()),

@@ -20,7 +20,7 @@ use crate::{
         traffic::Exchange,
     },
     ui::{
-        Cx,
+        ViewContext,
         widgets::{
             text::{age, clock},
             value,
@@ -29,7 +29,12 @@ use crate::{
 };
 
 /// The value with its quality and age, the reason for a doubt, and what to do about it.
-pub(super) fn value_rows(cx: &Cx, def: &TagDef, exchange: Option<&Exchange>, found: Option<&Found>) -> Vec<Row> {
+pub(super) fn value_rows(
+    cx: &ViewContext,
+    def: &TagDef,
+    exchange: Option<&Exchange>,
+    found: Option<&Found>,
+) -> Vec<Row> {
     let sample = cx.snapshot.sample(def.id);
     let shown = value::show(cx, def.id);
     let at = clock(sample.at, &cx.def().time_zone);
@@ -53,7 +58,13 @@ pub(super) fn value_rows(cx: &Cx, def: &TagDef, exchange: Option<&Exchange>, fou
 }
 
 /// What the cause does not say by itself: the other tag, the number that means "no value".
-fn because(cx: &Cx, def: &TagDef, cause: Cause, exchange: Option<&Exchange>, found: Option<&Found>) -> Option<String> {
+fn because(
+    cx: &ViewContext,
+    def: &TagDef,
+    cause: Cause,
+    exchange: Option<&Exchange>,
+    found: Option<&Found>,
+) -> Option<String> {
     let line = cx.def().device(def.device).line;
     let words_of = |tag: TagId| format!("{} is {}", cx.def().tag(tag).name, value::show(cx, tag).whole());
     match cause {
@@ -84,7 +95,7 @@ fn because(cx: &Cx, def: &TagDef, cause: Cause, exchange: Option<&Exchange>, fou
 }
 
 /// One sentence: what a technician does.
-fn advice(cx: &Cx, def: &TagDef, cause: Cause, exchange: Option<&Exchange>) -> Option<String> {
+fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchange>) -> Option<String> {
     let device = cx.def().device(def.device);
     let fault = exchange.and_then(|exchange| exchange.outcome.err());
     let last = cx.snapshot.device(device.id).last_fault.map(|(_, fault)| fault);
@@ -116,7 +127,7 @@ fn advice(cx: &Cx, def: &TagDef, cause: Cause, exchange: Option<&Exchange>) -> O
 }
 
 /// `5058 5234 = "PXR4", blanks at the end left out`.
-fn text(cx: &Cx, def: &TagDef, found: Option<&Found>) -> String {
+fn text(cx: &ViewContext, def: &TagDef, found: Option<&Found>) -> String {
     let in_answer = found.and_then(|found| codec::decode_text(def.point, &found.words));
     match (in_answer, found, cx.snapshot.text(def.id)) {
         (Some(text), Some(found), _) => {
@@ -131,7 +142,7 @@ fn text(cx: &Cx, def: &TagDef, found: Option<&Found>) -> String {
 }
 
 /// `raw 724 (02D4) × 10^-1 = 72.4 °C, decimals from TIC-1.DP`.
-pub(super) fn number(cx: &Cx, def: &TagDef, exchange: Option<&Exchange>, found: Option<&Found>) -> String {
+pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>, found: Option<&Found>) -> String {
     if def.is_text() {
         return text(cx, def, found);
     }

@@ -16,14 +16,14 @@ use crate::{
         traffic::Exchange,
     },
     ui::{
-        Cx,
+        ViewContext,
         widgets::text::{between, clock, running},
     },
 };
 
 /// Request, answer, verdict; gives both frames in words.
 pub(super) fn exchange_rows(
-    cx: &Cx,
+    cx: &ViewContext,
     def: &TagDef,
     exchange: &Exchange,
     found: Option<&Found>,
@@ -71,7 +71,7 @@ pub(super) fn exchange_rows(
 
 /// Every byte of both frames, one meaning a row: for who scrolls or has a large screen.
 pub(super) fn every_byte(
-    cx: &Cx,
+    cx: &ViewContext,
     exchange: &Exchange,
     (request, answer): &(Explained, Explained),
     found: Option<&Found>,
@@ -97,7 +97,7 @@ pub(super) fn every_byte(
     rows
 }
 
-pub(super) fn never_asked(cx: &Cx, def: &TagDef) -> &'static str {
+pub(super) fn never_asked(cx: &ViewContext, def: &TagDef) -> &'static str {
     match (def.access, def.poll, &cx.snapshot.line(cx.def().device(def.device).line).state) {
         (Access::Write, ..) => "never: it can only be written",
         (_, Poll::Never, _) => "never: it is not read by itself",
@@ -108,7 +108,7 @@ pub(super) fn never_asked(cx: &Cx, def: &TagDef) -> &'static str {
     }
 }
 
-pub(super) fn place(cx: &Cx, def: &TagDef, device: &DeviceDef) -> String {
+pub(super) fn place(cx: &ViewContext, def: &TagDef, device: &DeviceDef) -> String {
     let line = settings(cx, def);
     format!("{} {} unit {} on {}, {}", device.name, device.model, device.unit, line.name, line.transport)
 }

@@ -6,7 +6,7 @@ use crate::{
         def::{AlarmDef, PlantDef, Priority},
         snapshot::ActiveAlarm,
     },
-    ui::Cx,
+    ui::ViewContext,
 };
 
 /// What may be typed, for the entry window.
@@ -67,7 +67,7 @@ impl Filter {
     }
 
     /// Does it let this alarm through?
-    pub fn holds(&self, cx: &Cx, alarm: &ActiveAlarm) -> bool {
+    pub fn holds(&self, cx: &ViewContext, alarm: &ActiveAlarm) -> bool {
         if self.is_off() {
             return true;
         }
@@ -95,7 +95,7 @@ impl Filter {
 }
 
 /// All that is looked through for words, in small letters: what the view shows, nothing that is hidden.
-fn text_of(cx: &Cx, alarm: &ActiveAlarm, def: &AlarmDef) -> String {
+fn text_of(cx: &ViewContext, alarm: &ActiveAlarm, def: &AlarmDef) -> String {
     let by = alarm.acknowledged.as_ref().and_then(|deed| deed.by.as_deref()).unwrap_or_default();
     format!("{} {} {} {by}", subject_name(cx.def(), def.subject), def.text, alarm.state.word()).to_lowercase()
 }

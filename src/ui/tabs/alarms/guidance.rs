@@ -10,7 +10,7 @@ use crate::{
         station::STATION,
     },
     ui::{
-        Cx,
+        ViewContext,
         modal::{
             confirm::subject,
             faceplate::{device_words, line_state_words},
@@ -27,12 +27,12 @@ use crate::{
 const NAMES: u16 = 10;
 
 /// All there is to say about a listed alarm.
-pub fn rows(cx: &Cx, alarm: &ActiveAlarm) -> [(&'static str, String); 4] {
+pub fn rows(cx: &ViewContext, alarm: &ActiveAlarm) -> [(&'static str, String); 4] {
     rows_of_any(cx, alarm.id, now_words(cx, cx.def().alarm(alarm.id), alarm))
 }
 
 /// The same for one that is not in a list.
-pub fn rows_of_any(cx: &Cx, alarm: AlarmId, now: String) -> [(&'static str, String); 4] {
+pub fn rows_of_any(cx: &ViewContext, alarm: AlarmId, now: String) -> [(&'static str, String); 4] {
     let guidance = &cx.def().alarm(alarm).guidance;
     [
         ("now", now),
@@ -49,7 +49,7 @@ pub fn height(rows: &[(&str, String)], width: u16) -> u16 {
 }
 
 /// Draws it for a listed alarm.
-pub fn view(cx: &Cx, alarm: &ActiveAlarm, canvas: &mut Canvas) {
+pub fn view(cx: &ViewContext, alarm: &ActiveAlarm, canvas: &mut Canvas) {
     let def = cx.def().alarm(alarm.id);
     let go = go_words(cx, def, Some(alarm));
     let rows = rows(cx, alarm);
@@ -60,7 +60,7 @@ pub fn view(cx: &Cx, alarm: &ActiveAlarm, canvas: &mut Canvas) {
 }
 
 /// Draws what there is to know of any alarm, with words of its own at the top.
-pub fn view_any(cx: &Cx, alarm: AlarmId, now: String, canvas: &mut Canvas) {
+pub fn view_any(cx: &ViewContext, alarm: AlarmId, now: String, canvas: &mut Canvas) {
     let def = cx.def().alarm(alarm);
     let rows = rows_of_any(cx, alarm, now);
     let cut = title(cx, def, None, None, canvas);
@@ -69,7 +69,7 @@ pub fn view_any(cx: &Cx, alarm: AlarmId, now: String, canvas: &mut Canvas) {
 
 /// Which alarm it is about; at the right how long there is to respond. Its whole name, where there was no room for that.
 fn title(
-    cx: &Cx,
+    cx: &ViewContext,
     def: &AlarmDef,
     listed: Option<&ActiveAlarm>,
     respond: Option<(String, Style)>,
@@ -95,7 +95,7 @@ fn title(
 }
 
 /// Draws the rows below the title, above them the `name` where the title has it only in part.
-fn draw(cx: &Cx, name: Option<&str>, rows: &[(&str, String)], go: &str, canvas: &mut Canvas) {
+fn draw(cx: &ViewContext, name: Option<&str>, rows: &[(&str, String)], go: &str, canvas: &mut Canvas) {
     let theme = cx.theme;
     let (width, height) = (canvas.width(), canvas.height());
     let room = width.saturating_sub(NAMES);
@@ -138,7 +138,7 @@ fn or_dash(text: &str) -> &str {
 }
 
 /// The value now and when it was raised, how often, and who acknowledged it.
-fn now_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
+fn now_words(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
     let zone = &cx.def().time_zone;
     let mut words = match def.subject {
         Subject::Tag(tag) => {
@@ -166,7 +166,7 @@ fn now_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
 }
 
 /// `respond within 10 min, 09:19 left`, and whether that time is over; nothing where the plant file gives no time.
-pub fn respond_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(String, bool)> {
+pub fn respond_words(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(String, bool)> {
     let respond = def.guidance.response_time?;
     let within = format!("respond within {} min", respond.as_secs().div_ceil(60));
     let gone = between(alarm.raised_at, cx.now);
@@ -186,7 +186,7 @@ pub fn respond_words(cx: &Cx, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(St
 }
 
 /// The keys that lead from an alarm to what it watches.
-pub fn go_words(cx: &Cx, def: &AlarmDef, alarm: Option<&ActiveAlarm>) -> String {
+pub fn go_words(cx: &ViewContext, def: &AlarmDef, alarm: Option<&ActiveAlarm>) -> String {
     let at = alarm.map(|alarm| format!(" at {}", clock(alarm.raised_at, &cx.def().time_zone))).unwrap_or_default();
     let journal = format!("j journal of {}", journal_of(cx, def.subject));
     match def.subject {
@@ -197,7 +197,7 @@ pub fn go_words(cx: &Cx, def: &AlarmDef, alarm: Option<&ActiveAlarm>) -> String 
 }
 
 /// What the journal is searched for: the whole device, because its settings are what often makes the alarm of a tag.
-pub fn journal_of<'a>(cx: &Cx<'a>, subject: Subject) -> &'a str {
+pub fn journal_of<'a>(cx: &ViewContext<'a>, subject: Subject) -> &'a str {
     let def = cx.def();
     match subject {
         Subject::Tag(tag) => &def.device(def.tag(tag).device).name,
@@ -208,7 +208,7 @@ pub fn journal_of<'a>(cx: &Cx<'a>, subject: Subject) -> &'a str {
 }
 
 /// The limit of an alarm: `> 72.0`; empty where there is none.
-pub fn condition_words(cx: &Cx, alarm: AlarmId) -> String {
+pub fn condition_words(cx: &ViewContext, alarm: AlarmId) -> String {
     let def = cx.def().alarm(alarm);
     let number = |value| match def.subject {
         Subject::Tag(tag) => cx.snapshot.format(tag, value),

@@ -20,7 +20,7 @@ use crate::{
     },
     report::Period,
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         modal::{confirm::subject, faceplate::device_words},
         widgets::{
             text::{Canvas, between, clock, fit_words, moment, running, wrap},
@@ -64,7 +64,7 @@ pub struct Handover {
 
 impl Handover {
     /// So many shifts later; `0` is the running one.
-    pub fn shift(&mut self, cx: &Cx, by: isize) {
+    pub fn shift(&mut self, cx: &ViewContext, by: isize) {
         let shown = self.period(cx);
         let chosen = match by {
             0 => None,
@@ -77,7 +77,7 @@ impl Handover {
     }
 
     /// Scrolls.
-    pub fn step(&mut self, cx: &Cx, by: isize) {
+    pub fn step(&mut self, cx: &ViewContext, by: isize) {
         let room = usize::from(cx.area.height.saturating_sub(2)).max(1);
         let lines = self.lines(cx, cx.area.width).len();
         self.first = self.first.saturating_add_signed(by).min(lines.saturating_sub(room));
@@ -88,12 +88,12 @@ impl Handover {
         self.errand.want();
     }
 
-    fn period(&self, cx: &Cx) -> Option<Period> {
+    fn period(&self, cx: &ViewContext) -> Option<Period> {
         self.period.clone().or_else(|| period::at(cx.def(), cx.now))
     }
 
     /// Asks the history if it is time.
-    pub fn ask(&mut self, cx: &Cx, number: &mut u32) -> Vec<Act> {
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<Act> {
         let Some(shown) = self.period(cx) else { return Vec::new() };
         if !span::due(cx, &self.errand, EVERY_S, Some(&shown)) {
             return Vec::new();
@@ -111,7 +111,7 @@ impl Handover {
     }
 
     /// The history answered.
-    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: &Result<Answer, HistoryError>) {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
         if self.errand.answered(number, cx.steady()).is_none() {
             return;
         }
@@ -132,7 +132,7 @@ impl Handover {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, canvas: &mut Canvas) {
+    pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let theme = cx.theme;
         let (width, height) = (canvas.width(), canvas.height());
         let x = canvas.text(1, 0, "Handover  ", theme.strong());
@@ -156,7 +156,7 @@ impl Handover {
         }
     }
 
-    fn lines(&self, cx: &Cx, width: u16) -> Vec<(String, Style)> {
+    fn lines(&self, cx: &ViewContext, width: u16) -> Vec<(String, Style)> {
         let theme = cx.theme;
         let room = width.saturating_sub(4);
         let mut lines = self.note_lines(cx, room);
@@ -186,7 +186,7 @@ impl Handover {
     }
 
     /// The last note, and who has taken over since.
-    fn note_lines(&self, cx: &Cx, room: u16) -> Vec<(String, Style)> {
+    fn note_lines(&self, cx: &ViewContext, room: u16) -> Vec<(String, Style)> {
         let theme = cx.theme;
         let when = |row: &ActionRecord| moment(row.at, cx.now, &cx.def().time_zone);
         let note = self.actions.iter().position(|row| &*row.action == HAND_OVER && !is_failed(row));
@@ -207,18 +207,18 @@ impl Handover {
     }
 
     /// Was it whoever sits here that handed over, and has nobody taken over since?
-    pub fn is_own(&self, cx: &Cx) -> bool {
+    pub fn is_own(&self, cx: &ViewContext) -> bool {
         let last = |row: &&ActionRecord| [HAND_OVER, TAKE_OVER].contains(&&*row.action) && !is_failed(row);
         self.actions.iter().find(last).is_some_and(|row| &*row.action == HAND_OVER && is_own(cx, row))
     }
 }
 
-fn is_own(cx: &Cx, row: &ActionRecord) -> bool {
+fn is_own(cx: &ViewContext, row: &ActionRecord) -> bool {
     cx.standing.who.as_ref().is_some_and(|who| who.user == row.by)
 }
 
 /// Each row with its time; those that are alike once, at the time of the newest, with their count.
-fn folded(cx: &Cx, rows: impl Iterator<Item = (Timestamp, String)>) -> Vec<String> {
+fn folded(cx: &ViewContext, rows: impl Iterator<Item = (Timestamp, String)>) -> Vec<String> {
     let mut kinds: Vec<(Timestamp, String, usize)> = Vec::new();
     for (at, words) in rows {
         match kinds.iter_mut().find(|(_, other, _)| *other == words) {
@@ -236,7 +236,7 @@ fn folded(cx: &Cx, rows: impl Iterator<Item = (Timestamp, String)>) -> Vec<Strin
 }
 
 /// `shelved ‹2›! TIC-1.PV temperature high, 41:00 left, by anna: sensor is cleaned, since 13:20:00`.
-pub fn aside_words(cx: &Cx, aside: &AsideAlarm) -> String {
+pub fn aside_words(cx: &ViewContext, aside: &AsideAlarm) -> String {
     let def = cx.def().alarm(aside.id);
     let mark = cx.theme.priority_tag(def.priority);
     let left = aside.until.map(|until| format!(", {} left", running(between(cx.now, until)))).unwrap_or_default();
@@ -249,7 +249,7 @@ pub fn aside_words(cx: &Cx, aside: &AsideAlarm) -> String {
 }
 
 /// Lines and devices that somebody has taken away, sequences in manual, actuators that do not obey.
-fn unusual(cx: &Cx) -> Vec<String> {
+fn unusual(cx: &ViewContext) -> Vec<String> {
     let (def, snapshot) = (cx.def(), cx.snapshot);
     let zone = &def.time_zone;
     let lines = def.lines.iter().flat_map(|line| {
@@ -289,7 +289,7 @@ fn unusual(cx: &Cx) -> Vec<String> {
 }
 
 /// Values that are not good, and alarms that have been active for a day.
-fn doubtful(cx: &Cx) -> Vec<String> {
+fn doubtful(cx: &ViewContext) -> Vec<String> {
     let polled = cx.def().tags.iter().filter(|tag| tag.store);
     let bad: Vec<String> = polled
         .filter(|tag| match cx.snapshot.sample(tag.id).quality {

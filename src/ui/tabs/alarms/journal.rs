@@ -12,7 +12,7 @@ use crate::{
     plant::record::{ActionRecord, AlarmRecord},
     report::Period,
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         widgets::text::{Canvas, fit_words, moment, pad},
     },
 };
@@ -53,7 +53,7 @@ impl Journal {
     }
 
     /// What was typed: words, and what looks like a time is the period.
-    pub fn search(&mut self, cx: &Cx, text: &str) -> Result<(), String> {
+    pub fn search(&mut self, cx: &ViewContext, text: &str) -> Result<(), String> {
         let is_time = |word: &&str| word.starts_with(|c: char| c.is_ascii_digit()) && word.contains([':', '-']);
         let (times, words): (Vec<&str>, Vec<&str>) = text.split_whitespace().partition(is_time);
         let period = match times.is_empty() {
@@ -71,7 +71,7 @@ impl Journal {
     }
 
     /// So many shifts later; `0` is everything of the last 24 hours.
-    pub fn shift(&mut self, cx: &Cx, by: isize) {
+    pub fn shift(&mut self, cx: &ViewContext, by: isize) {
         if by == 0 {
             self.words.clear();
         }
@@ -85,7 +85,7 @@ impl Journal {
     }
 
     /// Scrolls.
-    pub fn step(&mut self, cx: &Cx, by: isize) {
+    pub fn step(&mut self, cx: &ViewContext, by: isize) {
         let last = self.rows(cx).len().saturating_sub(1);
         self.first = self.first.saturating_add_signed(by).min(last);
     }
@@ -102,7 +102,7 @@ impl Journal {
     }
 
     /// Asks the history if it is time.
-    pub fn ask(&mut self, cx: &Cx, number: &mut u32) -> Vec<Act> {
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<Act> {
         let to = cx.now + SignedDuration::from_secs(1);
         let (from, to) = self.period.as_ref().map_or((to - SPAN, to), |period| (period.from, period.to));
         let limit = self.limit();
@@ -125,7 +125,7 @@ impl Journal {
     }
 
     /// The history answered.
-    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: &Result<Answer, HistoryError>) {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
         if self.steps.answered(number, cx.steady()).or_else(|| self.deeds.answered(number, cx.steady())).is_none() {
             return;
         }
@@ -146,7 +146,7 @@ impl Journal {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, canvas: &mut Canvas) {
+    pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let theme = cx.theme;
         let x = canvas.text(1, 0, "Journal  ", theme.strong());
         let rows = self.rows(cx);
@@ -185,7 +185,7 @@ impl Journal {
     }
 
     /// Alarms and deeds in one list, newest first.
-    fn rows(&self, cx: &Cx) -> Vec<(Timestamp, String, Style)> {
+    fn rows(&self, cx: &ViewContext) -> Vec<(Timestamp, String, Style)> {
         let alarms = self.alarms.iter().map(|row| (row.at, alarm_words(cx, row), cx.theme.normal()));
         let actions = self.actions.iter().map(|row| (row.at, action_words(cx, row), cx.theme.strong()));
         let mut rows: Vec<_> = alarms.chain(actions).filter(|(_, text, _)| self.finds(text)).collect();
@@ -199,7 +199,7 @@ impl Journal {
     }
 }
 
-fn alarm_words(cx: &Cx, row: &AlarmRecord) -> String {
+fn alarm_words(cx: &ViewContext, row: &AlarmRecord) -> String {
     // A state by its word, a number with its decimals, as everywhere else.
     let shown = |value: f64| match cx.def().tag_named(&row.subject) {
         Some(tag) => format!(" {}", cx.snapshot.format(tag, value)),
@@ -213,7 +213,7 @@ fn alarm_words(cx: &Cx, row: &AlarmRecord) -> String {
 }
 
 /// A deed in one line: `TIC-1.SV write 60.0 → 70.0 °C  verified by anna`.
-pub fn action_words(cx: &Cx, row: &ActionRecord) -> String {
+pub fn action_words(cx: &ViewContext, row: &ActionRecord) -> String {
     let change = match (&row.old, &row.new) {
         (Some(old), Some(new)) => format!("{old} → {new}  "),
         (None, Some(new)) => format!("? → {new}  "),

@@ -16,7 +16,7 @@ use crate::{
     },
     report::{Period, alarm_quality},
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         modal::confirm::subject,
         theme::Theme,
         widgets::text::{self, Canvas, between, clock, fit_words, pad, pad_left, running},
@@ -43,7 +43,7 @@ pub struct Quality {
 
 impl Quality {
     /// So many shifts later; `0` is the present.
-    pub fn shift(&mut self, cx: &Cx, by: isize) {
+    pub fn shift(&mut self, cx: &ViewContext, by: isize) {
         self.period = match by {
             0 => None,
             by if by < 0 => span::earlier(cx, self.period.as_ref()),
@@ -54,14 +54,14 @@ impl Quality {
     }
 
     /// Scrolls.
-    pub fn step(&mut self, cx: &Cx, by: isize) {
+    pub fn step(&mut self, cx: &ViewContext, by: isize) {
         let lines = self.lines(cx, cx.area.width).len();
         let room = usize::from(cx.area.height.saturating_sub(3)).max(1);
         self.first = self.first.saturating_add_signed(by).min(lines.saturating_sub(room));
     }
 
     /// Asks the history for a chosen shift if it is time.
-    pub fn ask(&mut self, cx: &Cx, number: &mut u32) -> Vec<Act> {
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<Act> {
         let Some(period) = &self.period else { return Vec::new() };
         if !span::due(cx, &self.errand, EVERY_S, Some(period)) {
             return Vec::new();
@@ -77,7 +77,7 @@ impl Quality {
     }
 
     /// The history answered.
-    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: &Result<Answer, HistoryError>) {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
         if self.errand.answered(number, cx.steady()).is_none() {
             return;
         }
@@ -96,7 +96,7 @@ impl Quality {
     }
 
     /// The figures shown: of the chosen shift, or of the last 24 hours.
-    fn figures<'a>(&'a self, cx: &Cx<'a>) -> Option<&'a Figures> {
+    fn figures<'a>(&'a self, cx: &ViewContext<'a>) -> Option<&'a Figures> {
         match self.period {
             Some(_) => self.figures.as_deref(),
             None => Some(&cx.snapshot.alarm_quality.day),
@@ -104,7 +104,7 @@ impl Quality {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, canvas: &mut Canvas) {
+    pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let theme = cx.theme;
         let (width, height) = (canvas.width(), canvas.height());
         let x = canvas.text(1, 0, "Now  ", theme.strong());
@@ -144,7 +144,7 @@ impl Quality {
     }
 
     /// The table, and below it the alarms to look into unless they stand beside it.
-    fn lines(&self, cx: &Cx, width: u16) -> Vec<(String, Style)> {
+    fn lines(&self, cx: &ViewContext, width: u16) -> Vec<(String, Style)> {
         let Some(figures) = self.figures(cx) else { return Vec::new() };
         let head = line(cx.theme, ["measure", "figure", "target", "limit", "verdict"]);
         let mut lines = vec![(head, cx.theme.dim())];
@@ -167,7 +167,7 @@ impl Quality {
     }
 
     /// The most frequent alarms and their share, those that chattered, were fleeting, or have been active for a day.
-    fn culprits(&self, cx: &Cx) -> Vec<(String, Style)> {
+    fn culprits(&self, cx: &ViewContext) -> Vec<(String, Style)> {
         let Some(figures) = self.figures(cx) else { return Vec::new() };
         let all = figures.annunciated().max(1) as f64;
         let mut lines = vec![("alarms to look into".to_owned(), cx.theme.dim())];
@@ -203,7 +203,7 @@ impl Quality {
 }
 
 /// The rates of this moment, and whether there is a flood.
-fn now_words(cx: &Cx) -> (String, bool) {
+fn now_words(cx: &ViewContext) -> (String, bool) {
     let quality = &cx.snapshot.alarm_quality;
     let flood = match quality.flood_since {
         Some(since) => format!("FLOOD since {}", clock(since, &cx.def().time_zone)),

@@ -9,7 +9,7 @@ use crate::{
         snapshot::{ActiveAlarm, AsideAlarm},
     },
     ui::{
-        Cx,
+        ViewContext,
         chrome::history_words,
         modal::confirm::subject,
         widgets::{
@@ -23,7 +23,7 @@ use crate::{
 const HEAD: u16 = 3;
 
 /// Draws the tab.
-pub(super) fn draw(tab: &Alarms, cx: &Cx, frame: &mut Frame, area: Rect) {
+pub(super) fn draw(tab: &Alarms, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let top = history_trouble(cx, &mut canvas);
     let (width, height) = (canvas.width(), canvas.height());
@@ -40,7 +40,7 @@ pub(super) fn draw(tab: &Alarms, cx: &Cx, frame: &mut Frame, area: Rect) {
 
 /// What is wrong with the history, whole, in at most a third of the tab; returns the rows taken. The header has no room
 /// for it.
-fn history_trouble(cx: &Cx, canvas: &mut Canvas) -> u16 {
+fn history_trouble(cx: &ViewContext, canvas: &mut Canvas) -> u16 {
     let rows = trouble_rows(cx, canvas.width(), canvas.height());
     for (y, line) in rows.iter().enumerate() {
         canvas.text(1, y as u16, line, cx.theme.trouble());
@@ -48,7 +48,7 @@ fn history_trouble(cx: &Cx, canvas: &mut Canvas) -> u16 {
     rows.len() as u16
 }
 
-fn trouble_rows(cx: &Cx, width: u16, height: u16) -> Vec<String> {
+fn trouble_rows(cx: &ViewContext, width: u16, height: u16) -> Vec<String> {
     let Some(trouble) = history_words(cx) else { return Vec::new() };
     let mut lines = wrap(&trouble, width.saturating_sub(2));
     lines.truncate(usize::from(height / 3).max(1));
@@ -56,7 +56,7 @@ fn trouble_rows(cx: &Cx, width: u16, height: u16) -> Vec<String> {
 }
 
 /// Rows of a list on a tab of this size.
-pub(super) fn room(cx: &Cx, width: u16, height: u16) -> usize {
+pub(super) fn room(cx: &ViewContext, width: u16, height: u16) -> usize {
     let height = height.saturating_sub(trouble_rows(cx, width, height).len() as u16);
     usize::from(height.saturating_sub(HEAD + guide(height))).max(1)
 }
@@ -72,7 +72,7 @@ fn guide(height: u16) -> u16 {
 }
 
 /// The names of the views, each with how much is in it, and how much of that waits: nothing is hidden in another view.
-fn views(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
+fn views(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let count = |page| {
         let (mut all, mut waiting) = (0, 0);
         for alarm in cx.snapshot.alarms.iter().filter(|alarm| is_on(page, cx.def().alarm(alarm.id))) {
@@ -112,7 +112,7 @@ fn views(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
     canvas.text_right(end, 0, bell, cx.theme.strong());
 }
 
-fn list(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
+fn list(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
     let (width, height) = (canvas.width(), canvas.height());
     let rows = tab.rows(cx);
@@ -153,7 +153,12 @@ fn list(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
 }
 
 /// The filter in force, how many it shows of how many, and what is above and below the rows that are seen.
-fn filter_line(tab: &Alarms, cx: &Cx, (rows, all, first, room): (&[Row], usize, usize, usize), canvas: &mut Canvas) {
+fn filter_line(
+    tab: &Alarms,
+    cx: &ViewContext,
+    (rows, all, first, room): (&[Row], usize, usize, usize),
+    canvas: &mut Canvas,
+) {
     let theme = cx.theme;
     let folded: usize = rows.iter().filter(|row| row.folded).map(|row| row.more).sum();
     let shown = rows.len() + folded;
@@ -185,7 +190,7 @@ fn filter_line(tab: &Alarms, cx: &Cx, (rows, all, first, room): (&[Row], usize, 
     canvas.text_right(end, 0, &more, theme.strong());
 }
 
-fn aside(tab: &Alarms, cx: &Cx, canvas: &mut Canvas) {
+fn aside(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
     let (width, height) = (canvas.width(), canvas.height());
     let all: &[AsideAlarm] = &cx.snapshot.aside;
@@ -228,7 +233,7 @@ struct Columns {
 
 impl Columns {
     /// For the rows that are seen.
-    fn of(rows: &[Row], cx: &Cx, room: usize, width: u16) -> Columns {
+    fn of(rows: &[Row], cx: &ViewContext, room: usize, width: u16) -> Columns {
         let by = if width >= 110 { 12 } else { 0 };
         let free = width.saturating_sub(1 + 6 + 10 + 11 + 9 + 10 + if by > 0 { by + 1 } else { 0 });
         let seen = rows.iter().take(room).map(|row| self::width(&subject(cx, row.alarm.id)));
@@ -250,7 +255,7 @@ impl Columns {
     }
 }
 
-fn cells(cx: &Cx, row: &Row, what: u16) -> [String; 9] {
+fn cells(cx: &ViewContext, row: &Row, what: u16) -> [String; 9] {
     let alarm: &ActiveAlarm = row.alarm;
     let def = cx.def().alarm(alarm.id);
     [
@@ -271,7 +276,7 @@ fn cells(cx: &Cx, row: &Row, what: u16) -> [String; 9] {
 
 /// `1st temperature high > 72.0 +14 more, 3 unack`: how many are folded under it, and an acknowledgement that is not on
 /// disk, are never cut off.
-fn what_words(cx: &Cx, row: &Row, room: u16) -> String {
+fn what_words(cx: &ViewContext, row: &Row, room: u16) -> String {
     let mark = match (row.first, row.under) {
         (true, _) => "1st ",
         (false, true) => cx.theme.pick("└ ", "` "),

@@ -14,7 +14,7 @@ use crate::{
         traffic::{Frame, Frames},
     },
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         drawn::Rows,
         modal::{Modal, Prompt},
         tabs::{Outgoing, Tab},
@@ -63,14 +63,14 @@ impl Ring {
     }
 
     /// Takes in what is new, if it runs and it is time.
-    pub fn follow(&mut self, cx: &Cx, at: &Place) {
+    pub fn follow(&mut self, cx: &ViewContext, at: &Place) {
         let due = self.taken.is_none_or(|taken| EVERY <= cx.phase.wrapping_sub(taken));
         if (self.runs || self.taken.is_none()) && due {
             self.take(cx, at);
         }
     }
 
-    fn take(&mut self, cx: &Cx, at: &Place) {
+    fn take(&mut self, cx: &ViewContext, at: &Place) {
         if let Some(report) = at.report {
             self.held = report.frames.clone();
             self.taken = Some(cx.phase);
@@ -78,7 +78,7 @@ impl Ring {
     }
 
     /// Holds still, or runs on from the newest frame.
-    pub fn toggle(&mut self, cx: &Cx, at: &Place) {
+    pub fn toggle(&mut self, cx: &ViewContext, at: &Place) {
         self.runs = !self.runs;
         self.selected = None;
         if self.runs {
@@ -87,7 +87,7 @@ impl Ring {
     }
 
     /// Frames that were held still run on; `false` if they ran.
-    pub fn back(&mut self, cx: &Cx, at: &Place) -> bool {
+    pub fn back(&mut self, cx: &ViewContext, at: &Place) -> bool {
         let held = !self.runs;
         if held {
             self.toggle(cx, at);
@@ -101,7 +101,7 @@ impl Ring {
     }
 
     /// Moves the selection; looking back holds still.
-    pub fn scroll(&mut self, cx: &Cx, at: &Place, by: isize) {
+    pub fn scroll(&mut self, cx: &ViewContext, at: &Place, by: isize) {
         if self.taken.is_none() {
             self.take(cx, at);
         }
@@ -134,7 +134,7 @@ impl Ring {
     }
 
     /// Writes the frames that are shown, as text and as a capture.
-    pub fn save(&mut self, cx: &Cx, at: &Place) -> Vec<Act> {
+    pub fn save(&mut self, cx: &ViewContext, at: &Place) -> Vec<Act> {
         if !self.outgoing.is_empty() {
             return Vec::new();
         }
@@ -173,7 +173,7 @@ impl Ring {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, at: &Place, canvas: &mut Canvas) {
+    pub fn view(&self, cx: &ViewContext, at: &Place, canvas: &mut Canvas) {
         let theme = cx.theme;
         // Before the first message has come the page is drawn from the report itself.
         let held = at.report.map(|report| report.frames.clone()).unwrap_or_default();
@@ -200,7 +200,7 @@ impl Ring {
         }
     }
 
-    fn heading(&self, cx: &Cx, count: usize) -> (String, ratatui::style::Style) {
+    fn heading(&self, cx: &ViewContext, count: usize) -> (String, ratatui::style::Style) {
         let filter = self.filter.to_string();
         let filter = if filter.is_empty() { String::new() } else { format!("   filter: {filter}") };
         let zone = &cx.def().time_zone;
@@ -251,7 +251,7 @@ impl Ring {
     }
 
     /// `02:31.412 TX   1 01 03 03 E8 00 03 85 BB  read holding 41001–41003 (0x03E8, 3)`.
-    fn row(&self, cx: &Cx, frame: &Frame, selected: bool, canvas: &mut Canvas) {
+    fn row(&self, cx: &ViewContext, frame: &Frame, selected: bool, canvas: &mut Canvas) {
         let theme = cx.theme;
         let wide = 100 <= canvas.width();
         let time = frame.at.to_zoned(cx.def().time_zone.clone());

@@ -18,7 +18,7 @@ use crate::{
         tally::Tally,
     },
     ui::{
-        Cx,
+        ViewContext,
         modal::faceplate::retry_words,
         tabs::controllers::signal_mark,
         widgets::{
@@ -32,7 +32,7 @@ use crate::{
 const NEAR: f64 = 0.8;
 
 /// All rows of the page.
-pub fn rows(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
+pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     let mut rows = lines(cx, at);
     rows.extend(worries(cx, at).iter().flat_map(|worry| sentence(cx, worry, width)));
     rows.extend(settings(cx, at, width));
@@ -50,7 +50,7 @@ pub fn rows(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
 }
 
 /// Every line with its state, to choose one; nothing where there is only one.
-fn lines(cx: &Cx, at: &Place) -> Vec<Row> {
+fn lines(cx: &ViewContext, at: &Place) -> Vec<Row> {
     let lines = &cx.def().lines;
     if lines.len() < 2 {
         return Vec::new();
@@ -71,14 +71,14 @@ fn lines(cx: &Cx, at: &Place) -> Vec<Row> {
 }
 
 /// `! what is wrong`, over as many rows as it needs.
-fn sentence(cx: &Cx, words: &str, width: u16) -> Vec<Row> {
+fn sentence(cx: &ViewContext, words: &str, width: u16) -> Vec<Row> {
     let lines = wrap(words, width.saturating_sub(5)).into_iter().enumerate();
     lines
         .map(|(n, line)| plain(if n == 0 { format!("! {line}") } else { format!("  {line}") }, cx.theme.trouble()))
         .collect()
 }
 
-fn settings(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
+fn settings(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     let (theme, line) = (cx.theme, at.settings);
     let mut flow = Flow::new("settings", theme.dim(), width);
     flow.add(plain(line.transport.to_string(), theme.strong()));
@@ -99,7 +99,7 @@ fn settings(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
     flow.rows()
 }
 
-fn load(cx: &Cx, report: &LineReport, width: u16) -> Vec<Row> {
+fn load(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
     let (theme, counters) = (cx.theme, &report.counters);
     let (now, minute) = (f64::from(counters.utilisation), f64::from(counters.utilisation_minute));
     let mut flow = Flow::new("load", theme.dim(), width);
@@ -114,7 +114,7 @@ fn load(cx: &Cx, report: &LineReport, width: u16) -> Vec<Row> {
     flow.rows()
 }
 
-fn cycle(cx: &Cx, report: &LineReport, width: u16) -> Vec<Row> {
+fn cycle(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
     let mut flow = Flow::new("cycle", cx.theme.dim(), width);
     let plan = Planned::of(report);
     flow.add(value(cx, "blocks", &plan.blocks.to_string()));
@@ -155,7 +155,7 @@ fn missed_lately(report: &LineReport) -> bool {
     0.9 <= report.counters.utilisation && 0 < report.counters.missed
 }
 
-fn counters(cx: &Cx, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
+fn counters(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
     let (theme, counters) = (cx.theme, &report.counters);
     let sum = Tallies::of(report);
     let ill = sum.lately;
@@ -228,7 +228,7 @@ impl Tallies {
     }
 }
 
-fn devices(cx: &Cx, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
+fn devices(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
     let columns = [
         words("", 0),
         words("device", 0),
@@ -276,7 +276,7 @@ fn devices(cx: &Cx, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
     rows
 }
 
-fn state(cx: &Cx, device: &DeviceDef) -> String {
+fn state(cx: &ViewContext, device: &DeviceDef) -> String {
     match cx.snapshot.device(device.id).state {
         DeviceState::Unknown => "not asked".to_owned(),
         DeviceState::Answering => "answering".to_owned(),
@@ -287,7 +287,7 @@ fn state(cx: &Cx, device: &DeviceDef) -> String {
     }
 }
 
-fn is_ill(cx: &Cx, device: &DeviceDef) -> bool {
+fn is_ill(cx: &ViewContext, device: &DeviceDef) -> bool {
     match cx.snapshot.device(device.id).state {
         DeviceState::Failing(_) | DeviceState::Down { .. } => true,
         DeviceState::Unknown | DeviceState::Answering => false,
@@ -300,7 +300,7 @@ fn near(tally: &Tally, timeout: Duration) -> Option<Duration> {
 }
 
 /// What is wrong and what to do about it, a sentence each.
-fn worries(cx: &Cx, at: &Place) -> Vec<String> {
+fn worries(cx: &ViewContext, at: &Place) -> Vec<String> {
     let mut worries = Vec::new();
     if let Some(before) = &at.status.settings_before {
         worries.push(format!("these settings are tried, not saved; before: {}", before.transport));
@@ -331,7 +331,7 @@ fn worries(cx: &Cx, at: &Place) -> Vec<String> {
     worries
 }
 
-fn of_device(cx: &Cx, line: &LineDef, report: &LineReport, device: &DeviceDef, tally: &Tally) -> Vec<String> {
+fn of_device(cx: &ViewContext, line: &LineDef, report: &LineReport, device: &DeviceDef, tally: &Tally) -> Vec<String> {
     let mut worries = Vec::new();
     if let Some(p99) = near(tally, line.timeout) {
         worries.push(format!("replies take {} of {} ms: raise the timeout", p99.as_millis(), line.timeout.as_millis()));
@@ -362,12 +362,12 @@ fn of_device(cx: &Cx, line: &LineDef, report: &LineReport, device: &DeviceDef, t
     worries
 }
 
-fn value(cx: &Cx, label: &str, text: &str) -> Row {
+fn value(cx: &ViewContext, label: &str, text: &str) -> Row {
     vec![(format!("{label} "), cx.theme.dim()), (text.to_owned(), cx.theme.normal())]
 }
 
 /// A count of what should not happen: quiet at zero and when it is long ago.
-fn count(cx: &Cx, label: &str, times: u64, lately: bool) -> Row {
+fn count(cx: &ViewContext, label: &str, times: u64, lately: bool) -> Row {
     match (times, lately) {
         (0, _) | (_, false) => value(cx, label, &grouped(times)),
         (_, true) => plain(format!("!{label} {}", grouped(times)), cx.theme.trouble()),

@@ -16,7 +16,7 @@ use crate::{
         tag::Poll,
     },
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         drawn::Rows,
         modal::{Modal, Why},
         widgets::text::{Canvas, between, fit_words, wrap},
@@ -53,13 +53,13 @@ impl Plan {
     }
 
     /// Why the values of the selected block are what they are, beginning with one that is not good.
-    pub fn why(&self, cx: &Cx, at: &Place) -> Vec<Act> {
+    pub fn why(&self, cx: &ViewContext, at: &Place) -> Vec<Act> {
         let poll = at.report.and_then(|report| report.polls.get(self.selected));
         Why::open(Why::of_all(cx, poll.map(|poll| poll.tags.to_vec()).unwrap_or_default()))
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, at: &Place, canvas: &mut Canvas) {
+    pub fn view(&self, cx: &ViewContext, at: &Place, canvas: &mut Canvas) {
         let theme = cx.theme;
         let Some(report) = at.report.filter(|report| !report.polls.is_empty()) else {
             canvas.text(1, 0, "nothing is polled on this line yet", theme.normal());
@@ -121,7 +121,7 @@ const COLUMNS: [rows::Column; 15] = [
     number("missed", 9),
 ];
 
-fn cells(cx: &Cx, poll: &PollReport) -> [String; 15] {
+fn cells(cx: &ViewContext, poll: &PollReport) -> [String; 15] {
     let (code, tally) = (poll.table.read_fc(), &poll.tally);
     let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
     let next = poll.next.map_or("–".to_owned(), |next| format!("{:.1}", between(cx.now, next).as_secs_f64()));
@@ -192,7 +192,7 @@ pub fn plural<'a>(count: usize, one: &'a str, many: &'a str) -> &'a str {
 }
 
 /// All that the table has no room for.
-fn detail(cx: &Cx, report: &LineReport, poll: &PollReport) -> Vec<String> {
+fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<String> {
     let (device, code, tally) = (cx.def().device(poll.device), poll.table.read_fc(), &poll.tally);
     let last = poll.address.saturating_add(poll.count.saturating_sub(1));
     let used: u16 = poll.tags.iter().map(|tag| cx.def().tag(*tag).point.len()).sum();

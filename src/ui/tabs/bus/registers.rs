@@ -14,7 +14,7 @@ use crate::{
         tool::{Finding, Tool, ToolState},
     },
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         keys::char,
         modal::{Modal, Next, window},
         widgets::text::{Canvas, fit_words},
@@ -45,7 +45,7 @@ impl Registers {
     }
 
     /// A key.
-    pub fn on_key(mut self, cx: &Cx, event: KeyEvent) -> Next {
+    pub fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         let last = self.count.saturating_sub(1);
         self.problem = None;
         match event.code {
@@ -73,7 +73,7 @@ impl Registers {
     }
 
     /// Words by address, and how the test stands.
-    fn values(&self, cx: &Cx) -> (BTreeMap<u16, u16>, String, bool) {
+    fn values(&self, cx: &ViewContext) -> (BTreeMap<u16, u16>, String, bool) {
         let run = cx.snapshot.lines.get(self.line.index()).and_then(|line| line.test.as_ref());
         let Some(run) = run.filter(|run| run.tool == self.tool()) else {
             return (BTreeMap::new(), "asked, nothing came yet".to_owned(), false);
@@ -105,7 +105,7 @@ impl Registers {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, screen: &mut Screen, body: Rect) {
+    pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
         let theme = cx.theme;
         let (words, state, ill) = self.values(cx);
         let title = format!("unit {}, {} from {}", self.unit, self.table.word(), self.table.modicon(self.address));
@@ -170,7 +170,7 @@ impl Registers {
     }
 
     /// The selected register and the next one as one value.
-    fn pair(&self, cx: &Cx, words: &BTreeMap<u16, u16>, canvas: &mut Canvas) {
+    fn pair(&self, cx: &ViewContext, words: &BTreeMap<u16, u16>, canvas: &mut Canvas) {
         let theme = cx.theme;
         let first = self.address.wrapping_add(self.selected);
         let second = first.wrapping_add(1);

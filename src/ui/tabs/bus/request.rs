@@ -23,7 +23,7 @@ use crate::{
         tool::{Scan, Tool},
     },
     ui::{
-        Act, Cx, keys,
+        Act, ViewContext, keys,
         modal::{Next, line::Line, window},
         widgets::text::{pad, width, wrap},
     },
@@ -69,7 +69,7 @@ const CHARACTERS: [(Parity, u8); 4] = [(Parity::None, 1), (Parity::Even, 1), (Pa
 
 impl Form {
     /// With what suits most.
-    pub fn new(cx: &Cx, at: &Place, tried: Tried) -> Form {
+    pub fn new(cx: &ViewContext, at: &Place, tried: Tried) -> Form {
         let unit = cx.def().devices.iter().find(|device| device.line == at.id).map_or(1, |device| device.unit);
         let text = |label, text: &str| Field { label, input: Input::Text(Line::long(text, 400)) };
         let choice = |label, options: Vec<String>| Field { label, input: Input::Choice(options, 0) };
@@ -114,7 +114,7 @@ impl Form {
     }
 
     /// A key; what is filled in is kept for the next time.
-    pub fn on_key(mut self, cx: &Cx, bench: &mut Bench, event: KeyEvent) -> Next {
+    pub fn on_key(mut self, cx: &ViewContext, bench: &mut Bench, event: KeyEvent) -> Next {
         let last = self.fields.len() - 1;
         if keys::code(KeyCode::Enter).is(event) {
             match self.start(cx) {
@@ -164,7 +164,7 @@ impl Form {
         }
     }
 
-    fn start(&self, cx: &Cx) -> Result<Vec<Act>, String> {
+    fn start(&self, cx: &ViewContext) -> Result<Vec<Act>, String> {
         let at = Place::of(cx, self.line).ok_or("this line has gone")?;
         let missed = |field: &Field| matches!(&field.input, Input::Text(line) if line.missed());
         if self.fields.iter().any(missed) {
@@ -240,7 +240,7 @@ impl Form {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, screen: &mut Screen, body: Rect) {
+    pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
         let Some(at) = Place::of(cx, self.line) else { return };
         let theme = cx.theme;
         let room = body.width.saturating_sub(8).min(72);

@@ -13,13 +13,13 @@ use crate::{
     bus::explain::{self, Direction},
     plant::tool::{Finding, Tool, ToolRun, ToolState},
     ui::{
-        Cx,
+        ViewContext,
         widgets::text::{between, clock, wrap},
     },
 };
 
 /// The last test of a line, or how to begin.
-pub fn rows(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
+pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     let theme = cx.theme;
     let room = width.saturating_sub(3);
     let Some(run) = &at.status.test else {
@@ -69,7 +69,7 @@ pub fn rows(cx: &Cx, at: &Place, width: u16) -> Vec<Row> {
 }
 
 /// What, by whom, when, how it stands; and how far it has come.
-fn heading(cx: &Cx, run: &ToolRun) -> Vec<Row> {
+fn heading(cx: &ViewContext, run: &ToolRun) -> Vec<Row> {
     let theme = cx.theme;
     let at = clock(run.started, &cx.def().time_zone);
     let (state, style) = match &run.state {
@@ -93,7 +93,7 @@ fn heading(cx: &Cx, run: &ToolRun) -> Vec<Row> {
 }
 
 /// Time left, if the steps to come take as long as those before.
-fn remaining(cx: &Cx, run: &ToolRun) -> Option<std::time::Duration> {
+fn remaining(cx: &ViewContext, run: &ToolRun) -> Option<std::time::Duration> {
     let spent = between(run.started, cx.now).as_secs_f64() / cx.snapshot.speed.clamp(0.01, 1e6);
     let each = spent / f64::from((0 < run.done).then_some(run.done)?);
     SignedDuration::try_from_secs_f64(each * f64::from(run.total.saturating_sub(run.done))).ok()?.try_into().ok()
@@ -101,7 +101,7 @@ fn remaining(cx: &Cx, run: &ToolRun) -> Option<std::time::Duration> {
 
 /// What came back for bytes, decoded.
 fn came_back(
-    cx: &Cx,
+    cx: &ViewContext,
     at: &Place,
     run: &ToolRun,
     bytes: &[u8],

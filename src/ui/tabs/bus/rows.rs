@@ -3,7 +3,7 @@
 use ratatui::style::Style;
 
 use crate::ui::{
-    Cx,
+    ViewContext,
     widgets::text::{Canvas, fit_words, pad, pad_left, width},
 };
 
@@ -16,7 +16,7 @@ pub fn plain(text: impl Into<String>, style: Style) -> Row {
 }
 
 /// Draws rows from `first` on, a column free on the left; says how many more there are below.
-pub fn draw(cx: &Cx, canvas: &mut Canvas, rows: &[Row], first: usize) {
+pub fn draw(cx: &ViewContext, canvas: &mut Canvas, rows: &[Row], first: usize) {
     let height = usize::from(canvas.height());
     // The last row says how much there is more, so that the mark covers nothing.
     let room = if rows.len() <= height { height } else { height.saturating_sub(1) };
@@ -125,7 +125,7 @@ pub fn first_for(selected: usize, count: usize, room: usize) -> usize {
 }
 
 /// A share as a bar: `██████────`.
-pub fn bar(cx: &Cx, share: f64, cells: usize) -> String {
+pub fn bar(cx: &ViewContext, share: f64, cells: usize) -> String {
     let full = ((share.clamp(0.0, 1.0) * cells as f64).round() as usize).max(usize::from(0.0 < share));
     "█".repeat(full) + &cx.theme.pick("─", "-").repeat(cells - full)
 }

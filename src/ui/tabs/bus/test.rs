@@ -25,7 +25,7 @@ use crate::{
         tool::Tool,
     },
     ui::{
-        Act, Cx, keys,
+        Act, ViewContext, keys,
         modal::{Confirm, Modal, Next, Notice, line::Line},
         widgets::text::{Canvas, fit, fit_words, pad, wrap},
     },
@@ -91,7 +91,7 @@ impl Bench {
     }
 
     /// Opens the entry of a test.
-    pub fn open(&mut self, cx: &Cx, at: &Place, tried: Tried) -> Vec<Act> {
+    pub fn open(&mut self, cx: &ViewContext, at: &Place, tried: Tried) -> Vec<Act> {
         self.selected = Tried::ALL.iter().position(|known| *known == tried).unwrap_or(0);
         self.first = None;
         let window = match tried {
@@ -115,7 +115,7 @@ impl Bench {
     }
 
     /// Single rows move the selection; screens scroll the results.
-    pub fn scroll(&mut self, cx: &Cx, at: &Place, by: isize) {
+    pub fn scroll(&mut self, cx: &ViewContext, at: &Place, by: isize) {
         if by.abs() == 1 {
             self.selected = self.selected.saturating_add_signed(by).min(Tried::ALL.len() - 1);
             return;
@@ -130,7 +130,7 @@ impl Bench {
     }
 
     /// Draws it: the tests, then what came of the last one.
-    pub fn view(&self, cx: &Cx, at: &Place, canvas: &mut Canvas) {
+    pub fn view(&self, cx: &ViewContext, at: &Place, canvas: &mut Canvas) {
         let theme = cx.theme;
         let (width, height) = (canvas.width(), canvas.height());
         let tests = height.saturating_sub(3).min(TOP - 2);
@@ -232,7 +232,7 @@ fn only_reads(message: &[u8]) -> bool {
 }
 
 /// The last test once more.
-pub fn again(_cx: &Cx, at: &Place) -> Vec<Act> {
+pub fn again(_cx: &ViewContext, at: &Place) -> Vec<Act> {
     let Some(run) = &at.status.test else { return Vec::new() };
     start(at, run.tool.clone()).into_iter().collect()
 }
@@ -264,7 +264,7 @@ struct Ready {
 
 impl Send {
     /// A key; what is typed is kept for the next time.
-    pub fn on_key(mut self, cx: &Cx, bench: &mut Bench, event: KeyEvent) -> Next {
+    pub fn on_key(mut self, cx: &ViewContext, bench: &mut Bench, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Tab).is(event) {
             self.bare = !self.bare;
             self.problem = None;
@@ -289,7 +289,7 @@ impl Send {
         self.text.paste(text);
     }
 
-    fn send(&self, cx: &Cx) -> Result<Act, String> {
+    fn send(&self, cx: &ViewContext) -> Result<Act, String> {
         let at = Place::of(cx, self.line).ok_or("this line has gone")?;
         if self.text.missed() {
             return Err("not all of it was taken; Ctrl-U empties the line".to_owned());
@@ -310,7 +310,7 @@ impl Send {
     }
 
     /// Draws it over the tests, so that what comes back is seen below.
-    pub fn view(&self, cx: &Cx, screen: &mut Screen, body: Rect) {
+    pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
         let Some(at) = Place::of(cx, self.line) else { return };
         let theme = cx.theme;
         let area = Rect { height: (TOP + 1).min(body.height), ..body };
@@ -359,7 +359,7 @@ impl Send {
 }
 
 impl Ready {
-    fn rows(&self, cx: &Cx, bare: bool, width: u16) -> Vec<Row> {
+    fn rows(&self, cx: &ViewContext, bare: bool, width: u16) -> Vec<Row> {
         let theme = cx.theme;
         let added = match (bare, self.added.is_empty()) {
             (true, _) => "as typed, nothing added".to_owned(),

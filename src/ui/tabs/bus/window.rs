@@ -19,7 +19,7 @@ use crate::{
         traffic::{Exchange, Frame},
     },
     ui::{
-        Cx,
+        ViewContext,
         keys::Hint,
         modal::{Modal, Next, window},
         tabs::Tabs,
@@ -53,7 +53,7 @@ impl Window {
     }
 
     /// A key.
-    pub fn on_key(self, cx: &Cx, tabs: &mut Tabs, event: KeyEvent) -> Next {
+    pub fn on_key(self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
         match self {
             Window::Sheet(sheet) => sheet.on_key(event),
             Window::Send(send) => send.on_key(cx, &mut tabs.bus.test, event),
@@ -90,7 +90,7 @@ impl Window {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, screen: &mut Screen, body: Rect) {
+    pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
         match self {
             Window::Sheet(sheet) => sheet.view(cx, screen, body),
             Window::Send(send) => send.view(cx, screen, body),
@@ -153,7 +153,7 @@ impl Sheet {
         Window::Sheet(self).stay()
     }
 
-    fn view(&self, cx: &Cx, screen: &mut Screen, body: Rect) {
+    fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
         let room = body.width.saturating_sub(6);
         let (title, rows) = match &self.shown {
             Shown::Frame { line, frame, before } => {
@@ -173,7 +173,7 @@ impl Sheet {
 }
 
 /// Every byte of a frame with its name and meaning.
-fn frame_rows(cx: &Cx, frame: &Frame, told: &explain::Explained, room: u16) -> Vec<Row> {
+fn frame_rows(cx: &ViewContext, frame: &Frame, told: &explain::Explained, room: u16) -> Vec<Row> {
     let theme = cx.theme;
     let at = frame.at.to_zoned(cx.def().time_zone.clone()).strftime("%H:%M:%S%.6f");
     let direction = if frame.sent { "TX sent" } else { "RX received" };
@@ -193,7 +193,7 @@ fn frame_rows(cx: &Cx, frame: &Frame, told: &explain::Explained, room: u16) -> V
 }
 
 /// Summary and fields.
-pub fn told_rows(cx: &Cx, told: &explain::Explained, room: u16) -> Vec<Row> {
+pub fn told_rows(cx: &ViewContext, told: &explain::Explained, room: u16) -> Vec<Row> {
     let theme = cx.theme;
     let mut rows: Vec<Row> = wrap(&told.summary, room).into_iter().map(|line| plain(line, theme.strong())).collect();
     let widest = |text: fn(&explain::Field) -> &str, most| {
@@ -219,7 +219,7 @@ pub fn told_rows(cx: &Cx, told: &explain::Explained, room: u16) -> Vec<Row> {
 }
 
 /// A request and its answer in words.
-pub fn exchange_rows(cx: &Cx, exchange: &Exchange, room: u16) -> Vec<Row> {
+pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Row> {
     let theme = cx.theme;
     let framing = Some(exchange.framing);
     let asked = explain::message_of(&exchange.request, exchange.framing);
@@ -242,7 +242,7 @@ pub fn exchange_rows(cx: &Cx, exchange: &Exchange, room: u16) -> Vec<Row> {
 }
 
 /// The tags of a block as they stand.
-fn block_rows(cx: &Cx, line: LineId, device: DeviceId, table: Table, address: u16) -> Vec<Row> {
+fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, address: u16) -> Vec<Row> {
     let report = cx.snapshot.line(line).report.as_deref();
     let poll = report.and_then(|report| {
         report.polls.iter().find(|poll| (poll.device, poll.table, poll.address) == (device, table, address))

@@ -12,7 +12,7 @@ use crate::{
         tag::{Confidence, TagDef},
     },
     ui::{
-        Cx,
+        ViewContext,
         modal::Confirm,
         widgets::text::{fit_words, width, wrap},
     },
@@ -24,7 +24,13 @@ const ROOM: u16 = 68;
 const WARNINGS_MAX: usize = 6;
 
 /// The question whether to write these changes.
-pub fn question(cx: &Cx, device: &DeviceDef, source: &Source, set: Arc<ParameterSet>, changes: Vec<Change>) -> Confirm {
+pub fn question(
+    cx: &ViewContext,
+    device: &DeviceDef,
+    source: &Source,
+    set: Arc<ParameterSet>,
+    changes: Vec<Change>,
+) -> Confirm {
     let from: Arc<str> = source.words(cx).into();
     let count = if changes.len() == 1 { "1 value".to_owned() } else { format!("{} values", changes.len()) };
     let question =
@@ -44,7 +50,7 @@ pub fn question(cx: &Cx, device: &DeviceDef, source: &Source, set: Arc<Parameter
     Confirm::order(title, question, Command::Restore(Box::new(wish))).with_notes(notes).signed(cx)
 }
 
-fn change_words(cx: &Cx, change: &Change) -> String {
+fn change_words(cx: &ViewContext, change: &Change) -> String {
     let text = |value| cx.snapshot.format(change.tag, value);
     let (short, unit) = (&cx.def().tag(change.tag).short, cx.snapshot.unit(change.tag));
     format!("{short}  {} → {} {unit}", text(change.old), text(change.new)).trim_end().to_owned()

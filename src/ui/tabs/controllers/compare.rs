@@ -11,7 +11,7 @@ use crate::{
         restore::{Restore, State},
     },
     ui::{
-        Cx,
+        ViewContext,
         chrome::outcome_words,
         modal::{Confirm, Notice},
         widgets::text::{Canvas, fit, fit_words, moment, pad, pad_left},
@@ -38,7 +38,7 @@ impl Compare {
         Compare { source, first: 0, all: false }
     }
 
-    fn rows(&self, cx: &Cx, device: &DeviceDef) -> Vec<Compared> {
+    fn rows(&self, cx: &ViewContext, device: &DeviceDef) -> Vec<Compared> {
         let Some(set) = self.source.set(cx) else { return Vec::new() };
         let rows = parameter_set::compare(cx.def(), device.id, &set, &trusted(cx));
         let run = self.at_work(cx, device);
@@ -48,7 +48,7 @@ impl Compare {
     }
 
     /// The restore of this very source to this device, at work or the last one.
-    fn run<'a>(&self, cx: &Cx<'a>, device: &DeviceDef) -> Option<&'a Restore> {
+    fn run<'a>(&self, cx: &ViewContext<'a>, device: &DeviceDef) -> Option<&'a Restore> {
         let run = cx.snapshot.restore(device.id).filter(|run| *run.from == *self.source.words(cx))?;
         let same = match self.source {
             // Another set may have got the name since.
@@ -60,23 +60,23 @@ impl Compare {
     }
 
     /// The same while it has not ended. What it has written later may have changed since, so only then its steps are shown.
-    fn at_work<'a>(&self, cx: &Cx<'a>, device: &DeviceDef) -> Option<&'a Restore> {
+    fn at_work<'a>(&self, cx: &ViewContext<'a>, device: &DeviceDef) -> Option<&'a Restore> {
         self.run(cx, device).filter(|run| run.at_work())
     }
 
-    fn plan(&self, cx: &Cx, device: &DeviceDef) -> Option<Plan> {
+    fn plan(&self, cx: &ViewContext, device: &DeviceDef) -> Option<Plan> {
         let set = self.source.set(cx)?;
         Some(parameter_set::plan(cx.def(), device.id, &set, &trusted(cx)))
     }
 
     /// Scrolls.
-    pub fn move_by(&mut self, cx: &Cx, device: &DeviceDef, by: isize) {
+    pub fn move_by(&mut self, cx: &ViewContext, device: &DeviceDef, by: isize) {
         let last = self.rows(cx, device).len().saturating_sub(1);
         self.first = self.first.saturating_add_signed(by).min(last);
     }
 
     /// The question whether to write the differences, or why they cannot be written.
-    pub fn restore(&self, cx: &Cx, device: &DeviceDef) -> Result<Confirm, Notice> {
+    pub fn restore(&self, cx: &ViewContext, device: &DeviceDef) -> Result<Confirm, Notice> {
         let words = |words: Vec<String>| Err(Notice::new(device.name.clone(), words));
         if let Some(notice) = Notice::unreachable(cx, device.id) {
             return Err(notice);
@@ -97,7 +97,7 @@ impl Compare {
     }
 
     /// Draws the page.
-    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, device: &DeviceDef) {
+    pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef) {
         let theme = cx.theme;
         let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
         let x = canvas.text(1, 0, &format!("{} → {}", self.source.words(cx), device.name), theme.focus());
@@ -136,7 +136,7 @@ impl Compare {
         }
     }
 
-    fn summary(&self, cx: &Cx, device: &DeviceDef, shown: &[Compared]) -> String {
+    fn summary(&self, cx: &ViewContext, device: &DeviceDef, shown: &[Compared]) -> String {
         let Some(set) = self.source.set(cx) else { return String::new() };
         let rows = parameter_set::compare(cx.def(), device.id, &set, &trusted(cx));
         let same = rows.iter().filter(|row| row.same).count();
@@ -147,7 +147,7 @@ impl Compare {
         format!("{differ} differ, {same} the same{silent}{hidden}")
     }
 
-    fn row(&self, cx: &Cx, canvas: &mut Canvas, y: u16, row: &Compared, run: Option<&Restore>) {
+    fn row(&self, cx: &ViewContext, canvas: &mut Canvas, y: u16, row: &Compared, run: Option<&Restore>) {
         let theme = cx.theme;
         let step = run.and_then(|run| run.steps.iter().find(|step| Some(step.change.tag) == row.tag));
         let label = row.tag.map_or("no such setting", |tag| cx.def().tag(tag).label.as_str());
@@ -185,7 +185,7 @@ fn columns([short, label, set, device, note]: [&str; 5], end: u16) -> String {
 }
 
 /// How a restore goes, or how it ended.
-fn run_words(cx: &Cx, device: &DeviceDef, run: &Restore) -> (String, bool) {
+fn run_words(cx: &ViewContext, device: &DeviceDef, run: &Restore) -> (String, bool) {
     let (done, all) = (run.done(), run.steps.len());
     let (at, by) = (moment(run.at, cx.now, &cx.def().time_zone), &run.by);
     match run.state {

@@ -8,14 +8,14 @@ use crate::{
         event::LineState,
     },
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         modal::{Choice, Confirm, Modal, Notice, Settings, Why},
     },
 };
 
 impl Controllers {
     /// What can be done with a device on any of its pages.
-    pub(super) fn on_device(&mut self, cx: &Cx, device: &DeviceDef, action: Action) -> Vec<Act> {
+    pub(super) fn on_device(&mut self, cx: &ViewContext, device: &DeviceDef, action: Action) -> Vec<Act> {
         match action {
             Action::Why if matches!(self.page, Page::Program) => {
                 let tag = device.program.as_ref().and_then(|program| self.cell.tag(program));
@@ -44,19 +44,19 @@ impl Controllers {
 }
 
 /// The window that writes a tag.
-pub(super) fn write(cx: &Cx, tag: Option<TagId>) -> Vec<Act> {
+pub(super) fn write(cx: &ViewContext, tag: Option<TagId>) -> Vec<Act> {
     tag.and_then(|tag| Modal::write(cx, tag)).map(Act::Open).into_iter().collect()
 }
 
 /// The question whether to write this value, unless nothing can be written now.
-pub(super) fn confirm(cx: &Cx, tag: TagId, value: f64) -> Vec<Act> {
+pub(super) fn confirm(cx: &ViewContext, tag: TagId, value: f64) -> Vec<Act> {
     let device = cx.def().tag(tag).device;
     let question = || Modal::Confirm(Confirm::write(cx, tag, value));
     vec![Act::Open(Notice::unreachable(cx, device).map_or_else(question, Modal::Notice))]
 }
 
 /// Auto-tuning at work is stopped, else the window asks which kind is wanted.
-fn tune(cx: &Cx, device: &DeviceDef) -> Vec<Act> {
+fn tune(cx: &ViewContext, device: &DeviceDef) -> Vec<Act> {
     let Some(tune) = device.faceplate.as_ref().and_then(|plate| plate.tune) else {
         return notice(device, "this device has no auto-tuning");
     };
@@ -69,7 +69,7 @@ pub(super) fn notice(device: &DeviceDef, words: &str) -> Vec<Act> {
 }
 
 /// Closing a line is asked with what it means for everything on it.
-fn connect(cx: &Cx, line: LineId) -> Confirm {
+fn connect(cx: &ViewContext, line: LineId) -> Confirm {
     let name = &cx.def().line(line).name;
     if cx.snapshot.line(line).state == LineState::Disconnected {
         return Confirm::order(

@@ -14,7 +14,7 @@ use crate::{
         snapshot::DeviceState,
     },
     ui::{
-        Cx,
+        ViewContext,
         chrome::{order_words, outcome_words},
         modal::faceplate::{device_words, retry_words},
         widgets::text::{Canvas, clock, fit_words, width, wrap},
@@ -27,7 +27,7 @@ const WIDE: (u16, u16) = (110, 30);
 const PANEL: u16 = 36;
 
 /// Draws the page.
-pub fn view(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, table: &Table, trend: Option<&Series>) {
+pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Table, trend: Option<&Series>) {
     heading(cx, device, canvas);
     let (wide, high) = (canvas.width(), canvas.height());
     if device.faceplate.is_some() && wide >= WIDE.0 && high + 6 >= WIDE.1 {
@@ -43,7 +43,7 @@ pub fn view(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, table: &Table, tre
 }
 
 /// The table, what the selected parameter means, and the last write.
-fn below(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, table: &Table) {
+fn below(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Table) {
     let (wide, high) = (canvas.width(), canvas.height());
     let (end, bottom) = (wide.saturating_sub(1), high.saturating_sub(1));
     let words = if high > 16 { 2 } else { 1 };
@@ -83,7 +83,7 @@ fn below(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, table: &Table) {
     }
 }
 
-fn heading(cx: &Cx, device: &DeviceDef, canvas: &mut Canvas) {
+fn heading(cx: &ViewContext, device: &DeviceDef, canvas: &mut Canvas) {
     let theme = cx.theme;
     let count = cx.def().devices.len();
     let x = canvas.text(1, 0, &format!("‹ {} ›", device.name), theme.focus());
@@ -101,7 +101,7 @@ fn heading(cx: &Cx, device: &DeviceDef, canvas: &mut Canvas) {
 }
 
 /// How a device stands: mark of NE 107, its word and its reason.
-pub fn status_words(cx: &Cx, device: DeviceId) -> (String, Style) {
+pub fn status_words(cx: &ViewContext, device: DeviceId) -> (String, Style) {
     let (theme, status) = (cx.theme, cx.snapshot.device(device));
     match (status.diagnosis, status.state) {
         (Some(reason), _) => {
@@ -129,7 +129,7 @@ pub fn signal_mark(signal: Signal) -> String {
 }
 
 /// The latest write to this device and its outcome, and whether that is a worry.
-fn last_write(cx: &Cx, device: DeviceId) -> Option<(String, bool)> {
+fn last_write(cx: &ViewContext, device: DeviceId) -> Option<(String, bool)> {
     let to_device = |tag| cx.def().tag(tag).device == device;
     let order =
         cx.snapshot.orders.iter().find(|order| order.command.written().is_some_and(|(tag, _)| to_device(tag)))?;

@@ -1,6 +1,6 @@
 //! What the words of a controller mean, and what to change when it does not do what it should: pages to read.
 
-use crate::ui::{Cx, widgets::text::Canvas};
+use crate::ui::{ViewContext, widgets::text::Canvas};
 
 /// A page: its heading and its lines, at most 16 of at most 76 columns.
 type Page = (&'static str, &'static [&'static str]);
@@ -111,7 +111,7 @@ pub const PAGES: &[Page] = &[
 ];
 
 /// Draws a page.
-pub fn view(cx: &Cx, canvas: &mut Canvas, page: usize) {
+pub fn view(cx: &ViewContext, canvas: &mut Canvas, page: usize) {
     let Some((heading, lines)) = PAGES.get(page) else { return };
     canvas.text(1, 0, heading, cx.theme.strong());
     let end = canvas.width().saturating_sub(1);

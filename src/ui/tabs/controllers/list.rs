@@ -10,7 +10,7 @@ use crate::{
         tag::{Access, Poll},
     },
     ui::{
-        Cx,
+        ViewContext,
         widgets::{
             text::{Canvas, fit, fit_words, pad_left, width},
             value,
@@ -32,7 +32,7 @@ impl Columns {
     const ALARM: u16 = 6;
     const REPLY: u16 = 6;
 
-    fn of(cx: &Cx, screen: u16) -> Columns {
+    fn of(cx: &ViewContext, screen: u16) -> Columns {
         let devices = &cx.def().devices;
         let widest = |text: &dyn Fn(&DeviceDef) -> String, least: u16, most: u16| {
             devices.iter().map(|device| width(&text(device))).max().unwrap_or(0).clamp(least, most)
@@ -52,7 +52,7 @@ impl Columns {
 }
 
 /// Draws the list with this row selected.
-pub fn view(cx: &Cx, canvas: &mut Canvas, selected: usize) {
+pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: usize) {
     let (theme, devices) = (cx.theme, &cx.def().devices);
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
     canvas.text(1, 0, &fit_words(&summary(cx), end), theme.normal());
@@ -77,7 +77,7 @@ pub fn view(cx: &Cx, canvas: &mut Canvas, selected: usize) {
 }
 
 /// `31 devices   2 not answering   1 with alarms`.
-fn summary(cx: &Cx) -> String {
+fn summary(cx: &ViewContext) -> String {
     let devices = &cx.def().devices;
     let down = devices.iter().filter(|device| {
         let status = cx.snapshot.device(device.id);
@@ -126,11 +126,11 @@ fn heading(columns: &Columns, style: Style) -> Cells {
 }
 
 /// `L1/1`.
-fn place(cx: &Cx, device: &DeviceDef) -> String {
+fn place(cx: &ViewContext, device: &DeviceDef) -> String {
     format!("{}/{}", cx.def().line(device.line).name, device.unit)
 }
 
-fn row(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, device: &DeviceDef, selected: bool) {
+fn row(cx: &ViewContext, canvas: &mut Canvas, y: u16, columns: &Columns, device: &DeviceDef, selected: bool) {
     let theme = cx.theme;
     let mut cells = cells(cx, columns, device);
     if selected {
@@ -142,7 +142,7 @@ fn row(cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, device: &DeviceD
     put(canvas, y, cells);
 }
 
-fn cells(cx: &Cx, columns: &Columns, device: &DeviceDef) -> Cells {
+fn cells(cx: &ViewContext, columns: &Columns, device: &DeviceDef) -> Cells {
     let theme = cx.theme;
     let (mark, words, style) = state(cx, device.id);
     let mut cells = vec![
@@ -185,7 +185,7 @@ fn cells(cx: &Cx, columns: &Columns, device: &DeviceDef) -> Cells {
 }
 
 /// The most urgent alarm of a device, and how many there are.
-fn alarm(cx: &Cx, device: DeviceId) -> (String, Style) {
+fn alarm(cx: &ViewContext, device: DeviceId) -> (String, Style) {
     let all: Vec<&ActiveAlarm> = alarms(cx, device).collect();
     let Some(alarm) = all.iter().min_by_key(|alarm| cx.def().alarm(alarm.id).priority) else {
         return (String::new(), cx.theme.dim());
@@ -197,7 +197,7 @@ fn alarm(cx: &Cx, device: DeviceId) -> (String, Style) {
 }
 
 /// AT while it is on, standby, else the control method.
-fn mode(cx: &Cx, device: &DeviceDef) -> String {
+fn mode(cx: &ViewContext, device: &DeviceDef) -> String {
     let Some(plate) = &device.faceplate else { return String::new() };
     let on = |tag: Option<_>| tag.is_some_and(|tag| value::is_on(cx, tag) == Some(true));
     if on(plate.tune) {
@@ -207,12 +207,12 @@ fn mode(cx: &Cx, device: &DeviceDef) -> String {
     shown.map_or(String::new(), |tag| value::show(cx, tag).bare(Columns::MODE))
 }
 
-fn answers(cx: &Cx, device: DeviceId) -> bool {
+fn answers(cx: &ViewContext, device: DeviceId) -> bool {
     matches!(cx.snapshot.device(device).state, DeviceState::Answering | DeviceState::Failing(_))
 }
 
 /// The mark of NE 107 and its words; a device that is well has a tick.
-fn state(cx: &Cx, device: DeviceId) -> (String, String, Style) {
+fn state(cx: &ViewContext, device: DeviceId) -> (String, String, Style) {
     let status = cx.snapshot.device(device);
     match (status.diagnosis, status.state) {
         (Some(reason), _) => (signal_mark(reason.signal()), reason.to_string(), cx.theme.trouble()),
@@ -224,7 +224,7 @@ fn state(cx: &Cx, device: DeviceId) -> (String, String, Style) {
 }
 
 /// The alarms of a device and of its tags.
-pub fn alarms<'a>(cx: &'a Cx, device: DeviceId) -> impl Iterator<Item = &'a ActiveAlarm> {
+pub fn alarms<'a>(cx: &'a ViewContext, device: DeviceId) -> impl Iterator<Item = &'a ActiveAlarm> {
     cx.snapshot.alarms.iter().filter(move |alarm| match cx.def().alarm(alarm.id).subject {
         Subject::Device(of) => of == device,
         Subject::Tag(tag) => cx.def().tag(tag).device == device,

@@ -10,7 +10,7 @@ use crate::{
         tuning::Tuning,
     },
     ui::{
-        Cx,
+        ViewContext,
         widgets::{
             mimic::{Bounds, panel::set_apart, trend},
             text::{Canvas, clock, fit_words, pad, running, width},
@@ -25,13 +25,13 @@ pub const WINDOW: std::time::Duration = std::time::Duration::from_secs(1_800);
 const TREND: u16 = 22;
 
 /// Rows that [`strip`] takes.
-pub fn strip_height(cx: &Cx, device: &DeviceDef) -> u16 {
+pub fn strip_height(cx: &ViewContext, device: &DeviceDef) -> u16 {
     let Some(plate) = &device.faceplate else { return 0 };
     3 + u16::from(plate.mv.is_some()) + u16::from(tuning_of(cx, device).is_some())
 }
 
 /// Three bars over each other, with their ranges, the trend beside them, and a row of states and alarms.
-pub fn strip(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, series: Option<&Series>) {
+pub fn strip(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: Option<&Series>) {
     let Some(plate) = &device.faceplate else { return };
     let wide = canvas.width();
     let rows = 2 + u16::from(plate.mv.is_some());
@@ -46,7 +46,7 @@ pub fn strip(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, series: Option<&S
 }
 
 /// The same in a column of its own: more room, no other content.
-pub fn panel(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, series: Option<&Series>) {
+pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: Option<&Series>) {
     let Some(plate) = &device.faceplate else { return };
     let (wide, high) = (canvas.width(), canvas.height());
     let rows = 3 * (2 + u16::from(plate.mv.is_some()));
@@ -83,12 +83,12 @@ pub fn panel(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, series: Option<&S
 }
 
 /// The tuning worth a word: at work, or ended and not older than the plant's memory of it.
-fn tuning_of<'a>(cx: &Cx<'a>, device: &DeviceDef) -> Option<&'a Tuning> {
+fn tuning_of<'a>(cx: &ViewContext<'a>, device: &DeviceDef) -> Option<&'a Tuning> {
     cx.snapshot.tuning(device.id)
 }
 
 /// A row a bar (`tall`: three, with value, bar and ends of the scale).
-fn bars(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tall: bool) {
+fn bars(cx: &ViewContext, canvas: &mut Canvas, plate: &Faceplate, tall: bool) {
     let rows = [("PV", Some(plate.pv)), ("SV", Some(plate.aim())), ("MV", plate.mv)];
     let rows: Vec<(&str, TagId)> = rows.into_iter().filter_map(|(name, tag)| Some((name, tag?))).collect();
     // All bars start in one column, so that they can be compared.
@@ -124,7 +124,7 @@ fn bars(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tall: bool) {
 }
 
 /// The ends of a tag's range: `0.0`, `120.0 °C`.
-fn ends(cx: &Cx, tag: TagId) -> Option<(String, String)> {
+fn ends(cx: &ViewContext, tag: TagId) -> Option<(String, String)> {
     let (min, max) = cx.snapshot.range(tag)?;
     let text = |value| cx.snapshot.format(tag, value);
     Some((text(min), format!("{} {}", text(max), cx.snapshot.unit(tag)).trim_end().to_owned()))
@@ -132,7 +132,7 @@ fn ends(cx: &Cx, tag: TagId) -> Option<(String, String)> {
 
 /// `├███████──▼──┃──┤`: filled up to the value; the set value as a triangle, alarm limits as bars; of SV only the
 /// triangle, on a track that is dotted where it may not be set. Without a good value there is no filling.
-fn bar(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tag: TagId, scale: TagId) {
+fn bar(cx: &ViewContext, canvas: &mut Canvas, plate: &Faceplate, tag: TagId, scale: TagId) {
     let theme = cx.theme;
     let inner = canvas.width().saturating_sub(2);
     canvas.run(0, 0, inner + 2, '─', theme.dim());
@@ -173,13 +173,13 @@ fn bar(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tag: TagId, scale: TagId
 }
 
 /// The limits of a tag's alarms.
-fn limits(cx: &Cx, tag: TagId) -> impl Iterator<Item = f64> {
+fn limits(cx: &ViewContext, tag: TagId) -> impl Iterator<Item = f64> {
     let of_tag = cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag));
     of_tag.filter_map(|alarm| alarm.condition.on_scale())
 }
 
 /// `PID   AT off   RUN   ‹2›! temperature high UNACK`.
-fn states(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, plate: &Faceplate) {
+fn states(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, plate: &Faceplate) {
     let mut x = 1;
     for (name, tag) in [("", plate.mode), ("AT", plate.tune), ("", plate.run)] {
         let Some(tag) = tag else { continue };
@@ -198,7 +198,7 @@ fn states(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, plate: &Faceplate) {
     canvas.text(x, 0, &fit_words(&words, room), cx.theme.alarm(def.priority, alarm.state, cx.flash()));
 }
 
-fn tuning_row(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tuning: &Tuning) {
+fn tuning_row(cx: &ViewContext, canvas: &mut Canvas, plate: &Faceplate, tuning: &Tuning) {
     let words = tuning_words(cx, plate, tuning).join("  ");
     let room = canvas.width().saturating_sub(2);
     let style = if tuning.ended.is_none() { cx.theme.strong() } else { cx.theme.normal() };
@@ -206,7 +206,7 @@ fn tuning_row(cx: &Cx, canvas: &mut Canvas, plate: &Faceplate, tuning: &Tuning) 
 }
 
 /// How a tuning goes, or what it has found.
-pub fn tuning_words(cx: &Cx, plate: &Faceplate, tuning: &Tuning) -> Vec<String> {
+pub fn tuning_words(cx: &ViewContext, plate: &Faceplate, tuning: &Tuning) -> Vec<String> {
     let elapsed = running(tuning.elapsed(cx.now));
     let least = if tuning.seen { "" } else { "more than " };
     let number = |value: f64| cx.snapshot.format(plate.pv, value);

@@ -10,7 +10,7 @@ use crate::{
         program::Place,
     },
     ui::{
-        Cx,
+        ViewContext,
         widgets::{
             mimic::trend,
             text::{Canvas, fit_words, pad, pad_left, running, width},
@@ -45,7 +45,7 @@ impl Cell {
 }
 
 /// Draws the page.
-pub fn view(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef, cell: Cell) {
+pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef, cell: Cell) {
     let (wide, high) = (canvas.width(), canvas.height());
     heading(cx, canvas, device, program);
     let rows = program.steps.len() as u16;
@@ -56,7 +56,7 @@ pub fn view(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramD
     picture(cx, &mut canvas.part(1, top, wide.saturating_sub(2), high.saturating_sub(top)), device, program);
 }
 
-fn heading(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
+fn heading(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
     let theme = cx.theme;
     let x = canvas.text(1, 0, &device.name, theme.focus());
     let x = canvas.text(x + 2, 0, "ramp/soak program", theme.normal());
@@ -68,7 +68,7 @@ fn heading(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDe
 }
 
 /// `RUN, ramp 2, 03:12 of 10 min`.
-fn now_words(cx: &Cx, device: &DeviceDef, program: &ProgramDef) -> String {
+fn now_words(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> String {
     let command = value::show(cx, program.command).text;
     let Some(place) = place(cx, program) else { return format!("{command}, position not known") };
     let (what, length) = match place {
@@ -87,16 +87,16 @@ fn now_words(cx: &Cx, device: &DeviceDef, program: &ProgramDef) -> String {
     format!("{command}, {what}, {into} of {}", value::show(cx, length).with_unit())
 }
 
-fn place(cx: &Cx, program: &ProgramDef) -> Option<Place> {
+fn place(cx: &ViewContext, program: &ProgramDef) -> Option<Place> {
     cx.snapshot.sample(program.position).trusted().map(|position| program.place(position))
 }
 
 /// The steps that the pattern runs, from 0.
-fn chosen(cx: &Cx, program: &ProgramDef) -> Option<(usize, usize)> {
+fn chosen(cx: &ViewContext, program: &ProgramDef) -> Option<(usize, usize)> {
     program.steps_of(program.pattern.and_then(|pattern| cx.snapshot.sample(pattern).trusted()))
 }
 
-fn table(cx: &Cx, canvas: &mut Canvas, program: &ProgramDef, cell: Cell) {
+fn table(cx: &ViewContext, canvas: &mut Canvas, program: &ProgramDef, cell: Cell) {
     let theme = cx.theme;
     let names = ["target", "ramp", "soak"].map(|name| pad_left(name, CELL));
     canvas.text(1, 0, &format!("{} {}", pad("step", 6), names.join(" ")), theme.dim());
@@ -128,7 +128,7 @@ fn table(cx: &Cx, canvas: &mut Canvas, program: &ProgramDef, cell: Cell) {
 }
 
 /// What the program does besides its steps.
-fn facts(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
+fn facts(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
     let sv = device.faceplate.as_ref().map(|plate| plate.aim());
     let pv = device.faceplate.as_ref().map(|plate| plate.pv);
     let rows = [
@@ -156,7 +156,7 @@ struct Leg {
 }
 
 /// The way of the set value, from PV as it is now; `None` while a part of it is not known.
-fn legs(cx: &Cx, device: &DeviceDef, program: &ProgramDef) -> Option<Vec<Leg>> {
+fn legs(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Option<Vec<Leg>> {
     let (first, last) = chosen(cx, program)?;
     let trusted = |tag: TagId| cx.snapshot.sample(tag).trusted();
     // A ramp begins where the step before has ended; the first at PV as it is at the start. Once it runs that is past,
@@ -173,7 +173,7 @@ fn legs(cx: &Cx, device: &DeviceDef, program: &ProgramDef) -> Option<Vec<Leg>> {
     Some(legs)
 }
 
-fn picture(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
+fn picture(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
     let theme = cx.theme;
     let Some(legs) = legs(cx, device, program) else {
         canvas.text(0, 0, "no picture: a target or time of the program is not known", theme.dim());
@@ -205,7 +205,7 @@ fn picture(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDe
 }
 
 /// The way as a curve of so many columns.
-fn way(tag: TagId, legs: &[Leg], total: f64, dots: usize, cx: &Cx) -> Series {
+fn way(tag: TagId, legs: &[Leg], total: f64, dots: usize, cx: &ViewContext) -> Series {
     let at = |minute: f64| {
         let mut left = minute;
         for leg in legs {
@@ -226,7 +226,7 @@ fn way(tag: TagId, legs: &[Leg], total: f64, dots: usize, cx: &Cx) -> Series {
 }
 
 /// Time below the picture, with a mark where the program is.
-fn axis(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef, legs: &[Leg], total: f64) {
+fn axis(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef, legs: &[Leg], total: f64) {
     let theme = cx.theme;
     let unit = cx.snapshot.unit(program.steps[0].ramp).to_owned();
     canvas.run(0, 0, canvas.width(), '─', theme.dim());

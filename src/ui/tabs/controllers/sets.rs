@@ -8,7 +8,7 @@ use crate::{
         parameter_set::{self, Compared, ParameterSet, StoredSet},
     },
     ui::{
-        Cx,
+        ViewContext,
         modal::Notice,
         widgets::text::{Canvas, fit, fit_words, moment, pad, pad_left, width, wrap},
     },
@@ -25,14 +25,14 @@ pub enum Source {
 
 impl Source {
     /// In words: `set winter`, `copy of TIC-2`.
-    pub fn words(&self, cx: &Cx) -> String {
+    pub fn words(&self, cx: &ViewContext) -> String {
         match self {
             Source::Set(name) => format!("set {name}"),
             Source::Device(device) => format!("copy of {}", cx.def().device(*device).name),
         }
     }
     /// Its values as they are now; `None` if it has gone or cannot be used.
-    pub fn set(&self, cx: &Cx) -> Option<Arc<ParameterSet>> {
+    pub fn set(&self, cx: &ViewContext) -> Option<Arc<ParameterSet>> {
         match self {
             Source::Set(name) => {
                 let stored = cx.snapshot.sets.iter().find(|stored| stored.name == *name)?;
@@ -48,12 +48,12 @@ impl Source {
 }
 
 /// What is trusted now.
-pub fn trusted<'a>(cx: &'a Cx) -> impl Fn(TagId) -> Option<f64> + 'a {
+pub fn trusted<'a>(cx: &'a ViewContext) -> impl Fn(TagId) -> Option<f64> + 'a {
     |tag| cx.snapshot.sample(tag).trusted()
 }
 
 /// Every source that can be compared with a device: its sets, files that cannot be used, other devices of its profile.
-pub fn sources(cx: &Cx, device: &DeviceDef) -> Vec<Source> {
+pub fn sources(cx: &ViewContext, device: &DeviceDef) -> Vec<Source> {
     let fits = |stored: &&StoredSet| stored.set.as_ref().map_or(true, |set| set.profile == device.profile);
     let sets = cx.snapshot.sets.iter().filter(fits).map(|stored| Source::Set(stored.name.clone()));
     let twins = cx.def().devices.iter().filter(|other| other.profile == device.profile && other.id != device.id);
@@ -62,7 +62,7 @@ pub fn sources(cx: &Cx, device: &DeviceDef) -> Vec<Source> {
 }
 
 /// What is wrong with the file of a set, as a window.
-pub fn problems(cx: &Cx, source: &Source) -> Option<Notice> {
+pub fn problems(cx: &ViewContext, source: &Source) -> Option<Notice> {
     let Source::Set(name) = source else { return None };
     let stored = cx.snapshot.sets.iter().find(|stored| stored.name == *name)?;
     let problems = stored.set.as_ref().err()?;
@@ -75,7 +75,7 @@ pub fn problems(cx: &Cx, source: &Source) -> Option<Notice> {
 }
 
 /// Draws the list of sources.
-pub fn view(cx: &Cx, canvas: &mut Canvas, device: &DeviceDef, selected: usize) {
+pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, selected: usize) {
     let theme = cx.theme;
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
     let x = canvas.text(1, 0, &device.name, theme.focus());
@@ -120,7 +120,7 @@ fn columns([mark, name, from, saved, by, values, differ]: [&str; 7]) -> String {
     )
 }
 
-fn row(cx: &Cx, device: &DeviceDef, source: &Source, selected: bool) -> (String, bool) {
+fn row(cx: &ViewContext, device: &DeviceDef, source: &Source, selected: bool) -> (String, bool) {
     let mark = if selected { cx.theme.pick("▸", ">") } else { "" };
     let counts = |set: &ParameterSet| {
         let rows = parameter_set::compare(cx.def(), device.id, set, &trusted(cx));
@@ -152,7 +152,7 @@ fn row(cx: &Cx, device: &DeviceDef, source: &Source, selected: bool) -> (String,
 }
 
 /// What a set would hold that was taken now, for the question for its name.
-pub fn save_hint(cx: &Cx, device: DeviceId) -> String {
+pub fn save_hint(cx: &ViewContext, device: DeviceId) -> String {
     let set = parameter_set::take(cx.def(), device, "", "".into(), cx.now, &trusted(cx));
     match set.missing.as_slice() {
         [] => format!("all {} settings, for example: winter", set.values.len()),
@@ -164,7 +164,7 @@ pub fn save_hint(cx: &Cx, device: DeviceId) -> String {
 }
 
 /// The question before a set is written over: whose it is, for it may be of another kind of device.
-pub fn replace_words(cx: &Cx, there: &StoredSet) -> String {
+pub fn replace_words(cx: &ViewContext, there: &StoredSet) -> String {
     let name = &there.name;
     match &there.set {
         Ok(set) => {
@@ -177,7 +177,7 @@ pub fn replace_words(cx: &Cx, there: &StoredSet) -> String {
 }
 
 /// What the set says, in the set's own unit.
-pub fn shown_of_set(cx: &Cx, row: &Compared) -> String {
+pub fn shown_of_set(cx: &ViewContext, row: &Compared) -> String {
     match (row.tag, row.set, &row.unit) {
         (Some(tag), Some(value), Some(unit)) => format!("{} {unit}", cx.snapshot.format(tag, value)),
         _ => shown(cx, row, row.set),
@@ -185,7 +185,7 @@ pub fn shown_of_set(cx: &Cx, row: &Compared) -> String {
 }
 
 /// A value of a comparison, as the device would show it.
-pub fn shown(cx: &Cx, row: &Compared, value: Option<f64>) -> String {
+pub fn shown(cx: &ViewContext, row: &Compared, value: Option<f64>) -> String {
     match (row.tag, value) {
         (_, None) => "–".to_owned(),
         (Some(tag), Some(value)) => {

@@ -6,7 +6,7 @@ use crate::{
         tag::{Access, Poll, TagDef},
     },
     ui::{
-        Cx,
+        ViewContext,
         modal::number::range_words,
         widgets::{
             text::{Canvas, age, pad, pad_left, whole, width},
@@ -28,7 +28,7 @@ pub struct Table {
 
 impl Table {
     /// The tags that are shown, those of one group together, in the order of the profile.
-    pub fn rows<'a>(&self, cx: &Cx<'a>, device: DeviceId) -> Vec<&'a TagDef> {
+    pub fn rows<'a>(&self, cx: &ViewContext<'a>, device: DeviceId) -> Vec<&'a TagDef> {
         let tags: Vec<&TagDef> = cx.def().tags_of(device).filter(|tag| self.fits(tag)).collect();
         let mut sorted = tags.clone();
         sorted.sort_by_key(|tag| tags.iter().position(|first| first.group == tag.group));
@@ -36,19 +36,19 @@ impl Table {
     }
 
     /// The selected tag.
-    pub fn tag<'a>(&self, cx: &Cx<'a>, device: DeviceId) -> Option<&'a TagDef> {
+    pub fn tag<'a>(&self, cx: &ViewContext<'a>, device: DeviceId) -> Option<&'a TagDef> {
         self.rows(cx, device).into_iter().nth(self.selected)
     }
 
     /// Selects so many rows further on.
-    pub fn move_by(&mut self, cx: &Cx, device: DeviceId, by: isize) {
+    pub fn move_by(&mut self, cx: &ViewContext, device: DeviceId, by: isize) {
         let last = self.rows(cx, device).len().saturating_sub(1);
         self.selected = self.selected.saturating_add_signed(by).min(last);
     }
 
     /// The place of the parameter that the filter means most likely: its exact name, then one with it in its name, then
     /// one with it in its meaning.
-    pub fn best(&self, cx: &Cx, device: DeviceId) -> usize {
+    pub fn best(&self, cx: &ViewContext, device: DeviceId) -> usize {
         let typed = self.filter.trim().to_lowercase();
         let rank = |tag: &TagDef| match (tag.short.to_lowercase(), tag.label.to_lowercase()) {
             (short, label) if short == typed || label == typed => 0,
@@ -66,7 +66,7 @@ impl Table {
 
     /// Parameters under the names of their groups, the selected one in sight; returns how many rows are out of sight
     /// below.
-    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, device: DeviceId) -> usize {
+    pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas, device: DeviceId) -> usize {
         let theme = cx.theme;
         let tags = self.rows(cx, device);
         let columns = Columns::of(cx, device, canvas.width());
@@ -99,7 +99,15 @@ impl Table {
         rows.len().saturating_sub(first + room)
     }
 
-    fn parameter(&self, cx: &Cx, canvas: &mut Canvas, y: u16, columns: &Columns, tag: &TagDef, selected: bool) {
+    fn parameter(
+        &self,
+        cx: &ViewContext,
+        canvas: &mut Canvas,
+        y: u16,
+        columns: &Columns,
+        tag: &TagDef,
+        selected: bool,
+    ) {
         let theme = cx.theme;
         let shown = value::show(cx, tag.id);
         let text = shown.bare(Columns::VALUE);
@@ -131,7 +139,7 @@ impl Table {
 }
 
 /// Is the value known, and another than the maker delivers?
-pub fn differs(cx: &Cx, tag: &TagDef) -> bool {
+pub fn differs(cx: &ViewContext, tag: &TagDef) -> bool {
     let now = cx.snapshot.sample(tag.id).trusted();
     // Half of the last digit shown: what looks the same is the same.
     let least = 0.5 * 10f64.powi(-i32::from(cx.snapshot.decimals[tag.id.index()]));
@@ -139,7 +147,7 @@ pub fn differs(cx: &Cx, tag: &TagDef) -> bool {
 }
 
 /// The default as the value is written.
-pub fn default_words(cx: &Cx, tag: &TagDef) -> Option<String> {
+pub fn default_words(cx: &ViewContext, tag: &TagDef) -> Option<String> {
     tag.default.map(|default| cx.snapshot.format(tag.id, default))
 }
 
@@ -157,7 +165,7 @@ impl Columns {
     const RANGE: u16 = 16;
     const AGE: u16 = 6;
 
-    fn of(cx: &Cx, device: DeviceId, wide: u16) -> Columns {
+    fn of(cx: &ViewContext, device: DeviceId, wide: u16) -> Columns {
         let tags = || cx.def().tags_of(device);
         let short = tags().map(|tag| width(&tag.short)).max().unwrap_or(0).min(10);
         let label = tags().map(|tag| width(&tag.label)).max().unwrap_or(0);

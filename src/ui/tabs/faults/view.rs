@@ -11,7 +11,7 @@ use crate::{
         scenario::judge::Standing,
     },
     ui::{
-        Cx,
+        ViewContext,
         widgets::{
             text::{Canvas, between, fit, fit_words, pad, running, width, wrap},
             value::show,
@@ -24,7 +24,7 @@ const LIST: u16 = 31;
 /// Rows that the comparison with the truth has at the least.
 const TRUTH_MIN: u16 = 5;
 
-pub(super) fn view(tab: &Faults, cx: &Cx, frame: &mut Frame, area: Rect) {
+pub(super) fn view(tab: &Faults, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let Some(status) = open(cx) else {
         canvas.text(1, 1, "nothing is simulated here", cx.theme.dim());
@@ -50,7 +50,7 @@ pub(super) fn view(tab: &Faults, cx: &Cx, frame: &mut Frame, area: Rect) {
     }
 }
 
-fn heading(cx: &Cx, progress: &Progress, canvas: &mut Canvas) {
+fn heading(cx: &ViewContext, progress: &Progress, canvas: &mut Canvas) {
     let Progress { elapsed, duration, verdict, .. } = progress;
     let time = format!("{} of {}", running((*elapsed).min(*duration)), running(*duration));
     let right = format!("{time}   {}", verdict.summary());
@@ -61,7 +61,7 @@ fn heading(cx: &Cx, progress: &Progress, canvas: &mut Canvas) {
 }
 
 /// All faults by place; the selected row is always in sight.
-fn list(tab: &Faults, cx: &Cx, status: &Status, canvas: &mut Canvas) {
+fn list(tab: &Faults, cx: &ViewContext, status: &Status, canvas: &mut Canvas) {
     let mut lines: Vec<(String, String, Style, bool)> = Vec::new();
     let (mut number, mut selected_line) = (0, 0);
     let last = rows(status).len().saturating_sub(1);
@@ -101,7 +101,7 @@ fn list(tab: &Faults, cx: &Cx, status: &Status, canvas: &mut Canvas) {
     }
 }
 
-fn place_words(cx: &Cx, place: Place) -> String {
+fn place_words(cx: &ViewContext, place: Place) -> String {
     let name = place.name(cx.def());
     match place {
         Place::Line(_) => format!("{name} line"),
@@ -112,7 +112,7 @@ fn place_words(cx: &Cx, place: Place) -> String {
 }
 
 /// The selected fault told, above what is really so.
-fn told(cx: &Cx, status: &Status, place: Place, fault: Fault, canvas: &mut Canvas) {
+fn told(cx: &ViewContext, status: &Status, place: Place, fault: Fault, canvas: &mut Canvas) {
     let (theme, room) = (cx.theme, canvas.width());
     let story = fault.story();
     let mut lines = vec![(format!("{}: {fault}", place.name(cx.def())), theme.strong())];
@@ -156,7 +156,7 @@ enum Likeness {
 }
 
 /// The tags of a place with their truth, the most dangerous first.
-fn compare(cx: &Cx, status: &Status, place: Place) -> Vec<Compared> {
+fn compare(cx: &ViewContext, status: &Status, place: Place) -> Vec<Compared> {
     let device = match place {
         Place::Unit(line, unit) => device_at(cx.def(), line, unit).map(|device| device.id),
         Place::Tag(tag) => Some(cx.def().tag(tag).device),
@@ -185,12 +185,12 @@ fn compare(cx: &Cx, status: &Status, place: Place) -> Vec<Compared> {
 }
 
 /// What a value may change between two readings: two hundredths of its range; a state not at all.
-fn allowed(cx: &Cx, tag: TagId) -> f64 {
+fn allowed(cx: &ViewContext, tag: TagId) -> f64 {
     let span = cx.snapshot.range(tag).map_or(0.0, |(low, high)| high - low);
     if cx.def().tag(tag).labels.is_empty() { (0.02 * span).max(0.5) } else { 0.0 }
 }
 
-fn comparison(cx: &Cx, rows: &[Compared], canvas: &mut Canvas) {
+fn comparison(cx: &ViewContext, rows: &[Compared], canvas: &mut Canvas) {
     if rows.is_empty() {
         canvas.text(0, 0, "what is really so is not known here", cx.theme.dim());
         return;
@@ -215,7 +215,7 @@ fn comparison(cx: &Cx, rows: &[Compared], canvas: &mut Canvas) {
 }
 
 /// Every expectation of the drill and how it stands.
-fn verdict(cx: &Cx, progress: &Progress, canvas: &mut Canvas) {
+fn verdict(cx: &ViewContext, progress: &Progress, canvas: &mut Canvas) {
     let (theme, room) = (cx.theme, canvas.width());
     let mut y = 1;
     for row in &progress.verdict.rows {

@@ -4,7 +4,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::Login;
 use crate::ui::{
-    Cx,
+    ViewContext,
     chrome::{alarm_words, counts},
     rights,
     widgets::text::{Canvas, clock, fit_words, running, wrap},
@@ -16,7 +16,7 @@ const READ_MAX: u16 = 72;
 const ALARM_ROWS_MIN: u16 = 4;
 
 /// Draws the page.
-pub(super) fn draw(login: &Login, cx: &Cx, frame: &mut Frame, area: Rect) {
+pub(super) fn draw(login: &Login, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (width, height) = (canvas.width(), canvas.height());
     let room = width.saturating_sub(6).min(READ_MAX);
@@ -48,7 +48,7 @@ pub(super) fn draw(login: &Login, cx: &Cx, frame: &mut Frame, area: Rect) {
 }
 
 /// The title of the plant stands where somebody has yet to learn where he is.
-fn heading(cx: &Cx, title: &str) -> String {
+fn heading(cx: &ViewContext, title: &str) -> String {
     match &cx.standing.who {
         Some(who) if cx.standing.locked => format!("{title} as another person than {}", who.user),
         Some(_) | None => title.to_owned(),
@@ -56,7 +56,7 @@ fn heading(cx: &Cx, title: &str) -> String {
 }
 
 /// What must be read before a login, in so many rows at the most; returns the row after it.
-fn notice(cx: &Cx, canvas: &mut Canvas, most: u16) -> u16 {
+fn notice(cx: &ViewContext, canvas: &mut Canvas, most: u16) -> u16 {
     let Some(notice) = cx.standing.notice.as_ref().filter(|_| cx.standing.who.is_none()) else { return 0 };
     let most = usize::from(most.max(1));
     let mut lines: Vec<String> = notice.lines().flat_map(|line| wrap(line, canvas.width())).collect();
@@ -72,7 +72,7 @@ fn notice(cx: &Cx, canvas: &mut Canvas, most: u16) -> u16 {
 }
 
 /// Who is in, since when, and what he may; returns the row after it.
-fn who(login: &Login, cx: &Cx, canvas: &mut Canvas, y: u16) -> u16 {
+fn who(login: &Login, cx: &ViewContext, canvas: &mut Canvas, y: u16) -> u16 {
     let theme = cx.theme;
     let Some(who) = &cx.standing.who else { return y };
     let x = canvas.text(0, y, &who.user, theme.strong());
@@ -94,7 +94,7 @@ fn who(login: &Login, cx: &Cx, canvas: &mut Canvas, y: u16) -> u16 {
 }
 
 /// The most urgent alarms, as many as fit.
-fn alarms(cx: &Cx, canvas: &mut Canvas) {
+fn alarms(cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
     let all = &cx.snapshot.alarms;
     let width = canvas.width();

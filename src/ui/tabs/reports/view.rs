@@ -18,7 +18,7 @@ use crate::{
     },
     report::{Period, ShiftReport, SuppressedAlarm, TagFigures, csv::raised, text::mean_or_difference},
     ui::{
-        Cx,
+        ViewContext,
         widgets::text::{Canvas, fit, pad, pad_left, width},
     },
 };
@@ -27,7 +27,7 @@ use crate::{
 const LIST_MAX: usize = 500;
 
 /// Draws the tab.
-pub fn draw(reports: &Reports, cx: &Cx, frame: &mut Frame, area: Rect) {
+pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (columns, height) = (canvas.width(), canvas.height());
     let Some(period) = &reports.period else { return };
@@ -60,7 +60,7 @@ pub fn draw(reports: &Reports, cx: &Cx, frame: &mut Frame, area: Rect) {
 }
 
 /// `▸ morning 2026-11-21   06:00 – 14:00 +07   closed`.
-fn draw_title(reports: &Reports, cx: &Cx, period: &Period, canvas: &mut Canvas) {
+fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut Canvas) {
     let (theme, zone) = (cx.theme, &cx.def().time_zone);
     let x = canvas.text(1, 0, theme.pick("▸ ", "> "), theme.dim());
     let x = canvas.text(x, 0, &period.name, theme.strong());
@@ -88,7 +88,7 @@ fn draw_title(reports: &Reports, cx: &Cx, period: &Period, canvas: &mut Canvas) 
 }
 
 /// What the CSV is like, and where it went.
-fn draw_export(reports: &Reports, cx: &Cx, report: &ShiftReport, hidden: usize, row: &mut Canvas) {
+fn draw_export(reports: &Reports, cx: &ViewContext, report: &ShiftReport, hidden: usize, row: &mut Canvas) {
     let (theme, dialect) = (cx.theme, reports.dialect);
     let separator = if dialect.separator == ';' { "semicolons" } else { "commas" };
     let decimal = if dialect.decimal == ',' { "decimal comma" } else { "decimal point" };
@@ -120,7 +120,7 @@ fn widths(width: u16) -> (u16, u16) {
     (15 + wide / 4, 9 + wide / 10)
 }
 
-fn heading(cx: &Cx, width: u16) -> Line<'static> {
+fn heading(cx: &ViewContext, width: u16) -> Line<'static> {
     let (tag, figure) = widths(width);
     let mut text = format!("  {}{}", pad("tag", tag), pad("unit", 7));
     for (name, more) in [("min", 0), ("mean/+", 0), ("max", 0), ("last", 0), ("in alarm", 1), ("good", 0)] {
@@ -130,7 +130,7 @@ fn heading(cx: &Cx, width: u16) -> Line<'static> {
 }
 
 /// Everything below the heading: figures, counts, alarms, actions.
-pub fn lines(cx: &Cx, report: &ShiftReport) -> Vec<Line<'static>> {
+pub fn lines(cx: &ViewContext, report: &ShiftReport) -> Vec<Line<'static>> {
     let theme = cx.theme;
     let mut lines = Vec::new();
     if report.tags.iter().all(|tag| tag.good == 0.0) {
@@ -179,7 +179,7 @@ pub fn lines(cx: &Cx, report: &ShiftReport) -> Vec<Line<'static>> {
     lines
 }
 
-fn figures(cx: &Cx, tag: &TagFigures) -> Line<'static> {
+fn figures(cx: &ViewContext, tag: &TagFigures) -> Line<'static> {
     let (theme, (name, figure)) = (cx.theme, widths(cx.area.width));
     let value = |value: Option<f64>| match value {
         Some(value) => pad_left(&format!("{value:.*}", usize::from(tag.decimals)), figure),
@@ -202,7 +202,7 @@ fn figures(cx: &Cx, tag: &TagFigures) -> Line<'static> {
 }
 
 /// `alarms 3 (high 1, medium 2)   most TIC-1.PV ×2   operator actions 4`.
-fn counts(cx: &Cx, report: &ShiftReport) -> Line<'static> {
+fn counts(cx: &ViewContext, report: &ShiftReport) -> Line<'static> {
     let priorities = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low];
     let by = priorities.map(|priority| (raised(&report.alarms, priority), priority.word()));
     let total: usize = by.iter().map(|(n, _)| n).sum();
@@ -226,14 +226,14 @@ fn counts(cx: &Cx, report: &ShiftReport) -> Line<'static> {
     Line::from(Span::styled(text, cx.theme.normal()))
 }
 
-fn section(cx: &Cx, title: &str) -> Line<'static> {
+fn section(cx: &ViewContext, title: &str) -> Line<'static> {
     let rule = cx.theme.pick("─", "-");
     let rest = usize::from(cx.area.width).saturating_sub(title.len() + 5);
     Line::from(Span::styled(format!(" {rule} {title} {}", rule.repeat(rest)), cx.theme.dim()))
 }
 
 /// An alarm that was active without being annunciated, and for how long.
-fn suppressed_line(cx: &Cx, alarm: &SuppressedAlarm) -> Line<'static> {
+fn suppressed_line(cx: &ViewContext, alarm: &SuppressedAlarm) -> Line<'static> {
     let (theme, room) = (cx.theme, cx.area.width.saturating_sub(46));
     Line::from(vec![
         Span::styled(format!("  {}", theme.priority_mark(alarm.priority)), theme.dim()),
@@ -243,7 +243,7 @@ fn suppressed_line(cx: &Cx, alarm: &SuppressedAlarm) -> Line<'static> {
 }
 
 /// One step of an alarm. An acknowledgement tells who, the other steps tell the value.
-fn alarm_line(cx: &Cx, alarm: &AlarmRecord, time: String) -> Line<'static> {
+fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'static> {
     let theme = cx.theme;
     let value = |value: f64| match cx.def().tag_named(&alarm.subject) {
         Some(tag) => format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)),
@@ -269,7 +269,7 @@ fn alarm_line(cx: &Cx, alarm: &AlarmRecord, time: String) -> Line<'static> {
 }
 
 /// One deed of an operator; where it is too long, its outcome is kept.
-fn action_line(cx: &Cx, action: &ActionRecord, time: String) -> Line<'static> {
+fn action_line(cx: &ViewContext, action: &ActionRecord, time: String) -> Line<'static> {
     let arrow = cx.theme.pick("→", "->");
     let change = match (&action.old, &action.new) {
         (Some(old), Some(new)) => format!("{old} {arrow} {new}"),

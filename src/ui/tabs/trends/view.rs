@@ -16,7 +16,7 @@ use super::{
 use crate::{
     plant::def::{Pen, TagId},
     ui::{
-        Cx,
+        ViewContext,
         theme::Glyphs,
         widgets::{
             chart::{Axis, Chart, Curve, Plan, mark, trace::Trace},
@@ -33,7 +33,7 @@ const CHART_ROWS_MIN: u16 = 7;
 static NO_TRACE: Trace = Trace::EMPTY;
 
 /// Draws the tab.
-pub fn draw(trends: &Trends, cx: &Cx, frame: &mut Frame, area: Rect) {
+pub fn draw(trends: &Trends, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     match trends.values {
         Some((first, row)) => draw_values(trends, cx, &mut canvas, first, row),
@@ -41,7 +41,7 @@ pub fn draw(trends: &Trends, cx: &Cx, frame: &mut Frame, area: Rect) {
     }
 }
 
-fn draw_curves(trends: &Trends, cx: &Cx, canvas: &mut Canvas) {
+fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let (width, height) = (canvas.width(), canvas.height());
     let pens = trends.pens(cx);
     let legend = (pens.len() as u16 + 1).min(height.saturating_sub(1 + CHART_ROWS_MIN));
@@ -63,7 +63,7 @@ fn draw_curves(trends: &Trends, cx: &Cx, canvas: &mut Canvas) {
 }
 
 /// Group, window, live or past, rate; on the right what is wrong with the history.
-fn draw_title(trends: &Trends, cx: &Cx, canvas: &mut Canvas) {
+fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let (def, theme, view) = (cx.def(), cx.theme, trends.span(cx));
     let zone = &def.time_zone;
     let name = match (def.trends.get(trends.group), trends.picked) {
@@ -101,13 +101,13 @@ fn draw_title(trends: &Trends, cx: &Cx, canvas: &mut Canvas) {
 }
 
 /// What is wrong with the history, or that it keeps us waiting.
-fn trouble(trends: &Trends, cx: &Cx) -> Option<String> {
+fn trouble(trends: &Trends, cx: &ViewContext) -> Option<String> {
     let errands = [&trends.errands.curves, &trends.errands.hours];
     let slow = errands.iter().filter_map(|errand| errand.waiting(cx.steady())).any(|time| time >= super::real(cx, 2.0));
     trends.data.trouble.clone().or_else(|| slow.then(|| "waiting for the history".to_owned()))
 }
 
-fn chart<'a>(trends: &'a Trends, cx: &Cx<'a>) -> Chart<'a> {
+fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Chart<'a> {
     let view = trends.span(cx);
     let curve = |(n, pen): (usize, Pen)| Curve {
         trace: trends.data.traces.get(&pen.tag).unwrap_or(&NO_TRACE),
@@ -132,7 +132,7 @@ fn chart<'a>(trends: &'a Trends, cx: &Cx<'a>) -> Chart<'a> {
 }
 
 /// The time at the cursor with the value of every pen; only the time where that is too wide, the legend has the values.
-fn readout<'a>(trends: &Trends, cx: &Cx, at: Timestamp, room: u16) -> Line<'a> {
+fn readout<'a>(trends: &Trends, cx: &ViewContext, at: Timestamp, room: u16) -> Line<'a> {
     let zone = &cx.def().time_zone;
     let mut line = Line::from(Span::styled(moment_exact(at, cx.now, zone), cx.theme.strong()));
     let time = line.clone();
@@ -143,7 +143,7 @@ fn readout<'a>(trends: &Trends, cx: &Cx, at: Timestamp, room: u16) -> Line<'a> {
     if line.width() <= usize::from(room) { line } else { time }
 }
 
-fn at_cursor(trends: &Trends, cx: &Cx, tag: TagId, at: Timestamp) -> Option<String> {
+fn at_cursor(trends: &Trends, cx: &ViewContext, tag: TagId, at: Timestamp) -> Option<String> {
     let value = trends.data.traces.get(&tag)?.value_at(at)?;
     Some(cx.snapshot.format(tag, value))
 }
@@ -167,7 +167,7 @@ impl Columns {
     }
 }
 
-fn draw_legend(trends: &Trends, cx: &Cx, canvas: &mut Canvas, plan: Option<&Plan>) {
+fn draw_legend(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, plan: Option<&Plan>) {
     let (columns, dim) = (Columns::of(canvas.width()), cx.theme.dim());
     if canvas.height() == 0 {
         return;
@@ -205,7 +205,7 @@ fn draw_legend(trends: &Trends, cx: &Cx, canvas: &mut Canvas, plan: Option<&Plan
 /// One row of the legend. A pen with a scale of its own tells it, because no axis does.
 fn draw_pen(
     trends: &Trends,
-    cx: &Cx,
+    cx: &ViewContext,
     row: &mut Canvas,
     (n, pen): (usize, Pen),
     cursor: Option<Timestamp>,
@@ -249,7 +249,7 @@ fn draw_pen(
 
 /// Least, mean and greatest of the window and its share of good time; nothing where there was no good value, and no
 /// arithmetic with the numbers of an enumeration.
-fn draw_figures(trends: &Trends, cx: &Cx, row: &mut Canvas, tag: TagId) {
+fn draw_figures(trends: &Trends, cx: &ViewContext, row: &mut Canvas, tag: TagId) {
     let (columns, style) = (Columns::of(row.width()), cx.theme.normal());
     let Some((summary, good)) = trends.data.figures.get(&tag) else { return };
     if cx.def().tag(tag).labels.is_empty() {
@@ -264,7 +264,7 @@ fn draw_figures(trends: &Trends, cx: &Cx, row: &mut Canvas, tag: TagId) {
 }
 
 /// Every stored value with its last hour.
-fn draw_values(trends: &Trends, cx: &Cx, canvas: &mut Canvas, first: usize, selected: usize) {
+fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, first: usize, selected: usize) {
     let (theme, all) = (cx.theme, stored(cx));
     let rows = usize::from(canvas.height().saturating_sub(2)).max(1);
     let last = (first + rows).min(all.len());
@@ -304,12 +304,12 @@ fn draw_values(trends: &Trends, cx: &Cx, canvas: &mut Canvas, first: usize, sele
 }
 
 /// The last digit of a tag: 0.1 for one decimal.
-fn resolution(cx: &Cx, tag: TagId) -> f64 {
+fn resolution(cx: &ViewContext, tag: TagId) -> f64 {
     10f64.powi(-i32::from(cx.snapshot.decimals[tag.index()]))
 }
 
 /// Is it set by somebody rather than measured? Such pens are drawn as broken lines.
-fn is_set_value(cx: &Cx, tag: TagId) -> bool {
+fn is_set_value(cx: &ViewContext, tag: TagId) -> bool {
     let faceplates = cx.def().devices.iter().filter_map(|device| device.faceplate.as_ref());
     let def = cx.def().tag(tag);
     faceplates.clone().any(|face| face.sv == tag || face.sv_used == Some(tag))

@@ -10,7 +10,7 @@ use crate::{
     plant::record::ActionRecord,
     report::Period,
     ui::{
-        Act, Cx,
+        Act, ViewContext,
         drawn::Rows,
         keys::{Key, char, code},
         modal::{Deed, Modal, Prompt},
@@ -111,7 +111,7 @@ impl Audit {
     }
 
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, _cx: &Cx, action: Action) -> Vec<Act> {
+    pub fn on_key(&mut self, _cx: &ViewContext, action: Action) -> Vec<Act> {
         let last = self.rows.len().saturating_sub(1);
         match action {
             Action::Move(by) => self.selected = self.selected.saturating_add_signed(by).min(last),
@@ -142,7 +142,7 @@ impl Audit {
     }
 
     /// What was typed for the search.
-    pub fn on_text(&mut self, cx: &Cx, text: &str) -> Result<(), String> {
+    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<(), String> {
         let text = text.trim().to_owned();
         match self.asking {
             Some(Part::Words) => self.words = text,
@@ -164,7 +164,7 @@ impl Audit {
     }
 
     /// Asks the history when it is time to.
-    pub fn ask(&mut self, cx: &Cx) -> Vec<Act> {
+    pub fn ask(&mut self, cx: &ViewContext) -> Vec<Act> {
         let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
         if !self.errand.due(cx.steady(), real(EVERY_S), real(PATIENCE_S)) {
             return Vec::new();
@@ -183,7 +183,7 @@ impl Audit {
     }
 
     /// The history answered question `number`.
-    pub fn on_answer(&mut self, cx: &Cx, number: u32, answer: Result<Answer, HistoryError>) {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
         // An answer to a search that is no longer meant is not shown.
         if self.errand.answered(number, cx.steady()).is_none() || self.errand.is_wanted() {
             return;
@@ -210,7 +210,7 @@ impl Audit {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &Cx, frame: &mut Frame, area: Rect) {
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let theme = cx.theme;
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let columns = canvas.width();
@@ -266,7 +266,7 @@ fn from_width(columns: u16) -> u16 {
 }
 
 /// A deed in one row; where it is too long, its outcome is kept.
-fn row(cx: &Cx, deed: &ActionRecord, columns: u16) -> String {
+fn row(cx: &ViewContext, deed: &ActionRecord, columns: u16) -> String {
     let cell = |text: &str, columns: u16| pad(&fit(text, columns - 1), columns);
     let number = deed.seal.map_or("–".to_owned(), |seal| seal.number.to_string());
     let at = moment(deed.at, cx.now, &cx.def().time_zone);

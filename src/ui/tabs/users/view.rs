@@ -5,12 +5,12 @@ use ratatui::{Frame, layout::Rect};
 
 use super::state;
 use crate::ui::{
-    Cx, rights,
+    ViewContext, rights,
     widgets::text::{Canvas, clock, fit, pad},
 };
 
 /// Draws both lists; the terminals have the lower third at the most.
-pub(super) fn draw(cx: &Cx, place: usize, frame: &mut Frame, area: Rect) {
+pub(super) fn draw(cx: &ViewContext, place: usize, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (width, height) = (canvas.width(), canvas.height());
     let terminals = cx.standing.sessions.len() as u16 + 2;
@@ -19,7 +19,7 @@ pub(super) fn draw(cx: &Cx, place: usize, frame: &mut Frame, area: Rect) {
     sessions(cx, &mut canvas.part(0, height.saturating_sub(below), width, below));
 }
 
-fn users(cx: &Cx, place: usize, canvas: &mut Canvas) {
+fn users(cx: &ViewContext, place: usize, canvas: &mut Canvas) {
     let theme = cx.theme;
     let all = &cx.standing.users;
     let name = (canvas.width() / 4).clamp(14, 34);
@@ -48,7 +48,7 @@ fn users(cx: &Cx, place: usize, canvas: &mut Canvas) {
     }
 }
 
-fn sessions(cx: &Cx, canvas: &mut Canvas) {
+fn sessions(cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
     let all = &cx.standing.sessions;
     let width = canvas.width();
@@ -73,6 +73,6 @@ fn sessions(cx: &Cx, canvas: &mut Canvas) {
     }
 }
 
-fn date(cx: &Cx, at: Timestamp) -> String {
+fn date(cx: &ViewContext, at: Timestamp) -> String {
     at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M").to_string()
 }

@@ -6,7 +6,7 @@ use super::{label_style, place, put_value, tags, title};
 use crate::{
     plant::def::{MimicItem, TagId},
     ui::{
-        Cx,
+        ViewContext,
         widgets::{
             text::{Canvas, fit, width},
             value,
@@ -18,7 +18,7 @@ use crate::{
 const VALUE: u16 = 18;
 
 /// Is the list shown, because the picture does not fit? Tanks and curves that are cut at the bottom still tell their values.
-pub fn is_shown(cx: &Cx, area: Rect) -> bool {
+pub fn is_shown(cx: &ViewContext, area: Rect) -> bool {
     let picture = &cx.def().mimic;
     let bottom = |item: &MimicItem| {
         let Some(place) = place(item) else { return 0 };
@@ -53,7 +53,7 @@ pub fn neighbour(items: &[MimicItem], selected: Option<usize>, (dx, dy): (i32, i
 }
 
 /// Every item with its values; the page with the selected one.
-pub fn view(cx: &Cx, canvas: &mut Canvas, selected: Option<usize>) {
+pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: Option<usize>) {
     let items = &cx.def().mimic.items;
     let (all, half) = (canvas.width(), canvas.width() / 2);
     let rows = rows(items);
@@ -70,7 +70,7 @@ pub fn view(cx: &Cx, canvas: &mut Canvas, selected: Option<usize>) {
 }
 
 /// `TIC-1  PV 72.4 °C  SV 70.0 °C`: as many values as fit whole.
-fn item(cx: &Cx, canvas: &mut Canvas, item: &MimicItem, names: u16, selected: bool) {
+fn item(cx: &ViewContext, canvas: &mut Canvas, item: &MimicItem, names: u16, selected: bool) {
     let (name, tags): (String, Vec<TagId>) = match item {
         MimicItem::Controller { device, .. } => {
             let device = cx.def().device(*device);

@@ -12,7 +12,7 @@ use ratatui::style::Style;
 use super::text::Canvas;
 use crate::{
     plant::def::{MimicItem, Place, TagId},
-    ui::Cx,
+    ui::ViewContext,
 };
 
 /// Maps nominal cells to cells of the screen. Never shrinks: what does not fit is cut off at the right and bottom.
@@ -76,7 +76,7 @@ fn middle(near: u16, far: u16) -> u16 {
 }
 
 /// The tags of an item, the most telling first; none for pipes and words.
-pub fn tags(cx: &Cx, item: &MimicItem) -> Vec<TagId> {
+pub fn tags(cx: &ViewContext, item: &MimicItem) -> Vec<TagId> {
     match item {
         MimicItem::Tank { level, temperature, heater, agitator, .. } => {
             [*temperature, *level, *heater, *agitator].into_iter().flatten().collect()
@@ -100,7 +100,7 @@ pub fn tags(cx: &Cx, item: &MimicItem) -> Vec<TagId> {
 }
 
 /// What the item is called.
-pub fn title(cx: &Cx, item: &MimicItem) -> String {
+pub fn title(cx: &ViewContext, item: &MimicItem) -> String {
     match item {
         MimicItem::Tank { label, .. }
         | MimicItem::Valve { label, .. }
@@ -130,7 +130,7 @@ pub fn place(item: &MimicItem) -> Option<Place> {
 }
 
 /// The mark of the most urgent alarm of a tag.
-pub(super) fn alarm_mark(cx: &Cx, tag: TagId) -> Option<(&'static str, Style)> {
+pub(super) fn alarm_mark(cx: &ViewContext, tag: TagId) -> Option<(&'static str, Style)> {
     let alarm = cx.snapshot.alarms_of(tag).next()?;
     let priority = cx.def().alarm(alarm.id).priority;
     Some((cx.theme.priority_tag(priority), cx.theme.alarm(priority, alarm.state, cx.flash())))
@@ -138,7 +138,7 @@ pub(super) fn alarm_mark(cx: &Cx, tag: TagId) -> Option<(&'static str, Style)> {
 
 /// Writes a value with unit, doubt and alarm mark; returns the column after it. What does not fit into the room or on
 /// the screen goes in this order: the mark, the unit, the number itself (`##`).
-pub(super) fn put_value(cx: &Cx, canvas: &mut Canvas, x: u16, y: u16, tag: TagId, room: u16) -> u16 {
+pub(super) fn put_value(cx: &ViewContext, canvas: &mut Canvas, x: u16, y: u16, tag: TagId, room: u16) -> u16 {
     let room = room.min(canvas.width().saturating_sub(x));
     let mark = alarm_mark(cx, tag);
     let taken = mark.map_or(0, |(mark, _)| super::text::width(mark) + 1);
@@ -159,7 +159,7 @@ pub(super) fn put_value(cx: &Cx, canvas: &mut Canvas, x: u16, y: u16, tag: TagId
 }
 
 /// The label of an item: reversed while it is selected.
-pub(super) fn label_style(cx: &Cx, selected: bool) -> Style {
+pub(super) fn label_style(cx: &ViewContext, selected: bool) -> Style {
     if selected { cx.theme.focus() } else { cx.theme.normal() }
 }
 

@@ -6,7 +6,7 @@ use super::{Bounds, alarm_mark, label_style, put_value, unit::states};
 use crate::{
     plant::def::{DeviceDef, Faceplate, Subject, TagId},
     ui::{
-        Cx,
+        ViewContext,
         widgets::{
             text::{Canvas, fit, running, whole, width},
             value,
@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// A controller: PV, SV, MV, a bar of the range with SV and limits, and its states.
-pub fn controller(cx: &Cx, canvas: &mut Canvas, at: Bounds, device: &DeviceDef, selected: bool) {
+pub fn controller(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, device: &DeviceDef, selected: bool) {
     let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
     let theme = cx.theme;
     let x = canvas.text(0, 0, &device.name, label_style(cx, selected));
@@ -51,14 +51,14 @@ pub fn controller(cx: &Cx, canvas: &mut Canvas, at: Bounds, device: &DeviceDef, 
 }
 
 /// `set 70.0`, where the controller works towards something else: a program or a ramp moves it.
-pub fn set_apart(cx: &Cx, plate: &Faceplate) -> Option<String> {
+pub fn set_apart(cx: &ViewContext, plate: &Faceplate) -> Option<String> {
     let value = |tag| cx.snapshot.sample(tag).trusted();
     let set = value(plate.sv).filter(|set| value(plate.aim()) != Some(*set))?;
     Some(format!("set {}", cx.snapshot.format(plate.sv, set)))
 }
 
 /// The ends of the range above the bar.
-fn scale(cx: &Cx, canvas: &mut Canvas, y: u16, pv: TagId) {
+fn scale(cx: &ViewContext, canvas: &mut Canvas, y: u16, pv: TagId) {
     let Some((min, max)) = cx.snapshot.range(pv) else { return };
     let end = canvas.width();
     let (low, high) =
@@ -70,7 +70,7 @@ fn scale(cx: &Cx, canvas: &mut Canvas, y: u16, pv: TagId) {
 }
 
 /// `├───┃────▼──█──┃────┤`: PV filled, SV as a triangle, alarm limits as bars. Without a good PV the bar has no PV.
-fn bar(cx: &Cx, canvas: &mut Canvas, y: u16, plate: &Faceplate) {
+fn bar(cx: &ViewContext, canvas: &mut Canvas, y: u16, plate: &Faceplate) {
     let theme = cx.theme;
     let inner = canvas.width().saturating_sub(2);
     canvas.run(0, y, inner + 2, '─', theme.dim());
@@ -98,7 +98,7 @@ fn bar(cx: &Cx, canvas: &mut Canvas, y: u16, plate: &Faceplate) {
 }
 
 /// The limits of a tag's alarms.
-fn limits(cx: &Cx, tag: TagId) -> impl Iterator<Item = f64> {
+fn limits(cx: &ViewContext, tag: TagId) -> impl Iterator<Item = f64> {
     let of_tag = cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag));
     of_tag.filter_map(|alarm| alarm.condition.on_scale())
 }
@@ -118,7 +118,7 @@ pub struct Sequence<'a> {
 
 impl Sequence<'_> {
     /// Draws heading, steps with the present one marked, and states.
-    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, at: Bounds, selected: bool) {
+    pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas, at: Bounds, selected: bool) {
         let theme = cx.theme;
         let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
         let x = canvas.text(0, 0, self.label, label_style(cx, selected));
@@ -143,7 +143,7 @@ impl Sequence<'_> {
     }
 
     /// Draws the steps; returns the rows that they take.
-    fn steps(&self, cx: &Cx, canvas: &mut Canvas) -> u16 {
+    fn steps(&self, cx: &ViewContext, canvas: &mut Canvas) -> u16 {
         let theme = cx.theme;
         let now = cx.snapshot.sample(self.step).trusted();
         let (mut x, mut y) = (0, 0);

@@ -4,7 +4,7 @@ use super::Stretch;
 use crate::{
     plant::def::TagId,
     ui::{
-        Cx,
+        ViewContext,
         widgets::{text::Canvas, value},
     },
 };
@@ -30,7 +30,14 @@ enum Way {
 }
 
 /// Draws a pipe along its nominal points.
-pub fn view(cx: &Cx, canvas: &mut Canvas, points: &[(u16, u16)], flow: &[TagId], stretch: Stretch, motion: bool) {
+pub fn view(
+    cx: &ViewContext,
+    canvas: &mut Canvas,
+    points: &[(u16, u16)],
+    flow: &[TagId],
+    stretch: Stretch,
+    motion: bool,
+) {
     let flowing = flow.iter().try_fold(!flow.is_empty(), |all, tag| value::is_on(cx, *tag).map(|on| all && on));
     let style = match flowing {
         Some(true) => cx.theme.running(),
@@ -154,7 +161,7 @@ mod tests {
         let mut buffer = Buffer::empty(Rect::new(0, 0, 10, 3));
         let area = buffer.area;
         with_cx(&fixture.snapshot(), |cx| {
-            let cx = Cx { phase, theme: &Theme::FULL, ..*cx };
+            let cx = ViewContext { phase, theme: &Theme::FULL, ..*cx };
             let mut canvas = Canvas::new(&mut buffer, area);
             view(&cx, &mut canvas, &POINTS, &[fixture.tag("PLC-1.SV-1")], Stretch::new((10, 3), (10, 3)), true);
         });

@@ -6,7 +6,7 @@ use super::{Bounds, alarm_mark, label_style, put_value};
 use crate::{
     plant::def::TagId,
     ui::{
-        Cx, guard,
+        ViewContext, guard,
         theme::Colours,
         widgets::{
             text::{Canvas, fit, width},
@@ -32,7 +32,7 @@ pub struct Tank<'a> {
 
 impl Tank<'_> {
     /// Draws the vessel into its box.
-    pub fn view(&self, cx: &Cx, canvas: &mut Canvas, at: Bounds, selected: bool, motion: bool) {
+    pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas, at: Bounds, selected: bool, motion: bool) {
         let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
         canvas.frame("", cx.theme.dim());
         let room = at.width.saturating_sub(2);
@@ -62,7 +62,7 @@ impl Tank<'_> {
     }
 
     /// Level and temperature, from the top; the temperature is what the eye looks for first.
-    fn values(&self, cx: &Cx, canvas: &mut Canvas) {
+    fn values(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let room = canvas.width();
         let rows = [self.temperature, self.level];
         for (y, tag) in rows.into_iter().flatten().enumerate() {
@@ -76,7 +76,7 @@ impl Tank<'_> {
     }
 
     /// Agitator and heater, from the bottom.
-    fn fittings(&self, cx: &Cx, canvas: &mut Canvas, motion: bool) {
+    fn fittings(&self, cx: &ViewContext, canvas: &mut Canvas, motion: bool) {
         let theme = cx.theme;
         let centre = canvas.width() / 2;
         let mut y = canvas.height();
@@ -118,7 +118,7 @@ impl Tank<'_> {
     }
 
     /// Quarters of the range on the right wall.
-    fn marks(&self, cx: &Cx, canvas: &mut Canvas, rows: u16) {
+    fn marks(&self, cx: &ViewContext, canvas: &mut Canvas, rows: u16) {
         if self.level.is_none() || rows < 4 {
             return;
         }
@@ -130,7 +130,7 @@ impl Tank<'_> {
 }
 
 /// The level in eighths of a row; `None` unless the value is good and its range known.
-fn eighths(cx: &Cx, level: TagId, rows: u16) -> Option<u32> {
+fn eighths(cx: &ViewContext, level: TagId, rows: u16) -> Option<u32> {
     let value = cx.snapshot.sample(level).trusted()?;
     let (min, max) = cx.snapshot.range(level)?;
     let share = ((value - min) / (max - min)).clamp(0.0, 1.0);
@@ -157,7 +157,7 @@ fn fill_around(canvas: &mut Canvas, y: u16, glyph: char) {
     }
 }
 
-fn liquid(cx: &Cx, canvas: &mut Canvas, eighths: u32) {
+fn liquid(cx: &ViewContext, canvas: &mut Canvas, eighths: u32) {
     const SURFACE: [char; 7] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇'];
     let plain = cx.theme.colours == Colours::None;
     let body = if plain { BODY } else { '█' };
@@ -174,7 +174,7 @@ fn liquid(cx: &Cx, canvas: &mut Canvas, eighths: u32) {
 }
 
 /// The mark of an actuator inside the vessel: its shape alone, the faceplate has the words.
-fn shape_of_mark(cx: &Cx, canvas: &mut Canvas, x: u16, y: u16, output: TagId) {
+fn shape_of_mark(cx: &ViewContext, canvas: &mut Canvas, x: u16, y: u16, output: TagId) {
     if let Some((words, style)) = guard::mark(cx, output) {
         canvas.text(x, y, words.split(' ').next().unwrap_or_default(), style);
     }

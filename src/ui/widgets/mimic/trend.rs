@@ -9,7 +9,7 @@ use crate::{
     history::Series,
     plant::def::TagId,
     ui::{
-        Cx,
+        ViewContext,
         theme::Glyphs,
         widgets::text::{Canvas, fit, whole},
     },
@@ -17,7 +17,7 @@ use crate::{
 
 /// Draws the curve of a tag, a gap where nothing good is known.
 pub fn view(
-    cx: &Cx,
+    cx: &ViewContext,
     canvas: &mut Canvas,
     at: Bounds,
     tag: TagId,

@@ -4,7 +4,7 @@ use super::{Bounds, label_style, put_value};
 use crate::{
     plant::def::TagId,
     ui::{
-        Cx, guard,
+        ViewContext, guard,
         widgets::{
             text::{Canvas, fit, width},
             value,
@@ -14,7 +14,7 @@ use crate::{
 
 /// A valve at a spot: bow tie, name above (beside, in a vertical pipe) and its state in a word.
 pub fn valve(
-    cx: &Cx,
+    cx: &ViewContext,
     canvas: &mut Canvas,
     (x, y): (u16, u16),
     label: &str,
@@ -44,7 +44,7 @@ pub fn valve(
 }
 
 /// A pump in a pipe: a filled disc while it runs, a ring while it rests. Where its place is narrow the word stands above.
-pub fn pump(cx: &Cx, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagId, selected: bool) {
+pub fn pump(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagId, selected: bool) {
     let theme = cx.theme;
     let (shape, style) = match value::is_on(cx, tag) {
         Some(true) => (theme.pick("●", "@"), theme.running()),
@@ -70,7 +70,7 @@ const MARK_REACH: (u16, u16) = (14, 6);
 
 /// What there is to say of an actuator beyond its state: blocked, sent, failed, not obeying. It is drawn when all else is,
 /// in the first of these rows that has room for its word, else for its shape: it never hides a number.
-pub fn mark(cx: &Cx, canvas: &mut Canvas, x: u16, rows: &[u16], tag: TagId) {
+pub fn mark(cx: &ViewContext, canvas: &mut Canvas, x: u16, rows: &[u16], tag: TagId) {
     let Some((words, style)) = guard::mark(cx, tag) else { return };
     let shape = words.split(' ').next().unwrap_or_default().to_owned();
     for text in [&words, &shape] {
@@ -87,7 +87,7 @@ pub fn mark(cx: &Cx, canvas: &mut Canvas, x: u16, rows: &[u16], tag: TagId) {
 }
 
 /// A label and its value.
-pub fn labelled(cx: &Cx, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagId, selected: bool) {
+pub fn labelled(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagId, selected: bool) {
     // In the row of the valve or pump beside it.
     let at = Bounds { y: at.y + at.height / 2, ..at };
     let style = if selected { cx.theme.focus() } else { cx.theme.dim() };
@@ -108,7 +108,7 @@ pub fn labelled(cx: &Cx, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagI
 }
 
 /// Tags of few states side by side: label and word, or the word alone where there is no room for labels.
-pub fn states(cx: &Cx, canvas: &mut Canvas, y: u16, tags: &[TagId]) {
+pub fn states(cx: &ViewContext, canvas: &mut Canvas, y: u16, tags: &[TagId]) {
     let label = |tag: &TagId| cx.def().tag(*tag).label.as_str();
     let room: u16 = tags.iter().map(|tag| width(label(tag)) + width(&value::show(cx, *tag).text) + 3).sum();
     let mut x = 0;
@@ -123,7 +123,7 @@ pub fn states(cx: &Cx, canvas: &mut Canvas, y: u16, tags: &[TagId]) {
 }
 
 /// The state in a word: the profile's, else ours; why not, when it is not known.
-fn word(cx: &Cx, tag: TagId, (on, off): (&str, &str)) -> String {
+fn word(cx: &ViewContext, tag: TagId, (on, off): (&str, &str)) -> String {
     let shown = value::show(cx, tag);
     match (value::is_on(cx, tag), cx.def().tag(tag).labels.is_empty()) {
         (Some(true), true) => on.to_owned(),
