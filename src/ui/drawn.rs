@@ -1,4 +1,4 @@
-//! What the last frame showed: a key acts on the row that its operator saw, or on none.
+//! What the last frame showed: a key actions on the row that its operator saw, or on none.
 //!
 //! Keys alone change nothing unseen: what they lead to follows from what is on the screen. News do, between two frames; then a
 //! key that would act on another row than the drawn one, or on the same in another state, does nothing and says so.
@@ -9,7 +9,7 @@ use crossterm::event::{KeyCode, KeyEvent};
 use jiff::Timestamp;
 
 use super::{
-    Act, Model,
+    Model, UiAction,
     tabs::{Tab, alarms::deeds},
 };
 use crate::plant::{def::AlarmId, snapshot::ActiveAlarm};
@@ -130,13 +130,13 @@ impl Model {
 }
 
 /// Acknowledges what `a` is for; says so where that needs none.
-pub(super) fn acknowledge(model: &mut Model) -> Vec<Act> {
-    let (acts, note) = match model.alarm_seen() {
+pub(super) fn acknowledge(model: &mut Model) -> Vec<UiAction> {
+    let (actions, note) = match model.alarm_seen() {
         Ok(Some(alarm)) if alarm.state.needs_acknowledgement() => (deeds::acknowledge(&model.cx(), alarm), None),
         Ok(Some(alarm)) if model.lists() => (deeds::acknowledged(&model.cx(), alarm), None),
         Ok(_) => (Vec::new(), None),
         Err(why) => (Vec::new(), Some(why)),
     };
     model.note = note;
-    acts
+    actions
 }

@@ -35,7 +35,7 @@ use crate::{
 use drawn::Drawn;
 use keys::Global;
 use modal::{Confirm, Modal};
-pub use msg::{Act, AskId, Effect, Leaving, Msg};
+pub use msg::{AskId, Effect, Leaving, Msg, UiAction};
 use presence::Presence;
 use tabs::{Tab, Tabs, alarms::deeds};
 use theme::Theme;
@@ -184,12 +184,12 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
     if matches!(msg, Msg::Snapshot(_) | Msg::Standing(_) | Msg::Answer(..) | Msg::Drill(_) | Msg::Tick { .. }) {
         model.note_news();
     }
-    let acts = match msg {
+    let actions = match msg {
         Msg::Key(event) if event.kind == KeyEventKind::Release => Vec::new(),
         Msg::Key(event) => {
             let active = presence::active(model);
-            let acts = on_key(model, event);
-            active.map(Act::Do).into_iter().chain(acts).collect()
+            let actions = on_key(model, event);
+            active.map(UiAction::Do).into_iter().chain(actions).collect()
         }
         Msg::Paste(text) => {
             match &mut model.modal {
@@ -229,8 +229,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             Vec::new()
         }
     };
-    let acts = presence::hold_back(model, acts);
-    let effects = perform(model, acts);
+    let actions = presence::hold_back(model, actions);
+    let effects = perform(model, actions);
     model.settle();
     if keyed {
         model.note_keyed();
@@ -267,12 +267,12 @@ fn view_context<'a>(
 }
 
 /// Lets the tabs change while they read the rest of the model.
-fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &ViewContext) -> Vec<Act>) -> Vec<Act> {
+fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &ViewContext) -> Vec<UiAction>) -> Vec<UiAction> {
     let Model { snapshot, theme, clock, drill, standing, screen, tabs, .. } = model;
     change(tabs, &view_context(snapshot, theme, *clock, *screen, drill, standing))
 }
 
-fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
+fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     model.note = None;
     if keys::find(keys::GLOBAL, event) == Some(Global::Lock) {
         return presence::lock(model);
@@ -292,9 +292,9 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
     if let Some(modal) = model.modal.take_if(|_| !past) {
         let Model { snapshot, theme, clock, drill, standing, screen, tabs, .. } = model;
         let cx = view_context(snapshot, theme, *clock, *screen, drill, standing);
-        let (rest, acts) = modal.on_key(&cx, tabs, event);
+        let (rest, actions) = modal.on_key(&cx, tabs, event);
         model.modal = rest;
-        return acts;
+        return actions;
     }
     if model.tabs.shown == Tab::Login && model.tabs.login.is_typing() && !model.small() {
         return presence::on_typed(model, event);
@@ -309,20 +309,20 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<Act> {
     }
 }
 
-fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
+fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
     match global {
         Global::Show(tab) if Tab::offered(&model.cx()).contains(&tab) => {
             if tab == Tab::Alarms && model.tabs.shown != tab {
                 model.tabs.alarms.front();
             }
-            vec![Act::Show(tab)]
+            vec![UiAction::Show(tab)]
         }
         Global::Show(_) => Vec::new(),
-        Global::Next => vec![Act::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), 1))],
-        Global::Previous => vec![Act::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), -1))],
+        Global::Next => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), 1))],
+        Global::Previous => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), -1))],
         Global::Lock => presence::lock(model),
-        Global::Help => vec![Act::Open(Modal::Help(0))],
-        Global::Quit => vec![Act::Leave],
+        Global::Help => vec![UiAction::Open(Modal::Help(0))],
+        Global::Quit => vec![UiAction::Leave],
         Global::Acknowledge => drawn::acknowledge(model),
         Global::AcknowledgeAll => {
             let cx = model.cx();
@@ -333,9 +333,9 @@ fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
             }
         }
         // Where nothing sounds there is nothing to silence.
-        Global::Silence if model.snapshot.sound => vec![Act::Order(Command::Alarm(AlarmCommand::Silence))],
+        Global::Silence if model.snapshot.sound => vec![UiAction::Order(Command::Alarm(AlarmCommand::Silence))],
         Global::Silence => Vec::new(),
-        Global::Redraw => vec![Act::Do(Effect::Redraw)],
+        Global::Redraw => vec![UiAction::Do(Effect::Redraw)],
         Global::Dismiss => {
             // A failure that is being read is dismissed first; everything else does not hold up the way back.
             let failed = model.watch.take().is_some_and(|watch| watch.is_trouble());
@@ -350,11 +350,11 @@ fn on_global(model: &mut Model, global: Global) -> Vec<Act> {
     }
 }
 
-fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<Act> {
+fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<UiAction> {
     model.clock.silent = Duration::ZERO;
     if !Arc::ptr_eq(&snapshot.def, &model.snapshot.def) && snapshot.def != model.snapshot.def {
-        let acts = presence::on_other_plant(model, snapshot);
-        return acts.into_iter().chain(with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))).collect();
+        let actions = presence::on_other_plant(model, snapshot);
+        return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))).collect();
     }
     let rings = model.tabs.alarms.bell && bell::rings(&model.snapshot, &snapshot);
     model.snapshot = snapshot;
@@ -363,11 +363,11 @@ fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<Act> {
         // What still came through is as old as all the rest.
         model.doubt();
     }
-    let bell = rings.then_some(Act::Do(Effect::Bell));
+    let bell = rings.then_some(UiAction::Do(Effect::Bell));
     bell.into_iter().chain(with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))).collect()
 }
 
-fn on_tick(model: &mut Model, silent: Duration) -> Vec<Act> {
+fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
     model.clock.phase = model.clock.phase.wrapping_add(1);
     model.clock.silent = silent;
     let phase = model.clock.phase;
@@ -378,40 +378,40 @@ fn on_tick(model: &mut Model, silent: Duration) -> Vec<Act> {
     with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
 }
 
-fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
+fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
     let mut effects = Vec::new();
-    for act in acts {
-        match act {
-            Act::Open(modal) => model.modal = Some(modal),
-            Act::Show(tab) => effects.extend(show(model, tab)),
-            Act::ShowDevice(device) => {
+    for action in actions {
+        match action {
+            UiAction::Open(modal) => model.modal = Some(modal),
+            UiAction::Show(tab) => effects.extend(show(model, tab)),
+            UiAction::ShowDevice(device) => {
                 model.tabs.controllers.show(device);
                 effects.extend(show(model, Tab::Controllers));
             }
-            Act::ShowParameter(tag) => {
+            UiAction::ShowParameter(tag) => {
                 with_tabs(model, |tabs, cx| {
                     tabs.controllers.show_parameter(cx, tag);
                     Vec::new()
                 });
                 effects.extend(show(model, Tab::Controllers));
             }
-            Act::ShowOnMimic(tags) => {
+            UiAction::ShowOnMimic(tags) => {
                 with_tabs(model, |tabs, cx| {
                     tabs.mimic.select(cx, &tags);
                     Vec::new()
                 });
                 effects.extend(show(model, Tab::Mimic));
             }
-            Act::ShowOnTrends(tag, at) => {
+            UiAction::ShowOnTrends(tag, at) => {
                 with_tabs(model, |tabs, cx| {
                     tabs.trends.show(cx, tag, at);
                     Vec::new()
                 });
                 effects.extend(show(model, Tab::Trends));
             }
-            Act::Order(command) => effects.extend(model.order(command.into())),
-            Act::Confirmed(confirmed) => effects.extend(model.order(confirmed)),
-            Act::Wish(tab, wish) => {
+            UiAction::Order(command) => effects.extend(model.order(command.into())),
+            UiAction::Confirmed(confirmed) => effects.extend(model.order(confirmed)),
+            UiAction::Wish(tab, wish) => {
                 // Nought is nobody's: whoever waits has a number.
                 model.presence.wished = model.presence.wished.checked_add(1).unwrap_or(1);
                 let number = model.presence.wished;
@@ -420,8 +420,8 @@ fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
                 }
                 effects.push(Effect::Wish(AskId { tab, number }, wish));
             }
-            Act::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
-            Act::Do(effect) => effects.push(effect),
+            UiAction::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
+            UiAction::Do(effect) => effects.push(effect),
         }
     }
     effects
@@ -431,18 +431,18 @@ fn perform(model: &mut Model, acts: Vec<Act>) -> Vec<Effect> {
 fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     model.tabs.shown = tab;
     let asked = with_tabs(model, |tabs, cx| tabs.on_snapshot(cx));
-    let effects = asked.into_iter().filter_map(|act| match act {
-        Act::Do(effect) => Some(effect),
-        Act::Open(_)
-        | Act::Leave
-        | Act::Show(_)
-        | Act::ShowDevice(_)
-        | Act::ShowParameter(_)
-        | Act::ShowOnMimic(_)
-        | Act::ShowOnTrends(..)
-        | Act::Order(_)
-        | Act::Confirmed(_)
-        | Act::Wish(..) => None,
+    let effects = asked.into_iter().filter_map(|action| match action {
+        UiAction::Do(effect) => Some(effect),
+        UiAction::Open(_)
+        | UiAction::Leave
+        | UiAction::Show(_)
+        | UiAction::ShowDevice(_)
+        | UiAction::ShowParameter(_)
+        | UiAction::ShowOnMimic(_)
+        | UiAction::ShowOnTrends(..)
+        | UiAction::Order(_)
+        | UiAction::Confirmed(_)
+        | UiAction::Wish(..) => None,
     });
     effects.collect()
 }

@@ -88,7 +88,7 @@ pub struct AskId {
 
 /// What a tab or window asks of the terminal.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Act {
+pub enum UiAction {
     /// Put a window on top.
     Open(Modal),
     /// Show a tab.
@@ -125,9 +125,9 @@ pub enum Leaving {
     Terminal,
 }
 
-impl Act {
+impl UiAction {
     /// Asks the history on behalf of a tab.
-    pub fn ask(tab: Tab, number: u32, question: Question) -> Act {
-        Act::Do(Effect::Ask(AskId { tab, number }, question))
+    pub fn ask(tab: Tab, number: u32, question: Question) -> UiAction {
+        UiAction::Do(Effect::Ask(AskId { tab, number }, question))
     }
 }

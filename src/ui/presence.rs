@@ -5,7 +5,7 @@ use std::{mem, sync::Arc, time::Duration};
 use crossterm::event::{KeyCode, KeyEvent};
 
 use super::{
-    Act, AskId, Effect, Model, context,
+    AskId, Effect, Model, UiAction, context,
     keys::{self, Global},
     modal::{Modal, Notice, Sheet, sheet::Purpose},
     tabs::{Tab, Tabs, login},
@@ -57,7 +57,7 @@ impl Model {
 }
 
 /// The station tells how this terminal stands.
-pub(super) fn on_standing(model: &mut Model, standing: Arc<Standing>) -> Vec<Act> {
+pub(super) fn on_standing(model: &mut Model, standing: Arc<Standing>) -> Vec<UiAction> {
     let before = mem::replace(&mut model.standing, standing);
     let (now, phase) = (model.standing.clone(), model.clock.phase);
     model.presence.told_at = phase;
@@ -87,12 +87,12 @@ pub(super) fn on_standing(model: &mut Model, standing: Arc<Standing>) -> Vec<Act
     // The login page has every letter for itself: a locked terminal is for looking.
     let locked = shown == Tab::Login && !before.locked && now.locked;
     if is_closed(&now) || (now.first && !before.first) {
-        return vec![Act::Show(Tab::Login)];
+        return vec![UiAction::Show(Tab::Login)];
     }
     let offered = Tab::offered(&model.cx()).contains(&shown);
     match back {
-        Some(tab) => vec![Act::Show(tab)],
-        None if let_in || opened || locked || !offered => vec![Act::Show(Tab::Mimic)],
+        Some(tab) => vec![UiAction::Show(tab)],
+        None if let_in || opened || locked || !offered => vec![UiAction::Show(Tab::Mimic)],
         None => Vec::new(),
     }
 }
@@ -119,13 +119,13 @@ fn keep_work(model: &mut Model, before: &Standing, now: &Standing) -> Option<Tab
 }
 
 /// A key of the login page while a form has every letter.
-pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<Act> {
+pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     if login::is_leave(event) {
         let standing = model.standing.clone();
         let changing = standing.who.is_some() && !standing.locked;
         model.tabs.login.back(&standing);
         let leads = !changing && !is_closed(&standing);
-        return if leads { vec![Act::Show(Tab::Mimic)] } else { Vec::new() };
+        return if leads { vec![UiAction::Show(Tab::Mimic)] } else { Vec::new() };
     }
     match keys::find(keys::GLOBAL, event) {
         Some(global @ (Global::Quit | Global::Redraw)) if event.modifiers.contains(keys::CONTROL) => {
@@ -136,9 +136,9 @@ pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<Act> {
 }
 
 /// Locks at once, if there is somebody to lock it.
-pub(super) fn lock(model: &Model) -> Vec<Act> {
+pub(super) fn lock(model: &Model) -> Vec<UiAction> {
     let may = model.standing.who.is_some() && !model.standing.locked;
-    if may { vec![Act::Wish(Tab::Login, Wish::Lock)] } else { Vec::new() }
+    if may { vec![UiAction::Wish(Tab::Login, Wish::Lock)] } else { Vec::new() }
 }
 
 /// A key on a locked terminal that is meant for a window with work in it, as a faceplate opens one: the password is asked
@@ -155,33 +155,33 @@ pub(super) fn ask_before_work(model: &mut Model, event: KeyEvent) -> bool {
 }
 
 /// While the terminal is locked nothing is done: the password is asked for, and what was to be opened waits below.
-pub(super) fn hold_back(model: &mut Model, acts: Vec<Act>) -> Vec<Act> {
+pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiAction> {
     if !model.standing.locked {
-        return acts;
+        return actions;
     }
     let mut held = None;
     let mut rest = Vec::new();
-    for act in acts {
-        match act {
-            Act::Open(modal) if !modal.only_looks() && !modal.is_unlock() => held = Some(Some(modal)),
-            Act::Order(_)
-            | Act::Confirmed(_)
-            | Act::Wish(_, Wish::Exported { .. })
-            | Act::Do(Effect::SaveReport { .. } | Effect::Drill(_)) => held = held.or(Some(None)),
-            Act::Open(_)
-            | Act::Leave
-            | Act::Show(_)
-            | Act::ShowDevice(_)
-            | Act::ShowParameter(_)
-            | Act::ShowOnMimic(_)
-            | Act::ShowOnTrends(..)
-            | Act::Wish(..)
-            | Act::Do(_) => rest.push(act),
+    for action in actions {
+        match action {
+            UiAction::Open(modal) if !modal.only_looks() && !modal.is_unlock() => held = Some(Some(modal)),
+            UiAction::Order(_)
+            | UiAction::Confirmed(_)
+            | UiAction::Wish(_, Wish::Exported { .. })
+            | UiAction::Do(Effect::SaveReport { .. } | Effect::Drill(_)) => held = held.or(Some(None)),
+            UiAction::Open(_)
+            | UiAction::Leave
+            | UiAction::Show(_)
+            | UiAction::ShowDevice(_)
+            | UiAction::ShowParameter(_)
+            | UiAction::ShowOnMimic(_)
+            | UiAction::ShowOnTrends(..)
+            | UiAction::Wish(..)
+            | UiAction::Do(_) => rest.push(action),
         }
     }
     if let Some(wanted) = held {
         let below = wanted.or_else(|| model.modal.take());
-        rest.extend(unlock(model, below).map(Act::Open));
+        rest.extend(unlock(model, below).map(UiAction::Open));
     }
     rest
 }
@@ -207,7 +207,7 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
 
 /// The station's answer to a request: for the window that waits for it, also one that a lock has hidden, else for the tab,
 /// which waits for its last request only.
-pub(super) fn on_granted(model: &mut Model, id: AskId, answer: Result<Durability, String>) -> Vec<Act> {
+pub(super) fn on_granted(model: &mut Model, id: AskId, answer: Result<Durability, String>) -> Vec<UiAction> {
     if answer == Ok(Durability::NotRecorded) {
         model.note = Some(NOT_RECORDED);
     }
@@ -238,7 +238,7 @@ fn answered(model: &Model, mut sheet: Box<Sheet>, answer: Result<(), String>) ->
 }
 
 /// The station runs another plant file: nothing that was known of the old one may stay.
-pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<Act> {
+pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<UiAction> {
     let shown = model.tabs.shown;
     model.tabs = Tabs::new(&snapshot);
     (model.snapshot, model.watch, model.kept) = (snapshot, None, None);
@@ -254,7 +254,7 @@ pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<
     });
     let closed = is_closed(&model.standing);
     model.modal = (!closed).then(|| Modal::Notice(Notice::new("plant file", words)));
-    if closed { vec![Act::Show(Tab::Login)] } else { Vec::new() }
+    if closed { vec![UiAction::Show(Tab::Login)] } else { Vec::new() }
 }
 
 /// A key that the password of a locked terminal has no use for, and that leads to what there is to be seen below it.

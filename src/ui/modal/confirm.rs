@@ -21,7 +21,7 @@ use crate::{
         tool::Tool,
     },
     ui::{
-        Act, Confirmed, Effect, Leaving, ViewContext, guard, keys, rights,
+        Confirmed, Effect, Leaving, UiAction, ViewContext, guard, keys, rights,
         tabs::mimic,
         widgets::{
             text::{Canvas, width, wrap},
@@ -225,11 +225,11 @@ impl Confirm {
             return Next::Stay(Modal::Confirm(self));
         }
         let act = match &self.intent {
-            Intent::Quit => Act::Do(Effect::Quit),
+            Intent::Quit => UiAction::Do(Effect::Quit),
             Intent::Order(command) => {
                 let seen = self.seen.as_ref().and_then(|seen| seen.shown(cx));
                 let sign = self.sign.as_ref().map(signature);
-                Act::Confirmed(Confirmed { seen, sign, ..command.clone().into() })
+                UiAction::Confirmed(Confirmed { seen, sign, ..command.clone().into() })
             }
         };
         if self.sign.is_some() {

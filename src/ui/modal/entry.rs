@@ -14,7 +14,7 @@ use super::{
 use crate::{
     plant::{command::Command, def::TagId},
     ui::{
-        Act, Confirmed, ViewContext, guard, keys, rights,
+        Confirmed, UiAction, ViewContext, guard, keys, rights,
         widgets::{
             text::{width, wrap},
             value,
@@ -56,7 +56,7 @@ impl Entry {
                 Ok(value) => {
                     let seen = self.seen.shown(cx);
                     let command = Command::Write { tag: self.tag, value };
-                    return Next::Do(vec![Act::Confirmed(Confirmed { seen, ..command.into() })]);
+                    return Next::Do(vec![UiAction::Confirmed(Confirmed { seen, ..command.into() })]);
                 }
                 Err(problem) => self.problem = Some(problem),
             }

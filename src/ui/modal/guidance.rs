@@ -7,7 +7,7 @@ use super::{Faceplate, Modal, Next, window};
 use crate::{
     plant::def::AlarmId,
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         keys::{self, Hint},
         modal::confirm::subject,
         tabs::alarms::{aside_words, guidance},
@@ -45,7 +45,7 @@ impl Guidance {
         match event.code {
             KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => {
                 return match self.plate {
-                    Some(plate) => Next::Do(vec![Act::Open(Modal::Faceplate(plate))]),
+                    Some(plate) => Next::Do(vec![UiAction::Open(Modal::Faceplate(plate))]),
                     None => Next::Close,
                 };
             }

@@ -35,7 +35,7 @@ pub use sheet::Sheet;
 pub use why::Why;
 
 use super::{
-    Act, ViewContext,
+    UiAction, ViewContext,
     keys::{self, Hint},
     tabs::{Tab, Tabs, bus},
     widgets::text::{Canvas, fit, width},
@@ -83,9 +83,9 @@ pub enum Next {
     /// It is gone.
     Close,
     /// It is gone, and this is to be done.
-    Do(Vec<Act>),
+    Do(Vec<UiAction>),
     /// It stays, and this is to be done.
-    Both(Modal, Vec<Act>),
+    Both(Modal, Vec<UiAction>),
 }
 
 impl Modal {
@@ -102,7 +102,7 @@ impl Modal {
     }
 
     /// A key: what is left of the window, and what is to be done.
-    pub fn on_key(self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> (Option<Modal>, Vec<Act>) {
+    pub fn on_key(self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> (Option<Modal>, Vec<UiAction>) {
         if keys::code(KeyCode::Esc).is(event) {
             let back = match self {
                 Modal::Confirm(confirm) => confirm.back().map(Modal::Faceplate),
@@ -112,7 +112,7 @@ impl Modal {
             return (back, Vec::new());
         }
         if keys::ctrl('c').is(event) {
-            return (Some(self), vec![Act::Leave]);
+            return (Some(self), vec![UiAction::Leave]);
         }
         let next = match self {
             Modal::Help(row) => help::on_key(row, event),

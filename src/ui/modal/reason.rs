@@ -12,7 +12,7 @@ use crate::{
         command::Command,
         def::AlarmId,
     },
-    ui::{Act, Confirmed, ViewContext, keys, rights, widgets::text::wrap},
+    ui::{Confirmed, UiAction, ViewContext, keys, rights, widgets::text::wrap},
 };
 
 /// The window.
@@ -141,7 +141,7 @@ impl Reason {
             return Next::Stay(Modal::Reason(Box::new(self)));
         }
         let note = (!words.is_empty()).then(|| Arc::from(words));
-        Next::Do(vec![Act::Confirmed(Confirmed { note, ..command.into() })])
+        Next::Do(vec![UiAction::Confirmed(Confirmed { note, ..command.into() })])
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {

@@ -16,7 +16,7 @@ use crate::{
         snapshot::DeviceState,
     },
     ui::{
-        Act, ViewContext, keys,
+        UiAction, ViewContext, keys,
         keys::Hint,
         widgets::text::{Canvas, fit, fit_words, wrap},
     },
@@ -71,7 +71,7 @@ impl Settings {
         let enter = keys::code(KeyCode::Enter).is(event);
         if let Some(deed) = self.asking.take() {
             let yes = enter || keys::char('y').is(event);
-            let acts = if yes { vec![Act::Order(self.command(deed))] } else { Vec::new() };
+            let acts = if yes { vec![UiAction::Order(self.command(deed))] } else { Vec::new() };
             // Off the text field, so that u and S are keys again.
             self.row = 0;
             return Next::Both(Modal::Settings(Box::new(self)), acts);

@@ -17,7 +17,7 @@ use crate::{
     },
     plant::role::Role,
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         keys::{self, Hint},
         tabs::Tab,
         widgets::text::{Canvas, width, wrap},
@@ -201,12 +201,12 @@ impl Sheet {
 
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         if matches!(self.purpose, Purpose::Unlock(_)) && keys::ctrl('o').is(event) {
-            return Next::Do(vec![Act::Show(Tab::Login)]);
+            return Next::Do(vec![UiAction::Show(Tab::Login)]);
         }
         match self.press(cx, event) {
             Some(wish) => {
                 let tab = self.tab();
-                Next::Both(Modal::Sheet(Box::new(self)), vec![Act::Wish(tab, wish)])
+                Next::Both(Modal::Sheet(Box::new(self)), vec![UiAction::Wish(tab, wish)])
             }
             None => Next::Stay(Modal::Sheet(Box::new(self))),
         }

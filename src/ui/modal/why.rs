@@ -16,7 +16,7 @@ use super::{Modal, Next, window};
 use crate::{
     plant::def::{DeviceId, TagId},
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         keys::Hint,
         widgets::text::{Canvas, fit_words, width, wrap},
     },
@@ -57,8 +57,8 @@ impl Why {
     }
 
     /// The act that opens it, for a key.
-    pub fn open(why: Option<Why>) -> Vec<Act> {
-        why.map(|why| Act::Open(Modal::Why(why))).into_iter().collect()
+    pub fn open(why: Option<Why>) -> Vec<UiAction> {
+        why.map(|why| UiAction::Open(Modal::Why(why))).into_iter().collect()
     }
 
     pub(super) fn hints(&self) -> Vec<Hint> {

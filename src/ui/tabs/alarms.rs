@@ -27,7 +27,7 @@ use crate::{
         snapshot::{ActiveAlarm, AsideAlarm, Snapshot},
     },
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         drawn::Rows,
         keys::{Hint, find},
         modal::{Faceplate, Guidance, Modal, Prompt, Why, faceplate::device_words},
@@ -137,7 +137,7 @@ impl Alarms {
     }
 
     /// A key of the page.
-    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         let Some(action) = find(&keys::table(self.page), event) else { return Vec::new() };
         let alarm = self.selected(cx);
         match action {
@@ -176,7 +176,7 @@ impl Alarms {
     }
 
     /// The words that were typed.
-    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         match self.page {
             Page::Active | Page::System => self.filter.type_words(text),
             Page::Journal => self.journal.search(cx, text)?,
@@ -221,7 +221,7 @@ impl Alarms {
     }
 
     /// News, or time has passed: the page that needs the history asks for it.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let there = |began: &Timestamp| {
             cx.snapshot.alarms.iter().any(|alarm| alarm.burst.is_some_and(|burst| burst.began == *began))
         };
@@ -240,7 +240,7 @@ impl Alarms {
     }
 
     /// The history answered question `number`; an answer to an older one is ignored.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.journal.on_answer(cx, number, &answer);
         self.quality.on_answer(cx, number, &answer);
         self.handover.on_answer(cx, number, &answer);
@@ -347,32 +347,32 @@ impl Alarms {
         self.page = Page::Journal;
     }
 
-    fn ask_words(&self) -> Vec<Act> {
+    fn ask_words(&self) -> Vec<UiAction> {
         let prompt = match self.page {
             Page::Journal => Prompt::new("search the journal", journal::FORMS, &self.journal.typed()),
             Page::Active | Page::Aside | Page::System | Page::Quality | Page::Handover => {
                 Prompt::new("show only alarms with", filter::FORMS, &self.filter.typed())
             }
         };
-        vec![Act::Open(Modal::Prompt(prompt))]
+        vec![UiAction::Open(Modal::Prompt(prompt))]
     }
 
     /// Leads to what the alarm watches.
-    fn go(&self, cx: &ViewContext, action: Action) -> Vec<Act> {
+    fn go(&self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         let Some(id) = self.target(cx) else { return Vec::new() };
         let raised = self.selected(cx).map_or(cx.now, |alarm| alarm.raised_at);
         match (cx.def().alarm(id).subject, action) {
-            (Subject::Tag(tag), Action::Mimic) => vec![Act::ShowOnMimic(vec![tag])],
+            (Subject::Tag(tag), Action::Mimic) => vec![UiAction::ShowOnMimic(vec![tag])],
             (Subject::Device(device), Action::Mimic) => {
-                vec![Act::ShowOnMimic(cx.def().tags_of(device).map(|tag| tag.id).collect())]
+                vec![UiAction::ShowOnMimic(cx.def().tags_of(device).map(|tag| tag.id).collect())]
             }
-            (Subject::Tag(tag), Action::Trend) => vec![Act::ShowOnTrends(tag, raised)],
-            (Subject::Tag(tag), Action::Controller) => vec![Act::ShowParameter(tag)],
-            (Subject::Device(device), Action::Controller) => vec![Act::ShowDevice(device)],
+            (Subject::Tag(tag), Action::Trend) => vec![UiAction::ShowOnTrends(tag, raised)],
+            (Subject::Tag(tag), Action::Controller) => vec![UiAction::ShowParameter(tag)],
+            (Subject::Device(device), Action::Controller) => vec![UiAction::ShowDevice(device)],
             (Subject::Tag(tag), Action::Why) => Why::open(Why::new(vec![tag], 0)),
             (Subject::Device(device), Action::Why) => Why::open(Why::of_device(cx, device)),
             (subject, Action::Open) => {
-                vec![Act::Open(Modal::Guidance(Box::new(Guidance::new(id, faceplate(cx, subject)))))]
+                vec![UiAction::Open(Modal::Guidance(Box::new(Guidance::new(id, faceplate(cx, subject)))))]
             }
             (Subject::Tag(_) | Subject::Device(_) | Subject::Line(_) | Subject::Station, _) => Vec::new(),
         }

@@ -33,7 +33,7 @@ use crate::{
         snapshot::{DeviceState, LineStatus, Snapshot},
     },
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         drawn::Rows,
         keys::{self, Hint, Key, char, code},
         modal::{Modal, Notice, Settings},
@@ -194,7 +194,7 @@ impl Bus {
     }
 
     /// Any key: first those of the page, then those of every page.
-    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         let action = keys::find(page_keys(self.page), event).or_else(|| keys::find(KEYS, event));
         let (Some(action), Some(at)) = (action, Place::of(cx, self.line)) else { return Vec::new() };
         let screen = isize::try_from(self.room(cx)).unwrap_or(1).max(2) - 1;
@@ -259,7 +259,7 @@ impl Bus {
     }
 
     /// News: frames that run are taken in now and then.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         if let (Page::Frames, Some(at)) = (self.page, Place::of(cx, self.line)) {
             self.frames.follow(cx, &at);
         }
@@ -268,7 +268,7 @@ impl Bus {
         }
         self.asked = self.asked.wrapping_add(1);
         self.errand.asked(self.asked, cx.steady());
-        vec![Act::ask(Tab::Bus, self.asked, line_trend::question(self.line, cx.now))]
+        vec![UiAction::ask(Tab::Bus, self.asked, line_trend::question(self.line, cx.now))]
     }
 
     /// Is the answer to question `number` waited for?
@@ -284,12 +284,12 @@ impl Bus {
     }
 
     /// A filter was typed.
-    pub fn on_text(&mut self, _cx: &ViewContext, text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, _cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         self.frames.set_filter(text).map(|()| Vec::new())
     }
 
     /// The station has put a capture on record, or refuses it.
-    pub fn on_granted(&mut self, answer: Result<(), String>) -> Vec<Act> {
+    pub fn on_granted(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
         self.frames.on_granted(answer)
     }
 
@@ -362,7 +362,7 @@ impl Bus {
         }
     }
 
-    fn open(&mut self, cx: &ViewContext, at: &Place) -> Vec<Act> {
+    fn open(&mut self, cx: &ViewContext, at: &Place) -> Vec<UiAction> {
         match self.page {
             Page::Line => Vec::new(),
             Page::Plan => self.plan.open(at).into_iter().collect(),
@@ -419,12 +419,12 @@ impl<'a> Place<'a> {
 }
 
 /// The devices that do not answer are asked at once: those of a line, or of all.
-pub fn retry(cx: &ViewContext, line: Option<LineId>) -> Vec<Act> {
+pub fn retry(cx: &ViewContext, line: Option<LineId>) -> Vec<UiAction> {
     let silent = |device: &&DeviceDef| match cx.snapshot.device(device.id).state {
         DeviceState::Failing(_) | DeviceState::Down { .. } => line.is_none_or(|line| line == device.line),
         DeviceState::Unknown | DeviceState::Answering => false,
     };
-    cx.def().devices.iter().filter(silent).map(|device| Act::Order(Command::Refresh(device.id))).collect()
+    cx.def().devices.iter().filter(silent).map(|device| UiAction::Order(Command::Refresh(device.id))).collect()
 }
 
 /// `connected since 13:02:11`, `DOWN 00:12: No such file or directory, next try in 4s`.

@@ -40,7 +40,7 @@ use crate::{
         snapshot::Snapshot,
     },
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         drawn::Rows,
         keys::{Hint, find, hints},
         modal::{Confirm, Faceplate, Modal, Prompt},
@@ -171,7 +171,7 @@ impl Controllers {
     }
 
     /// A key of the page.
-    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         let Some(action) = find(page_keys(&self.page), event) else { return Vec::new() };
         let Some(device) = cx.def().devices.get(self.device.index()) else { return Vec::new() };
         match action {
@@ -209,7 +209,7 @@ impl Controllers {
             Action::Find => {
                 self.asked_for = Asked::Filter;
                 let hint = "words in name or meaning; empty shows all";
-                vec![Act::Open(Modal::Prompt(Prompt::new("find a parameter", hint, &self.table.filter)))]
+                vec![UiAction::Open(Modal::Prompt(Prompt::new("find a parameter", hint, &self.table.filter)))]
             }
             Action::Defaults => {
                 self.table.defaults = !self.table.defaults;
@@ -218,11 +218,11 @@ impl Controllers {
             Action::Save => {
                 self.asked_for = Asked::SetName;
                 let title = format!("save the settings of {} as a set", device.name);
-                vec![Act::Open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")))]
+                vec![UiAction::Open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")))]
             }
             Action::All | Action::Turnaround => self.in_compare(cx, action),
-            Action::Stop => vec![Act::Order(Command::StopRestore(device.id))],
-            Action::ReadSets => vec![Act::Order(Command::ReadSets)],
+            Action::Stop => vec![UiAction::Order(Command::StopRestore(device.id))],
+            Action::ReadSets => vec![UiAction::Order(Command::ReadSets)],
             Action::Command(which) => device.program.as_ref().map_or(Vec::new(), |program| {
                 let value = match which {
                     keys::Wish::Run => Some(program.run),
@@ -248,14 +248,14 @@ impl Controllers {
         }
     }
 
-    fn step_device(&mut self, cx: &ViewContext, by: isize) -> Vec<Act> {
+    fn step_device(&mut self, cx: &ViewContext, by: isize) -> Vec<UiAction> {
         let count = cx.def().devices.len() as isize;
         let next = DeviceId((self.device.0 as isize + by).rem_euclid(count) as u16);
         self.show(next);
         self.on_snapshot(cx)
     }
 
-    fn move_by(&mut self, cx: &ViewContext, device: &DeviceDef, by: isize) -> Vec<Act> {
+    fn move_by(&mut self, cx: &ViewContext, device: &DeviceDef, by: isize) -> Vec<UiAction> {
         match &mut self.page {
             Page::List => {
                 let last = cx.def().devices.len().saturating_sub(1);
@@ -278,7 +278,7 @@ impl Controllers {
     }
 
     /// Enter: what is selected is opened, edited or written.
-    fn open(&mut self, cx: &ViewContext, device: &DeviceDef) -> Vec<Act> {
+    fn open(&mut self, cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
         match &self.page {
             Page::List => {
                 self.show(device.id);
@@ -287,7 +287,7 @@ impl Controllers {
             Page::Device => match self.table.tag(cx, device.id) {
                 Some(tag) if tag.writable() => write(cx, Some(tag.id)),
                 Some(tag) => Faceplate::new(tag.label.clone(), vec![tag.id])
-                    .map(|plate| Act::Open(Modal::Faceplate(plate)))
+                    .map(|plate| UiAction::Open(Modal::Faceplate(plate)))
                     .into_iter()
                     .collect(),
                 None => Vec::new(),
@@ -296,20 +296,20 @@ impl Controllers {
             Page::Sets => {
                 let Some(source) = sets::sources(cx, device).into_iter().nth(self.set) else { return Vec::new() };
                 if let Some(notice) = sets::problems(cx, &source) {
-                    return vec![Act::Open(Modal::Notice(notice))];
+                    return vec![UiAction::Open(Modal::Notice(notice))];
                 }
                 self.page = Page::Compare(Compare::new(source));
                 Vec::new()
             }
             Page::Compare(compare) => {
                 let window = compare.restore(cx, device).map_or_else(Modal::Notice, Modal::Confirm);
-                vec![Act::Open(window)]
+                vec![UiAction::Open(window)]
             }
             Page::Guide(..) => Vec::new(),
         }
     }
 
-    fn in_compare(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
+    fn in_compare(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         let Page::Compare(compare) = &mut self.page else { return Vec::new() };
         match (action, &compare.source) {
             (Action::All, _) => compare.all = !compare.all,
@@ -357,7 +357,7 @@ impl Controllers {
     }
 
     /// News, or time has passed: the small trend is asked for now and then.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let plate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
         let Some(plate) = plate.filter(|_| self.page == Page::Device) else { return Vec::new() };
         if !self.errand.due(cx.steady(), TREND_EVERY, PATIENCE) {
@@ -367,7 +367,7 @@ impl Controllers {
         self.errand.asked(self.asked, cx.steady());
         let from = cx.now.checked_sub(plate::WINDOW).unwrap_or(cx.now);
         let question = Question::Series { tags: vec![plate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
-        vec![Act::ask(Tab::Controllers, self.asked, question)]
+        vec![UiAction::ask(Tab::Controllers, self.asked, question)]
     }
 
     /// Is the answer to question `number` waited for?
@@ -383,7 +383,7 @@ impl Controllers {
     }
 
     /// Words to find, or the name of a set.
-    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         let text = text.trim();
         match self.asked_for {
             Asked::Filter => {
@@ -400,9 +400,9 @@ impl Controllers {
                 parameter_set::check_name(text)?;
                 let there = cx.snapshot.sets.iter().find(|stored| stored.name == text);
                 let command = Command::SaveSet { device: self.device, name: text.into(), replace: there.is_some() };
-                let Some(there) = there else { return Ok(vec![Act::Order(command)]) };
+                let Some(there) = there else { return Ok(vec![UiAction::Order(command)]) };
                 let words = sets::replace_words(cx, there);
-                Ok(vec![Act::Open(Modal::Confirm(Confirm::order(format!("save set {text}"), words, command)))])
+                Ok(vec![UiAction::Open(Modal::Confirm(Confirm::order(format!("save set {text}"), words, command)))])
             }
         }
     }

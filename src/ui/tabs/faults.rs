@@ -16,7 +16,7 @@ use crate::{
         faults::{Fault, Place},
     },
     ui::{
-        Act, Effect, ViewContext,
+        Effect, UiAction, ViewContext,
         drawn::Rows,
         keys::{self, Hint, Key, char, code},
         rights,
@@ -80,7 +80,7 @@ pub const KEYS: &[Key<Action>] = &[
 
 impl Faults {
     /// A key.
-    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         let Some(status) = open(cx) else { return Vec::new() };
         let rows = rows(status);
         let Some((place, offered)) = rows.get(self.selected.min(rows.len().saturating_sub(1))).copied() else {
@@ -152,11 +152,11 @@ fn rows(status: &Status) -> Vec<(Place, Fault)> {
 }
 
 /// A silent device may answer again: it is asked at once, if the present user may do that.
-fn cleared(cx: &ViewContext, command: SimCommand) -> Vec<Act> {
-    let allowed = |act: &Act| matches!(act, Act::Order(command) if rights::missing(cx, command).is_none());
+fn cleared(cx: &ViewContext, command: SimCommand) -> Vec<UiAction> {
+    let allowed = |act: &UiAction| matches!(act, UiAction::Order(command) if rights::missing(cx, command).is_none());
     send(command).into_iter().chain(bus::retry(cx, None).into_iter().filter(allowed)).collect()
 }
 
-fn send(command: SimCommand) -> Vec<Act> {
-    vec![Act::Do(Effect::Drill(command))]
+fn send(command: SimCommand) -> Vec<UiAction> {
+    vec![UiAction::Do(Effect::Drill(command))]
 }

@@ -12,7 +12,7 @@ use super::Tab;
 use crate::{
     access::{Standing, Wish, wish::Secret},
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         keys::{self, Hint, Key, char},
         modal::sheet::{Purpose, Sheet},
     },
@@ -58,7 +58,7 @@ pub struct Login {
 
 impl Login {
     /// A key: the form has all of them while there is one.
-    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         let Some(sheet) = &mut self.sheet else {
             return keys::find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default();
         };
@@ -66,10 +66,10 @@ impl Login {
         if let Wish::Login { password, .. } = &wish {
             self.given = Some(password.clone());
         }
-        vec![Act::Wish(Tab::Login, wish)]
+        vec![UiAction::Wish(Tab::Login, wish)]
     }
 
-    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
+    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         if cx.standing.who.is_none() {
             return Vec::new();
         }
@@ -80,8 +80,8 @@ impl Login {
                 self.fit(cx.standing);
                 Vec::new()
             }
-            Action::Lock => vec![Act::Wish(Tab::Login, Wish::Lock)],
-            Action::Leave => vec![Act::Wish(Tab::Login, Wish::Logout)],
+            Action::Lock => vec![UiAction::Wish(Tab::Login, Wish::Lock)],
+            Action::Leave => vec![UiAction::Wish(Tab::Login, Wish::Logout)],
         }
     }
 

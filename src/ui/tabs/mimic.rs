@@ -12,7 +12,7 @@ use crate::{
         snapshot::Snapshot,
     },
     ui::{
-        Act, ViewContext, guard,
+        UiAction, ViewContext, guard,
         keys::{self, Hint, Key, char, code},
         modal::{Choice, Confirm, Faceplate, Modal, Notice, Why},
         widgets::{
@@ -84,7 +84,7 @@ impl Mimic {
     }
 
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         let items = &cx.def().mimic.items;
         match action {
             Action::Move(dx, dy) if list::is_shown(cx, cx.area) => {
@@ -95,7 +95,7 @@ impl Mimic {
             Action::Actuators => {
                 let outputs = cx.def().guards.actuators.iter().map(|actuator| actuator.output).collect();
                 let plate = Faceplate::new("commands", outputs);
-                return plate.map(|plate| Act::Open(Modal::Faceplate(plate))).into_iter().collect();
+                return plate.map(|plate| UiAction::Open(Modal::Faceplate(plate))).into_iter().collect();
             }
             Action::Why => {
                 self.selected = self.selected.or_else(|| neighbour(items, None, (1, 0)));
@@ -105,7 +105,7 @@ impl Mimic {
             Action::Open => {
                 let item = self.selected.and_then(|n| items.get(n));
                 let plate = item.and_then(|item| Faceplate::new(title(cx, item), tags(cx, item)));
-                return plate.map(|plate| Act::Open(Modal::Faceplate(plate))).into_iter().collect();
+                return plate.map(|plate| UiAction::Open(Modal::Faceplate(plate))).into_iter().collect();
             }
         }
         Vec::new()
@@ -118,8 +118,8 @@ impl Mimic {
     }
 
     /// A key that the plant file defines: a window with the finished intent.
-    pub fn on_command_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
-        command_of(cx, event).map(Act::Open).into_iter().collect()
+    pub fn on_command_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+        command_of(cx, event).map(UiAction::Open).into_iter().collect()
     }
 
     /// The plant's keys first: they are what the tab is for.
@@ -131,7 +131,7 @@ impl Mimic {
     }
 
     /// News, or time has passed: the small trends are asked again now and then.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         if self.trends.is_empty() || self.asked_at.is_some_and(|at| cx.phase.wrapping_sub(at) < TREND_TICKS) {
             return Vec::new();
         }
@@ -144,7 +144,7 @@ impl Mimic {
                 let width = stretch(cx, cx.area).place(*place).width;
                 let question =
                     Question::Series { tags: vec![*tag], from, to: cx.now, buckets: usize::from(width.max(1)) * 2 };
-                Some(Act::ask(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(n as u32), question))
+                Some(UiAction::ask(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(n as u32), question))
             }
             MimicItem::Tank { .. }
             | MimicItem::Valve { .. }
@@ -164,7 +164,7 @@ impl Mimic {
     }
 
     /// The history answered question `number`.
-    pub fn on_answer(&mut self, _cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+    pub fn on_answer(&mut self, _cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         let first = self.asked.wrapping_mul(self.trends.len() as u32);
         let place = number.wrapping_sub(first) as usize;
         if let Some((_, series)) = self.trends.get_mut(place) {

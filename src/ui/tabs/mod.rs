@@ -20,7 +20,7 @@ use crossterm::event::KeyEvent;
 use ratatui::{Frame, layout::Rect};
 
 use super::{
-    Act, AskId, Effect, ViewContext,
+    AskId, Effect, UiAction, ViewContext,
     drawn::Rows,
     keys::{self, Hint},
     presence,
@@ -41,13 +41,13 @@ struct Outgoing {
 
 impl Outgoing {
     /// Asks for it.
-    fn wish(&self) -> Act {
+    fn wish(&self) -> UiAction {
         let file = self.path.display().to_string();
-        Act::Wish(self.tab, Wish::Exported { file, sha256: sha256(&self.bytes) })
+        UiAction::Wish(self.tab, Wish::Exported { file, sha256: sha256(&self.bytes) })
     }
     /// Writes it.
-    fn write(self) -> Act {
-        Act::Do(Effect::SaveReport { tab: self.tab, path: self.path, bytes: self.bytes })
+    fn write(self) -> UiAction {
+        UiAction::Do(Effect::SaveReport { tab: self.tab, path: self.path, bytes: self.bytes })
     }
 }
 
@@ -171,8 +171,12 @@ impl Tabs {
     }
 
     /// A key for the shown tab; one that is in no table does nothing.
-    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
-        fn act<A: Copy>(table: &[keys::Key<A>], event: KeyEvent, on_key: impl FnOnce(A) -> Vec<Act>) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+        fn act<A: Copy>(
+            table: &[keys::Key<A>],
+            event: KeyEvent,
+            on_key: impl FnOnce(A) -> Vec<UiAction>,
+        ) -> Vec<UiAction> {
             keys::find(table, event).map(on_key).unwrap_or_default()
         }
         match self.shown {
@@ -234,7 +238,7 @@ impl Tabs {
     }
 
     /// News, or time has passed, or the tab was just shown.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         match self.shown {
             Tab::Mimic => self.mimic.on_snapshot(cx),
             Tab::Trends => self.trends.on_snapshot(cx),
@@ -262,7 +266,7 @@ impl Tabs {
     }
 
     /// An answer goes to the tab that asked, shown or not.
-    pub fn on_answer(&mut self, cx: &ViewContext, id: AskId, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+    pub fn on_answer(&mut self, cx: &ViewContext, id: AskId, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         match id.tab {
             Tab::Mimic => self.mimic.on_answer(cx, id.number, answer),
             Tab::Trends => self.trends.on_answer(cx, id.number, answer),
@@ -285,7 +289,7 @@ impl Tabs {
     }
 
     /// A wish goes to the tab that wished, shown or not.
-    pub fn on_granted(&mut self, cx: &ViewContext, id: AskId, answer: Result<(), String>) -> Vec<Act> {
+    pub fn on_granted(&mut self, cx: &ViewContext, id: AskId, answer: Result<(), String>) -> Vec<UiAction> {
         match id.tab {
             Tab::Login => self.login.on_granted(cx, answer),
             Tab::Reports => return self.reports.on_granted(answer),
@@ -296,7 +300,7 @@ impl Tabs {
     }
 
     /// The text that was entered in a window which the shown tab had opened; `Err` keeps the window open and says why.
-    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         match self.shown {
             Tab::Trends => self.trends.on_text(cx, text),
             Tab::Reports => self.reports.on_text(cx, text),
@@ -309,7 +313,7 @@ impl Tabs {
     }
 
     /// A file was written, or why not: told to the tab that wanted it, shown or not.
-    pub fn on_saved(&mut self, cx: &ViewContext, tab: Tab, result: Result<PathBuf, String>) -> Vec<Act> {
+    pub fn on_saved(&mut self, cx: &ViewContext, tab: Tab, result: Result<PathBuf, String>) -> Vec<UiAction> {
         match tab {
             Tab::Reports => return self.reports.on_saved(cx, result),
             Tab::Bus => self.bus.on_saved(result),

@@ -21,7 +21,7 @@ use crate::{
         csv::{file_name, shift_csv},
     },
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         keys::{Key, char, code},
         modal::{Modal, Prompt, Why},
     },
@@ -128,7 +128,7 @@ impl Reports {
     }
 
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         let page = usize::from(cx.area.height.saturating_sub(3)).max(1);
         match action {
             Action::Before => self.step(cx, period::before),
@@ -139,7 +139,7 @@ impl Reports {
             }
             Action::Free => {
                 let prompt = Prompt::new("report of a period", period::FORMS, "");
-                return vec![Act::Open(Modal::Prompt(prompt))];
+                return vec![UiAction::Open(Modal::Prompt(prompt))];
             }
             Action::Up => self.first = self.first.saturating_sub(1),
             Action::Down => self.scroll(cx, 1),
@@ -167,7 +167,7 @@ impl Reports {
     }
 
     /// News, or time has passed.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         if self.follow {
             let running = period::at(cx.def(), cx.now);
             if running != self.period {
@@ -183,7 +183,7 @@ impl Reports {
     }
 
     /// The history answered question `number`; an answer for another period than the one shown is ignored.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         if self.errand.answered(number, cx.steady()).is_none() {
             return Vec::new();
         }
@@ -201,14 +201,14 @@ impl Reports {
     }
 
     /// The period that was typed.
-    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         let typed = period::typed(cx.def(), text, cx.now)?;
         self.show(Some(typed));
         Ok(self.ask(cx))
     }
 
     /// The station has put the export on record, or refuses it: without that nothing is written.
-    pub fn on_granted(&mut self, answer: Result<(), String>) -> Vec<Act> {
+    pub fn on_granted(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
         let Some(outgoing) = self.outgoing.take() else { return Vec::new() };
         match answer {
             Ok(()) => vec![outgoing.write()],
@@ -220,7 +220,7 @@ impl Reports {
     }
 
     /// A report was written, or why not.
-    pub fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<Act> {
+    pub fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
         self.export = match result {
             Ok(path) => Export::Done(path),
             Err(why) => Export::Failed(why),
@@ -258,7 +258,7 @@ impl Reports {
         self.period.as_ref().is_some_and(|period| now < period.to)
     }
 
-    fn ask(&mut self, cx: &ViewContext) -> Vec<Act> {
+    fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
         // The past stays as it is; but a report that was read while its shift still ran is not the last word.
         let settled = self.report.as_ref().is_some_and(|report| report.until >= report.period.to);
@@ -267,14 +267,14 @@ impl Reports {
             Some(period) if self.errand.due(cx.steady(), every, real(PATIENCE_S)) => {
                 self.number = self.number.wrapping_add(1);
                 self.errand.asked(self.number, cx.steady());
-                vec![Act::ask(Tab::Reports, self.number, Question::Report { period: period.clone() })]
+                vec![UiAction::ask(Tab::Reports, self.number, Question::Report { period: period.clone() })]
             }
             Some(_) | None => Vec::new(),
         }
     }
 
     /// Writes exactly the figures that are shown.
-    fn export(&mut self, cx: &ViewContext) -> Vec<Act> {
+    fn export(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let Some(report) = &self.report else {
             self.export = Export::Failed("nothing to write yet".to_owned());
             return Vec::new();

@@ -24,7 +24,7 @@ use crate::{
         snapshot::Snapshot,
     },
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         modal::Why,
         widgets::chart::{self, trace::Trace},
     },
@@ -111,7 +111,7 @@ impl Trends {
     }
 
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         match (self.values, action) {
             (Some(_), Action::Up) => self.select_value(cx, -1),
             (Some(_), Action::Down) => self.select_value(cx, 1),
@@ -154,7 +154,7 @@ impl Trends {
     }
 
     /// News, or time has passed: takes in live values and asks what is due.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         // Either way: the time of a snapshot may lie a little before what was guessed until it came.
         let away = |seen: Timestamp| cx.now.duration_since(seen).abs() > real(cx, UNSEEN_S);
         let unseen = self.data.seen.is_none_or(away);
@@ -175,7 +175,7 @@ impl Trends {
     }
 
     /// The history answered question `number`; an answer to an older question is ignored.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<Act> {
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         let (errands, steady) = (&mut self.errands, cx.steady());
         let curves = errands.curves.answered(number, steady);
         let (hours, raised) = (errands.hours.answered(number, steady), errands.raised.answered(number, steady));
@@ -213,7 +213,7 @@ impl Trends {
     }
 
     /// No entry window is opened here.
-    pub fn on_text(&mut self, _cx: &ViewContext, _text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, _cx: &ViewContext, _text: &str) -> Result<Vec<UiAction>, String> {
         Ok(Vec::new())
     }
 
@@ -401,7 +401,7 @@ impl Trends {
     }
 
     /// Asks what is due.
-    fn ask(&mut self, cx: &ViewContext) -> Vec<Act> {
+    fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let (now, patience, view) = (cx.now, real(cx, PATIENCE_S), self.span(cx));
         let group: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         let rate = real(cx, RATES[self.rate] as f64 / 1_000.0);
@@ -419,7 +419,7 @@ impl Trends {
             if errand.due(steady, every, patience) {
                 *number = number.wrapping_add(1);
                 errand.asked(*number, steady);
-                acts.push(Act::ask(Tab::Trends, *number, question));
+                acts.push(UiAction::ask(Tab::Trends, *number, question));
             }
         };
         if self.values.is_none() && !group.is_empty() {

@@ -12,7 +12,7 @@ use crate::{
     access::UserRow,
     history::{Answer, HistoryError},
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         drawn::Rows,
         keys::{self, Hint, Key, char, code},
         modal::{Modal, Notice, Sheet, sheet::Purpose},
@@ -83,7 +83,7 @@ pub struct Users {
 
 impl Users {
     /// A key.
-    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<Act> {
+    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         match &mut self.audit {
             Some(audit) => match keys::find(AUDIT, event) {
                 Some(AuditAction::Back) => {
@@ -101,7 +101,7 @@ impl Users {
         }
     }
 
-    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<Act> {
+    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         let users = &cx.standing.users;
         let place = self.place(cx);
         let row = users.get(place);
@@ -122,7 +122,7 @@ impl Users {
                     "A demonstration needs no login; a station started with `sightglass run` has users.",
                 ];
                 let notice = Notice::new("add a user", words.map(str::to_owned).to_vec());
-                return vec![Act::Open(Modal::Notice(notice))];
+                return vec![UiAction::Open(Modal::Notice(notice))];
             }
             (Action::Add, Some(_)) => Some(Sheet::new(Purpose::Add)),
             (Action::Role, Some(row)) => Some(Sheet::role_of(row)),
@@ -135,7 +135,7 @@ impl Users {
             (Action::Delete, Some(row)) => Some(Sheet::new(Purpose::Delete(row.user.clone()))),
             (Action::Role | Action::Disable | Action::Reset | Action::Delete, None) => None,
         };
-        sheet.map(|sheet| Act::Open(Modal::Sheet(Box::new(sheet)))).into_iter().collect()
+        sheet.map(|sheet| UiAction::Open(Modal::Sheet(Box::new(sheet)))).into_iter().collect()
     }
 
     /// The list that keys act on.
@@ -157,7 +157,7 @@ impl Users {
     }
 
     /// News, or time has passed.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<Act> {
+    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let Some(audit) = &mut self.audit else { return Vec::new() };
         let acts = audit.ask(cx);
         self.asked = audit.asked();
@@ -177,7 +177,7 @@ impl Users {
     }
 
     /// What was typed in a window that the audit list had opened.
-    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<Act>, String> {
+    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         let Some(audit) = &mut self.audit else { return Ok(Vec::new()) };
         audit.on_text(cx, text)?;
         Ok(self.on_snapshot(cx))

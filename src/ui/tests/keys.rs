@@ -18,7 +18,7 @@ use crate::{
         snapshot::DeviceState,
     },
     ui::{
-        Act, Effect, Model, Msg,
+        Effect, Model, Msg, UiAction,
         fixture::{self, Fixture},
         modal::{Faceplate, Modal},
         perform,
@@ -605,7 +605,7 @@ fn only_what_was_read_back_is_called_verified() {
     let device = fixture.def.devices[0].id;
     let check = |command: Command, expect: &str| {
         let mut model = model(&fixture, Theme::FULL);
-        perform(&mut model, vec![Act::Order(command.clone())]);
+        perform(&mut model, vec![UiAction::Order(command.clone())]);
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
         snapshot.orders = vec![OrderStatus {
             from: "".into(),

@@ -11,7 +11,7 @@ use crate::{
         snapshot::{ActiveAlarm, AsideAlarm},
     },
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         modal::{Confirm, Modal, Notice, Reason, confirm::subject, reason::spelled},
         widgets::text::{clock, running},
     },
@@ -23,15 +23,15 @@ const SHELVE_MIN: [u64; 4] = [15, 30, 60, 240];
 const NAMED: usize = 6;
 
 /// Acknowledges one alarm; where the plant file wants a note it is asked for.
-pub fn acknowledge(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<Act> {
+pub fn acknowledge(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     match cx.def().alarm(alarm.id).note {
         true => note(cx, alarm),
-        false => vec![Act::Order(alarm.acknowledge())],
+        false => vec![UiAction::Order(alarm.acknowledge())],
     }
 }
 
 /// Says that this one needs no acknowledgement, and who gave it.
-pub fn acknowledged(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<Act> {
+pub fn acknowledged(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     let by = alarm.acknowledged.as_ref().map(|deed| {
         let by = deed.by.as_deref().unwrap_or("the station");
         format!("It was acknowledged {} by {by}.", clock(deed.at, &cx.def().time_zone))
@@ -41,7 +41,7 @@ pub fn acknowledged(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<Act> {
 }
 
 /// Acknowledges one alarm with a note.
-pub fn note(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<Act> {
+pub fn note(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     if !alarm.state.needs_acknowledgement() {
         return Vec::new();
     }
@@ -52,7 +52,7 @@ pub fn note(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<Act> {
 }
 
 /// Asks whether to acknowledge all of these, exactly as they are seen now; where one of them needs a note it is asked for.
-pub fn acknowledge_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a ActiveAlarm>) -> Vec<Act> {
+pub fn acknowledge_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a ActiveAlarm>) -> Vec<UiAction> {
     let waiting: Vec<_> = alarms.filter(|alarm| alarm.state.needs_acknowledgement()).collect();
     let needed = waiting.iter().any(|alarm| cx.def().alarm(alarm.id).note);
     if waiting.is_empty() {
@@ -78,7 +78,7 @@ pub fn acknowledge_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a Ac
 }
 
 /// Asks for how long an alarm is shelved, and why.
-pub fn shelve(cx: &ViewContext, alarm: AlarmId) -> Vec<Act> {
+pub fn shelve(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
     let max = cx.def().alarm_rules.shelve_max;
     let fixed = SHELVE_MIN.map(|minutes| Duration::from_secs(minutes * 60));
     let mut times: Vec<_> = fixed.into_iter().filter(|span| *span <= max).map(|span| (spelled(span), span)).collect();
@@ -94,7 +94,7 @@ pub fn shelve(cx: &ViewContext, alarm: AlarmId) -> Vec<Act> {
 }
 
 /// Asks why an alarm is taken out of service.
-pub fn out_of_service(cx: &ViewContext, alarm: AlarmId) -> Vec<Act> {
+pub fn out_of_service(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
     let notes = vec![name(cx, alarm), "It is not annunciated until it is put back in service.".to_owned()];
     let command = Command::Alarm(AlarmCommand::OutOfService(alarm));
     let reason = Reason::new("out of service", "put out of service", notes, command.clone(), true);
@@ -102,7 +102,7 @@ pub fn out_of_service(cx: &ViewContext, alarm: AlarmId) -> Vec<Act> {
 }
 
 /// Asks whether to let go an alarm that latches.
-pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<Act> {
+pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     let why = match alarm.state {
         AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
             let command = Command::Alarm(AlarmCommand::Reset(alarm.id));
@@ -123,7 +123,7 @@ pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<Act> {
 }
 
 /// Asks whether to take back what was put aside.
-pub fn put_back(cx: &ViewContext, aside: &AsideAlarm) -> Vec<Act> {
+pub fn put_back(cx: &ViewContext, aside: &AsideAlarm) -> Vec<UiAction> {
     let (title, command) = match aside.state {
         AlarmState::Shelved => ("take back from the shelf", AlarmCommand::Unshelve(aside.id)),
         AlarmState::OutOfService => ("put in service", AlarmCommand::InService(aside.id)),
@@ -145,27 +145,27 @@ pub fn put_back(cx: &ViewContext, aside: &AsideAlarm) -> Vec<Act> {
 }
 
 /// Asks for what the next shift should know.
-pub fn hand_over() -> Vec<Act> {
+pub fn hand_over() -> Vec<UiAction> {
     let notes = vec!["What the next shift should know besides what stands on this page:".to_owned()];
     let reason = Reason::new("hand over", "hand over", notes, Command::HandOver, false);
     open(Modal::Reason(Box::new(reason)))
 }
 
 /// Says that a handover takes two.
-pub fn own_handover() -> Vec<Act> {
+pub fn own_handover() -> Vec<UiAction> {
     let words = ["You have handed over yourself.", "Another person reads this page and takes the plant over."];
     open(Modal::Notice(Notice::new("take over", words.map(str::to_owned).to_vec())))
 }
 
 /// Asks whether whoever sits here takes the plant over.
-pub fn take_over(cx: &ViewContext) -> Vec<Act> {
+pub fn take_over(cx: &ViewContext) -> Vec<UiAction> {
     let who = cx.standing.who.as_ref().map_or("nobody", |who| &who.user);
     let words = format!("{who} has read this page and takes the plant over.");
     open(Modal::Confirm(Confirm::order("take over", words, Command::TakeOver)))
 }
 
-fn open(modal: Modal) -> Vec<Act> {
-    vec![Act::Open(modal)]
+fn open(modal: Modal) -> Vec<UiAction> {
+    vec![UiAction::Open(modal)]
 }
 
 /// The same with the mark as wide as all others, for lists.

@@ -20,7 +20,7 @@ use crate::{
     },
     report::Period,
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         modal::{confirm::subject, faceplate::device_words},
         widgets::{
             text::{Canvas, between, clock, fit_words, moment, running, wrap},
@@ -93,7 +93,7 @@ impl Handover {
     }
 
     /// Asks the history if it is time.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<Act> {
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
         let Some(shown) = self.period(cx) else { return Vec::new() };
         if !span::due(cx, &self.errand, EVERY_S, Some(&shown)) {
             return Vec::new();
@@ -102,7 +102,7 @@ impl Handover {
         self.errand.asked(*number, cx.steady());
         // What the shift before wrote down is for this one.
         let from = period::before(cx.def(), &shown).map_or(shown.from, |before| before.from);
-        vec![Act::ask(Tab::Alarms, *number, Question::Actions { from, to: shown.to, limit: ROWS })]
+        vec![UiAction::ask(Tab::Alarms, *number, Question::Actions { from, to: shown.to, limit: ROWS })]
     }
 
     /// Is the answer to question `number` waited for?

@@ -12,7 +12,7 @@ use crate::{
     plant::record::{ActionRecord, AlarmRecord},
     report::Period,
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         widgets::text::{Canvas, fit_words, moment, pad},
     },
 };
@@ -102,7 +102,7 @@ impl Journal {
     }
 
     /// Asks the history if it is time.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<Act> {
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
         let to = cx.now + SignedDuration::from_secs(1);
         let (from, to) = self.period.as_ref().map_or((to - SPAN, to), |period| (period.from, period.to));
         let limit = self.limit();
@@ -111,7 +111,7 @@ impl Journal {
             if span::due(cx, errand, EVERY_S, self.period.as_ref()) {
                 *number = number.wrapping_add(1);
                 errand.asked(*number, cx.steady());
-                acts.push(Act::ask(Tab::Alarms, *number, question));
+                acts.push(UiAction::ask(Tab::Alarms, *number, question));
             }
         };
         due(&mut self.steps, Question::Journal { from, to, limit });

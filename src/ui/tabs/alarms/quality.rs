@@ -16,7 +16,7 @@ use crate::{
     },
     report::{Period, alarm_quality},
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         modal::confirm::subject,
         theme::Theme,
         widgets::text::{self, Canvas, between, clock, fit_words, pad, pad_left, running},
@@ -61,14 +61,14 @@ impl Quality {
     }
 
     /// Asks the history for a chosen shift if it is time.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<Act> {
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
         let Some(period) = &self.period else { return Vec::new() };
         if !span::due(cx, &self.errand, EVERY_S, Some(period)) {
             return Vec::new();
         }
         *number = number.wrapping_add(1);
         self.errand.asked(*number, cx.steady());
-        vec![Act::ask(Tab::Alarms, *number, Question::AlarmQuality { from: period.from, to: period.to })]
+        vec![UiAction::ask(Tab::Alarms, *number, Question::AlarmQuality { from: period.from, to: period.to })]
     }
 
     /// Is the answer to question `number` waited for?

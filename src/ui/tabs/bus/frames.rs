@@ -14,7 +14,7 @@ use crate::{
         traffic::{Frame, Frames},
     },
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         drawn::Rows,
         modal::{Modal, Prompt},
         tabs::{Outgoing, Tab},
@@ -112,19 +112,19 @@ impl Ring {
     }
 
     /// The selected frame, byte by byte.
-    pub fn open(&mut self, at: &Place) -> Option<Act> {
+    pub fn open(&mut self, at: &Place) -> Option<UiAction> {
         let shown = self.shown();
         // Frames that run go on below the window, which has this one for itself.
         let frame = (*shown.get(self.place(&shown))?).clone();
         let before: Vec<Frame> = self.before(frame.number).take(16).cloned().collect();
         let shown = Shown::Frame { line: at.settings.name.clone(), frame: Box::new(frame), before };
-        Some(Act::Open(Modal::Bus(Box::new(Window::Sheet(Sheet::new(shown))))))
+        Some(UiAction::Open(Modal::Bus(Box::new(Window::Sheet(Sheet::new(shown))))))
     }
 
     /// Asks for the filter.
-    pub fn ask_filter(&self) -> Act {
+    pub fn ask_filter(&self) -> UiAction {
         let hint = "unit 1   fc 3   tx   rx   error   03EA (bytes); all must hold; empty: all frames";
-        Act::Open(Modal::Prompt(Prompt::new("which frames", hint, &self.filter.to_string())))
+        UiAction::Open(Modal::Prompt(Prompt::new("which frames", hint, &self.filter.to_string())))
     }
 
     /// Takes a filter that was typed.
@@ -134,7 +134,7 @@ impl Ring {
     }
 
     /// Writes the frames that are shown, as text and as a capture.
-    pub fn save(&mut self, cx: &ViewContext, at: &Place) -> Vec<Act> {
+    pub fn save(&mut self, cx: &ViewContext, at: &Place) -> Vec<UiAction> {
         if !self.outgoing.is_empty() {
             return Vec::new();
         }
@@ -156,7 +156,7 @@ impl Ring {
     }
 
     /// The station has put a file on record, which is then written, and the next one is asked for; or it refuses.
-    pub fn on_granted(&mut self, answer: Result<(), String>) -> Vec<Act> {
+    pub fn on_granted(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
         if let Err(why) = answer {
             self.outgoing.clear();
             self.saved.push(Err(why));

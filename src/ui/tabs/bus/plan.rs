@@ -16,7 +16,7 @@ use crate::{
         tag::Poll,
     },
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         drawn::Rows,
         modal::{Modal, Why},
         widgets::text::{Canvas, between, fit_words, wrap},
@@ -46,14 +46,14 @@ impl Plan {
     }
 
     /// The tags of the selected block.
-    pub fn open(&self, at: &Place) -> Option<Act> {
+    pub fn open(&self, at: &Place) -> Option<UiAction> {
         let poll = at.report?.polls.get(self.selected)?;
         let shown = Shown::Block { line: at.id, device: poll.device, table: poll.table, address: poll.address };
-        Some(Act::Open(Modal::Bus(Box::new(Window::Sheet(Sheet::new(shown))))))
+        Some(UiAction::Open(Modal::Bus(Box::new(Window::Sheet(Sheet::new(shown))))))
     }
 
     /// Why the values of the selected block are what they are, beginning with one that is not good.
-    pub fn why(&self, cx: &ViewContext, at: &Place) -> Vec<Act> {
+    pub fn why(&self, cx: &ViewContext, at: &Place) -> Vec<UiAction> {
         let poll = at.report.and_then(|report| report.polls.get(self.selected));
         Why::open(Why::of_all(cx, poll.map(|poll| poll.tags.to_vec()).unwrap_or_default()))
     }

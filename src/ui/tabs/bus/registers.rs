@@ -14,7 +14,7 @@ use crate::{
         tool::{Finding, Tool, ToolState},
     },
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         keys::char,
         modal::{Modal, Next, window},
         widgets::text::{Canvas, fit_words},
@@ -61,7 +61,7 @@ impl Registers {
                     Place::of(cx, self.line).ok_or_else(String::new).and_then(|at| test::start(&at, self.tool()));
                 match started {
                     Ok(act) => {
-                        let stay = Act::Open(Modal::Bus(Box::new(Window::Registers(self))));
+                        let stay = UiAction::Open(Modal::Bus(Box::new(Window::Registers(self))));
                         return Next::Do(vec![act, stay]);
                     }
                     Err(why) => self.problem = Some(why),

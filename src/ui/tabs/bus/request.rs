@@ -23,7 +23,7 @@ use crate::{
         tool::{Scan, Tool},
     },
     ui::{
-        Act, ViewContext, keys,
+        UiAction, ViewContext, keys,
         modal::{Next, line::Line, window},
         widgets::text::{pad, width, wrap},
     },
@@ -164,7 +164,7 @@ impl Form {
         }
     }
 
-    fn start(&self, cx: &ViewContext) -> Result<Vec<Act>, String> {
+    fn start(&self, cx: &ViewContext) -> Result<Vec<UiAction>, String> {
         let at = Place::of(cx, self.line).ok_or("this line has gone")?;
         let missed = |field: &Field| matches!(&field.input, Input::Text(line) if line.missed());
         if self.fields.iter().any(missed) {

@@ -25,7 +25,7 @@ use crate::{
         tool::Tool,
     },
     ui::{
-        Act, ViewContext, keys,
+        UiAction, ViewContext, keys,
         modal::{Confirm, Modal, Next, Notice, line::Line},
         widgets::text::{Canvas, fit, fit_words, pad, wrap},
     },
@@ -91,7 +91,7 @@ impl Bench {
     }
 
     /// Opens the entry of a test.
-    pub fn open(&mut self, cx: &ViewContext, at: &Place, tried: Tried) -> Vec<Act> {
+    pub fn open(&mut self, cx: &ViewContext, at: &Place, tried: Tried) -> Vec<UiAction> {
         self.selected = Tried::ALL.iter().position(|known| *known == tried).unwrap_or(0);
         self.first = None;
         let window = match tried {
@@ -177,7 +177,7 @@ pub fn closed(at: &Place) -> Option<String> {
 }
 
 /// Starts a test, or asks first; `Err` says why it cannot be started.
-pub fn start(at: &Place, tool: Tool) -> Result<Act, String> {
+pub fn start(at: &Place, tool: Tool) -> Result<UiAction, String> {
     let alone = matches!(&tool, Tool::Scan(scan) if !scan.serials.is_empty());
     if let Some(why) = closed(at).filter(|_| !alone) {
         return Err(why);
@@ -185,8 +185,10 @@ pub fn start(at: &Place, tool: Tool) -> Result<Act, String> {
     let question = danger(at, &tool);
     let order = Command::Test(at.id, tool);
     Ok(match question {
-        Some(words) => Act::Open(Modal::Confirm(Confirm::order(format!("test of {}", at.settings.name), words, order))),
-        None => Act::Order(order),
+        Some(words) => {
+            UiAction::Open(Modal::Confirm(Confirm::order(format!("test of {}", at.settings.name), words, order)))
+        }
+        None => UiAction::Order(order),
     })
 }
 
@@ -232,14 +234,14 @@ fn only_reads(message: &[u8]) -> bool {
 }
 
 /// The last test once more.
-pub fn again(_cx: &ViewContext, at: &Place) -> Vec<Act> {
+pub fn again(_cx: &ViewContext, at: &Place) -> Vec<UiAction> {
     let Some(run) = &at.status.test else { return Vec::new() };
     start(at, run.tool.clone()).into_iter().collect()
 }
 
 /// Stops the test at work.
-pub fn stop(at: &Place) -> Vec<Act> {
-    if at.is_testing() { vec![Act::Order(Command::StopTest(at.id))] } else { Vec::new() }
+pub fn stop(at: &Place) -> Vec<UiAction> {
+    if at.is_testing() { vec![UiAction::Order(Command::StopTest(at.id))] } else { Vec::new() }
 }
 
 /// Bytes on their way onto a line.
@@ -270,9 +272,12 @@ impl Send {
             self.problem = None;
         } else if keys::code(KeyCode::Enter).is(event) {
             match self.send(cx) {
-                Ok(Act::Order(command)) => {
+                Ok(UiAction::Order(command)) => {
                     bench.first = None;
-                    return Next::Do(vec![Act::Order(command), Act::Open(Modal::Bus(Box::new(Window::Send(self))))]);
+                    return Next::Do(vec![
+                        UiAction::Order(command),
+                        UiAction::Open(Modal::Bus(Box::new(Window::Send(self)))),
+                    ]);
                 }
                 Ok(act) => return Next::Do(vec![act]),
                 Err(problem) => self.problem = Some(problem),
@@ -289,7 +294,7 @@ impl Send {
         self.text.paste(text);
     }
 
-    fn send(&self, cx: &ViewContext) -> Result<Act, String> {
+    fn send(&self, cx: &ViewContext) -> Result<UiAction, String> {
         let at = Place::of(cx, self.line).ok_or("this line has gone")?;
         if self.text.missed() {
             return Err("not all of it was taken; Ctrl-U empties the line".to_owned());
@@ -410,6 +415,6 @@ fn dress(typed: &typed::Typed, framing: Framing) -> (Vec<u8>, String) {
 }
 
 /// The window of the registers that were read.
-pub fn registers(line: LineId, tool: &Tool) -> Option<Act> {
-    Registers::new(line, tool).map(|window| Act::Open(Modal::Bus(Box::new(Window::Registers(window)))))
+pub fn registers(line: LineId, tool: &Tool) -> Option<UiAction> {
+    Registers::new(line, tool).map(|window| UiAction::Open(Modal::Bus(Box::new(Window::Registers(window)))))
 }

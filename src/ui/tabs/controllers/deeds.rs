@@ -8,14 +8,14 @@ use crate::{
         event::LineState,
     },
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         modal::{Choice, Confirm, Modal, Notice, Settings, Why},
     },
 };
 
 impl Controllers {
     /// What can be done with a device on any of its pages.
-    pub(super) fn on_device(&mut self, cx: &ViewContext, device: &DeviceDef, action: Action) -> Vec<Act> {
+    pub(super) fn on_device(&mut self, cx: &ViewContext, device: &DeviceDef, action: Action) -> Vec<UiAction> {
         match action {
             Action::Why if matches!(self.page, Page::Program) => {
                 let tag = device.program.as_ref().and_then(|program| self.cell.tag(program));
@@ -25,38 +25,39 @@ impl Controllers {
                 let tags = self.table.rows(cx, device.id).into_iter().map(|tag| tag.id).collect();
                 Why::open(Why::new(tags, self.table.selected))
             }
-            Action::Refresh => vec![Act::Order(Command::Refresh(device.id))],
+            Action::Refresh => vec![UiAction::Order(Command::Refresh(device.id))],
             Action::Actions => {
                 let actions = Choice::actions(cx, device.id).map(Modal::Choice);
                 let window = actions.map(|list| Notice::unreachable(cx, device.id).map_or(list, Modal::Notice));
-                window.map_or_else(|| notice(device, "this device has no actions"), |window| vec![Act::Open(window)])
+                window
+                    .map_or_else(|| notice(device, "this device has no actions"), |window| vec![UiAction::Open(window)])
             }
             Action::Tune => tune(cx, device),
             Action::Run => match device.faceplate.as_ref().and_then(|plate| plate.run) {
                 Some(run) => write(cx, Some(run)),
                 None => notice(device, "this device cannot be put in standby from here"),
             },
-            Action::Settings => vec![Act::Open(Modal::Settings(Box::new(Settings::new(cx, device.line))))],
-            Action::Line => vec![Act::Open(Modal::Confirm(connect(cx, device.line)))],
+            Action::Settings => vec![UiAction::Open(Modal::Settings(Box::new(Settings::new(cx, device.line))))],
+            Action::Line => vec![UiAction::Open(Modal::Confirm(connect(cx, device.line)))],
             _ => Vec::new(),
         }
     }
 }
 
 /// The window that writes a tag.
-pub(super) fn write(cx: &ViewContext, tag: Option<TagId>) -> Vec<Act> {
-    tag.and_then(|tag| Modal::write(cx, tag)).map(Act::Open).into_iter().collect()
+pub(super) fn write(cx: &ViewContext, tag: Option<TagId>) -> Vec<UiAction> {
+    tag.and_then(|tag| Modal::write(cx, tag)).map(UiAction::Open).into_iter().collect()
 }
 
 /// The question whether to write this value, unless nothing can be written now.
-pub(super) fn confirm(cx: &ViewContext, tag: TagId, value: f64) -> Vec<Act> {
+pub(super) fn confirm(cx: &ViewContext, tag: TagId, value: f64) -> Vec<UiAction> {
     let device = cx.def().tag(tag).device;
     let question = || Modal::Confirm(Confirm::write(cx, tag, value));
-    vec![Act::Open(Notice::unreachable(cx, device).map_or_else(question, Modal::Notice))]
+    vec![UiAction::Open(Notice::unreachable(cx, device).map_or_else(question, Modal::Notice))]
 }
 
 /// Auto-tuning at work is stopped, else the window asks which kind is wanted.
-fn tune(cx: &ViewContext, device: &DeviceDef) -> Vec<Act> {
+fn tune(cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
     let Some(tune) = device.faceplate.as_ref().and_then(|plate| plate.tune) else {
         return notice(device, "this device has no auto-tuning");
     };
@@ -64,8 +65,8 @@ fn tune(cx: &ViewContext, device: &DeviceDef) -> Vec<Act> {
     if on { confirm(cx, tune, 0.0) } else { write(cx, Some(tune)) }
 }
 
-pub(super) fn notice(device: &DeviceDef, words: &str) -> Vec<Act> {
-    vec![Act::Open(Modal::Notice(Notice::new(device.name.clone(), vec![words.to_owned()])))]
+pub(super) fn notice(device: &DeviceDef, words: &str) -> Vec<UiAction> {
+    vec![UiAction::Open(Modal::Notice(Notice::new(device.name.clone(), vec![words.to_owned()])))]
 }
 
 /// Closing a line is asked with what it means for everything on it.

@@ -10,7 +10,7 @@ use crate::{
     plant::record::ActionRecord,
     report::Period,
     ui::{
-        Act, ViewContext,
+        UiAction, ViewContext,
         drawn::Rows,
         keys::{Key, char, code},
         modal::{Deed, Modal, Prompt},
@@ -111,13 +111,13 @@ impl Audit {
     }
 
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, _cx: &ViewContext, action: Action) -> Vec<Act> {
+    pub fn on_key(&mut self, _cx: &ViewContext, action: Action) -> Vec<UiAction> {
         let last = self.rows.len().saturating_sub(1);
         match action {
             Action::Move(by) => self.selected = self.selected.saturating_add_signed(by).min(last),
             Action::Open => {
                 let deed = self.rows.get(self.selected).cloned();
-                return deed.map(|deed| Act::Open(Modal::Deed(Box::new(Deed(deed))))).into_iter().collect();
+                return deed.map(|deed| UiAction::Open(Modal::Deed(Box::new(Deed(deed))))).into_iter().collect();
             }
             Action::Search(part) => {
                 self.asking = Some(part);
@@ -127,7 +127,7 @@ impl Audit {
                     Part::Action => ("only this action", "write, acknowledge, login …; empty for all", &*self.action),
                     Part::Time => ("time", period::FORMS, ""),
                 };
-                return vec![Act::Open(Modal::Prompt(Prompt::new(title, hint, text)))];
+                return vec![UiAction::Open(Modal::Prompt(Prompt::new(title, hint, text)))];
             }
             Action::Everything => {
                 for part in [&mut self.words, &mut self.who, &mut self.action] {
@@ -164,7 +164,7 @@ impl Audit {
     }
 
     /// Asks the history when it is time to.
-    pub fn ask(&mut self, cx: &ViewContext) -> Vec<Act> {
+    pub fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
         if !self.errand.due(cx.steady(), real(EVERY_S), real(PATIENCE_S)) {
             return Vec::new();
@@ -174,7 +174,7 @@ impl Audit {
         let until = cx.now + SignedDuration::from_secs(1);
         let (from, to) = self.period.as_ref().map_or((until - SPAN, until), |period| (period.from, period.to));
         let (words, by, action) = (self.words.clone(), self.who.clone(), self.action.clone());
-        vec![Act::ask(Tab::Users, self.number, Question::Audit { from, to, words, by, action, limit: ROWS })]
+        vec![UiAction::ask(Tab::Users, self.number, Question::Audit { from, to, words, by, action, limit: ROWS })]
     }
 
     /// Is the answer to question `number` waited for?
