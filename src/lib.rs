@@ -40,7 +40,7 @@
 //! alone decides what is permitted. What it refuses goes on to the plant as a refused order, so that it is seen and on
 //! record like any other. Actions are in the audit log and alarms in their state file, on disk, before a snapshot shows an
 //! outcome as recorded; the history follows within a second.
-//! The history thread only writes; a second one answers questions, each on a connection of its own and for a bounded time.
+//! The history thread only writes; a second one answers queries, each on a connection of its own and for a bounded time.
 //!
 //! There is exactly one awaited send in the station (link → plant). Everything else is `try_send` or `watch`, so the
 //! plant task never blocks and deadlock is ruled out by shape. Shutdown runs downstream: the links stop, the plant ends

@@ -31,7 +31,7 @@ use super::{
     user::{Change, Users},
 };
 use crate::{
-    history::Question,
+    history::Query,
     plant::{
         PlantDef,
         command::{Order, OrderId, Refusal},
@@ -282,11 +282,11 @@ impl AccessControl {
     }
 
     /// May this terminal ask this of the history? `Err` says why not, and what must happen because of it.
-    pub fn may_ask(&mut self, terminal: u32, question: &Question, at: Timestamp) -> Result<(), (String, Vec<Effect>)> {
+    pub fn may_ask(&mut self, terminal: u32, query: &Query, at: Timestamp) -> Result<(), (String, Vec<Effect>)> {
         if !self.heard(terminal, at) {
             return Err((TOO_MANY.to_owned(), Vec::new()));
         }
-        let needed = right::needs_for_question(question);
+        let needed = right::needs_for_question(query);
         let may =
             if needed == Role::Viewer { self.may_look(terminal) } else { self.may(terminal, Some(needed)).map(drop) };
         let Err(why) = may else { return Ok(()) };

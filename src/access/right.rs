@@ -2,7 +2,7 @@
 
 use super::Wish;
 use crate::{
-    history::Question,
+    history::Query,
     plant::{alarm::AlarmCommand, command::Command, role::Role, tool::Tool},
 };
 
@@ -82,17 +82,17 @@ pub fn needs(command: &Command) -> Role {
     of_command(command).role()
 }
 
-/// The least role that may ask a question.
-pub fn needs_for_question(question: &Question) -> Role {
-    let right = match question {
-        Question::Series { .. }
-        | Question::Journal { .. }
-        | Question::Actions { .. }
-        | Question::LineMinutes { .. }
-        | Question::AlarmQuality { .. }
-        | Question::Values { .. }
-        | Question::Report { .. } => Right::Look,
-        Question::Audit { .. } => Right::People,
+/// The least role that may ask a query.
+pub fn needs_for_question(query: &Query) -> Role {
+    let right = match query {
+        Query::Series { .. }
+        | Query::Journal { .. }
+        | Query::Actions { .. }
+        | Query::LineMinutes { .. }
+        | Query::AlarmQuality { .. }
+        | Query::Values { .. }
+        | Query::Report { .. } => Right::Look,
+        Query::Audit { .. } => Right::People,
     };
     right.role()
 }

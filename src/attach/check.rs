@@ -5,7 +5,7 @@ use jiff::SignedDuration;
 
 use super::protocol::encode;
 use crate::{
-    history::Question,
+    history::Query,
     plant::{
         PlantDef,
         alarm::AlarmCommand,
@@ -24,9 +24,9 @@ const SETTINGS_BYTES_MAX: usize = 4 << 10;
 
 /// Most columns of a curve: more than any screen has.
 pub const BUCKETS_MAX: usize = 4_096;
-/// Most columns of all curves of one question.
+/// Most columns of all curves of one query.
 pub const COLUMNS_MAX: usize = 65_536;
-/// Most curves of one question.
+/// Most curves of one query.
 pub const SERIES_MAX: usize = 64;
 /// Most rows of one answer.
 const ROWS_MAX: usize = 10_000;
@@ -97,10 +97,10 @@ fn of_alarms(def: &PlantDef, command: &AlarmCommand) -> Result<(), String> {
     }
 }
 
-/// `Err` says what a question names that this plant does not have, or that it asks too much at once.
-pub fn question(def: &PlantDef, question: &Question) -> Result<(), String> {
-    match question {
-        Question::Series { tags, buckets, .. } | Question::Values { tags, count: buckets, .. } => {
+/// `Err` says what a query names that this plant does not have, or that it asks too much at once.
+pub fn query(def: &PlantDef, query: &Query) -> Result<(), String> {
+    match query {
+        Query::Series { tags, buckets, .. } | Query::Values { tags, count: buckets, .. } => {
             if *buckets == 0 || BUCKETS_MAX < *buckets {
                 return Err(format!("{buckets} columns, expected 1 to {BUCKETS_MAX}"));
             }
@@ -113,17 +113,15 @@ pub fn question(def: &PlantDef, question: &Question) -> Result<(), String> {
             }
             tags.iter().try_for_each(|id| tag(def, *id))
         }
-        Question::LineMinutes { line: id, limit, .. } => {
+        Query::LineMinutes { line: id, limit, .. } => {
             rows(*limit)?;
             line(def, *id)
         }
-        Question::Journal { limit, .. } | Question::Actions { limit, .. } | Question::Audit { limit, .. } => {
-            rows(*limit)
-        }
-        Question::Report { period } if REPORT_MAX < period.to.duration_since(period.from) => {
+        Query::Journal { limit, .. } | Query::Actions { limit, .. } | Query::Audit { limit, .. } => rows(*limit),
+        Query::Report { period } if REPORT_MAX < period.to.duration_since(period.from) => {
             Err(format!("a report of more than {} days, choose a shorter period", REPORT_MAX.as_hours() / 24))
         }
-        Question::Report { .. } | Question::AlarmQuality { .. } => Ok(()),
+        Query::Report { .. } | Query::AlarmQuality { .. } => Ok(()),
     }
 }
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use super::delta::Delta;
 use crate::{
     access::{Durability, OrderRequest, Standing, Wish},
-    history::{Answer, HistoryError, Question},
+    history::{Answer, HistoryError, Query},
     plant::{PlantDef, command::OrderId, visible::acts},
 };
 
@@ -70,16 +70,16 @@ pub struct Welcome {
 pub enum Asked {
     /// An order to the plant.
     Order(Box<OrderRequest>),
-    /// A question to the history.
+    /// A query to the history.
     Ask {
         /// Comes back with the answer.
         ticket: u64,
-        /// The question.
-        question: Question,
+        /// The query.
+        query: Query,
     },
-    /// The answer to a question is not needed any more; none comes, unless it is on its way.
+    /// The answer to a query is not needed any more; none comes, unless it is on its way.
     Cancel {
-        /// Of the question.
+        /// Of the query.
         ticket: u64,
     },
     /// A wish about people or the station.
@@ -100,7 +100,7 @@ pub enum Told {
     Standing(Box<Standing>),
     /// What the history says.
     Answer {
-        /// Of the question.
+        /// Of the query.
         ticket: u64,
         /// The answer.
         answer: Result<Answer, HistoryError>,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::{
-    history::{Answer, HistoryError, Question},
+    history::{Answer, HistoryError, Query},
     plant::PlantDef,
     report::alarm_quality,
 };
@@ -48,9 +48,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
 async fn tell(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     let source = Source::open(&def, &args.station, &args.login).await?;
     let period = source.period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref())?;
-    let question = Question::AlarmQuality { from: period.from, to: period.to };
-    let Answer::AlarmQuality(figures) = source.ask(question).await? else {
-        return Err(CliError::History(HistoryError::Engine("answered another question".into())));
+    let query = Query::AlarmQuality { from: period.from, to: period.to };
+    let Answer::AlarmQuality(figures) = source.ask(query).await? else {
+        return Err(CliError::History(HistoryError::Engine("answered another query".into())));
     };
     if args.json {
         let quality = alarm_quality::quality(&figures, &def, &period);

@@ -16,7 +16,7 @@ use crate::{
         io::{book, sealing},
         sealing::{Sealed, VerificationKey},
     },
-    history::{Answer, Question},
+    history::{Answer, Query},
     plant::{PlantDef, record::Seal},
 };
 
@@ -24,7 +24,7 @@ use super::{CliError, StationArgs, client, in_runtime, load, run, say, source::S
 
 /// The store counts time in these.
 const MICROSECOND: jiff::SignedDuration = jiff::SignedDuration::from_micros(1);
-/// Deeds that one question is answered with.
+/// Deeds that one query is answered with.
 const PAGE: usize = 10_000;
 
 /// A verification key is a line and some comments; whatever is longer is something else.
@@ -182,10 +182,10 @@ async fn seals(def: &Arc<PlantDef>, args: &VerifyArgs) -> Result<Vec<Seal>, CliE
     let (mut seals, mut to) = (BTreeMap::new(), Timestamp::MAX);
     loop {
         let all = String::new;
-        let question =
-            Question::Audit { from: Timestamp::UNIX_EPOCH, to, words: all(), by: all(), action: all(), limit: PAGE };
-        let Answer::Actions(deeds) = source.ask(question).await? else {
-            return Err(CliError::Failed("the history answered another question".to_owned()));
+        let query =
+            Query::Audit { from: Timestamp::UNIX_EPOCH, to, words: all(), by: all(), action: all(), limit: PAGE };
+        let Answer::Actions(deeds) = source.ask(query).await? else {
+            return Err(CliError::Failed("the history answered another query".to_owned()));
         };
         let before = seals.len();
         seals.extend(deeds.iter().filter_map(|deed| deed.seal).map(|seal| (seal.number, seal)));

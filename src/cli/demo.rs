@@ -7,7 +7,7 @@ use tokio::sync::oneshot;
 
 use crate::{
     bus::io::{clock::Clock, transport::Connector},
-    history::{Answer, HistoryError, Question, io::Query},
+    history::{Answer, HistoryError, Query, io::QueryRequest},
     plant::Snapshot,
     profile::io::atomic::write_for_user,
     report::{Period, ShiftReport, csv},
@@ -140,7 +140,7 @@ async fn headless(session: Session, clock: Clock, duration: Option<Duration>, ar
 async fn ask_report(session: &Session, period: Period) -> Result<Box<ShiftReport>, HistoryError> {
     let (reply, answer) = oneshot::channel();
     let gone = || HistoryError::Engine("the store has stopped".into());
-    session.ask(Query { question: Question::Report { period }, reply }).map_err(|_| gone())?;
+    session.ask(QueryRequest { query: Query::Report { period }, reply }).map_err(|_| gone())?;
     match answer.await.map_err(|_| gone())?? {
         Answer::Report(report) => Ok(report),
         Answer::Series(_)
@@ -148,7 +148,7 @@ async fn ask_report(session: &Session, period: Period) -> Result<Box<ShiftReport
         | Answer::Actions(_)
         | Answer::LineMinutes(_)
         | Answer::AlarmQuality(_)
-        | Answer::Values(_) => Err(HistoryError::Engine("answered another question".into())),
+        | Answer::Values(_) => Err(HistoryError::Engine("answered another query".into())),
     }
 }
 

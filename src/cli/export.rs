@@ -11,7 +11,7 @@ use jiff::Timestamp;
 
 use crate::{
     attach::check::{BUCKETS_MAX, COLUMNS_MAX, SERIES_MAX},
-    history::{Answer, HistoryError, Question},
+    history::{Answer, HistoryError, Query},
     plant::{PlantDef, def::TagId},
     report::{
         export,
@@ -88,8 +88,8 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
             export::Column { tag, unit, decimals, values: Vec::with_capacity(rows) }
         }));
         for (from, count) in pieces(period.from, args.every, rows, group.len()) {
-            let question = Question::Values { tags: group.to_vec(), from, every: args.every, count };
-            for (column, values) in columns[begin..].iter_mut().zip(values(source.ask(question).await?)?) {
+            let query = Query::Values { tags: group.to_vec(), from, every: args.every, count };
+            for (column, values) in columns[begin..].iter_mut().zip(values(source.ask(query).await?)?) {
                 column.values.extend(values);
             }
         }
@@ -111,14 +111,14 @@ async fn latest(
     let choosers: Vec<TagId> = choosers.into_iter().collect();
     let mut latest = HashMap::new();
     for tags in choosers.chunks(SERIES_MAX) {
-        let question = Question::Series { tags: tags.to_vec(), from, to, buckets: 1 };
-        let Answer::Series(series) = source.ask(question).await? else { return Err(other()) };
+        let query = Query::Series { tags: tags.to_vec(), from, to, buckets: 1 };
+        let Answer::Series(series) = source.ask(query).await? else { return Err(other()) };
         latest.extend(series.iter().filter_map(|series| Some((series.tag, (*series.buckets.last()?)?.last))));
     }
     Ok(latest)
 }
 
-/// Start and number of rows of each question about this many tags.
+/// Start and number of rows of each query about this many tags.
 fn pieces(from: Timestamp, every: Duration, rows: usize, tags: usize) -> impl Iterator<Item = (Timestamp, usize)> {
     let piece = (COLUMNS_MAX / tags.max(1)).clamp(1, BUCKETS_MAX);
     (0..rows).step_by(piece).map(move |begin| (instant(from, every, begin), piece.min(rows - begin)))
@@ -164,5 +164,5 @@ fn values(answer: Answer) -> Result<Vec<Vec<Option<Stood>>>, CliError> {
 }
 
 fn other() -> CliError {
-    CliError::History(HistoryError::Engine("answered another question".into()))
+    CliError::History(HistoryError::Engine("answered another query".into()))
 }

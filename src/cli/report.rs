@@ -3,7 +3,7 @@
 use std::{path::PathBuf, sync::Arc};
 
 use crate::{
-    history::{Answer, HistoryError, Question},
+    history::{Answer, HistoryError, Query},
     plant::{PlantDef, def::CsvDialect},
     report::csv,
 };
@@ -54,8 +54,8 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     }
     let source = Source::open(&def, &args.station, &args.login).await?;
     let period = source.period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref())?;
-    let Answer::Report(report) = source.ask(Question::Report { period }).await? else {
-        return Err(CliError::History(HistoryError::Engine("answered another question".into())));
+    let Answer::Report(report) = source.ask(Query::Report { period }).await? else {
+        return Err(CliError::History(HistoryError::Engine("answered another query".into())));
     };
     for gap in &report.unreadable {
         let [from, to] = [gap.from, gap.to].map(|at| at.to_zoned(def.time_zone.clone()).strftime("%F %T"));

@@ -11,8 +11,8 @@ use tokio::sync::oneshot;
 use crate::{
     access::{Wish, book::sha256},
     history::{
-        Answer, HistoryError, Question,
-        io::{Query, store::Store},
+        Answer, HistoryError, Query,
+        io::{QueryRequest, store::Store},
     },
     plant::PlantDef,
     profile::io::atomic::write_for_user,
@@ -76,12 +76,12 @@ impl Source {
     }
 
     /// Asks.
-    pub async fn ask(&self, question: Question) -> Result<Answer, CliError> {
+    pub async fn ask(&self, query: Query) -> Result<Answer, CliError> {
         match self {
-            Source::File { store, until } => Ok(store.answer(&question, *until)?),
+            Source::File { store, until } => Ok(store.answer(&query, *until)?),
             Source::Station(session) => {
                 let (reply, answer) = oneshot::channel();
-                session.ask(Query { question, reply }).map_err(|why| CliError::Failed(why.to_owned()))?;
+                session.ask(QueryRequest { query, reply }).map_err(|why| CliError::Failed(why.to_owned()))?;
                 Ok(answer.await.map_err(|_| CliError::StationGone)??)
             }
         }

@@ -1,4 +1,4 @@
-//! What the plant remembers: one thread writes it with DuckDB, another answers questions about it.
+//! What the plant remembers: one thread writes it with DuckDB, another answers queries about it.
 
 pub mod series;
 pub mod alarm_state;
@@ -22,7 +22,7 @@ use crate::{
 
 /// What can be asked. Spans include `from` and exclude `to`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Question {
+pub enum Query {
     /// Curves of some tags, reduced to at most `buckets` columns; one series a tag, in the order asked.
     Series {
         /// Which tags.
@@ -103,7 +103,7 @@ pub enum Question {
     },
 }
 
-/// The answer to the question of the same name.
+/// The answer to the query of the same name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Answer {
     /// One series a tag.
@@ -181,18 +181,18 @@ pub enum HistoryError {
     /// The answer would be longer than is safe to hold; a shorter period is answered.
     #[error("too much for one answer: {rows} rows, at most {max}; choose a shorter period")]
     TooManyRows {
-        /// Rows that the question means.
+        /// Rows that the query means.
         rows: u64,
         /// Rows that are permitted.
         max: u64,
     },
-    /// The question makes no sense: empty or negative span.
+    /// The query makes no sense: empty or negative span.
     #[error("empty period")]
     EmptyPeriod,
     /// No store is open: not yet, not any more, or none could be opened.
     #[error("the history is not open")]
     NotOpen,
-    /// The answer was not ready in the time that a question may take.
+    /// The answer was not ready in the time that a query may take.
     #[error("no answer within {seconds} s; choose a shorter period")]
     TooLong {
         /// That time.

@@ -106,7 +106,7 @@ pub fn complaints(line: &LineDef) -> Vec<Complaint> {
 }
 
 impl Serial {
-    /// Can a port have these parameters? Which of them a framing needs is another question.
+    /// Can a port have these parameters? Which of them a framing needs is another query.
     pub fn is_usual(self) -> bool {
         BAUDS.contains(&self.baud) && matches!(self.data_bits, 7 | 8) && matches!(self.stop_bits, 1 | 2)
     }

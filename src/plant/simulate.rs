@@ -32,7 +32,7 @@ pub struct Case {
     pub value: f64,
 }
 
-/// A question to another tag.
+/// A query to another tag.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Check {
     /// The tag that is asked.

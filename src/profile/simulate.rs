@@ -148,7 +148,7 @@ fn pace(table: &SimulateTable, problems: &mut Problems) -> Pace {
     }
 }
 
-/// A question and what must be so besides; `None` if something is wrong with one.
+/// A query and what must be so besides; `None` if something is wrong with one.
 fn checks(tables: &[CheckTable], scope: &Scope, problems: &mut Problems) -> Option<Vec<Check>> {
     let mut found = Vec::new();
     for table in tables {
@@ -181,7 +181,7 @@ fn check(table: &CheckTable, scope: &Scope, problems: &mut Problems) -> Option<C
     tests.extend(table.above.map(|above| (above.at, Test::Above(above.value))));
     tests.extend(table.below.map(|below| (below.at, Test::Below(below.value))));
     if let [(first, _), (second, _), ..] = tests[..] {
-        problems.add(second, "one question at a time").label("put it into `and`").also(first, "the other");
+        problems.add(second, "one query at a time").label("put it into `and`").also(first, "the other");
     }
     let test = tests.into_iter().next().map_or(Test::On, |(_, test)| test);
     Some(Check { tag, field, test })
@@ -232,7 +232,7 @@ mod tests {
             &["`onn` is not a state of D1.MODE", "on"],
         );
         wrong("case = [{ when = { tag = 'MODE' } }]", &["a case needs `value`"]);
-        wrong("follow = 'DP', when = { tag = 'MODE', is = 1, above = 3 }", &["one question at a time", "`and`"]);
+        wrong("follow = 'DP', when = { tag = 'MODE', is = 1, above = 3 }", &["one query at a time", "`and`"]);
         wrong("follow = 'DP', when = { tag = 'MODE', field = '3-9', is = 1 }", &["this is not a field of bits"]);
     }
 

@@ -236,7 +236,7 @@ mod tests {
         }
         world.spoiled(L1);
         world.spoiled(LineId(1));
-        // All four messages and this question; one that was spoiled; unit 2, the broadcast and the three questions.
+        // All four messages and this query; one that was spoiled; unit 2, the broadcast and the three queries.
         assert_eq!(counter(&mut world, 0x0B), Some(5));
         assert_eq!(counter(&mut world, 0x0C), Some(1));
         assert_eq!(counter(&mut world, 0x0E), Some(5));

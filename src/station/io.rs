@@ -15,7 +15,7 @@ use crate::{
     bus::io::{clock::Clock, transport::Connector},
     history::{
         HistoryError,
-        io::{Query, thread as history},
+        io::{QueryRequest, thread as history},
     },
     plant::{
         Plant, PlantDef,
@@ -148,7 +148,7 @@ fn users_fault(access: &AccessControl, log: &Opened) -> Option<FaultState> {
     (had_users && access.people_digest() == Some(nobody)).then(|| FaultState::Occurred(words.into()))
 }
 
-/// A station that keeps nothing, for drills in virtual time, where no other thread may take part. Questions to the history
+/// A station that keeps nothing, for drills in virtual time, where no other thread may take part. Queries to the history
 /// are refused.
 pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, listener: Listener) -> Station {
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
@@ -161,7 +161,7 @@ pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, li
 
 /// What runs beside the tasks.
 struct Threads {
-    queries: mpsc::Sender<(u32, Query)>,
+    queries: mpsc::Sender<(u32, QueryRequest)>,
     history: Option<history::Handle>,
     book: Option<std::thread::JoinHandle<Option<Seal>>>,
 }

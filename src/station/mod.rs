@@ -19,7 +19,7 @@
 //! | audit log, alarm-state file | what is done is shown as "not recorded" | retried each second; then recorded |
 //! | users file: damaged, missing | login is closed; for a missing one only the station's own user makes the first Supervisor | restored, and the station restarted |
 //! | system clock: set | followed at once, recorded; ages, delays and shelvings do not move | acknowledged |
-//! | memory, CPU: too many questions | three at a time, two of one terminal, 20 s each, on connections of their own; a full queue of samples is counted as lost | the queue empties |
+//! | memory, CPU: too many queries | three at a time, two of one terminal, 20 s each, on connections of their own; a full queue of samples is counted as lost | the queue empties |
 //! | line: cable, port | its values become bad, the port is opened again with backoff; a line alarm | answers come |
 //! | line: too much to do | process values are stretched alike, alarm inputs keep their period; the header says so | demand falls |
 //! | a line's task panics | started again after 1, 2, 5 s; the other lines do not notice | acknowledged |

@@ -6,7 +6,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::{
     access::{Durability, OrderRequest, Standing, Wish},
-    history::io::Query,
+    history::io::QueryRequest,
     plant::{
         Snapshot,
         command::{Command, OrderId},
@@ -37,8 +37,8 @@ pub struct Session {
 pub enum Request {
     /// An order to the plant. Its outcome is seen in a later snapshot, also that it was not permitted.
     Order(OrderRequest),
-    /// A question to the history.
-    Ask(Query),
+    /// A query to the history.
+    Ask(QueryRequest),
     /// A wish about people or the station.
     Wish(Wish, oneshot::Sender<Result<Durability, String>>),
 }
@@ -64,7 +64,7 @@ impl Session {
     }
 
     /// Asks the history.
-    pub fn ask(&self, query: Query) -> Result<(), &'static str> {
+    pub fn ask(&self, query: QueryRequest) -> Result<(), &'static str> {
         self.send(Request::Ask(query))
     }
 

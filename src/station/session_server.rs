@@ -24,7 +24,7 @@ use super::{
 use crate::{
     access::{AccessControl, Durability, Effect, Peer, Standing},
     bus::io::clock::Clock,
-    history::{HistoryError, io::Query},
+    history::{HistoryError, io::QueryRequest},
     plant::{Snapshot, command::Order},
 };
 
@@ -63,7 +63,7 @@ pub struct Outputs {
     /// To the plant.
     pub orders: mpsc::Sender<Order>,
     /// To the history.
-    pub queries: mpsc::Sender<(u32, Query)>,
+    pub queries: mpsc::Sender<(u32, QueryRequest)>,
     /// To the book of deeds.
     pub deeds: mpsc::Sender<Paper>,
     /// To whoever has started the station.
@@ -205,7 +205,7 @@ impl SessionServer {
                 let effects = self.access.order(terminal, order, now);
                 self.carry_out(effects);
             }
-            Request::Ask(query) => match self.access.may_ask(terminal, &query.question, now) {
+            Request::Ask(query) => match self.access.may_ask(terminal, &query.query, now) {
                 Ok(()) => {
                     if let Err(error) = self.outputs.queries.try_send((terminal, query)) {
                         let (_, query) = error.into_inner();

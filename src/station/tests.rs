@@ -10,7 +10,7 @@ use crate::{
         io::{book, users_beside},
     },
     bus::io::{clock::Clock, transport::Connector},
-    history::{Answer, Question, io::Query},
+    history::{Answer, Query, io::QueryRequest},
     plant::{command::Command, def::AlarmId, fixture, record::ActionRecord, station::StationFault},
 };
 
@@ -27,8 +27,8 @@ async fn deeds(session: &super::Session, action: &str) -> Vec<ActionRecord> {
     loop {
         let (reply, answer) = tokio::sync::oneshot::channel();
         let all = String::new;
-        let question = Question::Audit { from, to, words: all(), by: all(), action: all(), limit: 1_000 };
-        session.ask(Query { question, reply }).unwrap();
+        let query = Query::Audit { from, to, words: all(), by: all(), action: all(), limit: 1_000 };
+        session.ask(QueryRequest { query, reply }).unwrap();
         let Answer::Actions(deeds) = answer.await.unwrap().unwrap() else { panic!("another answer") };
         if deeds.iter().any(|deed| &*deed.action == action) {
             return deeds;

@@ -1,4 +1,4 @@
-//! The terminal's loop: keys, snapshots, answers and ticks become messages; effects become orders, questions and frames.
+//! The terminal's loop: keys, snapshots, answers and ticks become messages; effects become orders, queries and frames.
 
 mod screen;
 #[cfg(test)]
@@ -23,7 +23,7 @@ use tokio::{
 use super::{AskId, Effect, Leaving, Model, Msg, tabs::Tab, theme::Theme, update, view};
 use crate::{
     access::Wish,
-    history::{HistoryError, Question, io::Query},
+    history::{HistoryError, Query, io::QueryRequest},
     profile::io::atomic::write_for_user,
     sim::{drill, io::Port},
     station::{Request, Session},
@@ -36,7 +36,7 @@ const TICK: Duration = Duration::from_millis(500);
 const FRAME: Duration = Duration::from_millis(250);
 /// Least time between two frames while keys come in.
 const ECHO: Duration = Duration::from_millis(30);
-/// Answers that may wait to be taken in; the history's own queue bounds the questions.
+/// Answers that may wait to be taken in; the history's own queue bounds the queries.
 const INBOX: usize = 32;
 
 /// What can be chosen about a terminal.
@@ -98,7 +98,7 @@ struct Loop {
     screen: Screen,
     /// For answers and saved reports, which come from other tasks, with the plant (its count) that they were asked of.
     outbox: mpsc::Sender<(u32, Msg)>,
-    /// Questions on their way, and what waits for their answers.
+    /// Queries on their way, and what waits for their answers.
     asked: Vec<(AskId, AbortHandle)>,
     /// When the next frame is due; `None` while the screen is up to date.
     redraw_at: Option<Instant>,
@@ -188,7 +188,7 @@ impl Loop {
                     }
                 }
                 Effect::Wish(id, wish) => self.wish(id, wish),
-                Effect::Ask(id, question) => self.ask(id, question),
+                Effect::Ask(id, query) => self.ask(id, query),
                 Effect::Drill(command) => {
                     if let Some(port) = &self.session.drill {
                         // What is in force is seen in the next status; a wish that was lost changes nothing there.
@@ -204,16 +204,16 @@ impl Loop {
         Ok(false)
     }
 
-    /// Cancels the questions whose answers no tab waits for any more.
+    /// Cancels the queries whose answers no tab waits for any more.
     fn cancel(&mut self) {
         let tabs = &self.model.tabs;
         self.asked.extract_if(.., |(id, _)| !tabs.awaits(*id)).for_each(|(_, waiting)| waiting.abort());
         self.asked.retain(|(_, waiting)| !waiting.is_finished());
     }
 
-    fn ask(&mut self, id: AskId, question: Question) {
+    fn ask(&mut self, id: AskId, query: Query) {
         let (reply, answer) = oneshot::channel();
-        let sent = self.session.ask(Query { question, reply });
+        let sent = self.session.ask(QueryRequest { query, reply });
         let (outbox, plants) = (self.outbox.clone(), self.model.plants);
         let waiting = tokio::spawn(async move {
             let answer = match sent {

@@ -103,7 +103,7 @@ pub struct ViewContext<'a> {
     pub now: Timestamp,
     /// Counts half seconds.
     pub phase: u32,
-    /// Where the shown tab draws, for questions that depend on its width.
+    /// Where the shown tab draws, for queries that depend on its width.
     pub area: Rect,
     /// The simulation behind the plant; `None` at a real one.
     pub drill: Option<&'a drill::Status>,

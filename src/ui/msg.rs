@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use super::{Confirmed, modal::Modal, tabs::Tab};
 use crate::{
     access::{Durability, OrderRequest, Standing, Wish},
-    history::{Answer, HistoryError, Question},
+    history::{Answer, HistoryError, Query},
     plant::{
         command::{Command, OrderId},
         def::{DeviceId, TagId},
@@ -57,7 +57,7 @@ pub enum Effect {
     /// Wish something of the station; answered by [`Msg::Granted`].
     Wish(AskId, Wish),
     /// Ask the history.
-    Ask(AskId, Question),
+    Ask(AskId, Query),
     /// Let something go wrong in the simulation, or mend it.
     Drill(drill::SimCommand),
     /// Write a report or a capture; answered by [`Msg::Saved`].
@@ -77,7 +77,7 @@ pub enum Effect {
     Quit,
 }
 
-/// Identifies a question: who asked, and its running count. An answer to an older question is ignored by the tab.
+/// Identifies a query: who asked, and its running count. An answer to an older query is ignored by the tab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct AskId {
     /// The tab that asked.
@@ -127,7 +127,7 @@ pub enum Leaving {
 
 impl UiAction {
     /// Asks the history on behalf of a tab.
-    pub fn ask(tab: Tab, number: u32, question: Question) -> UiAction {
-        UiAction::Do(Effect::Ask(AskId { tab, number }, question))
+    pub fn ask(tab: Tab, number: u32, query: Query) -> UiAction {
+        UiAction::Do(Effect::Ask(AskId { tab, number }, query))
     }
 }

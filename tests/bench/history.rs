@@ -1,5 +1,5 @@
 //! What the history costs: one commit, rows a second, bytes a sample, and reading a curve of a week; with `-- load`, what
-//! questions cost the recording.
+//! queries cost the recording.
 #![allow(clippy::print_stdout, missing_docs)]
 
 #[path = "history/load.rs"]
@@ -10,7 +10,7 @@ use std::{hint::black_box, path::Path, sync::Arc, time::Duration, time::Instant}
 use criterion::{Criterion, criterion_group};
 use jiff::{Timestamp, tz::TimeZone};
 use sightglass::{
-    history::{Question, io::store::Store},
+    history::{Query, io::store::Store},
     plant::{
         def::{CsvDialect, DeviceId, MimicDef, PlantDef, ReportDef, TagId},
         record::Record,
@@ -92,12 +92,12 @@ fn history(c: &mut Criterion) {
     let end = Timestamp::from_second(WEEK).expect("in range");
     for (name, from) in [("hour", WEEK - 3600), ("day", WEEK - 86_400), ("week", 0)] {
         let from = Timestamp::from_second(from).expect("in range");
-        let question = Question::Series { tags: vec![TagId(0)], from, to: end, buckets: 160 };
-        c.bench_function(&format!("curve of a {name}"), |b| b.iter(|| black_box(store.answer(&question, end))));
+        let query = Query::Series { tags: vec![TagId(0)], from, to: end, buckets: 160 };
+        c.bench_function(&format!("curve of a {name}"), |b| b.iter(|| black_box(store.answer(&query, end))));
     }
     let from = Timestamp::from_second(WEEK - 8 * 3600).expect("in range");
-    let question = Question::Report { period: Period { name: "period".into(), from, to: end } };
-    c.bench_function("report of eight hours", |b| b.iter(|| black_box(store.answer(&question, end))));
+    let query = Query::Report { period: Period { name: "period".into(), from, to: end } };
+    c.bench_function("report of eight hours", |b| b.iter(|| black_box(store.answer(&query, end))));
     let mut at = WEEK;
     c.bench_function("commit of one second", |b| {
         b.iter(|| {

@@ -21,7 +21,7 @@ use sightglass::{
             self, Asked, Greeting, HELLO_BYTES_MAX, LENGTH_BYTES, NEWS_BYTES_MAX, Place, REQUEST_BYTES_MAX, Told,
         },
     },
-    history::{HistoryError, Question, io::Query},
+    history::{HistoryError, Query, io::QueryRequest},
     plant::alarm::AlarmCommand,
     plant::{
         PlantDef, Snapshot,
@@ -225,7 +225,7 @@ async fn a_terminal_sees_the_plant_gives_orders_and_is_told_where_it_is() {
     assert_eq!(session.wish(Wish::Logout).await, Err("not yet".to_owned()));
     let (reply, answer) = oneshot::channel();
     let at = session.snapshots.borrow().at;
-    session.ask(Query { question: Question::Journal { from: at, to: at, limit: 1 }, reply }).unwrap();
+    session.ask(QueryRequest { query: Query::Journal { from: at, to: at, limit: 1 }, reply }).unwrap();
     assert_eq!(answer.await.unwrap(), Err(HistoryError::EmptyPeriod));
     drop(session);
     stand.until_present(0).await;
@@ -488,13 +488,13 @@ async fn a_flood_of_questions_waits_where_it_comes_from() {
     flood.set_nonblocking(true).unwrap();
     flood.write_all(&hello()).unwrap();
     let at = stand.publish.borrow().at;
-    let question = asked(&Asked::Ask { ticket: 1, question: Question::Journal { from: at, to: at, limit: 1 } });
+    let query = asked(&Asked::Ask { ticket: 1, query: Query::Journal { from: at, to: at, limit: 1 } });
     let started = tokio::time::Instant::now();
     let (mut sent, mut begun) = (0, 0);
     for value in 0..200 {
         // As much as the socket takes; what did not fit goes first in the next round.
-        while let Ok(count) = flood.write(&question[begun..]) {
-            begun = (begun + count) % question.len();
+        while let Ok(count) = flood.write(&query[begun..]) {
+            begun = (begun + count) % query.len();
             sent += usize::from(begun == 0);
         }
         stand.set(f64::from(value));
@@ -502,7 +502,7 @@ async fn a_flood_of_questions_waits_where_it_comes_from() {
     }
     let taken = *stand.asked.borrow();
     let seconds = started.elapsed().as_secs_f64();
-    assert!(taken as f64 <= 64.0 + 50.0 * (seconds + 1.0), "{taken} of {sent} questions were taken in {seconds} s");
+    assert!(taken as f64 <= 64.0 + 50.0 * (seconds + 1.0), "{taken} of {sent} queries were taken in {seconds} s");
     assert!(taken < sent, "nothing has waited: {taken} of {sent}");
 }
 

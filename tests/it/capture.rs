@@ -59,13 +59,13 @@ fn check(lines: &[String], expect: &[&[&str]]) {
 }
 
 const NAMED: [&[&str]; 8] = [
-    &["Query", "Read Holding Registers"],
+    &["QueryRequest", "Read Holding Registers"],
     &["Response", "Read Holding Registers"],
-    &["Query", "Write Single Register"],
+    &["QueryRequest", "Write Single Register"],
     &["Response", "Write Single Register"],
-    &["Query", "Write Multiple Registers"],
+    &["QueryRequest", "Write Multiple Registers"],
     &["Response", "Write Multiple Registers"],
-    &["Query", "Read Coils"],
+    &["QueryRequest", "Read Coils"],
     &["Response", "Read Coils", "Exception returned"],
 ];
 

@@ -17,7 +17,7 @@ use crate::{
 /// What ends a terminal.
 #[derive(Debug, Clone, Copy)]
 enum Way {
-    /// A key, and the answer to its question.
+    /// A key, and the answer to its query.
     Key(&'static str),
     Signal(&'static str),
 }

@@ -27,9 +27,9 @@ use sightglass::{
     },
     attach::io::connect::connect,
     history::{
-        Question,
+        Query,
         io::{
-            Query,
+            QueryRequest,
             alarm_file::{self, AlarmFile},
             store::Store,
         },
@@ -263,7 +263,7 @@ async fn report_on(session: Session, asked: watch::Sender<bool>) -> u64 {
         let to = session.snapshots.borrow().at;
         let period = Period { name: "shift".into(), from: to - jiff::SignedDuration::from_hours(8), to };
         let (reply, answer) = tokio::sync::oneshot::channel();
-        if session.ask(Query { question: Question::Report { period }, reply }).is_ok() {
+        if session.ask(QueryRequest { query: Query::Report { period }, reply }).is_ok() {
             asked.send_replace(true);
             reports += u64::from(answer.await.is_ok_and(|answer| answer.is_ok()));
         }

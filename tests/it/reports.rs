@@ -254,7 +254,7 @@ impl Running {
 fn a_running_station_exports_more_tags_than_one_question_takes_in_the_units_of_its_devices() {
     let running = Running::start(TWO);
     let stored: Vec<&str> = running.def.tags.iter().filter(|tag| tag.store).map(|tag| &*tag.name).collect();
-    assert!(64 < stored.len(), "{} tags fit into one question", stored.len());
+    assert!(64 < stored.len(), "{} tags fit into one query", stored.len());
     let from = (Timestamp::now() - SignedDuration::from_secs(5)).to_string();
     let end = Instant::now() + PATIENCE;
     // Until every tag has been read, its value is on disk, and the unit of the first device is known.

@@ -1,4 +1,4 @@
-//! Every command, wish and question through the socket, by everybody who may be at a terminal: what is let through, what
+//! Every command, wish and query through the socket, by everybody who may be at a terminal: what is let through, what
 //! is refused, and that the book has it. The tables below are written by hand; the program has its own.
 
 use std::{sync::Arc, time::Duration};
@@ -6,7 +6,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use sightglass::{
     access::{Peer, Wish, book::Entry},
-    history::{Question, io::Query},
+    history::{Query, io::QueryRequest},
     plant::{
         PlantDef,
         alarm::AlarmCommand,
@@ -328,32 +328,32 @@ async fn every_wish_is_granted_or_refused_as_the_table_says_and_is_on_record() {
     assert_eq!(heard.await.unwrap(), expected, "the Supervisor and whoever has started the station, once each");
 }
 
-/// A new question does not compile until it has a row here; put it into [`questions`] as well.
-fn of_question(question: &Question) -> Row {
-    match question {
-        Question::Series { .. } => look("", "-VTSL-"),
-        Question::Journal { .. } => look("", "-VTSL-"),
-        Question::Actions { .. } => look("", "-VTSL-"),
-        Question::LineMinutes { .. } => look("", "-VTSL-"),
-        Question::Values { .. } => look("", "-VTSL-"),
-        Question::AlarmQuality { .. } => look("", "-VTSL-"),
-        Question::Report { .. } => look("", "-VTSL-"),
-        Question::Audit { .. } => look("read audit log", "---S--"),
+/// A new query does not compile until it has a row here; put it into [`queries`] as well.
+fn of_question(query: &Query) -> Row {
+    match query {
+        Query::Series { .. } => look("", "-VTSL-"),
+        Query::Journal { .. } => look("", "-VTSL-"),
+        Query::Actions { .. } => look("", "-VTSL-"),
+        Query::LineMinutes { .. } => look("", "-VTSL-"),
+        Query::Values { .. } => look("", "-VTSL-"),
+        Query::AlarmQuality { .. } => look("", "-VTSL-"),
+        Query::Report { .. } => look("", "-VTSL-"),
+        Query::Audit { .. } => look("read audit log", "---S--"),
     }
 }
 
-fn questions(def: &PlantDef, to: Timestamp) -> Vec<Question> {
+fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
     let (from, limit) = (to - jiff::SignedDuration::from_secs(60), 10);
     let (words, by, action) = (String::new(), String::new(), String::new());
     vec![
-        Question::Series { tags: vec![def.tags[0].id], from, to, buckets: 10 },
-        Question::Journal { from, to, limit },
-        Question::Actions { from, to, limit },
-        Question::LineMinutes { line: LineId(0), from, to, limit },
-        Question::Values { tags: vec![def.tags[0].id], from, every: std::time::Duration::from_secs(10), count: 6 },
-        Question::AlarmQuality { from, to },
-        Question::Report { period: Period { name: "period".into(), from, to } },
-        Question::Audit { from, to, words, by, action, limit },
+        Query::Series { tags: vec![def.tags[0].id], from, to, buckets: 10 },
+        Query::Journal { from, to, limit },
+        Query::Actions { from, to, limit },
+        Query::LineMinutes { line: LineId(0), from, to, limit },
+        Query::Values { tags: vec![def.tags[0].id], from, every: std::time::Duration::from_secs(10), count: 6 },
+        Query::AlarmQuality { from, to },
+        Query::Report { period: Period { name: "period".into(), from, to } },
+        Query::Audit { from, to, words, by, action, limit },
     ]
 }
 
@@ -363,12 +363,12 @@ async fn every_question_is_answered_or_refused_as_the_table_says_and_who_asks_fo
     let at = guarded.truth.borrow().at;
     for (person, name) in PEOPLE.into_iter().enumerate() {
         let session = sits(&guarded, person).await;
-        for question in questions(&guarded.def, at) {
-            let row = of_question(&question);
-            let said = format!("{question:?} by {name}");
+        for query in queries(&guarded.def, at) {
+            let row = of_question(&query);
+            let said = format!("{query:?} by {name}");
             let written = guarded.entries().len();
             let (reply, answer) = oneshot::channel();
-            session.ask(Query { question, reply }).unwrap();
+            session.ask(QueryRequest { query, reply }).unwrap();
             let answer = answer.await.unwrap();
             assert_eq!(answer.is_ok(), row.lets(person), "{said}: {answer:?}");
             let Err(error) = answer else { continue };

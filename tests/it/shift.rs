@@ -7,8 +7,8 @@ use jiff::{Timestamp, civil::date, tz::TimeZone};
 use sightglass::{
     bus::io::{clock::Clock, transport::Connector},
     history::{
-        Answer, Question,
-        io::{Query, store::Store},
+        Answer, Query,
+        io::{QueryRequest, store::Store},
     },
     plant::{
         PlantDef,
@@ -74,7 +74,7 @@ async fn a_shift_of_eight_hours_is_reported_truly() {
     let now = clock.now();
     let period = ask::period(&def, Some("morning@2026-03-02"), None, None, now).unwrap();
     let line = def.lines[0].id;
-    let every_minute = Question::LineMinutes { line, from: period.from, to: period.to, limit: 1_000 };
+    let every_minute = Query::LineMinutes { line, from: period.from, to: period.to, limit: 1_000 };
     let Answer::LineMinutes(minutes) = store.answer(&every_minute, now).unwrap() else { panic!("not minutes") };
     assert_eq!(minutes.len(), 480, "a row a minute");
     assert!(minutes.iter().all(|minute| minute.requests == minute.ok && 60 <= minute.requests), "{:?}", minutes[0]);
@@ -137,9 +137,9 @@ async fn wait(session: &Session, clock: Clock, seconds: u64) {
     for _ in 0..seconds / 60 {
         clock.sleep(Duration::from_secs(60)).await;
         let (reply, answer) = oneshot::channel();
-        let question = Question::Journal { from: Timestamp::UNIX_EPOCH, to: Timestamp::MAX, limit: 1 };
-        session.ask(Query { question, reply }).unwrap();
-        // The question goes through the session server, a task of this very runtime, before the thread can answer it.
+        let query = Query::Journal { from: Timestamp::UNIX_EPOCH, to: Timestamp::MAX, limit: 1 };
+        session.ask(QueryRequest { query, reply }).unwrap();
+        // The query goes through the session server, a task of this very runtime, before the thread can answer it.
         for _ in 0..100 {
             tokio::task::yield_now().await;
         }

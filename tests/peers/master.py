@@ -1,4 +1,4 @@
-"""A foreign master for the tests: asks the simulated water tank and prints what it understood, one line for each question.
+"""A foreign master for the tests: asks the simulated water tank and prints what it understood, one line for each query.
 
     master.py pymodbus rtu|ascii PORT | tcp|rtu-over-tcp ADDRESS:TCPPORT
     master.py minimalmodbus rtu|ascii PORT

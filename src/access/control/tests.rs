@@ -226,30 +226,30 @@ fn each_role_may_what_is_its_own_and_refused_orders_go_to_the_plant_as_refused()
 
 #[test]
 fn without_a_login_the_history_is_answered_only_where_the_plant_may_be_seen() {
-    let question = Question::Journal { from: Timestamp::MIN, to: Timestamp::MAX, limit: 1 };
+    let query = Query::Journal { from: Timestamp::MIN, to: Timestamp::MAX, limit: 1 };
     for view in [false, true] {
         let mut bench = Bench::new(AccessDef { view, ..AccessDef::default() });
         bench.open(1, "here");
-        assert_eq!(bench.access.may_ask(1, &question, bench.now).is_ok(), view);
+        assert_eq!(bench.access.may_ask(1, &query, bench.now).is_ok(), view);
         bench.login(1, "view", VIEW).unwrap();
-        assert_eq!(bench.access.may_ask(1, &question, bench.now), Ok(()));
+        assert_eq!(bench.access.may_ask(1, &query, bench.now), Ok(()));
     }
 }
 
 #[test]
 fn the_audit_trail_is_for_a_supervisor_at_an_unlocked_terminal_and_who_else_asks_is_on_record() {
     let (words, by, action) = (String::new(), String::new(), String::new());
-    let question = Question::Audit { from: Timestamp::MIN, to: Timestamp::MAX, words, by, action, limit: 1 };
+    let query = Query::Audit { from: Timestamp::MIN, to: Timestamp::MAX, words, by, action, limit: 1 };
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "here");
     bench.login(1, "tech", TECH).unwrap();
-    let (why, effects) = bench.access.may_ask(1, &question, bench.now).unwrap_err();
+    let (why, effects) = bench.access.may_ask(1, &query, bench.now).unwrap_err();
     assert_eq!(why, "this is for a supervisor, you are technician");
     assert!(matches!(&effects[..], [Effect::Record(deed)] if &*deed.by == "tech" && deed.outcome.ends_with(&why)));
     bench.login(1, "boss", BOSS).unwrap();
-    assert_eq!(bench.access.may_ask(1, &question, bench.now), Ok(()));
+    assert_eq!(bench.access.may_ask(1, &query, bench.now), Ok(()));
     bench.wish(1, Wish::Lock).unwrap();
-    assert!(bench.access.may_ask(1, &question, bench.now).unwrap_err().0.contains("locked"));
+    assert!(bench.access.may_ask(1, &query, bench.now).unwrap_err().0.contains("locked"));
 }
 
 #[test]

@@ -21,7 +21,7 @@ use crate::{
         protocol::{self, Asked, Greeting, NEWS_BYTES_MAX, ProtocolError, REQUEST_BYTES_MAX, Told, Welcome},
         sight,
     },
-    history::{HistoryError, Question, io::Query},
+    history::{HistoryError, Query, io::QueryRequest},
     plant::{PlantDef, Snapshot, command::Outcome},
     station::{Request, Session},
 };
@@ -30,11 +30,11 @@ use crate::{
 pub const SNAPSHOT_EVERY: Duration = Duration::from_millis(250);
 /// A terminal that takes nothing for so long is let go.
 pub const STUCK_MAX: Duration = Duration::from_secs(300);
-/// A terminal that does not take the answer to its own question is let go after so long: answers may be large.
+/// A terminal that does not take the answer to its own query is let go after so long: answers may be large.
 pub const ANSWER_STUCK_MAX: Duration = Duration::from_secs(30);
-/// Questions and wishes of one terminal that may wait for their answers.
+/// Queries and wishes of one terminal that may wait for their answers.
 const IN_FLIGHT_MAX: usize = 16;
-/// Questions of one terminal that are before the history, or answered and not taken yet.
+/// Queries of one terminal that are before the history, or answered and not taken yet.
 const ANSWERS_MAX: usize = 4;
 /// So long a newcomer may wait to hear how it stands.
 const STANDING_MAX: Duration = Duration::from_secs(2);
@@ -55,8 +55,8 @@ where
     let (replies, answered) = mpsc::channel(IN_FLIGHT_MAX);
     let in_flight = Arc::new(Semaphore::new(IN_FLIGHT_MAX));
     let asked = Arc::new(Semaphore::new(ANSWERS_MAX));
-    let (questions, tickets) = (JoinSet::new(), HashMap::new());
-    let asking = Asking { session: session.clone(), def: def.clone(), replies, in_flight, asked, questions, tickets };
+    let (queries, tickets) = (JoinSet::new(), HashMap::new());
+    let asking = Asking { session: session.clone(), def: def.clone(), replies, in_flight, asked, queries, tickets };
     let telling = Telling { write, session, def };
     tokio::select! {
         Err(ended) = asking.run(read) => ended,
@@ -92,8 +92,8 @@ struct Asking {
     replies: mpsc::Sender<Reply>,
     in_flight: Arc<Semaphore>,
     asked: Arc<Semaphore>,
-    /// Questions that wait for their answers; they are cancelled when the terminal leaves.
-    questions: JoinSet<()>,
+    /// Queries that wait for their answers; they are cancelled when the terminal leaves.
+    queries: JoinSet<()>,
     /// The same by their tickets.
     tickets: HashMap<u64, AbortHandle>,
 }
@@ -108,7 +108,7 @@ impl Asking {
             pace.step().await;
             match asked {
                 Asked::Order(order) => self.order(*order).await,
-                Asked::Ask { ticket, question } => self.ask(ticket, question).await,
+                Asked::Ask { ticket, query } => self.ask(ticket, query).await,
                 Asked::Cancel { ticket } => self.cancel(ticket),
                 Asked::Wish { ticket, wish } => self.wish(ticket, wish).await,
             }
@@ -129,16 +129,16 @@ impl Asking {
         }
     }
 
-    async fn ask(&mut self, ticket: u64, question: Question) {
+    async fn ask(&mut self, ticket: u64, query: Query) {
         let Ok(place) = self.in_flight.clone().acquire_owned().await else { return };
-        let sent = check::question(&self.def, &question);
+        let sent = check::query(&self.def, &query);
         let (reply, answer) = oneshot::channel();
-        let query = Query { question, reply };
+        let query = QueryRequest { query, reply };
         let (session, replies, asked) = (self.session.clone(), self.replies.clone(), self.asked.clone());
-        while self.questions.try_join_next().is_some() {}
-        self.tickets.retain(|_, question| !question.is_finished());
-        let question = self.questions.spawn(async move {
-            // A question waits here for those before it, so that what comes behind it, an order perhaps, does not.
+        while self.queries.try_join_next().is_some() {}
+        self.tickets.retain(|_, query| !query.is_finished());
+        let query = self.queries.spawn(async move {
+            // A query waits here for those before it, so that what comes behind it, an order perhaps, does not.
             let Ok(turn) = asked.acquire_owned().await else { return };
             let sent = sent.and_then(|()| session.ask(query).map_err(str::to_owned));
             // The station takes a terminal for gone when nobody holds its session any more.
@@ -150,13 +150,13 @@ impl Asking {
             // Only a terminal that has ended does not hear it.
             let _ = replies.send((Told::Answer { ticket, answer }, vec![place, turn])).await;
         });
-        self.tickets.insert(ticket, question);
+        self.tickets.insert(ticket, query);
     }
 
-    /// The history stops working on a question when nothing waits for its answer.
+    /// The history stops working on a query when nothing waits for its answer.
     fn cancel(&mut self, ticket: u64) {
-        if let Some(question) = self.tickets.remove(&ticket) {
-            question.abort();
+        if let Some(query) = self.tickets.remove(&ticket) {
+            query.abort();
         }
     }
 
@@ -295,24 +295,24 @@ mod tests {
         far.write_all(&protocol::encode(asked, REQUEST_BYTES_MAX).unwrap()).await.unwrap();
     }
 
-    fn question(ticket: u64) -> Asked {
+    fn query(ticket: u64) -> Asked {
         let (from, to) = (Timestamp::UNIX_EPOCH, Timestamp::from_second(9).unwrap());
-        Asked::Ask { ticket, question: Question::Journal { from, to, limit: 1 } }
+        Asked::Ask { ticket, query: Query::Journal { from, to, limit: 1 } }
     }
 
-    async fn next_question(requests: &mut mpsc::Receiver<(u32, Request)>) -> Query {
-        let Some((_, Request::Ask(query))) = requests.recv().await else { panic!("no question") };
+    async fn next_question(requests: &mut mpsc::Receiver<(u32, Request)>) -> QueryRequest {
+        let Some((_, Request::Ask(query))) = requests.recv().await else { panic!("no query") };
         query
     }
 
-    async fn is_cancelled(query: &mut Query) -> bool {
+    async fn is_cancelled(query: &mut QueryRequest) -> bool {
         timeout(Duration::from_secs(60), query.reply.closed()).await.is_ok()
     }
 
     #[tokio::test(start_paused = true)]
     async fn questions_of_a_terminal_that_has_left_are_cancelled() {
         let (mut far, mut requests, served) = serving();
-        say(&mut far, &question(1)).await;
+        say(&mut far, &query(1)).await;
         let mut query = next_question(&mut requests).await;
         drop(far);
         assert!(is_cancelled(&mut query).await, "the history still works on it");
@@ -324,7 +324,7 @@ mod tests {
         let (mut far, mut requests, _served) = serving();
         let last = ANSWERS_MAX as u64 + 1;
         for ticket in 1..=last {
-            say(&mut far, &question(ticket)).await;
+            say(&mut far, &query(ticket)).await;
         }
         let mut asked = Vec::new();
         for _ in 1..last {

@@ -18,7 +18,7 @@ use crate::{
         own::{GONE, Own},
         protocol::{self, Asked, NEWS_BYTES_MAX, Place, REQUEST_BYTES_MAX, Told, Welcome},
     },
-    history::{Answer, HistoryError, io::Query},
+    history::{Answer, HistoryError, io::QueryRequest},
     plant::{PlantDef, Snapshot},
     station::Request,
 };
@@ -32,7 +32,7 @@ const OUT: usize = 64;
 /// Messages that may wait to be taken in; more wait in the socket.
 const IN: usize = 4;
 
-/// A question or wish that waits for its answer.
+/// A query or wish that waits for its answer.
 enum Waiting {
     Ask(oneshot::Sender<Result<Answer, HistoryError>>),
     Wish(oneshot::Sender<Result<Durability, String>>),
@@ -186,9 +186,9 @@ impl Pump {
                     self.show();
                 }
             }
-            Request::Ask(Query { question, reply }) => {
+            Request::Ask(QueryRequest { query, reply }) => {
                 let ticket = self.ticket();
-                self.await_answer(ticket, Waiting::Ask(reply), &Asked::Ask { ticket, question }, out);
+                self.await_answer(ticket, Waiting::Ask(reply), &Asked::Ask { ticket, query }, out);
             }
             Request::Wish(wish, reply) => {
                 let ticket = self.ticket();
@@ -204,7 +204,7 @@ impl Pump {
         }
     }
 
-    /// Cancels the questions whose answers are not waited for any more. Called with every message of either side.
+    /// Cancels the queries whose answers are not waited for any more. Called with every message of either side.
     fn cancel(&mut self, out: &mpsc::Sender<Vec<u8>>) {
         let given_up = |waiting: &Waiting| matches!(waiting, Waiting::Ask(reply) if reply.is_closed());
         for (ticket, _) in self.waiting.extract_if(|_, waiting| given_up(waiting)) {
@@ -317,7 +317,7 @@ mod tests {
     use tokio::net::UnixStream;
 
     use super::*;
-    use crate::{history::Question, plant::fixture};
+    use crate::{history::Query, plant::fixture};
 
     #[tokio::test]
     async fn a_question_whose_answer_is_not_waited_for_is_cancelled_at_the_station() {
@@ -328,22 +328,22 @@ mod tests {
         let (read, write) = near.into_split();
         let (asks, mut requests) = mpsc::channel(4);
         tokio::spawn(async move { pump.attend(read, write, &mut requests).await });
-        let question = Question::Journal { from: Timestamp::UNIX_EPOCH, to: Timestamp::UNIX_EPOCH, limit: 1 };
+        let query = Query::Journal { from: Timestamp::UNIX_EPOCH, to: Timestamp::UNIX_EPOCH, limit: 1 };
         let ask = || {
             let (reply, answer) = oneshot::channel();
-            asks.try_send((1, Request::Ask(Query { question: question.clone(), reply }))).unwrap();
+            asks.try_send((1, Request::Ask(QueryRequest { query: query.clone(), reply }))).unwrap();
             answer
         };
         let mut asked = async || {
             protocol::decode::<Asked>(&wire::read(&mut far, REQUEST_BYTES_MAX).await.unwrap(), "message").unwrap()
         };
         let first = ask();
-        assert_eq!(asked().await, Asked::Ask { ticket: 1, question: question.clone() });
+        assert_eq!(asked().await, Asked::Ask { ticket: 1, query: query.clone() });
         drop(first);
         let _second = ask();
-        assert_eq!(asked().await, Asked::Ask { ticket: 2, question: question.clone() });
+        assert_eq!(asked().await, Asked::Ask { ticket: 2, query: query.clone() });
         assert_eq!(asked().await, Asked::Cancel { ticket: 1 }, "the second is waited for");
         let _third = ask();
-        assert_eq!(asked().await, Asked::Ask { ticket: 3, question: question.clone() }, "cancelled once");
+        assert_eq!(asked().await, Asked::Ask { ticket: 3, query: query.clone() }, "cancelled once");
     }
 }

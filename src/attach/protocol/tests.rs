@@ -82,7 +82,7 @@ fn requests_and_news_survive_the_way() {
     let order = OrderRequest::new(7, OrderId { terminal: 1, number: 2 }, Command::Write { tag: TagId(0), value: 0.1 });
     let asked = [
         Asked::Order(Box::new(order)),
-        Asked::Ask { ticket: 1, question: Question::Journal { from: now(), to: now(), limit: 5 } },
+        Asked::Ask { ticket: 1, query: Query::Journal { from: now(), to: now(), limit: 5 } },
         Asked::Cancel { ticket: 1 },
         Asked::Wish { ticket: 2, wish: Wish::Login { user: "anna".into(), password: "long and secret".into() } },
         Asked::Wish { ticket: 3, wish: Wish::SetRole { user: "anna".into(), role: Role::Technician } },
@@ -144,26 +144,26 @@ fn what_this_plant_does_not_have_never_reaches_it() {
     }
     assert_eq!(check::command(&def, &Command::Configure(Box::new(def.lines[0].clone()))), Ok(()));
     assert_eq!(check::command(&def, &Command::Write { tag: TagId(0), value: 1.0 }), Ok(()));
-    let series = |tags: Vec<TagId>, buckets| Question::Series { tags, from: now(), to: now(), buckets };
+    let series = |tags: Vec<TagId>, buckets| Query::Series { tags, from: now(), to: now(), buckets };
     let report = |days: i64| {
         let to = now() + jiff::SignedDuration::from_hours(24 * days);
-        Question::Report { period: crate::report::Period { name: "period".into(), from: now(), to } }
+        Query::Report { period: crate::report::Period { name: "period".into(), from: now(), to } }
     };
-    assert_eq!(check::question(&def, &series(vec![TagId(0)], 200)), Ok(()));
-    assert_eq!(check::question(&def, &report(92)), Ok(()));
+    assert_eq!(check::query(&def, &series(vec![TagId(0)], 200)), Ok(()));
+    assert_eq!(check::query(&def, &report(92)), Ok(()));
     for wrong in [
         series(vec![TagId(far)], 200),
         series(vec![TagId(0)], usize::MAX),
         series(vec![TagId(0)], 0),
         series(vec![TagId(0); 1_000], 200),
         series(vec![TagId(0); 64], 4_096),
-        Question::LineMinutes { line: LineId(far), from: now(), to: now(), limit: 1 },
-        Question::LineMinutes { line: LineId(0), from: now(), to: now(), limit: 10_001 },
-        Question::Journal { from: now(), to: now(), limit: usize::MAX },
-        Question::Actions { from: now(), to: now(), limit: usize::MAX },
+        Query::LineMinutes { line: LineId(far), from: now(), to: now(), limit: 1 },
+        Query::LineMinutes { line: LineId(0), from: now(), to: now(), limit: 10_001 },
+        Query::Journal { from: now(), to: now(), limit: usize::MAX },
+        Query::Actions { from: now(), to: now(), limit: usize::MAX },
         report(93),
     ] {
-        assert!(check::question(&def, &wrong).is_err(), "{wrong:?}");
+        assert!(check::query(&def, &wrong).is_err(), "{wrong:?}");
     }
 }
 

@@ -1,15 +1,15 @@
-//! The edge of the history: DuckDB, its files, the thread that writes and the one that answers questions.
+//! The edge of the history: DuckDB, its files, the thread that writes and the one that answers queries.
 
 use tokio::sync::oneshot;
 
-use super::{Answer, HistoryError, Question};
+use super::{Answer, HistoryError, Query};
 
-/// A question on its way to the history, with the place for its answer.
+/// A query on its way to the history, with the place for its answer.
 /// A dropped answer means: the store has gone.
 #[derive(Debug)]
-pub struct Query {
+pub struct QueryRequest {
     /// What is asked.
-    pub question: Question,
+    pub query: Query,
     /// Where the answer goes.
     pub reply: oneshot::Sender<Result<Answer, HistoryError>>,
 }

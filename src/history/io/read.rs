@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     history::{
-        Answer, HistoryError, Question, Series,
+        Answer, HistoryError, Query, Series,
         series::{self, Curve},
     },
     plant::{
@@ -29,9 +29,9 @@ pub const ROWS_MAX: u64 = 200_000;
 pub const SAMPLES_MAX: u64 = 100_000_000;
 
 impl Store {
-    /// Answers a question; nothing after `now` is known.
-    pub fn answer(&self, question: &Question, now: Timestamp) -> Result<Answer, HistoryError> {
-        let answer = self.look_up(question, now);
+    /// Answers a query; nothing after `now` is known.
+    pub fn answer(&self, query: &Query, now: Timestamp) -> Result<Answer, HistoryError> {
+        let answer = self.look_up(query, now);
         if let Err(error) = &answer
             && is_damage(error)
         {
@@ -40,37 +40,37 @@ impl Store {
         answer
     }
 
-    fn look_up(&self, question: &Question, now: Timestamp) -> Result<Answer, HistoryError> {
-        match question {
-            Question::Series { tags, from, to, buckets } => {
+    fn look_up(&self, query: &Query, now: Timestamp) -> Result<Answer, HistoryError> {
+        match query {
+            Query::Series { tags, from, to, buckets } => {
                 self.curves(tags, series::Span { from: *from, to: *to, until: now }, *buckets).map(Answer::Series)
             }
-            Question::Values { tags, from, every, count } => {
+            Query::Values { tags, from, every, count } => {
                 self.values(tags, *from, *every, *count, now).map(Answer::Values)
             }
-            Question::Journal { from, to, limit } => {
+            Query::Journal { from, to, limit } => {
                 check_span(*from, *to)?;
                 self.list(&sql::journal_newest(), params![utc(*from), utc(*to), capped(*limit)], alarm)
                     .map(Answer::Journal)
             }
-            Question::Actions { from, to, limit } => {
+            Query::Actions { from, to, limit } => {
                 check_span(*from, *to)?;
                 self.list(&sql::actions_newest(), params![utc(*from), utc(*to), capped(*limit)], action)
                     .map(Answer::Actions)
             }
-            Question::Audit { from, to, words, by, action: what, limit } => {
+            Query::Audit { from, to, words, by, action: what, limit } => {
                 check_span(*from, *to)?;
                 self.list(&sql::audit(), params![utc(*from), utc(*to), capped(*limit), by, what, words], action)
                     .map(Answer::Actions)
             }
-            Question::LineMinutes { line, from, to, limit } => {
+            Query::LineMinutes { line, from, to, limit } => {
                 check_span(*from, *to)?;
                 let name = self.def.lines.get(line.index()).map_or("", |line| &line.name);
                 self.list(sql::LINE_MINUTES, params![name, utc(*from), utc(*to), capped(*limit)], line_minute)
                     .map(Answer::LineMinutes)
             }
-            Question::Report { period } => self.report(period, now).map(|report| Answer::Report(Box::new(report))),
-            Question::AlarmQuality { from, to } => {
+            Query::Report { period } => self.report(period, now).map(|report| Answer::Report(Box::new(report))),
+            Query::AlarmQuality { from, to } => {
                 self.alarm_quality(*from, *to, now).map(|figures| Answer::AlarmQuality(Box::new(figures)))
             }
         }

@@ -1,9 +1,9 @@
-//! Answers questions beside the recording: each on a connection of its own, few at a time, each for a bounded time, and
+//! Answers queries beside the recording: each on a connection of its own, few at a time, each for a bounded time, and
 //! never all places for one terminal.
 //!
 //! ```text
-//!   Query ──> queue ──> run ──┬── question, connection, time limit ──> answer
-//!                             └── question, connection, time limit ──> answer
+//!   QueryRequest ──> queue ──> run ──┬── query, connection, time limit ──> answer
+//!                             └── query, connection, time limit ──> answer
 //!   writer: a fresh store after every opening ──>   <── "commit first", "this cannot be read"
 //! ```
 
@@ -20,27 +20,27 @@ use tokio::{
     time::timeout,
 };
 
-use super::{Query, store::Store};
+use super::{QueryRequest, store::Store};
 use crate::{
     bus::io::clock::Clock,
-    history::{Answer, HistoryError, Question},
+    history::{Answer, HistoryError, Query},
 };
 
-/// Questions that are answered at a time; the others wait.
+/// Queries that are answered at a time; the others wait.
 pub const QUESTIONS_MAX: usize = 3;
 /// Of these of one terminal: the others find a place at once.
 pub const QUESTIONS_OF_ONE_MAX: usize = QUESTIONS_MAX - 1;
-/// Questions that wait here; those behind them wait in the queue, which refuses when it is full.
+/// Queries that wait here; those behind them wait in the queue, which refuses when it is full.
 const WAITING_MAX: usize = 64;
-/// Real time for one question.
+/// Real time for one query.
 pub const TIME_MAX: Duration = Duration::from_secs(20);
-/// How long a question waits for the commit of what is pending.
+/// How long a query waits for the commit of what is pending.
 const COMMIT_MAX: Duration = Duration::from_secs(2);
 /// Real time between two attempts to interrupt: one that comes between two statements has no effect.
 const INTERRUPT_EVERY: Duration = Duration::from_millis(10);
 
-/// How a question is answered: [`Store::answer`], except in tests.
-pub type Answerer = Arc<dyn Fn(&Store, &Question, Timestamp) -> Result<Answer, HistoryError> + Send + Sync>;
+/// How a query is answered: [`Store::answer`], except in tests.
+pub type Answerer = Arc<dyn Fn(&Store, &Query, Timestamp) -> Result<Answer, HistoryError> + Send + Sync>;
 
 /// What the reader asks of the writer.
 #[derive(Debug)]
@@ -59,31 +59,31 @@ pub struct Reader {
     pub writer: mpsc::Sender<Request>,
     /// Plant time.
     pub clock: Clock,
-    /// How questions are answered.
+    /// How queries are answered.
     pub answer: Answerer,
 }
 
 impl Reader {
     /// Answers until the writer has ended; what cannot be answered any more is dropped with its reply.
-    pub async fn run(mut self, mut queries: mpsc::Receiver<(u32, Query)>) {
+    pub async fn run(mut self, mut queries: mpsc::Receiver<(u32, QueryRequest)>) {
         let mut store: Option<Store> = None;
-        // Questions wait until the first opening has ended, well or not.
+        // Queries wait until the first opening has ended, well or not.
         let mut tried = false;
         let (mut opened, _) = watch::channel(());
         let mut running = JoinSet::new();
         let mut waiting = VecDeque::new();
-        // The terminal of each question that is being answered.
+        // The terminal of each query that is being answered.
         let mut terminals = HashMap::new();
         loop {
-            // A question that was cancelled needs no place.
-            waiting.retain(|(_, query): &(u32, Query)| !query.reply.is_closed());
+            // A query that was cancelled needs no place.
+            waiting.retain(|(_, query): &(u32, QueryRequest)| !query.reply.is_closed());
             if tried && let Some((terminal, query)) = next(&mut waiting, terminals.values()) {
                 match store.as_ref().ok_or(HistoryError::NotOpen).and_then(Store::try_clone) {
                     Ok(own) => {
                         let task = running.spawn(self.ask(own, query, opened.subscribe()));
                         terminals.insert(task.id(), terminal);
                     }
-                    // The question may have been cancelled meanwhile.
+                    // The query may have been cancelled meanwhile.
                     Err(error) => drop(query.reply.send(Err(error))),
                 }
                 continue;
@@ -91,7 +91,7 @@ impl Reader {
             tokio::select! {
                 biased;
                 handed = self.stores.recv() => {
-                    // Questions to the old store end now: its file closes with their connections.
+                    // Queries to the old store end now: its file closes with their connections.
                     opened = watch::channel(()).0;
                     let Some(handed) = handed else { break };
                     (store, tried) = (handed, true);
@@ -106,19 +106,24 @@ impl Reader {
         while running.join_next().await.is_some() {}
     }
 
-    /// Answers a question until its time is over, it is cancelled (its reply is dropped) or the store closes.
-    fn ask(&self, store: Store, query: Query, mut opened: watch::Receiver<()>) -> impl Future<Output = ()> + use<> {
+    /// Answers a query until its time is over, it is cancelled (its reply is dropped) or the store closes.
+    fn ask(
+        &self,
+        store: Store,
+        query: QueryRequest,
+        mut opened: watch::Receiver<()>,
+    ) -> impl Future<Output = ()> + use<> {
         let (writer, clock, answer) = (self.writer.clone(), self.clock, Arc::clone(&self.answer));
-        let Query { question, mut reply } = query;
+        let QueryRequest { query, mut reply } = query;
         async move {
             let interrupt = store.interrupt_handle();
             let mut work = None;
             let answered = async {
-                if counts_a_period(&question) {
+                if counts_a_period(&query) {
                     commit_first(&writer).await;
                 }
                 let now = clock.utc();
-                work.insert(spawn_blocking(move || (answer(&store, &question, now), store.unreadable.take()))).await
+                work.insert(spawn_blocking(move || (answer(&store, &query, now), store.unreadable.take()))).await
             };
             let ended = tokio::select! {
                 answered = timeout(TIME_MAX, answered) => answered.map_err(|_| HistoryError::TooLong { seconds: TIME_MAX.as_secs() }),
@@ -128,16 +133,16 @@ impl Reader {
             let answer = match ended {
                 Ok(Ok((answer, unreadable))) => {
                     if let Some(what) = unreadable {
-                        // If the writer is too busy, the next question reports it.
+                        // If the writer is too busy, the next query reports it.
                         let _ = writer.try_send(Request::Unreadable(what));
                     }
                     if let Err(error @ HistoryError::Engine(_)) = &answer {
-                        tracing::warn!(?error, "a question is not answered");
+                        tracing::warn!(?error, "a query is not answered");
                     }
                     answer
                 }
                 Ok(Err(panic)) => {
-                    tracing::error!(%panic, "a question ended badly");
+                    tracing::error!(%panic, "a query ended badly");
                     Err(HistoryError::Engine("internal error, see the log".to_owned()))
                 }
                 Err(why) => {
@@ -147,13 +152,13 @@ impl Reader {
                     Err(why)
                 }
             };
-            // The question may have been cancelled meanwhile.
+            // The query may have been cancelled meanwhile.
             let _ = reply.send(answer);
         }
     }
 }
 
-/// Takes the question that is answered next, if there is a place for one: that of the terminal with the fewest being
+/// Takes the query that is answered next, if there is a place for one: that of the terminal with the fewest being
 /// answered, and of those the one that waits longest.
 fn next<'a, T>(
     waiting: &mut VecDeque<(u32, T)>,
@@ -169,15 +174,15 @@ fn next<'a, T>(
 }
 
 /// Does a figure of the answer lack what is not committed yet?
-fn counts_a_period(question: &Question) -> bool {
-    match question {
-        Question::Report { .. } | Question::AlarmQuality { .. } => true,
-        Question::Series { .. }
-        | Question::Values { .. }
-        | Question::Journal { .. }
-        | Question::Actions { .. }
-        | Question::Audit { .. }
-        | Question::LineMinutes { .. } => false,
+fn counts_a_period(query: &Query) -> bool {
+    match query {
+        Query::Report { .. } | Query::AlarmQuality { .. } => true,
+        Query::Series { .. }
+        | Query::Values { .. }
+        | Query::Journal { .. }
+        | Query::Actions { .. }
+        | Query::Audit { .. }
+        | Query::LineMinutes { .. } => false,
     }
 }
 
@@ -203,7 +208,7 @@ async fn stop<T>(work: &mut JoinHandle<T>, interrupt: impl Fn()) {
 mod tests {
     use super::*;
 
-    /// Which of the waiting questions (their terminals) is next, by its place.
+    /// Which of the waiting queries (their terminals) is next, by its place.
     fn place(waiting: &[u32], answered: &[u32]) -> Option<usize> {
         let mut waiting = waiting.iter().copied().zip(0..).collect();
         next(&mut waiting, answered.iter()).map(|(_, place)| place)

@@ -1,4 +1,4 @@
-//! Stored samples of many tags, read once, piece by piece in order of time: the memory that a question needs does not
+//! Stored samples of many tags, read once, piece by piece in order of time: the memory that a query needs does not
 //! grow with its period.
 
 use duckdb::{
@@ -113,7 +113,7 @@ impl Store {
         Ok(gaps)
     }
 
-    /// The place of each stored number, and the question for their rows. A list of numbers is worth its cost where it
+    /// The place of each stored number, and the query for their rows. A list of numbers is worth its cost where it
     /// leaves most rows out.
     fn asked_for(&self, tags: &[TagId]) -> (Vec<u32>, String) {
         let numbers: Vec<Option<u16>> = tags.iter().map(|tag| self.id(*tag)).collect();
@@ -151,7 +151,7 @@ impl Store {
         Ok(Piece::Whole)
     }
 
-    /// Refuses a question behind which more rows lie than can be answered in time, without counting them: as if the rows
+    /// Refuses a query behind which more rows lie than can be answered in time, without counting them: as if the rows
     /// of the file lay evenly over its period and its tags.
     pub(super) fn bounded(
         &self,

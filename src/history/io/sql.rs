@@ -1,4 +1,4 @@
-//! The schema as numbered migrations, and the questions in SQL. Times are UTC; local time is Rust's business.
+//! The schema as numbered migrations, and the queries in SQL. Times are UTC; local time is Rust's business.
 
 use crate::plant::record::ELSEWHERE;
 

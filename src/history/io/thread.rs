@@ -1,4 +1,4 @@
-//! The thread that writes: records in, one commit a second; and the thread beside it that answers questions.
+//! The thread that writes: records in, one commit a second; and the thread beside it that answers queries.
 
 use std::{path::Path, sync::Arc, thread::JoinHandle, time::Duration};
 
@@ -9,7 +9,7 @@ use tokio::{
 };
 
 use super::{
-    Query, files,
+    QueryRequest, files,
     open::{Opened, Restored},
     reader::{Answerer, QUESTIONS_MAX, Reader, Request},
     store::Store,
@@ -25,9 +25,9 @@ use crate::{
 pub const RECORDS_MAX: usize = 1024;
 /// Places of that queue that samples may not take.
 const KEPT_FOR_EVENTS: usize = 128;
-/// Questions that wait for their turn; a full queue refuses more.
+/// Queries that wait for their turn; a full queue refuses more.
 pub const QUERIES_MAX: usize = 64;
-/// Requests of questions on their way to the writer: each that is being answered has one at most.
+/// Requests of queries on their way to the writer: each that is being answered has one at most.
 const REQUESTS_MAX: usize = 2 * QUESTIONS_MAX;
 /// Real time between two commits: what a power failure may cost.
 const COMMIT_EVERY: Duration = Duration::from_secs(1);
@@ -37,8 +37,8 @@ const COMMIT_EVERY: Duration = Duration::from_secs(1);
 pub struct Handle {
     /// Records to store. When the last sender is dropped the thread stores what it has and ends.
     pub records: mpsc::Sender<Vec<Record>>,
-    /// Questions, each with the number of its terminal; those that can no longer be answered are dropped with their reply.
-    pub queries: mpsc::Sender<(u32, Query)>,
+    /// Queries, each with the number of its terminal; those that can no longer be answered are dropped with their reply.
+    pub queries: mpsc::Sender<(u32, QueryRequest)>,
     /// How the store stands, after every commit.
     pub status: watch::Receiver<HistoryStatus>,
     /// What the plant takes up from its history, as soon as it is open for the first time.
@@ -151,7 +151,7 @@ async fn run(
             opening = Some(spawn_blocking(writer.opener(clock.utc())));
         }
         tokio::select! {
-            // In this order: a question sees the records before it.
+            // In this order: a query sees the records before it.
             biased;
             _ = tick.tick() => {
                 writer.commit(clock.utc());
@@ -172,7 +172,7 @@ async fn run(
                 Request::Commit(done) => {
                     writer.commit(clock.utc());
                     outputs.publish(writer);
-                    // The question may have been cancelled meanwhile.
+                    // The query may have been cancelled meanwhile.
                     let _ = done.send(());
                 }
                 Request::Unreadable(what) => {

@@ -58,7 +58,7 @@ pub struct Writer {
     failing: Option<String>,
     /// What was wrong with the last checkpoint; goes with the next good one.
     unchecked: Option<String>,
-    /// What a question could not read; stays until the station ends.
+    /// What a query could not read; stays until the station ends.
     unreadable: Option<String>,
     /// A store was open before.
     was_open: bool,
@@ -229,7 +229,7 @@ impl Writer {
         }
     }
 
-    /// The stores that questions are answered from: this one, and each that is opened after it.
+    /// The stores that queries are answered from: this one, and each that is opened after it.
     pub fn stores(&mut self) -> mpsc::Receiver<Option<Store>> {
         let (reader, stores) = mpsc::channel(STORES_MAX);
         self.reader = Some(reader);
@@ -247,14 +247,14 @@ impl Writer {
     fn hand_over(&mut self) {
         let Some(reader) = &self.reader else { return };
         let handed = self.store.as_ref().and_then(|store| {
-            store.try_clone().inspect_err(|error| tracing::error!(%error, "questions cannot be answered")).ok()
+            store.try_clone().inspect_err(|error| tracing::error!(%error, "queries cannot be answered")).ok()
         });
         if reader.try_send(handed).is_err() {
             tracing::error!("the reader of the history does not take the store");
         }
     }
 
-    /// Notes what a question could not read.
+    /// Notes what a query could not read.
     pub fn unreadable(&mut self, what: String) {
         self.unreadable = Some(what);
         self.describe();
@@ -293,7 +293,7 @@ impl Writer {
         let Some(store) = &self.store else { return };
         match store.checkpoint() {
             Ok(()) => (self.unchecked, self.commits) = (None, 0),
-            // A question stood in the way: with the next commit again, and said only when that goes on for long.
+            // A query stood in the way: with the next commit again, and said only when that goes on for long.
             Err(error) if is_of_questions(&error) && self.commits < 2 * CHECKPOINT_EVERY => {}
             Err(error) => {
                 let words = Some(format!("its log grows: {}", error.words()));
@@ -350,7 +350,7 @@ fn shed(pending: &mut Vec<Record>, max: usize) -> u64 {
     lost
 }
 
-/// A checkpoint failed because questions are answered at the same time: they read, or have all the memory.
+/// A checkpoint failed because queries are answered at the same time: they read, or have all the memory.
 fn is_of_questions(error: &HistoryError) -> bool {
     let busy = |words: &str| words.contains("Cannot CHECKPOINT") || words.contains("Out of Memory");
     matches!(error, HistoryError::Engine(words) if busy(words) && !is_fatal(error))

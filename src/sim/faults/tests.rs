@@ -94,7 +94,7 @@ fn noise_spoils_about_as_many_messages_as_it_says_and_always_the_same() {
     assert_eq!(answers, spoiled(20), "a replay has the same noise");
     let good = |frame: &[u8]| crc16(frame) == 0;
     let whole = answers.iter().flatten().filter(|(rtu, _)| good(rtu)).count();
-    // A question and its answer both come through in 0.8 × 0.8 of all cases.
+    // A query and its answer both come through in 0.8 × 0.8 of all cases.
     assert!((590..690).contains(&whole), "{whole} of 1000");
     for (rtu, characters) in answers.iter().flatten().filter(|(rtu, _)| !good(rtu)) {
         assert_eq!(rtu.len(), 7);

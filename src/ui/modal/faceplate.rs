@@ -85,7 +85,7 @@ impl Faceplate {
         Some((command, guard::other_state(cx, command)?))
     }
 
-    /// The question for the other state; where the command would have no effect, the question for the state that it needs
+    /// The query for the other state; where the command would have no effect, the query for the state that it needs
     /// comes first, as a step of its own.
     fn asked(self, cx: &ViewContext) -> Option<Modal> {
         let (_, actuator) = cx.def().guards.actuator(self.tag())?;

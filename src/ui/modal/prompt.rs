@@ -6,7 +6,7 @@ use ratatui::{Frame, layout::Rect};
 use super::{Modal, Next, line::Line, window};
 use crate::ui::{ViewContext, keys, tabs::Tabs, widgets::text::width};
 
-/// A question with one line for the answer; the shown tab's `on_text` takes it.
+/// A query with one line for the answer; the shown tab's `on_text` takes it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prompt {
     /// What is asked.
@@ -20,7 +20,7 @@ pub struct Prompt {
 }
 
 impl Prompt {
-    /// A question with a text to start from.
+    /// A query with a text to start from.
     pub fn new(title: impl Into<String>, hint: impl Into<String>, text: &str) -> Prompt {
         Prompt { title: title.into(), hint: hint.into(), line: Line::new(text), problem: None }
     }

@@ -182,11 +182,11 @@ impl Settings {
         rows
     }
 
-    /// The question, or what is wrong; and the keys.
+    /// The query, or what is wrong; and the keys.
     fn pinned(&self, cx: &ViewContext, used: &LineDef, room: u16) -> Vec<(String, Style)> {
         let theme = cx.theme;
         let (words, style) = match (&self.asking, &self.problem) {
-            (Some(deed), _) => (self.question(cx, used, deed), theme.strong()),
+            (Some(deed), _) => (self.query(cx, used, deed), theme.strong()),
             (None, Some(problem)) => (problem.clone(), theme.trouble()),
             (None, None) => (String::new(), theme.normal()),
         };
@@ -199,7 +199,7 @@ impl Settings {
         rows.chain([(fit_words(keys, room), theme.strong())]).collect()
     }
 
-    fn question(&self, cx: &ViewContext, used: &LineDef, deed: &Deed) -> String {
+    fn query(&self, cx: &ViewContext, used: &LineDef, deed: &Deed) -> String {
         let restart = "Polling starts anew; values are bad until the devices answer.";
         match deed {
             Deed::Use(new) => format!("Use {}? {restart}", difference(used, new)),

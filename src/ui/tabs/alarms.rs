@@ -89,7 +89,7 @@ pub struct Alarms {
     journal: Journal,
     quality: Quality,
     handover: Handover,
-    /// Questions asked so far.
+    /// Queries asked so far.
     asked: u32,
     /// The bell of the terminal rings for new alarms.
     pub bell: bool,
@@ -234,12 +234,12 @@ impl Alarms {
         }
     }
 
-    /// Is the answer to question `number` waited for?
+    /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
         self.journal.awaits(number) || self.quality.awaits(number) || self.handover.awaits(number)
     }
 
-    /// The history answered question `number`; an answer to an older one is ignored.
+    /// The history answered query `number`; an answer to an older one is ignored.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.journal.on_answer(cx, number, &answer);
         self.quality.on_answer(cx, number, &answer);

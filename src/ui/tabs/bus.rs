@@ -171,7 +171,7 @@ pub struct Bus {
     frames: frames::Ring,
     /// The bench of tests.
     pub(super) test: test::Bench,
-    /// How the line did over the last day, and the question for it.
+    /// How the line did over the last day, and the query for it.
     minutes: Vec<LineMinute>,
     errand: Errand,
     asked: u32,
@@ -268,10 +268,10 @@ impl Bus {
         }
         self.asked = self.asked.wrapping_add(1);
         self.errand.asked(self.asked, cx.steady());
-        vec![UiAction::ask(Tab::Bus, self.asked, line_trend::question(self.line, cx.now))]
+        vec![UiAction::ask(Tab::Bus, self.asked, line_trend::query(self.line, cx.now))]
     }
 
-    /// Is the answer to question `number` waited for?
+    /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
         self.errand.awaits(number)
     }

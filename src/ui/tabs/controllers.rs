@@ -32,7 +32,7 @@ use self::{
 };
 use super::{Tab, errand::Errand};
 use crate::{
-    history::{Answer, HistoryError, Question, Series},
+    history::{Answer, HistoryError, Query, Series},
     plant::{
         command::Command,
         def::{DeviceDef, DeviceId, ProgramDef, TagId},
@@ -88,7 +88,7 @@ pub struct Controllers {
     /// The selected row of the sets.
     set: usize,
     asked_for: Asked,
-    /// The small trend, of which tag, and the question for it.
+    /// The small trend, of which tag, and the query for it.
     trend: Option<Series>,
     errand: Errand,
     asked: u32,
@@ -366,11 +366,11 @@ impl Controllers {
         self.asked = self.asked.wrapping_add(1);
         self.errand.asked(self.asked, cx.steady());
         let from = cx.now.checked_sub(plate::WINDOW).unwrap_or(cx.now);
-        let question = Question::Series { tags: vec![plate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
-        vec![UiAction::ask(Tab::Controllers, self.asked, question)]
+        let query = Query::Series { tags: vec![plate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
+        vec![UiAction::ask(Tab::Controllers, self.asked, query)]
     }
 
-    /// Is the answer to question `number` waited for?
+    /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
         self.errand.awaits(number)
     }

@@ -1,14 +1,14 @@
-//! A question that is asked again and again: one at a time is on its way, and only its answer counts.
+//! A query that is asked again and again: one at a time is on its way, and only its answer counts.
 
 use jiff::{SignedDuration, Timestamp};
 
-/// Between two questions passes at least so many times as long as the last answer took.
+/// Between two queries passes at least so many times as long as the last answer took.
 const REST: i32 = 4;
-/// An answer that was not there after so many times the patience is lost: the station answers each question, and says so
+/// An answer that was not there after so many times the patience is lost: the station answers each query, and says so
 /// where it cannot.
 const LOST: i32 = 4;
 
-/// One kind of question of a tab. All times are steady, see [`ViewContext::steady`](crate::ui::ViewContext::steady).
+/// One kind of query of a tab. All times are steady, see [`ViewContext::steady`](crate::ui::ViewContext::steady).
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Errand {
     on_way: Option<(u32, Timestamp)>,
@@ -18,11 +18,11 @@ pub struct Errand {
 }
 
 impl Errand {
-    /// Is it time to ask: something changed, or the last question is `every` old, and the history has rested from it?
+    /// Is it time to ask: something changed, or the last query is `every` old, and the history has rested from it?
     /// While one is on its way, its answer is waited for; only where it is no longer what is wanted not longer than
-    /// `patience`, so that fast keys never pile up questions before the history.
+    /// `patience`, so that fast keys never pile up queries before the history.
     pub fn due(&self, now: Timestamp, every: SignedDuration, patience: SignedDuration) -> bool {
-        // A station that was started again with a clock set back must not silence the question for good; a small step back
+        // A station that was started again with a clock set back must not silence the query for good; a small step back
         // is only the difference between the time of a snapshot and what was guessed before it came.
         let set_back = |at: Timestamp| at.duration_since(now) >= patience;
         let every = every.max(self.took * REST);
@@ -40,29 +40,29 @@ impl Errand {
         self.wanted = true;
     }
 
-    /// Question `number` goes out.
+    /// Query `number` goes out.
     pub fn asked(&mut self, number: u32, now: Timestamp) {
         *self = Errand { on_way: Some((number, now)), asked: Some(now), took: self.took, wanted: false };
     }
 
-    /// An answer has come: when it was asked for, or `None` if it is the answer to an older question.
+    /// An answer has come: when it was asked for, or `None` if it is the answer to an older query.
     pub fn answered(&mut self, number: u32, now: Timestamp) -> Option<Timestamp> {
         let (_, at) = self.on_way.take_if(|(on_way, _)| *on_way == number)?;
         self.took = now.duration_since(at).max(SignedDuration::ZERO);
         Some(at)
     }
 
-    /// Does the answer to this question count? The history need not work on another.
+    /// Does the answer to this query count? The history need not work on another.
     pub fn awaits(&self, number: u32) -> bool {
         self.on_way.is_some_and(|(on_way, _)| on_way == number)
     }
 
-    /// Has what is shown changed since the last question went out?
+    /// Has what is shown changed since the last query went out?
     pub fn is_wanted(&self) -> bool {
         self.wanted
     }
 
-    /// How long the question on its way has been waiting.
+    /// How long the query on its way has been waiting.
     pub fn waiting(&self, now: Timestamp) -> Option<SignedDuration> {
         self.on_way.map(|(_, at)| now.duration_since(at))
     }
@@ -89,7 +89,7 @@ mod tests {
         assert!(!due(&errand, 5), "while one is on its way");
         assert!(due(&errand, 10), "when it is not what is wanted any more");
         errand.asked(2, at(10));
-        assert!(errand.awaits(2) && !errand.awaits(1), "an older question can be cancelled");
+        assert!(errand.awaits(2) && !errand.awaits(1), "an older query can be cancelled");
         assert_eq!(errand.answered(1, at(10)), None, "an older answer");
         assert_eq!(errand.answered(2, at(10)), Some(at(10)));
         assert_eq!(errand.answered(2, at(10)), None, "twice");
@@ -105,7 +105,7 @@ mod tests {
     fn a_late_answer_counts_and_the_history_rests_after_it() {
         let mut errand = Errand::default();
         errand.asked(1, at(0));
-        assert!(!due(&errand, 30), "no second question while the first is answered");
+        assert!(!due(&errand, 30), "no second query while the first is answered");
         assert_eq!(errand.answered(1, at(30)), Some(at(0)), "late, but what was asked for");
         assert!(!due(&errand, 119) && due(&errand, 120), "a quarter of the time at most");
         errand.asked(2, at(120));

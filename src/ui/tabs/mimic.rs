@@ -6,7 +6,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::Tab;
 use crate::{
-    history::{Answer, HistoryError, Question, Series},
+    history::{Answer, HistoryError, Query, Series},
     plant::{
         def::{MimicCommand, MimicItem, Place, TagId},
         snapshot::Snapshot,
@@ -70,7 +70,7 @@ pub struct Mimic {
     motion: bool,
     /// Curves of the small trends, by the item's place.
     trends: Vec<(usize, Option<Series>)>,
-    /// Tick of the last questions; their number is a multiple of the number of trends, plus which trend.
+    /// Tick of the last queries; their number is a multiple of the number of trends, plus which trend.
     asked_at: Option<u32>,
     asked: u32,
 }
@@ -142,9 +142,9 @@ impl Mimic {
             MimicItem::Trend { tag, window, place } => {
                 let from = cx.now - SignedDuration::try_from(*window).ok()?;
                 let width = stretch(cx, cx.area).place(*place).width;
-                let question =
-                    Question::Series { tags: vec![*tag], from, to: cx.now, buckets: usize::from(width.max(1)) * 2 };
-                Some(UiAction::ask(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(n as u32), question))
+                let query =
+                    Query::Series { tags: vec![*tag], from, to: cx.now, buckets: usize::from(width.max(1)) * 2 };
+                Some(UiAction::ask(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(n as u32), query))
             }
             MimicItem::Tank { .. }
             | MimicItem::Valve { .. }
@@ -158,12 +158,12 @@ impl Mimic {
         asks.collect()
     }
 
-    /// Is the answer to question `number` waited for?
+    /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
         (number.wrapping_sub(self.asked.wrapping_mul(self.trends.len() as u32)) as usize) < self.trends.len()
     }
 
-    /// The history answered question `number`.
+    /// The history answered query `number`.
     pub fn on_answer(&mut self, _cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         let first = self.asked.wrapping_mul(self.trends.len() as u32);
         let place = number.wrapping_sub(first) as usize;

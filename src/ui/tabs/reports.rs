@@ -14,7 +14,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Outgoing, Tab, errand::Errand};
 use crate::{
-    history::{Answer, HistoryError, Question},
+    history::{Answer, HistoryError, Query},
     plant::{def::CsvDialect, snapshot::Snapshot},
     report::{
         Period, ShiftReport,
@@ -177,12 +177,12 @@ impl Reports {
         self.ask(cx)
     }
 
-    /// Is the answer to question `number` waited for?
+    /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
         self.errand.awaits(number)
     }
 
-    /// The history answered question `number`; an answer for another period than the one shown is ignored.
+    /// The history answered query `number`; an answer for another period than the one shown is ignored.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         if self.errand.answered(number, cx.steady()).is_none() {
             return Vec::new();
@@ -267,7 +267,7 @@ impl Reports {
             Some(period) if self.errand.due(cx.steady(), every, real(PATIENCE_S)) => {
                 self.number = self.number.wrapping_add(1);
                 self.errand.asked(self.number, cx.steady());
-                vec![UiAction::ask(Tab::Reports, self.number, Question::Report { period: period.clone() })]
+                vec![UiAction::ask(Tab::Reports, self.number, Query::Report { period: period.clone() })]
             }
             Some(_) | None => Vec::new(),
         }

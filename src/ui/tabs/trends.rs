@@ -17,7 +17,7 @@ pub use self::keys::{Action, KEYS};
 use self::span::{RATES, View, WINDOWS, midnight, nearest, pan};
 use super::{Tab, errand::Errand};
 use crate::{
-    history::{Answer, HistoryError, Question, Series},
+    history::{Answer, HistoryError, Query, Series},
     plant::{
         def::{Pen, TagId, TrendGroup},
         record::{AlarmRecord, AlarmStep},
@@ -81,7 +81,7 @@ struct Data {
 
 type Figures = (Option<(f64, f64, f64)>, f64);
 
-/// The questions of this tab.
+/// The queries of this tab.
 #[derive(Debug, Default)]
 struct Errands {
     curves: Errand,
@@ -168,13 +168,13 @@ impl Trends {
         self.ask(cx)
     }
 
-    /// Is the answer to question `number` waited for?
+    /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
         let Errands { curves, hours, raised, number: _ } = &self.errands;
         [curves, hours, raised].iter().any(|errand| errand.awaits(number))
     }
 
-    /// The history answered question `number`; an answer to an older question is ignored.
+    /// The history answered query `number`; an answer to an older query is ignored.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         let (errands, steady) = (&mut self.errands, cx.steady());
         let curves = errands.curves.answered(number, steady);
@@ -411,20 +411,20 @@ impl Trends {
             false => real(cx, 60.0),
         };
         let to = view.to.min(now);
-        let series = |tags: &[TagId], from, to, buckets| Question::Series { tags: tags.to_vec(), from, to, buckets };
+        let series = |tags: &[TagId], from, to, buckets| Query::Series { tags: tags.to_vec(), from, to, buckets };
         let mut acts = Vec::new();
         let Errands { curves, hours, raised, number } = &mut self.errands;
         let steady = cx.steady();
-        let mut due = |errand: &mut Errand, every, question: Question| {
+        let mut due = |errand: &mut Errand, every, query: Query| {
             if errand.due(steady, every, patience) {
                 *number = number.wrapping_add(1);
                 errand.asked(*number, steady);
-                acts.push(UiAction::ask(Tab::Trends, *number, question));
+                acts.push(UiAction::ask(Tab::Trends, *number, query));
             }
         };
         if self.values.is_none() && !group.is_empty() {
             due(curves, often, series(&group, view.from, view.to, view.columns));
-            due(raised, often.max(real(cx, 10.0)), Question::Journal { from: view.from, to, limit: MARKS_MAX });
+            due(raised, often.max(real(cx, 10.0)), Query::Journal { from: view.from, to, limit: MARKS_MAX });
         }
         let tags = match self.values {
             Some((first, _)) => stored(cx).into_iter().skip(first).take(usize::from(cx.area.height)).collect(),

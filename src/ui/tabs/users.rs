@@ -77,7 +77,7 @@ pub struct Users {
     selected: Option<std::sync::Arc<str>>,
     /// The audit list while it is shown.
     audit: Option<Audit>,
-    /// Questions asked so far.
+    /// Queries asked so far.
     asked: u32,
 }
 
@@ -164,12 +164,12 @@ impl Users {
         acts
     }
 
-    /// Is the answer to question `number` waited for?
+    /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
         self.audit.as_ref().is_some_and(|audit| audit.awaits(number))
     }
 
-    /// The history answered question `number`.
+    /// The history answered query `number`.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
         if let Some(audit) = &mut self.audit {
             audit.on_answer(cx, number, answer);

@@ -8,7 +8,7 @@ use jiff::SignedDuration;
 use super::{model, order_of, screen, type_keys};
 use crate::{
     access::OrderRequest,
-    history::{Answer, HistoryError, Question},
+    history::{Answer, HistoryError, Query},
     plant::{
         command::{Command, NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
         def::{AlarmId, Priority},
@@ -233,7 +233,7 @@ fn what_an_interlock_blocks_is_told_and_not_sent() {
     assert!(shown.contains(reason) && shown.contains("This is not sent"), "{shown}");
     assert!(!shown.contains("write and verify"), "no key is offered that does nothing");
     assert_eq!(order_of(&type_keys(&mut model, "⏎y")), None);
-    // The tank is emptied while the question stands: then it may be sent.
+    // The tank is emptied while the query stands: then it may be sent.
     fixture.set("PLC-1.TK-2", 12.0);
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     assert!(order_of(&type_keys(&mut model, "⏎")).is_some());
@@ -472,20 +472,20 @@ fn the_journal_tells_alarms_and_deeds_in_one_order() {
         seal: None,
     };
     for effect in effects {
-        let Effect::Ask(id, question) = effect else { continue };
-        let answer = match question {
-            Question::Journal { .. } => Answer::Journal(vec![
+        let Effect::Ask(id, query) = effect else { continue };
+        let answer = match query {
+            Query::Journal { .. } => Answer::Journal(vec![
                 step(100, AlarmStep::Acknowledged, Some("tech1")),
                 step(800, AlarmStep::Raised, None),
                 step(90_000, AlarmStep::Raised, None),
             ]),
-            Question::Actions { .. } => Answer::Actions(vec![deed.clone()]),
-            Question::Series { .. }
-            | Question::Audit { .. }
-            | Question::LineMinutes { .. }
-            | Question::Report { .. }
-            | Question::AlarmQuality { .. }
-            | Question::Values { .. } => continue,
+            Query::Actions { .. } => Answer::Actions(vec![deed.clone()]),
+            Query::Series { .. }
+            | Query::Audit { .. }
+            | Query::LineMinutes { .. }
+            | Query::Report { .. }
+            | Query::AlarmQuality { .. }
+            | Query::Values { .. } => continue,
         };
         update(&mut model, Msg::Answer(id, Ok(answer)));
     }

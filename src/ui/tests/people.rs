@@ -10,7 +10,7 @@ use crate::{
         Durability, OrderRequest, Standing, Who, Wish,
         wish::{SessionRow, UserRow},
     },
-    history::{Answer, Question},
+    history::{Answer, Query},
     plant::{
         command::{Command, OrderId, OrderStatus, Outcome, Refusal},
         record::{ActionRecord, Seal},
@@ -557,13 +557,13 @@ fn the_audit_list_is_searched_by_the_history_and_read_whole() {
     let mut model = with(&Fixture::normal(), supervisor());
     let asked = |effects: &[Effect]| {
         effects.iter().find_map(|effect| match effect {
-            Effect::Ask(id, Question::Audit { words, by, action, limit, .. }) => {
+            Effect::Ask(id, Query::Audit { words, by, action, limit, .. }) => {
                 Some((*id, words.clone(), by.clone(), action.clone(), *limit))
             }
             _ => None,
         })
     };
-    let question = asked(&type_keys(&mut model, "7j")).expect("a question");
+    let query = asked(&type_keys(&mut model, "7j")).expect("a query");
     let rows = vec![
         deed(38, "anna", "write", "TIC-1.SV", ("70.0 °C", "65.0 °C"), "verified"),
         deed(37, "tom", "write", "PLC-1.PUMP", ("OFF", "ON"), "refused: needs technician"),
@@ -573,21 +573,21 @@ fn the_audit_list_is_searched_by_the_history_and_read_whole() {
             ..deed(35, "anna", "add user", "tom", ("", "technician"), "done")
         },
     ];
-    update(&mut model, Msg::Answer(question.0, Ok(Answer::Actions(rows))));
+    update(&mut model, Msg::Answer(query.0, Ok(Answer::Actions(rows))));
     for (width, height) in [(80, 24), (120, 40)] {
         insta::assert_snapshot!(format!("audit_{width}x{height}"), screen(&mut model, width, height));
     }
     type_keys(&mut model, "↓⏎");
     insta::assert_snapshot!("window_deed_80x24", screen(&mut model, 80, 24));
-    let (_, words, by, action, _) = asked(&type_keys(&mut model, "⎋/pump⏎")).expect("a question");
+    let (_, words, by, action, _) = asked(&type_keys(&mut model, "⎋/pump⏎")).expect("a query");
     assert_eq!((words.as_str(), by.as_str(), action.as_str()), ("pump", "", ""));
     let (_, words, by, ..) = {
         let effects = type_keys(&mut model, "bto⏎");
-        // The question on its way is answered first; the new one follows at once.
+        // The query on its way is answered first; the new one follows at once.
         assert_eq!(asked(&effects), None);
-        let id = AskId { tab: Tab::Users, number: question.0.number + 1 };
+        let id = AskId { tab: Tab::Users, number: query.0.number + 1 };
         update(&mut model, Msg::Answer(id, Ok(Answer::Actions(Vec::new()))));
-        asked(&update(&mut model, Msg::Tick { silent: Duration::ZERO })).expect("a question")
+        asked(&update(&mut model, Msg::Tick { silent: Duration::ZERO })).expect("a query")
     };
     assert_eq!((words.as_str(), by.as_str()), ("pump", "to"));
 }
@@ -614,12 +614,12 @@ fn an_audit_entry_is_opened_only_as_it_was_drawn() {
     let mut model = with(&Fixture::normal(), supervisor());
     let asked = |effects: &[Effect]| {
         effects.iter().find_map(|effect| match effect {
-            Effect::Ask(id, Question::Audit { .. }) => Some(*id),
+            Effect::Ask(id, Query::Audit { .. }) => Some(*id),
             _ => None,
         })
     };
     let row = |number| deed(number, "anna", "write", "TIC-1.SV", ("70.0 °C", "65.0 °C"), "verified");
-    let first = asked(&type_keys(&mut model, "7j")).expect("a question");
+    let first = asked(&type_keys(&mut model, "7j")).expect("a query");
     update(&mut model, Msg::Answer(first, Ok(Answer::Actions(vec![row(37), row(36)]))));
     let mut later = (*Fixture::normal().snapshot()).clone();
     later.at += jiff::SignedDuration::from_secs(11);

@@ -39,7 +39,7 @@ fn quitting_says_what_ends_in_each_way_to_run() {
 
 #[test]
 fn the_number_of_a_tab_leads_out_of_windows_without_a_text() {
-    // Help, the why window, a faceplate, a question, a choice, the guidance of an alarm.
+    // Help, the why window, a faceplate, a query, a choice, the guidance of an alarm.
     for keys in ["?", "w", "→⏎", "q", "4⏎T", "3⏎"] {
         let mut model = model(&Fixture::alarm(), Theme::FULL);
         type_keys(&mut model, keys);

@@ -7,7 +7,7 @@ use super::{
     text::{Canvas, pad, pad_left, width},
 };
 use crate::{
-    history::Question,
+    history::Query,
     plant::{def::LineId, line_minute::LineMinute},
     ui::ViewContext,
 };
@@ -23,9 +23,9 @@ const NAME: u16 = 8;
 const FIGURES: u16 = 26;
 
 /// What the history is asked.
-pub fn question(line: LineId, now: Timestamp) -> Question {
+pub fn query(line: LineId, now: Timestamp) -> Query {
     let to = now + SignedDuration::from_secs(60);
-    Question::LineMinutes { line, from: to - SPAN, to, limit: MINUTES_MAX }
+    Query::LineMinutes { line, from: to - SPAN, to, limit: MINUTES_MAX }
 }
 
 /// One column of bars: the worst share of failures in it, the mean share of busy time.

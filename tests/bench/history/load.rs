@@ -1,4 +1,4 @@
-//! What questions cost the recording: 1,000 tags that change every second, written by the station's own threads, while a
+//! What queries cost the recording: 1,000 tags that change every second, written by the station's own threads, while a
 //! shift report and a day's trends are asked without pause.
 //!
 //! `cargo bench --bench history -- load [SECONDS] [HOURS]`: for so many seconds (10) over a history of so many hours (2).
@@ -18,8 +18,8 @@ use jiff::Timestamp;
 use sightglass::{
     bus::io::clock::Clock,
     history::{
-        Answer, Question,
-        io::{Query, store::Store, thread as history},
+        Answer, Query,
+        io::{QueryRequest, store::Store, thread as history},
     },
     plant::{PlantDef, def::TagId, record::Record, sample::Sample},
     report::Period,
@@ -92,9 +92,9 @@ fn run(path: &Path, seconds: i64, hours: i64) {
     let (mut times, mut asked) = (Vec::new(), Vec::new());
     thread::scope(|scope| {
         scope.spawn(|| record(&handle, clock, &counts));
-        let askers = [report(now), trend(now, hours)].map(|(name, question)| {
+        let askers = [report(now), trend(now, hours)].map(|(name, query)| {
             let (handle, counts) = (&handle, &counts);
-            scope.spawn(move || (name, ask(handle, &question, counts)))
+            scope.spawn(move || (name, ask(handle, &query, counts)))
         });
         let watcher = scope.spawn(|| commits(&handle, clock, &counts));
         for _ in 0..seconds {
@@ -155,24 +155,24 @@ fn commits(handle: &history::Handle, clock: Clock, counts: &Counts) -> Vec<Durat
     times
 }
 
-fn report(now: Timestamp) -> (&'static str, Question) {
+fn report(now: Timestamp) -> (&'static str, Query) {
     let period = Period { name: "period".into(), from: now - Duration::from_secs(8 * 3_600), to: now };
-    ("report of 8 h, 1,000 tags", Question::Report { period })
+    ("report of 8 h, 1,000 tags", Query::Report { period })
 }
 
-fn trend(now: Timestamp, hours: i64) -> (&'static str, Question) {
+fn trend(now: Timestamp, hours: i64) -> (&'static str, Query) {
     let from = now - Duration::from_secs(hours as u64 * 3_600);
     let tags = (0..8).map(|pen| TagId(pen * 120)).collect();
-    ("trend of all hours, 8 pens", Question::Series { tags, from, to: now, buckets: 300 })
+    ("trend of all hours, 8 pens", Query::Series { tags, from, to: now, buckets: 300 })
 }
 
 /// Asks without pause; how long each answer took, and what went wrong.
-fn ask(handle: &history::Handle, question: &Question, counts: &Counts) -> (Vec<Duration>, Vec<String>) {
+fn ask(handle: &history::Handle, query: &Query, counts: &Counts) -> (Vec<Duration>, Vec<String>) {
     let (mut times, mut failed) = (Vec::new(), Vec::new());
     while !counts.stop.load(Ordering::Relaxed) {
         let (reply, answer) = oneshot::channel();
         let began = Instant::now();
-        handle.queries.blocking_send((1, Query { question: question.clone(), reply })).expect("asked");
+        handle.queries.blocking_send((1, QueryRequest { query: query.clone(), reply })).expect("asked");
         match answer.blocking_recv().expect("answered") {
             Ok(Answer::Series(series)) => assert!(series[0].good > 0.9, "{}", series[0].good),
             Ok(Answer::Report(report)) => assert_eq!(report.tags.len(), usize::from(TAGS)),

@@ -25,7 +25,7 @@ use super::{
 };
 use crate::{
     bus::io::clock::Clock,
-    history::{Answer, HistoryError, Question, Series, io::Query},
+    history::{Answer, HistoryError, Query, Series, io::QueryRequest},
     plant::{
         def::{LineDef, LineId, PlantDef, Priority, TagId, Transport},
         line_minute::LineMinute,
@@ -94,8 +94,8 @@ fn deed(at: i64) -> ActionRecord {
 }
 
 fn series(store: &Store, tag: TagId, from: i64, to: i64, buckets: usize) -> Series {
-    let question = Question::Series { tags: vec![tag], from: sec(from), to: sec(to), buckets };
-    match store.answer(&question, sec(to)).unwrap() {
+    let query = Query::Series { tags: vec![tag], from: sec(from), to: sec(to), buckets };
+    match store.answer(&query, sec(to)).unwrap() {
         Answer::Series(mut series) => series.remove(0),
         other => panic!("{other:?}"),
     }
@@ -224,18 +224,18 @@ fn lists_come_newest_first_within_their_span_and_limit() {
     let mut records: Vec<_> = steps.iter().cloned().map(Record::Alarm).collect();
     records.extend([deed(3), deed(4)].map(Record::Action));
     store.append(&records).unwrap();
-    let journal = |from, to, limit| Question::Journal { from: sec(from), to: sec(to), limit };
+    let journal = |from, to, limit| Query::Journal { from: sec(from), to: sec(to), limit };
     let [raised, acked, returned, low] = &steps;
-    for (question, expect) in [
+    for (query, expect) in [
         (journal(0, 10, 100), vec![low, returned, acked, raised]),
         (journal(0, 9, 2), vec![returned, acked]),
         (journal(2, 9, 100), vec![returned, acked]),
     ] {
         let expect = Answer::Journal(expect.into_iter().cloned().collect());
-        assert_eq!(store.answer(&question, sec(10)).unwrap(), expect);
+        assert_eq!(store.answer(&query, sec(10)).unwrap(), expect);
     }
-    let question = Question::Actions { from: sec(0), to: sec(10), limit: 1 };
-    assert_eq!(store.answer(&question, sec(10)).unwrap(), Answer::Actions(vec![deed(4)]));
+    let query = Query::Actions { from: sec(0), to: sec(10), limit: 1 };
+    assert_eq!(store.answer(&query, sec(10)).unwrap(), Answer::Actions(vec![deed(4)]));
     assert_eq!(store.answer(&journal(5, 5, 1), sec(10)), Err(HistoryError::EmptyPeriod));
 }
 
@@ -249,8 +249,8 @@ fn deeds_are_found_by_words_by_whom_and_by_what() {
     store.append(&[Record::Action(deed(3)), Record::Action(login.clone())]).unwrap();
     let check = |words: &str, by: &str, action: &str, expect: Vec<ActionRecord>| {
         let (words, by, action) = (words.to_owned(), by.to_owned(), action.to_owned());
-        let question = Question::Audit { from: sec(0), to: sec(10), words, by, action, limit: 10 };
-        assert_eq!(store.answer(&question, sec(10)).unwrap(), Answer::Actions(expect), "{question:?}");
+        let query = Query::Audit { from: sec(0), to: sec(10), words, by, action, limit: 10 };
+        assert_eq!(store.answer(&query, sec(10)).unwrap(), Answer::Actions(expect), "{query:?}");
     };
     check("", "", "", vec![login.clone(), deed(3)]);
     check("tic-1", "", "write", vec![deed(3)]);
@@ -292,11 +292,11 @@ fn what_a_line_counted_comes_back_minute_by_minute() {
     let records = minutes.iter().cloned().chain([minute("L2", 120, 9)]).map(Record::Line);
     store.append(&records.collect::<Vec<_>>()).unwrap();
     assert_eq!(store.count_rows().unwrap(), 4);
-    let ask = |from, to, limit| Question::LineMinutes { line: LineId(0), from: sec(from), to: sec(to), limit };
-    for (question, expect) in
+    let ask = |from, to, limit| Query::LineMinutes { line: LineId(0), from: sec(from), to: sec(to), limit };
+    for (query, expect) in
         [(ask(0, 300, 100), &minutes[..]), (ask(60, 180, 100), &minutes[..2]), (ask(0, 300, 2), &minutes[1..])]
     {
-        assert_eq!(store.answer(&question, sec(300)).unwrap(), Answer::LineMinutes(expect.to_vec()), "{question:?}");
+        assert_eq!(store.answer(&query, sec(300)).unwrap(), Answer::LineMinutes(expect.to_vec()), "{query:?}");
     }
 }
 
@@ -384,8 +384,8 @@ fn the_report_of_a_shift_has_its_figures_alarms_deeds_and_record() {
     let alarms = [step(5, "high", Raised), step(30, "high", Returned), step(50, "low", Raised)].map(Record::Alarm);
     store.append(&samples.chain(alarms).chain([Record::Action(deed(25))]).collect::<Vec<_>>()).unwrap();
     let period = Period { name: "period".into(), from: sec(20), to: sec(200) };
-    let question = Question::Report { period: period.clone() };
-    let Answer::Report(report) = store.answer(&question, sec(100)).unwrap() else { panic!("not a report") };
+    let query = Query::Report { period: period.clone() };
+    let Answer::Report(report) = store.answer(&query, sec(100)).unwrap() else { panic!("not a report") };
     assert_eq!((report.period, report.until), (period, sec(100)));
     let [pv, sv, mv] = report.tags.as_slice() else { panic!("three tags") };
     assert_eq!((pv.tag.as_str(), pv.unit.as_str(), pv.decimals), ("TIC-1.PV", "°C", 1));
@@ -399,7 +399,7 @@ fn the_report_of_a_shift_has_its_figures_alarms_deeds_and_record() {
     assert_eq!(report.record_of, Some(("TIC-1".into(), "°C".into())));
     assert_eq!(report.record.len(), 8);
     assert_eq!((report.record[0].at, report.record[0].er), (sec(20), Some(48.0)));
-    let future = Question::Report { period: Period { name: "period".into(), from: sec(300), to: sec(400) } };
+    let future = Query::Report { period: Period { name: "period".into(), from: sec(300), to: sec(400) } };
     assert_eq!(store.answer(&future, sec(100)), Err(HistoryError::EmptyPeriod));
 }
 
@@ -432,7 +432,7 @@ fn a_period_of_a_century_is_answered_at_once_and_a_record_of_millions_of_rows_re
     let century = 3_000_000_000;
     assert_eq!(series(&store, PV, -century, century, 3).buckets.len(), 3);
     let period = Period { name: "period".into(), from: sec(0), to: sec(century) };
-    let answer = store.answer(&Question::Report { period }, sec(century));
+    let answer = store.answer(&Query::Report { period }, sec(century));
     assert!(matches!(answer, Err(HistoryError::TooManyRows { .. })));
 }
 
@@ -490,7 +490,7 @@ fn a_stopped_station_leaves_every_curve_ended_and_a_running_one_answers() {
     handle.records.blocking_send(vec![good(PV, 5, 27.0), Record::Alarm(step(6, "high", AlarmStep::Raised))]).unwrap();
     let (reply, answer) = tokio::sync::oneshot::channel();
     let period = Period { name: "period".into(), from: sec(0), to: sec(10) };
-    handle.queries.blocking_send((1, Query { question: Question::Report { period }, reply })).unwrap();
+    handle.queries.blocking_send((1, QueryRequest { query: Query::Report { period }, reply })).unwrap();
     let Ok(Ok(Answer::Report(report))) = answer.blocking_recv() else { panic!("no report") };
     assert_eq!(report.tags[0].last, Some(27.0));
     assert_eq!(handle.status.borrow().lost, 0);

@@ -11,7 +11,7 @@ use crate::{
     report::{figures::Figures, figures::Label, hold::HOLD_MAX},
 };
 
-/// The samples of a tag in order of time, as one plain question has them.
+/// The samples of a tag in order of time, as one plain query has them.
 fn by_itself(store: &Store, tag: TagId) -> Vec<Sample> {
     let sql = "SELECT utc, value, quality FROM sample WHERE tag = ? ORDER BY utc, rowid";
     let mut statement = store.db.prepare(sql).unwrap();
@@ -46,17 +46,17 @@ proptest! {
         let (from, to) = (sec(from), sec(from + length));
         let until = to - Duration::from_secs(1);
         let tags = [2, 0, 2, 1].map(TagId);
-        let question = Question::Series { tags: tags.to_vec(), from, to, buckets };
+        let query = Query::Series { tags: tags.to_vec(), from, to, buckets };
         let samples = |tag| by_itself(&store, tag).into_iter().filter(|s| from - HOLD_MAX <= s.at && s.at < to);
         let curve = |tag| {
             let mut curve = Curve::new(tag, Span { from, to, until }, buckets);
             samples(tag).for_each(|sample| curve.next(sample));
             curve.end()
         };
-        prop_assert_eq!(store.answer(&question, until), Ok(Answer::Series(tags.map(curve).to_vec())));
+        prop_assert_eq!(store.answer(&query, until), Ok(Answer::Series(tags.map(curve).to_vec())));
         if from < until {
             let period = Period { name: "period".into(), from, to };
-            let Ok(Answer::Report(report)) = store.answer(&Question::Report { period }, until) else { panic!("no report") };
+            let Ok(Answer::Report(report)) = store.answer(&Query::Report { period }, until) else { panic!("no report") };
             for (place, row) in report.tags.iter().enumerate() {
                 let mut figures = Figures::new(from, until);
                 samples(TagId(place as u16)).filter(|s| s.at < until).for_each(|sample| figures.next(sample));
@@ -98,7 +98,7 @@ fn a_damaged_block_costs_the_period_of_its_rows_and_is_named() {
     let handle = thread::start(&db, def(), Clock::starting_at(sec(rows), 1.0)).unwrap();
     let (reply, answer) = tokio::sync::oneshot::channel();
     let period = Period { name: "period".into(), from: sec(0), to: sec(rows) };
-    handle.queries.blocking_send((1, Query { question: Question::Report { period }, reply })).unwrap();
+    handle.queries.blocking_send((1, QueryRequest { query: Query::Report { period }, reply })).unwrap();
     let answer = answer.blocking_recv().unwrap();
     let Ok(Answer::Report(report)) = answer else { panic!("{answer:?}") };
     let lost: i64 = report.unreadable.iter().map(|gap| gap.to.duration_since(gap.from).as_secs()).sum();

@@ -161,8 +161,8 @@ proptest! {
         store.append(&journal.iter().cloned().map(Record::Alarm).collect::<Vec<_>>()).unwrap();
         let from = instant(&journal, a, from_step);
         let until = instant(&journal, a + (1.0 - a) * b, until_step).max(from + Duration::from_secs(1));
-        let question = Question::AlarmQuality { from, to: until };
-        let answer = store.answer(&question, until).unwrap();
+        let query = Query::AlarmQuality { from, to: until };
+        let answer = store.answer(&query, until).unwrap();
         prop_assert_eq!(answer, Answer::AlarmQuality(Box::new(counted(&store, from, until))));
     }
 }

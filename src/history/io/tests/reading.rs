@@ -1,4 +1,4 @@
-//! Questions beside the recording: they do not delay it, and end when they are cancelled or their time is over.
+//! Queries beside the recording: they do not delay it, and end when they are cancelled or their time is over.
 
 use std::sync::mpsc as std_mpsc;
 
@@ -13,7 +13,7 @@ use crate::history::io::{
 /// Answers that never end by themselves, and two queues that say when one has begun and how it ended.
 fn endless() -> (Answerer, std_mpsc::Receiver<()>, std_mpsc::Receiver<String>) {
     let ((begins, begun), (ends, ended)) = (std_mpsc::channel(), std_mpsc::channel());
-    let answer = move |store: &Store, _: &Question, _: Timestamp| {
+    let answer = move |store: &Store, _: &Query, _: Timestamp| {
         begins.send(()).unwrap();
         let result = store.db.execute_batch("SELECT count(*) FROM range(1000000000000000)");
         let why = result.unwrap_err().to_string();
@@ -23,9 +23,9 @@ fn endless() -> (Answerer, std_mpsc::Receiver<()>, std_mpsc::Receiver<String>) {
     (Arc::new(answer), begun, ended)
 }
 
-fn query() -> (Query, oneshot::Receiver<Result<Answer, HistoryError>>) {
+fn query() -> (QueryRequest, oneshot::Receiver<Result<Answer, HistoryError>>) {
     let (reply, answer) = oneshot::channel();
-    (Query { question: Question::Journal { from: sec(0), to: sec(9), limit: 1 }, reply }, answer)
+    (QueryRequest { query: Query::Journal { from: sec(0), to: sec(9), limit: 1 }, reply }, answer)
 }
 
 #[test]
@@ -33,9 +33,9 @@ fn records_are_committed_while_a_question_runs() {
     let (_folder, db) = folder();
     let (answer, begun, ended) = endless();
     let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), answer).unwrap();
-    let questions: Vec<_> = (0..QUESTIONS_MAX as u32).map(|terminal| (terminal, query())).collect();
+    let queries: Vec<_> = (0..QUESTIONS_MAX as u32).map(|terminal| (terminal, query())).collect();
     let mut answers = Vec::new();
-    for (terminal, (query, answer)) in questions {
+    for (terminal, (query, answer)) in queries {
         handle.queries.blocking_send((terminal, query)).unwrap();
         begun.recv().unwrap();
         answers.push(answer);
@@ -45,8 +45,8 @@ fn records_are_committed_while_a_question_runs() {
     let mut status = handle.status.clone();
     let committed =
         async { tokio::time::timeout(Duration::from_secs(30), status.wait_for(|status| status.rows == 1)).await };
-    assert!(runtime.block_on(committed).is_ok(), "no commit while questions run");
-    // A cancelled question is not worked on any longer.
+    assert!(runtime.block_on(committed).is_ok(), "no commit while queries run");
+    // A cancelled query is not worked on any longer.
     drop(answers);
     assert!((0..QUESTIONS_MAX).all(|_| ended.recv().unwrap().contains("INTERRUPT")));
     handle.stop();
@@ -112,10 +112,10 @@ fn alarms_and_actions_have_room_when_samples_have_filled_the_queue() {
     assert_eq!(batches, [vec![alarm], vec![Record::Action(deed(sent))]]);
 }
 
-/// A reader by itself: where stores are handed over, and where questions go.
+/// A reader by itself: where stores are handed over, and where queries go.
 struct Alone {
     stores: mpsc::Sender<Option<Store>>,
-    queries: mpsc::Sender<(u32, Query)>,
+    queries: mpsc::Sender<(u32, QueryRequest)>,
     requests: mpsc::Receiver<Request>,
 }
 
@@ -175,7 +175,7 @@ async fn a_report_waits_for_the_commit_but_not_for_ever() {
     for answers in [true, false] {
         let (reply, mut answer) = oneshot::channel();
         let period = Period { name: "period".into(), from: sec(0), to: sec(10) };
-        reader.queries.send((1, Query { question: Question::Report { period }, reply })).await.unwrap();
+        reader.queries.send((1, QueryRequest { query: Query::Report { period }, reply })).await.unwrap();
         let Some(Request::Commit(done)) = reader.requests.recv().await else { panic!("no commit asked for") };
         assert!(answer.try_recv().is_err(), "answered before the commit");
         if answers {
@@ -220,16 +220,16 @@ fn a_checkpoint_finds_its_moment_between_questions_without_pause() {
         for reader in readers {
             let (answered, done) = (&answered, &done);
             scope.spawn(move || {
-                let question = Question::Series { tags: vec![PV], from: sec(0), to: sec(rows), buckets: 100 };
+                let query = Query::Series { tags: vec![PV], from: sec(0), to: sec(rows), buckets: 100 };
                 while done.load(Ordering::Relaxed) == 0 {
-                    assert!(matches!(reader.answer(&question, sec(rows)), Ok(Answer::Series(_))));
+                    assert!(matches!(reader.answer(&query, sec(rows)), Ok(Answer::Series(_))));
                     answered.fetch_add(1, Ordering::Relaxed);
                 }
             });
         }
         let mut logged = 0;
         for at in rows..rows + 600 {
-            // As many questions as commits: they overlap, and none of them pauses.
+            // As many queries as commits: they overlap, and none of them pauses.
             while answered.load(Ordering::Relaxed) < (at - rows) as usize / 10 {
                 std::thread::yield_now();
             }
@@ -297,12 +297,12 @@ fn the_longest_lists_that_are_answered_fit_in_the_memory_of_the_engine() {
     store.db.execute_batch(&rows).unwrap();
     let (from, to) = (sec(0), sec(8 * 3_600));
     let period = Period { name: "period".into(), from, to };
-    let Ok(Answer::Report(report)) = store.answer(&Question::Report { period }, to) else { panic!("no report") };
+    let Ok(Answer::Report(report)) = store.answer(&Query::Report { period }, to) else { panic!("no report") };
     assert_eq!((report.alarms.len() as u64, report.actions.len() as u64), (ROWS_MAX, ROWS_MAX));
     let lists = [
-        Question::AlarmQuality { from, to },
-        Question::Journal { from, to, limit: ROWS_MAX as usize },
-        Question::Actions { from, to, limit: ROWS_MAX as usize },
+        Query::AlarmQuality { from, to },
+        Query::Journal { from, to, limit: ROWS_MAX as usize },
+        Query::Actions { from, to, limit: ROWS_MAX as usize },
     ];
     for list in lists {
         let answer = store.answer(&list, to);

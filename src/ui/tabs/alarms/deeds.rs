@@ -1,4 +1,4 @@
-//! What an operator does with alarms: the windows that ask, and the orders that need no question.
+//! What an operator does with alarms: the windows that ask, and the orders that need no query.
 
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ use crate::{
 
 /// Times that are offered for the shelf, minutes.
 const SHELVE_MIN: [u64; 4] = [15, 30, 60, 240];
-/// Alarms that a question names.
+/// Alarms that a query names.
 const NAMED: usize = 6;
 
 /// Acknowledges one alarm; where the plant file wants a note it is asked for.

@@ -9,7 +9,7 @@ use super::{
     span,
 };
 use crate::{
-    history::{Answer, HistoryError, Question},
+    history::{Answer, HistoryError, Query},
     plant::{
         alarm::AlarmState,
         event::LineState,
@@ -102,10 +102,10 @@ impl Handover {
         self.errand.asked(*number, cx.steady());
         // What the shift before wrote down is for this one.
         let from = period::before(cx.def(), &shown).map_or(shown.from, |before| before.from);
-        vec![UiAction::ask(Tab::Alarms, *number, Question::Actions { from, to: shown.to, limit: ROWS })]
+        vec![UiAction::ask(Tab::Alarms, *number, Query::Actions { from, to: shown.to, limit: ROWS })]
     }
 
-    /// Is the answer to question `number` waited for?
+    /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
         self.errand.awaits(number)
     }

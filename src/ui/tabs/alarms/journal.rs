@@ -8,7 +8,7 @@ use super::{
     span,
 };
 use crate::{
-    history::{Answer, HistoryError, Question},
+    history::{Answer, HistoryError, Query},
     plant::record::{ActionRecord, AlarmRecord},
     report::Period,
     ui::{
@@ -107,19 +107,19 @@ impl Journal {
         let (from, to) = self.period.as_ref().map_or((to - SPAN, to), |period| (period.from, period.to));
         let limit = self.limit();
         let mut acts = Vec::new();
-        let mut due = |errand: &mut Errand, question| {
+        let mut due = |errand: &mut Errand, query| {
             if span::due(cx, errand, EVERY_S, self.period.as_ref()) {
                 *number = number.wrapping_add(1);
                 errand.asked(*number, cx.steady());
-                acts.push(UiAction::ask(Tab::Alarms, *number, question));
+                acts.push(UiAction::ask(Tab::Alarms, *number, query));
             }
         };
-        due(&mut self.steps, Question::Journal { from, to, limit });
-        due(&mut self.deeds, Question::Actions { from, to, limit });
+        due(&mut self.steps, Query::Journal { from, to, limit });
+        due(&mut self.deeds, Query::Actions { from, to, limit });
         acts
     }
 
-    /// Is the answer to question `number` waited for?
+    /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
         self.steps.awaits(number) || self.deeds.awaits(number)
     }

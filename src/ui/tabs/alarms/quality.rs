@@ -9,7 +9,7 @@ use super::{
     span,
 };
 use crate::{
-    history::{Answer, HistoryError, Question},
+    history::{Answer, HistoryError, Query},
     plant::alarm::{
         AlarmState, Figures,
         quality::{GOALS, Verdict},
@@ -68,10 +68,10 @@ impl Quality {
         }
         *number = number.wrapping_add(1);
         self.errand.asked(*number, cx.steady());
-        vec![UiAction::ask(Tab::Alarms, *number, Question::AlarmQuality { from: period.from, to: period.to })]
+        vec![UiAction::ask(Tab::Alarms, *number, Query::AlarmQuality { from: period.from, to: period.to })]
     }
 
-    /// Is the answer to question `number` waited for?
+    /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
         self.errand.awaits(number)
     }

@@ -5,7 +5,7 @@ use jiff::SignedDuration;
 use super::super::{errand::Errand, reports::period};
 use crate::{report::Period, ui::ViewContext};
 
-/// An answer that has not come after so long (real time) counts as lost: a question over weeks may take its time.
+/// An answer that has not come after so long (real time) counts as lost: a query over weeks may take its time.
 const PATIENCE_S: f64 = 30.0;
 
 /// The shift before the one shown; from the present it is the running one.

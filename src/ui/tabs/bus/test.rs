@@ -182,9 +182,9 @@ pub fn start(at: &Place, tool: Tool) -> Result<UiAction, String> {
     if let Some(why) = closed(at).filter(|_| !alone) {
         return Err(why);
     }
-    let question = danger(at, &tool);
+    let query = danger(at, &tool);
     let order = Command::Test(at.id, tool);
-    Ok(match question {
+    Ok(match query {
         Some(words) => {
             UiAction::Open(Modal::Confirm(Confirm::order(format!("test of {}", at.settings.name), words, order)))
         }

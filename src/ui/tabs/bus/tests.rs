@@ -7,7 +7,7 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use crate::{
     access::{Durability, Wish},
     bus::frame::with_crc,
-    history::{Answer, Question},
+    history::{Answer, Query},
     plant::{
         command::{Command, OrderId},
         def::{Framing, LineId, Serial},
@@ -476,7 +476,7 @@ fn the_day_of_a_line_is_asked_for_and_shown_as_a_trend() {
     let mut model = model(&Fixture::traffic(), Theme::FULL);
     let effects = type_keys(&mut model, "6");
     let asked = effects.into_iter().find_map(|effect| match effect {
-        Effect::Ask(id, Question::LineMinutes { line: L1, .. }) => Some(id),
+        Effect::Ask(id, Query::LineMinutes { line: L1, .. }) => Some(id),
         _ => None,
     });
     let minute = |ago: i64| LineMinute {

@@ -1,4 +1,4 @@
-//! The question before a restore: what would be written, and what the profile wants said before any of it is.
+//! The query before a restore: what would be written, and what the profile wants said before any of it is.
 
 use std::sync::Arc;
 
@@ -23,8 +23,8 @@ const ROOM: u16 = 68;
 /// Lines of warnings that a window of 24 rows has room for.
 const WARNINGS_MAX: usize = 6;
 
-/// The question whether to write these changes.
-pub fn question(
+/// The query whether to write these changes.
+pub fn query(
     cx: &ViewContext,
     device: &DeviceDef,
     source: &Source,
@@ -33,7 +33,7 @@ pub fn question(
 ) -> Confirm {
     let from: Arc<str> = source.words(cx).into();
     let count = if changes.len() == 1 { "1 value".to_owned() } else { format!("{} values", changes.len()) };
-    let question =
+    let query =
         format!("Write {count} to {}, one after the other, each read back? The first failure stops it.", device.name);
     let warnings = warnings(cx.def(), &changes);
     let shown = if warnings.len() <= 2 { 6 } else { 4 };
@@ -47,7 +47,7 @@ pub fn question(
     notes.extend(warnings);
     let title = format!("{from} → {}", device.name);
     let wish = RestoreWish { device: device.id, from, set, changes };
-    Confirm::order(title, question, Command::Restore(Box::new(wish))).with_notes(notes).signed(cx)
+    Confirm::order(title, query, Command::Restore(Box::new(wish))).with_notes(notes).signed(cx)
 }
 
 fn change_words(cx: &ViewContext, change: &Change) -> String {

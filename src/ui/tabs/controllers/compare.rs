@@ -75,7 +75,7 @@ impl Compare {
         self.first = self.first.saturating_add_signed(by).min(last);
     }
 
-    /// The question whether to write the differences, or why they cannot be written.
+    /// The query whether to write the differences, or why they cannot be written.
     pub fn restore(&self, cx: &ViewContext, device: &DeviceDef) -> Result<Confirm, Notice> {
         let words = |words: Vec<String>| Err(Notice::new(device.name.clone(), words));
         if let Some(notice) = Notice::unreachable(cx, device.id) {
@@ -93,7 +93,7 @@ impl Compare {
                 return words(lines);
             }
         };
-        Ok(ask::question(cx, device, &self.source, set, changes))
+        Ok(ask::query(cx, device, &self.source, set, changes))
     }
 
     /// Draws the page.

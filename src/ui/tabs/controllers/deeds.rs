@@ -49,11 +49,11 @@ pub(super) fn write(cx: &ViewContext, tag: Option<TagId>) -> Vec<UiAction> {
     tag.and_then(|tag| Modal::write(cx, tag)).map(UiAction::Open).into_iter().collect()
 }
 
-/// The question whether to write this value, unless nothing can be written now.
+/// The query whether to write this value, unless nothing can be written now.
 pub(super) fn confirm(cx: &ViewContext, tag: TagId, value: f64) -> Vec<UiAction> {
     let device = cx.def().tag(tag).device;
-    let question = || Modal::Confirm(Confirm::write(cx, tag, value));
-    vec![UiAction::Open(Notice::unreachable(cx, device).map_or_else(question, Modal::Notice))]
+    let query = || Modal::Confirm(Confirm::write(cx, tag, value));
+    vec![UiAction::Open(Notice::unreachable(cx, device).map_or_else(query, Modal::Notice))]
 }
 
 /// Auto-tuning at work is stopped, else the window asks which kind is wanted.

@@ -151,7 +151,7 @@ fn row(cx: &ViewContext, device: &DeviceDef, source: &Source, selected: bool) ->
     }
 }
 
-/// What a set would hold that was taken now, for the question for its name.
+/// What a set would hold that was taken now, for the query for its name.
 pub fn save_hint(cx: &ViewContext, device: DeviceId) -> String {
     let set = parameter_set::take(cx.def(), device, "", "".into(), cx.now, &trusted(cx));
     match set.missing.as_slice() {
@@ -163,7 +163,7 @@ pub fn save_hint(cx: &ViewContext, device: DeviceId) -> String {
     }
 }
 
-/// The question before a set is written over: whose it is, for it may be of another kind of device.
+/// The query before a set is written over: whose it is, for it may be of another kind of device.
 pub fn replace_words(cx: &ViewContext, there: &StoredSet) -> String {
     let name = &there.name;
     match &there.set {

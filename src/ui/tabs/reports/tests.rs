@@ -23,7 +23,7 @@ use crate::{
 
 struct Stand {
     model: Model,
-    asked: Vec<(AskId, Question)>,
+    asked: Vec<(AskId, Query)>,
     saved: Vec<(PathBuf, Vec<u8>)>,
     /// What the station says to an export.
     granted: Result<Durability, String>,
@@ -41,7 +41,7 @@ impl Stand {
     fn send(&mut self, msg: Msg) {
         for effect in update(&mut self.model, msg) {
             match effect {
-                Effect::Ask(id, question) if id.tab == Tab::Reports => self.asked.push((id, question)),
+                Effect::Ask(id, query) if id.tab == Tab::Reports => self.asked.push((id, query)),
                 Effect::SaveReport { path, bytes, .. } => self.saved.push((path, bytes)),
                 Effect::Wish(id, Wish::Exported { file, sha256 }) => {
                     assert_eq!((file.ends_with(".csv"), sha256.len()), (true, 64));
@@ -73,8 +73,8 @@ impl Stand {
 
     /// Answers what was asked; `full` with figures, else with an empty report.
     fn answer(&mut self, full: bool) {
-        for (id, question) in std::mem::take(&mut self.asked) {
-            let Question::Report { period } = question else { panic!("reports ask for reports: {question:?}") };
+        for (id, query) in std::mem::take(&mut self.asked) {
+            let Query::Report { period } = query else { panic!("reports ask for reports: {query:?}") };
             self.send(Msg::Answer(id, Ok(Answer::Report(Box::new(report(period, full))))));
         }
     }
@@ -225,7 +225,7 @@ fn figures_never_stand_under_the_name_of_another_shift() {
     assert!(stand.screen().contains("morning 2026-11-21") && !stand.screen().contains("58.31"));
     let asked = std::mem::take(&mut stand.asked);
     stand.press("←");
-    let Some((id, Question::Report { period })) = asked.into_iter().next() else { panic!("a report is asked for") };
+    let Some((id, Query::Report { period })) = asked.into_iter().next() else { panic!("a report is asked for") };
     stand.send(Msg::Answer(id, Ok(Answer::Report(Box::new(report(period, true))))));
     assert!(
         stand.screen().contains("night 2026-11-20") && !stand.screen().contains("58.31"),

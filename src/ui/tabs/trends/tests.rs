@@ -21,7 +21,7 @@ use crate::{
 /// A terminal on the trends tab, and the history that answers it.
 struct Stand {
     model: Model,
-    asked: Vec<(AskId, Question)>,
+    asked: Vec<(AskId, Query)>,
     /// When the store began.
     begin: Timestamp,
     /// Nothing was recorded here.
@@ -62,7 +62,7 @@ impl Stand {
     fn send(&mut self, msg: Msg) {
         let effects = update(&mut self.model, msg);
         self.asked.extend(effects.into_iter().filter_map(|effect| match effect {
-            Effect::Ask(id, question) if id.tab == Tab::Trends => Some((id, question)),
+            Effect::Ask(id, query) if id.tab == Tab::Trends => Some((id, query)),
             _ => None,
         }));
     }
@@ -83,20 +83,20 @@ impl Stand {
     /// Answers everything that was asked, until nothing more is asked.
     fn answer(&mut self) {
         for _ in 0..10 {
-            for (id, question) in std::mem::take(&mut self.asked) {
-                let answer = self.history(&question);
+            for (id, query) in std::mem::take(&mut self.asked) {
+                let answer = self.history(&query);
                 self.send(Msg::Answer(id, Ok(answer)));
             }
         }
         assert_eq!(self.asked, [], "the tab never comes to rest");
     }
 
-    fn history(&self, question: &Question) -> Answer {
-        match question {
-            Question::Series { tags, from, to, buckets } => {
+    fn history(&self, query: &Query) -> Answer {
+        match query {
+            Query::Series { tags, from, to, buckets } => {
                 Answer::Series(tags.iter().map(|tag| self.series(*tag, *from, *to, *buckets)).collect())
             }
-            Question::Journal { .. } => Answer::Journal(vec![AlarmRecord {
+            Query::Journal { .. } => Answer::Journal(vec![AlarmRecord {
                 at: ago(240),
                 subject: "TIC-1.PV".into(),
                 text: "temperature high".into(),
@@ -229,20 +229,20 @@ fn everything_since_the_first_value_of_the_day() {
     insta::assert_snapshot!(stand.screen());
 }
 
-/// Which questions are on their way, by what they ask about.
-fn kinds(asked: &[(AskId, Question)]) -> String {
-    let kind = |question: &Question| match question {
-        Question::Series { buckets: HOUR_COLUMNS, .. } => "hour",
-        Question::Series { .. } => "curves",
-        Question::Journal { .. } => "alarms",
-        Question::Actions { .. }
-        | Question::Audit { .. }
-        | Question::LineMinutes { .. }
-        | Question::Report { .. }
-        | Question::AlarmQuality { .. }
-        | Question::Values { .. } => "other",
+/// Which queries are on their way, by what they ask about.
+fn kinds(asked: &[(AskId, Query)]) -> String {
+    let kind = |query: &Query| match query {
+        Query::Series { buckets: HOUR_COLUMNS, .. } => "hour",
+        Query::Series { .. } => "curves",
+        Query::Journal { .. } => "alarms",
+        Query::Actions { .. }
+        | Query::Audit { .. }
+        | Query::LineMinutes { .. }
+        | Query::Report { .. }
+        | Query::AlarmQuality { .. }
+        | Query::Values { .. } => "other",
     };
-    asked.iter().map(|(_, question)| kind(question)).collect::<Vec<_>>().join(" ")
+    asked.iter().map(|(_, query)| kind(query)).collect::<Vec<_>>().join(" ")
 }
 
 #[test]
@@ -265,8 +265,8 @@ fn an_answer_to_an_older_question_is_ignored() {
     stand.live(20, |_| Some(60.0));
     assert_eq!(kinds(&stand.asked), "curves alarms", "the answers are overdue, and to another view");
     let before = stand.screen();
-    for (id, question) in old.into_iter().take(2) {
-        let answer = stand.history(&question);
+    for (id, query) in old.into_iter().take(2) {
+        let answer = stand.history(&query);
         stand.send(Msg::Answer(id, Ok(answer)));
     }
     assert_eq!(stand.screen(), before);
@@ -281,8 +281,8 @@ fn a_late_answer_is_waited_for_and_shown() {
     stand.live(40, |_| Some(60.0));
     assert_eq!(kinds(&stand.asked), "", "not asked again while the history is busy with it");
     let before = stand.screen();
-    for (id, question) in asked {
-        let answer = stand.history(&question);
+    for (id, query) in asked {
+        let answer = stand.history(&query);
         stand.send(Msg::Answer(id, Ok(answer)));
     }
     assert_ne!(stand.screen(), before);
@@ -387,8 +387,8 @@ fn figures_of_another_view_do_not_stand_beside_this_one() {
     assert!(!stand.screen().contains("58.2"), "until the history has answered");
     let old = std::mem::take(&mut stand.asked);
     stand.press("-");
-    for (id, question) in old {
-        let answer = stand.history(&question);
+    for (id, query) in old {
+        let answer = stand.history(&query);
         stand.send(Msg::Answer(id, Ok(answer)));
     }
     assert!(!stand.screen().contains("58.2"), "the answer was for the window before");

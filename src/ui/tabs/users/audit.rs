@@ -6,7 +6,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::super::{Tab, errand::Errand, reports::period};
 use crate::{
-    history::{Answer, HistoryError, Question},
+    history::{Answer, HistoryError, Query},
     plant::record::ActionRecord,
     report::Period,
     ui::{
@@ -95,12 +95,12 @@ pub struct Audit {
 }
 
 impl Audit {
-    /// The last week; questions are counted on from `asked`, so that no older answer fits.
+    /// The last week; queries are counted on from `asked`, so that no older answer fits.
     pub fn new(asked: u32) -> Audit {
         Audit { number: asked, ..Audit::default() }
     }
 
-    /// Questions asked so far.
+    /// Queries asked so far.
     pub fn asked(&self) -> u32 {
         self.number
     }
@@ -174,15 +174,15 @@ impl Audit {
         let until = cx.now + SignedDuration::from_secs(1);
         let (from, to) = self.period.as_ref().map_or((until - SPAN, until), |period| (period.from, period.to));
         let (words, by, action) = (self.words.clone(), self.who.clone(), self.action.clone());
-        vec![UiAction::ask(Tab::Users, self.number, Question::Audit { from, to, words, by, action, limit: ROWS })]
+        vec![UiAction::ask(Tab::Users, self.number, Query::Audit { from, to, words, by, action, limit: ROWS })]
     }
 
-    /// Is the answer to question `number` waited for?
+    /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
         self.errand.awaits(number) && !self.errand.is_wanted()
     }
 
-    /// The history answered question `number`.
+    /// The history answered query `number`.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
         // An answer to a search that is no longer meant is not shown.
         if self.errand.answered(number, cx.steady()).is_none() || self.errand.is_wanted() {
