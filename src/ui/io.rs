@@ -20,7 +20,7 @@ use tokio::{
     time::{Instant, MissedTickBehavior, interval, sleep_until},
 };
 
-use super::{AskId, Effect, Leaving, Model, Msg, tabs::Tab, theme::Theme, update, view};
+use super::{Effect, Leaving, Model, Msg, QueryId, tabs::Tab, theme::Theme, update, view};
 use crate::{
     access::Wish,
     history::{HistoryError, Query, io::QueryRequest},
@@ -99,7 +99,7 @@ struct Loop {
     /// For answers and saved reports, which come from other tasks, with the plant (its count) that they were asked of.
     outbox: mpsc::Sender<(u32, Msg)>,
     /// Queries on their way, and what waits for their answers.
-    asked: Vec<(AskId, AbortHandle)>,
+    asked: Vec<(QueryId, AbortHandle)>,
     /// When the next frame is due; `None` while the screen is up to date.
     redraw_at: Option<Instant>,
     drawn_at: Option<Instant>,
@@ -188,7 +188,7 @@ impl Loop {
                     }
                 }
                 Effect::Wish(id, wish) => self.wish(id, wish),
-                Effect::Ask(id, query) => self.ask(id, query),
+                Effect::Query(id, query) => self.ask(id, query),
                 Effect::Drill(command) => {
                     if let Some(port) = &self.session.drill {
                         // What is in force is seen in the next status; a wish that was lost changes nothing there.
@@ -211,7 +211,7 @@ impl Loop {
         self.asked.retain(|(_, waiting)| !waiting.is_finished());
     }
 
-    fn ask(&mut self, id: AskId, query: Query) {
+    fn ask(&mut self, id: QueryId, query: Query) {
         let (reply, answer) = oneshot::channel();
         let sent = self.session.ask(QueryRequest { query, reply });
         let (outbox, plants) = (self.outbox.clone(), self.model.plants);
@@ -226,7 +226,7 @@ impl Loop {
         self.asked.push((id, waiting.abort_handle()));
     }
 
-    fn wish(&self, id: AskId, wish: Wish) {
+    fn wish(&self, id: QueryId, wish: Wish) {
         let (session, outbox, plants) = (self.session.clone(), self.outbox.clone(), self.model.plants);
         tokio::spawn(async move {
             let answer = session.wish(wish).await;

@@ -35,7 +35,7 @@ use crate::{
 use drawn::Drawn;
 use keys::Global;
 use modal::{Confirm, Modal};
-pub use msg::{AskId, Effect, Leaving, Msg, UiAction};
+pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
 use presence::Presence;
 use tabs::{Tab, Tabs, alarms::deeds};
 use theme::Theme;
@@ -418,7 +418,7 @@ fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
                 if let Some(Modal::Sheet(sheet)) = &mut model.modal {
                     sheet.sent(number);
                 }
-                effects.push(Effect::Wish(AskId { tab, number }, wish));
+                effects.push(Effect::Wish(QueryId { tab, number }, wish));
             }
             UiAction::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
             UiAction::Do(effect) => effects.push(effect),

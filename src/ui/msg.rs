@@ -31,11 +31,11 @@ pub enum Msg {
     /// News of who sits here.
     Standing(Arc<Standing>),
     /// A wish was granted, or why not.
-    Granted(AskId, Result<Durability, String>),
+    Granted(QueryId, Result<Durability, String>),
     /// News of the simulation.
     Drill(Arc<drill::Status>),
     /// The history answered.
-    Answer(AskId, Result<Answer, HistoryError>),
+    Answer(QueryId, Result<Answer, HistoryError>),
     /// A file of this tab was written, or why not.
     Saved(Tab, Result<PathBuf, String>),
     /// The station did not take this order: its queue is full, or it has gone.
@@ -55,9 +55,9 @@ pub enum Effect {
     /// Give the station an order.
     Order(OrderRequest),
     /// Wish something of the station; answered by [`Msg::Granted`].
-    Wish(AskId, Wish),
+    Wish(QueryId, Wish),
     /// Ask the history.
-    Ask(AskId, Query),
+    Query(QueryId, Query),
     /// Let something go wrong in the simulation, or mend it.
     Drill(drill::SimCommand),
     /// Write a report or a capture; answered by [`Msg::Saved`].
@@ -79,7 +79,7 @@ pub enum Effect {
 
 /// Identifies a query: who asked, and its running count. An answer to an older query is ignored by the tab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct AskId {
+pub struct QueryId {
     /// The tab that asked.
     pub tab: Tab,
     /// Chosen by the tab.
@@ -126,8 +126,8 @@ pub enum Leaving {
 }
 
 impl UiAction {
-    /// Asks the history on behalf of a tab.
-    pub fn ask(tab: Tab, number: u32, query: Query) -> UiAction {
-        UiAction::Do(Effect::Ask(AskId { tab, number }, query))
+    /// Queries the history on behalf of a tab.
+    pub fn query(tab: Tab, number: u32, query: Query) -> UiAction {
+        UiAction::Do(Effect::Query(QueryId { tab, number }, query))
     }
 }

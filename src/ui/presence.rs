@@ -5,7 +5,7 @@ use std::{mem, sync::Arc, time::Duration};
 use crossterm::event::{KeyCode, KeyEvent};
 
 use super::{
-    AskId, Effect, Model, UiAction, context,
+    Effect, Model, QueryId, UiAction, context,
     keys::{self, Global},
     modal::{Modal, Notice, Sheet, sheet::Purpose},
     tabs::{Tab, Tabs, login},
@@ -202,12 +202,12 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
         return None;
     }
     model.presence.active_at = Some(model.clock.phase);
-    Some(Effect::Wish(AskId { tab: Tab::Login, number: 0 }, Wish::Active))
+    Some(Effect::Wish(QueryId { tab: Tab::Login, number: 0 }, Wish::Active))
 }
 
 /// The station's answer to a request: for the window that waits for it, also one that a lock has hidden, else for the tab,
 /// which waits for its last request only.
-pub(super) fn on_granted(model: &mut Model, id: AskId, answer: Result<Durability, String>) -> Vec<UiAction> {
+pub(super) fn on_granted(model: &mut Model, id: QueryId, answer: Result<Durability, String>) -> Vec<UiAction> {
     if answer == Ok(Durability::NotRecorded) {
         model.note = Some(NOT_RECORDED);
     }

@@ -69,7 +69,7 @@ pub fn order_of(effects: &[Effect]) -> Option<&Command> {
     effects.iter().find_map(|effect| match effect {
         Effect::Order(order) => Some(&order.command),
         Effect::Wish(..) => None,
-        Effect::Ask(..)
+        Effect::Query(..)
         | Effect::Drill(_)
         | Effect::SaveReport { .. }
         | Effect::Bell

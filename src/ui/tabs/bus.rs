@@ -21,7 +21,7 @@ use ratatui::{Frame, layout::Rect};
 
 pub use window::Window;
 
-use super::{Tab, errand::Errand};
+use super::{Tab, periodic_query::PeriodicQuery};
 use crate::{
     history::{Answer, HistoryError},
     plant::{
@@ -173,7 +173,7 @@ pub struct Bus {
     pub(super) test: test::Bench,
     /// How the line did over the last day, and the query for it.
     minutes: Vec<LineMinute>,
-    errand: Errand,
+    periodic: PeriodicQuery,
     asked: u32,
 }
 
@@ -188,7 +188,7 @@ impl Bus {
             frames: frames::Ring::default(),
             test: test::Bench::default(),
             minutes: Vec::new(),
-            errand: Errand::default(),
+            periodic: PeriodicQuery::default(),
             asked: 0,
         }
     }
@@ -263,22 +263,22 @@ impl Bus {
         if let (Page::Frames, Some(at)) = (self.page, Place::of(cx, self.line)) {
             self.frames.follow(cx, &at);
         }
-        if self.page != Page::Line || !self.errand.due(cx.steady(), ASK_EVERY, PATIENCE) {
+        if self.page != Page::Line || !self.periodic.due(cx.steady(), ASK_EVERY, PATIENCE) {
             return Vec::new();
         }
         self.asked = self.asked.wrapping_add(1);
-        self.errand.asked(self.asked, cx.steady());
-        vec![UiAction::ask(Tab::Bus, self.asked, line_trend::query(self.line, cx.now))]
+        self.periodic.asked(self.asked, cx.steady());
+        vec![UiAction::query(Tab::Bus, self.asked, line_trend::query(self.line, cx.now))]
     }
 
     /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
-        self.errand.awaits(number)
+        self.periodic.awaits(number)
     }
 
     /// The history has answered. Without an answer the day before is left as it was.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
-        if let (Some(_), Ok(Answer::LineMinutes(minutes))) = (self.errand.answered(number, cx.steady()), answer) {
+        if let (Some(_), Ok(Answer::LineMinutes(minutes))) = (self.periodic.answered(number, cx.steady()), answer) {
             self.minutes = minutes;
         }
     }
@@ -346,7 +346,7 @@ impl Bus {
         self.frames.forget();
         self.test.first = None;
         self.minutes.clear();
-        self.errand = Errand::default();
+        self.periodic = PeriodicQuery::default();
     }
 
     fn scroll(&mut self, cx: &ViewContext, at: &Place, by: isize) {

@@ -30,7 +30,7 @@ use self::{
     sets::Source,
     table::Table,
 };
-use super::{Tab, errand::Errand};
+use super::{Tab, periodic_query::PeriodicQuery};
 use crate::{
     history::{Answer, HistoryError, Query, Series},
     plant::{
@@ -90,7 +90,7 @@ pub struct Controllers {
     asked_for: Asked,
     /// The small trend, of which tag, and the query for it.
     trend: Option<Series>,
-    errand: Errand,
+    periodic: PeriodicQuery,
     asked: u32,
 }
 
@@ -106,7 +106,7 @@ impl Controllers {
             set: 0,
             asked_for: Asked::Filter,
             trend: None,
-            errand: Errand::default(),
+            periodic: PeriodicQuery::default(),
             asked: 0,
         }
     }
@@ -122,7 +122,7 @@ impl Controllers {
             set: 0,
             asked_for: Asked::Filter,
             trend: None,
-            errand: Errand::default(),
+            periodic: PeriodicQuery::default(),
             asked: self.asked,
         };
     }
@@ -360,24 +360,24 @@ impl Controllers {
     pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let plate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
         let Some(plate) = plate.filter(|_| self.page == Page::Device) else { return Vec::new() };
-        if !self.errand.due(cx.steady(), TREND_EVERY, PATIENCE) {
+        if !self.periodic.due(cx.steady(), TREND_EVERY, PATIENCE) {
             return Vec::new();
         }
         self.asked = self.asked.wrapping_add(1);
-        self.errand.asked(self.asked, cx.steady());
+        self.periodic.asked(self.asked, cx.steady());
         let from = cx.now.checked_sub(plate::WINDOW).unwrap_or(cx.now);
         let query = Query::Series { tags: vec![plate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
-        vec![UiAction::ask(Tab::Controllers, self.asked, query)]
+        vec![UiAction::query(Tab::Controllers, self.asked, query)]
     }
 
     /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
-        self.errand.awaits(number)
+        self.periodic.awaits(number)
     }
 
     /// The history has answered.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
-        if let (Some(_), Ok(Answer::Series(series))) = (self.errand.answered(number, cx.steady()), answer) {
+        if let (Some(_), Ok(Answer::Series(series))) = (self.periodic.answered(number, cx.steady()), answer) {
             self.trend = series.into_iter().next();
         }
     }

@@ -144,7 +144,7 @@ impl Mimic {
                 let width = stretch(cx, cx.area).place(*place).width;
                 let query =
                     Query::Series { tags: vec![*tag], from, to: cx.now, buckets: usize::from(width.max(1)) * 2 };
-                Some(UiAction::ask(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(n as u32), query))
+                Some(UiAction::query(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(n as u32), query))
             }
             MimicItem::Tank { .. }
             | MimicItem::Valve { .. }

@@ -6,7 +6,7 @@
 pub mod alarms;
 pub mod bus;
 pub mod controllers;
-mod errand;
+mod periodic_query;
 pub mod faults;
 pub mod login;
 pub mod mimic;
@@ -20,7 +20,7 @@ use crossterm::event::KeyEvent;
 use ratatui::{Frame, layout::Rect};
 
 use super::{
-    AskId, Effect, UiAction, ViewContext,
+    Effect, QueryId, UiAction, ViewContext,
     drawn::Rows,
     keys::{self, Hint},
     presence,
@@ -252,7 +252,7 @@ impl Tabs {
     }
 
     /// Does the tab that asked still wait for the answer?
-    pub fn awaits(&self, id: AskId) -> bool {
+    pub fn awaits(&self, id: QueryId) -> bool {
         match id.tab {
             Tab::Mimic => self.mimic.awaits(id.number),
             Tab::Trends => self.trends.awaits(id.number),
@@ -266,7 +266,7 @@ impl Tabs {
     }
 
     /// An answer goes to the tab that asked, shown or not.
-    pub fn on_answer(&mut self, cx: &ViewContext, id: AskId, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+    pub fn on_answer(&mut self, cx: &ViewContext, id: QueryId, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         match id.tab {
             Tab::Mimic => self.mimic.on_answer(cx, id.number, answer),
             Tab::Trends => self.trends.on_answer(cx, id.number, answer),
@@ -289,7 +289,7 @@ impl Tabs {
     }
 
     /// A wish goes to the tab that wished, shown or not.
-    pub fn on_granted(&mut self, cx: &ViewContext, id: AskId, answer: Result<(), String>) -> Vec<UiAction> {
+    pub fn on_granted(&mut self, cx: &ViewContext, id: QueryId, answer: Result<(), String>) -> Vec<UiAction> {
         match id.tab {
             Tab::Login => self.login.on_granted(cx, answer),
             Tab::Reports => return self.reports.on_granted(answer),

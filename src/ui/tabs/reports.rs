@@ -12,7 +12,7 @@ use crossterm::event::KeyCode;
 use jiff::{SignedDuration, Timestamp};
 use ratatui::{Frame, layout::Rect};
 
-use super::{Outgoing, Tab, errand::Errand};
+use super::{Outgoing, Tab, periodic_query::PeriodicQuery};
 use crate::{
     history::{Answer, HistoryError, Query},
     plant::{def::CsvDialect, snapshot::Snapshot},
@@ -93,7 +93,7 @@ pub struct Reports {
     outgoing: Option<Outgoing>,
     /// First line shown.
     first: usize,
-    errand: Errand,
+    periodic: PeriodicQuery,
     number: u32,
 }
 
@@ -122,7 +122,7 @@ impl Reports {
             export: Export::Not,
             outgoing: None,
             first: 0,
-            errand: Errand::default(),
+            periodic: PeriodicQuery::default(),
             number: 0,
         }
     }
@@ -150,7 +150,7 @@ impl Reports {
                 self.dialect = other(self.dialect, cx.def().report.csv);
                 self.export = Export::Not;
             }
-            Action::Refresh => self.errand.want(),
+            Action::Refresh => self.periodic.want(),
             Action::Why => {
                 let rows = self.report.iter().flat_map(|report| &report.tags);
                 return Why::open(Why::of_all(cx, rows.filter_map(|row| cx.def().tag_named(&row.tag)).collect()));
@@ -179,12 +179,12 @@ impl Reports {
 
     /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
-        self.errand.awaits(number)
+        self.periodic.awaits(number)
     }
 
     /// The history answered query `number`; an answer for another period than the one shown is ignored.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        if self.errand.answered(number, cx.steady()).is_none() {
+        if self.periodic.answered(number, cx.steady()).is_none() {
             return Vec::new();
         }
         match answer {
@@ -239,7 +239,7 @@ impl Reports {
     fn show(&mut self, period: Option<Period>) {
         (self.period, self.follow, self.report, self.first) = (period, false, None, 0);
         (self.export, self.trouble) = (Export::Not, None);
-        self.errand.want();
+        self.periodic.want();
     }
 
     fn step(&mut self, cx: &ViewContext, to: impl Fn(&crate::plant::def::PlantDef, &Period) -> Option<Period>) {
@@ -264,10 +264,10 @@ impl Reports {
         let settled = self.report.as_ref().is_some_and(|report| report.until >= report.period.to);
         let every = if settled && !self.is_running(cx.now) { SignedDuration::MAX } else { real(EVERY_S) };
         match &self.period {
-            Some(period) if self.errand.due(cx.steady(), every, real(PATIENCE_S)) => {
+            Some(period) if self.periodic.due(cx.steady(), every, real(PATIENCE_S)) => {
                 self.number = self.number.wrapping_add(1);
-                self.errand.asked(self.number, cx.steady());
-                vec![UiAction::ask(Tab::Reports, self.number, Query::Report { period: period.clone() })]
+                self.periodic.asked(self.number, cx.steady());
+                vec![UiAction::query(Tab::Reports, self.number, Query::Report { period: period.clone() })]
             }
             Some(_) | None => Vec::new(),
         }

@@ -15,7 +15,7 @@ use ratatui::{Frame, layout::Rect};
 
 pub use self::keys::{Action, KEYS};
 use self::span::{RATES, View, WINDOWS, midnight, nearest, pan};
-use super::{Tab, errand::Errand};
+use super::{Tab, periodic_query::PeriodicQuery};
 use crate::{
     history::{Answer, HistoryError, Query, Series},
     plant::{
@@ -63,7 +63,7 @@ pub struct Trends {
     /// The list of values instead of the curves: first row shown, row selected.
     values: Option<(usize, usize)>,
     data: Data,
-    errands: Errands,
+    periodics: PeriodicQueries,
 }
 
 /// What the history and the snapshots have told.
@@ -83,10 +83,10 @@ type Figures = (Option<(f64, f64, f64)>, f64);
 
 /// The queries of this tab.
 #[derive(Debug, Default)]
-struct Errands {
-    curves: Errand,
-    hours: Errand,
-    raised: Errand,
+struct PeriodicQueries {
+    curves: PeriodicQuery,
+    hours: PeriodicQuery,
+    raised: PeriodicQuery,
     number: u32,
 }
 
@@ -106,7 +106,7 @@ impl Trends {
             cursor: None,
             values: None,
             data: Data::default(),
-            errands: Errands::default(),
+            periodics: PeriodicQueries::default(),
         }
     }
 
@@ -125,7 +125,7 @@ impl Trends {
             }
             (_, Action::Values) => {
                 self.values = if self.values.is_some() { None } else { Some((0, 0)) };
-                self.errands.hours.want();
+                self.periodics.hours.want();
             }
             (Some(_), _) => {}
             (None, Action::Left) => self.step(cx, -1),
@@ -161,7 +161,7 @@ impl Trends {
         if unseen {
             self.data.traces.clear();
             self.moved();
-            self.errands.hours.want();
+            self.periodics.hours.want();
         }
         self.data.seen = Some(cx.now);
         self.push_live(cx);
@@ -170,15 +170,15 @@ impl Trends {
 
     /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
-        let Errands { curves, hours, raised, number: _ } = &self.errands;
-        [curves, hours, raised].iter().any(|errand| errand.awaits(number))
+        let PeriodicQueries { curves, hours, raised, number: _ } = &self.periodics;
+        [curves, hours, raised].iter().any(|periodic| periodic.awaits(number))
     }
 
     /// The history answered query `number`; an answer to an older query is ignored.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        let (errands, steady) = (&mut self.errands, cx.steady());
-        let curves = errands.curves.answered(number, steady);
-        let (hours, raised) = (errands.hours.answered(number, steady), errands.raised.answered(number, steady));
+        let (periodics, steady) = (&mut self.periodics, cx.steady());
+        let curves = periodics.curves.answered(number, steady);
+        let (hours, raised) = (periodics.hours.answered(number, steady), periodics.raised.answered(number, steady));
         let answer = match answer {
             Ok(answer) => answer,
             Err(error) => {
@@ -305,7 +305,7 @@ impl Trends {
             Some(place) => drop(self.off.remove(place)),
             None => self.off.push(pen.tag),
         }
-        self.errands.curves.want();
+        self.periodics.curves.want();
     }
 
     fn next_group(&mut self, cx: &ViewContext) {
@@ -318,15 +318,15 @@ impl Trends {
         let tags: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         self.data.traces.retain(|tag, _| tags.contains(tag));
         self.moved();
-        self.errands.hours.want();
+        self.periodics.hours.want();
         self.push_live(cx);
     }
 
     /// The chart shows another stretch of time or other pens; figures of the old one must not stand beside it.
     fn moved(&mut self) {
         self.data.figures.clear();
-        self.errands.curves.want();
-        self.errands.raised.want();
+        self.periodics.curves.want();
+        self.periodics.raised.want();
     }
 
     /// Rows that the list of values has room for.
@@ -339,7 +339,7 @@ impl Trends {
         let row = row.saturating_add_signed(by).min(stored(cx).len().saturating_sub(1));
         let first_now = first.clamp((row + 1).saturating_sub(self.rows(cx)), row);
         if first_now != first {
-            self.errands.hours.want();
+            self.periodics.hours.want();
         }
         self.values = Some((first_now, row));
     }
@@ -377,7 +377,7 @@ impl Trends {
     /// Takes curves of the history in. Figures, and where the day's data begin, are taken only from an answer for what
     /// is shown now; a curve carries its own times and is right in any view.
     fn take_curves(&mut self, cx: &ViewContext, series: Vec<Series>, asked: Timestamp) {
-        if !self.errands.curves.is_wanted() {
+        if !self.periodics.curves.is_wanted() {
             self.data.figures = series.iter().map(|series| (series.tag, figures(series, asked))).collect();
             if self.accumulate && self.end.is_none() {
                 self.begin_with(self.span(cx), series.iter().filter_map(first_value).min());
@@ -413,13 +413,13 @@ impl Trends {
         let to = view.to.min(now);
         let series = |tags: &[TagId], from, to, buckets| Query::Series { tags: tags.to_vec(), from, to, buckets };
         let mut acts = Vec::new();
-        let Errands { curves, hours, raised, number } = &mut self.errands;
+        let PeriodicQueries { curves, hours, raised, number } = &mut self.periodics;
         let steady = cx.steady();
-        let mut due = |errand: &mut Errand, every, query: Query| {
-            if errand.due(steady, every, patience) {
+        let mut due = |periodic: &mut PeriodicQuery, every, query: Query| {
+            if periodic.due(steady, every, patience) {
                 *number = number.wrapping_add(1);
-                errand.asked(*number, steady);
-                acts.push(UiAction::ask(Tab::Trends, *number, query));
+                periodic.asked(*number, steady);
+                acts.push(UiAction::query(Tab::Trends, *number, query));
             }
         };
         if self.values.is_none() && !group.is_empty() {

@@ -368,7 +368,7 @@ fn escape_changes_nothing() {
     {
         let mut model = model(&Fixture::alarm(), Theme::FULL);
         let effects = type_keys(&mut model, keys);
-        assert!(effects.iter().all(|effect| matches!(effect, Effect::Ask(..))), "{keys}: {effects:?}");
+        assert!(effects.iter().all(|effect| matches!(effect, Effect::Query(..))), "{keys}: {effects:?}");
         assert_eq!(model.modal, None, "{keys}");
     }
 }
@@ -472,7 +472,7 @@ fn the_journal_tells_alarms_and_deeds_in_one_order() {
         seal: None,
     };
     for effect in effects {
-        let Effect::Ask(id, query) = effect else { continue };
+        let Effect::Query(id, query) = effect else { continue };
         let answer = match query {
             Query::Journal { .. } => Answer::Journal(vec![
                 step(100, AlarmStep::Acknowledged, Some("tech1")),
@@ -674,13 +674,16 @@ fn an_order_that_never_left_is_told() {
 fn the_journal_is_asked_only_while_it_is_shown() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
     let asks = |effects: Vec<Effect>| {
-        effects.iter().filter(|effect| matches!(effect, Effect::Ask(id, _) if id.tab == Tab::Alarms)).count()
+        effects.iter().filter(|effect| matches!(effect, Effect::Query(id, _) if id.tab == Tab::Alarms)).count()
     };
     let tick = || Msg::Tick { silent: Duration::ZERO };
     assert_eq!(asks(type_keys(&mut model, "3")), 0);
     assert_eq!(asks(type_keys(&mut model, "j")), 2, "alarms and actions");
     for number in [1, 2] {
-        update(&mut model, Msg::Answer(crate::ui::AskId { tab: Tab::Alarms, number }, Ok(Answer::Journal(Vec::new()))));
+        update(
+            &mut model,
+            Msg::Answer(crate::ui::QueryId { tab: Tab::Alarms, number }, Ok(Answer::Journal(Vec::new()))),
+        );
     }
     let half = |n: u64| Msg::Tick { silent: Duration::from_millis(500 * n) };
     assert_eq!((0..=10).map(|n| asks(update(&mut model, half(n)))).sum::<usize>(), 2, "once more in five seconds");
@@ -694,7 +697,7 @@ fn a_history_without_answer_is_said_so() {
     let effects = type_keys(&mut model, "3j");
     assert!(screen(&mut model, 80, 24).contains("reading …"));
     for effect in effects {
-        if let Effect::Ask(id, _) = effect {
+        if let Effect::Query(id, _) = effect {
             update(&mut model, Msg::Answer(id, Err(HistoryError::Engine("disk full".to_owned()))));
         }
     }

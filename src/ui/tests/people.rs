@@ -18,7 +18,7 @@ use crate::{
         sample::Quality,
     },
     ui::{
-        AskId, Effect, Model, Msg,
+        Effect, Model, Msg, QueryId,
         fixture::{self, Fixture},
         modal::Modal,
         tabs::Tab,
@@ -65,7 +65,7 @@ fn wish(effects: &[Effect]) -> Option<&Wish> {
 }
 
 fn answer(model: &mut Model, answer: Result<(), &str>) {
-    let id = AskId { tab: Tab::Login, number: model.presence.wished };
+    let id = QueryId { tab: Tab::Login, number: model.presence.wished };
     update(model, Msg::Granted(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
 }
 
@@ -101,7 +101,7 @@ fn the_login_page_in_every_mood() {
 #[test]
 fn what_was_granted_and_is_not_on_disk_is_shown_as_not_recorded() {
     let mut model = with(&Fixture::normal(), person("anna", Role::Supervisor));
-    let id = AskId { tab: Tab::Users, number: model.presence.wished };
+    let id = QueryId { tab: Tab::Users, number: model.presence.wished };
     update(&mut model, Msg::Granted(id, Ok(Durability::Recorded)));
     assert!(!screen(&mut model, 80, 24).contains("RECORDED"));
     update(&mut model, Msg::Granted(id, Ok(Durability::NotRecorded)));
@@ -508,7 +508,7 @@ fn the_users_and_what_can_be_done_with_them() {
         let mut model = with(&Fixture::normal(), supervisor());
         let effects = type_keys(&mut model, keys);
         assert_eq!(wish(&effects), Some(&expect), "{keys}");
-        let id = AskId { tab: Tab::Users, number: model.presence.wished };
+        let id = QueryId { tab: Tab::Users, number: model.presence.wished };
         update(&mut model, Msg::Granted(id, Err("at least one Supervisor must remain".to_owned())));
         shows(&mut model, "at least one Supervisor must remain");
         update(&mut model, Msg::Granted(id, Ok(Durability::Recorded)));
@@ -557,7 +557,7 @@ fn the_audit_list_is_searched_by_the_history_and_read_whole() {
     let mut model = with(&Fixture::normal(), supervisor());
     let asked = |effects: &[Effect]| {
         effects.iter().find_map(|effect| match effect {
-            Effect::Ask(id, Query::Audit { words, by, action, limit, .. }) => {
+            Effect::Query(id, Query::Audit { words, by, action, limit, .. }) => {
                 Some((*id, words.clone(), by.clone(), action.clone(), *limit))
             }
             _ => None,
@@ -585,7 +585,7 @@ fn the_audit_list_is_searched_by_the_history_and_read_whole() {
         let effects = type_keys(&mut model, "bto⏎");
         // The query on its way is answered first; the new one follows at once.
         assert_eq!(asked(&effects), None);
-        let id = AskId { tab: Tab::Users, number: query.0.number + 1 };
+        let id = QueryId { tab: Tab::Users, number: query.0.number + 1 };
         update(&mut model, Msg::Answer(id, Ok(Answer::Actions(Vec::new()))));
         asked(&update(&mut model, Msg::Tick { silent: Duration::ZERO })).expect("a query")
     };
@@ -614,7 +614,7 @@ fn an_audit_entry_is_opened_only_as_it_was_drawn() {
     let mut model = with(&Fixture::normal(), supervisor());
     let asked = |effects: &[Effect]| {
         effects.iter().find_map(|effect| match effect {
-            Effect::Ask(id, Query::Audit { .. }) => Some(*id),
+            Effect::Query(id, Query::Audit { .. }) => Some(*id),
             _ => None,
         })
     };

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 use ratatui::style::Style;
 
 use super::{
-    super::{Tab, errand::Errand, reports::period},
+    super::{Tab, periodic_query::PeriodicQuery, reports::period},
     journal::action_words,
     span,
 };
@@ -59,7 +59,7 @@ pub struct Handover {
     answered: bool,
     trouble: Option<String>,
     first: usize,
-    errand: Errand,
+    periodic: PeriodicQuery,
 }
 
 impl Handover {
@@ -73,7 +73,7 @@ impl Handover {
         };
         self.period = chosen.filter(|chosen| chosen.to <= cx.now);
         (self.actions, self.answered, self.trouble, self.first) = (Vec::new(), false, None, 0);
-        self.errand = Errand::default();
+        self.periodic = PeriodicQuery::default();
     }
 
     /// Scrolls.
@@ -85,7 +85,7 @@ impl Handover {
 
     /// A deed was done: what it left is asked at once.
     pub fn want(&mut self) {
-        self.errand.want();
+        self.periodic.want();
     }
 
     fn period(&self, cx: &ViewContext) -> Option<Period> {
@@ -95,24 +95,24 @@ impl Handover {
     /// Asks the history if it is time.
     pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
         let Some(shown) = self.period(cx) else { return Vec::new() };
-        if !span::due(cx, &self.errand, EVERY_S, Some(&shown)) {
+        if !span::due(cx, &self.periodic, EVERY_S, Some(&shown)) {
             return Vec::new();
         }
         *number = number.wrapping_add(1);
-        self.errand.asked(*number, cx.steady());
+        self.periodic.asked(*number, cx.steady());
         // What the shift before wrote down is for this one.
         let from = period::before(cx.def(), &shown).map_or(shown.from, |before| before.from);
-        vec![UiAction::ask(Tab::Alarms, *number, Query::Actions { from, to: shown.to, limit: ROWS })]
+        vec![UiAction::query(Tab::Alarms, *number, Query::Actions { from, to: shown.to, limit: ROWS })]
     }
 
     /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
-        self.errand.awaits(number)
+        self.periodic.awaits(number)
     }
 
     /// The history answered.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self.errand.answered(number, cx.steady()).is_none() {
+        if self.periodic.answered(number, cx.steady()).is_none() {
             return;
         }
         match answer {

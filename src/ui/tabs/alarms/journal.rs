@@ -4,7 +4,7 @@ use jiff::{SignedDuration, Timestamp};
 use ratatui::style::Style;
 
 use super::{
-    super::{Tab, errand::Errand, reports::period},
+    super::{Tab, periodic_query::PeriodicQuery, reports::period},
     span,
 };
 use crate::{
@@ -41,8 +41,8 @@ pub struct Journal {
     words: Vec<String>,
     /// The chosen period; `None` is the last 24 hours.
     period: Option<Period>,
-    steps: Errand,
-    deeds: Errand,
+    steps: PeriodicQuery,
+    deeds: PeriodicQuery,
 }
 
 impl Journal {
@@ -94,7 +94,7 @@ impl Journal {
     fn show(&mut self, period: Option<Period>) {
         (self.first, self.answered, self.period) = (0, false, period);
         (self.alarms, self.actions) = (Vec::new(), Vec::new());
-        (self.steps, self.deeds) = (Errand::default(), Errand::default());
+        (self.steps, self.deeds) = (PeriodicQuery::default(), PeriodicQuery::default());
     }
 
     fn limit(&self) -> usize {
@@ -107,11 +107,11 @@ impl Journal {
         let (from, to) = self.period.as_ref().map_or((to - SPAN, to), |period| (period.from, period.to));
         let limit = self.limit();
         let mut acts = Vec::new();
-        let mut due = |errand: &mut Errand, query| {
-            if span::due(cx, errand, EVERY_S, self.period.as_ref()) {
+        let mut due = |periodic: &mut PeriodicQuery, query| {
+            if span::due(cx, periodic, EVERY_S, self.period.as_ref()) {
                 *number = number.wrapping_add(1);
-                errand.asked(*number, cx.steady());
-                acts.push(UiAction::ask(Tab::Alarms, *number, query));
+                periodic.asked(*number, cx.steady());
+                acts.push(UiAction::query(Tab::Alarms, *number, query));
             }
         };
         due(&mut self.steps, Query::Journal { from, to, limit });

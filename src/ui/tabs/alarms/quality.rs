@@ -5,7 +5,7 @@ use std::time::Duration;
 use ratatui::style::Style;
 
 use super::{
-    super::{Tab, errand::Errand},
+    super::{Tab, periodic_query::PeriodicQuery},
     span,
 };
 use crate::{
@@ -38,7 +38,7 @@ pub struct Quality {
     figures: Option<Box<Figures>>,
     trouble: Option<String>,
     first: usize,
-    errand: Errand,
+    periodic: PeriodicQuery,
 }
 
 impl Quality {
@@ -50,7 +50,7 @@ impl Quality {
             _ => span::later(cx, self.period.as_ref()),
         };
         // Figures of one period must not stand under the name of another.
-        (self.figures, self.trouble, self.first, self.errand) = (None, None, 0, Errand::default());
+        (self.figures, self.trouble, self.first, self.periodic) = (None, None, 0, PeriodicQuery::default());
     }
 
     /// Scrolls.
@@ -63,22 +63,22 @@ impl Quality {
     /// Asks the history for a chosen shift if it is time.
     pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
         let Some(period) = &self.period else { return Vec::new() };
-        if !span::due(cx, &self.errand, EVERY_S, Some(period)) {
+        if !span::due(cx, &self.periodic, EVERY_S, Some(period)) {
             return Vec::new();
         }
         *number = number.wrapping_add(1);
-        self.errand.asked(*number, cx.steady());
-        vec![UiAction::ask(Tab::Alarms, *number, Query::AlarmQuality { from: period.from, to: period.to })]
+        self.periodic.asked(*number, cx.steady());
+        vec![UiAction::query(Tab::Alarms, *number, Query::AlarmQuality { from: period.from, to: period.to })]
     }
 
     /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
-        self.errand.awaits(number)
+        self.periodic.awaits(number)
     }
 
     /// The history answered.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self.errand.answered(number, cx.steady()).is_none() {
+        if self.periodic.answered(number, cx.steady()).is_none() {
             return;
         }
         match answer {

@@ -2,7 +2,7 @@
 
 use jiff::SignedDuration;
 
-use super::super::{errand::Errand, reports::period};
+use super::super::{periodic_query::PeriodicQuery, reports::period};
 use crate::{report::Period, ui::ViewContext};
 
 /// An answer that has not come after so long (real time) counts as lost: a query over weeks may take its time.
@@ -22,10 +22,10 @@ pub fn later(cx: &ViewContext, shown: Option<&Period>) -> Option<Period> {
 }
 
 /// Is it time to ask? What is still going on is asked every `seconds`, the past once in a while.
-pub fn due(cx: &ViewContext, errand: &Errand, seconds: f64, shown: Option<&Period>) -> bool {
+pub fn due(cx: &ViewContext, periodic: &PeriodicQuery, seconds: f64, shown: Option<&Period>) -> bool {
     let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
     let past = shown.is_some_and(|shown| shown.to <= cx.now);
-    errand.due(cx.steady(), real(if past { 20.0 * seconds } else { seconds }), real(PATIENCE_S))
+    periodic.due(cx.steady(), real(if past { 20.0 * seconds } else { seconds }), real(PATIENCE_S))
 }
 
 /// `morning 2026-11-21 06:00–14:00`; a period without a name of its own has its times in it already.

@@ -201,7 +201,7 @@ fn the_meter_is_shown_with_target_limit_and_verdict() {
     assert!(banner.contains("FLOOD") && banner.contains("UNACK"), "{banner}");
     // A past shift is asked of the history, and its figures stand under its name only.
     let effects = type_keys(&mut model, "vvvv←←");
-    let Some(Effect::Ask(id, Query::AlarmQuality { from, to })) = effects.last() else { panic!("{effects:?}") };
+    let Some(Effect::Query(id, Query::AlarmQuality { from, to })) = effects.last() else { panic!("{effects:?}") };
     let span = [from, to].map(ToString::to_string);
     assert_eq!(span, ["2026-11-20T23:00:00Z", "2026-11-21T07:00:00Z"]);
     assert!(screen(&mut model, 80, 24).contains("reading …"));
@@ -250,7 +250,7 @@ fn the_handover_tells_what_the_next_shift_must_know() {
     {
         let mut model = model(&fixture, theme);
         let effects = type_keys(&mut model, "3V");
-        let Some(Effect::Ask(id, Query::Actions { .. })) = effects.last() else { panic!("{effects:?}") };
+        let Some(Effect::Query(id, Query::Actions { .. })) = effects.last() else { panic!("{effects:?}") };
         update(&mut model, Msg::Answer(*id, Ok(Answer::Actions(rows.clone()))));
         let picture = screen(&mut model, width, height);
         insta::assert_snapshot!(format!("handover_{look}"), picture);

@@ -235,7 +235,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
             Effect::SaveReport { tab, path, bytes } => Some((tab, path, bytes)),
             Effect::Order(..)
             | Effect::Wish(..)
-            | Effect::Ask(..)
+            | Effect::Query(..)
             | Effect::Drill(_)
             | Effect::Bell
             | Effect::Redraw
@@ -476,7 +476,7 @@ fn the_day_of_a_line_is_asked_for_and_shown_as_a_trend() {
     let mut model = model(&Fixture::traffic(), Theme::FULL);
     let effects = type_keys(&mut model, "6");
     let asked = effects.into_iter().find_map(|effect| match effect {
-        Effect::Ask(id, Query::LineMinutes { line: L1, .. }) => Some(id),
+        Effect::Query(id, Query::LineMinutes { line: L1, .. }) => Some(id),
         _ => None,
     });
     let minute = |ago: i64| LineMinute {

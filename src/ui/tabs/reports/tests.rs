@@ -14,7 +14,7 @@ use crate::{
     },
     report::TagFigures,
     ui::{
-        AskId, Effect, Model, Msg,
+        Effect, Model, Msg, QueryId,
         fixture::{Fixture, now},
         theme::Theme,
         update, view,
@@ -23,7 +23,7 @@ use crate::{
 
 struct Stand {
     model: Model,
-    asked: Vec<(AskId, Query)>,
+    asked: Vec<(QueryId, Query)>,
     saved: Vec<(PathBuf, Vec<u8>)>,
     /// What the station says to an export.
     granted: Result<Durability, String>,
@@ -41,13 +41,13 @@ impl Stand {
     fn send(&mut self, msg: Msg) {
         for effect in update(&mut self.model, msg) {
             match effect {
-                Effect::Ask(id, query) if id.tab == Tab::Reports => self.asked.push((id, query)),
+                Effect::Query(id, query) if id.tab == Tab::Reports => self.asked.push((id, query)),
                 Effect::SaveReport { path, bytes, .. } => self.saved.push((path, bytes)),
                 Effect::Wish(id, Wish::Exported { file, sha256 }) => {
                     assert_eq!((file.ends_with(".csv"), sha256.len()), (true, 64));
                     self.send(Msg::Granted(id, self.granted.clone()));
                 }
-                Effect::Ask(..)
+                Effect::Query(..)
                 | Effect::Order(..)
                 | Effect::Wish(..)
                 | Effect::Drill(_)

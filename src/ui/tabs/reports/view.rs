@@ -76,7 +76,7 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
     };
     let x = canvas.text(x + 3, 0, &state, if running { theme.strong() } else { theme.normal() });
     let slow =
-        reports.errand.waiting(cx.steady()).is_some_and(|waiting| waiting.as_secs_f64() > 2.0 * cx.snapshot.speed);
+        reports.periodic.waiting(cx.steady()).is_some_and(|waiting| waiting.as_secs_f64() > 2.0 * cx.snapshot.speed);
     if reports.report.is_some() {
         let right = canvas.width().saturating_sub(1);
         match &reports.trouble {

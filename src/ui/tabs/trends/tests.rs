@@ -11,7 +11,7 @@ use crate::{
     history::Bucket,
     plant::{def::Priority, sample::Sample},
     ui::{
-        AskId, Effect, Model, Msg,
+        Effect, Model, Msg, QueryId,
         fixture::{Fixture, now},
         theme::Theme,
         update, view,
@@ -21,7 +21,7 @@ use crate::{
 /// A terminal on the trends tab, and the history that answers it.
 struct Stand {
     model: Model,
-    asked: Vec<(AskId, Query)>,
+    asked: Vec<(QueryId, Query)>,
     /// When the store began.
     begin: Timestamp,
     /// Nothing was recorded here.
@@ -62,7 +62,7 @@ impl Stand {
     fn send(&mut self, msg: Msg) {
         let effects = update(&mut self.model, msg);
         self.asked.extend(effects.into_iter().filter_map(|effect| match effect {
-            Effect::Ask(id, query) if id.tab == Tab::Trends => Some((id, query)),
+            Effect::Query(id, query) if id.tab == Tab::Trends => Some((id, query)),
             _ => None,
         }));
     }
@@ -230,7 +230,7 @@ fn everything_since_the_first_value_of_the_day() {
 }
 
 /// Which queries are on their way, by what they ask about.
-fn kinds(asked: &[(AskId, Query)]) -> String {
+fn kinds(asked: &[(QueryId, Query)]) -> String {
     let kind = |query: &Query| match query {
         Query::Series { buckets: HOUR_COLUMNS, .. } => "hour",
         Query::Series { .. } => "curves",

@@ -102,8 +102,9 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
 
 /// What is wrong with the history, or that it keeps us waiting.
 fn trouble(trends: &Trends, cx: &ViewContext) -> Option<String> {
-    let errands = [&trends.errands.curves, &trends.errands.hours];
-    let slow = errands.iter().filter_map(|errand| errand.waiting(cx.steady())).any(|time| time >= super::real(cx, 2.0));
+    let periodics = [&trends.periodics.curves, &trends.periodics.hours];
+    let slow =
+        periodics.iter().filter_map(|periodic| periodic.waiting(cx.steady())).any(|time| time >= super::real(cx, 2.0));
     trends.data.trouble.clone().or_else(|| slow.then(|| "waiting for the history".to_owned()))
 }
 

@@ -4,7 +4,7 @@ use crossterm::event::KeyCode;
 use jiff::SignedDuration;
 use ratatui::{Frame, layout::Rect};
 
-use super::super::{Tab, errand::Errand, reports::period};
+use super::super::{Tab, periodic_query::PeriodicQuery, reports::period};
 use crate::{
     history::{Answer, HistoryError, Query},
     plant::record::ActionRecord,
@@ -90,7 +90,7 @@ pub struct Audit {
     period: Option<Period>,
     /// What the open window asks for.
     asking: Option<Part>,
-    errand: Errand,
+    periodic: PeriodicQuery,
     number: u32,
 }
 
@@ -160,32 +160,32 @@ impl Audit {
     /// Rows of another search must not stand under this one.
     fn anew(&mut self) {
         (self.rows, self.answered, self.selected) = (Vec::new(), false, 0);
-        self.errand.want();
+        self.periodic.want();
     }
 
     /// Asks the history when it is time to.
     pub fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
-        if !self.errand.due(cx.steady(), real(EVERY_S), real(PATIENCE_S)) {
+        if !self.periodic.due(cx.steady(), real(EVERY_S), real(PATIENCE_S)) {
             return Vec::new();
         }
         self.number = self.number.wrapping_add(1);
-        self.errand.asked(self.number, cx.steady());
+        self.periodic.asked(self.number, cx.steady());
         let until = cx.now + SignedDuration::from_secs(1);
         let (from, to) = self.period.as_ref().map_or((until - SPAN, until), |period| (period.from, period.to));
         let (words, by, action) = (self.words.clone(), self.who.clone(), self.action.clone());
-        vec![UiAction::ask(Tab::Users, self.number, Query::Audit { from, to, words, by, action, limit: ROWS })]
+        vec![UiAction::query(Tab::Users, self.number, Query::Audit { from, to, words, by, action, limit: ROWS })]
     }
 
     /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
-        self.errand.awaits(number) && !self.errand.is_wanted()
+        self.periodic.awaits(number) && !self.periodic.is_wanted()
     }
 
     /// The history answered query `number`.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
         // An answer to a search that is no longer meant is not shown.
-        if self.errand.answered(number, cx.steady()).is_none() || self.errand.is_wanted() {
+        if self.periodic.answered(number, cx.steady()).is_none() || self.periodic.is_wanted() {
             return;
         }
         self.answered = true;

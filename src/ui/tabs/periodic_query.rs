@@ -10,14 +10,14 @@ const LOST: i32 = 4;
 
 /// One kind of query of a tab. All times are steady, see [`ViewContext::steady`](crate::ui::ViewContext::steady).
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Errand {
+pub struct PeriodicQuery {
     on_way: Option<(u32, Timestamp)>,
     asked: Option<Timestamp>,
     took: SignedDuration,
     wanted: bool,
 }
 
-impl Errand {
+impl PeriodicQuery {
     /// Is it time to ask: something changed, or the last query is `every` old, and the history has rested from it?
     /// While one is on its way, its answer is waited for; only where it is no longer what is wanted not longer than
     /// `patience`, so that fast keys never pile up queries before the history.
@@ -42,7 +42,7 @@ impl Errand {
 
     /// Query `number` goes out.
     pub fn asked(&mut self, number: u32, now: Timestamp) {
-        *self = Errand { on_way: Some((number, now)), asked: Some(now), took: self.took, wanted: false };
+        *self = PeriodicQuery { on_way: Some((number, now)), asked: Some(now), took: self.took, wanted: false };
     }
 
     /// An answer has come: when it was asked for, or `None` if it is the answer to an older query.
@@ -76,41 +76,41 @@ mod tests {
         Timestamp::from_second(second).expect("a small number of seconds")
     }
 
-    fn due(errand: &Errand, second: i64) -> bool {
-        errand.due(at(second), SignedDuration::from_secs(2), SignedDuration::from_secs(10))
+    fn due(periodic: &PeriodicQuery, second: i64) -> bool {
+        periodic.due(at(second), SignedDuration::from_secs(2), SignedDuration::from_secs(10))
     }
 
     #[test]
     fn questions_do_not_pile_up_and_old_answers_do_not_count() {
-        let mut errand = Errand::default();
-        assert!(due(&errand, 0), "at first");
-        errand.asked(1, at(0));
-        errand.want();
-        assert!(!due(&errand, 5), "while one is on its way");
-        assert!(due(&errand, 10), "when it is not what is wanted any more");
-        errand.asked(2, at(10));
-        assert!(errand.awaits(2) && !errand.awaits(1), "an older query can be cancelled");
-        assert_eq!(errand.answered(1, at(10)), None, "an older answer");
-        assert_eq!(errand.answered(2, at(10)), Some(at(10)));
-        assert_eq!(errand.answered(2, at(10)), None, "twice");
-        assert!(!due(&errand, 11) && due(&errand, 12), "at its rate");
-        errand.want();
-        assert!(due(&errand, 11), "after a change");
-        errand.asked(3, at(20));
-        assert!(!due(&errand, 19), "guessed time may run a little ahead");
-        assert!(due(&errand, 10), "after the clock was set back");
+        let mut periodic = PeriodicQuery::default();
+        assert!(due(&periodic, 0), "at first");
+        periodic.asked(1, at(0));
+        periodic.want();
+        assert!(!due(&periodic, 5), "while one is on its way");
+        assert!(due(&periodic, 10), "when it is not what is wanted any more");
+        periodic.asked(2, at(10));
+        assert!(periodic.awaits(2) && !periodic.awaits(1), "an older query can be cancelled");
+        assert_eq!(periodic.answered(1, at(10)), None, "an older answer");
+        assert_eq!(periodic.answered(2, at(10)), Some(at(10)));
+        assert_eq!(periodic.answered(2, at(10)), None, "twice");
+        assert!(!due(&periodic, 11) && due(&periodic, 12), "at its rate");
+        periodic.want();
+        assert!(due(&periodic, 11), "after a change");
+        periodic.asked(3, at(20));
+        assert!(!due(&periodic, 19), "guessed time may run a little ahead");
+        assert!(due(&periodic, 10), "after the clock was set back");
     }
 
     #[test]
     fn a_late_answer_counts_and_the_history_rests_after_it() {
-        let mut errand = Errand::default();
-        errand.asked(1, at(0));
-        assert!(!due(&errand, 30), "no second query while the first is answered");
-        assert_eq!(errand.answered(1, at(30)), Some(at(0)), "late, but what was asked for");
-        assert!(!due(&errand, 119) && due(&errand, 120), "a quarter of the time at most");
-        errand.asked(2, at(120));
-        assert!(!due(&errand, 159) && due(&errand, 160), "an answer may be lost");
-        errand.answered(2, at(121));
-        assert!(due(&errand, 124), "a fast answer is asked for at its own rate again");
+        let mut periodic = PeriodicQuery::default();
+        periodic.asked(1, at(0));
+        assert!(!due(&periodic, 30), "no second query while the first is answered");
+        assert_eq!(periodic.answered(1, at(30)), Some(at(0)), "late, but what was asked for");
+        assert!(!due(&periodic, 119) && due(&periodic, 120), "a quarter of the time at most");
+        periodic.asked(2, at(120));
+        assert!(!due(&periodic, 159) && due(&periodic, 160), "an answer may be lost");
+        periodic.answered(2, at(121));
+        assert!(due(&periodic, 124), "a fast answer is asked for at its own rate again");
     }
 }
