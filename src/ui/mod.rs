@@ -2,7 +2,7 @@
 
 pub mod bell;
 pub mod chrome;
-pub mod drawn;
+pub mod last_frame;
 pub mod edge;
 pub mod io;
 pub mod guard;
@@ -32,8 +32,8 @@ use crate::{
     plant::{alarm::AlarmCommand, command::Command, def::PlantDef, sample::Cause, snapshot::Snapshot},
     sim::drill,
 };
-use drawn::Drawn;
 use keys::Global;
+use last_frame::LastFrame;
 use modal::{Confirm, Modal};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
 use presence::Presence;
@@ -76,7 +76,7 @@ pub struct Model {
     /// The simulation behind the plant; `None` at a real one.
     pub drill: Option<Arc<drill::Status>>,
     /// What the last frame showed; `None` before the first one.
-    pub drawn: Option<Drawn>,
+    pub last_frame: Option<LastFrame>,
     /// Why the last key did nothing; until the next one.
     pub note: Option<&'static str>,
     /// What ends when its operator leaves.
@@ -149,7 +149,7 @@ impl Model {
             ordered: 0,
             plants: 0,
             drill: None,
-            drawn: None,
+            last_frame: None,
             note: None,
             leaving: Leaving::default(),
         };
@@ -323,7 +323,7 @@ fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
         Global::Lock => presence::lock(model),
         Global::Help => vec![UiAction::Open(Modal::Help(0))],
         Global::Quit => vec![UiAction::Leave],
-        Global::Acknowledge => drawn::acknowledge(model),
+        Global::Acknowledge => last_frame::acknowledge(model),
         Global::AcknowledgeAll => {
             let cx = model.cx();
             let listed = (model.tabs.shown == Tab::Alarms).then(|| model.tabs.alarms.listed(&cx)).flatten();

@@ -28,8 +28,8 @@ use crate::{
     },
     ui::{
         UiAction, ViewContext,
-        drawn::Rows,
         keys::{Hint, find},
+        last_frame::Rows,
         modal::{Faceplate, Guidance, Modal, Prompt, Why, faceplate::device_words},
     },
 };

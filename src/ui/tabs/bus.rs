@@ -34,8 +34,8 @@ use crate::{
     },
     ui::{
         UiAction, ViewContext,
-        drawn::Rows,
         keys::{self, Hint, Key, char, code},
+        last_frame::Rows,
         modal::{Modal, Notice, Settings},
         widgets::{
             line_trend::{self, line_trend},

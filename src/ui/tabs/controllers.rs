@@ -41,8 +41,8 @@ use crate::{
     },
     ui::{
         UiAction, ViewContext,
-        drawn::Rows,
         keys::{Hint, find, hints},
+        last_frame::Rows,
         modal::{Confirm, Faceplate, Modal, Prompt},
         widgets::text::Canvas,
     },

@@ -17,8 +17,8 @@ use crate::{
     },
     ui::{
         Effect, UiAction, ViewContext,
-        drawn::Rows,
         keys::{self, Hint, Key, char, code},
+        last_frame::Rows,
         rights,
         tabs::bus,
     },

@@ -21,8 +21,8 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{
     Effect, QueryId, UiAction, ViewContext,
-    drawn::Rows,
     keys::{self, Hint},
+    last_frame::Rows,
     presence,
 };
 use crate::{

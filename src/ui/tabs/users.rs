@@ -13,8 +13,8 @@ use crate::{
     history::{Answer, HistoryError},
     ui::{
         UiAction, ViewContext,
-        drawn::Rows,
         keys::{self, Hint, Key, char, code},
+        last_frame::Rows,
         modal::{Modal, Notice, Sheet, sheet::Purpose},
     },
 };

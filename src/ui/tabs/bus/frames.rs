@@ -15,7 +15,7 @@ use crate::{
     },
     ui::{
         UiAction, ViewContext,
-        drawn::Rows,
+        last_frame::Rows,
         modal::{Modal, Prompt},
         tabs::{Outgoing, Tab},
         widgets::text::{Canvas, clock, fit, fit_words, pad, width},

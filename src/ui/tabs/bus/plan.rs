@@ -17,7 +17,7 @@ use crate::{
     },
     ui::{
         UiAction, ViewContext,
-        drawn::Rows,
+        last_frame::Rows,
         modal::{Modal, Why},
         widgets::text::{Canvas, between, fit_words, wrap},
     },

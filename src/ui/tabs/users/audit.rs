@@ -11,8 +11,8 @@ use crate::{
     report::Period,
     ui::{
         UiAction, ViewContext,
-        drawn::Rows,
         keys::{Key, char, code},
+        last_frame::Rows,
         modal::{Deed, Modal, Prompt},
         widgets::text::{Canvas, fit, moment, pad, pad_left, width},
     },

@@ -41,7 +41,7 @@ impl Rows {
 
 /// What a frame showed, as far as a key may mean it that is pressed before the next one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Drawn {
+pub struct LastFrame {
     /// The tab.
     tab: Tab,
     /// Its list.
@@ -55,32 +55,33 @@ pub struct Drawn {
 }
 
 impl Model {
-    /// A frame was drawn.
+    /// A frame was last_frame.
     pub(super) fn note_drawn(&mut self) {
-        self.drawn = Some(self.as_drawn());
+        self.last_frame = Some(self.as_drawn());
     }
 
     /// Something has come from the station that no frame has shown.
     pub(super) fn note_news(&mut self) {
-        if let Some(drawn) = &mut self.drawn {
-            drawn.news = true;
+        if let Some(last_frame) = &mut self.last_frame {
+            last_frame.news = true;
         }
     }
 
     /// Is all that a key can mean as it was drawn?
     pub(super) fn is_as_drawn(&self) -> bool {
-        self.drawn.is_some_and(|drawn| !drawn.news || Drawn { news: true, ..self.as_drawn() } == drawn)
+        self.last_frame
+            .is_some_and(|last_frame| !last_frame.news || LastFrame { news: true, ..self.as_drawn() } == last_frame)
     }
 
     /// A key alone has led to what there is now: it is as good as seen.
     pub(super) fn note_keyed(&mut self) {
-        let news = self.drawn.is_some_and(|drawn| drawn.news);
-        self.drawn = Some(Drawn { news, ..self.as_drawn() });
+        let news = self.last_frame.is_some_and(|last_frame| last_frame.news);
+        self.last_frame = Some(LastFrame { news, ..self.as_drawn() });
     }
 
-    fn as_drawn(&self) -> Drawn {
+    fn as_drawn(&self) -> LastFrame {
         let alarm = self.alarm_to_acknowledge().map(|alarm| (alarm.id, alarm.annunciated_at));
-        Drawn { tab: self.tabs.shown, rows: self.tabs.rows(&self.cx()), alarm, news: false, astray: false }
+        LastFrame { tab: self.tabs.shown, rows: self.tabs.rows(&self.cx()), alarm, news: false, astray: false }
     }
 
     /// May a key of the tab act on the selected row? Else that is said. To move on is always possible.
@@ -90,12 +91,12 @@ impl Model {
             KeyCode::Up | KeyCode::Down | KeyCode::PageUp | KeyCode::PageDown | KeyCode::Home | KeyCode::End
         );
         let now = self.tabs.rows(&self.cx());
-        let Some(drawn) = self.drawn.as_mut().filter(|drawn| drawn.news) else { return true };
+        let Some(last_frame) = self.last_frame.as_mut().filter(|last_frame| last_frame.news) else { return true };
         if moves {
-            drawn.astray |= drawn.tab != self.tabs.shown || drawn.rows.all != now.all;
+            last_frame.astray |= last_frame.tab != self.tabs.shown || last_frame.rows.all != now.all;
             return true;
         }
-        let seen = !drawn.astray && drawn.tab == self.tabs.shown && drawn.rows.selected == now.selected;
+        let seen = !last_frame.astray && last_frame.tab == self.tabs.shown && last_frame.rows.selected == now.selected;
         if !seen {
             self.note = Some(CHANGED);
         }
@@ -117,11 +118,11 @@ impl Model {
     /// The alarm that `a` was drawn for, exactly as it was annunciated; `Err` if there is another one by now.
     fn alarm_seen(&self) -> Result<Option<&ActiveAlarm>, &'static str> {
         let now = self.alarm_to_acknowledge();
-        let Some(drawn) = self.drawn else { return Ok(now) };
-        if drawn.astray {
+        let Some(last_frame) = self.last_frame else { return Ok(now) };
+        if last_frame.astray {
             return Err(CHANGED);
         }
-        let Some((id, annunciated_at)) = drawn.alarm else {
+        let Some((id, annunciated_at)) = last_frame.alarm else {
             return if now.is_none() { Ok(None) } else { Err(CHANGED) };
         };
         let seen = |alarm: &&ActiveAlarm| (alarm.id, alarm.annunciated_at) == (id, annunciated_at);
