@@ -3,7 +3,7 @@
 pub mod bell;
 pub mod chrome;
 pub mod last_frame;
-pub mod edge;
+pub mod glyph_filter;
 pub mod io;
 pub mod guard;
 pub mod keys;
@@ -242,7 +242,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
 pub fn view(model: &Model, frame: &mut Frame) {
     let cx = context(model, frame.area());
     chrome::view(model, &cx, frame);
-    edge::finish(frame.buffer_mut(), &model.theme);
+    glyph_filter::apply(frame.buffer_mut(), &model.theme);
 }
 
 /// What the parts of a terminal of this size may read.

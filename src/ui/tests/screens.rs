@@ -17,8 +17,9 @@ use crate::{
         snapshot::Snapshot,
     },
     ui::{
-        Model, Msg, edge,
+        Model, Msg,
         fixture::{self, Fixture},
+        glyph_filter,
         modal::{self, Modal},
         tabs::Tab,
         theme::{Colours, Glyphs, Theme},
@@ -447,7 +448,7 @@ fn the_next_frame_leaves_nothing_of_the_last_one() {
             let mut canvas = widgets::text::Canvas::new(&mut buffer, area);
             canvas.text((seed * 5 % 9) as u16, y, text, Theme::FULL.normal());
         }
-        edge::finish(&mut buffer, &Theme::FULL);
+        glyph_filter::apply(&mut buffer, &Theme::FULL);
         buffer
     };
     let send = |parser: &mut vt100::Parser, from: &Buffer, to: &Buffer| {

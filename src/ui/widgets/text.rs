@@ -6,7 +6,7 @@ use jiff::{Timestamp, tz::TimeZone};
 use ratatui::{buffer::Buffer, layout::Rect, style::Style};
 use unicode_width::UnicodeWidthStr;
 
-use crate::ui::edge::thai_cells;
+use crate::ui::glyph_filter::thai_cells;
 
 /// A rectangle of the screen with coordinates of its own; what falls outside is not drawn.
 #[derive(Debug)]

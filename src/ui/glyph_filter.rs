@@ -1,4 +1,4 @@
-//! The last step before the terminal: every cell becomes something that the terminal draws in the width we think.
+//! Rewrites the cells of a drawn frame so that the terminal draws each in the width that the layout assumes.
 
 use std::borrow::Cow;
 
@@ -32,7 +32,7 @@ pub fn thai_cells(text: &str) -> Cow<'_, str> {
 
 /// Makes a drawn frame safe for the terminal: nothing that moves the cursor or turns the direction of writing, no SARA AM,
 /// and only characters of the glyph set.
-pub fn finish(buffer: &mut Buffer, theme: &Theme) {
+pub fn apply(buffer: &mut Buffer, theme: &Theme) {
     for cell in &mut buffer.content {
         if cell.symbol().chars().any(acts) {
             cell.set_symbol("?");
@@ -137,7 +137,7 @@ mod tests {
         assert_eq!(thai_cells("ทำ"), "ท\u{e4d}\u{e32}");
         let mut buffer = Buffer::empty(Rect::new(0, 0, 20, 1));
         buffer.set_string(0, 0, "น้ำในถัง", Style::new());
-        finish(&mut buffer, &Theme::FULL);
+        apply(&mut buffer, &Theme::FULL);
         assert!(buffer.content.iter().all(|cell| !cell.symbol().contains('\u{e33}')));
     }
 
@@ -145,7 +145,7 @@ mod tests {
     fn an_ascii_terminal_gets_seven_bits() {
         let mut buffer = Buffer::empty(Rect::new(0, 0, 12, 1));
         buffer.set_string(0, 0, "72.4 °C ▲─█⡇", Style::new());
-        finish(&mut buffer, &Theme::PLAIN);
+        apply(&mut buffer, &Theme::PLAIN);
         let text: String = buffer.content.iter().map(|cell| cell.symbol()).collect();
         assert_eq!(text, "72.4 *C ^-#?");
     }
