@@ -9,7 +9,7 @@ pub mod guard;
 pub mod keys;
 pub mod modal;
 pub mod msg;
-pub mod presence;
+pub mod session_lock;
 pub mod rights;
 pub mod tabs;
 pub mod theme;
@@ -36,7 +36,7 @@ use keys::Global;
 use last_frame::LastFrame;
 use modal::{Confirm, Modal};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
-use presence::Presence;
+use session_lock::SessionLock;
 use tabs::{Tab, Tabs, alarms::deeds};
 use theme::Theme;
 pub use watch::{Confirmed, Watch};
@@ -66,7 +66,7 @@ pub struct Model {
     /// Who sits here and what he may.
     pub standing: Arc<Standing>,
     /// The lock, its warning, and wishes on their way.
-    pub presence: Presence,
+    pub session_lock: SessionLock,
     /// The window with work in it that waits for an unlock, and the tab that it stood on.
     pub kept: Option<(Tab, Modal)>,
     /// Orders given so far.
@@ -144,7 +144,7 @@ impl Model {
             watch: None,
             terminal,
             standing: Arc::default(),
-            presence: Presence::default(),
+            session_lock: SessionLock::default(),
             kept: None,
             ordered: 0,
             plants: 0,
@@ -187,7 +187,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let actions = match msg {
         Msg::Key(event) if event.kind == KeyEventKind::Release => Vec::new(),
         Msg::Key(event) => {
-            let active = presence::active(model);
+            let active = session_lock::active(model);
             let actions = on_key(model, event);
             active.map(UiAction::Do).into_iter().chain(actions).collect()
         }
@@ -209,8 +209,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
         }
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
-        Msg::Standing(standing) => presence::on_standing(model, standing),
-        Msg::Granted(id, answer) => presence::on_granted(model, id, answer),
+        Msg::Standing(standing) => session_lock::on_standing(model, standing),
+        Msg::Granted(id, answer) => session_lock::on_granted(model, id, answer),
         Msg::Drill(status) => {
             model.drill = Some(status);
             Vec::new()
@@ -229,7 +229,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             Vec::new()
         }
     };
-    let actions = presence::hold_back(model, actions);
+    let actions = session_lock::hold_back(model, actions);
     let effects = perform(model, actions);
     model.settle();
     if keyed {
@@ -275,12 +275,12 @@ fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &ViewContext) -> 
 fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     model.note = None;
     if keys::find(keys::GLOBAL, event) == Some(Global::Lock) {
-        return presence::lock(model);
+        return session_lock::lock(model);
     }
-    if presence::ask_before_work(model, event) {
+    if session_lock::ask_before_work(model, event) {
         return Vec::new();
     }
-    let past = presence::is_past_unlock(model, event);
+    let past = session_lock::is_past_unlock(model, event);
     if let Some(show @ Global::Show(tab)) = keys::find(keys::GLOBAL, event)
         && model.modal.as_ref().is_some_and(|modal| !modal.takes_text())
         && Tab::offered(&model.cx()).contains(&tab)
@@ -297,7 +297,7 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         return actions;
     }
     if model.tabs.shown == Tab::Login && model.tabs.login.is_typing() && !model.small() {
-        return presence::on_typed(model, event);
+        return session_lock::on_typed(model, event);
     }
     match keys::find(keys::GLOBAL, event) {
         Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw)) => on_global(model, global),
@@ -320,7 +320,7 @@ fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
         Global::Show(_) => Vec::new(),
         Global::Next => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), 1))],
         Global::Previous => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), -1))],
-        Global::Lock => presence::lock(model),
+        Global::Lock => session_lock::lock(model),
         Global::Help => vec![UiAction::Open(Modal::Help(0))],
         Global::Quit => vec![UiAction::Leave],
         Global::Acknowledge => last_frame::acknowledge(model),
@@ -353,7 +353,7 @@ fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
 fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<UiAction> {
     model.clock.silent = Duration::ZERO;
     if !Arc::ptr_eq(&snapshot.def, &model.snapshot.def) && snapshot.def != model.snapshot.def {
-        let actions = presence::on_other_plant(model, snapshot);
+        let actions = session_lock::on_other_plant(model, snapshot);
         return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))).collect();
     }
     let rings = model.tabs.alarms.bell && bell::rings(&model.snapshot, &snapshot);
@@ -413,8 +413,8 @@ fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
             UiAction::Confirmed(confirmed) => effects.extend(model.order(confirmed)),
             UiAction::Wish(tab, wish) => {
                 // Nought is nobody's: whoever waits has a number.
-                model.presence.wished = model.presence.wished.checked_add(1).unwrap_or(1);
-                let number = model.presence.wished;
+                model.session_lock.wished = model.session_lock.wished.checked_add(1).unwrap_or(1);
+                let number = model.session_lock.wished;
                 if let Some(Modal::Sheet(sheet)) = &mut model.modal {
                     sheet.sent(number);
                 }

@@ -23,7 +23,7 @@ use super::{
     Effect, QueryId, UiAction, ViewContext,
     keys::{self, Hint},
     last_frame::Rows,
-    presence,
+    session_lock,
 };
 use crate::{
     access::{Wish, book::sha256},
@@ -91,7 +91,7 @@ impl Tab {
     /// Those that there are here. Before a login only the login page, unless the plant file lets everybody look; users
     /// only for a Supervisor; faults only where the plant is simulated, and not in an exam.
     pub fn offered(cx: &ViewContext) -> Vec<Tab> {
-        let closed = presence::is_closed(cx.standing);
+        let closed = session_lock::is_closed(cx.standing);
         let supervisor = cx.standing.who.as_ref().is_some_and(|who| who.role == Role::Supervisor);
         let there = |tab: &Tab| match tab {
             Tab::Login => true,

@@ -65,7 +65,7 @@ fn wish(effects: &[Effect]) -> Option<&Wish> {
 }
 
 fn answer(model: &mut Model, answer: Result<(), &str>) {
-    let id = QueryId { tab: Tab::Login, number: model.presence.wished };
+    let id = QueryId { tab: Tab::Login, number: model.session_lock.wished };
     update(model, Msg::Granted(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
 }
 
@@ -101,7 +101,7 @@ fn the_login_page_in_every_mood() {
 #[test]
 fn what_was_granted_and_is_not_on_disk_is_shown_as_not_recorded() {
     let mut model = with(&Fixture::normal(), person("anna", Role::Supervisor));
-    let id = QueryId { tab: Tab::Users, number: model.presence.wished };
+    let id = QueryId { tab: Tab::Users, number: model.session_lock.wished };
     update(&mut model, Msg::Granted(id, Ok(Durability::Recorded)));
     assert!(!screen(&mut model, 80, 24).contains("RECORDED"));
     update(&mut model, Msg::Granted(id, Ok(Durability::NotRecorded)));
@@ -508,7 +508,7 @@ fn the_users_and_what_can_be_done_with_them() {
         let mut model = with(&Fixture::normal(), supervisor());
         let effects = type_keys(&mut model, keys);
         assert_eq!(wish(&effects), Some(&expect), "{keys}");
-        let id = QueryId { tab: Tab::Users, number: model.presence.wished };
+        let id = QueryId { tab: Tab::Users, number: model.session_lock.wished };
         update(&mut model, Msg::Granted(id, Err("at least one Supervisor must remain".to_owned())));
         shows(&mut model, "at least one Supervisor must remain");
         update(&mut model, Msg::Granted(id, Ok(Durability::Recorded)));

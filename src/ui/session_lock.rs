@@ -1,4 +1,4 @@
-//! Who sits at this terminal: what is open to him, the lock and its warning, and word to the station that keys are pressed.
+//! The session of this terminal: what is open to its user, the idle lock and its warning, and activity messages to the station.
 
 use std::{mem, sync::Arc, time::Duration};
 
@@ -24,16 +24,16 @@ const WARNED_TICKS: u32 = 4;
 /// Said of what the station has done and its disk has not taken.
 const NOT_RECORDED: &str = "Done, but NOT RECORDED: the disk of the station does not take it";
 
-/// What the terminal remembers of the station's dealings with whoever sits here, in ticks.
+/// Times of the session and the lock, in ticks, and the number of the last request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Presence {
+pub struct SessionLock {
     /// Number of the last wish; only its answer counts.
     pub wished: u32,
-    /// When the present standing came.
-    told_at: u32,
-    /// When the station was last told that a key was pressed.
+    /// When the present session status came.
+    status_at: u32,
+    /// When the last activity message was sent.
     active_at: Option<u32>,
-    /// When the station went.
+    /// When the connection to the station was lost.
     gone_at: Option<u32>,
 }
 
@@ -45,13 +45,13 @@ pub fn is_closed(standing: &Standing) -> bool {
 impl Model {
     /// How long ago the station went.
     pub fn gone(&self) -> Option<Duration> {
-        let at = self.standing.gone.as_ref().and(self.presence.gone_at)?;
+        let at = self.standing.gone.as_ref().and(self.session_lock.gone_at)?;
         Some(Duration::from_millis(500) * self.clock.phase.wrapping_sub(at))
     }
 
     /// Time until the terminal is locked, once the station has said that this is near.
     pub fn locks_in(&self) -> Option<Duration> {
-        let passed = Duration::from_millis(500) * self.clock.phase.wrapping_sub(self.presence.told_at);
+        let passed = Duration::from_millis(500) * self.clock.phase.wrapping_sub(self.session_lock.status_at);
         self.standing.locks_in.filter(|_| !self.standing.locked).map(|left| left.saturating_sub(passed))
     }
 }
@@ -60,13 +60,13 @@ impl Model {
 pub(super) fn on_standing(model: &mut Model, standing: Arc<Standing>) -> Vec<UiAction> {
     let before = mem::replace(&mut model.standing, standing);
     let (now, phase) = (model.standing.clone(), model.clock.phase);
-    model.presence.told_at = phase;
+    model.session_lock.status_at = phase;
     match (&before.gone, &now.gone) {
         (None, Some(_)) => {
-            model.presence.gone_at = Some(phase);
+            model.session_lock.gone_at = Some(phase);
             model.doubt();
         }
-        (_, None) => model.presence.gone_at = None,
+        (_, None) => model.session_lock.gone_at = None,
         (Some(_), Some(_)) => {}
     }
     // Nobody inherits the window of somebody else. Whoever is only locked out for a while finds his own again.
@@ -198,10 +198,10 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
         return None;
     }
     let pause = if standing.locks_in.is_some() { WARNED_TICKS } else { ACTIVE_TICKS };
-    if model.presence.active_at.is_some_and(|at| model.clock.phase.wrapping_sub(at) < pause) {
+    if model.session_lock.active_at.is_some_and(|at| model.clock.phase.wrapping_sub(at) < pause) {
         return None;
     }
-    model.presence.active_at = Some(model.clock.phase);
+    model.session_lock.active_at = Some(model.clock.phase);
     Some(Effect::Wish(QueryId { tab: Tab::Login, number: 0 }, Wish::Active))
 }
 
@@ -224,7 +224,7 @@ pub(super) fn on_granted(model: &mut Model, id: QueryId, answer: Result<Durabili
         (_, Some((tab, Modal::Sheet(sheet)))) => {
             model.kept = answered(model, sheet, answer).map(|modal| (tab, modal));
         }
-        _ if id.number != 0 && id.number == model.presence.wished => {
+        _ if id.number != 0 && id.number == model.session_lock.wished => {
             return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
         }
         _ => {}
