@@ -8,7 +8,7 @@ use banner::banner;
 pub use banner::{alarm_words, counts, history_words};
 
 use super::{
-    Model, SILENCE, ViewContext, Watch,
+    Model, PendingCommand, SILENCE, ViewContext,
     keys::{self, Hint},
     modal::Modal,
     rights,
@@ -288,11 +288,11 @@ fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     canvas.run(0, 0, length, '─', cx.theme.dim());
     if let Some(note) = model.note {
         canvas.text(1, 0, &format!(" {note} "), cx.theme.strong());
-    } else if let Some(watch) = &model.watch {
-        let (text, style) = watch_words(cx, watch);
+    } else if let Some(pending) = &model.pending_command {
+        let (text, style) = pending_label(cx, pending);
         let room = length.saturating_sub(4);
         // The time stays whatever must be cut: an old outcome is not a new one.
-        let text = match &watch.status {
+        let text = match &pending.status {
             Some(status) if width(&text) > room => {
                 let at = clock(status.at, &cx.def().time_zone);
                 format!("{at} {}", fit_words(&text, room.saturating_sub(width(&at) + 1)))
@@ -304,13 +304,14 @@ fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
 }
 
 /// An order and how it stands: `TIC-1.SV 60.0 → 70.0 °C verified 13:40:02`.
-pub fn watch_words(cx: &ViewContext, watch: &Watch) -> (String, Style) {
+pub fn pending_label(cx: &ViewContext, pending: &PendingCommand) -> (String, Style) {
     let theme = cx.theme;
     // As the station took it: a write of what the device can hold.
-    let (command, old) = watch.status.as_ref().map_or((&watch.command, None), |status| (&status.command, status.old));
+    let (command, old) =
+        pending.status.as_ref().map_or((&pending.command, None), |status| (&status.command, status.old));
     let what = order_words(cx, command, old);
-    let Some(status) = &watch.status else {
-        return match watch.undelivered {
+    let Some(status) = &pending.status else {
+        return match pending.undelivered {
             Some(why) => (format!("{what}  NOT SENT: {why}"), theme.trouble()),
             None => (format!("{what}  sent …"), theme.normal()),
         };

@@ -13,7 +13,7 @@ pub mod session_lock;
 pub mod rights;
 pub mod tabs;
 pub mod theme;
-pub mod watch;
+pub mod pending_command;
 pub mod widgets;
 
 #[cfg(test)]
@@ -36,10 +36,10 @@ use keys::Global;
 use last_frame::LastFrame;
 use modal::{Confirm, Modal};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
+pub use pending_command::{Confirmed, PendingCommand};
 use session_lock::SessionLock;
 use tabs::{Tab, Tabs, alarms::deeds};
 use theme::Theme;
-pub use watch::{Confirmed, Watch};
 
 /// A station that has said nothing for so long (real time) is silent: its values are doubted.
 pub const SILENCE: Duration = Duration::from_secs(3);
@@ -60,7 +60,7 @@ pub struct Model {
     /// What time it is and how the animation stands.
     pub clock: Clock,
     /// The last order of this terminal and its outcome.
-    pub watch: Option<Watch>,
+    pub pending_command: Option<PendingCommand>,
     /// Number of this terminal.
     pub terminal: u32,
     /// Who sits here and what he may.
@@ -141,7 +141,7 @@ impl Model {
             theme,
             screen: Rect::default(),
             clock: Clock::default(),
-            watch: None,
+            pending_command: None,
             terminal,
             standing: Arc::default(),
             session_lock: SessionLock::default(),
@@ -218,8 +218,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Answer(id, answer) => with_tabs(model, |tabs, cx| tabs.on_answer(cx, id, answer)),
         Msg::Saved(tab, result) => with_tabs(model, |tabs, cx| tabs.on_saved(cx, tab, result)),
         Msg::Undelivered(id, why) => {
-            if let Some(watch) = model.watch.as_mut().filter(|watch| watch.id == id) {
-                watch.undelivered = Some(why);
+            if let Some(pending) = model.pending_command.as_mut().filter(|pending| pending.id == id) {
+                pending.undelivered = Some(why);
             }
             Vec::new()
         }
@@ -338,7 +338,7 @@ fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
         Global::Redraw => vec![UiAction::Do(Effect::Redraw)],
         Global::Dismiss => {
             // A failure that is being read is dismissed first; everything else does not hold up the way back.
-            let failed = model.watch.take().is_some_and(|watch| watch.is_trouble());
+            let failed = model.pending_command.take().is_some_and(|pending| pending.is_trouble());
             if !failed {
                 with_tabs(model, |tabs, cx| {
                     tabs.back(cx);
@@ -371,7 +371,7 @@ fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
     model.clock.phase = model.clock.phase.wrapping_add(1);
     model.clock.silent = silent;
     let phase = model.clock.phase;
-    model.watch.take_if(|watch| watch.is_over(phase));
+    model.pending_command.take_if(|pending| pending.is_over(phase));
     if silent >= SILENCE {
         model.doubt();
     }

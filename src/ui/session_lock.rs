@@ -73,7 +73,7 @@ pub(super) fn on_standing(model: &mut Model, standing: Arc<Standing>) -> Vec<UiA
     let user = |standing: &Standing| standing.who.as_ref().map(|who| who.user.clone());
     if user(&before) != user(&now) || is_closed(&now) {
         model.modal.take_if(|modal| !modal.is_quit());
-        model.watch = model.watch.take_if(|_| user(&before) == user(&now));
+        model.pending_command = model.pending_command.take_if(|_| user(&before) == user(&now));
         model.kept = None;
     }
     let back = keep_work(model, &before, &now);
@@ -241,7 +241,7 @@ fn answered(model: &Model, mut sheet: Box<Sheet>, answer: Result<(), String>) ->
 pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<UiAction> {
     let shown = model.tabs.shown;
     model.tabs = Tabs::new(&snapshot);
-    (model.snapshot, model.watch, model.kept) = (snapshot, None, None);
+    (model.snapshot, model.pending_command, model.kept) = (snapshot, None, None);
     model.plants = model.plants.wrapping_add(1);
     let words = vec![
         "The plant file changed".to_owned(),

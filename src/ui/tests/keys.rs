@@ -610,7 +610,7 @@ fn only_what_was_read_back_is_called_verified() {
         snapshot.orders = vec![OrderStatus {
             from: "".into(),
             note: None,
-            id: model.watch.as_ref().expect("the order is watched").id,
+            id: model.pending_command.as_ref().expect("the order is watched").id,
             by: Arc::from("tech1"),
             command,
             at: snapshot.at,

@@ -33,7 +33,7 @@ impl From<Command> for Confirmed {
 
 /// An order of this terminal on its way.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Watch {
+pub struct PendingCommand {
     /// Which.
     pub id: OrderId,
     /// What was wished.
@@ -46,7 +46,7 @@ pub struct Watch {
     pub undelivered: Option<&'static str>,
 }
 
-impl Watch {
+impl PendingCommand {
     /// Has it ended in a way that its operator must read?
     pub fn is_trouble(&self) -> bool {
         let outcome = self.status.as_ref().map(|status| &status.outcome);
@@ -74,7 +74,8 @@ impl Model {
         let id = OrderId { terminal: self.terminal, number: self.ordered };
         let undelivered = self.standing.gone.as_ref().map(|_| "the station has gone");
         let changed_at = self.clock.phase;
-        self.watch = Some(Watch { id, command: command.clone(), status: None, changed_at, undelivered });
+        self.pending_command =
+            Some(PendingCommand { id, command: command.clone(), status: None, changed_at, undelivered });
         let request = OrderRequest::on(&self.snapshot, id, command);
         let request = OrderRequest { seen: seen.or(request.seen), sign, note, ..request };
         undelivered.is_none().then_some(Effect::Order(request))
@@ -82,20 +83,20 @@ impl Model {
 
     /// Takes the outcome of the watched order from the snapshot that has come.
     pub(super) fn follow(&mut self) {
-        if let Some(watch) = &mut self.watch
-            && let Some(status) = self.snapshot.orders.iter().find(|status| status.id == watch.id)
+        if let Some(pending) = &mut self.pending_command
+            && let Some(status) = self.snapshot.orders.iter().find(|status| status.id == pending.id)
         {
-            if watch.status.as_ref() != Some(status) {
-                watch.changed_at = self.clock.phase;
+            if pending.status.as_ref() != Some(status) {
+                pending.changed_at = self.clock.phase;
             }
-            watch.status = Some(status.clone());
+            pending.status = Some(status.clone());
         }
     }
 
     /// Ends the wait of a window for the station's word on its signature; one that was not taken is asked for again.
     pub(super) fn settle(&mut self) {
-        let Some(watch) = &self.watch else { return };
-        let refused = match (watch.undelivered, watch.status.as_ref().map(|status| &status.outcome)) {
+        let Some(pending) = &self.pending_command else { return };
+        let refused = match (pending.undelivered, pending.status.as_ref().map(|status| &status.outcome)) {
             (Some(why), _) => Some(format!("not sent: {why}")),
             (None, Some(Outcome::Refused(Refusal::NotSigned(why)))) => Some(why.clone()),
             (None, Some(_)) => None,
