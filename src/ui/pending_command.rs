@@ -17,7 +17,7 @@ pub struct Confirmed {
     /// What.
     pub command: Command,
     /// The displayed value of the tag to be written; `None` where it was not known.
-    pub seen: Option<f64>,
+    pub expected: Option<f64>,
     /// What a tag asks for again.
     pub sign: Option<Signature>,
     /// Why, in his words.
@@ -27,7 +27,7 @@ pub struct Confirmed {
 impl From<Command> for Confirmed {
     /// A command that nothing was asked about.
     fn from(command: Command) -> Confirmed {
-        Confirmed { command, seen: None, sign: None, note: None }
+        Confirmed { command, expected: None, sign: None, note: None }
     }
 }
 
@@ -69,7 +69,7 @@ impl PendingCommand {
 impl Model {
     /// Gives an order and watches it. A station that has gone takes none: that is said at once.
     pub(super) fn order(&mut self, confirmed: Confirmed) -> Option<Effect> {
-        let Confirmed { command, seen, sign, note } = confirmed;
+        let Confirmed { command, expected, sign, note } = confirmed;
         self.ordered = self.ordered.wrapping_add(1);
         let id = OrderId { terminal: self.terminal, number: self.ordered };
         let undelivered = self.standing.gone.as_ref().map(|_| "the station has gone");
@@ -77,7 +77,7 @@ impl Model {
         self.pending_command =
             Some(PendingCommand { id, command: command.clone(), status: None, changed_at, undelivered });
         let request = OrderRequest::on(&self.snapshot, id, command);
-        let request = OrderRequest { seen: seen.or(request.seen), sign, note, ..request };
+        let request = OrderRequest { seen: expected.or(request.seen), sign, note, ..request };
         undelivered.is_none().then_some(Effect::Order(request))
     }
 

@@ -5,9 +5,9 @@ use ratatui::{Frame, layout::Rect, style::Style};
 
 use super::{
     Faceplate, Modal, Next,
+    confirmed_value::ConfirmedValue,
     form::{Field, Form, Turn},
     number::rounded_words,
-    seen::Seen,
     window,
 };
 use crate::{
@@ -39,7 +39,7 @@ pub struct Confirm {
     /// Where it was asked from, and where it leads back to.
     back: Option<Faceplate>,
     /// What its reader saw, where a value is written.
-    seen: Option<Seen>,
+    expected: Option<ConfirmedValue>,
     /// What the tag asks for again.
     sign: Option<Form>,
     /// Why the last Enter was not taken.
@@ -74,7 +74,7 @@ impl Confirm {
             title: title.into(),
             notes,
             back: None,
-            seen: None,
+            expected: None,
             sign: None,
             problem: None,
             waiting: false,
@@ -95,7 +95,7 @@ impl Confirm {
         let intent = Intent::Order(Command::Write { tag, value });
         let notes = rounded.into_iter().chain(write_notes(def)).collect();
         let confirm = Confirm::new(intent, format!("write {}", def.name), notes);
-        Confirm { seen: Some(Seen::new(cx, tag)), ..confirm }.signed(cx)
+        Confirm { expected: Some(ConfirmedValue::new(cx, tag)), ..confirm }.signed(cx)
     }
 
     /// The same, asked from a faceplate, with words of its own above all others.
@@ -217,7 +217,7 @@ impl Confirm {
     /// Does it, unless something has changed, is missing, or makes it useless.
     fn yes(mut self, cx: &ViewContext) -> Next {
         let refused = self.is_refused(cx);
-        if refused || self.seen.as_mut().is_some_and(|seen| seen.changed(cx)) {
+        if refused || self.expected.as_mut().is_some_and(|expected| expected.changed(cx)) {
             return Next::Stay(Modal::Confirm(self));
         }
         if let Some(why) = self.sign.as_mut().and_then(Form::lacking) {
@@ -227,9 +227,9 @@ impl Confirm {
         let act = match &self.intent {
             Intent::Quit => UiAction::Do(Effect::Quit),
             Intent::Order(command) => {
-                let seen = self.seen.as_ref().and_then(|seen| seen.shown(cx));
+                let expected = self.expected.as_ref().and_then(|expected| expected.shown(cx));
                 let sign = self.sign.as_ref().map(signature);
-                UiAction::Confirmed(Confirmed { seen, sign, ..command.clone().into() })
+                UiAction::Confirmed(Confirmed { expected, sign, ..command.clone().into() })
             }
         };
         if self.sign.is_some() {
@@ -305,7 +305,7 @@ impl Confirm {
             Intent::Order(command) => rights::missing(cx, command),
             Intent::Quit => None,
         };
-        let news = self.seen.as_ref().and_then(|seen| seen.news(cx)).map(|words| cx.theme.enter(&words));
+        let news = self.expected.as_ref().and_then(|expected| expected.news(cx)).map(|words| cx.theme.enter(&words));
         let told = news.into_iter().chain(missing);
         rows.extend(told.flat_map(|words| wrap(&words, room)).map(|line| (line, cx.theme.trouble())));
         let yes = if self.wants_y() { "y".to_owned() } else { cx.theme.enter("⏎") };

@@ -6,9 +6,9 @@ use ratatui::{Frame, layout::Rect, style::Style};
 use super::{
     Confirm, Modal, Next,
     confirm::{wire_words, write_notes},
+    confirmed_value::ConfirmedValue,
     line::Line,
     number::{self, is_numeric, range_words},
-    seen::Seen,
     window,
 };
 use crate::{
@@ -32,13 +32,13 @@ pub struct Entry {
     /// Why the last Enter was not taken.
     pub problem: Option<String>,
     /// What its author saw.
-    seen: Seen,
+    expected: ConfirmedValue,
 }
 
 impl Entry {
     /// An empty entry.
     pub fn new(cx: &ViewContext, tag: TagId) -> Entry {
-        Entry { tag, line: Line::default(), problem: None, seen: Seen::new(cx, tag) }
+        Entry { tag, line: Line::default(), problem: None, expected: ConfirmedValue::new(cx, tag) }
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
@@ -48,15 +48,15 @@ impl Entry {
                 false => number::check(cx, self.tag, &self.line.text()),
             };
             match checked {
-                Ok(_) if self.seen.changed(cx) => self.problem = None,
+                Ok(_) if self.expected.changed(cx) => self.problem = None,
                 Ok(value) if number::asks(cx, self.tag, value) => {
                     let why = number::worries(cx, self.tag, value);
                     return Next::Stay(Modal::Confirm(Confirm::write(cx, self.tag, value).with_notes(why)));
                 }
                 Ok(value) => {
-                    let seen = self.seen.shown(cx);
+                    let expected = self.expected.shown(cx);
                     let command = Command::Write { tag: self.tag, value };
-                    return Next::Do(vec![UiAction::Confirmed(Confirmed { seen, ..command.into() })]);
+                    return Next::Do(vec![UiAction::Confirmed(Confirmed { expected, ..command.into() })]);
                 }
                 Err(problem) => self.problem = Some(problem),
             }
@@ -95,7 +95,7 @@ impl Entry {
         let notes = notes.chain(guard::key_words(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
         let missing = rights::missing(cx, &Command::Write { tag: self.tag, value: 0.0 });
-        let told = self.problem.clone().or_else(|| self.seen.news(cx)).or(missing);
+        let told = self.problem.clone().or_else(|| self.expected.news(cx)).or(missing);
         let problem = wrap(&told.map_or(String::new(), |words| theme.enter(&words)), room);
         let inner = rows
             .iter()

@@ -13,7 +13,7 @@ pub mod notice;
 pub mod number;
 pub mod prompt;
 pub mod reason;
-pub mod seen;
+pub mod confirmed_value;
 pub mod settings;
 pub mod sheet;
 pub mod why;

@@ -120,7 +120,7 @@ fn told(cx: &ViewContext, status: &Status, place: Place, fault: Fault, canvas: &
         lines.extend(wrap(&format!("{head}{text}"), room).into_iter().map(|line| (line, theme.normal())));
     };
     paragraph("", story.what);
-    paragraph("Seen: ", story.seen);
+    paragraph("ConfirmedValue: ", story.seen);
     paragraph("Do: ", story.act);
 
     let truth = compare(cx, status, place);

@@ -10,7 +10,7 @@ const ASKED_MAX: u8 = 2;
 
 /// What was seen of a tag.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
+pub struct ConfirmedValue {
     tag: TagId,
     value: Option<f64>,
     /// What stood there before the last change that was noticed, and how often one was.
@@ -18,10 +18,10 @@ pub struct Seen {
     asked: u8,
 }
 
-impl Seen {
+impl ConfirmedValue {
     /// The tag as it stands.
-    pub fn new(cx: &ViewContext, tag: TagId) -> Seen {
-        Seen { tag, value: cx.snapshot.sample(tag).value, before: None, asked: 0 }
+    pub fn new(cx: &ViewContext, tag: TagId) -> ConfirmedValue {
+        ConfirmedValue { tag, value: cx.snapshot.sample(tag).value, before: None, asked: 0 }
     }
 
     /// Is it another value than was seen? Then that is what was seen from now on, and its author should be asked again.
