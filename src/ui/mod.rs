@@ -415,8 +415,8 @@ fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
                 // Nought is nobody's: whoever waits has a number.
                 model.session_lock.wished = model.session_lock.wished.checked_add(1).unwrap_or(1);
                 let number = model.session_lock.wished;
-                if let Some(Modal::Sheet(sheet)) = &mut model.modal {
-                    sheet.sent(number);
+                if let Some(Modal::UserForm(form)) = &mut model.modal {
+                    form.sent(number);
                 }
                 effects.push(Effect::Wish(QueryId { tab, number }, wish));
             }

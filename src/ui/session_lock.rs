@@ -7,7 +7,7 @@ use crossterm::event::{KeyCode, KeyEvent};
 use super::{
     Effect, Model, QueryId, UiAction, context,
     keys::{self, Global},
-    modal::{Modal, Notice, Sheet, sheet::Purpose},
+    modal::{Modal, Notice, UserForm, user_form::Purpose},
     tabs::{Tab, Tabs, login},
     with_tabs,
 };
@@ -107,8 +107,8 @@ fn keep_work(model: &mut Model, before: &Standing, now: &Standing) -> Option<Tab
             None
         }
         (true, false) => {
-            if let Some(Modal::Sheet(sheet)) = model.modal.take_if(|modal| modal.is_unlock()) {
-                model.modal = sheet.below();
+            if let Some(Modal::UserForm(form)) = model.modal.take_if(|modal| modal.is_unlock()) {
+                model.modal = form.below();
             }
             let (tab, work) = model.kept.take()?;
             model.modal = Some(work);
@@ -188,7 +188,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
 
 fn unlock(model: &Model, below: Option<Modal>) -> Option<Modal> {
     let who = model.standing.who.as_ref()?;
-    Some(Modal::Sheet(Box::new(Sheet::unlock(who.user.clone(), below))))
+    Some(Modal::UserForm(Box::new(UserForm::unlock(who.user.clone(), below))))
 }
 
 /// Word to the station that somebody is there; twice a minute at most, but at once when it is about to lock.
@@ -216,13 +216,13 @@ pub(super) fn on_granted(model: &mut Model, id: QueryId, answer: Result<Durabili
         // A file that waits to be written waits for its own answer, whatever was wished since.
         return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
     }
-    let waits = |modal: &Modal| matches!(modal, Modal::Sheet(sheet) if sheet.waits_for(id.number));
+    let waits = |modal: &Modal| matches!(modal, Modal::UserForm(form) if form.waits_for(id.number));
     let shown = model.modal.take_if(|modal| waits(modal));
     let kept = model.kept.take_if(|(_, modal)| waits(modal));
     match (shown, kept) {
-        (Some(Modal::Sheet(sheet)), _) => model.modal = answered(model, sheet, answer),
-        (_, Some((tab, Modal::Sheet(sheet)))) => {
-            model.kept = answered(model, sheet, answer).map(|modal| (tab, modal));
+        (Some(Modal::UserForm(form)), _) => model.modal = answered(model, form, answer),
+        (_, Some((tab, Modal::UserForm(form)))) => {
+            model.kept = answered(model, form, answer).map(|modal| (tab, modal));
         }
         _ if id.number != 0 && id.number == model.session_lock.wished => {
             return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
@@ -232,9 +232,9 @@ pub(super) fn on_granted(model: &mut Model, id: QueryId, answer: Result<Durabili
     Vec::new()
 }
 
-fn answered(model: &Model, mut sheet: Box<Sheet>, answer: Result<(), String>) -> Option<Modal> {
-    let done = sheet.answered(&context(model, model.screen), answer);
-    if done { sheet.below() } else { Some(Modal::Sheet(sheet)) }
+fn answered(model: &Model, mut form: Box<UserForm>, answer: Result<(), String>) -> Option<Modal> {
+    let done = form.answered(&context(model, model.screen), answer);
+    if done { form.below() } else { Some(Modal::UserForm(form)) }
 }
 
 /// The station runs another plant file: nothing that was known of the old one may stay.
@@ -271,6 +271,6 @@ impl Modal {
 
     /// Does it ask for the password of a locked terminal?
     pub fn is_unlock(&self) -> bool {
-        matches!(self, Modal::Sheet(sheet) if matches!(sheet.purpose, Purpose::Unlock(_)))
+        matches!(self, Modal::UserForm(form) if matches!(form.purpose, Purpose::Unlock(_)))
     }
 }

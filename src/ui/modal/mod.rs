@@ -15,7 +15,7 @@ pub mod prompt;
 pub mod reason;
 pub mod confirmed_value;
 pub mod settings;
-pub mod sheet;
+pub mod user_form;
 pub mod why;
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -31,7 +31,7 @@ pub use notice::Notice;
 pub use prompt::Prompt;
 pub use reason::Reason;
 pub use settings::Settings;
-pub use sheet::Sheet;
+pub use user_form::UserForm;
 pub use why::Why;
 
 use super::{
@@ -70,7 +70,7 @@ pub enum Modal {
     /// A frame, a block, a test of the bus tab.
     Bus(Box<bus::Window>),
     /// A form about people.
-    Sheet(Box<Sheet>),
+    UserForm(Box<UserForm>),
     /// A deed on record, whole.
     Deed(Box<Deed>),
 }
@@ -106,7 +106,7 @@ impl Modal {
         if keys::code(KeyCode::Esc).is(event) {
             let back = match self {
                 Modal::Confirm(confirm) => confirm.back().map(Modal::Faceplate),
-                Modal::Sheet(sheet) => sheet.below(),
+                Modal::UserForm(form) => form.below(),
                 _ => None,
             };
             return (back, Vec::new());
@@ -127,7 +127,7 @@ impl Modal {
             Modal::Why(why) => why.on_key(event),
             Modal::Settings(settings) => settings.on_key(cx, event),
             Modal::Bus(window) => window.on_key(cx, tabs, event),
-            Modal::Sheet(sheet) => sheet.on_key(cx, event),
+            Modal::UserForm(form) => form.on_key(cx, event),
             Modal::Deed(deed) => deed.on_key(event),
         };
         match next {
@@ -148,7 +148,7 @@ impl Modal {
         match self {
             Modal::Confirm(confirm) => confirm.takes_text(),
             Modal::Choice(_) => false,
-            Modal::Entry(_) | Modal::Prompt(_) | Modal::Reason(_) | Modal::Settings(_) | Modal::Sheet(_) => true,
+            Modal::Entry(_) | Modal::Prompt(_) | Modal::Reason(_) | Modal::Settings(_) | Modal::UserForm(_) => true,
             Modal::Help(_)
             | Modal::Notice(_)
             | Modal::Guidance(_)
@@ -175,7 +175,7 @@ impl Modal {
             | Modal::Prompt(_)
             | Modal::Reason(_)
             | Modal::Settings(_)
-            | Modal::Sheet(_) => false,
+            | Modal::UserForm(_) => false,
         }
     }
 
@@ -187,7 +187,7 @@ impl Modal {
             Modal::Reason(reason) => reason.paste(text),
             Modal::Settings(settings) => settings.on_paste(text),
             Modal::Confirm(confirm) => confirm.on_paste(text),
-            Modal::Sheet(sheet) => sheet.paste(text),
+            Modal::UserForm(form) => form.paste(text),
             Modal::Help(_)
             | Modal::Choice(_)
             | Modal::Faceplate(_)
@@ -216,7 +216,7 @@ impl Modal {
             Modal::Why(why) => why.hints(),
             Modal::Settings(settings) => settings.hints(),
             Modal::Bus(window) => window.hints(),
-            Modal::Sheet(sheet) => sheet.hints().into_iter().chain([hint("Esc", "leave")]).collect(),
+            Modal::UserForm(form) => form.hints().into_iter().chain([hint("Esc", "leave")]).collect(),
             Modal::Deed(_) => vec![hint("Esc", "close")],
         };
         // A digit is typed here: the tabs are one key further away.
@@ -241,7 +241,7 @@ impl Modal {
             Modal::Why(why) => why.view(cx, frame, body),
             Modal::Settings(settings) => settings.view(cx, frame, body),
             Modal::Bus(window) => window.view(cx, frame, body),
-            Modal::Sheet(sheet) => sheet.view(cx, frame, body),
+            Modal::UserForm(form) => form.view(cx, frame, body),
             Modal::Deed(deed) => deed.view(cx, frame, body),
         }
     }

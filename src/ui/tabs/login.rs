@@ -14,7 +14,7 @@ use crate::{
     ui::{
         UiAction, ViewContext,
         keys::{self, Hint, Key, char},
-        modal::sheet::{Purpose, Sheet},
+        modal::user_form::{Purpose, UserForm},
     },
 };
 
@@ -45,7 +45,7 @@ pub const KEYS: &[Key<Action>] = &[
 #[derive(Debug, Default)]
 pub struct Login {
     /// The form that is filled in.
-    sheet: Option<Sheet>,
+    form: Option<UserForm>,
     /// The password with which somebody has just logged in, as long as he may have to change it.
     given: Option<Secret>,
     /// He wishes another password.
@@ -59,10 +59,10 @@ pub struct Login {
 impl Login {
     /// A key: the form has all of them while there is one.
     pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        let Some(sheet) = &mut self.sheet else {
+        let Some(form) = &mut self.form else {
             return keys::find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default();
         };
-        let Some(wish) = sheet.press(cx, event) else { return Vec::new() };
+        let Some(wish) = form.press(cx, event) else { return Vec::new() };
         if let Wish::Login { password, .. } = &wish {
             self.given = Some(password.clone());
         }
@@ -87,12 +87,12 @@ impl Login {
 
     /// Does a form take every key?
     pub fn is_typing(&self) -> bool {
-        self.sheet.is_some()
+        self.form.is_some()
     }
 
     /// Esc: out of the form, where that leads somewhere; else the form is emptied. `false`: there was nothing to leave.
     pub fn back(&mut self, standing: &Standing) -> bool {
-        let typing = self.sheet.take().is_some();
+        let typing = self.form.take().is_some();
         self.changing = false;
         self.fit(standing);
         typing
@@ -100,8 +100,8 @@ impl Login {
 
     /// Pasted text.
     pub fn on_paste(&mut self, text: &str) {
-        if let Some(sheet) = &mut self.sheet {
-            sheet.paste(text);
+        if let Some(form) = &mut self.form {
+            form.paste(text);
         }
     }
 
@@ -129,25 +129,25 @@ impl Login {
             None if standing.first => Some(Purpose::First),
             None => Some(Purpose::Login),
         };
-        let fits = self.sheet.as_ref().map(|sheet| &sheet.purpose) == purpose.as_ref();
+        let fits = self.form.as_ref().map(|form| &form.purpose) == purpose.as_ref();
         if !fits {
-            self.sheet = purpose.map(Sheet::new);
+            self.form = purpose.map(UserForm::new);
         }
     }
 
     /// The station's answer to the last wish.
     pub fn on_granted(&mut self, cx: &ViewContext, answer: Result<(), String>) {
-        match &mut self.sheet {
-            Some(sheet) if sheet.is_waiting() => {
+        match &mut self.form {
+            Some(form) if form.is_waiting() => {
                 if answer.is_err() {
-                    self.given = self.given.take_if(|_| sheet.purpose != Purpose::Login);
+                    self.given = self.given.take_if(|_| form.purpose != Purpose::Login);
                 }
-                if sheet.answered(cx, answer) {
-                    if matches!(sheet.purpose, Purpose::Change(_)) {
+                if form.answered(cx, answer) {
+                    if matches!(form.purpose, Purpose::Change(_)) {
                         self.told = Some(Ok("The new password is in force."));
                     }
                     self.changing = false;
-                    self.sheet = None;
+                    self.form = None;
                     self.fit(cx.standing);
                 }
             }
@@ -157,10 +157,10 @@ impl Login {
 
     /// The keys of the moment.
     pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let Some(sheet) = &self.sheet else { return keys::hints(KEYS) };
+        let Some(form) = &self.form else { return keys::hints(KEYS) };
         let leads = if self.changing || cx.standing.view || cx.standing.locked { "back" } else { "clear" };
         let quit = Hint::new("Ctrl-C", "quit", "");
-        sheet.hints().into_iter().chain([Hint::new("Esc", leads, ""), quit]).collect()
+        form.hints().into_iter().chain([Hint::new("Esc", leads, ""), quit]).collect()
     }
 
     /// Draws it.

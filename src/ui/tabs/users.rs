@@ -15,7 +15,7 @@ use crate::{
         UiAction, ViewContext,
         keys::{self, Hint, Key, char, code},
         last_frame::Rows,
-        modal::{Modal, Notice, Sheet, sheet::Purpose},
+        modal::{Modal, Notice, UserForm, user_form::Purpose},
     },
 };
 
@@ -105,7 +105,7 @@ impl Users {
         let users = &cx.standing.users;
         let place = self.place(cx);
         let row = users.get(place);
-        let sheet = match (action, row) {
+        let form = match (action, row) {
             (Action::Move(by), _) => {
                 let place = place.saturating_add_signed(by).min(users.len().saturating_sub(1));
                 self.selected = users.get(place).map(|row| row.user.clone());
@@ -124,18 +124,18 @@ impl Users {
                 let notice = Notice::new("add a user", words.map(str::to_owned).to_vec());
                 return vec![UiAction::Open(Modal::Notice(notice))];
             }
-            (Action::Add, Some(_)) => Some(Sheet::new(Purpose::Add)),
-            (Action::Role, Some(row)) => Some(Sheet::role_of(row)),
+            (Action::Add, Some(_)) => Some(UserForm::new(Purpose::Add)),
+            (Action::Role, Some(row)) => Some(UserForm::role_of(row)),
             (Action::Disable, Some(row)) => {
                 let locked_out = row.locked_until.is_some_and(|until| until > cx.now);
                 let disable = !row.disabled && !locked_out;
-                Some(Sheet::new(Purpose::Disable(row.user.clone(), disable)))
+                Some(UserForm::new(Purpose::Disable(row.user.clone(), disable)))
             }
-            (Action::Reset, Some(row)) => Some(Sheet::new(Purpose::Reset(row.user.clone()))),
-            (Action::Delete, Some(row)) => Some(Sheet::new(Purpose::Delete(row.user.clone()))),
+            (Action::Reset, Some(row)) => Some(UserForm::new(Purpose::Reset(row.user.clone()))),
+            (Action::Delete, Some(row)) => Some(UserForm::new(Purpose::Delete(row.user.clone()))),
             (Action::Role | Action::Disable | Action::Reset | Action::Delete, None) => None,
         };
-        sheet.map(|sheet| UiAction::Open(Modal::Sheet(Box::new(sheet)))).into_iter().collect()
+        form.map(|form| UiAction::Open(Modal::UserForm(Box::new(form)))).into_iter().collect()
     }
 
     /// The list that keys act on.

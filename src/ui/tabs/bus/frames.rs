@@ -5,7 +5,7 @@ use std::{collections::VecDeque, path::PathBuf};
 use super::{
     Place, Window,
     rows::first_for,
-    window::{Sheet, Shown},
+    window::{Shown, TextWindow},
 };
 use crate::{
     bus::{capture, explain, filter::Filter, frame::hex},
@@ -118,7 +118,7 @@ impl Ring {
         let frame = (*shown.get(self.place(&shown))?).clone();
         let before: Vec<Frame> = self.before(frame.number).take(16).cloned().collect();
         let shown = Shown::Frame { line: at.settings.name.clone(), frame: Box::new(frame), before };
-        Some(UiAction::Open(Modal::Bus(Box::new(Window::Sheet(Sheet::new(shown))))))
+        Some(UiAction::Open(Modal::Bus(Box::new(Window::Text(TextWindow::new(shown))))))
     }
 
     /// Asks for the filter.

@@ -6,7 +6,7 @@ use super::{
     Place, Window,
     line::{grouped, ms, short_ms},
     rows::{self, first_for, number, plain, words},
-    window::{Sheet, Shown},
+    window::{Shown, TextWindow},
 };
 use crate::{
     bus::names,
@@ -49,7 +49,7 @@ impl Plan {
     pub fn open(&self, at: &Place) -> Option<UiAction> {
         let poll = at.report?.polls.get(self.selected)?;
         let shown = Shown::Block { line: at.id, device: poll.device, table: poll.table, address: poll.address };
-        Some(UiAction::Open(Modal::Bus(Box::new(Window::Sheet(Sheet::new(shown))))))
+        Some(UiAction::Open(Modal::Bus(Box::new(Window::Text(TextWindow::new(shown))))))
     }
 
     /// Why the values of the selected block are what they are, beginning with one that is not good.

@@ -34,7 +34,7 @@ use crate::{
 #[derive(Debug, Clone, PartialEq)]
 pub enum Window {
     /// Something to read.
-    Sheet(Sheet),
+    Text(TextWindow),
     /// Bytes or words to be sent.
     Send(Send),
     /// A test with its fields.
@@ -47,7 +47,7 @@ impl Window {
     /// Is it only something to read?
     pub fn only_shows(&self) -> bool {
         match self {
-            Window::Sheet(_) => true,
+            Window::Text(_) => true,
             Window::Send(_) | Window::Form(_) | Window::Registers(_) => false,
         }
     }
@@ -55,7 +55,7 @@ impl Window {
     /// A key.
     pub fn on_key(self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
         match self {
-            Window::Sheet(sheet) => sheet.on_key(event),
+            Window::Text(text) => text.on_key(event),
             Window::Send(send) => send.on_key(cx, &mut tabs.bus.test, event),
             Window::Form(form) => form.on_key(cx, &mut tabs.bus.test, event),
             Window::Registers(registers) => registers.on_key(cx, event),
@@ -72,7 +72,7 @@ impl Window {
         match self {
             Window::Send(send) => send.on_paste(text),
             Window::Form(form) => form.on_paste(text),
-            Window::Sheet(_) | Window::Registers(_) => {}
+            Window::Text(_) | Window::Registers(_) => {}
         }
     }
 
@@ -80,7 +80,7 @@ impl Window {
     pub fn hints(&self) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         match self {
-            Window::Sheet(_) => vec![hint("↑↓", "scroll"), hint("Esc", "close")],
+            Window::Text(_) => vec![hint("↑↓", "scroll"), hint("Esc", "close")],
             Window::Send(_) => vec![hint("⏎", "send"), hint("Tab", "check on or off"), hint("Esc", "close")],
             Window::Form(_) => {
                 vec![hint("↑↓", "field"), hint("←→", "choose"), hint("⏎", "start"), hint("Esc", "close")]
@@ -92,7 +92,7 @@ impl Window {
     /// Draws it.
     pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
         match self {
-            Window::Sheet(sheet) => sheet.view(cx, screen, body),
+            Window::Text(text) => text.view(cx, screen, body),
             Window::Send(send) => send.view(cx, screen, body),
             Window::Form(form) => form.view(cx, screen, body),
             Window::Registers(registers) => registers.view(cx, screen, body),
@@ -102,12 +102,12 @@ impl Window {
 
 /// Rows to read, drawn anew with every snapshot.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sheet {
+pub struct TextWindow {
     shown: Shown,
     first: usize,
 }
 
-/// What a sheet shows.
+/// What a text shows.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shown {
     /// One frame, byte by byte.
@@ -132,10 +132,10 @@ pub enum Shown {
     },
 }
 
-impl Sheet {
+impl TextWindow {
     /// From its first row.
-    pub fn new(shown: Shown) -> Sheet {
-        Sheet { shown, first: 0 }
+    pub fn new(shown: Shown) -> TextWindow {
+        TextWindow { shown, first: 0 }
     }
 
     fn on_key(mut self, event: KeyEvent) -> Next {
@@ -148,9 +148,9 @@ impl Sheet {
             KeyCode::Enter | KeyCode::Char('q') => return Next::Close,
             _ => {}
         }
-        // No sheet has more rows; the view stops at its last one.
+        // No text has more rows; the view stops at its last one.
         self.first = self.first.min(400);
-        Window::Sheet(self).stay()
+        Window::Text(self).stay()
     }
 
     fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {

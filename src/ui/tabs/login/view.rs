@@ -24,14 +24,14 @@ pub(super) fn draw(login: &Login, cx: &ViewContext, frame: &mut Frame, area: Rec
     let least = if height < 14 { 2 } else { ALARM_ROWS_MIN };
     let above = height.saturating_sub(least);
     let mut part = canvas.part(3, u16::from(least > 2), room, above);
-    let form = login.sheet.as_ref().map_or(0, |sheet| sheet.height(cx, room) + 4);
+    let form = login.form.as_ref().map_or(0, |form| form.height(cx, room) + 4);
     let mut y = notice(cx, &mut part, above.saturating_sub(form));
-    y = match &login.sheet {
-        Some(sheet) => {
-            part.text(0, y, &heading(cx, &sheet.title()), cx.theme.strong());
+    y = match &login.form {
+        Some(form) => {
+            part.text(0, y, &heading(cx, &form.title()), cx.theme.strong());
             let (width, height) = (part.width(), part.height());
             let mut rest = part.part(0, y + 2, width, height.saturating_sub(y + 2));
-            y + 2 + sheet.draw(cx, &mut rest)
+            y + 2 + form.draw(cx, &mut rest)
         }
         None => who(login, cx, &mut part, y),
     };

@@ -24,7 +24,7 @@ use crate::{
     },
 };
 
-/// What a sheet is for.
+/// What a form is for.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Purpose {
     /// The first Supervisor of a plant that knows nobody.
@@ -49,7 +49,7 @@ pub enum Purpose {
 
 /// A form and how its wish stands.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sheet {
+pub struct UserForm {
     /// What for.
     pub purpose: Purpose,
     form: Form,
@@ -63,9 +63,9 @@ pub struct Sheet {
     below: Option<Box<Modal>>,
 }
 
-impl Sheet {
-    /// An empty sheet.
-    pub fn new(purpose: Purpose) -> Sheet {
+impl UserForm {
+    /// An empty form.
+    pub fn new(purpose: Purpose) -> UserForm {
         let twice = || [Field::secret("password"), Field::secret("password again")];
         let fields = match &purpose {
             Purpose::First => [Field::name("name")].into_iter().chain(twice()).collect(),
@@ -83,18 +83,18 @@ impl Sheet {
             Purpose::Disable(..) => Vec::new(),
             Purpose::Delete(_) => vec![Field::name("name")],
         };
-        Sheet { purpose, form: Form::new(fields), waiting: false, number: 0, problem: None, below: None }
+        UserForm { purpose, form: Form::new(fields), waiting: false, number: 0, problem: None, below: None }
     }
 
     /// Another role for this user; the present one is shown first.
-    pub fn role_of(row: &UserRow) -> Sheet {
+    pub fn role_of(row: &UserRow) -> UserForm {
         let form = Form::new(vec![Field::role("role", row.role)]);
-        Sheet { form, ..Sheet::new(Purpose::Role(row.user.clone())) }
+        UserForm { form, ..UserForm::new(Purpose::Role(row.user.clone())) }
     }
 
     /// Asks for the password of the one who locked this terminal, above what he was doing.
-    pub fn unlock(user: Arc<str>, below: Option<Modal>) -> Sheet {
-        Sheet { below: below.map(Box::new), ..Sheet::new(Purpose::Unlock(user)) }
+    pub fn unlock(user: Arc<str>, below: Option<Modal>) -> UserForm {
+        UserForm { below: below.map(Box::new), ..UserForm::new(Purpose::Unlock(user)) }
     }
 
     /// The window below.
@@ -146,7 +146,7 @@ impl Sheet {
         self.form.secret(1)
     }
 
-    /// The station's answer; `true` if the sheet has done its work.
+    /// The station's answer; `true` if the form has done its work.
     pub fn answered(&mut self, cx: &ViewContext, answer: Result<(), String>) -> bool {
         (self.waiting, self.number) = (false, 0);
         match answer {
@@ -206,9 +206,9 @@ impl Sheet {
         match self.press(cx, event) {
             Some(wish) => {
                 let tab = self.tab();
-                Next::Both(Modal::Sheet(Box::new(self)), vec![UiAction::Wish(tab, wish)])
+                Next::Both(Modal::UserForm(Box::new(self)), vec![UiAction::Wish(tab, wish)])
             }
-            None => Next::Stay(Modal::Sheet(Box::new(self))),
+            None => Next::Stay(Modal::UserForm(Box::new(self))),
         }
     }
 
@@ -245,7 +245,7 @@ impl Sheet {
         }
     }
 
-    /// The keys of the moment; Esc is told by whoever shows the sheet.
+    /// The keys of the moment; Esc is told by whoever shows the form.
     pub fn hints(&self) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         let mut hints = vec![hint("⏎", self.verb())];
@@ -335,7 +335,7 @@ impl Sheet {
         })
     }
 
-    /// Rows of a sheet in so many columns.
+    /// Rows of a form in so many columns.
     fn rows(&self, cx: &ViewContext, room: u16) -> Vec<(String, Style)> {
         let told = self.words(cx).into_iter().flat_map(|words| wrap(&words, room));
         told.map(|words| (words, cx.theme.normal())).collect()
