@@ -23,29 +23,29 @@ const NAMES: u16 = 9;
 pub struct Guidance {
     alarm: AlarmId,
     /// The faceplate of what the alarm watches, which Enter opens.
-    plate: Option<Faceplate>,
+    faceplate: Option<Faceplate>,
     /// The first row that is shown.
     first: u16,
 }
 
 impl Guidance {
     /// From the top.
-    pub fn new(alarm: AlarmId, plate: Option<Faceplate>) -> Guidance {
-        Guidance { alarm, plate, first: 0 }
+    pub fn new(alarm: AlarmId, faceplate: Option<Faceplate>) -> Guidance {
+        Guidance { alarm, faceplate, first: 0 }
     }
 
     /// The keys of the moment.
     pub fn hints(&self) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
-        let plate = self.plate.is_some().then(|| hint("⏎", "faceplate"));
-        plate.into_iter().chain([hint("↑↓", "scroll"), hint("Esc", "close")]).collect()
+        let faceplate = self.faceplate.is_some().then(|| hint("⏎", "faceplate"));
+        faceplate.into_iter().chain([hint("↑↓", "scroll"), hint("Esc", "close")]).collect()
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         match event.code {
             KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => {
-                return match self.plate {
-                    Some(plate) => Next::Do(vec![UiAction::Open(Modal::Faceplate(plate))]),
+                return match self.faceplate {
+                    Some(faceplate) => Next::Do(vec![UiAction::Open(Modal::Faceplate(faceplate))]),
                     None => Next::Close,
                 };
             }

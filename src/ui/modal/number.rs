@@ -90,8 +90,8 @@ pub fn worries(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let share = step.zip(cx.snapshot.range(tag)).map(|(step, (min, max))| (step, step / (max - min)));
     let large = share.filter(|(_, share)| STEP_MAX < *share);
     let large = large.map(|(step, share)| format!("! a step of {}, {:.0} % of the range", text(step), share * 100.0));
-    let plate = cx.def().device(cx.def().tag(tag).device).faceplate.as_ref();
-    let process = plate.filter(|plate| plate.sv == tag).map(|plate| plate.pv);
+    let faceplate = cx.def().device(cx.def().tag(tag).device).faceplate.as_ref();
+    let process = faceplate.filter(|faceplate| faceplate.sv == tag).map(|faceplate| faceplate.pv);
     let alarms = cx.def().alarms.iter().filter(|alarm| alarm.subject == Subject::Tag(process.unwrap_or(tag)));
     let limits = alarms.filter_map(|alarm| {
         let Condition::Limit { level, limit, .. } = alarm.condition else { return None };

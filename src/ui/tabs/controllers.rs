@@ -7,7 +7,7 @@ mod device;
 mod guide;
 mod keys;
 mod list;
-mod plate;
+mod faceplate;
 mod program;
 mod sets;
 mod table;
@@ -287,7 +287,7 @@ impl Controllers {
             Page::Device => match self.table.tag(cx, device.id) {
                 Some(tag) if tag.writable() => write(cx, Some(tag.id)),
                 Some(tag) => Faceplate::new(tag.label.clone(), vec![tag.id])
-                    .map(|plate| UiAction::Open(Modal::Faceplate(plate)))
+                    .map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate)))
                     .into_iter()
                     .collect(),
                 None => Vec::new(),
@@ -333,8 +333,8 @@ impl Controllers {
         let device = cx.def().devices.get(self.device.index());
         let lacks = |label: &str| {
             device.is_some_and(|device| match label {
-                "tune" => device.faceplate.as_ref().is_none_or(|plate| plate.tune.is_none()),
-                "standby" => device.faceplate.as_ref().is_none_or(|plate| plate.run.is_none()),
+                "tune" => device.faceplate.as_ref().is_none_or(|faceplate| faceplate.tune.is_none()),
+                "standby" => device.faceplate.as_ref().is_none_or(|faceplate| faceplate.run.is_none()),
                 "program" => device.program.is_none(),
                 "actions" => device.actions.is_empty(),
                 "defaults" => cx.def().tags_of(device.id).all(|tag| tag.default.is_none()),
@@ -358,15 +358,15 @@ impl Controllers {
 
     /// News, or time has passed: the small trend is asked for now and then.
     pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let plate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
-        let Some(plate) = plate.filter(|_| self.page == Page::Device) else { return Vec::new() };
+        let faceplate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
+        let Some(faceplate) = faceplate.filter(|_| self.page == Page::Device) else { return Vec::new() };
         if !self.periodic.due(cx.steady(), TREND_EVERY, PATIENCE) {
             return Vec::new();
         }
         self.asked = self.asked.wrapping_add(1);
         self.periodic.asked(self.asked, cx.steady());
-        let from = cx.now.checked_sub(plate::WINDOW).unwrap_or(cx.now);
-        let query = Query::Series { tags: vec![plate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
+        let from = cx.now.checked_sub(faceplate::WINDOW).unwrap_or(cx.now);
+        let query = Query::Series { tags: vec![faceplate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
         vec![UiAction::query(Tab::Controllers, self.asked, query)]
     }
 

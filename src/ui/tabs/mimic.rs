@@ -94,8 +94,8 @@ impl Mimic {
             Action::Motion => self.motion = !self.motion,
             Action::Actuators => {
                 let outputs = cx.def().guards.actuators.iter().map(|actuator| actuator.output).collect();
-                let plate = Faceplate::new("commands", outputs);
-                return plate.map(|plate| UiAction::Open(Modal::Faceplate(plate))).into_iter().collect();
+                let faceplate = Faceplate::new("commands", outputs);
+                return faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect();
             }
             Action::Why => {
                 self.selected = self.selected.or_else(|| neighbour(items, None, (1, 0)));
@@ -104,8 +104,8 @@ impl Mimic {
             }
             Action::Open => {
                 let item = self.selected.and_then(|n| items.get(n));
-                let plate = item.and_then(|item| Faceplate::new(title(cx, item), tags(cx, item)));
-                return plate.map(|plate| UiAction::Open(Modal::Faceplate(plate))).into_iter().collect();
+                let faceplate = item.and_then(|item| Faceplate::new(title(cx, item), tags(cx, item)));
+                return faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect();
             }
         }
         Vec::new()

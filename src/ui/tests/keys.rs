@@ -116,7 +116,7 @@ fn a_screen_too_small_to_see_takes_no_orders() {
     assert_eq!(type_keys(&mut model, "q⏎"), [Effect::Quit]);
 }
 
-fn plate(fixture: &Fixture, tag: &str) -> Model {
+fn faceplate(fixture: &Fixture, tag: &str) -> Model {
     let mut model = model(fixture, Theme::FULL);
     model.modal = Faceplate::new("it", vec![fixture.tag(tag)]).map(Modal::Faceplate);
     model
@@ -127,7 +127,7 @@ fn a_pump_is_switched_by_its_manual_command() {
     let mut fixture = Fixture::normal();
     for (auto, told) in [(1.0, true), (0.0, false)] {
         fixture.set("PLC-1.AUTO", auto);
-        let mut model = plate(&fixture, "PLC-1.P-1");
+        let mut model = faceplate(&fixture, "PLC-1.P-1");
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains("t ON P-1"), "{shown}");
         assert_eq!(shown.contains("acts in MANUAL only, and PLC-1.AUTO is AUTO"), told, "{shown}");
@@ -138,7 +138,7 @@ fn a_pump_is_switched_by_its_manual_command() {
         assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
     }
     // One without such a command has nothing to write.
-    let mut model = plate(&fixture, "PLC-1.SV-1");
+    let mut model = faceplate(&fixture, "PLC-1.SV-1");
     type_keys(&mut model, "⏎t");
     assert!(matches!(model.modal, Some(Modal::Faceplate(_))));
 }
@@ -147,7 +147,7 @@ fn a_pump_is_switched_by_its_manual_command() {
 fn in_auto_the_change_to_manual_is_a_step_of_its_own() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 1.0);
-    let mut model = plate(&fixture, "PLC-1.P-1");
+    let mut model = faceplate(&fixture, "PLC-1.P-1");
     type_keys(&mut model, "t");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("old AUTO  →  new MANUAL"), "{shown}");
@@ -157,14 +157,14 @@ fn in_auto_the_change_to_manual_is_a_step_of_its_own() {
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
     assert!(matches!(model.modal, Some(Modal::Faceplate(_))), "back where it was asked from");
     assert_eq!(order_of(&type_keys(&mut model, "⏎⏎")), None, "further Enters send nothing that was not asked");
-    let mut model = plate(&fixture, "PLC-1.P-1");
+    let mut model = faceplate(&fixture, "PLC-1.P-1");
     type_keys(&mut model, "t⎋");
     assert!(matches!(model.modal, Some(Modal::Faceplate(_))), "Esc takes one step back");
     type_keys(&mut model, "⎋");
     assert_eq!(model.modal, None);
     // In MANUAL the same key asks for the command itself, and only the Enter after it sends it.
     fixture.set("PLC-1.AUTO", 0.0);
-    let mut model = plate(&fixture, "PLC-1.P-1");
+    let mut model = faceplate(&fixture, "PLC-1.P-1");
     assert_eq!(order_of(&type_keys(&mut model, "tt")), None, "a key pressed twice sends nothing");
     let order = Command::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
@@ -188,7 +188,7 @@ fn what_manual_changes_at_once_is_told_before() {
 fn a_mode_that_is_changed_under_the_question_is_told_in_it() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
-    let mut model = plate(&fixture, "PLC-1.P-1");
+    let mut model = faceplate(&fixture, "PLC-1.P-1");
     type_keys(&mut model, "t");
     assert!(!screen(&mut model, 80, 24).contains("acts in MANUAL only"));
     fixture.set("PLC-1.AUTO", 1.0);
@@ -200,13 +200,13 @@ fn a_mode_that_is_changed_under_the_question_is_told_in_it() {
 fn a_line_that_goes_down_under_the_question_is_told_in_it() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
-    let mut model = plate(&fixture, "PLC-1.P-1");
+    let mut model = faceplate(&fixture, "PLC-1.P-1");
     type_keys(&mut model, "t");
     update(&mut model, Msg::Snapshot(Fixture::line_down().snapshot()));
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("! Nothing can be written now. Line L1 is not connected"), "{shown}");
     // Asked while it is down, there is nothing to confirm.
-    let mut model = plate(&Fixture::line_down(), "PLC-1.P-1");
+    let mut model = faceplate(&Fixture::line_down(), "PLC-1.P-1");
     type_keys(&mut model, "t");
     assert!(matches!(model.modal, Some(Modal::Notice(_))));
     assert_eq!(order_of(&type_keys(&mut model, "⏎⏎t⏎")), None);
@@ -225,7 +225,7 @@ fn what_an_interlock_blocks_is_told_and_not_sent() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
     fixture.set("PLC-1.TK-2", 19.5);
-    let mut model = plate(&fixture, "PLC-1.P-1");
+    let mut model = faceplate(&fixture, "PLC-1.P-1");
     let reason = "⊘ no pumping into a full tank: PLC-1.TK-2 is 19.5 l";
     assert!(screen(&mut model, 80, 24).contains(reason));
     type_keys(&mut model, "t");
@@ -240,7 +240,7 @@ fn what_an_interlock_blocks_is_told_and_not_sent() {
     // What nobody can tell is told, and left to the PLC.
     let level = fixture.tag("PLC-1.TK-2");
     fixture.samples[level.index()] = Sample::bad(Cause::Timeout, fixture::now());
-    let mut model = plate(&fixture, "PLC-1.P-1");
+    let mut model = faceplate(&fixture, "PLC-1.P-1");
     type_keys(&mut model, "t");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("? cannot be told: PLC-1.TK-2 is not good"), "{shown}");
@@ -255,7 +255,7 @@ fn a_key_that_is_sent_first_is_named_before_it_is() {
     fixture.set("PLC-1.AUTO", 0.0);
     for (now, told) in [(0.0, true), (1.0, false)] {
         fixture.set("PLC-1.P-1", now);
-        let mut model = plate(&fixture, "PLC-1.P-1");
+        let mut model = faceplate(&fixture, "PLC-1.P-1");
         type_keys(&mut model, "t");
         let shown = screen(&mut model, 80, 24);
         assert_eq!(shown.contains("First PLC-1.P-1 := RUN; it stays so."), told, "{now}: {shown}");
@@ -285,7 +285,7 @@ fn a_stop_need_not_wait_for_a_window_to_close() {
     fixture.set("PLC-1.AUTO", 0.0);
     let stop = Command::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 };
     for before in ["", "t"] {
-        let mut model = plate(&fixture, "PLC-1.P-1");
+        let mut model = faceplate(&fixture, "PLC-1.P-1");
         type_keys(&mut model, before);
         assert_eq!(order_of(&type_keys(&mut model, "r")), None, "it asks all the same");
         assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&stop));

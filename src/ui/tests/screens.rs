@@ -32,8 +32,8 @@ use crate::{
 fn the_set_value_in_use_stands_where_sv_stands_with_what_was_set_beside_it() {
     let mut fixture = Fixture::normal();
     let used = fixture.tag("TIC-1.MV");
-    if let Some(plate) = &mut fixture.def.devices[0].faceplate {
-        (plate.sv_used, plate.mv) = (Some(used), None);
+    if let Some(faceplate) = &mut fixture.def.devices[0].faceplate {
+        (faceplate.sv_used, faceplate.mv) = (Some(used), None);
     }
     for (tab, keys) in [(Tab::Mimic, ""), (Tab::Controllers, "⏎")] {
         let mut model = model(&fixture, Theme::FULL);

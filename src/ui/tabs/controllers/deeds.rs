@@ -33,7 +33,7 @@ impl Controllers {
                     .map_or_else(|| notice(device, "this device has no actions"), |window| vec![UiAction::Open(window)])
             }
             Action::Tune => tune(cx, device),
-            Action::Run => match device.faceplate.as_ref().and_then(|plate| plate.run) {
+            Action::Run => match device.faceplate.as_ref().and_then(|faceplate| faceplate.run) {
                 Some(run) => write(cx, Some(run)),
                 None => notice(device, "this device cannot be put in standby from here"),
             },
@@ -58,7 +58,7 @@ pub(super) fn confirm(cx: &ViewContext, tag: TagId, value: f64) -> Vec<UiAction>
 
 /// Auto-tuning at work is stopped, else the window asks which kind is wanted.
 fn tune(cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
-    let Some(tune) = device.faceplate.as_ref().and_then(|plate| plate.tune) else {
+    let Some(tune) = device.faceplate.as_ref().and_then(|faceplate| faceplate.tune) else {
         return notice(device, "this device has no auto-tuning");
     };
     let on = cx.snapshot.sample(tune).trusted().is_some_and(|value| value != 0.0);

@@ -3,7 +3,7 @@
 use ratatui::style::Style;
 
 use super::{
-    plate,
+    faceplate,
     table::{Table, default_words, differs},
 };
 use crate::{
@@ -31,12 +31,12 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &T
     heading(cx, device, canvas);
     let (wide, high) = (canvas.width(), canvas.height());
     if device.faceplate.is_some() && wide >= WIDE.0 && high + 6 >= WIDE.1 {
-        plate::panel(cx, &mut canvas.part(1, 2, PANEL, high.saturating_sub(2)), device, trend);
+        faceplate::panel(cx, &mut canvas.part(1, 2, PANEL, high.saturating_sub(2)), device, trend);
         let left = PANEL + 3;
         below(cx, &mut canvas.part(left, 1, wide.saturating_sub(left), high.saturating_sub(1)), device, table);
     } else {
-        let strip = plate::strip_height(cx, device);
-        plate::strip(cx, &mut canvas.part(0, 1, wide, strip), device, trend);
+        let strip = faceplate::strip_height(cx, device);
+        faceplate::strip(cx, &mut canvas.part(0, 1, wide, strip), device, trend);
         let top = 1 + strip;
         below(cx, &mut canvas.part(0, top, wide, high.saturating_sub(top)), device, table);
     }

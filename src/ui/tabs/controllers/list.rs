@@ -154,8 +154,8 @@ fn cells(cx: &ViewContext, columns: &Columns, device: &DeviceDef) -> Cells {
     let (text, style) = alarm(cx, device.id);
     cells.push((text, Columns::ALARM, style));
     match &device.faceplate {
-        Some(plate) => {
-            for tag in [Some(plate.pv), Some(plate.aim()), plate.mv] {
+        Some(faceplate) => {
+            for tag in [Some(faceplate.pv), Some(faceplate.aim()), faceplate.mv] {
                 let shown = tag.map(|tag| value::show(cx, tag));
                 let text = shown.as_ref().map_or(String::new(), |shown| {
                     let whole = shown.with_unit();
@@ -198,12 +198,12 @@ fn alarm(cx: &ViewContext, device: DeviceId) -> (String, Style) {
 
 /// AT while it is on, standby, else the control method.
 fn mode(cx: &ViewContext, device: &DeviceDef) -> String {
-    let Some(plate) = &device.faceplate else { return String::new() };
+    let Some(faceplate) = &device.faceplate else { return String::new() };
     let on = |tag: Option<_>| tag.is_some_and(|tag| value::is_on(cx, tag) == Some(true));
-    if on(plate.tune) {
+    if on(faceplate.tune) {
         return "AT".to_owned();
     }
-    let shown = plate.run.filter(|_| on(plate.run)).or(plate.mode);
+    let shown = faceplate.run.filter(|_| on(faceplate.run)).or(faceplate.mode);
     shown.map_or(String::new(), |tag| value::show(cx, tag).bare(Columns::MODE))
 }
 

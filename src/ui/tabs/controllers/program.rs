@@ -129,8 +129,8 @@ fn table(cx: &ViewContext, canvas: &mut Canvas, program: &ProgramDef, cell: Cell
 
 /// What the program does besides its steps.
 fn facts(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
-    let sv = device.faceplate.as_ref().map(|plate| plate.aim());
-    let pv = device.faceplate.as_ref().map(|plate| plate.pv);
+    let sv = device.faceplate.as_ref().map(|faceplate| faceplate.aim());
+    let pv = device.faceplate.as_ref().map(|faceplate| faceplate.pv);
     let rows = [
         ("command", Some(program.command)),
         ("pattern", program.pattern),
@@ -162,7 +162,7 @@ fn legs(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Option<Ve
     // A ramp begins where the step before has ended; the first at PV as it is at the start. Once it runs that is past,
     // and the device does not tell it: the first ramp is a gap then.
     let resting = matches!(place(cx, program), Some(Place::Off | Place::Ended));
-    let mut from = device.faceplate.as_ref().and_then(|plate| trusted(plate.pv)).filter(|_| resting);
+    let mut from = device.faceplate.as_ref().and_then(|faceplate| trusted(faceplate.pv)).filter(|_| resting);
     let mut legs = Vec::new();
     for (n, step) in program.steps.iter().enumerate().take(last + 1).skip(first) {
         let (to, ramp, soak) = (trusted(step.sv)?, trusted(step.ramp)?, trusted(step.soak)?);

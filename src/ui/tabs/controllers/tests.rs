@@ -73,15 +73,15 @@ fn tuning(fixture: &Fixture, ended: bool) -> Tuning {
     use crate::plant::tuning::TuningWatch;
     let mut watch = TuningWatch::default();
     let device = &fixture.def.devices[0];
-    let plate = device.faceplate.as_ref().expect("a controller");
+    let faceplate = device.faceplate.as_ref().expect("a controller");
     let began = fixture::now() - SignedDuration::from_secs(754);
     let swings = [64.0, 72.4, 68.1, 73.0, 68.0, 70.0];
     let last = swings.len() - 1;
     for (n, pv) in std::iter::once(60.0).chain(swings).enumerate() {
         let at = began + SignedDuration::from_secs(n as i64 * 120);
         let sample = |tag| match tag {
-            tag if tag == plate.pv => Sample::good(pv, at),
-            tag if Some(tag) == plate.tune => Sample::good(f64::from(u8::from(n > 0)), at),
+            tag if tag == faceplate.pv => Sample::good(pv, at),
+            tag if Some(tag) == faceplate.tune => Sample::good(f64::from(u8::from(n > 0)), at),
             tag => Sample { at, ..fixture.samples[crate::plant::def::TagId::index(tag)] },
         };
         watch.take(device, &sample, Some(120.0), at);

@@ -74,8 +74,10 @@ fn item(cx: &ViewContext, canvas: &mut Canvas, item: &MimicItem, names: u16, sel
     let (name, tags): (String, Vec<TagId>) = match item {
         MimicItem::Controller { device, .. } => {
             let device = cx.def().device(*device);
-            let plate = device.faceplate.as_ref();
-            let tags = plate.map(|plate| [Some(plate.pv), Some(plate.aim()), plate.mv].into_iter().flatten().collect());
+            let faceplate = device.faceplate.as_ref();
+            let tags = faceplate.map(|faceplate| {
+                [Some(faceplate.pv), Some(faceplate.aim()), faceplate.mv].into_iter().flatten().collect()
+            });
             (device.name.clone(), tags.unwrap_or_default())
         }
         _ => (title(cx, item), tags(cx, item)),

@@ -86,10 +86,18 @@ pub fn tags(cx: &ViewContext, item: &MimicItem) -> Vec<TagId> {
         | MimicItem::Value { tag, .. }
         | MimicItem::Trend { tag, .. } => vec![*tag],
         MimicItem::Controller { device, .. } => match &cx.def().device(*device).faceplate {
-            Some(plate) => [Some(plate.sv), plate.sv_used, Some(plate.pv), plate.mv, plate.run, plate.mode, plate.tune]
-                .into_iter()
-                .flatten()
-                .collect(),
+            Some(faceplate) => [
+                Some(faceplate.sv),
+                faceplate.sv_used,
+                Some(faceplate.pv),
+                faceplate.mv,
+                faceplate.run,
+                faceplate.mode,
+                faceplate.tune,
+            ]
+            .into_iter()
+            .flatten()
+            .collect(),
             None => Vec::new(),
         },
         MimicItem::Sequence { step, remaining, states, .. } => {

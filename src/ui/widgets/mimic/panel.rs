@@ -21,28 +21,28 @@ pub fn controller(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, device: &De
     let x = canvas.text(0, 0, &device.name, label_style(cx, selected));
     let room = canvas.width().saturating_sub(x + 2);
     canvas.text(x + 2, 0, &fit(&device.model, room), theme.dim());
-    let Some(plate) = &device.faceplate else { return };
+    let Some(faceplate) = &device.faceplate else { return };
     let mut y = 1;
-    for (name, tag) in [("PV", Some(plate.pv)), ("SV", Some(plate.aim())), ("MV", plate.mv)] {
+    for (name, tag) in [("PV", Some(faceplate.pv)), ("SV", Some(faceplate.aim())), ("MV", faceplate.mv)] {
         let Some(tag) = tag else { continue };
         canvas.text(0, y, name, theme.dim());
         put_value(cx, &mut canvas, 4, y, tag, at.width.saturating_sub(4));
-        if let Some(words) = set_apart(cx, plate).filter(|_| tag == plate.aim()) {
+        if let Some(words) = set_apart(cx, faceplate).filter(|_| tag == faceplate.aim()) {
             canvas.text_right(at.width, y, &words, theme.strong());
         }
         y += 1;
     }
     if at.height > 7 {
         y += 1;
-        scale(cx, &mut canvas, y, plate.pv);
+        scale(cx, &mut canvas, y, faceplate.pv);
         y += 1;
     }
-    bar(cx, &mut canvas, y, plate);
-    let tags: Vec<TagId> = [plate.mode, plate.tune, plate.run].into_iter().flatten().collect();
+    bar(cx, &mut canvas, y, faceplate);
+    let tags: Vec<TagId> = [faceplate.mode, faceplate.tune, faceplate.run].into_iter().flatten().collect();
     let mut x = 0;
     for tag in tags {
         let shown = value::show(cx, tag);
-        if Some(tag) == plate.tune {
+        if Some(tag) == faceplate.tune {
             x = canvas.text(x, y + 1, "AT", theme.dim()) + 1;
         }
         let room = canvas.width().saturating_sub(x);
@@ -51,10 +51,10 @@ pub fn controller(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, device: &De
 }
 
 /// `set 70.0`, where the controller works towards something else: a program or a ramp moves it.
-pub fn set_apart(cx: &ViewContext, plate: &Faceplate) -> Option<String> {
+pub fn set_apart(cx: &ViewContext, faceplate: &Faceplate) -> Option<String> {
     let value = |tag| cx.snapshot.sample(tag).trusted();
-    let set = value(plate.sv).filter(|set| value(plate.aim()) != Some(*set))?;
-    Some(format!("set {}", cx.snapshot.format(plate.sv, set)))
+    let set = value(faceplate.sv).filter(|set| value(faceplate.aim()) != Some(*set))?;
+    Some(format!("set {}", cx.snapshot.format(faceplate.sv, set)))
 }
 
 /// The ends of the range above the bar.
@@ -70,29 +70,29 @@ fn scale(cx: &ViewContext, canvas: &mut Canvas, y: u16, pv: TagId) {
 }
 
 /// `├───┃────▼──█──┃────┤`: PV filled, SV as a triangle, alarm limits as bars. Without a good PV the bar has no PV.
-fn bar(cx: &ViewContext, canvas: &mut Canvas, y: u16, plate: &Faceplate) {
+fn bar(cx: &ViewContext, canvas: &mut Canvas, y: u16, faceplate: &Faceplate) {
     let theme = cx.theme;
     let inner = canvas.width().saturating_sub(2);
     canvas.run(0, y, inner + 2, '─', theme.dim());
     canvas.glyph(0, y, '├', theme.dim());
     canvas.glyph(inner + 1, y, '┤', theme.dim());
-    let Some((min, max)) = cx.snapshot.range(plate.pv) else { return };
+    let Some((min, max)) = cx.snapshot.range(faceplate.pv) else { return };
     let column = |value: f64| {
         let share = (value - min) / (max - min);
         share.is_finite().then(|| 1 + (share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round() as u16)
     };
-    for limit in limits(cx, plate.pv) {
+    for limit in limits(cx, faceplate.pv) {
         if let Some(x) = column(limit) {
             canvas.glyph(x, y, '┃', theme.normal());
         }
     }
-    if let Some(x) = cx.snapshot.sample(plate.aim()).trusted().and_then(column) {
+    if let Some(x) = cx.snapshot.sample(faceplate.aim()).trusted().and_then(column) {
         canvas.glyph(x, y, '▼', theme.set_value());
     }
-    if let Some(x) = cx.snapshot.sample(plate.pv).trusted().and_then(column) {
+    if let Some(x) = cx.snapshot.sample(faceplate.pv).trusted().and_then(column) {
         // Never reversed: a reversed full block is an empty one.
         let style =
-            alarm_mark(cx, plate.pv).map_or(theme.strong(), |(_, style)| style.remove_modifier(Modifier::REVERSED));
+            alarm_mark(cx, faceplate.pv).map_or(theme.strong(), |(_, style)| style.remove_modifier(Modifier::REVERSED));
         canvas.glyph(x, y, '█', style);
     }
 }

@@ -26,32 +26,32 @@ const TREND: u16 = 22;
 
 /// Rows that [`strip`] takes.
 pub fn strip_height(cx: &ViewContext, device: &DeviceDef) -> u16 {
-    let Some(plate) = &device.faceplate else { return 0 };
-    3 + u16::from(plate.mv.is_some()) + u16::from(tuning_of(cx, device).is_some())
+    let Some(faceplate) = &device.faceplate else { return 0 };
+    3 + u16::from(faceplate.mv.is_some()) + u16::from(tuning_of(cx, device).is_some())
 }
 
 /// Three bars over each other, with their ranges, the trend beside them, and a row of states and alarms.
 pub fn strip(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: Option<&Series>) {
-    let Some(plate) = &device.faceplate else { return };
+    let Some(faceplate) = &device.faceplate else { return };
     let wide = canvas.width();
-    let rows = 2 + u16::from(plate.mv.is_some());
+    let rows = 2 + u16::from(faceplate.mv.is_some());
     let bars = wide.saturating_sub(TREND + 2);
-    self::bars(cx, &mut canvas.part(0, 0, bars, rows), plate, false);
+    self::bars(cx, &mut canvas.part(0, 0, bars, rows), faceplate, false);
     let at = Bounds { x: bars + 1, y: 0, width: TREND, height: rows };
-    trend::view(cx, canvas, at, plate.pv, WINDOW, series, false);
-    states(cx, &mut canvas.part(0, rows, wide, 1), device, plate);
+    trend::view(cx, canvas, at, faceplate.pv, WINDOW, series, false);
+    states(cx, &mut canvas.part(0, rows, wide, 1), device, faceplate);
     if let Some(tuning) = tuning_of(cx, device) {
-        tuning_row(cx, &mut canvas.part(0, rows + 1, wide, 1), plate, tuning);
+        tuning_row(cx, &mut canvas.part(0, rows + 1, wide, 1), faceplate, tuning);
     }
 }
 
 /// The same in a column of its own: more room, no other content.
 pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: Option<&Series>) {
-    let Some(plate) = &device.faceplate else { return };
+    let Some(faceplate) = &device.faceplate else { return };
     let (wide, high) = (canvas.width(), canvas.height());
-    let rows = 3 * (2 + u16::from(plate.mv.is_some()));
-    bars(cx, &mut canvas.part(0, 0, wide, rows), plate, true);
-    states(cx, &mut canvas.part(0, rows, wide, 1), device, plate);
+    let rows = 3 * (2 + u16::from(faceplate.mv.is_some()));
+    bars(cx, &mut canvas.part(0, 0, wide, rows), faceplate, true);
+    states(cx, &mut canvas.part(0, rows, wide, 1), device, faceplate);
     let mut y = rows + 2;
     for alarm in list::alarms(cx, device.id).take(4) {
         let def = cx.def().alarm(alarm.id);
@@ -67,7 +67,7 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
     }
     y += 1;
     if let Some(tuning) = tuning_of(cx, device) {
-        for (n, words) in tuning_words(cx, plate, tuning).into_iter().enumerate() {
+        for (n, words) in tuning_words(cx, faceplate, tuning).into_iter().enumerate() {
             let style = if n == 0 { cx.theme.strong() } else { cx.theme.normal() };
             for line in crate::ui::widgets::text::wrap(&words, wide) {
                 canvas.text(0, y, &line, style);
@@ -78,7 +78,7 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
     }
     let at = Bounds { x: 0, y, width: wide, height: high.saturating_sub(y).min(12) };
     if at.height > 3 {
-        trend::view(cx, canvas, at, plate.pv, WINDOW, series, false);
+        trend::view(cx, canvas, at, faceplate.pv, WINDOW, series, false);
     }
 }
 
@@ -88,8 +88,8 @@ fn tuning_of<'a>(cx: &ViewContext<'a>, device: &DeviceDef) -> Option<&'a Tuning>
 }
 
 /// A row a bar (`tall`: three, with value, bar and ends of the scale).
-fn bars(cx: &ViewContext, canvas: &mut Canvas, plate: &Faceplate, tall: bool) {
-    let rows = [("PV", Some(plate.pv)), ("SV", Some(plate.aim())), ("MV", plate.mv)];
+fn bars(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tall: bool) {
+    let rows = [("PV", Some(faceplate.pv)), ("SV", Some(faceplate.aim())), ("MV", faceplate.mv)];
     let rows: Vec<(&str, TagId)> = rows.into_iter().filter_map(|(name, tag)| Some((name, tag?))).collect();
     // All bars start in one column, so that they can be compared.
     let values = rows.iter().map(|(_, tag)| width(&value::show(cx, *tag).with_unit())).max().unwrap_or(0).clamp(9, 14);
@@ -99,12 +99,12 @@ fn bars(cx: &ViewContext, canvas: &mut Canvas, plate: &Faceplate, tall: bool) {
         canvas.text(if tall { 0 } else { 1 }, y, name, cx.theme.dim());
         let room = if tall { canvas.width().saturating_sub(4) } else { values };
         let end = canvas.text(4, y, &shown.within(room), shown.style);
-        let apart = set_apart(cx, plate).filter(|_| tag == plate.aim());
+        let apart = set_apart(cx, faceplate).filter(|_| tag == faceplate.aim());
         if let Some(words) = apart.as_ref().filter(|_| tall) {
             canvas.text(end + 2, y, words, cx.theme.strong());
         }
         // PV and SV share the scale of PV, so that their distance is seen.
-        let scale = if tag == plate.aim() { plate.pv } else { tag };
+        let scale = if tag == faceplate.aim() { faceplate.pv } else { tag };
         let ends = ends(cx, scale);
         let (x, y, wide) = if tall {
             if let Some((low, high)) = &ends {
@@ -119,7 +119,7 @@ fn bars(cx: &ViewContext, canvas: &mut Canvas, plate: &Faceplate, tall: bool) {
             canvas.text(5 + values + wide + 1, y, &words, cx.theme.dim());
             (5 + values, y, wide)
         };
-        bar(cx, &mut canvas.part(x, y, wide, 1), plate, tag, scale);
+        bar(cx, &mut canvas.part(x, y, wide, 1), faceplate, tag, scale);
     }
 }
 
@@ -132,7 +132,7 @@ fn ends(cx: &ViewContext, tag: TagId) -> Option<(String, String)> {
 
 /// `├███████──▼──┃──┤`: filled up to the value; the set value as a triangle, alarm limits as bars; of SV only the
 /// triangle, on a track that is dotted where it may not be set. Without a good value there is no filling.
-fn bar(cx: &ViewContext, canvas: &mut Canvas, plate: &Faceplate, tag: TagId, scale: TagId) {
+fn bar(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tag: TagId, scale: TagId) {
     let theme = cx.theme;
     let inner = canvas.width().saturating_sub(2);
     canvas.run(0, 0, inner + 2, '─', theme.dim());
@@ -144,9 +144,9 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, plate: &Faceplate, tag: TagId, sca
         share.is_finite().then(|| 1 + (share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round() as u16)
     };
     let now = cx.snapshot.sample(tag).trusted();
-    if tag == plate.aim() {
+    if tag == faceplate.aim() {
         if let Some((low, high)) =
-            cx.snapshot.range(plate.sv).and_then(|(low, high)| Some((column(low)?, column(high)?)))
+            cx.snapshot.range(faceplate.sv).and_then(|(low, high)| Some((column(low)?, column(high)?)))
         {
             canvas.run(1, 0, low.saturating_sub(1), '·', theme.dim());
             canvas.run(high + 1, 0, (inner + 1).saturating_sub(high + 1), '·', theme.dim());
@@ -165,8 +165,8 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, plate: &Faceplate, tag: TagId, sca
             canvas.glyph(x, 0, '┃', theme.strong());
         }
     }
-    if scale == plate.pv
-        && let Some(x) = cx.snapshot.sample(plate.aim()).trusted().and_then(column)
+    if scale == faceplate.pv
+        && let Some(x) = cx.snapshot.sample(faceplate.aim()).trusted().and_then(column)
     {
         canvas.glyph(x, 0, '▼', theme.set_value());
     }
@@ -179,9 +179,9 @@ fn limits(cx: &ViewContext, tag: TagId) -> impl Iterator<Item = f64> {
 }
 
 /// `PID   AT off   RUN   ‹2›! temperature high UNACK`.
-fn states(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, plate: &Faceplate) {
+fn states(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, faceplate: &Faceplate) {
     let mut x = 1;
-    for (name, tag) in [("", plate.mode), ("AT", plate.tune), ("", plate.run)] {
+    for (name, tag) in [("", faceplate.mode), ("AT", faceplate.tune), ("", faceplate.run)] {
         let Some(tag) = tag else { continue };
         if !name.is_empty() {
             x = canvas.text(x, 0, name, cx.theme.dim()) + 1;
@@ -198,18 +198,18 @@ fn states(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, plate: &Fac
     canvas.text(x, 0, &fit_words(&words, room), cx.theme.alarm(def.priority, alarm.state, cx.flash()));
 }
 
-fn tuning_row(cx: &ViewContext, canvas: &mut Canvas, plate: &Faceplate, tuning: &Tuning) {
-    let words = tuning_words(cx, plate, tuning).join("  ");
+fn tuning_row(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tuning: &Tuning) {
+    let words = tuning_words(cx, faceplate, tuning).join("  ");
     let room = canvas.width().saturating_sub(2);
     let style = if tuning.ended.is_none() { cx.theme.strong() } else { cx.theme.normal() };
     canvas.text(1, 0, &pad(&fit_words(&words, room), room), style);
 }
 
 /// How a tuning goes, or what it has found.
-pub fn tuning_words(cx: &ViewContext, plate: &Faceplate, tuning: &Tuning) -> Vec<String> {
+pub fn tuning_words(cx: &ViewContext, faceplate: &Faceplate, tuning: &Tuning) -> Vec<String> {
     let elapsed = running(tuning.elapsed(cx.now));
     let least = if tuning.seen { "" } else { "more than " };
-    let number = |value: f64| cx.snapshot.format(plate.pv, value);
+    let number = |value: f64| cx.snapshot.format(faceplate.pv, value);
     let Some(ended) = tuning.ended else {
         let around = tuning.sv.map_or(String::new(), |sv| format!(" around {}", number(sv)));
         let turns = tuning.turns.iter().rev().take(4).rev();
@@ -217,7 +217,7 @@ pub fn tuning_words(cx: &ViewContext, plate: &Faceplate, tuning: &Tuning) -> Vec
         let turns: Vec<String> = turns.map(|turn| format!("{}{}", arrow(turn.high), number(turn.pv))).collect();
         let swings = if turns.is_empty() { "no swing yet".to_owned() } else { format!("swings {}", turns.join(" ")) };
         let period = tuning.period().map_or(String::new(), |period| format!(", {} s each", period.as_secs()));
-        let known = plate.tune.is_some_and(|tune| cx.snapshot.sample(tune).trusted().is_some());
+        let known = faceplate.tune.is_some_and(|tune| cx.snapshot.sample(tune).trusted().is_some());
         let how = if known { "AUTO-TUNING" } else { "not known now; when last heard AUTO-TUNING" };
         return vec![format!("{how} {least}{elapsed}{around} (T stops)"), format!("{swings}{period}")];
     };
