@@ -303,7 +303,7 @@ impl AccessControl {
 
     fn may_look(&self, terminal: u32) -> Result<(), String> {
         match &self.sessions.get(&terminal).ok_or("this terminal is not attached")?.who {
-            // Locked or not: the picture stays, and so does what lies behind it.
+            // Locked or not: the snapshot stays, and so does what lies behind it.
             Some(who) if who.must_change => Err(CHANGE_FIRST.to_owned()),
             Some(_) => Ok(()),
             None if self.def.access.view => Ok(()),

@@ -124,7 +124,7 @@ impl Own {
                 line.test = Some(Arc::new(ToolRun { id: self.renumbered(test.id), ..ToolRun::clone(test) }));
             }
         }
-        // The last picture of a station that has gone shows as under way what nobody will hear the end of.
+        // The last snapshot of a station that has gone shows as under way what nobody will hear the end of.
         let is_lost =
             |id: OrderId| id.terminal == self.terminal && self.lost.iter().any(|lost| lost.id.number == id.number);
         seen.orders.retain(|order| !is_lost(order.id));

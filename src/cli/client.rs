@@ -70,7 +70,7 @@ async fn attach_with_password(plant: Option<&str>, login: &Login) -> Result<(Ses
     let granted = session.wish(Wish::Login { user, password: password.clone() }).await.map_err(CliError::Failed)?;
     warn_not_recorded("logged in", granted);
     let settled = async {
-        // The answer may come before the standing, and the standing before the picture that belongs to it.
+        // The answer may come before the standing, and the standing before the snapshot that belongs to it.
         let _ = session.standing.wait_for(|standing| standing.who.is_some()).await;
         let view = session.standing.borrow().view;
         if view {

@@ -40,7 +40,7 @@ pub struct PlantDef {
     pub alarm_rules: AlarmRules,
     /// What stands between commands and their effect.
     pub guards: Guards,
-    /// The picture of the process.
+    /// The mimic of the process.
     pub mimic: MimicDef,
     /// Groups of pens for the trends tab; at least one.
     pub trends: Vec<TrendGroup>,
@@ -195,7 +195,7 @@ pub struct ActionDef {
     pub saves: bool,
 }
 
-/// The picture of the process, on a canvas of nominal cells that is stretched to the screen.
+/// The mimic of the process, on a canvas of nominal cells that is stretched to the screen.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct MimicDef {
     /// Nominal size, columns and rows; 80 by 18 fits a terminal of 80 by 24.
@@ -219,7 +219,7 @@ pub struct Place {
     pub height: u16,
 }
 
-/// One element of the picture.
+/// One element of the mimic.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum MimicItem {
     /// A vessel with liquid that follows a level tag.

@@ -143,7 +143,7 @@ mod tests {
     /// What the lint says of a plant with these alarms, a line each.
     fn warnings(alarms: &str) -> Vec<String> {
         let start = PLANT.find("[[alarm]]").expect("the plant has an alarm");
-        let end = PLANT.find("[mimic]").expect("the plant has a picture");
+        let end = PLANT.find("[mimic]").expect("the plant has a mimic");
         let text = format!("{}{alarms}{}", &PLANT[..start], &PLANT[end..]);
         let find = |name: &str| {
             let text = if name == "meter" { METER } else { PLC };

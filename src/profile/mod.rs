@@ -4,7 +4,7 @@
 //!  plant file ─┐                      ┌─ tag ─── address, units
 //!              ├─ reader ── schema ── plant ─ line, device
 //!  profiles  ──┘  (layers,  (words)   ├─ alarm, lint
-//!                 spans)              ├─ picture, report
+//!                 spans)              ├─ mimic, report
 //!                                     └─ Arc<PlantDef>   or   diagnostic::Errors
 //! ```
 //!
@@ -24,7 +24,7 @@ pub(crate) mod io;
 pub mod line;
 mod lint;
 pub(crate) mod names;
-mod picture;
+mod mimic;
 mod plant;
 mod program;
 pub(crate) mod reader;

@@ -53,7 +53,7 @@ impl Names {
     }
 }
 
-/// Devices and tags, finished: what alarms, the picture, trends and reports refer to.
+/// Devices and tags, finished: what alarms, the mimic, trends and reports refer to.
 pub(super) struct Defs<'a> {
     pub names: &'a Names,
     pub lines: &'a [LineDef],

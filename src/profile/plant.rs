@@ -7,9 +7,9 @@ use jiff::tz::TimeZone;
 use super::{
     access, alarm, device,
     diagnostic::{Errors, Problems},
-    guard, history, line, lint,
+    guard, history, line, lint, mimic,
     names::{Defs, Names, Unique, check_name},
-    picture, program, reader,
+    program, reader,
     reader::{At, Node, Raw, text},
     report,
     schema::{DeviceTable, PlantFile, ProfileFile},
@@ -71,11 +71,10 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let defs = Defs { names: &names, lines: &lines, devices: &devices, tags: &tags };
     let alarms = alarm::alarms(&file.alarms, &defs, problems);
     lint::lint(&file.alarms, problems);
-    let mimic =
-        file.mimic.as_ref().map_or_else(MimicDef::default, |mimic| picture::mimic(&mimic.value, &defs, problems));
+    let mimic = file.mimic.as_ref().map_or_else(MimicDef::default, |mimic| mimic::mimic(&mimic.value, &defs, problems));
     let access = access::access(file.access.as_ref().map(|table| &table.value), problems);
     let guards = guard::guards(file, &defs, problems);
-    let trends = picture::trends(&file.trends, &defs, problems);
+    let trends = mimic::trends(&file.trends, &defs, problems);
     let shifts = report::shifts(&file.shifts, problems);
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, problems);
     let history = history::history(file.history.as_ref().map(|history| &history.value), problems);

@@ -383,7 +383,7 @@ table!(
 );
 
 table!(
-    /// The picture of the process.
+    /// The mimic of the process.
     MimicTable, "the mimic" {
         opt "size" size: [u16; 2],
         list "item" items: Raw,

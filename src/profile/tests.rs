@@ -360,13 +360,13 @@ fn nothing_counts_with_a_text() {
         assert!(text.contains("D1.MODEL is a text"), "{to}: {text}");
     }
     let shown = PLANT.replace("y = 1, tag = \"D1.T\"", "y = 1, tag = \"D1.MODEL\"");
-    assert!(load(shown.as_bytes(), &meter, PLC).is_ok(), "the picture may show it");
+    assert!(load(shown.as_bytes(), &meter, PLC).is_ok(), "the mimic may show it");
     let scaled = meter.replace("decimals_from = \"DP\"", "decimals_from = \"MODEL\"");
     let text = load(PLANT.as_bytes(), &scaled, PLC).expect_err("no decimals").to_string();
     assert!(text.contains("D1.MODEL is a text"), "{text}");
 }
 
-/// The small plant with more tables before its picture.
+/// The small plant with more tables before its mimic.
 fn guarded(tables: &str) -> Result<PlantDef, Errors> {
     load(PLANT.replace("[mimic]", &format!("{tables}\n[mimic]")).as_bytes(), METER, PLC)
 }

@@ -17,7 +17,7 @@ use crate::plant::{
     tag::{Kind, TagDef},
 };
 
-/// How long the end of a command is marked in the picture, in seconds of the operator.
+/// How long the end of a command is marked in the mimic, in seconds of the operator.
 const DONE_S: f64 = 5.0;
 /// The same for one that did not end well.
 const FAILED_S: f64 = 60.0;
@@ -218,7 +218,7 @@ fn news<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<(&'a Outcome, Option
     (passed <= lasts).then_some((&status.outcome, well))
 }
 
-/// The mark of an actuator in the picture, by its output: what does not obey, how the last command went, what is blocked.
+/// The mark of an actuator in the mimic, by its output: what does not obey, how the last command went, what is blocked.
 pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
     let theme = cx.theme;
     let guards = &cx.def().guards;

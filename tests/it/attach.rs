@@ -280,7 +280,7 @@ async fn a_terminal_says_at_once_that_the_station_has_gone_and_finds_it_again() 
     until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
     assert_eq!(session.order(1, Command::Alarm(AlarmCommand::Silence)), Err("station has gone"));
     assert_eq!(session.wish(Wish::Stop).await, Err("station has gone".to_owned()));
-    assert_eq!(session.snapshots.borrow().samples[0].value, Some(1.0), "the last picture stays");
+    assert_eq!(session.snapshots.borrow().samples[0].value, Some(1.0), "the last snapshot stays");
 
     let mut stand = Stand::start_in(folder);
     let other = stand.session().await;

@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `architecture` | the rules of the house: the line of modules, the io edge, file headers |
-//! | `attach` | the station's socket: equal pictures at both ends, stuck and hostile terminals, reconnecting |
+//! | `attach` | the station's socket: equal snapshots at both ends, stuck and hostile terminals, reconnecting |
 //! | `commands` | the program as scripts see it: help, exit codes, messages, the headless demo and its report |
 //! | `terminal` | the program as a person sees it, in a pseudo-terminal: starts, keys, leaves the terminal as it was |
 //! | `peers` | our master against slaves that we did not write: pymodbus, libmodbus |

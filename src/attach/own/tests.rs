@@ -67,7 +67,7 @@ fn an_order_under_way_when_the_station_goes_is_uncertain_until_the_same_station_
         send(&mut own, 1);
         assert_eq!(seen(&mut own, &under_way), under_way);
         own.gone();
-        assert_eq!(seen(&mut own, &under_way), uncertain, "the last picture does not stand for ever");
+        assert_eq!(seen(&mut own, &under_way), uncertain, "the last snapshot does not stand for ever");
         own
     };
     let mut same = begun();

@@ -65,7 +65,7 @@ const TREND_TICKS: u32 = 20;
 /// State of this tab.
 #[derive(Debug)]
 pub struct Mimic {
-    /// The selected item, by its place in the picture.
+    /// The selected item, by its place in the mimic.
     selected: Option<usize>,
     motion: bool,
     /// Curves of the small trends, by the item's place.
@@ -111,7 +111,7 @@ impl Mimic {
         Vec::new()
     }
 
-    /// Selects the first item that shows one of these tags; none if the picture has none of them.
+    /// Selects the first item that shows one of these tags; none if the mimic has none of them.
     pub fn select(&mut self, cx: &ViewContext, wanted: &[TagId]) {
         let shows = |item: &MimicItem| tags(cx, item).iter().any(|tag| wanted.contains(tag));
         self.selected = cx.def().mimic.items.iter().position(shows);
@@ -219,7 +219,7 @@ impl Mimic {
             }
         }
         if items.is_empty() {
-            canvas.text(1, 1, "the plant file draws no picture", cx.theme.dim());
+            canvas.text(1, 1, "the plant file defines no mimic", cx.theme.dim());
         }
     }
 

@@ -56,7 +56,7 @@ impl Outgoing {
 pub enum Tab {
     /// Who sits here.
     Login,
-    /// The picture of the process.
+    /// The mimic.
     Mimic,
     /// Curves.
     Trends,

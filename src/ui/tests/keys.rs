@@ -319,7 +319,7 @@ fn a_start_says_what_it_begins_with() {
 }
 
 #[test]
-fn the_picture_tells_how_a_command_went() {
+fn the_mimic_shows_how_a_command_went() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
     let tag = fixture.tag("PLC-1.MAN.P-1");

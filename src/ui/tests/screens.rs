@@ -99,7 +99,7 @@ fn commanded() -> Snapshot {
 }
 
 #[test]
-fn the_picture_with_commands() {
+fn the_mimic_with_commands() {
     for (name, theme, width, height) in
         [("80x24", Theme::FULL, 80, 24), ("120x40", Theme::FULL, 120, 40), ("ascii", Theme::PLAIN, 80, 24)]
     {
@@ -244,7 +244,7 @@ fn no_screen_is_so_narrow_that_a_number_is_cut() {
 }
 
 #[test]
-fn a_screen_too_small_for_the_picture_lists_its_values() {
+fn a_screen_too_small_for_the_mimic_lists_its_values() {
     let mut fixture = Fixture::alarm();
     fixture.set("TIC-1.MV", 100.0);
     let mut model = model(&fixture, Theme::FULL);
@@ -258,7 +258,7 @@ fn a_screen_too_small_for_the_picture_lists_its_values() {
     }
     for height in [24, 23] {
         // A status line of tmux takes one row, and only the bottom of a tank.
-        assert!(screen(&mut model, 80, height).contains("┌TK-2 cold─┐"), "the picture is back where there is room");
+        assert!(screen(&mut model, 80, height).contains("┌TK-2 cold─┐"), "the mimic is back where there is room");
     }
 }
 

@@ -42,7 +42,7 @@ pub enum Action {
     Area,
     /// Say why the value that the alarm watches is what it is.
     Why,
-    /// Show what the alarm watches in the picture.
+    /// Show what the alarm watches in the mimic.
     Mimic,
     /// Show the curve at the moment of the alarm.
     Trend,

@@ -1,4 +1,4 @@
-//! The ramp/soak program as a table and as a picture, with the place where it is now.
+//! The ramp/soak program as a table and as a curve, with the place where it is now.
 
 use std::time::Duration;
 
@@ -49,11 +49,11 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: 
     let (wide, high) = (canvas.width(), canvas.height());
     heading(cx, canvas, device, program);
     let rows = program.steps.len() as u16;
-    // The table and what it says of the present; the picture below takes the rest.
+    // The table and what it says of the present; the curve below takes the rest.
     table(cx, &mut canvas.part(0, 2, 54, rows + 1), program, cell);
     facts(cx, &mut canvas.part(56, 2, wide.saturating_sub(57), rows + 1), device, program);
     let top = rows + 4;
-    picture(cx, &mut canvas.part(1, top, wide.saturating_sub(2), high.saturating_sub(top)), device, program);
+    curve(cx, &mut canvas.part(1, top, wide.saturating_sub(2), high.saturating_sub(top)), device, program);
 }
 
 fn heading(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
@@ -147,7 +147,7 @@ fn facts(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &Pr
     canvas.text(0, 6, "r run   p hold   o off", cx.theme.strong());
 }
 
-/// One straight piece of the picture: how long, from where (`None`: nobody remembers), to where, and which place it is.
+/// One straight piece of the curve: how long, from where (`None`: nobody remembers), to where, and which place it is.
 struct Leg {
     minutes: f64,
     from: Option<f64>,
@@ -173,15 +173,15 @@ fn legs(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Option<Ve
     Some(legs)
 }
 
-fn picture(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
+fn curve(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
     let theme = cx.theme;
     let Some(legs) = legs(cx, device, program) else {
-        canvas.text(0, 0, "no picture: a target or time of the program is not known", theme.dim());
+        canvas.text(0, 0, "no curve: a target or time of the program is not known", theme.dim());
         return;
     };
     let total: f64 = legs.iter().map(|leg| leg.minutes).sum();
     if total <= 0.0 {
-        canvas.text(0, 0, "no picture: all times of the chosen steps are 0", theme.dim());
+        canvas.text(0, 0, "no curve: all times of the chosen steps are 0", theme.dim());
         return;
     }
     let (low, high) = legs
@@ -225,7 +225,7 @@ fn way(tag: TagId, legs: &[Leg], total: f64, dots: usize, cx: &ViewContext) -> S
     Series { tag, from: cx.now, step: Duration::from_secs_f64(each * 60.0), buckets, summary: None, good: 1.0 }
 }
 
-/// Time below the picture, with a mark where the program is.
+/// Time below the curve, with a mark where the program is.
 fn axis(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef, legs: &[Leg], total: f64) {
     let theme = cx.theme;
     let unit = cx.snapshot.unit(program.steps[0].ramp).to_owned();

@@ -1,4 +1,4 @@
-//! The picture of the login page: the notice, the form or who is in, and the most urgent alarms, which never hide.
+//! The view of the login page: the notice, the form or who is in, and the most urgent alarms, which never hide.
 
 use ratatui::{Frame, layout::Rect};
 

@@ -1,4 +1,4 @@
-//! The picture of the reports tab: which period, its figures, alarms and actions, and what the CSV will be.
+//! The view of the reports tab: which period, its figures, alarms and actions, and what the CSV will be.
 
 use std::{collections::BTreeMap, time::Duration};
 

@@ -1,4 +1,4 @@
-//! The picture of the trends tab: title, chart, legend with figures; or the list of values.
+//! The view of the trends tab: title, chart, legend with figures; or the list of values.
 
 use jiff::{Timestamp, tz::TimeZone};
 use ratatui::{

@@ -1,4 +1,4 @@
-//! The picture of the list of users, and of the terminals that are attached.
+//! The view of the list of users, and of the terminals that are attached.
 
 use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};

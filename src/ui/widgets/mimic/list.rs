@@ -1,4 +1,4 @@
-//! The items of the picture as a list of values, on a screen that is too small for the picture.
+//! The items of the mimic as a list of values, on a screen that is too small for the mimic.
 
 use ratatui::layout::Rect;
 
@@ -17,9 +17,9 @@ use crate::{
 /// Columns of half a row for a value with its unit and its alarm mark.
 const VALUE: u16 = 18;
 
-/// Is the list shown, because the picture does not fit? Tanks and curves that are cut at the bottom still tell their values.
+/// Is the list shown, because the mimic does not fit? Tanks and curves that are cut at the bottom still tell their values.
 pub fn is_shown(cx: &ViewContext, area: Rect) -> bool {
-    let picture = &cx.def().mimic;
+    let mimic = &cx.def().mimic;
     let bottom = |item: &MimicItem| {
         let Some(place) = place(item) else { return 0 };
         let rows = match item {
@@ -28,8 +28,8 @@ pub fn is_shown(cx: &ViewContext, area: Rect) -> bool {
         };
         place.y.saturating_add(rows)
     };
-    let cut = || picture.items.iter().any(|item| area.height < bottom(item));
-    area.width < picture.size.0 || area.height < picture.size.1 && cut()
+    let cut = || mimic.items.iter().any(|item| area.height < bottom(item));
+    area.width < mimic.size.0 || area.height < mimic.size.1 && cut()
 }
 
 /// The items of each row: two in a row where one is short.

@@ -1,4 +1,4 @@
-//! The parts of the process picture, on a canvas of nominal cells that is stretched to the screen.
+//! The parts of the mimic, on a canvas of nominal cells that is stretched to the screen.
 
 pub mod list;
 pub mod panel;
@@ -22,7 +22,7 @@ pub struct Stretch {
     y: f64,
 }
 
-/// A rectangle of the screen, relative to the picture.
+/// A rectangle of the screen, relative to the mimic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bounds {
     /// Left column.
@@ -36,7 +36,7 @@ pub struct Bounds {
 }
 
 impl Stretch {
-    /// From the nominal size of the picture to the room there is.
+    /// From the nominal size of the mimic to the room there is.
     pub fn new(nominal: (u16, u16), room: (u16, u16)) -> Stretch {
         let scale = |nominal: u16, room: u16| (f64::from(room) / f64::from(nominal.max(1))).max(1.0);
         Stretch { x: scale(nominal.0, room.0), y: scale(nominal.1, room.1) }

@@ -1,4 +1,4 @@
-//! Panels beside the picture: a controller with its bar, and a sequence with its steps.
+//! Panels beside the mimic: a controller with its bar, and a sequence with its steps.
 
 use ratatui::style::Modifier;
 

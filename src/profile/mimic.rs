@@ -13,7 +13,7 @@ use crate::plant::{
     tag::{Poll, TagDef},
 };
 
-/// The picture of the process.
+/// The mimic of the process.
 pub(super) fn mimic(table: &MimicTable, defs: &Defs, problems: &mut Problems) -> MimicDef {
     let size = table.size.map_or((80, 18), |size| (size.value[0], size.value[1]));
     if size.0 == 0 || size.1 == 0 || size.0 > 500 || size.1 > 200 {
@@ -210,7 +210,7 @@ fn check_inside(item: &MimicItem, at: Span, size: (u16, u16), problems: &mut Pro
             .fold((0, 0), |(x, y), point| (x.max(point.0.saturating_add(1)), y.max(point.1.saturating_add(1)))),
     };
     if right > size.0 || bottom > size.1 {
-        let problem = problems.add(at, "this item reaches out of the picture");
+        let problem = problems.add(at, "this item reaches out of the mimic");
         problem.label(format!("to column {right}, row {bottom} of {} by {}", size.0, size.1));
     }
 }
