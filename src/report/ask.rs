@@ -72,8 +72,8 @@ pub fn period(
         (None, None, Some(_)) => Err(PeriodError::NoFrom),
         (shift, None, None) => shift_named(def, shift.unwrap_or("last"), now),
         (None, Some(from), to) => {
-            let from = moment(def, from, Fold::First)?;
-            let to = to.map_or(Ok(now), |to| moment(def, to, Fold::Second))?;
+            let from = moment(def, from, DstFold::First)?;
+            let to = to.map_or(Ok(now), |to| moment(def, to, DstFold::Second))?;
             if from >= to {
                 return Err(PeriodError::Empty { from, to });
             }
@@ -115,13 +115,13 @@ fn begun(period: Period, now: Timestamp) -> Result<Period, PeriodError> {
 }
 
 /// Which of two equal local times is meant.
-enum Fold {
+enum DstFold {
     First,
     Second,
 }
 
 /// An instant with offset, or a local time of the plant (a date alone is its midnight).
-fn moment(def: &PlantDef, text: &str, fold: Fold) -> Result<Timestamp, PeriodError> {
+fn moment(def: &PlantDef, text: &str, fold: DstFold) -> Result<Timestamp, PeriodError> {
     let wrong = || PeriodError::NotATime(text.into());
     // First, because a local time may be followed by an offset that reading it as local would pass over.
     if let Ok(at) = text.parse::<Timestamp>() {
@@ -133,8 +133,8 @@ fn moment(def: &PlantDef, text: &str, fold: Fold) -> Result<Timestamp, PeriodErr
         false => text.parse().map_err(|_| wrong())?,
     };
     match (def.time_zone.to_ambiguous_timestamp(local).offset(), fold) {
-        (AmbiguousOffset::Fold { after, .. }, Fold::Second) => after.to_timestamp(local).ok(),
-        (_, Fold::First | Fold::Second) => instant(&def.time_zone, local),
+        (AmbiguousOffset::Fold { after, .. }, DstFold::Second) => after.to_timestamp(local).ok(),
+        (_, DstFold::First | DstFold::Second) => instant(&def.time_zone, local),
     }
     .ok_or_else(wrong)
 }

@@ -16,7 +16,7 @@ use crate::{
         keys::{self, Hint, Key, char, code},
         modal::{Choice, Confirm, Faceplate, Modal, Notice, Why},
         widgets::{
-            mimic::{Stretch, list, panel, pipe, place, tags, tank::Tank, title, trend, unit},
+            mimic::{CanvasScale, list, panel, pipe, place, tags, tank::Tank, title, trend, unit},
             text::{Canvas, fit},
         },
     },
@@ -141,7 +141,7 @@ impl Mimic {
         let asks = self.trends.iter().enumerate().filter_map(|(n, (item, _))| match &cx.def().mimic.items[*item] {
             MimicItem::Trend { tag, window, place } => {
                 let from = cx.now - SignedDuration::try_from(*window).ok()?;
-                let width = stretch(cx, cx.area).place(*place).width;
+                let width = scale(cx, cx.area).place(*place).width;
                 let query =
                     Query::Series { tags: vec![*tag], from, to: cx.now, buckets: usize::from(width.max(1)) * 2 };
                 Some(UiAction::query(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(n as u32), query))
@@ -191,21 +191,21 @@ impl Mimic {
         if list::is_shown(cx, area) {
             return list::view(cx, &mut canvas, self.selected);
         }
-        let stretch = stretch(cx, area);
+        let scale = scale(cx, area);
         for (n, item) in items.iter().enumerate() {
-            self.item(cx, &mut canvas, item, n, stretch);
+            self.item(cx, &mut canvas, item, n, scale);
         }
         // When all is drawn it is known where there is room for a mark.
         for item in items {
             match item {
                 MimicItem::Valve { place, tag, vertical, .. } => {
-                    let (x, y) = stretch.spot(*place);
+                    let (x, y) = scale.spot(*place);
                     let rows =
                         if *vertical { [y, y + 1, y.saturating_sub(1)] } else { [y.saturating_sub(1), y + 1, y + 2] };
                     unit::mark(cx, &mut canvas, x + 1, &rows, *tag);
                 }
                 MimicItem::Pump { place, tag, .. } => {
-                    let at = stretch.place(*place);
+                    let at = scale.place(*place);
                     let y = at.y + at.height / 2;
                     unit::mark(cx, &mut canvas, at.x, &[y + 1, y.saturating_sub(1), y + 2, y], *tag);
                 }
@@ -223,46 +223,44 @@ impl Mimic {
         }
     }
 
-    fn item(&self, cx: &ViewContext, canvas: &mut Canvas, item: &MimicItem, n: usize, stretch: Stretch) {
+    fn item(&self, cx: &ViewContext, canvas: &mut Canvas, item: &MimicItem, n: usize, scale: CanvasScale) {
         let selected = self.selected == Some(n);
         let motion = self.motion && cx.theme.motion;
         match item {
             MimicItem::Tank { place, label, level, temperature, heater, agitator } => {
                 let tank =
                     Tank { label, level: *level, temperature: *temperature, heater: *heater, agitator: *agitator };
-                tank.view(cx, canvas, stretch.place(*place), selected, motion);
+                tank.view(cx, canvas, scale.place(*place), selected, motion);
             }
             MimicItem::Valve { place, label, tag, vertical } => {
-                unit::valve(cx, canvas, stretch.spot(*place), label, *tag, *vertical, selected)
+                unit::valve(cx, canvas, scale.spot(*place), label, *tag, *vertical, selected)
             }
-            MimicItem::Pump { place, label, tag } => {
-                unit::pump(cx, canvas, stretch.place(*place), label, *tag, selected)
-            }
-            MimicItem::Pipe { points, flow } => pipe::view(cx, canvas, points, flow, stretch, motion),
+            MimicItem::Pump { place, label, tag } => unit::pump(cx, canvas, scale.place(*place), label, *tag, selected),
+            MimicItem::Pipe { points, flow } => pipe::view(cx, canvas, points, flow, scale, motion),
             MimicItem::Value { place, label, tag } => {
-                unit::labelled(cx, canvas, stretch.place(*place), label, *tag, selected)
+                unit::labelled(cx, canvas, scale.place(*place), label, *tag, selected)
             }
             MimicItem::Controller { place, device } => {
-                panel::controller(cx, canvas, stretch.place(*place), cx.def().device(*device), selected)
+                panel::controller(cx, canvas, scale.place(*place), cx.def().device(*device), selected)
             }
             MimicItem::Sequence { place, label, step, remaining, states } => {
                 let sequence = panel::Sequence { label, step: *step, remaining: *remaining, states };
-                sequence.view(cx, canvas, stretch.place(*place), selected);
+                sequence.view(cx, canvas, scale.place(*place), selected);
             }
             MimicItem::Trend { place, tag, window } => {
                 let series = self.trends.iter().find(|(item, _)| *item == n).and_then(|(_, series)| series.as_ref());
-                trend::view(cx, canvas, stretch.place(*place), *tag, *window, series, selected);
+                trend::view(cx, canvas, scale.place(*place), *tag, *window, series, selected);
             }
             MimicItem::Text { place, text } => {
-                let at = stretch.place(*place);
+                let at = scale.place(*place);
                 canvas.text(at.x, at.y + at.height / 2, &fit(text, at.width.max(1)), cx.theme.dim());
             }
         }
     }
 }
 
-fn stretch(cx: &ViewContext, area: Rect) -> Stretch {
-    Stretch::new(cx.def().mimic.size, (area.width, area.height))
+fn scale(cx: &ViewContext, area: Rect) -> CanvasScale {
+    CanvasScale::new(cx.def().mimic.size, (area.width, area.height))
 }
 
 /// The window of the plant's command on this key. Other windows ask too, so that a stop never waits for one to close.

@@ -148,7 +148,7 @@ fn facts(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &Pr
 }
 
 /// One straight piece of the curve: how long, from where (`None`: nobody remembers), to where, and which place it is.
-struct Leg {
+struct Segment {
     minutes: f64,
     from: Option<f64>,
     to: f64,
@@ -156,37 +156,37 @@ struct Leg {
 }
 
 /// The way of the set value, from PV as it is now; `None` while a part of it is not known.
-fn legs(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Option<Vec<Leg>> {
+fn segments(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Option<Vec<Segment>> {
     let (first, last) = chosen(cx, program)?;
     let trusted = |tag: TagId| cx.snapshot.sample(tag).trusted();
     // A ramp begins where the step before has ended; the first at PV as it is at the start. Once it runs that is past,
     // and the device does not tell it: the first ramp is a gap then.
     let resting = matches!(place(cx, program), Some(Place::Off | Place::Ended));
     let mut from = device.faceplate.as_ref().and_then(|faceplate| trusted(faceplate.pv)).filter(|_| resting);
-    let mut legs = Vec::new();
+    let mut segments = Vec::new();
     for (n, step) in program.steps.iter().enumerate().take(last + 1).skip(first) {
         let (to, ramp, soak) = (trusted(step.sv)?, trusted(step.ramp)?, trusted(step.soak)?);
-        legs.push(Leg { minutes: ramp.max(0.0), from, to, place: Place::Ramp(n) });
-        legs.push(Leg { minutes: soak.max(0.0), from: Some(to), to, place: Place::Soak(n) });
+        segments.push(Segment { minutes: ramp.max(0.0), from, to, place: Place::Ramp(n) });
+        segments.push(Segment { minutes: soak.max(0.0), from: Some(to), to, place: Place::Soak(n) });
         from = Some(to);
     }
-    Some(legs)
+    Some(segments)
 }
 
 fn curve(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
     let theme = cx.theme;
-    let Some(legs) = legs(cx, device, program) else {
+    let Some(segments) = segments(cx, device, program) else {
         canvas.text(0, 0, "no curve: a target or time of the program is not known", theme.dim());
         return;
     };
-    let total: f64 = legs.iter().map(|leg| leg.minutes).sum();
+    let total: f64 = segments.iter().map(|segment| segment.minutes).sum();
     if total <= 0.0 {
         canvas.text(0, 0, "no curve: all times of the chosen steps are 0", theme.dim());
         return;
     }
-    let (low, high) = legs
+    let (low, high) = segments
         .iter()
-        .flat_map(|leg| leg.from.into_iter().chain([leg.to]))
+        .flat_map(|segment| segment.from.into_iter().chain([segment.to]))
         .fold((f64::MAX, f64::MIN), |(low, high), sv| (low.min(sv), high.max(sv)));
     let step = program.steps[0];
     let label = |value: f64| cx.snapshot.format(step.sv, value);
@@ -198,23 +198,23 @@ fn curve(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &Pr
     canvas.text(0, 0, &pad_left(&label(high), gutter - 1), theme.dim());
     canvas.text(0, high_rows - 1, &pad_left(&label(low), gutter - 1), theme.dim());
     let dots = usize::from(wide) * 2;
-    let series = way(step.sv, &legs, total, dots, cx);
+    let series = way(step.sv, &segments, total, dots, cx);
     let mut plot = canvas.part(gutter, 0, wide, high_rows);
     trend::curve(&mut plot, &series, (low, high.max(low + 0.1)), theme.glyphs, theme.set_value());
-    axis(cx, &mut canvas.part(gutter, high_rows, wide, 1), device, program, &legs, total);
+    axis(cx, &mut canvas.part(gutter, high_rows, wide, 1), device, program, &segments, total);
 }
 
 /// The way as a curve of so many columns.
-fn way(tag: TagId, legs: &[Leg], total: f64, dots: usize, cx: &ViewContext) -> Series {
+fn way(tag: TagId, segments: &[Segment], total: f64, dots: usize, cx: &ViewContext) -> Series {
     let at = |minute: f64| {
         let mut left = minute;
-        for leg in legs {
-            if left <= leg.minutes && leg.minutes > 0.0 {
-                return leg.from.map(|from| from + (leg.to - from) * left / leg.minutes);
+        for segment in segments {
+            if left <= segment.minutes && segment.minutes > 0.0 {
+                return segment.from.map(|from| from + (segment.to - from) * left / segment.minutes);
             }
-            left -= leg.minutes;
+            left -= segment.minutes;
         }
-        legs.last().map(|leg| leg.to)
+        segments.last().map(|segment| segment.to)
     };
     let each = total / dots as f64;
     let bucket = |n: usize| {
@@ -226,7 +226,14 @@ fn way(tag: TagId, legs: &[Leg], total: f64, dots: usize, cx: &ViewContext) -> S
 }
 
 /// Time below the curve, with a mark where the program is.
-fn axis(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef, legs: &[Leg], total: f64) {
+fn axis(
+    cx: &ViewContext,
+    canvas: &mut Canvas,
+    device: &DeviceDef,
+    program: &ProgramDef,
+    segments: &[Segment],
+    total: f64,
+) {
     let theme = cx.theme;
     let unit = cx.snapshot.unit(program.steps[0].ramp).to_owned();
     canvas.run(0, 0, canvas.width(), '─', theme.dim());
@@ -234,13 +241,13 @@ fn axis(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &Pro
     let end = canvas.width();
     canvas.text_right(end, 0, &format!(" {total} {unit}"), theme.dim());
     let Some(now) = place(cx, program) else { return };
-    let Some(leg) = legs.iter().position(|leg| leg.place == now) else { return };
-    let before: f64 = legs[..leg].iter().map(|leg| leg.minutes).sum();
+    let Some(segment) = segments.iter().position(|segment| segment.place == now) else { return };
+    let before: f64 = segments[..segment].iter().map(|segment| segment.minutes).sum();
     let into = cx.snapshot.programs.get(device.id.index()).copied().flatten().map_or(0.0, |(into, _)| {
         // Times are in the unit of the device; minutes unless it says seconds.
         into.as_secs_f64() / seconds_of(&unit)
     });
-    let share = (before + into.min(legs[leg].minutes)) / total;
+    let share = (before + into.min(segments[segment].minutes)) / total;
     let x = (share.clamp(0.0, 1.0) * f64::from(canvas.width().saturating_sub(1))).round() as u16;
     canvas.glyph(x, 0, '▲', theme.strong());
     canvas.text(if x + 6 < end { x + 1 } else { x.saturating_sub(4) }, 0, " now", theme.strong());

@@ -141,12 +141,12 @@ fn told(cx: &ViewContext, status: &Status, place: Place, fault: Fault, canvas: &
 struct Compared {
     tag: TagId,
     truth: String,
-    standing: Likeness,
+    comparison: TruthComparison,
 }
 
 /// How what is shown and what is so go together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Likeness {
+enum TruthComparison {
     /// Shown as good, and wrong.
     Wrong,
     /// Not shown as good.
@@ -171,16 +171,16 @@ fn compare(cx: &ViewContext, status: &Status, place: Place) -> Vec<Compared> {
         .iter()
         .filter(|(tag, _)| of_place(**tag))
         .map(|(tag, truth)| {
-            let standing = match cx.snapshot.sample(*tag).trusted() {
-                None => Likeness::Unknown,
-                Some(shown) if (shown - truth).abs() > allowed(cx, *tag) => Likeness::Wrong,
-                Some(_) => Likeness::Same,
+            let comparison = match cx.snapshot.sample(*tag).trusted() {
+                None => TruthComparison::Unknown,
+                Some(shown) if (shown - truth).abs() > allowed(cx, *tag) => TruthComparison::Wrong,
+                Some(_) => TruthComparison::Same,
             };
             let text = format!("{} {}", cx.snapshot.format(*tag, *truth), cx.snapshot.unit(*tag));
-            Compared { tag: *tag, truth: text.trim_end().to_owned(), standing }
+            Compared { tag: *tag, truth: text.trim_end().to_owned(), comparison }
         })
         .collect();
-    rows.sort_by_key(|row| (row.standing, row.tag));
+    rows.sort_by_key(|row| (row.comparison, row.tag));
     rows
 }
 
@@ -203,10 +203,10 @@ fn comparison(cx: &ViewContext, rows: &[Compared], canvas: &mut Canvas) {
         canvas.text(0, y, &pad(&cx.def().tag(row.tag).name, names), cx.theme.normal());
         canvas.text(names + 2, y, &fit(&row.truth, 10), cx.theme.strong());
         let shown = show(cx, row.tag);
-        let (mark, style) = match row.standing {
-            Likeness::Wrong => (cx.theme.pick("≠", "#"), cx.theme.trouble()),
-            Likeness::Unknown => ("?", cx.theme.trouble()),
-            Likeness::Same => ("=", cx.theme.dim()),
+        let (mark, style) = match row.comparison {
+            TruthComparison::Wrong => (cx.theme.pick("≠", "#"), cx.theme.trouble()),
+            TruthComparison::Unknown => ("?", cx.theme.trouble()),
+            TruthComparison::Same => ("=", cx.theme.dim()),
         };
         canvas.text(names + 13, y, mark, style);
         let room = canvas.width().saturating_sub(names + 15);

@@ -17,7 +17,7 @@ use crate::{
 
 /// Maps nominal cells to cells of the screen. Never shrinks: what does not fit is cut off at the right and bottom.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stretch {
+pub struct CanvasScale {
     x: f64,
     y: f64,
 }
@@ -35,11 +35,11 @@ pub struct Bounds {
     pub height: u16,
 }
 
-impl Stretch {
+impl CanvasScale {
     /// From the nominal size of the mimic to the room there is.
-    pub fn new(nominal: (u16, u16), room: (u16, u16)) -> Stretch {
+    pub fn new(nominal: (u16, u16), room: (u16, u16)) -> CanvasScale {
         let scale = |nominal: u16, room: u16| (f64::from(room) / f64::from(nominal.max(1))).max(1.0);
-        Stretch { x: scale(nominal.0, room.0), y: scale(nominal.1, room.1) }
+        CanvasScale { x: scale(nominal.0, room.0), y: scale(nominal.1, room.1) }
     }
     /// The left edge of a nominal column.
     pub fn column(self, x: u16) -> u16 {
@@ -178,31 +178,31 @@ mod tests {
     #[test]
     fn neighbours_stay_neighbours_at_every_size() {
         for room in [(80, 18), (97, 18), (120, 34), (200, 54)] {
-            let stretch = Stretch::new((80, 18), room);
-            let tank = stretch.place(Place { x: 14, y: 6, width: 16, height: 6 });
-            let below = stretch.place(Place { x: 14, y: 12, width: 16, height: 1 });
+            let scale = CanvasScale::new((80, 18), room);
+            let tank = scale.place(Place { x: 14, y: 6, width: 16, height: 6 });
+            let below = scale.place(Place { x: 14, y: 12, width: 16, height: 1 });
             assert_eq!(tank.y + tank.height, below.y, "{room:?}");
-            assert_eq!(tank.x + tank.width, stretch.column(30), "{room:?}");
-            assert!(stretch.middle_column(14) >= tank.x && stretch.middle_column(29) < tank.x + tank.width);
+            assert_eq!(tank.x + tank.width, scale.column(30), "{room:?}");
+            assert!(scale.middle_column(14) >= tank.x && scale.middle_column(29) < tank.x + tank.width);
         }
     }
 
     #[test]
     fn a_pump_stands_in_its_pipe_at_every_size() {
         for rows in 18..80 {
-            let stretch = Stretch::new((80, 18), (80, rows));
+            let scale = CanvasScale::new((80, 18), (80, rows));
             for y in 0..18 {
-                let pump = stretch.place(Place { x: 15, y, width: 15, height: 1 });
-                assert_eq!(stretch.middle_row(y), pump.y + pump.height / 2, "row {y} of {rows}");
+                let pump = scale.place(Place { x: 15, y, width: 15, height: 1 });
+                assert_eq!(scale.middle_row(y), pump.y + pump.height / 2, "row {y} of {rows}");
             }
         }
     }
 
     #[test]
     fn a_small_screen_cuts_and_never_squeezes() {
-        let stretch = Stretch::new((80, 18), (60, 10));
+        let scale = CanvasScale::new((80, 18), (60, 10));
         assert_eq!(
-            stretch.place(Place { x: 54, y: 6, width: 26, height: 6 }),
+            scale.place(Place { x: 54, y: 6, width: 26, height: 6 }),
             Bounds { x: 54, y: 6, width: 26, height: 6 }
         );
     }

@@ -1,6 +1,6 @@
 //! A pipe: arrows travel along it only while every flow tag is on and good.
 
-use super::Stretch;
+use super::CanvasScale;
 use crate::{
     plant::def::TagId,
     ui::{
@@ -35,7 +35,7 @@ pub fn view(
     canvas: &mut Canvas,
     points: &[(u16, u16)],
     flow: &[TagId],
-    stretch: Stretch,
+    scale: CanvasScale,
     motion: bool,
 ) {
     let flowing = flow.iter().try_fold(!flow.is_empty(), |all, tag| value::is_on(cx, *tag).map(|on| all && on));
@@ -43,7 +43,7 @@ pub fn view(
         Some(true) => cx.theme.running(),
         Some(false) | None => cx.theme.dim(),
     };
-    let steps = steps(points, stretch);
+    let steps = steps(points, scale);
     let shift = if motion { cx.phase as usize / 2 } else { 0 };
     for (n, step) in steps.iter().enumerate() {
         let arrow = (n + ARROW_CELLS - shift % ARROW_CELLS) % ARROW_CELLS == ARROW_CELLS / 2 && step.from == step.to;
@@ -59,9 +59,9 @@ pub fn view(
 
 /// The cells of a pipe in the order of its flow. The ends reach to the edge of their nominal cells, so that they touch
 /// what stands beside them at every size.
-fn steps(points: &[(u16, u16)], stretch: Stretch) -> Vec<Step> {
+fn steps(points: &[(u16, u16)], scale: CanvasScale) -> Vec<Step> {
     let corners: Vec<(u16, u16)> =
-        points.iter().enumerate().map(|(n, point)| corner(points, n, *point, stretch)).collect();
+        points.iter().enumerate().map(|(n, point)| corner(points, n, *point, scale)).collect();
     let mut steps: Vec<Step> = Vec::new();
     for pair in corners.windows(2) {
         let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
@@ -87,10 +87,10 @@ fn steps(points: &[(u16, u16)], stretch: Stretch) -> Vec<Step> {
 }
 
 /// A point of the pipe on the screen: the middle of its nominal cell, but at the ends the far edge along the pipe.
-fn corner(points: &[(u16, u16)], n: usize, (x, y): (u16, u16), stretch: Stretch) -> (u16, u16) {
-    let (near_x, far_x) = (stretch.column(x), stretch.column(x + 1).saturating_sub(1));
-    let (near_y, far_y) = (stretch.row(y), stretch.row(y + 1).saturating_sub(1));
-    let (middle_x, middle_y) = (stretch.middle_column(x), stretch.middle_row(y));
+fn corner(points: &[(u16, u16)], n: usize, (x, y): (u16, u16), scale: CanvasScale) -> (u16, u16) {
+    let (near_x, far_x) = (scale.column(x), scale.column(x + 1).saturating_sub(1));
+    let (near_y, far_y) = (scale.row(y), scale.row(y + 1).saturating_sub(1));
+    let (middle_x, middle_y) = (scale.middle_column(x), scale.middle_row(y));
     let starts = points.get(1).filter(|_| n == 0).and_then(|next| way((x, y), *next));
     let ends = (n > 0 && n + 1 == points.len()).then(|| way(points[n - 1], (x, y))).flatten();
     match (starts, ends) {
@@ -163,7 +163,7 @@ mod tests {
         with_cx(&fixture.snapshot(), |cx| {
             let cx = ViewContext { phase, theme: &Theme::FULL, ..*cx };
             let mut canvas = Canvas::new(&mut buffer, area);
-            view(&cx, &mut canvas, &POINTS, &[fixture.tag("PLC-1.SV-1")], Stretch::new((10, 3), (10, 3)), true);
+            view(&cx, &mut canvas, &POINTS, &[fixture.tag("PLC-1.SV-1")], CanvasScale::new((10, 3), (10, 3)), true);
         });
         buffer.content.chunks(10).map(|row| row.iter().map(|cell| cell.symbol()).collect()).collect()
     }
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_stretched_pipe_still_touches_its_ends() {
-        let steps = steps(&[(2, 1), (4, 1), (4, 3)], Stretch::new((10, 5), (25, 15)));
+        let steps = steps(&[(2, 1), (4, 1), (4, 3)], CanvasScale::new((10, 5), (25, 15)));
         let (first, last) = (steps[0], steps[steps.len() - 1]);
         assert_eq!((first.x, last.y), (5, 11), "the left edge of column 2 and the lower edge of row 3");
         assert!(steps.windows(2).all(|pair| pair[0].x.abs_diff(pair[1].x) + pair[0].y.abs_diff(pair[1].y) == 1));
