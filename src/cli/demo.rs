@@ -67,8 +67,8 @@ pub fn main(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let clock = Clock::starting_at(Timestamp::now(), args.speed);
         let services: Vec<_> = def.lines.iter().map(sim::io::Service::of).collect();
-        let simulated = drill::world(&def, scenario.as_deref())?;
-        let simulated = sim::io::serve_world(&def, simulated, clock, &services).await.map_err(simulation_error)?;
+        let simulated = drill::simulator(&def, scenario.as_deref())?;
+        let simulated = sim::io::serve_simulator(&def, simulated, clock, &services).await.map_err(simulation_error)?;
         simulated.plug_into(&mut def);
         let def = Arc::new(def);
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
@@ -79,7 +79,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let mut session = station.session(&if args.headless { "demo".to_owned() } else { paths::operator() });
         let trainer = sim::io::Trainer {
             def: def.clone(),
-            world: simulated.world.clone(),
+            simulator: simulated.simulator.clone(),
             snapshots: session.snapshots.clone(),
             journal,
             // Without a terminal nobody else is there to act.

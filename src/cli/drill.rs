@@ -10,13 +10,13 @@ use crate::{
     plant::{PlantDef, Snapshot},
     profile::{self, Kind, Search},
     sim::{
-        io::{Trainer, WorldHandle, in_memory, journal},
+        io::{SimulatorHandle, Trainer, in_memory, journal},
         scenario::{
             Scenario, Start,
             judge::{Verdict, clock},
             read,
         },
-        world::World,
+        simulator::Simulator,
     },
     station::{io as station, teller},
 };
@@ -57,16 +57,16 @@ pub fn load(path: &Path) -> Result<(Scenario, Arc<PlantDef>), CliError> {
     read::load(path, &Search::usual()).map_err(|errors| CliError::Profile(Box::new(errors)))
 }
 
-/// The world of a scenario at its start.
-pub fn world(def: &PlantDef, scenario: Option<&Scenario>) -> Result<World, CliError> {
-    let mut world = World::of(def).map_err(|error| simulation_error(error.into()))?;
+/// The simulator of a scenario at its start.
+pub fn simulator(def: &PlantDef, scenario: Option<&Scenario>) -> Result<Simulator, CliError> {
+    let mut simulator = Simulator::of(def).map_err(|error| simulation_error(error.into()))?;
     if let Some(scenario) = scenario {
         if scenario.start == Start::Rest {
-            world = world.at_rest();
+            simulator = simulator.at_rest();
         }
-        world.advance(scenario.ahead);
+        simulator.advance(scenario.ahead);
     }
-    Ok(world)
+    Ok(simulator)
 }
 
 /// Prints a table of what was expected and what came of it.
@@ -102,15 +102,15 @@ fn rehearse(
         .map_err(|error| CliError::Io { what: "cannot start".into(), error })?;
     runtime.block_on(async {
         let time = Clock::starting_at(morning(&def), 1.0);
-        let world = WorldHandle::spawn_for(&def, world(&def, Some(&scenario))?, time);
+        let simulator = SimulatorHandle::spawn_for(&def, simulator(&def, Some(&scenario))?, time);
         let (listener, journal) = journal();
-        let station = station::rehearse(def.clone(), time, in_memory(&def, &world), listener);
+        let station = station::rehearse(def.clone(), time, in_memory(&def, &simulator), listener);
         let session = station.session("drill");
         // Without an operator his orders lead nowhere.
         let orders = if with_operator { station.orders.clone() } else { mpsc::channel(1).0 };
         let trainer = Trainer {
             def,
-            world,
+            simulator,
             snapshots: session.snapshots.clone(),
             journal,
             scenario: Some(scenario),

@@ -15,7 +15,7 @@ pub use self::{
     story::Story,
     word::{Fault, Position, Target, Valve},
 };
-use super::{ascii, world::World};
+use super::{ascii, simulator::Simulator};
 use crate::{
     bus::frame::with_crc,
     plant::{
@@ -80,25 +80,25 @@ impl Faults {
     }
 
     /// Puts a fault in force; one that it excludes ends.
-    pub fn set(&mut self, world: &mut World, place: Place, fault: Fault, since: Timestamp) {
+    pub fn set(&mut self, simulator: &mut Simulator, place: Place, fault: Fault, since: Timestamp) {
         // The same fault with another number goes on: what is stuck stays.
         let since = self.find(place, fault).map_or(since, |old| old.since);
         self.list.retain(|old| old.place != place || !old.fault.excludes(fault));
         self.list.push(InForce { place, fault, since });
         self.list.sort_by_key(|in_force| in_force.place);
-        self.arrange(world, place, fault, true);
+        self.arrange(simulator, place, fault, true);
     }
 
     /// Ends a fault, whatever its number.
-    pub fn clear(&mut self, world: &mut World, place: Place, fault: Fault) {
+    pub fn clear(&mut self, simulator: &mut Simulator, place: Place, fault: Fault) {
         self.list.retain(|old| old.place != place || old.fault.word() != fault.word());
-        self.arrange(world, place, fault, false);
+        self.arrange(simulator, place, fault, false);
     }
 
     /// All is well again.
-    pub fn clear_all(&mut self, world: &mut World) {
+    pub fn clear_all(&mut self, simulator: &mut Simulator) {
         for InForce { place, fault, .. } in std::mem::take(&mut self.list) {
-            self.arrange(world, place, fault, false);
+            self.arrange(simulator, place, fault, false);
         }
     }
 
@@ -116,19 +116,19 @@ impl Faults {
     }
 
     /// Carries a change into the process, and forgets what is no longer stuck.
-    fn arrange(&mut self, world: &mut World, place: Place, fault: Fault, begins: bool) {
+    fn arrange(&mut self, simulator: &mut Simulator, place: Place, fault: Fault, begins: bool) {
         match (place, fault) {
             (_, Fault::Stuck) if !begins => {
                 self.memories.entry(place).or_default().let_go();
             }
-            (Place::Unit(line, unit), Fault::SensorBurnout) if world.is_controller(line, unit) => {
-                if let Some(rig) = world.rig_mut() {
+            (Place::Unit(line, unit), Fault::SensorBurnout) if simulator.is_controller(line, unit) => {
+                if let Some(rig) = simulator.rig_mut() {
                     rig.set_sensor_open(begins);
                 }
             }
             (Place::Process, _) => {
                 let troubles = Troubles::of(self.at(Place::Process, Target::Process));
-                if let Some(rig) = world.rig_mut() {
+                if let Some(rig) = simulator.rig_mut() {
                     rig.set_troubles(troubles);
                 }
             }
@@ -136,31 +136,31 @@ impl Faults {
         }
     }
 
-    /// Lets the world answer a request, or the fault in its place. `None`: nothing comes back.
-    pub fn answer(&mut self, world: &mut World, line: LineId, unit: u8, request: &[u8]) -> Option<Answer> {
+    /// Lets the simulator answer a request, or the fault in its place. `None`: nothing comes back.
+    pub fn answer(&mut self, simulator: &mut Simulator, line: LineId, unit: u8, request: &[u8]) -> Option<Answer> {
         if self.hit(line).is_some() {
-            world.spoiled(line);
+            simulator.spoiled(line);
             return None;
         }
-        if world.is_broadcast(line, unit) {
+        if simulator.is_broadcast(line, unit) {
             let deaf = |unit| matches!(self.on_the_line(line, unit), Some(Fault::Silent | Fault::Exception(_)));
-            world.broadcast(line, request, |unit| !deaf(unit));
+            simulator.broadcast(line, request, |unit| !deaf(unit));
             return None;
         }
-        let late = world.reply_delay(line, unit);
+        let late = simulator.reply_delay(line, unit);
         let answer = |pdu, damage, delay| Answer { unit, pdu, damage, delay };
         let mut answer = match self.on_the_line(line, unit) {
             Some(Fault::Silent) => {
-                world.overhear(line, unit);
+                simulator.overhear(line, unit);
                 return None;
             }
             Some(Fault::Exception(code)) => {
-                return world.refuse(line, unit, request, code).map(|pdu| answer(pdu, Damage::None, late));
+                return simulator.refuse(line, unit, request, code).map(|pdu| answer(pdu, Damage::None, late));
             }
-            Some(Fault::Late(by)) => answer(world.respond(line, unit, request)?, Damage::None, late + by),
-            Some(Fault::BadCrc) => answer(world.respond(line, unit, request)?, Damage::Check, late),
-            Some(Fault::Cut) => answer(world.respond(line, unit, request)?, Damage::Cut, late),
-            Some(_) | None => answer(world.respond(line, unit, request)?, Damage::None, late),
+            Some(Fault::Late(by)) => answer(simulator.respond(line, unit, request)?, Damage::None, late + by),
+            Some(Fault::BadCrc) => answer(simulator.respond(line, unit, request)?, Damage::Check, late),
+            Some(Fault::Cut) => answer(simulator.respond(line, unit, request)?, Damage::Cut, late),
+            Some(_) | None => answer(simulator.respond(line, unit, request)?, Damage::None, late),
         };
         answer.pdu = self.spoil_values(line, unit, request, answer.pdu);
         if let Some(bit) = self.hit(line) {

@@ -1,4 +1,4 @@
-//! A world to test and to train against: every device of a plant as a Modbus slave. Bytes and time move only in [`io`].
+//! The simulator: every device of a plant as a Modbus slave, to test and to train against. Bytes and time move only in [`io`].
 //!
 //! ```text
 //!  tank  <── actuators ── dl06 <── at SV ── pxr <── probe ── tank        one step of 0.1 s in `rig`: the water tank
@@ -6,7 +6,7 @@
 //!                                  │
 //!                               slave ─ pdu::serve                       one Modbus server for all, which counts
 //!                                  │
-//!                               world: (line, unit) ─> slave             `faults` spoil what is measured, done or answered
+//!                           simulator: (line, unit) ─> slave             `faults` spoil what is measured, done or answered
 //!                                  │
 //!                               io: RTU or ASCII on a pty, TCP, RTU over TCP; each line at a place of its own
 //!
@@ -22,7 +22,7 @@ pub mod dl06;
 pub mod rig;
 pub mod experiment;
 pub mod model;
-pub mod world;
+pub mod simulator;
 pub mod faults;
 pub mod scenario;
 pub mod truth;

@@ -450,10 +450,10 @@ mod tests {
             }
             let parts: Vec<_> = def.devices.iter().map(|device| part(&def, device.id)).collect();
             assert_eq!(parts, expect, "{simulation:?} {profiles:?}");
-            // The world serves what this says.
-            let Ok(world) = super::super::world::World::of(&def) else { panic!("{simulation:?} is known") };
+            // The simulator serves what this says.
+            let Ok(simulator) = super::super::simulator::Simulator::of(&def) else { panic!("{simulation:?} is known") };
             let answers: Vec<_> =
-                def.devices.iter().map(|device| world.is_controller(device.line, device.unit)).collect();
+                def.devices.iter().map(|device| simulator.is_controller(device.line, device.unit)).collect();
             assert_eq!(answers, expect.map(|part| part == Some(Part::Controller)));
         };
         let (controller, plc) = (Some(Part::Controller), Some(Part::Plc));

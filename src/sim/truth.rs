@@ -3,7 +3,7 @@
 use super::{
     rig::{Part, Truth, part},
     scenario::judge::Truths,
-    world::World,
+    simulator::Simulator,
 };
 use crate::plant::{
     PlantDef,
@@ -35,10 +35,10 @@ impl Lens {
     }
 
     /// What is so now, in the units of the tags.
-    pub fn look(&self, world: &World) -> Truths {
-        let truth = world.rig().map(|rig| rig.truth());
+    pub fn look(&self, simulator: &Simulator) -> Truths {
+        let truth = simulator.rig().map(|rig| rig.truth());
         let rig = self.rig.iter().filter_map(|(tag, look)| Some((*tag, look(truth.as_ref()?))));
-        let others = self.others.iter().filter_map(|tag| Some((*tag, world.value(*tag)?)));
+        let others = self.others.iter().filter_map(|tag| Some((*tag, simulator.value(*tag)?)));
         rig.chain(others).collect()
     }
 }

@@ -22,8 +22,8 @@ use sightglass::{
     profile::{self, Kind, Search},
     sim::{
         faults::{Fault, Target},
-        io::{Service, WorldHandle, serve_stream},
-        world::World,
+        io::{Service, SimulatorHandle, serve_stream},
+        simulator::Simulator,
     },
     station::{self, Session},
 };
@@ -90,7 +90,7 @@ async fn survive(name: &str, def: PlantDef) {
         plant.set_all(fault).await;
         plant.watch(&format!("{name}, {fault}"), FAULTY).await;
         assert_eq!(plant.trusted(), Vec::<String>::new(), "{name}, {fault}: still called good");
-        plant.world.all_well().await;
+        plant.simulator.all_well().await;
         plant.until_good(&format!("{name}, after {fault}"), CURED_MAX).await;
     }
 }
@@ -98,7 +98,7 @@ async fn survive(name: &str, def: PlantDef) {
 /// A station on the simulated devices of its plant, over lines in memory.
 struct Plant {
     def: Arc<PlantDef>,
-    world: WorldHandle,
+    simulator: SimulatorHandle,
     session: Session,
     /// Tags that are read again and again.
     polled: Vec<TagId>,
@@ -110,14 +110,14 @@ struct Plant {
 impl Plant {
     fn start(def: &Arc<PlantDef>, history: &Path) -> Plant {
         let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
-        let world = WorldHandle::spawn(World::of(def).unwrap(), clock);
-        let connectors = def.lines.iter().map(|line| plug(&world, line)).collect();
+        let simulator = SimulatorHandle::spawn(Simulator::of(def).unwrap(), clock);
+        let connectors = def.lines.iter().map(|line| plug(&simulator, line)).collect();
         let options =
             station::io::Options { def: def.clone(), clock, history: history.to_owned(), connectors, file: None };
         let station = station::io::start(options).unwrap();
         let every = def.tags.iter().filter(|tag| matches!(tag.poll, Poll::Every(_))).map(|tag| tag.id).collect();
         let session = station.session("test");
-        Plant { def: def.clone(), world, session, polled: every, truth: BTreeMap::new(), _station: station }
+        Plant { def: def.clone(), simulator, session, polled: every, truth: BTreeMap::new(), _station: station }
     }
 
     fn snapshot(&self) -> Arc<Snapshot> {
@@ -139,8 +139,8 @@ impl Plant {
     }
 
     async fn set_all(&self, fault: Fault) {
-        for (line, unit) in self.world.units().collect::<Vec<_>>() {
-            self.world.set_fault(line, unit, fault).await;
+        for (line, unit) in self.simulator.units().collect::<Vec<_>>() {
+            self.simulator.set_fault(line, unit, fault).await;
         }
     }
 
@@ -164,7 +164,7 @@ impl Plant {
     /// Looks at what the devices really hold.
     async fn look(&mut self) {
         for tag in self.polled.clone() {
-            if let Some(now) = self.world.value(tag).await {
+            if let Some(now) = self.simulator.value(tag).await {
                 let (low, high) = self.truth.entry(tag).or_insert((now, now));
                 (*low, *high) = (low.min(now), high.max(now));
             }
@@ -191,9 +191,9 @@ impl Plant {
 }
 
 /// A port in memory that can be opened again and again, as the line reopens it.
-fn plug(world: &WorldHandle, line: &LineDef) -> Connector {
+fn plug(simulator: &SimulatorHandle, line: &LineDef) -> Connector {
     let (ports, streams) = mpsc::channel(2);
-    let (units, speech) = (world.line(line.id), Service::of(line).speech());
+    let (units, speech) = (simulator.line(line.id), Service::of(line).speech());
     tokio::spawn(async move {
         loop {
             let (ours, theirs) = tokio::io::duplex(1024);
@@ -236,13 +236,13 @@ async fn check(golden: Golden<'_>) {
     }
     let def = Arc::new(def);
     let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
-    let world = WorldHandle::spawn(World::of(&def).unwrap(), clock);
+    let simulator = SimulatorHandle::spawn(Simulator::of(&def).unwrap(), clock);
     let (port, theirs) = tokio::io::duplex(1024);
     let (ports, streams) = mpsc::channel(1);
     ports.try_send(port).unwrap();
     let asked = Arc::new(Mutex::new(Vec::new()));
     let recorded = golden.reply.map(|(request, reply, ..)| (bytes(request), with_crc(&bytes(reply))));
-    tokio::spawn(listen(theirs, world, recorded, asked.clone()));
+    tokio::spawn(listen(theirs, simulator, recorded, asked.clone()));
     let folder = folder();
     let options = station::io::Options {
         def: def.clone(),
@@ -275,7 +275,7 @@ async fn check(golden: Golden<'_>) {
 /// Answers each request in the device's name, or with what was recorded; keeps what was asked.
 async fn listen(
     mut line: DuplexStream,
-    world: WorldHandle,
+    simulator: SimulatorHandle,
     recorded: Option<(Vec<u8>, Vec<u8>)>,
     asked: Arc<Mutex<Vec<Vec<u8>>>>,
 ) {
@@ -285,7 +285,7 @@ async fn listen(
         let request = buffer[..count].to_vec();
         let answer = match &recorded {
             Some((frame, reply)) if *frame == request => Some(reply.clone()),
-            _ => world.ask(LineId(0), request[0], &request[1..count - 2]).await.map(|answer| answer.rtu()),
+            _ => simulator.ask(LineId(0), request[0], &request[1..count - 2]).await.map(|answer| answer.rtu()),
         };
         asked.lock().unwrap().push(request);
         if let Some(answer) = answer {

@@ -16,9 +16,9 @@ use sightglass::{
     },
     profile::{self, PlantFile, Search},
     sim::{
-        io::{Wire, WorldHandle, serve_line},
+        io::{SimulatorHandle, Wire, serve_line},
         rig::Rig,
-        world::World,
+        simulator::Simulator,
     },
     station::{self, Request, Session},
 };
@@ -36,12 +36,12 @@ fn start(def: &Arc<PlantDef>, file: Option<PlantFile>, history: &Path) -> statio
 fn start_at(base: Timestamp, def: &Arc<PlantDef>, file: Option<PlantFile>, history: &Path) -> station::io::Station {
     let clock = Clock::starting_at(base, 1.0);
     let (ports, streams) = mpsc::channel(3);
-    let world = WorldHandle::spawn(World::tank(Rig::demo()), clock);
+    let simulator = SimulatorHandle::spawn(Simulator::tank(Rig::demo()), clock);
     for _ in 0..3 {
         let (ours, theirs) = tokio::io::duplex(1024);
         ports.try_send(ours).unwrap();
         let wire = Wire { serial: Serial::USUAL, ascii: false };
-        tokio::spawn(serve_line(theirs, world.line(L1), wire, Duration::from_secs(86_400)));
+        tokio::spawn(serve_line(theirs, simulator.line(L1), wire, Duration::from_secs(86_400)));
     }
     let options = station::io::Options {
         def: def.clone(),

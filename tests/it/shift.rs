@@ -18,9 +18,9 @@ use sightglass::{
     profile::{self, Search},
     report::{ask, csv},
     sim::{
-        io::{Wire, WorldHandle, serve_line},
+        io::{SimulatorHandle, Wire, serve_line},
         rig::Rig,
-        world::World,
+        simulator::Simulator,
     },
     station::{self, Session},
 };
@@ -118,8 +118,9 @@ fn start_on_simulation(def: &Arc<PlantDef>, clock: Clock, history: &Path) -> sta
     let (ports, streams) = mpsc::channel(1);
     ports.try_send(ours).unwrap();
     let Some(serial) = def.lines[0].transport.serial() else { panic!("the tank has a serial line") };
-    let (world, wire) = (WorldHandle::spawn(World::tank(Rig::demo()), clock), Wire { serial, ascii: false });
-    tokio::spawn(serve_line(theirs, world.line(LineId(0)), wire, Duration::from_secs(86_400)));
+    let (simulator, wire) =
+        (SimulatorHandle::spawn(Simulator::tank(Rig::demo()), clock), Wire { serial, ascii: false });
+    tokio::spawn(serve_line(theirs, simulator.line(LineId(0)), wire, Duration::from_secs(86_400)));
     let connectors = vec![Connector::Memory(streams)];
     station::io::start(station::io::Options {
         def: def.clone(),

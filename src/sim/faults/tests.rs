@@ -9,24 +9,24 @@ const READ_SV: [u8; 5] = [3, 0x03, 0xEA, 0, 1];
 const WRITE_SV: [u8; 5] = [6, 0x03, 0xEA, 0x01, 0xF4];
 const SINCE: Timestamp = Timestamp::UNIX_EPOCH;
 
-fn world() -> (World, Faults) {
-    (World::tank(Rig::new()), Faults::default())
+fn simulator() -> (Simulator, Faults) {
+    (Simulator::tank(Rig::new()), Faults::default())
 }
 
 fn check(fault: Option<Fault>, expect: Option<(usize, bool)>, written: bool) {
-    let (mut world, mut faults) = world();
+    let (mut simulator, mut faults) = simulator();
     if let Some(fault) = fault {
-        faults.set(&mut world, TIC, fault, SINCE);
+        faults.set(&mut simulator, TIC, fault, SINCE);
     }
-    let answer = faults.answer(&mut world, L1, 1, &READ_SV);
+    let answer = faults.answer(&mut simulator, L1, 1, &READ_SV);
     let seen = answer.map(|answer| answer.rtu()).map(|frame| (frame.len(), crc16(&frame) == 0));
     assert_eq!(seen, expect, "{fault:?}: length and check");
-    let answered = faults.answer(&mut world, L1, 1, &WRITE_SV).is_some();
+    let answered = faults.answer(&mut simulator, L1, 1, &WRITE_SV).is_some();
     assert_eq!(answered, expect.is_some());
-    assert_eq!(world.respond(L1, 1, &READ_SV) == Some(vec![3, 2, 0x01, 0xF4]), written, "{fault:?}");
-    assert!(faults.answer(&mut world, L1, 2, &[1, 8, 0, 0, 1]).is_some(), "{fault:?} of another unit");
-    faults.clear_all(&mut world);
-    let well = faults.answer(&mut world, L1, 1, &READ_SV).expect("an answer");
+    assert_eq!(simulator.respond(L1, 1, &READ_SV) == Some(vec![3, 2, 0x01, 0xF4]), written, "{fault:?}");
+    assert!(faults.answer(&mut simulator, L1, 2, &[1, 8, 0, 0, 1]).is_some(), "{fault:?} of another unit");
+    faults.clear_all(&mut simulator);
+    let well = faults.answer(&mut simulator, L1, 1, &READ_SV).expect("an answer");
     assert_eq!((well.rtu().len(), well.delay), (7, Duration::from_millis(5)), "well again after {fault:?}");
 }
 
@@ -43,11 +43,11 @@ fn each_fault_looks_as_it_does_on_the_line() {
 
 #[test]
 fn the_same_answer_in_ascii() {
-    let (mut world, mut faults) = world();
+    let (mut simulator, mut faults) = simulator();
     let mut frame = |fault: Option<Fault>| {
-        faults.clear_all(&mut world);
-        fault.into_iter().for_each(|fault| faults.set(&mut world, TIC, fault, SINCE));
-        faults.answer(&mut world, L1, 1, &READ_SV).map(|answer| answer.ascii())
+        faults.clear_all(&mut simulator);
+        fault.into_iter().for_each(|fault| faults.set(&mut simulator, TIC, fault, SINCE));
+        faults.answer(&mut simulator, L1, 1, &READ_SV).map(|answer| answer.ascii())
     };
     assert_eq!(frame(None).as_deref(), Some(&b":01030202BC3C\r\n"[..]));
     assert_eq!(frame(Some(Fault::BadCrc)).as_deref(), Some(&b":01030202BC30\r\n"[..]));
@@ -56,38 +56,38 @@ fn the_same_answer_in_ascii() {
 
 #[test]
 fn a_broadcast_passes_by_a_silent_unit() {
-    let (mut world, mut faults) = world();
-    faults.set(&mut world, TIC, Fault::Silent, SINCE);
-    assert_eq!(faults.answer(&mut world, L1, 0, &WRITE_SV), None);
-    assert_eq!(world.respond(L1, 1, &READ_SV), Some(vec![3, 2, 0x02, 0xBC]));
-    assert_eq!(world.respond(L1, 2, &READ_SV), Some(vec![3, 2, 0x01, 0xF4]));
+    let (mut simulator, mut faults) = simulator();
+    faults.set(&mut simulator, TIC, Fault::Silent, SINCE);
+    assert_eq!(faults.answer(&mut simulator, L1, 0, &WRITE_SV), None);
+    assert_eq!(simulator.respond(L1, 1, &READ_SV), Some(vec![3, 2, 0x02, 0xBC]));
+    assert_eq!(simulator.respond(L1, 2, &READ_SV), Some(vec![3, 2, 0x01, 0xF4]));
 }
 
 #[test]
 fn a_late_answer_says_how_late() {
-    let (mut world, mut faults) = world();
-    faults.set(&mut world, TIC, Fault::Late(Duration::from_millis(700)), SINCE);
-    let delay = faults.answer(&mut world, L1, 1, &READ_SV).map(|answer| answer.delay);
+    let (mut simulator, mut faults) = simulator();
+    faults.set(&mut simulator, TIC, Fault::Late(Duration::from_millis(700)), SINCE);
+    let delay = faults.answer(&mut simulator, L1, 1, &READ_SV).map(|answer| answer.delay);
     assert_eq!(delay, Some(Duration::from_millis(705)));
 }
 
 #[test]
 fn the_same_answer_on_tcp() {
-    let (mut world, mut faults) = world();
+    let (mut simulator, mut faults) = simulator();
     let frame = |answer: Option<Answer>| answer.map(|answer| answer.tcp(0x1234));
-    let well = frame(faults.answer(&mut world, L1, 1, &READ_SV));
+    let well = frame(faults.answer(&mut simulator, L1, 1, &READ_SV));
     assert_eq!(well, Some(vec![0x12, 0x34, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]));
-    faults.set(&mut world, TIC, Fault::BadCrc, SINCE);
-    let wrong = frame(faults.answer(&mut world, L1, 1, &READ_SV));
+    faults.set(&mut simulator, TIC, Fault::BadCrc, SINCE);
+    let wrong = frame(faults.answer(&mut simulator, L1, 1, &READ_SV));
     assert_eq!(wrong.map(|frame| frame[..2].to_vec()), Some(vec![0xED, 0x34]));
 }
 
 #[test]
 fn noise_spoils_about_as_many_messages_as_it_says_and_always_the_same() {
     let spoiled = |percent| {
-        let (mut world, mut faults) = world();
-        faults.set(&mut world, Place::Line(L1), Fault::Noise(percent), SINCE);
-        let ask = |_| faults.answer(&mut world, L1, 1, &READ_SV).map(|answer| (answer.rtu(), answer.ascii()));
+        let (mut simulator, mut faults) = simulator();
+        faults.set(&mut simulator, Place::Line(L1), Fault::Noise(percent), SINCE);
+        let ask = |_| faults.answer(&mut simulator, L1, 1, &READ_SV).map(|answer| (answer.rtu(), answer.ascii()));
         (0..1_000).map(ask).collect::<Vec<_>>()
     };
     let answers = spoiled(20);
@@ -104,16 +104,16 @@ fn noise_spoils_about_as_many_messages_as_it_says_and_always_the_same() {
 
 #[test]
 fn a_later_fault_takes_the_place_of_one_that_it_excludes() {
-    let (mut world, mut faults) = world();
+    let (mut simulator, mut faults) = simulator();
     let list = |faults: &Faults| faults.list().iter().map(|f| f.fault.to_string()).collect::<Vec<_>>();
     for fault in [Fault::Silent, Fault::BadCrc, Fault::Stuck] {
-        faults.set(&mut world, TIC, fault, SINCE);
+        faults.set(&mut simulator, TIC, fault, SINCE);
     }
     assert_eq!(list(&faults), ["bad crc", "stuck value"]);
-    faults.set(&mut world, Place::Process, Fault::Leak(500), SINCE);
-    faults.set(&mut world, Place::Process, Fault::Leak(2_000), SINCE + jiff::SignedDuration::from_secs(9));
+    faults.set(&mut simulator, Place::Process, Fault::Leak(500), SINCE);
+    faults.set(&mut simulator, Place::Process, Fault::Leak(2_000), SINCE + jiff::SignedDuration::from_secs(9));
     assert_eq!(list(&faults), ["bad crc", "stuck value", "leak 2 l/min"]);
     assert_eq!(faults.list()[2].since, SINCE, "it is the same leak");
-    faults.clear(&mut world, Place::Process, Fault::Leak(1));
+    faults.clear(&mut simulator, Place::Process, Fault::Leak(1));
     assert_eq!(list(&faults), ["bad crc", "stuck value"]);
 }

@@ -11,7 +11,7 @@ use std::{
 use jiff::Timestamp;
 use tokio::sync::{mpsc, watch};
 
-use super::WorldHandle;
+use super::SimulatorHandle;
 use crate::{
     plant::{
         PlantDef, Snapshot,
@@ -90,7 +90,7 @@ pub struct Trainer {
     /// The plant.
     pub def: Arc<PlantDef>,
     /// The simulation.
-    pub world: WorldHandle,
+    pub simulator: SimulatorHandle,
     /// What is shown.
     pub snapshots: watch::Receiver<Arc<Snapshot>>,
     /// Steps of alarms.
@@ -107,7 +107,7 @@ impl Trainer {
     /// Starts the task. It ends when the station does, or in a drill without a person when the drill is over.
     pub fn spawn(self) -> (Port, tokio::task::JoinHandle<Option<Verdict>>) {
         let (commands, inbox) = mpsc::channel(COMMANDS_MAX);
-        let began = self.world.clock().now();
+        let began = self.simulator.clock().now();
         let judge = self.scenario.clone().map(|scenario| Judge::new(scenario, self.def.clone(), began));
         let cues = self.scenario.as_ref().map(|scenario| scenario.cues(self.operator.is_some())).unwrap_or_default();
         let offers: Arc<[Offer]> = offers(&self.def).into();
@@ -133,7 +133,7 @@ impl Task {
         mut inbox: mpsc::Receiver<SimCommand>,
         publish: watch::Sender<Arc<Status>>,
     ) -> Option<Verdict> {
-        let clock = self.trainer.world.clock();
+        let clock = self.trainer.simulator.clock();
         loop {
             let cue =
                 self.cues.front().map(|cue| self.began + jiff::SignedDuration::try_from(cue.at()).unwrap_or_default());
@@ -162,7 +162,7 @@ impl Task {
                     }
                 }
             }
-            let Some(report) = self.trainer.world.report().await else { break };
+            let Some(report) = self.trainer.simulator.report().await else { break };
             let snapshot = self.trainer.snapshots.borrow_and_update().clone();
             let lost = self.trainer.journal.lost.load(Ordering::Relaxed);
             if let Some(judge) = self.running() {
@@ -186,8 +186,8 @@ impl Task {
 
     async fn perform(&mut self, cue: Cue) {
         match cue {
-            Cue::Event(Event { place, fault, begins: true, .. }) => self.trainer.world.set(place, fault).await,
-            Cue::Event(Event { place, fault, begins: false, .. }) => self.trainer.world.clear(place, fault).await,
+            Cue::Event(Event { place, fault, begins: true, .. }) => self.trainer.simulator.set(place, fault).await,
+            Cue::Event(Event { place, fault, begins: false, .. }) => self.trainer.simulator.clear(place, fault).await,
             Cue::Deed(deed) => {
                 let Some(orders) = &self.trainer.operator else { return };
                 let snapshot = self.trainer.snapshots.borrow().clone();
@@ -205,9 +205,9 @@ impl Task {
 
     async fn apply_command(&self, command: SimCommand) {
         match command {
-            SimCommand::Set(place, fault) => self.trainer.world.set(place, fault).await,
-            SimCommand::Clear(place, fault) => self.trainer.world.clear(place, fault).await,
-            SimCommand::AllWell => self.trainer.world.all_well().await,
+            SimCommand::Set(place, fault) => self.trainer.simulator.set(place, fault).await,
+            SimCommand::Clear(place, fault) => self.trainer.simulator.clear(place, fault).await,
+            SimCommand::AllWell => self.trainer.simulator.all_well().await,
         }
     }
 

@@ -50,7 +50,7 @@ impl Wire {
 }
 
 /// Serves until the stream ends, fails, or brings nothing for longer than `idle_max`. Everything on the wire runs in the
-/// plant time of the world's clock.
+/// plant time of the simulator's clock.
 pub async fn serve_line<S>(mut stream: S, units: LineHandle, wire: Wire, idle_max: Duration) -> io::Result<()>
 where
     S: AsyncRead + AsyncWrite + Unpin,
@@ -221,24 +221,25 @@ mod tests {
     use crate::plant::def::LineId;
     use crate::plant::def::Parity;
     use crate::sim::faults::Fault;
-    use crate::sim::io::WorldHandle;
+    use crate::sim::io::SimulatorHandle;
     use crate::sim::rig::Rig;
-    use crate::sim::world::World;
+    use crate::sim::simulator::Simulator;
 
     const FOR_EVER: Duration = Duration::from_secs(86_400 * 365);
     const L1: LineId = LineId(0);
     const READ_TEN: &[u8] = &[1, 4, 0x03, 0xE8, 0, 10];
     const READ_STEP: &[u8] = &[2, 3, 4, 0, 0, 1];
 
-    fn line(baud: u32, parity: Parity, speed: f64) -> (DuplexStream, WorldHandle) {
+    fn line(baud: u32, parity: Parity, speed: f64) -> (DuplexStream, SimulatorHandle) {
         serve(Serial { baud, data_bits: 8, parity, stop_bits: 1 }, false, speed)
     }
 
-    fn serve(serial: Serial, ascii: bool, speed: f64) -> (DuplexStream, WorldHandle) {
-        let world = WorldHandle::spawn(World::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, speed));
+    fn serve(serial: Serial, ascii: bool, speed: f64) -> (DuplexStream, SimulatorHandle) {
+        let simulator =
+            SimulatorHandle::spawn(Simulator::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, speed));
         let (master, slave) = duplex(1024);
-        tokio::spawn(serve_line(slave, world.line(L1), Wire { serial, ascii }, FOR_EVER));
-        (master, world)
+        tokio::spawn(serve_line(slave, simulator.line(L1), Wire { serial, ascii }, FOR_EVER));
+        (master, simulator)
     }
 
     /// What arrives until nothing has come for two seconds, and when its last byte came.
@@ -261,7 +262,7 @@ mod tests {
     }
 
     async fn check(baud: u32, parity: Parity, speed: f64, expect_ms: f64) {
-        let (mut master, _world) = line(baud, parity, speed);
+        let (mut master, _simulator) = line(baud, parity, speed);
         let (frame, took) = ask(&mut master, READ_TEN).await;
         assert_eq!(frame.len(), 25);
         let took_ms = took.as_secs_f64() * 1e3;
@@ -280,7 +281,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn the_grain_of_the_timers_does_not_add_up() {
-        let (mut master, _world) = line(115_200, Parity::None, 1.0);
+        let (mut master, _simulator) = line(115_200, Parity::None, 1.0);
         let (began, mut reply, rounds) = (Instant::now(), [0; 25], 200);
         for _ in 0..rounds {
             master.write_all(&with_crc(READ_TEN)).await.expect("the line takes requests");
@@ -293,7 +294,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_request_in_pieces_and_one_after_noise_are_understood() {
-        let (mut master, _world) = line(9600, Parity::None, 1.0);
+        let (mut master, _simulator) = line(9600, Parity::None, 1.0);
         let request = with_crc(READ_STEP);
         master.write_all(&request[..3]).await.expect("the line takes bytes");
         tokio::time::advance(Duration::from_millis(5)).await;
@@ -307,21 +308,21 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn faults_look_as_they_do_on_a_line() {
-        let (mut master, world) = line(9600, Parity::None, 1.0);
-        world.set_fault(L1, 1, Fault::Silent).await;
+        let (mut master, simulator) = line(9600, Parity::None, 1.0);
+        simulator.set_fault(L1, 1, Fault::Silent).await;
         assert_eq!(ask(&mut master, READ_TEN).await.0, Vec::<u8>::new());
         assert_eq!(ask(&mut master, READ_STEP).await.0.len(), 7);
-        world.set_fault(L1, 1, Fault::Cut).await;
+        simulator.set_fault(L1, 1, Fault::Cut).await;
         assert_eq!(ask(&mut master, READ_TEN).await.0.len(), 12);
-        world.set_fault(L1, 1, Fault::Late(Duration::from_millis(700))).await;
+        simulator.set_fault(L1, 1, Fault::Late(Duration::from_millis(700))).await;
         let (frame, took) = ask(&mut master, READ_TEN).await;
         assert!(frame.len() == 25 && took > Duration::from_millis(743), "{took:?}");
     }
 
     #[tokio::test(start_paused = true)]
     async fn another_unit_answers_while_one_is_late() {
-        let (mut master, world) = line(9600, Parity::None, 1.0);
-        world.set_fault(L1, 1, Fault::Late(Duration::from_millis(500))).await;
+        let (mut master, simulator) = line(9600, Parity::None, 1.0);
+        simulator.set_fault(L1, 1, Fault::Late(Duration::from_millis(500))).await;
         master.write_all(&with_crc(READ_TEN)).await.expect("the line takes requests");
         tokio::time::advance(Duration::from_millis(100)).await;
         let (frames, _) = ask(&mut master, READ_STEP).await;
@@ -330,7 +331,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_broadcast_is_obeyed_but_not_answered_nor_is_a_stranger() {
-        let (mut master, _world) = line(9600, Parity::None, 1.0);
+        let (mut master, _simulator) = line(9600, Parity::None, 1.0);
         assert_eq!(ask(&mut master, &[0, 6, 0x03, 0xEA, 0, 1]).await.0, Vec::<u8>::new());
         assert_eq!(ask(&mut master, &[9, 3, 0, 0, 0, 1]).await.0, Vec::<u8>::new());
         for unit in [1, 2] {
@@ -341,7 +342,7 @@ mod tests {
     /// The counter of bus communication errors (08/0C) of unit 2.
     #[tokio::test(start_paused = true)]
     async fn a_slave_counts_the_frames_that_it_could_not_read() {
-        let (mut master, _world) = line(9600, Parity::None, 1.0);
+        let (mut master, _simulator) = line(9600, Parity::None, 1.0);
         for spoiled in [&[1, 3, 0, 0, 0, 1, 0, 0][..], &[0xFF], &[2; 300]] {
             master.write_all(spoiled).await.expect("the line takes bytes");
             assert_eq!(gather(&mut master).await.0, Vec::<u8>::new());
@@ -361,7 +362,7 @@ mod tests {
     /// 17 characters there, 15 back, 5 ms of the device, no silence between.
     #[tokio::test(start_paused = true)]
     async fn ascii_takes_its_own_time() {
-        let (mut master, _world) = serve(SEVEN_BITS, true, 1.0);
+        let (mut master, _simulator) = serve(SEVEN_BITS, true, 1.0);
         let (answer, took) = ask_ascii(&mut master, ":010303EA00010E\r\n").await;
         assert_eq!(answer, ":01030202BC3C\r\n");
         let (took_ms, wire_ms) = (took.as_secs_f64() * 1e3, 320.0 / 9.6 + 5.0);
@@ -370,7 +371,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn ascii_waits_a_second_for_a_character_and_begins_anew_with_a_colon() {
-        let (mut master, world) = serve(SEVEN_BITS, true, 1.0);
+        let (mut master, simulator) = serve(SEVEN_BITS, true, 1.0);
         master.write_all(b":010303EA").await.expect("the line takes bytes");
         tokio::time::advance(Duration::from_millis(900)).await;
         assert_eq!(ask_ascii(&mut master, "00010E\r\n").await.0, ":01030202BC3C\r\n");
@@ -380,7 +381,7 @@ mod tests {
         assert_eq!(ask_ascii(&mut master, ":0103:010303EA00010E\r\n").await.0, ":01030202BC3C\r\n");
         assert_eq!(ask_ascii(&mut master, ":010303EA00010F\r\n").await.0, "");
         assert_eq!(ask_ascii(&mut master, ":0208000C0000EA\r\n").await.0, ":0208000C0003E7\r\n");
-        world.set_fault(L1, 1, Fault::BadCrc).await;
+        simulator.set_fault(L1, 1, Fault::BadCrc).await;
         assert_eq!(ask_ascii(&mut master, ":010303EA00010E\r\n").await.0, ":01030202BC30\r\n");
     }
 }

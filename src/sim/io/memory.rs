@@ -5,7 +5,7 @@ use std::time::Duration;
 use tokio::{io::duplex, sync::mpsc};
 
 use super::{
-    LineHandle, Wire, WorldHandle, serve_line,
+    LineHandle, SimulatorHandle, Wire, serve_line,
     serving::{Mode, Service},
     tcp::{Speech, serve_stream},
 };
@@ -19,12 +19,12 @@ const FOR_EVER: Duration = Duration::from_secs(86_400 * 365);
 
 /// Serves every line of a plant as it speaks; gives what a station opens its lines with, by
 /// [`LineId`](crate::plant::def::LineId).
-pub fn in_memory(def: &PlantDef, world: &WorldHandle) -> Vec<Connector> {
+pub fn in_memory(def: &PlantDef, simulator: &SimulatorHandle) -> Vec<Connector> {
     let line = |line: &crate::plant::def::LineDef| {
         let (streams, opened) = mpsc::channel(OPENINGS);
         for _ in 0..OPENINGS {
             let (master, slave) = duplex(BYTES);
-            tokio::spawn(serve(slave, world.line(line.id), Service::of(line)));
+            tokio::spawn(serve(slave, simulator.line(line.id), Service::of(line)));
             // The channel has room for all of them.
             let _ = streams.try_send(master);
         }

@@ -1,4 +1,4 @@
-//! The edge of the simulated world: the task that owns it, its serial lines, its TCP ports.
+//! The edge of the simulator: the task that owns it, its serial lines, its TCP ports.
 
 mod drill;
 mod line;
@@ -11,7 +11,7 @@ mod tcp;
 pub use drill::{Journal, Listener, Port, Trainer, journal};
 pub use line::{Wire, serve_line};
 pub use memory::in_memory;
-pub use owner::{LineHandle, Report, WorldHandle};
+pub use owner::{LineHandle, Report, SimulatorHandle};
 pub use pty::{Pty, open_pty};
-pub use serving::{Mode, Place, Service, Serving, SimError, serve, serve_world};
+pub use serving::{Mode, Place, Service, Serving, SimError, serve, serve_simulator};
 pub use tcp::{Speech, serve_stream, serve_tcp};

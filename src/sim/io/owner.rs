@@ -1,4 +1,4 @@
-//! The task that owns the world, and the handle that lines, tests and pages talk to it through.
+//! The task that owns the simulator, and the handle that lines, tests and pages use.
 
 use std::{collections::BTreeSet, sync::Arc, time::Duration};
 
@@ -15,22 +15,22 @@ use crate::{
         faults::{Answer, Fault, Faults, InForce, Place},
         rig::{Rig, Truth},
         scenario::judge::Truths,
+        simulator::Simulator,
         truth::Lens,
-        world::World,
     },
 };
 
 /// Requests that may wait; a full queue makes the sender wait, and the task always drains it.
 const REQUESTS_MAX: usize = 64;
-/// The world is brought up to date this often when nobody asks (plant time), but not oftener than the real interval.
+/// The simulator is brought up to date this often when nobody asks (plant time), but not oftener than the real interval.
 const IDLE: Duration = Duration::from_secs(1);
 const IDLE_REAL_MIN: Duration = Duration::from_millis(50);
 /// The most plant time made up for at once, after the machine was asleep or overloaded; the rest is not simulated.
 const CATCH_UP_MAX: Duration = Duration::from_secs(3600);
 
-/// Speaks to the task that owns the world. The task ends when the last handle is gone.
+/// Handle of the task that owns the simulator. The task ends when the last handle is gone.
 #[derive(Debug, Clone)]
-pub struct WorldHandle {
+pub struct SimulatorHandle {
     requests: mpsc::Sender<SimRequest>,
     clock: Clock,
     units: Arc<BTreeSet<(LineId, u8)>>,
@@ -39,11 +39,11 @@ pub struct WorldHandle {
 /// Speaks to the units of one line.
 #[derive(Debug, Clone)]
 pub struct LineHandle {
-    world: WorldHandle,
+    simulator: SimulatorHandle,
     line: LineId,
 }
 
-/// What is wrong in a world, and what is really so.
+/// Active faults and actual values of a simulator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
     /// The faults in force.
@@ -52,7 +52,7 @@ pub struct Report {
     pub truths: Truths,
 }
 
-/// What a task waits for when it asks the world; if the task is gone, nothing comes back.
+/// What a task waits for when it asks the simulator; if the task is gone, nothing comes back.
 type Reply<T> = oneshot::Sender<T>;
 
 #[derive(Debug)]
@@ -76,35 +76,35 @@ enum Told {
     Spoiled(LineId),
 }
 
-impl WorldHandle {
-    /// Starts the task. The world lives in the plant time of `clock`; of its values nothing is known.
-    pub fn spawn(world: World, clock: Clock) -> WorldHandle {
-        WorldHandle::start(world, clock, Faults::default(), Lens::default())
+impl SimulatorHandle {
+    /// Starts the task. The simulator lives in the plant time of `clock`; of its values nothing is known.
+    pub fn spawn(simulator: Simulator, clock: Clock) -> SimulatorHandle {
+        SimulatorHandle::start(simulator, clock, Faults::default(), Lens::default())
     }
 
     /// The same for a plant whose values are known: they can be faulty, and what is really so can be told.
-    pub fn spawn_for(def: &PlantDef, world: World, clock: Clock) -> WorldHandle {
-        WorldHandle::start(world, clock, Faults::of(def), Lens::of(def))
+    pub fn spawn_for(def: &PlantDef, simulator: Simulator, clock: Clock) -> SimulatorHandle {
+        SimulatorHandle::start(simulator, clock, Faults::of(def), Lens::of(def))
     }
 
-    fn start(world: World, clock: Clock, faults: Faults, lens: Lens) -> WorldHandle {
+    fn start(simulator: Simulator, clock: Clock, faults: Faults, lens: Lens) -> SimulatorHandle {
         let (requests, inbox) = mpsc::channel(REQUESTS_MAX);
-        let units = Arc::new(world.addresses().collect());
-        tokio::spawn(run(world, clock, (faults, lens), clock.now(), inbox));
-        WorldHandle { requests, clock, units }
+        let units = Arc::new(simulator.addresses().collect());
+        tokio::spawn(run(simulator, clock, (faults, lens), clock.now(), inbox));
+        SimulatorHandle { requests, clock, units }
     }
 
-    /// The clock of the world.
+    /// The clock of the simulator.
     pub fn clock(&self) -> Clock {
         self.clock
     }
 
     /// The units of one line, to serve them.
     pub fn line(&self, line: LineId) -> LineHandle {
-        LineHandle { world: self.clone(), line }
+        LineHandle { simulator: self.clone(), line }
     }
 
-    /// Every unit of the world, by its line.
+    /// Every unit of the simulator, by its line.
     pub fn units(&self) -> impl Iterator<Item = (LineId, u8)> + '_ {
         self.units.iter().copied()
     }
@@ -155,7 +155,7 @@ impl WorldHandle {
         self.tell(Told::PowerCycle).await;
     }
 
-    /// What is really so in the tank rig now; `None` if the world has no rig, or once its task has ended.
+    /// What is really so in the tank rig now; `None` if the simulator has no rig, or once its task has ended.
     pub async fn truth(&self) -> Option<Truth> {
         self.put(SimRequest::Truth).await.flatten()
     }
@@ -185,29 +185,29 @@ impl WorldHandle {
 }
 
 impl LineHandle {
-    /// The clock of the world.
+    /// The clock of the simulator.
     pub fn clock(&self) -> Clock {
-        self.world.clock
+        self.simulator.clock
     }
 
     /// Whether a unit has this address.
     pub fn has(&self, unit: u8) -> bool {
-        self.world.units.contains(&(self.line, unit))
+        self.simulator.units.contains(&(self.line, unit))
     }
 
     /// Puts a request to a unit. `None`: nothing comes back, now or ever.
     pub async fn ask(&self, unit: u8, pdu: &[u8]) -> Option<Answer> {
-        self.world.ask(self.line, unit, pdu).await
+        self.simulator.ask(self.line, unit, pdu).await
     }
 
     /// Something passed on the line that no unit could read.
     pub async fn spoiled(&self) {
-        self.world.tell(Told::Spoiled(self.line)).await;
+        self.simulator.tell(Told::Spoiled(self.line)).await;
     }
 }
 
 async fn run(
-    mut world: World,
+    mut simulator: Simulator,
     clock: Clock,
     (mut faults, lens): (Faults, Lens),
     mut reached: Timestamp,
@@ -225,57 +225,57 @@ async fn run(
             () = clock.sleep(idle) => None,
         };
         let now = clock.now();
-        world.advance(Duration::try_from(now.duration_since(reached)).unwrap_or_default().min(CATCH_UP_MAX));
+        simulator.advance(Duration::try_from(now.duration_since(reached)).unwrap_or_default().min(CATCH_UP_MAX));
         reached = now;
         if let Some(request) = request {
-            handle_request(&mut world, &mut faults, &lens, now, request);
+            handle_request(&mut simulator, &mut faults, &lens, now, request);
         }
     }
 }
 
 /// Who asked may have gone meanwhile; an answer that nobody waits for is dropped.
-fn handle_request(world: &mut World, faults: &mut Faults, lens: &Lens, now: Timestamp, request: SimRequest) {
+fn handle_request(simulator: &mut Simulator, faults: &mut Faults, lens: &Lens, now: Timestamp, request: SimRequest) {
     match request {
         SimRequest::Ask { line, unit, pdu, reply } => {
-            reply.send(faults.answer(world, line, unit, &pdu)).ok();
+            reply.send(faults.answer(simulator, line, unit, &pdu)).ok();
         }
         SimRequest::Truth(reply) => {
-            reply.send(world.rig().map(Rig::truth)).ok();
+            reply.send(simulator.rig().map(Rig::truth)).ok();
         }
         SimRequest::Value(tag, reply) => {
-            reply.send(world.value(tag)).ok();
+            reply.send(simulator.value(tag)).ok();
         }
         SimRequest::SetValue(tag, value, reply) => {
-            reply.send(world.set_value(tag, value)).ok();
+            reply.send(simulator.set_value(tag, value)).ok();
         }
         SimRequest::Report(reply) => {
-            reply.send(Report { in_force: faults.list().to_vec(), truths: lens.look(world) }).ok();
+            reply.send(Report { in_force: faults.list().to_vec(), truths: lens.look(simulator) }).ok();
         }
         SimRequest::Tell(told, done) => {
-            follow(world, faults, now, told);
+            follow(simulator, faults, now, told);
             done.send(()).ok();
         }
     }
 }
 
-/// What concerns the rig is lost on a world that has none.
-fn follow(world: &mut World, faults: &mut Faults, now: Timestamp, told: Told) {
+/// Requests to the rig do nothing on a simulator without one.
+fn follow(simulator: &mut Simulator, faults: &mut Faults, now: Timestamp, told: Told) {
     match told {
-        Told::Fault(place, fault) => faults.set(world, place, fault, now),
-        Told::Mended(place, fault) => faults.clear(world, place, fault),
-        Told::AllWell => faults.clear_all(world),
+        Told::Fault(place, fault) => faults.set(simulator, place, fault, now),
+        Told::Mended(place, fault) => faults.clear(simulator, place, fault),
+        Told::AllWell => faults.clear_all(simulator),
         Told::SensorOpen(open) => {
-            if let Some(rig) = world.rig_mut() {
+            if let Some(rig) = simulator.rig_mut() {
                 rig.set_sensor_open(open);
             }
         }
         Told::Switch(switch, on) => {
-            if let Some(rig) = world.rig_mut() {
+            if let Some(rig) = simulator.rig_mut() {
                 rig.set_switch(switch, on);
             }
         }
-        Told::PowerCycle => world.power_cycle(),
-        Told::Spoiled(line) => world.spoiled(line),
+        Told::PowerCycle => simulator.power_cycle(),
+        Told::Spoiled(line) => simulator.spoiled(line),
     }
 }
 
@@ -286,9 +286,10 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn the_rig_lives_in_plant_time() {
-        let world = WorldHandle::spawn(World::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, 60.0));
+        let simulator =
+            SimulatorHandle::spawn(Simulator::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, 60.0));
         tokio::time::advance(Duration::from_secs(5)).await;
-        let truth = world.truth().await.expect("the task runs");
+        let truth = simulator.truth().await.expect("the task runs");
         // Five real seconds are five minutes of plant: filled, and about 270 s of heating done.
         assert_eq!(truth.step, Step::Heat);
         assert!((40.0..50.0).contains(&truth.probe_c), "{truth:?}");
@@ -296,16 +297,17 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn faults_reach_the_units() {
-        let world = WorldHandle::spawn(World::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0));
-        world.set_fault(LineId(0), 1, Fault::Silent).await;
-        assert_eq!(world.ask(LineId(0), 1, &[3, 3, 0xEA, 0, 1]).await, None);
-        assert!(world.ask(LineId(0), 2, &[3, 4, 0, 0, 1]).await.is_some());
-        world.set_sensor_open(true).await;
+        let simulator =
+            SimulatorHandle::spawn(Simulator::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0));
+        simulator.set_fault(LineId(0), 1, Fault::Silent).await;
+        assert_eq!(simulator.ask(LineId(0), 1, &[3, 3, 0xEA, 0, 1]).await, None);
+        assert!(simulator.ask(LineId(0), 2, &[3, 4, 0, 0, 1]).await.is_some());
+        simulator.set_sensor_open(true).await;
         tokio::time::advance(Duration::from_secs(1)).await;
-        let truth = world.truth().await.expect("the task runs");
+        let truth = simulator.truth().await.expect("the task runs");
         assert!(truth.pv_c > 190.0 && truth.mv_percent == 0.0, "{truth:?}");
-        world.power_cycle().await;
+        simulator.power_cycle().await;
         tokio::time::advance(Duration::from_secs(1)).await;
-        assert_eq!(world.truth().await.map(|truth| truth.step), Some(Step::Idle));
+        assert_eq!(simulator.truth().await.map(|truth| truth.step), Some(Step::Idle));
     }
 }

@@ -59,16 +59,22 @@ mod tests {
     use crate::bus::io::clock::Clock;
     use crate::plant::def::LineId;
     use crate::plant::def::Serial;
-    use crate::sim::io::{Wire, WorldHandle, serve_line};
+    use crate::sim::io::{SimulatorHandle, Wire, serve_line};
     use crate::sim::rig::Rig;
-    use crate::sim::world::World;
+    use crate::sim::simulator::Simulator;
 
     #[tokio::test]
     async fn a_client_can_close_the_port_and_come_back() {
         let (pty, path) = open_pty().expect("a pseudo-terminal is free");
         let serial = Serial::USUAL;
-        let world = WorldHandle::spawn(World::tank(Rig::demo()), Clock::starting_at(jiff::Timestamp::UNIX_EPOCH, 20.0));
-        tokio::spawn(serve_line(pty, world.line(LineId(0)), Wire { serial, ascii: false }, Duration::from_secs(60)));
+        let simulator =
+            SimulatorHandle::spawn(Simulator::tank(Rig::demo()), Clock::starting_at(jiff::Timestamp::UNIX_EPOCH, 20.0));
+        tokio::spawn(serve_line(
+            pty,
+            simulator.line(LineId(0)),
+            Wire { serial, ascii: false },
+            Duration::from_secs(60),
+        ));
         for _ in 0..3 {
             let name = path.to_str().expect("the path is ASCII");
             let mut port = tokio_serial::new(name, 9600).open_native_async().expect("the port opens");

@@ -9,14 +9,14 @@ use std::{
 
 use tokio::{net::TcpListener, task::JoinHandle};
 
-use super::{LineHandle, Speech, Wire, WorldHandle, open_pty, serve_line, serve_tcp};
+use super::{LineHandle, SimulatorHandle, Speech, Wire, open_pty, serve_line, serve_tcp};
 use crate::{
     bus::io::clock::Clock,
     plant::{
         PlantDef,
         def::{Framing, LineDef, LineId, Serial, Transport},
     },
-    sim::world::{UnknownSimulation, World},
+    sim::simulator::{Simulator, UnknownSimulation},
 };
 
 /// A pseudo-terminal waits for its client as long as it takes.
@@ -36,8 +36,8 @@ pub enum SimError {
 /// A simulated plant that is being served; it ends when this is dropped.
 #[derive(Debug)]
 pub struct Serving {
-    /// The world behind it, for faults on demand.
-    pub world: WorldHandle,
+    /// The simulator behind it, to inject faults.
+    pub simulator: SimulatorHandle,
     places: Vec<Place>,
     tasks: Vec<JoinHandle<io::Result<()>>>,
 }
@@ -167,21 +167,21 @@ impl Service {
 
 /// Serves every line of a plant; `services` tells how, by [`LineId`].
 pub async fn serve(def: &PlantDef, clock: Clock, services: &[Service]) -> Result<Serving, SimError> {
-    serve_world(def, World::of(def)?, clock, services).await
+    serve_simulator(def, Simulator::of(def)?, clock, services).await
 }
 
-/// The same with a world that has a past.
-pub async fn serve_world(
+/// The same with a simulator that has already run.
+pub async fn serve_simulator(
     def: &PlantDef,
-    world: World,
+    simulator: Simulator,
     clock: Clock,
     services: &[Service],
 ) -> Result<Serving, SimError> {
-    let world = WorldHandle::spawn_for(def, world, clock);
+    let simulator = SimulatorHandle::spawn_for(def, simulator, clock);
     // What has started is ended by dropping this if a later line cannot be served.
-    let mut serving = Serving { world, places: Vec::new(), tasks: Vec::new() };
+    let mut serving = Serving { simulator, places: Vec::new(), tasks: Vec::new() };
     for (line, service) in services.iter().enumerate() {
-        let (place, task) = start(serving.world.line(LineId(line as u16)), *service).await?;
+        let (place, task) = start(serving.simulator.line(LineId(line as u16)), *service).await?;
         serving.places.push(place);
         serving.tasks.push(task);
     }

@@ -98,7 +98,7 @@ mod tests {
     use crate::bus::frame::with_crc;
     use crate::bus::io::clock::Clock;
     use crate::plant::def::{LineId, Serial};
-    use crate::sim::{io::WorldHandle, rig::Rig, world::World};
+    use crate::sim::{io::SimulatorHandle, rig::Rig, simulator::Simulator};
 
     async fn exchange(client: &mut TcpStream, request: &[u8], expect: &[u8]) {
         client.write_all(request).await.expect("the server takes requests");
@@ -112,8 +112,9 @@ mod tests {
     async fn serve(speech: Speech) -> SocketAddr {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port is free");
         let address = listener.local_addr().expect("a bound listener has an address");
-        let world = WorldHandle::spawn(World::tank(Rig::new()), Clock::starting_at(Timestamp::UNIX_EPOCH, 10.0));
-        tokio::spawn(serve_tcp(listener, world.line(LineId(0)), speech));
+        let simulator =
+            SimulatorHandle::spawn(Simulator::tank(Rig::new()), Clock::starting_at(Timestamp::UNIX_EPOCH, 10.0));
+        tokio::spawn(serve_tcp(listener, simulator.line(LineId(0)), speech));
         address
     }
 
@@ -123,7 +124,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn several_clients_share_one_world() {
+    async fn several_clients_share_one_simulator() {
         let address = serve(Speech::Mbap).await;
         let connect = || async { TcpStream::connect(address).await.expect("the server accepts") };
         let (mut one, mut two) = (connect().await, connect().await);

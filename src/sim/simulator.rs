@@ -1,4 +1,4 @@
-//! The world: every simulated unit of a plant at its line and unit address, and the time that passes for all of them.
+//! The simulator: every simulated unit of a plant by line and unit address, and its plant time.
 //!
 //! ```text
 //!  (L1, 1) ── controller ─┐ rig: the tank of `simulation = "tank"`
@@ -24,7 +24,7 @@ pub const BROADCAST: u8 = 0;
 
 /// All simulated units of a plant.
 #[derive(Debug, Clone, Default)]
-pub struct World {
+pub struct Simulator {
     rig: Option<Rig>,
     models: Models,
     places: BTreeMap<(LineId, u8), Place>,
@@ -43,9 +43,9 @@ enum Place {
 #[error("simulation = \"{0}\" is not known, expected \"tank\" or none")]
 pub struct UnknownSimulation(pub String);
 
-impl World {
-    /// The world of a plant: the rig that it names, and for every other device a model made from its profile.
-    pub fn of(def: &PlantDef) -> Result<World, UnknownSimulation> {
+impl Simulator {
+    /// Simulates a plant: the rig that it names, and for every other device a model made from its profile.
+    pub fn of(def: &PlantDef) -> Result<Simulator, UnknownSimulation> {
         let rig = match def.simulation.as_deref() {
             Some(rig::SIMULATION) => Some(Rig::demo()),
             Some(other) => return Err(UnknownSimulation(other.to_owned())),
@@ -67,13 +67,13 @@ impl World {
             };
             places.insert((device.line, device.unit), place);
         }
-        Ok(World { rig, models: Models::new(def, &modelled), places })
+        Ok(Simulator { rig, models: Models::new(def, &modelled), places })
     }
 
     /// A tank rig alone, at the addresses of the thesis: controller 1 and PLC 2 of the first line.
-    pub fn tank(rig: Rig) -> World {
+    pub fn tank(rig: Rig) -> Simulator {
         let places = BTreeMap::from([((LineId(0), 1), Place::Controller), ((LineId(0), 2), Place::Plc)]);
-        World { rig: Some(rig), models: Models::default(), places }
+        Simulator { rig: Some(rig), models: Models::default(), places }
     }
 
     /// Lets plant time pass for everything.
@@ -153,8 +153,8 @@ impl World {
     }
 
     /// The same with its process at rest; otherwise it is in the middle of work.
-    pub fn at_rest(self) -> World {
-        World { rig: self.rig.map(|_| Rig::new()), ..self }
+    pub fn at_rest(self) -> Simulator {
+        Simulator { rig: self.rig.map(|_| Rig::new()), ..self }
     }
 
     /// Whether a unit is the controller of the tank rig.
@@ -208,39 +208,40 @@ mod tests {
 
     #[test]
     fn a_stranger_and_a_broadcast_get_no_answer() {
-        let mut world = World::tank(Rig::new());
+        let mut simulator = Simulator::tank(Rig::new());
         for unit in [0, 3, 247] {
-            assert_eq!(world.respond(L1, unit, &[3, 0, 0, 0, 1]), None);
+            assert_eq!(simulator.respond(L1, unit, &[3, 0, 0, 0, 1]), None);
         }
-        assert_eq!(world.respond(LineId(1), 1, &[3, 0x03, 0xEA, 0, 1]), None, "the same unit of another line");
+        assert_eq!(simulator.respond(LineId(1), 1, &[3, 0x03, 0xEA, 0, 1]), None, "the same unit of another line");
     }
 
     /// 41003 is SV of the controller and plain V memory of the PLC.
     #[test]
     fn a_broadcast_is_obeyed_by_every_unit_of_its_line() {
-        let mut world = World::tank(Rig::new());
-        assert_eq!(world.respond(LineId(1), 0, &[16, 0x03, 0xEA, 0, 1, 2, 0x00, 0x09]), None);
-        assert_eq!(world.respond(L1, 0, &[16, 0x03, 0xEA, 0, 1, 2, 0x01, 0xF4]), None);
+        let mut simulator = Simulator::tank(Rig::new());
+        assert_eq!(simulator.respond(LineId(1), 0, &[16, 0x03, 0xEA, 0, 1, 2, 0x00, 0x09]), None);
+        assert_eq!(simulator.respond(L1, 0, &[16, 0x03, 0xEA, 0, 1, 2, 0x01, 0xF4]), None);
         for unit in [1, 2] {
-            assert_eq!(world.respond(L1, unit, &[3, 0x03, 0xEA, 0, 1]), Some(vec![3, 2, 0x01, 0xF4]));
+            assert_eq!(simulator.respond(L1, unit, &[3, 0x03, 0xEA, 0, 1]), Some(vec![3, 2, 0x01, 0xF4]));
         }
     }
 
     #[test]
     fn a_unit_counts_what_passes_on_its_line() {
-        let mut world = World::tank(Rig::new());
-        let counter = |world: &mut World, which: u8| world.respond(L1, 2, &[8, 0, which, 0, 0]).map(|reply| reply[4]);
+        let mut simulator = Simulator::tank(Rig::new());
+        let counter =
+            |simulator: &mut Simulator, which: u8| simulator.respond(L1, 2, &[8, 0, which, 0, 0]).map(|reply| reply[4]);
         for unit in [1, 2, 9, 0] {
-            world.respond(L1, unit, &[3, 0x03, 0xEA, 0, 1]);
-            world.respond(LineId(1), unit, &[3, 0x03, 0xEA, 0, 1]);
+            simulator.respond(L1, unit, &[3, 0x03, 0xEA, 0, 1]);
+            simulator.respond(LineId(1), unit, &[3, 0x03, 0xEA, 0, 1]);
         }
-        world.spoiled(L1);
-        world.spoiled(LineId(1));
+        simulator.spoiled(L1);
+        simulator.spoiled(LineId(1));
         // All four messages and this query; one that was spoiled; unit 2, the broadcast and the three queries.
-        assert_eq!(counter(&mut world, 0x0B), Some(5));
-        assert_eq!(counter(&mut world, 0x0C), Some(1));
-        assert_eq!(counter(&mut world, 0x0E), Some(5));
-        world.power_cycle();
-        assert_eq!(counter(&mut world, 0x0B), Some(1));
+        assert_eq!(counter(&mut simulator, 0x0B), Some(5));
+        assert_eq!(counter(&mut simulator, 0x0C), Some(1));
+        assert_eq!(counter(&mut simulator, 0x0E), Some(5));
+        simulator.power_cycle();
+        assert_eq!(counter(&mut simulator, 0x0B), Some(1));
     }
 }
