@@ -1,10 +1,10 @@
-//! What a terminal may know and change of a simulated plant: faults on offer and in force, what is really so, the drill at work.
+//! What a terminal sees of a simulator: available and active faults, actual values, the running drill.
 
 use std::{sync::Arc, time::Duration};
 
 use super::{
     faults::{Fault, InForce, Offer, Place},
-    scenario::judge::{Truths, Verdict},
+    scenario::judge::{ActualValues, Verdict},
 };
 
 /// A command to the simulation.
@@ -25,8 +25,8 @@ pub struct Status {
     pub offers: Arc<[Offer]>,
     /// What is wrong.
     pub in_force: Vec<InForce>,
-    /// What is really so.
-    pub truths: Truths,
+    /// Actual values by tag.
+    pub actual: ActualValues,
     /// Nothing of all this may be told before the drill is over.
     pub exam: bool,
     /// The drill at work, or the one that is over.

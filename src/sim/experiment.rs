@@ -95,7 +95,7 @@ pub fn run(control: &Control) -> Outcome {
     let taken = rig.plc().respond(&[15, 0x0C, 0, 0, 7, 1, 0b100_1001]);
     assert_eq!(taken.as_deref(), Some(&[15, 0x0C, 0, 0, 7][..]), "the PLC takes its commands");
     measure((0..=RECORDING.as_secs() as u32).map(|second| {
-        let pv_c = rig.truth().pv_c;
+        let pv_c = rig.state().pv_c;
         rig.advance(Duration::from_secs(1));
         (second, pv_c)
     }))

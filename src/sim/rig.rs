@@ -59,7 +59,7 @@ pub struct Rig {
 
 /// What is really so in the rig, whatever the devices and the wire say: for tests and training.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Truth {
+pub struct RigState {
     /// Water at the probe in °C.
     pub probe_c: f64,
     /// The controller's process value in °C.
@@ -152,8 +152,8 @@ impl Rig {
     }
 
     /// What is really so.
-    pub fn truth(&self) -> Truth {
-        Truth {
+    pub fn state(&self) -> RigState {
+        RigState {
             probe_c: self.tank.probe_c(),
             pv_c: self.pxr.device.pv_c(),
             sv_c: self.pxr.device.sv_c(),
@@ -257,7 +257,7 @@ mod tests {
         exchange(rig, "01 06 03 EA 00 32 29 AF", "01 06 03 EA 00 32 29 AF");
         exchange(rig, "02 06 41 40 FF FF 9D A1", "02 06 41 40 FF FF 9D A1");
         rig.advance(Duration::from_secs(2));
-        assert_eq!(rig.truth().sv_c, 5.0);
+        assert_eq!(rig.state().sv_c, 5.0);
         assert_eq!(rig.respond(2, &[1, 8, 0, 0, 16]), Some(vec![1, 2, 0xFF, 0xFF]));
     }
 
@@ -265,30 +265,30 @@ mod tests {
     fn until_left(rig: &mut Rig, step: Step, longest_s: u64) -> u64 {
         let left = (0..longest_s).find(|_| {
             rig.advance(Duration::from_secs(1));
-            rig.truth().step != step
+            rig.state().step != step
         });
-        left.unwrap_or_else(|| panic!("still {step:?} after {longest_s} s: {:?}", rig.truth()))
+        left.unwrap_or_else(|| panic!("still {step:?} after {longest_s} s: {:?}", rig.state()))
     }
 
     #[test]
     fn a_batch_runs_through_and_begins_again() {
         let rig = &mut Rig::demo();
         rig.advance(Duration::from_secs(1));
-        assert_eq!(rig.truth().step, Step::Fill);
+        assert_eq!(rig.state().step, Step::Fill);
         assert!(until_left(rig, Step::Fill, 60) > 5);
         let heating_s = until_left(rig, Step::Heat, 1500);
         assert!((9 * 60..16 * 60).contains(&heating_s), "heating took {heating_s} s");
-        assert!((rig.truth().pv_c - 70.0).abs() <= 1.1);
+        assert!((rig.state().pv_c - 70.0).abs() <= 1.1);
         let holding_s = until_left(rig, Step::Hold, 200);
         assert!((178..182).contains(&holding_s));
-        assert!((rig.truth().pv_c - 70.0).abs() < 3.0, "{:?}", rig.truth());
+        assert!((rig.state().pv_c - 70.0).abs() < 3.0, "{:?}", rig.state());
         for (step, longest_s) in [(Step::Drain, 900), (Step::Cool, 65), (Step::Return, 300)] {
-            assert_eq!(rig.truth().step, step);
+            assert_eq!(rig.state().step, step);
             until_left(rig, step, longest_s);
         }
-        assert_eq!(rig.truth().step, Step::Fill);
+        assert_eq!(rig.state().step, Step::Fill);
         assert_eq!(rig.respond(2, &[3, 4, 2, 0, 1]), Some(vec![3, 2, 0, 1]));
-        assert!(!rig.truth().fault);
+        assert!(!rig.state().fault);
     }
 
     #[test]
@@ -298,14 +298,14 @@ mod tests {
         rig.plc.device.start();
         rig.advance(Duration::from_secs(1));
         until_left(rig, Step::Fill, 2400);
-        let Truth { readings, step, .. } = rig.truth();
-        assert!((39.0..40.1).contains(&readings.level_cm) && step == Step::Heat, "{:?}", rig.truth());
+        let RigState { readings, step, .. } = rig.state();
+        assert!((39.0..40.1).contains(&readings.level_cm) && step == Step::Heat, "{:?}", rig.state());
         // 20 l by 43 °C at 1600 W are 37 minutes and a half, without loss.
         let heating_s = until_left(rig, Step::Heat, 5000);
         assert!((38 * 60..60 * 60).contains(&heating_s), "heating took {heating_s} s");
         until_left(rig, Step::Hold, 200);
         until_left(rig, Step::Drain, 2400);
-        assert!(!rig.truth().fault);
+        assert!(!rig.state().fault);
     }
 
     #[test]
@@ -322,7 +322,7 @@ mod tests {
         let (mut whole, mut pieces) = (Rig::demo(), Rig::demo());
         whole.advance(Duration::from_millis(70_000));
         (0..10_000).for_each(|_| pieces.advance(Duration::from_millis(7)));
-        assert_eq!(whole.truth(), pieces.truth());
+        assert_eq!(whole.state(), pieces.state());
     }
 
     /// The controller of the thesis found P 1.2 %, I 70 s and D 13.5 s.
@@ -345,7 +345,7 @@ mod tests {
             }
             for _ in 0..1800 {
                 rig.advance(Duration::from_secs(1));
-                assert!((rig.truth().pv_c - 70.0).abs() < 0.8, "type {kind}: {:?}", rig.truth());
+                assert!((rig.state().pv_c - 70.0).abs() < 0.8, "type {kind}: {:?}", rig.state());
             }
         }
     }
@@ -354,13 +354,13 @@ mod tests {
     fn a_broken_sensor_stops_the_heating_and_in_time_the_sequence() {
         let rig = &mut Rig::demo();
         rig.advance(Duration::from_secs(300));
-        assert!(rig.truth().readings.heater_w > 1500.0);
+        assert!(rig.state().readings.heater_w > 1500.0);
         rig.set_sensor_open(true);
         rig.advance(Duration::from_secs(60));
-        assert!(rig.truth().readings.heater_w < 1.0);
+        assert!(rig.state().readings.heater_w < 1.0);
         rig.advance(Duration::from_secs(2 * 3600));
-        assert!(rig.truth().fault);
-        assert_eq!(rig.truth().outputs, Outputs::default());
+        assert!(rig.state().fault);
+        assert_eq!(rig.state().outputs, Outputs::default());
     }
 
     /// What an operator may write: a coil of the PLC, all outputs at once, a setting of the controller.
@@ -391,12 +391,12 @@ mod tests {
                 prop_assert!(rig.respond(unit, &pdu).is_some() || unit == PXR_UNIT);
                 for _ in 0..seconds {
                     rig.advance(Duration::from_secs(1));
-                    let Readings { level_cm, heater_w, .. } = rig.truth().readings;
+                    let Readings { level_cm, heater_w, .. } = rig.state().readings;
                     // The heating element needs some seconds to cool after the interlock has opened.
                     prop_assert!(level_cm >= 4.5 || heater_w < 500.0, "{heater_w} W at {level_cm} cm");
                     prop_assert!(level_cm <= 28.1, "{level_cm} cm");
                     prop_assert!(rig.tank.control.temperature_c < 100.0);
-                    prop_assert!((0.0..=100.0).contains(&rig.truth().mv_percent));
+                    prop_assert!((0.0..=100.0).contains(&rig.state().mv_percent));
                 }
             }
         }
@@ -437,7 +437,7 @@ mod tests {
         rig.advance(Duration::from_secs(300));
         rig.power_cycle();
         rig.advance(Duration::from_secs(60));
-        assert_eq!((rig.truth().step, rig.truth().outputs), (Step::Idle, Outputs::default()));
+        assert_eq!((rig.state().step, rig.state().outputs), (Step::Idle, Outputs::default()));
     }
 
     #[test]

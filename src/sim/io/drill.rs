@@ -167,9 +167,9 @@ impl Task {
             let lost = self.trainer.journal.lost.load(Ordering::Relaxed);
             if let Some(judge) = self.running() {
                 judge.on_lost(lost);
-                judge.on_values(&snapshot, &report.truths);
+                judge.on_values(&snapshot, &report.actual);
             }
-            let status = self.status(report.in_force, report.truths, clock.now());
+            let status = self.status(report.in_force, report.actual, clock.now());
             let over = status.scenario.as_ref().is_some_and(|progress| progress.verdict.over);
             publish.send_replace(Arc::new(status));
             if over && self.trainer.operator.is_some() {
@@ -214,7 +214,7 @@ impl Task {
     fn status(
         &self,
         in_force: Vec<crate::sim::faults::InForce>,
-        truths: crate::sim::scenario::judge::Truths,
+        actual: crate::sim::scenario::judge::ActualValues,
         now: Timestamp,
     ) -> Status {
         let scenario = self.judge.as_ref().map(|judge| {
@@ -222,7 +222,7 @@ impl Task {
             let Scenario { about, duration, .. } = &**judge.scenario();
             Progress { about: about.clone(), elapsed, duration: *duration, verdict: judge.verdict() }
         });
-        Status { offers: self.offers.clone(), in_force, truths, exam: self.trainer.exam, scenario }
+        Status { offers: self.offers.clone(), in_force, actual, exam: self.trainer.exam, scenario }
     }
 }
 

@@ -13,10 +13,10 @@ use crate::{
     },
     sim::{
         faults::{Answer, Fault, Faults, InForce, Place},
-        rig::{Rig, Truth},
-        scenario::judge::Truths,
+        ground_truth::GroundTruth,
+        rig::{Rig, RigState},
+        scenario::judge::ActualValues,
         simulator::Simulator,
-        truth::Lens,
     },
 };
 
@@ -49,7 +49,7 @@ pub struct Report {
     /// The faults in force.
     pub in_force: Vec<InForce>,
     /// By tag.
-    pub truths: Truths,
+    pub actual: ActualValues,
 }
 
 /// What a task waits for when it asks the simulator; if the task is gone, nothing comes back.
@@ -59,7 +59,7 @@ type Reply<T> = oneshot::Sender<T>;
 enum SimRequest {
     Ask { line: LineId, unit: u8, pdu: Vec<u8>, reply: Reply<Option<Answer>> },
     Tell(Told, Reply<()>),
-    Truth(Reply<Option<Truth>>),
+    RigState(Reply<Option<RigState>>),
     Value(TagId, Reply<Option<f64>>),
     SetValue(TagId, f64, Reply<bool>),
     Report(Reply<Report>),
@@ -79,18 +79,18 @@ enum Told {
 impl SimulatorHandle {
     /// Starts the task. The simulator lives in the plant time of `clock`; of its values nothing is known.
     pub fn spawn(simulator: Simulator, clock: Clock) -> SimulatorHandle {
-        SimulatorHandle::start(simulator, clock, Faults::default(), Lens::default())
+        SimulatorHandle::start(simulator, clock, Faults::default(), GroundTruth::default())
     }
 
-    /// The same for a plant whose values are known: they can be faulty, and what is really so can be told.
+    /// The same for a plant whose values are known: faults can be injected, and actual values are reported.
     pub fn spawn_for(def: &PlantDef, simulator: Simulator, clock: Clock) -> SimulatorHandle {
-        SimulatorHandle::start(simulator, clock, Faults::of(def), Lens::of(def))
+        SimulatorHandle::start(simulator, clock, Faults::of(def), GroundTruth::of(def))
     }
 
-    fn start(simulator: Simulator, clock: Clock, faults: Faults, lens: Lens) -> SimulatorHandle {
+    fn start(simulator: Simulator, clock: Clock, faults: Faults, ground_truth: GroundTruth) -> SimulatorHandle {
         let (requests, inbox) = mpsc::channel(REQUESTS_MAX);
         let units = Arc::new(simulator.addresses().collect());
-        tokio::spawn(run(simulator, clock, (faults, lens), clock.now(), inbox));
+        tokio::spawn(run(simulator, clock, (faults, ground_truth), clock.now(), inbox));
         SimulatorHandle { requests, clock, units }
     }
 
@@ -135,7 +135,7 @@ impl SimulatorHandle {
         self.tell(Told::AllWell).await;
     }
 
-    /// What is wrong and what is really so now; `None` once the task has ended.
+    /// The active faults and the actual values now; `None` once the task has ended.
     pub async fn report(&self) -> Option<Report> {
         self.put(SimRequest::Report).await
     }
@@ -155,9 +155,9 @@ impl SimulatorHandle {
         self.tell(Told::PowerCycle).await;
     }
 
-    /// What is really so in the tank rig now; `None` if the simulator has no rig, or once its task has ended.
-    pub async fn truth(&self) -> Option<Truth> {
-        self.put(SimRequest::Truth).await.flatten()
+    /// The state of the tank rig now; `None` if the simulator has no rig, or once its task has ended.
+    pub async fn rig_state(&self) -> Option<RigState> {
+        self.put(SimRequest::RigState).await.flatten()
     }
 
     /// What a modelled device holds for a tag now, in the tag's unit; `None` for a tag of the rig.
@@ -209,7 +209,7 @@ impl LineHandle {
 async fn run(
     mut simulator: Simulator,
     clock: Clock,
-    (mut faults, lens): (Faults, Lens),
+    (mut faults, ground_truth): (Faults, GroundTruth),
     mut reached: Timestamp,
     mut inbox: mpsc::Receiver<SimRequest>,
 ) {
@@ -228,19 +228,25 @@ async fn run(
         simulator.advance(Duration::try_from(now.duration_since(reached)).unwrap_or_default().min(CATCH_UP_MAX));
         reached = now;
         if let Some(request) = request {
-            handle_request(&mut simulator, &mut faults, &lens, now, request);
+            handle_request(&mut simulator, &mut faults, &ground_truth, now, request);
         }
     }
 }
 
 /// Who asked may have gone meanwhile; an answer that nobody waits for is dropped.
-fn handle_request(simulator: &mut Simulator, faults: &mut Faults, lens: &Lens, now: Timestamp, request: SimRequest) {
+fn handle_request(
+    simulator: &mut Simulator,
+    faults: &mut Faults,
+    ground_truth: &GroundTruth,
+    now: Timestamp,
+    request: SimRequest,
+) {
     match request {
         SimRequest::Ask { line, unit, pdu, reply } => {
             reply.send(faults.answer(simulator, line, unit, &pdu)).ok();
         }
-        SimRequest::Truth(reply) => {
-            reply.send(simulator.rig().map(Rig::truth)).ok();
+        SimRequest::RigState(reply) => {
+            reply.send(simulator.rig().map(Rig::state)).ok();
         }
         SimRequest::Value(tag, reply) => {
             reply.send(simulator.value(tag)).ok();
@@ -249,7 +255,7 @@ fn handle_request(simulator: &mut Simulator, faults: &mut Faults, lens: &Lens, n
             reply.send(simulator.set_value(tag, value)).ok();
         }
         SimRequest::Report(reply) => {
-            reply.send(Report { in_force: faults.list().to_vec(), truths: lens.look(simulator) }).ok();
+            reply.send(Report { in_force: faults.list().to_vec(), actual: ground_truth.values(simulator) }).ok();
         }
         SimRequest::Tell(told, done) => {
             follow(simulator, faults, now, told);
@@ -289,10 +295,10 @@ mod tests {
         let simulator =
             SimulatorHandle::spawn(Simulator::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, 60.0));
         tokio::time::advance(Duration::from_secs(5)).await;
-        let truth = simulator.truth().await.expect("the task runs");
+        let state = simulator.rig_state().await.expect("the task runs");
         // Five real seconds are five minutes of plant: filled, and about 270 s of heating done.
-        assert_eq!(truth.step, Step::Heat);
-        assert!((40.0..50.0).contains(&truth.probe_c), "{truth:?}");
+        assert_eq!(state.step, Step::Heat);
+        assert!((40.0..50.0).contains(&state.probe_c), "{state:?}");
     }
 
     #[tokio::test(start_paused = true)]
@@ -304,10 +310,10 @@ mod tests {
         assert!(simulator.ask(LineId(0), 2, &[3, 4, 0, 0, 1]).await.is_some());
         simulator.set_sensor_open(true).await;
         tokio::time::advance(Duration::from_secs(1)).await;
-        let truth = simulator.truth().await.expect("the task runs");
-        assert!(truth.pv_c > 190.0 && truth.mv_percent == 0.0, "{truth:?}");
+        let state = simulator.rig_state().await.expect("the task runs");
+        assert!(state.pv_c > 190.0 && state.mv_percent == 0.0, "{state:?}");
         simulator.power_cycle().await;
         tokio::time::advance(Duration::from_secs(1)).await;
-        assert_eq!(simulator.truth().await.map(|truth| truth.step), Some(Step::Idle));
+        assert_eq!(simulator.rig_state().await.map(|state| state.step), Some(Step::Idle));
     }
 }

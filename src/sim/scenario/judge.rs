@@ -14,7 +14,7 @@ use crate::plant::{
 };
 
 /// What is really so in the simulated plant, in the units of the tags.
-pub type Truths = BTreeMap<TagId, f64>;
+pub type ActualValues = BTreeMap<TagId, f64>;
 
 /// A shown value may differ from the truth for so long: it was read a moment ago.
 const GRACE: Duration = Duration::from_secs(5);
@@ -116,7 +116,7 @@ impl Judge {
     }
 
     /// Takes what is shown now, and what is really so.
-    pub fn on_values(&mut self, snapshot: &Snapshot, truths: &Truths) {
+    pub fn on_values(&mut self, snapshot: &Snapshot, actual: &ActualValues) {
         let Some(at) = self.elapsed(snapshot.at) else { return };
         self.now = self.now.max(at);
         for order in snapshot.orders.iter().rev() {
@@ -124,7 +124,7 @@ impl Judge {
         }
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
             if expect.from <= at && at <= expect.until {
-                mark.take(at, expect.wish, snapshot, truths);
+                mark.take(at, expect.wish, snapshot, actual);
             }
         }
     }
@@ -195,7 +195,7 @@ fn is(def: &PlantDef, alarm: AlarmId, step: &AlarmRecord) -> bool {
 }
 
 impl Mark {
-    fn take(&mut self, at: Duration, wish: Wish, snapshot: &Snapshot, truths: &Truths) {
+    fn take(&mut self, at: Duration, wish: Wish, snapshot: &Snapshot, actual: &ActualValues) {
         match wish {
             Wish::NotGood(tag) if !snapshot.sample(tag).quality.is_good() => {
                 self.met.get_or_insert(at);
@@ -204,7 +204,7 @@ impl Mark {
                 self.met.get_or_insert(at);
             }
             Wish::Within { tag, low, high } => {
-                if let Some(value) = truths.get(&tag).copied() {
+                if let Some(value) = actual.get(&tag).copied() {
                     self.seen = true;
                     if value < low || high < value {
                         self.broken.get_or_insert((at, Some(value)));
@@ -212,7 +212,7 @@ impl Mark {
                 }
             }
             Wish::True(tag, allowed) => {
-                let (shown, truth) = (snapshot.sample(tag).trusted(), truths.get(&tag).copied());
+                let (shown, truth) = (snapshot.sample(tag).trusted(), actual.get(&tag).copied());
                 self.seen |= truth.is_some();
                 match (shown, truth) {
                     (Some(shown), Some(truth)) if (shown - truth).abs() > allowed => {

@@ -1,4 +1,4 @@
-//! Tab 8, in demonstrations only: what can go wrong, what is wrong, and what is really so beside what the screens show.
+//! Tab 8, in demonstrations only: what can go wrong, what is wrong, and actual beside displayed values.
 
 mod view;
 

@@ -57,7 +57,7 @@ fn standing(judge: &Judge) -> Standing {
 }
 
 fn is_over(judge: &mut Judge) -> Standing {
-    judge.on_values(&shown(100, good(0.0), Vec::new()), &Truths::new());
+    judge.on_values(&shown(100, good(0.0), Vec::new()), &ActualValues::new());
     standing(judge)
 }
 
@@ -118,7 +118,7 @@ fn only_a_verified_write_of_the_right_value_counts() {
             outcome,
             recorded: true,
         };
-        judge.on_values(&shown(50, good(50.0), vec![order]), &Truths::new());
+        judge.on_values(&shown(50, good(50.0), vec![order]), &ActualValues::new());
         assert_eq!(is_over(&mut judge), expect);
     };
     check(15, 60.0, Outcome::Verified, met(15));
@@ -133,7 +133,7 @@ fn a_value_is_judged_by_what_is_shown_and_by_what_is_so() {
     let check = |wish: Wish, seconds: &[(u64, Sample, f64)], expect: Standing| {
         let mut judge = judge(wish);
         for (second, sample, truth) in seconds {
-            judge.on_values(&shown(*second, *sample, Vec::new()), &Truths::from([(PV, *truth)]));
+            judge.on_values(&shown(*second, *sample, Vec::new()), &ActualValues::from([(PV, *truth)]));
         }
         assert_eq!(is_over(&mut judge), expect, "{wish:?}");
     };
@@ -160,10 +160,10 @@ fn a_value_is_judged_by_what_is_shown_and_by_what_is_so() {
 #[test]
 fn a_verdict_is_open_until_its_time_is_over_and_then_a_sum() {
     let mut judge = judge(Wish::NotGood(PV));
-    judge.on_values(&shown(15, good(50.0), Vec::new()), &Truths::new());
+    judge.on_values(&shown(15, good(50.0), Vec::new()), &ActualValues::new());
     assert_eq!(standing(&judge), Standing::Open);
     assert_eq!(judge.verdict().summary(), "so far 0 of 10 points, 100 % needed");
-    judge.on_values(&shown(21, good(50.0), Vec::new()), &Truths::new());
+    judge.on_values(&shown(21, good(50.0), Vec::new()), &ActualValues::new());
     assert_eq!(standing(&judge), late());
     assert!(!judge.verdict().over);
     assert_eq!(is_over(&mut judge), late());
@@ -176,7 +176,7 @@ fn a_verdict_is_open_until_its_time_is_over_and_then_a_sum() {
 #[test]
 fn a_drill_of_which_steps_were_lost_is_not_passed() {
     let mut judge = judge(Wish::NoAlarm(HIGH));
-    judge.on_values(&shown(100, Sample::good(60.0, at(100)), Vec::new()), &Truths::new());
+    judge.on_values(&shown(100, Sample::good(60.0, at(100)), Vec::new()), &ActualValues::new());
     assert!(judge.verdict().passed(), "{:?}", judge.verdict());
     judge.on_lost(3);
     let verdict = judge.verdict();

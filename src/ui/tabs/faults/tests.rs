@@ -31,14 +31,14 @@ fn status(fixture: &Fixture) -> Status {
         Offer { place, faults }
     };
     let since = fixture::now() - SignedDuration::from_secs(42);
-    let truths = [("TIC-1.PV", 68.0), ("PLC-1.LT-1", 22.0), ("PLC-1.SV-2", 1.0), ("PLC-1.POWER", 670.0)];
+    let actual = [("TIC-1.PV", 68.0), ("PLC-1.LT-1", 22.0), ("PLC-1.SV-2", 1.0), ("PLC-1.POWER", 670.0)];
     Status {
         offers: [Place::Line(L1), TIC, Place::Unit(L1, 2), Place::Process].map(of).into(),
         in_force: vec![
             InForce { place: TIC, fault: Fault::Silent, since },
             InForce { place: Place::Process, fault: Fault::Leak(500), since },
         ],
-        truths: truths.into_iter().map(|(name, value)| (fixture.tag(name), value)).collect(),
+        actual: actual.into_iter().map(|(name, value)| (fixture.tag(name), value)).collect(),
         exam: false,
         scenario: None,
     }

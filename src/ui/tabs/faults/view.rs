@@ -1,4 +1,4 @@
-//! Draws the faults: a list by place, the selected one told, and truth beside what is shown.
+//! Draws the faults: a list by place, the selected one described, and actual beside displayed values.
 
 use ratatui::{Frame, layout::Rect, style::Style};
 
@@ -111,7 +111,7 @@ fn place_words(cx: &ViewContext, place: Place) -> String {
     }
 }
 
-/// The selected fault told, above what is really so.
+/// Describes the selected fault above the comparison.
 fn told(cx: &ViewContext, status: &Status, place: Place, fault: Fault, canvas: &mut Canvas) {
     let (theme, room) = (cx.theme, canvas.width());
     let story = fault.story();
@@ -167,7 +167,7 @@ fn compare(cx: &ViewContext, status: &Status, place: Place) -> Vec<Compared> {
         def.poll != Poll::Never && device.is_none_or(|device| device == def.device)
     };
     let mut rows: Vec<Compared> = status
-        .truths
+        .actual
         .iter()
         .filter(|(tag, _)| of_place(**tag))
         .map(|(tag, truth)| {
@@ -192,12 +192,12 @@ fn allowed(cx: &ViewContext, tag: TagId) -> f64 {
 
 fn comparison(cx: &ViewContext, rows: &[Compared], canvas: &mut Canvas) {
     if rows.is_empty() {
-        canvas.text(0, 0, "what is really so is not known here", cx.theme.dim());
+        canvas.text(0, 0, "actual values are not known here", cx.theme.dim());
         return;
     }
     let names = rows.iter().map(|row| width(&cx.def().tag(row.tag).name)).max().unwrap_or(0).clamp(10, 16);
-    canvas.text(names + 2, 0, "really so", cx.theme.dim());
-    canvas.text(names + 15, 0, "shown", cx.theme.dim());
+    canvas.text(names + 2, 0, "actual", cx.theme.dim());
+    canvas.text(names + 15, 0, "displayed", cx.theme.dim());
     for (y, row) in rows.iter().enumerate() {
         let y = y as u16 + 1;
         canvas.text(0, y, &pad(&cx.def().tag(row.tag).name, names), cx.theme.normal());
