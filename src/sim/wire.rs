@@ -15,43 +15,47 @@ pub struct Request {
     pub characters: usize,
 }
 
-/// What a slave listens with.
+/// Collects received characters into requests.
 #[derive(Debug, Clone)]
-pub enum Ears {
+pub enum FrameReceiver {
     /// For RTU.
     Rtu(Receiver),
     /// For ASCII.
     Ascii(ascii::Receiver),
 }
 
-impl Ears {
+impl FrameReceiver {
     /// For RTU, or for ASCII with so many data bits.
-    pub fn new(ascii: bool, data_bits: u8) -> Ears {
-        if ascii { Ears::Ascii(ascii::Receiver::new(data_bits)) } else { Ears::Rtu(Receiver::default()) }
+    pub fn new(ascii: bool, data_bits: u8) -> FrameReceiver {
+        if ascii {
+            FrameReceiver::Ascii(ascii::Receiver::new(data_bits))
+        } else {
+            FrameReceiver::Rtu(Receiver::default())
+        }
     }
 
     /// Adds characters as they arrive.
     pub fn push(&mut self, characters: &[u8]) {
         match self {
-            Ears::Rtu(receiver) => receiver.push(characters),
-            Ears::Ascii(receiver) => receiver.push(characters),
+            FrameReceiver::Rtu(receiver) => receiver.push(characters),
+            FrameReceiver::Ascii(receiver) => receiver.push(characters),
         }
     }
 
     /// The next thing that is complete: a request, or `None` in its place if it could not be read.
     pub fn take(&mut self) -> Option<Option<Request>> {
         match self {
-            Ears::Rtu(receiver) => receiver.take().map(|frame| Some(request(frame))),
-            Ears::Ascii(receiver) => receiver.take(),
+            FrameReceiver::Rtu(receiver) => receiver.take().map(|frame| Some(request(frame))),
+            FrameReceiver::Ascii(receiver) => receiver.take(),
         }
     }
 
     /// The line was silent for long enough to end a frame.
     pub fn silence(&mut self) -> Option<Option<Request>> {
         match self {
-            Ears::Rtu(receiver) if receiver.is_empty() => None,
-            Ears::Rtu(receiver) => Some(receiver.silence().map(request)),
-            Ears::Ascii(receiver) => {
+            FrameReceiver::Rtu(receiver) if receiver.is_empty() => None,
+            FrameReceiver::Rtu(receiver) => Some(receiver.silence().map(request)),
+            FrameReceiver::Ascii(receiver) => {
                 receiver.silence();
                 receiver.take()
             }
@@ -61,8 +65,8 @@ impl Ears {
     /// Whether nothing waits for its rest.
     pub fn is_empty(&self) -> bool {
         match self {
-            Ears::Rtu(receiver) => receiver.is_empty(),
-            Ears::Ascii(receiver) => receiver.is_empty(),
+            FrameReceiver::Rtu(receiver) => receiver.is_empty(),
+            FrameReceiver::Ascii(receiver) => receiver.is_empty(),
         }
     }
 }

@@ -193,14 +193,14 @@ impl Plant {
 /// A port in memory that can be opened again and again, as the line reopens it.
 fn plug(simulator: &SimulatorHandle, line: &LineDef) -> Connector {
     let (ports, streams) = mpsc::channel(2);
-    let (units, speech) = (simulator.line(line.id), Service::of(line).speech());
+    let (units, framing) = (simulator.line(line.id), Service::of(line).tcp_framing());
     tokio::spawn(async move {
         loop {
             let (ours, theirs) = tokio::io::duplex(1024);
             if ports.send(ours).await.is_err() {
                 return;
             }
-            tokio::spawn(serve_stream(theirs, units.clone(), speech));
+            tokio::spawn(serve_stream(theirs, units.clone(), framing));
         }
     });
     Connector::Memory(streams)

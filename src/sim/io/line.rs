@@ -16,7 +16,7 @@ use super::LineHandle;
 use crate::bus::io::clock::Clock;
 use crate::plant::def::Serial;
 use crate::sim::faults::Answer;
-use crate::sim::wire::{Ears, Request};
+use crate::sim::wire::{FrameReceiver, Request};
 
 /// Requests and answers under way at once; a request beyond that is not heard.
 const JOBS_MAX: usize = 8;
@@ -85,7 +85,7 @@ where
 struct Line {
     clock: Clock,
     wire: Wire,
-    ears: Ears,
+    receiver: FrameReceiver,
     /// Frames that could not be read since the units were told.
     spoiled: usize,
     /// Since when the request that is arriving has been on the wire, and when its latest bytes came.
@@ -119,7 +119,7 @@ impl Line {
         Line {
             clock,
             wire,
-            ears: Ears::new(wire.ascii, wire.serial.data_bits),
+            receiver: FrameReceiver::new(wire.ascii, wire.serial.data_bits),
             spoiled: 0,
             began: now,
             latest: now,
@@ -131,15 +131,15 @@ impl Line {
 
     /// Bytes have arrived. They come at once, but the request is not over before its time on the wire.
     fn heard(&mut self, now: Instant, bytes: &[u8]) {
-        if self.ears.is_empty() {
+        if self.receiver.is_empty() {
             // A master that asks again at once was held up by the late answer; the lateness must not add up.
             let at_once = now - self.sent < SILENCE_REAL_MIN;
             self.began = if at_once { now.checked_sub(self.credit).unwrap_or(now) } else { now };
             self.credit = Duration::ZERO;
         }
         self.latest = now;
-        self.ears.push(bytes);
-        while let Some(frame) = self.ears.take() {
+        self.receiver.push(bytes);
+        while let Some(frame) = self.receiver.take() {
             self.accept(frame);
         }
     }
@@ -161,12 +161,12 @@ impl Line {
 
     /// The next moment at which something is due.
     fn next(&self) -> Instant {
-        let silence = (!self.ears.is_empty()).then(|| self.silent_at());
+        let silence = (!self.receiver.is_empty()).then(|| self.silent_at());
         self.jobs.iter().map(|job| job.at).chain(silence).min().unwrap_or(self.latest)
     }
 
     fn waits(&self) -> bool {
-        !self.jobs.is_empty() || !self.ears.is_empty()
+        !self.jobs.is_empty() || !self.receiver.is_empty()
     }
 
     fn silent_at(&self) -> Instant {
@@ -175,8 +175,8 @@ impl Line {
     }
 
     fn due(&mut self, now: Instant) -> Due {
-        if !self.ears.is_empty() && self.silent_at() <= now {
-            if let Some(frame) = self.ears.silence() {
+        if !self.receiver.is_empty() && self.silent_at() <= now {
+            if let Some(frame) = self.receiver.silence() {
                 self.accept(frame);
             }
             return Due::Nothing;

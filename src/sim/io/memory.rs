@@ -7,7 +7,7 @@ use tokio::{io::duplex, sync::mpsc};
 use super::{
     LineHandle, SimulatorHandle, Wire, serve_line,
     serving::{Mode, Service},
-    tcp::{Speech, serve_stream},
+    tcp::{TcpFraming, serve_stream},
 };
 use crate::{bus::io::transport::Connector, plant::PlantDef};
 
@@ -36,7 +36,7 @@ pub fn in_memory(def: &PlantDef, simulator: &SimulatorHandle) -> Vec<Connector> 
 async fn serve(stream: tokio::io::DuplexStream, units: LineHandle, service: Service) {
     let wire = Wire { serial: service.serial, ascii: service.mode == Mode::Ascii };
     let ended = match service.mode {
-        Mode::Tcp => serve_stream(stream, units, Speech::Mbap).await,
+        Mode::Tcp => serve_stream(stream, units, TcpFraming::Mbap).await,
         Mode::Rtu | Mode::Ascii | Mode::RtuOverTcp => serve_line(stream, units, wire, FOR_EVER).await,
     };
     if let Err(error) = ended {

@@ -14,4 +14,4 @@ pub use memory::in_memory;
 pub use owner::{LineHandle, Report, SimulatorHandle};
 pub use pty::{Pty, open_pty};
 pub use serving::{Mode, Place, Service, Serving, SimError, serve, serve_simulator};
-pub use tcp::{Speech, serve_stream, serve_tcp};
+pub use tcp::{TcpFraming, serve_stream, serve_tcp};

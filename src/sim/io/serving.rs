@@ -9,7 +9,7 @@ use std::{
 
 use tokio::{net::TcpListener, task::JoinHandle};
 
-use super::{LineHandle, SimulatorHandle, Speech, Wire, open_pty, serve_line, serve_tcp};
+use super::{LineHandle, SimulatorHandle, TcpFraming, Wire, open_pty, serve_line, serve_tcp};
 use crate::{
     bus::io::clock::Clock,
     plant::{
@@ -159,9 +159,9 @@ impl Service {
     }
 
     /// What is spoken on any stream of bytes that stands for the line.
-    pub fn speech(&self) -> Speech {
+    pub fn tcp_framing(&self) -> TcpFraming {
         let wire = Wire { serial: self.serial, ascii: self.mode == Mode::Ascii };
-        if self.mode == Mode::Tcp { Speech::Mbap } else { Speech::Line(wire) }
+        if self.mode == Mode::Tcp { TcpFraming::Mbap } else { TcpFraming::Line(wire) }
     }
 }
 
@@ -189,15 +189,15 @@ pub async fn serve_simulator(
 }
 
 async fn start(units: LineHandle, service: Service) -> io::Result<(Place, JoinHandle<io::Result<()>>)> {
-    match service.speech() {
-        Speech::Line(wire) if !service.mode.is_tcp() => {
+    match service.tcp_framing() {
+        TcpFraming::Line(wire) if !service.mode.is_tcp() => {
             let (pty, path) = open_pty()?;
             Ok((Place::Port(path), tokio::spawn(serve_line(pty, units, wire, FOR_EVER))))
         }
-        speech => {
+        framing => {
             let listener = TcpListener::bind(service.address).await?;
             let place = Place::Address(listener.local_addr()?);
-            Ok((place, tokio::spawn(serve_tcp(listener, units, speech))))
+            Ok((place, tokio::spawn(serve_tcp(listener, units, framing))))
         }
     }
 }

@@ -19,7 +19,7 @@ const LENGTHS: std::ops::RangeInclusive<u16> = 2..=254;
 
 /// What is spoken over TCP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Speech {
+pub enum TcpFraming {
     /// Modbus TCP.
     Mbap,
     /// The frames of a serial line, as a serial server passes them on.
@@ -27,7 +27,7 @@ pub enum Speech {
 }
 
 /// Serves until the listener fails. Clients are cut off when this future is dropped.
-pub async fn serve_tcp(listener: TcpListener, units: LineHandle, speech: Speech) -> io::Result<()> {
+pub async fn serve_tcp(listener: TcpListener, units: LineHandle, framing: TcpFraming) -> io::Result<()> {
     let mut clients = JoinSet::new();
     loop {
         tokio::select! {
@@ -36,7 +36,7 @@ pub async fn serve_tcp(listener: TcpListener, units: LineHandle, speech: Speech)
                     // Without this small answers wait for the client's acknowledgement; if it fails they are just slower.
                     stream.set_nodelay(true).ok();
                     let units = units.clone();
-                    clients.spawn(serve_stream(stream, units, speech));
+                    clients.spawn(serve_stream(stream, units, framing));
                 }
                 Ok(_turned_away) => {}
                 Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => {}
@@ -48,13 +48,13 @@ pub async fn serve_tcp(listener: TcpListener, units: LineHandle, speech: Speech)
 }
 
 /// Serves one client, over any stream of bytes.
-pub async fn serve_stream<S>(stream: S, units: LineHandle, speech: Speech) -> io::Result<()>
+pub async fn serve_stream<S>(stream: S, units: LineHandle, framing: TcpFraming) -> io::Result<()>
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
-    match speech {
-        Speech::Mbap => serve_client(stream, units).await,
-        Speech::Line(wire) => serve_line(stream, units, wire, IDLE_MAX).await,
+    match framing {
+        TcpFraming::Mbap => serve_client(stream, units).await,
+        TcpFraming::Line(wire) => serve_line(stream, units, wire, IDLE_MAX).await,
     }
 }
 
@@ -109,12 +109,12 @@ mod tests {
     }
 
     /// Ten times as fast as life.
-    async fn serve(speech: Speech) -> SocketAddr {
+    async fn serve(framing: TcpFraming) -> SocketAddr {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port is free");
         let address = listener.local_addr().expect("a bound listener has an address");
         let simulator =
             SimulatorHandle::spawn(Simulator::tank(Rig::new()), Clock::starting_at(Timestamp::UNIX_EPOCH, 10.0));
-        tokio::spawn(serve_tcp(listener, simulator.line(LineId(0)), speech));
+        tokio::spawn(serve_tcp(listener, simulator.line(LineId(0)), framing));
         address
     }
 
@@ -125,7 +125,7 @@ mod tests {
 
     #[tokio::test]
     async fn several_clients_share_one_simulator() {
-        let address = serve(Speech::Mbap).await;
+        let address = serve(TcpFraming::Mbap).await;
         let connect = || async { TcpStream::connect(address).await.expect("the server accepts") };
         let (mut one, mut two) = (connect().await, connect().await);
         let write = [0, 7, 0, 0, 0, 6, 1, 6, 0x03, 0xEA, 0x01, 0xF4];
@@ -140,7 +140,7 @@ mod tests {
 
     #[tokio::test]
     async fn requests_of_one_segment_are_answered_in_order_and_half_a_frame_waits() {
-        let mut client = TcpStream::connect(serve(Speech::Mbap).await).await.expect("the server accepts");
+        let mut client = TcpStream::connect(serve(TcpFraming::Mbap).await).await.expect("the server accepts");
         let read = |transaction: u8, function: u8| [0, transaction, 0, 0, 0, 6, 1, function, 0x03, 0xEA, 0, 1];
         let segment =
             [&read(1, 3)[..], &[0, 2, 0, 0, 0, 6, 0, 6, 0x03, 0xEA, 0, 9], &read(3, 1), &read(4, 3)[..7]].concat();
@@ -154,7 +154,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_client_too_many_is_turned_away() {
-        let address = serve(Speech::Mbap).await;
+        let address = serve(TcpFraming::Mbap).await;
         let mut clients = Vec::new();
         for transaction in 0..CLIENTS_MAX as u8 {
             let mut client = TcpStream::connect(address).await.expect("the server accepts");
@@ -167,7 +167,7 @@ mod tests {
 
     #[tokio::test]
     async fn the_frames_of_a_serial_line_pass_over_tcp() {
-        let rtu = Speech::Line(Wire { serial: Serial::USUAL, ascii: false });
+        let rtu = TcpFraming::Line(Wire { serial: Serial::USUAL, ascii: false });
         let mut client = TcpStream::connect(serve(rtu).await).await.expect("the server accepts");
         let broadcast = with_crc(&[0, 6, 0x03, 0xEA, 0, 50]);
         let requests = [&broadcast[..], &with_crc(&[1, 3, 0x03, 0xEA, 0, 1])].concat();
