@@ -3,10 +3,10 @@
 //!
 //! ```text
 //!  profile ── DeviceDef, TagDef ──> Model: words and bits by address ──> Slave ──> line
-//!             Simulate ───────────> Mover: one value, in steps of 0.1 s ──┘
+//!             Simulate ─> SignalGenerator: one value, in steps of 0.1 s ───┘
 //! ```
 
-mod motion;
+mod signal;
 mod registers;
 
 #[cfg(test)]
@@ -14,9 +14,9 @@ mod tests;
 
 use std::{sync::Arc, time::Duration};
 
-use motion::{Mover, Step};
 use registers::Chart;
 pub use registers::Model;
+use signal::{SignalGenerator, Step};
 
 use super::slave::Slave;
 use crate::plant::{
@@ -30,7 +30,7 @@ const REPLY_DELAY: Duration = Duration::from_millis(5);
 /// Length of a step of the simulation.
 const STEP: Duration = Duration::from_millis(100);
 /// A value made of others that stand below it is right one step later; no profile goes deeper than this.
-const SETTLING_STEPS: usize = 4;
+const INITIAL_STEPS: usize = 4;
 
 /// The modelled devices of a plant.
 #[derive(Debug, Clone, Default)]
@@ -38,23 +38,23 @@ pub struct Models {
     devices: Vec<Slave<Model>>,
     /// The model of each tag, by [`TagId`]; `None` for tags of other devices.
     of_tag: Vec<Option<usize>>,
-    movings: Vec<Moving>,
-    /// Tags that a moving one asks, and what they were last, by [`TagId`].
-    asked: Vec<TagId>,
+    signals: Vec<Signal>,
+    /// Tags that signals depend on, and their last values, by [`TagId`].
+    inputs: Vec<TagId>,
     values: Vec<Option<f64>>,
     at: Duration,
     owed: Duration,
 }
 
-/// A tag with a simulation of its own.
+/// A tag with a `simulate` table.
 #[derive(Debug, Clone)]
-struct Moving {
+struct Signal {
     tag: TagId,
     how: Arc<Simulate>,
-    start: Mover,
-    mover: Mover,
-    /// What the registers said after the last step: if they say something else, somebody has written.
-    put: Option<f64>,
+    start: SignalGenerator,
+    generator: SignalGenerator,
+    /// The register value after the last step: a different one now was written by a master.
+    written: Option<f64>,
 }
 
 impl Models {
@@ -68,14 +68,14 @@ impl Models {
             let Some(how) = &tag.simulate else { continue };
             let idle = || how.motion.as_ref().and_then(|Motion { idle, .. }| *idle);
             let start = how.start.or_else(idle).or(models.value(tag.id)).unwrap_or(0.0);
-            let start = Mover::new(&tag.name, start);
-            let put = models.value(tag.id);
-            models.movings.push(Moving { tag: tag.id, how: how.clone(), mover: start.clone(), start, put });
-            models.asked.extend(how.sources());
+            let start = SignalGenerator::new(&tag.name, start);
+            let written = models.value(tag.id);
+            models.signals.push(Signal { tag: tag.id, how: how.clone(), generator: start.clone(), start, written });
+            models.inputs.extend(how.sources());
         }
-        models.asked.sort_unstable();
-        models.asked.dedup();
-        models.settle();
+        models.inputs.sort_unstable();
+        models.inputs.dedup();
+        models.initialise();
         models
     }
 
@@ -91,7 +91,7 @@ impl Models {
 
     /// Lets plant time pass. What is left over below one step is kept for the next call.
     pub fn advance(&mut self, dt: Duration) {
-        if self.movings.is_empty() {
+        if self.signals.is_empty() {
             return;
         }
         self.owed += dt;
@@ -117,17 +117,17 @@ impl Models {
         for slave in &mut self.devices {
             *slave = Slave::new(slave.device.restarted());
         }
-        let mut movings = std::mem::take(&mut self.movings);
-        for moving in &mut movings {
-            (moving.mover, moving.put) = (moving.start.clone(), self.value(moving.tag));
+        let mut signals = std::mem::take(&mut self.signals);
+        for signal in &mut signals {
+            (signal.generator, signal.written) = (signal.start.clone(), self.value(signal.tag));
         }
-        self.movings = movings;
-        self.settle();
+        self.signals = signals;
+        self.initialise();
     }
 
-    /// Lets what is made of others, and of others again, fit together before the first request.
-    fn settle(&mut self) {
-        for _ in 0..SETTLING_STEPS {
+    /// Computes derived values before the first request.
+    fn initialise(&mut self) {
+        for _ in 0..INITIAL_STEPS {
             self.step(Duration::ZERO);
         }
     }
@@ -136,22 +136,23 @@ impl Models {
     fn step(&mut self, dt: Duration) {
         self.at += dt;
         let step = Step { at: self.at, dt };
-        for place in 0..self.asked.len() {
-            let tag = self.asked[place];
+        for place in 0..self.inputs.len() {
+            let tag = self.inputs[place];
             self.values[tag.index()] = self.value(tag);
         }
-        let mut movings = std::mem::take(&mut self.movings);
-        for moving in &mut movings {
-            let found = self.value(moving.tag);
-            if let Some(written) = found.filter(|_| found != moving.put) {
-                moving.mover.exact = written;
+        let mut signals = std::mem::take(&mut self.signals);
+        for signal in &mut signals {
+            let found = self.value(signal.tag);
+            if let Some(changed) = found.filter(|_| found != signal.written) {
+                signal.generator.exact = changed;
             }
-            let shown = moving.mover.step(&moving.how, step, &|tag| self.values.get(tag.index()).copied().flatten());
-            self.set_value(moving.tag, shown);
-            self.values[moving.tag.index()] = Some(shown);
-            moving.put = self.value(moving.tag);
+            let shown =
+                signal.generator.step(&signal.how, step, &|tag| self.values.get(tag.index()).copied().flatten());
+            self.set_value(signal.tag, shown);
+            self.values[signal.tag.index()] = Some(shown);
+            signal.written = self.value(signal.tag);
         }
-        self.movings = movings;
+        self.signals = signals;
     }
 
     fn place(&self, tag: TagId) -> Option<usize> {

@@ -1,4 +1,4 @@
-//! How the simulated values of tags move, step by step. Pure: the time of a step and the other values are arguments.
+//! Generates the simulated values of tags, step by step. Pure: the time of a step and the other values are arguments.
 
 use std::time::Duration;
 
@@ -7,9 +7,9 @@ use crate::plant::{
     simulate::{Check, Motion, Operation, Pace, Simulate, Source, Test},
 };
 
-/// A moving value and what it must remember.
+/// Generates the value of one tag.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mover {
+pub struct SignalGenerator {
     /// The value without noise and without the grain of its register.
     pub exact: f64,
     /// Since when it has not been 0, for a pulse.
@@ -26,14 +26,14 @@ pub struct Step {
     pub dt: Duration,
 }
 
-impl Mover {
+impl SignalGenerator {
     /// A value at its start. Two tags of different names wander differently, one tag the same in every run.
-    pub fn new(name: &str, start: f64) -> Mover {
+    pub fn new(name: &str, start: f64) -> SignalGenerator {
         // FNV-1a.
         let seed = name.bytes().fold(0xCBF2_9CE4_8422_2325, |hash: u64, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3)
         });
-        Mover { exact: start, on_since: None, seed }
+        SignalGenerator { exact: start, on_since: None, seed }
     }
 
     /// Moves by one step; `values` tells the value of another tag. Returns what the registers show.
@@ -163,11 +163,11 @@ mod tests {
 
     /// The value after so many seconds in steps of 0.1 s, with A and B held.
     fn after(how: &Simulate, start: f64, seconds: u64, a: f64, b: f64) -> f64 {
-        let mut mover = Mover::new("D.T", start);
+        let mut generator = SignalGenerator::new("D.T", start);
         let dt = Duration::from_millis(100);
         (0..seconds * 10).fold(start, |_, count| {
             let step = Step { at: dt * count as u32, dt };
-            mover.step(how, step, &|tag| Some(if tag == A { a } else { b }))
+            generator.step(how, step, &|tag| Some(if tag == A { a } else { b }))
         })
     }
 
@@ -249,7 +249,7 @@ mod tests {
             let range = [low, low + width];
             let how = moving(motion(Source::Wander { range, period: Duration::from_secs(60) }));
             let step = Step { at: Duration::from_secs(at_s), dt: Duration::from_millis(100) };
-            let value = |_| Mover::new(&name, 0.0).step(&how, step, &|_| None);
+            let value = |_| SignalGenerator::new(&name, 0.0).step(&how, step, &|_| None);
             prop_assert!((low - 1e-9..=low + width + 1e-9).contains(&value(0)));
             prop_assert_eq!(value(0), value(1));
         }
@@ -262,7 +262,7 @@ mod tests {
         let noisy = Simulate { noise: 0.5, ..Simulate::default() };
         let step = |count: u64| Step { at: Duration::from_secs(count), dt: Duration::from_millis(100) };
         let values = |how: &Simulate| -> Vec<f64> {
-            (0..600).map(|count| Mover::new("D.T", 5.0).step(how, step(count), &|_| None)).collect()
+            (0..600).map(|count| SignalGenerator::new("D.T", 5.0).step(how, step(count), &|_| None)).collect()
         };
         let spread = |values: &[f64]| {
             (values.iter().copied().fold(f64::MAX, f64::min), values.iter().copied().fold(f64::MIN, f64::max))
