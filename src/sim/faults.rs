@@ -2,18 +2,18 @@
 
 pub mod place;
 pub mod process;
-pub mod story;
+pub mod description;
 pub mod values;
-pub mod word;
+pub mod syntax;
 
 use std::{collections::BTreeMap, time::Duration};
 
 use jiff::Timestamp;
 
 pub use self::{
+    description::Description,
     place::{Offer, Place, offers, refusal},
-    story::Story,
-    word::{Fault, Position, Target, Valve},
+    syntax::{Fault, Position, Target, Valve},
 };
 use super::{ascii, simulator::Simulator};
 use crate::{

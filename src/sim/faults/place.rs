@@ -1,8 +1,8 @@
 //! Where a fault is, by its name in the plant, and which faults can be there.
 
 use super::{
+    syntax::{Fault, Target},
     values::Values,
-    word::{Fault, Target},
 };
 use crate::plant::{
     PlantDef,

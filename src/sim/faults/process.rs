@@ -1,6 +1,6 @@
 //! What faults of the process do between the outputs of PLC and controller and the water.
 
-use super::word::{Fault, Position, Valve};
+use super::syntax::{Fault, Position, Valve};
 use crate::sim::tank::Actuators;
 
 /// The faults of the tank that are in force.

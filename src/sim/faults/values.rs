@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::word::Fault;
+use super::syntax::Fault;
 use crate::{
     bus::codec,
     plant::{

@@ -114,14 +114,14 @@ fn place_words(cx: &ViewContext, place: Place) -> String {
 /// Describes the selected fault above the comparison.
 fn told(cx: &ViewContext, status: &Status, place: Place, fault: Fault, canvas: &mut Canvas) {
     let (theme, room) = (cx.theme, canvas.width());
-    let story = fault.story();
+    let description = fault.description();
     let mut lines = vec![(format!("{}: {fault}", place.name(cx.def())), theme.strong())];
     let mut paragraph = |head: &str, text: &str| {
         lines.extend(wrap(&format!("{head}{text}"), room).into_iter().map(|line| (line, theme.normal())));
     };
-    paragraph("", story.what);
-    paragraph("ConfirmedValue: ", story.seen);
-    paragraph("Do: ", story.act);
+    paragraph("", description.cause);
+    paragraph("ConfirmedValue: ", description.symptoms);
+    paragraph("Do: ", description.response);
 
     let truth = compare(cx, status, place);
     let wanted = (truth.len() as u16 + 1).min(canvas.height().saturating_sub(lines.len() as u16 + 1));

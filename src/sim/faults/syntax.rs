@@ -1,4 +1,4 @@
-//! The words for what can go wrong: the same in a scenario file, on screen and here.
+//! The faults and their spelling, the same in a scenario file and on screen.
 
 use std::{fmt, str::FromStr, time::Duration};
 
@@ -83,7 +83,7 @@ pub struct Parameter {
 
 /// Why a text is no fault.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum WordError {
+pub enum FaultSyntaxError {
     /// No fault has this name.
     #[error("unknown fault `{0}`")]
     Unknown(String),
@@ -258,17 +258,17 @@ impl fmt::Display for Fault {
 }
 
 impl FromStr for Fault {
-    type Err = WordError;
+    type Err = FaultSyntaxError;
 
     /// A fault as [`Fault`] is displayed; a number that is left out is the usual one. Units may be left out but for a time.
-    fn from_str(text: &str) -> Result<Fault, WordError> {
+    fn from_str(text: &str) -> Result<Fault, FaultSyntaxError> {
         let text = text.trim();
         // The longest name first: `SV-1 stuck open` before any that it might begin with.
         let named = |fault: &&Fault| {
             text.strip_prefix(fault.word()).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
         };
         let fault = Fault::ALL.iter().filter(named).max_by_key(|fault| fault.word().len());
-        let Some(fault) = fault.copied() else { return Err(WordError::Unknown(text.to_owned())) };
+        let Some(fault) = fault.copied() else { return Err(FaultSyntaxError::Unknown(text.to_owned())) };
         let rest = text[fault.word().len()..].trim();
         if rest.is_empty() {
             return Ok(fault);
@@ -282,7 +282,7 @@ impl FromStr for Fault {
         };
         number
             .and_then(|number| fault.with(number))
-            .ok_or_else(|| WordError::Number { found: text.to_owned(), expected: fault.expected() })
+            .ok_or_else(|| FaultSyntaxError::Number { found: text.to_owned(), expected: fault.expected() })
     }
 }
 
