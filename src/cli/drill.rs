@@ -152,7 +152,7 @@ fn morning(def: &PlantDef) -> Timestamp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::faults::{Fault, Place, offers};
+    use crate::sim::faults::{Fault, FaultTarget, available_faults};
 
     fn drill(name: &str, with_operator: bool) -> (Verdict, Vec<String>) {
         let told = std::cell::RefCell::new(Vec::new());
@@ -178,10 +178,10 @@ mod tests {
         }
     }
 
-    /// A drill of this fault in this place from 0:40 to 2:40, with more to expect.
-    fn drill_of(place: &str, fault: &str, more: &str) -> (Verdict, Vec<String>) {
+    /// A drill of this fault in this target from 0:40 to 2:40, with more to expect.
+    fn drill_of(target: &str, fault: &str, more: &str) -> (Verdict, Vec<String>) {
         let text = format!(
-            "title = 't'\nplant = 'tank'\nduration = '4m'\n[[event]]\nat = '40s'\nfor = '2m'\nfault = '{fault}'\n{place}\n{more}"
+            "title = 't'\nplant = 'tank'\nduration = '4m'\n[[event]]\nat = '40s'\nfor = '2m'\nfault = '{fault}'\n{target}\n{more}"
         );
         let find = |plant: &str| profile::load(Path::new(plant), &Search::shipped());
         let (scenario, def) =
@@ -218,16 +218,16 @@ mod tests {
     fn what_an_operator_sees_of_each_fault_is_never_a_wrong_value() {
         let tank = profile::load(Path::new("tank"), &Search::shipped()).expect("the tank");
         let mut tried = 0;
-        for offer in offers(&tank) {
-            let name = offer.place.name(&tank);
-            let (place, device) = match offer.place {
-                Place::Line(_) => (format!("line = '{name}'"), ""),
-                Place::Unit(..) => (format!("device = '{name}'"), name.as_str()),
-                Place::Tag(_) | Place::Process => (String::new(), ""),
+        for available in available_faults(&tank) {
+            let name = available.target.name(&tank);
+            let (target, device) = match available.target {
+                FaultTarget::Line(_) => (format!("line = '{name}'"), ""),
+                FaultTarget::Unit(..) => (format!("device = '{name}'"), name.as_str()),
+                FaultTarget::Tag(_) | FaultTarget::Process => (String::new(), ""),
             };
             // What is stuck no master can know; the next test says so.
-            for fault in offer.faults.into_iter().filter(|fault| *fault != Fault::Stuck) {
-                let (verdict, told) = drill_of(&place, &fault.to_string(), &(seen(device, fault) + HONEST));
+            for fault in available.faults.into_iter().filter(|fault| *fault != Fault::Stuck) {
+                let (verdict, told) = drill_of(&target, &fault.to_string(), &(seen(device, fault) + HONEST));
                 let all = format!("{name} {fault}\n{}\n{}", told.join("\n"), verdict.lines().join("\n"));
                 assert!(verdict.over && verdict.passed(), "{all}");
                 tried += 1;

@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use super::{
-    faults::{Fault, InForce, Offer, Place},
+    faults::{AvailableFaults, Fault, FaultTarget, InForce},
     scenario::judge::{ActualValues, Verdict},
 };
 
@@ -11,9 +11,9 @@ use super::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SimCommand {
     /// This goes wrong, or goes wrong in another measure.
-    Set(Place, Fault),
+    Set(FaultTarget, Fault),
     /// This is mended, whatever its measure.
-    Clear(Place, Fault),
+    Clear(FaultTarget, Fault),
     /// All is well again.
     AllWell,
 }
@@ -21,8 +21,8 @@ pub enum SimCommand {
 /// The simulation as it stands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Status {
-    /// What can go wrong, by place.
-    pub offers: Arc<[Offer]>,
+    /// The faults that can be injected, by target.
+    pub available: Arc<[AvailableFaults]>,
     /// What is wrong.
     pub in_force: Vec<InForce>,
     /// Actual values by tag.
@@ -52,8 +52,8 @@ impl Status {
         !self.exam || self.scenario.as_ref().is_some_and(|progress| progress.verdict.over)
     }
 
-    /// The fault of this name that is in force in a place.
-    pub fn find(&self, place: Place, fault: Fault) -> Option<&InForce> {
-        self.in_force.iter().find(|in_force| in_force.place == place && in_force.fault.word() == fault.word())
+    /// The fault of this name that is in force in a target.
+    pub fn find(&self, target: FaultTarget, fault: Fault) -> Option<&InForce> {
+        self.in_force.iter().find(|in_force| in_force.target == target && in_force.fault.word() == fault.word())
     }
 }

@@ -1,6 +1,6 @@
 //! Faults on demand: which are in force where, and what leaves a device because of them.
 
-pub mod place;
+pub mod target;
 pub mod process;
 pub mod description;
 pub mod values;
@@ -12,8 +12,8 @@ use jiff::Timestamp;
 
 pub use self::{
     description::Description,
-    place::{Offer, Place, offers, refusal},
-    syntax::{Fault, Position, Target, Valve},
+    syntax::{Fault, Position, TargetKind, Valve},
+    target::{AvailableFaults, FaultTarget, available_faults, why_not_applicable},
 };
 use super::{ascii, simulator::Simulator};
 use crate::{
@@ -32,7 +32,7 @@ pub struct Faults {
     list: Vec<InForce>,
     units: BTreeMap<(LineId, u8), Values>,
     tags: BTreeMap<TagId, ((LineId, u8), Values)>,
-    memories: BTreeMap<Place, Memory>,
+    memories: BTreeMap<FaultTarget, Memory>,
     /// Messages on noisy lines so far: the same drill has the same noise.
     dice: u64,
 }
@@ -41,7 +41,7 @@ pub struct Faults {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct InForce {
     /// Where.
-    pub place: Place,
+    pub target: FaultTarget,
     /// What.
     pub fault: Fault,
     /// Since when.
@@ -80,54 +80,54 @@ impl Faults {
     }
 
     /// Puts a fault in force; one that it excludes ends.
-    pub fn set(&mut self, simulator: &mut Simulator, place: Place, fault: Fault, since: Timestamp) {
+    pub fn set(&mut self, simulator: &mut Simulator, target: FaultTarget, fault: Fault, since: Timestamp) {
         // The same fault with another number goes on: what is stuck stays.
-        let since = self.find(place, fault).map_or(since, |old| old.since);
-        self.list.retain(|old| old.place != place || !old.fault.excludes(fault));
-        self.list.push(InForce { place, fault, since });
-        self.list.sort_by_key(|in_force| in_force.place);
-        self.arrange(simulator, place, fault, true);
+        let since = self.find(target, fault).map_or(since, |old| old.since);
+        self.list.retain(|old| old.target != target || !old.fault.excludes(fault));
+        self.list.push(InForce { target, fault, since });
+        self.list.sort_by_key(|in_force| in_force.target);
+        self.arrange(simulator, target, fault, true);
     }
 
     /// Ends a fault, whatever its number.
-    pub fn clear(&mut self, simulator: &mut Simulator, place: Place, fault: Fault) {
-        self.list.retain(|old| old.place != place || old.fault.word() != fault.word());
-        self.arrange(simulator, place, fault, false);
+    pub fn clear(&mut self, simulator: &mut Simulator, target: FaultTarget, fault: Fault) {
+        self.list.retain(|old| old.target != target || old.fault.word() != fault.word());
+        self.arrange(simulator, target, fault, false);
     }
 
     /// All is well again.
     pub fn clear_all(&mut self, simulator: &mut Simulator) {
-        for InForce { place, fault, .. } in std::mem::take(&mut self.list) {
-            self.arrange(simulator, place, fault, false);
+        for InForce { target, fault, .. } in std::mem::take(&mut self.list) {
+            self.arrange(simulator, target, fault, false);
         }
     }
 
-    /// All that are in force, by place.
+    /// All that are in force, by target.
     pub fn list(&self) -> &[InForce] {
         &self.list
     }
 
-    fn find(&self, place: Place, fault: Fault) -> Option<&InForce> {
-        self.list.iter().find(|in_force| in_force.place == place && in_force.fault.word() == fault.word())
+    fn find(&self, target: FaultTarget, fault: Fault) -> Option<&InForce> {
+        self.list.iter().find(|in_force| in_force.target == target && in_force.fault.word() == fault.word())
     }
 
-    fn at(&self, place: Place, target: Target) -> impl Iterator<Item = Fault> {
-        self.list.iter().filter(move |f| f.place == place && f.fault.target() == target).map(|f| f.fault)
+    fn at(&self, target: FaultTarget, kind: TargetKind) -> impl Iterator<Item = Fault> {
+        self.list.iter().filter(move |f| f.target == target && f.fault.target_kind() == kind).map(|f| f.fault)
     }
 
     /// Carries a change into the process, and forgets what is no longer stuck.
-    fn arrange(&mut self, simulator: &mut Simulator, place: Place, fault: Fault, begins: bool) {
-        match (place, fault) {
+    fn arrange(&mut self, simulator: &mut Simulator, target: FaultTarget, fault: Fault, begins: bool) {
+        match (target, fault) {
             (_, Fault::Stuck) if !begins => {
-                self.memories.entry(place).or_default().let_go();
+                self.memories.entry(target).or_default().let_go();
             }
-            (Place::Unit(line, unit), Fault::SensorBurnout) if simulator.is_controller(line, unit) => {
+            (FaultTarget::Unit(line, unit), Fault::SensorBurnout) if simulator.is_controller(line, unit) => {
                 if let Some(rig) = simulator.rig_mut() {
                     rig.set_sensor_open(begins);
                 }
             }
-            (Place::Process, _) => {
-                let troubles = Troubles::of(self.at(Place::Process, Target::Process));
+            (FaultTarget::Process, _) => {
+                let troubles = Troubles::of(self.at(FaultTarget::Process, TargetKind::Process));
                 if let Some(rig) = simulator.rig_mut() {
                     rig.set_troubles(troubles);
                 }
@@ -136,7 +136,7 @@ impl Faults {
         }
     }
 
-    /// Lets the simulator answer a request, or the fault in its place. `None`: nothing comes back.
+    /// Answers a request, unless an active fault answers instead. `None`: nothing comes back.
     pub fn answer(&mut self, simulator: &mut Simulator, line: LineId, unit: u8, request: &[u8]) -> Option<Answer> {
         if self.hit(line).is_some() {
             simulator.spoiled(line);
@@ -170,22 +170,24 @@ impl Faults {
     }
 
     fn on_the_line(&self, line: LineId, unit: u8) -> Option<Fault> {
-        self.at(Place::Unit(line, unit), Target::Unit).next()
+        self.at(FaultTarget::Unit(line, unit), TargetKind::Unit).next()
     }
 
     fn spoil_values(&mut self, line: LineId, unit: u8, request: &[u8], mut pdu: Vec<u8>) -> Vec<u8> {
-        let places: Vec<Place> = self.list.iter().map(|in_force| in_force.place).collect();
-        let mut places = places;
-        places.dedup();
-        for place in places {
-            let values = match place {
-                Place::Unit(on, asked) if (on, asked) == (line, unit) => self.units.get(&(on, asked)),
-                Place::Tag(tag) => self.tags.get(&tag).filter(|(at, _)| *at == (line, unit)).map(|(_, values)| values),
-                Place::Unit(..) | Place::Line(_) | Place::Process => None,
+        let targets: Vec<FaultTarget> = self.list.iter().map(|in_force| in_force.target).collect();
+        let mut targets = targets;
+        targets.dedup();
+        for target in targets {
+            let values = match target {
+                FaultTarget::Unit(on, asked) if (on, asked) == (line, unit) => self.units.get(&(on, asked)),
+                FaultTarget::Tag(tag) => {
+                    self.tags.get(&tag).filter(|(at, _)| *at == (line, unit)).map(|(_, values)| values)
+                }
+                FaultTarget::Unit(..) | FaultTarget::Line(_) | FaultTarget::Process => None,
             };
-            let faults: Vec<Fault> = self.at(place, Target::Value).collect();
+            let faults: Vec<Fault> = self.at(target, TargetKind::Value).collect();
             if let (Some(values), false) = (values, faults.is_empty()) {
-                pdu = values.spoil(&faults, self.memories.entry(place).or_default(), request, pdu);
+                pdu = values.spoil(&faults, self.memories.entry(target).or_default(), request, pdu);
             }
         }
         pdu
@@ -193,7 +195,9 @@ impl Faults {
 
     /// Whether noise hits the next message on a line; the number says which bit.
     fn hit(&mut self, line: LineId) -> Option<u64> {
-        let Some(Fault::Noise(percent)) = self.at(Place::Line(line), Target::Line).next() else { return None };
+        let Some(Fault::Noise(percent)) = self.at(FaultTarget::Line(line), TargetKind::Line).next() else {
+            return None;
+        };
         self.dice += 1;
         let number = scatter(self.dice);
         (number % 100 < u64::from(percent)).then_some(number / 100)
@@ -262,8 +266,8 @@ impl Answer {
 }
 
 fn flip(frame: &mut [u8], which: u64, bits: u64) {
-    let place = (which / bits) as usize % frame.len().max(1);
-    if let Some(byte) = frame.get_mut(place) {
+    let index = (which / bits) as usize % frame.len().max(1);
+    if let Some(byte) = frame.get_mut(index) {
         *byte ^= 1 << (which % bits);
     }
 }

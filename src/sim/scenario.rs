@@ -11,7 +11,7 @@ pub mod read;
 
 use std::time::Duration;
 
-use super::faults::{Fault, Place};
+use super::faults::{Fault, FaultTarget};
 use crate::plant::{
     Snapshot,
     command::Command,
@@ -63,7 +63,7 @@ pub struct Event {
     /// When.
     pub at: Duration,
     /// Where.
-    pub place: Place,
+    pub target: FaultTarget,
     /// What.
     pub fault: Fault,
     /// `false`: it is mended.

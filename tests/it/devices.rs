@@ -21,7 +21,7 @@ use sightglass::{
     },
     profile::{self, Kind, Search},
     sim::{
-        faults::{Fault, Target},
+        faults::{Fault, TargetKind},
         io::{Service, SimulatorHandle, serve_stream},
         simulator::Simulator,
     },
@@ -37,7 +37,7 @@ use crate::support::folder;
 /// What a unit can do wrong on the wire. Each makes every value of the unit doubtful, and none of them wrong. An answer that
 /// is only late must be later than any shipped line waits.
 fn faults() -> impl Iterator<Item = Fault> {
-    let of_unit = Fault::ALL.into_iter().filter(|fault| fault.target() == Target::Unit);
+    let of_unit = Fault::ALL.into_iter().filter(|fault| fault.target_kind() == TargetKind::Unit);
     of_unit.map(|fault| if matches!(fault, Fault::Late(_)) { Fault::Late(Duration::from_secs(3)) } else { fault })
 }
 

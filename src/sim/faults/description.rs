@@ -49,7 +49,7 @@ impl Fault {
             ),
             Fault::Exception(_) => describe(
                 "The unit understands and refuses: no such register, busy, or its own failure.",
-                "Values are bad with the refusal as their cause. The unit counts as answering, so its alarm \"not answering\" \
+                "Values are bad with the why_not_applicable as their cause. The unit counts as answering, so its alarm \"not answering\" \
                  does not come.",
                 "Press w on a value and read why it is bad; the code says what the unit objects to.",
             ),

@@ -57,7 +57,7 @@ pub enum Position {
 
 /// What a fault is a fault of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Target {
+pub enum TargetKind {
     /// A serial line.
     Line,
     /// A unit on a line: what comes back, or does not.
@@ -145,16 +145,16 @@ impl Fault {
     }
 
     /// What it is a fault of.
-    pub fn target(self) -> Target {
+    pub fn target_kind(self) -> TargetKind {
         match self {
-            Fault::Noise(_) => Target::Line,
-            Fault::Silent | Fault::Late(_) | Fault::BadCrc | Fault::Cut | Fault::Exception(_) => Target::Unit,
-            Fault::Stuck | Fault::Torn | Fault::WordOrder | Fault::SensorBurnout => Target::Value,
+            Fault::Noise(_) => TargetKind::Line,
+            Fault::Silent | Fault::Late(_) | Fault::BadCrc | Fault::Cut | Fault::Exception(_) => TargetKind::Unit,
+            Fault::Stuck | Fault::Torn | Fault::WordOrder | Fault::SensorBurnout => TargetKind::Value,
             Fault::HeaterBurnout
             | Fault::ValveStuck(..)
             | Fault::Leak(_)
             | Fault::PumpFailed
-            | Fault::AgitatorFailed => Target::Process,
+            | Fault::AgitatorFailed => TargetKind::Process,
         }
     }
 
@@ -162,7 +162,10 @@ impl Fault {
     pub fn excludes(self, other: Fault) -> bool {
         match (self, other) {
             (Fault::ValveStuck(one, _), Fault::ValveStuck(two, _)) => one == two,
-            _ => self.word() == other.word() || (self.target() == Target::Unit && other.target() == Target::Unit),
+            _ => {
+                self.word() == other.word()
+                    || (self.target_kind() == TargetKind::Unit && other.target_kind() == TargetKind::Unit)
+            }
         }
     }
 

@@ -4,7 +4,7 @@ use super::*;
 use crate::{bus::frame::crc16, sim::rig::Rig};
 
 const L1: LineId = LineId(0);
-const TIC: Place = Place::Unit(L1, 1);
+const TIC: FaultTarget = FaultTarget::Unit(L1, 1);
 const READ_SV: [u8; 5] = [3, 0x03, 0xEA, 0, 1];
 const WRITE_SV: [u8; 5] = [6, 0x03, 0xEA, 0x01, 0xF4];
 const SINCE: Timestamp = Timestamp::UNIX_EPOCH;
@@ -86,7 +86,7 @@ fn the_same_answer_on_tcp() {
 fn noise_spoils_about_as_many_messages_as_it_says_and_always_the_same() {
     let spoiled = |percent| {
         let (mut simulator, mut faults) = simulator();
-        faults.set(&mut simulator, Place::Line(L1), Fault::Noise(percent), SINCE);
+        faults.set(&mut simulator, FaultTarget::Line(L1), Fault::Noise(percent), SINCE);
         let ask = |_| faults.answer(&mut simulator, L1, 1, &READ_SV).map(|answer| (answer.rtu(), answer.ascii()));
         (0..1_000).map(ask).collect::<Vec<_>>()
     };
@@ -110,10 +110,10 @@ fn a_later_fault_takes_the_place_of_one_that_it_excludes() {
         faults.set(&mut simulator, TIC, fault, SINCE);
     }
     assert_eq!(list(&faults), ["bad crc", "stuck value"]);
-    faults.set(&mut simulator, Place::Process, Fault::Leak(500), SINCE);
-    faults.set(&mut simulator, Place::Process, Fault::Leak(2_000), SINCE + jiff::SignedDuration::from_secs(9));
+    faults.set(&mut simulator, FaultTarget::Process, Fault::Leak(500), SINCE);
+    faults.set(&mut simulator, FaultTarget::Process, Fault::Leak(2_000), SINCE + jiff::SignedDuration::from_secs(9));
     assert_eq!(list(&faults), ["bad crc", "stuck value", "leak 2 l/min"]);
     assert_eq!(faults.list()[2].since, SINCE, "it is the same leak");
-    faults.clear(&mut simulator, Place::Process, Fault::Leak(1));
+    faults.clear(&mut simulator, FaultTarget::Process, Fault::Leak(1));
     assert_eq!(list(&faults), ["bad crc", "stuck value"]);
 }

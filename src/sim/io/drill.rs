@@ -20,7 +20,7 @@ use crate::{
     },
     sim::{
         drill::{Progress, SimCommand, Status},
-        faults::{Offer, offers},
+        faults::{AvailableFaults, available_faults},
         scenario::{
             Cue, Event, Scenario,
             judge::{Judge, Verdict},
@@ -110,8 +110,8 @@ impl Trainer {
         let began = self.simulator.clock().now();
         let judge = self.scenario.clone().map(|scenario| Judge::new(scenario, self.def.clone(), began));
         let cues = self.scenario.as_ref().map(|scenario| scenario.cues(self.operator.is_some())).unwrap_or_default();
-        let offers: Arc<[Offer]> = offers(&self.def).into();
-        let task = Task { cues: cues.into(), judge, began, offers, trainer: self, ordered: 0 };
+        let available: Arc<[AvailableFaults]> = available_faults(&self.def).into();
+        let task = Task { cues: cues.into(), judge, began, available, trainer: self, ordered: 0 };
         let (publish, status) = watch::channel(Arc::new(task.status(Vec::new(), Default::default(), began)));
         let work = tokio::spawn(task.run(inbox, publish));
         (Port { commands, status }, work)
@@ -123,7 +123,7 @@ struct Task {
     cues: std::collections::VecDeque<Cue>,
     judge: Option<Judge>,
     began: Timestamp,
-    offers: Arc<[Offer]>,
+    available: Arc<[AvailableFaults]>,
     ordered: u32,
 }
 
@@ -186,8 +186,8 @@ impl Task {
 
     async fn perform(&mut self, cue: Cue) {
         match cue {
-            Cue::Event(Event { place, fault, begins: true, .. }) => self.trainer.simulator.set(place, fault).await,
-            Cue::Event(Event { place, fault, begins: false, .. }) => self.trainer.simulator.clear(place, fault).await,
+            Cue::Event(Event { target, fault, begins: true, .. }) => self.trainer.simulator.set(target, fault).await,
+            Cue::Event(Event { target, fault, begins: false, .. }) => self.trainer.simulator.clear(target, fault).await,
             Cue::Deed(deed) => {
                 let Some(orders) = &self.trainer.operator else { return };
                 let snapshot = self.trainer.snapshots.borrow().clone();
@@ -205,8 +205,8 @@ impl Task {
 
     async fn apply_command(&self, command: SimCommand) {
         match command {
-            SimCommand::Set(place, fault) => self.trainer.simulator.set(place, fault).await,
-            SimCommand::Clear(place, fault) => self.trainer.simulator.clear(place, fault).await,
+            SimCommand::Set(target, fault) => self.trainer.simulator.set(target, fault).await,
+            SimCommand::Clear(target, fault) => self.trainer.simulator.clear(target, fault).await,
             SimCommand::AllWell => self.trainer.simulator.all_well().await,
         }
     }
@@ -222,7 +222,7 @@ impl Task {
             let Scenario { about, duration, .. } = &**judge.scenario();
             Progress { about: about.clone(), elapsed, duration: *duration, verdict: judge.verdict() }
         });
-        Status { offers: self.offers.clone(), in_force, actual, exam: self.trainer.exam, scenario }
+        Status { available: self.available.clone(), in_force, actual, exam: self.trainer.exam, scenario }
     }
 }
 

@@ -12,7 +12,7 @@ use crate::{
         def::{LineId, TagId},
     },
     sim::{
-        faults::{Answer, Fault, Faults, InForce, Place},
+        faults::{Answer, Fault, FaultTarget, Faults, InForce},
         ground_truth::GroundTruth,
         rig::{Rig, RigState},
         scenario::judge::ActualValues,
@@ -67,8 +67,8 @@ enum SimRequest {
 
 #[derive(Debug)]
 enum Told {
-    Fault(Place, Fault),
-    Mended(Place, Fault),
+    Fault(FaultTarget, Fault),
+    Mended(FaultTarget, Fault),
     AllWell,
     SensorOpen(bool),
     Switch(u16, bool),
@@ -117,17 +117,17 @@ impl SimulatorHandle {
 
     /// Makes a unit of a line faulty.
     pub async fn set_fault(&self, line: LineId, unit: u8, fault: Fault) {
-        self.set(Place::Unit(line, unit), fault).await;
+        self.set(FaultTarget::Unit(line, unit), fault).await;
     }
 
     /// Lets something go wrong; a fault that it excludes ends.
-    pub async fn set(&self, place: Place, fault: Fault) {
-        self.tell(Told::Fault(place, fault)).await;
+    pub async fn set(&self, target: FaultTarget, fault: Fault) {
+        self.tell(Told::Fault(target, fault)).await;
     }
 
     /// Ends a fault, whatever its number.
-    pub async fn clear(&self, place: Place, fault: Fault) {
-        self.tell(Told::Mended(place, fault)).await;
+    pub async fn clear(&self, target: FaultTarget, fault: Fault) {
+        self.tell(Told::Mended(target, fault)).await;
     }
 
     /// Ends every fault.
@@ -267,8 +267,8 @@ fn handle_request(
 /// Requests to the rig do nothing on a simulator without one.
 fn follow(simulator: &mut Simulator, faults: &mut Faults, now: Timestamp, told: Told) {
     match told {
-        Told::Fault(place, fault) => faults.set(simulator, place, fault, now),
-        Told::Mended(place, fault) => faults.clear(simulator, place, fault),
+        Told::Fault(target, fault) => faults.set(simulator, target, fault, now),
+        Told::Mended(target, fault) => faults.clear(simulator, target, fault),
         Told::AllWell => faults.clear_all(simulator),
         Told::SensorOpen(open) => {
             if let Some(rig) = simulator.rig_mut() {

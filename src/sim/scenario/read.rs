@@ -16,7 +16,7 @@ use crate::{
         diagnostic::{Problems, Span},
         reader::{self, At, Choice, Node, Value, table, text, words},
     },
-    sim::faults::{Fault, Place, refusal},
+    sim::faults::{Fault, FaultTarget, why_not_applicable},
 };
 
 table!(
@@ -192,11 +192,12 @@ fn scenario(name: &str, table: &ScenarioTable, def: &PlantDef, problems: &mut Pr
 
 /// The beginning of a fault and, if it lasts for a time, its end.
 fn events(table: &EventTable, duration: Duration, def: &PlantDef, problems: &mut Problems) -> Vec<Event> {
-    let place = place(table, def, problems);
-    let (Some(at), Some(fault), Some(place)) = (in_time(table.at_time, duration, problems), table.fault, place) else {
+    let target = target(table, def, problems);
+    let (Some(at), Some(fault), Some(target)) = (in_time(table.at_time, duration, problems), table.fault, target)
+    else {
         return Vec::new();
     };
-    if let Some(why) = refusal(def, place, fault.value) {
+    if let Some(why) = why_not_applicable(def, target, fault.value) {
         problems.add(fault.at, why).label("cannot be there");
         return Vec::new();
     }
@@ -204,26 +205,26 @@ fn events(table: &EventTable, duration: Duration, def: &PlantDef, problems: &mut
     if let (false, Some(lasts)) = (begins, table.lasts) {
         problems.add(lasts.at, "what is mended does not last").label("leave out `for` or `mended`");
     }
-    let first = Event { at, place, fault: fault.value, begins };
+    let first = Event { at, target, fault: fault.value, begins };
     let end = table.lasts.map(|lasts| Event { at: at + lasts.value, begins: false, ..first });
     [Some(first), end].into_iter().flatten().collect()
 }
 
-fn place(table: &EventTable, def: &PlantDef, problems: &mut Problems) -> Option<Place> {
+fn target(table: &EventTable, def: &PlantDef, problems: &mut Problems) -> Option<FaultTarget> {
     match (&table.line, &table.device, &table.tag) {
         (Some(name), None, None) => {
             let line = def.lines.iter().find(|line| line.name == name.value);
             let known = def.lines.iter().map(|line| line.name.as_str());
-            unknown(line.map(|line| Place::Line(line.id)), "line", name, known, problems)
+            unknown(line.map(|line| FaultTarget::Line(line.id)), "line", name, known, problems)
         }
         (None, Some(name), None) => {
             let device = def.devices.iter().find(|device| device.name == name.value);
             let known = def.devices.iter().map(|device| device.name.as_str());
-            unknown(device.map(Place::of), "device", name, known, problems)
+            unknown(device.map(FaultTarget::of), "device", name, known, problems)
         }
-        (None, None, Some(name)) => tag(name, def, problems).map(Place::Tag),
+        (None, None, Some(name)) => tag(name, def, problems).map(FaultTarget::Tag),
         (None, None, None) => match table.fault {
-            Some(fault) if Place::Process.takes(fault.value) => Some(Place::Process),
+            Some(fault) if FaultTarget::Process.accepts(fault.value) => Some(FaultTarget::Process),
             Some(fault) => {
                 let problem = problems.add(table.at, format!("where is `{}`?", fault.value));
                 problem.label("expected `line`, `device` or `tag`");
@@ -233,7 +234,7 @@ fn place(table: &EventTable, def: &PlantDef, problems: &mut Problems) -> Option<
         },
         (_, second, third) => {
             let at = third.as_ref().or(second.as_ref()).map_or(table.at, |name| name.at);
-            problems.add(at, "a fault is in one place").label("keep one of `line`, `device`, `tag`");
+            problems.add(at, "a fault has one target").label("keep one of `line`, `device`, `tag`");
             None
         }
     }

@@ -13,7 +13,7 @@ use ratatui::{Frame, layout::Rect};
 use crate::{
     sim::{
         drill::{SimCommand, Status},
-        faults::{Fault, Place},
+        faults::{Fault, FaultTarget},
     },
     ui::{
         Effect, UiAction, ViewContext,
@@ -30,7 +30,7 @@ pub struct Faults {
     /// Which row is selected; headings are not counted.
     selected: usize,
     /// Numbers chosen for faults that are not in force.
-    numbers: BTreeMap<(Place, &'static str), Fault>,
+    numbers: BTreeMap<(FaultTarget, &'static str), Fault>,
     /// The points of the drill are shown instead of the fault told.
     verdict: bool,
 }
@@ -42,8 +42,8 @@ pub enum Action {
     Up,
     /// Select the row below.
     Down,
-    /// Select the first row of the next place.
-    NextPlace,
+    /// Select the first row of the next target.
+    NextTarget,
     /// Let it go wrong, or mend it.
     Toggle,
     /// Less of it.
@@ -64,7 +64,7 @@ pub const KEYS: &[Key<Action>] = &[
         chord: code(KeyCode::PageDown),
         label: "",
         help: "select the next line, unit or the process",
-        action: Action::NextPlace,
+        action: Action::NextTarget,
     },
     Key { chord: code(KeyCode::Enter), label: "on/off", help: "let it go wrong, or mend it", action: Action::Toggle },
     Key { chord: code(KeyCode::Left), label: "", help: "less of it, where it has a number", action: Action::Less },
@@ -83,26 +83,26 @@ impl Faults {
     pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         let Some(status) = open(cx) else { return Vec::new() };
         let rows = rows(status);
-        let Some((place, offered)) = rows.get(self.selected.min(rows.len().saturating_sub(1))).copied() else {
+        let Some((target, offered)) = rows.get(self.selected.min(rows.len().saturating_sub(1))).copied() else {
             return Vec::new();
         };
-        let fault = self.number(status, place, offered);
-        let in_force = status.find(place, fault).is_some();
+        let fault = self.number(status, target, offered);
+        let in_force = status.find(target, fault).is_some();
         match action {
             Action::Up => self.selected = self.selected.min(rows.len()).saturating_sub(1),
             Action::Down => self.selected = (self.selected + 1).min(rows.len() - 1),
-            Action::NextPlace => {
+            Action::NextTarget => {
                 self.selected =
-                    rows.iter().skip(self.selected).position(|row| row.0 != place).map_or(0, |by| self.selected + by);
+                    rows.iter().skip(self.selected).position(|row| row.0 != target).map_or(0, |by| self.selected + by);
             }
-            Action::Toggle if in_force => return cleared(cx, SimCommand::Clear(place, fault)),
-            Action::Toggle => return send(SimCommand::Set(place, fault)),
+            Action::Toggle if in_force => return cleared(cx, SimCommand::Clear(target, fault)),
+            Action::Toggle => return send(SimCommand::Set(target, fault)),
             Action::Less | Action::More => {
                 let other = fault.step(action == Action::More);
-                self.numbers.insert((place, fault.word()), other);
+                self.numbers.insert((target, fault.word()), other);
                 // What is in force changes at once.
                 if in_force && other != fault {
-                    return send(SimCommand::Set(place, other));
+                    return send(SimCommand::Set(target, other));
                 }
             }
             Action::AllWell => return cleared(cx, SimCommand::AllWell),
@@ -115,17 +115,17 @@ impl Faults {
     pub fn drawn_rows(&self, cx: &ViewContext) -> Rows {
         let Some(status) = open(cx) else { return Rows::default() };
         let rows = rows(status);
-        let seen = |(place, fault): &(Place, Fault)| {
-            (format!("{place:?}"), fault.word(), status.find(*place, *fault).is_some())
+        let seen = |(target, fault): &(FaultTarget, Fault)| {
+            (format!("{target:?}"), fault.word(), status.find(*target, *fault).is_some())
         };
         Rows::of(rows.iter().map(seen), self.selected.min(rows.len().saturating_sub(1)))
     }
 
     /// The fault with the number it has, or would have.
-    fn number(&self, status: &Status, place: Place, offered: Fault) -> Fault {
-        match status.find(place, offered) {
+    fn number(&self, status: &Status, target: FaultTarget, offered: Fault) -> Fault {
+        match status.find(target, offered) {
             Some(in_force) => in_force.fault,
-            None => self.numbers.get(&(place, offered.word())).copied().unwrap_or(offered),
+            None => self.numbers.get(&(target, offered.word())).copied().unwrap_or(offered),
         }
     }
 
@@ -147,8 +147,12 @@ fn open<'a>(cx: &ViewContext<'a>) -> Option<&'a Status> {
     cx.drill.filter(|status| status.is_open())
 }
 
-fn rows(status: &Status) -> Vec<(Place, Fault)> {
-    status.offers.iter().flat_map(|offer| offer.faults.iter().map(|fault| (offer.place, *fault))).collect()
+fn rows(status: &Status) -> Vec<(FaultTarget, Fault)> {
+    status
+        .available
+        .iter()
+        .flat_map(|available| available.faults.iter().map(|fault| (available.target, *fault)))
+        .collect()
 }
 
 /// A silent device may answer again: it is asked at once, if the present user may do that.

@@ -8,7 +8,7 @@ use crate::{
     plant::def::LineId,
     sim::{
         drill::{Progress, SimCommand, Status},
-        faults::{Fault, InForce, Offer, Place, Target},
+        faults::{AvailableFaults, Fault, FaultTarget, InForce, TargetKind},
         scenario::judge::{Row, Standing, Verdict},
     },
     ui::{
@@ -22,21 +22,21 @@ use crate::{
 };
 
 const L1: LineId = LineId(0);
-const TIC: Place = Place::Unit(L1, 1);
+const TIC: FaultTarget = FaultTarget::Unit(L1, 1);
 
 /// TIC-1 is silent and TK-1 leaks; the screen does not know yet that the valve is open.
 fn status(fixture: &Fixture) -> Status {
-    let of = |place: Place| {
-        let faults = Fault::ALL.into_iter().filter(|fault| place.takes(*fault)).collect();
-        Offer { place, faults }
+    let of = |target: FaultTarget| {
+        let faults = Fault::ALL.into_iter().filter(|fault| target.accepts(*fault)).collect();
+        AvailableFaults { target, faults }
     };
     let since = fixture::now() - SignedDuration::from_secs(42);
     let actual = [("TIC-1.PV", 68.0), ("PLC-1.LT-1", 22.0), ("PLC-1.SV-2", 1.0), ("PLC-1.POWER", 670.0)];
     Status {
-        offers: [Place::Line(L1), TIC, Place::Unit(L1, 2), Place::Process].map(of).into(),
+        available: [FaultTarget::Line(L1), TIC, FaultTarget::Unit(L1, 2), FaultTarget::Process].map(of).into(),
         in_force: vec![
-            InForce { place: TIC, fault: Fault::Silent, since },
-            InForce { place: Place::Process, fault: Fault::Leak(500), since },
+            InForce { target: TIC, fault: Fault::Silent, since },
+            InForce { target: FaultTarget::Process, fault: Fault::Leak(500), since },
         ],
         actual: actual.into_iter().map(|(name, value)| (fixture.tag(name), value)).collect(),
         exam: false,
@@ -96,14 +96,14 @@ fn press(model: &mut Model, keys: &str) -> Vec<SimCommand> {
 fn faults_go_on_and_off_by_enter_with_their_numbers() {
     let fixture = Fixture::normal();
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
-    assert_eq!(press(&mut model, "⏎"), [SimCommand::Set(Place::Line(L1), Fault::Noise(10))]);
-    assert_eq!(press(&mut model, "→→⏎"), [SimCommand::Set(Place::Line(L1), Fault::Noise(50))]);
+    assert_eq!(press(&mut model, "⏎"), [SimCommand::Set(FaultTarget::Line(L1), Fault::Noise(10))]);
+    assert_eq!(press(&mut model, "→→⏎"), [SimCommand::Set(FaultTarget::Line(L1), Fault::Noise(50))]);
     assert_eq!(press(&mut model, "↓⏎"), [SimCommand::Clear(TIC, Fault::Silent)], "what is on goes off");
     let late = Fault::Late(Duration::from_secs(1));
     assert_eq!(press(&mut model, "↓←⏎"), [SimCommand::Set(TIC, late)], "a number is set before it is on");
     assert_eq!(press(&mut model, "m"), [SimCommand::AllWell]);
     assert_eq!(press(&mut model, "↑↑↑↑↑"), []);
-    assert_eq!(press(&mut model, "⏎"), [SimCommand::Set(Place::Line(L1), Fault::Noise(50))]);
+    assert_eq!(press(&mut model, "⏎"), [SimCommand::Set(FaultTarget::Line(L1), Fault::Noise(50))]);
 }
 
 #[test]
@@ -131,7 +131,7 @@ fn a_fault_is_switched_only_as_it_was_drawn() {
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
     // Another operator of the demonstration sets it first: Enter, meant to set it, would clear it.
     let mut set = status(&fixture);
-    set.in_force.push(InForce { place: Place::Line(L1), fault: Fault::Noise(10), since: fixture::now() });
+    set.in_force.push(InForce { target: FaultTarget::Line(L1), fault: Fault::Noise(10), since: fixture::now() });
     let set = |model: &mut Model| drop(update(model, Msg::Drill(Arc::new(set))));
     acts_only_on_what_was_drawn(&mut model, set, "⏎");
 }
@@ -141,12 +141,14 @@ fn the_number_of_a_fault_in_force_changes_at_once() {
     let fixture = Fixture::normal();
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
     let leak = Fault::ALL.into_iter().position(|fault| matches!(fault, Fault::Leak(_))).expect("a leak");
-    let process =
-        Fault::ALL.into_iter().position(|fault| fault.target() == Target::Process).expect("faults of the process");
+    let process = Fault::ALL
+        .into_iter()
+        .position(|fault| fault.target_kind() == TargetKind::Process)
+        .expect("faults of the process");
     let units = 2 * (process - 1);
     press(&mut model, &"↓".repeat(1 + units + leak - process));
-    assert_eq!(press(&mut model, "→"), [SimCommand::Set(Place::Process, Fault::Leak(1_000))]);
-    assert_eq!(press(&mut model, "←"), [SimCommand::Set(Place::Process, Fault::Leak(200))]);
+    assert_eq!(press(&mut model, "→"), [SimCommand::Set(FaultTarget::Process, Fault::Leak(1_000))]);
+    assert_eq!(press(&mut model, "←"), [SimCommand::Set(FaultTarget::Process, Fault::Leak(200))]);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Draws the faults: a list by place, the selected one described, and actual beside displayed values.
+//! Draws the faults: a list by target, the selected one described, and actual beside displayed values.
 
 use ratatui::{Frame, layout::Rect, style::Style};
 
@@ -7,7 +7,7 @@ use crate::{
     plant::{def::TagId, tag::Poll},
     sim::{
         drill::{Progress, Status},
-        faults::{Fault, Place, place::device_at},
+        faults::{Fault, FaultTarget, target::device_at},
         scenario::judge::Standing,
     },
     ui::{
@@ -45,8 +45,8 @@ pub(super) fn view(tab: &Faults, cx: &ViewContext, frame: &mut Frame, area: Rect
     }
     let mut side = canvas.part(LIST + 2, top, area.width.saturating_sub(LIST + 3), height);
     let all = rows(status);
-    if let Some((place, offered)) = all.get(tab.selected.min(all.len().saturating_sub(1))) {
-        told(cx, status, *place, tab.number(status, *place, *offered), &mut side);
+    if let Some((target, offered)) = all.get(tab.selected.min(all.len().saturating_sub(1))) {
+        told(cx, status, *target, tab.number(status, *target, *offered), &mut side);
     }
 }
 
@@ -60,20 +60,20 @@ fn heading(cx: &ViewContext, progress: &Progress, canvas: &mut Canvas) {
     canvas.text_right(canvas.width().saturating_sub(1), 0, &right, style);
 }
 
-/// All faults by place; the selected row is always in sight.
+/// All faults by target; the selected row is always in sight.
 fn list(tab: &Faults, cx: &ViewContext, status: &Status, canvas: &mut Canvas) {
     let mut lines: Vec<(String, String, Style, bool)> = Vec::new();
     let (mut number, mut selected_line) = (0, 0);
     let last = rows(status).len().saturating_sub(1);
-    for offer in status.offers.iter() {
-        lines.push((place_words(cx, offer.place), String::new(), cx.theme.dim(), false));
-        for fault in &offer.faults {
+    for available in status.available.iter() {
+        lines.push((target_label(cx, available.target), String::new(), cx.theme.dim(), false));
+        for fault in &available.faults {
             let selected = number == tab.selected.min(last);
             if selected {
                 selected_line = lines.len();
             }
-            let in_force = status.find(offer.place, *fault);
-            let name = tab.number(status, offer.place, *fault).to_string();
+            let in_force = status.find(available.target, *fault);
+            let name = tab.number(status, available.target, *fault).to_string();
             let (state, style) = match in_force {
                 Some(in_force) => (format!("ON {}", running(between(in_force.since, cx.now))), cx.theme.trouble()),
                 None => ("off".to_owned(), cx.theme.normal()),
@@ -101,21 +101,21 @@ fn list(tab: &Faults, cx: &ViewContext, status: &Status, canvas: &mut Canvas) {
     }
 }
 
-fn place_words(cx: &ViewContext, place: Place) -> String {
-    let name = place.name(cx.def());
-    match place {
-        Place::Line(_) => format!("{name} line"),
-        Place::Unit(line, unit) => format!("{name} unit {unit} on {}", cx.def().line(line).name),
-        Place::Tag(_) => name,
-        Place::Process => "process".to_owned(),
+fn target_label(cx: &ViewContext, target: FaultTarget) -> String {
+    let name = target.name(cx.def());
+    match target {
+        FaultTarget::Line(_) => format!("{name} line"),
+        FaultTarget::Unit(line, unit) => format!("{name} unit {unit} on {}", cx.def().line(line).name),
+        FaultTarget::Tag(_) => name,
+        FaultTarget::Process => "process".to_owned(),
     }
 }
 
 /// Describes the selected fault above the comparison.
-fn told(cx: &ViewContext, status: &Status, place: Place, fault: Fault, canvas: &mut Canvas) {
+fn told(cx: &ViewContext, status: &Status, target: FaultTarget, fault: Fault, canvas: &mut Canvas) {
     let (theme, room) = (cx.theme, canvas.width());
     let description = fault.description();
-    let mut lines = vec![(format!("{}: {fault}", place.name(cx.def())), theme.strong())];
+    let mut lines = vec![(format!("{}: {fault}", target.name(cx.def())), theme.strong())];
     let mut paragraph = |head: &str, text: &str| {
         lines.extend(wrap(&format!("{head}{text}"), room).into_iter().map(|line| (line, theme.normal())));
     };
@@ -123,7 +123,7 @@ fn told(cx: &ViewContext, status: &Status, place: Place, fault: Fault, canvas: &
     paragraph("ConfirmedValue: ", description.symptoms);
     paragraph("Do: ", description.response);
 
-    let truth = compare(cx, status, place);
+    let truth = compare(cx, status, target);
     let wanted = (truth.len() as u16 + 1).min(canvas.height().saturating_sub(lines.len() as u16 + 1));
     let below = wanted.max(TRUTH_MIN + 1).min(truth.len() as u16 + 1).min(canvas.height() / 2);
     let above = canvas.height().saturating_sub(below);
@@ -155,12 +155,12 @@ enum TruthComparison {
     Same,
 }
 
-/// The tags of a place with their truth, the most dangerous first.
-fn compare(cx: &ViewContext, status: &Status, place: Place) -> Vec<Compared> {
-    let device = match place {
-        Place::Unit(line, unit) => device_at(cx.def(), line, unit).map(|device| device.id),
-        Place::Tag(tag) => Some(cx.def().tag(tag).device),
-        Place::Line(_) | Place::Process => None,
+/// The tags of a target with their truth, the most dangerous first.
+fn compare(cx: &ViewContext, status: &Status, target: FaultTarget) -> Vec<Compared> {
+    let device = match target {
+        FaultTarget::Unit(line, unit) => device_at(cx.def(), line, unit).map(|device| device.id),
+        FaultTarget::Tag(tag) => Some(cx.def().tag(tag).device),
+        FaultTarget::Line(_) | FaultTarget::Process => None,
     };
     let of_place = |tag: TagId| {
         let def = cx.def().tag(tag);
