@@ -408,7 +408,7 @@ fn of_a_storm_none_is_lost_and_the_first_out_is_marked() {
 
 /// One thing that happens in the property test.
 #[derive(Debug, Clone)]
-enum Happening {
+enum TestEvent {
     Passes(i64),
     Value(Option<f64>),
     Enabled(Option<bool>),
@@ -422,20 +422,20 @@ enum Happening {
     Restart,
 }
 
-fn happening() -> impl Strategy<Value = Happening> {
+fn test_event() -> impl Strategy<Value = TestEvent> {
     prop_oneof![
-        4 => (0i64..40).prop_map(Happening::Passes),
-        1 => (-5_000i64..5_000).prop_map(Happening::Passes),
-        5 => proptest::option::weighted(0.9, 70.0..80.0f64).prop_map(Happening::Value),
-        2 => proptest::option::of(any::<bool>()).prop_map(Happening::Enabled),
-        3 => Just(Happening::Acknowledge),
-        1 => Just(Happening::Silence),
-        2 => Just(Happening::Reset),
-        2 => (0u64..2_000).prop_map(Happening::Shelve),
-        1 => Just(Happening::Unshelve),
-        1 => Just(Happening::OutOfService),
-        1 => Just(Happening::InService),
-        2 => Just(Happening::Restart),
+        4 => (0i64..40).prop_map(TestEvent::Passes),
+        1 => (-5_000i64..5_000).prop_map(TestEvent::Passes),
+        5 => proptest::option::weighted(0.9, 70.0..80.0f64).prop_map(TestEvent::Value),
+        2 => proptest::option::of(any::<bool>()).prop_map(TestEvent::Enabled),
+        3 => Just(TestEvent::Acknowledge),
+        1 => Just(TestEvent::Silence),
+        2 => Just(TestEvent::Reset),
+        2 => (0u64..2_000).prop_map(TestEvent::Shelve),
+        1 => Just(TestEvent::Unshelve),
+        1 => Just(TestEvent::OutOfService),
+        1 => Just(TestEvent::InService),
+        2 => Just(TestEvent::Restart),
     ]
 }
 
@@ -463,7 +463,7 @@ proptest! {
         latch in any::<bool>(),
         designed in any::<bool>(),
         delay in 0u64..20,
-        happenings in proptest::collection::vec(happening(), 1..120),
+        test_events in proptest::collection::vec(test_event(), 1..120),
     ) {
         let manner = |alarm: &mut AlarmDef| {
             (alarm.latch, alarm.on_delay) = (latch, Duration::from_secs(delay));
@@ -473,32 +473,32 @@ proptest! {
         let mut book = Book::new(def.clone());
         let (mut now, mut value, mut enabled) = (100_000, Some(70.0), Some(true));
         let mut journal: Vec<AlarmRecord> = Vec::new();
-        for happening in happenings {
+        for test_event in test_events {
             let (before, sounded, known) = (book.machine(HIGH).clone(), book.lists().sound, journal.len());
             let by = by();
-            match happening.clone() {
-                Happening::Passes(seconds) => now = (now + seconds).max(0),
-                Happening::Value(next) => value = next,
-                Happening::Enabled(next) => enabled = next,
-                Happening::Acknowledge => {
+            match test_event.clone() {
+                TestEvent::Passes(seconds) => now = (now + seconds).max(0),
+                TestEvent::Value(next) => value = next,
+                TestEvent::Enabled(next) => enabled = next,
+                TestEvent::Acknowledge => {
                     let seen = before.annunciated_at.unwrap_or(at(0));
                     let done = book.acknowledge(HIGH, seen, None, at(now), &by);
                     prop_assert_eq!(done.is_ok(), before.state().needs_acknowledgement());
                     journal.extend(done);
                 }
-                Happening::Silence => { book.silence(); }
-                Happening::Reset => {
+                TestEvent::Silence => { book.silence(); }
+                TestEvent::Reset => {
                     let done = book.reset(HIGH, at(now), &by);
                     prop_assert!(done.is_err() || !before.is_active(), "a reset while the cause lasts");
                     journal.extend(done);
                 }
-                Happening::Shelve(seconds) => {
+                TestEvent::Shelve(seconds) => {
                     journal.extend(book.shelve(HIGH, Duration::from_secs(seconds), Some(&why()), at(now), &by));
                 }
-                Happening::Unshelve => journal.extend(book.unshelve(HIGH, value, at(now), &by).into_iter().flatten()),
-                Happening::OutOfService => journal.extend(book.out_of_service(HIGH, Some(&why()), at(now), &by)),
-                Happening::InService => journal.extend(book.in_service(HIGH, value, at(now), &by).into_iter().flatten()),
-                Happening::Restart => {
+                TestEvent::Unshelve => journal.extend(book.unshelve(HIGH, value, at(now), &by).into_iter().flatten()),
+                TestEvent::OutOfService => journal.extend(book.out_of_service(HIGH, Some(&why()), at(now), &by)),
+                TestEvent::InService => journal.extend(book.in_service(HIGH, value, at(now), &by).into_iter().flatten()),
+                TestEvent::Restart => {
                     let mut again = Book::new(def.clone());
                     again.restore(&remembered(&journal));
                     prop_assert_eq!(lasting(&again), lasting(&book));
@@ -516,7 +516,7 @@ proptest! {
             let (machine, new) = (book.machine(HIGH), &journal[known..]);
             let raised = new.iter().any(|step| matches!(step.step, AlarmStep::Raised | AlarmStep::RaisedAgain));
             // Who is told is told once, and only where something was raised in the open.
-            prop_assert!(!book.lists().sound || sounded || raised, "it sounds for nothing: {:?}", happening);
+            prop_assert!(!book.lists().sound || sounded || raised, "it sounds for nothing: {:?}", test_event);
             prop_assert!(!(machine.state().is_aside() && book.lists().sound));
             let shown = book.active().iter().any(|alarm| alarm.id == HIGH);
             let aside = book.lists().aside.iter().any(|alarm| alarm.id == HIGH);

@@ -233,14 +233,14 @@ fn a_programme_waits_in_standby() {
 }
 
 /// A tank that warms by 0.07 °C/s at full output and cools by 0.005 °C/s, seen late.
-struct Kettle {
+struct FirstOrderTank {
     water_c: f64,
     late: std::collections::VecDeque<f64>,
 }
 
-impl Kettle {
-    fn at(water_c: f64, late_s: usize) -> Kettle {
-        Kettle { water_c, late: std::collections::VecDeque::from(vec![water_c; 2 * late_s]) }
+impl FirstOrderTank {
+    fn at(water_c: f64, late_s: usize) -> FirstOrderTank {
+        FirstOrderTank { water_c, late: std::collections::VecDeque::from(vec![water_c; 2 * late_s]) }
     }
 
     fn sample(&mut self, pxr: &mut Pxr) -> f64 {
@@ -254,9 +254,9 @@ impl Kettle {
 
 #[test]
 fn self_tuning_learns_from_the_approach_and_holds_sv() {
-    let (pxr, kettle) = (&mut Pxr::new(27.0), &mut Kettle::at(27.0, 15));
+    let (pxr, tank) = (&mut Pxr::new(27.0), &mut FirstOrderTank::at(27.0, 15));
     write(pxr, 1001, 2);
-    let highest_c = (0..2400).map(|_| kettle.sample(pxr)).fold(0.0, f64::max);
+    let highest_c = (0..2400).map(|_| tank.sample(pxr)).fold(0.0, f64::max);
     let tuned = [1005, 1006, 1007].map(|address| read(pxr, 3, address));
     let expect = rule::settings(0.07, 15.0);
     let expect = [100.0 * expect.band_k / 185.0, expect.i_s, expect.d_s].map(|value| 10.0 * value);
@@ -264,22 +264,22 @@ fn self_tuning_learns_from_the_approach_and_holds_sv() {
         assert!((f64::from(tuned) / expect - 1.0).abs() < 0.15, "{tuned} instead of {expect} (tenths)");
     }
     assert!(highest_c < 73.0, "{highest_c} °C");
-    let last: Vec<f64> = (0..600).map(|_| kettle.sample(pxr)).collect();
+    let last: Vec<f64> = (0..600).map(|_| tank.sample(pxr)).collect();
     assert!(last.iter().all(|c| (c - 70.0).abs() < 0.5), "{last:?}");
 }
 
 #[test]
 fn self_tuning_calms_a_loop_that_swings() {
-    let (pxr, kettle) = (&mut Pxr::new(70.0), &mut Kettle::at(70.0, 60));
+    let (pxr, tank) = (&mut Pxr::new(70.0), &mut FirstOrderTank::at(70.0, 60));
     // Far too narrow a band, no D: the output goes to and fro.
     for (address, value) in [(1001, 2), (1005, 3), (1006, 200), (1007, 0)] {
         write(pxr, address, value);
     }
     for _ in 0..14_400 {
-        kettle.sample(pxr);
+        tank.sample(pxr);
     }
     assert!(read(pxr, 3, 1005) > 3, "P is still {}", read(pxr, 3, 1005));
-    let last: Vec<f64> = (0..1200).map(|_| kettle.sample(pxr)).collect();
+    let last: Vec<f64> = (0..1200).map(|_| tank.sample(pxr)).collect();
     let swing_c = last.iter().fold(0.0_f64, |swing_c, c| swing_c.max((c - 70.0).abs()));
     assert!(swing_c < 1.5, "{swing_c} °C");
 }
