@@ -16,7 +16,7 @@ use crate::{
     report::{
         export,
         figures::{self, Label},
-        hold::Stood,
+        step_series::HeldValue,
     },
 };
 
@@ -156,7 +156,7 @@ fn instant(from: Timestamp, every: Duration, count: usize) -> Timestamp {
     from.checked_add(jiff::SignedDuration::from_nanos_i128(ahead)).unwrap_or(Timestamp::MAX)
 }
 
-fn values(answer: Answer) -> Result<Vec<Vec<Option<Stood>>>, CliError> {
+fn values(answer: Answer) -> Result<Vec<Vec<Option<HeldValue>>>, CliError> {
     match answer {
         Answer::Values(values) => Ok(values),
         _ => Err(other()),

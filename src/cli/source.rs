@@ -16,7 +16,7 @@ use crate::{
     },
     plant::PlantDef,
     profile::io::atomic::write_for_user,
-    report::{Period, ask},
+    report::{Period, period_parser},
     station::Session,
 };
 
@@ -72,7 +72,7 @@ impl Source {
         from: Option<&str>,
         to: Option<&str>,
     ) -> Result<Period, CliError> {
-        ask::period(def, shift, from, to, self.now()).map_err(|error| CliError::Usage(error.to_string()))
+        period_parser::period(def, shift, from, to, self.now()).map_err(|error| CliError::Usage(error.to_string()))
     }
 
     /// Asks.

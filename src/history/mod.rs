@@ -17,7 +17,7 @@ use crate::{
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord},
     },
-    report::{Period, ShiftReport, hold::Stood},
+    report::{Period, ShiftReport, step_series::HeldValue},
 };
 
 /// What can be asked. Spans include `from` and exclude `to`.
@@ -119,7 +119,7 @@ pub enum Answer {
     /// The figures of the alarm system.
     AlarmQuality(Box<Figures>),
     /// By tag the value in force at each instant; `None` where nothing is stored, or nothing recent enough.
-    Values(Vec<Vec<Option<Stood>>>),
+    Values(Vec<Vec<Option<HeldValue>>>),
 }
 
 /// A curve reduced to columns of equal width.

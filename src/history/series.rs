@@ -7,7 +7,7 @@ use jiff::{SignedDuration, Timestamp};
 use super::{Bucket, Series};
 use crate::{
     plant::{def::TagId, sample::Sample},
-    report::hold::{Held, Holding, Tally},
+    report::step_series::{Segment, SegmentStats, StepSeries},
 };
 
 /// The span of a curve; `from < to`.
@@ -22,53 +22,54 @@ pub struct Span {
 }
 
 /// Computes a curve of at most `buckets` columns. The samples come in order of time and begin
-/// [`HOLD_MAX`](crate::report::hold::HOLD_MAX) before the span, so that the value standing at its start is known.
+/// [`HOLD_MAX`](crate::report::step_series::HOLD_MAX) before the span, so that the value standing at its start is known.
 pub struct Curve {
     tag: TagId,
     from: Timestamp,
     columns: Columns,
-    holding: Holding,
-    tallies: Vec<Option<Tally>>,
-    whole: Option<Tally>,
+    steps: StepSeries,
+    stats: Vec<Option<SegmentStats>>,
+    whole: Option<SegmentStats>,
 }
 
 impl Curve {
     /// Nothing has come yet.
     pub fn new(tag: TagId, span: Span, buckets: usize) -> Curve {
         let columns = Columns::new(span, buckets);
-        let tallies = vec![None; columns.count];
-        let holding = Holding::new(span.from, span.until.min(span.to));
-        Curve { tag, from: span.from, columns, holding, tallies, whole: None }
+        let stats = vec![None; columns.count];
+        let steps = StepSeries::new(span.from, span.until.min(span.to));
+        Curve { tag, from: span.from, columns, steps, stats, whole: None }
     }
 
     /// The next sample.
     pub fn next(&mut self, sample: Sample) {
-        if let Some(piece) = self.holding.next(sample) {
+        if let Some(piece) = self.steps.next(sample) {
             self.add(piece);
         }
     }
 
     /// The curve, when the last sample has come.
     pub fn end(mut self) -> Series {
-        if let Some(piece) = self.holding.clone().end() {
+        if let Some(piece) = self.steps.clone().end() {
             self.add(piece);
         }
-        let Curve { tag, from, columns, tallies, whole, holding: _ } = self;
-        let bucket = |tally: Tally| Bucket { min: tally.min, max: tally.max, mean: tally.mean, last: tally.last };
+        let Curve { tag, from, columns, stats, whole, steps: _ } = self;
+        let bucket =
+            |stats: SegmentStats| Bucket { min: stats.min, max: stats.max, mean: stats.mean, last: stats.last };
         Series {
             tag,
             from,
             step: columns.step(),
-            buckets: tallies.into_iter().map(|tally| tally.map(bucket)).collect(),
-            summary: whole.map(|tally| (tally.min, tally.mean, tally.max)),
-            good: whole.map_or(0.0, |tally| (tally.seconds * 1e9 / columns.nanos as f64).clamp(0.0, 1.0)),
+            buckets: stats.into_iter().map(|stats| stats.map(bucket)).collect(),
+            summary: whole.map(|stats| (stats.min, stats.mean, stats.max)),
+            good: whole.map_or(0.0, |stats| (stats.seconds * 1e9 / columns.nanos as f64).clamp(0.0, 1.0)),
         }
     }
 
-    fn add(&mut self, piece: Held) {
-        let Curve { columns, tallies, whole, .. } = self;
-        Tally::add(whole, piece);
-        columns.cut(piece, |column, part| Tally::add(&mut tallies[column], part));
+    fn add(&mut self, piece: Segment) {
+        let Curve { columns, stats, whole, .. } = self;
+        SegmentStats::add(whole, piece);
+        columns.cut(piece, |column, part| SegmentStats::add(&mut stats[column], part));
     }
 }
 
@@ -103,13 +104,13 @@ impl Columns {
     }
 
     /// Cuts a piece at the edges of the columns that it lies in.
-    fn cut(&self, piece: Held, mut each: impl FnMut(usize, Held)) {
+    fn cut(&self, piece: Segment, mut each: impl FnMut(usize, Segment)) {
         let mut from = piece.from;
         let mut column = self.column_of(from);
         while from < piece.to && column < self.count {
             let to = self.edge(column + 1).min(piece.to);
             if from < to {
-                each(column, Held { from, to, ..piece });
+                each(column, Segment { from, to, ..piece });
                 from = to;
             }
             column += 1;

@@ -6,7 +6,7 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::{
     csv::{self, iso_millis, number, plain, text},
-    hold::Stood,
+    step_series::HeldValue,
 };
 use crate::plant::def::{CsvDialect, PlantDef};
 
@@ -20,7 +20,7 @@ pub struct Column {
     /// Decimals to print.
     pub decimals: u8,
     /// What stood at the end of each interval; `None` where nothing was stored.
-    pub values: Vec<Option<Stood>>,
+    pub values: Vec<Option<HeldValue>>,
 }
 
 /// The table: time with offset, then of each tag the value, with its unit in the header, and the quality: `good`,
@@ -72,15 +72,15 @@ mod tests {
     #[test]
     fn every_cell_has_its_quality_and_only_good_values_are_written() {
         let def = plant("Asia/Bangkok", &THREE);
-        let good = |value| Some(Stood::from(Sample::good(value, sec(0))));
-        let column = |tag: &str, unit: &str, values: &[Option<Stood>]| Column {
+        let good = |value| Some(HeldValue::from(Sample::good(value, sec(0))));
+        let column = |tag: &str, unit: &str, values: &[Option<HeldValue>]| Column {
             tag: tag.into(),
             unit: unit.into(),
             decimals: 1,
             values: values.to_vec(),
         };
-        let doubted = Some(Stood::from(Sample::good(20.0, sec(0)).doubted(Cause::Stale)));
-        let bad = Some(Stood::from(Sample::bad(Cause::Timeout, sec(0))));
+        let doubted = Some(HeldValue::from(Sample::good(20.0, sec(0)).doubted(Cause::Stale)));
+        let bad = Some(HeldValue::from(Sample::bad(Cause::Timeout, sec(0))));
         let columns = [column("TIC-1.PV", "°C", &[good(20.04), bad]), column("=RUN", "", &[doubted, None])];
         let from = at("2026-11-21T06:00+07");
         let german = CsvDialect { separator: ';', decimal: ',', bom: false };

@@ -9,7 +9,7 @@ use jiff::{Timestamp, ToSpan, tz::TimeZone};
 
 use super::{
     DECIMALS_UNKNOWN, RecordRow, SuppressedAlarm, TagFigures,
-    hold::{Held, Holding, Tally, good_value},
+    step_series::{Segment, SegmentStats, StepSeries, good_value},
 };
 use crate::plant::{
     def::TagId,
@@ -65,11 +65,11 @@ pub fn choosers(def: &TagDef) -> impl Iterator<Item = TagId> + use<> {
 }
 
 /// Computes the figures of one tag over a period. The samples come in order of time and begin
-/// [`HOLD_MAX`](super::hold::HOLD_MAX) before it.
+/// [`HOLD_MAX`](super::step_series::HOLD_MAX) before it.
 pub struct Figures {
     seconds: f64,
-    holding: Holding,
-    tally: Option<Tally>,
+    steps: StepSeries,
+    stats: Option<SegmentStats>,
     counted: f64,
 }
 
@@ -77,46 +77,46 @@ impl Figures {
     /// Over `from..until`; nothing has come yet.
     pub fn new(from: Timestamp, until: Timestamp) -> Figures {
         let seconds = until.duration_since(from).as_secs_f64();
-        Figures { seconds, holding: Holding::new(from, until), tally: None, counted: 0.0 }
+        Figures { seconds, steps: StepSeries::new(from, until), stats: None, counted: 0.0 }
     }
 
     /// The next sample.
     pub fn next(&mut self, sample: Sample) {
-        if let Some(span) = self.holding.next(sample) {
+        if let Some(span) = self.steps.next(sample) {
             self.add(span);
         }
     }
 
-    fn add(&mut self, span: Held) {
-        let last = self.tally.map_or(span.value, |tally| tally.last);
+    fn add(&mut self, span: Segment) {
+        let last = self.stats.map_or(span.value, |stats| stats.last);
         // A counter that shows less than half of its last value, but not less than nothing, was reset or has rolled over:
         // it counts from zero. Any other step back is that of a balance, as of energy taken and fed back.
         let reset = (0.0..last / 2.0).contains(&span.value);
         self.counted += if reset { span.value } else { span.value - last };
-        Tally::add(&mut self.tally, span);
+        SegmentStats::add(&mut self.stats, span);
     }
 
     /// The figures, when the last sample has come.
     pub fn end(mut self, label: Label, in_alarm: Duration) -> TagFigures {
-        if let Some(span) = self.holding.clone().end() {
+        if let Some(span) = self.steps.clone().end() {
             self.add(span);
         }
-        let Figures { seconds, tally, counted, holding: _ } = self;
+        let Figures { seconds, stats, counted, steps: _ } = self;
         let (mean, difference) = match label.counts {
-            true => (None, tally.map(|_| counted)),
-            false => (tally.map(|tally| tally.mean), None),
+            true => (None, stats.map(|_| counted)),
+            false => (stats.map(|stats| stats.mean), None),
         };
         TagFigures {
             tag: label.tag,
             unit: label.unit,
             decimals: label.decimals,
-            min: tally.map(|tally| tally.min),
+            min: stats.map(|stats| stats.min),
             mean,
             difference,
-            max: tally.map(|tally| tally.max),
-            last: tally.map(|tally| tally.last),
+            max: stats.map(|stats| stats.max),
+            last: stats.map(|stats| stats.last),
             in_alarm,
-            good: tally.map_or(0.0, |tally| (tally.seconds / seconds).clamp(0.0, 1.0)),
+            good: stats.map_or(0.0, |stats| (stats.seconds / seconds).clamp(0.0, 1.0)),
         }
     }
 }

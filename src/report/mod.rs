@@ -1,8 +1,8 @@
 //! Reports: the shift calendar, the figures of a shift, and their CSV; pure, rows in and bytes out.
 
 pub mod shift;
-pub mod ask;
-pub mod hold;
+pub mod period_parser;
+pub mod step_series;
 pub mod figures;
 pub mod alarm_quality;
 pub mod csv;

@@ -16,7 +16,7 @@ use sightglass::{
         def::{CsvDialect, LineId},
     },
     profile::{self, Search},
-    report::{ask, csv},
+    report::{csv, period_parser},
     sim::{
         io::{SimulatorHandle, Wire, serve_line},
         rig::Rig,
@@ -72,7 +72,7 @@ async fn a_shift_of_eight_hours_is_reported_truly() {
 
     let store = Store::open_read_only(&history, &def).unwrap();
     let now = clock.now();
-    let period = ask::period(&def, Some("morning@2026-03-02"), None, None, now).unwrap();
+    let period = period_parser::period(&def, Some("morning@2026-03-02"), None, None, now).unwrap();
     let line = def.lines[0].id;
     let every_minute = Query::LineMinutes { line, from: period.from, to: period.to, limit: 1_000 };
     let Answer::LineMinutes(minutes) = store.answer(&every_minute, now).unwrap() else { panic!("not minutes") };

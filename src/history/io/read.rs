@@ -20,7 +20,7 @@ use crate::{
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord, AlarmStep, Burst, Seal},
     },
-    report::hold::{AsOf, Stood},
+    report::step_series::{AsOf, HeldValue},
 };
 
 /// Rows of a list or of a record in one answer; an answer that would be longer is refused, never cut.
@@ -91,7 +91,7 @@ impl Store {
         Ok(tags.all(curves.into_iter().map(Curve::end)))
     }
 
-    /// What stood at equal distances: the first instant is one `every` after `from`. Nothing stands after `now`.
+    /// The values at equal distances: the first instant is one `every` after `from`. Nothing stands after `now`.
     fn values(
         &self,
         tags: &[TagId],
@@ -99,7 +99,7 @@ impl Store {
         every: Duration,
         count: usize,
         now: Timestamp,
-    ) -> Result<Vec<Vec<Option<Stood>>>, HistoryError> {
+    ) -> Result<Vec<Vec<Option<HeldValue>>>, HistoryError> {
         let instants = (1..=count).map_while(|number| grid(from, every, number)).take_while(|at| *at <= now);
         let instants: Arc<[Timestamp]> = instants.collect();
         let Some(last) = instants.last() else { return Ok(vec![vec![None; count]; tags.len()]) };
@@ -107,13 +107,13 @@ impl Store {
         check_span(from, to)?;
         self.bounded(tags.len(), from, to, now, SAMPLES_MAX)?;
         let tags = Distinct::new(tags);
-        let mut stood: Vec<AsOf> = tags.each.iter().map(|_| AsOf::new(instants.clone())).collect();
-        self.each_sample(&tags.each, from, to, |place, sample| stood[place].next(sample))?;
-        let column = |stood: AsOf| {
-            let stood = stood.end().into_iter().map(|sample| sample.map(Stood::from));
-            stood.chain(std::iter::repeat(None)).take(count).collect()
+        let mut as_of: Vec<AsOf> = tags.each.iter().map(|_| AsOf::new(instants.clone())).collect();
+        self.each_sample(&tags.each, from, to, |place, sample| as_of[place].next(sample))?;
+        let column = |as_of: AsOf| {
+            let as_of = as_of.end().into_iter().map(|sample| sample.map(HeldValue::from));
+            as_of.chain(std::iter::repeat(None)).take(count).collect()
         };
-        Ok(tags.all(stood.into_iter().map(column)))
+        Ok(tags.all(as_of.into_iter().map(column)))
     }
 
     pub(super) fn id(&self, tag: TagId) -> Option<u16> {

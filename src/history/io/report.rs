@@ -21,7 +21,7 @@ use crate::{
     report::{
         Period, ShiftReport,
         figures::{self, Figures, Label},
-        hold::AsOf,
+        step_series::AsOf,
     },
 };
 
@@ -81,11 +81,11 @@ impl Store {
         let latest: HashMap<TagId, f64> =
             tags.iter().zip(&gathered).filter_map(|(tag, gathered)| Some((*tag, gathered.latest_good?))).collect();
         let mut gathered: HashMap<TagId, Gathered> = tags.into_iter().zip(gathered).collect();
-        let mut stood = |tag| gathered.get_mut(&tag).and_then(|tag| tag.record.take()).map(AsOf::end);
+        let mut as_of = |tag| gathered.get_mut(&tag).and_then(|tag| tag.record.take()).map(AsOf::end);
         let (record, record_of) = match recorded {
             Some(Recorded { name, sv, pv, instants }) => {
-                let pv_stood = stood(pv).unwrap_or_default();
-                let sv_stood = if sv == pv { pv_stood.clone() } else { stood(sv).unwrap_or_default() };
+                let pv_stood = as_of(pv).unwrap_or_default();
+                let sv_stood = if sv == pv { pv_stood.clone() } else { as_of(sv).unwrap_or_default() };
                 let rows = figures::record(&instants, &sv_stood, &pv_stood);
                 (rows, Some((name, Label::at(def.tag(pv), &latest).unit)))
             }

@@ -21,7 +21,7 @@ use crate::{
         def::TagId,
         sample::{Cause, Quality, Sample},
     },
-    report::{Gap, hold::HOLD_MAX},
+    report::{Gap, step_series::HOLD_MAX},
 };
 
 /// Rows of a piece that are aimed at; twice as many are held at most.

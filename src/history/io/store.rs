@@ -27,7 +27,7 @@ use crate::{
         record::{ActionRecord, AlarmRecord, Record},
         sample::{Cause, Quality, Sample},
     },
-    report::hold::HOLD_MAX,
+    report::step_series::HOLD_MAX,
 };
 
 /// An open store.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::*;
 use crate::{
     plant::{def::Priority, sample::Cause},
-    report::hold::AsOf,
+    report::step_series::AsOf,
     report::testing::{at, sec, zone},
 };
 

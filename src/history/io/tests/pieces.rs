@@ -8,7 +8,7 @@ use super::*;
 use crate::{
     history::series::{Curve, Span},
     plant::sample::Quality,
-    report::{figures::Figures, figures::Label, hold::HOLD_MAX},
+    report::{figures::Figures, figures::Label, step_series::HOLD_MAX},
 };
 
 /// The samples of a tag in order of time, as one plain query has them.

@@ -4,7 +4,7 @@ use jiff::{SignedDuration, Timestamp, ToSpan, civil};
 
 use crate::{
     plant::def::PlantDef,
-    report::{Period, ask, shift},
+    report::{Period, period_parser, shift},
 };
 
 /// The longest free period: a quarter of a year.
@@ -35,15 +35,15 @@ pub fn after(def: &PlantDef, period: &Period, now: Timestamp) -> Option<Period> 
 /// now, a shift may be named. Times without a date are of today, or of last night where the first is the later one.
 pub fn typed(def: &PlantDef, text: &str, now: Timestamp) -> Result<Period, String> {
     let text = text.trim();
-    let said = |error: ask::PeriodError| error.to_string();
+    let said = |error: period_parser::PeriodError| error.to_string();
     let period = match split(text) {
         _ if text.is_empty() => return Err(format!("expected {FORMS}")),
         (from, None) if from.starts_with(|c: char| c.is_alphabetic()) => {
-            return ask::period(def, Some(from), None, None, now).map_err(said);
+            return period_parser::period(def, Some(from), None, None, now).map_err(said);
         }
         (from, to) => {
             let (from, to) = whole(def, from, to, now)?;
-            ask::period(def, None, Some(&from), to.as_deref(), now).map_err(said)?
+            period_parser::period(def, None, Some(&from), to.as_deref(), now).map_err(said)?
         }
     };
     if period.to.duration_since(period.from) > LONGEST {

@@ -1,4 +1,4 @@
-//! How long a stored sample stands: until the next one, and never longer than [`HOLD_MAX`].
+//! Step-hold interpolation: a stored sample is valid until the next one, and at most for [`HOLD_MAX`].
 //!
 //! ```text
 //!   stored      27.1      27.4   bad          27.6                  (nothing more)
@@ -17,9 +17,9 @@ use crate::plant::sample::{Quality, Sample};
 /// without a successor for longer than this was therefore not stored any more: from here on it is not known.
 pub const HOLD_MAX: Duration = Duration::from_secs(150);
 
-/// A span in which one good value stood; never empty.
+/// A span with one good value; never empty.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Held {
+pub struct Segment {
     /// From, inclusive.
     pub from: Timestamp,
     /// To, exclusive.
@@ -28,7 +28,7 @@ pub struct Held {
     pub value: f64,
 }
 
-impl Held {
+impl Segment {
     /// How long, in seconds.
     pub fn seconds(self) -> f64 {
         self.to.duration_since(self.from).as_secs_f64()
@@ -38,35 +38,35 @@ impl Held {
 /// The spans of good values within `from..until`, in order. The samples come in order of time and should begin
 /// [`HOLD_MAX`] before `from`, so that the value standing there is known. Nothing is held beyond `until`.
 #[derive(Debug, Clone)]
-pub struct Holding {
+pub struct StepSeries {
     from: Timestamp,
     until: Timestamp,
     current: Option<Sample>,
 }
 
-impl Holding {
+impl StepSeries {
     /// Nothing has come yet.
-    pub fn new(from: Timestamp, until: Timestamp) -> Holding {
-        Holding { from, until, current: None }
+    pub fn new(from: Timestamp, until: Timestamp) -> StepSeries {
+        StepSeries { from, until, current: None }
     }
 
     /// The span that ends with the next sample.
-    pub fn next(&mut self, sample: Sample) -> Option<Held> {
+    pub fn next(&mut self, sample: Sample) -> Option<Segment> {
         let before = self.current.replace(sample)?;
         self.span(before, sample.at)
     }
 
     /// The span that nothing comes after.
-    pub fn end(mut self) -> Option<Held> {
+    pub fn end(mut self) -> Option<Segment> {
         let last = self.current.take()?;
         self.span(last, self.until)
     }
 
-    fn span(&self, sample: Sample, successor: Timestamp) -> Option<Held> {
+    fn span(&self, sample: Sample, successor: Timestamp) -> Option<Segment> {
         let value = good_value(sample)?;
         let to = successor.min(expiry(sample)).min(self.until);
         let from = sample.at.max(self.from);
-        (from < to).then_some(Held { from, to, value })
+        (from < to).then_some(Segment { from, to, value })
     }
 }
 
@@ -76,13 +76,13 @@ impl Holding {
 pub struct AsOf {
     instants: Arc<[Timestamp]>,
     current: Option<Sample>,
-    stood: Vec<Option<Sample>>,
+    values: Vec<Option<Sample>>,
 }
 
 impl AsOf {
     /// At instants in order of time.
     pub fn new(instants: Arc<[Timestamp]>) -> AsOf {
-        AsOf { stood: Vec::with_capacity(instants.len()), instants, current: None }
+        AsOf { values: Vec::with_capacity(instants.len()), instants, current: None }
     }
 
     /// The next sample.
@@ -94,34 +94,34 @@ impl AsOf {
     /// By instant the sample in force; `None` if there was none, or it was too old.
     pub fn end(mut self) -> Vec<Option<Sample>> {
         self.up_to(Timestamp::MAX);
-        self.stood
+        self.values
     }
 
     fn up_to(&mut self, next: Timestamp) {
-        while let Some(at) = self.instants.get(self.stood.len()).filter(|at| **at < next) {
-            self.stood.push(self.current.filter(|sample| *at < expiry(*sample)));
+        while let Some(at) = self.instants.get(self.values.len()).filter(|at| **at < next) {
+            self.values.push(self.current.filter(|sample| *at < expiry(*sample)));
         }
     }
 }
 
-/// A stored value and its quality.
+/// A stored value and its quality, held up to an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Stood {
+pub struct HeldValue {
     /// In the tag's unit; `None` exactly when the quality is bad.
     pub value: Option<f64>,
     /// How far to trust it.
     pub quality: Quality,
 }
 
-impl From<Sample> for Stood {
-    fn from(sample: Sample) -> Stood {
-        Stood { value: sample.value, quality: sample.quality }
+impl From<Sample> for HeldValue {
+    fn from(sample: Sample) -> HeldValue {
+        HeldValue { value: sample.value, quality: sample.quality }
     }
 }
 
 /// Extremes, time-weighted mean and last value of spans.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tally {
+pub struct SegmentStats {
     /// Least.
     pub min: f64,
     /// Greatest.
@@ -134,13 +134,13 @@ pub struct Tally {
     pub seconds: f64,
 }
 
-impl Tally {
+impl SegmentStats {
     /// Adds a span to what there is.
-    pub fn add(tally: &mut Option<Tally>, span: Held) {
-        let Held { value, .. } = span;
+    pub fn add(stats: &mut Option<SegmentStats>, span: Segment) {
+        let Segment { value, .. } = span;
         let seconds = span.seconds();
-        let Some(old) = tally else {
-            *tally = Some(Tally { min: value, max: value, mean: value, last: value, seconds });
+        let Some(old) = stats else {
+            *stats = Some(SegmentStats { min: value, max: value, mean: value, last: value, seconds });
             return;
         };
         old.seconds += seconds;
@@ -166,10 +166,10 @@ mod tests {
     use super::*;
     use crate::{plant::sample::Cause, report::testing::sec};
 
-    fn held(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> Vec<Held> {
-        let mut holding = Holding::new(from, until);
-        let mut spans: Vec<Held> = samples.filter_map(|sample| holding.next(sample)).collect();
-        spans.extend(holding.end());
+    fn held(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> Vec<Segment> {
+        let mut steps = StepSeries::new(from, until);
+        let mut spans: Vec<Segment> = samples.filter_map(|sample| steps.next(sample)).collect();
+        spans.extend(steps.end());
         spans
     }
 
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn an_uncertain_value_is_not_counted_as_good() {
         let samples = [Sample::good(5.0, sec(0)), Sample::good(5.0, sec(4)).doubted(Cause::Stale)];
-        assert_eq!(held(samples.into_iter(), sec(0), sec(10)), [Held { from: sec(0), to: sec(4), value: 5.0 }]);
+        assert_eq!(held(samples.into_iter(), sec(0), sec(10)), [Segment { from: sec(0), to: sec(4), value: 5.0 }]);
     }
 
     #[test]
