@@ -1,7 +1,7 @@
 //! A drill on a simulated plant: faults at their times, and what is expected of alarms and operator. Plain data.
 //!
 //! ```text
-//!  scenario file ── read ──> Scenario ──> cues: break, mend, (headless) what a good operator does
+//!  scenario file ── read ──> Scenario ──> timeline: inject and clear faults, (headless) act as a good operator
 //!                                │
 //!  journal, snapshots, truth ────┴─ judge ──> Verdict
 //! ```
@@ -40,7 +40,7 @@ pub struct Scenario {
     /// Points of 100 that are needed to pass.
     pub pass_percent: u32,
     /// What goes wrong, in order of time.
-    pub events: Vec<Event>,
+    pub events: Vec<FaultEvent>,
     /// What a good operator does, in order of time.
     pub operator: Vec<Deed>,
     /// What is expected.
@@ -57,9 +57,9 @@ pub enum Start {
     Rest,
 }
 
-/// Something goes wrong, or well again.
+/// A fault is injected or cleared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Event {
+pub struct FaultEvent {
     /// When.
     pub at: Duration,
     /// Where.
@@ -144,32 +144,33 @@ pub enum Wish {
     True(TagId, f64),
 }
 
-/// What happens at a moment.
+/// An entry of the timeline.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Cue {
+pub enum ScenarioEvent {
     /// A fault begins or ends.
-    Event(Event),
+    Fault(FaultEvent),
     /// A good operator acts.
     Deed(Deed),
 }
 
-impl Cue {
+impl ScenarioEvent {
     /// When.
     pub fn at(&self) -> Duration {
         match self {
-            Cue::Event(event) => event.at,
-            Cue::Deed(deed) => deed.at,
+            ScenarioEvent::Fault(event) => event.at,
+            ScenarioEvent::Deed(deed) => deed.at,
         }
     }
 }
 
 impl Scenario {
     /// Everything that happens, in order of time; with the deeds of a good operator, or without where a person sits.
-    pub fn cues(&self, with_operator: bool) -> Vec<Cue> {
-        let deeds = self.operator.iter().filter(|_| with_operator).cloned().map(Cue::Deed);
-        let mut cues: Vec<Cue> = self.events.iter().copied().map(Cue::Event).chain(deeds).collect();
-        cues.sort_by_key(Cue::at);
-        cues
+    pub fn timeline(&self, with_operator: bool) -> Vec<ScenarioEvent> {
+        let deeds = self.operator.iter().filter(|_| with_operator).cloned().map(ScenarioEvent::Deed);
+        let mut timeline: Vec<ScenarioEvent> =
+            self.events.iter().copied().map(ScenarioEvent::Fault).chain(deeds).collect();
+        timeline.sort_by_key(ScenarioEvent::at);
+        timeline
     }
 
     /// All points that there are.

@@ -22,7 +22,7 @@ use crate::{
         drill::{Progress, SimCommand, Status},
         faults::{AvailableFaults, available_faults},
         scenario::{
-            Cue, Event, Scenario,
+            FaultEvent, Scenario, ScenarioEvent,
             judge::{Judge, Verdict},
         },
     },
@@ -109,9 +109,10 @@ impl Trainer {
         let (commands, inbox) = mpsc::channel(COMMANDS_MAX);
         let began = self.simulator.clock().now();
         let judge = self.scenario.clone().map(|scenario| Judge::new(scenario, self.def.clone(), began));
-        let cues = self.scenario.as_ref().map(|scenario| scenario.cues(self.operator.is_some())).unwrap_or_default();
+        let timeline =
+            self.scenario.as_ref().map(|scenario| scenario.timeline(self.operator.is_some())).unwrap_or_default();
         let available: Arc<[AvailableFaults]> = available_faults(&self.def).into();
-        let task = Task { cues: cues.into(), judge, began, available, trainer: self, ordered: 0 };
+        let task = Task { timeline: timeline.into(), judge, began, available, trainer: self, ordered: 0 };
         let (publish, status) = watch::channel(Arc::new(task.status(Vec::new(), Default::default(), began)));
         let work = tokio::spawn(task.run(inbox, publish));
         (Port { commands, status }, work)
@@ -120,7 +121,7 @@ impl Trainer {
 
 struct Task {
     trainer: Trainer,
-    cues: std::collections::VecDeque<Cue>,
+    timeline: std::collections::VecDeque<ScenarioEvent>,
     judge: Option<Judge>,
     began: Timestamp,
     available: Arc<[AvailableFaults]>,
@@ -135,14 +136,16 @@ impl Task {
     ) -> Option<Verdict> {
         let clock = self.trainer.simulator.clock();
         loop {
-            let cue =
-                self.cues.front().map(|cue| self.began + jiff::SignedDuration::try_from(cue.at()).unwrap_or_default());
+            let event = self
+                .timeline
+                .front()
+                .map(|event| self.began + jiff::SignedDuration::try_from(event.at()).unwrap_or_default());
             tokio::select! {
                 // A replay must come to the same end: what is due at one moment happens in this order.
                 biased;
-                () = clock.sleep_until(cue.unwrap_or(self.began)), if cue.is_some() => {
-                    if let Some(cue) = self.cues.pop_front() {
-                        self.perform(cue).await;
+                () = clock.sleep_until(event.unwrap_or(self.began)), if event.is_some() => {
+                    if let Some(event) = self.timeline.pop_front() {
+                        self.perform(event).await;
                     }
                 }
                 Some(command) = inbox.recv() => {
@@ -184,11 +187,15 @@ impl Task {
         self.judge.as_mut().filter(|judge| !judge.is_over())
     }
 
-    async fn perform(&mut self, cue: Cue) {
-        match cue {
-            Cue::Event(Event { target, fault, begins: true, .. }) => self.trainer.simulator.set(target, fault).await,
-            Cue::Event(Event { target, fault, begins: false, .. }) => self.trainer.simulator.clear(target, fault).await,
-            Cue::Deed(deed) => {
+    async fn perform(&mut self, event: ScenarioEvent) {
+        match event {
+            ScenarioEvent::Fault(FaultEvent { target, fault, begins: true, .. }) => {
+                self.trainer.simulator.set(target, fault).await
+            }
+            ScenarioEvent::Fault(FaultEvent { target, fault, begins: false, .. }) => {
+                self.trainer.simulator.clear(target, fault).await
+            }
+            ScenarioEvent::Deed(deed) => {
                 let Some(orders) = &self.trainer.operator else { return };
                 let snapshot = self.trainer.snapshots.borrow().clone();
                 let Some(command) = deed.wish.command(&snapshot) else { return };

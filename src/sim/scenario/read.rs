@@ -8,7 +8,7 @@ mod tests;
 use std::{path::Path, sync::Arc, time::Duration};
 
 use self::names::{alarm, tag, unknown, value};
-use super::{Deed, Event, Expect, OperatorWish, Scenario, Start, judge::clock};
+use super::{Deed, Expect, FaultEvent, OperatorWish, Scenario, Start, judge::clock};
 use crate::{
     plant::{PlantDef, record::AlarmStep},
     profile::{
@@ -161,7 +161,7 @@ pub fn read(name: &str, file: &str, bytes: &[u8], find: FindPlant) -> Result<(Sc
 
 fn scenario(name: &str, table: &ScenarioTable, def: &PlantDef, problems: &mut Problems) -> Scenario {
     let duration = table.duration.map_or(Duration::ZERO, |duration| duration.value);
-    let mut events: Vec<Event> =
+    let mut events: Vec<FaultEvent> =
         table.events.iter().flat_map(|event| events(&event.value, duration, def, problems)).collect();
     events.sort_by_key(|event| event.at);
     let mut operator: Vec<Deed> =
@@ -191,7 +191,7 @@ fn scenario(name: &str, table: &ScenarioTable, def: &PlantDef, problems: &mut Pr
 }
 
 /// The beginning of a fault and, if it lasts for a time, its end.
-fn events(table: &EventTable, duration: Duration, def: &PlantDef, problems: &mut Problems) -> Vec<Event> {
+fn events(table: &EventTable, duration: Duration, def: &PlantDef, problems: &mut Problems) -> Vec<FaultEvent> {
     let target = target(table, def, problems);
     let (Some(at), Some(fault), Some(target)) = (in_time(table.at_time, duration, problems), table.fault, target)
     else {
@@ -205,8 +205,8 @@ fn events(table: &EventTable, duration: Duration, def: &PlantDef, problems: &mut
     if let (false, Some(lasts)) = (begins, table.lasts) {
         problems.add(lasts.at, "what is mended does not last").label("leave out `for` or `mended`");
     }
-    let first = Event { at, target, fault: fault.value, begins };
-    let end = table.lasts.map(|lasts| Event { at: at + lasts.value, begins: false, ..first });
+    let first = FaultEvent { at, target, fault: fault.value, begins };
+    let end = table.lasts.map(|lasts| FaultEvent { at: at + lasts.value, begins: false, ..first });
     [Some(first), end].into_iter().flatten().collect()
 }
 

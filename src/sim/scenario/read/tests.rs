@@ -51,8 +51,8 @@ fn everything_in_a_file_is_understood() {
             "TIC-1.PV really never above 90 °C",
         ]
     );
-    assert_eq!(scenario.cues(false).len(), 5);
-    let at: Vec<u64> = scenario.cues(true).iter().map(|cue| cue.at().as_secs()).collect();
+    assert_eq!(scenario.timeline(false).len(), 5);
+    let at: Vec<u64> = scenario.timeline(true).iter().map(|event| event.at().as_secs()).collect();
     assert_eq!(at, [60, 60, 60, 120, 150, 150, 180]);
 }
 
