@@ -1,7 +1,7 @@
 //! The access-control state machine: takes the requests of terminals and returns what is permitted. Rights are decided here only.
 
 mod login;
-mod paper;
+mod audit_entries;
 mod people;
 mod session_limit;
 mod session;
@@ -20,7 +20,7 @@ use std::{
 use jiff::{SignedDuration, Timestamp};
 
 use self::{
-    paper::{actor_name, clean, deed, record, words},
+    audit_entries::{actor_name, audit, clean, record, words},
     people::Saving,
     session::{Refusals, SessionState},
     work::Errand,
@@ -177,12 +177,12 @@ impl AccessControl {
         session.who = self.known(&session.peer);
         session.trusted = session.who.is_some();
         if !own && self.may_record(&session.origin.clone(), at) {
-            effects.push(deed(&session, "attach", "", "done", at));
+            effects.push(audit(&session, "attach", "", "done", at));
         }
         if let Some(who) = &session.who
             && self.people.is_some()
         {
-            effects.push(deed(&session, "login", &who.user, "done: known to the operating system", at));
+            effects.push(audit(&session, "login", &who.user, "done: known to the operating system", at));
         }
         self.sessions.insert(terminal, session);
         self.tell(terminal, &mut effects);
@@ -208,7 +208,7 @@ impl AccessControl {
         let mut effects = self.sent_out(terminal, "done: the terminal has gone", at);
         let Some(session) = self.sessions.remove(&terminal) else { return effects };
         if !session.peer.own && self.may_record(&session.origin, at) {
-            effects.push(deed(&session, "detach", "", "done", at));
+            effects.push(audit(&session, "detach", "", "done", at));
         }
         self.tell(terminal, &mut effects);
         effects
@@ -221,7 +221,7 @@ impl AccessControl {
         request.note = request.note.map(|note| clean(&note).into());
         // A stop is never one request too many.
         let stops = request.command.written().is_some_and(|(tag, value)| guard::is_stop(&self.def, tag, value));
-        if !self.heard(terminal, at) && !stops {
+        if !self.within_rate(terminal, at) && !stops {
             return self.undelivered(request.id, TOO_MANY);
         }
         if request.run != self.run {
@@ -283,7 +283,7 @@ impl AccessControl {
 
     /// May this terminal ask this of the history? `Err` says why not, and what must happen because of it.
     pub fn may_ask(&mut self, terminal: u32, query: &Query, at: Timestamp) -> Result<(), (String, Vec<Effect>)> {
-        if !self.heard(terminal, at) {
+        if !self.within_rate(terminal, at) {
             return Err((TOO_MANY.to_owned(), Vec::new()));
         }
         let needed = right::needs_for_question(query);
@@ -313,7 +313,7 @@ impl AccessControl {
 
     /// A terminal wishes; the answer goes to the ticket.
     pub fn wish(&mut self, terminal: u32, ticket: u64, wish: Wish, at: Timestamp) -> Vec<Effect> {
-        if !self.heard(terminal, at) {
+        if !self.within_rate(terminal, at) {
             return vec![Effect::Reply(ticket, Err(TOO_MANY.to_owned()))];
         }
         let needed = right::needs_for_wish(&wish);
@@ -398,7 +398,7 @@ impl AccessControl {
     /// Time passes.
     pub fn tick(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = self.lock_idle(at);
-        effects.extend(self.told_late(at));
+        effects.extend(self.summarise_refusals(at));
         effects.extend(self.begin_waiting(at));
         if self.unsaved && self.saving.is_none() {
             effects.extend(self.save_logins());

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::{
     AccessControl, Effect, LOG_IN_FIRST, SessionState,
-    paper::deed,
+    audit_entries::audit,
     passed,
     standing::LOCK_NEAR,
     work::{What, Wrong},
@@ -67,7 +67,7 @@ impl AccessControl {
         let name = who.user.clone();
         let utc = at.checked_add(self.behind_utc).unwrap_or(at);
         session.enter(who, at);
-        let mut effects = vec![deed(session, "login", &name, "done", at)];
+        let mut effects = vec![audit(session, "login", &name, "done", at)];
         if let Some(people) = &mut self.people {
             people.logged_in(&name, utc);
             self.unsaved = true;
@@ -88,7 +88,7 @@ impl AccessControl {
     ) -> Vec<Effect> {
         let mut effects = Vec::new();
         if let Some(session) = self.sessions.get(&terminal) {
-            effects.push(deed(session, action, user.unwrap_or("unknown user"), &format!("refused: {why}"), at));
+            effects.push(audit(session, action, user.unwrap_or("unknown user"), &format!("refused: {why}"), at));
         }
         effects.push(Effect::Reply(ticket, Err(told)));
         effects
@@ -109,7 +109,7 @@ impl AccessControl {
         let asked = self.people.is_some();
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let Some(who) = &session.who else { return Vec::new() };
-        let effects = if asked { vec![deed(session, "logout", &who.user, outcome, at)] } else { Vec::new() };
+        let effects = if asked { vec![audit(session, "logout", &who.user, outcome, at)] } else { Vec::new() };
         session.leave();
         effects
     }
@@ -121,7 +121,7 @@ impl AccessControl {
                 session.locked = true;
                 let target = session.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
                 let mut effects =
-                    vec![deed(session, "lock terminal", &target, "done", at), Effect::Reply(ticket, Ok(()))];
+                    vec![audit(session, "lock terminal", &target, "done", at), Effect::Reply(ticket, Ok(()))];
                 self.tell(terminal, &mut effects);
                 effects
             }
@@ -152,7 +152,7 @@ impl AccessControl {
         }
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         (session.locked, session.active) = (false, at);
-        let mut effects = vec![deed(session, "unlock terminal", &user, "done", at), Effect::Reply(ticket, Ok(()))];
+        let mut effects = vec![audit(session, "unlock terminal", &user, "done", at), Effect::Reply(ticket, Ok(()))];
         self.tell(terminal, &mut effects);
         effects
     }
@@ -175,7 +175,7 @@ impl AccessControl {
             if let Some(session) = self.sessions.get_mut(&terminal).filter(|_| left.is_zero()) {
                 session.locked = true;
                 let name = session.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
-                effects.push(deed(session, "lock terminal", &name, "done: nobody has touched it", at));
+                effects.push(audit(session, "lock terminal", &name, "done: nobody has touched it", at));
                 self.tell(terminal, &mut effects);
             } else {
                 effects.push(Effect::Standing(terminal));

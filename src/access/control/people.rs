@@ -5,9 +5,10 @@ use std::sync::Arc;
 use jiff::Timestamp;
 
 use super::{
-    AccessControl, Effect, Peer, enough,
+    AccessControl, Effect, Peer,
+    audit_entries::{audit, record, words},
+    enough,
     login::reply,
-    paper::{deed, record, words},
     right,
     work::{What, Wrong},
 };
@@ -87,7 +88,7 @@ impl AccessControl {
     ) -> Vec<Effect> {
         let mut effects = reply(ticket, why);
         let Some(session) = self.sessions.get(&terminal) else { return effects };
-        let record = deed(session, action, target, &format!("refused: {why}"), at);
+        let record = audit(session, action, target, &format!("refused: {why}"), at);
         let origin = session.origin.clone();
         if self.may_record(&origin, at) {
             effects.push(record);

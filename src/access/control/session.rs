@@ -128,22 +128,22 @@ impl Bucket {
 pub struct Refusals {
     bucket: Bucket,
     /// Not on record yet.
-    pub untold: u64,
-    /// When it was last told.
-    pub told: Timestamp,
+    pub unrecorded: u64,
+    /// When refusals were last recorded.
+    pub recorded_at: Timestamp,
 }
 
 impl Refusals {
     /// Nothing was refused yet.
     pub fn new(at: Timestamp) -> Refusals {
-        Refusals { bucket: Bucket::full(REFUSALS, at), untold: 0, told: at }
+        Refusals { bucket: Bucket::full(REFUSALS, at), unrecorded: 0, recorded_at: at }
     }
 
     /// One more. `true` if it may be on record by itself; otherwise it is counted.
     pub fn one(&mut self, at: Timestamp) -> bool {
         let some = self.bucket.take(at);
         if !some {
-            self.untold += 1;
+            self.unrecorded += 1;
         }
         some
     }

@@ -69,7 +69,13 @@ impl AccessControl {
             let mut effects = Vec::new();
             if let Some(session) = self.sessions.get(&terminal) {
                 let signer = signer.as_deref().unwrap_or("unknown user");
-                effects.push(super::paper::deed(session, "signature failed", signer, &format!("refused: {why}"), at));
+                effects.push(super::audit_entries::audit(
+                    session,
+                    "signature failed",
+                    signer,
+                    &format!("refused: {why}"),
+                    at,
+                ));
             }
             effects.extend(self.not_signed(terminal, request, told, at));
             return effects;

@@ -245,7 +245,7 @@ fn the_audit_trail_is_for_a_supervisor_at_an_unlocked_terminal_and_who_else_asks
     bench.login(1, "tech", TECH).unwrap();
     let (why, effects) = bench.access.may_ask(1, &query, bench.now).unwrap_err();
     assert_eq!(why, "this is for a supervisor, you are technician");
-    assert!(matches!(&effects[..], [Effect::Record(deed)] if &*deed.by == "tech" && deed.outcome.ends_with(&why)));
+    assert!(matches!(&effects[..], [Effect::Record(entry)] if &*entry.by == "tech" && entry.outcome.ends_with(&why)));
     bench.login(1, "boss", BOSS).unwrap();
     assert_eq!(bench.access.may_ask(1, &query, bench.now), Ok(()));
     bench.wish(1, Wish::Lock).unwrap();

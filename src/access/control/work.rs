@@ -257,12 +257,18 @@ impl AccessControl {
         let mut effects = Vec::new();
         if let (true, Some(user)) = (locked.account, user) {
             let outcome = format!("done: for {seconds} s, system user {origin}");
-            effects.push(super::paper::deed(session, "lock-out", &user, &outcome, at));
+            effects.push(super::audit_entries::audit(session, "lock-out", &user, &outcome, at));
             self.tell(terminal, &mut effects);
         }
         if locked.origin {
             let outcome = format!("done: for up to {seconds} s");
-            effects.push(super::paper::deed(session, "lock-out", &format!("system user {origin}"), &outcome, at));
+            effects.push(super::audit_entries::audit(
+                session,
+                "lock-out",
+                &format!("system user {origin}"),
+                &outcome,
+                at,
+            ));
         }
         effects
     }

@@ -1,4 +1,4 @@
-//! What access control puts on record, in which words, and how much of it: nobody fills the book by asking for what he may not.
+//! Builds the audit entries of access control and limits their rate, so that refused requests cannot fill the audit log.
 
 use std::{sync::Arc, time::Duration};
 
@@ -13,41 +13,42 @@ use crate::{
     plant::{record::ActionRecord, visible::acts},
 };
 
-/// Most characters of what somebody may put on record in his own words.
+/// Most characters of a text that a user can put into the audit log.
 const WORDS_MAX: usize = 500;
-/// Users of the operating system whose refusals are counted apart; what more there are share one count.
+/// Users of the operating system whose refusals are counted separately; further users share one count.
 const ORIGINS_MAX: usize = 512;
-/// What was refused too often to be told each time is told so often.
-const TOLD_EVERY: Duration = Duration::from_secs(60);
+/// How often suppressed refusals of one user are recorded as one entry.
+const SUMMARY_EVERY: Duration = Duration::from_secs(60);
 
 impl AccessControl {
-    /// Is a request of this terminal listened to?
-    pub(super) fn heard(&mut self, terminal: u32, at: Timestamp) -> bool {
+    /// Checks the request rate of this terminal.
+    pub(super) fn within_rate(&mut self, terminal: u32, at: Timestamp) -> bool {
         let Some(session) = self.sessions.get_mut(&terminal) else { return false };
         // The station's own process shares its fate anyway.
         if session.peer.own || session.requests.take(at) {
             return true;
         }
         let origin = session.origin.clone();
-        self.refusals_of(&origin, at).untold += 1;
+        self.refusals_of(&origin, at).unrecorded += 1;
         false
     }
 
-    /// May one more refusal, or coming and going, of this place be on record by itself?
+    /// Whether one more refusal, attach or detach of this user gets an entry of its own.
     pub(super) fn may_record(&mut self, origin: &Arc<str>, at: Timestamp) -> bool {
         self.refusals_of(origin, at).one(at)
     }
 
     fn refusals_of(&mut self, origin: &Arc<str>, at: Timestamp) -> &mut Refusals {
         if ORIGINS_MAX <= self.refusals.len() && !self.refusals.contains_key(origin) {
-            self.refusals.retain(|_, refusals| refusals.untold > 0 || passed(refusals.told, at) < TOLD_EVERY);
+            self.refusals
+                .retain(|_, refusals| refusals.unrecorded > 0 || passed(refusals.recorded_at, at) < SUMMARY_EVERY);
         }
         let full = ORIGINS_MAX <= self.refusals.len() && !self.refusals.contains_key(origin);
         let origin = if full { "of many users".into() } else { origin.clone() };
         self.refusals.entry(origin).or_insert_with(|| Refusals::new(at))
     }
 
-    /// The record of a refusal, unless there are too many of them.
+    /// The entry of a refusal; none above the rate limit.
     pub(super) fn refused(
         &mut self,
         session: &SessionState,
@@ -56,16 +57,16 @@ impl AccessControl {
         why: &str,
         at: Timestamp,
     ) -> Vec<Effect> {
-        let told = self.may_record(&session.origin, at);
-        told.then(|| deed(session, action, target, &format!("refused: {why}"), at)).into_iter().collect()
+        let recorded = self.may_record(&session.origin, at);
+        recorded.then(|| audit(session, action, target, &format!("refused: {why}"), at)).into_iter().collect()
     }
 
-    /// What was refused too often to be told each time, a line a minute for each place.
-    pub(super) fn told_late(&mut self, at: Timestamp) -> Vec<Effect> {
+    /// One entry a minute and user with the number of refusals that have no entry of their own.
+    pub(super) fn summarise_refusals(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = Vec::new();
         for (origin, refusals) in &mut self.refusals {
-            if refusals.untold > 0 && passed(refusals.told, at) >= TOLD_EVERY {
-                let outcome = format!("refused: {} requests", refusals.untold);
+            if refusals.unrecorded > 0 && passed(refusals.recorded_at, at) >= SUMMARY_EVERY {
+                let outcome = format!("refused: {} requests", refusals.unrecorded);
                 effects.push(Effect::Record(ActionRecord {
                     at,
                     by: "not logged in".into(),
@@ -78,7 +79,7 @@ impl AccessControl {
                     note: None,
                     seal: None,
                 }));
-                (refusals.untold, refusals.told) = (0, at);
+                (refusals.unrecorded, refusals.recorded_at) = (0, at);
             }
         }
         effects
@@ -132,11 +133,11 @@ pub(super) fn record(session: &SessionState, action: &str, target: &str, outcome
     }
 }
 
-pub(super) fn deed(session: &SessionState, action: &str, target: &str, outcome: &str, at: Timestamp) -> Effect {
+pub(super) fn audit(session: &SessionState, action: &str, target: &str, outcome: &str, at: Timestamp) -> Effect {
     Effect::Record(record(session, action, target, outcome, at))
 }
 
-/// Words of a terminal as they may stand on record: not endless, and nothing that moves a cursor or hides in the text.
+/// A text of a terminal for the audit log: limited in length, without control and invisible characters.
 pub(super) fn clean(words: &str) -> String {
     words.chars().take(WORDS_MAX).map(|letter| if acts(letter) { ' ' } else { letter }).collect()
 }
