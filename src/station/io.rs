@@ -29,7 +29,7 @@ use crate::{
 };
 
 use super::{
-    deeds::Deeds,
+    audit_queue::AuditQueue,
     past::Past,
     plant_task::{KEPT_FOR_STOPS, Keeping, PlantTask},
     session::Session,
@@ -122,7 +122,7 @@ fn begin(
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
     let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the audit log: {error}"));
     let recorder = recorder::start(&path, clock, records.clone()).map_err(no_thread)?;
-    let mut deeds = Deeds::new(&recorder);
+    let mut audit_queue = AuditQueue::new(&recorder);
     // Without such a file, at the first start or after it was damaged, the journal has the state.
     let from_journal = recorder.alarms.steps.is_none();
     recorder.alarms.steps.iter().for_each(|steps| plant.restore(steps));
@@ -130,9 +130,9 @@ fn begin(
     if let Some(state) = guarded.as_ref().and_then(|(access, _)| users_fault(access, &recorder.opened)) {
         plant.on_fault(StationFault::UsersFile, state);
     }
-    deeds.started(&def.name, file.as_ref(), users, clock.utc());
+    audit_queue.started(&def.name, file.as_ref(), users, clock.utc());
     let past = Some(Past::new(history.restored.take(), from_journal));
-    let keeping = Keeping { records: Some(records), store, past, book: Some(deeds), sets: Some(sets), listener };
+    let keeping = Keeping { records: Some(records), store, past, book: Some(audit_queue), sets: Some(sets), listener };
     let threads = Threads { queries, history: Some(history), book: Some(recorder.join) };
     Ok(assemble(def, clock, connectors, plant, file, keeping, threads, guarded))
 }
@@ -202,10 +202,10 @@ fn assemble(
     let run = first.run;
     let (publish, snapshots) = watch::channel(Arc::new(first));
     let desk = PlantTask::new(plant, clock, links, file, keeping, publish);
-    let (deeds, deed_queue) = mpsc::channel(ORDERS);
-    tasks.push(tokio::spawn(desk.run(event_queue, order_queue, deed_queue)));
+    let (audit, audit_messages) = mpsc::channel(ORDERS);
+    tasks.push(tokio::spawn(desk.run(event_queue, order_queue, audit_messages)));
     let (lifecycle_sender, lifecycle) = mpsc::channel(session_server::LIFECYCLE_REQUESTS_MAX);
-    let outputs = Outputs { orders: orders.clone(), queries, deeds, lifecycle: lifecycle_sender };
+    let outputs = Outputs { orders: orders.clone(), queries, audit, lifecycle: lifecycle_sender };
     let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
     let open = guarded.is_none();
     let (access, users) = guarded.map_or_else(

@@ -25,7 +25,7 @@
 //! | a line's task panics | started again after 1, 2, 5 s; the other lines do not notice | acknowledged |
 
 pub mod session;
-mod deeds;
+mod audit_queue;
 mod session_server;
 mod past;
 mod plant_task;

@@ -10,7 +10,7 @@ use tokio::{
 };
 
 use super::{
-    deeds::{self, Deeds, Paper},
+    audit_queue::{self, AuditMessage, AuditQueue},
     past::{self, Past},
     sets,
 };
@@ -35,8 +35,8 @@ use crate::{
 pub(super) const KEPT_FOR_STOPS: usize = 4;
 /// Real time between two snapshots: what a person can follow.
 const SNAPSHOT_EVERY: Duration = Duration::from_millis(100);
-/// At the end the papers of the session server are waited for so long: more than it takes itself to end.
-const PAPERS_MAX: Duration = Duration::from_secs(3);
+/// How long a stop waits for messages of the session server: longer than the server needs to end.
+const MESSAGES_WAIT_MAX: Duration = Duration::from_secs(3);
 /// At the end a history that is still being opened is waited for so long.
 const HISTORY_MAX: Duration = Duration::from_secs(2);
 /// At the end the plant file and the folder of parameter sets are waited for so long, each.
@@ -50,8 +50,8 @@ pub(super) struct Keeping {
     pub store: watch::Receiver<HistoryStatus>,
     /// What is still to come from the history; `None` once it is known.
     pub past: Option<Past>,
-    /// Deeds and the state of the alarms go there first.
-    pub book: Option<Deeds>,
+    /// AuditQueue and the state of the alarms go there first.
+    pub book: Option<AuditQueue>,
     /// The folder of parameter sets.
     pub sets: Option<PathBuf>,
     pub listener: Option<Listener>,
@@ -121,7 +121,7 @@ impl PlantTask {
         mut self,
         mut events: mpsc::Receiver<Event>,
         mut orders: mpsc::Receiver<Order>,
-        mut papers: mpsc::Receiver<Paper>,
+        mut messages: mpsc::Receiver<AuditMessage>,
     ) {
         let tick_every = self.clock.real_span(Duration::from_secs(1)).max(TICK_MIN);
         self.file_sets(SetWork::Read);
@@ -149,7 +149,7 @@ impl PlantTask {
                     self.carry_out(effects);
                     (changed, next) = (true, Instant::now());
                 }
-                Some(paper) = papers.recv() => self.take_paper(paper),
+                Some(message) = messages.recv() => self.handle_audit_message(message),
                 saved = saved(&mut self.saving) => {
                     self.take_saved(saved);
                     changed = true;
@@ -166,7 +166,7 @@ impl PlantTask {
                     self.hear_store();
                     changed = true;
                 }
-                () = Deeds::changed(&mut self.keeping.book) => {
+                () = AuditQueue::changed(&mut self.keeping.book) => {
                     self.tell_answers();
                     self.hear_store();
                     changed = true;
@@ -195,8 +195,8 @@ impl PlantTask {
             self.take_up(restored);
         }
         // What the session server had begun is on record as well; it ends soon after the links.
-        while let Ok(Some(paper)) = tokio::time::timeout(PAPERS_MAX, papers.recv()).await {
-            self.take_paper(paper);
+        while let Ok(Some(message)) = tokio::time::timeout(MESSAGES_WAIT_MAX, messages.recv()).await {
+            self.handle_audit_message(message);
         }
         // What was begun is ended, but a disk that hangs does not keep the station from ending.
         if self.saving.is_some() {
@@ -213,7 +213,7 @@ impl PlantTask {
         }
         let ended = self.plant.on_stop();
         self.keep(ended.records);
-        let stopped = deeds::stopped(&self.plant.def().name, self.clock.utc());
+        let stopped = audit_queue::stopped(&self.plant.def().name, self.clock.utc());
         if let Some(book) = &mut self.keeping.book {
             book.tell_all();
             self.write_down(vec![stopped], Vec::new());
@@ -245,19 +245,19 @@ impl PlantTask {
         self.plant.remeasure(&recent.active, &recent.steps, &recent.watched, self.clock.now());
     }
 
-    fn take_paper(&mut self, paper: Paper) {
-        match (paper, &mut self.keeping.book) {
-            (Paper::Deed(deed), _) => self.keep(vec![Record::Action(deed)]),
-            (Paper::Answer(reply, answer), Some(book)) => book.answer(reply, answer),
+    fn handle_audit_message(&mut self, message: AuditMessage) {
+        match (message, &mut self.keeping.book) {
+            (AuditMessage::Entry(action), _) => self.keep(vec![Record::Action(action)]),
+            (AuditMessage::Reply(reply, answer), Some(book)) => book.answer(reply, answer),
             // A terminal that has left needs no answer.
-            (Paper::Answer(reply, answer), None) => drop(reply.send(answer.map(|()| Durability::NotRecorded))),
-            (Paper::Lost(count), Some(book)) => book.lost(count),
-            (Paper::Lost(_), None) => {}
+            (AuditMessage::Reply(reply, answer), None) => drop(reply.send(answer.map(|()| Durability::NotRecorded))),
+            (AuditMessage::Lost(count), Some(book)) => book.lost(count),
+            (AuditMessage::Lost(_), None) => {}
         }
     }
 
     fn tell_answers(&mut self) {
-        let left = self.keeping.book.as_mut().map(Deeds::tell).unwrap_or_default();
+        let left = self.keeping.book.as_mut().map(AuditQueue::tell).unwrap_or_default();
         self.store(left.into_iter().map(Record::Action).collect());
     }
 
@@ -270,7 +270,7 @@ impl PlantTask {
 
     fn clock_stepped(&mut self, old: Timestamp, new: Timestamp) {
         self.store(vec![Record::ClockSet]);
-        self.write_down(vec![deeds::clock_step(old, new)], Vec::new());
+        self.write_down(vec![audit_queue::clock_step(old, new)], Vec::new());
         let words = format!("the clock was set from {old:.0} to {new:.0}; times follow it from here on");
         tracing::warn!("{words}");
         let state = FaultState::Occurred(words.into());
@@ -388,10 +388,10 @@ impl PlantTask {
         if let Some(listener) = &self.keeping.listener {
             listener.tell(&records);
         }
-        let (mut deeds, mut steps, mut others) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut actions, mut steps, mut others) = (Vec::new(), Vec::new(), Vec::new());
         for record in records {
             match record {
-                Record::Action(deed) => deeds.push(deed),
+                Record::Action(action) => actions.push(action),
                 Record::Alarm(step) => {
                     self.keeping.past.iter_mut().for_each(|past| past.note(&step));
                     steps.push(step.clone());
@@ -400,18 +400,18 @@ impl PlantTask {
                 Record::Sample(..) | Record::Line(_) | Record::ClockSet => others.push(record),
             }
         }
-        self.write_down(deeds, steps);
+        self.write_down(actions, steps);
         self.store(others);
     }
 
     /// To the disk, and actions from there to the history; straight there where there is no room.
-    fn write_down(&mut self, deeds: Vec<ActionRecord>, steps: Vec<AlarmRecord>) {
-        if deeds.is_empty() && steps.is_empty() {
+    fn write_down(&mut self, actions: Vec<ActionRecord>, steps: Vec<AlarmRecord>) {
+        if actions.is_empty() && steps.is_empty() {
             return;
         }
         let left = match &mut self.keeping.book {
-            Some(book) => book.put(deeds, steps),
-            None => deeds,
+            Some(book) => book.put(actions, steps),
+            None => actions,
         };
         self.store(left.into_iter().map(Record::Action).collect());
     }

@@ -17,7 +17,7 @@ use tokio::{
 };
 
 use super::{
-    deeds::Paper,
+    audit_queue::AuditMessage,
     session::{Request, Session},
     toil::{Done, Toil},
 };
@@ -64,8 +64,8 @@ pub struct Outputs {
     pub orders: mpsc::Sender<Order>,
     /// To the history.
     pub queries: mpsc::Sender<(u32, QueryRequest)>,
-    /// To the book of deeds.
-    pub deeds: mpsc::Sender<Paper>,
+    /// To the audit log.
+    pub audit: mpsc::Sender<AuditMessage>,
     /// To whoever has started the station.
     pub lifecycle: mpsc::Sender<LifecycleRequest>,
 }
@@ -179,7 +179,7 @@ impl SessionServer {
                         let effects = self.access.close(terminal, self.clock.now());
                         self.carry_out(effects);
                     }
-                    if self.lost > 0 && self.outputs.deeds.try_send(Paper::Lost(self.lost)).is_ok() {
+                    if self.lost > 0 && self.outputs.audit.try_send(AuditMessage::Lost(self.lost)).is_ok() {
                         self.lost = 0;
                     }
                     // Who has left waits for no answer any more.
@@ -241,8 +241,8 @@ impl SessionServer {
                         self.carry_out(told);
                     }
                 }
-                Effect::Record(deed) => {
-                    let sent = self.outputs.deeds.try_send(Paper::Deed(deed));
+                Effect::Record(action) => {
+                    let sent = self.outputs.audit.try_send(AuditMessage::Entry(action));
                     if let Err(error) = &sent {
                         tracing::error!(%error, "an action did not reach the audit log");
                         self.lost += 1;
@@ -285,8 +285,13 @@ impl SessionServer {
             Record::None => (reply, answer, Durability::Recorded),
             Record::Lost => (reply, answer, Durability::NotRecorded),
             Record::Sent => {
-                match self.outputs.deeds.try_send(Paper::Answer(reply, answer)).map_err(|error| error.into_inner()) {
-                    Err(Paper::Answer(reply, answer)) => (reply, answer, Durability::NotRecorded),
+                match self
+                    .outputs
+                    .audit
+                    .try_send(AuditMessage::Reply(reply, answer))
+                    .map_err(|error| error.into_inner())
+                {
+                    Err(AuditMessage::Reply(reply, answer)) => (reply, answer, Durability::NotRecorded),
                     Ok(()) | Err(_) => return,
                 }
             }

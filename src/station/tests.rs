@@ -20,8 +20,8 @@ fn options(history: &Path) -> Options {
     Options { def, clock: Clock::real(), history: history.to_owned(), connectors, file: None }
 }
 
-/// What the history holds of deeds, once it holds one of this name.
-async fn deeds(session: &super::Session, action: &str) -> Vec<ActionRecord> {
+/// The actions in the history, once it holds one of this name.
+async fn actions_of(session: &super::Session, action: &str) -> Vec<ActionRecord> {
     let (from, to) = (jiff::Timestamp::MIN, jiff::Timestamp::MAX);
     let mut snapshots = session.snapshots.clone();
     loop {
@@ -29,9 +29,9 @@ async fn deeds(session: &super::Session, action: &str) -> Vec<ActionRecord> {
         let all = String::new;
         let query = Query::Audit { from, to, words: all(), by: all(), action: all(), limit: 1_000 };
         session.ask(QueryRequest { query, reply }).unwrap();
-        let Answer::Actions(deeds) = answer.await.unwrap().unwrap() else { panic!("another answer") };
-        if deeds.iter().any(|deed| &*deed.action == action) {
-            return deeds;
+        let Answer::Actions(actions) = answer.await.unwrap().unwrap() else { panic!("another answer") };
+        if actions.iter().any(|row| &*row.action == action) {
+            return actions;
         }
         // The store commits once a second.
         snapshots.changed().await.unwrap();
@@ -62,7 +62,7 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
     assert_eq!(snapshot.history.trouble, None);
     // What was typed wrong at one terminal is held against that terminal only.
     other.wish(Wish::Login { user: "ANNA".into(), password: password.into() }).await.unwrap();
-    let rows = deeds(&other, "unlock failed").await;
+    let rows = actions_of(&other, "unlock failed").await;
     other.wish(Wish::Stop).await.unwrap();
     assert!(matches!(station.lifecycle.recv().await, Some(super::LifecycleRequest::Stop)));
     drop((session, other));

@@ -27,7 +27,7 @@ struct Station {
     task: JoinHandle<()>,
     recorder: std::thread::JoinHandle<Option<Seal>>,
     _blocked: mpsc::Receiver<Vec<Record>>,
-    papers: mpsc::Sender<Paper>,
+    messages: mpsc::Sender<AuditMessage>,
     _requests: mpsc::Receiver<BusRequest>,
 }
 
@@ -46,18 +46,18 @@ impl Station {
         records.try_send(Vec::new()).unwrap();
         let recorder = recorder::start(history, clock, records.clone()).unwrap();
         let (_, store) = watch::channel(HistoryStatus::default());
-        let book = Some(Deeds::new(&recorder));
+        let book = Some(AuditQueue::new(&recorder));
         let keeping = Keeping { records: Some(records), store, past: None, book, sets: None, listener: None };
         let (request, requests) = mpsc::channel(8);
         let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
         let (events, event_queue) = mpsc::channel(8);
         let (orders, order_queue) = mpsc::channel(8);
-        let (papers, paper_queue) = mpsc::channel(8);
+        let (messages, message_queue) = mpsc::channel(8);
         let task = PlantTask::new(plant, clock, vec![request], None, keeping, publish);
-        let task = tokio::spawn(task.run(event_queue, order_queue, paper_queue));
+        let task = tokio::spawn(task.run(event_queue, order_queue, message_queue));
         let recorder = recorder.join;
         let station =
-            Station { events, orders, snapshots, task, recorder, _blocked: blocked, papers, _requests: requests };
+            Station { events, orders, snapshots, task, recorder, _blocked: blocked, messages, _requests: requests };
         let tags: Vec<TagId> = def.tags_of(fixture::TIC).map(|tag| tag.id).collect();
         let silent =
             Event::Failed { at: clock.now(), device: fixture::TIC, tags, fault: Fault::Resting, exchange: None };
@@ -85,8 +85,8 @@ impl Station {
     }
 
     async fn stop(self) {
-        let Station { events, task, recorder, papers, .. } = self;
-        drop((events, papers));
+        let Station { events, task, recorder, messages, .. } = self;
+        drop((events, messages));
         task.await.unwrap();
         tokio::task::spawn_blocking(move || recorder.join()).await.unwrap().unwrap();
     }
@@ -145,10 +145,10 @@ async fn a_login_is_reported_as_not_recorded_while_the_disk_takes_nothing() {
     let obstacle = alarm_file::beside(&history);
     fs::create_dir(&obstacle).unwrap();
     let mut station = Station::start(&history).await;
-    let answer = |papers: &mpsc::Sender<Paper>| {
+    let answer = |messages: &mpsc::Sender<AuditMessage>| {
         let (reply, answer) = tokio::sync::oneshot::channel();
-        papers.try_send(Paper::Deed(deeds::stopped("login", jiff::Timestamp::UNIX_EPOCH))).unwrap();
-        papers.try_send(Paper::Answer(reply, Ok(()))).unwrap();
+        messages.try_send(AuditMessage::Entry(audit_queue::stopped("login", jiff::Timestamp::UNIX_EPOCH))).unwrap();
+        messages.try_send(AuditMessage::Reply(reply, Ok(()))).unwrap();
         answer
     };
     let unwritten = |snapshot: &Arc<Snapshot>| {
@@ -156,10 +156,10 @@ async fn a_login_is_reported_as_not_recorded_while_the_disk_takes_nothing() {
         trouble.is_some_and(|trouble| trouble.contains("the state of the alarms cannot be written"))
     };
     station.snapshots.wait_for(unwritten).await.unwrap();
-    assert_eq!(answer(&station.papers).await.unwrap(), Ok(Durability::NotRecorded));
+    assert_eq!(answer(&station.messages).await.unwrap(), Ok(Durability::NotRecorded));
     fs::remove_dir(&obstacle).unwrap();
     // A slow disk may need more than one.
-    let recorded = async { while answer(&station.papers).await.unwrap() != Ok(Durability::Recorded) {} };
+    let recorded = async { while answer(&station.messages).await.unwrap() != Ok(Durability::Recorded) {} };
     tokio::time::timeout(Duration::from_secs(60), recorded).await.unwrap();
     station.stop().await;
 }

@@ -1,4 +1,4 @@
-//! The way of actions and alarms to the disk, and what the station itself puts there: start, stop, plant file, steps of the clock.
+//! The plant-side end of the audit writer, and the entries of the station itself: start, stop, plant file, clock steps.
 
 use std::{
     collections::{HashMap, VecDeque},
@@ -39,14 +39,14 @@ const ORDERS_MAX: usize = 64;
 /// Answers that wait for the audit log; one more, and the oldest waits no longer.
 const ANSWERS_MAX: usize = 64;
 
-/// What comes from the session server, in its order.
+/// A message of the session server; order matters.
 #[derive(Debug)]
-pub enum Paper {
+pub enum AuditMessage {
     /// Put this into the audit log.
-    Deed(ActionRecord),
+    Entry(ActionRecord),
     /// Send this once the log has what came before it, or say that it has not: what is reported as recorded survives a loss
     /// of power.
-    Answer(oneshot::Sender<Result<Durability, String>>, Result<(), String>),
+    Reply(oneshot::Sender<Result<Durability, String>>, Result<(), String>),
     /// So many actions found no room on this way.
     Lost(u64),
 }
@@ -68,9 +68,9 @@ impl Answer {
     }
 }
 
-/// The plant's end of the recorder.
+/// The plant-side end of the audit writer.
 #[derive(Debug)]
-pub struct Deeds {
+pub struct AuditQueue {
     queue: queue::SyncSender<Message>,
     recorded: watch::Receiver<Recorded>,
     /// What the queue had no room for: the next batch. Its steps are bounded by the alarms of the plant.
@@ -95,11 +95,11 @@ pub struct Deeds {
     users_file: Option<Arc<str>>,
 }
 
-impl Deeds {
+impl AuditQueue {
     /// The end of a recorder that has just been started.
-    pub fn new(recorder: &Handle) -> Deeds {
+    pub fn new(recorder: &Handle) -> AuditQueue {
         let (plant_file, users_file) = (recorder.opened.plant_file.clone(), recorder.opened.users_file.clone());
-        Deeds {
+        AuditQueue {
             queue: recorder.batches.clone(),
             recorded: recorder.recorded.clone(),
             backlog: Vec::new(),
@@ -192,14 +192,14 @@ impl Deeds {
         self.lost += count;
     }
 
-    /// Sends an answer once all that was put here before it is on disk; see [`Deeds::tell`].
+    /// Sends an answer once all that was put here before it is on disk; see [`AuditQueue::tell`].
     pub fn answer(&mut self, reply: oneshot::Sender<Result<Durability, String>>, answer: Result<(), String>) {
         self.answers.push_back(Answer { batches: self.needed, since: Instant::now(), reply, answer });
         let _ = self.tell();
     }
 
     /// Sends the answers whose actions are on disk, and those that have waited too long as not recorded. Gives back actions
-    /// as [`Deeds::put`].
+    /// as [`AuditQueue::put`].
     pub fn tell(&mut self) -> Vec<ActionRecord> {
         let (recorded, alive) = (self.recorded.borrow().batches, self.recorded.has_changed().is_ok());
         let is_due = |answer: &Answer| !alive || answer.batches <= recorded || WAIT_MAX <= answer.since.elapsed();
@@ -250,7 +250,7 @@ impl Deeds {
             !self.steps.contains_key(&name)
         };
         for alarm in Arc::make_mut(&mut snapshot.alarms) {
-            alarm.acknowledged.iter_mut().for_each(|deed| deed.recorded = is_recorded(alarm.id));
+            alarm.acknowledged.iter_mut().for_each(|note| note.recorded = is_recorded(alarm.id));
         }
         for alarm in Arc::make_mut(&mut snapshot.aside) {
             alarm.deed.recorded = is_recorded(alarm.id);
@@ -258,7 +258,7 @@ impl Deeds {
     }
 
     /// Waits until the disk has taken something.
-    pub async fn changed(book: &mut Option<Deeds>) {
+    pub async fn changed(book: &mut Option<AuditQueue>) {
         let changed = match book {
             Some(book) => book.recorded.changed().await.is_ok(),
             None => false,
