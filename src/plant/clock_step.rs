@@ -8,7 +8,7 @@ use std::sync::Arc;
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    alarm::{AlarmCommand, state::Deed},
+    alarm::{AlarmCommand, state::OperatorNote},
     command::Command,
     event::LineState,
     record::{AlarmRecord, Burst, Record},
@@ -47,8 +47,8 @@ fn shift_burst(burst: &mut Option<Burst>, by: SignedDuration) {
     burst.iter_mut().for_each(|burst| shift(&mut burst.began, by));
 }
 
-fn shift_deed(deed: &mut Deed, by: SignedDuration) {
-    shift(&mut deed.at, by);
+fn shift_note(note: &mut OperatorNote, by: SignedDuration) {
+    shift(&mut note.at, by);
 }
 
 impl Command {
@@ -119,14 +119,14 @@ impl ActiveAlarm {
     fn shift(&mut self, by: SignedDuration) {
         let times = [&mut self.raised_at, &mut self.annunciated_at].into_iter().chain(&mut self.returned_at);
         times.for_each(|at| shift(at, by));
-        self.acknowledged.iter_mut().for_each(|deed| shift_deed(deed, by));
+        self.acknowledged.iter_mut().for_each(|note| shift_note(note, by));
         shift_burst(&mut self.burst, by);
     }
 }
 
 impl AsideAlarm {
     fn shift(&mut self, by: SignedDuration) {
-        shift_deed(&mut self.deed, by);
+        shift_note(&mut self.note, by);
         self.until.iter_mut().for_each(|until| shift(until, by));
     }
 }
@@ -184,7 +184,7 @@ mod tests {
             let mut snapshot = plant.snapshot();
             snapshot.shift(by);
             assert_eq!(snapshot.orders[0].outcome, Outcome::Verified);
-            assert_eq!(snapshot.alarms[0].acknowledged.as_ref().map(|deed| deed.at), Some(at(1_000_005) + by));
+            assert_eq!(snapshot.alarms[0].acknowledged.as_ref().map(|note| note.at), Some(at(1_000_005) + by));
         }
     }
 }

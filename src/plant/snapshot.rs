@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     alarm::{
         AlarmCommand, AlarmQuality,
-        state::{AlarmState, Deed},
+        state::{AlarmState, OperatorNote},
     },
     command::{Command, OrderStatus},
     def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, TagId},
@@ -269,7 +269,7 @@ pub struct ActiveAlarm {
     /// The value that raised it.
     pub value: Option<f64>,
     /// Who acknowledged it, when, with which note.
-    pub acknowledged: Option<Deed>,
+    pub acknowledged: Option<OperatorNote>,
     /// Activations since the station started.
     pub times: u32,
     /// Its place among the alarms that were raised together.
@@ -297,7 +297,7 @@ pub struct AsideAlarm {
     /// Shelved, suppressed or out of service.
     pub state: AlarmState,
     /// Who put it aside, when and why; nobody, where it is by design.
-    pub deed: Deed,
+    pub note: OperatorNote,
     /// When it comes back by itself, if it is shelved.
     pub until: Option<Timestamp>,
     /// Its condition holds all the same.

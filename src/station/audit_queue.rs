@@ -253,7 +253,7 @@ impl AuditQueue {
             alarm.acknowledged.iter_mut().for_each(|note| note.recorded = is_recorded(alarm.id));
         }
         for alarm in Arc::make_mut(&mut snapshot.aside) {
-            alarm.deed.recorded = is_recorded(alarm.id);
+            alarm.note.recorded = is_recorded(alarm.id);
         }
     }
 

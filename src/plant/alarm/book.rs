@@ -159,7 +159,7 @@ impl Book {
             records.push(self.step(alarm, AlarmStep::Unshelved, at, facts.value));
             records.extend(self.raise_anew(alarm, at, facts.value));
         } else if let Some(until) = shelving.moved(at) {
-            let (by, reason) = (shelving.deed.by.clone(), shelving.deed.reason.clone());
+            let (by, reason) = (shelving.note.by.clone(), shelving.note.reason.clone());
             let record = self.record(alarm, AlarmStep::Shelved, at, facts.value);
             records.push(self.take(alarm.id, AlarmRecord { by, reason, until: Some(until), ..record }));
         }
@@ -208,7 +208,7 @@ impl Book {
             return;
         }
         // After a restart the time before it counts as far as the clock can be believed.
-        let before = || machine.acknowledged.as_ref().map(|deed| at.duration_since(deed.at));
+        let before = || machine.acknowledged.as_ref().map(|note| at.duration_since(note.at));
         let before = || before().and_then(|span| Duration::try_from(span).ok()).unwrap_or_default();
         let lasts = machine.acknowledged_for.map_or_else(before, |lasts| lasts + passed);
         machine.acknowledged_for = Some(lasts);

@@ -120,7 +120,7 @@ impl Book {
         }
         check_words(note)?;
         let value = machine.value;
-        Ok(self.deed(&alarm, AlarmStep::Acknowledged, at, value, by, note))
+        Ok(self.record_action(&alarm, AlarmStep::Acknowledged, at, value, by, note))
     }
 
     /// Lets go an alarm that latches.
@@ -140,7 +140,7 @@ impl Book {
             | AlarmState::Suppressed
             | AlarmState::OutOfService => return Err(AlarmRefusal::NothingToReset),
         }
-        Ok(self.deed(&alarm, AlarmStep::Reset, at, None, by, None))
+        Ok(self.record_action(&alarm, AlarmStep::Reset, at, None, by, None))
     }
 
     /// Puts an alarm on the shelf, or one that lies there for another time.
@@ -193,7 +193,7 @@ impl Book {
         if self.machine(id).out_of_service().is_some() {
             return Err(AlarmRefusal::OutOfService);
         }
-        Ok(self.deed(&alarm, AlarmStep::OutOfService, at, None, by, Some(reason)))
+        Ok(self.record_action(&alarm, AlarmStep::OutOfService, at, None, by, Some(reason)))
     }
 
     /// Puts an alarm back in service; if it is active it is raised anew with its present `value`.
@@ -219,11 +219,11 @@ impl Book {
         at: Timestamp,
         by: &Arc<str>,
     ) -> Vec<AlarmRecord> {
-        let back = self.deed(alarm, step, at, value, by, None);
+        let back = self.record_action(alarm, step, at, value, by, None);
         [Some(back), self.raise_anew(alarm, at, value)].into_iter().flatten().collect()
     }
 
-    fn deed(
+    fn record_action(
         &mut self,
         alarm: &AlarmDef,
         step: AlarmStep,

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::{
     Book,
-    state::{AlarmState, Deed, Machine},
+    state::{AlarmState, Machine, OperatorNote},
 };
 use crate::plant::{
     def::AlarmId,
@@ -89,10 +89,10 @@ fn shown(id: AlarmId, machine: &Machine) -> ActiveAlarm {
 fn put_aside(id: AlarmId, machine: &Machine) -> Option<AsideAlarm> {
     let state = machine.state();
     let shelf = machine.shelved().filter(|_| state == AlarmState::Shelved);
-    let deed = match state {
+    let note = match state {
         AlarmState::OutOfService => machine.out_of_service()?.clone(),
-        AlarmState::Shelved => machine.shelved()?.deed.clone(),
-        AlarmState::Suppressed => Deed { at: machine.suppressed()?, by: None, reason: None, recorded: true },
+        AlarmState::Shelved => machine.shelved()?.note.clone(),
+        AlarmState::Suppressed => OperatorNote { at: machine.suppressed()?, by: None, reason: None, recorded: true },
         AlarmState::Normal
         | AlarmState::Unacknowledged
         | AlarmState::Acknowledged
@@ -100,5 +100,5 @@ fn put_aside(id: AlarmId, machine: &Machine) -> Option<AsideAlarm> {
         | AlarmState::LatchedUnacknowledged
         | AlarmState::LatchedAcknowledged => return None,
     };
-    Some(AsideAlarm { id, state, deed, until: shelf.map(|shelving| shelving.until), active: machine.is_active() })
+    Some(AsideAlarm { id, state, note, until: shelf.map(|shelving| shelving.until), active: machine.is_active() })
 }

@@ -87,7 +87,7 @@ impl AlarmState {
 
 /// Who did something with an alarm, when, and in which words.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Deed {
+pub struct OperatorNote {
     /// When.
     pub at: Timestamp,
     /// Who; `None` if the station did it by itself.
@@ -102,7 +102,7 @@ pub struct Deed {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Shelving {
     /// Who, when, why.
-    pub deed: Deed,
+    pub note: OperatorNote,
     /// It comes back by itself then.
     pub until: Timestamp,
 }
@@ -110,7 +110,7 @@ pub struct Shelving {
 impl Shelving {
     /// If the clock has gone back behind the beginning, the end moves along: nobody shelved it for longer than this.
     pub fn moved(&self, at: Timestamp) -> Option<Timestamp> {
-        (at < self.deed.at).then(|| at + self.until.duration_since(self.deed.at))
+        (at < self.note.at).then(|| at + self.until.duration_since(self.note.at))
     }
 }
 
@@ -131,7 +131,7 @@ pub struct Machine {
     latched: bool,
     suppressed: Option<Timestamp>,
     shelved: Option<Shelving>,
-    out_of_service: Option<Deed>,
+    out_of_service: Option<OperatorNote>,
     /// Since when the condition differs from `active`: the delay runs. An instant of the book's own clock.
     pending_since: Option<Duration>,
     /// The last activation that was annunciated.
@@ -141,7 +141,7 @@ pub struct Machine {
     /// When the last activation returned.
     pub returned_at: Option<Timestamp>,
     /// The last acknowledgement since it was raised.
-    pub acknowledged: Option<Deed>,
+    pub acknowledged: Option<OperatorNote>,
     /// The value that raised it.
     pub value: Option<f64>,
     /// Its place among the alarms that were raised together.
@@ -185,7 +185,7 @@ impl Machine {
         self.shelved.as_ref()
     }
     /// Since when it is out of service, by whom and why.
-    pub fn out_of_service(&self) -> Option<&Deed> {
+    pub fn out_of_service(&self) -> Option<&OperatorNote> {
         self.out_of_service.as_ref()
     }
     /// Since when it is suppressed by design.
@@ -234,7 +234,7 @@ impl Machine {
     /// Takes a step: one that was just decided, or one that the journal remembers after a restart. Both end in the same
     /// state, because this is the only place where it changes.
     pub fn apply(&mut self, step: &AlarmRecord, latch: bool) {
-        let deed = || Deed { at: step.at, by: step.by.clone(), reason: step.reason.clone(), recorded: true };
+        let note = || OperatorNote { at: step.at, by: step.by.clone(), reason: step.reason.clone(), recorded: true };
         match step.step {
             AlarmStep::Raised => {
                 (self.active, self.unacknowledged, self.pending_since) = (true, true, None);
@@ -256,7 +256,7 @@ impl Machine {
             }
             AlarmStep::RaisedAgain => (self.unacknowledged, self.annunciated_at) = (true, Some(step.at)),
             AlarmStep::Acknowledged => {
-                (self.unacknowledged, self.acknowledged) = (false, Some(deed()));
+                (self.unacknowledged, self.acknowledged) = (false, Some(note()));
             }
             AlarmStep::Returned | AlarmStep::ReturnedQuietly => {
                 (self.active, self.pending_since, self.returned_at) = (false, None, Some(step.at));
@@ -264,7 +264,7 @@ impl Machine {
             AlarmStep::Reset => self.latched = false,
             AlarmStep::Shelved => {
                 // Without an end it would stay away for ever: the journal of another program, or a damaged one.
-                self.shelved = Some(Shelving { deed: deed(), until: step.until.unwrap_or(step.at) });
+                self.shelved = Some(Shelving { note: note(), until: step.until.unwrap_or(step.at) });
                 self.keep_latched();
             }
             AlarmStep::Unshelved => self.shelved = None,
@@ -276,7 +276,7 @@ impl Machine {
             }
             AlarmStep::Released => self.suppressed = None,
             AlarmStep::OutOfService => {
-                self.out_of_service = Some(deed());
+                self.out_of_service = Some(note());
                 self.keep_latched();
             }
             AlarmStep::InService => self.out_of_service = None,
@@ -391,8 +391,8 @@ mod tests {
     #[test]
     fn a_shelving_is_never_longer_than_it_was_given_for() {
         let at = |second| Timestamp::from_second(second).expect("a small number");
-        let deed = Deed { at: at(1_000), by: None, reason: None, recorded: true };
-        let shelving = Shelving { deed, until: at(1_600) };
+        let note = OperatorNote { at: at(1_000), by: None, reason: None, recorded: true };
+        let shelving = Shelving { note, until: at(1_600) };
         assert_eq!(shelving.moved(at(1_500)), None);
         assert_eq!(shelving.moved(at(100)), Some(at(700)));
     }

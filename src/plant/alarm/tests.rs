@@ -58,7 +58,7 @@ fn an_alarm_is_told_with_value_and_limit_and_survives_a_restart() {
     assert_eq!((ack.by, ack.reason), (Some(by()), Some(why())));
     assert_eq!(again.acknowledge(HIGH, at(2), None, at(3), &by()), Err(AlarmRefusal::NothingToAcknowledge));
     assert_eq!(again.active()[0].state, AlarmState::Acknowledged);
-    assert_eq!(again.active()[0].acknowledged.as_ref().and_then(|deed| deed.by.clone()), Some(by()));
+    assert_eq!(again.active()[0].acknowledged.as_ref().and_then(|note| note.by.clone()), Some(by()));
 }
 
 #[test]
@@ -143,7 +143,7 @@ fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
     assert_eq!(steps(&book.judge(at(10), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
     assert!(!book.lists().sound && book.active().is_empty());
     let aside = book.lists().aside[0].clone();
-    assert_eq!((aside.until, aside.active, aside.deed.reason), (Some(at(60)), true, Some(why())));
+    assert_eq!((aside.until, aside.active, aside.note.reason), (Some(at(60)), true, Some(why())));
     assert_eq!(steps(&book.judge(at(59), facts(80.0, true))), []);
     assert_eq!(steps(&book.judge(at(60), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
     assert_eq!((state(&book), book.active()[0].raised_at), (AlarmState::Unacknowledged, at(60)));

@@ -118,7 +118,7 @@ impl Alarms {
             Page::Aside => {
                 let place = |aside: &AsideAlarm| Some(aside.id) == self.selected;
                 let place = cx.snapshot.aside.iter().position(place).unwrap_or(0);
-                Rows::of(cx.snapshot.aside.iter().map(|aside| (aside.id, aside.state, aside.deed.at)), place)
+                Rows::of(cx.snapshot.aside.iter().map(|aside| (aside.id, aside.state, aside.note.at)), place)
             }
             // Nothing is done with a row of these.
             Page::Journal | Page::Quality | Page::Handover => Rows::default(),

@@ -32,9 +32,9 @@ pub fn acknowledge(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
 
 /// Says that this one needs no acknowledgement, and who gave it.
 pub fn acknowledged(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
-    let by = alarm.acknowledged.as_ref().map(|deed| {
-        let by = deed.by.as_deref().unwrap_or("the station");
-        format!("It was acknowledged {} by {by}.", clock(deed.at, &cx.def().time_zone))
+    let by = alarm.acknowledged.as_ref().map(|note| {
+        let by = note.by.as_deref().unwrap_or("the station");
+        format!("It was acknowledged {} by {by}.", clock(note.at, &cx.def().time_zone))
     });
     let words = ["already acknowledged".to_owned(), name(cx, alarm.id)].into_iter().chain(by).collect();
     open(Modal::Notice(Notice::new("acknowledge", words)))

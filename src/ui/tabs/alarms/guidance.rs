@@ -152,14 +152,14 @@ fn now_words(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
     if 1 < alarm.times {
         words += &format!(", {} times since the start", alarm.times);
     }
-    if let Some(deed) = &alarm.acknowledged {
-        let by = deed.by.as_deref().unwrap_or("the station");
-        words += &format!(", acknowledged {} by {by}", clock(deed.at, zone));
-        if !deed.recorded {
+    if let Some(note) = &alarm.acknowledged {
+        let by = note.by.as_deref().unwrap_or("the station");
+        words += &format!(", acknowledged {} by {by}", clock(note.at, zone));
+        if !note.recorded {
             words += " (NOT RECORDED)";
         }
-        if let Some(note) = &deed.reason {
-            words += &format!(": {note}");
+        if let Some(reason) = &note.reason {
+            words += &format!(": {reason}");
         }
     }
     words

@@ -240,9 +240,9 @@ pub fn aside_words(cx: &ViewContext, aside: &AsideAlarm) -> String {
     let def = cx.def().alarm(aside.id);
     let mark = cx.theme.priority_tag(def.priority);
     let left = aside.until.map(|until| format!(", {} left", running(between(cx.now, until)))).unwrap_or_default();
-    let since = moment(aside.deed.at, cx.now, &cx.def().time_zone);
-    let by = aside.deed.by.as_ref().map(|by| format!(", by {by}")).unwrap_or_default();
-    let reason = aside.deed.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
+    let since = moment(aside.note.at, cx.now, &cx.def().time_zone);
+    let by = aside.note.by.as_ref().map(|by| format!(", by {by}")).unwrap_or_default();
+    let reason = aside.note.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
     let active = if aside.active { " ACTIVE" } else { "" };
     let name = subject(cx, aside.id);
     format!("{} {mark} {name} {}{active}{left}{by}{reason}, since {since}", aside.state.word(), def.text)

@@ -10,7 +10,7 @@ use crate::{
         alarm::{
             AlarmCommand, AlarmState, Figures,
             quality::{Frequent, Named},
-            state::Deed,
+            state::OperatorNote,
         },
         command::Command,
         def::{AlarmClass, AlarmDef, AlarmId, Priority},
@@ -61,7 +61,7 @@ fn storm() -> Fixture {
         if n == 2 {
             alarm.state = AlarmState::Acknowledged;
             let reason = Some("pump is looked at".into());
-            alarm.acknowledged = Some(Deed { at: ago(20), by: Some("anna".into()), reason, recorded: true });
+            alarm.acknowledged = Some(OperatorNote { at: ago(20), by: Some("anna".into()), reason, recorded: true });
         }
         if n == 4 {
             (alarm.state, alarm.returned_at) = (AlarmState::LatchedUnacknowledged, Some(ago(9)));
@@ -80,7 +80,7 @@ fn storm() -> Fixture {
 /// Shelved, suppressed, out of service.
 fn put_aside() -> Fixture {
     let mut fixture = storm();
-    let deed = |seconds, by: Option<&str>, reason: Option<&str>| Deed {
+    let note = |seconds, by: Option<&str>, reason: Option<&str>| OperatorNote {
         at: ago(seconds),
         by: by.map(Arc::from),
         reason: reason.map(Arc::from),
@@ -90,21 +90,21 @@ fn put_aside() -> Fixture {
     aside.push(AsideAlarm {
         id: AlarmId(1),
         state: AlarmState::Shelved,
-        deed: deed(1_140, Some("anna"), Some("sensor is being cleaned")),
+        note: note(1_140, Some("anna"), Some("sensor is being cleaned")),
         until,
         active: true,
     });
     aside.push(AsideAlarm {
         id: AlarmId(2),
         state: AlarmState::OutOfService,
-        deed: deed(90_000, Some("tech1"), Some("level probe broken, spare part ordered")),
+        note: note(90_000, Some("tech1"), Some("level probe broken, spare part ordered")),
         until: None,
         active: false,
     });
     aside.push(AsideAlarm {
         id: AlarmId(3),
         state: AlarmState::Suppressed,
-        deed: deed(300, None, None),
+        note: note(300, None, None),
         until: None,
         active: false,
     });
@@ -161,7 +161,7 @@ fn a_storm_is_folded_and_counted() {
 #[test]
 fn an_acknowledgement_that_is_not_on_disk_is_marked_in_list_and_guidance() {
     let mut fixture = storm();
-    fixture.alarms.iter_mut().filter_map(|alarm| alarm.acknowledged.as_mut()).for_each(|deed| deed.recorded = false);
+    fixture.alarms.iter_mut().filter_map(|alarm| alarm.acknowledged.as_mut()).for_each(|note| note.recorded = false);
     let mut model = shown(&fixture, Theme::FULL, " ");
     let mut picture = |_| {
         type_keys(&mut model, "↓");
@@ -435,10 +435,10 @@ fn every_priority_in_every_state_looks_different_without_colour() {
             }
             let mut fixture = Fixture::alarm();
             fixture.def.alarms[0].priority = priority;
-            let deed = Deed { at: now(), by: None, reason: None, recorded: true };
+            let note = OperatorNote { at: now(), by: None, reason: None, recorded: true };
             if state.is_aside() {
                 fixture.alarms.clear();
-                fixture.aside = vec![AsideAlarm { id: AlarmId(0), state, deed, until: None, active: true }];
+                fixture.aside = vec![AsideAlarm { id: AlarmId(0), state, note, until: None, active: true }];
             } else {
                 fixture.alarms.truncate(1);
                 fixture.alarms[0].state = state;
@@ -512,7 +512,7 @@ fn a_suppressed_alarm_is_put_back_only_as_it_was_drawn() {
     type Change = fn(&mut Vec<AsideAlarm>);
     let first_left: Change = |aside| drop(aside.remove(0));
     // Back in service and shelved by a colleague: the same alarm, for another reason.
-    let shelved_again: Change = |aside| aside[0].deed.at = now();
+    let shelved_again: Change = |aside| aside[0].note.at = now();
     for change in [first_left, shelved_again] {
         let mut fixture = put_aside();
         let mut model = shown(&fixture, Theme::FULL, "v");

@@ -270,7 +270,7 @@ fn cells(cx: &ViewContext, row: &Row, what: u16) -> [String; 9] {
         },
         alarm.state.word().to_owned(),
         running(between(alarm.raised_at, cx.now)),
-        alarm.acknowledged.as_ref().and_then(|deed| deed.by.as_deref()).unwrap_or_default().to_owned(),
+        alarm.acknowledged.as_ref().and_then(|note| note.by.as_deref()).unwrap_or_default().to_owned(),
     ]
 }
 
@@ -287,7 +287,7 @@ fn what_words(cx: &ViewContext, row: &Row, room: u16) -> String {
         (true, more, 0) => (format!(" +{more} more"), format!(" +{more}")),
         (true, more, waiting) => (format!(" +{more} more, {waiting} unack"), format!(" +{more} ({waiting})")),
     };
-    let unrecorded = row.alarm.acknowledged.as_ref().is_some_and(|deed| !deed.recorded);
+    let unrecorded = row.alarm.acknowledged.as_ref().is_some_and(|note| !note.recorded);
     let unrecorded = if unrecorded { " NOT RECORDED" } else { "" };
     let (long, short) = (long + unrecorded, short + unrecorded);
     let name = format!("{mark}{}", cx.def().alarm(row.alarm.id).text);
