@@ -375,8 +375,8 @@ pub fn order_words(cx: &ViewContext, command: &Command, old: Option<f64>) -> Str
             text.trim_end().to_owned()
         }
         Command::Alarm(command) => {
-            let (deed, target, _) = alarm_words_of(cx.def(), command);
-            format!("{deed} {target}")
+            let (action, target, _) = alarm_words_of(cx.def(), command);
+            format!("{action} {target}")
         }
         Command::Refresh(device) => format!("refresh {}", cx.def().device(*device).name),
         Command::Connect(line, true) => format!("connect {}", cx.def().line(*line).name),

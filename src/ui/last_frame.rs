@@ -10,7 +10,7 @@ use jiff::Timestamp;
 
 use super::{
     Model, UiAction,
-    tabs::{Tab, alarms::deeds},
+    tabs::{Tab, alarms::actions},
 };
 use crate::plant::{def::AlarmId, snapshot::ActiveAlarm};
 
@@ -133,8 +133,8 @@ impl Model {
 /// Acknowledges what `a` is for; says so where that needs none.
 pub(super) fn acknowledge(model: &mut Model) -> Vec<UiAction> {
     let (actions, note) = match model.alarm_seen() {
-        Ok(Some(alarm)) if alarm.state.needs_acknowledgement() => (deeds::acknowledge(&model.cx(), alarm), None),
-        Ok(Some(alarm)) if model.lists() => (deeds::acknowledged(&model.cx(), alarm), None),
+        Ok(Some(alarm)) if alarm.state.needs_acknowledgement() => (actions::acknowledge(&model.cx(), alarm), None),
+        Ok(Some(alarm)) if model.lists() => (actions::acknowledged(&model.cx(), alarm), None),
         Ok(_) => (Vec::new(), None),
         Err(why) => (Vec::new(), Some(why)),
     };

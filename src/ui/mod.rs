@@ -38,7 +38,7 @@ use modal::{Confirm, Modal};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
 pub use pending_command::{Confirmed, PendingCommand};
 use session_lock::SessionLock;
-use tabs::{Tab, Tabs, alarms::deeds};
+use tabs::{Tab, Tabs, alarms::actions};
 use theme::Theme;
 
 /// A station that has said nothing for so long (real time) is silent: its values are doubted.
@@ -328,8 +328,8 @@ fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             let cx = model.cx();
             let listed = (model.tabs.shown == Tab::Alarms).then(|| model.tabs.alarms.listed(&cx)).flatten();
             match listed {
-                Some(listed) => deeds::acknowledge_all(&cx, listed.into_iter()),
-                None => deeds::acknowledge_all(&cx, cx.snapshot.alarms.iter()),
+                Some(listed) => actions::acknowledge_all(&cx, listed.into_iter()),
+                None => actions::acknowledge_all(&cx, cx.snapshot.alarms.iter()),
             }
         }
         // Where nothing sounds there is nothing to silence.

@@ -48,8 +48,8 @@ pub fn of_key(cx: &ViewContext, tab: Tab, hint: &Hint) -> Option<Role> {
             return lesser.then_some(Role::Supervisor);
         }
         Tab::Alarms => {
-            let deeds = ["note", "shelve", "page", "reset", "put back", "hand over", "take over"];
-            matches!(hint.key.as_str(), "a" | "A") || deeds.contains(&hint.label.as_str())
+            let actions = ["note", "shelve", "page", "reset", "put back", "hand over", "take over"];
+            matches!(hint.key.as_str(), "a" | "A") || actions.contains(&hint.label.as_str())
         }
         Tab::Controllers => matches!(hint.label.as_str(), "edit" | "tune" | "actions" | "refresh" | "line"),
         Tab::Bus => ["start", "retry"].contains(&hint.label.as_str()),

@@ -123,7 +123,7 @@ impl Theme {
     pub fn trouble(&self) -> Style {
         self.fg((230, 160, 80), 214, Color::Yellow).add_modifier(Modifier::BOLD)
     }
-    /// A deed that ended as wished.
+    /// An action that succeeded.
     pub fn done(&self) -> Style {
         self.strong()
     }

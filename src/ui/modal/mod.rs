@@ -2,7 +2,7 @@
 
 pub mod choice;
 pub mod confirm;
-pub mod deed;
+pub mod audit_entry;
 pub mod entry;
 pub mod faceplate;
 pub mod form;
@@ -21,9 +21,9 @@ pub mod why;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
+pub use audit_entry::AuditEntryDialog;
 pub use choice::Choice;
 pub use confirm::Confirm;
-pub use deed::Deed;
 pub use entry::Entry;
 pub use faceplate::Faceplate;
 pub use guidance::Guidance;
@@ -55,7 +55,7 @@ pub enum Modal {
     Choice(Choice),
     /// A text for the tab below.
     Prompt(Prompt),
-    /// A deed that wants words.
+    /// An action with a reason or a note.
     Reason(Box<Reason>),
     /// What there is to know about an item of the mimic.
     Faceplate(Faceplate),
@@ -71,8 +71,8 @@ pub enum Modal {
     Bus(Box<bus::Window>),
     /// A form about people.
     UserForm(Box<UserForm>),
-    /// A deed on record, whole.
-    Deed(Box<Deed>),
+    /// One audit entry.
+    AuditEntry(Box<AuditEntryDialog>),
 }
 
 /// What a key did to a window.
@@ -128,7 +128,7 @@ impl Modal {
             Modal::Settings(settings) => settings.on_key(cx, event),
             Modal::Bus(window) => window.on_key(cx, tabs, event),
             Modal::UserForm(form) => form.on_key(cx, event),
-            Modal::Deed(deed) => deed.on_key(event),
+            Modal::AuditEntry(dialog) => dialog.on_key(event),
         };
         match next {
             Next::Stay(modal) => (Some(modal), Vec::new()),
@@ -154,7 +154,7 @@ impl Modal {
             | Modal::Guidance(_)
             | Modal::Why(_)
             | Modal::Faceplate(_)
-            | Modal::Deed(_)
+            | Modal::AuditEntry(_)
             | Modal::Bus(_) => !self.only_shows(),
         }
     }
@@ -167,7 +167,7 @@ impl Modal {
             | Modal::Guidance(_)
             | Modal::Why(_)
             | Modal::Faceplate(_)
-            | Modal::Deed(_) => true,
+            | Modal::AuditEntry(_) => true,
             Modal::Confirm(confirm) => confirm.is_quit(),
             Modal::Bus(window) => window.only_shows(),
             Modal::Entry(_)
@@ -193,7 +193,7 @@ impl Modal {
             | Modal::Faceplate(_)
             | Modal::Notice(_)
             | Modal::Guidance(_)
-            | Modal::Deed(_)
+            | Modal::AuditEntry(_)
             | Modal::Why(_) => {}
             Modal::Bus(window) => window.on_paste(text),
         }
@@ -217,7 +217,7 @@ impl Modal {
             Modal::Settings(settings) => settings.hints(),
             Modal::Bus(window) => window.hints(),
             Modal::UserForm(form) => form.hints().into_iter().chain([hint("Esc", "leave")]).collect(),
-            Modal::Deed(_) => vec![hint("Esc", "close")],
+            Modal::AuditEntry(_) => vec![hint("Esc", "close")],
         };
         // A digit is typed here: the tabs are one key further away.
         if let Some(last) = Tab::offered(cx).last().filter(|_| self.takes_text()) {
@@ -242,7 +242,7 @@ impl Modal {
             Modal::Settings(settings) => settings.view(cx, frame, body),
             Modal::Bus(window) => window.view(cx, frame, body),
             Modal::UserForm(form) => form.view(cx, frame, body),
-            Modal::Deed(deed) => deed.view(cx, frame, body),
+            Modal::AuditEntry(dialog) => dialog.view(cx, frame, body),
         }
     }
 }

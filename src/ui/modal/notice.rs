@@ -12,7 +12,7 @@ use crate::{
     },
 };
 
-/// A window without a deed.
+/// A message without a choice.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Notice {
     title: String,

@@ -1,4 +1,4 @@
-//! A deed that wants words: a note with an acknowledgement, the reason for putting an alarm aside, a note for the next shift.
+//! Asks for a reason or a note: of an acknowledgement, a suppression, a handover.
 
 use std::{sync::Arc, time::Duration};
 
@@ -35,7 +35,7 @@ pub struct Reason {
 }
 
 impl Reason {
-    /// A deed with words; they are `needed` or may be left out.
+    /// An action with a text, which is required if `needed`.
     pub fn new(title: &str, verb: &'static str, notes: Vec<String>, command: Command, needed: bool) -> Reason {
         let choices = vec![(String::new(), command)];
         let (title, line) = (title.to_owned(), Line::long("", WORDS_MAX));

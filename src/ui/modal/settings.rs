@@ -31,13 +31,13 @@ pub struct Settings {
     /// The selected row.
     row: usize,
     /// What Enter will do, asked once more.
-    asking: Option<Deed>,
+    asking: Option<SettingsAction>,
     problem: Option<String>,
 }
 
 /// What can be done here.
 #[derive(Debug, Clone, PartialEq)]
-enum Deed {
+enum SettingsAction {
     Use(Box<LineDef>),
     TakeBack(Box<LineDef>),
     Save,
@@ -69,9 +69,9 @@ impl Settings {
 
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         let enter = keys::code(KeyCode::Enter).is(event);
-        if let Some(deed) = self.asking.take() {
+        if let Some(action) = self.asking.take() {
             let yes = enter || keys::char('y').is(event);
-            let acts = if yes { vec![UiAction::Order(self.command(deed))] } else { Vec::new() };
+            let acts = if yes { vec![UiAction::Order(self.command(action))] } else { Vec::new() };
             // Off the text field, so that u and S are keys again.
             self.row = 0;
             return Next::Both(Modal::Settings(Box::new(self)), acts);
@@ -91,7 +91,7 @@ impl Settings {
             _ => Ok(None),
         };
         match asked {
-            Ok(deed) => self.asking = deed,
+            Ok(action) => self.asking = action,
             Err(problem) => self.problem = Some(problem),
         }
         Next::Stay(Modal::Settings(Box::new(self.in_range())))
@@ -186,7 +186,7 @@ impl Settings {
     fn pinned(&self, cx: &ViewContext, used: &LineDef, room: u16) -> Vec<(String, Style)> {
         let theme = cx.theme;
         let (words, style) = match (&self.asking, &self.problem) {
-            (Some(deed), _) => (self.query(cx, used, deed), theme.strong()),
+            (Some(action), _) => (self.query(cx, used, action), theme.strong()),
             (None, Some(problem)) => (problem.clone(), theme.trouble()),
             (None, None) => (String::new(), theme.normal()),
         };
@@ -199,12 +199,12 @@ impl Settings {
         rows.chain([(fit_words(keys, room), theme.strong())]).collect()
     }
 
-    fn query(&self, cx: &ViewContext, used: &LineDef, deed: &Deed) -> String {
+    fn query(&self, cx: &ViewContext, used: &LineDef, action: &SettingsAction) -> String {
         let restart = "Polling starts anew; values are bad until the devices answer.";
-        match deed {
-            Deed::Use(new) => format!("Use {}? {restart}", difference(used, new)),
-            Deed::TakeBack(before) => format!("Take back to {}? {restart}", difference(used, before)),
-            Deed::Save => {
+        match action {
+            SettingsAction::Use(new) => format!("Use {}? {restart}", difference(used, new)),
+            SettingsAction::TakeBack(before) => format!("Take back to {}? {restart}", difference(used, before)),
+            SettingsAction::Save => {
                 let (answer, well) = answers(cx, self.line);
                 let doubt = if well { String::new() } else { format!("! {answer} ") };
                 let title = &cx.def().title;
@@ -213,29 +213,29 @@ impl Settings {
         }
     }
 
-    fn command(&self, deed: Deed) -> Command {
-        match deed {
-            Deed::Use(settings) | Deed::TakeBack(settings) => Command::Configure(settings),
-            Deed::Save => Command::SaveSettings(self.line),
+    fn command(&self, action: SettingsAction) -> Command {
+        match action {
+            SettingsAction::Use(settings) | SettingsAction::TakeBack(settings) => Command::Configure(settings),
+            SettingsAction::Save => Command::SaveSettings(self.line),
         }
     }
 
-    fn ask_use(&self, cx: &ViewContext) -> Result<Option<Deed>, String> {
+    fn ask_use(&self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let (used, new) = (in_use(cx, self.line), self.draft.settings()?);
         if new == *used {
             return Err("these are the settings in use; change one first".to_owned());
         }
-        Ok(Some(Deed::Use(Box::new(new))))
+        Ok(Some(SettingsAction::Use(Box::new(new))))
     }
 
-    fn ask_take_back(&mut self, cx: &ViewContext) -> Result<Option<Deed>, String> {
+    fn ask_take_back(&mut self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let before = cx.snapshot.line(self.line).settings_before.as_ref();
         let before = before.ok_or("nothing to take back: nobody has tried other settings")?;
         self.draft = Draft::of(before);
-        Ok(Some(Deed::TakeBack(Box::new(LineDef::clone(before)))))
+        Ok(Some(SettingsAction::TakeBack(Box::new(LineDef::clone(before)))))
     }
 
-    fn ask_save(&self, cx: &ViewContext) -> Result<Option<Deed>, String> {
+    fn ask_save(&self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let used = in_use(cx, self.line);
         if self.draft.settings()? != *used {
             return Err("only what is in use is saved: use these settings first (⏎)".to_owned());
@@ -243,10 +243,10 @@ impl Settings {
         if cx.snapshot.line(self.line).settings_before.is_none() {
             return Err("nothing to save: these settings are in the plant file".to_owned());
         }
-        Ok(Some(Deed::Save))
+        Ok(Some(SettingsAction::Save))
     }
 
-    fn select(&mut self, by: isize) -> Result<Option<Deed>, String> {
+    fn select(&mut self, by: isize) -> Result<Option<SettingsAction>, String> {
         self.row = self.row.saturating_add_signed(by);
         Ok(None)
     }

@@ -1,7 +1,7 @@
 //! Tab 3: what is wrong, how urgent and what to do about it; what is put aside; what was; how good the alarm system is;
 //! and what the next shift must know.
 
-pub mod deeds;
+pub mod actions;
 mod filter;
 pub mod guidance;
 mod handover;
@@ -153,23 +153,23 @@ impl Alarms {
             Action::Shift(by) => self.shift(cx, by),
             Action::Now => self.shift(cx, 0),
             Action::Journal => self.turn_to_journal(cx),
-            Action::Note => return alarm.map_or_else(Vec::new, |alarm| deeds::note(cx, alarm)),
-            Action::AcknowledgePage => return deeds::acknowledge_all(cx, self.seen(cx).into_iter()),
-            Action::Shelve => return alarm.map_or_else(Vec::new, |alarm| deeds::shelve(cx, alarm.id)),
-            Action::OutOfService => return alarm.map_or_else(Vec::new, |alarm| deeds::out_of_service(cx, alarm.id)),
-            Action::PutBack => return self.aside(cx).map_or_else(Vec::new, |aside| deeds::put_back(cx, aside)),
-            Action::Reset => return alarm.map_or_else(Vec::new, |alarm| deeds::reset(cx, alarm)),
+            Action::Note => return alarm.map_or_else(Vec::new, |alarm| actions::note(cx, alarm)),
+            Action::AcknowledgePage => return actions::acknowledge_all(cx, self.seen(cx).into_iter()),
+            Action::Shelve => return alarm.map_or_else(Vec::new, |alarm| actions::shelve(cx, alarm.id)),
+            Action::OutOfService => return alarm.map_or_else(Vec::new, |alarm| actions::out_of_service(cx, alarm.id)),
+            Action::PutBack => return self.aside(cx).map_or_else(Vec::new, |aside| actions::put_back(cx, aside)),
+            Action::Reset => return alarm.map_or_else(Vec::new, |alarm| actions::reset(cx, alarm)),
             Action::Why | Action::Open | Action::Mimic | Action::Trend | Action::Controller => {
                 return self.go(cx, action);
             }
             Action::HandOver => {
                 self.handover.want();
-                return deeds::hand_over();
+                return actions::hand_over();
             }
-            Action::TakeOver if self.handover.is_own(cx) => return deeds::own_handover(),
+            Action::TakeOver if self.handover.is_own(cx) => return actions::own_handover(),
             Action::TakeOver => {
                 self.handover.want();
-                return deeds::take_over(cx);
+                return actions::take_over(cx);
             }
         }
         self.on_snapshot(cx)

@@ -2,7 +2,7 @@
 
 mod ask;
 mod compare;
-mod deeds;
+mod actions;
 mod device;
 mod guide;
 mod keys;
@@ -23,8 +23,8 @@ pub use device::signal_mark;
 pub use keys::{Action, all_chords};
 
 use self::{
+    actions::{confirm, notice, write},
     compare::Compare,
-    deeds::{confirm, notice, write},
     keys::page_keys,
     program::Cell,
     sets::Source,

@@ -442,7 +442,7 @@ fn closing_a_line_is_asked_and_opening_it_too() {
 }
 
 #[test]
-fn the_journal_tells_alarms_and_deeds_in_one_order() {
+fn the_journal_lists_alarms_and_actions_in_one_order() {
     let mut model = model(&Fixture::alarm(), Theme::FULL);
     let effects = type_keys(&mut model, "3j");
     let ago = |seconds| fixture::now() - jiff::SignedDuration::from_secs(seconds);
@@ -459,7 +459,7 @@ fn the_journal_tells_alarms_and_deeds_in_one_order() {
         until: None,
         burst: None,
     };
-    let deed = ActionRecord {
+    let action = ActionRecord {
         at: ago(700),
         by: "tech1".into(),
         action: "write".into(),
@@ -479,7 +479,7 @@ fn the_journal_tells_alarms_and_deeds_in_one_order() {
                 step(800, AlarmStep::Raised, None),
                 step(90_000, AlarmStep::Raised, None),
             ]),
-            Query::Actions { .. } => Answer::Actions(vec![deed.clone()]),
+            Query::Actions { .. } => Answer::Actions(vec![action.clone()]),
             Query::Series { .. }
             | Query::Audit { .. }
             | Query::LineMinutes { .. }

@@ -536,7 +536,7 @@ fn the_users_and_what_can_be_done_with_them() {
     }
 }
 
-fn deed(number: u64, by: &str, action: &str, target: &str, change: (&str, &str), outcome: &str) -> ActionRecord {
+fn action(number: u64, by: &str, action: &str, target: &str, change: (&str, &str), outcome: &str) -> ActionRecord {
     let told = |text: &str| (!text.is_empty()).then(|| Arc::from(text));
     ActionRecord {
         at: fixture::now() - jiff::SignedDuration::from_secs(60 * (40 - number as i64)),
@@ -565,12 +565,12 @@ fn the_audit_list_is_searched_by_the_history_and_read_whole() {
     };
     let query = asked(&type_keys(&mut model, "7j")).expect("a query");
     let rows = vec![
-        deed(38, "anna", "write", "TIC-1.SV", ("70.0 °C", "65.0 °C"), "verified"),
-        deed(37, "tom", "write", "PLC-1.PUMP", ("OFF", "ON"), "refused: needs technician"),
-        deed(36, "unknown user", "login failed", "", ("", ""), "refused: wrong name or password"),
+        action(38, "anna", "write", "TIC-1.SV", ("70.0 °C", "65.0 °C"), "verified"),
+        action(37, "tom", "write", "PLC-1.PUMP", ("OFF", "ON"), "refused: needs technician"),
+        action(36, "unknown user", "login failed", "", ("", ""), "refused: wrong name or password"),
         ActionRecord {
             note: Some("countersigned by boris".into()),
-            ..deed(35, "anna", "add user", "tom", ("", "technician"), "done")
+            ..action(35, "anna", "add user", "tom", ("", "technician"), "done")
         },
     ];
     update(&mut model, Msg::Answer(query.0, Ok(Answer::Actions(rows))));
@@ -578,7 +578,7 @@ fn the_audit_list_is_searched_by_the_history_and_read_whole() {
         insta::assert_snapshot!(format!("audit_{width}x{height}"), screen(&mut model, width, height));
     }
     type_keys(&mut model, "↓⏎");
-    insta::assert_snapshot!("window_deed_80x24", screen(&mut model, 80, 24));
+    insta::assert_snapshot!("window_audit_entry_80x24", screen(&mut model, 80, 24));
     let (_, words, by, action, _) = asked(&type_keys(&mut model, "⎋/pump⏎")).expect("a query");
     assert_eq!((words.as_str(), by.as_str(), action.as_str()), ("pump", "", ""));
     let (_, words, by, ..) = {
@@ -618,7 +618,7 @@ fn an_audit_entry_is_opened_only_as_it_was_drawn() {
             _ => None,
         })
     };
-    let row = |number| deed(number, "anna", "write", "TIC-1.SV", ("70.0 °C", "65.0 °C"), "verified");
+    let row = |number| action(number, "anna", "write", "TIC-1.SV", ("70.0 °C", "65.0 °C"), "verified");
     let first = asked(&type_keys(&mut model, "7j")).expect("a query");
     update(&mut model, Msg::Answer(first, Ok(Answer::Actions(vec![row(37), row(36)]))));
     let mut later = (*Fixture::normal().snapshot()).clone();

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crossterm::event::{KeyCode, KeyEvent};
 
-use super::Deed;
+use super::SettingsAction;
 use crate::{
     plant::{
         def::{Framing, LineDef, Parity, Rs485, Serial, Transport},
@@ -238,7 +238,7 @@ impl Draft {
     }
 
     /// The next or previous choice, around the end.
-    pub fn step(&mut self, field: Field, by: isize) -> Result<Option<Deed>, String> {
+    pub fn step(&mut self, field: Field, by: isize) -> Result<Option<SettingsAction>, String> {
         let serial = &mut self.serial;
         match field {
             Field::Mode => {

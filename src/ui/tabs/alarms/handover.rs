@@ -29,13 +29,13 @@ use crate::{
     },
 };
 
-/// Deeds that are read at most; more are said to be left out.
+/// Most actions that are read; the list says when there are more.
 const ROWS: usize = 500;
 /// How often they are asked anew, real time.
 const EVERY_S: f64 = 2.0;
 /// Values in doubt that are named at most.
 const NAMED: usize = 8;
-/// Deeds that are only about the program, and no change of the plant.
+/// Actions that only concern the program and change nothing in the plant.
 const NO_CHANGE: [&str; 10] = [
     "acknowledge",
     "silence",
@@ -54,7 +54,7 @@ const NO_CHANGE: [&str; 10] = [
 pub struct Handover {
     /// The chosen shift; `None` is the running one.
     period: Option<Period>,
-    /// Deeds of it and of the shift before, newest first.
+    /// Actions of it and of the shift before, newest first.
     actions: Vec<ActionRecord>,
     answered: bool,
     trouble: Option<String>,
@@ -83,7 +83,7 @@ impl Handover {
         self.first = self.first.saturating_add_signed(by).min(lines.saturating_sub(room));
     }
 
-    /// A deed was done: what it left is asked at once.
+    /// An action was done: queries at once what it changed.
     pub fn want(&mut self) {
         self.periodic.want();
     }
@@ -179,7 +179,7 @@ impl Handover {
             section("failed in this shift", of(|row| is_failed(row) && is_change(row)), true);
             section("changed in this shift", of(|row| !is_failed(row) && is_change(row)), false);
             if self.actions.len() >= ROWS {
-                section("the oldest deeds are left out", Vec::new(), true);
+                section("the oldest actions are left out", Vec::new(), true);
             }
         }
         lines

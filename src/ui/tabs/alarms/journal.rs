@@ -1,4 +1,4 @@
-//! The journal: steps of alarms and deeds of operators in one list, searched by words and by time.
+//! The journal: steps of alarms and actions of operators in one list, searched by words and by time.
 
 use jiff::{SignedDuration, Timestamp};
 use ratatui::style::Style;
@@ -42,7 +42,7 @@ pub struct Journal {
     /// The chosen period; `None` is the last 24 hours.
     period: Option<Period>,
     steps: PeriodicQuery,
-    deeds: PeriodicQuery,
+    actions_query: PeriodicQuery,
 }
 
 impl Journal {
@@ -94,7 +94,7 @@ impl Journal {
     fn show(&mut self, period: Option<Period>) {
         (self.first, self.answered, self.period) = (0, false, period);
         (self.alarms, self.actions) = (Vec::new(), Vec::new());
-        (self.steps, self.deeds) = (PeriodicQuery::default(), PeriodicQuery::default());
+        (self.steps, self.actions_query) = (PeriodicQuery::default(), PeriodicQuery::default());
     }
 
     fn limit(&self) -> usize {
@@ -115,18 +115,23 @@ impl Journal {
             }
         };
         due(&mut self.steps, Query::Journal { from, to, limit });
-        due(&mut self.deeds, Query::Actions { from, to, limit });
+        due(&mut self.actions_query, Query::Actions { from, to, limit });
         acts
     }
 
     /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
-        self.steps.awaits(number) || self.deeds.awaits(number)
+        self.steps.awaits(number) || self.actions_query.awaits(number)
     }
 
     /// The history answered.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self.steps.answered(number, cx.steady()).or_else(|| self.deeds.answered(number, cx.steady())).is_none() {
+        if self
+            .steps
+            .answered(number, cx.steady())
+            .or_else(|| self.actions_query.answered(number, cx.steady()))
+            .is_none()
+        {
             return;
         }
         self.answered = true;
@@ -184,7 +189,7 @@ impl Journal {
         }
     }
 
-    /// Alarms and deeds in one list, newest first.
+    /// Alarms and operator actions in one list, newest first.
     fn rows(&self, cx: &ViewContext) -> Vec<(Timestamp, String, Style)> {
         let alarms = self.alarms.iter().map(|row| (row.at, alarm_words(cx, row), cx.theme.normal()));
         let actions = self.actions.iter().map(|row| (row.at, action_words(cx, row), cx.theme.strong()));
@@ -212,7 +217,7 @@ fn alarm_words(cx: &ViewContext, row: &AlarmRecord) -> String {
     format!("{mark} {} {} {}{number}{by}{reason}", pad(&row.subject, 12), pad(&row.text, 22), pad(row.step.word(), 12))
 }
 
-/// A deed in one line: `TIC-1.SV write 60.0 → 70.0 °C  verified by anna`.
+/// An action in one line: `TIC-1.SV write 60.0 → 70.0 °C  verified by anna`.
 pub fn action_words(cx: &ViewContext, row: &ActionRecord) -> String {
     let change = match (&row.old, &row.new) {
         (Some(old), Some(new)) => format!("{old} → {new}  "),

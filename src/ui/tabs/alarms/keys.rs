@@ -81,7 +81,7 @@ const VIEWS: [Row; 3] = [
     row(char('b'), "", "bell for new alarms on or off", Action::Bell),
 ];
 
-const DEEDS: [Row; 9] = [
+const ACTIONS: [Row; 9] = [
     row(char('n'), "note", "acknowledge with a note", Action::Note),
     row(char('z'), "shelve", "shelve the alarm for a time, with a reason", Action::Shelve),
     row(char('/'), "filter", "show only alarms with these words; Esc shows all again", Action::Words),
@@ -136,7 +136,7 @@ const HANDOVER: [Row; 2] = [
 /// The keys of a page, the most wanted ones first.
 pub fn table(page: Page) -> Vec<Row> {
     let parts: &[&[Row]] = match page {
-        Page::Active | Page::System => &[&OPEN, &DEEDS, &VIEWS, &MOVE, &GO, &AREA],
+        Page::Active | Page::System => &[&OPEN, &ACTIONS, &VIEWS, &MOVE, &GO, &AREA],
         Page::Aside => &[&BACK, &OPEN, &VIEWS, &MOVE, &GO],
         Page::Journal => &[&SEARCH, &SHIFT, &VIEWS, &MOVE],
         Page::Quality => &[&SHIFT, &VIEWS, &MOVE],

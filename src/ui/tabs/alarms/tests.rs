@@ -216,7 +216,7 @@ fn the_meter_is_shown_with_target_limit_and_verdict() {
     assert!(screen(&mut model, 80, 24).contains("last 24 hours: 220 alarms"));
 }
 
-fn deed(seconds: i64, by: &str, action: &str, target: &str, outcome: &str, note: Option<&str>) -> ActionRecord {
+fn action(seconds: i64, by: &str, action: &str, target: &str, outcome: &str, note: Option<&str>) -> ActionRecord {
     ActionRecord {
         at: ago(seconds),
         by: by.into(),
@@ -237,13 +237,13 @@ fn the_handover_tells_what_the_next_shift_must_know() {
     fixture.set("PLC-1.AUTO", 0.0);
     let note = "Pump P-1 draws too much current; electrician comes at 16:00.";
     let rows = vec![
-        deed(40, "anna", "write", "TIC-1.SV", "failed: no answer in time", None),
-        deed(45, "anna", "write", "TIC-1.SV", "failed: no answer in time", None),
-        deed(50, "anna", "unlock terminal", "anna", "done", None),
-        deed(60, "anna", "acknowledge", "TIC-1.PV temperature high", "verified", None),
-        deed(100, "anna", "write", "TIC-1.SV", "verified", None),
-        deed(1_000, "tech1", "hand over", "tank", "verified", Some(note)),
-        deed(9_000, "tech1", "write", "TIC-1.P", "verified", None),
+        action(40, "anna", "write", "TIC-1.SV", "failed: no answer in time", None),
+        action(45, "anna", "write", "TIC-1.SV", "failed: no answer in time", None),
+        action(50, "anna", "unlock terminal", "anna", "done", None),
+        action(60, "anna", "acknowledge", "TIC-1.PV temperature high", "verified", None),
+        action(100, "anna", "write", "TIC-1.SV", "verified", None),
+        action(1_000, "tech1", "hand over", "tank", "verified", Some(note)),
+        action(9_000, "tech1", "write", "TIC-1.P", "verified", None),
     ];
     for (look, theme, width, height) in
         [("80x24", Theme::FULL, 80, 24), ("120x40", Theme::FULL, 120, 40), ("plain", Theme::PLAIN, 80, 24)]

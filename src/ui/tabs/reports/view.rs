@@ -268,7 +268,7 @@ fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'stat
     ])
 }
 
-/// One deed of an operator; where it is too long, its outcome is kept.
+/// One operator action; where it is too long, its outcome is kept.
 fn action_line(cx: &ViewContext, action: &ActionRecord, time: String) -> Line<'static> {
     let arrow = cx.theme.pick("→", "->");
     let change = match (&action.old, &action.new) {

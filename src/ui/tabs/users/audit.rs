@@ -13,7 +13,7 @@ use crate::{
         UiAction, ViewContext,
         keys::{Key, char, code},
         last_frame::Rows,
-        modal::{Deed, Modal, Prompt},
+        modal::{AuditEntryDialog, Modal, Prompt},
         widgets::text::{Canvas, fit, moment, pad, pad_left, width},
     },
 };
@@ -23,7 +23,7 @@ use crate::{
 pub enum Action {
     /// Select so many rows further on.
     Move(isize),
-    /// The whole of the selected deed.
+    /// All fields of the selected entry.
     Open,
     /// Search words, a user, an action, a time.
     Search(Part),
@@ -54,7 +54,7 @@ pub const KEYS: &[Key<Action>] = &[
     Key { chord: code(KeyCode::PageDown), label: "", help: "ten rows down", action: Action::Move(10) },
     Key { chord: code(KeyCode::Home), label: "", help: "the newest", action: Action::Move(-9_999) },
     Key { chord: code(KeyCode::End), label: "", help: "the oldest", action: Action::Move(9_999) },
-    Key { chord: code(KeyCode::Enter), label: "open", help: "the whole of the selected deed", action: Action::Open },
+    Key { chord: code(KeyCode::Enter), label: "open", help: "entry details", action: Action::Open },
     Key { chord: char('/'), label: "search", help: "only rows with some words", action: Action::Search(Part::Words) },
     Key { chord: char('b'), label: "by", help: "only what a user did", action: Action::Search(Part::Who) },
     Key {
@@ -116,8 +116,11 @@ impl Audit {
         match action {
             Action::Move(by) => self.selected = self.selected.saturating_add_signed(by).min(last),
             Action::Open => {
-                let deed = self.rows.get(self.selected).cloned();
-                return deed.map(|deed| UiAction::Open(Modal::Deed(Box::new(Deed(deed))))).into_iter().collect();
+                let entry = self.rows.get(self.selected).cloned();
+                return entry
+                    .map(|entry| UiAction::Open(Modal::AuditEntry(Box::new(AuditEntryDialog(entry)))))
+                    .into_iter()
+                    .collect();
             }
             Action::Search(part) => {
                 self.asking = Some(part);
@@ -193,7 +196,7 @@ impl Audit {
         match answer {
             Ok(Answer::Actions(rows)) => {
                 let selected = self.rows.get(self.selected).cloned();
-                let place = selected.and_then(|deed| rows.iter().position(|row| *row == deed));
+                let place = selected.and_then(|entry| rows.iter().position(|row| *row == entry));
                 self.selected = if self.selected == 0 { 0 } else { place.unwrap_or(0) };
                 self.rows = rows;
             }
@@ -228,9 +231,9 @@ impl Audit {
         }
         let rows = usize::from(canvas.height().saturating_sub(2)).max(1);
         let first = self.selected.saturating_sub(rows - 1);
-        for (y, (n, deed)) in self.rows.iter().enumerate().skip(first).take(rows).enumerate() {
+        for (y, (n, entry)) in self.rows.iter().enumerate().skip(first).take(rows).enumerate() {
             let style = if n == self.selected { theme.focus() } else { theme.normal() };
-            canvas.text(0, y as u16 + 2, &pad(&row(cx, deed, columns), columns), style);
+            canvas.text(0, y as u16 + 2, &pad(&row(cx, entry, columns), columns), style);
         }
     }
 
@@ -260,36 +263,36 @@ impl Audit {
     }
 }
 
-/// Columns for where it was done from; none on a narrow screen, where the window of the deed tells it.
+/// Columns for where it was done from; none on a narrow screen, where the window of the entry tells it.
 fn from_width(columns: u16) -> u16 {
     if columns >= 110 { 22 } else { 0 }
 }
 
-/// A deed in one row; where it is too long, its outcome is kept.
-fn row(cx: &ViewContext, deed: &ActionRecord, columns: u16) -> String {
+/// An entry in one row; where it is too long, its outcome is kept.
+fn row(cx: &ViewContext, entry: &ActionRecord, columns: u16) -> String {
     let cell = |text: &str, columns: u16| pad(&fit(text, columns - 1), columns);
-    let number = deed.seal.map_or("–".to_owned(), |seal| seal.number.to_string());
-    let at = moment(deed.at, cx.now, &cx.def().time_zone);
+    let number = entry.seal.map_or("–".to_owned(), |seal| seal.number.to_string());
+    let at = moment(entry.at, cx.now, &cx.def().time_zone);
     let from = from_width(columns);
     let head = format!(
         " {} {}{}{}{}{}",
         pad_left(&number, 5),
         pad(&at, 10),
-        cell(&deed.by, 10),
-        if from > 0 { cell(&deed.from, from) } else { String::new() },
-        cell(&deed.action, 12),
-        cell(&deed.target, 12),
+        cell(&entry.by, 10),
+        if from > 0 { cell(&entry.from, from) } else { String::new() },
+        cell(&entry.action, 12),
+        cell(&entry.target, 12),
     );
     let arrow = cx.theme.pick("→", "->");
-    let change = match (&deed.old, &deed.new) {
+    let change = match (&entry.old, &entry.new) {
         (Some(old), Some(new)) => format!("{old} {arrow} {new}  "),
         (None, Some(new)) => format!("{arrow} {new}  "),
         (Some(old), None) => format!("{old}  "),
         (None, None) => String::new(),
     };
     let room = columns.saturating_sub(width(&head) + 1);
-    let note = deed.note.as_ref().map_or(String::new(), |note| format!("  {note}"));
-    let outcome = fit(&format!("{}{note}", deed.outcome), room.saturating_sub(width(&change)).max(room / 2));
+    let note = entry.note.as_ref().map_or(String::new(), |note| format!("  {note}"));
+    let outcome = fit(&format!("{}{note}", entry.outcome), room.saturating_sub(width(&change)).max(room / 2));
     let change = match room.saturating_sub(width(&outcome)) {
         left if width(&change) > left => format!("{} ", fit(change.trim_end(), left.saturating_sub(1))),
         _ => change,

@@ -1,4 +1,4 @@
-//! A deed on record, whole: what the list has no room for.
+//! All fields of one audit entry: what the list has no room for.
 
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
@@ -15,37 +15,37 @@ use crate::{
 /// Columns of the names at the left.
 const NAMES: u16 = 8;
 
-/// The window.
+/// The dialog.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Deed(pub ActionRecord);
+pub struct AuditEntryDialog(pub ActionRecord);
 
-impl Deed {
+impl AuditEntryDialog {
     pub(super) fn on_key(self, event: KeyEvent) -> Next {
         match event.code {
             KeyCode::Enter | KeyCode::Char('q') => Next::Close,
-            _ => Next::Stay(Modal::Deed(Box::new(self))),
+            _ => Next::Stay(Modal::AuditEntry(Box::new(self))),
         }
     }
 
     /// Name and words of every line that says something.
     fn lines(&self, cx: &ViewContext) -> Vec<(&'static str, String)> {
-        let deed = &self.0;
+        let entry = &self.0;
         let told = |words: &Option<std::sync::Arc<str>>| words.as_deref().unwrap_or_default().to_owned();
-        let at = deed.at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S %:z").to_string();
-        let seal = deed.seal.map_or((String::new(), "not in the chained book".to_owned()), |seal| {
+        let at = entry.at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S %:z").to_string();
+        let seal = entry.seal.map_or((String::new(), "not in the audit log".to_owned()), |seal| {
             (seal.number.to_string(), seal.hash_hex())
         });
         let lines = [
             ("number", seal.0),
             ("time", at),
-            ("who", deed.by.to_string()),
-            ("from", deed.from.to_string()),
-            ("action", deed.action.to_string()),
-            ("target", deed.target.to_string()),
-            ("old", told(&deed.old)),
-            ("new", told(&deed.new)),
-            ("outcome", deed.outcome.to_string()),
-            ("note", told(&deed.note)),
+            ("who", entry.by.to_string()),
+            ("from", entry.from.to_string()),
+            ("action", entry.action.to_string()),
+            ("target", entry.target.to_string()),
+            ("old", told(&entry.old)),
+            ("new", told(&entry.new)),
+            ("outcome", entry.outcome.to_string()),
+            ("note", told(&entry.note)),
             ("hash", seal.1),
         ];
         lines.into_iter().filter(|(_, words)| !words.is_empty()).collect()
@@ -56,7 +56,7 @@ impl Deed {
         let lines = self.lines(cx).into_iter().map(|(name, words)| (name, broken(&words, room)));
         let lines: Vec<(&str, Vec<String>)> = lines.collect();
         let height = lines.iter().map(|(_, rows)| rows.len() as u16).sum::<u16>();
-        let mut canvas = window(cx, frame, body, "a deed on record", (room + NAMES, height));
+        let mut canvas = window(cx, frame, body, "audit entry", (room + NAMES, height));
         let mut y = 0;
         for (name, rows) in &lines {
             canvas.text(0, y, &pad(name, NAMES), cx.theme.dim());
