@@ -184,13 +184,13 @@ async fn seals(def: &Arc<PlantDef>, args: &VerifyArgs) -> Result<Vec<Seal>, CliE
         let all = String::new;
         let query =
             Query::Audit { from: Timestamp::UNIX_EPOCH, to, words: all(), by: all(), action: all(), limit: PAGE };
-        let Answer::Actions(deeds) = source.ask(query).await? else {
+        let Answer::Actions(actions) = source.ask(query).await? else {
             return Err(CliError::Failed("the history answered another query".to_owned()));
         };
         let before = seals.len();
-        seals.extend(deeds.iter().filter_map(|deed| deed.seal).map(|seal| (seal.number, seal)));
-        // Newest first: the next page ends with the instant in which this one begins, whose deeds come once more.
-        match deeds.last().filter(|_| deeds.len() == PAGE && before < seals.len()) {
+        seals.extend(actions.iter().filter_map(|action| action.seal).map(|seal| (seal.number, seal)));
+        // Newest first: the next page ends with the instant in which this one begins, whose actions come once more.
+        match actions.last().filter(|_| actions.len() == PAGE && before < seals.len()) {
             Some(last) => to = last.at + MICROSECOND,
             None => return Ok(seals.into_values().collect()),
         }

@@ -43,7 +43,7 @@ pub enum Query {
         /// At most so many.
         limit: usize,
     },
-    /// Deeds of operators, newest first.
+    /// Operator actions, newest first.
     Actions {
         /// From.
         from: Timestamp,
@@ -52,7 +52,7 @@ pub enum Query {
         /// At most so many.
         limit: usize,
     },
-    /// The same for those who watch over all deeds, with a search; answered by [`Answer::Actions`].
+    /// All actions with a search, for Supervisors; answered by [`Answer::Actions`].
     Audit {
         /// From.
         from: Timestamp,
@@ -110,7 +110,7 @@ pub enum Answer {
     Series(Vec<Series>),
     /// Steps of alarms.
     Journal(Vec<AlarmRecord>),
-    /// Deeds of operators.
+    /// Operator actions.
     Actions(Vec<ActionRecord>),
     /// Minutes of a line.
     LineMinutes(Vec<LineMinute>),

@@ -123,7 +123,7 @@ impl Desk {
         self.close(order.id, outcome, board)
     }
 
-    /// The key that a write needs was sent before it, which is a deed of its own.
+    /// The key that a write needs was sent before it, which is an action of its own.
     pub fn unlocked(
         &mut self,
         id: WriteId,
@@ -416,7 +416,7 @@ fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
     }
 }
 
-/// Action, target and new state of a deed with alarms.
+/// Action, target and new state of an action on alarms.
 pub fn alarm_words(def: &PlantDef, command: &AlarmCommand) -> (&'static str, String, Option<String>) {
     let name = |alarm: &AlarmId| match def.alarms.get(alarm.index()) {
         Some(alarm) => format!("{} {}", subject_name(def, alarm.subject), alarm.text),

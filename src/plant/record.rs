@@ -1,4 +1,4 @@
-//! What the plant leaves behind for the history: samples, steps of alarms, deeds of operators, minutes of lines.
+//! What the plant leaves behind for the history: samples, steps of alarms, operator actions, minutes of lines.
 
 use std::{fmt, sync::Arc};
 
@@ -18,7 +18,7 @@ pub enum Record {
     Sample(TagId, Sample),
     /// A step of an alarm.
     Alarm(AlarmRecord),
-    /// A deed of an operator.
+    /// An operator action.
     Action(ActionRecord),
     /// A minute of a line.
     Line(LineMinute),
@@ -148,7 +148,7 @@ impl AlarmStep {
     }
 }
 
-/// A deed of an operator, written when its outcome is known.
+/// An operator action, written when its outcome is known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionRecord {
     /// When the order was taken.
@@ -179,7 +179,7 @@ pub const ORDER: &str = "order";
 /// The word on record for a seal over the entries of the audit log.
 pub const SEAL_LOG: &str = "seal audit log";
 
-/// Deeds that are not at the plant but about people, terminals and the station: for the book and the list of a Supervisor,
+/// Actions on users, terminals and the station, not on the plant: for the audit log and the list of a Supervisor,
 /// not for shift reports and curves. So it is with the intent of a write, whose outcome is there already.
 pub const ELSEWHERE: [&str; 26] = [
     ORDER,

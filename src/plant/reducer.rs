@@ -185,7 +185,7 @@ impl Plant {
             Command::Alarm(command) => self.alarm_order(&order, command, at, &mut effects),
             Command::Refresh(device) => {
                 effects.bus.push((self.def.device(device).line, BusRequest::Refresh { device, order: Some(order.id) }));
-                // Looking is not a deed: it is shown, but not put on record.
+                // A read is not an operator action: it is shown, but not recorded.
                 let _ = self.desk.note(&order, Outcome::Verified, &self.board, at);
                 None
             }

@@ -277,7 +277,7 @@ pub struct ActiveAlarm {
 }
 
 impl ActiveAlarm {
-    /// An alarm without value, deeds and burst.
+    /// An alarm without value, actions and burst.
     pub fn new(id: AlarmId, state: AlarmState, raised_at: Timestamp) -> ActiveAlarm {
         let (returned_at, value, acknowledged, times, burst) = (None, None, None, 1, None);
         let annunciated_at = raised_at;

@@ -66,7 +66,7 @@ pub struct ShiftReport {
     pub alarms: Vec<AlarmRecord>,
     /// How good the alarm system was in the period.
     pub quality: Figures,
-    /// Deeds of operators in the period, oldest first.
+    /// Operator actions in the period, oldest first.
     pub actions: Vec<ActionRecord>,
     /// The thesis's raw record at a fixed interval.
     pub record: Vec<RecordRow>,

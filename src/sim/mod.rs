@@ -10,7 +10,7 @@
 //!                                  │
 //!                               io: RTU or ASCII on a pty, TCP, RTU over TCP; each line at a place of its own
 //!
-//!  scenario ─> drill: faults at their times, an operator's deeds, and a judge over journal, snapshots and `ground_truth`
+//!  scenario ─> drill: faults at their times, operator actions, and a judge over journal, snapshots and `ground_truth`
 //!  experiment: the six of the thesis, on the rig alone
 //! ```
 

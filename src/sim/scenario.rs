@@ -42,7 +42,7 @@ pub struct Scenario {
     /// What goes wrong, in order of time.
     pub events: Vec<FaultEvent>,
     /// What a good operator does, in order of time.
-    pub operator: Vec<Deed>,
+    pub operator: Vec<OperatorStep>,
     /// What is expected.
     pub expect: Vec<Expect>,
 }
@@ -72,7 +72,7 @@ pub struct FaultEvent {
 
 /// What a good operator does.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Deed {
+pub struct OperatorStep {
     /// When.
     pub at: Duration,
     /// What.
@@ -150,7 +150,7 @@ pub enum ScenarioEvent {
     /// A fault begins or ends.
     Fault(FaultEvent),
     /// A good operator acts.
-    Deed(Deed),
+    OperatorStep(OperatorStep),
 }
 
 impl ScenarioEvent {
@@ -158,17 +158,17 @@ impl ScenarioEvent {
     pub fn at(&self) -> Duration {
         match self {
             ScenarioEvent::Fault(event) => event.at,
-            ScenarioEvent::Deed(deed) => deed.at,
+            ScenarioEvent::OperatorStep(step) => step.at,
         }
     }
 }
 
 impl Scenario {
-    /// Everything that happens, in order of time; with the deeds of a good operator, or without where a person sits.
+    /// Everything that happens, in order of time; with the actions of the scripted operator, or without where a person sits.
     pub fn timeline(&self, with_operator: bool) -> Vec<ScenarioEvent> {
-        let deeds = self.operator.iter().filter(|_| with_operator).cloned().map(ScenarioEvent::Deed);
+        let steps = self.operator.iter().filter(|_| with_operator).cloned().map(ScenarioEvent::OperatorStep);
         let mut timeline: Vec<ScenarioEvent> =
-            self.events.iter().copied().map(ScenarioEvent::Fault).chain(deeds).collect();
+            self.events.iter().copied().map(ScenarioEvent::Fault).chain(steps).collect();
         timeline.sort_by_key(ScenarioEvent::at);
         timeline
     }

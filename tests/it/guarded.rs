@@ -282,7 +282,7 @@ impl Tap {
     }
 
     /// The functions of requests that were no mere reading of registers or bits.
-    pub fn deeds(&self) -> Vec<u8> {
+    pub fn writes(&self) -> Vec<u8> {
         self.heard.lock().unwrap().functions.iter().copied().filter(|function| !(1..=4).contains(function)).collect()
     }
 }

@@ -160,8 +160,8 @@ async fn a_terminal_that_nobody_touches_is_locked_shows_alarms_and_opens_to_the_
     }
     let again = request(&idle, 2, acknowledge.command);
     assert_eq!(guarded.order(&idle, again).await.outcome, Outcome::Verified);
-    let deeds: Vec<_> = guarded.entries().into_iter().filter(|entry| &*entry.who == "sue").collect();
-    let words: Vec<String> = deeds.iter().map(|entry| format!("{}: {}", entry.action, entry.outcome)).collect();
+    let writes: Vec<_> = guarded.entries().into_iter().filter(|entry| &*entry.who == "sue").collect();
+    let words: Vec<String> = writes.iter().map(|entry| format!("{}: {}", entry.action, entry.outcome)).collect();
     for expected in [
         "lock terminal: done: nobody has touched it",
         "unlock failed: refused: wrong password",
@@ -198,7 +198,7 @@ async fn a_tag_for_two_persons_is_written_once_a_second_one_who_may_has_signed()
         assert_eq!(status.outcome, Outcome::Refused(Refusal::NotSigned(why)), "{by:?}");
         waited(&guarded, 2).await;
     }
-    assert!(guarded.tap.deeds().is_empty(), "something has reached the line: {:?}", guarded.tap.deeds());
+    assert!(guarded.tap.writes().is_empty(), "something has reached the line: {:?}", guarded.tap.writes());
     let written = guarded.entries().len();
     assert_eq!(guarded.order(&tom, signed(9, Some(("sue", PASSWORD)))).await.outcome, Outcome::Verified);
     let line = guarded.written(written, "the write", |entry| &*entry.action == "write").await;

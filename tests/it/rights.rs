@@ -43,8 +43,8 @@ const WHY: [&str; 6] = [
 struct Row {
     action: &'static str,
     by: &'static str,
-    /// Looking is no deed: it is on record only where it is refused.
-    is_deed: bool,
+    /// Reading is not an action: only its refusal is recorded.
+    is_action: bool,
 }
 
 impl Row {
@@ -60,11 +60,11 @@ impl Row {
 }
 
 fn row(action: &'static str, by: &'static str) -> Row {
-    Row { action, by, is_deed: true }
+    Row { action, by, is_action: true }
 }
 
 fn look(action: &'static str, by: &'static str) -> Row {
-    Row { action, by, is_deed: false }
+    Row { action, by, is_action: false }
 }
 
 /// A new command does not compile until it has a row here; put it into [`commands`] as well.
@@ -170,11 +170,11 @@ fn is_by(line: &Entry, person: usize) -> bool {
 #[tokio::test(flavor = "multi_thread")]
 async fn every_command_is_let_through_or_refused_as_the_table_says_and_nothing_refused_reaches_the_line() {
     let guarded = Guarded::start(|_| {}).await;
-    let before = (guarded.tap.deeds(), guarded.tap.connections());
+    let before = (guarded.tap.writes(), guarded.tap.connections());
     // Those who may nothing first, so that the line shows what came of it.
     for person in [0, 1, 4, 5, 2, 3] {
         if person == 2 {
-            let after = (guarded.tap.deeds(), guarded.tap.connections());
+            let after = (guarded.tap.writes(), guarded.tap.connections());
             assert_eq!(after, before, "something that was refused has reached the line");
         }
         let session = sits(&guarded, person).await;
@@ -189,7 +189,7 @@ async fn every_command_is_let_through_or_refused_as_the_table_says_and_nothing_r
             if !row.lets(person) {
                 assert_eq!(status.outcome, Outcome::Refused(Refusal::NotPermitted(row.why(person))), "{said}");
             }
-            if row.is_deed || !row.lets(person) {
+            if row.is_action || !row.lets(person) {
                 let line = guarded.written(written, &said, |entry| &*entry.action == row.action).await;
                 assert!(is_by(&line, person), "{said}: {line:?}");
                 assert_eq!(*line.outcome, outcome_words(&status.outcome), "{said}");
@@ -197,7 +197,7 @@ async fn every_command_is_let_through_or_refused_as_the_table_says_and_nothing_r
             }
         }
     }
-    assert!(guarded.tap.deeds().contains(&6), "what was permitted has reached the line: {:?}", guarded.tap.deeds());
+    assert!(guarded.tap.writes().contains(&6), "what was permitted has reached the line: {:?}", guarded.tap.writes());
     assert!(before.1 < guarded.tap.connections());
     guarded.end().await;
 }

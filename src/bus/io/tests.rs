@@ -21,7 +21,7 @@ use jiff::Timestamp;
 use proptest::prelude::*;
 use tokio::io::AsyncWriteExt;
 
-use self::slave::{Deed, MS, Mode, line, plant};
+use self::slave::{MS, Mode, SlaveAction, line, plant};
 use crate::bus::frame;
 use crate::plant::{
     command::{BusRequest, WriteId},
@@ -32,7 +32,11 @@ use crate::plant::{
 };
 
 /// Runs a line against a script until `polls` block reads have ended; gives good and failed ones.
-async fn poll(mode: Mode, polls: usize, script: impl FnMut(usize, &[u8]) -> Deed + Send + 'static) -> (usize, usize) {
+async fn poll(
+    mode: Mode,
+    polls: usize,
+    script: impl FnMut(usize, &[u8]) -> SlaveAction + Send + 'static,
+) -> (usize, usize) {
     let def = plant(mode);
     let mut line = line(def.clone());
     line.plug(mode, script);
@@ -43,7 +47,7 @@ async fn poll(mode: Mode, polls: usize, script: impl FnMut(usize, &[u8]) -> Deed
             Event::Failed { fault, .. } if fault != Fault::Resting => failed += 1,
             Event::Line { state: LineState::Waiting { .. }, .. } => {
                 // A TCP stream out of step is closed; the gateway takes the next connection.
-                line.plug(mode, |_, _| Deed::Answer);
+                line.plug(mode, |_, _| SlaveAction::Answer);
             }
             _ => {}
         }
@@ -55,7 +59,8 @@ async fn poll(mode: Mode, polls: usize, script: impl FnMut(usize, &[u8]) -> Deed
 async fn a_late_reply_never_lands_in_another_tag() {
     for mode in Mode::ALL {
         for late_ms in [310, 500, 700, 1_000, 2_900, 9_000] {
-            let script = move |number, _: &[u8]| if number == 2 { Deed::Late(late_ms * MS) } else { Deed::Answer };
+            let script =
+                move |number, _: &[u8]| if number == 2 { SlaveAction::Late(late_ms * MS) } else { SlaveAction::Answer };
             let (good, failed) = poll(mode, 60, script).await;
             assert!(40 <= good && failed <= 14, "{mode:?}, late by {late_ms} ms: {good} good, {failed} failed");
         }
@@ -66,7 +71,7 @@ async fn a_late_reply_never_lands_in_another_tag() {
 #[tokio::test(start_paused = true)]
 async fn an_in_order_gateway_is_in_step_again_within_one_poll() {
     for mode in Mode::ALL {
-        let script = |number, _: &[u8]| Deed::Late(if number == 3 { 700 * MS } else { 40 * MS });
+        let script = |number, _: &[u8]| SlaveAction::Late(if number == 3 { 700 * MS } else { 40 * MS });
         let (good, failed) = poll(mode, 100, script).await;
         // What is under way behind the late answer is late with it: that is one flight of eight blocks.
         let at_once = if mode == Mode::Tcp16 { 8 } else { 2 };
@@ -80,7 +85,7 @@ async fn an_answer_before_bytes_that_are_no_header_is_refused() {
     for mode in [Mode::Tcp, Mode::Tcp16] {
         let def = plant(mode);
         let mut line = line(def.clone());
-        line.plug(mode, |_, _| Deed::Trailing(vec![0xFF, 0xFF, 0xFF, 0xFF, 0x00, 0x55]));
+        line.plug(mode, |_, _| SlaveAction::Trailing(vec![0xFF, 0xFF, 0xFF, 0xFF, 0x00, 0x55]));
         let read = |event: &Event| match event {
             Event::Read { .. } => Some(true),
             Event::Line { state: LineState::Waiting { .. }, .. } => Some(false),
@@ -96,22 +101,22 @@ proptest! {
     #[test]
     fn no_mixture_of_faults_puts_a_value_into_a_wrong_tag(
         mode in prop::sample::select(Mode::ALL.to_vec()),
-        deeds in proptest::collection::vec((0u8..14, 0u64..4_000, 0usize..14), 400),
+        actions in proptest::collection::vec((0u8..14, 0u64..4_000, 0usize..14), 400),
     ) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build()
             .expect("a runtime");
         let script = move |number: usize, message: &[u8]| {
-            let (deed, ms, at) = deeds[number % deeds.len()];
-            match deed {
-                0 => Deed::Late(Duration::from_millis(ms)),
-                1 => Deed::Silent,
-                2 => Deed::Torn(at, Duration::from_millis(ms / 100)),
-                3 if !mode.has_ids() => Deed::Cut(at),
-                4 if !mode.has_ids() => Deed::BadCheck,
-                5 if !mode.has_ids() => Deed::Noise(vec![0xFF, message[0], 0x55, message[1]]),
-                6 => Deed::Exception(6),
-                7 => Deed::Instead(vec![message[0] ^ 0x40, 3, 8, 0, 1, 0, 2, 0, 3, 0, 4]),
-                _ => Deed::Answer,
+            let (action, ms, at) = actions[number % actions.len()];
+            match action {
+                0 => SlaveAction::Late(Duration::from_millis(ms)),
+                1 => SlaveAction::Silent,
+                2 => SlaveAction::Torn(at, Duration::from_millis(ms / 100)),
+                3 if !mode.has_ids() => SlaveAction::Cut(at),
+                4 if !mode.has_ids() => SlaveAction::BadCheck,
+                5 if !mode.has_ids() => SlaveAction::Noise(vec![0xFF, message[0], 0x55, message[1]]),
+                6 => SlaveAction::Exception(6),
+                7 => SlaveAction::Instead(vec![message[0] ^ 0x40, 3, 8, 0, 1, 0, 2, 0, 3, 0, 4]),
+                _ => SlaveAction::Answer,
             }
         };
         let (good, _) = runtime.block_on(poll(mode, 500, script));
@@ -123,7 +128,7 @@ proptest! {
 async fn an_answer_in_two_pieces_is_one_answer() {
     for mode in Mode::ALL {
         for cut in 1..14 {
-            let (_, failed) = poll(mode, 20, move |_, _| Deed::Torn(cut, 30 * MS)).await;
+            let (_, failed) = poll(mode, 20, move |_, _| SlaveAction::Torn(cut, 30 * MS)).await;
             assert_eq!(failed, 0, "{mode:?}, cut after {cut} bytes");
         }
     }
@@ -132,34 +137,36 @@ async fn an_answer_in_two_pieces_is_one_answer() {
 #[tokio::test(start_paused = true)]
 async fn each_spoiled_answer_is_told_by_its_name() {
     // Twice, so that the one retry of a spoiled read does not hide it; the probes before each of the two answer well.
-    let twice =
-        |deed: Deed| move |number, _: &[u8]| if number == 1 || number == 3 { deed.clone() } else { Deed::Answer };
+    let twice = |action: SlaveAction| {
+        move |number, _: &[u8]| if number == 1 || number == 3 { action.clone() } else { SlaveAction::Answer }
+    };
     let crc = Fault::Crc { got: 0, computed: 0 };
-    for (deed, expect) in [
-        (Deed::BadCheck, crc),
-        (Deed::Cut(6), Fault::Truncated { got: 6, expected: 13 }),
-        (Deed::Silent, Fault::Timeout),
-        (Deed::Instead(vec![9, 3, 2, 0, 1]), Fault::WrongUnit { got: 9, asked: 1 }),
-        (Deed::Instead(vec![1, 4, 8, 0, 1, 0, 2, 0, 3, 0, 4]), Fault::WrongFunction { got: 4, asked: 3 }),
-        (Deed::Instead(vec![1, 3, 2, 0, 1]), Fault::WrongLength { got: 5, asked: 11 }),
-        (Deed::Exception(4), Fault::Exception(ExceptionCode(4))),
+    for (action, expect) in [
+        (SlaveAction::BadCheck, crc),
+        (SlaveAction::Cut(6), Fault::Truncated { got: 6, expected: 13 }),
+        (SlaveAction::Silent, Fault::Timeout),
+        (SlaveAction::Instead(vec![9, 3, 2, 0, 1]), Fault::WrongUnit { got: 9, asked: 1 }),
+        (SlaveAction::Instead(vec![1, 4, 8, 0, 1, 0, 2, 0, 3, 0, 4]), Fault::WrongFunction { got: 4, asked: 3 }),
+        (SlaveAction::Instead(vec![1, 3, 2, 0, 1]), Fault::WrongLength { got: 5, asked: 11 }),
+        (SlaveAction::Exception(4), Fault::Exception(ExceptionCode(4))),
     ] {
         let def = plant(Mode::Rtu);
         let mut line = line(def.clone());
-        line.plug(Mode::Rtu, twice(deed.clone()));
+        line.plug(Mode::Rtu, twice(action.clone()));
         let fault = line.fault(&def).await;
         let same = matches!((fault, expect), (Fault::Crc { .. }, Fault::Crc { .. })) || fault == expect;
-        assert!(same, "{deed:?}: {fault}, expected {expect}");
+        assert!(same, "{action:?}: {fault}, expected {expect}");
         line.read(&def).await;
     }
 }
 
 #[tokio::test(start_paused = true)]
 async fn noise_before_an_answer_and_one_spoiled_answer_are_overcome() {
-    let (_, failed) = poll(Mode::Rtu, 40, |_, _| Deed::Noise(vec![0xFF, 0x00, 0x55])).await;
+    let (_, failed) = poll(Mode::Rtu, 40, |_, _| SlaveAction::Noise(vec![0xFF, 0x00, 0x55])).await;
     assert_eq!(failed, 0);
     let (_, failed) =
-        poll(Mode::Rtu, 40, |number, _| if number % 7 == 0 { Deed::BadCheck } else { Deed::Answer }).await;
+        poll(Mode::Rtu, 40, |number, _| if number % 7 == 0 { SlaveAction::BadCheck } else { SlaveAction::Answer })
+            .await;
     assert!(failed <= 2, "a spoiled read is asked for once more: {failed} failed");
 }
 
@@ -167,7 +174,7 @@ async fn noise_before_an_answer_and_one_spoiled_answer_are_overcome() {
 async fn one_dead_unit_leaves_the_others_their_rate() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
-    line.plug(Mode::Rtu, |_, message| if message[0] == 1 { Deed::Silent } else { Deed::Answer });
+    line.plug(Mode::Rtu, |_, message| if message[0] == 1 { SlaveAction::Silent } else { SlaveAction::Answer });
     let (mut reads, mut told_down) = (BTreeMap::new(), 0);
     let mut end = Timestamp::UNIX_EPOCH;
     while end < Timestamp::from_second(120).expect("a small number") {
@@ -198,8 +205,8 @@ async fn a_repaired_unit_is_read_as_soon_as_an_operator_retries() {
     let repaired = Arc::new(AtomicUsize::new(0));
     let is_repaired = repaired.clone();
     line.plug(Mode::Rtu, move |_, message| match (message[0], is_repaired.load(Ordering::Relaxed)) {
-        (1, 0) => Deed::Silent,
-        _ => Deed::Answer,
+        (1, 0) => SlaveAction::Silent,
+        _ => SlaveAction::Answer,
     });
     let of_other = |event: &Event, after: Timestamp| match event {
         Event::Read { at, device: DeviceId(1), .. } if after < *at => Some(*at),
@@ -222,7 +229,10 @@ async fn a_repaired_unit_is_read_as_soon_as_an_operator_retries() {
 async fn a_fast_unit_that_dies_is_not_waited_for_long() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
-    line.plug(Mode::Rtu, |number, message| if 200 < number && message[0] == 1 { Deed::Silent } else { Deed::Answer });
+    line.plug(
+        Mode::Rtu,
+        |number, message| if 200 < number && message[0] == 1 { SlaveAction::Silent } else { SlaveAction::Answer },
+    );
     let waited = |event: &Event| match event {
         Event::Failed { at, fault: Fault::Timeout, exchange: Some(exchange), .. } => {
             Some(at.duration_since(exchange.at))
@@ -237,7 +247,7 @@ async fn a_fast_unit_that_dies_is_not_waited_for_long() {
 #[tokio::test(start_paused = true)]
 async fn a_fast_unit_that_becomes_slow_is_waited_for() {
     for mode in [Mode::Rtu, Mode::Ascii, Mode::RtuOverTcp] {
-        let slow = |number, _: &[u8]| if 200 < number { Deed::Late(220 * MS) } else { Deed::Answer };
+        let slow = |number, _: &[u8]| if 200 < number { SlaveAction::Late(220 * MS) } else { SlaveAction::Answer };
         let (good, failed) = poll(mode, 400, slow).await;
         // Behind this slave requests wait for their turn, so that one late answer makes others late.
         assert!(failed <= 6, "{mode:?}: {good} good, {failed} failed");
@@ -250,7 +260,7 @@ async fn a_hole_in_a_block_costs_only_itself() {
     let mut line = line(def.clone());
     line.plug(Mode::Rtu, |_, message| {
         let (first, count) = (u16::from_be_bytes([message[2], message[3]]), u16::from(message[5]));
-        if (first..first + count).contains(&21) { Deed::Exception(2) } else { Deed::Answer }
+        if (first..first + count).contains(&21) { SlaveAction::Exception(2) } else { SlaveAction::Answer }
     });
     let (mut good, mut holes) = (std::collections::BTreeSet::new(), std::collections::BTreeSet::new());
     for _ in 0..100 {
@@ -276,7 +286,10 @@ async fn a_device_that_nothing_brings_into_step_is_read_again_after_a_rest() {
     def.tags.retain(|tag| tag.device == DeviceId(0) && tag.point.address == 400);
     def.tags[0].id = TagId(0);
     let mut line = line(def.clone());
-    line.plug(Mode::Rtu, |number, message| if number == 4 || message[1] == 8 { Deed::Silent } else { Deed::Answer });
+    line.plug(
+        Mode::Rtu,
+        |number, message| if number == 4 || message[1] == 8 { SlaveAction::Silent } else { SlaveAction::Answer },
+    );
     for _ in 0..3 {
         line.read(&def).await;
     }
@@ -311,9 +324,9 @@ async fn a_late_refusal_splits_no_block() {
     line.plug(Mode::Rtu, move |_, message| {
         of_first += usize::from(message[0] == 1);
         match of_first {
-            2 if message[0] == 1 => Deed::Silent,
-            3 | 4 if message[0] == 1 => Deed::Exception(2),
-            _ => Deed::Answer,
+            2 if message[0] == 1 => SlaveAction::Silent,
+            3 | 4 if message[0] == 1 => SlaveAction::Exception(2),
+            _ => SlaveAction::Answer,
         }
     });
     let mut whole = 0;
@@ -330,7 +343,7 @@ async fn a_port_that_goes_away_comes_back_by_itself() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
     for _ in 0..100 {
-        let served = line.plug(Mode::Rtu, |_, _| Deed::Answer);
+        let served = line.plug(Mode::Rtu, |_, _| SlaveAction::Answer);
         line.read(&def).await;
         served.abort();
         let waiting =
@@ -339,13 +352,13 @@ async fn a_port_that_goes_away_comes_back_by_itself() {
     }
     line.requests.send(BusRequest::Connect(false)).await.expect("the line runs");
     line.until(&def, |event| matches!(event, Event::Line { state: LineState::Disconnected, .. }).then_some(())).await;
-    line.plug(Mode::Rtu, |_, _| Deed::Answer);
+    line.plug(Mode::Rtu, |_, _| SlaveAction::Answer);
     line.requests.send(BusRequest::Connect(true)).await.expect("the line runs");
     line.read(&def).await;
 }
 
 /// Writes register 10 := 10 (so that the read-back fits the address rule) and gives result and number of writes on the wire.
-async fn write(deed: Deed, read_back: Deed) -> (WriteResult, usize) {
+async fn write(action: SlaveAction, read_back: SlaveAction) -> (WriteResult, usize) {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
     let writes = Arc::new(AtomicUsize::new(0));
@@ -353,9 +366,9 @@ async fn write(deed: Deed, read_back: Deed) -> (WriteResult, usize) {
     line.plug(Mode::Rtu, move |_, message| {
         if message[1] == 6 {
             count.fetch_add(1, Ordering::Relaxed);
-            return deed.clone();
+            return action.clone();
         }
-        if message[2..6] == [0, 10, 0, 1] { read_back.clone() } else { Deed::Answer }
+        if message[2..6] == [0, 10, 0, 1] { read_back.clone() } else { SlaveAction::Answer }
     });
     line.read(&def).await;
     let request =
@@ -375,15 +388,15 @@ async fn write(deed: Deed, read_back: Deed) -> (WriteResult, usize) {
 
 #[tokio::test(start_paused = true)]
 async fn a_write_is_sent_once_whatever_happens() {
-    for (deed, read_back, expect) in [
-        (Deed::Answer, Deed::Answer, WriteResult::ReadBack(10.0)),
-        (Deed::Exception(3), Deed::Answer, WriteResult::Refused(ExceptionCode(3))),
-        (Deed::Silent, Deed::Answer, WriteResult::Held(10.0)),
-        (Deed::Silent, Deed::Silent, WriteResult::Lost(Fault::Timeout)),
-        (Deed::Answer, Deed::Silent, WriteResult::NotRead(Fault::Timeout)),
-        (Deed::Instead(vec![1, 6, 0, 10, 0, 11]), Deed::Answer, WriteResult::Held(10.0)),
+    for (action, read_back, expect) in [
+        (SlaveAction::Answer, SlaveAction::Answer, WriteResult::ReadBack(10.0)),
+        (SlaveAction::Exception(3), SlaveAction::Answer, WriteResult::Refused(ExceptionCode(3))),
+        (SlaveAction::Silent, SlaveAction::Answer, WriteResult::Held(10.0)),
+        (SlaveAction::Silent, SlaveAction::Silent, WriteResult::Lost(Fault::Timeout)),
+        (SlaveAction::Answer, SlaveAction::Silent, WriteResult::NotRead(Fault::Timeout)),
+        (SlaveAction::Instead(vec![1, 6, 0, 10, 0, 11]), SlaveAction::Answer, WriteResult::Held(10.0)),
     ] {
-        assert_eq!(write(deed.clone(), read_back).await, (expect, 1), "{deed:?}");
+        assert_eq!(write(action.clone(), read_back).await, (expect, 1), "{action:?}");
     }
 }
 
@@ -404,10 +417,10 @@ async fn a_broadcast_is_sent_once_and_never_called_verified() {
         let count = heard.clone();
         line.plug(mode, move |_, message| {
             if message[0] != 0 {
-                return Deed::Answer;
+                return SlaveAction::Answer;
             }
             count.fetch_add(1, Ordering::Relaxed);
-            Deed::Silent
+            SlaveAction::Silent
         });
         line.read(&def).await;
         let request =
@@ -432,13 +445,13 @@ async fn a_late_reply_is_known_after_other_settings_too() {
     let mut gone = false;
     line.plug(Mode::Rtu, move |_, message| {
         gone |= message[..4] == [1, 3, 0, 20];
-        if gone && message[0] == 1 { Deed::Silent } else { Deed::Answer }
+        if gone && message[0] == 1 { SlaveAction::Silent } else { SlaveAction::Answer }
     });
     assert_eq!(line.fault(&def).await, Fault::Timeout);
     // The answer to the block at 20 comes when the block at 10, of the same shape, would be asked.
     let late = vec![1, 3, 8, 0, 20, 0, 21, 0, 22, 0, 23];
     line.plug(Mode::Rtu, move |number, message| {
-        if number == 0 && message[..2] == [1, 3] { Deed::Instead(late.clone()) } else { Deed::Answer }
+        if number == 0 && message[..2] == [1, 3] { SlaveAction::Instead(late.clone()) } else { SlaveAction::Answer }
     });
     let settings = LineDef { timeout: 500 * MS, ..def.lines[0].clone() };
     line.requests.send(BusRequest::Configure(Box::new(settings))).await.expect("the line runs");
@@ -457,9 +470,9 @@ async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
     line.plug(Mode::Rtu, move |_, message| {
         writes += usize::from(message[1] == 6);
         match (message[1], writes) {
-            (6, 1) | (8, _) => Deed::Silent,
-            (6, _) => Deed::Exception(3),
-            _ => Deed::Answer,
+            (6, 1) | (8, _) => SlaveAction::Silent,
+            (6, _) => SlaveAction::Exception(3),
+            _ => SlaveAction::Answer,
         }
     });
     line.read(&def).await;
@@ -491,12 +504,12 @@ async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
 /// An adapter that gives back what it sends: its echo is neither an answer nor noise.
 #[tokio::test(start_paused = true)]
 async fn the_echo_of_an_adapter_is_no_answer() {
-    let (_, failed) = poll(Mode::Rtu, 60, |_, message| Deed::Noise(frame::with_crc(message))).await;
+    let (_, failed) = poll(Mode::Rtu, 60, |_, message| SlaveAction::Noise(frame::with_crc(message))).await;
     assert_eq!(failed, 0);
     // Nothing but the echo, as on a line without a device.
     let (good, _) = poll(Mode::Rtu, 60, |_, message| match message {
-        [2, ..] => Deed::Answer,
-        _ => Deed::Instead(message.to_vec()),
+        [2, ..] => SlaveAction::Answer,
+        _ => SlaveAction::Instead(message.to_vec()),
     })
     .await;
     assert!(0 < good, "the other unit is read");
@@ -508,9 +521,9 @@ async fn cured_and_late_answers_are_counted_with_their_device() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
     line.plug(Mode::Rtu, |number, _| match number % 20 {
-        3 => Deed::BadCheck,
-        11 => Deed::Late(700 * MS),
-        _ => Deed::Answer,
+        3 => SlaveAction::BadCheck,
+        11 => SlaveAction::Late(700 * MS),
+        _ => SlaveAction::Answer,
     });
     for _ in 0..10_000 {
         let event = line.events.recv().await.expect("the line runs");
@@ -535,7 +548,7 @@ async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
     line.plug(Mode::Rtu, move |_, message| {
         list.lock().expect("no panic").push(message[..6].to_vec());
         let lost = message[1] == 6 && message[3] < 20;
-        if lost { Deed::Silent } else { Deed::Late(200 * MS) }
+        if lost { SlaveAction::Silent } else { SlaveAction::Late(200 * MS) }
     });
     line.read(&def).await;
     let write = |id, tag, raw, urgent| BusRequest::Write {
@@ -575,8 +588,8 @@ async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
     let (value, key) = (TagId(1), TagId(9));
     let mut line = line(def.clone());
     line.plug(Mode::Rtu, |_, message| match message {
-        [1, 6, 0, 11, ..] => Deed::Exception(3),
-        _ => Deed::Answer,
+        [1, 6, 0, 11, ..] => SlaveAction::Exception(3),
+        _ => SlaveAction::Answer,
     });
     // The key is read once at the start and then only when somebody asks for it.
     let holds = |event: &Event| match event {
@@ -601,11 +614,11 @@ async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
 #[tokio::test(start_paused = true)]
 async fn a_silent_unit_that_is_out_of_step_is_read_again() {
     let script = |number, _: &[u8]| match number {
-        0 | 2 => Deed::Silent,
-        1 => Deed::Late(1_681 * MS),
-        4 => Deed::Late(332 * MS),
-        5 => Deed::Torn(0, Duration::ZERO),
-        _ => Deed::Answer,
+        0 | 2 => SlaveAction::Silent,
+        1 => SlaveAction::Late(1_681 * MS),
+        4 => SlaveAction::Late(332 * MS),
+        5 => SlaveAction::Torn(0, Duration::ZERO),
+        _ => SlaveAction::Answer,
     };
     let (good, failed) = poll(Mode::Ascii, 60, script).await;
     assert!(failed < good, "{good} good, {failed} failed");

@@ -377,7 +377,7 @@ proptest! {
     fn the_queue_decides_as_a_look_at_every_poll_does(
         load in polls(1..12),
         classes in proptest::collection::vec((0usize..3, 0u16..4, 0u8..8), 12),
-        deeds in proptest::collection::vec((0u8..40, 0i64..700), 1..60),
+        actions in proptest::collection::vec((0u8..40, 0i64..700), 1..60),
     ) {
         let block_of = |n: usize| {
             let (class, device, once) = classes[n];
@@ -388,7 +388,7 @@ proptest! {
         let mut schedule = Schedule::new(&blocks, at(0));
         let mut now = 0;
         for turn in 0..3_000 {
-            let (deed, ms) = deeds[turn % deeds.len()];
+            let (action, ms) = actions[turn % actions.len()];
             let (device, expect) = (DeviceId(classes[turn % 12].1), by_scan(&schedule, at(now)));
             match (schedule.next(at(now)), expect) {
                 (Next::Run(index), Next::Run(same)) => {
@@ -396,7 +396,7 @@ proptest! {
                     let (began, device) = (now, blocks[index].device);
                     now += load[index].1;
                     schedule.done(index, at(began), at(now));
-                    match deed {
+                    match action {
                         0 | 1 => { schedule.failed(device, at(began), Duration::from_millis(300), at(now)); }
                         2 => { schedule.excused(index, ExceptionCode(6), at(now)); }
                         3 => { schedule.again(index, at(now)); }
@@ -414,7 +414,7 @@ proptest! {
                 }
                 (next, expect) => prop_assert_eq!(next, expect, "turn {} at {} ms", turn, now),
             }
-            match deed {
+            match action {
                 37 => schedule.rest(device, at(now + ms)),
                 38 => schedule.refresh(device, at(now)),
                 39 => schedule.replan(&blocks, at(now)),

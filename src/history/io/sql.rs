@@ -172,28 +172,28 @@ pub fn restore() -> String {
     )
 }
 
-/// Deeds in a span.
-const DEED: &str = "utc, by_whom, action, target, old_value, new_value, outcome, from_where, note, number, hash";
+/// Actions in a span.
+const ACTION: &str = "utc, by_whom, action, target, old_value, new_value, outcome, from_where, note, number, hash";
 
-/// Deeds at the plant, without those about people and terminals.
+/// Actions on the plant, without those on users and terminals.
 fn at_the_plant() -> String {
     let words: Vec<String> = ELSEWHERE.iter().map(|word| format!("'{word}'")).collect();
     format!("action NOT IN ({})", words.join(", "))
 }
 
-/// Deeds at the plant in a span, newest first.
+/// Actions on the plant in a span, newest first.
 pub fn actions_newest() -> String {
     let plant = at_the_plant();
     format!(
-        "SELECT {DEED} FROM operator_action WHERE utc >= ? AND utc < ? AND {plant} ORDER BY utc DESC, rowid DESC LIMIT ?"
+        "SELECT {ACTION} FROM operator_action WHERE utc >= ? AND utc < ? AND {plant} ORDER BY utc DESC, rowid DESC LIMIT ?"
     )
 }
 
-/// Deeds in a span, newest first, with a part of who, of the action, and of the words of all columns; large and small
+/// Actions in a span, newest first, with a part of who, of the action, and of the words of all columns; large and small
 /// letters are the same. An empty part is in everything.
 pub fn audit() -> String {
     format!(
-        "SELECT {DEED} FROM operator_action WHERE utc >= $1 AND utc < $2
+        "SELECT {ACTION} FROM operator_action WHERE utc >= $1 AND utc < $2
             AND contains(lower(by_whom), lower($4)) AND contains(lower(action), lower($5))
             AND contains(lower(concat_ws(' ', by_whom, from_where, action, target, old_value, new_value, outcome, note)),
                 lower($6))
@@ -201,10 +201,10 @@ pub fn audit() -> String {
     )
 }
 
-/// Deeds at the plant in a span, oldest first.
+/// Actions on the plant in a span, oldest first.
 pub fn actions_oldest() -> String {
     let plant = at_the_plant();
-    format!("SELECT {DEED} FROM operator_action WHERE utc >= ? AND utc < ? AND {plant} ORDER BY utc, rowid LIMIT ?")
+    format!("SELECT {ACTION} FROM operator_action WHERE utc >= ? AND utc < ? AND {plant} ORDER BY utc, rowid LIMIT ?")
 }
 
 /// Number and hash of the last entry of the audit log before an instant.

@@ -127,7 +127,7 @@ impl Store {
         files::size(&self.path)
     }
 
-    /// Rows of all tables: samples, steps of alarms, deeds of operators, minutes of lines.
+    /// Rows of all tables: samples, steps of alarms, operator actions, minutes of lines.
     pub fn count_rows(&self) -> Result<u64, HistoryError> {
         self.db.query_row(sql::COUNT_ROWS, [], |row| row.get(0)).map_err(engine)
     }
@@ -286,8 +286,8 @@ impl Store {
         });
         let Some(first) = rows.next() else { return Ok(()) };
         let mut appender = self.db.appender("operator_action")?;
-        for deed in std::iter::once(first).chain(rows) {
-            let ActionRecord { at, by, from, action, target, old, new, outcome, note, seal } = deed;
+        for action in std::iter::once(first).chain(rows) {
+            let ActionRecord { at, by, from, action, target, old, new, outcome, note, seal } = action;
             let (number, hash) = (seal.map(|seal| seal.number), seal.map(|seal| seal.hash.to_vec()));
             appender.append_row(params![
                 utc(*at),

@@ -42,7 +42,7 @@ impl Plant {
         match &order.command {
             Command::ReadSets => {
                 effects.sets = Some(SetWork::Read);
-                // Looking is not a deed.
+                // A read is not an operator action.
                 let _ = self.desk.note(order, Outcome::Verified, &self.board, at);
                 None
             }

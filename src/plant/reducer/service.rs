@@ -126,7 +126,7 @@ mod tests {
     /// Orders other settings and lets the line take them.
     fn try_out(plant: &mut Plant, number: u32, settings: LineDef) -> Effects {
         let mut effects = order(plant, number, Command::Configure(Box::new(settings.clone())));
-        assert_eq!(deeds(&effects), [], "not before the line has it");
+        assert_eq!(actions(&effects), [], "not before the line has it");
         effects.records.extend(plant.on_delivered(L1, &effects.bus[0].1).records);
         works_with(plant, &settings);
         effects
@@ -136,17 +136,17 @@ mod tests {
         plant.snapshot().line(L1).settings_before.as_deref().cloned()
     }
 
-    fn deeds(effects: &Effects) -> Vec<(String, String, String, String)> {
-        let deed = |record: &Record| match record {
-            Record::Action(deed) => Some((
-                deed.by.to_string(),
-                deed.action.to_string(),
-                deed.new.as_deref().unwrap_or("").to_owned(),
-                deed.outcome.to_string(),
+    fn actions(effects: &Effects) -> Vec<(String, String, String, String)> {
+        let action = |record: &Record| match record {
+            Record::Action(action) => Some((
+                action.by.to_string(),
+                action.action.to_string(),
+                action.new.as_deref().unwrap_or("").to_owned(),
+                action.outcome.to_string(),
             )),
             Record::Sample(..) | Record::Alarm(_) | Record::Line(_) | Record::ClockSet => None,
         };
-        effects.records.iter().filter_map(deed).collect()
+        effects.records.iter().filter_map(action).collect()
     }
 
     #[test]
@@ -176,7 +176,7 @@ mod tests {
             let mut plant = plant();
             let effects = order(&mut plant, 1, command.clone());
             assert_eq!(effects.bus, [], "{command:?} goes to the line");
-            let refused = deeds(&effects);
+            let refused = actions(&effects);
             assert!(refused.len() == 1 && refused[0].3.starts_with("refused: "), "{refused:?}");
             assert_eq!(before(&plant), None, "nothing to take back");
         }
@@ -185,11 +185,11 @@ mod tests {
     #[test]
     fn it_is_on_record_who_changed_a_line_and_to_what() {
         let mut plant = plant();
-        let record = deeds(&try_out(&mut plant, 1, baud(19_200)));
+        let record = actions(&try_out(&mut plant, 1, baud(19_200)));
         let new = "RTU /dev/null 19200 8N1";
         assert_eq!(record, [("anna".into(), "configure".into(), new.into(), "verified".into())]);
         let effects = order(&mut plant, 2, Command::StopTest(L1));
-        let record = deeds(&plant.on_delivered(L1, &effects.bus[0].1));
+        let record = actions(&plant.on_delivered(L1, &effects.bus[0].1));
         assert_eq!(record, [("anna".into(), "stop test".into(), String::new(), "verified".into())]);
     }
 
@@ -201,8 +201,8 @@ mod tests {
             [(1, Command::Configure(Box::new(baud(19_200)))), (2, test), (3, Command::StopTest(L1))]
         {
             let effects = order(&mut plant, number, command);
-            assert_eq!(deeds(&effects), []);
-            let refused = deeds(&plant.on_undeliverable(L1, &effects.bus[0].1));
+            assert_eq!(actions(&effects), []);
+            let refused = actions(&plant.on_undeliverable(L1, &effects.bus[0].1));
             assert!(refused.len() == 1 && refused[0].3.starts_with("refused"), "{refused:?}");
         }
     }
@@ -214,11 +214,11 @@ mod tests {
         let effects = order(&mut plant, 2, Command::SaveSettings(L1));
         let id = OrderId { terminal: 1, number: 2 };
         assert_eq!(effects.save, Some((id, baud(19_200))));
-        assert_eq!(deeds(&effects), [], "not before it is done");
+        assert_eq!(actions(&effects), [], "not before it is done");
         assert!(before(&plant).is_some());
         let saved = plant.on_saved(id, &baud(19_200), Ok(()));
-        let deed = ("anna".to_owned(), "save settings".to_owned(), String::new(), "verified".to_owned());
-        assert_eq!(deeds(&saved), [deed]);
+        let action = ("anna".to_owned(), "save settings".to_owned(), String::new(), "verified".to_owned());
+        assert_eq!(actions(&saved), [action]);
         assert_eq!(before(&plant), None);
     }
 
@@ -228,7 +228,7 @@ mod tests {
         try_out(&mut plant, 1, baud(19_200));
         order(&mut plant, 2, Command::SaveSettings(L1));
         let effects = plant.on_saved(OrderId { terminal: 1, number: 2 }, &baud(19_200), Err("the disk is full".into()));
-        assert_eq!(deeds(&effects)[0].3, "refused: not saved: the disk is full");
+        assert_eq!(actions(&effects)[0].3, "refused: not saved: the disk is full");
         assert!(before(&plant).is_some());
     }
 }

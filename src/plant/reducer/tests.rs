@@ -115,21 +115,21 @@ fn after_a_write_that_may_have_failed_the_old_value_is_not_trusted() {
 #[test]
 fn a_handover_is_on_record_with_its_note() {
     let mut plant = running();
-    let mut deed = |number, command, note: Option<String>| {
+    let mut action = |number, command, note: Option<String>| {
         let order = Order { note: note.map(Into::into), ..order(number, command) };
         let effects = plant.on_order(order, at(1));
-        let [Record::Action(deed)] = &effects.records[..] else { panic!("{effects:?}") };
-        (deed.action.to_string(), deed.note.as_deref().map(str::to_owned), deed.outcome.to_string())
+        let [Record::Action(action)] = &effects.records[..] else { panic!("{effects:?}") };
+        (action.action.to_string(), action.note.as_deref().map(str::to_owned), action.outcome.to_string())
     };
     let told = |action: &str, note: Option<&str>, outcome: &str| {
         (action.to_owned(), note.map(str::to_owned), outcome.to_owned())
     };
     assert_eq!(
-        deed(1, Command::HandOver, Some("pump is loud".to_owned())),
+        action(1, Command::HandOver, Some("pump is loud".to_owned())),
         told("hand over", Some("pump is loud"), "verified")
     );
-    assert_eq!(deed(2, Command::TakeOver, None), told("take over", None, "verified"));
-    let (_, _, outcome) = deed(3, Command::HandOver, Some("x".repeat(501)));
+    assert_eq!(action(2, Command::TakeOver, None), told("take over", None, "verified"));
+    let (_, _, outcome) = action(3, Command::HandOver, Some("x".repeat(501)));
     assert_eq!(outcome, "refused: more than 500 characters");
 }
 
@@ -142,7 +142,10 @@ fn a_line_is_closed_when_it_says_so() {
     let effects = plant.on_event(Event::Line { at: at(2), line: L1, state: LineState::Disconnected });
     assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Verified);
     assert!(
-        effects.records.iter().any(|record| matches!(record, Record::Action(deed) if &*deed.action == "disconnect"))
+        effects
+            .records
+            .iter()
+            .any(|record| matches!(record, Record::Action(action) if &*action.action == "disconnect"))
     );
     plant.on_order(order(2, Command::Connect(L1, false)), at(3));
     assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Unchanged);
@@ -160,9 +163,9 @@ fn a_write_leaves_a_trace_before_it_is_sent_and_is_closed_when_the_station_stops
     assert!(crate::plant::record::ELSEWHERE.contains(&&*intent.action), "a shift report has the outcome alone");
     assert_eq!(plant.intent(&BusRequest::StopTest), None);
     let ended = plant.on_stop().records;
-    let [Record::Action(deed)] = &ended[..] else { panic!("{ended:?}") };
-    assert_eq!((&*deed.action, &deed.new), ("write", &intent.new));
-    assert_eq!(&*deed.outcome, "not confirmed: the station stopped; it may have taken effect");
+    let [Record::Action(action)] = &ended[..] else { panic!("{ended:?}") };
+    assert_eq!((&*action.action, &action.new), ("write", &intent.new));
+    assert_eq!(&*action.outcome, "not confirmed: the station stopped; it may have taken effect");
     assert_eq!(plant.on_stop().records, []);
 }
 
@@ -397,9 +400,9 @@ fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
     let (id, unlock) = keyed(&mut plant, 1, 71.0);
     assert_eq!(unlock, Some((FAULT, 1.0)));
     let effects = plant.on_event(Event::Unlocked { at: at(2), id, key: FAULT, result: WriteResult::Accepted });
-    let Some(Record::Action(deed)) = effects.records.last() else { panic!("no line for the key") };
-    assert_eq!((&*deed.by, &*deed.target, deed.new.as_deref()), ("anna", "TIC-1.FAULT", Some("1 °C")));
-    assert_eq!(&*deed.outcome, "not confirmed: accepted, not read back; for TIC-1.SV");
+    let Some(Record::Action(action)) = effects.records.last() else { panic!("no line for the key") };
+    assert_eq!((&*action.by, &*action.target, action.new.as_deref()), ("anna", "TIC-1.FAULT", Some("1 °C")));
+    assert_eq!(&*action.outcome, "not confirmed: accepted, not read back; for TIC-1.SV");
     assert!(plant.snapshot().sample(FAULT).trusted().is_none(), "the key is not as it was read before");
     plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::Refused(ExceptionCode(3)) });
     // Not read again yet: nobody can tell, so it is sent again.

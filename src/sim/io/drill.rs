@@ -195,10 +195,10 @@ impl Task {
             ScenarioEvent::Fault(FaultEvent { target, fault, begins: false, .. }) => {
                 self.trainer.simulator.clear(target, fault).await
             }
-            ScenarioEvent::Deed(deed) => {
+            ScenarioEvent::OperatorStep(step) => {
                 let Some(orders) = &self.trainer.operator else { return };
                 let snapshot = self.trainer.snapshots.borrow().clone();
-                let Some(command) = deed.wish.command(&snapshot) else { return };
+                let Some(command) = step.wish.command(&snapshot) else { return };
                 self.ordered += 1;
                 let id = OrderId { terminal: OPERATOR, number: self.ordered };
                 let seen = snapshot.seen(&command);

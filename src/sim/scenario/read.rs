@@ -8,7 +8,7 @@ mod tests;
 use std::{path::Path, sync::Arc, time::Duration};
 
 use self::names::{alarm, tag, unknown, value};
-use super::{Deed, Expect, FaultEvent, OperatorWish, Scenario, Start, judge::clock};
+use super::{Expect, FaultEvent, OperatorStep, OperatorWish, Scenario, Start, judge::clock};
 use crate::{
     plant::{PlantDef, record::AlarmStep},
     profile::{
@@ -30,7 +30,7 @@ table!(
         need "duration" duration: Duration,
         opt "pass_percent" pass_percent: u8,
         list "event" events: EventTable,
-        list "operator" operator: DeedTable,
+        list "operator" operator: OperatorTable,
         list "expect" expect: ExpectTable,
     }
 );
@@ -52,7 +52,7 @@ table!(
 
 table!(
     /// An `[[operator]]`: what a good operator does.
-    DeedTable, "a deed of the operator" {
+    OperatorTable, "an operator action" {
         need "at" at_time: Duration,
         opt "acknowledge" acknowledge: String,
         opt "text" text: String,
@@ -164,9 +164,9 @@ fn scenario(name: &str, table: &ScenarioTable, def: &PlantDef, problems: &mut Pr
     let mut events: Vec<FaultEvent> =
         table.events.iter().flat_map(|event| events(&event.value, duration, def, problems)).collect();
     events.sort_by_key(|event| event.at);
-    let mut operator: Vec<Deed> =
-        table.operator.iter().filter_map(|deed| self::deed(&deed.value, duration, def, problems)).collect();
-    operator.sort_by_key(|deed| deed.at);
+    let mut operator: Vec<OperatorStep> =
+        table.operator.iter().filter_map(|step| self::step(&step.value, duration, def, problems)).collect();
+    operator.sort_by_key(|step| step.at);
     let expect: Vec<Expect> =
         table.expect.iter().filter_map(|expect| expect::expectation(&expect.value, duration, def, problems)).collect();
     if table.expect.is_empty() {
@@ -240,7 +240,7 @@ fn target(table: &EventTable, def: &PlantDef, problems: &mut Problems) -> Option
     }
 }
 
-fn deed(table: &DeedTable, duration: Duration, def: &PlantDef, problems: &mut Problems) -> Option<Deed> {
+fn step(table: &OperatorTable, duration: Duration, def: &PlantDef, problems: &mut Problems) -> Option<OperatorStep> {
     let at = in_time(table.at_time, duration, problems);
     let wish = match (&table.acknowledge, &table.write) {
         (Some(all), None) if all.value == "all" => OperatorWish::AcknowledgeAll,
@@ -251,7 +251,7 @@ fn deed(table: &DeedTable, duration: Duration, def: &PlantDef, problems: &mut Pr
             OperatorWish::Write(tag, value)
         }
         (Some(_), Some(write)) => {
-            problems.add(write.at, "one deed at a time").label("needs an [[operator]] of its own");
+            problems.add(write.at, "one action at a time").label("needs an [[operator]] of its own");
             return None;
         }
         (None, None) => {
@@ -259,7 +259,7 @@ fn deed(table: &DeedTable, duration: Duration, def: &PlantDef, problems: &mut Pr
             return None;
         }
     };
-    Some(Deed { at: at?, wish })
+    Some(OperatorStep { at: at?, wish })
 }
 
 fn in_time(at: Option<At<Duration>>, duration: Duration, problems: &mut Problems) -> Option<Duration> {

@@ -116,7 +116,7 @@ pub fn plant(mode: Mode) -> PlantDef {
 
 /// What the slave does with its n-th request.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Deed {
+pub enum SlaveAction {
     Answer,
     /// Answers after this time; the next request waits for its turn, as behind a gateway.
     Late(Duration),
@@ -148,7 +148,7 @@ pub fn correct(message: &[u8]) -> Vec<u8> {
 }
 
 /// Serves until the stream closes; `script(n, message)` says what to do with the n-th request.
-async fn slave(mut stream: DuplexStream, mode: Mode, mut script: impl FnMut(usize, &[u8]) -> Deed) {
+async fn slave(mut stream: DuplexStream, mode: Mode, mut script: impl FnMut(usize, &[u8]) -> SlaveAction) {
     let mut buffer = Vec::new();
     let mut slow: Vec<(Instant, Vec<u8>)> = Vec::new();
     for number in 0.. {
@@ -179,33 +179,33 @@ async fn slave(mut stream: DuplexStream, mode: Mode, mut script: impl FnMut(usiz
         let framed = |message: &[u8]| frame::wrap(mode.framing(), transaction, message);
         let answer = framed(&correct(&message));
         let send = match script(number, &message) {
-            Deed::Answer => answer,
-            Deed::Late(delay) => {
+            SlaveAction::Answer => answer,
+            SlaveAction::Late(delay) => {
                 tokio::time::sleep(delay).await;
                 answer
             }
-            Deed::Meanwhile(delay) => {
+            SlaveAction::Meanwhile(delay) => {
                 slow.push((Instant::now() + delay, answer));
                 continue;
             }
-            Deed::Silent => continue,
-            Deed::Torn(at, pause) => {
+            SlaveAction::Silent => continue,
+            SlaveAction::Torn(at, pause) => {
                 let at = at.min(answer.len() - 1);
                 let _ = stream.write_all(&answer[..at]).await;
                 tokio::time::sleep(pause).await;
                 answer[at..].to_vec()
             }
-            Deed::Cut(at) => answer[..at.min(answer.len() - 1)].to_vec(),
-            Deed::BadCheck => {
+            SlaveAction::Cut(at) => answer[..at.min(answer.len() - 1)].to_vec(),
+            SlaveAction::BadCheck => {
                 let mut spoiled = answer;
                 let check = spoiled.len() - if mode == Mode::Ascii { 4 } else { 1 };
                 spoiled[check] ^= if mode == Mode::Ascii { 1 } else { 0xFF };
                 spoiled
             }
-            Deed::Noise(noise) => noise.into_iter().chain(answer).collect(),
-            Deed::Trailing(bytes) => answer.into_iter().chain(bytes).collect(),
-            Deed::Instead(message) => framed(&message),
-            Deed::Exception(code) => framed(&[message[0], message[1] | 0x80, code]),
+            SlaveAction::Noise(noise) => noise.into_iter().chain(answer).collect(),
+            SlaveAction::Trailing(bytes) => answer.into_iter().chain(bytes).collect(),
+            SlaveAction::Instead(message) => framed(&message),
+            SlaveAction::Exception(code) => framed(&[message[0], message[1] | 0x80, code]),
         };
         if stream.write_all(&send).await.is_err() {
             return;
@@ -244,7 +244,7 @@ impl Line {
     pub fn plug(
         &self,
         mode: Mode,
-        script: impl FnMut(usize, &[u8]) -> Deed + Send + 'static,
+        script: impl FnMut(usize, &[u8]) -> SlaveAction + Send + 'static,
     ) -> tokio::task::JoinHandle<()> {
         let (ours, theirs) = tokio::io::duplex(4096);
         self.ports.try_send(ours).expect("room for a port");

@@ -10,7 +10,7 @@ use std::{
 
 use tokio::time::Instant;
 
-use super::slave::{Deed, Line, MS, Mode, line, plant, until_silent};
+use super::slave::{Line, MS, Mode, SlaveAction, line, plant, until_silent};
 use crate::plant::{
     command::{BusRequest, WriteId},
     def::{DeviceId, TagId},
@@ -44,10 +44,10 @@ async fn a_stop_is_sent_to_a_device_that_is_given_up() {
             line.plug(mode, move |_, message| match message {
                 [1, 6, ..] => {
                     *count.lock().expect("no panic") += 1;
-                    if hears { Deed::Answer } else { Deed::Silent }
+                    if hears { SlaveAction::Answer } else { SlaveAction::Silent }
                 }
-                [1, ..] if !hears || *count.lock().expect("no panic") == 0 => Deed::Silent,
-                _ => Deed::Answer,
+                [1, ..] if !hears || *count.lock().expect("no panic") == 0 => SlaveAction::Silent,
+                _ => SlaveAction::Answer,
             });
             let given_up = |event: &Event| {
                 matches!(event, Event::Failed { device: DeviceId(0), fault: Fault::Resting, .. }).then_some(())
@@ -73,10 +73,10 @@ fn slow_line(mode: Mode) -> (crate::plant::PlantDef, Line, Arc<AtomicBool>, Arc<
     line.plug(mode, move |_, message| match message {
         [2, 6, ..] => {
             heard.lock().expect("no panic").push(Instant::now());
-            Deed::Answer
+            SlaveAction::Answer
         }
-        [1, ..] if is_silent.load(Ordering::Relaxed) => Deed::Silent,
-        _ => Deed::Answer,
+        [1, ..] if is_silent.load(Ordering::Relaxed) => SlaveAction::Silent,
+        _ => SlaveAction::Answer,
     });
     (def, line, silent, stops)
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 
-use super::slave::{Deed, Line, MS, Mode, correct, line, plant};
+use super::slave::{Line, MS, Mode, SlaveAction, correct, line, plant};
 use crate::{
     bus::frame,
     plant::{
@@ -41,8 +41,8 @@ async fn an_answer_owed_to_a_process_that_was_killed_is_no_value() {
         let mut line = line(def.clone());
         // It needs 250 ms for each request, and answers in their order: the first two are those of the dead process.
         line.plug(mode, move |number, _| match number {
-            0 => Deed::Noise([owed(mode), owed(mode)].concat()),
-            _ => Deed::Late(250 * MS),
+            0 => SlaveAction::Noise([owed(mode), owed(mode)].concat()),
+            _ => SlaveAction::Late(250 * MS),
         });
         let (good, failed) = read(&mut line, &def, 60).await;
         assert!(50 <= good, "{mode:?}: {good} good, {failed} failed");
@@ -60,10 +60,10 @@ async fn an_owed_answer_to_the_first_request_does_not_shift_the_others() {
         line.plug(mode, move |number, message| {
             let answer = correct(message);
             match behind.replace(answer.clone()) {
-                Some(before) if number < 40 => Deed::Instead(before),
-                Some(before) if number == 40 => Deed::Noise(frame::wrap(mode.framing(), 0, &before)),
-                Some(_) => Deed::Answer,
-                None => Deed::Answer,
+                Some(before) if number < 40 => SlaveAction::Instead(before),
+                Some(before) if number == 40 => SlaveAction::Noise(frame::wrap(mode.framing(), 0, &before)),
+                Some(_) => SlaveAction::Answer,
+                None => SlaveAction::Answer,
             }
         });
         let (good, _) = read(&mut line, &def, 120).await;
@@ -136,7 +136,7 @@ async fn an_unasked_frame_puts_the_values_of_its_unit_in_doubt() {
         let mut sent = 0;
         line.plug(mode, move |_, message| {
             sent += usize::from(message[0] == 2);
-            if sent == 6 && message[0] == 2 { Deed::Noise(owed(mode)) } else { Deed::Answer }
+            if sent == 6 && message[0] == 2 { SlaveAction::Noise(owed(mode)) } else { SlaveAction::Answer }
         });
         let mut doubted = None;
         let mut good = 0;

@@ -11,7 +11,7 @@ use std::{
 
 use jiff::Timestamp;
 
-use super::slave::{Deed, Line, MS, Mode, line, plant};
+use super::slave::{Line, MS, Mode, SlaveAction, line, plant};
 use crate::plant::{
     PlantDef,
     command::{BusRequest, WriteId},
@@ -48,7 +48,7 @@ async fn reads(line: &mut Line, def: &PlantDef, until: i64) -> BTreeMap<DeviceId
 async fn a_slow_unit_does_not_hold_the_answers_of_the_others() {
     let def = gateway();
     let mut line = line(def.clone());
-    let slow = |_, message: &[u8]| if message[0] == 1 { Deed::Meanwhile(250 * MS) } else { Deed::Answer };
+    let slow = |_, message: &[u8]| if message[0] == 1 { SlaveAction::Meanwhile(250 * MS) } else { SlaveAction::Answer };
     line.plug(Mode::Tcp16, slow);
     let reads = reads(&mut line, &def, 60).await;
     // Three blocks each.
@@ -61,8 +61,8 @@ async fn a_dead_unit_does_not_hold_the_answers_of_the_others() {
     let def = gateway();
     let mut line = line(def.clone());
     line.plug(Mode::Tcp16, |number, message| match message[0] {
-        1 if 100 < number => Deed::Silent,
-        _ => Deed::Answer,
+        1 if 100 < number => SlaveAction::Silent,
+        _ => SlaveAction::Answer,
     });
     let reads = reads(&mut line, &def, 60).await;
     assert!(1_780 <= reads[&DeviceId(1)], "of 1,800 reads of the living unit: {reads:?}");
@@ -74,9 +74,9 @@ async fn no_value_that_was_read_before_a_write_is_told_after_it() {
     let def = gateway();
     let mut line = line(def.clone());
     line.plug(Mode::Tcp16, |_, message| match message {
-        [2, 3, _, 10, ..] => Deed::Meanwhile(80 * MS),
-        [1, 3, ..] => Deed::Meanwhile(250 * MS),
-        _ => Deed::Answer,
+        [2, 3, _, 10, ..] => SlaveAction::Meanwhile(80 * MS),
+        [1, 3, ..] => SlaveAction::Meanwhile(250 * MS),
+        _ => SlaveAction::Answer,
     });
     let seconds = Timestamp::from_second(2).expect("a small number");
     line.until(&def, |event| matches!(event, Event::Read { at, .. } if seconds < *at).then_some(())).await;
@@ -111,7 +111,7 @@ async fn a_stop_does_not_wait_for_the_answers_of_other_units() {
         if message[1] == 6 {
             at.store(start.elapsed().as_millis() as usize, Ordering::Relaxed);
         }
-        if message[0] == 1 { Deed::Meanwhile(290 * MS) } else { Deed::Answer }
+        if message[0] == 1 { SlaveAction::Meanwhile(290 * MS) } else { SlaveAction::Answer }
     });
     let first = |event: &Event| matches!(event, Event::Read { device: DeviceId(1), .. }).then_some(());
     line.until(&def, first).await;
@@ -135,7 +135,7 @@ async fn the_gap_of_a_unit_after_a_write_does_not_hold_the_others() {
             tag.poll = if tag.point.address == 10 { Poll::Every(100 * MS) } else { Poll::Never };
         }
         let mut line = line(def.clone());
-        line.plug(mode, |_, _| Deed::Answer);
+        line.plug(mode, |_, _| SlaveAction::Answer);
         let first = |event: &Event| matches!(event, Event::Read { device: DeviceId(1), .. }).then_some(());
         line.until(&def, first).await;
         let request =
@@ -161,7 +161,10 @@ async fn a_fast_unit_that_dies_is_not_waited_for_long_over_tcp() {
         let mut def = plant(mode);
         def.lines[0].timeout = Duration::from_secs(2);
         let mut line = line(def.clone());
-        line.plug(mode, |number, message| if 200 < number && message[0] == 1 { Deed::Silent } else { Deed::Answer });
+        line.plug(
+            mode,
+            |number, message| if 200 < number && message[0] == 1 { SlaveAction::Silent } else { SlaveAction::Answer },
+        );
         let waited = |event: &Event| match event {
             Event::Failed { at, fault: Fault::Timeout, exchange: Some(exchange), .. } => {
                 Some(at.duration_since(exchange.at))
@@ -181,8 +184,8 @@ async fn a_late_answer_over_tcp_is_known_and_its_unit_waited_for() {
         def.lines[0].timeout = Duration::from_secs(2);
         let mut line = line(def.clone());
         line.plug(mode, |number, message| match message[0] {
-            1 if 200 < number => Deed::Meanwhile(700 * MS),
-            _ => Deed::Answer,
+            1 if 200 < number => SlaveAction::Meanwhile(700 * MS),
+            _ => SlaveAction::Answer,
         });
         let (mut failed, mut late) = (0, 0);
         for _ in 0..1_000 {

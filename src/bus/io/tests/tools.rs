@@ -7,7 +7,7 @@ use tokio::{
     time::Instant,
 };
 
-use super::slave::{Deed, Line, MS, Mode, line, plant, until_silent};
+use super::slave::{Line, MS, Mode, SlaveAction, line, plant, until_silent};
 use crate::plant::{
     command::{BusRequest, OrderId, WriteId},
     def::{Serial, TagId},
@@ -24,9 +24,9 @@ async fn start(line: &Line, tool: Tool) {
 async fn a_line_can_be_closed_while_a_scan_has_it_for_itself() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
-    line.plug(Mode::Rtu, |_, _| Deed::Answer);
+    line.plug(Mode::Rtu, |_, _| SlaveAction::Answer);
     line.read(&def).await;
-    line.plug(Mode::Rtu, |_, _| Deed::Silent);
+    line.plug(Mode::Rtu, |_, _| SlaveAction::Silent);
     let serials = vec![Serial::USUAL, Serial { baud: 19_200, ..Serial::USUAL }];
     let tool = Tool::Scan(Scan { first: 1, last: 247, serials, timeout: 100 * MS });
     let (id, by) = (OrderId { terminal: 1, number: 1 }, "anna".into());
@@ -72,7 +72,7 @@ async fn nonsense_is_sent_and_nonsense_is_told() {
 async fn stop_during_scan(serials: Vec<Serial>) -> (Duration, WriteResult, ToolState) {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
-    let script = |_, message: &[u8]| if message[0] == 9 { Deed::Silent } else { Deed::Answer };
+    let script = |_, message: &[u8]| if message[0] == 9 { SlaveAction::Silent } else { SlaveAction::Answer };
     line.plug(Mode::Rtu, script);
     line.read(&def).await;
     line.plug(Mode::Rtu, script);
@@ -109,7 +109,7 @@ async fn a_stop_cuts_a_scan_short_and_goes_out_at_once() {
 async fn a_test_that_waits_is_stopped_at_once() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
-    line.plug(Mode::Rtu, |_, message| if message[0] == 9 { Deed::Silent } else { Deed::Answer });
+    line.plug(Mode::Rtu, |_, message| if message[0] == 9 { SlaveAction::Silent } else { SlaveAction::Answer });
     start(&line, Tool::Scan(Scan { first: 9, last: 9, serials: Vec::new(), timeout: Duration::from_secs(10) })).await;
     until_silent(&mut line, &def).await;
     let asked = Instant::now();
@@ -131,7 +131,7 @@ async fn a_test_that_waits_is_stopped_at_once() {
 async fn a_usual_write_waits_for_the_step_of_a_test() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
-    line.plug(Mode::Rtu, |_, message| if message[0] == 9 { Deed::Silent } else { Deed::Answer });
+    line.plug(Mode::Rtu, |_, message| if message[0] == 9 { SlaveAction::Silent } else { SlaveAction::Answer });
     start(&line, Tool::Scan(Scan { first: 9, last: 9, serials: Vec::new(), timeout: Duration::from_secs(10) })).await;
     until_silent(&mut line, &def).await;
     let write =

@@ -11,9 +11,9 @@ use std::{
 
 use super::{
     super::{files::beside, last, store::Store},
-    PV, SV,
+    PV, SV, action,
     damage::{FILE, child},
-    deed, def, good, step,
+    def, good, step,
 };
 use crate::{
     plant::record::{AlarmStep, Record},
@@ -135,7 +135,7 @@ fn fill(db: &Path) -> Store {
     let store = Store::open(db, &def(), sec(0)).unwrap().store;
     let rows = (0..FILED).flat_map(|i| [good(PV, i, value(i)), good(SV, i, 70.0)]);
     store.append(&rows.collect::<Vec<_>>()).unwrap();
-    let others = (0..500).flat_map(|i| [Record::Alarm(step(i, "high", AlarmStep::Raised)), Record::Action(deed(i))]);
+    let others = (0..500).flat_map(|i| [Record::Alarm(step(i, "high", AlarmStep::Raised)), Record::Action(action(i))]);
     store.append(&others.collect::<Vec<_>>()).unwrap();
     store.checkpoint().unwrap();
     for i in FILED..FILED + LOGGED {
@@ -151,7 +151,8 @@ fn value(i: i64) -> f64 {
 /// Starts a station on these files and records; returns what it reports and what is missing.
 fn survive(db: &Path) -> String {
     let now = FILED + LOGGED + 10;
-    let records = [good(PV, now, 1.0), Record::Alarm(step(now, "high", AlarmStep::Raised)), Record::Action(deed(now))];
+    let records =
+        [good(PV, now, 1.0), Record::Alarm(step(now, "high", AlarmStep::Raised)), Record::Action(action(now))];
     let record = || {
         let opened = Store::open_at_start(db, &def(), sec(now)).unwrap();
         opened.store.append(&records).and_then(|()| opened.store.checkpoint()).map(|()| opened)
@@ -178,11 +179,12 @@ fn survive(db: &Path) -> String {
     let sum = (0..FILED + LOGGED).map(value).sum::<f64>() + FILED as f64 * 70.0;
     match read {
         Err(error) => report += &format!("; unreadable: {}", error.to_string().lines().next().unwrap_or_default()),
-        Ok((rows, total, journal, deeds)) => {
-            let whole = (rows, journal, deeds) == (2 * FILED + LOGGED, 500 + LOGGED, 500) && (total - sum).abs() < 1e-3;
+        Ok((rows, total, journal, actions)) => {
+            let whole =
+                (rows, journal, actions) == (2 * FILED + LOGGED, 500 + LOGGED, 500) && (total - sum).abs() < 1e-3;
             if !whole && opened.trouble.is_none() {
                 report +=
-                    &format!("; WRONG: {rows} rows, sum {total} instead of {sum}, {journal} steps, {deeds} actions");
+                    &format!("; WRONG: {rows} rows, sum {total} instead of {sum}, {journal} steps, {actions} actions");
             }
         }
     }

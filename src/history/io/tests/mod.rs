@@ -78,7 +78,7 @@ fn step(at: i64, text: &str, step: AlarmStep) -> AlarmRecord {
     }
 }
 
-fn deed(at: i64) -> ActionRecord {
+fn action(at: i64) -> ActionRecord {
     ActionRecord {
         at: sec(at),
         by: "somchai".into(),
@@ -203,7 +203,7 @@ fn a_commit_that_fails_leaves_nothing_behind() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
     store.db.execute_batch("DROP TABLE operator_action").unwrap();
-    let records = [good(PV, 0, 27.0), Record::Alarm(step(0, "high", AlarmStep::Raised)), Record::Action(deed(0))];
+    let records = [good(PV, 0, 27.0), Record::Alarm(step(0, "high", AlarmStep::Raised)), Record::Action(action(0))];
     assert!(matches!(store.append(&records), Err(HistoryError::Engine(_))));
     for table in ["sample", "alarm_journal"] {
         let sql = format!("SELECT count(*) FROM {table}");
@@ -222,7 +222,7 @@ fn lists_come_newest_first_within_their_span_and_limit() {
     let steps =
         [step(1, "high", Raised), step(2, "high", Acknowledged), step(2, "high", Returned), step(9, "low", Raised)];
     let mut records: Vec<_> = steps.iter().cloned().map(Record::Alarm).collect();
-    records.extend([deed(3), deed(4)].map(Record::Action));
+    records.extend([action(3), action(4)].map(Record::Action));
     store.append(&records).unwrap();
     let journal = |from, to, limit| Query::Journal { from: sec(from), to: sec(to), limit };
     let [raised, acked, returned, low] = &steps;
@@ -235,25 +235,25 @@ fn lists_come_newest_first_within_their_span_and_limit() {
         assert_eq!(store.answer(&query, sec(10)).unwrap(), expect);
     }
     let query = Query::Actions { from: sec(0), to: sec(10), limit: 1 };
-    assert_eq!(store.answer(&query, sec(10)).unwrap(), Answer::Actions(vec![deed(4)]));
+    assert_eq!(store.answer(&query, sec(10)).unwrap(), Answer::Actions(vec![action(4)]));
     assert_eq!(store.answer(&journal(5, 5, 1), sec(10)), Err(HistoryError::EmptyPeriod));
 }
 
 #[test]
-fn deeds_are_found_by_words_by_whom_and_by_what() {
+fn actions_are_found_by_text_user_and_action() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
     let login = ActionRecord {
-        by: "Anna".into(), action: "login".into(), target: "ฝ่ายผลิต 50%".into(), ..deed(4)
+        by: "Anna".into(), action: "login".into(), target: "ฝ่ายผลิต 50%".into(), ..action(4)
     };
-    store.append(&[Record::Action(deed(3)), Record::Action(login.clone())]).unwrap();
+    store.append(&[Record::Action(action(3)), Record::Action(login.clone())]).unwrap();
     let check = |words: &str, by: &str, action: &str, expect: Vec<ActionRecord>| {
         let (words, by, action) = (words.to_owned(), by.to_owned(), action.to_owned());
         let query = Query::Audit { from: sec(0), to: sec(10), words, by, action, limit: 10 };
         assert_eq!(store.answer(&query, sec(10)).unwrap(), Answer::Actions(expect), "{query:?}");
     };
-    check("", "", "", vec![login.clone(), deed(3)]);
-    check("tic-1", "", "write", vec![deed(3)]);
+    check("", "", "", vec![login.clone(), action(3)]);
+    check("tic-1", "", "write", vec![action(3)]);
     check("", "ANNA", "", vec![login.clone()]);
     check("ผลิต 50%", "", "log", vec![login.clone()]);
     check("70.0 °c", "anna", "", vec![login.clone()]);
@@ -313,8 +313,8 @@ fn a_history_of_an_older_program_gets_the_new_table_and_keeps_its_rows() {
     .unwrap();
     drop(old);
     let store = open(&db, 10);
-    store.append(&[Record::Line(minute("L1", 60, 60)), Record::Action(deed(5))]).unwrap();
-    // The value, the end of its curve, the minute, the deed.
+    store.append(&[Record::Line(minute("L1", 60, 60)), Record::Action(action(5))]).unwrap();
+    // The value, the end of its curve, the minute, the action.
     assert_eq!(store.count_rows().unwrap(), 4);
 }
 
@@ -333,7 +333,7 @@ fn each_record_has_the_epoch_of_its_clock() {
     store.append(&[Record::ClockSet, Record::ClockSet]).unwrap();
     drop(store);
     let store = open(&db, 20);
-    store.append(&[raised(21), Record::Action(deed(21)), Record::Line(minute("L1", 60, 60))]).unwrap();
+    store.append(&[raised(21), Record::Action(action(21)), Record::Line(minute("L1", 60, 60))]).unwrap();
     // The last sample is the end of the curve, which is written at the start.
     assert_eq!(epochs(&store, "sample"), [0, 1, 3]);
     assert_eq!(epochs(&store, "alarm_journal"), [0, 3]);
@@ -376,13 +376,13 @@ fn the_alarms_of_before_the_restart_are_restored_with_their_acknowledgements() {
 }
 
 #[test]
-fn the_report_of_a_shift_has_its_figures_alarms_deeds_and_record() {
+fn a_shift_report_has_figures_alarms_and_actions() {
     use AlarmStep::{Raised, Returned};
     let (_folder, db) = folder();
     let store = open(&db, 0);
     let samples = (0..12).map(|i| good(PV, i * 10, 20.0 + i as f64)).chain([good(SV, 0, 70.0)]);
     let alarms = [step(5, "high", Raised), step(30, "high", Returned), step(50, "low", Raised)].map(Record::Alarm);
-    store.append(&samples.chain(alarms).chain([Record::Action(deed(25))]).collect::<Vec<_>>()).unwrap();
+    store.append(&samples.chain(alarms).chain([Record::Action(action(25))]).collect::<Vec<_>>()).unwrap();
     let period = Period { name: "period".into(), from: sec(20), to: sec(200) };
     let query = Query::Report { period: period.clone() };
     let Answer::Report(report) = store.answer(&query, sec(100)).unwrap() else { panic!("not a report") };
@@ -395,7 +395,7 @@ fn the_report_of_a_shift_has_its_figures_alarms_deeds_and_record() {
     assert_eq!((sv.mean, sv.good), (Some(70.0), 1.0));
     assert_eq!((mv.mean, mv.good), (None, 0.0));
     assert_eq!(report.alarms, [step(30, "high", Returned), step(50, "low", Raised)]);
-    assert_eq!(report.actions, [deed(25)]);
+    assert_eq!(report.actions, [action(25)]);
     assert_eq!(report.record_of, Some(("TIC-1".into(), "°C".into())));
     assert_eq!(report.record.len(), 8);
     assert_eq!((report.record[0].at, report.record[0].er), (sec(20), Some(48.0)));
@@ -409,11 +409,11 @@ fn a_report_has_the_last_entry_of_the_audit_log_before_its_end() {
     let store = open(&db, 0);
     let entry = |at: i64, number: u64| {
         let seal = Some(Seal { number, hash: [number as u8; 32] });
-        Record::Action(ActionRecord { seal, ..deed(at) })
+        Record::Action(ActionRecord { seal, ..action(at) })
     };
     // The clock went back between 3 and 4, 6 was written after the period, and one action is not in the log.
     let log = [entry(10, 1), entry(30, 2), entry(50, 3), entry(40, 4), entry(45, 5), entry(100, 6)];
-    store.append(&log.into_iter().chain([Record::Action(deed(60))]).collect::<Vec<_>>()).unwrap();
+    store.append(&log.into_iter().chain([Record::Action(action(60))]).collect::<Vec<_>>()).unwrap();
     let audit = |from: i64, to: i64| {
         let period = Period { name: "period".into(), from: sec(from), to: sec(to) };
         store.report(&period, sec(1_000)).unwrap().audit.map(|entry| (entry.number, entry.hash[0]))

@@ -105,11 +105,11 @@ fn alarms_and_actions_have_room_when_samples_have_filled_the_queue() {
     assert!(lost == 1 && queue.capacity() > 0);
     let alarm = Record::Alarm(step(sent, "high", AlarmStep::Raised));
     assert_eq!(thread::offer(&queue, vec![good(PV, sent, 27.0), alarm.clone()]), 1, "the sample alone is lost");
-    assert_eq!(thread::offer(&queue, vec![Record::Action(deed(sent))]), 0);
+    assert_eq!(thread::offer(&queue, vec![Record::Action(action(sent))]), 0);
     assert_eq!(thread::offer(&queue, vec![]), 0);
     drop(queue);
     let batches: Vec<_> = std::iter::from_fn(|| waiting.blocking_recv()).skip(sent as usize - 1).collect();
-    assert_eq!(batches, [vec![alarm], vec![Record::Action(deed(sent))]]);
+    assert_eq!(batches, [vec![alarm], vec![Record::Action(action(sent))]]);
 }
 
 /// A reader by itself: where stores are handed over, and where queries go.

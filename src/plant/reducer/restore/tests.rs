@@ -116,12 +116,12 @@ fn end(plant: &mut Plant, effects: &Effects, result: fn(f64) -> WriteResult) -> 
     plant.on_event(Event::Wrote { at: at(2), id, result: result(raw) })
 }
 
-fn deeds(effects: &Effects) -> Vec<String> {
-    let deed = |record: &Record| match record {
-        Record::Action(deed) => Some(format!("{} {} {} {}", deed.by, deed.action, deed.target, deed.outcome)),
+fn actions(effects: &Effects) -> Vec<String> {
+    let action = |record: &Record| match record {
+        Record::Action(action) => Some(format!("{} {} {} {}", action.by, action.action, action.target, action.outcome)),
         Record::Sample(..) | Record::Alarm(_) | Record::Line(_) | Record::ClockSet => None,
     };
-    effects.records.iter().filter_map(deed).collect()
+    effects.records.iter().filter_map(action).collect()
 }
 
 #[test]
@@ -131,11 +131,11 @@ fn one_write_after_the_other_each_on_record_and_then_the_whole() {
     let first = begin(&mut plant, 1, wish);
     assert_eq!(written(&first), [(HIGH, 200.0)], "the limit first, and nothing else yet");
     let second = end(&mut plant, &first, WriteResult::ReadBack);
-    assert_eq!(deeds(&second), ["anna write TIC-1.SV-H verified"]);
+    assert_eq!(actions(&second), ["anna write TIC-1.SV-H verified"]);
     assert_eq!(written(&second), [(SV, 1500.0)]);
     assert_eq!(outcome(&plant, 1), Some(Outcome::Pending));
     let last = end(&mut plant, &second, WriteResult::ReadBack);
-    assert_eq!(deeds(&last), ["anna write TIC-1.SV verified", "anna restore set TIC-1 verified"]);
+    assert_eq!(actions(&last), ["anna write TIC-1.SV verified", "anna restore set TIC-1 verified"]);
     assert_eq!(plant.restore_of(TIC).map(|run| (run.state, run.done())), Some((State::Done, 2)));
 }
 
@@ -152,7 +152,7 @@ fn the_first_failure_stops_it_and_says_what_was_written() {
         outcome(&plant, 1).map(|o| crate::plant::orders::outcome_words(&o)).as_deref(),
         Some("not confirmed: 1 of 2 written, then SV-H failed")
     );
-    assert_eq!(deeds(&last).len(), 2, "the write and the whole: {:?}", deeds(&last));
+    assert_eq!(actions(&last).len(), 2, "the write and the whole: {:?}", actions(&last));
     assert_eq!(plant.restore_of(TIC).map(|run| run.state), Some(State::Failed));
 }
 
@@ -165,7 +165,7 @@ fn a_device_that_has_changed_since_is_not_written() {
     let effects = read(&mut plant, 1, 610.0, 100.0);
     let changed = Some(Outcome::Refused(Refusal::Changed));
     assert_eq!((written(&effects), outcome(&plant, 1)), (vec![], changed.clone()));
-    assert_eq!(deeds(&effects), [format!("anna restore set TIC-1 refused: {}", Refusal::Changed)]);
+    assert_eq!(actions(&effects), [format!("anna restore set TIC-1 refused: {}", Refusal::Changed)]);
     let effects = order(&mut plant, 2, Command::Restore(Box::new(wish)));
     assert_eq!((effects.bus, outcome(&plant, 2)), (vec![], changed));
 }
@@ -186,7 +186,7 @@ fn nothing_is_written_before_every_value_of_the_set_was_read_anew() {
     assert_eq!(outcome(&plant, 1), Some(Outcome::Pending));
     let late = plant.on_tick(at(62));
     assert_eq!(outcome(&plant, 1), Some(Outcome::Refused(Refusal::NotRead(60))));
-    assert_eq!(deeds(&late), ["anna restore set TIC-1 refused: the device could not be read within 60 s"]);
+    assert_eq!(actions(&late), ["anna restore set TIC-1 refused: the device could not be read within 60 s"]);
 }
 
 #[test]
@@ -224,7 +224,7 @@ fn a_value_that_changes_while_a_restore_runs_is_not_written_over() {
             expect,
             "anna restore set TIC-1 not confirmed: 1 of 2 written, then SV-H failed",
         ];
-        assert_eq!(deeds(&last), told);
+        assert_eq!(actions(&last), told);
         assert_eq!(plant.restore_of(TIC).map(|run| (run.state, run.done())), Some((State::Failed, 1)));
     };
     let at_the_panel = |plant: &mut Plant| drop(read(plant, 1, 500.0, 120.0));
@@ -291,7 +291,7 @@ fn a_set_is_taken_with_what_is_known_and_saving_it_is_on_record() {
     assert_eq!((set.values.len(), set.missing.len()), (2, 0));
     let id = OrderId { terminal: 1, number: 1 };
     let done = plant.on_set_written(id, Err("the disk is full".into()));
-    assert_eq!(deeds(&done), ["anna save set TIC-1 refused: not saved: the disk is full"]);
+    assert_eq!(actions(&done), ["anna save set TIC-1 refused: not saved: the disk is full"]);
     let bad = Command::SaveSet { device: DeviceId(0), name: "../x".into(), replace: false };
     assert_eq!(order(&mut plant, 2, bad).sets, None, "no path leaves the folder");
 }

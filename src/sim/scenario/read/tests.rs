@@ -41,7 +41,7 @@ fn everything_in_a_file_is_understood() {
         ]
     );
     assert_eq!((scenario.start, scenario.ahead, scenario.pass_percent), (Start::Rest, Duration::from_secs(3600), 80));
-    assert_eq!(scenario.operator.iter().map(|deed| deed.at.as_secs()).collect::<Vec<_>>(), [150, 180]);
+    assert_eq!(scenario.operator.iter().map(|step| step.at.as_secs()).collect::<Vec<_>>(), [150, 180]);
     assert_eq!((scenario.points(), scenario.expect[0].until), (27, Duration::from_secs(130)));
     assert_eq!(
         scenario.expect.iter().map(|expect| expect.text.as_str()).collect::<Vec<_>>(),
