@@ -76,8 +76,8 @@ pub struct Motion {
 /// Where a moving value goes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Source {
-    /// Slowly to and fro between two values, the same in every run.
-    Wander {
+    /// Slowly up and down between two values, the same in every run.
+    Oscillation {
         /// Lowest and highest value.
         range: [f64; 2],
         /// The longer of its two swings.
@@ -89,8 +89,8 @@ pub enum Source {
     Integral {
         /// What is added up.
         of: TagId,
-        /// The time in which a steady 1 adds 1.
-        per: Duration,
+        /// The time in which a constant 1 adds 1.
+        time_base: Duration,
     },
 }
 
@@ -107,8 +107,8 @@ pub enum Operation {
     Difference,
     /// The first over the second; 0 over 0.
     Quotient,
-    /// The other leg of a right triangle with the first as its longest side: reactive from apparent and active power.
-    Leg,
+    /// Reactive power: the root of the first squared less the squares of the others (apparent and active power).
+    Reactive,
     /// The angle in degrees whose cosine it is: from a power factor.
     Angle,
 }
@@ -130,7 +130,7 @@ impl Simulate {
         let asked = self.cases.iter().flat_map(|case| &case.when);
         let of_motion = self.motion.iter().flat_map(|motion| {
             let followed = match &motion.source {
-                Source::Wander { .. } => Vec::new(),
+                Source::Oscillation { .. } => Vec::new(),
                 Source::Of(_, tags) => tags.clone(),
                 Source::Integral { of, .. } => vec![*of],
             };

@@ -3,7 +3,12 @@
 use super::{diagnostic::Problem, reader::Raw};
 
 /// Table as its messages name it (of a keyword: the kind of keyword), old spelling, new spelling.
-const RENAMED: &[(&str, &str, &str)] = &[("an alarm", "respond", "response_time")];
+const RENAMED: &[(&str, &str, &str)] = &[
+    ("simulate", "wander", "oscillate"),
+    ("simulate", "leg", "reactive"),
+    ("simulate", "per", "time_base"),
+    ("an alarm", "respond", "response_time"),
+];
 
 /// The name that a key or keyword has now, if it had another one.
 pub(super) fn new_name(table: &str, old: &str) -> Option<&'static str> {

@@ -73,7 +73,7 @@ fn motion(table: &SimulateTable, scope: &Scope, problems: &mut Problems) -> Opti
         (&table.product, Operation::Product),
         (&table.difference, Operation::Difference),
         (&table.quotient, Operation::Quotient),
-        (&table.leg, Operation::Leg),
+        (&table.reactive, Operation::Reactive),
     ];
     let mut sources: Vec<(Span, Option<Source>)> = Vec::new();
     for (list, operation) in lists.into_iter().filter(|(list, _)| !list.is_empty()) {
@@ -86,15 +86,18 @@ fn motion(table: &SimulateTable, scope: &Scope, problems: &mut Problems) -> Opti
         sources.push((name.at, tag.map(|tag| Source::Of(operation, vec![tag]))));
     }
     if let Some(name) = &table.integrate {
-        let per = table.per.and_then(|per| lasting(per, "per", problems)).unwrap_or(Duration::from_secs(1));
+        let time_base = table
+            .time_base
+            .and_then(|time_base| lasting(time_base, "time_base", problems))
+            .unwrap_or(Duration::from_secs(1));
         let of = scope.names.near(name, scope.device, problems);
-        sources.push((name.at, of.map(|of| Source::Integral { of, per })));
+        sources.push((name.at, of.map(|of| Source::Integral { of, time_base })));
     }
-    if let Some(wander) = table.wander {
+    if let Some(oscillate) = table.oscillate {
         let period = table.period.and_then(|period| lasting(period, "period", problems));
         let period = period.unwrap_or(Duration::from_secs(60));
-        let range = rising(wander, "wander", problems);
-        sources.push((wander.at, range.map(|range| Source::Wander { range, period })));
+        let range = rising(oscillate, "oscillate", problems);
+        sources.push((oscillate.at, range.map(|range| Source::Oscillation { range, period })));
     }
     stray(table, !sources.is_empty(), problems);
     if let [(first, _), (second, _), ..] = sources[..] {
@@ -120,13 +123,13 @@ fn stray(table: &SimulateTable, moves: bool, problems: &mut Problems) {
             problems.add(at, format!("`{word}` says nothing without {other}")).label("not used");
         }
     };
-    needs(table.period.map(|at| at.at), "period", "`wander`", table.wander.is_some());
-    needs(table.per.map(|at| at.at), "per", "`integrate`", table.integrate.is_some());
+    needs(table.period.map(|at| at.at), "period", "`oscillate`", table.oscillate.is_some());
+    needs(table.time_base.map(|at| at.at), "time_base", "`integrate`", table.integrate.is_some());
     for (word, at) in [("gain", table.gain), ("offset", table.offset), ("rate", table.rate), ("idle", table.idle)] {
-        needs(at.map(|at| at.at), word, "a source such as `follow` or `wander`", moves);
+        needs(at.map(|at| at.at), word, "a source such as `follow` or `oscillate`", moves);
     }
-    needs(table.lag.map(|at| at.at), "lag", "a source such as `follow` or `wander`", moves);
-    needs(table.when.as_ref().map(|at| at.at), "when", "a source such as `follow` or `wander`", moves);
+    needs(table.lag.map(|at| at.at), "lag", "a source such as `follow` or `oscillate`", moves);
+    needs(table.when.as_ref().map(|at| at.at), "when", "a source such as `follow` or `oscillate`", moves);
 }
 
 fn pace(table: &SimulateTable, problems: &mut Problems) -> Pace {
@@ -218,12 +221,12 @@ mod tests {
     fn a_word_that_cannot_be_is_named() {
         wrong("folow = 'DP'", &["unknown key `folow` in simulate", "did you mean `follow`", "[meter.toml:15:14]"]);
         wrong("follow = 'DQ'", &["unknown tag `DQ` in D1", "did you mean `DP`"]);
-        wrong("wander = [5, 1]", &["wander from 5 to 1 has no room", "expected [lowest, highest]"]);
+        wrong("oscillate = [5, 1]", &["oscillate from 5 to 1 has no room", "expected [lowest, highest]"]);
         wrong("follow = 'DP', rate = 0", &["a rate is how much a second, above 0"]);
         wrong("follow = 'DP', rate = 1, lag = '5s'", &["`rate` and `lag` exclude each other"]);
-        wrong("follow = 'DP', wander = [0, 1]", &["a value can go one way only"]);
+        wrong("follow = 'DP', oscillate = [0, 1]", &["a value can go one way only"]);
         wrong("gain = 2", &["`gain` says nothing without a source such as `follow`"]);
-        wrong("start = 3, period = '1min'", &["`period` says nothing without `wander`"]);
+        wrong("start = 3, period = '1min'", &["`period` says nothing without `oscillate`"]);
         wrong("pulse = '0s'", &["pulse takes some time"]);
         wrong("noise = -1", &["noise cannot be negative"]);
         wrong("start = 'hot'", &["`hot` is not a state of D1.T", "expected a number"]);

@@ -27,7 +27,7 @@ pub struct Step {
 }
 
 impl SignalGenerator {
-    /// A value at its start. Two tags of different names wander differently, one tag the same in every run.
+    /// A value at its start. The name seeds oscillation and noise: tags differ, runs do not.
     pub fn new(name: &str, start: f64) -> SignalGenerator {
         // FNV-1a.
         let seed = name.bytes().fold(0xCBF2_9CE4_8422_2325, |hash: u64, byte| {
@@ -57,12 +57,12 @@ impl SignalGenerator {
         let seconds = step.dt.as_secs_f64();
         let runs = holds(&motion.when, values);
         let target = match (&motion.source, runs) {
-            (Source::Integral { of, per }, true) => {
-                let grown = values(*of).unwrap_or(0.0) * motion.gain * seconds / per.as_secs_f64();
+            (Source::Integral { of, time_base }, true) => {
+                let grown = values(*of).unwrap_or(0.0) * motion.gain * seconds / time_base.as_secs_f64();
                 return self.exact + grown;
             }
             (_, false) => motion.idle,
-            (Source::Wander { range, period }, true) => Some(wander(*range, *period, step.at, self.seed)),
+            (Source::Oscillation { range, period }, true) => Some(oscillate(*range, *period, step.at, self.seed)),
             (Source::Of(operation, tags), true) => made(*operation, tags, values),
         };
         // A source that is no number now (a tag of another device) leaves the value where it is.
@@ -112,13 +112,13 @@ fn made(operation: Operation, tags: &[TagId], values: &impl Fn(TagId) -> Option<
         Operation::Product => of.iter().product(),
         Operation::Difference => first - rest_sum,
         Operation::Quotient => rest.first().filter(|below| **below != 0.0).map_or(0.0, |below| first / below),
-        Operation::Leg => (first * first - rest.iter().map(|leg| leg * leg).sum::<f64>()).max(0.0).sqrt(),
+        Operation::Reactive => (first * first - rest.iter().map(|part| part * part).sum::<f64>()).max(0.0).sqrt(),
         Operation::Angle => first.clamp(-1.0, 1.0).acos().to_degrees(),
     })
 }
 
 /// Two swings of different length, which meet again only after a long time.
-fn wander([low, high]: [f64; 2], period: Duration, at: Duration, seed: u64) -> f64 {
+fn oscillate([low, high]: [f64; 2], period: Duration, at: Duration, seed: u64) -> f64 {
     let phase = |shift: u32| f64::from((seed >> shift) as u16) / 65_536.0;
     let turn = |length: f64, phase: f64| (std::f64::consts::TAU * (at.as_secs_f64() / length + phase)).sin();
     let period = period.as_secs_f64();
@@ -214,8 +214,8 @@ mod tests {
 
     #[test]
     fn power_adds_up_to_energy() {
-        let per = Duration::from_secs(3600);
-        let energy = moving(Motion { gain: 0.001, ..motion(Source::Integral { of: A, per }) });
+        let time_base = Duration::from_secs(3600);
+        let energy = moving(Motion { gain: 0.001, ..motion(Source::Integral { of: A, time_base }) });
         check(&energy, 100.0, 1800, (6000.0, 0.0), 103.0);
     }
 
@@ -229,7 +229,7 @@ mod tests {
         of(Operation::Product, 20.0);
         of(Operation::Difference, 1.0);
         of(Operation::Quotient, 1.25);
-        of(Operation::Leg, 3.0);
+        of(Operation::Reactive, 3.0);
         check(&moving(motion(Source::Of(Operation::Quotient, vec![A, B]))), 0.0, 1, (5.0, 0.0), 0.0);
         check(&moving(motion(Source::Of(Operation::Angle, vec![A]))), 0.0, 1, (0.5, 0.0), 60.0);
     }
@@ -243,11 +243,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_wandering_value_stays_in_its_range_and_is_the_same_in_every_run(
+        fn oscillation_stays_in_its_range_and_repeats_in_every_run(
             low in -100.0..100.0f64, width in 0.1..100.0f64, at_s in 0..1_000_000u64, name in "[A-Z]{1,4}",
         ) {
             let range = [low, low + width];
-            let how = moving(motion(Source::Wander { range, period: Duration::from_secs(60) }));
+            let how = moving(motion(Source::Oscillation { range, period: Duration::from_secs(60) }));
             let step = Step { at: Duration::from_secs(at_s), dt: Duration::from_millis(100) };
             let value = |_| SignalGenerator::new(&name, 0.0).step(&how, step, &|_| None);
             prop_assert!((low - 1e-9..=low + width + 1e-9).contains(&value(0)));
@@ -256,9 +256,9 @@ mod tests {
     }
 
     #[test]
-    fn a_wandering_value_uses_its_range_and_noise_stays_small() {
+    fn oscillation_uses_its_range_and_noise_stays_small() {
         let range = [10.0, 20.0];
-        let how = moving(motion(Source::Wander { range, period: Duration::from_secs(60) }));
+        let how = moving(motion(Source::Oscillation { range, period: Duration::from_secs(60) }));
         let noisy = Simulate { noise: 0.5, ..Simulate::default() };
         let step = |count: u64| Step { at: Duration::from_secs(count), dt: Duration::from_millis(100) };
         let values = |how: &Simulate| -> Vec<f64> {
