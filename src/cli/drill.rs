@@ -64,7 +64,7 @@ pub fn simulator(def: &PlantDef, scenario: Option<&Scenario>) -> Result<Simulato
         if scenario.start == Start::Rest {
             simulator = simulator.at_rest();
         }
-        simulator.advance(scenario.ahead);
+        simulator.advance(scenario.warm_up);
     }
     Ok(simulator)
 }
@@ -192,8 +192,8 @@ mod tests {
     }
 
     /// No value is shown as good and is not so, and in the end all is well again.
-    const HONEST: &str = "[[expect]]\nshown_true = 'TIC-1.PV'\ngive = 4.0\n\
-        [[expect]]\nshown_true = 'PLC-1.LT-1'\ngive = 0.6\n[[expect]]\nshown_true = 'PLC-1.HEATER'\ngive = 200\n\
+    const HONEST: &str = "[[expect]]\ndisplayed_within = 'TIC-1.PV'\ntolerance = 4.0\n\
+        [[expect]]\ndisplayed_within = 'PLC-1.LT-1'\ntolerance = 0.6\n[[expect]]\ndisplayed_within = 'PLC-1.HEATER'\ntolerance = 200\n\
         [[expect]]\ngood = 'TIC-1.PV'\nafter = '3m 45s'\n[[expect]]\ngood = 'PLC-1.LT-1'\nafter = '3m 45s'\n";
 
     /// What the operator sees of a fault in a device: a value that is bad, and an alarm that comes and goes.

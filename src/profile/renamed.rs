@@ -4,6 +4,11 @@ use super::{diagnostic::Problem, reader::Raw};
 
 /// Table as its messages name it (of a keyword: the kind of keyword), old spelling, new spelling.
 const RENAMED: &[(&str, &str, &str)] = &[
+    ("the scenario", "about", "description"),
+    ("the scenario", "ahead", "warm_up"),
+    ("an event", "mended", "clear"),
+    ("an expectation", "shown_true", "displayed_within"),
+    ("an expectation", "give", "tolerance"),
     ("simulate", "wander", "oscillate"),
     ("simulate", "leg", "reactive"),
     ("simulate", "per", "time_base"),

@@ -36,8 +36,8 @@ pub struct Status {
 /// How a drill stands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Progress {
-    /// What the trainer should know.
-    pub about: String,
+    /// Description for the trainer.
+    pub description: String,
     /// Time since its start.
     pub elapsed: Duration,
     /// How long it takes.

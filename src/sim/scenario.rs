@@ -27,14 +27,14 @@ pub struct Scenario {
     pub name: String,
     /// What the screens show.
     pub title: String,
-    /// What the trainer should know.
-    pub about: String,
+    /// Description for the trainer.
+    pub description: String,
     /// The plant it is for, as the file names it.
     pub plant: String,
     /// How the process stands at the start.
     pub start: Start,
-    /// The process runs so long before anybody looks at it.
-    pub ahead: Duration,
+    /// Plant time that the process runs before the start.
+    pub warm_up: Duration,
     /// How long it takes.
     pub duration: Duration,
     /// Points of 100 that are needed to pass.
@@ -66,7 +66,7 @@ pub struct FaultEvent {
     pub target: FaultTarget,
     /// What.
     pub fault: Fault,
-    /// `false`: it is mended.
+    /// `false`: the fault is cleared.
     pub begins: bool,
 }
 

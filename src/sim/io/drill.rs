@@ -226,8 +226,8 @@ impl Task {
     ) -> Status {
         let scenario = self.judge.as_ref().map(|judge| {
             let elapsed = Duration::try_from(now.duration_since(self.began)).unwrap_or_default();
-            let Scenario { about, duration, .. } = &**judge.scenario();
-            Progress { about: about.clone(), elapsed, duration: *duration, verdict: judge.verdict() }
+            let Scenario { description, duration, .. } = &**judge.scenario();
+            Progress { description: description.clone(), elapsed, duration: *duration, verdict: judge.verdict() }
         });
         Status { available: self.available.clone(), in_force, actual, exam: self.trainer.exam, scenario }
     }

@@ -23,10 +23,10 @@ table!(
     /// A scenario file.
     ScenarioTable, "the scenario" {
         need "title" title: String,
-        opt "about" about: String,
+        opt "description" description: String,
         need "plant" plant: String,
         opt "start" start: Start,
-        opt "ahead" ahead: Duration,
+        opt "warm_up" warm_up: Duration,
         need "duration" duration: Duration,
         opt "pass_percent" pass_percent: u8,
         list "event" events: EventTable,
@@ -43,10 +43,10 @@ table!(
         opt "line" line: String,
         opt "device" device: String,
         opt "tag" tag: String,
-        /// It is mended after this time.
+        /// The fault is cleared after this time.
         opt "for" lasts: Duration,
-        /// It is mended now.
-        opt "mended" mended: bool,
+        /// The fault is cleared now.
+        opt "clear" clear: bool,
     }
 );
 
@@ -81,8 +81,8 @@ table!(
         opt "process" process: String,
         opt "never_above" never_above: f64,
         opt "never_below" never_below: f64,
-        opt "shown_true" shown_true: String,
-        opt "give" give: f64,
+        opt "displayed_within" displayed_within: String,
+        opt "tolerance" tolerance: f64,
     }
 );
 
@@ -178,10 +178,10 @@ fn scenario(name: &str, table: &ScenarioTable, def: &PlantDef, problems: &mut Pr
     Scenario {
         name: name.to_owned(),
         title: text(&table.title),
-        about: text(&table.about),
+        description: text(&table.description),
         plant: text(&table.plant),
         start: table.start.map(|start| start.value).unwrap_or_default(),
-        ahead: table.ahead.map_or(Duration::ZERO, |ahead| ahead.value),
+        warm_up: table.warm_up.map_or(Duration::ZERO, |warm_up| warm_up.value),
         duration,
         pass_percent: table.pass_percent.map_or(100, |percent| u32::from(percent.value)),
         events,
@@ -201,9 +201,9 @@ fn events(table: &EventTable, duration: Duration, def: &PlantDef, problems: &mut
         problems.add(fault.at, why).label("cannot be there");
         return Vec::new();
     }
-    let begins = !table.mended.is_some_and(|mended| mended.value);
+    let begins = !table.clear.is_some_and(|clear| clear.value);
     if let (false, Some(lasts)) = (begins, table.lasts) {
-        problems.add(lasts.at, "what is mended does not last").label("leave out `for` or `mended`");
+        problems.add(lasts.at, "a fault that is cleared has no duration").label("leave out `for` or `clear`");
     }
     let first = FaultEvent { at, target, fault: fault.value, begins };
     let end = table.lasts.map(|lasts| FaultEvent { at: at + lasts.value, begins: false, ..first });

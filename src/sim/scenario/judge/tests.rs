@@ -27,10 +27,10 @@ fn judge(wish: Wish) -> Judge {
     let scenario = Scenario {
         name: String::new(),
         title: "drill".to_owned(),
-        about: String::new(),
+        description: String::new(),
         plant: String::new(),
         start: Default::default(),
-        ahead: Duration::ZERO,
+        warm_up: Duration::ZERO,
         duration: s(100),
         pass_percent: 100,
         events: Vec::new(),

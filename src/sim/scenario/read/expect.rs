@@ -48,7 +48,7 @@ fn wish(table: &ExpectTable, def: &PlantDef, problems: &mut Problems) -> Option<
         ("not_good", &table.not_good),
         ("good", &table.good),
         ("process", &table.process),
-        ("shown_true", &table.shown_true),
+        ("displayed_within", &table.displayed_within),
     ];
     let mut found = keys.iter().filter_map(|(key, name)| name.as_ref().map(|name| (*key, name)));
     let Some((key, name)) = found.next() else {
@@ -80,15 +80,18 @@ fn wish(table: &ExpectTable, def: &PlantDef, problems: &mut Problems) -> Option<
         }
         "not_good" => Some((Wish::NotGood(tag), format!("{} shown as not good", name.value))),
         "good" => Some((Wish::Good(tag), format!("{} shown as good", name.value))),
-        "shown_true" => {
-            if let Some(give) = table.give.filter(|give| give.value < 0.0) {
+        "displayed_within" => {
+            if let Some(tolerance) = table.tolerance.filter(|tolerance| tolerance.value < 0.0) {
                 problems
-                    .add(give.at, format!("found {}, expected 0 or more", give.value))
+                    .add(tolerance.at, format!("found {}, expected 0 or more", tolerance.value))
                     .label("how far it may be off");
                 return None;
             }
-            let give = table.give.map_or(0.0, |give| give.value);
-            Some((Wish::True(tag, give), format!("{} never shown wrong by more than {give} {unit}", name.value)))
+            let tolerance = table.tolerance.map_or(0.0, |tolerance| tolerance.value);
+            Some((
+                Wish::True(tag, tolerance),
+                format!("{} never shown wrong by more than {tolerance} {unit}", name.value),
+            ))
         }
         _ => within(table, name, tag, def, problems),
     }

@@ -16,7 +16,7 @@ const EXPECT: &str = "[[expect]]\nprocess = 'TIC-1.PV'\nnever_above = 90\n";
 #[test]
 fn everything_in_a_file_is_understood() {
     let text = format!(
-        "{HEAD}start = 'rest'\nahead = '1h'\npass_percent = 80\n\
+        "{HEAD}start = 'rest'\nwarm_up = '1h'\npass_percent = 80\n\
          [[event]]\nat = '2m'\nfault = 'sensor burnout'\ndevice = 'TIC-1'\nfor = '30s'\n\
          [[event]]\nat = '1m'\nfault = 'leak 0.5 l/min'\n\
          [[event]]\nat = '1m'\nfault = 'noise 20 %'\nline = 'L1'\n\
@@ -40,7 +40,7 @@ fn everything_in_a_file_is_understood() {
             event(150, "sensor burnout", false),
         ]
     );
-    assert_eq!((scenario.start, scenario.ahead, scenario.pass_percent), (Start::Rest, Duration::from_secs(3600), 80));
+    assert_eq!((scenario.start, scenario.warm_up, scenario.pass_percent), (Start::Rest, Duration::from_secs(3600), 80));
     assert_eq!(scenario.operator.iter().map(|step| step.at.as_secs()).collect::<Vec<_>>(), [150, 180]);
     assert_eq!((scenario.points(), scenario.expect[0].until), (27, Duration::from_secs(130)));
     assert_eq!(
@@ -74,8 +74,9 @@ fn a_mistake_is_told_with_its_line_what_was_found_and_what_was_expected() {
         "s.toml:9:9: found `late 2`, expected a time from 50ms to 60s, such as `late 2s`",
     );
     check(&event("fault = 'silent'"), "s.toml:7:1: where is `silent`?");
-    let never_off = "[[expect]]\nshown_true = 'TIC-1.PV'\ngive = -1\n";
-    check(&format!("{HEAD}{never_off}"), "s.toml:6:8: found -1, expected 0 or more");
+    check(&event("fault = 'silent'\nmended = true"), "s.toml:10:1: `mended` is now `clear`");
+    let never_off = "[[expect]]\ndisplayed_within = 'TIC-1.PV'\ntolerance = -1\n";
+    check(&format!("{HEAD}{never_off}"), "s.toml:6:13: found -1, expected 0 or more");
     check(&event("fault = 'silent'\ndevice = 'TIC-9'"), "s.toml:10:10: unknown device `TIC-9`");
     check(&event("fault = 'silent'\nline = 'L1'"), "s.toml:9:9: `silent` is a fault of a device, not of L1");
     check(&event("fault = 'torn value'\ndevice = 'TIC-1'"), "s.toml:9:9: TIC-1 has no value of 32 bits");

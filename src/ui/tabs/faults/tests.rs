@@ -69,7 +69,7 @@ fn drill(over: bool) -> Progress {
     };
     let elapsed = Duration::from_secs(if over { 480 } else { 185 });
     Progress {
-        about: "The controller knows that its sensor is broken.".to_owned(),
+        description: "The controller knows that its sensor is broken.".to_owned(),
         elapsed,
         duration: Duration::from_secs(480),
         verdict,

@@ -233,7 +233,7 @@ fn verdict(cx: &ViewContext, progress: &Progress, canvas: &mut Canvas) {
         }
     }
     canvas.text(11, y + 1, &progress.verdict.summary(), theme.strong());
-    for (n, line) in wrap(&progress.about, room.saturating_sub(11)).into_iter().enumerate() {
+    for (n, line) in wrap(&progress.description, room.saturating_sub(11)).into_iter().enumerate() {
         canvas.text(11, y + 3 + n as u16, &line, theme.dim());
     }
 }
