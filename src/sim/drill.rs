@@ -3,19 +3,19 @@
 use std::{sync::Arc, time::Duration};
 
 use super::{
-    faults::{AvailableFaults, Fault, FaultTarget, InForce},
+    faults::{ActiveFault, AvailableFaults, Fault, FaultTarget},
     scenario::judge::{ActualValues, Verdict},
 };
 
 /// A command to the simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SimCommand {
-    /// This goes wrong, or goes wrong in another measure.
-    Set(FaultTarget, Fault),
-    /// This is mended, whatever its measure.
+    /// Inject a fault, or change its parameter.
+    Inject(FaultTarget, Fault),
+    /// Clear a fault, whatever its parameter.
     Clear(FaultTarget, Fault),
-    /// All is well again.
-    AllWell,
+    /// Clear all faults.
+    ClearAll,
 }
 
 /// The simulation as it stands.
@@ -23,8 +23,8 @@ pub enum SimCommand {
 pub struct Status {
     /// The faults that can be injected, by target.
     pub available: Arc<[AvailableFaults]>,
-    /// What is wrong.
-    pub in_force: Vec<InForce>,
+    /// The active faults.
+    pub active: Vec<ActiveFault>,
     /// Actual values by tag.
     pub actual: ActualValues,
     /// Nothing of all this may be told before the drill is over.
@@ -52,8 +52,8 @@ impl Status {
         !self.exam || self.scenario.as_ref().is_some_and(|progress| progress.verdict.over)
     }
 
-    /// The fault of this name that is in force in a target.
-    pub fn find(&self, target: FaultTarget, fault: Fault) -> Option<&InForce> {
-        self.in_force.iter().find(|in_force| in_force.target == target && in_force.fault.word() == fault.word())
+    /// The active fault of this name in a target.
+    pub fn find(&self, target: FaultTarget, fault: Fault) -> Option<&ActiveFault> {
+        self.active.iter().find(|active| active.target == target && active.fault.word() == fault.word())
     }
 }

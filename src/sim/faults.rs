@@ -26,10 +26,10 @@ use crate::{
 use process::Troubles;
 use values::{Memory, Values};
 
-/// The faults in force.
+/// The active faults.
 #[derive(Debug, Clone, Default)]
 pub struct Faults {
-    list: Vec<InForce>,
+    list: Vec<ActiveFault>,
     units: BTreeMap<(LineId, u8), Values>,
     tags: BTreeMap<TagId, ((LineId, u8), Values)>,
     memories: BTreeMap<FaultTarget, Memory>,
@@ -37,9 +37,9 @@ pub struct Faults {
     dice: u64,
 }
 
-/// A fault that is there.
+/// A fault that is active.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct InForce {
+pub struct ActiveFault {
     /// Where.
     pub target: FaultTarget,
     /// What.
@@ -79,36 +79,36 @@ impl Faults {
         Faults { units, tags: tags.collect(), ..Faults::default() }
     }
 
-    /// Puts a fault in force; one that it excludes ends.
-    pub fn set(&mut self, simulator: &mut Simulator, target: FaultTarget, fault: Fault, since: Timestamp) {
+    /// Injects a fault; a fault that it excludes is cleared.
+    pub fn inject(&mut self, simulator: &mut Simulator, target: FaultTarget, fault: Fault, since: Timestamp) {
         // The same fault with another number goes on: what is stuck stays.
         let since = self.find(target, fault).map_or(since, |old| old.since);
         self.list.retain(|old| old.target != target || !old.fault.excludes(fault));
-        self.list.push(InForce { target, fault, since });
-        self.list.sort_by_key(|in_force| in_force.target);
+        self.list.push(ActiveFault { target, fault, since });
+        self.list.sort_by_key(|active| active.target);
         self.arrange(simulator, target, fault, true);
     }
 
-    /// Ends a fault, whatever its number.
+    /// Clears a fault, whatever its parameter.
     pub fn clear(&mut self, simulator: &mut Simulator, target: FaultTarget, fault: Fault) {
         self.list.retain(|old| old.target != target || old.fault.word() != fault.word());
         self.arrange(simulator, target, fault, false);
     }
 
-    /// All is well again.
+    /// Clears all faults.
     pub fn clear_all(&mut self, simulator: &mut Simulator) {
-        for InForce { target, fault, .. } in std::mem::take(&mut self.list) {
+        for ActiveFault { target, fault, .. } in std::mem::take(&mut self.list) {
             self.arrange(simulator, target, fault, false);
         }
     }
 
-    /// All that are in force, by target.
-    pub fn list(&self) -> &[InForce] {
+    /// The active faults, by target.
+    pub fn list(&self) -> &[ActiveFault] {
         &self.list
     }
 
-    fn find(&self, target: FaultTarget, fault: Fault) -> Option<&InForce> {
-        self.list.iter().find(|in_force| in_force.target == target && in_force.fault.word() == fault.word())
+    fn find(&self, target: FaultTarget, fault: Fault) -> Option<&ActiveFault> {
+        self.list.iter().find(|active| active.target == target && active.fault.word() == fault.word())
     }
 
     fn at(&self, target: FaultTarget, kind: TargetKind) -> impl Iterator<Item = Fault> {
@@ -174,7 +174,7 @@ impl Faults {
     }
 
     fn spoil_values(&mut self, line: LineId, unit: u8, request: &[u8], mut pdu: Vec<u8>) -> Vec<u8> {
-        let targets: Vec<FaultTarget> = self.list.iter().map(|in_force| in_force.target).collect();
+        let targets: Vec<FaultTarget> = self.list.iter().map(|active| active.target).collect();
         let mut targets = targets;
         targets.dedup();
         for target in targets {

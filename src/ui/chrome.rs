@@ -200,7 +200,7 @@ fn who_words(model: &Model, cx: &ViewContext, role: bool) -> (usize, String, Sty
 
 /// That nothing here is real, and how much of it is wrong on purpose; an exam does not tell.
 fn demo_words(cx: &ViewContext, status: &Status) -> (usize, String, Style) {
-    match (status.is_open(), status.in_force.len()) {
+    match (status.is_open(), status.active.len()) {
         (false, _) => {
             let left = |progress: &Progress| running(progress.duration.saturating_sub(progress.elapsed));
             let left = status.scenario.as_ref().map_or(String::new(), |progress| format!(" {} left", left(progress)));

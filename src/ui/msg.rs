@@ -58,7 +58,7 @@ pub enum Effect {
     Wish(QueryId, Wish),
     /// Ask the history.
     Query(QueryId, Query),
-    /// Let something go wrong in the simulation, or mend it.
+    /// Inject or clear a fault of the simulation.
     Drill(drill::SimCommand),
     /// Write a report or a capture; answered by [`Msg::Saved`].
     SaveReport {

@@ -90,7 +90,7 @@ async fn survive(name: &str, def: PlantDef) {
         plant.set_all(fault).await;
         plant.watch(&format!("{name}, {fault}"), FAULTY).await;
         assert_eq!(plant.trusted(), Vec::<String>::new(), "{name}, {fault}: still called good");
-        plant.simulator.all_well().await;
+        plant.simulator.clear_all().await;
         plant.until_good(&format!("{name}, after {fault}"), CURED_MAX).await;
     }
 }
@@ -140,7 +140,7 @@ impl Plant {
 
     async fn set_all(&self, fault: Fault) {
         for (line, unit) in self.simulator.units().collect::<Vec<_>>() {
-            self.simulator.set_fault(line, unit, fault).await;
+            self.simulator.inject_into_unit(line, unit, fault).await;
         }
     }
 

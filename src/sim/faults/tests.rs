@@ -16,7 +16,7 @@ fn simulator() -> (Simulator, Faults) {
 fn check(fault: Option<Fault>, expect: Option<(usize, bool)>, written: bool) {
     let (mut simulator, mut faults) = simulator();
     if let Some(fault) = fault {
-        faults.set(&mut simulator, TIC, fault, SINCE);
+        faults.inject(&mut simulator, TIC, fault, SINCE);
     }
     let answer = faults.answer(&mut simulator, L1, 1, &READ_SV);
     let seen = answer.map(|answer| answer.rtu()).map(|frame| (frame.len(), crc16(&frame) == 0));
@@ -46,7 +46,7 @@ fn the_same_answer_in_ascii() {
     let (mut simulator, mut faults) = simulator();
     let mut frame = |fault: Option<Fault>| {
         faults.clear_all(&mut simulator);
-        fault.into_iter().for_each(|fault| faults.set(&mut simulator, TIC, fault, SINCE));
+        fault.into_iter().for_each(|fault| faults.inject(&mut simulator, TIC, fault, SINCE));
         faults.answer(&mut simulator, L1, 1, &READ_SV).map(|answer| answer.ascii())
     };
     assert_eq!(frame(None).as_deref(), Some(&b":01030202BC3C\r\n"[..]));
@@ -57,7 +57,7 @@ fn the_same_answer_in_ascii() {
 #[test]
 fn a_broadcast_passes_by_a_silent_unit() {
     let (mut simulator, mut faults) = simulator();
-    faults.set(&mut simulator, TIC, Fault::Silent, SINCE);
+    faults.inject(&mut simulator, TIC, Fault::Silent, SINCE);
     assert_eq!(faults.answer(&mut simulator, L1, 0, &WRITE_SV), None);
     assert_eq!(simulator.respond(L1, 1, &READ_SV), Some(vec![3, 2, 0x02, 0xBC]));
     assert_eq!(simulator.respond(L1, 2, &READ_SV), Some(vec![3, 2, 0x01, 0xF4]));
@@ -66,7 +66,7 @@ fn a_broadcast_passes_by_a_silent_unit() {
 #[test]
 fn a_late_answer_says_how_late() {
     let (mut simulator, mut faults) = simulator();
-    faults.set(&mut simulator, TIC, Fault::Late(Duration::from_millis(700)), SINCE);
+    faults.inject(&mut simulator, TIC, Fault::Late(Duration::from_millis(700)), SINCE);
     let delay = faults.answer(&mut simulator, L1, 1, &READ_SV).map(|answer| answer.delay);
     assert_eq!(delay, Some(Duration::from_millis(705)));
 }
@@ -77,7 +77,7 @@ fn the_same_answer_on_tcp() {
     let frame = |answer: Option<Answer>| answer.map(|answer| answer.tcp(0x1234));
     let well = frame(faults.answer(&mut simulator, L1, 1, &READ_SV));
     assert_eq!(well, Some(vec![0x12, 0x34, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]));
-    faults.set(&mut simulator, TIC, Fault::BadCrc, SINCE);
+    faults.inject(&mut simulator, TIC, Fault::BadCrc, SINCE);
     let wrong = frame(faults.answer(&mut simulator, L1, 1, &READ_SV));
     assert_eq!(wrong.map(|frame| frame[..2].to_vec()), Some(vec![0xED, 0x34]));
 }
@@ -86,7 +86,7 @@ fn the_same_answer_on_tcp() {
 fn noise_spoils_about_as_many_messages_as_it_says_and_always_the_same() {
     let spoiled = |percent| {
         let (mut simulator, mut faults) = simulator();
-        faults.set(&mut simulator, FaultTarget::Line(L1), Fault::Noise(percent), SINCE);
+        faults.inject(&mut simulator, FaultTarget::Line(L1), Fault::Noise(percent), SINCE);
         let ask = |_| faults.answer(&mut simulator, L1, 1, &READ_SV).map(|answer| (answer.rtu(), answer.ascii()));
         (0..1_000).map(ask).collect::<Vec<_>>()
     };
@@ -107,11 +107,11 @@ fn a_later_fault_takes_the_place_of_one_that_it_excludes() {
     let (mut simulator, mut faults) = simulator();
     let list = |faults: &Faults| faults.list().iter().map(|f| f.fault.to_string()).collect::<Vec<_>>();
     for fault in [Fault::Silent, Fault::BadCrc, Fault::Stuck] {
-        faults.set(&mut simulator, TIC, fault, SINCE);
+        faults.inject(&mut simulator, TIC, fault, SINCE);
     }
     assert_eq!(list(&faults), ["bad crc", "stuck value"]);
-    faults.set(&mut simulator, FaultTarget::Process, Fault::Leak(500), SINCE);
-    faults.set(&mut simulator, FaultTarget::Process, Fault::Leak(2_000), SINCE + jiff::SignedDuration::from_secs(9));
+    faults.inject(&mut simulator, FaultTarget::Process, Fault::Leak(500), SINCE);
+    faults.inject(&mut simulator, FaultTarget::Process, Fault::Leak(2_000), SINCE + jiff::SignedDuration::from_secs(9));
     assert_eq!(list(&faults), ["bad crc", "stuck value", "leak 2 l/min"]);
     assert_eq!(faults.list()[2].since, SINCE, "it is the same leak");
     faults.clear(&mut simulator, FaultTarget::Process, Fault::Leak(1));

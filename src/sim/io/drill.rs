@@ -172,7 +172,7 @@ impl Task {
                 judge.on_lost(lost);
                 judge.on_values(&snapshot, &report.actual);
             }
-            let status = self.status(report.in_force, report.actual, clock.now());
+            let status = self.status(report.active, report.actual, clock.now());
             let over = status.scenario.as_ref().is_some_and(|progress| progress.verdict.over);
             publish.send_replace(Arc::new(status));
             if over && self.trainer.operator.is_some() {
@@ -190,7 +190,7 @@ impl Task {
     async fn perform(&mut self, event: ScenarioEvent) {
         match event {
             ScenarioEvent::Fault(FaultEvent { target, fault, begins: true, .. }) => {
-                self.trainer.simulator.set(target, fault).await
+                self.trainer.simulator.inject(target, fault).await
             }
             ScenarioEvent::Fault(FaultEvent { target, fault, begins: false, .. }) => {
                 self.trainer.simulator.clear(target, fault).await
@@ -212,15 +212,15 @@ impl Task {
 
     async fn apply_command(&self, command: SimCommand) {
         match command {
-            SimCommand::Set(target, fault) => self.trainer.simulator.set(target, fault).await,
+            SimCommand::Inject(target, fault) => self.trainer.simulator.inject(target, fault).await,
             SimCommand::Clear(target, fault) => self.trainer.simulator.clear(target, fault).await,
-            SimCommand::AllWell => self.trainer.simulator.all_well().await,
+            SimCommand::ClearAll => self.trainer.simulator.clear_all().await,
         }
     }
 
     fn status(
         &self,
-        in_force: Vec<crate::sim::faults::InForce>,
+        active: Vec<crate::sim::faults::ActiveFault>,
         actual: crate::sim::scenario::judge::ActualValues,
         now: Timestamp,
     ) -> Status {
@@ -229,7 +229,7 @@ impl Task {
             let Scenario { description, duration, .. } = &**judge.scenario();
             Progress { description: description.clone(), elapsed, duration: *duration, verdict: judge.verdict() }
         });
-        Status { available: self.available.clone(), in_force, actual, exam: self.trainer.exam, scenario }
+        Status { available: self.available.clone(), active, actual, exam: self.trainer.exam, scenario }
     }
 }
 

@@ -12,7 +12,7 @@ use crate::{
         def::{LineId, TagId},
     },
     sim::{
-        faults::{Answer, Fault, FaultTarget, Faults, InForce},
+        faults::{ActiveFault, Answer, Fault, FaultTarget, Faults},
         ground_truth::GroundTruth,
         rig::{Rig, RigState},
         scenario::judge::ActualValues,
@@ -47,7 +47,7 @@ pub struct LineHandle {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
     /// The faults in force.
-    pub in_force: Vec<InForce>,
+    pub active: Vec<ActiveFault>,
     /// By tag.
     pub actual: ActualValues,
 }
@@ -58,7 +58,7 @@ type Reply<T> = oneshot::Sender<T>;
 #[derive(Debug)]
 enum SimRequest {
     Ask { line: LineId, unit: u8, pdu: Vec<u8>, reply: Reply<Option<Answer>> },
-    Tell(Told, Reply<()>),
+    Change(Change, Reply<()>),
     RigState(Reply<Option<RigState>>),
     Value(TagId, Reply<Option<f64>>),
     SetValue(TagId, f64, Reply<bool>),
@@ -66,10 +66,10 @@ enum SimRequest {
 }
 
 #[derive(Debug)]
-enum Told {
-    Fault(FaultTarget, Fault),
-    Mended(FaultTarget, Fault),
-    AllWell,
+enum Change {
+    InjectFault(FaultTarget, Fault),
+    ClearFault(FaultTarget, Fault),
+    ClearAll,
     SensorOpen(bool),
     Switch(u16, bool),
     PowerCycle,
@@ -115,24 +115,24 @@ impl SimulatorHandle {
         self.put(|reply| SimRequest::Ask { line, unit, pdu, reply }).await.flatten()
     }
 
-    /// Makes a unit of a line faulty.
-    pub async fn set_fault(&self, line: LineId, unit: u8, fault: Fault) {
-        self.set(FaultTarget::Unit(line, unit), fault).await;
+    /// Injects a fault into a unit of a line.
+    pub async fn inject_into_unit(&self, line: LineId, unit: u8, fault: Fault) {
+        self.inject(FaultTarget::Unit(line, unit), fault).await;
     }
 
-    /// Lets something go wrong; a fault that it excludes ends.
-    pub async fn set(&self, target: FaultTarget, fault: Fault) {
-        self.tell(Told::Fault(target, fault)).await;
+    /// Injects a fault; a fault that it excludes is cleared.
+    pub async fn inject(&self, target: FaultTarget, fault: Fault) {
+        self.change(Change::InjectFault(target, fault)).await;
     }
 
-    /// Ends a fault, whatever its number.
+    /// Clears a fault, whatever its parameter.
     pub async fn clear(&self, target: FaultTarget, fault: Fault) {
-        self.tell(Told::Mended(target, fault)).await;
+        self.change(Change::ClearFault(target, fault)).await;
     }
 
-    /// Ends every fault.
-    pub async fn all_well(&self) {
-        self.tell(Told::AllWell).await;
+    /// Clears all faults.
+    pub async fn clear_all(&self) {
+        self.change(Change::ClearAll).await;
     }
 
     /// The active faults and the actual values now; `None` once the task has ended.
@@ -142,17 +142,17 @@ impl SimulatorHandle {
 
     /// Breaks or repairs the wire of the temperature sensor in the tank rig.
     pub async fn set_sensor_open(&self, open: bool) {
-        self.tell(Told::SensorOpen(open)).await;
+        self.change(Change::SensorOpen(open)).await;
     }
 
     /// Turns a panel switch X0–X3 of the rig's PLC.
     pub async fn set_switch(&self, switch: u16, on: bool) {
-        self.tell(Told::Switch(switch, on)).await;
+        self.change(Change::Switch(switch, on)).await;
     }
 
     /// Takes the power from all devices and gives it back.
     pub async fn power_cycle(&self) {
-        self.tell(Told::PowerCycle).await;
+        self.change(Change::PowerCycle).await;
     }
 
     /// The state of the tank rig now; `None` if the simulator has no rig, or once its task has ended.
@@ -172,9 +172,9 @@ impl SimulatorHandle {
     }
 
     /// Returns when it is in force. The task lives as long as this handle, except while its runtime shuts down; then
-    /// there is nobody to tell.
-    async fn tell(&self, told: Told) {
-        self.put(|reply| SimRequest::Tell(told, reply)).await;
+    /// nothing changes.
+    async fn change(&self, change: Change) {
+        self.put(|reply| SimRequest::Change(change, reply)).await;
     }
 
     async fn put<T>(&self, request: impl FnOnce(Reply<T>) -> SimRequest) -> Option<T> {
@@ -202,7 +202,7 @@ impl LineHandle {
 
     /// Something passed on the line that no unit could read.
     pub async fn spoiled(&self) {
-        self.simulator.tell(Told::Spoiled(self.line)).await;
+        self.simulator.change(Change::Spoiled(self.line)).await;
     }
 }
 
@@ -255,33 +255,33 @@ fn handle_request(
             reply.send(simulator.set_value(tag, value)).ok();
         }
         SimRequest::Report(reply) => {
-            reply.send(Report { in_force: faults.list().to_vec(), actual: ground_truth.values(simulator) }).ok();
+            reply.send(Report { active: faults.list().to_vec(), actual: ground_truth.values(simulator) }).ok();
         }
-        SimRequest::Tell(told, done) => {
-            follow(simulator, faults, now, told);
+        SimRequest::Change(change, done) => {
+            apply_change(simulator, faults, now, change);
             done.send(()).ok();
         }
     }
 }
 
 /// Requests to the rig do nothing on a simulator without one.
-fn follow(simulator: &mut Simulator, faults: &mut Faults, now: Timestamp, told: Told) {
-    match told {
-        Told::Fault(target, fault) => faults.set(simulator, target, fault, now),
-        Told::Mended(target, fault) => faults.clear(simulator, target, fault),
-        Told::AllWell => faults.clear_all(simulator),
-        Told::SensorOpen(open) => {
+fn apply_change(simulator: &mut Simulator, faults: &mut Faults, now: Timestamp, change: Change) {
+    match change {
+        Change::InjectFault(target, fault) => faults.inject(simulator, target, fault, now),
+        Change::ClearFault(target, fault) => faults.clear(simulator, target, fault),
+        Change::ClearAll => faults.clear_all(simulator),
+        Change::SensorOpen(open) => {
             if let Some(rig) = simulator.rig_mut() {
                 rig.set_sensor_open(open);
             }
         }
-        Told::Switch(switch, on) => {
+        Change::Switch(switch, on) => {
             if let Some(rig) = simulator.rig_mut() {
                 rig.set_switch(switch, on);
             }
         }
-        Told::PowerCycle => simulator.power_cycle(),
-        Told::Spoiled(line) => simulator.spoiled(line),
+        Change::PowerCycle => simulator.power_cycle(),
+        Change::Spoiled(line) => simulator.spoiled(line),
     }
 }
 
@@ -305,7 +305,7 @@ mod tests {
     async fn faults_reach_the_units() {
         let simulator =
             SimulatorHandle::spawn(Simulator::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0));
-        simulator.set_fault(LineId(0), 1, Fault::Silent).await;
+        simulator.inject_into_unit(LineId(0), 1, Fault::Silent).await;
         assert_eq!(simulator.ask(LineId(0), 1, &[3, 3, 0xEA, 0, 1]).await, None);
         assert!(simulator.ask(LineId(0), 2, &[3, 4, 0, 0, 1]).await.is_some());
         simulator.set_sensor_open(true).await;

@@ -1,4 +1,4 @@
-//! Tab 8, in demonstrations only: what can go wrong, what is wrong, and actual beside displayed values.
+//! Tab 8, in demonstrations only: available and active faults, and actual beside displayed values.
 
 mod view;
 
@@ -44,14 +44,14 @@ pub enum Action {
     Down,
     /// Select the first row of the next target.
     NextTarget,
-    /// Let it go wrong, or mend it.
+    /// Inject or clear the fault.
     Toggle,
     /// Less of it.
     Less,
     /// More of it.
     More,
-    /// Mend everything.
-    AllWell,
+    /// Clear all faults.
+    ClearAll,
     /// Points or fault.
     Verdict,
 }
@@ -66,16 +66,11 @@ pub const KEYS: &[Key<Action>] = &[
         help: "select the next line, unit or the process",
         action: Action::NextTarget,
     },
-    Key { chord: code(KeyCode::Enter), label: "on/off", help: "let it go wrong, or mend it", action: Action::Toggle },
-    Key { chord: code(KeyCode::Left), label: "", help: "less of it, where it has a number", action: Action::Less },
-    Key {
-        chord: code(KeyCode::Right),
-        label: "number",
-        help: "more of it, where it has a number",
-        action: Action::More,
-    },
-    Key { chord: char('m'), label: "mend all", help: "mend everything", action: Action::AllWell },
-    Key { chord: char('v'), label: "points", help: "how the drill stands, or the fault told", action: Action::Verdict },
+    Key { chord: code(KeyCode::Enter), label: "on/off", help: "inject or clear the fault", action: Action::Toggle },
+    Key { chord: code(KeyCode::Left), label: "", help: "decrease its parameter", action: Action::Less },
+    Key { chord: code(KeyCode::Right), label: "number", help: "increase its parameter", action: Action::More },
+    Key { chord: char('c'), label: "clear all", help: "clear all faults", action: Action::ClearAll },
+    Key { chord: char('v'), label: "points", help: "score of the drill, or the fault", action: Action::Verdict },
 ];
 
 impl Faults {
@@ -87,7 +82,7 @@ impl Faults {
             return Vec::new();
         };
         let fault = self.number(status, target, offered);
-        let in_force = status.find(target, fault).is_some();
+        let active = status.find(target, fault).is_some();
         match action {
             Action::Up => self.selected = self.selected.min(rows.len()).saturating_sub(1),
             Action::Down => self.selected = (self.selected + 1).min(rows.len() - 1),
@@ -95,17 +90,17 @@ impl Faults {
                 self.selected =
                     rows.iter().skip(self.selected).position(|row| row.0 != target).map_or(0, |by| self.selected + by);
             }
-            Action::Toggle if in_force => return cleared(cx, SimCommand::Clear(target, fault)),
-            Action::Toggle => return send(SimCommand::Set(target, fault)),
+            Action::Toggle if active => return cleared(cx, SimCommand::Clear(target, fault)),
+            Action::Toggle => return send(SimCommand::Inject(target, fault)),
             Action::Less | Action::More => {
                 let other = fault.step(action == Action::More);
                 self.numbers.insert((target, fault.word()), other);
                 // What is in force changes at once.
-                if in_force && other != fault {
-                    return send(SimCommand::Set(target, other));
+                if active && other != fault {
+                    return send(SimCommand::Inject(target, other));
                 }
             }
-            Action::AllWell => return cleared(cx, SimCommand::AllWell),
+            Action::ClearAll => return cleared(cx, SimCommand::ClearAll),
             Action::Verdict => self.verdict = !self.verdict && status.scenario.is_some(),
         }
         Vec::new()
@@ -124,7 +119,7 @@ impl Faults {
     /// The fault with the number it has, or would have.
     fn number(&self, status: &Status, target: FaultTarget, offered: Fault) -> Fault {
         match status.find(target, offered) {
-            Some(in_force) => in_force.fault,
+            Some(active) => active.fault,
             None => self.numbers.get(&(target, offered.word())).copied().unwrap_or(offered),
         }
     }

@@ -8,7 +8,7 @@ use crate::{
     plant::def::LineId,
     sim::{
         drill::{Progress, SimCommand, Status},
-        faults::{AvailableFaults, Fault, FaultTarget, InForce, TargetKind},
+        faults::{ActiveFault, AvailableFaults, Fault, FaultTarget, TargetKind},
         scenario::judge::{Row, Standing, Verdict},
     },
     ui::{
@@ -34,9 +34,9 @@ fn status(fixture: &Fixture) -> Status {
     let actual = [("TIC-1.PV", 68.0), ("PLC-1.LT-1", 22.0), ("PLC-1.SV-2", 1.0), ("PLC-1.POWER", 670.0)];
     Status {
         available: [FaultTarget::Line(L1), TIC, FaultTarget::Unit(L1, 2), FaultTarget::Process].map(of).into(),
-        in_force: vec![
-            InForce { target: TIC, fault: Fault::Silent, since },
-            InForce { target: FaultTarget::Process, fault: Fault::Leak(500), since },
+        active: vec![
+            ActiveFault { target: TIC, fault: Fault::Silent, since },
+            ActiveFault { target: FaultTarget::Process, fault: Fault::Leak(500), since },
         ],
         actual: actual.into_iter().map(|(name, value)| (fixture.tag(name), value)).collect(),
         exam: false,
@@ -96,14 +96,14 @@ fn press(model: &mut Model, keys: &str) -> Vec<SimCommand> {
 fn faults_go_on_and_off_by_enter_with_their_numbers() {
     let fixture = Fixture::normal();
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
-    assert_eq!(press(&mut model, "⏎"), [SimCommand::Set(FaultTarget::Line(L1), Fault::Noise(10))]);
-    assert_eq!(press(&mut model, "→→⏎"), [SimCommand::Set(FaultTarget::Line(L1), Fault::Noise(50))]);
+    assert_eq!(press(&mut model, "⏎"), [SimCommand::Inject(FaultTarget::Line(L1), Fault::Noise(10))]);
+    assert_eq!(press(&mut model, "→→⏎"), [SimCommand::Inject(FaultTarget::Line(L1), Fault::Noise(50))]);
     assert_eq!(press(&mut model, "↓⏎"), [SimCommand::Clear(TIC, Fault::Silent)], "what is on goes off");
     let late = Fault::Late(Duration::from_secs(1));
-    assert_eq!(press(&mut model, "↓←⏎"), [SimCommand::Set(TIC, late)], "a number is set before it is on");
-    assert_eq!(press(&mut model, "m"), [SimCommand::AllWell]);
+    assert_eq!(press(&mut model, "↓←⏎"), [SimCommand::Inject(TIC, late)], "a number is set before it is on");
+    assert_eq!(press(&mut model, "c"), [SimCommand::ClearAll]);
     assert_eq!(press(&mut model, "↑↑↑↑↑"), []);
-    assert_eq!(press(&mut model, "⏎"), [SimCommand::Set(FaultTarget::Line(L1), Fault::Noise(50))]);
+    assert_eq!(press(&mut model, "⏎"), [SimCommand::Inject(FaultTarget::Line(L1), Fault::Noise(50))]);
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn devices_that_do_not_answer_are_asked_at_once_when_their_faults_are_cleared() 
         let refreshed = |command| if let Command::Refresh(device) = command { Some(device) } else { None };
         effects.into_iter().filter_map(order).filter_map(refreshed).collect()
     };
-    assert_eq!(retried(type_keys(&mut model, "m")), [DeviceId(0)]);
+    assert_eq!(retried(type_keys(&mut model, "c")), [DeviceId(0)]);
     assert_eq!(retried(type_keys(&mut model, "↓⏎")), [DeviceId(0)], "also when one fault is cleared");
     assert_eq!(retried(type_keys(&mut model, "↓⏎")), [], "not when one is set");
 }
@@ -131,7 +131,7 @@ fn a_fault_is_switched_only_as_it_was_drawn() {
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
     // Another operator of the demonstration sets it first: Enter, meant to set it, would clear it.
     let mut set = status(&fixture);
-    set.in_force.push(InForce { target: FaultTarget::Line(L1), fault: Fault::Noise(10), since: fixture::now() });
+    set.active.push(ActiveFault { target: FaultTarget::Line(L1), fault: Fault::Noise(10), since: fixture::now() });
     let set = |model: &mut Model| drop(update(model, Msg::Drill(Arc::new(set))));
     acts_only_on_what_was_drawn(&mut model, set, "⏎");
 }
@@ -147,8 +147,8 @@ fn the_number_of_a_fault_in_force_changes_at_once() {
         .expect("faults of the process");
     let units = 2 * (process - 1);
     press(&mut model, &"↓".repeat(1 + units + leak - process));
-    assert_eq!(press(&mut model, "→"), [SimCommand::Set(FaultTarget::Process, Fault::Leak(1_000))]);
-    assert_eq!(press(&mut model, "←"), [SimCommand::Set(FaultTarget::Process, Fault::Leak(200))]);
+    assert_eq!(press(&mut model, "→"), [SimCommand::Inject(FaultTarget::Process, Fault::Leak(1_000))]);
+    assert_eq!(press(&mut model, "←"), [SimCommand::Inject(FaultTarget::Process, Fault::Leak(200))]);
 }
 
 #[test]

@@ -72,10 +72,10 @@ fn list(tab: &Faults, cx: &ViewContext, status: &Status, canvas: &mut Canvas) {
             if selected {
                 selected_line = lines.len();
             }
-            let in_force = status.find(available.target, *fault);
+            let active = status.find(available.target, *fault);
             let name = tab.number(status, available.target, *fault).to_string();
-            let (state, style) = match in_force {
-                Some(in_force) => (format!("ON {}", running(between(in_force.since, cx.now))), cx.theme.trouble()),
+            let (state, style) = match active {
+                Some(active) => (format!("ON {}", running(between(active.since, cx.now))), cx.theme.trouble()),
                 None => ("off".to_owned(), cx.theme.normal()),
             };
             lines.push((format!("  {name}"), state, style, selected));
