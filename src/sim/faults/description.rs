@@ -88,7 +88,7 @@ impl Fault {
                  truth.",
                 "Stop; close the hand valve under TK-1.",
             ),
-            Fault::ValveStuck(Valve::Drain, Position::Shut) => describe(
+            Fault::ValveStuck(Valve::Drain, Position::Closed) => describe(
                 "SV-1 does not open: TK-1 keeps its hot water.",
                 "The PLC shows OPEN, but no flow out and the level stands. After the time of the step the sequence fails with \
                  an alarm.",
@@ -99,7 +99,7 @@ impl Fault {
                 "The PLC shows SHUT, but there is flow in and the level rises to its alarm.",
                 "Close the hand valve under TK-2 before TK-1 overflows.",
             ),
-            Fault::ValveStuck(Valve::Fill, Position::Shut) => describe(
+            Fault::ValveStuck(Valve::Fill, Position::Closed) => describe(
                 "SV-2 does not open: TK-1 is not filled.",
                 "The PLC shows OPEN, but no flow in. The sequence fails after the time of the step; the interlock keeps the \
                  heater off without level.",

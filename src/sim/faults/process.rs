@@ -69,8 +69,8 @@ mod tests {
         check(&["silent", "leak 2"], ALL_ON, ALL_ON);
         check(&["heater burnout"], ALL_ON, Actuators { heater_percent: 0.0, ..ALL_ON });
         check(&["pump failed", "agitator failed"], ALL_ON, Actuators { pump: false, agitator: false, ..ALL_ON });
-        check(&["SV-1 stuck shut"], ALL_ON, Actuators { drain_valve: false, ..ALL_ON });
+        check(&["SV-1 stuck closed"], ALL_ON, Actuators { drain_valve: false, ..ALL_ON });
         check(&["SV-1 stuck open", "SV-2 stuck open"], off, Actuators { drain_valve: true, fill_valve: true, ..off });
-        check(&["SV-2 stuck shut"], ALL_ON, Actuators { fill_valve: false, ..ALL_ON });
+        check(&["SV-2 stuck closed"], ALL_ON, Actuators { fill_valve: false, ..ALL_ON });
     }
 }

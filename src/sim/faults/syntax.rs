@@ -52,7 +52,7 @@ pub enum Position {
     /// Water runs.
     Open,
     /// No water runs.
-    Shut,
+    Closed,
 }
 
 /// What a fault is a fault of.
@@ -112,9 +112,9 @@ impl Fault {
         Fault::SensorBurnout,
         Fault::HeaterBurnout,
         Fault::ValveStuck(Valve::Drain, Position::Open),
-        Fault::ValveStuck(Valve::Drain, Position::Shut),
+        Fault::ValveStuck(Valve::Drain, Position::Closed),
         Fault::ValveStuck(Valve::Fill, Position::Open),
-        Fault::ValveStuck(Valve::Fill, Position::Shut),
+        Fault::ValveStuck(Valve::Fill, Position::Closed),
         Fault::Leak(2_000),
         Fault::PumpFailed,
         Fault::AgitatorFailed,
@@ -135,9 +135,9 @@ impl Fault {
             Fault::SensorBurnout => "sensor burnout",
             Fault::HeaterBurnout => "heater burnout",
             Fault::ValveStuck(Valve::Drain, Position::Open) => "SV-1 stuck open",
-            Fault::ValveStuck(Valve::Drain, Position::Shut) => "SV-1 stuck shut",
+            Fault::ValveStuck(Valve::Drain, Position::Closed) => "SV-1 stuck closed",
             Fault::ValveStuck(Valve::Fill, Position::Open) => "SV-2 stuck open",
-            Fault::ValveStuck(Valve::Fill, Position::Shut) => "SV-2 stuck shut",
+            Fault::ValveStuck(Valve::Fill, Position::Closed) => "SV-2 stuck closed",
             Fault::Leak(_) => "leak",
             Fault::PumpFailed => "pump failed",
             Fault::AgitatorFailed => "agitator failed",
@@ -334,7 +334,7 @@ mod tests {
         check("leak 0.5 l/min", Ok(Fault::Leak(500)));
         check("leak 0.5", Ok(Fault::Leak(500)));
         check("noise 20%", Ok(Fault::Noise(20)));
-        check("SV-1 stuck shut", Ok(Fault::ValveStuck(Valve::Drain, Position::Shut)));
+        check("SV-1 stuck closed", Ok(Fault::ValveStuck(Valve::Drain, Position::Closed)));
         check("late 5", Err("found `late 5`, expected a time from 50ms to 60s, such as `late 2s`"));
         check("noise 101 %", Err("found `noise 101 %`, expected a number from 1 to 100, such as `noise 10 %`"));
         check("exception 2.5", Err("found `exception 2.5`, expected a number from 1 to 255, such as `exception 4`"));
@@ -352,8 +352,8 @@ mod tests {
         check("late 1s", "late 2s", true);
         check("silent", "stuck value", false);
         check("stuck value", "torn value", false);
-        check("SV-1 stuck open", "SV-1 stuck shut", true);
-        check("SV-1 stuck open", "SV-2 stuck shut", false);
+        check("SV-1 stuck open", "SV-1 stuck closed", true);
+        check("SV-1 stuck open", "SV-2 stuck closed", false);
         check("leak 1", "leak 2", true);
         check("leak", "pump failed", false);
     }

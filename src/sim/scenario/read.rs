@@ -15,6 +15,7 @@ use crate::{
         self, Errors, Search,
         diagnostic::{Problems, Span},
         reader::{self, At, Choice, Node, Value, table, text, words},
+        renamed,
     },
     sim::faults::{Fault, FaultTarget, why_not_applicable},
 };
@@ -115,8 +116,8 @@ impl Value for Fault {
             Err(error) => {
                 let mut known: Vec<&str> = Fault::ALL.iter().map(|fault| fault.word()).collect();
                 known.dedup();
-                let problem = problems.add(at, format!("{error}"));
-                problem.label("not a fault").suggest(&word, known.iter().copied());
+                let problem = problems.add(at, format!("{error}")).label("not a fault");
+                renamed::offer(problem, "a fault", &word, &known);
                 None
             }
         }
