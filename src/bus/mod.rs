@@ -4,14 +4,14 @@
 //!   tags ──> plan ──> schedule ──> task ──> link ──> wire ──> port        asked
 //!            blocks   whose turn   polls    one      silences,
 //!            (holes)  (classes)    writes   request  every byte on record
-//!                                  tests    (debt)
+//!                                  tests    (replies)
 //!   values <── codec <── task <── gather <── ascii, frame <── port        answered
 //! ```
 //!
 //! | room | what is decided there |
 //! |---|---|
 //! | [`frame`], [`ascii`], [`gather`] | where a frame begins and ends, whether its check fits, whether it answers what was asked |
-//! | [`debt`] | which answers may still come late, and what may be asked meanwhile |
+//! | [`late_reply`] | which replies are outstanding, and what may be asked meanwhile |
 //! | [`codec`] | words to numbers and back |
 //! | [`plan`], [`admission`], [`schedule`], [`backoff`] | what is read together, whether it can all be in time, what is read next |
 //! | [`books`] | what is counted |
@@ -34,7 +34,7 @@ pub mod plan;
 pub mod backoff;
 pub mod schedule;
 pub mod admission;
-pub mod debt;
+pub mod late_reply;
 pub mod tool;
 pub mod books;
 pub mod io;

@@ -377,7 +377,7 @@ impl Schedule {
         self.health(device).is_some_and(Health::is_down)
     }
 
-    /// Must the device be left alone now (it is settling, or owes answers)?
+    /// Must the device be left alone now (it is settling, or replies are outstanding)?
     pub fn is_resting(&self, device: DeviceId, now: Timestamp) -> bool {
         self.health(device).is_some_and(|health| now < health.rests_until)
     }

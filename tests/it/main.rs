@@ -15,7 +15,7 @@
 //! | `rights` | every command, wish and query through the socket, by everybody who may be at a terminal |
 //! | `people` | wrong passwords, lock-out, idle lock, second persons, two operators at once |
 //! | `kills` | stations killed during writes, acknowledgements, logins and reports: what was reported as done is in the audit log |
-//! | `owed` | stations killed and started again, with a slow device: what it owes to the dead one is no value |
+//! | `outstanding` | stations killed and started again, with a slow device: a late reply to the old one is no value |
 //! | `tampering` | the book changed by hand: what `sightglass audit verify` says |
 //! | `hostile` | text of others, by every command: nothing of it acts on a terminal |
 //! | `tools` | the tools for a line against peers that echo, chatter and lie |
@@ -38,7 +38,7 @@ mod guarded;
 mod hostile;
 mod kills;
 mod masters;
-mod owed;
+mod outstanding;
 mod peers;
 mod people;
 mod pty;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  call(Request) ─> tokio-modbus ─> pipe ─> message ─┐
-//!  exchange(message) ────────────────────────────────┼─> wire    RTU, ASCII: check, silences, debts; one at a time
+//!  exchange(message) ────────────────────────────────┼─> wire    RTU, ASCII: check, silences, outstanding replies; one at a time
 //!  submit(message), flush() ─────────────────────────┘           MBAP: transaction ids; several under way
 //! ```
 //!
@@ -37,9 +37,9 @@ use super::{
 };
 use crate::{
     bus::{
-        debt::Debt,
         frame::{self, Mbap, Shape},
         gather::{self, Verdict},
+        late_reply::OutstandingReplies,
         plan::Block,
     },
     plant::{
@@ -151,7 +151,7 @@ impl Link {
             return self.exchange_mbap(message).await;
         }
         // An answer proves that nothing older is to come only if it could not itself have been older.
-        let proof = !self.wire.debts.is_ambiguous(message);
+        let proof = !self.wire.replies.is_ambiguous(message);
         let frame: Arc<[u8]> = frame::wrap(self.framing(), 0, message).into();
         let sent_at = self.send(message, &frame).await?;
         let started = Instant::now();
@@ -161,7 +161,7 @@ impl Link {
             _ => self.gather(message, &frame, sent_at).await?,
         };
         // Something unsolicited came meanwhile: this may be unsolicited too.
-        if proof && gathered.answer.is_ok() && self.wire.debts.is_ambiguous(message) {
+        if proof && gathered.answer.is_ok() && self.wire.replies.is_ambiguous(message) {
             gathered.answer = Err(Fault::OutOfStep);
         }
         self.asked = None;
@@ -176,7 +176,7 @@ impl Link {
             Ok(answer) => {
                 self.wire.counters.ok += 1;
                 let age = self.wire.age();
-                self.wire.debts.answered(message, answer, proof, age);
+                self.wire.replies.answered(message, answer, proof, age);
             }
             Err(fault) => self.account(message, *fault),
         }
@@ -193,7 +193,7 @@ impl Link {
         let sent_at = self.send(&request, bytes).await?;
         self.note_sent(bytes.into());
         let deadline = sent_at + self.timeout + self.wire.char_time * frame::MESSAGE_MAX as u32;
-        let proof = framing != Framing::Mbap && !self.wire.debts.is_ambiguous(&request);
+        let proof = framing != Framing::Mbap && !self.wire.replies.is_ambiguous(&request);
         let (mut buffer, mut reply) = (Vec::new(), None);
         let mut until = deadline;
         let answered = loop {
@@ -223,7 +223,7 @@ impl Link {
         self.wire.rest(self.wire.silence);
         // What was sent may have been a request whose answer is still to come.
         if framing != Framing::Mbap && !request.is_empty() && !(answered && proof) {
-            self.owe(&request);
+            self.expect_late(&request);
         }
         Ok((buffer, reply))
     }
@@ -233,7 +233,7 @@ impl Link {
         self.abandon_mbap();
         let Some(message) = self.asked.take() else { return };
         if self.framing() != Framing::Mbap && !message.is_empty() {
-            self.wire.debts.failed(&message, self.wire.age());
+            self.wire.replies.failed(&message, self.wire.age());
         }
         self.wire.rest_after_sending(self.idle);
     }
@@ -257,14 +257,14 @@ impl Link {
         self.wire.framing()
     }
 
-    /// Could the answer to this message be mistaken for one that its unit still owes?
+    /// Could the answer to this message be mistaken for an outstanding one?
     pub fn is_ambiguous(&self, message: &[u8]) -> bool {
-        self.framing() != Framing::Mbap && self.wire.debts.is_ambiguous(message)
+        self.framing() != Framing::Mbap && self.wire.replies.is_ambiguous(message)
     }
 
-    /// See [`crate::bus::debt::Debts::must_wait`].
+    /// See [`crate::bus::late_reply::LineReplies::must_wait`].
     pub fn must_wait(&self, message: &[u8]) -> bool {
-        self.wire.debts.must_wait(message)
+        self.wire.replies.must_wait(message)
     }
 
     /// How long an answer may take.
@@ -277,20 +277,20 @@ impl Link {
         self.timeout = timeout;
     }
 
-    /// What a unit owes.
-    pub fn debt(&self, unit: u8) -> &Debt {
-        self.wire.debts.of(unit)
+    /// Outstanding replies of a unit.
+    pub fn outstanding(&self, unit: u8) -> &OutstandingReplies {
+        self.wire.replies.of(unit)
     }
 
     /// Brings a unit into step by a loopback, where no read can: after it nothing older can come any more.
     pub async fn loopback(&mut self, unit: u8) -> Result<(), Trouble> {
-        let proves = self.debt(unit).refusal_proves();
-        let loopback = self.wire.debts.next_loopback(unit);
+        let proves = self.outstanding(unit).refusal_proves();
+        let loopback = self.wire.replies.next_loopback(unit);
         match self.exchange(&loopback).await {
             Ok(_) => Ok(()),
             Err(Trouble::Fault(Fault::Exception(_))) if proves => {
                 if !self.is_unsettled(unit) {
-                    self.wire.debts.clear(unit, self.wire.age());
+                    self.wire.replies.clear(unit, self.wire.age());
                 }
                 Ok(())
             }
@@ -300,9 +300,9 @@ impl Link {
         }
     }
 
-    /// See [`crate::bus::debt::Debts::forget`].
-    pub fn forget_debt(&mut self, unit: u8) -> Option<Duration> {
-        self.wire.debts.forget(unit, self.wire.age())
+    /// See [`crate::bus::late_reply::LineReplies::forget`].
+    pub fn forget_outstanding(&mut self, unit: u8) -> Option<Duration> {
+        self.wire.replies.forget(unit, self.wire.age())
     }
 
     /// Nothing is sent to a unit for this long (plant time): it wants a gap between two requests.
@@ -349,14 +349,14 @@ impl Link {
         &mut self.wire.counters
     }
 
-    /// See [`crate::bus::debt::Debts::is_unsettled`].
+    /// See [`crate::bus::late_reply::LineReplies::is_unsettled`].
     pub fn is_unsettled(&self, unit: u8) -> bool {
-        self.wire.debts.is_unsettled(unit, self.wire.age())
+        self.wire.replies.is_unsettled(unit, self.wire.age())
     }
 
     /// Other blocks are asked for from now on.
     pub fn expect(&mut self, blocks: &[Block]) {
-        self.wire.debts.expect(blocks);
+        self.wire.replies.expect(blocks);
     }
 
     /// See [`Wire::take_unasked`].
@@ -401,7 +401,7 @@ impl Link {
         gathered.answer
     }
 
-    /// Counts a fault. On a line without transaction ids the unit owes the answer, and the line rests until the longest
+    /// Counts a fault. On a line without transaction ids the reply becomes outstanding, and the line pauses until the longest
     /// late frame has passed.
     fn account(&mut self, message: &[u8], fault: Fault) {
         let Some(unit) = message.first() else { return };
@@ -410,7 +410,7 @@ impl Link {
             Fault::Exception(_) => {
                 self.wire.counters.exceptions += 1;
                 // An exception names no address: while the unit owes, it may be the answer to an older request.
-                if mbap || self.wire.debts.of(*unit).is_clear() {
+                if mbap || self.wire.replies.of(*unit).is_clear() {
                     return;
                 }
             }
@@ -431,13 +431,13 @@ impl Link {
         tracing::debug!(unit, request = %frame::hex(message), %fault, "a request failed");
         // Even what looked like a spoiled answer may have been noise, with the answer still on its way.
         if !mbap {
-            self.owe(message);
+            self.expect_late(message);
         }
     }
 
     /// The answer to this message may still come: it is remembered, and the line rests until it would have passed.
-    fn owe(&mut self, message: &[u8]) {
-        self.wire.debts.failed(message, self.wire.age());
+    fn expect_late(&mut self, message: &[u8]) {
+        self.wire.replies.failed(message, self.wire.age());
         let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);
         let chars = frame::wrapped_length(self.framing(), longest) as u32;
         self.wire.rest(self.wire.char_time * chars + self.wire.silence);

@@ -123,7 +123,7 @@ struct Task<'a> {
     hunt: Hunt,
     /// The share of the line's time that writes may take from polls.
     budget: Budget,
-    /// Counters and debts, from one opening to the next.
+    /// Counters and outstanding replies, from one opening to the next.
     memory: Memory,
     /// Writes whose fate is not known yet.
     unconfirmed: Vec<confirm::Unconfirmed>,

@@ -22,11 +22,11 @@ pub async fn step(link: &mut Link, step: &Step) -> Result<Came, Trouble> {
         Ask::Message(message) => {
             let (usual, unanswered) = (link.timeout(), link.unanswered);
             link.set_timeout(step.timeout.unwrap_or(usual));
-            // An answer that the unit still owes would be shown as the answer to this.
+            // An outstanding reply would be shown as the answer to this.
             if let (true, Some(unit)) = (link.is_ambiguous(message), message.first()) {
                 match link.loopback(*unit).await {
                     Ok(()) => {}
-                    Err(Trouble::Fault(_)) => drop(link.forget_debt(*unit)),
+                    Err(Trouble::Fault(_)) => drop(link.forget_outstanding(*unit)),
                     Err(gone) => return Err(gone),
                 }
             }

@@ -12,8 +12,8 @@ use super::{clock::Clock, link::Trouble, pause::Pause, transport::Stream};
 use crate::{
     bus::{
         ascii,
-        debt::Debts,
         frame::{self, Unasked},
+        late_reply::LineReplies,
         plan::Block,
     },
     plant::{
@@ -31,8 +31,8 @@ const STRAY_MAX: usize = 4 * frame::MESSAGE_MAX;
 pub struct Memory {
     /// Totals; `utilisation`, `opens` and `missed` are the task's.
     pub counters: LineCounters,
-    /// What each unit owes; bytes that come late pay.
-    debts: Debts,
+    /// Outstanding replies of each unit.
+    replies: LineReplies,
     born: Instant,
 }
 
@@ -40,12 +40,16 @@ impl Memory {
     /// Nothing has gone over the line yet.
     pub fn new(line: &LineDef, clock: Clock) -> Memory {
         let seed = clock.now().as_microsecond() as u16;
-        Memory { counters: LineCounters::default(), debts: Debts::new(line.timeout, seed), born: Instant::now() }
+        Memory {
+            counters: LineCounters::default(),
+            replies: LineReplies::new(line.timeout, seed),
+            born: Instant::now(),
+        }
     }
 
     /// These blocks will be asked for.
     pub fn expect(mut self, blocks: &[Block]) -> Memory {
-        self.debts.expect(blocks);
+        self.replies.expect(blocks);
         self
     }
 }
@@ -66,8 +70,8 @@ pub struct Wire {
     /// When the last byte sent has left.
     left_at: Instant,
     born: Instant,
-    /// What each unit owes.
-    pub debts: Debts,
+    /// Outstanding replies of each unit.
+    pub replies: LineReplies,
     /// Bytes that no request waits for, until silence shows that their frame has ended.
     stray: Vec<u8>,
     /// Bytes that are further apart than this (real time) are of two frames.
@@ -76,7 +80,7 @@ pub struct Wire {
     frames: Vec<Frame>,
     /// Units whose answers came late since this was last taken.
     late: Vec<u8>,
-    /// Units that sent since then what they were not asked for, though nothing was owed.
+    /// Units that sent since then what they were not asked for, though nothing was outstanding.
     unasked: Vec<u8>,
     /// Totals of the line; `utilisation`, `opens` and `missed` are the task's.
     pub counters: LineCounters,
@@ -85,8 +89,8 @@ pub struct Wire {
 impl Wire {
     /// A freshly opened port; `memory` goes on from an earlier opening.
     pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, memory: Memory) -> Wire {
-        let Memory { counters, mut debts, born } = memory;
-        debts.set_timeout(line.timeout);
+        let Memory { counters, mut replies, born } = memory;
+        replies.set_timeout(line.timeout);
         let (char_time, silence) = match line.transport.serial() {
             // The frames of ASCII have a beginning and an end of their own.
             Some(serial) if line.transport.framing() == Framing::Ascii => (serial.char_time(), line.gap),
@@ -107,7 +111,7 @@ impl Wire {
             quiet_until: Instant::now() + if may_come { line.timeout } else { Duration::ZERO },
             left_at: Instant::now(),
             born,
-            debts,
+            replies,
             stray: Vec::new(),
             idle: clock.real_span(silence).max(line.idle),
             frames: Vec::new(),
@@ -134,7 +138,7 @@ impl Wire {
 
     /// What is remembered until the next opening.
     pub fn memory(&self) -> Memory {
-        Memory { counters: self.counters, debts: self.debts.clone(), born: self.born }
+        Memory { counters: self.counters, replies: self.replies.clone(), born: self.born }
     }
 
     /// Nothing is sent for this long (real time).
@@ -164,7 +168,7 @@ impl Wire {
     pub async fn send(&mut self, bytes: &[u8]) -> Result<Instant, Trouble> {
         self.wait_for_silence().await;
         if self.framing != Framing::Mbap {
-            // What is just coming in is heard to its end: it may be what the unit owes.
+            // What is just coming in is heard to its end: it may be an outstanding reply.
             self.drain()?;
             if self.has_begun() {
                 self.rest(self.idle);
@@ -259,7 +263,7 @@ impl Wire {
         self.drop_stale(&bytes);
     }
 
-    /// Bytes that nobody waits for, or not any more: on record, and on the account of the unit that owed them.
+    /// Bytes that nobody waits for, or not any more: on record, and counted for their unit.
     pub fn drop_stale(&mut self, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
@@ -273,18 +277,18 @@ impl Wire {
             let (Unasked::Answer(message) | Unasked::Request(message)) = &unasked;
             let Some(unit) = message.first().copied() else { continue };
             let asks = matches!(unasked, Unasked::Request(_));
-            let overtook = !asks && self.debts.overtook(unit, message, age);
-            let pays = !asks && !overtook && self.debts.came_late(unit, message, age);
-            if pays {
+            let overtook = !asks && self.replies.overtook(unit, message, age);
+            let was_outstanding = !asks && !overtook && self.replies.came_late(unit, message, age);
+            if was_outstanding {
                 late = true;
                 self.counters.late += 1;
                 self.late.push(unit);
             }
-            if overtook || (!pays && self.debts.unasked(unit, message, age)) {
+            if overtook || (!was_outstanding && self.replies.unasked(unit, message, age)) {
                 self.unasked.push(unit);
             }
             if asks {
-                self.debts.distrust_all();
+                self.replies.distrust_all();
             }
         }
         self.record(false, bytes.into(), Cow::Borrowed(if late { "late, dropped" } else { "stale, dropped" }));

@@ -34,7 +34,7 @@ impl Gathered {
 }
 
 impl Link {
-    /// Gathers until a frame has come that answers the message. Whole frames that do not (another unit, an owed answer)
+    /// Gathers until a frame has come that answers the message. Whole frames that do not (another unit, an outstanding reply)
     /// are dropped, and waiting goes on inside the same deadline.
     pub(super) async fn gather(&mut self, message: &[u8], sent: &[u8], sent_at: Instant) -> Result<Gathered, Trouble> {
         let framing = self.framing();

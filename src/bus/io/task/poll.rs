@@ -133,7 +133,7 @@ impl Task<'_> {
             }
             Err(fault @ Fault::Exception(code)) if is_answer => {
                 self.tell_failed(at, block.device, block.tags.to_vec(), fault, exchange).await?;
-                let its_own = link.debt(block.unit).is_clear();
+                let its_own = link.outstanding(block.unit).is_clear();
                 let Some(index) = index else { return Ok(()) };
                 schedule.again(index, at);
                 let hole = code == ExceptionCode(0x02) && its_own;
@@ -251,7 +251,7 @@ pub(super) fn span(from: Timestamp, to: Timestamp) -> Duration {
     Duration::try_from(to.duration_since(from)).unwrap_or_default()
 }
 
-/// Makes sure that the answer to a block cannot be mistaken for one that the unit still owes: by a read of another shape,
+/// Makes sure that the answer to a block cannot be mistaken for an outstanding one: by a read of another shape,
 /// part of this block or of one of `blocks`, if there is one, else by a loopback, else by patience.
 async fn bring_into_step(blocks: &[Block], link: &mut Link, block: &Block) -> Result<(), Trouble> {
     if !link.is_ambiguous(&block.request()) {
@@ -261,11 +261,11 @@ async fn bring_into_step(blocks: &[Block], link: &mut Link, block: &Block) -> Re
         return Err(Fault::OutOfStep.into());
     }
     if link.must_wait(&block.request()) {
-        return if link.forget_debt(block.unit).is_none() { Ok(()) } else { Err(Fault::OutOfStep.into()) };
+        return if link.forget_outstanding(block.unit).is_none() { Ok(()) } else { Err(Fault::OutOfStep.into()) };
     }
     let own = std::iter::once(block);
     let others = blocks.iter().filter(|other| other.device == block.device && *other != block);
-    if let Some(probe) = link.debt(block.unit).probe(own.chain(others)) {
+    if let Some(probe) = link.outstanding(block.unit).probe(own.chain(others)) {
         match link.exchange(&probe).await {
             // The device does not read parts of a block, or this answers an older request: neither proves anything.
             Err(Trouble::Fault(Fault::Exception(_))) => {}
@@ -274,13 +274,13 @@ async fn bring_into_step(blocks: &[Block], link: &mut Link, block: &Block) -> Re
         }
     }
     match link.loopback(block.unit).await {
-        Err(Trouble::Fault(_)) if link.forget_debt(block.unit).is_none() => Ok(()),
+        Err(Trouble::Fault(_)) if link.forget_outstanding(block.unit).is_none() => Ok(()),
         Ok(()) => proven(link, block),
         Err(trouble) => Err(trouble),
     }
 }
 
-/// Reads a block from a unit that is in step. A `spoiled` answer is asked for once more; it counts as owed, so the unit is
+/// Reads a block from a unit that is in step. A `spoiled` answer is asked for once more; it counts as outstanding, so the unit is
 /// brought into step before.
 async fn read_in_step(
     blocks: &[Block],

@@ -210,7 +210,7 @@ impl Task<'_> {
         })
     }
 
-    /// An exception names no address: only from a unit that owes nothing is it certainly the answer to what was sent. `Err`
+    /// An exception names no address: only from a unit without outstanding replies is it certainly the answer to what was sent. `Err`
     /// when the port is gone.
     async fn owes_nothing(&mut self, link: &mut Link, device: &DeviceDef) -> Result<bool, String> {
         if is_clear(link, device) {
@@ -218,7 +218,7 @@ impl Task<'_> {
         }
         match self.requests.unless_stopped(link.loopback(device.unit)).await {
             Some(Ok(())) => Ok(true),
-            Some(Err(Trouble::Fault(_))) => Ok(link.debt(device.unit).is_clear()),
+            Some(Err(Trouble::Fault(_))) => Ok(link.outstanding(device.unit).is_clear()),
             Some(Err(Trouble::Gone(why))) => Err(why),
             None => {
                 link.abandon();
@@ -258,10 +258,10 @@ impl Task<'_> {
     }
 }
 
-/// Can no answer that a device still owes be taken for the next one?
+/// Can no outstanding reply be taken for the next one?
 fn is_clear(link: &Link, device: &DeviceDef) -> bool {
     let broadcast = device.unit == 0;
-    link.framing() == Framing::Mbap || broadcast || link.debt(device.unit).is_clear()
+    link.framing() == Framing::Mbap || broadcast || link.outstanding(device.unit).is_clear()
 }
 
 /// The request that writes a raw number: function 5 or 6 for one, 15 or 16 for more or where the profile says so, 22 for a

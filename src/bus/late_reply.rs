@@ -1,14 +1,14 @@
 //! Protection against late answers where frames carry no transaction id (RTU and ASCII).
 //!
-//! After a timeout a unit *owes* an answer. It may come at any later moment and would then be taken for the answer to the
-//! next request of the same shape: the value of another tag, called good. So while a unit owes, only a request is sent
-//! whose answer cannot be mistaken for an owed one. A serial device answers in order; a valid answer to such a request
-//! therefore proves that nothing older is still to come, and the debt is cleared.
+//! After a timeout a reply is *outstanding*. It may come at any later moment and would then be taken for the answer to the
+//! next request of the same shape: the value of another tag, called good. So while a reply is outstanding, only a request is sent
+//! whose answer cannot be mistaken for an outstanding one. A serial device answers in order; a valid answer to such a request
+//! therefore proves that nothing older is still to come, and nothing is outstanding any more.
 //!
-//! A unit whose owed answer comes after such a proof does not answer in order: from then on only the owed answer itself, or
-//! patience, clears what it owes.
+//! A unit whose outstanding reply comes after such a proof does not answer in order: from then on only the outstanding reply itself, or
+//! patience, clears what is outstanding.
 //!
-//! A unit that was never asked before may owe an answer to an earlier process that was killed, and one that sends what it was
+//! A unit that was never asked before may still answer an earlier process that was killed, and one that sends what it was
 //! not asked for may do so again: both are *unproven*, and are first asked something that is no usual block of theirs.
 
 use std::time::Duration;
@@ -18,8 +18,8 @@ use super::{
     plan::Block,
 };
 
-/// Most answers that are remembered as owed; a unit that owes more is asked nothing until it has rested.
-const OWED_MAX: usize = 16;
+/// Most answers that are remembered as outstanding; with more, the unit is not polled until it has paused.
+const OUTSTANDING_MAX: usize = 16;
 
 /// Usual shapes that are remembered of a unit; one with more is brought into step by a loopback.
 const USUAL_MAX: usize = 64;
@@ -27,46 +27,46 @@ const USUAL_MAX: usize = 64;
 /// A unit rests no longer than this, however late it seems to have been.
 const REST_MAX: Duration = Duration::from_secs(600);
 
-/// What one unit owes.
+/// Outstanding replies of one unit.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Debt {
-    owed: Vec<Shape>,
-    /// A loopback is owed: the next *refusal* of a loopback may be the answer to that one.
+pub struct OutstandingReplies {
+    shapes: Vec<Shape>,
+    /// A loopback is outstanding: the next *refusal* of a loopback may be the answer to that one.
     loopback: bool,
-    /// Functions whose answers have no shape (identification, event log) that are owed.
+    /// Functions whose answers have no shape (identification, event log) that are outstanding.
     functions: Vec<u8>,
     /// Shapes of the blocks that the unit is asked for.
     usual: Vec<Shape>,
-    /// It may owe an answer of a usual shape that this line has not asked for.
+    /// A reply of a usual shape may be outstanding that this line has not asked for.
     unproven: bool,
 }
 
-impl Debt {
+impl OutstandingReplies {
     /// A request of this shape was not answered in time.
-    pub fn owe(&mut self, shape: Shape) {
+    pub fn add(&mut self, shape: Shape) {
         if shape.is_loopback() {
             self.loopback = true;
-        } else if !self.owed.contains(&shape) && self.owed.len() < OWED_MAX {
-            self.owed.push(shape);
+        } else if !self.shapes.contains(&shape) && self.shapes.len() < OUTSTANDING_MAX {
+            self.shapes.push(shape);
         }
     }
 
     /// A request of a function whose answers have no shape was not answered in time.
-    fn owe_function(&mut self, function: u8) {
+    fn add_function(&mut self, function: u8) {
         if !self.functions.contains(&function) {
             self.functions.push(function);
         }
     }
 
-    /// Could an answer of this shape be an owed one?
+    /// Could an answer of this shape be an outstanding one?
     pub fn is_ambiguous(&self, shape: Shape) -> bool {
         let usual = self.unproven && (self.usual.contains(&shape) || self.usual.len() == USUAL_MAX);
-        !shape.is_loopback() && (usual || self.owed.contains(&shape) || self.owed.len() == OWED_MAX)
+        !shape.is_loopback() && (usual || self.shapes.contains(&shape) || self.shapes.len() == OUTSTANDING_MAX)
     }
 
-    /// Is an answer of this shape owed?
-    fn owes(&self, shape: Shape) -> bool {
-        self.owed.contains(&shape)
+    /// Is a reply of this shape outstanding?
+    fn contains(&self, shape: Shape) -> bool {
+        self.shapes.contains(&shape)
     }
 
     /// Does the refusal of a loopback (exception 01, by devices that do not have it) prove as much as its echo?
@@ -74,19 +74,19 @@ impl Debt {
         !self.loopback
     }
 
-    /// How many shapes are owed.
+    /// How many shapes are outstanding.
     pub fn count(&self) -> usize {
-        self.owed.len()
+        self.shapes.len()
     }
 
     /// Nothing older can come any more.
     pub fn clear(&mut self) {
-        *self = Debt { usual: std::mem::take(&mut self.usual), ..Debt::default() };
+        *self = OutstandingReplies { usual: std::mem::take(&mut self.usual), ..OutstandingReplies::default() };
     }
 
-    /// Does the unit owe nothing?
+    /// Is nothing outstanding?
     pub fn is_clear(&self) -> bool {
-        self.owed.is_empty() && self.functions.is_empty() && !self.loopback && !self.unproven
+        self.shapes.is_empty() && self.functions.is_empty() && !self.loopback && !self.unproven
     }
 
     /// A read that brings the unit back into step: part of a block that is read anyway, with a count whose answer cannot
@@ -111,10 +111,10 @@ fn probes(block: &Block) -> impl Iterator<Item = [u8; 6]> {
     counts.map(move |count| Block { count, ..block.clone() }.request())
 }
 
-/// What all units of a line owe, and how late they have ever been. It outlives an opening: what was asked before a port
+/// Outstanding replies of all units of a line, and how late they have ever been. It outlives an opening: what was asked before a port
 /// was closed may be answered when it is open again. Times are spans since the line began.
 #[derive(Debug, Clone)]
-pub struct Debts {
+pub struct LineReplies {
     units: Vec<Unit>,
     /// How long an answer may take.
     timeout: Duration,
@@ -124,8 +124,8 @@ pub struct Debts {
 
 #[derive(Debug, Clone, Default)]
 struct Unit {
-    debt: Debt,
-    /// How late an owed answer has ever come, its timeout included.
+    outstanding: OutstandingReplies,
+    /// How late an outstanding reply has ever come, its timeout included.
     late_max: Duration,
     /// When it last failed to answer in time.
     failed_at: Option<Duration>,
@@ -134,83 +134,83 @@ struct Unit {
     /// Its last good answer, and whether that came again.
     answer: Vec<u8>,
     repeats: bool,
-    /// Owed shapes of which one has come late.
-    paid: Vec<Shape>,
-    /// What had not come, and since when it was owed, when it proved to be in step: from a unit that answers in order, it
+    /// Outstanding shapes of which one has come late.
+    arrived: Vec<Shape>,
+    /// What had not come, and since when it was outstanding, when it proved to be in step: from a unit that answers in order, it
     /// never comes.
     disproved: Vec<(Shape, Duration)>,
     /// It does not answer in order.
     overtakes: bool,
-    /// More than one answer of a shape may be under way: only patience clears what it owes.
+    /// More than one answer of a shape may be under way: only patience clears what is outstanding.
     is_unsure: bool,
 }
 
 impl Unit {
     fn in_step(&mut self) {
-        self.debt.clear();
-        self.paid.clear();
+        self.outstanding.clear();
+        self.arrived.clear();
         (self.failed_at, self.unasked_at, self.is_unsure) = (None, None, false);
     }
 
     /// It has given an answer that cannot have been an older one.
     fn prove(&mut self, patience: Duration, now: Duration) {
-        let (owed, paid) = (std::mem::take(&mut self.debt.owed), std::mem::take(&mut self.paid));
+        let (shapes, arrived) = (std::mem::take(&mut self.outstanding.shapes), std::mem::take(&mut self.arrived));
         let (failed_at, is_unsure) = (self.failed_at, self.is_unsure);
         self.in_step();
         let Some(failed_at) = failed_at else { return };
         if self.overtakes {
-            (self.debt.owed, self.failed_at, self.is_unsure) = (owed, Some(failed_at), is_unsure);
+            (self.outstanding.shapes, self.failed_at, self.is_unsure) = (shapes, Some(failed_at), is_unsure);
             return;
         }
         self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < patience);
-        let missing = owed.into_iter().filter(|shape| !paid.contains(shape)).map(|shape| (shape, failed_at));
-        self.disproved.extend(missing.take(OWED_MAX.saturating_sub(self.disproved.len())));
+        let missing = shapes.into_iter().filter(|shape| !arrived.contains(shape)).map(|shape| (shape, failed_at));
+        self.disproved.extend(missing.take(OUTSTANDING_MAX.saturating_sub(self.disproved.len())));
     }
 
-    /// An answer has come late. `true` if it shows that answers overtake each other: nothing of its shape is owed but what
+    /// An answer has come late. `true` if it shows that answers overtake each other: nothing of its shape is outstanding but what
     /// cannot come any more from a unit that answers in order. All of that may still come now.
     fn overtook(&mut self, message: &[u8], patience: Duration, now: Duration) -> bool {
         let fits = |shape: &&Shape| shape.fits(message);
-        if let Some(shape) = self.debt.owed.iter().find(fits).filter(|shape| !self.paid.contains(shape)) {
-            self.paid.push(*shape);
+        if let Some(shape) = self.outstanding.shapes.iter().find(fits).filter(|shape| !self.arrived.contains(shape)) {
+            self.arrived.push(*shape);
             return false;
         }
         self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < patience);
         let Some(place) = self.disproved.iter().position(|(shape, _)| shape.fits(message)) else { return false };
         self.disproved.swap_remove(place);
-        (self.overtakes, self.is_unsure) = (true, !self.disproved.is_empty() || !self.debt.owed.is_empty());
+        (self.overtakes, self.is_unsure) = (true, !self.disproved.is_empty() || !self.outstanding.shapes.is_empty());
         for (shape, failed_at) in std::mem::take(&mut self.disproved) {
-            self.debt.owe(shape);
+            self.outstanding.add(shape);
             self.failed_at = self.failed_at.max(Some(failed_at));
         }
         true
     }
 
-    /// It rests so long for each answer that it owes, where nothing can prove that it is in step.
+    /// It rests so long for each outstanding reply, where nothing can prove that it is in step.
     fn patience(&self, timeout: Duration) -> Duration {
         (2 * self.late_max).max(10 * timeout)
     }
 }
 
-impl Debts {
-    /// No unit owes anything. The numbers of loopbacks begin behind `seed`, which differs from process to process.
-    pub fn new(timeout: Duration, seed: u16) -> Debts {
-        Debts { units: vec![Unit::default(); 256], timeout, loopbacks: seed }
+impl LineReplies {
+    /// Nothing is outstanding. The numbers of loopbacks begin behind `seed`, which differs from process to process.
+    pub fn new(timeout: Duration, seed: u16) -> LineReplies {
+        LineReplies { units: vec![Unit::default(); 256], timeout, loopbacks: seed }
     }
 
     /// These blocks are asked for from now on; a unit that was asked for none before is unproven.
     pub fn expect(&mut self, blocks: &[Block]) {
         for (unit, known) in (0..).zip(&mut self.units) {
-            let debt = &mut known.debt;
-            let first = debt.usual.is_empty();
-            debt.usual.clear();
+            let outstanding = &mut known.outstanding;
+            let first = outstanding.usual.is_empty();
+            outstanding.usual.clear();
             for shape in blocks.iter().filter(|block| block.unit == unit).filter_map(|block| shape_of(&block.request()))
             {
-                if !debt.usual.contains(&shape) && debt.usual.len() < USUAL_MAX {
-                    debt.usual.push(shape);
+                if !outstanding.usual.contains(&shape) && outstanding.usual.len() < USUAL_MAX {
+                    outstanding.usual.push(shape);
                 }
             }
-            debt.unproven |= first && !debt.usual.is_empty();
+            outstanding.unproven |= first && !outstanding.usual.is_empty();
         }
     }
 
@@ -225,9 +225,9 @@ impl Debts {
             unit.prove(unit.patience(timeout), now);
         }
         answer.clone_into(&mut unit.answer);
-        let is_usual = shape_of(request).is_some_and(|shape| unit.debt.usual.contains(&shape));
+        let is_usual = shape_of(request).is_some_and(|shape| unit.outstanding.usual.contains(&shape));
         if is_usual && std::mem::take(&mut unit.repeats) {
-            unit.debt.unproven = true;
+            unit.outstanding.unproven = true;
             unit.unasked_at = Some(now);
         }
     }
@@ -237,16 +237,16 @@ impl Debts {
         let unit = &mut self.units[usize::from(unit)];
         if unit.answer == message {
             unit.repeats = true;
-            let usual = unit.debt.usual.iter().any(|shape| shape.fits(message));
+            let usual = unit.outstanding.usual.iter().any(|shape| shape.fits(message));
             if usual {
-                unit.debt.unproven = true;
+                unit.outstanding.unproven = true;
                 unit.unasked_at = Some(now);
             }
             return false;
         }
-        let was_in_step = unit.debt.is_clear() && !unit.debt.usual.is_empty();
+        let was_in_step = unit.outstanding.is_clear() && !unit.outstanding.usual.is_empty();
         if was_in_step || unit.unasked_at.is_some() {
-            unit.debt.unproven = true;
+            unit.outstanding.unproven = true;
             unit.unasked_at = Some(now);
         }
         was_in_step
@@ -254,8 +254,8 @@ impl Debts {
 
     /// Another master asks on this line: any unit may be answering it.
     pub fn distrust_all(&mut self) {
-        for unit in self.units.iter_mut().filter(|unit| !unit.debt.usual.is_empty()) {
-            unit.debt.unproven = true;
+        for unit in self.units.iter_mut().filter(|unit| !unit.outstanding.usual.is_empty()) {
+            unit.outstanding.unproven = true;
         }
     }
 
@@ -270,18 +270,18 @@ impl Debts {
         self.timeout = timeout;
     }
 
-    /// What a unit owes.
-    pub fn of(&self, unit: u8) -> &Debt {
-        &self.units[usize::from(unit)].debt
+    /// Outstanding replies of a unit.
+    pub fn of(&self, unit: u8) -> &OutstandingReplies {
+        &self.units[usize::from(unit)].outstanding
     }
 
-    /// Could the answer to this message be mistaken for one that its unit still owes?
+    /// Could the answer to this message be mistaken for an outstanding one?
     pub fn is_ambiguous(&self, message: &[u8]) -> bool {
         let Some(unit) = message.first() else { return false };
-        let debt = self.of(*unit);
+        let outstanding = self.of(*unit);
         match (shape_of(message), message.get(1)) {
-            (Some(shape), _) => debt.is_ambiguous(shape),
-            (None, Some(function)) => debt.unproven || debt.functions.contains(function),
+            (Some(shape), _) => outstanding.is_ambiguous(shape),
+            (None, Some(function)) => outstanding.unproven || outstanding.functions.contains(function),
             (None, None) => false,
         }
     }
@@ -298,8 +298,8 @@ impl Debts {
         let Some(unit) = message.first().map(|unit| &mut self.units[usize::from(*unit)]) else { return };
         let shape = shape_of(message);
         match (shape, message.get(1)) {
-            (Some(shape), _) => unit.debt.owe(shape),
-            (None, Some(function)) => unit.debt.owe_function(*function),
+            (Some(shape), _) => unit.outstanding.add(shape),
+            (None, Some(function)) => unit.outstanding.add_function(*function),
             (None, None) => {}
         }
         // Patience counts from the last request that may be answered late; a loopback cannot be mistaken.
@@ -308,14 +308,14 @@ impl Debts {
         }
     }
 
-    /// An answer of this unit came that was not waited for any more. `true` if it owed one.
+    /// An answer of this unit came that was not waited for any more. `true` if one was outstanding.
     pub fn came_late(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
         let timeout = self.timeout;
         let unit = &mut self.units[usize::from(unit)];
-        let Some(failed_at) = unit.failed_at.filter(|_| !unit.debt.is_clear()) else { return false };
+        let Some(failed_at) = unit.failed_at.filter(|_| !unit.outstanding.is_clear()) else { return false };
         unit.late_max = unit.late_max.max(now.saturating_sub(failed_at) + timeout);
         if unit.overtakes && !unit.is_unsure {
-            unit.debt.owed.retain(|shape| !shape.fits(message));
+            unit.outstanding.shapes.retain(|shape| !shape.fits(message));
         }
         true
     }
@@ -332,7 +332,7 @@ impl Debts {
     /// Can only time, or the owed answer, make sure that the answer to this message is no older one?
     pub fn must_wait(&self, message: &[u8]) -> bool {
         let Some(unit) = message.first().map(|unit| &self.units[usize::from(*unit)]) else { return false };
-        unit.overtakes && shape_of(message).is_some_and(|shape| unit.debt.owes(shape))
+        unit.overtakes && shape_of(message).is_some_and(|shape| unit.outstanding.contains(shape))
     }
 
     /// The next loopback of a unit, with a number of its own.
@@ -341,13 +341,13 @@ impl Debts {
         loopback(unit, self.loopbacks)
     }
 
-    /// For a unit that no probe can bring into step: how much longer it must rest before its debt may be forgotten,
-    /// `None` once it is forgotten. For each answer that it owes it rests twice as long as it has ever been late, ten
+    /// For a unit that no probe can bring into step: how much longer it must rest before its outstanding replies may be forgotten,
+    /// `None` once it is forgotten. For each outstanding reply it rests twice as long as it has ever been late, ten
     /// timeouts at the least: patience, not proof, and needed only for devices that do not answer a loopback at all.
     pub fn forget(&mut self, unit: u8, now: Duration) -> Option<Duration> {
         let timeout = self.timeout;
         let unit = &mut self.units[usize::from(unit)];
-        let rest = (unit.patience(timeout) * unit.debt.count().max(1) as u32).min(REST_MAX);
+        let rest = (unit.patience(timeout) * unit.outstanding.count().max(1) as u32).min(REST_MAX);
         let waited = unit.failed_at.map_or(rest, |failed_at| now.saturating_sub(failed_at));
         if waited < rest {
             return Some(rest - waited);

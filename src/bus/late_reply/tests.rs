@@ -1,0 +1,92 @@
+//! What a unit owes, and what proves that it owes nothing.
+
+use super::*;
+use crate::{
+    bus::plan,
+    plant::{def::LineId, fixture},
+};
+
+#[test]
+fn a_probe_is_never_of_an_owed_shape() {
+    let blocks = plan::blocks(&fixture::plant(), LineId(0), &plan::Holes::default());
+    let inputs = &blocks[0];
+    let mut outstanding = OutstandingReplies::default();
+    assert!(outstanding.is_clear());
+    let mut asked = Vec::new();
+    // Every probe in vain is owed too; each next one differs until the block has no more shapes to offer.
+    outstanding.add(shape_of(&inputs.request()).unwrap());
+    assert!(outstanding.is_ambiguous(shape_of(&inputs.request()).unwrap()));
+    while let Some(probe) = outstanding.probe([inputs].into_iter()) {
+        assert!(!asked.contains(&probe));
+        assert!(probe[5] < inputs.count as u8);
+        outstanding.add(shape_of(&probe).unwrap());
+        asked.push(probe);
+    }
+    assert_eq!(asked.len(), 7, "one to seven of eight registers");
+    outstanding.clear();
+    assert!(!outstanding.is_ambiguous(shape_of(&inputs.request()).unwrap()));
+}
+
+#[test]
+fn a_unit_that_owes_too_much_is_asked_nothing() {
+    let mut outstanding = OutstandingReplies::default();
+    for count in 1..=OUTSTANDING_MAX as u8 {
+        outstanding.add(shape_of(&[1, 3, 0, 0, 0, count]).unwrap());
+    }
+    assert!(outstanding.is_ambiguous(shape_of(&[1, 4, 0, 0, 0, 99]).unwrap()));
+}
+
+#[test]
+fn a_loopback_is_never_ambiguous_and_its_first_refusal_is_proof() {
+    let mut outstanding = OutstandingReplies::default();
+    let shape = |number| shape_of(&loopback(1, number)).unwrap();
+    assert!(outstanding.refusal_proves());
+    outstanding.add(shape(7));
+    assert!(!outstanding.is_clear() && !outstanding.refusal_proves());
+    assert!(!outstanding.is_ambiguous(shape(8)));
+    outstanding.clear();
+    assert!(outstanding.is_clear() && outstanding.refusal_proves());
+}
+
+#[test]
+fn writes_are_told_apart_by_their_echo() {
+    let mut outstanding = OutstandingReplies::default();
+    outstanding.add(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap());
+    assert!(!outstanding.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 6]).unwrap()));
+    assert!(outstanding.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap()));
+}
+
+#[test]
+fn a_unit_that_was_late_must_rest_longer() {
+    let s = Duration::from_secs;
+    let mut replies = LineReplies::new(s(1), 0);
+    let request = [1, 3, 0, 0, 0, 2];
+    assert_eq!(replies.forget(1, s(0)), None, "who owes nothing has nothing to forget");
+    replies.failed(&request, s(100));
+    assert!(replies.is_ambiguous(&request) && !replies.is_ambiguous(&[2, 3, 0, 0, 0, 2]));
+    assert_eq!(replies.forget(1, s(104)), Some(s(6)), "ten timeouts");
+    let answer = |unit| [unit, 3, 4, 0, 1, 0, 2];
+    assert!(replies.came_late(1, &answer(1), s(108)) && !replies.came_late(2, &answer(2), s(108)));
+    assert_eq!(replies.forget(1, s(110)), Some(s(8)), "twice the 9 s that it was late");
+    assert_eq!(replies.forget(1, s(118)), None);
+    assert!(!replies.is_ambiguous(&request));
+}
+
+#[test]
+fn a_unit_whose_answers_overtake_each_other_proves_nothing_by_a_later_one() {
+    let s = Duration::from_secs;
+    let mut replies = LineReplies::new(s(1), 0);
+    let (request, answer) = ([1, 3, 0, 0, 0, 2], [1, 3, 4, 0, 1, 0, 2]);
+    let (probe, probed) = ([1, 3, 0, 0, 0, 1], [1, 3, 2, 0, 1]);
+    replies.failed(&request, s(100));
+    replies.answered(&probe, &probed, true, s(101));
+    assert!(!replies.is_ambiguous(&request), "units are taken to answer in order");
+    assert!(replies.overtook(1, &answer, s(102)) && !replies.overtook(1, &answer, s(103)));
+    replies.failed(&request, s(200));
+    replies.answered(&probe, &probed, true, s(201));
+    assert!(replies.is_ambiguous(&request) && replies.must_wait(&request) && !replies.must_wait(&probe));
+    assert!(replies.came_late(1, &answer, s(202)));
+    assert!(!replies.is_ambiguous(&request), "what was owed has come");
+    replies.failed(&request, s(300));
+    assert_eq!((replies.forget(1, s(305)), replies.forget(1, s(310))), (Some(s(5)), None), "or it never comes");
+}
