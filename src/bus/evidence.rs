@@ -72,7 +72,7 @@ pub fn advice(fault: Fault) -> &'static str {
         Fault::WrongUnit { .. } | Fault::WrongFunction { .. } | Fault::WrongLength { .. } | Fault::WrongEcho => {
             "an answer to something else: raise the timeout of the line (c), look for a second master or one address used twice"
         }
-        Fault::OutOfStep => {
+        Fault::OutOfSync => {
             "look for a second master on the line, one address used twice, or a repeater that sends each answer again"
         }
         Fault::NotANumber => {

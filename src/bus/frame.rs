@@ -95,7 +95,7 @@ pub enum Mbap {
         /// End of the message in the buffer.
         end: usize,
     },
-    /// No MBAP header: the stream is out of step and must be closed.
+    /// No MBAP header: the stream is out of sync and must be closed.
     Broken,
 }
 
@@ -165,7 +165,7 @@ pub enum Unasked {
 }
 
 /// The whole good frames among bytes that nobody waits for, on lines without transaction ids.
-pub fn unasked(framing: Framing, bytes: &[u8]) -> Vec<Unasked> {
+pub fn on_unsolicited(framing: Framing, bytes: &[u8]) -> Vec<Unasked> {
     let judge = |message: &[u8]| match (answer_length(message), request_length(message)) {
         (Some(length), _) if length == message.len() => Some(Unasked::Answer(message.to_vec())),
         (_, Some(length)) if length == message.len() => Some(Unasked::Request(message.to_vec())),

@@ -21,7 +21,7 @@ use super::{
 /// Most answers that are remembered as outstanding; with more, the unit is not polled until it has paused.
 const OUTSTANDING_MAX: usize = 16;
 
-/// Usual shapes that are remembered of a unit; one with more is brought into step by a loopback.
+/// Usual shapes that are remembered of a unit; one with more is resynchronised by a loopback.
 const USUAL_MAX: usize = 64;
 
 /// A unit rests no longer than this, however late it seems to have been.
@@ -89,7 +89,7 @@ impl OutstandingReplies {
         self.shapes.is_empty() && self.functions.is_empty() && !self.loopback && !self.unproven
     }
 
-    /// A read that brings the unit back into step: part of a block that is read anyway, with a count whose answer cannot
+    /// A read that resynchronises the unit: part of a block that is read anyway, with a count whose answer cannot
     /// be mistaken. `None`: there is none, see [`loopback`].
     pub fn probe<'a>(&self, blocks: impl Iterator<Item = &'a Block>) -> Option<[u8; 6]> {
         blocks.flat_map(probes).find(|request| shape_of(request).is_some_and(|shape| !self.is_ambiguous(shape)))
@@ -129,36 +129,36 @@ struct Unit {
     late_max: Duration,
     /// When it last failed to answer in time.
     failed_at: Option<Duration>,
-    /// When it last sent what it was not asked for, unless it has been brought into step since.
-    unasked_at: Option<Duration>,
+    /// When it last sent what it was not asked for, unless it has been resynchronised since.
+    unsolicited_at: Option<Duration>,
     /// Its last good answer, and whether that came again.
     answer: Vec<u8>,
     repeats: bool,
     /// Outstanding shapes of which one has come late.
     arrived: Vec<Shape>,
-    /// What had not come, and since when it was outstanding, when it proved to be in step: from a unit that answers in order, it
+    /// What had not come, and since when it was outstanding, when it proved to be in sync: from a unit that answers in order, it
     /// never comes.
     disproved: Vec<(Shape, Duration)>,
     /// It does not answer in order.
-    overtakes: bool,
+    reorders: bool,
     /// More than one answer of a shape may be under way: only patience clears what is outstanding.
     is_unsure: bool,
 }
 
 impl Unit {
-    fn in_step(&mut self) {
+    fn resynchronise(&mut self) {
         self.outstanding.clear();
         self.arrived.clear();
-        (self.failed_at, self.unasked_at, self.is_unsure) = (None, None, false);
+        (self.failed_at, self.unsolicited_at, self.is_unsure) = (None, None, false);
     }
 
     /// It has given an answer that cannot have been an older one.
     fn prove(&mut self, patience: Duration, now: Duration) {
         let (shapes, arrived) = (std::mem::take(&mut self.outstanding.shapes), std::mem::take(&mut self.arrived));
         let (failed_at, is_unsure) = (self.failed_at, self.is_unsure);
-        self.in_step();
+        self.resynchronise();
         let Some(failed_at) = failed_at else { return };
-        if self.overtakes {
+        if self.reorders {
             (self.outstanding.shapes, self.failed_at, self.is_unsure) = (shapes, Some(failed_at), is_unsure);
             return;
         }
@@ -169,7 +169,7 @@ impl Unit {
 
     /// An answer has come late. `true` if it shows that answers overtake each other: nothing of its shape is outstanding but what
     /// cannot come any more from a unit that answers in order. All of that may still come now.
-    fn overtook(&mut self, message: &[u8], patience: Duration, now: Duration) -> bool {
+    fn detect_reordering(&mut self, message: &[u8], patience: Duration, now: Duration) -> bool {
         let fits = |shape: &&Shape| shape.fits(message);
         if let Some(shape) = self.outstanding.shapes.iter().find(fits).filter(|shape| !self.arrived.contains(shape)) {
             self.arrived.push(*shape);
@@ -178,7 +178,7 @@ impl Unit {
         self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < patience);
         let Some(place) = self.disproved.iter().position(|(shape, _)| shape.fits(message)) else { return false };
         self.disproved.swap_remove(place);
-        (self.overtakes, self.is_unsure) = (true, !self.disproved.is_empty() || !self.outstanding.shapes.is_empty());
+        (self.reorders, self.is_unsure) = (true, !self.disproved.is_empty() || !self.outstanding.shapes.is_empty());
         for (shape, failed_at) in std::mem::take(&mut self.disproved) {
             self.outstanding.add(shape);
             self.failed_at = self.failed_at.max(Some(failed_at));
@@ -186,7 +186,7 @@ impl Unit {
         true
     }
 
-    /// It rests so long for each outstanding reply, where nothing can prove that it is in step.
+    /// It rests so long for each outstanding reply, where nothing can prove that it is in sync.
     fn patience(&self, timeout: Duration) -> Duration {
         (2 * self.late_max).max(10 * timeout)
     }
@@ -228,32 +228,32 @@ impl LineReplies {
         let is_usual = shape_of(request).is_some_and(|shape| unit.outstanding.usual.contains(&shape));
         if is_usual && std::mem::take(&mut unit.repeats) {
             unit.outstanding.unproven = true;
-            unit.unasked_at = Some(now);
+            unit.unsolicited_at = Some(now);
         }
     }
 
     /// An unsolicited good frame of this unit came. `true` if that puts what was read of it into doubt.
-    pub fn unasked(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
+    pub fn on_unsolicited(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
         let unit = &mut self.units[usize::from(unit)];
         if unit.answer == message {
             unit.repeats = true;
             let usual = unit.outstanding.usual.iter().any(|shape| shape.fits(message));
             if usual {
                 unit.outstanding.unproven = true;
-                unit.unasked_at = Some(now);
+                unit.unsolicited_at = Some(now);
             }
             return false;
         }
-        let was_in_step = unit.outstanding.is_clear() && !unit.outstanding.usual.is_empty();
-        if was_in_step || unit.unasked_at.is_some() {
+        let was_in_sync = unit.outstanding.is_clear() && !unit.outstanding.usual.is_empty();
+        if was_in_sync || unit.unsolicited_at.is_some() {
             unit.outstanding.unproven = true;
-            unit.unasked_at = Some(now);
+            unit.unsolicited_at = Some(now);
         }
-        was_in_step
+        was_in_sync
     }
 
     /// Another master asks on this line: any unit may be answering it.
-    pub fn distrust_all(&mut self) {
+    pub fn mark_all_unproven(&mut self) {
         for unit in self.units.iter_mut().filter(|unit| !unit.outstanding.usual.is_empty()) {
             unit.outstanding.unproven = true;
         }
@@ -261,8 +261,8 @@ impl LineReplies {
 
     /// Has this unit sent within one timeout what it was not asked for? Nothing that it sends now proves anything.
     pub fn is_unsettled(&self, unit: u8, now: Duration) -> bool {
-        let unasked_at = self.units[usize::from(unit)].unasked_at;
-        unasked_at.is_some_and(|at| now.saturating_sub(at) < self.timeout)
+        let unsolicited_at = self.units[usize::from(unit)].unsolicited_at;
+        unsolicited_at.is_some_and(|at| now.saturating_sub(at) < self.timeout)
     }
 
     /// Other settings: an answer may take this long from now on.
@@ -309,30 +309,30 @@ impl LineReplies {
     }
 
     /// An answer of this unit came that was not waited for any more. `true` if one was outstanding.
-    pub fn came_late(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
+    pub fn on_late_reply(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
         let timeout = self.timeout;
         let unit = &mut self.units[usize::from(unit)];
         let Some(failed_at) = unit.failed_at.filter(|_| !unit.outstanding.is_clear()) else { return false };
         unit.late_max = unit.late_max.max(now.saturating_sub(failed_at) + timeout);
-        if unit.overtakes && !unit.is_unsure {
+        if unit.reorders && !unit.is_unsure {
             unit.outstanding.shapes.retain(|shape| !shape.fits(message));
         }
         true
     }
 
     /// An answer of this unit came that was not waited for any more. `true` if it shows for the first time that its answers overtake
-    /// each other: what was read of it while it seemed to be in step is in doubt.
-    pub fn overtook(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
+    /// each other: what was read of it while it seemed to be in sync is in doubt.
+    pub fn detect_reordering(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
         let timeout = self.timeout;
         let unit = &mut self.units[usize::from(unit)];
         let is_repeated = unit.answer == message;
-        !unit.overtakes && !is_repeated && unit.overtook(message, unit.patience(timeout), now)
+        !unit.reorders && !is_repeated && unit.detect_reordering(message, unit.patience(timeout), now)
     }
 
     /// Can only time, or the owed answer, make sure that the answer to this message is no older one?
     pub fn must_wait(&self, message: &[u8]) -> bool {
         let Some(unit) = message.first().map(|unit| &self.units[usize::from(*unit)]) else { return false };
-        unit.overtakes && shape_of(message).is_some_and(|shape| unit.outstanding.contains(shape))
+        unit.reorders && shape_of(message).is_some_and(|shape| unit.outstanding.contains(shape))
     }
 
     /// The next loopback of a unit, with a number of its own.
@@ -341,7 +341,7 @@ impl LineReplies {
         loopback(unit, self.loopbacks)
     }
 
-    /// For a unit that no probe can bring into step: how much longer it must rest before its outstanding replies may be forgotten,
+    /// For a unit that no probe can resynchronise: how much longer it must rest before its outstanding replies may be forgotten,
     /// `None` once it is forgotten. For each outstanding reply it rests twice as long as it has ever been late, ten
     /// timeouts at the least: patience, not proof, and needed only for devices that do not answer a loopback at all.
     pub fn forget(&mut self, unit: u8, now: Duration) -> Option<Duration> {
@@ -352,7 +352,7 @@ impl LineReplies {
         if waited < rest {
             return Some(rest - waited);
         }
-        unit.in_step();
+        unit.resynchronise();
         None
     }
 }

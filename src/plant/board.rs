@@ -319,7 +319,7 @@ fn judge(fault: Fault) -> Verdict {
         | Fault::WrongFunction { .. }
         | Fault::WrongLength { .. }
         | Fault::WrongEcho
-        | Fault::OutOfStep => Verdict::Doubt(Cause::Corrupt),
+        | Fault::OutOfSync => Verdict::Doubt(Cause::Corrupt),
         // 05 acknowledge and 06 busy pass; any other exception means that there is no such value.
         Fault::Exception(ExceptionCode(0x05 | 0x06)) => Verdict::Doubt(Cause::Exception),
         Fault::Exception(_) => Verdict::Gone(Cause::Exception),

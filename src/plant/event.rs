@@ -109,7 +109,7 @@ pub enum Event {
 pub enum WriteResult {
     /// The device accepted it; then it was read back: this raw number.
     ReadBack(f64),
-    /// No valid answer; read once the unit was in step again, the device holds this raw number.
+    /// No valid answer; read once the unit was in sync again, the device holds this raw number.
     Held(f64),
     /// The device accepted it, but the read-back failed.
     NotRead(Fault),
@@ -187,7 +187,7 @@ pub enum Fault {
     WrongEcho,
     /// Unsolicited frames came: the answer may be one of them.
     #[error("frames that were not asked for: answers cannot be trusted")]
-    OutOfStep,
+    OutOfSync,
     /// The answer is good, but the registers hold no number of the tag's type (a BCD digit above 9, NaN).
     #[error("the registers hold no number of this type")]
     NotANumber,
@@ -215,7 +215,7 @@ impl Fault {
             | Fault::WrongLength { .. }
             | Fault::WrongEcho => true,
             Fault::Timeout
-            | Fault::OutOfStep
+            | Fault::OutOfSync
             | Fault::NotANumber
             | Fault::Exception(_)
             | Fault::NotConnected

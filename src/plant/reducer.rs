@@ -348,7 +348,7 @@ impl Plant {
             | Fault::WrongFunction { .. }
             | Fault::WrongLength { .. }
             | Fault::WrongEcho
-            | Fault::OutOfStep => {
+            | Fault::OutOfSync => {
                 status.state = match status.state {
                     DeviceState::Down { since } => DeviceState::Down { since },
                     DeviceState::Failing(n) => DeviceState::Failing(n.saturating_add(1)),

@@ -55,7 +55,7 @@ impl Tally {
             Fault::Truncated { .. } | Fault::WrongLength { .. } | Fault::NotHex(_) | Fault::NotANumber => {
                 self.length += 1;
             }
-            Fault::WrongUnit { .. } | Fault::WrongFunction { .. } | Fault::WrongEcho | Fault::OutOfStep => {
+            Fault::WrongUnit { .. } | Fault::WrongFunction { .. } | Fault::WrongEcho | Fault::OutOfSync => {
                 self.foreign += 1
             }
             Fault::Exception(code) => match self.exceptions.iter_mut().find(|(known, _)| *known == code) {

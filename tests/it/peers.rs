@@ -253,7 +253,7 @@ fn text_in_registers_is_read() {
     check(&plant_of(text("TEXT", "string(4)", "BADC")), &[("WELL.TEXT", "BACA good")]);
 }
 
-/// Over TCP half an answer puts the whole stream out of step.
+/// Over TCP half an answer puts the whole stream out of sync.
 #[test]
 fn half_an_answer_over_tcp_is_never_shown_as_a_value() {
     let Some(python) = python() else { return };

@@ -162,7 +162,7 @@ impl Link {
         };
         // Something unsolicited came meanwhile: this may be unsolicited too.
         if proof && gathered.answer.is_ok() && self.wire.replies.is_ambiguous(message) {
-            gathered.answer = Err(Fault::OutOfStep);
+            gathered.answer = Err(Fault::OutOfSync);
         }
         self.asked = None;
         self.busy += started.elapsed();
@@ -282,7 +282,7 @@ impl Link {
         self.wire.replies.of(unit)
     }
 
-    /// Brings a unit into step by a loopback, where no read can: after it nothing older can come any more.
+    /// Resynchronises a unit by a loopback, where no read can: after it nothing older can come any more.
     pub async fn loopback(&mut self, unit: u8) -> Result<(), Trouble> {
         let proves = self.outstanding(unit).refusal_proves();
         let loopback = self.wire.replies.next_loopback(unit);
@@ -294,7 +294,7 @@ impl Link {
                 }
                 Ok(())
             }
-            // It may be the answer to an earlier loopback: the unit is alive, but not in step.
+            // It may be the answer to an earlier loopback: the unit is alive, but not in sync.
             Err(Trouble::Fault(Fault::Exception(_))) => Err(Fault::Timeout.into()),
             Err(trouble) => Err(trouble),
         }
@@ -359,9 +359,9 @@ impl Link {
         self.wire.replies.expect(blocks);
     }
 
-    /// See [`Wire::take_unasked`].
-    pub fn take_unasked(&mut self) -> Vec<u8> {
-        self.wire.take_unasked()
+    /// See [`Wire::take_unsolicited`].
+    pub fn take_unsolicited(&mut self) -> Vec<u8> {
+        self.wire.take_unsolicited()
     }
 
     /// See [`Wire::take_late`].
@@ -423,7 +423,7 @@ impl Link {
             | Fault::WrongFunction { .. }
             | Fault::WrongLength { .. }
             | Fault::WrongEcho
-            | Fault::OutOfStep
+            | Fault::OutOfSync
             | Fault::NotANumber
             | Fault::NotConnected
             | Fault::Resting => self.wire.counters.corrupt += 1,

@@ -299,7 +299,7 @@ impl Task<'_> {
         Ok(())
     }
 
-    /// Nothing is due: drops what comes unasked until something is.
+    /// Nothing is due: drops what comes on_unsolicited until something is.
     async fn listen(&mut self, link: &mut Link, schedule: &mut Schedule, until: Timestamp) -> Turn {
         let request = tokio::select! {
             // What comes at one moment is taken in this order, so that a rehearsal ends as the one before.
@@ -384,11 +384,11 @@ impl Task<'_> {
     /// What was read of a unit that sends what it was not asked for may be such a frame itself.
     async fn tell_doubts(&mut self, link: &mut Link) -> Result<(), Ended> {
         let (def, line) = (self.def.clone(), self.line);
-        for unit in link.take_unasked() {
+        for unit in link.take_unsolicited() {
             for device in def.devices.iter().filter(|device| device.line == line && device.unit == unit) {
                 tracing::warn!(device = device.name, "unsolicited frames: its values are in doubt");
                 let tags = def.tags_of(device.id).map(|tag| tag.id).collect();
-                self.tell_failed(self.clock.now(), device.id, tags, Fault::OutOfStep, None).await?;
+                self.tell_failed(self.clock.now(), device.id, tags, Fault::OutOfSync, None).await?;
             }
         }
         Ok(())

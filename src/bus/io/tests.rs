@@ -46,7 +46,7 @@ async fn poll(
             Event::Read { .. } => good += 1,
             Event::Failed { fault, .. } if fault != Fault::Resting => failed += 1,
             Event::Line { state: LineState::Waiting { .. }, .. } => {
-                // A TCP stream out of step is closed; the gateway takes the next connection.
+                // A TCP stream out of sync is closed; the gateway takes the next connection.
                 line.plug(mode, |_, _| SlaveAction::Answer);
             }
             _ => {}
@@ -67,9 +67,9 @@ async fn a_late_reply_never_lands_in_another_tag() {
     }
 }
 
-/// The gateway that answers everything in its order, 40 ms each, one answer 700 ms late: back in step within one poll.
+/// The gateway that answers everything in its order, 40 ms each, one answer 700 ms late: back in sync within one poll.
 #[tokio::test(start_paused = true)]
-async fn an_in_order_gateway_is_in_step_again_within_one_poll() {
+async fn an_in_order_gateway_is_in_sync_again_within_one_poll() {
     for mode in Mode::ALL {
         let script = |number, _: &[u8]| SlaveAction::Late(if number == 3 { 700 * MS } else { 40 * MS });
         let (good, failed) = poll(mode, 100, script).await;
@@ -91,7 +91,7 @@ async fn an_answer_before_bytes_that_are_no_header_is_refused() {
             Event::Line { state: LineState::Waiting { .. }, .. } => Some(false),
             _ => None,
         };
-        assert!(!line.until(&def, read).await, "{mode:?}: a value of a stream that is out of step");
+        assert!(!line.until(&def, read).await, "{mode:?}: a value of a stream that is out of sync");
     }
 }
 
@@ -488,7 +488,7 @@ async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
         line.requests.send(request).await.expect("the line runs");
     }
     for (id, expect) in
-        // Read once the unit is in step: what the device holds, not what an answer to another write says.
+        // Read once the unit is in sync: what the device holds, not what an answer to another write says.
         [(1, WriteResult::Held(10.0)), (2, WriteResult::Held(11.0))]
     {
         let result = line
@@ -610,7 +610,7 @@ async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
     line.until(&def, holds).await;
 }
 
-/// A try that was not even sent, because the unit is out of step, is not made again at once and for ever.
+/// A try that was not even sent, because the unit is out of sync, is not made again at once and for ever.
 #[tokio::test(start_paused = true)]
 async fn a_silent_unit_that_is_out_of_step_is_read_again() {
     let script = |number, _: &[u8]| match number {

@@ -81,7 +81,7 @@ pub struct Wire {
     /// Units whose answers came late since this was last taken.
     late: Vec<u8>,
     /// Units that sent since then what they were not asked for, though nothing was outstanding.
-    unasked: Vec<u8>,
+    on_unsolicited: Vec<u8>,
     /// Totals of the line; `utilisation`, `opens` and `missed` are the task's.
     pub counters: LineCounters,
 }
@@ -116,7 +116,7 @@ impl Wire {
             idle: clock.real_span(silence).max(line.idle),
             frames: Vec::new(),
             late: Vec::new(),
-            unasked: Vec::new(),
+            on_unsolicited: Vec::new(),
             counters,
         }
     }
@@ -272,23 +272,23 @@ impl Wire {
         tracing::debug!(bytes = %frame::hex(bytes), "stale bytes dropped");
         let mut late = false;
         // Only a whole good frame tells who was late: chance bytes name anybody.
-        for unasked in frame::unasked(self.framing, bytes) {
+        for on_unsolicited in frame::on_unsolicited(self.framing, bytes) {
             let age = self.age();
-            let (Unasked::Answer(message) | Unasked::Request(message)) = &unasked;
+            let (Unasked::Answer(message) | Unasked::Request(message)) = &on_unsolicited;
             let Some(unit) = message.first().copied() else { continue };
-            let asks = matches!(unasked, Unasked::Request(_));
-            let overtook = !asks && self.replies.overtook(unit, message, age);
-            let was_outstanding = !asks && !overtook && self.replies.came_late(unit, message, age);
+            let asks = matches!(on_unsolicited, Unasked::Request(_));
+            let detect_reordering = !asks && self.replies.detect_reordering(unit, message, age);
+            let was_outstanding = !asks && !detect_reordering && self.replies.on_late_reply(unit, message, age);
             if was_outstanding {
                 late = true;
                 self.counters.late += 1;
                 self.late.push(unit);
             }
-            if overtook || (!was_outstanding && self.replies.unasked(unit, message, age)) {
-                self.unasked.push(unit);
+            if detect_reordering || (!was_outstanding && self.replies.on_unsolicited(unit, message, age)) {
+                self.on_unsolicited.push(unit);
             }
             if asks {
-                self.replies.distrust_all();
+                self.replies.mark_all_unproven();
             }
         }
         self.record(false, bytes.into(), Cow::Borrowed(if late { "late, dropped" } else { "stale, dropped" }));
@@ -319,8 +319,8 @@ impl Wire {
     }
 
     /// The units that have sent what they were not asked for since this was last asked.
-    pub fn take_unasked(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.unasked)
+    pub fn take_unsolicited(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.on_unsolicited)
     }
 
     async fn wait_for_silence(&mut self) {
@@ -363,7 +363,7 @@ impl Wire {
         match self.framing {
             Framing::Mbap => false,
             Framing::Ascii => ascii::open_frame(&self.stray).is_some(),
-            Framing::Rtu => 1 < self.stray.len() && frame::unasked(self.framing, &self.stray).is_empty(),
+            Framing::Rtu => 1 < self.stray.len() && frame::on_unsolicited(self.framing, &self.stray).is_empty(),
         }
     }
 }

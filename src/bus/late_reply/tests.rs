@@ -66,7 +66,7 @@ fn a_unit_that_was_late_must_rest_longer() {
     assert!(replies.is_ambiguous(&request) && !replies.is_ambiguous(&[2, 3, 0, 0, 0, 2]));
     assert_eq!(replies.forget(1, s(104)), Some(s(6)), "ten timeouts");
     let answer = |unit| [unit, 3, 4, 0, 1, 0, 2];
-    assert!(replies.came_late(1, &answer(1), s(108)) && !replies.came_late(2, &answer(2), s(108)));
+    assert!(replies.on_late_reply(1, &answer(1), s(108)) && !replies.on_late_reply(2, &answer(2), s(108)));
     assert_eq!(replies.forget(1, s(110)), Some(s(8)), "twice the 9 s that it was late");
     assert_eq!(replies.forget(1, s(118)), None);
     assert!(!replies.is_ambiguous(&request));
@@ -81,11 +81,11 @@ fn a_unit_whose_answers_overtake_each_other_proves_nothing_by_a_later_one() {
     replies.failed(&request, s(100));
     replies.answered(&probe, &probed, true, s(101));
     assert!(!replies.is_ambiguous(&request), "units are taken to answer in order");
-    assert!(replies.overtook(1, &answer, s(102)) && !replies.overtook(1, &answer, s(103)));
+    assert!(replies.detect_reordering(1, &answer, s(102)) && !replies.detect_reordering(1, &answer, s(103)));
     replies.failed(&request, s(200));
     replies.answered(&probe, &probed, true, s(201));
     assert!(replies.is_ambiguous(&request) && replies.must_wait(&request) && !replies.must_wait(&probe));
-    assert!(replies.came_late(1, &answer, s(202)));
+    assert!(replies.on_late_reply(1, &answer, s(202)));
     assert!(!replies.is_ambiguous(&request), "what was owed has come");
     replies.failed(&request, s(300));
     assert_eq!((replies.forget(1, s(305)), replies.forget(1, s(310))), (Some(s(5)), None), "or it never comes");

@@ -211,7 +211,7 @@ impl Link {
         }
         let bytes = std::mem::take(&mut self.transactions.outbox);
         if std::mem::replace(&mut self.transactions.sending, true) {
-            return Err(Trouble::Gone("a request was cut short, the stream is out of step".into()));
+            return Err(Trouble::Gone("a request was cut short, the stream is out of sync".into()));
         }
         let sent_at = self.wire.put(&bytes).await?;
         self.transactions.sending = false;
@@ -235,7 +235,7 @@ impl Link {
         Ok(())
     }
 
-    /// Takes what comes unasked; returns when a request has ended.
+    /// Takes what comes on_unsolicited; returns when a request has ended.
     pub(super) async fn idle_mbap(&mut self) -> Result<(), Trouble> {
         while self.transactions.ended.is_empty() {
             self.collect(Instant::now() + LOOK_AGAIN).await?;
@@ -329,7 +329,7 @@ impl Link {
         if !expired.is_empty() && self.transactions.is_cut_short() {
             self.wire.record(false, self.transactions.inbox[..].into(), Cow::Borrowed("cut short"));
             // The rest may come later and would stand before the next header.
-            return Err(Trouble::Gone("an answer was cut short, the stream is out of step".into()));
+            return Err(Trouble::Gone("an answer was cut short, the stream is out of sync".into()));
         }
         for request in expired {
             if self.transactions.silence_at <= request.sent_at {
@@ -348,7 +348,7 @@ impl Link {
         let (mut bytes, mut start, now) = (std::mem::take(&mut self.transactions.inbox), 0, Instant::now());
         if frame::is_out_of_step(&bytes) {
             self.wire.record(false, bytes.into(), Cow::Borrowed("no MBAP header"));
-            return Err(Trouble::Gone("the stream is out of step".into()));
+            return Err(Trouble::Gone("the stream is out of sync".into()));
         }
         while let Mbap::Whole { transaction, end } = frame::mbap(&bytes[start..]) {
             let frame = &bytes[start..start + end];

@@ -1,4 +1,4 @@
-//! Writes whose fate is not known: what the device holds is read as soon as the unit is in step, never written again.
+//! Writes whose fate is not known: what the device holds is read as soon as the unit is in sync, never written again.
 
 use std::time::Duration;
 

@@ -154,7 +154,7 @@ impl Task<'_> {
                 }
                 self.tell_failed(at, block.device, block.tags.to_vec(), fault, exchange).await?;
                 // It answers, and is asked again in its turn.
-                if fault == Fault::OutOfStep {
+                if fault == Fault::OutOfSync {
                     return Ok(());
                 }
                 if schedule.failed(block.device, began, took, at) {
@@ -168,7 +168,7 @@ impl Task<'_> {
         }
     }
 
-    /// Reads a block once the unit is in step. `None`: a stop has come, and what was on the wire is given up for it.
+    /// Reads a block once the unit is in sync. `None`: a stop has come, and what was on the wire is given up for it.
     pub(super) async fn read_unless_stopped(
         &mut self,
         link: &mut Link,
@@ -179,7 +179,7 @@ impl Task<'_> {
         let read = if self.requests.stop_waits() {
             None
         } else {
-            self.requests.unless_stopped(read_in_step(&self.blocks, link, block, &mut cured)).await
+            self.requests.unless_stopped(read_in_sync(&self.blocks, link, block, &mut cured)).await
         };
         // A retry that cures it must not hide it.
         if let Some(fault) = cured {
@@ -237,7 +237,7 @@ impl Task<'_> {
 
 /// What came in between may have shown that the unit sends what it was not asked for.
 fn proven(link: &Link, block: &Block) -> Result<(), Trouble> {
-    if link.is_ambiguous(&block.request()) { Err(Fault::OutOfStep.into()) } else { Ok(()) }
+    if link.is_ambiguous(&block.request()) { Err(Fault::OutOfSync.into()) } else { Ok(()) }
 }
 
 /// What a block read gave: bits or registers, the first at the block's address.
@@ -253,15 +253,15 @@ pub(super) fn span(from: Timestamp, to: Timestamp) -> Duration {
 
 /// Makes sure that the answer to a block cannot be mistaken for an outstanding one: by a read of another shape,
 /// part of this block or of one of `blocks`, if there is one, else by a loopback, else by patience.
-async fn bring_into_step(blocks: &[Block], link: &mut Link, block: &Block) -> Result<(), Trouble> {
+async fn resynchronise(blocks: &[Block], link: &mut Link, block: &Block) -> Result<(), Trouble> {
     if !link.is_ambiguous(&block.request()) {
         return Ok(());
     }
     if link.is_unsettled(block.unit) {
-        return Err(Fault::OutOfStep.into());
+        return Err(Fault::OutOfSync.into());
     }
     if link.must_wait(&block.request()) {
-        return if link.forget_outstanding(block.unit).is_none() { Ok(()) } else { Err(Fault::OutOfStep.into()) };
+        return if link.forget_outstanding(block.unit).is_none() { Ok(()) } else { Err(Fault::OutOfSync.into()) };
     }
     let own = std::iter::once(block);
     let others = blocks.iter().filter(|other| other.device == block.device && *other != block);
@@ -280,19 +280,19 @@ async fn bring_into_step(blocks: &[Block], link: &mut Link, block: &Block) -> Re
     }
 }
 
-/// Reads a block from a unit that is in step. A `spoiled` answer is asked for once more; it counts as outstanding, so the unit is
-/// brought into step before.
-async fn read_in_step(
+/// Reads a block from a unit that is in sync. A `spoiled` answer is asked for once more; it counts as outstanding, so the unit is
+/// resynchronised before.
+async fn read_in_sync(
     blocks: &[Block],
     link: &mut Link,
     block: &Block,
     spoiled: &mut Option<Fault>,
 ) -> Result<Answer, Trouble> {
-    bring_into_step(blocks, link, block).await?;
+    resynchronise(blocks, link, block).await?;
     match read(link, block).await {
         Err(Trouble::Fault(fault)) if fault.is_corrupt() => {
             *spoiled = Some(fault);
-            bring_into_step(blocks, link, block).await?;
+            resynchronise(blocks, link, block).await?;
             let second = read(link, block).await;
             if let Some(last) = &mut link.last {
                 Arc::make_mut(last).tries = 2;

@@ -37,10 +37,10 @@ impl Task<'_> {
         let Some(came) = self.step_unless_cut(link, &step, false).await? else { return Ok(Ok(())) };
         match (came, &mut self.job) {
             (Ok(came), Some(job)) => {
-                let in_step = stays_in_step(link.framing(), &step.ask, &came);
+                let in_sync = stays_in_sync(link.framing(), &step.ask, &came);
                 job.take(came);
                 self.tell_test().await?;
-                Ok(if in_step { Ok(()) } else { Err(Leave::Reopen) })
+                Ok(if in_sync { Ok(()) } else { Err(Leave::Reopen) })
             }
             (Err(Trouble::Gone(why)), _) => Ok(Err(Leave::Lost(why))),
             (Ok(_), None) | (Err(Trouble::Fault(_)), _) => Ok(Ok(())),
@@ -170,8 +170,8 @@ impl Task<'_> {
 }
 
 /// Over Modbus TCP bytes that are no whole frame would be taken together with the next request, and an answer that is still
-/// to come could carry the transaction of a later one: then only a new connection is in step.
-fn stays_in_step(framing: Framing, ask: &Ask, came: &Came) -> bool {
+/// to come could carry the transaction of a later one: then only a new connection is in sync.
+fn stays_in_sync(framing: Framing, ask: &Ask, came: &Came) -> bool {
     let whole = |bytes: &[u8]| matches!(frame::mbap(bytes), Mbap::Whole { end, .. } if end == bytes.len());
     match (framing, ask, came) {
         (Framing::Mbap, Ask::Raw(sent), Came::Bytes(received, _)) => whole(sent) && whole(received),

@@ -145,7 +145,7 @@ async fn an_unasked_frame_puts_the_values_of_its_unit_in_doubt() {
                 break;
             }
             match line.next(&def).await {
-                Event::Failed { device, tags, fault: Fault::OutOfStep, .. } => {
+                Event::Failed { device, tags, fault: Fault::OutOfSync, .. } => {
                     doubted = Some((device.0, tags.len()));
                     good = 0;
                 }

@@ -61,8 +61,8 @@ async fn nonsense_is_sent_and_nonsense_is_told() {
             .await;
         let told = |found: &Finding| matches!(found, Finding::Bytes { bytes, .. } if bytes.ends_with(&[0, 9]));
         match mode {
-            // The poll before it was answered by nonsense too: the stream is out of step, and the test with it.
-            Mode::Tcp => assert_eq!(run.state, ToolState::Failed("the stream is out of step".into())),
+            // The poll before it was answered by nonsense too: the stream is out of sync, and the test with it.
+            Mode::Tcp => assert_eq!(run.state, ToolState::Failed("the stream is out of sync".into())),
             _ => assert!(run.findings.iter().any(told), "{mode:?}: {run:?}"),
         }
     }

@@ -355,7 +355,7 @@ fn of_device(cx: &ViewContext, line: &LineDef, report: &LineReport, device: &Dev
         | Fault::WrongFunction { .. }
         | Fault::WrongLength { .. }
         | Fault::WrongEcho
-        | Fault::OutOfStep => "is there another master, or a unit number twice?".to_owned(),
+        | Fault::OutOfSync => "is there another master, or a unit number twice?".to_owned(),
         Fault::NotANumber | Fault::NotConnected | Fault::Resting => String::new(),
     };
     worries.push(format!("{fault} at {when}: {advice}").trim_end_matches(": ").to_owned());
