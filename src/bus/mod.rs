@@ -17,13 +17,13 @@
 //! | [`books`] | what is counted |
 //! | [`tool`] | the steps of a test of the line |
 //! | [`explain`], [`names`], [`evidence`] | frames in words |
-//! | [`typed`], [`complaint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
+//! | [`typed`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
 
 pub mod ascii;
 pub mod frame;
 pub mod gather;
 pub mod names;
-pub mod complaint;
+pub mod request_lint;
 pub mod explain;
 pub mod evidence;
 pub mod typed;

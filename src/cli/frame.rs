@@ -5,9 +5,9 @@ use std::io::{BufRead, IsTerminal};
 use crate::{
     bus::{
         ascii,
-        complaint::check_request,
         explain::{self, Direction, Explained},
         frame::{crc16, hex},
+        request_lint::check_request,
         typed::{self, Typed},
     },
     plant::line::Framing,
@@ -138,8 +138,8 @@ fn tell(typed: &Typed, framing: Option<Framing>, asked: Option<&Explained>) -> V
         lines.extend(wrap(&words, WIDTH, 2));
     }
     if told.direction != Some(Direction::Answer) && told.verdict == "ok" {
-        for complaint in check_request(&told.message, told.framing.unwrap_or(Framing::Rtu)) {
-            lines.extend(wrap(&format!("must not be sent: {complaint}"), WIDTH, 2));
+        for error in check_request(&told.message, told.framing.unwrap_or(Framing::Rtu)) {
+            lines.extend(wrap(&format!("must not be sent: {error}"), WIDTH, 2));
         }
     }
     lines

@@ -9,7 +9,7 @@ pub const TIMEOUT_MIN: Duration = Duration::from_millis(10);
 /// Longest time that anything on a line may wait: for so long nothing else goes over it.
 pub const WAIT_MAX: Duration = Duration::from_secs(10);
 
-/// A setting of a line, for complaints.
+/// A setting of a line, in error messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Key {
     /// Path of a serial port.
@@ -38,7 +38,7 @@ pub enum Key {
 
 /// What is wrong with a setting.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Complaint {
+pub struct SettingError {
     /// Which setting.
     pub key: Key,
     /// `9601 is not a usual baud rate`.
@@ -49,18 +49,18 @@ pub struct Complaint {
 
 /// Can a line have these settings? `Err` says why not.
 pub fn valid(line: &LineDef) -> Result<(), String> {
-    match complaints(line).into_iter().next() {
-        Some(Complaint { what, expected, .. }) => Err(format!("{what}; {expected}")),
+    match check_settings(line).into_iter().next() {
+        Some(SettingError { what, expected, .. }) => Err(format!("{what}; {expected}")),
         None => Ok(()),
     }
 }
 
-/// Everything that is wrong with a line: the first complaint is the one to show where there is room for one.
-pub fn complaints(line: &LineDef) -> Vec<Complaint> {
+/// Everything that is wrong with a line: the first error is the one to show where there is room for one.
+pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
     let mut all = Vec::new();
     let mut check = |wrong: bool, key: Key, what: String, expected: &'static str| {
         if wrong {
-            all.push(Complaint { key, what, expected });
+            all.push(SettingError { key, what, expected });
         }
     };
     match &line.transport {

@@ -10,13 +10,13 @@ use super::{
 };
 use crate::plant::{
     def::{LineDef, Parity, Rs485, Transport},
-    line_check::complaints,
+    line_check::check_settings,
 };
 
 /// The text with these settings for the line of their name; `Err` says why not, in words for the operator.
 pub(super) fn with_line(text: &str, settings: &LineDef) -> Result<String, String> {
-    if let Some(complaint) = complaints(settings).into_iter().next() {
-        return Err(format!("{}, {}", complaint.what, complaint.expected));
+    if let Some(error) = check_settings(settings).into_iter().next() {
+        return Err(format!("{}, {}", error.what, error.expected));
     }
     let mut document: DocumentMut = text.parse().map_err(|error| format!("the file is no TOML: {error}"))?;
     let table = table_of(&mut document, &settings.name)?;

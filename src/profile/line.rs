@@ -10,7 +10,7 @@ use super::{
 };
 use crate::plant::{
     def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
-    line_check::{Complaint, Key, complaints},
+    line_check::{Key, SettingError, check_settings},
 };
 
 /// The lines in the order of the file.
@@ -70,9 +70,9 @@ struct Written {
 }
 
 impl Written {
-    /// The line, after every complaint about a key that is written was added.
+    /// The line, after every error about a key that is written was added.
     fn line(self, problems: &mut Problems) -> LineDef {
-        for Complaint { key, what, expected } in complaints(&self.line) {
+        for SettingError { key, what, expected } in check_settings(&self.line) {
             // What is not written has its usual value, or was reported as missing.
             if let Some((_, at)) = self.spans.iter().find(|(known, _)| *known == key) {
                 problems.add(*at, what).label(expected);

@@ -16,7 +16,7 @@ mod tests;
 use std::ops::Range;
 
 use self::{envelope::Envelope, reader::Reader};
-use super::{complaint, frame, names};
+use super::{frame, names, request_lint};
 use crate::plant::{line::Framing, traffic::Frame};
 
 pub use envelope::{message_of, recognise};
@@ -215,7 +215,7 @@ fn read(message: &[u8], mbap: bool, direction: Direction, asked: Option<&[u8]>) 
     let mut reader = Reader::new(message);
     let summary = read_message(&mut reader, mbap, direction, asked);
     let (fits, sense) = (reader.fits(), reader.sense());
-    let sound = complaint::check_request(message, Framing::Mbap).is_empty();
+    let sound = request_lint::check_request(message, Framing::Mbap).is_empty();
     reader.finish();
     let summary = summary.unwrap_or_else(|| match message {
         [unit, function, ..] => format!("unit {unit} {}, cut short", function_name(*function)),

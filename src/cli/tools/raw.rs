@@ -2,7 +2,7 @@
 
 use super::{PortArgs, answer_lines, run, shown};
 use crate::{
-    bus::{ascii, complaint::check_request, explain, frame, typed},
+    bus::{ascii, explain, frame, request_lint::check_request, typed},
     cli::{CliError, say, say_error},
     plant::{
         def::Framing,
@@ -105,25 +105,24 @@ fn refuse(message: &[u8], framing: Framing, args: &Args) -> Result<(), CliError>
     if args.as_is && message.is_empty() {
         return Ok(());
     }
-    let mut complaints: Vec<String> =
-        check_request(message, framing).into_iter().map(|complaint| complaint.to_string()).collect();
+    let mut errors: Vec<String> = check_request(message, framing).into_iter().map(|error| error.to_string()).collect();
     if let (Framing::Rtu, Some((inner, check))) = (framing, message.split_last_chunk::<2>())
-        && !complaints.is_empty()
+        && !errors.is_empty()
         && check_request(inner, framing).is_empty()
     {
         let [low, high] = frame::crc16(inner).to_le_bytes();
         let [got_low, got_high] = check;
-        complaints = vec![format!("wrong CRC: found {got_low:02X} {got_high:02X}, expected {low:02X} {high:02X}")];
+        errors = vec![format!("wrong CRC: found {got_low:02X} {got_high:02X}, expected {low:02X} {high:02X}")];
     }
-    if framing != Framing::Mbap && message.first() == Some(&0) && complaints.is_empty() {
-        complaints.push("unit 0 is a broadcast: every unit on the line obeys it and none answers".into());
+    if framing != Framing::Mbap && message.first() == Some(&0) && errors.is_empty() {
+        errors.push("unit 0 is a broadcast: every unit on the line obeys it and none answers".into());
     }
-    if complaints.is_empty() {
+    if errors.is_empty() {
         return Ok(());
     }
     if args.force {
-        complaints.iter().for_each(|complaint| say_error(&format!("sent all the same: {complaint}")));
+        errors.iter().for_each(|error| say_error(&format!("sent all the same: {error}")));
         return Ok(());
     }
-    Err(CliError::Usage(format!("nothing was sent (--force sends it): {}", complaints.join("; "))))
+    Err(CliError::Usage(format!("nothing was sent (--force sends it): {}", errors.join("; "))))
 }

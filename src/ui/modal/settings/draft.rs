@@ -8,7 +8,7 @@ use super::SettingsAction;
 use crate::{
     plant::{
         def::{Framing, LineDef, Parity, Rs485, Serial, Transport},
-        line_check::{BAUDS, complaints},
+        line_check::{BAUDS, check_settings},
     },
     profile::line::{TCP_PORT, usual_data_bits},
     ui::modal::line::Line,
@@ -136,8 +136,8 @@ impl Draft {
             gap: millis("gap", &self.gap)?,
             ..self.base.clone()
         };
-        match complaints(&settings).into_iter().next() {
-            Some(complaint) => Err(format!("{}, {}", complaint.what, complaint.expected)),
+        match check_settings(&settings).into_iter().next() {
+            Some(error) => Err(format!("{}, {}", error.what, error.expected)),
             None => Ok(settings),
         }
     }

@@ -12,10 +12,9 @@ use super::{
 };
 use crate::{
     bus::{
-        complaint,
         explain::{self, Direction},
         frame::{self, hex},
-        names,
+        names, request_lint,
     },
     plant::{
         def::{Framing, LineDef, LineId, Parity, Serial},
@@ -318,8 +317,8 @@ fn read(unit: u8, table: Table, address: u16, count: u16) -> Vec<u8> {
 
 /// The request in words, and its bytes; `Err` with what no device can take.
 fn request_words(message: &[u8], framing: Framing) -> Result<Vec<String>, String> {
-    if let Some(complaint) = complaint::check_request(message, framing).first() {
-        return Err(complaint.to_string());
+    if let Some(error) = request_lint::check_request(message, framing).first() {
+        return Err(error.to_string());
     }
     let told =
         explain::explain(&frame::wrap(framing, TRANSACTION, message), Some(framing), Some(Direction::Request), None);

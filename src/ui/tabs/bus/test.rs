@@ -13,10 +13,10 @@ use super::{
 };
 use crate::{
     bus::{
-        ascii, complaint,
+        ascii,
         explain::{self, Direction, Explained},
         frame::{self, Mbap, hex},
-        typed,
+        request_lint, typed,
     },
     plant::{
         command::Command,
@@ -203,7 +203,7 @@ fn danger(at: &Place, tool: &Tool) -> Option<String> {
         Tool::Send(bytes) => {
             let framing = at.settings.transport.framing();
             let told = explain::explain(bytes, Some(framing), Some(Direction::Request), None);
-            let whole = told.verdict == "ok" && complaint::check_request(&told.message, framing).is_empty();
+            let whole = told.verdict == "ok" && request_lint::check_request(&told.message, framing).is_empty();
             let broadcast = told.message.first() == Some(&0) && framing != Framing::Mbap;
             match (whole, broadcast, only_reads(&told.message)) {
                 (true, false, true) => None,
@@ -261,7 +261,7 @@ struct Ready {
     /// What was added to what was typed.
     added: String,
     told: Explained,
-    complaints: Vec<String>,
+    errors: Vec<String>,
 }
 
 impl Send {
@@ -306,12 +306,12 @@ impl Send {
         let typed = typed::parse(&self.text.text(), Some(framing)).map_err(|error| error.to_string())?;
         let (frame, added) = if self.bare { (typed.bytes.clone(), String::new()) } else { dress(&typed, framing) };
         let told = explain::explain(&frame, Some(framing), Some(Direction::Request), None);
-        let mut complaints: Vec<String> =
-            complaint::check_request(&told.message, framing).iter().map(ToString::to_string).collect();
-        if told.verdict != "ok" && complaints.is_empty() {
-            complaints.push(told.verdict.clone());
+        let mut errors: Vec<String> =
+            request_lint::check_request(&told.message, framing).iter().map(ToString::to_string).collect();
+        if told.verdict != "ok" && errors.is_empty() {
+            errors.push(told.verdict.clone());
         }
-        Ok(Ready { frame, added, told, complaints })
+        Ok(Ready { frame, added, told, errors })
     }
 
     /// Draws it over the tests, so that what comes back is seen below.
@@ -374,8 +374,8 @@ impl Ready {
         let mut rows = vec![plain(fit_words(&added, width), theme.normal())];
         let lines = wrap(&self.told.summary, width);
         rows.extend(lines.into_iter().map(|line| plain(line, theme.strong())));
-        for complaint in &self.complaints {
-            rows.extend(wrap(&format!("! {complaint}"), width).into_iter().map(|line| plain(line, theme.trouble())));
+        for error in &self.errors {
+            rows.extend(wrap(&format!("! {error}"), width).into_iter().map(|line| plain(line, theme.trouble())));
         }
         if rows.len() < 4 {
             let bytes = broken(

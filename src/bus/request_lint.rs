@@ -3,9 +3,9 @@
 use super::{frame, names};
 use crate::plant::line::Framing;
 
-/// Why a request should not be sent. Raw bytes may be sent all the same, by somebody who says so.
+/// Why a request should not be sent. Raw bytes can still be sent with an explicit override.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Complaint {
+pub enum RequestError {
     /// Not even unit and function.
     #[error("{bytes}, expected unit and function at least", bytes = names::counted(*.0, "byte"))]
     TooShort(usize),
@@ -16,7 +16,7 @@ pub enum Complaint {
     #[error("unit {0} is reserved on serial lines, expected 1–247, or 0 for a broadcast")]
     Unit(u8),
     /// A broadcast that wants an answer.
-    #[error("nobody answers a broadcast: unit 0 takes writes only")]
+    #[error("no unit answers a broadcast: unit 0 takes writes only")]
     ReadFromAll,
     /// An exception cannot be asked for.
     #[error("function {0} / 0x{0:02X} is an exception, no request")]
@@ -72,28 +72,28 @@ pub enum Complaint {
 }
 
 /// Everything that is wrong with a request message (unit and PDU) before it is sent.
-pub fn check_request(message: &[u8], framing: Framing) -> Vec<Complaint> {
-    let &[unit, function, ..] = message else { return vec![Complaint::TooShort(message.len())] };
-    let mut complaints = Vec::new();
+pub fn check_request(message: &[u8], framing: Framing) -> Vec<RequestError> {
+    let &[unit, function, ..] = message else { return vec![RequestError::TooShort(message.len())] };
+    let mut errors = Vec::new();
     if frame::MESSAGE_MAX < message.len() {
-        complaints.push(Complaint::TooLong(message.len()));
+        errors.push(RequestError::TooLong(message.len()));
     }
     if framing != Framing::Mbap {
         match unit {
-            0 if !is_write(function) => complaints.push(Complaint::ReadFromAll),
+            0 if !is_write(function) => errors.push(RequestError::ReadFromAll),
             0..=247 => {}
-            248..=255 => complaints.push(Complaint::Unit(unit)),
+            248..=255 => errors.push(RequestError::Unit(unit)),
         }
     }
     if 0x80 <= function {
-        complaints.push(Complaint::Exception(function));
+        errors.push(RequestError::Exception(function));
     } else if names::function(function).is_none() {
-        complaints.push(Complaint::Unknown(function));
+        errors.push(RequestError::Unknown(function));
     } else if let Some(expected) = request_length(message).filter(|expected| *expected != message.len()) {
-        complaints.push(Complaint::Length { function, got: message.len(), expected });
+        errors.push(RequestError::Length { function, got: message.len(), expected });
     }
-    complaints.extend(check_data(message, function));
-    complaints
+    errors.extend(check_data(message, function));
+    errors
 }
 
 fn is_write(function: u8) -> bool {
@@ -116,23 +116,23 @@ fn request_length(message: &[u8]) -> Option<usize> {
 }
 
 /// Counts, addresses and values, as far as they are there.
-fn check_data(message: &[u8], function: u8) -> Vec<Complaint> {
+fn check_data(message: &[u8], function: u8) -> Vec<RequestError> {
     let word = |at: usize| Some(u16::from_be_bytes([*message.get(at)?, *message.get(at + 1)?]));
     let block = |at: usize, what: &'static str, most: u16| {
         let (Some(address), Some(count)) = (word(at), word(at + 2)) else { return Vec::new() };
-        let range = (!(1..=most).contains(&count)).then_some(Complaint::Count { what, got: count, most });
+        let range = (!(1..=most).contains(&count)).then_some(RequestError::Count { what, got: count, most });
         let past = 0x1_0000 < u32::from(address) + u32::from(count);
-        range.into_iter().chain(past.then_some(Complaint::PastTheEnd { what, address, count })).collect()
+        range.into_iter().chain(past.then_some(RequestError::PastTheEnd { what, address, count })).collect()
     };
     let bytes = |at: usize, what: &'static str, count: Option<u16>| {
         let (&got, count) = (message.get(at)?, count?);
         let expected = if what == "coils" { usize::from(count).div_ceil(8) } else { 2 * usize::from(count) };
-        (usize::from(got) != expected).then_some(Complaint::ByteCount { got, count, what, expected })
+        (usize::from(got) != expected).then_some(RequestError::ByteCount { got, count, what, expected })
     };
     match function {
         0x01 | 0x02 => block(2, "to read", 2000),
         0x03 | 0x04 => block(2, "to read", 125),
-        0x05 => word(4).filter(|value| !matches!(value, 0 | 0xFF00)).map(Complaint::CoilValue).into_iter().collect(),
+        0x05 => word(4).filter(|value| !matches!(value, 0 | 0xFF00)).map(RequestError::CoilValue).into_iter().collect(),
         0x0F => block(2, "to write", 1968).into_iter().chain(bytes(6, "coils", word(4))).collect(),
         0x10 => block(2, "to write", 123).into_iter().chain(bytes(6, "registers", word(4))).collect(),
         0x17 => {
@@ -153,7 +153,7 @@ mod tests {
             let words: Vec<String> = check_request(message, Framing::Rtu).iter().map(ToString::to_string).collect();
             assert_eq!(words, expect, "{}", frame::hex(message));
         };
-        says(&[0, 3, 0, 0, 0, 1], &["nobody answers a broadcast: unit 0 takes writes only"]);
+        says(&[0, 3, 0, 0, 0, 1], &["no unit answers a broadcast: unit 0 takes writes only"]);
         says(&[0, 6, 0, 0, 0, 1], &[]);
         says(&[248, 6, 0, 0, 0, 1], &["unit 248 is reserved on serial lines, expected 1–247, or 0 for a broadcast"]);
         says(&[1, 1, 0, 0, 0x07, 0xD0], &[]);
