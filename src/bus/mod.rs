@@ -14,7 +14,7 @@
 //! | [`late_reply`] | which replies are outstanding, and what may be asked meanwhile |
 //! | [`codec`] | words to numbers and back |
 //! | [`plan`], [`admission`], [`schedule`], [`backoff`] | what is read together, whether it can all be in time, what is read next |
-//! | [`books`] | what is counted |
+//! | [`line_stats`] | what is counted |
 //! | [`tool`] | the steps of a test of the line |
 //! | [`explain`], [`names`], [`evidence`] | frames in words |
 //! | [`typed`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
@@ -36,5 +36,5 @@ pub mod schedule;
 pub mod admission;
 pub mod late_reply;
 pub mod tool;
-pub mod books;
+pub mod line_stats;
 pub mod io;

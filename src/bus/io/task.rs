@@ -21,7 +21,7 @@ use super::{
 use crate::{
     bus::{
         backoff::Backoff,
-        books::{Books, Plan},
+        line_stats::{LineStats, Plan},
         plan::{self, Block, Holes, Hunt},
         schedule::{Budget, Load, Next, Schedule, WRITE_SHARE},
         tool::Job,
@@ -35,7 +35,7 @@ use crate::{
     },
 };
 
-/// The books are told once in this plant time.
+/// A line report is sent this often, in plant time.
 const REPORT_EVERY: Duration = Duration::from_secs(1);
 
 /// Runs a line until `stop` turns true or nobody can send requests any more.
@@ -51,7 +51,7 @@ pub async fn run(
     let holes = Holes::default();
     let blocks = plan::blocks(&def, line, &holes);
     let task = Task {
-        books: Books::new(&def, line, &blocks),
+        stats: LineStats::new(&def, line, &blocks),
         holes,
         hunt: Hunt::default(),
         budget: Budget::new(WRITE_SHARE, clock.now()),
@@ -129,9 +129,9 @@ struct Task<'a> {
     unconfirmed: Vec<confirm::Unconfirmed>,
     /// Reads that are under way over Modbus TCP, no more than a device takes at once.
     under_way: Vec<concurrent::UnderWay>,
-    /// When the books were last told what the link has counted.
+    /// When the counters of the link were last added to the statistics.
     closed_at: Timestamp,
-    books: Books,
+    stats: LineStats,
     /// The tool at work.
     job: Option<Job>,
     polls_since_test: u32,
@@ -286,7 +286,7 @@ impl Task<'_> {
             }
         };
         self.close_second(&mut link);
-        self.books.rest(&mut self.memory.counters);
+        self.stats.rest(&mut self.memory.counters);
         self.refuse_waiting().await?;
         leave
     }
@@ -365,19 +365,19 @@ impl Task<'_> {
     /// Other settings, for as long as the station runs or until they are taken back.
     fn configure(&mut self, settings: LineDef) {
         tracing::info!(line = settings.name, transport = %settings.transport, "other settings");
-        self.books.admit(&self.def, &settings, &self.blocks);
+        self.stats.admit(&self.def, &settings, &self.blocks);
         self.connector.retarget(&settings.transport);
         self.settings = settings;
     }
 
-    /// Takes what the link has counted since this was last done into the books.
+    /// Adds what the link has counted since the last call to the statistics.
     fn close_second(&mut self, link: &mut Link) {
         let now = self.clock.now();
         let over = Duration::try_from(now.duration_since(self.closed_at)).unwrap_or_default();
         let busy = link.take_busy().as_secs_f32();
-        self.books.spent(busy / self.clock.real_span(over).as_secs_f32().max(1e-6), over);
-        self.books.late(&self.def, &link.take_late());
-        self.books.take(link.take_frames(), link.counters());
+        self.stats.spent(busy / self.clock.real_span(over).as_secs_f32().max(1e-6), over);
+        self.stats.late(&self.def, &link.take_late());
+        self.stats.take(link.take_frames(), link.counters());
         (self.memory, self.closed_at) = (link.memory(), now);
     }
 
@@ -404,7 +404,7 @@ impl Task<'_> {
             retries: schedule.map(Schedule::retries).unwrap_or_default(),
             load: schedule.map_or(Load::Normal, Schedule::load),
         };
-        let report = self.books.report(&self.def, &self.settings, plan, self.memory.counters);
+        let report = self.stats.report(&self.def, &self.settings, plan, self.memory.counters);
         self.tell(Event::Report { at: self.clock.now(), line: self.line, report }).await
     }
 

@@ -515,7 +515,7 @@ async fn the_echo_of_an_adapter_is_no_answer() {
     assert!(0 < good, "the other unit is read");
 }
 
-/// What a retry has cured, and what came late, stands in the books of its device all the same.
+/// What a retry has cured, and what came late, is counted for its device all the same.
 #[tokio::test(start_paused = true)]
 async fn cured_and_late_answers_are_counted_with_their_device() {
     let def = plant(Mode::Rtu);

@@ -73,7 +73,7 @@ impl Task<'_> {
         for UnderWay { index, block, began, .. } in std::mem::take(&mut self.under_way) {
             if let Some(index) = self.place_of(index, &block) {
                 let served = schedule.done(index, began, now);
-                self.books.served(index, served.jitter, served.missed);
+                self.stats.served(index, served.jitter, served.missed);
                 schedule.again(index, now);
             }
         }
@@ -104,7 +104,7 @@ impl Task<'_> {
                 && link.has_room(block.unit)
             {
                 // A retry that cures it must not hide it.
-                self.books.polled(Some(index), block.device, Err(*fault), None, 1);
+                self.stats.polled(Some(index), block.device, Err(*fault), None, 1);
                 self.begin(link, schedule, (index, block), self.clock.now(), 2);
                 continue;
             }
@@ -115,7 +115,7 @@ impl Task<'_> {
             let took = span(began, ended) / u32::from(device.limits.in_flight_max.max(1));
             if let Some(index) = index {
                 let served = schedule.done(index, began, ended);
-                self.books.served(index, served.jitter, served.missed);
+                self.stats.served(index, served.jitter, served.missed);
                 self.keep_gap(link, schedule, &block, ended);
             }
             let outcome = Outcome { began, ended, took, answer, exchange: Some(exchange) };

@@ -54,7 +54,7 @@ impl Task<'_> {
         link.set_timeout(timeout);
         let ended = self.clock.now();
         let served = schedule.done(index, began, ended);
-        self.books.served(index, served.jitter, served.missed);
+        self.stats.served(index, served.jitter, served.missed);
         self.note_late(link, schedule);
         self.keep_gap(link, schedule, &block, ended);
         let answer = match read {
@@ -77,7 +77,7 @@ impl Task<'_> {
     /// Answers that had been given up have come: their devices need more time than they used to.
     pub(super) fn note_late(&mut self, link: &mut Link, schedule: &mut Schedule) {
         let late = link.take_late();
-        self.books.late(&self.def, &late);
+        self.stats.late(&self.def, &late);
         for unit in late {
             let on_line = self.def.devices.iter().filter(|device| device.line == self.line && device.unit == unit);
             on_line.for_each(|device| schedule.answered_late(device.id));
@@ -112,7 +112,7 @@ impl Task<'_> {
         let reply = exchange.as_ref().and_then(|exchange| exchange.reply);
         if let Some(exchange) = &exchange {
             let outcome = answer.as_ref().map(drop).map_err(|fault| *fault);
-            self.books.polled(index, block.device, outcome, reply, exchange.tries);
+            self.stats.polled(index, block.device, outcome, reply, exchange.tries);
         }
         let is_answer = match &answer {
             Ok(_) => true,
@@ -183,7 +183,7 @@ impl Task<'_> {
         };
         // A retry that cures it must not hide it.
         if let Some(fault) = cured {
-            self.books.polled(index, block.device, Err(fault), None, 1);
+            self.stats.polled(index, block.device, Err(fault), None, 1);
         }
         if read.is_none() {
             link.abandon();
@@ -203,8 +203,8 @@ impl Task<'_> {
     }
 
     fn use_plan(&mut self, link: &mut Link, schedule: &mut Schedule, blocks: Vec<Block>, at: Timestamp) {
-        self.books.replan(&self.blocks, &blocks);
-        self.books.admit(&self.def, &self.settings, &blocks);
+        self.stats.replan(&self.blocks, &blocks);
+        self.stats.admit(&self.def, &self.settings, &blocks);
         schedule.replan(&blocks, at);
         link.expect(&blocks);
         self.blocks = blocks;

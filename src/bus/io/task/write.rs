@@ -252,7 +252,7 @@ impl Task<'_> {
             return Err(Fault::Timeout.into());
         };
         if let Some(last) = &link.last {
-            self.books.asked(device.id, last.outcome, last.reply);
+            self.stats.asked(device.id, last.outcome, last.reply);
         }
         sent.map(drop)
     }

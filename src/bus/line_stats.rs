@@ -1,4 +1,4 @@
-//! The books of a line: what every poll and every device has given, how busy the line was, which frames went over it.
+//! Statistics of a line: counters of every poll and device, load, and the ring of frames.
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
@@ -41,9 +41,9 @@ pub struct Plan<'a> {
     pub load: Load,
 }
 
-/// The books of one line. They outlive its openings.
+/// Statistics of one line, kept when its port is reopened.
 #[derive(Debug, Clone)]
-pub struct Books {
+pub struct LineStats {
     /// By block of the plan.
     polls: Vec<Tally>,
     devices: Vec<(DeviceId, Tally)>,
@@ -56,11 +56,11 @@ pub struct Books {
     admission: Admission,
 }
 
-impl Books {
-    /// Empty books for a plan.
-    pub fn new(def: &PlantDef, line: LineId, blocks: &[Block]) -> Books {
+impl LineStats {
+    /// Zero counters for a plan.
+    pub fn new(def: &PlantDef, line: LineId, blocks: &[Block]) -> LineStats {
         let devices = def.devices.iter().filter(|device| device.line == line);
-        Books {
+        LineStats {
             polls: vec![Tally::default(); blocks.len()],
             devices: devices.map(|device| (device.id, Tally::default())).collect(),
             busy: VecDeque::new(),
@@ -198,17 +198,17 @@ mod tests {
     fn the_load_of_the_last_ten_seconds_and_of_the_last_minute_are_told_apart() {
         let def = fixture::plant();
         let blocks = plan::blocks(&def, LineId(0), &plan::Holes::default());
-        let mut books = Books::new(&def, LineId(0), &blocks);
+        let mut stats = LineStats::new(&def, LineId(0), &blocks);
         let mut counters = LineCounters::default();
         for second in 0..100 {
-            books.spent(if second < 90 { 0.2 } else { 0.8 }, Duration::from_secs(1));
-            books.take(Vec::new(), &mut counters);
+            stats.spent(if second < 90 { 0.2 } else { 0.8 }, Duration::from_secs(1));
+            stats.take(Vec::new(), &mut counters);
         }
         assert!((counters.utilisation - 0.8).abs() < 1e-5, "{}", counters.utilisation);
         assert!((counters.utilisation_minute - 0.3).abs() < 1e-5, "{}", counters.utilisation_minute);
-        books.polled(Some(0), blocks[0].device, Err(Fault::Timeout), None, 1);
-        books.polled(Some(1), blocks[1].device, Ok(()), None, 1);
-        books.replan(&blocks, &blocks[1..]);
+        stats.polled(Some(0), blocks[0].device, Err(Fault::Timeout), None, 1);
+        stats.polled(Some(1), blocks[1].device, Ok(()), None, 1);
+        stats.replan(&blocks, &blocks[1..]);
         let plan = Plan {
             blocks: &blocks[1..],
             polls: Vec::new(),
@@ -216,7 +216,7 @@ mod tests {
             retries: Vec::new(),
             load: Load::Normal,
         };
-        let report = books.report(&def, &def.lines[0], plan, counters);
+        let report = stats.report(&def, &def.lines[0], plan, counters);
         assert_eq!(report.polls[0].tally.requests, 1, "a block that stays keeps its tally");
         assert_eq!(report.device(blocks[0].device).map(|tally| tally.timeouts), Some(1));
     }
