@@ -197,7 +197,7 @@ mod tests {
     #[test]
     fn the_load_of_the_last_ten_seconds_and_of_the_last_minute_are_told_apart() {
         let def = fixture::plant();
-        let blocks = plan::blocks(&def, LineId(0), &plan::Holes::default());
+        let blocks = plan::blocks(&def, LineId(0), &plan::UnreadableRanges::default());
         let mut stats = LineStats::new(&def, LineId(0), &blocks);
         let mut counters = LineCounters::default();
         for second in 0..100 {

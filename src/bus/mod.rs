@@ -3,7 +3,7 @@
 //! ```text
 //!   tags ──> plan ──> schedule ──> task ──> link ──> wire ──> port        asked
 //!            blocks   whose turn   polls    one      silences,
-//!            (holes)  (classes)    writes   request  every byte on record
+//!            (gaps)   (classes)    writes   request  every byte on record
 //!                                  tests    (replies)
 //!   values <── codec <── task <── gather <── ascii, frame <── port        answered
 //! ```

@@ -4,14 +4,14 @@
 //!   tags ──> groups ──────────────> runs ──────────────────> blocks
 //!            device, table, period  cheapest cut (cheapest)  one request each (cost)
 //!                                        ▲
-//!                                   holes: what the device refused (holes)
+//!                                   unreadable: what the device refused (unreadable)
 //! ```
 //!
 //! Tags of different [`Class`] share blocks, and the block has the most important of them: a word that is read along costs
 //! two characters, a request of its own twenty, so to leave it out would make the line slower for the hard ones as well.
 
 pub mod cost;
-pub mod holes;
+pub mod gaps;
 mod cheapest;
 #[cfg(test)]
 mod rivals;
@@ -19,7 +19,7 @@ mod rivals;
 mod tests;
 
 pub use cost::{Wire, cost};
-pub use holes::{Holes, Hunt};
+pub use gaps::{RangeBisection, UnreadableRanges};
 
 use std::{sync::Arc, time::Duration};
 
@@ -70,18 +70,18 @@ impl Block {
 
 /// The blocks of a line: every readable tag in exactly one, no value split, all within the limits of its device, in the
 /// least time on the wire. A tag that the device has [`refused`] is asked for alone and seldom.
-pub fn blocks(def: &PlantDef, line: LineId, holes: &Holes) -> Vec<Block> {
+pub fn blocks(def: &PlantDef, line: LineId, unreadable: &UnreadableRanges) -> Vec<Block> {
     let on_line = def.devices.iter().filter(|device| device.line == line);
-    on_line.flat_map(|device| blocks_of(def, device, holes)).collect()
+    on_line.flat_map(|device| blocks_of(def, device, unreadable)).collect()
 }
 
-fn blocks_of(def: &PlantDef, device: &DeviceDef, holes: &Holes) -> Vec<Block> {
+fn blocks_of(def: &PlantDef, device: &DeviceDef, unreadable: &UnreadableRanges) -> Vec<Block> {
     let (refused, mut tags): (Vec<&TagDef>, Vec<&TagDef>) =
-        readable(def, device).partition(|tag| is_refused(device, tag, holes));
+        readable(def, device).partition(|tag| is_refused(device, tag, unreadable));
     tags.sort_by_key(|tag| (tag.poll, tag.point.table, tag.point.address, tag.point.len(), tag.id));
     let wire = Wire::of(def.line(device.line), device);
     let groups = tags.chunk_by(|a, b| (a.poll, a.point.table) == (b.poll, b.point.table));
-    let runs = groups.flat_map(|group| cheapest::cut(group, device, wire, holes));
+    let runs = groups.flat_map(|group| cheapest::cut(group, device, wire, unreadable));
     runs.map(|run| together(device, &run)).chain(refused.iter().map(|tag| asked_again(device, tag))).collect()
 }
 
@@ -95,9 +95,9 @@ fn asked_again(device: &DeviceDef, tag: &TagDef) -> Block {
 }
 
 /// The tags of a line that its devices do not have, as their refusals told.
-pub fn refused(def: &PlantDef, line: LineId, holes: &Holes) -> Vec<TagId> {
+pub fn refused(def: &PlantDef, line: LineId, unreadable: &UnreadableRanges) -> Vec<TagId> {
     let on_line = def.devices.iter().filter(|device| device.line == line);
-    let refused = on_line.flat_map(|device| readable(def, device).filter(|tag| is_refused(device, tag, holes)));
+    let refused = on_line.flat_map(|device| readable(def, device).filter(|tag| is_refused(device, tag, unreadable)));
     refused.map(|tag| tag.id).collect()
 }
 
@@ -105,9 +105,9 @@ fn readable<'a>(def: &'a PlantDef, device: &DeviceDef) -> impl Iterator<Item = &
     def.tags_of(device.id).filter(|tag| tag.access != Access::Write && tag.poll != Poll::Never)
 }
 
-fn is_refused(device: &DeviceDef, tag: &TagDef, holes: &Holes) -> bool {
+fn is_refused(device: &DeviceDef, tag: &TagDef, unreadable: &UnreadableRanges) -> bool {
     let alone = Extent::of(tag.point, end_of(tag.point), device);
-    holes.touch(device.id, alone.table, alone.start, alone.end)
+    unreadable.touch(device.id, alone.table, alone.start, alone.end)
 }
 
 /// The block that reads one tag alone.
@@ -155,9 +155,9 @@ impl Extent {
         self.end - self.start
     }
 
-    /// Within the limits of one request, and free of holes.
-    fn allowed(self, device: &DeviceDef, holes: &Holes) -> bool {
-        self.count() <= device.limits.most(self.table) && !holes.touch(device.id, self.table, self.start, self.end)
+    /// Within the limits of one request, and free of unreadable registers.
+    fn allowed(self, device: &DeviceDef, unreadable: &UnreadableRanges) -> bool {
+        self.count() <= device.limits.most(self.table) && !unreadable.touch(device.id, self.table, self.start, self.end)
     }
 
     /// Most unused registers or bits between two tags: sixteen bits cost as much on the wire as one register.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::{
     bus::{
         admission,
-        plan::{self, Block, Holes},
+        plan::{self, Block, UnreadableRanges},
     },
     plant::{
         PlantDef,
@@ -48,7 +48,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 
 /// The plan of a line and its admission, a line of text each.
 fn describe(def: &PlantDef, line: LineId) -> Vec<String> {
-    let blocks = plan::blocks(def, line, &Holes::default());
+    let blocks = plan::blocks(def, line, &UnreadableRanges::default());
     let line = def.line(line);
     let mut text = vec![
         String::new(),

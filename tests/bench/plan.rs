@@ -11,7 +11,7 @@ use std::{
 
 use jiff::tz::TimeZone;
 use sightglass::{
-    bus::plan::{Block, Holes, blocks, cost, single},
+    bus::plan::{Block, UnreadableRanges, blocks, cost, single},
     plant::{
         PlantDef,
         def::{
@@ -90,8 +90,8 @@ fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
 }
 
 fn compare(def: &PlantDef) {
-    let holes = Holes::default();
-    let plan = blocks(def, LineId(0), &holes);
+    let unreadable = UnreadableRanges::default();
+    let plan = blocks(def, LineId(0), &unreadable);
     let ours = rivals::wire_time(def, &plan);
     println!("{} tags on {} devices, {}", def.tags.len(), def.devices.len(), def.lines[0].transport);
     println!("  our plan          {:4} requests {:8.1} ms", plan.len(), ours.as_secs_f64() * 1e3);
@@ -104,7 +104,7 @@ fn compare(def: &PlantDef) {
         ("one a tag", all(&rivals::singles)),
         ("fixed 10", all(&|group, device| rivals::fixed(group, device, 10))),
         ("fixed 60", all(&|group, device| rivals::fixed(group, device, 60))),
-        ("greedy", all(&|group, device| rivals::greedy(group, device, &holes))),
+        ("greedy", all(&|group, device| rivals::greedy(group, device, &unreadable))),
     ] {
         let theirs = rivals::wire_time(def, &rival);
         let ratio = ours.as_secs_f64() / theirs.as_secs_f64();
@@ -123,9 +123,11 @@ fn against_the_optimum(dice: &mut Dice) {
         let def = plant(1, 8, 24, dice);
         let tags = rivals::sorted(&def);
         let groups = rivals::groups(&def, &tags);
-        let least: Duration =
-            groups.iter().map(|(group, device)| rivals::best_of_all(&def, group, device, &Holes::default())).sum();
-        let ours = rivals::wire_time(&def, &blocks(&def, LineId(0), &Holes::default()));
+        let least: Duration = groups
+            .iter()
+            .map(|(group, device)| rivals::best_of_all(&def, group, device, &UnreadableRanges::default()))
+            .sum();
+        let ours = rivals::wire_time(&def, &blocks(&def, LineId(0), &UnreadableRanges::default()));
         worst = worst.max(ours.as_secs_f64() / least.as_secs_f64());
         cases += 1;
     }
@@ -140,7 +142,7 @@ fn main() {
     let many = plant(5, 10_000, 12, &mut dice);
     let times = (0..10).map(|_| {
         let start = Instant::now();
-        black_box(blocks(black_box(&many), LineId(0), &Holes::default()));
+        black_box(blocks(black_box(&many), LineId(0), &UnreadableRanges::default()));
         start.elapsed()
     });
     let best = times.min().unwrap_or_default();

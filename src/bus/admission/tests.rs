@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::{
-    bus::plan::{Holes, blocks},
+    bus::plan::{UnreadableRanges, blocks},
     plant::fixture::{self, PLC},
 };
 
@@ -70,7 +70,7 @@ proptest! {
 #[test]
 fn a_plant_that_fits_is_told_with_its_cycle_and_its_dead_units() {
     let def = fixture::plant();
-    let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &Holes::default()));
+    let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &UnreadableRanges::default()));
     assert_eq!((&admission.verdict, admission.factor), (&Verdict::Fits, Some(1.0)));
     // Four blocks, one a second each: cycle and utilisation are the same number.
     assert!((admission.cycle.as_secs_f64() - admission.utilisation).abs() < 1e-9);
@@ -85,7 +85,7 @@ fn a_long_poll_in_the_way_of_a_fast_one_is_named() {
     let mut def = fixture::plant();
     def.tags[fixture::RUN.index()].poll = Poll::Every(Duration::from_millis(30));
     def.tags[fixture::PV.index()].poll = Poll::Every(Duration::from_millis(200));
-    let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &Holes::default()));
+    let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &UnreadableRanges::default()));
     let words = admission.verdict.to_string();
     for part in ["in 30.1 ms the line must carry", "PLC-1 coil 3072 every 30 ms", "is read", "its period"] {
         assert!(words.contains(part), "no {part:?} in {words:?}");
@@ -99,7 +99,7 @@ fn what_is_too_much_says_how_far_process_values_will_be_stretched() {
         tag.poll = Poll::Every(Duration::from_millis(60));
     }
     def.lines[0].timeout = Duration::from_millis(20);
-    let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &Holes::default()));
+    let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &UnreadableRanges::default()));
     assert!(matches!(admission.verdict, Verdict::TooMuch { utilisation } if utilisation > 1.0), "{admission:?}");
     assert!(admission.hard.fits(), "no tag of the fixture is hard");
     assert!(admission.factor.is_some_and(|factor| factor > 1.0));

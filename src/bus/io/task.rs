@@ -22,7 +22,7 @@ use crate::{
     bus::{
         backoff::Backoff,
         line_stats::{LineStats, Plan},
-        plan::{self, Block, Holes, Hunt},
+        plan::{self, Block, RangeBisection, UnreadableRanges},
         schedule::{Budget, Load, Next, Schedule, WRITE_SHARE},
         tool::Job,
     },
@@ -48,12 +48,12 @@ pub async fn run(
     requests: &mut Requests,
     stop: watch::Receiver<bool>,
 ) {
-    let holes = Holes::default();
-    let blocks = plan::blocks(&def, line, &holes);
+    let unreadable = UnreadableRanges::default();
+    let blocks = plan::blocks(&def, line, &unreadable);
     let task = Task {
         stats: LineStats::new(&def, line, &blocks),
-        holes,
-        hunt: Hunt::default(),
+        unreadable,
+        bisection: RangeBisection::default(),
         budget: Budget::new(WRITE_SHARE, clock.now()),
         unconfirmed: Vec::new(),
         under_way: Vec::new(),
@@ -119,8 +119,8 @@ struct Task<'a> {
     /// The read plan; a block that is refused is split while the search for the culprit goes on.
     blocks: Vec<Block>,
     /// What the devices do not have, as far as found.
-    holes: Holes,
-    hunt: Hunt,
+    unreadable: UnreadableRanges,
+    bisection: RangeBisection,
     /// The share of the line's time that writes may take from polls.
     budget: Budget,
     /// Counters and outstanding replies, from one opening to the next.
@@ -400,7 +400,7 @@ impl Task<'_> {
         let plan = Plan {
             blocks: &self.blocks,
             polls,
-            refused: plan::refused(&self.def, self.line, &self.holes),
+            refused: plan::refused(&self.def, self.line, &self.unreadable),
             retries: schedule.map(Schedule::retries).unwrap_or_default(),
             load: schedule.map_or(Load::Normal, Schedule::load),
         };

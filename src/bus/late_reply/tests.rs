@@ -8,7 +8,7 @@ use crate::{
 
 #[test]
 fn a_probe_is_never_of_an_owed_shape() {
-    let blocks = plan::blocks(&fixture::plant(), LineId(0), &plan::Holes::default());
+    let blocks = plan::blocks(&fixture::plant(), LineId(0), &plan::UnreadableRanges::default());
     let inputs = &blocks[0];
     let mut outstanding = OutstandingReplies::default();
     assert!(outstanding.is_clear());

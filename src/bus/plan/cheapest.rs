@@ -2,7 +2,7 @@
 
 use std::{ops::Range, time::Duration};
 
-use super::{Extent, Holes, cost::Wire};
+use super::{Extent, UnreadableRanges, cost::Wire};
 use crate::plant::{def::DeviceDef, tag::TagDef};
 
 /// Cuts tags of one device, table and period, sorted by address and length, into runs that are one request each, so that
@@ -12,7 +12,12 @@ use crate::plant::{def::DeviceDef, tag::TagDef};
 /// over every tag that it covers from its start on. That fails only for a value that is longer than a request may be: it
 /// can be read alone and nothing can join it, so it is set aside first. `best[n]` is the least cost of the first n values;
 /// the last request of them begins at some value, no further back than the limits of the device allow.
-pub(super) fn cut<'a>(tags: &[&'a TagDef], device: &DeviceDef, wire: Wire, holes: &Holes) -> Vec<Vec<&'a TagDef>> {
+pub(super) fn cut<'a>(
+    tags: &[&'a TagDef],
+    device: &DeviceDef,
+    wire: Wire,
+    unreadable: &UnreadableRanges,
+) -> Vec<Vec<&'a TagDef>> {
     let too_long = |value: &Value| {
         let alone = Extent::of(tags[value.tags.start].point, value.end, device);
         device.limits.most(alone.table) < alone.count()
@@ -38,7 +43,7 @@ pub(super) fn cut<'a>(tags: &[&'a TagDef], device: &DeviceDef, wire: Wire, holes
             let extent = Extent::of(tags[values[start].tags.start].point, end, device);
             let alone = start == last;
             // From here on the run only grows: what is forbidden now stays forbidden.
-            if !alone && (values[start + 1].gap > extent.gap_max(device) || !extent.allowed(device, holes)) {
+            if !alone && (values[start + 1].gap > extent.gap_max(device) || !extent.allowed(device, unreadable)) {
                 break;
             }
             let (spent, requests) = best[start];

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Block, DeviceDef, Holes, PlantDef, TagDef, cost, single};
+use super::{Block, DeviceDef, PlantDef, TagDef, UnreadableRanges, cost, single};
 
 /// Wire time of one read of each block.
 pub fn wire_time(def: &PlantDef, blocks: &[Block]) -> Duration {
@@ -28,10 +28,10 @@ pub fn singles(group: &[TagDef], device: &DeviceDef) -> Vec<Block> {
 }
 
 /// As long as the next tag may join, it does.
-pub fn greedy(group: &[TagDef], device: &DeviceDef, holes: &Holes) -> Vec<Block> {
-    runs(group, |run| joined(group, run, device, holes).is_some())
+pub fn greedy(group: &[TagDef], device: &DeviceDef, unreadable: &UnreadableRanges) -> Vec<Block> {
+    runs(group, |run| joined(group, run, device, unreadable).is_some())
         .iter()
-        .filter_map(|run| joined(group, run, device, holes))
+        .filter_map(|run| joined(group, run, device, unreadable))
         .collect()
 }
 
@@ -56,7 +56,7 @@ pub fn fixed(group: &[TagDef], device: &DeviceDef, words: u32) -> Vec<Block> {
 }
 
 /// The cheapest of all ways to deal tags to requests, neighbours or not: for up to eight tags.
-pub fn best_of_all(def: &PlantDef, group: &[TagDef], device: &DeviceDef, holes: &Holes) -> Duration {
+pub fn best_of_all(def: &PlantDef, group: &[TagDef], device: &DeviceDef, unreadable: &UnreadableRanges) -> Duration {
     fn deal<'a>(
         rest: &'a [TagDef],
         runs: &mut Vec<Vec<&'a TagDef>>,
@@ -74,7 +74,7 @@ pub fn best_of_all(def: &PlantDef, group: &[TagDef], device: &DeviceDef, holes: 
         least
     }
     let price = |runs: &[Vec<&TagDef>]| {
-        let blocks: Option<Vec<Block>> = runs.iter().map(|run| joined(group, run, device, holes)).collect();
+        let blocks: Option<Vec<Block>> = runs.iter().map(|run| joined(group, run, device, unreadable)).collect();
         blocks.map_or(Duration::MAX, |blocks| wire_time(def, &blocks))
     };
     deal(group, &mut Vec::new(), &price)
@@ -97,8 +97,8 @@ fn runs<'a>(group: &'a [TagDef], fits: impl Fn(&[&'a TagDef]) -> bool) -> Vec<Ve
     runs
 }
 
-/// One request for some tags of a group, if limits, gaps and holes allow it; one tag always may.
-fn joined(group: &[TagDef], run: &[&TagDef], device: &DeviceDef, holes: &Holes) -> Option<Block> {
+/// One request for some tags of a group, if limits, gaps and unreadable allow it; one tag always may.
+fn joined(group: &[TagDef], run: &[&TagDef], device: &DeviceDef, unreadable: &UnreadableRanges) -> Option<Block> {
     let first = single(device, run[0]);
     if run.len() == 1 {
         return Some(first);
@@ -121,7 +121,7 @@ fn joined(group: &[TagDef], run: &[&TagDef], device: &DeviceDef, holes: &Holes) 
     }
     // Several values on the same registers are one, whatever its length.
     let same = run.iter().all(|tag| range(tag) == range(run[0]));
-    let fits = same || (end - start <= max && near && !holes.touch(device.id, first.table, start, end));
+    let fits = same || (end - start <= max && near && !unreadable.touch(device.id, first.table, start, end));
     fits.then(|| Block {
         address: start as u16,
         count: (end - start) as u16,

@@ -13,7 +13,7 @@ use crate::plant::{
 
 #[test]
 fn neighbours_share_a_block_and_tables_do_not() {
-    let plan = blocks(&fixture::plant(), LineId(0), &Holes::default());
+    let plan = blocks(&fixture::plant(), LineId(0), &UnreadableRanges::default());
     let seen: Vec<_> = plan.iter().map(|block| (block.unit, block.table, block.address, block.count)).collect();
     let expect = [
         (1, Table::Input, 1000, 8),
@@ -29,7 +29,7 @@ fn a_block_is_as_important_as_its_most_important_tag() {
     let mut def = fixture::plant();
     def.tags[fixture::PV.index()].class = Class::Idle;
     def.tags[fixture::FAULT.index()].class = Class::Hard;
-    assert_eq!(blocks(&def, LineId(0), &Holes::default())[0].class, Class::Hard);
+    assert_eq!(blocks(&def, LineId(0), &UnreadableRanges::default())[0].class, Class::Hard);
 }
 
 fn serial_line(baud: u32, stop_bits: u8, framing: Framing) -> Transport {
@@ -41,7 +41,7 @@ fn serial_line(baud: u32, stop_bits: u8, framing: Framing) -> Transport {
 #[test]
 fn costs_are_those_of_the_wire() {
     let mut def = fixture::plant();
-    let mut block = blocks(&def, LineId(0), &Holes::default()).remove(0);
+    let mut block = blocks(&def, LineId(0), &UnreadableRanges::default()).remove(0);
     let tcp = |framing| Transport::Tcp { host: "plc".into(), port: 502, framing };
     for (transport, words, ms) in [
         (serial_line(9600, 2, Framing::Rtu), 1, 25.2),
@@ -87,8 +87,8 @@ fn words(addresses: &[u16]) -> PlantDef {
     def
 }
 
-fn ranges(def: &PlantDef, holes: &Holes) -> Vec<(u32, u32)> {
-    kept(def, holes).iter().map(Block::range).collect()
+fn ranges(def: &PlantDef, unreadable: &UnreadableRanges) -> Vec<(u32, u32)> {
+    kept(def, unreadable).iter().map(Block::range).collect()
 }
 
 #[test]
@@ -96,106 +96,107 @@ fn a_request_is_not_filled_up_if_that_costs_a_longer_gap_elsewhere() {
     let mut def = words(&[0, 6, 7, 12]);
     def.devices[0].limits.read_words_max = 8;
     // Greedy would take 0 to 7 and leave 12 alone: 9 words with a gap of 5; this reads 7.
-    assert_eq!(ranges(&def, &Holes::default()), [(0, 1), (6, 13)]);
+    assert_eq!(ranges(&def, &UnreadableRanges::default()), [(0, 1), (6, 13)]);
 }
 
 #[test]
 fn over_tcp_a_gap_is_cheaper_than_a_round_trip_and_in_ascii_as_dear_as_the_device_allows() {
     let mut def = words(&[0, 30]);
     def.devices[0].limits.gap_words_max = 40;
-    assert_eq!(ranges(&def, &Holes::default()), [(0, 1), (30, 31)]);
+    assert_eq!(ranges(&def, &UnreadableRanges::default()), [(0, 1), (30, 31)]);
     def.lines[0].transport = Transport::tcp("plc", 502);
-    assert_eq!(ranges(&def, &Holes::default()), [(0, 31)]);
+    assert_eq!(ranges(&def, &UnreadableRanges::default()), [(0, 31)]);
     let mut def = words(&[0, 7]);
-    assert_eq!(ranges(&def, &Holes::default()), [(0, 8)], "in RTU six words are cheaper than 20 characters");
+    assert_eq!(ranges(&def, &UnreadableRanges::default()), [(0, 8)], "in RTU six words are cheaper than 20 characters");
     def.lines[0].transport = serial_line(9600, 1, Framing::Ascii);
-    assert_eq!(ranges(&def, &Holes::default()), [(0, 8)], "24 characters against 28");
+    assert_eq!(ranges(&def, &UnreadableRanges::default()), [(0, 8)], "24 characters against 28");
     let mut def = words(&[0, 9]);
     def.lines[0].transport = serial_line(9600, 1, Framing::Ascii);
-    assert_eq!(ranges(&def, &Holes::default()), [(0, 1), (9, 10)], "32 characters against 28");
+    assert_eq!(ranges(&def, &UnreadableRanges::default()), [(0, 1), (9, 10)], "32 characters against 28");
 }
 
 #[test]
 fn fields_of_a_word_and_twins_are_read_together() {
     let def = words(&[5, 5, 5, 6]);
-    let plan = blocks(&def, LineId(0), &Holes::default());
+    let plan = blocks(&def, LineId(0), &UnreadableRanges::default());
     assert_eq!(plan.len(), 1);
     assert_eq!((plan[0].range(), plan[0].tags.len()), ((5, 7), 4));
 }
 
 /// Plays a device that refuses every read which touches one of `missing`, until the plan holds; counts the requests.
-fn hunt(def: &PlantDef, missing: &[u32], count_max: u32) -> (Holes, usize) {
-    let (mut holes, mut search, mut asked) = (Holes::default(), Hunt::default(), 0);
-    let plan = |holes: &Holes| blocks(def, LineId(0), holes).into_iter().rev().collect::<Vec<Block>>();
-    let mut todo = plan(&holes);
+fn bisection(def: &PlantDef, missing: &[u32], count_max: u32) -> (UnreadableRanges, usize) {
+    let (mut unreadable, mut search, mut asked) = (UnreadableRanges::default(), RangeBisection::default(), 0);
+    let plan =
+        |unreadable: &UnreadableRanges| blocks(def, LineId(0), unreadable).into_iter().rev().collect::<Vec<Block>>();
+    let mut todo = plan(&unreadable);
     while let Some(block) = todo.pop() {
         asked += 1;
         assert!(asked < 1000, "the search ends");
         let (start, end) = block.range();
-        if end - start > count_max || missing.iter().any(|hole| (start..end).contains(hole)) {
+        if end - start > count_max || missing.iter().any(|is_unreadable| (start..end).contains(is_unreadable)) {
             // Behind what waits, as in a schedule.
-            todo.splice(0..0, search.refused(def, &holes, &block).unwrap_or_default());
+            todo.splice(0..0, search.refused(def, &unreadable, &block).unwrap_or_default());
         } else {
             search.answered(&block);
-            assert!(!holes.disproved(&block));
+            assert!(!unreadable.disproved(&block));
         }
-        if search.conclude(&mut holes) {
-            todo = plan(&holes);
+        if search.conclude(&mut unreadable) {
+            todo = plan(&unreadable);
         }
     }
-    (holes, asked)
+    (unreadable, asked)
 }
 
 /// The plan without the tags that are refused and asked for alone.
-fn kept(def: &PlantDef, holes: &Holes) -> Vec<Block> {
-    let refused = refused(def, LineId(0), holes);
-    blocks(def, LineId(0), holes).into_iter().filter(|block| !refused.contains(&block.tags[0])).collect()
+fn kept(def: &PlantDef, unreadable: &UnreadableRanges) -> Vec<Block> {
+    let refused = refused(def, LineId(0), unreadable);
+    blocks(def, LineId(0), unreadable).into_iter().filter(|block| !refused.contains(&block.tags[0])).collect()
 }
 
 #[test]
 fn a_missing_register_between_tags_is_found_and_never_read_over_again() {
     // Every second register: 15 gaps, the one at 13 is missing.
     let def = words(&(0..16).map(|n| 2 * n).collect::<Vec<u16>>());
-    let (holes, asked) = hunt(&def, &[13], 125);
-    assert_eq!(ranges(&def, &holes), [(0, 13), (14, 31)]);
-    assert!(refused(&def, LineId(0), &holes).is_empty());
+    let (unreadable, asked) = bisection(&def, &[13], 125);
+    assert_eq!(ranges(&def, &unreadable), [(0, 13), (14, 31)]);
+    assert!(refused(&def, LineId(0), &unreadable).is_empty());
     assert!(asked <= 12, "{asked} requests for 16 tags");
 }
 
 #[test]
 fn a_missing_tag_is_told_and_its_neighbours_are_read() {
     let def = words(&[0, 1, 2, 3, 4, 5, 6, 7]);
-    let (holes, asked) = hunt(&def, &[5], 125);
-    assert_eq!(refused(&def, LineId(0), &holes), [TagId(5)]);
-    assert_eq!(ranges(&def, &holes), [(0, 5), (6, 8)]);
+    let (unreadable, asked) = bisection(&def, &[5], 125);
+    assert_eq!(refused(&def, LineId(0), &unreadable), [TagId(5)]);
+    assert_eq!(ranges(&def, &unreadable), [(0, 5), (6, 8)]);
     assert_eq!(asked, 11, "the whole, six parts, the whole again, and the three blocks of the new plan");
 }
 
 #[test]
 fn what_is_refused_is_asked_for_seldom_and_believed_when_it_answers() {
     let def = words(&[0, 1, 2]);
-    let mut holes = holes_at(&[1]);
-    let plan = blocks(&def, LineId(0), &holes);
+    let mut unreadable = holes_at(&[1]);
+    let plan = blocks(&def, LineId(0), &unreadable);
     let seen: Vec<_> = plan.iter().map(|block| (block.range(), block.poll, block.class)).collect();
     let minute = Poll::Every(Duration::from_secs(60));
     assert_eq!(seen, [((0, 1), SECOND, Class::Soft), ((2, 3), SECOND, Class::Soft), ((1, 2), minute, Class::Idle)]);
-    let mut search = Hunt::default();
-    assert_eq!(search.refused(&def, &holes, &plan[2]), None, "that is known");
-    assert!(!holes.disproved(&plan[0]) && holes.disproved(&plan[2]));
-    assert_eq!(ranges(&def, &holes), [(0, 3)]);
+    let mut search = RangeBisection::default();
+    assert_eq!(search.refused(&def, &unreadable, &plan[2]), None, "that is known");
+    assert!(!unreadable.disproved(&plan[0]) && unreadable.disproved(&plan[2]));
+    assert_eq!(ranges(&def, &unreadable), [(0, 3)]);
 }
 
 #[test]
 fn a_device_that_stumbles_once_loses_nothing() {
     let def = words(&[0, 1, 2, 3]);
-    let (mut holes, mut search) = (Holes::default(), Hunt::default());
+    let (mut unreadable, mut search) = (UnreadableRanges::default(), RangeBisection::default());
     for _ in 0..3 {
-        let whole = blocks(&def, LineId(0), &holes).remove(0);
-        let parts = search.refused(&def, &holes, &whole).expect("something new");
-        assert!(!search.conclude(&mut holes), "the parts have not answered");
+        let whole = blocks(&def, LineId(0), &unreadable).remove(0);
+        let parts = search.refused(&def, &unreadable, &whole).expect("something new");
+        assert!(!search.conclude(&mut unreadable), "the parts have not answered");
         parts.iter().for_each(|part| search.answered(part));
-        assert!(search.conclude(&mut holes), "back to the whole block");
-        assert_eq!(ranges(&def, &holes), [(0, 4)]);
+        assert!(search.conclude(&mut unreadable), "back to the whole block");
+        assert_eq!(ranges(&def, &unreadable), [(0, 4)]);
         search.answered(&whole);
     }
 }
@@ -203,9 +204,9 @@ fn a_device_that_stumbles_once_loses_nothing() {
 #[test]
 fn a_device_that_takes_fewer_registers_than_it_says_is_read_in_shorter_blocks() {
     let def = words(&(0..40).collect::<Vec<u16>>());
-    let (holes, _) = hunt(&def, &[], 16);
-    assert!(refused(&def, LineId(0), &holes).is_empty(), "nothing is missing");
-    assert!(ranges(&def, &holes).iter().all(|(start, end)| end - start <= 16));
+    let (unreadable, _) = bisection(&def, &[], 16);
+    assert!(refused(&def, LineId(0), &unreadable).is_empty(), "nothing is missing");
+    assert!(ranges(&def, &unreadable).iter().all(|(start, end)| end - start <= 16));
 }
 
 type Row = (u16, usize, usize, u8);
@@ -242,12 +243,12 @@ fn transport() -> impl Strategy<Value = Transport> {
     ]
 }
 
-fn holes_at(addresses: &[u16]) -> Holes {
-    let mut holes = Holes::default();
+fn holes_at(addresses: &[u16]) -> UnreadableRanges {
+    let mut unreadable = UnreadableRanges::default();
     for address in addresses {
-        holes.add(fixture::TIC, Table::Holding, u32::from(*address), u32::from(*address) + 1);
+        unreadable.add(fixture::TIC, Table::Holding, u32::from(*address), u32::from(*address) + 1);
     }
-    holes
+    unreadable
 }
 
 /// With two-register alignment the four words at 35 take six, which is more than a request of four may ask: the values at
@@ -256,7 +257,8 @@ fn holes_at(addresses: &[u16]) -> Holes {
 fn a_value_too_long_for_a_request_does_not_part_its_neighbours() {
     let limits = Limits { read_words_max: 4, gap_words_max: 0, alignment: 2, ..Limits::STANDARD };
     let def = plant_of(&[(34, 3, 0, 0), (35, 3, 2, 0), (36, 3, 0, 0)], limits, serial_line(9600, 1, Framing::Rtu));
-    let seen: Vec<_> = blocks(&def, LineId(0), &Holes::default()).iter().map(|b| (b.address, b.count)).collect();
+    let seen: Vec<_> =
+        blocks(&def, LineId(0), &UnreadableRanges::default()).iter().map(|b| (b.address, b.count)).collect();
     assert_eq!(seen, [(34, 4), (34, 6)]);
 }
 
@@ -267,9 +269,9 @@ proptest! {
         limits in limits(), transport in transport(), missing in proptest::collection::vec(0u16..400, 0..20),
     ) {
         let def = plant_of(&rows, limits, transport);
-        let holes = holes_at(&missing);
-        let plan = blocks(&def, LineId(0), &holes);
-        let refused = refused(&def, LineId(0), &holes);
+        let unreadable = holes_at(&missing);
+        let plan = blocks(&def, LineId(0), &unreadable);
+        let refused = refused(&def, LineId(0), &unreadable);
         for tag in &def.tags {
             let holders: Vec<&Block> = plan.iter().filter(|block| block.tags.contains(&tag.id)).collect();
             prop_assert_eq!(holders.len(), usize::from(tag.poll != Poll::Never));
@@ -285,8 +287,8 @@ proptest! {
             let max = if block.table.is_bits() { limits.read_bits_max } else { words_max };
             prop_assert!(block.count <= max, "{:?}", block);
             let (start, end) = block.range();
-            let over = holes.touch(block.device, block.table, start, end);
-            prop_assert_eq!(over, refused.contains(&block.tags[0]), "{:?} and a hole", block);
+            let over = unreadable.touch(block.device, block.table, start, end);
+            prop_assert_eq!(over, refused.contains(&block.tags[0]), "{:?} and a is_unreadable", block);
             prop_assert!(!over || block.tags.len() == 1);
             if !block.table.is_bits() {
                 prop_assert_eq!((block.address % limits.alignment, block.count % limits.alignment), (0, 0));
@@ -301,13 +303,13 @@ proptest! {
         missing in proptest::collection::vec(0u16..60, 0..4),
     ) {
         let def = plant_of(&rows, Limits { read_words_max: words, ..limits }, transport);
-        let holes = holes_at(&missing);
-        let refused = refused(&def, LineId(0), &holes);
+        let unreadable = holes_at(&missing);
+        let refused = refused(&def, LineId(0), &unreadable);
         let mut tags = rivals::sorted(&def);
         tags.retain(|tag| !refused.contains(&tag.id));
         let least: Duration = rivals::groups(&def, &tags).iter()
-            .map(|(group, device)| rivals::best_of_all(&def, group, device, &holes)).sum();
-        prop_assert_eq!(rivals::wire_time(&def, &kept(&def, &holes)), least);
+            .map(|(group, device)| rivals::best_of_all(&def, group, device, &unreadable)).sum();
+        prop_assert_eq!(rivals::wire_time(&def, &kept(&def, &unreadable)), least);
     }
 
     #[test]
@@ -317,13 +319,13 @@ proptest! {
     ) {
         // Fixed blocks read over gaps of any length, so the limit of gaps must not stand in the way of the plan.
         let def = plant_of(&rows, Limits { gap_words_max: 200, alignment: 1, ..limits }, transport);
-        let ours = rivals::wire_time(&def, &blocks(&def, LineId(0), &Holes::default()));
+        let ours = rivals::wire_time(&def, &blocks(&def, LineId(0), &UnreadableRanges::default()));
         let tags = rivals::sorted(&def);
         let groups = rivals::groups(&def, &tags);
         let (mut single, mut greedy, mut short, mut long) = <(Vec<_>, Vec<_>, Vec<_>, Vec<_>)>::default();
         for (group, device) in &groups {
             single.extend(rivals::singles(group, device));
-            greedy.extend(rivals::greedy(group, device, &Holes::default()));
+            greedy.extend(rivals::greedy(group, device, &UnreadableRanges::default()));
             short.extend(rivals::fixed(group, device, 10));
             long.extend(rivals::fixed(group, device, 60));
         }
@@ -340,13 +342,13 @@ proptest! {
     ) {
         let def = words(&addresses.iter().copied().collect::<Vec<u16>>());
         let missing: Vec<u32> = missing.into_iter().collect();
-        let (holes, _) = hunt(&def, &missing, 125);
+        let (unreadable, _) = bisection(&def, &missing, 125);
         for tag in &def.tags {
             let gone = missing.contains(&u32::from(tag.point.address));
-            prop_assert_eq!(refused(&def, LineId(0), &holes).contains(&tag.id), gone);
+            prop_assert_eq!(refused(&def, LineId(0), &unreadable).contains(&tag.id), gone);
         }
-        for (start, end) in ranges(&def, &holes) {
-            prop_assert!(!missing.iter().any(|hole| (start..end).contains(hole)));
+        for (start, end) in ranges(&def, &unreadable) {
+            prop_assert!(!missing.iter().any(|is_unreadable| (start..end).contains(is_unreadable)));
         }
     }
 }

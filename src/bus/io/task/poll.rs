@@ -126,8 +126,8 @@ impl Task<'_> {
         match answer {
             Ok(values) => {
                 self.tell_values(at, block, &values, reply.unwrap_or_default(), exchange).await?;
-                self.hunt.answered(block);
-                let disproved = self.holes.disproved(block);
+                self.bisection.answered(block);
+                let disproved = self.unreadable.disproved(block);
                 self.replan(link, schedule, at, disproved);
                 Ok(())
             }
@@ -136,8 +136,8 @@ impl Task<'_> {
                 let its_own = link.outstanding(block.unit).is_clear();
                 let Some(index) = index else { return Ok(()) };
                 schedule.again(index, at);
-                let hole = code == ExceptionCode(0x02) && its_own;
-                if hole && let Some(parts) = self.hunt.refused(&self.def, &self.holes, block) {
+                let is_unreadable = code == ExceptionCode(0x02) && its_own;
+                if is_unreadable && let Some(parts) = self.bisection.refused(&self.def, &self.unreadable, block) {
                     tracing::debug!(address = block.address, count = block.count, "exception 02: the block is split");
                     let mut blocks = self.blocks.clone();
                     blocks.splice(index..=index, parts);
@@ -160,7 +160,7 @@ impl Task<'_> {
                 if schedule.failed(block.device, began, took, at) {
                     let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
                     self.tell_failed(at, block.device, tags, Fault::Resting, None).await?;
-                    self.holes.forget(block.device);
+                    self.unreadable.forget(block.device);
                     self.replan(link, schedule, at, true);
                 }
                 Ok(())
@@ -194,10 +194,10 @@ impl Task<'_> {
     /// Makes the plan anew when the search for what a device does not have has come to an end, or knowledge was `wrong`.
     fn replan(&mut self, link: &mut Link, schedule: &mut Schedule, at: Timestamp, wrong: bool) {
         if wrong {
-            self.hunt.reset();
+            self.bisection.reset();
         }
-        if wrong || self.hunt.conclude(&mut self.holes) {
-            let blocks = plan::blocks(&self.def, self.line, &self.holes);
+        if wrong || self.bisection.conclude(&mut self.unreadable) {
+            let blocks = plan::blocks(&self.def, self.line, &self.unreadable);
             self.use_plan(link, schedule, blocks, at);
         }
     }

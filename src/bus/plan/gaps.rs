@@ -11,13 +11,13 @@ use crate::plant::{
 /// Addresses that a device does not have, although the plan would read (over) them. An empty range is a seam: both sides
 /// can be read, but not with one request.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Holes {
+pub struct UnreadableRanges {
     /// End by start. Ranges never touch the inside of each other.
     ends: BTreeMap<(DeviceId, Table, u32), u32>,
 }
 
-impl Holes {
-    /// Remembers a hole from `start` up to before `end`.
+impl UnreadableRanges {
+    /// Remembers an unreadable range from `start` up to before `end`.
     pub fn add(&mut self, device: DeviceId, table: Table, start: u32, end: u32) {
         let (mut start, mut end) = (start, end);
         while let Some((old, old_end)) = self.touched(device, table, start, end.max(start + 1)) {
@@ -27,17 +27,17 @@ impl Holes {
         self.ends.insert((device, table, start), end);
     }
 
-    /// Would a read from `start` up to before `end` touch a hole?
+    /// Would a read from `start` up to before `end` touch a gap?
     pub fn touch(&self, device: DeviceId, table: Table, start: u32, end: u32) -> bool {
         self.touched(device, table, start, end).is_some()
     }
 
-    /// A device may be another one, or have another program, when it comes back: its holes are searched anew.
+    /// A device may be another one, or have another program, when it comes back: its unreadable ranges are searched again.
     pub fn forget(&mut self, device: DeviceId) {
-        self.ends.retain(|(hole, ..), _| *hole != device);
+        self.ends.retain(|(gap, ..), _| *gap != device);
     }
 
-    /// A block was read. If it lay on a hole, what is known of its device no longer holds, and `true` says so.
+    /// A block was read. If it lay on a gap, what is known of its device no longer holds, and `true` says so.
     pub fn disproved(&mut self, block: &Block) -> bool {
         let (start, end) = block.range();
         let wrong = self.touch(block.device, block.table, start, end);
@@ -50,7 +50,7 @@ impl Holes {
     fn touched(&self, device: DeviceId, table: Table, start: u32, end: u32) -> Option<(u32, u32)> {
         let before = self.ends.range((device, table, 0)..(device, table, end));
         // The last one that begins before the end is also the one that reaches furthest.
-        before.map(|((_, _, hole), hole_end)| (*hole, *hole_end)).next_back().filter(|(_, hole_end)| start < *hole_end)
+        before.map(|((_, _, gap), gap_end)| (*gap, *gap_end)).next_back().filter(|(_, gap_end)| start < *gap_end)
     }
 }
 
@@ -82,40 +82,40 @@ pub fn split(def: &PlantDef, block: &Block) -> Option<([Block; 2], (u32, u32))> 
 /// The search for what is wrong with a refused block: its parts are polled in its place, and what they answer tells. What
 /// was found must be confirmed by one more refusal, so that a device that stumbled once loses nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Hunt {
+pub struct RangeBisection {
     /// Parts that have not answered yet.
     open: Vec<Block>,
     /// Each refused block, and what lay between the two parts that it was cut into.
-    cuts: Vec<(Place, Place)>,
-    found: Vec<Place>,
-    /// Found once: holes, if the next read that contains them is refused too.
-    suspects: Vec<Place>,
+    cuts: Vec<(AddressRange, AddressRange)>,
+    found: Vec<AddressRange>,
+    /// Found once: unreadable if the next read that contains them is refused too.
+    suspects: Vec<AddressRange>,
 }
 
 /// Addresses of a table, from the first to before the last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Place {
+struct AddressRange {
     device: DeviceId,
     table: Table,
     start: u32,
     end: u32,
 }
 
-impl Place {
-    fn of(block: &Block, (start, end): (u32, u32)) -> Place {
-        Place { device: block.device, table: block.table, start, end }
+impl AddressRange {
+    fn of(block: &Block, (start, end): (u32, u32)) -> AddressRange {
+        AddressRange { device: block.device, table: block.table, start, end }
     }
 
-    fn contains(&self, other: &Place) -> bool {
+    fn contains(&self, other: &AddressRange) -> bool {
         (self.device, self.table) == (other.device, other.table) && self.start <= other.start && other.end <= self.end
     }
 }
 
-impl Hunt {
+impl RangeBisection {
     /// A block was refused with exception 02: what to poll in its place. `None`: leave it, nothing new was learnt.
-    pub fn refused(&mut self, def: &PlantDef, holes: &Holes, block: &Block) -> Option<Vec<Block>> {
-        let whole = Place::of(block, block.range());
-        if holes.touch(whole.device, whole.table, whole.start, whole.end) {
+    pub fn refused(&mut self, def: &PlantDef, unreadable: &UnreadableRanges, block: &Block) -> Option<Vec<Block>> {
+        let whole = AddressRange::of(block, block.range());
+        if unreadable.touch(whole.device, whole.table, whole.start, whole.end) {
             return None;
         }
         self.open.retain(|open| open != block);
@@ -123,7 +123,7 @@ impl Hunt {
         let confirmed = self.suspects.iter().any(|suspect| whole.contains(suspect));
         match parts {
             Some((parts, between)) if !confirmed => {
-                self.cuts.push((whole, Place::of(block, between)));
+                self.cuts.push((whole, AddressRange::of(block, between)));
                 self.open.extend(parts.clone());
                 Some(parts.into())
             }
@@ -142,14 +142,14 @@ impl Hunt {
 
     /// A block was read. The device has all of it.
     pub fn answered(&mut self, block: &Block) {
-        let whole = Place::of(block, block.range());
+        let whole = AddressRange::of(block, block.range());
         self.open.retain(|open| open != block);
         self.suspects.retain(|suspect| !whole.contains(suspect));
     }
 
-    /// When every part has answered, or is a hole itself: adds what was confirmed to `holes`. `true` if the plan must be
+    /// When every part has answered, or is a gap itself: adds what was confirmed to `unreadable`. `true` if the plan must be
     /// made anew. Where both parts of a refused block are sound, the culprit lies between them.
-    pub fn conclude(&mut self, holes: &mut Holes) -> bool {
+    pub fn conclude(&mut self, unreadable: &mut UnreadableRanges) -> bool {
         if !self.open.is_empty() || (self.cuts.is_empty() && self.found.is_empty()) {
             return false;
         }
@@ -158,16 +158,16 @@ impl Hunt {
                 self.found.push(between);
             }
         }
-        let (confirmed, new): (Vec<Place>, Vec<Place>) =
+        let (confirmed, new): (Vec<AddressRange>, Vec<AddressRange>) =
             self.found.drain(..).partition(|found| self.suspects.contains(found));
         self.suspects.retain(|suspect| !confirmed.contains(suspect));
         self.suspects.extend(new);
-        confirmed.iter().for_each(|hole| holes.add(hole.device, hole.table, hole.start, hole.end));
+        confirmed.iter().for_each(|gap| unreadable.add(gap.device, gap.table, gap.start, gap.end));
         true
     }
 
     /// The plan is made anew for another reason: the search begins again.
     pub fn reset(&mut self) {
-        *self = Hunt::default();
+        *self = RangeBisection::default();
     }
 }
