@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{frame, gather::Verdict};
+use super::{frame, framing::FrameMatch};
 use crate::plant::event::Fault;
 
 /// Longest frame, from `:` to LF (Modbus over serial line V1.02, 2.5.2.1).
@@ -57,7 +57,7 @@ pub fn open(frame: &[u8]) -> Result<Vec<u8>, Fault> {
 }
 
 /// What the bytes that have come over an ASCII line are.
-pub fn verdict(message: &[u8], buffer: &[u8]) -> Verdict {
+pub fn find_answer(message: &[u8], buffer: &[u8]) -> FrameMatch {
     let mut spoiled = None;
     for frame in frames(buffer) {
         let answer = match open(&buffer[frame.clone()]) {
@@ -68,15 +68,15 @@ pub fn verdict(message: &[u8], buffer: &[u8]) -> Verdict {
             }
         };
         return match frame::check_answer(message, &answer) {
-            Ok(()) | Err(Fault::Exception(_)) => Verdict::Answer(frame),
-            Err(fault) => Verdict::Foreign(frame.end, fault),
+            Ok(()) | Err(Fault::Exception(_)) => FrameMatch::Answer(frame),
+            Err(fault) => FrameMatch::Foreign(frame.end, fault),
         };
     }
     match (open_frame(buffer), spoiled) {
-        (Some(open), _) if open.len() <= FRAME_MAX => Verdict::Begun,
-        (Some(open), _) => Verdict::Spoiled(Fault::WrongLength { got: open.len() as u16, asked: FRAME_MAX as u16 }),
-        (None, Some(fault)) => Verdict::Spoiled(fault),
-        (None, None) => Verdict::Nothing,
+        (Some(open), _) if open.len() <= FRAME_MAX => FrameMatch::Begun,
+        (Some(open), _) => FrameMatch::Spoiled(Fault::WrongLength { got: open.len() as u16, asked: FRAME_MAX as u16 }),
+        (None, Some(fault)) => FrameMatch::Spoiled(fault),
+        (None, None) => FrameMatch::Nothing,
     }
 }
 
@@ -115,13 +115,13 @@ pub fn open_frame(buffer: &[u8]) -> Option<&[u8]> {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::{bus::gather, plant::def::Framing};
+    use crate::{bus::framing, plant::def::Framing};
 
     const REQUEST: [u8; 6] = [1, 3, 0, 10, 0, 2];
     const ANSWER: [u8; 7] = [1, 3, 4, 0, 10, 0, 11];
 
-    fn check(bytes: &[u8], expect: Verdict) {
-        assert_eq!(verdict(&REQUEST, bytes), expect, "{}", bytes.escape_ascii());
+    fn check(bytes: &[u8], expect: FrameMatch) {
+        assert_eq!(find_answer(&REQUEST, bytes), expect, "{}", bytes.escape_ascii());
     }
 
     #[test]
@@ -135,25 +135,25 @@ mod tests {
     fn an_answer_is_found_whole_and_behind_noise_and_cut_at_every_character() {
         let whole = encode(&ANSWER);
         let length = whole.len();
-        check(&whole, Verdict::Answer(0..length));
+        check(&whole, FrameMatch::Answer(0..length));
         assert_eq!(open(&whole), Ok(ANSWER.to_vec()));
-        check(&[], Verdict::Nothing);
-        check(b"\xFF\x00\r\n0A", Verdict::Nothing);
+        check(&[], FrameMatch::Nothing);
+        check(b"\xFF\x00\r\n0A", FrameMatch::Nothing);
         for cut in 1..whole.len() {
-            check(&whole[..cut], Verdict::Begun);
+            check(&whole[..cut], FrameMatch::Begun);
             let behind = [&whole[..cut], &whole].concat();
-            check(&behind, Verdict::Answer(cut..cut + length));
+            check(&behind, FrameMatch::Answer(cut..cut + length));
             assert_eq!(left_over(&REQUEST, &whole[..cut]), Fault::Truncated { got: cut as u16, expected: 19 });
         }
-        check(&[b"\xFF\r\n0", &whole[..]].concat(), Verdict::Answer(4..4 + length));
-        check(&whole.to_ascii_lowercase(), Verdict::Answer(0..length));
+        check(&[b"\xFF\r\n0", &whole[..]].concat(), FrameMatch::Answer(4..4 + length));
+        check(&whole.to_ascii_lowercase(), FrameMatch::Answer(0..length));
     }
 
     #[test]
     fn a_refusal_is_an_answer_and_another_unit_is_not() {
-        check(&encode(&[1, 0x83, 2]), Verdict::Answer(0..11));
+        check(&encode(&[1, 0x83, 2]), FrameMatch::Answer(0..11));
         let other = encode(&[2, 3, 4, 0, 10, 0, 11]);
-        check(&other, Verdict::Foreign(other.len(), Fault::WrongUnit { got: 2, asked: 1 }));
+        check(&other, FrameMatch::Foreign(other.len(), Fault::WrongUnit { got: 2, asked: 1 }));
     }
 
     #[test]
@@ -166,11 +166,11 @@ mod tests {
             (b":01FF\r\n", Fault::Truncated { got: 7, expected: 9 }),
             (b":\r\n", Fault::Truncated { got: 3, expected: 9 }),
         ] {
-            check(bytes, Verdict::Spoiled(fault));
+            check(bytes, FrameMatch::Spoiled(fault));
             assert_eq!(left_over(&REQUEST, bytes), fault);
             // The good answer behind it is taken all the same.
             let behind = [bytes, &encode(&ANSWER)].concat();
-            check(&behind, Verdict::Answer(bytes.len()..bytes.len() + 19));
+            check(&behind, FrameMatch::Answer(bytes.len()..bytes.len() + 19));
         }
         assert_eq!(left_over(&REQUEST, &[]), Fault::Timeout);
     }
@@ -178,8 +178,8 @@ mod tests {
     #[test]
     fn a_frame_without_end_is_given_up_at_513_characters() {
         let long = [b":", &[b'0'; 600][..]].concat();
-        check(&long[..513], Verdict::Begun);
-        check(&long[..514], Verdict::Spoiled(Fault::WrongLength { got: 514, asked: 513 }));
+        check(&long[..513], FrameMatch::Begun);
+        check(&long[..514], FrameMatch::Spoiled(Fault::WrongLength { got: 514, asked: 513 }));
         let longest = encode(&[1; 254]);
         assert_eq!((longest.len(), open(&longest)), (FRAME_MAX, Ok(vec![1; 254])));
         let longer = encode(&[1; 255]);
@@ -234,17 +234,17 @@ mod tests {
             for (other, _, request, ..) in of("request") {
                 let (ascii, rtu) = (encode(answer), frame::with_crc(answer));
                 for noise in [&b""[..], b"\xFF\x55"] {
-                    let in_ascii = verdict(request, &[noise, &ascii].concat());
-                    let in_rtu = gather::verdict(Framing::Rtu, request, &[noise, &rtu].concat());
-                    assert_eq!(matches!(in_ascii, Verdict::Answer(_)), id == other, "{id} to {other}: {in_ascii:?}");
-                    assert_eq!(matches!(in_rtu, Verdict::Answer(_)), id == other, "{id} to {other}: {in_rtu:?}");
+                    let in_ascii = find_answer(request, &[noise, &ascii].concat());
+                    let in_rtu = framing::find_answer(Framing::Rtu, request, &[noise, &rtu].concat());
+                    assert_eq!(matches!(in_ascii, FrameMatch::Answer(_)), id == other, "{id} to {other}: {in_ascii:?}");
+                    assert_eq!(matches!(in_rtu, FrameMatch::Answer(_)), id == other, "{id} to {other}: {in_rtu:?}");
                 }
                 for cut in 0..ascii.len() {
-                    assert!(!matches!(verdict(request, &ascii[..cut]), Verdict::Answer(_)), "{id} cut at {cut}");
+                    assert!(!matches!(find_answer(request, &ascii[..cut]), FrameMatch::Answer(_)), "{id} cut at {cut}");
                 }
                 for cut in 0..rtu.len() {
                     assert!(
-                        !matches!(gather::verdict(Framing::Rtu, request, &rtu[..cut]), Verdict::Answer(_)),
+                        !matches!(framing::find_answer(Framing::Rtu, request, &rtu[..cut]), FrameMatch::Answer(_)),
                         "{id} cut at {cut}"
                     );
                 }

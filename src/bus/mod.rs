@@ -5,12 +5,12 @@
 //!            blocks   whose turn   polls    one      silences,
 //!            (gaps)   (classes)    writes   request  every byte on record
 //!                                  tests    (replies)
-//!   values <── codec <── task <── gather <── ascii, frame <── port        answered
+//!   values <── codec <── task <── framing <─ ascii, frame <── port        answered
 //! ```
 //!
 //! | room | what is decided there |
 //! |---|---|
-//! | [`frame`], [`ascii`], [`gather`] | where a frame begins and ends, whether its check fits, whether it answers what was asked |
+//! | [`frame`], [`ascii`], [`framing`] | where a frame begins and ends, whether its check fits, whether it answers what was asked |
 //! | [`late_reply`] | which replies are outstanding, and what may be asked meanwhile |
 //! | [`codec`] | words to numbers and back |
 //! | [`plan`], [`admission`], [`schedule`], [`backoff`] | what is read together, whether it can all be in time, what is read next |
@@ -21,7 +21,7 @@
 
 pub mod ascii;
 pub mod frame;
-pub mod gather;
+pub mod framing;
 pub mod names;
 pub mod request_lint;
 pub mod explain;

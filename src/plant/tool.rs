@@ -26,7 +26,7 @@ const SERIALS_MAX: usize = 64;
 /// A test of a line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Tool {
-    /// Sends these bytes as they are, check included, and gathers whatever comes back.
+    /// Sends these bytes as they are, check included, and receives whatever comes back.
     Send(Vec<u8>),
     /// Diagnostics 08/00, return query data, so many times.
     Loopback {

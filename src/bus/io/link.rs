@@ -9,7 +9,7 @@
 //! PDUs are made and read by tokio-modbus, with a fresh context for every request on one end of a pipe; what travels on
 //! the port is ours.
 
-mod gathering;
+mod receive;
 mod transactions;
 
 use std::{borrow::Cow, sync::Arc, time::Duration};
@@ -27,7 +27,7 @@ use tokio_modbus::{
 
 pub use self::transactions::Ended;
 use self::{
-    gathering::{GATHER_MAX, Gathered},
+    receive::{RECEIVE_MAX, Received},
     transactions::Transactions,
 };
 use super::{
@@ -38,7 +38,7 @@ use super::{
 use crate::{
     bus::{
         frame::{self, Mbap, Shape},
-        gather::{self, Verdict},
+        framing::{self, FrameMatch},
         late_reply::OutstandingReplies,
         plan::Block,
     },
@@ -156,13 +156,13 @@ impl Link {
         let sent_at = self.send(message, &frame).await?;
         let started = Instant::now();
         self.note_sent(frame.clone());
-        let mut gathered = match message.first() {
-            Some(0) => Gathered::nothing(Ok(vec![])),
-            _ => self.gather(message, &frame, sent_at).await?,
+        let mut received = match message.first() {
+            Some(0) => Received::nothing(Ok(vec![])),
+            _ => self.receive(message, &frame, sent_at).await?,
         };
         // Something unsolicited came meanwhile: this may be unsolicited too.
-        if proof && gathered.answer.is_ok() && self.wire.replies.is_ambiguous(message) {
-            gathered.answer = Err(Fault::OutOfSync);
+        if proof && received.answer.is_ok() && self.wire.replies.is_ambiguous(message) {
+            received.answer = Err(Fault::OutOfSync);
         }
         self.asked = None;
         self.busy += started.elapsed();
@@ -172,7 +172,7 @@ impl Link {
             self.wire.silence
         };
         self.wire.rest(rest);
-        match &gathered.answer {
+        match &received.answer {
             Ok(answer) => {
                 self.wire.counters.ok += 1;
                 let age = self.wire.age();
@@ -180,8 +180,8 @@ impl Link {
             }
             Err(fault) => self.account(message, *fault),
         }
-        self.note_silence(matches!(gathered.answer, Err(Fault::Timeout)));
-        self.keep(frame, gathered, sent_at).map_err(Trouble::Fault)
+        self.note_silence(matches!(received.answer, Err(Fault::Timeout)));
+        self.keep(frame, received, sent_at).map_err(Trouble::Fault)
     }
 
     /// Sends bytes as they are and gives everything that comes back until the line is silent: for tests of the line.
@@ -197,7 +197,7 @@ impl Link {
         let (mut buffer, mut reply) = (Vec::new(), None);
         let mut until = deadline;
         let answered = loop {
-            if !self.wire.receive(until, &mut buffer).await? || GATHER_MAX <= buffer.len() {
+            if !self.wire.receive(until, &mut buffer).await? || RECEIVE_MAX <= buffer.len() {
                 break false;
             }
             reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
@@ -209,7 +209,7 @@ impl Link {
             let whole = match framing {
                 Framing::Mbap => matches!(frame::mbap(&buffer), Mbap::Whole { .. }),
                 Framing::Rtu | Framing::Ascii => {
-                    matches!(gather::verdict(framing, &request, &buffer), Verdict::Answer(_))
+                    matches!(framing::find_answer(framing, &request, &buffer), FrameMatch::Answer(_))
                 }
             };
             if whole {
@@ -388,17 +388,17 @@ impl Link {
         self.wire.record(true, frame, Cow::Borrowed("sent"));
     }
 
-    fn keep(&mut self, request: Arc<[u8]>, gathered: Gathered, sent_at: Instant) -> Result<Vec<u8>, Fault> {
+    fn keep(&mut self, request: Arc<[u8]>, received: Received, sent_at: Instant) -> Result<Vec<u8>, Fault> {
         self.last = Some(Arc::new(Exchange {
             at: self.wire.clock().to_utc(self.wire.clock().at(sent_at)),
             framing: self.framing(),
             request,
-            answer: gathered.frame,
-            outcome: gathered.answer.as_ref().map(drop).map_err(|fault| *fault),
-            reply: gathered.reply,
+            answer: received.frame,
+            outcome: received.answer.as_ref().map(drop).map_err(|fault| *fault),
+            reply: received.reply,
             tries: 1,
         }));
-        gathered.answer
+        received.answer
     }
 
     /// Counts a fault. On a line without transaction ids the reply becomes outstanding, and the line pauses until the longest

@@ -4,9 +4,9 @@
 use super::{ascii, frame};
 use crate::plant::{def::Framing, event::Fault};
 
-/// What the bytes gathered so far are.
+/// What the bytes received so far are.
 #[derive(Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum FrameMatch {
     /// They hold the answer: this range is its frame, check included.
     Answer(std::ops::Range<usize>),
     /// They begin with a whole good frame that is not the answer and ends here.
@@ -20,15 +20,15 @@ pub enum Verdict {
 }
 
 /// Looks for the answer to a message.
-pub fn verdict(framing: Framing, message: &[u8], buffer: &[u8]) -> Verdict {
+pub fn find_answer(framing: Framing, message: &[u8], buffer: &[u8]) -> FrameMatch {
     match framing {
-        Framing::Ascii => ascii::verdict(message, buffer),
+        Framing::Ascii => ascii::find_answer(message, buffer),
         Framing::Rtu | Framing::Mbap => in_bytes(message, buffer),
     }
 }
 
 /// Looks for a frame with a good CRC at the beginning, then behind noise.
-fn in_bytes(message: &[u8], buffer: &[u8]) -> Verdict {
+fn in_bytes(message: &[u8], buffer: &[u8]) -> FrameMatch {
     let begins = |rest: &[u8]| match (rest, message) {
         ([unit, function, ..], [asked_unit, asked, ..]) => unit == asked_unit && function & 0x7F == *asked,
         _ => false,
@@ -38,22 +38,22 @@ fn in_bytes(message: &[u8], buffer: &[u8]) -> Verdict {
         let Some(length) = frame::answer_length(rest).filter(|length| length + 2 <= rest.len()) else { continue };
         let Ok(answer) = frame::without_crc(&rest[..length + 2]) else { continue };
         match frame::check_answer(message, answer) {
-            Ok(()) | Err(Fault::Exception(_)) => return Verdict::Answer(start..start + length + 2),
+            Ok(()) | Err(Fault::Exception(_)) => return FrameMatch::Answer(start..start + length + 2),
             // Inside what may be the answer a chance check is no frame: it would cut the answer in two.
             Err(_) if (0..start).any(|earlier| begins(&buffer[earlier..])) => {}
-            Err(fault) => return Verdict::Foreign(start + length + 2, fault),
+            Err(fault) => return FrameMatch::Foreign(start + length + 2, fault),
         }
     }
     // No good frame yet. Is there one of the right beginning and full length, but spoiled?
     let mut beginnings = (0..buffer.len()).map(|start| &buffer[start..]).filter(|rest| begins(rest)).peekable();
     if beginnings.peek().is_none() {
-        return Verdict::Nothing;
+        return FrameMatch::Nothing;
     }
     let spoiled = beginnings.find_map(|rest| {
         let frame = rest.get(..frame::answer_length(rest)? + 2)?;
         frame::without_crc(frame).err()
     });
-    spoiled.map_or(Verdict::Begun, Verdict::Spoiled)
+    spoiled.map_or(FrameMatch::Begun, FrameMatch::Spoiled)
 }
 
 /// Names what is left at the deadline.
@@ -85,33 +85,33 @@ mod tests {
         with_crc(&[1, 3, 4, 0, 10, 0, 11])
     }
 
-    fn check(bytes: &[u8], expect: Verdict) {
-        assert_eq!(verdict(Framing::Rtu, &REQUEST, bytes), expect, "{}", frame::hex(bytes));
+    fn check(bytes: &[u8], expect: FrameMatch) {
+        assert_eq!(find_answer(Framing::Rtu, &REQUEST, bytes), expect, "{}", frame::hex(bytes));
     }
 
     #[test]
     fn an_answer_is_found_whole_and_behind_noise() {
-        check(&[], Verdict::Nothing);
-        check(&answer(), Verdict::Answer(0..9));
-        check(&[&[0xFF, 0x00, 0x55], &answer()[..]].concat(), Verdict::Answer(3..12));
+        check(&[], FrameMatch::Nothing);
+        check(&answer(), FrameMatch::Answer(0..9));
+        check(&[&[0xFF, 0x00, 0x55], &answer()[..]].concat(), FrameMatch::Answer(3..12));
         for cut in 2..answer().len() {
-            check(&answer()[..cut], Verdict::Begun);
+            check(&answer()[..cut], FrameMatch::Begun);
         }
-        check(&[0xFF, 0x00, 0x55], Verdict::Nothing);
+        check(&[0xFF, 0x00, 0x55], FrameMatch::Nothing);
     }
 
     #[test]
     fn a_refusal_is_an_answer_and_another_unit_is_not() {
-        check(&with_crc(&[1, 0x83, 2]), Verdict::Answer(0..5));
-        check(&with_crc(&[2, 3, 4, 0, 10, 0, 11]), Verdict::Foreign(9, Fault::WrongUnit { got: 2, asked: 1 }));
-        check(&with_crc(&[1, 3, 2, 0, 10]), Verdict::Foreign(7, Fault::WrongLength { got: 5, asked: 7 }));
+        check(&with_crc(&[1, 0x83, 2]), FrameMatch::Answer(0..5));
+        check(&with_crc(&[2, 3, 4, 0, 10, 0, 11]), FrameMatch::Foreign(9, Fault::WrongUnit { got: 2, asked: 1 }));
+        check(&with_crc(&[1, 3, 2, 0, 10]), FrameMatch::Foreign(7, Fault::WrongLength { got: 5, asked: 7 }));
     }
 
     #[test]
     fn a_spoiled_answer_is_named_and_not_taken() {
         let mut spoiled = answer();
         spoiled[4] ^= 1;
-        assert!(matches!(verdict(Framing::Rtu, &REQUEST, &spoiled), Verdict::Spoiled(Fault::Crc { .. })));
+        assert!(matches!(find_answer(Framing::Rtu, &REQUEST, &spoiled), FrameMatch::Spoiled(Fault::Crc { .. })));
     }
 
     #[test]
@@ -120,8 +120,8 @@ mod tests {
         let request = [1, 3, 0, 10, 0, 4];
         let inner = with_crc(&[2, 0x83, 2]);
         let whole = with_crc(&[&[1, 3, 8], &inner[..], &[0, 0, 0]].concat());
-        assert_eq!(verdict(Framing::Rtu, &request, &whole[..10]), Verdict::Begun);
-        assert_eq!(verdict(Framing::Rtu, &request, &whole), Verdict::Answer(0..13));
+        assert_eq!(find_answer(Framing::Rtu, &request, &whole[..10]), FrameMatch::Begun);
+        assert_eq!(find_answer(Framing::Rtu, &request, &whole), FrameMatch::Answer(0..13));
     }
 
     #[test]

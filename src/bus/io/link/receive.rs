@@ -1,4 +1,4 @@
-//! Gathers what comes back until it is the answer, or time is over.
+//! Receives bytes until they are the answer or the deadline passes.
 
 use std::{borrow::Cow, sync::Arc, time::Duration};
 
@@ -8,35 +8,35 @@ use super::{Link, Trouble};
 use crate::{
     bus::{
         frame::{self, Shape},
-        gather::{self, Verdict},
+        framing::{self, FrameMatch},
     },
     plant::{def::Framing, event::Fault},
 };
 
 /// Characters of an ASCII frame may be this far apart (Modbus over serial line V1.02, 2.5.2.1).
 const ASCII_PAUSE: Duration = Duration::from_secs(1);
-/// Most bytes gathered for one answer, noise included; more is no Modbus.
-pub(super) const GATHER_MAX: usize = 4_096;
+/// Most bytes received for one answer, noise included; more is no Modbus.
+pub(super) const RECEIVE_MAX: usize = 4_096;
 
-/// What was gathered for one request.
+/// What was received for one request.
 #[derive(Debug, Clone)]
-pub(super) struct Gathered {
+pub(super) struct Received {
     pub answer: Result<Vec<u8>, Fault>,
     /// As it was on the wire.
     pub frame: Arc<[u8]>,
     pub reply: Option<Duration>,
 }
 
-impl Gathered {
-    pub fn nothing(answer: Result<Vec<u8>, Fault>) -> Gathered {
-        Gathered { answer, frame: Arc::default(), reply: None }
+impl Received {
+    pub fn nothing(answer: Result<Vec<u8>, Fault>) -> Received {
+        Received { answer, frame: Arc::default(), reply: None }
     }
 }
 
 impl Link {
-    /// Gathers until a frame has come that answers the message. Whole frames that do not (another unit, an outstanding reply)
+    /// Receives until a frame has come that answers the message. Whole frames that do not (another unit, an outstanding reply)
     /// are dropped, and waiting goes on inside the same deadline.
-    pub(super) async fn gather(&mut self, message: &[u8], sent: &[u8], sent_at: Instant) -> Result<Gathered, Trouble> {
+    pub(super) async fn receive(&mut self, message: &[u8], sent: &[u8], sent_at: Instant) -> Result<Received, Trouble> {
         let framing = self.framing();
         let mut echo = self.expects_echo(message).then_some(sent);
         let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);
@@ -52,41 +52,42 @@ impl Link {
                 (self.echoes, echo) = (true, None);
             }
             let echo_begun = self.echoes && echo.is_some_and(|sent| sent.starts_with(&buffer));
-            let verdict = if echo_begun { Verdict::Nothing } else { gather::verdict(framing, message, &buffer) };
+            let verdict =
+                if echo_begun { FrameMatch::Nothing } else { framing::find_answer(framing, message, &buffer) };
             let wait_until = match verdict {
-                Verdict::Answer(range) => {
+                FrameMatch::Answer(range) => {
                     self.wire.drop_stale(&buffer[..range.start]);
                     let frame: Arc<[u8]> = buffer[range].into();
                     self.wire.record(false, frame.clone(), Cow::Borrowed("ok"));
                     let answer = frame::unwrap(framing, &frame)
                         .and_then(|answer| frame::check_answer(message, &answer).map(|()| answer));
-                    return Ok(Gathered { answer, frame, reply });
+                    return Ok(Received { answer, frame, reply });
                 }
-                Verdict::Foreign(end, fault) => {
+                FrameMatch::Foreign(end, fault) => {
                     self.wire.drop_stale(&buffer[..end]);
                     buffer.drain(..end);
                     misfit = Some(fault);
                     continue;
                 }
                 // Nothing, or noise: the answer may still come.
-                Verdict::Nothing => deadline,
+                FrameMatch::Nothing => deadline,
                 // The frame may still grow, or it is spoiled; silence decides.
-                Verdict::Begun if framing == Framing::Ascii => (Instant::now() + ASCII_PAUSE).min(deadline),
-                Verdict::Begun | Verdict::Spoiled(_) => (Instant::now() + self.idle).min(deadline),
+                FrameMatch::Begun if framing == Framing::Ascii => (Instant::now() + ASCII_PAUSE).min(deadline),
+                FrameMatch::Begun | FrameMatch::Spoiled(_) => (Instant::now() + self.idle).min(deadline),
             };
-            if self.wire.receive(wait_until, &mut buffer).await? && buffer.len() <= GATHER_MAX {
+            if self.wire.receive(wait_until, &mut buffer).await? && buffer.len() <= RECEIVE_MAX {
                 reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
                 continue;
             }
             let fault = match verdict {
-                Verdict::Spoiled(fault) => fault,
-                _ => misfit.unwrap_or_else(|| gather::left_over(framing, message, &buffer)),
+                FrameMatch::Spoiled(fault) => fault,
+                _ => misfit.unwrap_or_else(|| framing::left_over(framing, message, &buffer)),
             };
             let frame: Arc<[u8]> = buffer.into();
             if !frame.is_empty() {
                 self.wire.record(false, frame.clone(), Cow::Owned(fault.to_string()));
             }
-            return Ok(Gathered { answer: Err(fault), frame, reply });
+            return Ok(Received { answer: Err(fault), frame, reply });
         }
     }
 
