@@ -51,16 +51,16 @@ use crate::{
 
 /// Why a request could not be completed.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Trouble {
+pub enum LinkError {
     /// The device or the line spoiled this request; the port is fine.
     Fault(Fault),
     /// The port or connection is gone, in the words of the system.
     Gone(String),
 }
 
-impl From<Fault> for Trouble {
+impl From<Fault> for LinkError {
     fn from(fault: Fault) -> Self {
-        Trouble::Fault(fault)
+        LinkError::Fault(fault)
     }
 }
 
@@ -113,7 +113,7 @@ impl Link {
     }
 
     /// Sends a request through tokio-modbus and gives the answer; an exception is a [`Fault::Exception`].
-    pub async fn call(&mut self, unit: u8, request: Request<'_>) -> Result<Response, Trouble> {
+    pub async fn call(&mut self, unit: u8, request: Request<'_>) -> Result<Response, LinkError> {
         let (ours, theirs) = tokio::io::duplex(2 * frame::MESSAGE_MAX);
         let mut context = rtu::attach_slave(theirs, Slave(unit));
         let (answer, done) = tokio::join!(context.call(request), self.carry(ours));
@@ -133,9 +133,9 @@ impl Link {
         }
     }
 
-    /// Takes one frame from the pipe, exchanges its message over the port, hands the answer back. On trouble the pipe is
+    /// Takes one frame from the pipe, exchanges its message over the port, hands the answer back. On an error the pipe is
     /// dropped, which ends the waiting on its other end.
-    async fn carry(&mut self, mut pipe: DuplexStream) -> Result<(), Trouble> {
+    async fn carry(&mut self, mut pipe: DuplexStream) -> Result<(), LinkError> {
         let mut frame = vec![0; 2 * frame::MESSAGE_MAX];
         let count = pipe.read(&mut frame).await.unwrap_or(0);
         let message = frame::without_crc(&frame[..count])?.to_vec();
@@ -146,7 +146,7 @@ impl Link {
     }
 
     /// Sends a message (unit and PDU) and gives the checked answer message. Sent once, never repeated.
-    pub async fn exchange(&mut self, message: &[u8]) -> Result<Vec<u8>, Trouble> {
+    pub async fn exchange(&mut self, message: &[u8]) -> Result<Vec<u8>, LinkError> {
         if self.framing() == Framing::Mbap {
             return self.exchange_mbap(message).await;
         }
@@ -181,11 +181,11 @@ impl Link {
             Err(fault) => self.account(message, *fault),
         }
         self.note_silence(matches!(received.answer, Err(Fault::Timeout)));
-        self.keep(frame, received, sent_at).map_err(Trouble::Fault)
+        self.keep(frame, received, sent_at).map_err(LinkError::Fault)
     }
 
     /// Sends bytes as they are and gives everything that comes back until the line is silent: for tests of the line.
-    pub async fn send_raw(&mut self, bytes: &[u8]) -> Result<(Vec<u8>, Option<Duration>), Trouble> {
+    pub async fn send_raw(&mut self, bytes: &[u8]) -> Result<(Vec<u8>, Option<Duration>), LinkError> {
         let framing = self.framing();
         // What comes next would be shown as the answer.
         self.finish_all().await?;
@@ -246,7 +246,7 @@ impl Link {
     }
 
     /// Sends the frame of a message; until its answer is taken it may be given up.
-    async fn send(&mut self, message: &[u8], frame: &[u8]) -> Result<Instant, Trouble> {
+    async fn send(&mut self, message: &[u8], frame: &[u8]) -> Result<Instant, LinkError> {
         self.keep_gap(message.first().copied());
         self.asked = Some(message.to_vec());
         self.wire.send(frame).await
@@ -283,20 +283,20 @@ impl Link {
     }
 
     /// Resynchronises a unit by a loopback, where no read can: after it nothing older can come any more.
-    pub async fn loopback(&mut self, unit: u8) -> Result<(), Trouble> {
+    pub async fn loopback(&mut self, unit: u8) -> Result<(), LinkError> {
         let proves = self.outstanding(unit).refusal_proves();
         let loopback = self.wire.replies.next_loopback(unit);
         match self.exchange(&loopback).await {
             Ok(_) => Ok(()),
-            Err(Trouble::Fault(Fault::Exception(_))) if proves => {
+            Err(LinkError::Fault(Fault::Exception(_))) if proves => {
                 if !self.is_unsettled(unit) {
                     self.wire.replies.clear(unit, self.wire.age());
                 }
                 Ok(())
             }
             // It may be the answer to an earlier loopback: the unit is alive, but not in sync.
-            Err(Trouble::Fault(Fault::Exception(_))) => Err(Fault::Timeout.into()),
-            Err(trouble) => Err(trouble),
+            Err(LinkError::Fault(Fault::Exception(_))) => Err(Fault::Timeout.into()),
+            Err(error) => Err(error),
         }
     }
 
@@ -331,7 +331,7 @@ impl Link {
     }
 
     /// Takes what comes while nothing is sent. Returns when a request under way has ended, or an error when the port is gone.
-    pub async fn idle(&mut self) -> Result<(), Trouble> {
+    pub async fn idle(&mut self) -> Result<(), LinkError> {
         match self.framing() {
             Framing::Mbap => self.idle_mbap().await,
             Framing::Rtu | Framing::Ascii => Err(self.wire.idle().await),

@@ -13,7 +13,7 @@ use tokio::sync::{mpsc, watch};
 
 use super::{
     clock::Clock,
-    link::{Link, Trouble},
+    link::{Link, LinkError},
     requests::{Closed, Requests},
     transport::{Connector, Opened},
     wire::Memory,
@@ -96,12 +96,12 @@ enum Leave {
     Test,
 }
 
-impl From<Trouble> for Leave {
-    /// Trouble of a request without a caller: only the end of the port matters.
-    fn from(trouble: Trouble) -> Leave {
-        match trouble {
-            Trouble::Gone(why) => Leave::Lost(why),
-            Trouble::Fault(fault) => Leave::Lost(fault.to_string()),
+impl From<LinkError> for Leave {
+    /// LinkError of a request without a caller: only the end of the port matters.
+    fn from(error: LinkError) -> Leave {
+        match error {
+            LinkError::Gone(why) => Leave::Lost(why),
+            LinkError::Fault(fault) => Leave::Lost(fault.to_string()),
         }
     }
 }

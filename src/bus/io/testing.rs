@@ -2,7 +2,7 @@
 
 use super::{
     clock::Clock,
-    link::{Link, Trouble},
+    link::{Link, LinkError},
     transport::Connector,
     wire::Memory,
 };
@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// One step. `Err` only when the port is gone.
-pub async fn step(link: &mut Link, step: &Step) -> Result<Came, Trouble> {
+pub async fn step(link: &mut Link, step: &Step) -> Result<Came, LinkError> {
     match &step.ask {
         Ask::Raw(bytes) => link.send_raw(bytes).await.map(|(bytes, reply)| Came::Bytes(bytes, reply)),
         Ask::Message(message) => {
@@ -26,12 +26,12 @@ pub async fn step(link: &mut Link, step: &Step) -> Result<Came, Trouble> {
             if let (true, Some(unit)) = (link.is_ambiguous(message), message.first()) {
                 match link.loopback(*unit).await {
                     Ok(()) => {}
-                    Err(Trouble::Fault(_)) => drop(link.forget_outstanding(*unit)),
+                    Err(LinkError::Fault(_)) => drop(link.forget_outstanding(*unit)),
                     Err(gone) => return Err(gone),
                 }
             }
             let sent = if link.is_ambiguous(message) {
-                Err(Trouble::Fault(Fault::Resting))
+                Err(LinkError::Fault(Fault::Resting))
             } else {
                 link.exchange(message).await
             };
@@ -39,11 +39,11 @@ pub async fn step(link: &mut Link, step: &Step) -> Result<Came, Trouble> {
             link.unanswered = unanswered;
             let answer = match sent {
                 Ok(answer) => Ok(Ok(answer)),
-                Err(Trouble::Fault(fault)) => Ok(Err(fault)),
+                Err(LinkError::Fault(fault)) => Ok(Err(fault)),
                 Err(gone) => Err(gone),
             };
             link.set_timeout(usual);
-            let exchange = link.last.clone().ok_or(Trouble::Fault(Fault::Timeout))?;
+            let exchange = link.last.clone().ok_or(LinkError::Fault(Fault::Timeout))?;
             Ok(Came::Answer(answer?, exchange))
         }
     }
@@ -77,8 +77,8 @@ pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&ToolRun
         };
         match step(&mut link, &next).await {
             Ok(came) => job.take(came),
-            Err(Trouble::Gone(why)) => job.stop(ToolState::Failed(why)),
-            Err(Trouble::Fault(fault)) => job.stop(ToolState::Failed(fault.to_string())),
+            Err(LinkError::Gone(why)) => job.stop(ToolState::Failed(why)),
+            Err(LinkError::Fault(fault)) => job.stop(ToolState::Failed(fault.to_string())),
         }
         if !progress(job.run()) {
             job.stop(ToolState::Cancelled);

@@ -8,7 +8,7 @@ use tokio::{
     time::Instant,
 };
 
-use super::{clock::Clock, link::Trouble, pause::Pause, transport::Stream};
+use super::{clock::Clock, link::LinkError, pause::Pause, transport::Stream};
 use crate::{
     bus::{
         ascii,
@@ -165,7 +165,7 @@ impl Wire {
     }
 
     /// Sends bytes when the line has been silent long enough, and gives the moment when the last of them has left.
-    pub async fn send(&mut self, bytes: &[u8]) -> Result<Instant, Trouble> {
+    pub async fn send(&mut self, bytes: &[u8]) -> Result<Instant, LinkError> {
         self.wait_for_silence().await;
         if self.framing != Framing::Mbap {
             // What is just coming in is heard to its end: it may be an outstanding reply.
@@ -181,16 +181,16 @@ impl Wire {
     }
 
     /// Sends bytes now, and gives the moment when the last of them has left.
-    pub async fn put(&mut self, bytes: &[u8]) -> Result<Instant, Trouble> {
+    pub async fn put(&mut self, bytes: &[u8]) -> Result<Instant, LinkError> {
         // No flush: on a serial port that waits for the last byte to leave, and blocks the thread while it does.
         // What the system takes at once, as a rule all of it, costs no timer.
         self.left_at = Instant::now() + self.char_time * bytes.len() as u32;
         let taken = self.port.write(bytes).now_or_never().unwrap_or(Ok(0));
-        let taken = taken.map_err(|error| Trouble::Gone(error.to_string()))?;
+        let taken = taken.map_err(|error| LinkError::Gone(error.to_string()))?;
         if let Some(rest @ [_, ..]) = bytes.get(taken..) {
             match tokio::time::timeout(self.timeout + self.char_time * 512, self.port.write_all(rest)).await {
-                Ok(written) => written.map_err(|error| Trouble::Gone(error.to_string()))?,
-                Err(_) => return Err(Trouble::Gone("the port takes no bytes".into())),
+                Ok(written) => written.map_err(|error| LinkError::Gone(error.to_string()))?,
+                Err(_) => return Err(LinkError::Gone("the port takes no bytes".into())),
             }
         }
         let sent_at = Instant::now();
@@ -200,7 +200,7 @@ impl Wire {
     }
 
     /// Appends what comes next to `buffer`; `false` if nothing came before `until`.
-    pub async fn receive(&mut self, until: Instant, buffer: &mut Vec<u8>) -> Result<bool, Trouble> {
+    pub async fn receive(&mut self, until: Instant, buffer: &mut Vec<u8>) -> Result<bool, LinkError> {
         // Room of its own would be part of this future, and be moved with it from call to call.
         buffer.reserve(frame::MESSAGE_MAX);
         // What is there already costs no timer.
@@ -227,14 +227,14 @@ impl Wire {
     }
 
     /// Reads and drops what comes while nobody has asked; returns only when the port is gone.
-    pub async fn idle(&mut self) -> Trouble {
+    pub async fn idle(&mut self) -> LinkError {
         loop {
             let pause = if self.stray.is_empty() { Duration::from_secs(3_600) } else { self.idle };
             self.stray.reserve(frame::MESSAGE_MAX);
             match tokio::time::timeout(pause, self.port.read_buf(&mut self.stray)).await.map(received) {
                 Err(_) => self.drop_stray(),
                 Ok(Ok(count)) => self.took_stray(count),
-                Ok(Err(trouble)) => return trouble,
+                Ok(Err(error)) => return error,
             }
         }
     }
@@ -350,7 +350,7 @@ impl Wire {
     }
 
     /// Takes what lies in the kernel: it was sent before we asked. (Over Modbus TCP the transaction id tells.)
-    fn drain(&mut self) -> Result<(), Trouble> {
+    fn drain(&mut self) -> Result<(), LinkError> {
         loop {
             self.stray.reserve(frame::MESSAGE_MAX);
             let Some(read) = self.port.read_buf(&mut self.stray).now_or_never() else { return Ok(()) };
@@ -369,10 +369,10 @@ impl Wire {
 }
 
 /// No bytes mean the end of the stream.
-fn received(read: std::io::Result<usize>) -> Result<usize, Trouble> {
+fn received(read: std::io::Result<usize>) -> Result<usize, LinkError> {
     match read {
-        Ok(0) => Err(Trouble::Gone("closed by the other side".into())),
+        Ok(0) => Err(LinkError::Gone("closed by the other side".into())),
         Ok(count) => Ok(count),
-        Err(error) => Err(Trouble::Gone(error.to_string())),
+        Err(error) => Err(LinkError::Gone(error.to_string())),
     }
 }

@@ -4,7 +4,7 @@ use std::{borrow::Cow, sync::Arc, time::Duration};
 
 use tokio::time::Instant;
 
-use super::{Link, Trouble};
+use super::{Link, LinkError};
 use crate::{
     bus::{
         frame::{self, Shape},
@@ -36,7 +36,12 @@ impl Received {
 impl Link {
     /// Receives until a frame has come that answers the message. Whole frames that do not (another unit, an outstanding reply)
     /// are dropped, and waiting goes on inside the same deadline.
-    pub(super) async fn receive(&mut self, message: &[u8], sent: &[u8], sent_at: Instant) -> Result<Received, Trouble> {
+    pub(super) async fn receive(
+        &mut self,
+        message: &[u8],
+        sent: &[u8],
+        sent_at: Instant,
+    ) -> Result<Received, LinkError> {
         let framing = self.framing();
         let mut echo = self.expects_echo(message).then_some(sent);
         let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);

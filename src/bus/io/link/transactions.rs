@@ -9,7 +9,7 @@ use std::{borrow::Cow, collections::VecDeque, sync::Arc, time::Duration};
 
 use tokio::time::Instant;
 
-use super::{Link, Trouble};
+use super::{Link, LinkError};
 use crate::{
     bus::frame::{self, Mbap},
     plant::{def::Framing, event::Fault, traffic::Exchange},
@@ -202,7 +202,7 @@ impl Link {
     }
 
     /// Sends what was submitted in one write, once the line has rested long enough.
-    pub async fn flush(&mut self) -> Result<(), Trouble> {
+    pub async fn flush(&mut self) -> Result<(), LinkError> {
         if self.transactions.outbox.is_empty() {
             return Ok(());
         }
@@ -211,7 +211,7 @@ impl Link {
         }
         let bytes = std::mem::take(&mut self.transactions.outbox);
         if std::mem::replace(&mut self.transactions.sending, true) {
-            return Err(Trouble::Gone("a request was cut short, the stream is out of sync".into()));
+            return Err(LinkError::Gone("a request was cut short, the stream is out of sync".into()));
         }
         let sent_at = self.wire.put(&bytes).await?;
         self.transactions.sending = false;
@@ -228,7 +228,7 @@ impl Link {
     }
 
     /// Returns when a request has ended, or none is under way.
-    pub async fn wait_for_answer(&mut self) -> Result<(), Trouble> {
+    pub async fn wait_for_answer(&mut self) -> Result<(), LinkError> {
         while self.transactions.ended.is_empty() && !self.transactions.under_way.is_empty() {
             self.collect(Instant::now() + LOOK_AGAIN).await?;
         }
@@ -236,7 +236,7 @@ impl Link {
     }
 
     /// Takes what comes on_unsolicited; returns when a request has ended.
-    pub(super) async fn idle_mbap(&mut self) -> Result<(), Trouble> {
+    pub(super) async fn idle_mbap(&mut self) -> Result<(), LinkError> {
         while self.transactions.ended.is_empty() {
             self.collect(Instant::now() + LOOK_AGAIN).await?;
         }
@@ -249,7 +249,7 @@ impl Link {
     }
 
     /// Sends a message and waits for its own answer; what else ends meanwhile is kept. Nothing else of the unit is under way.
-    pub(super) async fn exchange_mbap(&mut self, message: &[u8]) -> Result<Vec<u8>, Trouble> {
+    pub(super) async fn exchange_mbap(&mut self, message: &[u8]) -> Result<Vec<u8>, LinkError> {
         let unit = message.first().copied().unwrap_or_default();
         while !self.is_free(unit) {
             self.collect(Instant::now() + LOOK_AGAIN).await?;
@@ -265,14 +265,14 @@ impl Link {
             if let Some(place) = ended.iter().position(|ended| ended.id == id) {
                 let Ended { answer, exchange, .. } = ended.remove(place);
                 (self.asked_id, self.last) = (None, Some(exchange));
-                return answer.map_err(Trouble::Fault);
+                return answer.map_err(LinkError::Fault);
             }
             self.collect(Instant::now() + LOOK_AGAIN).await?;
         }
     }
 
     /// Waits until nothing is under way; what ends meanwhile is kept.
-    pub(super) async fn finish_all(&mut self) -> Result<(), Trouble> {
+    pub(super) async fn finish_all(&mut self) -> Result<(), LinkError> {
         while !self.transactions.under_way.is_empty() {
             self.collect(Instant::now() + LOOK_AGAIN).await?;
         }
@@ -316,7 +316,7 @@ impl Link {
     }
 
     /// Takes what comes until `until`, or until the first time for an answer is over. May be dropped while it waits.
-    async fn collect(&mut self, until: Instant) -> Result<(), Trouble> {
+    async fn collect(&mut self, until: Instant) -> Result<(), LinkError> {
         let deadlines = self.transactions.under_way.iter().filter_map(Transaction::deadline);
         let until = deadlines.fold(until, Instant::min);
         if self.wire.receive(until, &mut self.transactions.inbox).await? {
@@ -329,7 +329,7 @@ impl Link {
         if !expired.is_empty() && self.transactions.is_cut_short() {
             self.wire.record(false, self.transactions.inbox[..].into(), Cow::Borrowed("cut short"));
             // The rest may come later and would stand before the next header.
-            return Err(Trouble::Gone("an answer was cut short, the stream is out of sync".into()));
+            return Err(LinkError::Gone("an answer was cut short, the stream is out of sync".into()));
         }
         for request in expired {
             if self.transactions.silence_at <= request.sent_at {
@@ -344,11 +344,11 @@ impl Link {
 
     /// Assigns the whole frames that have come to their requests. If what stands behind them is no header, none of them is an
     /// answer: each may be a piece of something else.
-    fn take_frames_mbap(&mut self) -> Result<(), Trouble> {
+    fn take_frames_mbap(&mut self) -> Result<(), LinkError> {
         let (mut bytes, mut start, now) = (std::mem::take(&mut self.transactions.inbox), 0, Instant::now());
         if frame::is_out_of_step(&bytes) {
             self.wire.record(false, bytes.into(), Cow::Borrowed("no MBAP header"));
-            return Err(Trouble::Gone("the stream is out of sync".into()));
+            return Err(LinkError::Gone("the stream is out of sync".into()));
         }
         while let Mbap::Whole { transaction, end } = frame::mbap(&bytes[start..]) {
             let frame = &bytes[start..start + end];

@@ -145,8 +145,8 @@ impl Task<'_> {
                 self.give_up_reads(link, schedule);
                 return Ok(Ok(urgent));
             };
-            if let Err(trouble) = waited {
-                return Ok(Err(Leave::from(trouble)));
+            if let Err(error) = waited {
+                return Ok(Err(Leave::from(error)));
             }
             if let Err(leave) = self.take_answers(link, schedule).await? {
                 return Ok(Err(leave));

@@ -8,7 +8,7 @@ use super::{Ended, Leave, Task, Turn, poll::value_of};
 use crate::{
     bus::{
         backoff::Backoff,
-        io::link::{Link, Trouble},
+        io::link::{Link, LinkError},
         plan,
         schedule::Schedule,
     },
@@ -70,8 +70,8 @@ impl Task<'_> {
         let at = self.clock.now();
         let raw = match back {
             Some(Ok(values)) => value_of(tag, &block, &values),
-            Some(Err(Trouble::Fault(_))) => None,
-            Some(Err(Trouble::Gone(why))) => return Ok(Err(Leave::Lost(why))),
+            Some(Err(LinkError::Fault(_))) => None,
+            Some(Err(LinkError::Gone(why))) => return Ok(Err(Leave::Lost(why))),
             None => return Ok(Ok(())),
         };
         let Some(raw) = raw else {

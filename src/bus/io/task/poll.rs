@@ -12,7 +12,7 @@ use super::{Ended, Leave, Task, Turn};
 use crate::{
     bus::{
         codec,
-        io::link::{Link, Trouble},
+        io::link::{Link, LinkError},
         plan::{self, Block},
         schedule::Schedule,
     },
@@ -59,8 +59,8 @@ impl Task<'_> {
         self.keep_gap(link, schedule, &block, ended);
         let answer = match read {
             Some(Ok(answer)) => Ok(answer),
-            Some(Err(Trouble::Fault(fault))) => Err(fault),
-            Some(Err(Trouble::Gone(why))) => return Ok(Err(Leave::Lost(why))),
+            Some(Err(LinkError::Fault(fault))) => Err(fault),
+            Some(Err(LinkError::Gone(why))) => return Ok(Err(Leave::Lost(why))),
             // Nothing was learned of the device.
             None => {
                 schedule.again(index, ended);
@@ -174,7 +174,7 @@ impl Task<'_> {
         link: &mut Link,
         block: &Block,
         index: Option<usize>,
-    ) -> Option<Result<Answer, Trouble>> {
+    ) -> Option<Result<Answer, LinkError>> {
         let mut cured = None;
         let read = if self.requests.stop_waits() {
             None
@@ -236,7 +236,7 @@ impl Task<'_> {
 }
 
 /// What came in between may have shown that the unit sends what it was not asked for.
-fn proven(link: &Link, block: &Block) -> Result<(), Trouble> {
+fn proven(link: &Link, block: &Block) -> Result<(), LinkError> {
     if link.is_ambiguous(&block.request()) { Err(Fault::OutOfSync.into()) } else { Ok(()) }
 }
 
@@ -253,7 +253,7 @@ pub(super) fn span(from: Timestamp, to: Timestamp) -> Duration {
 
 /// Makes sure that the answer to a block cannot be mistaken for an outstanding one: by a read of another shape,
 /// part of this block or of one of `blocks`, if there is one, else by a loopback, else by patience.
-async fn resynchronise(blocks: &[Block], link: &mut Link, block: &Block) -> Result<(), Trouble> {
+async fn resynchronise(blocks: &[Block], link: &mut Link, block: &Block) -> Result<(), LinkError> {
     if !link.is_ambiguous(&block.request()) {
         return Ok(());
     }
@@ -268,15 +268,15 @@ async fn resynchronise(blocks: &[Block], link: &mut Link, block: &Block) -> Resu
     if let Some(probe) = link.outstanding(block.unit).probe(own.chain(others)) {
         match link.exchange(&probe).await {
             // The device does not read parts of a block, or this answers an older request: neither proves anything.
-            Err(Trouble::Fault(Fault::Exception(_))) => {}
+            Err(LinkError::Fault(Fault::Exception(_))) => {}
             Ok(_) => return proven(link, block),
-            Err(trouble) => return Err(trouble),
+            Err(error) => return Err(error),
         }
     }
     match link.loopback(block.unit).await {
-        Err(Trouble::Fault(_)) if link.forget_outstanding(block.unit).is_none() => Ok(()),
+        Err(LinkError::Fault(_)) if link.forget_outstanding(block.unit).is_none() => Ok(()),
         Ok(()) => proven(link, block),
-        Err(trouble) => Err(trouble),
+        Err(error) => Err(error),
     }
 }
 
@@ -287,10 +287,10 @@ async fn read_in_sync(
     link: &mut Link,
     block: &Block,
     spoiled: &mut Option<Fault>,
-) -> Result<Answer, Trouble> {
+) -> Result<Answer, LinkError> {
     resynchronise(blocks, link, block).await?;
     match read(link, block).await {
-        Err(Trouble::Fault(fault)) if fault.is_corrupt() => {
+        Err(LinkError::Fault(fault)) if fault.is_corrupt() => {
             *spoiled = Some(fault);
             resynchronise(blocks, link, block).await?;
             let second = read(link, block).await;
@@ -303,7 +303,7 @@ async fn read_in_sync(
     }
 }
 
-async fn read(link: &mut Link, block: &Block) -> Result<Answer, Trouble> {
+async fn read(link: &mut Link, block: &Block) -> Result<Answer, LinkError> {
     let answer = link.exchange(&block.request()).await?;
     Ok(parse(block, answer)?)
 }

@@ -7,7 +7,7 @@ use crate::{
     bus::{
         frame::{self, Mbap},
         io::{
-            link::{Link, Trouble},
+            link::{Link, LinkError},
             testing,
         },
         schedule::Next,
@@ -42,8 +42,8 @@ impl Task<'_> {
                 self.tell_test().await?;
                 Ok(if in_sync { Ok(()) } else { Err(Leave::Reopen) })
             }
-            (Err(Trouble::Gone(why)), _) => Ok(Err(Leave::Lost(why))),
-            (Ok(_), None) | (Err(Trouble::Fault(_)), _) => Ok(Ok(())),
+            (Err(LinkError::Gone(why)), _) => Ok(Err(Leave::Lost(why))),
+            (Ok(_), None) | (Err(LinkError::Fault(_)), _) => Ok(Ok(())),
         }
     }
 
@@ -54,7 +54,7 @@ impl Task<'_> {
         link: &mut Link,
         step: &Step,
         alone: bool,
-    ) -> Result<Option<Result<Came, Trouble>>, Ended> {
+    ) -> Result<Option<Result<Came, LinkError>>, Ended> {
         {
             let mut came = pin!(testing::step(link, step));
             loop {
@@ -101,11 +101,11 @@ impl Task<'_> {
             let Some(came) = came else { break };
             match (came, &mut self.job) {
                 (Ok(came), Some(job)) => job.take(came),
-                (Err(Trouble::Gone(why)), _) => {
+                (Err(LinkError::Gone(why)), _) => {
                     self.end_test(&why).await?;
                     break;
                 }
-                (Ok(_), None) | (Err(Trouble::Fault(_)), _) => {}
+                (Ok(_), None) | (Err(LinkError::Fault(_)), _) => {}
             }
             self.tell_test().await?;
             open = Some(link);

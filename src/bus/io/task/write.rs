@@ -8,7 +8,7 @@ use super::{Ended, Leave, Task, Turn, poll::value_of};
 use crate::{
     bus::{
         codec,
-        io::link::{Link, Trouble},
+        io::link::{Link, LinkError},
         plan,
         schedule::Schedule,
     },
@@ -170,9 +170,9 @@ impl Task<'_> {
                 schedule.answered(tag.device, None, self.clock.now());
                 Ok(WriteResult::Accepted)
             }
-            Err(Trouble::Gone(why)) => Err(why),
-            Err(Trouble::Fault(Fault::Exception(code))) if own && code.is_refusal() => Ok(WriteResult::Refused(code)),
-            Err(Trouble::Fault(fault)) => Ok(WriteResult::Lost(fault)),
+            Err(LinkError::Gone(why)) => Err(why),
+            Err(LinkError::Fault(Fault::Exception(code))) if own && code.is_refusal() => Ok(WriteResult::Refused(code)),
+            Err(LinkError::Fault(fault)) => Ok(WriteResult::Lost(fault)),
         }
     }
 
@@ -204,8 +204,8 @@ impl Task<'_> {
                 None => WriteResult::NotRead(Fault::NotANumber),
             },
             // The device has accepted it; that the port is gone shows itself at the next request.
-            Some(Err(Trouble::Gone(_))) => WriteResult::NotRead(Fault::NotConnected),
-            Some(Err(Trouble::Fault(fault))) => WriteResult::NotRead(fault),
+            Some(Err(LinkError::Gone(_))) => WriteResult::NotRead(Fault::NotConnected),
+            Some(Err(LinkError::Fault(fault))) => WriteResult::NotRead(fault),
             None => WriteResult::NotRead(Fault::Timeout),
         })
     }
@@ -218,8 +218,8 @@ impl Task<'_> {
         }
         match self.requests.unless_stopped(link.loopback(device.unit)).await {
             Some(Ok(())) => Ok(true),
-            Some(Err(Trouble::Fault(_))) => Ok(link.outstanding(device.unit).is_clear()),
-            Some(Err(Trouble::Gone(why))) => Err(why),
+            Some(Err(LinkError::Fault(_))) => Ok(link.outstanding(device.unit).is_clear()),
+            Some(Err(LinkError::Gone(why))) => Err(why),
             None => {
                 link.abandon();
                 Ok(false)
@@ -244,7 +244,7 @@ impl Task<'_> {
         device: &DeviceDef,
         request: Request<'_>,
         keeps: bool,
-    ) -> Result<(), Trouble> {
+    ) -> Result<(), LinkError> {
         let sent = link.call(device.unit, request);
         let sent = if keeps { Some(sent.await) } else { self.requests.unless_stopped(sent).await };
         let Some(sent) = sent else {
