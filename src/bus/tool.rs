@@ -37,12 +37,12 @@ pub enum Ask {
     Raw(Vec<u8>),
 }
 
-/// What came of a step.
+/// What a step has given.
 #[derive(Debug, Clone)]
-pub enum Came {
+pub enum StepResult {
     /// The answer to a message, or why there is none, and both as they were on the wire.
     Answer(Result<Vec<u8>, Fault>, Arc<Exchange>),
-    /// All bytes that came back for raw ones.
+    /// All bytes that result back for raw ones.
     Bytes(Vec<u8>, Option<Duration>),
 }
 
@@ -105,16 +105,16 @@ impl Job {
         }
     }
 
-    /// Takes what came of the step that was next.
-    pub fn take(&mut self, came: Came) {
+    /// Takes the result of the step that was next.
+    pub fn take(&mut self, result: StepResult) {
         let Some(step) = self.step.take() else { return };
         self.run.done += 1;
-        match (&self.run.tool, came) {
-            (_, Came::Bytes(bytes, reply)) => self.found(Finding::Bytes { bytes, reply }),
-            (Tool::Scan(_), Came::Answer(answer, _)) => self.take_unit(&step, answer),
+        match (&self.run.tool, result) {
+            (_, StepResult::Bytes(bytes, reply)) => self.found(Finding::Bytes { bytes, reply }),
+            (Tool::Scan(_), StepResult::Answer(answer, _)) => self.take_unit(&step, answer),
             // It only had an adapter with echo give itself away.
-            (Tool::Loopback { .. }, Came::Answer(..)) if self.run.done == 1 => {}
-            (_, Came::Answer(answer, exchange)) => {
+            (Tool::Loopback { .. }, StepResult::Answer(..)) if self.run.done == 1 => {}
+            (_, StepResult::Answer(answer, exchange)) => {
                 self.found(Finding::Exchange(exchange));
                 self.take_answer(&step, answer);
             }
@@ -361,8 +361,8 @@ fn loopback_words(findings: &[Finding], sent: u32) -> String {
     let refused = findings.iter().any(|finding| matches!(finding, Finding::Failed { fault: Fault::Exception(_), .. }));
     match replies.len() {
         0 if refused => "the unit answers, but does not have loopbacks: line and unit work".to_owned(),
-        0 => format!("none of {sent} came back"),
-        back => format!("{back} of {sent} came back, {least:.1} to {most:.1} ms"),
+        0 => format!("none of {sent} result back"),
+        back => format!("{back} of {sent} result back, {least:.1} to {most:.1} ms"),
     }
 }
 
@@ -394,8 +394,8 @@ mod tests {
         let mut job = Job::new(id, "anna".into(), tool, Timestamp::UNIX_EPOCH);
         for _ in 0..10_000 {
             let Some(next) = job.next() else { return job.run().clone() };
-            let came = match next.ask.clone() {
-                Ask::Raw(bytes) => Came::Bytes(bytes, Some(Duration::from_millis(1))),
+            let result = match next.ask.clone() {
+                Ask::Raw(bytes) => StepResult::Bytes(bytes, Some(Duration::from_millis(1))),
                 Ask::Message(request) => {
                     let answer = device(&request);
                     let exchange = Exchange {
@@ -407,10 +407,10 @@ mod tests {
                         reply: answer.is_ok().then_some(Duration::from_millis(12)),
                         tries: 1,
                     };
-                    Came::Answer(answer, Arc::new(exchange))
+                    StepResult::Answer(answer, Arc::new(exchange))
                 }
             };
-            job.take(came);
+            job.take(result);
         }
         panic!("it never ends")
     }
@@ -477,9 +477,9 @@ mod tests {
     fn loopbacks_are_counted() {
         let tool = Tool::Loopback { unit: 1, data: 0xA537, count: 3 };
         let all = run(tool.clone(), |request| Ok(request.to_vec()));
-        assert_eq!(verdict(&all), "3 of 3 came back, 12.0 to 12.0 ms");
+        assert_eq!(verdict(&all), "3 of 3 result back, 12.0 to 12.0 ms");
         let none = run(tool, |_| Err(Fault::Timeout));
-        assert_eq!(verdict(&none), "none of 3 came back");
+        assert_eq!(verdict(&none), "none of 3 result back");
         let tool = Tool::Loopback { unit: 1, data: 0, count: 3 };
         let without = run(tool, |_| Err(Fault::Exception(ExceptionCode(1))));
         assert!(verdict(&without).starts_with("the unit answers"), "{}", verdict(&without));

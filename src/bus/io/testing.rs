@@ -7,7 +7,7 @@ use super::{
     wire::Memory,
 };
 use crate::{
-    bus::tool::{Ask, Came, Job, Step},
+    bus::tool::{Ask, Job, Step, StepResult},
     plant::{
         def::{LineDef, Transport},
         event::Fault,
@@ -16,9 +16,9 @@ use crate::{
 };
 
 /// One step. `Err` only when the port is gone.
-pub async fn step(link: &mut Link, step: &Step) -> Result<Came, LinkError> {
+pub async fn step(link: &mut Link, step: &Step) -> Result<StepResult, LinkError> {
     match &step.ask {
-        Ask::Raw(bytes) => link.send_raw(bytes).await.map(|(bytes, reply)| Came::Bytes(bytes, reply)),
+        Ask::Raw(bytes) => link.send_raw(bytes).await.map(|(bytes, reply)| StepResult::Bytes(bytes, reply)),
         Ask::Message(message) => {
             let (usual, unanswered) = (link.timeout(), link.unanswered);
             link.set_timeout(step.timeout.unwrap_or(usual));
@@ -44,7 +44,7 @@ pub async fn step(link: &mut Link, step: &Step) -> Result<Came, LinkError> {
             };
             link.set_timeout(usual);
             let exchange = link.last.clone().ok_or(LinkError::Fault(Fault::Timeout))?;
-            Ok(Came::Answer(answer?, exchange))
+            Ok(StepResult::Answer(answer?, exchange))
         }
     }
 }
@@ -76,7 +76,7 @@ pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&ToolRun
             },
         };
         match step(&mut link, &next).await {
-            Ok(came) => job.take(came),
+            Ok(result) => job.take(result),
             Err(LinkError::Gone(why)) => job.stop(ToolState::Failed(why)),
             Err(LinkError::Fault(fault)) => job.stop(ToolState::Failed(fault.to_string())),
         }

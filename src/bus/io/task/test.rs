@@ -11,7 +11,7 @@ use crate::{
             testing,
         },
         schedule::Next,
-        tool::{Ask, Came, Step},
+        tool::{Ask, Step, StepResult},
     },
     plant::{
         command::BusRequest,
@@ -34,11 +34,11 @@ impl Task<'_> {
     pub(super) async fn test_step(&mut self, link: &mut Link) -> Turn {
         self.polls_since_test = 0;
         let Some(step) = self.job.as_ref().and_then(|job| job.next().cloned()) else { return Ok(Ok(())) };
-        let Some(came) = self.step_unless_cut(link, &step, false).await? else { return Ok(Ok(())) };
-        match (came, &mut self.job) {
-            (Ok(came), Some(job)) => {
-                let in_sync = stays_in_sync(link.framing(), &step.ask, &came);
-                job.take(came);
+        let Some(result) = self.step_unless_cut(link, &step, false).await? else { return Ok(Ok(())) };
+        match (result, &mut self.job) {
+            (Ok(result), Some(job)) => {
+                let in_sync = stays_in_sync(link.framing(), &step.ask, &result);
+                job.take(result);
                 self.tell_test().await?;
                 Ok(if in_sync { Ok(()) } else { Err(Leave::Reopen) })
             }
@@ -54,14 +54,14 @@ impl Task<'_> {
         link: &mut Link,
         step: &Step,
         alone: bool,
-    ) -> Result<Option<Result<Came, LinkError>>, Ended> {
+    ) -> Result<Option<Result<StepResult, LinkError>>, Ended> {
         {
-            let mut came = pin!(testing::step(link, step));
+            let mut result = pin!(testing::step(link, step));
             loop {
                 let request = tokio::select! {
                     biased;
                     _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
-                    came = &mut came => return Ok(Some(came)),
+                    result = &mut result => return Ok(Some(result)),
                     request = self.requests.recv() => request?,
                 };
                 if !self.hear_while_testing(request, alone).await? {
@@ -96,11 +96,11 @@ impl Task<'_> {
                 },
             };
             settings = wanted;
-            let came = self.step_unless_cut(&mut link, &step, true).await?;
+            let result = self.step_unless_cut(&mut link, &step, true).await?;
             self.close_second(&mut link);
-            let Some(came) = came else { break };
-            match (came, &mut self.job) {
-                (Ok(came), Some(job)) => job.take(came),
+            let Some(result) = result else { break };
+            match (result, &mut self.job) {
+                (Ok(result), Some(job)) => job.take(result),
                 (Err(LinkError::Gone(why)), _) => {
                     self.end_test(&why).await?;
                     break;
@@ -171,10 +171,10 @@ impl Task<'_> {
 
 /// Over Modbus TCP bytes that are no whole frame would be taken together with the next request, and an answer that is still
 /// to come could carry the transaction of a later one: then only a new connection is in sync.
-fn stays_in_sync(framing: Framing, ask: &Ask, came: &Came) -> bool {
+fn stays_in_sync(framing: Framing, ask: &Ask, result: &StepResult) -> bool {
     let whole = |bytes: &[u8]| matches!(frame::mbap(bytes), Mbap::Whole { end, .. } if end == bytes.len());
-    match (framing, ask, came) {
-        (Framing::Mbap, Ask::Raw(sent), Came::Bytes(received, _)) => whole(sent) && whole(received),
+    match (framing, ask, result) {
+        (Framing::Mbap, Ask::Raw(sent), StepResult::Bytes(received, _)) => whole(sent) && whole(received),
         (Framing::Mbap | Framing::Rtu | Framing::Ascii, _, _) => true,
     }
 }

@@ -136,7 +136,7 @@ impl Device {
 
 /// What came of a run.
 #[derive(Debug, Default)]
-struct Came {
+struct Seen {
     good: usize,
     failed: usize,
     /// By how much values were older than the requests that they were taken for.
@@ -144,13 +144,13 @@ struct Came {
 }
 
 /// Polls a device for a minute; the process is killed and started again each time after one of `lives`, if there are any.
-async fn run(device: Device, timeout: Duration, lives: &[Duration]) -> Came {
+async fn run(device: Device, timeout: Duration, lives: &[Duration]) -> Seen {
     let mut def = plant(device.mode);
     def.lines[0].timeout = timeout;
     let start = Instant::now();
     let (ports, served) = mpsc::channel(4);
     tokio::spawn(device.serve(start, served));
-    let (mut came, mut lives) = (Came::default(), lives.iter().cycle());
+    let (mut came, mut lives) = (Seen::default(), lives.iter().cycle());
     while start.elapsed() < Duration::from_secs(60) {
         let born = Instant::now();
         let mut line = line(def.clone());
@@ -177,7 +177,7 @@ async fn run(device: Device, timeout: Duration, lives: &[Duration]) -> Came {
     came
 }
 
-fn take(came: &mut Came, event: &Event, born: Duration) {
+fn take(came: &mut Seen, event: &Event, born: Duration) {
     match event {
         Event::Read { values, exchange: Some(exchange), .. } => {
             came.good += 1;
