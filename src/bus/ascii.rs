@@ -58,12 +58,12 @@ pub fn open(frame: &[u8]) -> Result<Vec<u8>, Fault> {
 
 /// What the bytes that have come over an ASCII line are.
 pub fn find_answer(message: &[u8], buffer: &[u8]) -> FrameMatch {
-    let mut spoiled = None;
+    let mut corrupt = None;
     for frame in frames(buffer) {
         let answer = match open(&buffer[frame.clone()]) {
             Ok(answer) => answer,
             Err(fault) => {
-                spoiled.get_or_insert(fault);
+                corrupt.get_or_insert(fault);
                 continue;
             }
         };
@@ -72,20 +72,20 @@ pub fn find_answer(message: &[u8], buffer: &[u8]) -> FrameMatch {
             Err(fault) => FrameMatch::Foreign(frame.end, fault),
         };
     }
-    match (open_frame(buffer), spoiled) {
+    match (open_frame(buffer), corrupt) {
         (Some(open), _) if open.len() <= FRAME_MAX => FrameMatch::Begun,
-        (Some(open), _) => FrameMatch::Spoiled(Fault::WrongLength { got: open.len() as u16, asked: FRAME_MAX as u16 }),
-        (None, Some(fault)) => FrameMatch::Spoiled(fault),
+        (Some(open), _) => FrameMatch::Corrupt(Fault::WrongLength { got: open.len() as u16, asked: FRAME_MAX as u16 }),
+        (None, Some(fault)) => FrameMatch::Corrupt(fault),
         (None, None) => FrameMatch::Nothing,
     }
 }
 
 /// Names what is left at the deadline.
 pub fn left_over(message: &[u8], buffer: &[u8]) -> Fault {
-    let spoiled = frames(buffer).find_map(|frame| open(&buffer[frame]).err());
+    let corrupt = frames(buffer).find_map(|frame| open(&buffer[frame]).err());
     let expected = 2 * frame::shape_of(message).map_or(3, frame::Shape::length) + 5;
     let cut = || Fault::Truncated { got: open_frame(buffer).unwrap_or(buffer).len() as u16, expected: expected as u16 };
-    if buffer.is_empty() { Fault::Timeout } else { spoiled.unwrap_or_else(cut) }
+    if buffer.is_empty() { Fault::Timeout } else { corrupt.unwrap_or_else(cut) }
 }
 
 /// The messages of all whole good frames.
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn each_way_of_being_spoiled_has_its_name() {
+    fn each_way_of_being_corrupt_has_its_name() {
         for (bytes, fault) in [
             (&b":0103FD\r\n"[..], Fault::Lrc { got: 0xFD, computed: 0xFC }),
             (b":01G3FC\r\n", Fault::NotHex(b'G')),
@@ -166,7 +166,7 @@ mod tests {
             (b":01FF\r\n", Fault::Truncated { got: 7, expected: 9 }),
             (b":\r\n", Fault::Truncated { got: 3, expected: 9 }),
         ] {
-            check(bytes, FrameMatch::Spoiled(fault));
+            check(bytes, FrameMatch::Corrupt(fault));
             assert_eq!(left_over(&REQUEST, bytes), fault);
             // The good answer behind it is taken all the same.
             let behind = [bytes, &encode(&ANSWER)].concat();
@@ -179,7 +179,7 @@ mod tests {
     fn a_frame_without_end_is_given_up_at_513_characters() {
         let long = [b":", &[b'0'; 600][..]].concat();
         check(&long[..513], FrameMatch::Begun);
-        check(&long[..514], FrameMatch::Spoiled(Fault::WrongLength { got: 514, asked: 513 }));
+        check(&long[..514], FrameMatch::Corrupt(Fault::WrongLength { got: 514, asked: 513 }));
         let longest = encode(&[1; 254]);
         assert_eq!((longest.len(), open(&longest)), (FRAME_MAX, Ok(vec![1; 254])));
         let longer = encode(&[1; 255]);

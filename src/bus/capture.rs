@@ -218,9 +218,9 @@ mod tests {
     }
 
     #[test]
-    fn a_spoiled_ascii_frame_does_not_become_a_good_one() {
-        let spoiled = frame(false, Framing::Ascii, b":01030200010A\r\n".to_vec(), "LRC error");
-        assert!(upper_pdu(&spoiled).ends_with(b":01030200010A\r\n"));
+    fn a_corrupt_ascii_frame_does_not_become_a_good_one() {
+        let corrupt = frame(false, Framing::Ascii, b":01030200010A\r\n".to_vec(), "LRC error");
+        assert!(upper_pdu(&corrupt).ends_with(b":01030200010A\r\n"));
         let good = frame(false, Framing::Ascii, ascii::encode(&[1, 3, 2, 0, 1]), "ok");
         assert!(upper_pdu(&good).ends_with(&frame::with_crc(&[1, 3, 2, 0, 1])));
     }

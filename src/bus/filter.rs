@@ -73,7 +73,7 @@ fn once(place: &mut Option<u8>, word: &'static str, found: Option<&str>) -> Resu
     }
 }
 
-/// Spoiled, late or dropped; or a refusal.
+/// Corrupt, late or dropped; or a refusal.
 fn is_error(frame: &Frame, message: &[u8]) -> bool {
     let refused = !frame.sent && message.get(1).is_some_and(|code| 0x80 <= *code);
     refused || !matches!(&*frame.verdict, "ok" | "sent")
@@ -122,14 +122,14 @@ mod tests {
             unit: None,
             number,
         };
-        let mut spoiled = frame::with_crc(&[1, 3, 2, 0, 5]);
-        spoiled[4] = 9;
+        let mut corrupt = frame::with_crc(&[1, 3, 2, 0, 5]);
+        corrupt[4] = 9;
         vec![
             frame(0, true, Framing::Rtu, frame::with_crc(&[1, 3, 3, 0xEA, 0, 1]), "sent"),
             frame(1, false, Framing::Rtu, frame::with_crc(&[1, 0x83, 2]), "ok"),
             frame(2, true, Framing::Mbap, frame::with_mbap(9, &[2, 16, 3, 0xEA, 0, 1, 2, 0, 0]), "sent"),
             frame(3, false, Framing::Ascii, ascii::encode(&[1, 3, 2, 3, 0xEA]), "ok"),
-            frame(4, false, Framing::Rtu, spoiled, "CRC error: got 7BB8, computed 7EB8"),
+            frame(4, false, Framing::Rtu, corrupt, "CRC error: got 7BB8, computed 7EB8"),
             frame(5, false, Framing::Rtu, vec![0xFF], "noise before the answer"),
         ]
     }

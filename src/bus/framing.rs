@@ -16,7 +16,7 @@ pub enum FrameMatch {
     /// The beginning of the answer.
     Begun,
     /// A frame of full length whose check does not fit.
-    Spoiled(Fault),
+    Corrupt(Fault),
 }
 
 /// Looks for the answer to a message.
@@ -44,16 +44,16 @@ fn in_bytes(message: &[u8], buffer: &[u8]) -> FrameMatch {
             Err(fault) => return FrameMatch::Foreign(start + length + 2, fault),
         }
     }
-    // No good frame yet. Is there one of the right beginning and full length, but spoiled?
+    // No good frame yet. Is there one of the right beginning and full length, but corrupt?
     let mut beginnings = (0..buffer.len()).map(|start| &buffer[start..]).filter(|rest| begins(rest)).peekable();
     if beginnings.peek().is_none() {
         return FrameMatch::Nothing;
     }
-    let spoiled = beginnings.find_map(|rest| {
+    let corrupt = beginnings.find_map(|rest| {
         let frame = rest.get(..frame::answer_length(rest)? + 2)?;
         frame::without_crc(frame).err()
     });
-    spoiled.map_or(FrameMatch::Begun, FrameMatch::Spoiled)
+    corrupt.map_or(FrameMatch::Begun, FrameMatch::Corrupt)
 }
 
 /// Names what is left at the deadline.
@@ -108,10 +108,10 @@ mod tests {
     }
 
     #[test]
-    fn a_spoiled_answer_is_named_and_not_taken() {
-        let mut spoiled = answer();
-        spoiled[4] ^= 1;
-        assert!(matches!(find_answer(Framing::Rtu, &REQUEST, &spoiled), FrameMatch::Spoiled(Fault::Crc { .. })));
+    fn a_corrupt_answer_is_named_and_not_taken() {
+        let mut corrupt = answer();
+        corrupt[4] ^= 1;
+        assert!(matches!(find_answer(Framing::Rtu, &REQUEST, &corrupt), FrameMatch::Corrupt(Fault::Crc { .. })));
     }
 
     #[test]

@@ -293,7 +293,7 @@ impl LineReplies {
         unit.prove(unit.patience(timeout), now);
     }
 
-    /// A request was not answered, or only by something spoiled.
+    /// A request was not answered, or only by something corrupt.
     pub fn failed(&mut self, message: &[u8], now: Duration) {
         let Some(unit) = message.first().map(|unit| &mut self.units[usize::from(*unit)]) else { return };
         let shape = shape_of(message);

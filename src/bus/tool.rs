@@ -14,7 +14,7 @@ use crate::plant::{
     traffic::Exchange,
 };
 
-/// Most units of a scan with the same settings of which only spoiled bytes may come.
+/// Most units of a scan with the same settings of which only corrupt bytes may come.
 const TRACES_MAX: usize = 3;
 
 /// What is to be sent next.
@@ -58,7 +58,7 @@ pub struct Job {
     made: u32,
     /// How many it has.
     planned: u32,
-    /// Units of a scan that gave spoiled bytes, with which settings: each by itself may be a unit, all together are none.
+    /// Units of a scan that gave corrupt bytes, with which settings: each by itself may be a unit, all together are none.
     traces: Vec<(u8, Option<Serial>, Fault)>,
 }
 
@@ -209,14 +209,14 @@ impl Job {
                 _ => "answers".into(),
             },
             Err(fault @ Fault::Exception(code)) if !code.is_of_gateway() => fault.to_string(),
-            // Spoiled bytes are a trace too: a unit may be there with another parity or baud rate.
+            // Corrupt bytes are a trace too: a unit may be there with another parity or baud rate.
             Err(fault) if fault.is_corrupt() => return self.traces.push((request[0], step.serial, fault)),
             Err(_) => return,
         };
         self.found(Finding::Unit { unit: request[0], serial: step.serial, words });
     }
 
-    /// Few spoiled answers are told as what may be units; more with the same settings come from something else that talks.
+    /// Few corrupt answers are told as what may be units; more with the same settings come from something else that talks.
     fn conclude_traces(&mut self) {
         let traces = std::mem::take(&mut self.traces);
         for same in traces.chunk_by(|one, other| one.1 == other.1) {

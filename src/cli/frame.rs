@@ -62,7 +62,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 
 /// Explains frames as their lines come. An answer behind its request gets its addresses.
 fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> {
-    let (mut frames, mut spoiled, mut wrong) = (0, 0, 0);
+    let (mut frames, mut corrupt, mut wrong) = (0, 0, 0);
     let mut asked: Option<Explained> = None;
     for (index, line) in input.split(b'\n').enumerate() {
         let line = line.map_err(|error| CliError::Io { what: "cannot read standard input".into(), error })?;
@@ -74,7 +74,7 @@ fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> 
             Ok(typed) => typed,
             Err(error) => {
                 say_error(&format!("line {}: {error}", index + 1));
-                spoiled += 1;
+                corrupt += 1;
                 continue;
             }
         };
@@ -87,11 +87,11 @@ fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> 
         let told = explained(&typed, framing, None);
         asked = (told.direction != Some(Direction::Answer)).then_some(told);
     }
-    match (frames, spoiled, wrong) {
+    match (frames, corrupt, wrong) {
         (0, 0, _) => Err(CliError::Usage(typed::TypedError::Empty.to_string())),
         (_, 0, 0) => Ok(()),
         (_, 0, _) => Err(CliError::Failed(format!("{wrong} of {frames} frames are wrong"))),
-        _ => Err(CliError::Usage(format!("{spoiled} of {} lines cannot be read", frames + spoiled))),
+        _ => Err(CliError::Usage(format!("{corrupt} of {} lines cannot be read", frames + corrupt))),
     }
 }
 

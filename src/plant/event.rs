@@ -203,7 +203,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Frames that came but were spoiled, as opposed to silence and refusals.
+    /// Frames that came but were corrupt, as opposed to silence and refusals.
     pub fn is_corrupt(self) -> bool {
         match self {
             Fault::Crc { .. }
@@ -301,7 +301,7 @@ pub struct LineCounters {
     pub ok: u64,
     /// No answer in time.
     pub timeouts: u64,
-    /// Spoiled answers.
+    /// Corrupt answers.
     pub corrupt: u64,
     /// Exception answers.
     pub exceptions: u64,

@@ -20,7 +20,7 @@ pub struct LineMinute {
     pub ok: u64,
     /// No answer in time.
     pub timeouts: u64,
-    /// Spoiled answers.
+    /// Corrupt answers.
     pub corrupt: u64,
     /// Exception answers.
     pub exceptions: u64,

@@ -74,10 +74,10 @@ pub enum Reason {
     },
     /// It answers, and none of its latest answers held a value.
     NoValues,
-    /// Spoiled or repeated requests.
-    Spoiled {
+    /// Corrupt or repeated requests.
+    Corrupt {
         /// So many.
-        spoiled: u64,
+        corrupt: u64,
         /// Of so many.
         of: u64,
     },
@@ -94,7 +94,7 @@ impl Reason {
             Reason::NotConnected | Reason::Down | Reason::NoValues => Signal::Failure,
             Reason::LineClosed | Reason::LineTesting | Reason::Settling => Signal::FunctionCheck,
             Reason::Slow { .. } | Reason::Failing { .. } => Signal::OutOfSpecification,
-            Reason::Spoiled { .. } | Reason::Late(_) | Reason::MemoryParity(_) => Signal::Maintenance,
+            Reason::Corrupt { .. } | Reason::Late(_) | Reason::MemoryParity(_) => Signal::Maintenance,
         }
     }
 }
@@ -112,7 +112,7 @@ impl fmt::Display for Reason {
             }
             Reason::Failing { failed, of } => write!(f, "{failed} of {of} requests failed"),
             Reason::NoValues => f.write_str("answers, but gives no values"),
-            Reason::Spoiled { spoiled, of } => write!(f, "{spoiled} of {of} answers spoiled or repeated"),
+            Reason::Corrupt { corrupt, of } => write!(f, "{corrupt} of {of} answers corrupt or repeated"),
             Reason::Late(count) => write!(f, "{count} answers came too late"),
             Reason::MemoryParity(count) => write!(f, "memory parity error ({count})"),
         }
@@ -142,8 +142,8 @@ const SLOW_PERCENT: u32 = 80;
 const FAILING_PERCENT: u32 = 10;
 /// After so many failures in a row a device is of no use, whatever it answers.
 pub const NO_VALUES_AFTER: u32 = 12;
-/// Share of requests that may be spoiled or repeated, in hundredths.
-const SPOILED_PERCENT: u64 = 1;
+/// Share of requests that may be corrupt or repeated, in hundredths.
+const CORRUPT_PERCENT: u64 = 1;
 
 /// The worst that can be said of a device; `None` while it is well, or nothing is known.
 pub fn judge(evidence: Evidence) -> Option<Reason> {
@@ -185,12 +185,12 @@ fn out_of_specification(lately: &Tally, timeout: Duration) -> Option<Reason> {
 fn maintenance(lately: &Tally) -> Option<Reason> {
     let parity = |(code, count): &(ExceptionCode, u64)| (code.0 == 0x08).then_some(*count);
     let parity: u64 = lately.exceptions.iter().filter_map(parity).sum();
-    // What is repeated was spoiled: the greater of the two, not their sum.
-    let (spoiled, of) = (lately.corrupt().max(lately.retries), lately.requests);
+    // What is repeated was corrupt: the greater of the two, not their sum.
+    let (corrupt, of) = (lately.corrupt().max(lately.retries), lately.requests);
     if 0 < parity {
         Some(Reason::MemoryParity(parity))
-    } else if REQUESTS_MIN <= of && of * SPOILED_PERCENT <= spoiled * 100 {
-        Some(Reason::Spoiled { spoiled, of })
+    } else if REQUESTS_MIN <= of && of * CORRUPT_PERCENT <= corrupt * 100 {
+        Some(Reason::Corrupt { corrupt, of })
     } else {
         (0 < lately.late).then_some(Reason::Late(lately.late))
     }
@@ -264,8 +264,8 @@ mod tests {
         let check = |lately: &Tally, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
         let crc = Fault::Crc { got: 1, computed: 2 };
         check(&tally(199, 12, &[crc]), "");
-        check(&tally(198, 12, &[crc, crc]), "M 2 of 200 answers spoiled or repeated");
-        check(&Tally { retries: 1, ..tally(100, 12, &[]) }, "M 1 of 100 answers spoiled or repeated");
+        check(&tally(198, 12, &[crc, crc]), "M 2 of 200 answers corrupt or repeated");
+        check(&Tally { retries: 1, ..tally(100, 12, &[]) }, "M 1 of 100 answers corrupt or repeated");
         check(&Tally { late: 1, ..tally(100, 12, &[]) }, "M 1 answers came too late");
         check(&tally(100, 12, &[Fault::Exception(ExceptionCode(0x08))]), "M memory parity error (1)");
         check(&tally(100, 12, &[Fault::Exception(ExceptionCode(0x06))]), "");

@@ -23,7 +23,7 @@ pub struct Tally {
     pub foreign: u64,
     /// Exception answers by code.
     pub exceptions: Vec<(ExceptionCode, u64)>,
-    /// Requests that were sent again because the answer was spoiled.
+    /// Requests that were sent again because the answer was corrupt.
     pub retries: u64,
     /// Answers to requests that had been given up.
     pub late: u64,
@@ -67,7 +67,7 @@ impl Tally {
         }
     }
 
-    /// Spoiled answers of all kinds.
+    /// Corrupt answers of all kinds.
     pub fn corrupt(&self) -> u64 {
         self.check + self.length + self.foreign
     }

@@ -127,7 +127,7 @@ pub struct Exchange {
     pub outcome: Result<(), Fault>,
     /// From the last byte sent to the first byte received; `None` if none came.
     pub reply: Option<Duration>,
-    /// 1, or 2 if a spoiled answer was asked for again.
+    /// 1, or 2 if a corrupt answer was asked for again.
     pub tries: u8,
 }
 

@@ -113,7 +113,7 @@ mod tests {
     const READ: &[u8] = &[0x11, 3, 0, 0x6B, 0, 3];
 
     #[test]
-    fn requests_are_read_and_spoiled_ones_noticed() {
+    fn requests_are_read_and_corrupt_ones_noticed() {
         check(8, b":1103006B00037E\r\n", &[Some(READ)]);
         check(8, b":1103006b00037e\r\n", &[Some(READ)]);
         check(8, b"\xFF\x00noise:1103006B00037E\r\n", &[Some(READ)]);

@@ -139,7 +139,7 @@ impl Faults {
     /// Answers a request, unless an active fault answers instead. `None`: nothing comes back.
     pub fn answer(&mut self, simulator: &mut Simulator, line: LineId, unit: u8, request: &[u8]) -> Option<Answer> {
         if self.hit(line).is_some() {
-            simulator.spoiled(line);
+            simulator.corrupt(line);
             return None;
         }
         if simulator.is_broadcast(line, unit) {
@@ -162,7 +162,7 @@ impl Faults {
             Some(Fault::Cut) => answer(simulator.respond(line, unit, request)?, Damage::Cut, late),
             Some(_) | None => answer(simulator.respond(line, unit, request)?, Damage::None, late),
         };
-        answer.pdu = self.spoil_values(line, unit, request, answer.pdu);
+        answer.pdu = self.corrupt_values(line, unit, request, answer.pdu);
         if let Some(bit) = self.hit(line) {
             answer.damage = Damage::Bit(bit);
         }
@@ -173,7 +173,7 @@ impl Faults {
         self.at(FaultTarget::Unit(line, unit), TargetKind::Unit).next()
     }
 
-    fn spoil_values(&mut self, line: LineId, unit: u8, request: &[u8], mut pdu: Vec<u8>) -> Vec<u8> {
+    fn corrupt_values(&mut self, line: LineId, unit: u8, request: &[u8], mut pdu: Vec<u8>) -> Vec<u8> {
         let targets: Vec<FaultTarget> = self.list.iter().map(|active| active.target).collect();
         let mut targets = targets;
         targets.dedup();
@@ -187,7 +187,7 @@ impl Faults {
             };
             let faults: Vec<Fault> = self.at(target, TargetKind::Value).collect();
             if let (Some(values), false) = (values, faults.is_empty()) {
-                pdu = values.spoil(&faults, self.memories.entry(target).or_default(), request, pdu);
+                pdu = values.corrupt(&faults, self.memories.entry(target).or_default(), request, pdu);
             }
         }
         pdu
@@ -246,7 +246,7 @@ impl Answer {
         frame
     }
 
-    /// The bytes on a TCP connection. There is no check to spoil: a wrong transaction number is the nearest thing.
+    /// The bytes on a TCP connection. There is no check to corrupt: a wrong transaction number is the nearest thing.
     pub fn tcp(&self, transaction: u16) -> Vec<u8> {
         let transaction = if self.damage == Damage::Check { transaction ^ 0xFF00 } else { transaction };
         let message = self.message();

@@ -6,7 +6,7 @@
 //!                                  │
 //!                               slave ─ pdu::serve                       one Modbus server for all, which counts
 //!                                  │
-//!                           simulator: (line, unit) ─> slave             `faults` spoil what is measured, done or answered
+//!                           simulator: (line, unit) ─> slave             `faults` corrupt what is measured, done or answered
 //!                                  │
 //!                               io: RTU or ASCII on a pty, TCP, RTU over TCP; each line at a place of its own
 //!

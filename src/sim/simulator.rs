@@ -134,10 +134,10 @@ impl Simulator {
     }
 
     /// Something passed on a line that no unit could read.
-    pub fn spoiled(&mut self, line: LineId) {
+    pub fn corrupt(&mut self, line: LineId) {
         for unit in self.units(line) {
             if let Some(unit) = self.unit(line, unit) {
-                unit.hear_spoiled();
+                unit.hear_corrupt();
             }
         }
     }
@@ -235,9 +235,9 @@ mod tests {
             simulator.respond(L1, unit, &[3, 0x03, 0xEA, 0, 1]);
             simulator.respond(LineId(1), unit, &[3, 0x03, 0xEA, 0, 1]);
         }
-        simulator.spoiled(L1);
-        simulator.spoiled(LineId(1));
-        // All four messages and this query; one that was spoiled; unit 2, the broadcast and the three queries.
+        simulator.corrupt(L1);
+        simulator.corrupt(LineId(1));
+        // All four messages and this query; one that was corrupt; unit 2, the broadcast and the three queries.
         assert_eq!(counter(&mut simulator, 0x0B), Some(5));
         assert_eq!(counter(&mut simulator, 0x0C), Some(1));
         assert_eq!(counter(&mut simulator, 0x0E), Some(5));

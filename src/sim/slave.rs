@@ -27,7 +27,7 @@ struct Counters {
 
 /// Places in [`Counters::diagnostic`].
 const HEARD: usize = 0;
-const SPOILED: usize = 1;
+const CORRUPT: usize = 1;
 const EXCEPTIONS: usize = 2;
 const ADDRESSED: usize = 3;
 const UNANSWERED: usize = 4;
@@ -36,7 +36,7 @@ const BUSY: usize = 6;
 
 /// Bits of an event (V1.1b3, 6.10).
 const RECEIVED: u8 = 1 << 7;
-const RECEIVED_SPOILED: u8 = RECEIVED | 1 << 1;
+const RECEIVED_CORRUPT: u8 = RECEIVED | 1 << 1;
 const RECEIVED_BROADCAST: u8 = RECEIVED | 1 << 6;
 const SENT: u8 = 1 << 6;
 
@@ -51,7 +51,7 @@ pub trait Unit {
     /// A message for another unit passed on the line.
     fn hear(&mut self);
     /// A message passed that nobody could read.
-    fn hear_spoiled(&mut self);
+    fn hear_corrupt(&mut self);
 }
 
 impl<D> Slave<D> {
@@ -66,9 +66,9 @@ impl<D: Registers> Unit for Slave<D> {
         self.counters.count(HEARD);
     }
 
-    fn hear_spoiled(&mut self) {
-        self.counters.count(SPOILED);
-        self.counters.note(RECEIVED_SPOILED);
+    fn hear_corrupt(&mut self) {
+        self.counters.count(CORRUPT);
+        self.counters.note(RECEIVED_CORRUPT);
     }
 
     fn respond(&mut self, pdu: &[u8]) -> Option<Vec<u8>> {
@@ -213,7 +213,7 @@ mod tests {
         ask(slave, &[3, 4, 0, 0, 1], &[3, 2, 0, 0]);
         ask(slave, &[3, 4, 0, 0, 0], &[0x83, 3]);
         slave.hear();
-        slave.hear_spoiled();
+        slave.hear_corrupt();
         slave.obey(&[6, 4, 0x10, 0, 1]);
         slave.refuse(&[3, 4, 0, 0, 1], 6);
         slave.refuse(&[3, 4, 0, 0, 1], 7);
@@ -229,7 +229,7 @@ mod tests {
     #[test]
     fn the_log_keeps_the_latest_64_events() {
         let slave = &mut Slave::new(Dl06::new());
-        (0..100).for_each(|_| slave.hear_spoiled());
+        (0..100).for_each(|_| slave.hear_corrupt());
         let reply = slave.respond(&[0x0C]).expect("an answer");
         assert_eq!((reply.len(), reply[1], reply[8], reply[9], reply[71]), (72, 70, 0x80, 0x82, 0x82));
     }

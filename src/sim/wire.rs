@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_check_spoils_everything_up_to_the_silence() {
+    fn a_wrong_check_corrupts_everything_up_to_the_silence() {
         let mut receiver = Receiver::default();
         receiver.push(&[1, 3, 3, 0xEA, 0, 1, 0, 0]);
         assert_eq!(receiver.take(), None);

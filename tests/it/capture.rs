@@ -106,7 +106,7 @@ fn wireshark_reads_serial_traffic_without_settings() {
 }
 
 #[test]
-fn what_was_spoiled_is_no_modbus_and_says_why() {
+fn what_was_corrupt_is_no_modbus_and_says_why() {
     if !have("tshark", "tshark") {
         return;
     }

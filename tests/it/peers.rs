@@ -82,7 +82,7 @@ fn the_station_reads_pymodbus_over_tcp() {
 /// what is wrong (`peers/slave.py`).
 const WELL: (&str, u8, &str) = ("WELL", 3, "10");
 const LATE: (&str, u8, &str) = ("LATE", 4, "210");
-const SPOILED: (&str, u8, &str) = ("SPOILED", 5, "310");
+const CORRUPT: (&str, u8, &str) = ("CORRUPT", 5, "310");
 const SILENT: (&str, u8, &str) = ("SILENT", 6, "410");
 const NOISY: (&str, u8, &str) = ("NOISY", 7, "510");
 const CUT: (&str, u8, &str) = ("CUT", 8, "610");
@@ -135,13 +135,13 @@ fn a_faulty_answer_is_never_shown_as_a_value() {
     let folder = folder();
     let cable = Cable::plug(folder.path());
     let _slave = slave(&python, "rtu", cable.ends[1].to_str().unwrap());
-    let said = read_faults(&[WELL, LATE, SPOILED, SILENT, NOISY, CUT], "rtu", cable.ends[0].to_str().unwrap());
+    let said = read_faults(&[WELL, LATE, CORRUPT, SILENT, NOISY, CUT], "rtu", cable.ends[0].to_str().unwrap());
     check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
-    for tag in ["SPOILED.N", "SILENT.N", "CUT.N"] {
+    for tag in ["CORRUPT.N", "SILENT.N", "CUT.N"] {
         check(&said, &[(tag, "---- bad: device not answering")]);
     }
     for (unit, why) in
-        [("LATE", "no answer in time"), ("SPOILED", "CRC error"), ("SILENT", "no answer in time"), ("CUT", "cut short")]
+        [("LATE", "no answer in time"), ("CORRUPT", "CRC error"), ("SILENT", "no answer in time"), ("CUT", "cut short")]
     {
         assert!(said.iter().any(|line| line.contains(unit) && line.contains(why)), "{unit} {why}: {}", said.join("\n"));
     }
@@ -154,12 +154,12 @@ fn a_faulty_answer_in_ascii_is_never_shown_as_a_value() {
     let folder = folder();
     let cable = Cable::plug(folder.path());
     let _slave = slave(&python, "ascii", cable.ends[1].to_str().unwrap());
-    let said = read_faults(&[WELL, LATE, SPOILED, SILENT, NOISY, CUT], "ascii", cable.ends[0].to_str().unwrap());
+    let said = read_faults(&[WELL, LATE, CORRUPT, SILENT, NOISY, CUT], "ascii", cable.ends[0].to_str().unwrap());
     check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
-    for tag in ["SPOILED.N", "SILENT.N", "CUT.N"] {
+    for tag in ["CORRUPT.N", "SILENT.N", "CUT.N"] {
         check(&said, &[(tag, "---- bad: device not answering")]);
     }
-    assert!(said.iter().any(|line| line.contains("SPOILED") && line.contains("LRC error")), "{}", said.join("\n"));
+    assert!(said.iter().any(|line| line.contains("CORRUPT") && line.contains("LRC error")), "{}", said.join("\n"));
 }
 
 #[test]
@@ -168,9 +168,9 @@ fn a_faulty_answer_in_rtu_over_tcp_is_never_shown_as_a_value() {
     let port = free_port();
     let _slave = slave(&python, "rtu-over-tcp", &port.to_string());
     let place = format!("127.0.0.1:{port}");
-    let said = read_faults(&[WELL, LATE, SPOILED, SILENT, NOISY, CUT], "rtu-over-tcp", &place);
+    let said = read_faults(&[WELL, LATE, CORRUPT, SILENT, NOISY, CUT], "rtu-over-tcp", &place);
     check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
-    for tag in ["SPOILED.N", "SILENT.N", "CUT.N"] {
+    for tag in ["CORRUPT.N", "SILENT.N", "CUT.N"] {
         check(&said, &[(tag, "---- bad: device not answering")]);
     }
 }
@@ -225,9 +225,9 @@ fn a_faulty_answer_over_tcp_is_never_shown_as_a_value() {
     let Some(python) = python() else { return };
     let port = free_port();
     let _slave = slave(&python, "tcp", &port.to_string());
-    let said = read_faults(&[WELL, LATE, SPOILED, SILENT, NOISY], "tcp", &format!("127.0.0.1:{port}"));
+    let said = read_faults(&[WELL, LATE, CORRUPT, SILENT, NOISY], "tcp", &format!("127.0.0.1:{port}"));
     check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
-    check(&said, &[("SPOILED.N", "---- bad: device not answering"), ("SILENT.N", "---- bad: device not answering")]);
+    check(&said, &[("CORRUPT.N", "---- bad: device not answering"), ("SILENT.N", "---- bad: device not answering")]);
 }
 
 /// Its registers hold their address, so the ones from 16706 (0x4142) on read as `ABAC…`, two characters each.

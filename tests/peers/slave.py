@@ -63,7 +63,7 @@ def trace_pdu(sending, pdu):
     return pdu
 
 
-def spoiled(frame):
+def corrupt(frame):
     """The frame with a check that does not fit."""
     if KIND == "tcp":
         return bytes([frame[0] ^ 0xFF]) + frame[1:]
@@ -87,12 +87,12 @@ def trace_packet(sending, frame):
             asyncio.get_running_loop().call_later(1.5, send, frame)
             return b""
         case 3:
-            return spoiled(frame)
+            return corrupt(frame)
         case 4:
             return b""
         case 5:
             if KIND == "tcp":
-                return spoiled(frame)[:-1] + b"\x55" + frame
+                return corrupt(frame)[:-1] + b"\x55" + frame
             return b"\xff\x00\x55" + frame
         case 6:
             return frame[:-4]

@@ -177,7 +177,7 @@ proptest! {
     }
 
     #[test]
-    fn a_spoiled_message_is_refused_without_harm(place in 0usize..200, byte: u8, end in 0usize..200) {
+    fn a_corrupt_message_is_refused_without_harm(place in 0usize..200, byte: u8, end in 0usize..200) {
         let signature = crate::access::Signature { user: Some("somchai".into()), password: "secret".into() };
         let order = OrderRequest {
             note: Some("because".into()),

@@ -52,7 +52,7 @@ use crate::{
 /// Why a request could not be completed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LinkError {
-    /// The device or the line spoiled this request; the port is fine.
+    /// The device or the line corrupted this request; the port is fine.
     Fault(Fault),
     /// The port or connection is gone, in the words of the system.
     Gone(String),
@@ -429,7 +429,7 @@ impl Link {
             | Fault::Resting => self.wire.counters.corrupt += 1,
         }
         tracing::debug!(unit, request = %frame::hex(message), %fault, "a request failed");
-        // Even what looked like a spoiled answer may have been noise, with the answer still on its way.
+        // Even what looked like a corrupt answer may have been noise, with the answer still on its way.
         if !mbap {
             self.expect_late(message);
         }

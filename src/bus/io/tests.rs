@@ -135,8 +135,8 @@ async fn an_answer_in_two_pieces_is_one_answer() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn each_spoiled_answer_is_told_by_its_name() {
-    // Twice, so that the one retry of a spoiled read does not hide it; the probes before each of the two answer well.
+async fn each_corrupt_answer_is_told_by_its_name() {
+    // Twice, so that the one retry of a corrupt read does not hide it; the probes before each of the two answer well.
     let twice = |action: SlaveAction| {
         move |number, _: &[u8]| if number == 1 || number == 3 { action.clone() } else { SlaveAction::Answer }
     };
@@ -161,13 +161,13 @@ async fn each_spoiled_answer_is_told_by_its_name() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn noise_before_an_answer_and_one_spoiled_answer_are_overcome() {
+async fn noise_before_an_answer_and_one_corrupt_answer_are_overcome() {
     let (_, failed) = poll(Mode::Rtu, 40, |_, _| SlaveAction::Noise(vec![0xFF, 0x00, 0x55])).await;
     assert_eq!(failed, 0);
     let (_, failed) =
         poll(Mode::Rtu, 40, |number, _| if number % 7 == 0 { SlaveAction::BadCheck } else { SlaveAction::Answer })
             .await;
-    assert!(failed <= 2, "a spoiled read is asked for once more: {failed} failed");
+    assert!(failed <= 2, "a corrupt read is asked for once more: {failed} failed");
 }
 
 #[tokio::test(start_paused = true)]

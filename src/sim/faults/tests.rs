@@ -83,15 +83,15 @@ fn the_same_answer_on_tcp() {
 }
 
 #[test]
-fn noise_spoils_about_as_many_messages_as_it_says_and_always_the_same() {
-    let spoiled = |percent| {
+fn noise_corrupts_about_as_many_messages_as_it_says_and_always_the_same() {
+    let corrupt = |percent| {
         let (mut simulator, mut faults) = simulator();
         faults.inject(&mut simulator, FaultTarget::Line(L1), Fault::Noise(percent), SINCE);
         let ask = |_| faults.answer(&mut simulator, L1, 1, &READ_SV).map(|answer| (answer.rtu(), answer.ascii()));
         (0..1_000).map(ask).collect::<Vec<_>>()
     };
-    let answers = spoiled(20);
-    assert_eq!(answers, spoiled(20), "a replay has the same noise");
+    let answers = corrupt(20);
+    assert_eq!(answers, corrupt(20), "a replay has the same noise");
     let good = |frame: &[u8]| crc16(frame) == 0;
     let whole = answers.iter().flatten().filter(|(rtu, _)| good(rtu)).count();
     // A query and its answer both come through in 0.8 × 0.8 of all cases.

@@ -66,7 +66,7 @@ impl Values {
 
     /// The answer with what these faults make of it. `request` and `answer` are PDUs; what is no read of the four tables
     /// passes as it is.
-    pub fn spoil(&self, faults: &[Fault], memory: &mut Memory, request: &[u8], answer: Vec<u8>) -> Vec<u8> {
+    pub fn corrupt(&self, faults: &[Fault], memory: &mut Memory, request: &[u8], answer: Vec<u8>) -> Vec<u8> {
         let Some(mut cells) = Cells::of(request, &answer) else { return answer };
         let now = cells.clone();
         for fault in faults {
@@ -231,9 +231,9 @@ mod tests {
 
     fn check(fault: Fault, expect: [u16; 4]) {
         let mut memory = Memory::default();
-        let before = values().spoil(&[fault], &mut memory, &READ, answer([0x428B, 0xFAE1, 500, 270]));
+        let before = values().corrupt(&[fault], &mut memory, &READ, answer([0x428B, 0xFAE1, 500, 270]));
         assert_eq!(before.len(), 10);
-        let now = values().spoil(&[fault], &mut memory, &READ, answer([0x428C, 0x0A3D, 700, 280]));
+        let now = values().corrupt(&[fault], &mut memory, &READ, answer([0x428C, 0x0A3D, 700, 280]));
         assert_eq!(now, answer(expect), "{fault}");
     }
 
@@ -250,7 +250,8 @@ mod tests {
     #[test]
     fn bits_are_stuck_as_well_and_let_go() {
         let (values, mut memory) = (values(), Memory::default());
-        let read = |memory: &mut Memory, bit| values.spoil(&[Fault::Stuck], memory, &[2, 0, 0, 0, 2], vec![2, 1, bit]);
+        let read =
+            |memory: &mut Memory, bit| values.corrupt(&[Fault::Stuck], memory, &[2, 0, 0, 0, 2], vec![2, 1, bit]);
         assert_eq!(read(&mut memory, 0b01), [2, 1, 0b01]);
         assert_eq!(read(&mut memory, 0b10), [2, 1, 0b11], "the second bit is no tag and moves");
         memory.let_go();
@@ -270,10 +271,10 @@ mod tests {
             answer in prop::collection::vec(any::<u8>(), 0..12),
         ) {
             let mut memory = Memory::default();
-            let spoilt = values().spoil(&Fault::ALL, &mut memory, &request, answer.clone());
-            prop_assert_eq!(spoilt.len(), answer.len());
+            let corrupt = values().corrupt(&Fault::ALL, &mut memory, &request, answer.clone());
+            prop_assert_eq!(corrupt.len(), answer.len());
             if answer.first().is_some_and(|function| *function >= 0x80) {
-                prop_assert_eq!(spoilt, answer);
+                prop_assert_eq!(corrupt, answer);
             }
         }
     }

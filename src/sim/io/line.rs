@@ -75,8 +75,8 @@ where
             },
             () = sleep_until(line.latest + idle_max) => return Ok(()),
         }
-        for _ in 0..std::mem::take(&mut line.spoiled) {
-            units.spoiled().await;
+        for _ in 0..std::mem::take(&mut line.corrupt) {
+            units.corrupt().await;
         }
     }
 }
@@ -87,7 +87,7 @@ struct Line {
     wire: Wire,
     receiver: FrameReceiver,
     /// Frames that could not be read since the units were told.
-    spoiled: usize,
+    corrupt: usize,
     /// Since when the request that is arriving has been on the wire, and when its latest bytes came.
     began: Instant,
     latest: Instant,
@@ -120,7 +120,7 @@ impl Line {
             clock,
             wire,
             receiver: FrameReceiver::new(wire.ascii, wire.serial.data_bits),
-            spoiled: 0,
+            corrupt: 0,
             began: now,
             latest: now,
             sent: now,
@@ -146,7 +146,7 @@ impl Line {
 
     fn accept(&mut self, frame: Option<Request>) {
         let Some(Request { message, characters }) = frame else {
-            self.spoiled += 1;
+            self.corrupt += 1;
             return;
         };
         let on_wire = self.began + self.time_of(characters);
@@ -343,8 +343,8 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_slave_counts_the_frames_that_it_could_not_read() {
         let (mut master, _simulator) = line(9600, Parity::None, 1.0);
-        for spoiled in [&[1, 3, 0, 0, 0, 1, 0, 0][..], &[0xFF], &[2; 300]] {
-            master.write_all(spoiled).await.expect("the line takes bytes");
+        for corrupt in [&[1, 3, 0, 0, 0, 1, 0, 0][..], &[0xFF], &[2; 300]] {
+            master.write_all(corrupt).await.expect("the line takes bytes");
             assert_eq!(gather(&mut master).await.0, Vec::<u8>::new());
         }
         let answer = ask(&mut master, &[2, 8, 0, 0x0C, 0, 0]).await.0;

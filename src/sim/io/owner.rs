@@ -73,7 +73,7 @@ enum Change {
     SensorOpen(bool),
     Switch(u16, bool),
     PowerCycle,
-    Spoiled(LineId),
+    Corrupt(LineId),
 }
 
 impl SimulatorHandle {
@@ -201,8 +201,8 @@ impl LineHandle {
     }
 
     /// Something passed on the line that no unit could read.
-    pub async fn spoiled(&self) {
-        self.simulator.change(Change::Spoiled(self.line)).await;
+    pub async fn corrupt(&self) {
+        self.simulator.change(Change::Corrupt(self.line)).await;
     }
 }
 
@@ -281,7 +281,7 @@ fn apply_change(simulator: &mut Simulator, faults: &mut Faults, now: Timestamp, 
             }
         }
         Change::PowerCycle => simulator.power_cycle(),
-        Change::Spoiled(line) => simulator.spoiled(line),
+        Change::Corrupt(line) => simulator.corrupt(line),
     }
 }
 

@@ -76,16 +76,16 @@ impl Link {
                 }
                 // Nothing, or noise: the answer may still come.
                 FrameMatch::Nothing => deadline,
-                // The frame may still grow, or it is spoiled; silence decides.
+                // The frame may still grow, or it is corrupt; silence decides.
                 FrameMatch::Begun if framing == Framing::Ascii => (Instant::now() + ASCII_PAUSE).min(deadline),
-                FrameMatch::Begun | FrameMatch::Spoiled(_) => (Instant::now() + self.idle).min(deadline),
+                FrameMatch::Begun | FrameMatch::Corrupt(_) => (Instant::now() + self.idle).min(deadline),
             };
             if self.wire.receive(wait_until, &mut buffer).await? && buffer.len() <= RECEIVE_MAX {
                 reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
                 continue;
             }
             let fault = match verdict {
-                FrameMatch::Spoiled(fault) => fault,
+                FrameMatch::Corrupt(fault) => fault,
                 _ => misfit.unwrap_or_else(|| framing::left_over(framing, message, &buffer)),
             };
             let frame: Arc<[u8]> = buffer.into();

@@ -218,18 +218,18 @@ impl Task<'_> {
         reply: Duration,
         exchange: Option<Arc<Exchange>>,
     ) -> Result<(), Ended> {
-        let (mut numbers, mut texts, mut spoiled) = (Vec::with_capacity(block.tags.len()), Vec::new(), Vec::new());
+        let (mut numbers, mut texts, mut corrupt) = (Vec::with_capacity(block.tags.len()), Vec::new(), Vec::new());
         for tag in block.tags.iter().map(|tag| self.def.tag(*tag)) {
             match (value_of(tag, block, values), text_of(tag, block, values)) {
                 (Some(value), _) => numbers.push((tag.id, value)),
                 (None, Some(text)) => texts.push((tag.id, text)),
-                (None, None) => spoiled.push(tag.id),
+                (None, None) => corrupt.push(tag.id),
             }
         }
         self.tell(Event::Read { at, device: block.device, values: numbers, texts, reply, exchange: exchange.clone() })
             .await?;
-        if !spoiled.is_empty() {
-            self.tell_failed(at, block.device, spoiled, Fault::NotANumber, exchange).await?;
+        if !corrupt.is_empty() {
+            self.tell_failed(at, block.device, corrupt, Fault::NotANumber, exchange).await?;
         }
         Ok(())
     }
@@ -280,18 +280,18 @@ async fn resynchronise(blocks: &[Block], link: &mut Link, block: &Block) -> Resu
     }
 }
 
-/// Reads a block from a unit that is in sync. A `spoiled` answer is asked for once more; it counts as outstanding, so the unit is
+/// Reads a block from a unit that is in sync. A `corrupt` answer is asked for once more; it counts as outstanding, so the unit is
 /// resynchronised before.
 async fn read_in_sync(
     blocks: &[Block],
     link: &mut Link,
     block: &Block,
-    spoiled: &mut Option<Fault>,
+    corrupt: &mut Option<Fault>,
 ) -> Result<Answer, LinkError> {
     resynchronise(blocks, link, block).await?;
     match read(link, block).await {
         Err(LinkError::Fault(fault)) if fault.is_corrupt() => {
-            *spoiled = Some(fault);
+            *corrupt = Some(fault);
             resynchronise(blocks, link, block).await?;
             let second = read(link, block).await;
             if let Some(last) = &mut link.last {

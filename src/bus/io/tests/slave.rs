@@ -197,10 +197,10 @@ async fn slave(mut stream: DuplexStream, mode: Mode, mut script: impl FnMut(usiz
             }
             SlaveAction::Cut(at) => answer[..at.min(answer.len() - 1)].to_vec(),
             SlaveAction::BadCheck => {
-                let mut spoiled = answer;
-                let check = spoiled.len() - if mode == Mode::Ascii { 4 } else { 1 };
-                spoiled[check] ^= if mode == Mode::Ascii { 1 } else { 0xFF };
-                spoiled
+                let mut corrupt = answer;
+                let check = corrupt.len() - if mode == Mode::Ascii { 4 } else { 1 };
+                corrupt[check] ^= if mode == Mode::Ascii { 1 } else { 0xFF };
+                corrupt
             }
             SlaveAction::Noise(noise) => noise.into_iter().chain(answer).collect(),
             SlaveAction::Trailing(bytes) => answer.into_iter().chain(bytes).collect(),

@@ -105,10 +105,10 @@ fn cases() -> Vec<(&'static str, Fixture)> {
     timeout.devices[0].last_fault = Some((ago(420), Fault::Timeout));
     timeout.devices[0].diagnosis = Some(Reason::Failing { failed: 8, of: 64 });
     let mut crc = fixture();
-    let mut spoiled = crc.evidence[0].as_ref().map(|exchange| exchange.answer.to_vec()).unwrap_or_default();
-    spoiled[5] ^= 0x40;
-    let fault = frame::without_crc(&spoiled).expect_err("a spoiled frame");
-    asked(&mut crc, Err(fault), spoiled, 2);
+    let mut corrupt = crc.evidence[0].as_ref().map(|exchange| exchange.answer.to_vec()).unwrap_or_default();
+    corrupt[5] ^= 0x40;
+    let fault = frame::without_crc(&corrupt).expect_err("a corrupt frame");
+    asked(&mut crc, Err(fault), corrupt, 2);
     doubt(&mut crc, |sample| sample.doubted(Cause::Corrupt));
     crc.devices[0].last_fault = Some((ago(420), fault));
     let mut exception = fixture();

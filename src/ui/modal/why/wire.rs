@@ -56,7 +56,7 @@ pub(super) fn exchange_rows(
         rows.push(Row { wraps: false, ..row("", answer.summary.clone(), theme.dim()) });
     }
     let reply = exchange.reply.map(|reply| format!(", after {}", span(reply))).unwrap_or_default();
-    let tries = if 1 < exchange.tries { ", second try: the first answer was spoiled" } else { ", first try" };
+    let tries = if 1 < exchange.tries { ", second try: the first answer was corrupt" } else { ", first try" };
     let (verdict, style) = match exchange.outcome {
         Ok(()) if old => {
             let ago = running(between(exchange.at, cx.now));
