@@ -325,7 +325,7 @@ fn judge(fault: Fault) -> Verdict {
         Fault::Exception(_) => Verdict::Gone(Cause::Exception),
         Fault::NotANumber => Verdict::Gone(Cause::SensorFault),
         Fault::NotConnected => Verdict::Gone(Cause::NotConnected),
-        Fault::Resting => Verdict::Gone(Cause::DeviceDown),
+        Fault::BackedOff => Verdict::Gone(Cause::DeviceDown),
     }
 }
 
@@ -430,7 +430,7 @@ mod tests {
             (Fault::Exception(ExceptionCode(6)), Uncertain(Cause::Exception)),
             (Fault::NotANumber, Bad(Cause::SensorFault)),
             (Fault::NotConnected, Bad(Cause::NotConnected)),
-            (Fault::Resting, Bad(Cause::DeviceDown)),
+            (Fault::BackedOff, Bad(Cause::DeviceDown)),
         ] {
             let mut board = board();
             board.failed(&[PV], fault, at(1));

@@ -167,7 +167,8 @@ mod tests {
             assert_eq!(snapshot.at, at(1_000_003) + by);
             assert_eq!((snapshot.age(PV), snapshot.sample(PV).quality), (age, good));
             let tags = fixture::plant().tags_of(TIC).map(|tag| tag.id).collect();
-            let silent = Event::Failed { at: at(1_000_004), device: TIC, tags, fault: Fault::Resting, exchange: None };
+            let silent =
+                Event::Failed { at: at(1_000_004), device: TIC, tags, fault: Fault::BackedOff, exchange: None };
             let mut records = plant.on_event(silent).records;
             records.iter_mut().for_each(|record| record.shift(by));
             let Some(Record::Alarm(raised)) = records.iter().find(|record| matches!(record, Record::Alarm(_))) else {

@@ -192,7 +192,7 @@ pub enum Refusal {
     /// The device said no.
     #[error("{0}")]
     Exception(ExceptionCode),
-    /// Nothing was sent: line closed, device resting.
+    /// Nothing was sent: line closed, device in backoff.
     #[error("{0}")]
     NotSent(Fault),
     /// The station's queue to the line is full.

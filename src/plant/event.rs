@@ -198,8 +198,8 @@ pub enum Fault {
     #[error("line not connected")]
     NotConnected,
     /// The device is left alone (it has failed, or is saving its settings); nothing was sent.
-    #[error("the device rests, try again later")]
-    Resting,
+    #[error("device in backoff, try again later")]
+    BackedOff,
 }
 
 impl Fault {
@@ -219,7 +219,7 @@ impl Fault {
             | Fault::NotANumber
             | Fault::Exception(_)
             | Fault::NotConnected
-            | Fault::Resting => false,
+            | Fault::BackedOff => false,
         }
     }
 }

@@ -327,7 +327,7 @@ impl Plant {
         let down = matches!(status.state, DeviceState::Down { .. });
         match fault {
             // The bus has given the device up; these are its other tags.
-            Fault::Resting => {
+            Fault::BackedOff => {
                 if !down {
                     status.state = DeviceState::Down { since: at };
                 }

@@ -63,7 +63,7 @@ impl Tally {
                 None => self.exceptions.push((code, 1)),
             },
             // Nothing was sent.
-            Fault::NotConnected | Fault::Resting => self.requests -= 1,
+            Fault::NotConnected | Fault::BackedOff => self.requests -= 1,
         }
     }
 
@@ -229,7 +229,7 @@ mod tests {
         for _ in 0..2 {
             tally.count(Err(Fault::Exception(ExceptionCode(2))), None);
         }
-        tally.count(Err(Fault::Resting), None);
+        tally.count(Err(Fault::BackedOff), None);
         let sum = tally.ok + tally.timeouts + tally.corrupt() + tally.exceptions_total();
         assert_eq!((tally.requests, sum), (7, 7));
         assert_eq!(tally.exceptions, [(ExceptionCode(2), 2)]);

@@ -165,7 +165,13 @@ mod tests {
         assert_eq!(tell(&plant), ["line L1: connected"]);
         assert!(tell(&plant).is_empty());
         plant.on_event(Event::Failed { at: at(1), device: TIC, tags: vec![PV], fault: Fault::Timeout, exchange: None });
-        plant.on_event(Event::Failed { at: at(3), device: TIC, tags: vec![PV], fault: Fault::Resting, exchange: None });
+        plant.on_event(Event::Failed {
+            at: at(3),
+            device: TIC,
+            tags: vec![PV],
+            fault: Fault::BackedOff,
+            exchange: None,
+        });
         assert_eq!(
             tell(&plant),
             ["device TIC-1 (unit 1): not answering: no answer in time", "alarm 2 RAISED: TIC-1 alarm 1"]

@@ -426,7 +426,7 @@ impl Link {
             | Fault::OutOfSync
             | Fault::NotANumber
             | Fault::NotConnected
-            | Fault::Resting => self.wire.counters.corrupt += 1,
+            | Fault::BackedOff => self.wire.counters.corrupt += 1,
         }
         tracing::debug!(unit, request = %frame::hex(message), %fault, "a request failed");
         // Even what looked like a corrupt answer may have been noise, with the answer still on its way.

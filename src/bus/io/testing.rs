@@ -31,7 +31,7 @@ pub async fn step(link: &mut Link, step: &Step) -> Result<StepResult, LinkError>
                 }
             }
             let sent = if link.is_ambiguous(message) {
-                Err(LinkError::Fault(Fault::Resting))
+                Err(LinkError::Fault(Fault::BackedOff))
             } else {
                 link.exchange(message).await
             };

@@ -44,7 +44,7 @@ async fn poll(
     while good + failed < polls {
         match line.next(&def).await {
             Event::Read { .. } => good += 1,
-            Event::Failed { fault, .. } if fault != Fault::Resting => failed += 1,
+            Event::Failed { fault, .. } if fault != Fault::BackedOff => failed += 1,
             Event::Line { state: LineState::Waiting { .. }, .. } => {
                 // A TCP stream out of sync is closed; the gateway takes the next connection.
                 line.plug(mode, |_, _| SlaveAction::Answer);
@@ -183,7 +183,7 @@ async fn one_dead_unit_leaves_the_others_their_rate() {
                 *reads.entry(device).or_insert(0) += 1;
                 end = at;
             }
-            Event::Failed { fault: Fault::Resting, device, tags, .. } => {
+            Event::Failed { fault: Fault::BackedOff, device, tags, .. } => {
                 assert_eq!((device, tags.len()), (DeviceId(0), 10), "all its tags at once");
                 told_down += 1;
             }

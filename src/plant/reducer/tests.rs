@@ -221,7 +221,7 @@ fn a_silent_device_fails_then_is_down_then_comes_back() {
     assert_eq!(snapshot.devices[TIC.index()].state, DeviceState::Failing(1));
     assert_eq!(snapshot.sample(PV).quality, Quality::Uncertain(Cause::Timeout));
     assert_eq!(snapshot.sample(SV).quality, Quality::Good, "only what was asked for is in doubt");
-    let effects = plant.on_event(fail(3, &[PV, SV, DP, FAULT], Fault::Resting));
+    let effects = plant.on_event(fail(3, &[PV, SV, DP, FAULT], Fault::BackedOff));
     assert!(plant.snapshot().samples[..4].iter().all(|sample| sample.quality == Quality::Bad(Cause::DeviceDown)));
     assert!(
         effects.records.iter().any(|record| matches!(record, Record::Alarm(step) if step.step == AlarmStep::Raised))

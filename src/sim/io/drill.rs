@@ -251,7 +251,7 @@ mod tests {
             at: Timestamp::UNIX_EPOCH,
             device: TIC,
             tags,
-            fault: Fault::Resting,
+            fault: Fault::BackedOff,
             exchange: None,
         };
         let raised = plant.on_event(down).records;

@@ -60,7 +60,7 @@ impl Station {
             Station { events, orders, snapshots, task, recorder, _blocked: blocked, messages, _requests: requests };
         let tags: Vec<TagId> = def.tags_of(fixture::TIC).map(|tag| tag.id).collect();
         let silent =
-            Event::Failed { at: clock.now(), device: fixture::TIC, tags, fault: Fault::Resting, exchange: None };
+            Event::Failed { at: clock.now(), device: fixture::TIC, tags, fault: Fault::BackedOff, exchange: None };
         station.events.send(silent).await.unwrap();
         station
     }

@@ -159,7 +159,7 @@ impl Task<'_> {
                 }
                 if schedule.failed(block.device, began, took, at) {
                     let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
-                    self.tell_failed(at, block.device, tags, Fault::Resting, None).await?;
+                    self.tell_failed(at, block.device, tags, Fault::BackedOff, None).await?;
                     self.unreadable.forget(block.device);
                     self.replan(link, schedule, at, true);
                 }

@@ -151,9 +151,9 @@ impl Task<'_> {
         let def = self.def.clone();
         let device = def.device(tag.device);
         // A stop is sent in any case: a device that is silent may still hear it.
-        let rests = schedule.is_down(tag.device) || schedule.is_resting(tag.device, self.clock.now());
-        if rests && !urgent {
-            return Ok(WriteResult::NotSent(Fault::Resting));
+        let backed_off = schedule.is_down(tag.device) || schedule.is_resting(tag.device, self.clock.now());
+        if backed_off && !urgent {
+            return Ok(WriteResult::NotSent(Fault::BackedOff));
         }
         // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
         let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
@@ -163,7 +163,7 @@ impl Task<'_> {
         if !urgent && self.requests.stop_waits() {
             return Ok(WriteResult::Overtaken);
         }
-        let sent = self.send_write(link, device, request, urgent && !rests).await;
+        let sent = self.send_write(link, device, request, urgent && !backed_off).await;
         self.keep_write_gap(link, schedule, device);
         match sent {
             Ok(()) => {

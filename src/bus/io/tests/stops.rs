@@ -50,11 +50,11 @@ async fn a_stop_is_sent_to_a_device_that_is_given_up() {
                 _ => SlaveAction::Answer,
             });
             let given_up = |event: &Event| {
-                matches!(event, Event::Failed { device: DeviceId(0), fault: Fault::Resting, .. }).then_some(())
+                matches!(event, Event::Failed { device: DeviceId(0), fault: Fault::BackedOff, .. }).then_some(())
             };
             line.until(&def, given_up).await;
             line.requests.send(write(1, FIRST_OF[0], false)).await.expect("the line runs");
-            assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::NotSent(Fault::Resting), "{mode:?}");
+            assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::NotSent(Fault::BackedOff), "{mode:?}");
             line.requests.send(write(2, FIRST_OF[0], true)).await.expect("the line runs");
             let expect = if hears { WriteResult::ReadBack(10.0) } else { WriteResult::Lost(Fault::Timeout) };
             assert_eq!(end_of(&mut line, &def, 2).await, expect, "{mode:?}");

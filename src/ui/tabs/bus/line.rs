@@ -356,7 +356,7 @@ fn of_device(cx: &ViewContext, line: &LineDef, report: &LineReport, device: &Dev
         | Fault::WrongLength { .. }
         | Fault::WrongEcho
         | Fault::OutOfSync => "is there another master, or a unit number twice?".to_owned(),
-        Fault::NotANumber | Fault::NotConnected | Fault::Resting => String::new(),
+        Fault::NotANumber | Fault::NotConnected | Fault::BackedOff => String::new(),
     };
     worries.push(format!("{fault} at {when}: {advice}").trim_end_matches(": ").to_owned());
     worries

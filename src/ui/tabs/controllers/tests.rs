@@ -153,7 +153,7 @@ fn half_done(fixture: &Fixture, state: State) -> Restore {
     run.steps[0].outcome = Some(Outcome::Verified);
     run.steps[1].order = Some(id);
     if state == State::Failed {
-        run.take(Outcome::Refused(Refusal::NotSent(crate::plant::event::Fault::Resting)));
+        run.take(Outcome::Refused(Refusal::NotSent(crate::plant::event::Fault::BackedOff)));
     }
     run
 }
