@@ -249,7 +249,7 @@ mod tests {
              2023-11-14T22:13:20.123456Z RX :0183027A\\r\\n | exception 02 illegal data address | ok\n"
         );
         for (line, frame) in lines.lines().zip(&frames) {
-            let typed = crate::bus::typed::parse(line, None);
+            let typed = crate::bus::hex_input::parse(line, None);
             assert!(
                 typed.is_ok_and(|typed| typed.bytes[..] == frame.bytes[..] && typed.sent == Some(frame.sent)),
                 "{line}"

@@ -1,6 +1,6 @@
 //! Picks frames out of traffic by a line of words: `unit 1 fc 3 rx error 03EA`.
 
-use super::{explain, frame, typed};
+use super::{explain, frame, hex_input};
 use crate::plant::traffic::Frame;
 
 /// All of these must hold; an empty filter lets everything through.
@@ -45,7 +45,7 @@ impl Filter {
                 "rx" => filter.sent = Some(false),
                 "error" | "errors" => filter.errors = true,
                 "hex" => {}
-                _ => match typed::parse(word, None) {
+                _ => match hex_input::parse(word, None) {
                     Ok(typed) if !word.starts_with(':') => filter.bytes.extend(typed.bytes),
                     Ok(_) | Err(_) => return Err(FilterError::Word(word.to_owned())),
                 },

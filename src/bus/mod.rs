@@ -17,7 +17,7 @@
 //! | [`line_stats`] | what is counted |
 //! | [`tool`] | the steps of a test of the line |
 //! | [`explain`], [`names`], [`evidence`] | frames in words |
-//! | [`typed`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
+//! | [`hex_input`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
 
 pub mod ascii;
 pub mod frame;
@@ -26,7 +26,7 @@ pub mod names;
 pub mod request_lint;
 pub mod explain;
 pub mod evidence;
-pub mod typed;
+pub mod hex_input;
 pub mod filter;
 pub mod capture;
 pub mod codec;

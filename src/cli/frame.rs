@@ -7,8 +7,8 @@ use crate::{
         ascii,
         explain::{self, Direction, Explained},
         frame::{crc16, hex},
+        hex_input::{self, ParsedInput},
         request_lint::check_request,
-        typed::{self, Typed},
     },
     plant::line::Framing,
 };
@@ -47,7 +47,8 @@ pub fn main(args: Args) -> Result<(), CliError> {
         (false, false, false) => None,
     };
     if !args.bytes.is_empty() && args.bytes != ["-"] {
-        let typed = typed::parse(&args.bytes.join(" "), framing).map_err(|error| CliError::Usage(error.to_string()))?;
+        let typed =
+            hex_input::parse(&args.bytes.join(" "), framing).map_err(|error| CliError::Usage(error.to_string()))?;
         tell(&typed, framing, None).iter().for_each(|line| say(line));
         return match explained(&typed, framing, None).verdict {
             verdict if verdict == "ok" => Ok(()),
@@ -70,7 +71,7 @@ fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> 
         if line.trim().is_empty() {
             continue;
         }
-        let typed = match typed::parse(&line, framing) {
+        let typed = match hex_input::parse(&line, framing) {
             Ok(typed) => typed,
             Err(error) => {
                 say_error(&format!("line {}: {error}", index + 1));
@@ -88,14 +89,14 @@ fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> 
         asked = (told.direction != Some(Direction::Answer)).then_some(told);
     }
     match (frames, corrupt, wrong) {
-        (0, 0, _) => Err(CliError::Usage(typed::TypedError::Empty.to_string())),
+        (0, 0, _) => Err(CliError::Usage(hex_input::HexInputError::Empty.to_string())),
         (_, 0, 0) => Ok(()),
         (_, 0, _) => Err(CliError::Failed(format!("{wrong} of {frames} frames are wrong"))),
         _ => Err(CliError::Usage(format!("{corrupt} of {} lines cannot be read", frames + corrupt))),
     }
 }
 
-fn explained(typed: &Typed, framing: Option<Framing>, asked: Option<&Explained>) -> Explained {
+fn explained(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Explained>) -> Explained {
     let direction = typed.sent.map(|sent| if sent { Direction::Request } else { Direction::Answer });
     // Only what may be an answer to the request before it is read as one.
     let plain = explain::explain(&typed.bytes, typed.framing.or(framing), direction, None);
@@ -113,7 +114,7 @@ fn explained(typed: &Typed, framing: Option<Framing>, asked: Option<&Explained>)
 }
 
 /// The lines about one frame: what it is, every byte, the checks, what is wrong with it.
-fn tell(typed: &Typed, framing: Option<Framing>, asked: Option<&Explained>) -> Vec<String> {
+fn tell(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Explained>) -> Vec<String> {
     let told = explained(typed, framing, asked);
     let direction = match told.direction {
         Some(Direction::Request) => "request",

@@ -2,7 +2,7 @@
 
 use super::{PortArgs, answer_lines, run, shown};
 use crate::{
-    bus::{ascii, explain, frame, request_lint::check_request, typed},
+    bus::{ascii, explain, frame, hex_input, request_lint::check_request},
     cli::{CliError, say, say_error},
     plant::{
         def::Framing,
@@ -32,7 +32,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let line = args.port.line()?;
     let framing = line.transport.framing();
     let typed =
-        typed::parse(&args.bytes.join(" "), Some(framing)).map_err(|error| CliError::Usage(error.to_string()))?;
+        hex_input::parse(&args.bytes.join(" "), Some(framing)).map_err(|error| CliError::Usage(error.to_string()))?;
     let whole = frame::unwrap(framing, &typed.bytes).ok();
     let (message, frame) = match (whole, typed.framing) {
         (whole, _) if args.as_is => (whole.unwrap_or_default(), typed.bytes),

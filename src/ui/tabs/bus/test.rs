@@ -16,7 +16,7 @@ use crate::{
         ascii,
         explain::{self, Direction, Explained},
         frame::{self, Mbap, hex},
-        request_lint, typed,
+        hex_input, request_lint,
     },
     plant::{
         command::Command,
@@ -303,7 +303,7 @@ impl Send {
     }
 
     fn ready(&self, framing: Framing) -> Result<Ready, String> {
-        let typed = typed::parse(&self.text.text(), Some(framing)).map_err(|error| error.to_string())?;
+        let typed = hex_input::parse(&self.text.text(), Some(framing)).map_err(|error| error.to_string())?;
         let (frame, added) = if self.bare { (typed.bytes.clone(), String::new()) } else { dress(&typed, framing) };
         let told = explain::explain(&frame, Some(framing), Some(Direction::Request), None);
         let mut errors: Vec<String> =
@@ -392,7 +392,7 @@ impl Ready {
 }
 
 /// The frame of what was typed, and what was added to it, if it is not a frame already.
-fn dress(typed: &typed::Typed, framing: Framing) -> (Vec<u8>, String) {
+fn dress(typed: &hex_input::ParsedInput, framing: Framing) -> (Vec<u8>, String) {
     let bytes = &typed.bytes;
     match framing {
         Framing::Rtu if 4 <= bytes.len() && frame::without_crc(bytes).is_ok() => (bytes.clone(), String::new()),

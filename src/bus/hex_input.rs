@@ -3,9 +3,9 @@
 use super::{ascii, frame};
 use crate::plant::line::Framing;
 
-/// Bytes that somebody typed or pasted, and what the text around them told.
+/// Bytes that were typed or pasted, with the framing and direction that their text names.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Typed {
+pub struct ParsedInput {
     /// The bytes as they travel.
     pub bytes: Vec<u8>,
     /// [`Framing::Ascii`] if it began with `:`.
@@ -16,7 +16,7 @@ pub struct Typed {
 
 /// Why a text holds no bytes. Positions count characters from 1.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum TypedError {
+pub enum HexInputError {
     /// There is nothing.
     #[error(
         "found nothing, expected bytes in hex such as 01 03 00 00 00 01, or an ASCII frame such as :010300000001FB"
@@ -52,17 +52,17 @@ pub enum TypedError {
 
 /// Reads hex with or without spaces, commas, dashes, brackets or `0x`; an ASCII frame; or a line of a log, where bytes
 /// stand between `TX` or `RX` and `|`. Framing is only needed for the longest length; without it 260 bytes are taken.
-pub fn parse(text: &str, framing: Option<Framing>) -> Result<Typed, TypedError> {
+pub fn parse(text: &str, framing: Option<Framing>) -> Result<ParsedInput, HexInputError> {
     let (sent, skipped, rest) = of_log(text);
     let indent = rest.chars().take_while(|letter| letter.is_whitespace()).count();
     let body = rest.trim();
     let skipped = skipped + indent;
     if body.is_empty() {
-        return Err(TypedError::Empty);
+        return Err(HexInputError::Empty);
     }
     if let Some(digits) = body.strip_prefix(':') {
         let bytes = ascii_frame(digits, skipped)?;
-        return Ok(Typed { bytes, framing: Some(Framing::Ascii), sent });
+        return Ok(ParsedInput { bytes, framing: Some(Framing::Ascii), sent });
     }
     let sent = sent.or(if body.starts_with('[') {
         Some(true)
@@ -78,9 +78,9 @@ pub fn parse(text: &str, framing: Option<Framing>) -> Result<Typed, TypedError> 
         Some(Framing::Mbap) | None => 260,
     };
     match bytes.len() {
-        0 => Err(TypedError::Empty),
-        got if longest < got => Err(TypedError::TooLong { got, what: "bytes", longest }),
-        _ => Ok(Typed { bytes, framing: None, sent }),
+        0 => Err(HexInputError::Empty),
+        got if longest < got => Err(HexInputError::TooLong { got, what: "bytes", longest }),
+        _ => Ok(ParsedInput { bytes, framing: None, sent }),
     }
 }
 
@@ -107,29 +107,29 @@ fn of_log(text: &str) -> (Option<bool>, usize, &str) {
 }
 
 /// `:0103…` with its LRC; CR LF is added, typed as `\r\n` or not at all.
-fn ascii_frame(digits: &str, skipped: usize) -> Result<Vec<u8>, TypedError> {
+fn ascii_frame(digits: &str, skipped: usize) -> Result<Vec<u8>, HexInputError> {
     let digits = digits.trim_end_matches("\\n").trim_end_matches("\\r");
     let mut bytes = b":".to_vec();
     for (at, letter) in digits.chars().enumerate().filter(|(_, letter)| !letter.is_whitespace()) {
         if !letter.is_ascii_hexdigit() {
-            return Err(TypedError::NotHex { position: skipped + at + 2, found: letter });
+            return Err(HexInputError::NotHex { position: skipped + at + 2, found: letter });
         }
         bytes.push(letter as u8);
     }
     if bytes.len().is_multiple_of(2) {
-        return Err(TypedError::OddDigits { position: skipped + 2, found: digits.trim().to_owned() });
+        return Err(HexInputError::OddDigits { position: skipped + 2, found: digits.trim().to_owned() });
     }
     bytes.extend(b"\r\n");
     match bytes.len() {
-        3 => Err(TypedError::Empty),
+        3 => Err(HexInputError::Empty),
         got if ascii::FRAME_MAX < got => {
-            Err(TypedError::TooLong { got, what: "characters", longest: ascii::FRAME_MAX })
+            Err(HexInputError::TooLong { got, what: "characters", longest: ascii::FRAME_MAX })
         }
         _ => Ok(bytes),
     }
 }
 
-fn hex(body: &str, skipped: usize) -> Result<Vec<u8>, TypedError> {
+fn hex(body: &str, skipped: usize) -> Result<Vec<u8>, HexInputError> {
     let between = |letter: char| letter.is_whitespace() || ",;:-.[]<>(){}\"'".contains(letter);
     let letters: Vec<char> = body.chars().collect();
     let mut bytes = Vec::new();
@@ -157,17 +157,17 @@ fn hex(body: &str, skipped: usize) -> Result<Vec<u8>, TypedError> {
 }
 
 /// Digits without anything between them; `0x1` is a byte, `1` is half of one.
-fn run(digits: &[char], position: usize, prefixed: bool, bytes: &mut Vec<u8>) -> Result<(), TypedError> {
+fn run(digits: &[char], position: usize, prefixed: bool, bytes: &mut Vec<u8>) -> Result<(), HexInputError> {
     let found = || digits.iter().collect::<String>();
     let mut values = Vec::new();
     for (at, letter) in digits.iter().enumerate() {
-        let value = letter.to_digit(16).ok_or(TypedError::NotHex { position: position + at, found: *letter })?;
+        let value = letter.to_digit(16).ok_or(HexInputError::NotHex { position: position + at, found: *letter })?;
         values.push(value as u8);
     }
     match (values.as_slice(), prefixed) {
         ([value], true) => bytes.push(*value),
         (values, _) if values.is_empty() || values.len() % 2 == 1 => {
-            return Err(TypedError::OddDigits { position, found: found() });
+            return Err(HexInputError::OddDigits { position, found: found() });
         }
         (values, _) => bytes.extend(values.chunks(2).map(|pair| pair[0] << 4 | pair[1])),
     }
@@ -182,7 +182,7 @@ mod tests {
 
     fn check(text: &str, expect: &[u8], sent: Option<bool>) {
         let typed = parse(text, None);
-        assert_eq!(typed, Ok(Typed { bytes: expect.to_vec(), framing: None, sent }), "{text}");
+        assert_eq!(typed, Ok(ParsedInput { bytes: expect.to_vec(), framing: None, sent }), "{text}");
     }
 
     #[test]
@@ -212,9 +212,10 @@ mod tests {
         check("[01][03][00][00][00][01][84][0A]", &READ, Some(true));
         check("<01><03><00><00><00><01><84><0A>", &READ, Some(false));
         let typed = parse("RX :010300000001FB\\r\\n", None);
-        let expect = Typed { bytes: b":010300000001FB\r\n".to_vec(), framing: Some(Framing::Ascii), sent: Some(false) };
+        let expect =
+            ParsedInput { bytes: b":010300000001FB\r\n".to_vec(), framing: Some(Framing::Ascii), sent: Some(false) };
         assert_eq!(typed, Ok(expect.clone()));
-        assert_eq!(parse(":01 03 00 00 00 01 FB", None), Ok(Typed { sent: None, ..expect }));
+        assert_eq!(parse(":01 03 00 00 00 01 FB", None), Ok(ParsedInput { sent: None, ..expect }));
     }
 
     #[test]
