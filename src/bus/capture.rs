@@ -17,7 +17,7 @@
 use jiff::Timestamp;
 
 use super::{
-    ascii, explain,
+    ascii, dissect,
     frame::{self, Mbap, hex},
 };
 use crate::plant::{line::Framing, traffic::Frame};
@@ -53,13 +53,13 @@ pub fn pcapng(frames: &[Frame]) -> Vec<u8> {
 pub fn text(frames: &[Frame]) -> String {
     let mut lines = String::new();
     for (index, frame) in frames.iter().enumerate() {
-        let told = explain::of_line(frame, frames[..index].iter().rev());
+        let dissection = dissect::in_traffic(frame, frames[..index].iter().rev());
         let bytes = match frame.framing {
             Framing::Ascii if ascii::open(&frame.bytes).is_ok() => frame.bytes.escape_ascii().to_string(),
             Framing::Ascii | Framing::Rtu | Framing::Mbap => hex(&frame.bytes),
         };
         let direction = if frame.sent { "TX" } else { "RX" };
-        lines += &format!("{} {direction} {bytes} | {} | {}\n", micros(frame.at), told.summary, frame.verdict);
+        lines += &format!("{} {direction} {bytes} | {} | {}\n", micros(frame.at), dissection.summary, frame.verdict);
     }
     lines
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{codec, explain::message_of, names};
+use super::{codec, dissect::message_of, names};
 use crate::plant::{
     event::Fault,
     line::Framing,

@@ -1,6 +1,6 @@
 //! Picks frames out of traffic by a line of words: `unit 1 fc 3 rx error 03EA`.
 
-use super::{explain, frame, hex_input};
+use super::{dissect, frame, hex_input};
 use crate::plant::traffic::Frame;
 
 /// All of these must hold; an empty filter lets everything through.
@@ -56,7 +56,7 @@ impl Filter {
 
     /// Does this frame pass? Bytes are looked for in the message of a frame and in the frame as it travels.
     pub fn matches(&self, frame: &Frame) -> bool {
-        let message = explain::message_of(&frame.bytes, frame.framing).unwrap_or_default();
+        let message = dissect::message_of(&frame.bytes, frame.framing).unwrap_or_default();
         let function = message.get(1).map(|code| code & 0x7F);
         self.unit.is_none_or(|unit| frame.unit.or(message.first().copied()) == Some(unit))
             && self.function.is_none_or(|wanted| function == Some(wanted))

@@ -16,7 +16,7 @@
 //! | [`plan`], [`admission`], [`schedule`], [`backoff`] | what is read together, whether it can all be in time, what is read next |
 //! | [`line_stats`] | what is counted |
 //! | [`tool`] | the steps of a test of the line |
-//! | [`explain`], [`names`], [`evidence`] | frames in words |
+//! | [`dissect`], [`names`], [`evidence`] | the fields of a frame and their meaning |
 //! | [`hex_input`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
 
 pub mod ascii;
@@ -24,7 +24,7 @@ pub mod frame;
 pub mod framing;
 pub mod names;
 pub mod request_lint;
-pub mod explain;
+pub mod dissect;
 pub mod evidence;
 pub mod hex_input;
 pub mod filter;

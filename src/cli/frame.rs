@@ -5,7 +5,7 @@ use std::io::{BufRead, IsTerminal};
 use crate::{
     bus::{
         ascii,
-        explain::{self, Direction, Explained},
+        dissect::{self, Direction, Dissection},
         frame::{crc16, hex},
         hex_input::{self, ParsedInput},
         request_lint::check_request,
@@ -50,7 +50,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let typed =
             hex_input::parse(&args.bytes.join(" "), framing).map_err(|error| CliError::Usage(error.to_string()))?;
         tell(&typed, framing, None).iter().for_each(|line| say(line));
-        return match explained(&typed, framing, None).verdict {
+        return match dissection(&typed, framing, None).verdict {
             verdict if verdict == "ok" => Ok(()),
             wrong => Err(CliError::Failed(format!("the frame is wrong: {wrong}"))),
         };
@@ -64,7 +64,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 /// Explains frames as their lines come. An answer behind its request gets its addresses.
 fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> {
     let (mut frames, mut corrupt, mut wrong) = (0, 0, 0);
-    let mut asked: Option<Explained> = None;
+    let mut asked: Option<Dissection> = None;
     for (index, line) in input.split(b'\n').enumerate() {
         let line = line.map_err(|error| CliError::Io { what: "cannot read standard input".into(), error })?;
         let line = String::from_utf8_lossy(&line);
@@ -84,9 +84,9 @@ fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> 
         }
         frames += 1;
         tell(&typed, framing, asked.as_ref()).iter().for_each(|line| say(line));
-        wrong += usize::from(explained(&typed, framing, asked.as_ref()).verdict != "ok");
-        let told = explained(&typed, framing, None);
-        asked = (told.direction != Some(Direction::Answer)).then_some(told);
+        wrong += usize::from(dissection(&typed, framing, asked.as_ref()).verdict != "ok");
+        let dissection = dissection(&typed, framing, None);
+        asked = (dissection.direction != Some(Direction::Answer)).then_some(dissection);
     }
     match (frames, corrupt, wrong) {
         (0, 0, _) => Err(CliError::Usage(hex_input::HexInputError::Empty.to_string())),
@@ -96,10 +96,10 @@ fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> 
     }
 }
 
-fn explained(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Explained>) -> Explained {
+fn dissection(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Dissection>) -> Dissection {
     let direction = typed.sent.map(|sent| if sent { Direction::Request } else { Direction::Answer });
     // Only what may be an answer to the request before it is read as one.
-    let plain = explain::explain(&typed.bytes, typed.framing.or(framing), direction, None);
+    let plain = dissect::dissect(&typed.bytes, typed.framing.or(framing), direction, None);
     let matching = asked.filter(|asked| {
         let same =
             |at: usize, mask: u8| plain.message.get(at).map(|byte| byte & mask) == asked.message.get(at).copied();
@@ -107,39 +107,39 @@ fn explained(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Expla
     });
     match matching {
         Some(asked) if plain.direction != Some(Direction::Request) => {
-            explain::explain(&typed.bytes, typed.framing.or(framing), Some(Direction::Answer), Some(&asked.message))
+            dissect::dissect(&typed.bytes, typed.framing.or(framing), Some(Direction::Answer), Some(&asked.message))
         }
         Some(_) | None => plain,
     }
 }
 
 /// The lines about one frame: what it is, every byte, the checks, what is wrong with it.
-fn tell(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Explained>) -> Vec<String> {
-    let told = explained(typed, framing, asked);
-    let direction = match told.direction {
+fn tell(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Dissection>) -> Vec<String> {
+    let dissection = dissection(typed, framing, asked);
+    let direction = match dissection.direction {
         Some(Direction::Request) => "request",
         Some(Direction::Answer) => "answer",
-        None if told.also.is_some() => "request or answer",
+        None if dissection.also.is_some() => "request or answer",
         None => "bytes",
     };
-    let kind = match told.framing {
+    let kind = match dissection.framing {
         Some(Framing::Rtu) => format!("RTU {direction}"),
         Some(Framing::Ascii) => format!("ASCII {direction}"),
         Some(Framing::Mbap) => format!("TCP {direction}"),
         None => format!("{direction} without CRC or header"),
     };
-    let mut lines = wrap(&format!("{kind}: {}", told.summary), WIDTH, 2);
-    lines.extend(table(&told));
-    lines.extend(checks(&told));
-    if told.verdict != "ok" {
-        lines.extend(wrap(&format!("wrong: {}", told.verdict), WIDTH, 2));
+    let mut lines = wrap(&format!("{kind}: {}", dissection.summary), WIDTH, 2);
+    lines.extend(table(&dissection));
+    lines.extend(checks(&dissection));
+    if dissection.verdict != "ok" {
+        lines.extend(wrap(&format!("wrong: {}", dissection.verdict), WIDTH, 2));
     }
-    if let Some(also) = &told.also {
-        let words = if told.direction.is_none() { also.clone() } else { format!("may also be {also}") };
+    if let Some(also) = &dissection.also {
+        let words = if dissection.direction.is_none() { also.clone() } else { format!("may also be {also}") };
         lines.extend(wrap(&words, WIDTH, 2));
     }
-    if told.direction != Some(Direction::Answer) && told.verdict == "ok" {
-        for error in check_request(&told.message, told.framing.unwrap_or(Framing::Rtu)) {
+    if dissection.direction != Some(Direction::Answer) && dissection.verdict == "ok" {
+        for error in check_request(&dissection.message, dissection.framing.unwrap_or(Framing::Rtu)) {
             lines.extend(wrap(&format!("must not be sent: {error}"), WIDTH, 2));
         }
     }
@@ -147,27 +147,27 @@ fn tell(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Explained>
 }
 
 /// Both checks of the message, as they would be sent.
-fn checks(told: &Explained) -> Option<String> {
-    let message = &told.message;
+fn checks(dissection: &Dissection) -> Option<String> {
+    let message = &dissection.message;
     (2 <= message.len())
         .then(|| format!("CRC {}   LRC {:02X}", hex(&crc16(message).to_le_bytes()), ascii::lrc(message)))
 }
 
 /// Offset counted from 0, bytes, field, meaning.
-fn table(told: &Explained) -> Vec<String> {
+fn table(dissection: &Dissection) -> Vec<String> {
     let hex_rows = |hex: &str| -> Vec<String> {
         let bytes: Vec<&str> = hex.split(' ').collect();
         bytes.chunks(BYTES).map(|row| row.join(" ")).collect()
     };
     let widest = |lengths: &mut dyn Iterator<Item = usize>, least: usize| lengths.max().unwrap_or(0).max(least);
-    let hex_width = widest(&mut told.fields.iter().map(|field| field.hex.len().min(3 * BYTES - 1)), 5);
-    let name_width = widest(&mut told.fields.iter().map(|field| field.name.chars().count()), 5);
+    let hex_width = widest(&mut dissection.fields.iter().map(|field| field.hex.len().min(3 * BYTES - 1)), 5);
+    let name_width = widest(&mut dissection.fields.iter().map(|field| field.name.chars().count()), 5);
     let words_width = WIDTH.saturating_sub(2 + 4 + 2 + hex_width + 2 + name_width + 2).max(20);
     let row = |at: &str, hex: &str, name: &str, words: &str| {
         format!("  {at:>4}  {hex:hex_width$}  {name:name_width$}  {words}").trim_end().to_owned()
     };
     let mut lines = vec![row("at", "bytes", "field", "meaning")];
-    for field in &told.fields {
+    for field in &dissection.fields {
         let (hex, words) = (hex_rows(&field.hex), wrap(&field.words, words_width, 0));
         for index in 0..hex.len().max(words.len()) {
             let part = |rows: &[String]| rows.get(index).cloned().unwrap_or_default();

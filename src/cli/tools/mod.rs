@@ -10,7 +10,7 @@ use std::{io::IsTerminal, sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use crate::{
-    bus::{explain, frame::hex, io::testing, tool::Job},
+    bus::{dissect, frame::hex, io::testing, tool::Job},
     plant::{
         command::OrderId,
         def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
@@ -169,7 +169,7 @@ fn clear_progress() {
 
 /// Request and answer, byte for byte and in words.
 pub fn exchange_lines(exchange: &Exchange) -> Vec<String> {
-    let request = explain::explain(&exchange.request, Some(exchange.framing), Some(explain::Direction::Request), None);
+    let request = dissect::dissect(&exchange.request, Some(exchange.framing), Some(dissect::Direction::Request), None);
     let mut lines =
         vec![format!("TX {}", shown(&exchange.request, exchange.framing)), format!("   {}", request.summary)];
     if exchange.answer.is_empty() {
@@ -191,7 +191,7 @@ pub fn exchange_lines(exchange: &Exchange) -> Vec<String> {
 /// What came back, byte for byte and in words.
 pub fn answer_lines(bytes: &[u8], framing: Framing, request: &[u8]) -> Vec<String> {
     let asked = (!request.is_empty()).then_some(request);
-    let answer = explain::explain(bytes, Some(framing), Some(explain::Direction::Answer), asked);
+    let answer = dissect::dissect(bytes, Some(framing), Some(dissect::Direction::Answer), asked);
     vec![format!("RX {}", shown(bytes, framing)), format!("   {}", answer.summary)]
 }
 

@@ -2,7 +2,7 @@
 
 use super::{PortArgs, answer_lines, run, shown};
 use crate::{
-    bus::{ascii, explain, frame, hex_input, request_lint::check_request},
+    bus::{ascii, dissect, frame, hex_input, request_lint::check_request},
     cli::{CliError, say, say_error},
     plant::{
         def::Framing,
@@ -47,8 +47,8 @@ pub fn main(args: Args) -> Result<(), CliError> {
         (None, _) => (typed.bytes.clone(), frame::wrap(framing, 1, &typed.bytes)),
     };
     refuse(&message, framing, &args)?;
-    let told = explain::explain(&frame, Some(framing), Some(explain::Direction::Request), None);
-    let sent = [format!("TX {}", shown(&frame, framing)), format!("   {}", told.summary)];
+    let dissection = dissect::dissect(&frame, Some(framing), Some(dissect::Direction::Request), None);
+    let sent = [format!("TX {}", shown(&frame, framing)), format!("   {}", dissection.summary)];
     let request = message.clone();
     let run = run(&line, Tool::Send(frame), |finding| match finding {
         Finding::Bytes { bytes, .. } if bytes.is_empty() => sent.to_vec(),

@@ -26,14 +26,14 @@ pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
     rows.push(row(label, value::number(cx, def, exchange, found.as_ref()), cx.theme.normal()));
     rows.push(row("where", wire::place(cx, def, device), cx.theme.normal()));
     rows.push(row("", wire::point(def), cx.theme.normal()));
-    let told = exchange.map(|exchange| wire::exchange_rows(cx, def, exchange, found.as_ref(), room, &mut rows));
+    let dissection = exchange.map(|exchange| wire::exchange_rows(cx, def, exchange, found.as_ref(), room, &mut rows));
     if exchange.is_none() {
         rows.push(row("asked", wire::never_asked(cx, def).to_owned(), cx.theme.normal()));
     }
     rows.extend(service::device_rows(cx, def, device, exchange));
     rows.extend(service::poll_rows(cx, def));
-    if let (Some(told), Some(exchange)) = (told, exchange) {
-        rows.extend(wire::every_byte(cx, exchange, &told, found.as_ref(), room));
+    if let (Some(dissection), Some(exchange)) = (dissection, exchange) {
+        rows.extend(wire::every_byte(cx, exchange, &dissection, found.as_ref(), room));
     }
     rows
 }

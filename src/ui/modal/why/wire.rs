@@ -6,8 +6,8 @@ use super::{
 };
 use crate::{
     bus::{
+        dissect::{self, Direction, Dissection},
         evidence::Found,
-        explain::{self, Direction, Explained},
     },
     plant::{
         def::DeviceDef,
@@ -29,12 +29,12 @@ pub(super) fn exchange_rows(
     found: Option<&Found>,
     room: u16,
     rows: &mut Vec<Row>,
-) -> (Explained, Explained) {
+) -> (Dissection, Dissection) {
     let theme = cx.theme;
     let framing = exchange.framing;
-    let request = explain::explain(&exchange.request, Some(framing), Some(Direction::Request), None);
+    let request = dissect::dissect(&exchange.request, Some(framing), Some(Direction::Request), None);
     let answer =
-        explain::explain(&exchange.answer, Some(framing), Some(Direction::Answer), Some(request.message.as_slice()));
+        dissect::dissect(&exchange.answer, Some(framing), Some(Direction::Answer), Some(request.message.as_slice()));
     let frame = |bytes: &[u8], marked: Option<&std::ops::Range<usize>>| {
         bytes::telling(bytes::rows(bytes, framing, marked, room.saturating_sub(2)), theme.ellipsis())
     };
@@ -73,18 +73,18 @@ pub(super) fn exchange_rows(
 pub(super) fn every_byte(
     cx: &ViewContext,
     exchange: &Exchange,
-    (request, answer): &(Explained, Explained),
+    (request, answer): &(Dissection, Dissection),
     found: Option<&Found>,
     room: u16,
 ) -> Vec<Row> {
     let mut rows = Vec::new();
     let frames = [("asked", request, None), ("answer", answer, found.map(|found| &found.range))];
-    for (label, told, marked) in
+    for (label, dissection, marked) in
         frames.into_iter().filter(|(label, ..)| *label == "asked" || !exchange.answer.is_empty())
     {
         let heading = format!("{label}, byte by byte");
         rows.push(Row { label: "", text: heading, style: cx.theme.strong(), wraps: false });
-        for field in &told.fields {
+        for field in &dissection.fields {
             let own = marked.is_some_and(|marked| field.range.start < marked.end && marked.start < field.range.end);
             let mark = if own { "▸" } else { " " };
             let text = format!("{mark} {:<12} {:<16} {}", field.hex, field.name, field.words);
@@ -116,7 +116,7 @@ pub(super) fn place(cx: &ViewContext, def: &TagDef, device: &DeviceDef) -> Strin
 /// Function, both numbers of the address, type, word order.
 pub(super) fn point(def: &TagDef) -> String {
     let point = def.point;
-    let function = explain::function_words(point.table.read_fc());
+    let function = dissect::function_words(point.table.read_fc());
     let what = match (point.table.is_bits(), point.field) {
         (true, _) => "one bit".to_owned(),
         (false, Some((low, 1))) => format!("bit {low} of a word"),

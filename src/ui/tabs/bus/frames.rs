@@ -8,7 +8,7 @@ use super::{
     window::{Shown, TextWindow},
 };
 use crate::{
-    bus::{capture, explain, filter::Filter, frame::hex},
+    bus::{capture, dissect, filter::Filter, frame::hex},
     plant::{
         def::Framing,
         traffic::{Frame, Frames},
@@ -256,9 +256,9 @@ impl Ring {
         let wide = 100 <= canvas.width();
         let time = frame.at.to_zoned(cx.def().time_zone.clone());
         let time = time.strftime(if wide { "%H:%M:%S%.3f" } else { "%M:%S%.3f" });
-        let told = explain::of_line(frame, self.before(frame.number));
+        let dissection = dissect::in_traffic(frame, self.before(frame.number));
         let good = matches!(&*frame.verdict, "ok" | "sent" | "received");
-        let refused = !frame.sent && told.message.get(1).is_some_and(|code| 0x80 <= *code);
+        let refused = !frame.sent && dissection.message.get(1).is_some_and(|code| 0x80 <= *code);
         let style = match (selected, good && !refused) {
             (true, _) => theme.focus(),
             (false, false) => theme.trouble(),
@@ -271,7 +271,7 @@ impl Ring {
         let unit = frame.unit.map_or(String::new(), |unit| unit.to_string());
         let x = canvas.text(1, 0, &format!("{time} {direction} {unit:>3} {bytes} "), style);
         let room = canvas.width().saturating_sub(x + 1);
-        let summary = if wide { told.summary } else { short(&told.summary) };
+        let summary = if wide { dissection.summary } else { short(&dissection.summary) };
         let words = match (good, refused) {
             (true, false) => summary,
             (true, true) => format!("! {summary}"),

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     bus::{
-        explain::{self, Direction},
+        dissect::{self, Direction},
         frame::{self, hex},
         names, request_lint,
     },
@@ -76,7 +76,7 @@ impl Form {
         let fields = match tried {
             Tried::Bytes | Tried::Request => vec![
                 unit,
-                choice("function", FUNCTIONS.map(explain::function_words).to_vec()),
+                choice("function", FUNCTIONS.map(dissect::function_words).to_vec()),
                 text("address", "40001"),
                 text("count", "1"),
             ],
@@ -321,7 +321,7 @@ fn request_words(message: &[u8], framing: Framing) -> Result<Vec<String>, String
         return Err(error.to_string());
     }
     let told =
-        explain::explain(&frame::wrap(framing, TRANSACTION, message), Some(framing), Some(Direction::Request), None);
+        dissect::dissect(&frame::wrap(framing, TRANSACTION, message), Some(framing), Some(Direction::Request), None);
     Ok(vec![told.summary, hex(message)])
 }
 

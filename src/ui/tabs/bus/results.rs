@@ -7,10 +7,10 @@ use super::{
     frames::{broken, bytes_text},
     line::{ms, short_ms},
     rows::{Row, bar, plain},
-    window::{exchange_rows, told_rows},
+    window::{dissection_rows, exchange_rows},
 };
 use crate::{
-    bus::explain::{self, Direction},
+    bus::dissect::{self, Direction},
     plant::tool::{Finding, Tool, ToolRun, ToolState},
     ui::{
         ViewContext,
@@ -29,10 +29,12 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     let bare = matches!(run.tool, Tool::Send(_));
     if let Tool::Send(bytes) = &run.tool {
         let framing = at.settings.transport.framing();
-        let told = explain::explain(bytes, Some(framing), Some(Direction::Request), None);
+        let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Request), None);
         let sent = broken(&format!("TX {}", bytes_text(framing, bytes)), room);
         rows.extend(sent.into_iter().map(|line| plain(line, theme.dim())));
-        rows.extend(wrap(&told.summary, room - 3).into_iter().map(|line| plain(format!("   {line}"), theme.dim())));
+        rows.extend(
+            wrap(&dissection.summary, room - 3).into_iter().map(|line| plain(format!("   {line}"), theme.dim())),
+        );
     }
     for finding in &run.findings {
         match finding {
@@ -112,7 +114,7 @@ fn came_back(
     let framing = at.settings.transport.framing();
     let to_all = |sent: &Vec<u8>| {
         framing != crate::plant::def::Framing::Mbap
-            && explain::message_of(sent, framing).is_some_and(|message| message.first() == Some(&0))
+            && dissect::message_of(sent, framing).is_some_and(|message| message.first() == Some(&0))
     };
     if bytes.is_empty() && matches!(&run.tool, Tool::Send(sent) if to_all(sent)) {
         return vec![plain("sent to all; nobody answers a broadcast", theme.normal())];
@@ -121,22 +123,22 @@ fn came_back(
         return vec![plain(format!("✗ nothing came back within {}", ms(at.settings.timeout)), theme.trouble())];
     }
     let asked = match &run.tool {
-        Tool::Send(sent) => explain::message_of(sent, framing),
+        Tool::Send(sent) => dissect::message_of(sent, framing),
         Tool::Loopback { .. } | Tool::Identify { .. } | Tool::Read { .. } | Tool::Scan(_) => None,
     };
-    let told = explain::explain(bytes, Some(framing), Some(Direction::Answer), asked.as_deref());
+    let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Answer), asked.as_deref());
     let mut rows: Vec<Row> = broken(&format!("RX {}", bytes_text(framing, bytes)), room)
         .into_iter()
         .map(|line| plain(line, theme.normal()))
         .collect();
     let reply = reply.map_or(String::new(), |reply| format!("   after {} ms", short_ms(reply)));
-    let refused = told.message.get(1).is_some_and(|code| 0x80 <= *code);
-    let (mark, style) = match (told.verdict.as_str(), refused) {
+    let refused = dissection.message.get(1).is_some_and(|code| 0x80 <= *code);
+    let (mark, style) = match (dissection.verdict.as_str(), refused) {
         ("ok", false) => ("✓ ok".to_owned(), theme.normal()),
         ("ok", true) => ("✗ the device refuses".to_owned(), theme.trouble()),
         (verdict, _) => (format!("✗ {verdict}"), theme.trouble()),
     };
     rows.push(plain(format!("{mark}{reply}"), style));
-    rows.extend(told_rows(cx, &told, room));
+    rows.extend(dissection_rows(cx, &dissection, room));
     rows
 }

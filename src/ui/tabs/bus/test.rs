@@ -14,7 +14,7 @@ use super::{
 use crate::{
     bus::{
         ascii,
-        explain::{self, Direction, Explained},
+        dissect::{self, Direction, Dissection},
         frame::{self, Mbap, hex},
         hex_input, request_lint,
     },
@@ -202,21 +202,22 @@ fn danger(at: &Place, tool: &Tool) -> Option<String> {
         Tool::Scan(_) | Tool::Loopback { .. } | Tool::Identify { .. } | Tool::Read { .. } => None,
         Tool::Send(bytes) => {
             let framing = at.settings.transport.framing();
-            let told = explain::explain(bytes, Some(framing), Some(Direction::Request), None);
-            let whole = told.verdict == "ok" && request_lint::check_request(&told.message, framing).is_empty();
-            let broadcast = told.message.first() == Some(&0) && framing != Framing::Mbap;
-            match (whole, broadcast, only_reads(&told.message)) {
+            let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Request), None);
+            let whole =
+                dissection.verdict == "ok" && request_lint::check_request(&dissection.message, framing).is_empty();
+            let broadcast = dissection.message.first() == Some(&0) && framing != Framing::Mbap;
+            match (whole, broadcast, only_reads(&dissection.message)) {
                 (true, false, true) => None,
                 (true, true, _) => {
-                    Some(format!("{}. Every device of the line obeys, none answers. Send it?", told.summary))
+                    Some(format!("{}. Every device of the line obeys, none answers. Send it?", dissection.summary))
                 }
                 (true, false, false) => Some(format!(
                     "{}. This is past all limits of the plant file and is not read back. Send it?",
-                    told.summary
+                    dissection.summary
                 )),
                 (false, ..) => Some(format!(
                     "These bytes are no good request: {}. Send {} all the same?",
-                    told.verdict,
+                    dissection.verdict,
                     hex(bytes)
                 )),
             }
@@ -260,7 +261,7 @@ struct Ready {
     frame: Vec<u8>,
     /// What was added to what was typed.
     added: String,
-    told: Explained,
+    dissection: Dissection,
     errors: Vec<String>,
 }
 
@@ -305,13 +306,13 @@ impl Send {
     fn ready(&self, framing: Framing) -> Result<Ready, String> {
         let typed = hex_input::parse(&self.text.text(), Some(framing)).map_err(|error| error.to_string())?;
         let (frame, added) = if self.bare { (typed.bytes.clone(), String::new()) } else { dress(&typed, framing) };
-        let told = explain::explain(&frame, Some(framing), Some(Direction::Request), None);
+        let dissection = dissect::dissect(&frame, Some(framing), Some(Direction::Request), None);
         let mut errors: Vec<String> =
-            request_lint::check_request(&told.message, framing).iter().map(ToString::to_string).collect();
-        if told.verdict != "ok" && errors.is_empty() {
-            errors.push(told.verdict.clone());
+            request_lint::check_request(&dissection.message, framing).iter().map(ToString::to_string).collect();
+        if dissection.verdict != "ok" && errors.is_empty() {
+            errors.push(dissection.verdict.clone());
         }
-        Ok(Ready { frame, added, told, errors })
+        Ok(Ready { frame, added, dissection, errors })
     }
 
     /// Draws it over the tests, so that what comes back is seen below.
@@ -372,7 +373,7 @@ impl Ready {
             (false, false) => self.added.clone(),
         };
         let mut rows = vec![plain(fit_words(&added, width), theme.normal())];
-        let lines = wrap(&self.told.summary, width);
+        let lines = wrap(&self.dissection.summary, width);
         rows.extend(lines.into_iter().map(|line| plain(line, theme.strong())));
         for error in &self.errors {
             rows.extend(wrap(&format!("! {error}"), width).into_iter().map(|line| plain(line, theme.trouble())));
@@ -381,7 +382,7 @@ impl Ready {
             let bytes = broken(
                 &format!(
                     "sent as {}",
-                    super::frames::bytes_text(self.told.framing.unwrap_or(Framing::Rtu), &self.frame)
+                    super::frames::bytes_text(self.dissection.framing.unwrap_or(Framing::Rtu), &self.frame)
                 ),
                 width,
             );

@@ -12,7 +12,7 @@ use super::{
     test::Send,
 };
 use crate::{
-    bus::{explain, frame::hex, names},
+    bus::{dissect, frame::hex, names},
     plant::{
         def::{DeviceId, LineId},
         tag::Table,
@@ -157,8 +157,8 @@ impl TextWindow {
         let room = body.width.saturating_sub(6);
         let (title, rows) = match &self.shown {
             Shown::Frame { line, frame, before } => {
-                let told = explain::of_line(frame, before.iter());
-                (format!("frame {} on {line}", frame.number), frame_rows(cx, frame, &told, room))
+                let dissection = dissect::in_traffic(frame, before.iter());
+                (format!("frame {} on {line}", frame.number), frame_rows(cx, frame, &dissection, room))
             }
             Shown::Block { line, device, table, address } => {
                 (format!("tags of {} from {}", cx.def().device(*device).name, table.modicon(*address)), {
@@ -173,7 +173,7 @@ impl TextWindow {
 }
 
 /// Every byte of a frame with its name and meaning.
-fn frame_rows(cx: &ViewContext, frame: &Frame, told: &explain::Explained, room: u16) -> Vec<Row> {
+fn frame_rows(cx: &ViewContext, frame: &Frame, dissection: &dissect::Dissection, room: u16) -> Vec<Row> {
     let theme = cx.theme;
     let at = frame.at.to_zoned(cx.def().time_zone.clone()).strftime("%H:%M:%S%.6f");
     let direction = if frame.sent { "TX sent" } else { "RX received" };
@@ -185,22 +185,23 @@ fn frame_rows(cx: &ViewContext, frame: &Frame, told: &explain::Explained, room: 
     let good = matches!(&*frame.verdict, "ok" | "sent" | "received");
     let verdict = if good { frame.verdict.to_string() } else { format!("✗ {}", frame.verdict) };
     rows.push(plain(verdict, if good { theme.normal() } else { theme.trouble() }));
-    if told.verdict != "ok" && told.verdict != *frame.verdict {
-        rows.push(plain(format!("! {}", told.verdict), theme.trouble()));
+    if dissection.verdict != "ok" && dissection.verdict != *frame.verdict {
+        rows.push(plain(format!("! {}", dissection.verdict), theme.trouble()));
     }
-    rows.extend(told_rows(cx, told, room));
+    rows.extend(dissection_rows(cx, dissection, room));
     rows
 }
 
 /// Summary and fields.
-pub fn told_rows(cx: &ViewContext, told: &explain::Explained, room: u16) -> Vec<Row> {
+pub fn dissection_rows(cx: &ViewContext, dissection: &dissect::Dissection, room: u16) -> Vec<Row> {
     let theme = cx.theme;
-    let mut rows: Vec<Row> = wrap(&told.summary, room).into_iter().map(|line| plain(line, theme.strong())).collect();
-    let widest = |text: fn(&explain::Field) -> &str, most| {
-        told.fields.iter().map(|field| width(text(field))).max().unwrap_or(0).min(most)
+    let mut rows: Vec<Row> =
+        wrap(&dissection.summary, room).into_iter().map(|line| plain(line, theme.strong())).collect();
+    let widest = |text: fn(&dissect::Field) -> &str, most| {
+        dissection.fields.iter().map(|field| width(text(field))).max().unwrap_or(0).min(most)
     };
     let (bytes, name) = (widest(|field| &field.hex, 17), widest(|field| &field.name, 17));
-    for field in &told.fields {
+    for field in &dissection.fields {
         let words = room.saturating_sub(bytes + name + 4).max(12);
         let mut lines = wrap(&field.words, words).into_iter();
         let first = lines.next().unwrap_or_default();
@@ -212,7 +213,7 @@ pub fn told_rows(cx: &ViewContext, told: &explain::Explained, room: u16) -> Vec<
         let indent = " ".repeat(usize::from(bytes + name + 4));
         rows.extend(lines.map(|line| plain(indent.clone() + &line, theme.normal())));
     }
-    if let Some(also) = &told.also {
+    if let Some(also) = &dissection.also {
         rows.extend(wrap(&format!("or: {also}"), room).into_iter().map(|line| plain(line, theme.dim())));
     }
     rows
@@ -222,8 +223,8 @@ pub fn told_rows(cx: &ViewContext, told: &explain::Explained, room: u16) -> Vec<
 pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Row> {
     let theme = cx.theme;
     let framing = Some(exchange.framing);
-    let asked = explain::message_of(&exchange.request, exchange.framing);
-    let request = explain::explain(&exchange.request, framing, Some(explain::Direction::Request), None);
+    let asked = dissect::message_of(&exchange.request, exchange.framing);
+    let request = dissect::dissect(&exchange.request, framing, Some(dissect::Direction::Request), None);
     let row = |direction: &str, bytes: &[u8], words: &str, style| {
         let mut lines = broken(&format!("{direction} {}", bytes_text(exchange.framing, bytes)), room);
         lines.extend(wrap(words, room.saturating_sub(3)).into_iter().map(|line| format!("   {line}")));
@@ -234,7 +235,7 @@ pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Ro
     let outcome = exchange.outcome.map_or_else(|fault| format!("✗ {fault}{reply}"), |()| format!("✓ ok{reply}"));
     let style = if exchange.outcome.is_ok() { theme.normal() } else { theme.trouble() };
     if !exchange.answer.is_empty() {
-        let answer = explain::explain(&exchange.answer, framing, Some(explain::Direction::Answer), asked.as_deref());
+        let answer = dissect::dissect(&exchange.answer, framing, Some(dissect::Direction::Answer), asked.as_deref());
         rows.extend(row("RX", &exchange.answer, &answer.summary, style));
     }
     rows.push(plain(outcome, style));

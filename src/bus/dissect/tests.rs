@@ -5,30 +5,30 @@ use super::*;
 use crate::bus::{ascii, frame::with_crc, frame::with_mbap};
 
 /// Message in hex; request in hex or nothing; the summary expected.
-fn check(message: &str, asked: &str, summary: &str) -> Explained {
+fn check(message: &str, asked: &str, summary: &str) -> Dissection {
     let bytes = |text: &str| text.split_whitespace().map(|b| u8::from_str_radix(b, 16).unwrap()).collect::<Vec<u8>>();
     let (message, asked) = (bytes(message), bytes(asked));
     let asked = (!asked.is_empty()).then_some(&asked[..]);
-    let mut told = Vec::new();
+    let mut all = Vec::new();
     for frame in [with_crc(&message), ascii::encode(&message), with_mbap(1, &message), message.clone()] {
-        let explained = explain(&frame, None, None, asked);
-        assert_eq!(explained.summary, summary);
-        assert_eq!(explained.verdict, "ok", "{summary}");
-        assert_eq!(explained.message, message);
+        let dissection = dissect(&frame, None, None, asked);
+        assert_eq!(dissection.summary, summary);
+        assert_eq!(dissection.verdict, "ok", "{summary}");
+        assert_eq!(dissection.message, message);
         // Every byte is told, once and in order.
         let mut at = 0;
-        for field in &explained.fields {
+        for field in &dissection.fields {
             assert_eq!(field.range.start, at, "{summary}: {field:?}");
             at = field.range.end;
         }
         assert_eq!(at, frame.len(), "{summary}");
-        told.push(explained);
+        all.push(dissection);
     }
     assert_eq!(
-        told.iter().map(|told| told.framing).collect::<Vec<_>>(),
+        all.iter().map(|one| one.framing).collect::<Vec<_>>(),
         [Some(Framing::Rtu), Some(Framing::Ascii), Some(Framing::Mbap), None]
     );
-    told.remove(0)
+    all.remove(0)
 }
 
 #[test]
@@ -82,21 +82,21 @@ fn answers_are_told_with_the_addresses_of_their_request() {
     ] {
         check(message, asked, summary);
     }
-    let told = check("01 03 04 00 C8 FF FE", "01 03 03 EA 00 02", "2 registers: 00C8 FFFE");
-    let of = |name: &str| told.fields.iter().find(|field| field.name == name).unwrap().words.clone();
+    let dissection = check("01 03 04 00 C8 FF FE", "01 03 03 EA 00 02", "2 registers: 00C8 FFFE");
+    let of = |name: &str| dissection.fields.iter().find(|field| field.name == name).unwrap().words.clone();
     assert_eq!(of("41003 / 0x03EA"), "0x00C8  200");
     assert_eq!(of("41004 / 0x03EB"), "0xFFFE  65534 or -2");
-    let told = check("01 03 04 00 C8 FF FE", "", "2 registers: 00C8 FFFE");
-    assert_eq!((told.direction, told.fields[3].name.as_str()), (Some(Direction::Answer), "register 1"));
+    let dissection = check("01 03 04 00 C8 FF FE", "", "2 registers: 00C8 FFFE");
+    assert_eq!((dissection.direction, dissection.fields[3].name.as_str()), (Some(Direction::Answer), "register 1"));
 }
 
 #[test]
 fn unit_0_is_a_broadcast_on_a_serial_line_only() {
     let message = [0, 6, 0, 1, 0, 3];
-    let rtu = explain(&with_crc(&message), None, None, None);
+    let rtu = dissect(&with_crc(&message), None, None, None);
     assert_eq!(rtu.summary, "broadcast write register 40002 = 3 (0x0001, 0x0003)");
     assert!(rtu.fields[0].words.contains("none answers"));
-    assert!(explain(&with_mbap(1, &message), None, None, None).fields[3].words.contains("the device itself"));
+    assert!(dissect(&with_mbap(1, &message), None, None, None).fields[3].words.contains("the device itself"));
 }
 
 #[test]
@@ -107,24 +107,24 @@ fn unit_58_is_not_taken_for_the_colon_of_ascii() {
 
 #[test]
 fn what_may_be_two_things_says_so() {
-    let told = check("01 06 03 EA 00 32", "", "unit 1 write register 41003 = 50 (0x03EA, 0x0032)");
+    let dissection = check("01 06 03 EA 00 32", "", "unit 1 write register 41003 = 50 (0x03EA, 0x0032)");
     assert_eq!(
-        (told.direction, told.also.as_deref()),
+        (dissection.direction, dissection.also.as_deref()),
         (None, Some("the answer repeats the request: these bytes may be either"))
     );
     // Eight bytes that begin 01 01 03: a request from 00769, or 24 coils.
-    let told = check("01 01 03 00 00 05", "", "unit 1 read coils 00769–00773 (0x0300, 5)");
-    assert_eq!(told.also.as_deref(), Some("an answer: 24 bits: 0000 0000 0000 0000 1010 0000"));
+    let dissection = check("01 01 03 00 00 05", "", "unit 1 read coils 00769–00773 (0x0300, 5)");
+    assert_eq!(dissection.also.as_deref(), Some("an answer: 24 bits: 0000 0000 0000 0000 1010 0000"));
     // A request for 27397 coils would be refused: this is an answer.
-    let told = check("01 01 03 CD 6B 05", "", "24 bits: 1011 0011 1101 0110 1010 0000");
-    assert!(told.also.unwrap().starts_with("a request: unit 1 read coils"));
-    let told = check("01 03 03 EA 00 01", "", "unit 1 read holding registers 41003 (0x03EA, 1)");
-    assert_eq!(told.also, None);
+    let dissection = check("01 01 03 CD 6B 05", "", "24 bits: 1011 0011 1101 0110 1010 0000");
+    assert!(dissection.also.unwrap().starts_with("a request: unit 1 read coils"));
+    let dissection = check("01 03 03 EA 00 01", "", "unit 1 read holding registers 41003 (0x03EA, 1)");
+    assert_eq!(dissection.also, None);
 }
 
 #[test]
 fn broken_frames_say_what_is_wrong_and_what_it_should_be() {
-    let verdict = |bytes: &[u8]| explain(bytes, None, None, None).verdict;
+    let verdict = |bytes: &[u8]| dissect(bytes, None, None, None).verdict;
     assert_eq!(verdict(&[1, 3, 3, 0xEA, 0, 1, 0xA5, 0xBB]), "CRC error: got A5 BB, computed A5 BA");
     assert_eq!(verdict(b":010303EA00010F\r\n"), "LRC error: got 0F, computed 0E");
     assert_eq!(verdict(b":010303EA00010E"), "CR LF missing at the end");
@@ -133,23 +133,23 @@ fn broken_frames_say_what_is_wrong_and_what_it_should_be() {
     assert_eq!(verdict(&[1, 3, 4, 0, 1]), "cut short: 2 bytes of register 2 missing");
     assert_eq!(verdict(&[1, 6, 0, 1, 0, 1, 9]), "1 byte too many");
     assert_eq!(verdict(&[]), "cut short: 1 byte of unit missing");
-    let tcp = |bytes: &[u8]| explain(bytes, Some(Framing::Mbap), None, None).verdict;
+    let tcp = |bytes: &[u8]| dissect(bytes, Some(Framing::Mbap), None, None).verdict;
     assert_eq!(tcp(&[0, 1, 0, 0, 0, 9, 1, 3, 0, 0, 0, 1]), "MBAP length says 9, 6 bytes follow");
     assert_eq!(tcp(&[0, 1, 0, 7, 0, 6, 1, 3, 0, 0, 0, 1]), "MBAP protocol 7, expected 0");
-    let swapped = explain(&[1, 3, 3, 0xEA, 0, 1, 0xBA, 0xA5], None, None, None);
+    let swapped = dissect(&[1, 3, 3, 0xEA, 0, 1, 0xBA, 0xA5], None, None, None);
     assert!(swapped.fields.last().unwrap().words.starts_with("bytes swapped: A5 BA is right"));
     let asked = [1, 3, 0, 0, 0, 1];
-    let answer = explain(&with_crc(&[2, 3, 2, 0, 1]), None, None, Some(&asked));
+    let answer = dissect(&with_crc(&[2, 3, 2, 0, 1]), None, None, Some(&asked));
     assert_eq!(answer.verdict, "answer from unit 2, asked unit 1");
 }
 
 #[test]
 fn a_brief_summary_cuts_no_number() {
-    let told = check("01 03 04 00 C8 FF FE", "", "2 registers: 00C8 FFFE");
-    assert_eq!(told.brief(22), "2 registers: 00C8 FFFE");
-    assert_eq!(told.brief(21), "2 registers: 00C8 …");
-    assert_eq!(told.brief(1), "…");
-    assert_eq!(told.brief(0), "");
+    let dissection = check("01 03 04 00 C8 FF FE", "", "2 registers: 00C8 FFFE");
+    assert_eq!(dissection.brief(22), "2 registers: 00C8 FFFE");
+    assert_eq!(dissection.brief(21), "2 registers: 00C8 …");
+    assert_eq!(dissection.brief(1), "…");
+    assert_eq!(dissection.brief(0), "");
 }
 
 #[test]
@@ -164,10 +164,10 @@ fn an_answer_on_a_line_finds_its_request_before_it() {
         number: 0,
     };
     let line = [frame(true, &[1, 3, 0, 10, 0, 1], 1), frame(true, &[1, 3, 0, 20, 0, 1], 2)];
-    let told = of_line(&frame(false, &[1, 3, 2, 0, 5], 1), line.iter().rev());
-    assert_eq!(told.fields[6].name, "40011 / 0x000A");
-    let told = of_line(&frame(false, &[1, 3, 2, 0, 5], 3), line.iter().rev());
-    assert_eq!(told.fields[6].name, "register 1");
+    let dissection = in_traffic(&frame(false, &[1, 3, 2, 0, 5], 1), line.iter().rev());
+    assert_eq!(dissection.fields[6].name, "40011 / 0x000A");
+    let dissection = in_traffic(&frame(false, &[1, 3, 2, 0, 5], 3), line.iter().rev());
+    assert_eq!(dissection.fields[6].name, "register 1");
 }
 
 proptest::proptest! {
@@ -178,10 +178,10 @@ proptest::proptest! {
         framing in proptest::option::of(proptest::sample::select(vec![Framing::Rtu, Framing::Ascii, Framing::Mbap])),
         direction in proptest::option::of(proptest::sample::select(vec![Direction::Request, Direction::Answer])),
     ) {
-        let told = explain(&bytes, framing, direction, None);
-        proptest::prop_assert!(!told.summary.is_empty() && !told.verdict.is_empty());
+        let dissection = dissect(&bytes, framing, direction, None);
+        proptest::prop_assert!(!dissection.summary.is_empty() && !dissection.verdict.is_empty());
         let mut at = 0;
-        for field in &told.fields {
+        for field in &dissection.fields {
             proptest::prop_assert_eq!(field.range.start, at);
             at = field.range.end;
         }

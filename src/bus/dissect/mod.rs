@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  bytes ─> envelope ─> message ─┬─> request ─┐
-//!           CRC LRC MBAP         └─> answer ──┴─> the reading that fits ─> Explained
+//!           CRC LRC MBAP         └─> answer ──┴─> the reading that fits ─> Dissection
 //! ```
 
 mod answer;
@@ -45,7 +45,7 @@ pub struct Field {
 
 /// A frame in words.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Explained {
+pub struct Dissection {
     /// How it is framed; `None`: a message without check or header.
     pub framing: Option<Framing>,
     /// Who it comes from; `None` where request and answer are the same bytes.
@@ -62,7 +62,7 @@ pub struct Explained {
     pub also: Option<String>,
 }
 
-impl Explained {
+impl Dissection {
     /// The summary in at most `width` characters; cut between words, so that no number is cut.
     pub fn brief(&self, width: usize) -> String {
         if self.summary.chars().count() <= width {
@@ -76,12 +76,12 @@ impl Explained {
 
 /// Tells a frame in words. What is not told – framing, direction – is recognised. `asked` is the request message (unit
 /// and PDU) that the frame answers: it gives the values their addresses, and the answer is checked against it.
-pub fn explain(
+pub fn dissect(
     bytes: &[u8],
     framing: Option<Framing>,
     direction: Option<Direction>,
     asked: Option<&[u8]>,
-) -> Explained {
+) -> Dissection {
     let asked_of =
         |message: &[u8]| asked.filter(|asked| asked.get(1).copied() == message.get(1).map(|code| code & 0x7F));
     let direction = direction.or(asked.map(|_| Direction::Answer));
@@ -110,7 +110,7 @@ pub fn explain(
     let mut fields = envelope.before;
     fields.extend(reading.fields.into_iter().map(place));
     fields.extend(envelope.after);
-    Explained {
+    Dissection {
         framing: envelope.framing,
         direction,
         message: envelope.message,
@@ -123,12 +123,12 @@ pub fn explain(
 
 /// Tells a frame of a line in words; `before` are the earlier frames of the line, the latest first: one of them is the
 /// request of an answer.
-pub fn of_line<'a>(frame: &Frame, before: impl Iterator<Item = &'a Frame>) -> Explained {
+pub fn in_traffic<'a>(frame: &Frame, before: impl Iterator<Item = &'a Frame>) -> Dissection {
     let framing = Some(frame.framing);
     if frame.sent {
-        return explain(&frame.bytes, framing, Some(Direction::Request), None);
+        return dissect(&frame.bytes, framing, Some(Direction::Request), None);
     }
-    explain(&frame.bytes, framing, Some(Direction::Answer), request_of(frame, before).as_deref())
+    dissect(&frame.bytes, framing, Some(Direction::Answer), request_of(frame, before).as_deref())
 }
 
 /// Earlier frames among which the request of an answer is looked for.
@@ -189,11 +189,11 @@ impl Readings {
     }
 
     /// The reading that fits best, and the other one in a line if it fits too.
-    fn choose(self, told: Option<Direction>) -> (Option<Direction>, Reading, Option<String>) {
+    fn choose(self, known: Option<Direction>) -> (Option<Direction>, Reading, Option<String>) {
         let Readings { request, answer, same } = self;
-        match (told, request.fits, answer.fits) {
-            (Some(Direction::Request), ..) => (told, request, None),
-            (Some(Direction::Answer), ..) => (told, answer, None),
+        match (known, request.fits, answer.fits) {
+            (Some(Direction::Request), ..) => (known, request, None),
+            (Some(Direction::Answer), ..) => (known, answer, None),
             (None, true, true) if same.is_some() => (None, request, same.map(str::to_owned)),
             (None, true, true) if !request.sound => {
                 let also = format!("a request: {}", request.summary);
