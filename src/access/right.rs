@@ -3,7 +3,7 @@
 use super::Wish;
 use crate::{
     history::Query,
-    plant::{alarm::AlarmCommand, command::Command, role::Role, tool::Tool},
+    plant::{alarm::AlarmCommand, command::Command, diagnostics::Diagnostic, role::Role},
 };
 
 /// What a person may do. A role has the rights of those before it.
@@ -62,18 +62,20 @@ pub fn of_command(command: &Command) -> Right {
         Command::Alarm(AlarmCommand::OutOfService(_) | AlarmCommand::InService(_))
         | Command::Configure(_)
         | Command::SaveSettings(_) => Right::Engineer,
-        Command::Test(_, tool) => of_tool(tool),
+        Command::Test(_, diagnostic) => of_diagnostic(diagnostic),
     }
 }
 
 /// The right that a test of a line needs.
-fn of_tool(tool: &Tool) -> Right {
-    match tool {
+fn of_diagnostic(diagnostic: &Diagnostic) -> Right {
+    match diagnostic {
         // Raw bytes may be a write.
-        Tool::Send(_) => Right::Engineer,
+        Diagnostic::Send(_) => Right::Engineer,
         // While other settings are tried the line polls nobody.
-        Tool::Scan(scan) if !scan.serials.is_empty() => Right::Engineer,
-        Tool::Scan(_) | Tool::Loopback { .. } | Tool::Identify { .. } | Tool::Read { .. } => Right::Operate,
+        Diagnostic::Scan(scan) if !scan.serials.is_empty() => Right::Engineer,
+        Diagnostic::Scan(_) | Diagnostic::Loopback { .. } | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => {
+            Right::Operate
+        }
     }
 }
 
@@ -125,16 +127,16 @@ mod tests {
     use super::*;
     use crate::plant::{
         def::{AlarmId, DeviceId, LineId, TagId},
+        diagnostics::Scan,
         fixture,
         tag::Table,
-        tool::Scan,
     };
 
     #[test]
     fn each_command_is_for_the_role_that_the_manual_names() {
         let line = fixture::plant().lines[0].clone();
         let scan =
-            |serials| Tool::Scan(Scan { first: 1, last: 9, serials, timeout: std::time::Duration::from_secs(1) });
+            |serials| Diagnostic::Scan(Scan { first: 1, last: 9, serials, timeout: std::time::Duration::from_secs(1) });
         let serial = crate::plant::def::Serial::USUAL;
         let technician = [
             Command::Write { tag: TagId(1), value: 1.0 },
@@ -150,15 +152,15 @@ mod tests {
             Command::StopRestore(DeviceId(0)),
             Command::HandOver,
             Command::TakeOver,
-            Command::Test(LineId(0), Tool::Loopback { unit: 1, data: 7, count: 1 }),
-            Command::Test(LineId(0), Tool::Identify { unit: 1 }),
-            Command::Test(LineId(0), Tool::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
+            Command::Test(LineId(0), Diagnostic::Loopback { unit: 1, data: 7, count: 1 }),
+            Command::Test(LineId(0), Diagnostic::Identify { unit: 1 }),
+            Command::Test(LineId(0), Diagnostic::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
             Command::Test(LineId(0), scan(Vec::new())),
         ];
         let supervisor = [
             Command::Configure(Box::new(line)),
             Command::SaveSettings(LineId(0)),
-            Command::Test(LineId(0), Tool::Send(vec![1])),
+            Command::Test(LineId(0), Diagnostic::Send(vec![1])),
             Command::Test(LineId(0), scan(vec![serial])),
         ];
         for (commands, role) in [(&technician[..], Role::Technician), (&supervisor[..], Role::Supervisor)] {

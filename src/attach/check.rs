@@ -45,8 +45,8 @@ pub fn command(def: &PlantDef, command: &Command) -> Result<(), String> {
             device(def, *id)
         }
         Command::Connect(id, _) | Command::SaveSettings(id) | Command::StopTest(id) => line(def, *id),
-        Command::Test(id, tool) => {
-            tool.check()?;
+        Command::Test(id, diagnostic) => {
+            diagnostic.check()?;
             line(def, *id)
         }
         Command::Configure(settings) => {
@@ -159,19 +159,19 @@ mod tests {
     use super::*;
     use crate::plant::{
         def::{LineDef, Serial, Transport},
+        diagnostics::{Diagnostic, Scan},
         fixture,
         tag::Table,
-        tool::{Scan, Tool},
     };
 
     #[test]
     fn a_test_asks_for_no_more_than_a_line_can_carry() {
         let def = fixture::plant();
-        let check = |tool: Tool, expect: bool| {
-            assert_eq!(command(&def, &Command::Test(LineId(0), tool.clone())).is_ok(), expect, "{tool:?}");
+        let check = |diagnostic: Diagnostic, expect: bool| {
+            assert_eq!(command(&def, &Command::Test(LineId(0), diagnostic.clone())).is_ok(), expect, "{diagnostic:?}");
         };
         let usual = Duration::from_millis(100);
-        let scan = |serials, timeout| Tool::Scan(Scan { first: 0, last: 255, serials, timeout });
+        let scan = |serials, timeout| Diagnostic::Scan(Scan { first: 0, last: 255, serials, timeout });
         check(scan(vec![Serial::USUAL; 64], Duration::from_secs(10)), true);
         check(scan(Vec::new(), Duration::MAX), false);
         check(scan(Vec::new(), Duration::from_secs(3_600)), false);
@@ -179,17 +179,17 @@ mod tests {
         check(scan(vec![Serial { baud: 0, ..Serial::USUAL }], usual), false);
         check(scan(vec![Serial { data_bits: 9, ..Serial::USUAL }], usual), false);
         check(scan(vec![Serial::USUAL; 65], usual), false);
-        check(Tool::Scan(Scan { first: 2, last: 1, serials: Vec::new(), timeout: usual }), false);
-        let read = |address, count| Tool::Read { unit: 1, table: Table::Holding, address, count };
-        for (tool, expect) in [(read(0xFF83, 125), true), (read(0xFF84, 125), false), (read(0, 126), false)] {
-            check(tool, expect);
+        check(Diagnostic::Scan(Scan { first: 2, last: 1, serials: Vec::new(), timeout: usual }), false);
+        let read = |address, count| Diagnostic::Read { unit: 1, table: Table::Holding, address, count };
+        for (diagnostic, expect) in [(read(0xFF83, 125), true), (read(0xFF84, 125), false), (read(0, 126), false)] {
+            check(diagnostic, expect);
         }
-        let loopback = |count| Tool::Loopback { unit: 1, data: 0, count };
-        for (tool, expect) in [(loopback(1_000), true), (loopback(1_001), false), (loopback(0), false)] {
-            check(tool, expect);
+        let loopback = |count| Diagnostic::Loopback { unit: 1, data: 0, count };
+        for (diagnostic, expect) in [(loopback(1_000), true), (loopback(1_001), false), (loopback(0), false)] {
+            check(diagnostic, expect);
         }
         for (length, expect) in [(0, false), (513, true), (514, false)] {
-            check(Tool::Send(vec![0; length]), expect);
+            check(Diagnostic::Send(vec![0; length]), expect);
         }
     }
 

@@ -9,7 +9,7 @@ use crate::{
     plant::{
         Snapshot,
         command::{NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
-        tool::ToolRun,
+        diagnostics::DiagnosticRun,
     },
 };
 
@@ -121,7 +121,8 @@ impl Own {
         }
         for line in &mut seen.lines {
             if let Some(test) = &line.test {
-                line.test = Some(Arc::new(ToolRun { id: self.renumbered(test.id), ..ToolRun::clone(test) }));
+                line.test =
+                    Some(Arc::new(DiagnosticRun { id: self.renumbered(test.id), ..DiagnosticRun::clone(test) }));
             }
         }
         // The last snapshot of a station that has gone shows as under way what nobody will hear the end of.

@@ -15,7 +15,7 @@
 //! | [`codec`] | words to numbers and back |
 //! | [`plan`], [`admission`], [`schedule`], [`backoff`] | what is read together, whether it can all be in time, what is read next |
 //! | [`line_stats`] | what is counted |
-//! | [`tool`] | the steps of a test of the line |
+//! | [`diagnostics`] | the steps of a diagnostic |
 //! | [`dissect`], [`names`], [`evidence`] | the fields of a frame and their meaning |
 //! | [`hex_input`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
 
@@ -35,6 +35,6 @@ pub mod backoff;
 pub mod schedule;
 pub mod admission;
 pub mod late_reply;
-pub mod tool;
+pub mod diagnostics;
 pub mod line_stats;
 pub mod io;

@@ -9,9 +9,9 @@ pub use super::id::WriteId;
 use super::{
     alarm::{AlarmCommand, AlarmRefusal},
     def::{DeviceId, LineDef, LineId, TagId},
+    diagnostics::Diagnostic,
     event::{ExceptionCode, Fault},
     restore::RestoreWish,
-    tool::Tool,
 };
 
 /// One wish of one operator.
@@ -70,7 +70,7 @@ pub enum Command {
     /// Write the settings in use into the plant file.
     SaveSettings(LineId),
     /// Test a line.
-    Test(LineId, Tool),
+    Test(LineId, Diagnostic),
     /// Stop the test of a line.
     StopTest(LineId),
     /// Read the folder of parameter sets anew.
@@ -300,15 +300,15 @@ pub enum BusRequest {
     Connect(bool),
     /// Use these settings from now on.
     Configure(Box<LineDef>),
-    /// Start a tool; the one at work is stopped.
+    /// Start a diagnostic; the one at work is stopped.
     Test {
         /// The order it comes by.
         id: OrderId,
         /// Who ordered it.
         by: Arc<str>,
         /// What.
-        tool: Tool,
+        diagnostic: Diagnostic,
     },
-    /// Stop the tool at work.
+    /// Stop the running diagnostic.
     StopTest,
 }

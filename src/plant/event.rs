@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 use super::{
+    diagnostics::DiagnosticRun,
     id::{DeviceId, LineId, TagId, WriteId},
     line_report::LineReport,
     station::{FaultState, StationFault},
-    tool::ToolRun,
     traffic::Exchange,
 };
 
@@ -64,14 +64,14 @@ pub enum Event {
         /// Settings, counters, polls, frames.
         report: Arc<LineReport>,
     },
-    /// A tool has come further.
-    Tool {
+    /// A diagnostic has made progress.
+    Diagnostic {
         /// When.
         at: Timestamp,
         /// Where it is at work.
         line: LineId,
         /// How it stands.
-        run: Arc<ToolRun>,
+        run: Arc<DiagnosticRun>,
     },
     /// The key of a write was sent before it: the device now lets itself be written, also by others.
     Unlocked {

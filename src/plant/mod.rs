@@ -27,7 +27,7 @@ pub mod event;
 pub mod tally;
 pub mod line_report;
 pub mod line_minute;
-pub mod tool;
+pub mod diagnostics;
 pub mod command;
 pub mod record;
 pub mod guard;

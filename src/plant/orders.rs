@@ -388,7 +388,7 @@ fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
         Command::Connect(line, false) => ("disconnect", def.line(*line).name.clone(), None),
         Command::Configure(settings) => ("configure", settings.name.clone(), Some(settings.transport.to_string())),
         Command::SaveSettings(line) => ("save settings", def.line(*line).name.clone(), None),
-        Command::Test(line, tool) => ("test", def.line(*line).name.clone(), Some(tool.to_string())),
+        Command::Test(line, diagnostic) => ("test", def.line(*line).name.clone(), Some(diagnostic.to_string())),
         Command::StopTest(line) => ("stop test", def.line(*line).name.clone(), None),
         Command::ReadSets => ("read sets", "parameter sets".into(), None),
         Command::SaveSet { device, name, .. } => ("save set", def.device(*device).name.clone(), Some(name.to_string())),

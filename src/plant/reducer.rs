@@ -142,7 +142,7 @@ impl Plant {
                 status.report = Some(report);
                 (at, None)
             }
-            Event::Tool { at, line, run } => {
+            Event::Diagnostic { at, line, run } => {
                 self.lines[line.index()].test = Some(run);
                 (at, None)
             }

@@ -12,6 +12,7 @@ use super::{
     },
     command::{Command, OrderStatus},
     def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, TagId},
+    diagnostics::DiagnosticRun,
     event::{Fault, LineCounters, LineState},
     guard::Watch,
     line_report::LineReport,
@@ -23,7 +24,6 @@ use super::{
     scale,
     station::StationFault,
     tag::Decimals,
-    tool::ToolRun,
     traffic::Exchange,
     tuning::Tuning,
 };
@@ -210,7 +210,7 @@ pub struct LineStatus {
     /// Settings as they were before somebody tried others.
     pub settings_before: Option<Arc<LineDef>>,
     /// The test at work, or the last one.
-    pub test: Option<Arc<ToolRun>>,
+    pub test: Option<Arc<DiagnosticRun>>,
     /// When it came into this state.
     pub since: Option<Timestamp>,
     /// Since when it has not been connected although it should be.

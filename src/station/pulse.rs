@@ -3,7 +3,8 @@
 use std::{sync::Arc, time::Duration};
 
 use crate::plant::{
-    Snapshot, event::LineState, line_check::WAIT_MAX, line_report::LineReport, snapshot::LineStatus, tool::ToolState,
+    Snapshot, diagnostics::DiagnosticState, event::LineState, line_check::WAIT_MAX, line_report::LineReport,
+    snapshot::LineStatus,
 };
 
 /// A connected line that has reported nothing for so long (real time) hangs; it reports about once a second, but not while it
@@ -42,7 +43,7 @@ impl Pulse {
 /// How long a line may be silent: one turn of its task, with every answer that it waits for missing.
 fn patience(line: &LineStatus) -> Duration {
     let timeout = line.report.as_ref().map_or(Duration::ZERO, |report| report.settings.timeout);
-    let tested = line.test.as_ref().is_some_and(|run| run.state == ToolState::Running);
+    let tested = line.test.as_ref().is_some_and(|run| run.state == DiagnosticState::Running);
     LINE_MAX + WAITS_MAX * if tested { timeout.max(WAIT_MAX) } else { timeout }
 }
 

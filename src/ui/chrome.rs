@@ -383,7 +383,7 @@ pub fn order_words(cx: &ViewContext, command: &Command, old: Option<f64>) -> Str
         Command::Connect(line, false) => format!("disconnect {}", cx.def().line(*line).name),
         Command::Configure(settings) => format!("settings of {}", settings.name),
         Command::SaveSettings(line) => format!("save settings of {}", cx.def().line(*line).name),
-        Command::Test(line, tool) => format!("{} {tool}", cx.def().line(*line).name),
+        Command::Test(line, diagnostic) => format!("{} {diagnostic}", cx.def().line(*line).name),
         Command::StopTest(line) => format!("stop test of {}", cx.def().line(*line).name),
         Command::ReadSets => "read parameter sets".to_owned(),
         Command::SaveSet { device, name, .. } => format!("save set {name} of {}", cx.def().device(*device).name),

@@ -12,12 +12,12 @@ use sightglass::{
         alarm::AlarmCommand,
         command::{Command, OrderStatus, Outcome, Refusal},
         def::{AlarmId, DeviceId, LineId, Serial},
+        diagnostics::{Diagnostic, Scan},
         orders::outcome_words,
         parameter_set::ParameterSet,
         restore::RestoreWish,
         role::Role,
         tag::Table,
-        tool::{Scan, Tool},
     },
     report::Period,
     station::{self, Session},
@@ -84,10 +84,13 @@ fn of_command(command: &Command) -> Row {
         Command::Connect(_, true) => row("connect", "--TS--"),
         Command::Configure(_) => row("configure", "---S--"),
         Command::SaveSettings(_) => row("save settings", "---S--"),
-        Command::Test(_, tool) => match tool {
-            Tool::Send(_) => row("test", "---S--"),
-            Tool::Scan(Scan { serials, .. }) if !serials.is_empty() => row("test", "---S--"),
-            Tool::Scan(_) | Tool::Loopback { .. } | Tool::Identify { .. } | Tool::Read { .. } => row("test", "--TS--"),
+        Command::Test(_, diagnostic) => match diagnostic {
+            Diagnostic::Send(_) => row("test", "---S--"),
+            Diagnostic::Scan(Scan { serials, .. }) if !serials.is_empty() => row("test", "---S--"),
+            Diagnostic::Scan(_)
+            | Diagnostic::Loopback { .. }
+            | Diagnostic::Identify { .. }
+            | Diagnostic::Read { .. } => row("test", "--TS--"),
         },
         Command::StopTest(_) => row("stop test", "--TS--"),
         Command::ReadSets => look("read sets", "--TS--"),
@@ -102,7 +105,7 @@ fn of_command(command: &Command) -> Row {
 fn commands(def: &PlantDef, person: usize) -> Vec<Command> {
     let (alarm, device, line) = (AlarmId(0), DeviceId(0), LineId(0));
     let seen = Timestamp::UNIX_EPOCH;
-    let scan = |serials| Tool::Scan(Scan { first: 40, last: 40, serials, timeout: Duration::from_millis(50) });
+    let scan = |serials| Diagnostic::Scan(Scan { first: 40, last: 40, serials, timeout: Duration::from_millis(50) });
     let set = ParameterSet {
         name: "none".into(),
         device: "another".into(),
@@ -128,12 +131,12 @@ fn commands(def: &PlantDef, person: usize) -> Vec<Command> {
         Command::Refresh(device),
         Command::HandOver,
         Command::TakeOver,
-        Command::Test(line, Tool::Loopback { unit: 1, data: 7, count: 1 }),
-        Command::Test(line, Tool::Identify { unit: 1 }),
-        Command::Test(line, Tool::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
+        Command::Test(line, Diagnostic::Loopback { unit: 1, data: 7, count: 1 }),
+        Command::Test(line, Diagnostic::Identify { unit: 1 }),
+        Command::Test(line, Diagnostic::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
         Command::Test(line, scan(Vec::new())),
         Command::Test(line, scan(vec![Serial::USUAL])),
-        Command::Test(line, Tool::Send(vec![1, 3, 0, 0, 0, 1])),
+        Command::Test(line, Diagnostic::Send(vec![1, 3, 0, 0, 0, 1])),
         Command::StopTest(line),
         Command::ReadSets,
         Command::SaveSet { device, name: format!("of {person}").into(), replace: false },

@@ -9,11 +9,11 @@ use super::{List, Unfit};
 use crate::plant::{
     admission::Admission,
     def::{DeviceId, LineDef, TagId},
+    diagnostics::DiagnosticRun,
     event::LineCounters,
     line_report::{LineReport, PollReport},
     snapshot::LineStatus,
     tally::Tally,
-    tool::ToolRun,
     traffic::{Frame, Frames},
 };
 
@@ -22,7 +22,7 @@ use crate::plant::{
 pub struct LineDelta {
     /// All but test and report.
     state: Option<Box<LineStatus>>,
-    test: Option<Option<Arc<ToolRun>>>,
+    test: Option<Option<Arc<DiagnosticRun>>>,
     report: Option<Option<ReportDelta>>,
 }
 

@@ -14,13 +14,13 @@ use crate::{
         alarm::AlarmState,
         command::{Command, OrderId, OrderStatus, Outcome},
         def::{AlarmId, Framing, TagId},
+        diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState},
         event::{Fault, LineState},
         line_report::LineReport,
         parameter_set::StoredSet,
         sample::{Cause, Sample},
         snapshot::{ActiveAlarm, DeviceState},
         station::StationFault,
-        tool::{Tool, ToolRun, ToolState},
         traffic::{Exchange, Frame, Frames},
     },
     ui::fixture::{Fixture, now},
@@ -127,15 +127,15 @@ fn change(snapshot: &mut Snapshot, (kind, place, amount): (u8, u16, u32)) {
         11 => change_report(snapshot, place, amount),
         12 => snapshot.lines[0].report = None,
         13 => {
-            snapshot.lines[0].test = Some(Arc::new(ToolRun {
+            snapshot.lines[0].test = Some(Arc::new(DiagnosticRun {
                 id: OrderId { terminal: 1, number: amount },
                 by: "anna".into(),
-                tool: Tool::Send(vec![1, 2]),
+                diagnostic: Diagnostic::Send(vec![1, 2]),
                 started: at,
                 done: amount,
                 total: 9,
                 now: "unit 3".into(),
-                state: ToolState::Running,
+                state: DiagnosticState::Running,
                 findings: Vec::new(),
             }));
         }

@@ -10,8 +10,8 @@ use crate::{
     plant::{
         command::Command,
         def::{AlarmId, DeviceId, LineDef, LineId, TagId},
+        diagnostics::Diagnostic,
         role::Role,
-        tool::Tool,
     },
     ui::fixture::{Fixture, now},
 };
@@ -135,7 +135,7 @@ fn what_this_plant_does_not_have_never_reaches_it() {
     }
     let long = [
         Command::SaveSet { device: DeviceId(0), name: "x".repeat(33).into(), replace: false },
-        Command::Test(LineId(0), Tool::Send(vec![0; 514])),
+        Command::Test(LineId(0), Diagnostic::Send(vec![0; 514])),
         Command::Configure(Box::new(LineDef { name: "x".repeat(5_000), ..def.lines[0].clone() })),
     ];
     for command in long {

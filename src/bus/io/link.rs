@@ -272,7 +272,7 @@ impl Link {
         self.timeout
     }
 
-    /// Another time from now on, for a tool in a hurry.
+    /// Another time from now on, for a diagnostic in a hurry.
     pub fn set_timeout(&mut self, timeout: Duration) {
         self.timeout = timeout;
     }

@@ -1,4 +1,4 @@
-//! The task of one line: opens the port, keeps the schedule, serves operators and tools, and tells the plant what came of it.
+//! The task of one line: opens the port, keeps the schedule, serves operators and diagnostics, and tells the plant what came of it.
 
 mod concurrent;
 mod confirm;
@@ -21,10 +21,10 @@ use super::{
 use crate::{
     bus::{
         backoff::Backoff,
+        diagnostics::Job,
         line_stats::{LineStats, Plan},
         plan::{self, Block, RangeBisection, UnreadableRanges},
         schedule::{Budget, Load, Next, Schedule, WRITE_SHARE},
-        tool::Job,
     },
     plant::{
         PlantDef,
@@ -92,7 +92,7 @@ enum Leave {
     Lost(String),
     /// It is opened anew at once, with other settings.
     Reopen,
-    /// A tool needs the port for itself.
+    /// A diagnostic needs the port for itself.
     Test,
 }
 
@@ -132,7 +132,7 @@ struct Task<'a> {
     /// When the counters of the link were last added to the statistics.
     closed_at: Timestamp,
     stats: LineStats,
-    /// The tool at work.
+    /// The running diagnostic.
     job: Option<Job>,
     polls_since_test: u32,
 }
@@ -221,8 +221,8 @@ impl Task<'_> {
                         return Ok(());
                     }
                 }
-                BusRequest::Test { id, by, tool } => {
-                    let job = Job::new(id, by, tool, self.clock.now());
+                BusRequest::Test { id, by, diagnostic } => {
+                    let job = Job::new(id, by, diagnostic, self.clock.now());
                     let alone = job.is_exclusive();
                     self.job = Some(job);
                     if alone {
@@ -241,7 +241,7 @@ impl Task<'_> {
         }
     }
 
-    /// Serves an open port: operators first, then the schedule and the tool at work, else listens.
+    /// Serves an open port: operators first, then the schedule and the running diagnostic, else listens.
     async fn serve(&mut self, opened: Opened) -> Result<Leave, Ended> {
         let mut link = Link::new(opened, &self.settings, self.clock, self.memory.clone());
         let mut schedule = Schedule::new(&self.blocks, self.clock.now());
@@ -324,9 +324,9 @@ impl Task<'_> {
                 self.configure(*settings);
                 Ok(Err(Leave::Reopen))
             }
-            BusRequest::Test { id, by, tool } => {
+            BusRequest::Test { id, by, diagnostic } => {
                 self.stop_test().await?;
-                let job = self.job.insert(Job::new(id, by, tool, self.clock.now()));
+                let job = self.job.insert(Job::new(id, by, diagnostic, self.clock.now()));
                 if job.is_exclusive() {
                     return Ok(Err(Leave::Test));
                 }

@@ -1,4 +1,4 @@
-//! Carries the steps of a line tool over a link.
+//! Carries the steps of a line diagnostic over a link.
 
 use super::{
     clock::Clock,
@@ -7,11 +7,11 @@ use super::{
     wire::Memory,
 };
 use crate::{
-    bus::tool::{Ask, Job, Step, StepResult},
+    bus::diagnostics::{Ask, Job, Step, StepResult},
     plant::{
         def::{LineDef, Transport},
+        diagnostics::{DiagnosticRun, DiagnosticState},
         event::Fault,
-        tool::{ToolRun, ToolState},
     },
 };
 
@@ -58,8 +58,8 @@ pub fn settings_for(line: &LineDef, step: &Step) -> LineDef {
     settings
 }
 
-/// Runs a tool to its end on a line that nobody polls; `progress` sees every step and may stop it by `false`.
-pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&ToolRun) -> bool) -> ToolRun {
+/// Runs a diagnostic to its end on a line that nobody polls; `progress` sees every step and may stop it by `false`.
+pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&DiagnosticRun) -> bool) -> DiagnosticRun {
     let mut connector = Connector::Real(line.transport.clone());
     let mut memory = Memory::new(line, Clock::real());
     let mut open: Option<(LineDef, Link)> = None;
@@ -70,18 +70,18 @@ pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&ToolRun
             None => match connector.open_as(&wanted.transport).await {
                 Ok(opened) => Link::new(opened, &wanted, Clock::real(), memory.clone()),
                 Err(why) => {
-                    job.stop(ToolState::Failed(why));
+                    job.stop(DiagnosticState::Failed(why));
                     break;
                 }
             },
         };
         match step(&mut link, &next).await {
             Ok(result) => job.take(result),
-            Err(LinkError::Gone(why)) => job.stop(ToolState::Failed(why)),
-            Err(LinkError::Fault(fault)) => job.stop(ToolState::Failed(fault.to_string())),
+            Err(LinkError::Gone(why)) => job.stop(DiagnosticState::Failed(why)),
+            Err(LinkError::Fault(fault)) => job.stop(DiagnosticState::Failed(fault.to_string())),
         }
         if !progress(job.run()) {
-            job.stop(ToolState::Cancelled);
+            job.stop(DiagnosticState::Cancelled);
         }
         memory = link.memory();
         open = Some((wanted, link));

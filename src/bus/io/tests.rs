@@ -6,7 +6,7 @@ mod slow;
 mod stops;
 mod strangers;
 mod together;
-mod tools;
+mod diagnostics;
 
 use std::{
     collections::BTreeMap,

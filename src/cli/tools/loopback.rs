@@ -4,8 +4,8 @@ use super::{UnitArgs, exchange_lines, run};
 use crate::{
     cli::{CliError, say},
     plant::{
+        diagnostics::{Diagnostic, Finding},
         event::Fault,
-        tool::{Finding, Tool},
     },
 };
 
@@ -23,8 +23,8 @@ pub struct Args {
 pub fn main(args: Args) -> Result<(), CliError> {
     let (line, unit) = args.of.line_and_unit()?;
     say(&format!("loopback 08/00 to unit {} on {}", unit, line.transport));
-    let tool = Tool::Loopback { unit, data: 0xA537, count: args.count };
-    let run = run(&line, tool, |finding| match finding {
+    let diagnostic = Diagnostic::Loopback { unit, data: 0xA537, count: args.count };
+    let run = run(&line, diagnostic, |finding| match finding {
         Finding::Exchange(exchange) if args.of.verbose => exchange_lines(exchange),
         Finding::Failed { what, fault } if !args.of.verbose => vec![format!("{what}: {fault}")],
         Finding::Verdict(words) => vec![words.clone()],

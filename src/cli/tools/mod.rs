@@ -10,11 +10,11 @@ use std::{io::IsTerminal, sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use crate::{
-    bus::{dissect, frame::hex, io::testing, tool::Job},
+    bus::{diagnostics::Job, dissect, frame::hex, io::testing},
     plant::{
         command::OrderId,
         def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
-        tool::{Finding, Tool, ToolRun, ToolState},
+        diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
         traffic::Exchange,
     },
     profile::BAUDS,
@@ -22,7 +22,7 @@ use crate::{
 
 use super::{CliError, runtime, say};
 
-/// The port that a tool works on.
+/// The port that a diagnostic works on.
 #[derive(Debug, Clone, clap::Args)]
 pub struct PortArgs {
     /// A serial port (/dev/ttyUSB0), or HOST, HOST:TCPPORT or [IPV6]:TCPPORT
@@ -127,13 +127,17 @@ fn baud(baud: u32) -> Result<u32, CliError> {
     Err(CliError::Usage(format!("--baud: found {baud}, expected one of {}", known())))
 }
 
-/// Runs a tool and tells each finding when it comes. Ctrl-C ends it between two steps.
-pub fn run(line: &LineDef, tool: Tool, tell: impl Fn(&Finding) -> Vec<String>) -> Result<ToolRun, CliError> {
-    let job = Job::new(OrderId { terminal: 0, number: 0 }, Arc::from("cli"), tool, Timestamp::now());
+/// Runs a diagnostic and tells each finding when it comes. Ctrl-C ends it between two steps.
+pub fn run(
+    line: &LineDef,
+    diagnostic: Diagnostic,
+    tell: impl Fn(&Finding) -> Vec<String>,
+) -> Result<DiagnosticRun, CliError> {
+    let job = Job::new(OrderId { terminal: 0, number: 0 }, Arc::from("cli"), diagnostic, Timestamp::now());
     let shown = std::io::stderr().is_terminal();
     let mut told = 0;
     let run = runtime()?.block_on(async {
-        let work = testing::run(line, job, |run: &ToolRun| {
+        let work = testing::run(line, job, |run: &DiagnosticRun| {
             run.findings[told..].iter().flat_map(&tell).for_each(|text| say(&text));
             told = run.findings.len();
             if shown && 1 < run.total {
@@ -152,12 +156,12 @@ pub fn run(line: &LineDef, tool: Tool, tell: impl Fn(&Finding) -> Vec<String>) -
     let Some(run) = run else { return Err(CliError::Failed("stopped".into())) };
     run.findings[told.min(run.findings.len())..].iter().flat_map(&tell).for_each(|text| say(&text));
     match &run.state {
-        ToolState::Failed(why) => Err(CliError::Failed(why.clone())),
-        ToolState::Running | ToolState::Done | ToolState::Cancelled => Ok(run),
+        DiagnosticState::Failed(why) => Err(CliError::Failed(why.clone())),
+        DiagnosticState::Running | DiagnosticState::Done | DiagnosticState::Cancelled => Ok(run),
     }
 }
 
-fn progress(run: &ToolRun) {
+fn progress(run: &DiagnosticRun) {
     use std::io::Write;
     let _ = write!(std::io::stderr(), "\r\x1b[K{} of {}  {}", run.done, run.total, run.now);
 }

@@ -5,9 +5,9 @@ use crate::{
     bus::{codec, names},
     cli::{CliError, say},
     plant::{
+        diagnostics::{Diagnostic, Finding},
         event::Fault,
         tag::{ByteOrder, Kind, Point, Table},
-        tool::{Finding, Tool},
     },
 };
 
@@ -33,11 +33,11 @@ pub struct Place {
 pub fn main(args: Args) -> Result<(), CliError> {
     let (line, unit) = args.of.line_and_unit()?;
     say(&format!("unit {} on {}", unit, line.transport));
-    let tool = match args.read {
-        Some(Place { table, address, count }) => Tool::Read { unit, table, address, count },
-        None => Tool::Identify { unit },
+    let diagnostic = match args.read {
+        Some(Place { table, address, count }) => Diagnostic::Read { unit, table, address, count },
+        None => Diagnostic::Identify { unit },
     };
-    let run = run(&line, tool, |finding| match finding {
+    let run = run(&line, diagnostic, |finding| match finding {
         Finding::Exchange(exchange) if args.of.verbose => exchange_lines(exchange),
         Finding::Object { name, text } => vec![format!("{name:20}  {text}")],
         Finding::Values { table, address, words } => value_lines(*table, *address, words),

@@ -6,8 +6,8 @@ use crate::{
     cli::{CliError, say, say_error},
     plant::{
         def::Framing,
+        diagnostics::{Diagnostic, Finding},
         event::Fault,
-        tool::{Finding, Tool},
     },
 };
 
@@ -50,7 +50,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let dissection = dissect::dissect(&frame, Some(framing), Some(dissect::Direction::Request), None);
     let sent = [format!("TX {}", shown(&frame, framing)), format!("   {}", dissection.summary)];
     let request = message.clone();
-    let run = run(&line, Tool::Send(frame), |finding| match finding {
+    let run = run(&line, Diagnostic::Send(frame), |finding| match finding {
         Finding::Bytes { bytes, .. } if bytes.is_empty() => sent.to_vec(),
         Finding::Bytes { bytes, reply } => {
             let mut lines = sent.to_vec();

@@ -7,7 +7,7 @@ use crate::{
     cli::{CliError, say},
     plant::{
         def::Serial,
-        tool::{Finding, Scan, Tool},
+        diagnostics::{Diagnostic, Finding, Scan},
     },
     profile::BAUDS,
 };
@@ -45,7 +45,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let most = line.timeout * requests as u32;
     let seconds = most.as_secs_f64().ceil();
     say(&format!("scan on {}: {requests} requests, about {seconds:.0} s if nobody answers", line.transport));
-    let run = run(&line, Tool::Scan(scan), |finding| match finding {
+    let run = run(&line, Diagnostic::Scan(scan), |finding| match finding {
         Finding::Unit { unit, serial, words } => {
             let settings = serial.map(|serial| format!(" at {serial}")).unwrap_or_default();
             vec![format!("unit {unit:3}{settings}: {words}")]

@@ -24,7 +24,7 @@ impl Plant {
             Command::Configure(settings) if let Err(why) = valid(settings) => {
                 return self.desk.note(order, Outcome::Refused(Refusal::NotValid(why)), &self.board, at);
             }
-            Command::Test(_, tool) if let Err(why) = tool.check() => {
+            Command::Test(_, diagnostic) if let Err(why) = diagnostic.check() => {
                 return self.desk.note(order, Outcome::Refused(Refusal::NotValid(why)), &self.board, at);
             }
             Command::Configure(settings) => {
@@ -32,8 +32,8 @@ impl Plant {
                 self.restores_lose_line(settings.id);
                 effects.bus.push((settings.id, BusRequest::Configure(settings.clone())));
             }
-            Command::Test(line, tool) => {
-                let request = BusRequest::Test { id: order.id, by: order.by.clone(), tool: tool.clone() };
+            Command::Test(line, diagnostic) => {
+                let request = BusRequest::Test { id: order.id, by: order.by.clone(), diagnostic: diagnostic.clone() };
                 effects.bus.push((*line, request));
             }
             Command::StopTest(line) => effects.bus.push((*line, BusRequest::StopTest)),
@@ -91,10 +91,10 @@ mod tests {
     use super::*;
     use crate::plant::{
         def::{Serial, Transport},
+        diagnostics::{Diagnostic, Scan},
         event::Event,
         fixture,
         line_report::LineReport,
-        tool::{Scan, Tool},
     };
 
     const L1: LineId = LineId(0);
@@ -171,7 +171,7 @@ mod tests {
             Command::Configure(Box::new(LineDef { timeout: Duration::MAX, ..used.clone() })),
             Command::Configure(Box::new(LineDef { timeout: Duration::ZERO, ..used })),
             Command::Configure(Box::new(baud(0))),
-            Command::Test(L1, Tool::Scan(scan)),
+            Command::Test(L1, Diagnostic::Scan(scan)),
         ] {
             let mut plant = plant();
             let effects = order(&mut plant, 1, command.clone());
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn an_order_that_the_line_had_no_room_for_is_on_record_as_refused() {
         let mut plant = plant();
-        let test = Command::Test(L1, crate::plant::tool::Tool::Identify { unit: 1 });
+        let test = Command::Test(L1, crate::plant::diagnostics::Diagnostic::Identify { unit: 1 });
         for (number, command) in
             [(1, Command::Configure(Box::new(baud(19_200)))), (2, test), (3, Command::StopTest(L1))]
         {

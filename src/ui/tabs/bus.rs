@@ -413,8 +413,8 @@ impl<'a> Place<'a> {
     }
 
     fn is_testing(&self) -> bool {
-        use crate::plant::tool::ToolState;
-        self.status.test.as_ref().is_some_and(|run| run.state == ToolState::Running)
+        use crate::plant::diagnostics::DiagnosticState;
+        self.status.test.as_ref().is_some_and(|run| run.state == DiagnosticState::Running)
     }
 }
 

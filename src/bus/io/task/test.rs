@@ -1,27 +1,27 @@
-//! Line tools at work: between polls, or alone on the port when they try other serial parameters.
+//! Line running diagnostic: between polls, or alone on the port when they try other serial parameters.
 
 use std::{pin::pin, sync::Arc};
 
 use super::{Ended, Leave, Task, Turn};
 use crate::{
     bus::{
+        diagnostics::{Ask, Step, StepResult},
         frame::{self, Mbap},
         io::{
             link::{Link, LinkError},
             testing,
         },
         schedule::Next,
-        tool::{Ask, Step, StepResult},
     },
     plant::{
         command::BusRequest,
         def::Framing,
+        diagnostics::DiagnosticState,
         event::{Event, Fault, WriteResult},
-        tool::ToolState,
     },
 };
 
-/// A busy line gives a tool every so many-th turn.
+/// A busy line gives a diagnostic every so many-th turn.
 const POLLS_BETWEEN: u32 = 4;
 
 impl Task<'_> {
@@ -30,7 +30,7 @@ impl Task<'_> {
         self.job.as_ref().is_some_and(|job| job.next().is_some()) && (idle || POLLS_BETWEEN <= self.polls_since_test)
     }
 
-    /// One step of the tool, between polls.
+    /// One step of the diagnostic, between polls.
     pub(super) async fn test_step(&mut self, link: &mut Link) -> Turn {
         self.polls_since_test = 0;
         let Some(step) = self.job.as_ref().and_then(|job| job.next().cloned()) else { return Ok(Ok(())) };
@@ -73,7 +73,7 @@ impl Task<'_> {
         Ok(None)
     }
 
-    /// The tool has the port for itself, opened with the serial parameters that each step wants.
+    /// The diagnostic has the port for itself, opened with the serial parameters that each step wants.
     pub(super) async fn test_alone(&mut self) -> Result<(), Ended> {
         let mut open: Option<Link> = None;
         let mut settings = self.settings.clone();
@@ -142,30 +142,30 @@ impl Task<'_> {
         }
     }
 
-    /// An operator stops the tool at work.
+    /// An operator stops the running diagnostic.
     pub(super) async fn stop_test(&mut self) -> Result<(), Ended> {
         if let Some(job) = &mut self.job {
-            job.stop(ToolState::Cancelled);
+            job.stop(DiagnosticState::Cancelled);
         }
         self.tell_test().await
     }
 
-    /// The line cannot go on with the tool at work.
+    /// The line cannot go on with the running diagnostic.
     pub(super) async fn end_test(&mut self, why: &str) -> Result<(), Ended> {
         if let Some(job) = &mut self.job {
-            job.stop(ToolState::Failed(why.to_owned()));
+            job.stop(DiagnosticState::Failed(why.to_owned()));
         }
         self.tell_test().await
     }
 
-    /// Tells how the tool stands, and forgets it when it is over.
+    /// Tells how the diagnostic stands, and forgets it when it is over.
     pub(super) async fn tell_test(&mut self) -> Result<(), Ended> {
         let Some(job) = &self.job else { return Ok(()) };
         let run = Arc::new(job.run().clone());
-        if job.run().state != ToolState::Running {
+        if job.run().state != DiagnosticState::Running {
             self.job = None;
         }
-        self.tell(Event::Tool { at: self.clock.now(), line: self.line, run }).await
+        self.tell(Event::Diagnostic { at: self.clock.now(), line: self.line, run }).await
     }
 }
 

@@ -10,8 +10,8 @@ use crate::{
     bus::codec,
     plant::{
         def::LineId,
+        diagnostics::{Diagnostic, DiagnosticState, Finding},
         tag::{ByteOrder, Kind, Point, Table},
-        tool::{Finding, Tool, ToolState},
     },
     ui::{
         UiAction, ViewContext,
@@ -35,13 +35,13 @@ pub struct Registers {
 
 impl Registers {
     /// Those that a test reads; `None` for another test.
-    pub fn new(line: LineId, tool: &Tool) -> Option<Registers> {
-        let Tool::Read { unit, table, address, count } = *tool else { return None };
+    pub fn new(line: LineId, diagnostic: &Diagnostic) -> Option<Registers> {
+        let Diagnostic::Read { unit, table, address, count } = *diagnostic else { return None };
         Some(Registers { line, unit, table, address, count, selected: 0, problem: None })
     }
 
-    fn tool(&self) -> Tool {
-        Tool::Read { unit: self.unit, table: self.table, address: self.address, count: self.count }
+    fn diagnostic(&self) -> Diagnostic {
+        Diagnostic::Read { unit: self.unit, table: self.table, address: self.address, count: self.count }
     }
 
     /// A key.
@@ -58,7 +58,7 @@ impl Registers {
             KeyCode::Char('q') => return Next::Close,
             _ if char('r').is(event) => {
                 let started =
-                    Place::of(cx, self.line).ok_or_else(String::new).and_then(|at| test::start(&at, self.tool()));
+                    Place::of(cx, self.line).ok_or_else(String::new).and_then(|at| test::start(&at, self.diagnostic()));
                 match started {
                     Ok(act) => {
                         let stay = UiAction::Open(Modal::Bus(Box::new(Window::Registers(self))));
@@ -75,7 +75,7 @@ impl Registers {
     /// Words by address, and how the test stands.
     fn values(&self, cx: &ViewContext) -> (BTreeMap<u16, u16>, String, bool) {
         let run = cx.snapshot.lines.get(self.line.index()).and_then(|line| line.test.as_ref());
-        let Some(run) = run.filter(|run| run.tool == self.tool()) else {
+        let Some(run) = run.filter(|run| run.diagnostic == self.diagnostic()) else {
             return (BTreeMap::new(), "asked, nothing came yet".to_owned(), false);
         };
         let mut words = BTreeMap::new();
@@ -95,11 +95,11 @@ impl Registers {
         }
         let at = crate::ui::widgets::text::clock(run.started, &cx.def().time_zone);
         let (state, ill) = match (&run.state, fault) {
-            (ToolState::Running, _) => (format!("reading, {} of {} requests", run.done, run.total), false),
-            (ToolState::Failed(why), _) => (format!("FAILED: {why}"), true),
-            (ToolState::Cancelled, _) => ("STOPPED".to_owned(), true),
-            (ToolState::Done, Some(why)) => (format!("read {at}; ---- is {why}"), true),
-            (ToolState::Done, None) => (format!("read {at}"), false),
+            (DiagnosticState::Running, _) => (format!("reading, {} of {} requests", run.done, run.total), false),
+            (DiagnosticState::Failed(why), _) => (format!("FAILED: {why}"), true),
+            (DiagnosticState::Cancelled, _) => ("STOPPED".to_owned(), true),
+            (DiagnosticState::Done, Some(why)) => (format!("read {at}; ---- is {why}"), true),
+            (DiagnosticState::Done, None) => (format!("read {at}"), false),
         };
         (words, state, ill)
     }

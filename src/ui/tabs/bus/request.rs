@@ -18,8 +18,8 @@ use crate::{
     },
     plant::{
         def::{Framing, LineDef, LineId, Parity, Serial},
+        diagnostics::{Diagnostic, Scan},
         tag::Table,
-        tool::{Scan, Tool},
     },
     ui::{
         UiAction, ViewContext, keys,
@@ -56,7 +56,7 @@ enum Input {
 /// A form that makes sense: the test, and what it does in words.
 #[derive(Debug)]
 struct Built {
-    tool: Tool,
+    diagnostic: Diagnostic,
     told: Vec<String>,
 }
 
@@ -169,10 +169,10 @@ impl Form {
         if self.fields.iter().any(missed) {
             return Err("not all of it was taken; Ctrl-U empties a field".to_owned());
         }
-        let tool = self.build(at.settings)?.tool;
-        let mut acts = vec![test::start(&at, tool.clone())?];
+        let diagnostic = self.build(at.settings)?.diagnostic;
+        let mut acts = vec![test::start(&at, diagnostic.clone())?];
         if self.tried == Tried::Registers {
-            acts.extend(test::registers(self.line, &tool));
+            acts.extend(test::registers(self.line, &diagnostic));
         }
         Ok(acts)
     }
@@ -201,24 +201,24 @@ impl Form {
             Tried::Bytes | Tried::Request => {
                 let message = message(unit(0)?, FUNCTIONS[self.chosen(1)], &self.text(2), &self.text(3))?;
                 let told = request_words(&message, framing)?;
-                Ok(Built { tool: Tool::Send(frame::wrap(framing, TRANSACTION, &message)), told })
+                Ok(Built { diagnostic: Diagnostic::Send(frame::wrap(framing, TRANSACTION, &message)), told })
             }
             Tried::Registers => {
                 let (unit, table) = (unit(0)?, TABLES[self.chosen(1)]);
                 let address = address(&self.text(2), table)?;
                 let count = number(&self.text(3), "count", 1..=if table.is_bits() { 2_000 } else { 125 })? as u16;
                 let told = request_words(&read(unit, table, address, count), framing)?;
-                Ok(Built { tool: Tool::Read { unit, table, address, count }, told })
+                Ok(Built { diagnostic: Diagnostic::Read { unit, table, address, count }, told })
             }
             Tried::Loopback => {
                 let (unit, count) = (unit(0)?, number(&self.text(1), "times", 1..=1_000)? as u16);
                 let told = vec![format!("sends a word to unit {unit} and waits for the same word, {count} times")];
-                Ok(Built { tool: Tool::Loopback { unit, data: 0xA537, count }, told })
+                Ok(Built { diagnostic: Diagnostic::Loopback { unit, data: 0xA537, count }, told })
             }
             Tried::Identify => {
                 let unit = unit(0)?;
                 let told = vec![format!("asks unit {unit} for its maker, product and version; else for its server id")];
-                Ok(Built { tool: Tool::Identify { unit }, told })
+                Ok(Built { diagnostic: Diagnostic::Identify { unit }, told })
             }
             Tried::Scan => self.build_scan(line, unit(0)?, unit(1)?),
         }
@@ -235,7 +235,7 @@ impl Form {
         let told = vec![format!(
             "{units} units, {settings} settings: about {longest}, if nobody answers. Any answer counts, also a refusal."
         )];
-        Ok(Built { tool: Tool::Scan(Scan { first, last, serials, timeout }), told })
+        Ok(Built { diagnostic: Diagnostic::Scan(Scan { first, last, serials, timeout }), told })
     }
 
     /// Draws it.

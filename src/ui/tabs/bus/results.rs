@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     bus::dissect::{self, Direction},
-    plant::tool::{Finding, Tool, ToolRun, ToolState},
+    plant::diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
     ui::{
         ViewContext,
         widgets::text::{between, clock, wrap},
@@ -26,8 +26,8 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
         return vec![plain("nothing tried yet: ⏎ starts the selected test; polling goes on meanwhile", theme.dim())];
     };
     let mut rows = heading(cx, run);
-    let bare = matches!(run.tool, Tool::Send(_));
-    if let Tool::Send(bytes) = &run.tool {
+    let bare = matches!(run.diagnostic, Diagnostic::Send(_));
+    if let Diagnostic::Send(bytes) = &run.diagnostic {
         let framing = at.settings.transport.framing();
         let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Request), None);
         let sent = broken(&format!("TX {}", bytes_text(framing, bytes)), room);
@@ -39,7 +39,7 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     for finding in &run.findings {
         match finding {
             Finding::Bytes { bytes, reply } => rows.extend(came_back(cx, at, run, bytes, *reply, room)),
-            Finding::Exchange(exchange) if matches!(run.tool, Tool::Loopback { .. }) => {
+            Finding::Exchange(exchange) if matches!(run.diagnostic, Diagnostic::Loopback { .. }) => {
                 let reply = exchange.reply.map_or("–".to_owned(), |reply| format!("{} ms", short_ms(reply)));
                 rows.push(match exchange.outcome {
                     Ok(()) => plain(format!("✓ came back after {reply}"), theme.normal()),
@@ -71,21 +71,24 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
 }
 
 /// What, by whom, when, how it stands; and how far it has come.
-fn heading(cx: &ViewContext, run: &ToolRun) -> Vec<Row> {
+fn heading(cx: &ViewContext, run: &DiagnosticRun) -> Vec<Row> {
     let theme = cx.theme;
     let at = clock(run.started, &cx.def().time_zone);
     let (state, style) = match &run.state {
-        ToolState::Running => ("at work".to_owned(), theme.strong()),
-        ToolState::Done => ("done".to_owned(), theme.normal()),
-        ToolState::Cancelled => ("STOPPED".to_owned(), theme.trouble()),
-        ToolState::Failed(why) => (format!("FAILED: {why}"), theme.trouble()),
+        DiagnosticState::Running => ("at work".to_owned(), theme.strong()),
+        DiagnosticState::Done => ("done".to_owned(), theme.normal()),
+        DiagnosticState::Cancelled => ("STOPPED".to_owned(), theme.trouble()),
+        DiagnosticState::Failed(why) => (format!("FAILED: {why}"), theme.trouble()),
     };
-    let what = match &run.tool {
-        Tool::Send(_) => "sent".to_owned(),
-        tool @ (Tool::Loopback { .. } | Tool::Identify { .. } | Tool::Read { .. } | Tool::Scan(_)) => tool.to_string(),
+    let what = match &run.diagnostic {
+        Diagnostic::Send(_) => "sent".to_owned(),
+        diagnostic @ (Diagnostic::Loopback { .. }
+        | Diagnostic::Identify { .. }
+        | Diagnostic::Read { .. }
+        | Diagnostic::Scan(_)) => diagnostic.to_string(),
     };
     let mut rows = vec![vec![(format!("{at} {what} by {}   ", run.by), theme.normal()), (state, style)]];
-    if run.state == ToolState::Running && 1 < run.total {
+    if run.state == DiagnosticState::Running && 1 < run.total {
         let share = f64::from(run.done) / f64::from(run.total);
         let left = remaining(cx, run).map_or(String::new(), |left| format!(", {} left", ms(left)));
         let words = format!(" {} of {}{left}   {}", run.done, run.total, run.now);
@@ -95,7 +98,7 @@ fn heading(cx: &ViewContext, run: &ToolRun) -> Vec<Row> {
 }
 
 /// Time left, if the steps to come take as long as those before.
-fn remaining(cx: &ViewContext, run: &ToolRun) -> Option<std::time::Duration> {
+fn remaining(cx: &ViewContext, run: &DiagnosticRun) -> Option<std::time::Duration> {
     let spent = between(run.started, cx.now).as_secs_f64() / cx.snapshot.speed.clamp(0.01, 1e6);
     let each = spent / f64::from((0 < run.done).then_some(run.done)?);
     SignedDuration::try_from_secs_f64(each * f64::from(run.total.saturating_sub(run.done))).ok()?.try_into().ok()
@@ -105,7 +108,7 @@ fn remaining(cx: &ViewContext, run: &ToolRun) -> Option<std::time::Duration> {
 fn came_back(
     cx: &ViewContext,
     at: &Place,
-    run: &ToolRun,
+    run: &DiagnosticRun,
     bytes: &[u8],
     reply: Option<std::time::Duration>,
     room: u16,
@@ -116,15 +119,17 @@ fn came_back(
         framing != crate::plant::def::Framing::Mbap
             && dissect::message_of(sent, framing).is_some_and(|message| message.first() == Some(&0))
     };
-    if bytes.is_empty() && matches!(&run.tool, Tool::Send(sent) if to_all(sent)) {
+    if bytes.is_empty() && matches!(&run.diagnostic, Diagnostic::Send(sent) if to_all(sent)) {
         return vec![plain("sent to all; nobody answers a broadcast", theme.normal())];
     }
     if bytes.is_empty() {
         return vec![plain(format!("✗ nothing came back within {}", ms(at.settings.timeout)), theme.trouble())];
     }
-    let asked = match &run.tool {
-        Tool::Send(sent) => dissect::message_of(sent, framing),
-        Tool::Loopback { .. } | Tool::Identify { .. } | Tool::Read { .. } | Tool::Scan(_) => None,
+    let asked = match &run.diagnostic {
+        Diagnostic::Send(sent) => dissect::message_of(sent, framing),
+        Diagnostic::Loopback { .. } | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Scan(_) => {
+            None
+        }
     };
     let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Answer), asked.as_deref());
     let mut rows: Vec<Row> = broken(&format!("RX {}", bytes_text(framing, bytes)), room)

@@ -21,8 +21,8 @@ use crate::{
     plant::{
         command::Command,
         def::{Framing, LineId},
+        diagnostics::Diagnostic,
         event::LineState,
-        tool::Tool,
     },
     ui::{
         UiAction, ViewContext, keys,
@@ -107,11 +107,11 @@ impl Bench {
             }
         };
         // What is sent as it was typed may be a write.
-        let tool = match tried {
-            Tried::Bytes | Tried::Request => Tool::Send(Vec::new()),
-            Tried::Registers | Tried::Loopback | Tried::Identify | Tried::Scan => Tool::Identify { unit: 1 },
+        let diagnostic = match tried {
+            Tried::Bytes | Tried::Request => Diagnostic::Send(Vec::new()),
+            Tried::Registers | Tried::Loopback | Tried::Identify | Tried::Scan => Diagnostic::Identify { unit: 1 },
         };
-        vec![Notice::or(cx, "test", &Command::Test(at.id, tool), Modal::Bus(Box::new(window)))]
+        vec![Notice::or(cx, "test", &Command::Test(at.id, diagnostic), Modal::Bus(Box::new(window)))]
     }
 
     /// Single rows move the selection; screens scroll the results.
@@ -156,9 +156,9 @@ impl Bench {
 /// First row of the results until somebody scrolls: what has one answer is read from its beginning, what goes on for
 /// long is followed at its end.
 fn begin(at: &Place) -> usize {
-    match at.status.test.as_ref().map(|run| &run.tool) {
-        Some(Tool::Loopback { .. } | Tool::Scan(_)) => usize::MAX,
-        Some(Tool::Send(_) | Tool::Identify { .. } | Tool::Read { .. }) | None => 0,
+    match at.status.test.as_ref().map(|run| &run.diagnostic) {
+        Some(Diagnostic::Loopback { .. } | Diagnostic::Scan(_)) => usize::MAX,
+        Some(Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. }) | None => 0,
     }
 }
 
@@ -177,13 +177,13 @@ pub fn closed(at: &Place) -> Option<String> {
 }
 
 /// Starts a test, or asks first; `Err` says why it cannot be started.
-pub fn start(at: &Place, tool: Tool) -> Result<UiAction, String> {
-    let alone = matches!(&tool, Tool::Scan(scan) if !scan.serials.is_empty());
+pub fn start(at: &Place, diagnostic: Diagnostic) -> Result<UiAction, String> {
+    let alone = matches!(&diagnostic, Diagnostic::Scan(scan) if !scan.serials.is_empty());
     if let Some(why) = closed(at).filter(|_| !alone) {
         return Err(why);
     }
-    let query = danger(at, &tool);
-    let order = Command::Test(at.id, tool);
+    let query = danger(at, &diagnostic);
+    let order = Command::Test(at.id, diagnostic);
     Ok(match query {
         Some(words) => {
             UiAction::Open(Modal::Confirm(Confirm::order(format!("test of {}", at.settings.name), words, order)))
@@ -193,14 +193,16 @@ pub fn start(at: &Place, tool: Tool) -> Result<UiAction, String> {
 }
 
 /// What must be asked before a test; `None` for one that only reads.
-fn danger(at: &Place, tool: &Tool) -> Option<String> {
-    match tool {
-        Tool::Scan(scan) if !scan.serials.is_empty() => Some(format!(
+fn danger(at: &Place, diagnostic: &Diagnostic) -> Option<String> {
+    match diagnostic {
+        Diagnostic::Scan(scan) if !scan.serials.is_empty() => Some(format!(
             "Polling of {} pauses while other settings are tried, and its alarms are not judged. Start the scan?",
             at.settings.name
         )),
-        Tool::Scan(_) | Tool::Loopback { .. } | Tool::Identify { .. } | Tool::Read { .. } => None,
-        Tool::Send(bytes) => {
+        Diagnostic::Scan(_) | Diagnostic::Loopback { .. } | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => {
+            None
+        }
+        Diagnostic::Send(bytes) => {
             let framing = at.settings.transport.framing();
             let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Request), None);
             let whole =
@@ -237,7 +239,7 @@ fn only_reads(message: &[u8]) -> bool {
 /// The last test once more.
 pub fn again(_cx: &ViewContext, at: &Place) -> Vec<UiAction> {
     let Some(run) = &at.status.test else { return Vec::new() };
-    start(at, run.tool.clone()).into_iter().collect()
+    start(at, run.diagnostic.clone()).into_iter().collect()
 }
 
 /// Stops the test at work.
@@ -300,7 +302,7 @@ impl Send {
         if self.text.missed() {
             return Err("not all of it was taken; Ctrl-U empties the line".to_owned());
         }
-        start(&at, Tool::Send(self.ready(at.settings.transport.framing())?.frame))
+        start(&at, Diagnostic::Send(self.ready(at.settings.transport.framing())?.frame))
     }
 
     fn ready(&self, framing: Framing) -> Result<Ready, String> {
@@ -416,6 +418,6 @@ fn dress(typed: &hex_input::ParsedInput, framing: Framing) -> (Vec<u8>, String) 
 }
 
 /// The window of the registers that were read.
-pub fn registers(line: LineId, tool: &Tool) -> Option<UiAction> {
-    Registers::new(line, tool).map(|window| UiAction::Open(Modal::Bus(Box::new(Window::Registers(window)))))
+pub fn registers(line: LineId, diagnostic: &Diagnostic) -> Option<UiAction> {
+    Registers::new(line, diagnostic).map(|window| UiAction::Open(Modal::Bus(Box::new(Window::Registers(window)))))
 }

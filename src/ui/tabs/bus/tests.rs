@@ -11,12 +11,12 @@ use crate::{
     plant::{
         command::{Command, OrderId},
         def::{Framing, LineId, Serial},
+        diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
         event::{ExceptionCode, Fault, LineState},
         line_minute::LineMinute,
         ne107::Reason,
         snapshot::DeviceState,
         tag::Table,
-        tool::{Finding, Scan, Tool, ToolRun, ToolState},
         traffic::Exchange,
     },
     ui::{
@@ -39,15 +39,21 @@ fn bus(fixture: &Fixture, theme: Theme, keys: &str) -> Model {
     model
 }
 
-fn run(tool: Tool, state: ToolState, done: u32, total: u32, findings: Vec<Finding>) -> Arc<ToolRun> {
+fn run(
+    diagnostic: Diagnostic,
+    state: DiagnosticState,
+    done: u32,
+    total: u32,
+    findings: Vec<Finding>,
+) -> Arc<DiagnosticRun> {
     let id = OrderId { terminal: 1, number: 1 };
     let started = now() - jiff::SignedDuration::from_secs(8);
     let words = "unit 17, function 3 / 0x03 at 9600 8E1".to_owned();
-    Arc::new(ToolRun { id, by: "tech1".into(), tool, started, done, total, now: words, state, findings })
+    Arc::new(DiagnosticRun { id, by: "tech1".into(), diagnostic, started, done, total, now: words, state, findings })
 }
 
-fn read_of_three() -> Arc<ToolRun> {
-    let tool = Tool::Read { unit: 1, table: Table::Holding, address: 1_002, count: 3 };
+fn read_of_three() -> Arc<DiagnosticRun> {
+    let diagnostic = Diagnostic::Read { unit: 1, table: Table::Holding, address: 1_002, count: 3 };
     let exchange = Exchange {
         at: now(),
         framing: Framing::Rtu,
@@ -58,7 +64,7 @@ fn read_of_three() -> Arc<ToolRun> {
         tries: 1,
     };
     let values = Finding::Values { table: Table::Holding, address: 1_002, words: vec![0x42C8, 0, 0xFFFE] };
-    run(tool, ToolState::Done, 1, 1, vec![Finding::Exchange(Arc::new(exchange)), values])
+    run(diagnostic, DiagnosticState::Done, 1, 1, vec![Finding::Exchange(Arc::new(exchange)), values])
 }
 
 #[test]
@@ -277,7 +283,7 @@ fn typed_bytes_are_told_at_once_and_never_act_as_keys() {
     assert_eq!(type_keys(&mut model, "01 03 03 EA 00 01"), []);
     insta::assert_snapshot!("window_send", screen(&mut model, 80, 24));
     let effects = type_keys(&mut model, "⏎");
-    assert_eq!(order_of(&effects), Some(&Command::Test(L1, Tool::Send(with_crc(&[1, 3, 3, 0xEA, 0, 1])))));
+    assert_eq!(order_of(&effects), Some(&Command::Test(L1, Diagnostic::Send(with_crc(&[1, 3, 3, 0xEA, 0, 1])))));
     assert!(matches!(model.modal, Some(Modal::Bus(_))), "the entry stays for the next one");
     type_keys(&mut model, "⎋⏎");
     assert!(screen(&mut model, 80, 24).contains("01 03 03 EA 00 01"), "it is remembered");
@@ -292,7 +298,7 @@ fn bytes_go_out_as_typed_where_no_check_is_wanted() {
     assert!(shown.contains("These bytes are no good request: CRC"), "{shown}");
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), None, "a second Enter sends nothing");
     let effects = type_keys(&mut model, "y");
-    assert_eq!(order_of(&effects), Some(&Command::Test(L1, Tool::Send(vec![1, 3, 3, 0xEA, 0, 1, 0, 0]))));
+    assert_eq!(order_of(&effects), Some(&Command::Test(L1, Diagnostic::Send(vec![1, 3, 3, 0xEA, 0, 1, 0, 0]))));
 }
 
 #[test]
@@ -309,7 +315,7 @@ fn writes_and_broadcasts_are_asked_first() {
         let shown = screen(&mut model, 120, 40).replace("│", " ").split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(shown.contains(words) || before.contains(words), "{words}:\n{before}\n{shown}");
         let effects = type_keys(&mut model, "y");
-        assert_eq!(order_of(&effects), Some(&Command::Test(L1, Tool::Send(with_crc(&bytes)))), "{typed}");
+        assert_eq!(order_of(&effects), Some(&Command::Test(L1, Diagnostic::Send(with_crc(&bytes)))), "{typed}");
     }
 }
 
@@ -321,7 +327,7 @@ fn a_request_is_built_of_fields_with_either_kind_of_address() {
         if matches!(model.modal, Some(Modal::Confirm(_))) {
             effects = type_keys(&mut model, "y");
         }
-        assert_eq!(order_of(&effects), Some(&Command::Test(L1, Tool::Send(with_crc(expect)))), "{keys}");
+        assert_eq!(order_of(&effects), Some(&Command::Test(L1, Diagnostic::Send(with_crc(expect)))), "{keys}");
     };
     let clear = "\u{8}".repeat(6);
     check(&format!("↓↓{clear}41003"), &[1, 3, 3, 0xEA, 0, 1]);
@@ -352,13 +358,13 @@ fn a_scan_of_all_settings_is_asked_and_shows_how_far_it_is() {
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), None);
     assert!(screen(&mut model, 80, 24).contains("Polling of L1 pauses while other settings are tried"));
     let effects = type_keys(&mut model, "y");
-    let Some(Command::Test(_, tool @ Tool::Scan(scan))) = order_of(&effects) else { panic!("{effects:?}") };
+    let Some(Command::Test(_, diagnostic @ Diagnostic::Scan(scan))) = order_of(&effects) else { panic!("{effects:?}") };
     assert_eq!((scan.first, scan.last, scan.serials.len()), (1, 247, 32));
     let mut fixture = Fixture::traffic();
     fixture.line.state = LineState::Testing;
     let even = Serial { parity: crate::plant::def::Parity::Even, ..Serial::USUAL };
     let found = Finding::Unit { unit: 3, serial: Some(even), words: "register 0 = 77".to_owned() };
-    fixture.line.test = Some(run(tool.clone(), ToolState::Running, 40, 7_904, vec![found]));
+    fixture.line.test = Some(run(diagnostic.clone(), DiagnosticState::Running, 40, 7_904, vec![found]));
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     insta::assert_snapshot!("scan_at_work", screen(&mut model, 80, 24));
     assert_eq!(order_of(&type_keys(&mut model, "x")), Some(&Command::StopTest(L1)));
@@ -371,12 +377,12 @@ fn what_came_back_is_told_in_words() {
     let bytes = with_crc(&[1, 3, 2, 0, 0xC8]);
     let reply = Some(Duration::from_micros(12_400));
     fixture.line.test =
-        Some(run(Tool::Send(sent.clone()), ToolState::Done, 1, 1, vec![Finding::Bytes { bytes, reply }]));
+        Some(run(Diagnostic::Send(sent.clone()), DiagnosticState::Done, 1, 1, vec![Finding::Bytes { bytes, reply }]));
     insta::assert_snapshot!("test_answered_80x24", screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24));
     insta::assert_snapshot!("test_answered_120x40", screen(&mut bus(&fixture, Theme::FULL, "T"), 120, 40));
     let check = |finding: Finding, words: &str| {
         let mut fixture = Fixture::traffic();
-        fixture.line.test = Some(run(Tool::Send(sent.clone()), ToolState::Done, 1, 1, vec![finding]));
+        fixture.line.test = Some(run(Diagnostic::Send(sent.clone()), DiagnosticState::Done, 1, 1, vec![finding]));
         let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24);
         assert!(shown.contains(words), "{words} is missing:\n{shown}");
     };
@@ -402,16 +408,16 @@ fn loopback_and_identification_are_told_in_words() {
             tries: 1,
         }))
     };
-    let tool = Tool::Loopback { unit: 1, data: 0xA537, count: 2 };
+    let diagnostic = Diagnostic::Loopback { unit: 1, data: 0xA537, count: 2 };
     let verdict = Finding::Verdict("1 of 2 came back, 12.0 to 12.0 ms".to_owned());
     let findings = vec![exchange(Ok(())), exchange(Err(Fault::Timeout)), verdict];
-    fixture.line.test = Some(run(tool, ToolState::Done, 2, 2, findings));
+    fixture.line.test = Some(run(diagnostic, DiagnosticState::Done, 2, 2, findings));
     let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24);
     for words in ["✓ came back after 12 ms", "✗ no answer in time", "1 of 2 came back"] {
         assert!(shown.contains(words), "{words} is missing:\n{shown}");
     }
     let object = Finding::Object { name: "VendorName".to_owned(), text: "FUJI".to_owned() };
-    fixture.line.test = Some(run(Tool::Identify { unit: 1 }, ToolState::Done, 1, 1, vec![object]));
+    fixture.line.test = Some(run(Diagnostic::Identify { unit: 1 }, DiagnosticState::Done, 1, 1, vec![object]));
     assert!(screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24).contains("VendorName           FUJI"));
 }
 
@@ -422,7 +428,7 @@ fn registers_are_browsed_in_all_four_orders() {
     let mut model = bus(&fixture, Theme::FULL, &format!("Tb↓↓{clear}41003↓{clear}3"));
     let effects = type_keys(&mut model, "⏎");
     let run = read_of_three();
-    assert_eq!(order_of(&effects), Some(&Command::Test(L1, run.tool.clone())));
+    assert_eq!(order_of(&effects), Some(&Command::Test(L1, run.diagnostic.clone())));
     fixture.line.test = Some(run);
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     insta::assert_snapshot!("window_registers", screen(&mut model, 80, 24));
@@ -441,7 +447,7 @@ fn registers_are_browsed_in_all_four_orders() {
 fn no_size_breaks_a_page_or_a_window() {
     let mut fixture = Fixture::traffic_trouble();
     let scan = Scan { first: 1, last: 9, serials: vec![], timeout: Duration::from_millis(100) };
-    fixture.line.test = Some(run(Tool::Scan(scan), ToolState::Running, 3, 9, Vec::new()));
+    fixture.line.test = Some(run(Diagnostic::Scan(scan), DiagnosticState::Running, 3, 9, Vec::new()));
     for keys in ["L", "P", "F", "T", "P⏎", "F⏎", "Tt01 03", "Tf", "Tb⏎", "Ts"] {
         let mut model = bus(&fixture, Theme::FULL, keys);
         for (width, height) in [(60, 16), (61, 17), (79, 23), (81, 25), (200, 60), (400, 20), (70, 200)] {

@@ -1,4 +1,4 @@
-//! Line tools at work on a line that is polled, or alone on it.
+//! Line running diagnostic on a line that is polled, or alone on it.
 
 use std::time::Duration;
 
@@ -11,13 +11,13 @@ use super::slave::{Line, MS, Mode, SlaveAction, line, plant, until_silent};
 use crate::plant::{
     command::{BusRequest, OrderId, WriteId},
     def::{Serial, TagId},
+    diagnostics::{Diagnostic, DiagnosticState, Finding, Scan},
     event::{Event, LineState, WriteResult},
-    tool::{Finding, Scan, Tool, ToolState},
 };
 
-async fn start(line: &Line, tool: Tool) {
+async fn start(line: &Line, diagnostic: Diagnostic) {
     let id = OrderId { terminal: 1, number: 1 };
-    line.requests.send(BusRequest::Test { id, by: "anna".into(), tool }).await.expect("the line runs");
+    line.requests.send(BusRequest::Test { id, by: "anna".into(), diagnostic }).await.expect("the line runs");
 }
 
 #[tokio::test(start_paused = true)]
@@ -28,9 +28,9 @@ async fn a_line_can_be_closed_while_a_scan_has_it_for_itself() {
     line.read(&def).await;
     line.plug(Mode::Rtu, |_, _| SlaveAction::Silent);
     let serials = vec![Serial::USUAL, Serial { baud: 19_200, ..Serial::USUAL }];
-    let tool = Tool::Scan(Scan { first: 1, last: 247, serials, timeout: 100 * MS });
+    let diagnostic = Diagnostic::Scan(Scan { first: 1, last: 247, serials, timeout: 100 * MS });
     let (id, by) = (OrderId { terminal: 1, number: 1 }, "anna".into());
-    line.requests.send(BusRequest::Test { id, by, tool }).await.expect("the line runs");
+    line.requests.send(BusRequest::Test { id, by, diagnostic }).await.expect("the line runs");
     line.until(&def, |event| matches!(event, Event::Line { state: LineState::Testing, .. }).then_some(())).await;
     line.requests.send(BusRequest::Connect(false)).await.expect("the line runs");
     line.until(&def, |event| matches!(event, Event::Line { state: LineState::Disconnected, .. }).then_some(())).await;
@@ -51,32 +51,32 @@ async fn nonsense_is_sent_and_nonsense_is_told() {
             }
         });
         let (id, by) = (OrderId { terminal: 1, number: 1 }, "anna".into());
-        let tool = Tool::Send(vec![0xFF, 1, 2]);
-        line.requests.send(BusRequest::Test { id, by, tool }).await.expect("the line runs");
+        let diagnostic = Diagnostic::Send(vec![0xFF, 1, 2]);
+        line.requests.send(BusRequest::Test { id, by, diagnostic }).await.expect("the line runs");
         let run = line
             .until(&def, |event| match event {
-                Event::Tool { run, .. } if run.state != ToolState::Running => Some(run.clone()),
+                Event::Diagnostic { run, .. } if run.state != DiagnosticState::Running => Some(run.clone()),
                 _ => None,
             })
             .await;
         let told = |found: &Finding| matches!(found, Finding::Bytes { bytes, .. } if bytes.ends_with(&[0, 9]));
         match mode {
             // The poll before it was answered by nonsense too: the stream is out of sync, and the test with it.
-            Mode::Tcp => assert_eq!(run.state, ToolState::Failed("the stream is out of sync".into())),
+            Mode::Tcp => assert_eq!(run.state, DiagnosticState::Failed("the stream is out of sync".into())),
             _ => assert!(run.findings.iter().any(told), "{mode:?}: {run:?}"),
         }
     }
 }
 
 /// Sends a stop while no unit answers a scan that waits ten seconds for each unit; gives how long it took, and how the scan ended.
-async fn stop_during_scan(serials: Vec<Serial>) -> (Duration, WriteResult, ToolState) {
+async fn stop_during_scan(serials: Vec<Serial>) -> (Duration, WriteResult, DiagnosticState) {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
     let script = |_, message: &[u8]| if message[0] == 9 { SlaveAction::Silent } else { SlaveAction::Answer };
     line.plug(Mode::Rtu, script);
     line.read(&def).await;
     line.plug(Mode::Rtu, script);
-    start(&line, Tool::Scan(Scan { first: 9, last: 9, serials, timeout: Duration::from_secs(10) })).await;
+    start(&line, Diagnostic::Scan(Scan { first: 9, last: 9, serials, timeout: Duration::from_secs(10) })).await;
     until_silent(&mut line, &def).await;
     line.plug(Mode::Rtu, script);
     let asked = Instant::now();
@@ -85,7 +85,7 @@ async fn stop_during_scan(serials: Vec<Serial>) -> (Duration, WriteResult, ToolS
     let (mut state, mut result) = (None, None);
     while result.is_none() {
         match line.next(&def).await {
-            Event::Tool { run, .. } => state = Some(run.state.clone()),
+            Event::Diagnostic { run, .. } => state = Some(run.state.clone()),
             Event::Wrote { result: told, .. } => result = Some(told),
             _ => {}
         }
@@ -101,7 +101,7 @@ async fn a_stop_cuts_a_scan_short_and_goes_out_at_once() {
         let (after, result, state) = stop_during_scan(serials).await;
         assert_eq!(result, WriteResult::ReadBack(10.0), "{words}");
         assert!(after < 200 * MS, "{words}: after {after:?}");
-        assert_eq!(state, ToolState::Failed("ended by an urgent stop".into()), "{words}");
+        assert_eq!(state, DiagnosticState::Failed("ended by an urgent stop".into()), "{words}");
     }
 }
 
@@ -110,15 +110,16 @@ async fn a_test_that_waits_is_stopped_at_once() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
     line.plug(Mode::Rtu, |_, message| if message[0] == 9 { SlaveAction::Silent } else { SlaveAction::Answer });
-    start(&line, Tool::Scan(Scan { first: 9, last: 9, serials: Vec::new(), timeout: Duration::from_secs(10) })).await;
+    start(&line, Diagnostic::Scan(Scan { first: 9, last: 9, serials: Vec::new(), timeout: Duration::from_secs(10) }))
+        .await;
     until_silent(&mut line, &def).await;
     let asked = Instant::now();
     line.requests.send(BusRequest::StopTest).await.expect("the line runs");
     let stopped = |event: &Event| match event {
-        Event::Tool { run, .. } => Some(run.state.clone()),
+        Event::Diagnostic { run, .. } => Some(run.state.clone()),
         _ => None,
     };
-    assert_eq!(line.until(&def, stopped).await, ToolState::Cancelled);
+    assert_eq!(line.until(&def, stopped).await, DiagnosticState::Cancelled);
     assert!(asked.elapsed() < 200 * MS, "{:?}", asked.elapsed());
     // What was asked last may still be answered: every value is checked against its address.
     for _ in 0..10 {
@@ -132,14 +133,15 @@ async fn a_usual_write_waits_for_the_step_of_a_test() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
     line.plug(Mode::Rtu, |_, message| if message[0] == 9 { SlaveAction::Silent } else { SlaveAction::Answer });
-    start(&line, Tool::Scan(Scan { first: 9, last: 9, serials: Vec::new(), timeout: Duration::from_secs(10) })).await;
+    start(&line, Diagnostic::Scan(Scan { first: 9, last: 9, serials: Vec::new(), timeout: Duration::from_secs(10) }))
+        .await;
     until_silent(&mut line, &def).await;
     let write =
         BusRequest::Write { id: WriteId(1), tag: TagId(0), raw: 10.0, unlock: None, verify: true, urgent: false };
     line.requests.send(write).await.expect("the line runs");
     let mut done = None;
     let ended = |event: &Event| match event {
-        Event::Tool { run, .. } => {
+        Event::Diagnostic { run, .. } => {
             done = Some(run.state.clone());
             None
         }
@@ -147,5 +149,5 @@ async fn a_usual_write_waits_for_the_step_of_a_test() {
         _ => None,
     };
     assert_eq!(line.until(&def, ended).await, WriteResult::ReadBack(10.0));
-    assert_eq!(done, Some(ToolState::Done));
+    assert_eq!(done, Some(DiagnosticState::Done));
 }

@@ -1,4 +1,4 @@
-//! Line tools as pure step machines: which request is next, and what its answer tells.
+//! Diagnostics of a line as pure step machines: which request is next, and what its answer tells.
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
@@ -8,9 +8,9 @@ use super::names;
 use crate::plant::{
     command::OrderId,
     def::Serial,
+    diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, FINDINGS_MAX, Finding, Scan},
     event::Fault,
     tag::Table,
-    tool::{FINDINGS_MAX, Finding, Scan, Tool, ToolRun, ToolState},
     traffic::Exchange,
 };
 
@@ -46,15 +46,15 @@ pub enum StepResult {
     Bytes(Vec<u8>, Option<Duration>),
 }
 
-/// A tool at work. Its steps are made one by one: a scan may have thousands.
+/// A running diagnostic. Its steps are made one by one: a scan may have thousands.
 #[derive(Debug, Clone)]
 pub struct Job {
-    run: ToolRun,
+    run: DiagnosticRun,
     /// The step at work, or next.
     step: Option<Step>,
     /// Steps that an answer has called for; they go first.
     queued: VecDeque<Step>,
-    /// Steps of the tool itself that have been made.
+    /// Steps of the diagnostic itself that have been made.
     made: u32,
     /// How many it has.
     planned: u32,
@@ -64,17 +64,17 @@ pub struct Job {
 
 impl Job {
     /// Ready for its first step.
-    pub fn new(id: OrderId, by: Arc<str>, tool: Tool, at: Timestamp) -> Job {
-        let planned = steps_in(&tool);
-        let run = ToolRun {
+    pub fn new(id: OrderId, by: Arc<str>, diagnostic: Diagnostic, at: Timestamp) -> Job {
+        let planned = steps_in(&diagnostic);
+        let run = DiagnosticRun {
             id,
             by,
-            tool,
+            diagnostic,
             started: at,
             done: 0,
             total: planned,
             now: String::new(),
-            state: ToolState::Running,
+            state: DiagnosticState::Running,
             findings: Vec::new(),
         };
         let mut job = Job { run, step: None, queued: VecDeque::new(), made: 0, planned, traces: Vec::new() };
@@ -84,23 +84,23 @@ impl Job {
     }
 
     /// How it stands.
-    pub fn run(&self) -> &ToolRun {
+    pub fn run(&self) -> &DiagnosticRun {
         &self.run
     }
 
     /// Does it need the line for itself, because it tries other serial parameters?
     pub fn is_exclusive(&self) -> bool {
-        matches!(&self.run.tool, Tool::Scan(scan) if !scan.serials.is_empty())
+        matches!(&self.run.diagnostic, Diagnostic::Scan(scan) if !scan.serials.is_empty())
     }
 
     /// The next step; `None` when it is done or was stopped.
     pub fn next(&self) -> Option<&Step> {
-        self.step.as_ref().filter(|_| self.run.state == ToolState::Running)
+        self.step.as_ref().filter(|_| self.run.state == DiagnosticState::Running)
     }
 
     /// Stops it.
-    pub fn stop(&mut self, state: ToolState) {
-        if self.run.state == ToolState::Running {
+    pub fn stop(&mut self, state: DiagnosticState) {
+        if self.run.state == DiagnosticState::Running {
             self.run.state = state;
         }
     }
@@ -109,11 +109,11 @@ impl Job {
     pub fn take(&mut self, result: StepResult) {
         let Some(step) = self.step.take() else { return };
         self.run.done += 1;
-        match (&self.run.tool, result) {
+        match (&self.run.diagnostic, result) {
             (_, StepResult::Bytes(bytes, reply)) => self.found(Finding::Bytes { bytes, reply }),
-            (Tool::Scan(_), StepResult::Answer(answer, _)) => self.take_unit(&step, answer),
+            (Diagnostic::Scan(_), StepResult::Answer(answer, _)) => self.take_unit(&step, answer),
             // It only had an adapter with echo give itself away.
-            (Tool::Loopback { .. }, StepResult::Answer(..)) if self.run.done == 1 => {}
+            (Diagnostic::Loopback { .. }, StepResult::Answer(..)) if self.run.done == 1 => {}
             (_, StepResult::Answer(answer, exchange)) => {
                 self.found(Finding::Exchange(exchange));
                 self.take_answer(&step, answer);
@@ -123,7 +123,7 @@ impl Job {
         self.advance();
         if self.step.is_none() {
             self.conclude();
-            self.run.state = ToolState::Done;
+            self.run.state = DiagnosticState::Done;
         }
         self.tell_now();
     }
@@ -131,7 +131,7 @@ impl Job {
     /// Makes the step that is next.
     fn advance(&mut self) {
         self.step = self.queued.pop_front().or_else(|| {
-            let step = (self.made < self.planned).then(|| planned_step(&self.run.tool, self.made));
+            let step = (self.made < self.planned).then(|| planned_step(&self.run.diagnostic, self.made));
             self.made += u32::from(step.is_some());
             step
         });
@@ -164,12 +164,12 @@ impl Job {
 
     /// A device without 2B/0E may know 11; a block that does not exist as a whole may exist in parts.
     fn after_failure(&mut self, request: &[u8], fault: Fault) {
-        match (&self.run.tool, fault) {
-            (Tool::Identify { unit }, Fault::Exception(_)) if request.get(1..4) == Some(&[0x2B, 0x0E, 0x01]) => {
+        match (&self.run.diagnostic, fault) {
+            (Diagnostic::Identify { unit }, Fault::Exception(_)) if request.get(1..4) == Some(&[0x2B, 0x0E, 0x01]) => {
                 self.made = self.planned;
                 self.queued.push_back(step(vec![*unit, 0x11]));
             }
-            (Tool::Read { unit, table, address, count }, Fault::Exception(code))
+            (Diagnostic::Read { unit, table, address, count }, Fault::Exception(code))
                 if code.0 == 2 && 1 < *count && self.run.done == 1 =>
             {
                 let singles = (0..*count).map(|n| step(read(*unit, *table, address.wrapping_add(n), 1)));
@@ -238,9 +238,9 @@ impl Job {
 
     fn conclude(&mut self) {
         self.conclude_traces();
-        let verdict = match &self.run.tool {
-            Tool::Loopback { .. } => loopback_words(&self.run.findings, self.run.done - 1),
-            Tool::Scan(scan) => {
+        let verdict = match &self.run.diagnostic {
+            Diagnostic::Loopback { .. } => loopback_words(&self.run.findings, self.run.done - 1),
+            Diagnostic::Scan(scan) => {
                 let units = self.run.findings.iter().filter(|found| matches!(found, Finding::Unit { .. })).count();
                 match units {
                     0 => format!("no unit answers within {} ms", scan.timeout.as_millis()),
@@ -248,7 +248,7 @@ impl Job {
                     count => format!("{count} answers"),
                 }
             }
-            Tool::Send(_) | Tool::Identify { .. } | Tool::Read { .. } => return,
+            Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => return,
         };
         self.found(Finding::Verdict(verdict));
     }
@@ -271,13 +271,13 @@ impl Job {
     }
 }
 
-/// How many steps a tool has before any answer calls for more.
-fn steps_in(tool: &Tool) -> u32 {
-    match tool {
-        Tool::Send(_) | Tool::Read { .. } => 1,
-        Tool::Loopback { count, .. } => 1 + u32::from(*count),
-        Tool::Identify { .. } => 2,
-        Tool::Scan(scan) => units_of(scan) * scan.serials.len().max(1) as u32,
+/// How many steps a diagnostic has before any answer calls for more.
+fn steps_in(diagnostic: &Diagnostic) -> u32 {
+    match diagnostic {
+        Diagnostic::Send(_) | Diagnostic::Read { .. } => 1,
+        Diagnostic::Loopback { count, .. } => 1 + u32::from(*count),
+        Diagnostic::Identify { .. } => 2,
+        Diagnostic::Scan(scan) => units_of(scan) * scan.serials.len().max(1) as u32,
     }
 }
 
@@ -286,22 +286,22 @@ fn units_of(scan: &Scan) -> u32 {
     (u32::from(scan.last) + 1).saturating_sub(u32::from(scan.first))
 }
 
-/// Step `n` of a tool, from 0.
-fn planned_step(tool: &Tool, n: u32) -> Step {
-    match tool {
-        Tool::Send(bytes) => Step { serial: None, timeout: None, ask: Ask::Raw(bytes.clone()) },
+/// Step `n` of a diagnostic, from 0.
+fn planned_step(diagnostic: &Diagnostic, n: u32) -> Step {
+    match diagnostic {
+        Diagnostic::Send(bytes) => Step { serial: None, timeout: None, ask: Ask::Raw(bytes.clone()) },
         // An adapter that gives back what it sends would pass every loopback. A read cannot be answered by itself: the link
         // knows such an adapter from then on.
-        Tool::Loopback { unit, .. } if n == 0 => step(read(*unit, Table::Holding, 0, 1)),
-        Tool::Loopback { unit, data, .. } => {
+        Diagnostic::Loopback { unit, .. } if n == 0 => step(read(*unit, Table::Holding, 0, 1)),
+        Diagnostic::Loopback { unit, data, .. } => {
             let [high, low] = data.wrapping_add(n as u16 - 1).to_be_bytes();
             step(vec![*unit, 0x08, 0, 0, high, low])
         }
         // Basic objects, then the regular ones that follow them (id 3 and on).
-        Tool::Identify { unit } if n == 0 => step(vec![*unit, 0x2B, 0x0E, 0x01, 0]),
-        Tool::Identify { unit } => step(vec![*unit, 0x2B, 0x0E, 0x02, 3]),
-        Tool::Read { unit, table, address, count } => step(read(*unit, *table, *address, *count)),
-        Tool::Scan(scan) => {
+        Diagnostic::Identify { unit } if n == 0 => step(vec![*unit, 0x2B, 0x0E, 0x01, 0]),
+        Diagnostic::Identify { unit } => step(vec![*unit, 0x2B, 0x0E, 0x02, 3]),
+        Diagnostic::Read { unit, table, address, count } => step(read(*unit, *table, *address, *count)),
+        Diagnostic::Scan(scan) => {
             let units = units_of(scan).max(1);
             Step {
                 serial: scan.serials.get((n / units) as usize).copied(),
@@ -388,10 +388,10 @@ mod tests {
     use super::*;
     use crate::plant::{def::Framing, event::ExceptionCode};
 
-    /// Runs a tool against a device given as a function from request to answer.
-    fn run(tool: Tool, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>) -> ToolRun {
+    /// Runs a diagnostic against a device given as a function from request to answer.
+    fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>) -> DiagnosticRun {
         let id = OrderId { terminal: 1, number: 1 };
-        let mut job = Job::new(id, "anna".into(), tool, Timestamp::UNIX_EPOCH);
+        let mut job = Job::new(id, "anna".into(), diagnostic, Timestamp::UNIX_EPOCH);
         for _ in 0..10_000 {
             let Some(next) = job.next() else { return job.run().clone() };
             let result = match next.ask.clone() {
@@ -415,7 +415,7 @@ mod tests {
         panic!("it never ends")
     }
 
-    fn verdict(run: &ToolRun) -> &str {
+    fn verdict(run: &DiagnosticRun) -> &str {
         match run.findings.last() {
             Some(Finding::Verdict(words)) => words,
             other => panic!("no verdict but {other:?}"),
@@ -425,13 +425,13 @@ mod tests {
     #[test]
     fn a_scan_finds_who_answers_and_who_refuses() {
         let scan = Scan { first: 1, last: 20, serials: vec![], timeout: Duration::from_millis(100) };
-        let found = run(Tool::Scan(scan), |request| match request[0] {
+        let found = run(Diagnostic::Scan(scan), |request| match request[0] {
             3 => Ok(vec![3, 3, 2, 0, 77]),
             17 => Err(Fault::Exception(ExceptionCode(2))),
             18 => Err(Fault::Exception(ExceptionCode(0x0B))),
             _ => Err(Fault::Timeout),
         });
-        assert_eq!((found.done, found.total, &found.state), (20, 20, &ToolState::Done));
+        assert_eq!((found.done, found.total, &found.state), (20, 20, &DiagnosticState::Done));
         let units: Vec<_> = found
             .findings
             .iter()
@@ -448,7 +448,8 @@ mod tests {
     fn a_scan_over_several_settings_needs_the_line_for_itself() {
         let serials = vec![Serial::USUAL, Serial { baud: 19_200, ..Serial::USUAL }];
         let scan = Scan { first: 1, last: 3, serials, timeout: Duration::from_millis(100) };
-        let job = Job::new(OrderId { terminal: 1, number: 1 }, "anna".into(), Tool::Scan(scan), Timestamp::UNIX_EPOCH);
+        let job =
+            Job::new(OrderId { terminal: 1, number: 1 }, "anna".into(), Diagnostic::Scan(scan), Timestamp::UNIX_EPOCH);
         assert!(job.is_exclusive());
         assert_eq!(job.run().total, 6);
     }
@@ -456,13 +457,15 @@ mod tests {
     #[test]
     fn a_foreign_unit_that_chatters_is_not_every_unit() {
         let scan = |last| {
-            let tool = Tool::Scan(Scan { first: 1, last, serials: vec![], timeout: Duration::from_millis(100) });
-            run(tool, |request| match request[0] {
+            let diagnostic =
+                Diagnostic::Scan(Scan { first: 1, last, serials: vec![], timeout: Duration::from_millis(100) });
+            run(diagnostic, |request| match request[0] {
                 2 => Ok(vec![2, 3, 2, 0, 77]),
                 asked => Err(Fault::WrongUnit { got: 99, asked }),
             })
         };
-        let units = |run: &ToolRun| run.findings.iter().filter(|found| matches!(found, Finding::Unit { .. })).count();
+        let units =
+            |run: &DiagnosticRun| run.findings.iter().filter(|found| matches!(found, Finding::Unit { .. })).count();
         assert_eq!(units(&scan(4)), 4, "a few may be units with other settings");
         let many = scan(20);
         assert_eq!((units(&many), verdict(&many)), (1, "1 answer"));
@@ -475,20 +478,20 @@ mod tests {
 
     #[test]
     fn loopbacks_are_counted() {
-        let tool = Tool::Loopback { unit: 1, data: 0xA537, count: 3 };
-        let all = run(tool.clone(), |request| Ok(request.to_vec()));
+        let diagnostic = Diagnostic::Loopback { unit: 1, data: 0xA537, count: 3 };
+        let all = run(diagnostic.clone(), |request| Ok(request.to_vec()));
         assert_eq!(verdict(&all), "3 of 3 result back, 12.0 to 12.0 ms");
-        let none = run(tool, |_| Err(Fault::Timeout));
+        let none = run(diagnostic, |_| Err(Fault::Timeout));
         assert_eq!(verdict(&none), "none of 3 result back");
-        let tool = Tool::Loopback { unit: 1, data: 0, count: 3 };
-        let without = run(tool, |_| Err(Fault::Exception(ExceptionCode(1))));
+        let diagnostic = Diagnostic::Loopback { unit: 1, data: 0, count: 3 };
+        let without = run(diagnostic, |_| Err(Fault::Exception(ExceptionCode(1))));
         assert!(verdict(&without).starts_with("the unit answers"), "{}", verdict(&without));
     }
 
     #[test]
     fn an_identification_in_pieces_is_asked_to_its_end() {
         let objects = ["ACME", "PM", "1.0", "http://acme.example"];
-        let found = run(Tool::Identify { unit: 1 }, |request| {
+        let found = run(Diagnostic::Identify { unit: 1 }, |request| {
             let (code, id) = (request[3], usize::from(request[4]));
             let Some(text) = objects.get(id).filter(|_| code == 1 || 3 <= id) else {
                 return Err(Fault::Exception(ExceptionCode(2)));
@@ -514,7 +517,7 @@ mod tests {
 
     #[test]
     fn a_device_without_identification_is_asked_for_its_server_id() {
-        let found = run(Tool::Identify { unit: 1 }, |request| match request[1] {
+        let found = run(Diagnostic::Identify { unit: 1 }, |request| match request[1] {
             0x11 => Ok(vec![1, 0x11, 3, b'X', 0xFF, b'Y']),
             _ => Err(Fault::Exception(ExceptionCode(1))),
         });
@@ -524,8 +527,8 @@ mod tests {
 
     #[test]
     fn a_block_with_a_hole_is_read_register_by_register() {
-        let tool = Tool::Read { unit: 1, table: Table::Holding, address: 10, count: 3 };
-        let found = run(tool, |request| {
+        let diagnostic = Diagnostic::Read { unit: 1, table: Table::Holding, address: 10, count: 3 };
+        let found = run(diagnostic, |request| {
             let (first, count) = (u16::from(request[3]), u16::from(request[5]));
             if (first..first + count).contains(&11) {
                 return Err(Fault::Exception(ExceptionCode(2)));

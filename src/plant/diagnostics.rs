@@ -1,4 +1,4 @@
-//! Line tools: what a technician can ask of a line beyond polling, how far it has come, and what was found.
+//! Diagnostics of a line: what a technician can ask of a line beyond polling, how far it has come, and what was found.
 
 use std::{sync::Arc, time::Duration};
 
@@ -25,7 +25,7 @@ const SERIALS_MAX: usize = 64;
 
 /// A test of a line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Tool {
+pub enum Diagnostic {
     /// Sends these bytes as they are, check included, and receives whatever comes back.
     Send(Vec<u8>),
     /// Diagnostics 08/00, return query data, so many times.
@@ -57,7 +57,7 @@ pub enum Tool {
     Scan(Scan),
 }
 
-impl Tool {
+impl Diagnostic {
     /// Can a line carry it? `Err` says why not. A line is never busy with one step for longer than [`WAIT_MAX`].
     pub fn check(&self) -> Result<(), String> {
         let within = |what: &str, found: usize, most: usize| match found {
@@ -66,33 +66,33 @@ impl Tool {
             _ => Ok(()),
         };
         match self {
-            Tool::Send(bytes) => within("bytes to send", bytes.len(), SEND_MAX),
-            Tool::Loopback { count, .. } => within("loopbacks", usize::from(*count), usize::from(LOOPBACKS_MAX)),
-            Tool::Identify { .. } => Ok(()),
-            Tool::Read { table, address, count, .. } => {
+            Diagnostic::Send(bytes) => within("bytes to send", bytes.len(), SEND_MAX),
+            Diagnostic::Loopback { count, .. } => within("loopbacks", usize::from(*count), usize::from(LOOPBACKS_MAX)),
+            Diagnostic::Identify { .. } => Ok(()),
+            Diagnostic::Read { table, address, count, .. } => {
                 within("registers", usize::from(*count), if table.is_bits() { 2_000 } else { 125 })?;
                 let last = u32::from(*address) + u32::from(*count) - 1;
                 if last <= 0xFFFF { Ok(()) } else { Err(format!("address {last}: the last is 65535")) }
             }
-            Tool::Scan(scan) => scan.check(),
+            Diagnostic::Scan(scan) => scan.check(),
         }
     }
 }
 
 /// In a few words, for the record.
-impl std::fmt::Display for Tool {
+impl std::fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Tool::Send(bytes) => {
+            Diagnostic::Send(bytes) => {
                 write!(f, "send")?;
                 bytes.iter().try_for_each(|byte| write!(f, " {byte:02X}"))
             }
-            Tool::Loopback { unit, count, .. } => write!(f, "loopback unit {unit}, {count} times"),
-            Tool::Identify { unit } => write!(f, "identify unit {unit}"),
-            Tool::Read { unit, table, address, count } => {
+            Diagnostic::Loopback { unit, count, .. } => write!(f, "loopback unit {unit}, {count} times"),
+            Diagnostic::Identify { unit } => write!(f, "identify unit {unit}"),
+            Diagnostic::Read { unit, table, address, count } => {
                 write!(f, "read unit {unit} {} {address} / 0x{address:04X}, {count}", table.word())
             }
-            Tool::Scan(scan) => {
+            Diagnostic::Scan(scan) => {
                 write!(f, "scan units {} to {}", scan.first, scan.last)?;
                 if scan.serials.is_empty() { Ok(()) } else { write!(f, " at {} settings", scan.serials.len()) }
             }
@@ -131,15 +131,15 @@ impl Scan {
     }
 }
 
-/// A tool at work, or done.
+/// A running diagnostic, or done.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ToolRun {
+pub struct DiagnosticRun {
     /// The order it came by.
     pub id: OrderId,
     /// Who ordered it.
     pub by: Arc<str>,
     /// What.
-    pub tool: Tool,
+    pub diagnostic: Diagnostic,
     /// When it began.
     pub started: Timestamp,
     /// Steps done.
@@ -149,14 +149,14 @@ pub struct ToolRun {
     /// What it is doing: `unit 17 at 9600 8N1`.
     pub now: String,
     /// How it stands.
-    pub state: ToolState,
+    pub state: DiagnosticState,
     /// What was found, in order; at most [`FINDINGS_MAX`].
     pub findings: Vec<Finding>,
 }
 
-/// How a tool stands.
+/// How a diagnostic stands.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub enum ToolState {
+pub enum DiagnosticState {
     /// At work.
     Running,
     /// All steps are done.
@@ -167,7 +167,7 @@ pub enum ToolState {
     Failed(String),
 }
 
-/// What a tool has found.
+/// What a diagnostic has found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Finding {
     /// A request with its answer.
