@@ -11,14 +11,14 @@ use super::{
     schedule::{Demand, FACTOR_MAX, WRITE_SHARE},
 };
 use crate::plant::{
-    admission::{Admission, DeadDevice, PollWords, Verdict, Warning, Witness},
+    admission::{Admission, DeadDevice, OverloadInterval, PollWords, Verdict, Warning},
     def::{DeviceId, Framing, LineDef, LineId, Parity, PlantDef, Transport},
     tag::{Class, Poll},
 };
 
 /// A device that is given up is probed this often.
 const PROBE_EVERY: Duration = Duration::from_secs(30);
-/// Polls that a witness names.
+/// Polls that an overload interval names.
 const NAMED_MAX: usize = 3;
 
 /// A poll in whole units of time: worst cost and period.
@@ -38,7 +38,7 @@ pub enum Test {
     /// More than all the time is wanted.
     TooMuch,
     /// In a span of `length` there is a demand of `demand`, after the task at place `blocker` has just begun.
-    Witness {
+    OverloadInterval {
         /// L.
         length: u64,
         /// What must be carried in it.
@@ -76,7 +76,7 @@ pub fn test(tasks: &[Task]) -> Test {
         }
         let Some((_, blocking, blocker)) = longer.last().copied() else { break };
         if length < demand + blocking {
-            return Test::Witness { length, demand: demand + blocking, blocker };
+            return Test::OverloadInterval { length, demand: demand + blocking, blocker };
         }
         if length as f64 * (1.0 - load) >= dearest as f64 && load < 1.0 {
             break;
@@ -169,7 +169,7 @@ fn judge(loads: &[&Load], extra: Option<&PollWords>) -> Verdict {
     match test(&tasks) {
         Test::Accept => Verdict::Fits,
         Test::TooMuch => Verdict::TooMuch { utilisation: utilisation(&tasks) },
-        Test::Witness { length, demand, blocker } => {
+        Test::OverloadInterval { length, demand, blocker } => {
             let span = Duration::from_micros(length);
             let mut due: Vec<PollWords> =
                 polls.iter().filter(|poll| poll.period < span).map(|poll| (*poll).clone()).collect();
@@ -177,7 +177,7 @@ fn judge(loads: &[&Load], extra: Option<&PollWords>) -> Verdict {
             let more = due.len().saturating_sub(NAMED_MAX);
             due.truncate(NAMED_MAX);
             let (demand, blocker) = (Duration::from_micros(demand), polls[blocker].clone());
-            Verdict::Blocked(Witness { span, demand, blocker, due, more })
+            Verdict::Blocked(OverloadInterval { span, demand, blocker, due, more })
         }
     }
 }

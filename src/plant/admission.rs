@@ -1,4 +1,4 @@
-//! Whether the polls of a line can all meet their periods: the verdict, its witness and its warnings, as plain data.
+//! Whether the polls of a line can all meet their periods: the verdict, the interval that is overloaded, and warnings, as plain data.
 
 use std::{fmt, time::Duration};
 
@@ -60,7 +60,7 @@ pub enum Verdict {
         utilisation: f64,
     },
     /// There is time enough, but a transaction cannot be interrupted: once in a while one comes in the way of others.
-    Blocked(Witness),
+    Blocked(OverloadInterval),
 }
 
 impl Verdict {
@@ -75,7 +75,7 @@ impl Verdict {
 
 /// A span of time in which a line would have to carry more than goes into it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Witness {
+pub struct OverloadInterval {
     /// How long the span is.
     pub span: Duration,
     /// How much the line must carry in it.
@@ -145,14 +145,14 @@ impl fmt::Display for Verdict {
             Verdict::TooMuch { utilisation } => {
                 write!(f, "too much: the polls want {:.1} % of the line's time", utilisation * 100.0)
             }
-            Verdict::Blocked(witness) => witness.fmt(f),
+            Verdict::Blocked(overload) => overload.fmt(f),
         }
     }
 }
 
-impl fmt::Display for Witness {
+impl fmt::Display for OverloadInterval {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Witness { span, demand, blocker, due, more } = self;
+        let OverloadInterval { span, demand, blocker, due, more } = self;
         write!(f, "in {} the line must carry {}: ", ms(*span), ms(*demand))?;
         write!(f, "while {} ({}) is read, ", blocker.name, ms(blocker.cost))?;
         for (place, poll) in due.iter().enumerate() {

@@ -24,12 +24,12 @@ fn every_row_of_the_vectors_has_the_verdict_that_it_names() {
     for row in rows.records() {
         let row = row.expect("a row");
         let tasks = tasks(&row[1]);
-        let (verdict, witness) = match test(&tasks) {
+        let (verdict, overload) = match test(&tasks) {
             Test::Accept => ("accept", String::new()),
             Test::TooMuch => ("reject", String::new()),
-            Test::Witness { length, demand, .. } => ("reject", format!("L={length} demand {demand}")),
+            Test::OverloadInterval { length, demand, .. } => ("reject", format!("L={length} demand {demand}")),
         };
-        let found = (format!("{:.3}", utilisation(&tasks)), verdict, witness.as_str());
+        let found = (format!("{:.3}", utilisation(&tasks)), verdict, overload.as_str());
         assert_eq!(found, (row[2].to_owned(), &row[3], &row[4]), "{}", &row[0]);
         count += 1;
     }
@@ -57,7 +57,7 @@ proptest! {
         match test(&tasks) {
             Test::Accept => prop_assert!(by_the_letter(&tasks)),
             Test::TooMuch => prop_assert!(utilisation(&tasks) > 1.0),
-            Test::Witness { length, demand, blocker } => {
+            Test::OverloadInterval { length, demand, blocker } => {
                 prop_assert!(!by_the_letter(&tasks));
                 prop_assert!(length < demand && length < tasks[blocker].period);
                 let others: u64 = tasks.iter().map(|task| (length - 1) / task.period * task.cost).sum();

@@ -179,8 +179,8 @@ fn summary(report: &LineReport) -> (String, bool) {
     match &admission.verdict {
         Verdict::Fits => (format!("{words}: they fit{refused}"), false),
         Verdict::TooMuch { .. } => (format!("! {words}: TOO MUCH, reads are left out{refused}"), true),
-        Verdict::Blocked(witness) => {
-            let blocker = &witness.blocker.name;
+        Verdict::Blocked(overload) => {
+            let blocker = &overload.blocker.name;
             (format!("! {words}: some come late behind {blocker}{refused}"), true)
         }
     }
