@@ -81,10 +81,16 @@ fn an_alarm_that_would_not_help_is_a_warning_and_strictly_a_refusal() {
     let file = file.to_str().unwrap();
     let (code, out, err) = run(&["check", file]);
     assert_eq!(code, Some(0), "{err}");
-    assert!(out.contains("is good") && err.contains("has no `respond`") && err.contains("1 warning"), "{out}{err}");
+    assert!(
+        out.contains("is good") && err.contains("has no `response_time`") && err.contains("1 warning"),
+        "{out}{err}"
+    );
     let (code, out, err) = run(&["check", "--strict", file]);
     assert_eq!((code, out.as_str()), (Some(2), ""), "{err}");
-    assert!(err.contains("has no `respond`") && err.contains("plant.toml:") && err.contains("1 problem"), "{err}");
+    assert!(
+        err.contains("has no `response_time`") && err.contains("plant.toml:") && err.contains("1 problem"),
+        "{err}"
+    );
     for plant in ["tank", "inverter", "lab"] {
         assert_eq!(run(&["check", "--strict", plant]).0, Some(0), "{plant}");
     }
