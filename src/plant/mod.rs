@@ -3,7 +3,7 @@
 //! ```text
 //!  Event ──┐                       ┌──> Effects { bus requests, records }
 //!  Order ──┼──> Plant (reducer) ───┤
-//!  tick  ──┘    board book desk    └──> Snapshot
+//!  tick  ──┘    image alarms desk  └──> Snapshot
 //!               values alarms orders
 //! ```
 
@@ -38,7 +38,7 @@ pub mod restore;
 pub mod station;
 pub mod snapshot;
 pub mod clock_step;
-pub mod board;
+pub mod process_image;
 pub mod orders;
 pub mod reducer;
 

@@ -6,11 +6,11 @@ use jiff::Timestamp;
 
 use super::{
     alarm::{AlarmCommand, book::subject_name},
-    board::Board,
     command::{BusRequest, Command, NotConfirmed, Order, OrderId, OrderStatus, Outcome, Refusal, WriteId},
     def::{AlarmId, LineId, PlantDef, TagId},
     event::{Fault, WriteResult},
     guard,
+    process_image::ProcessImage,
     record::{ActionRecord, ORDER},
     scale,
     tag::TagDef,
@@ -63,22 +63,22 @@ impl Desk {
     /// Checks a write. `Ok` is the request for the bus; an order that needs none, or may not be, is closed at once.
     pub fn write(
         &mut self,
-        board: &Board,
+        image: &ProcessImage,
         order: &Order,
         tag: TagId,
         value: f64,
         at: Timestamp,
     ) -> Result<BusRequest, Option<Box<ActionRecord>>> {
-        let old = board.sample(tag).value;
-        let checked = self.check(board, tag, value);
-        let checked = checked.and_then(|checked| self.not_overtaken(board, order, tag, checked));
+        let old = image.sample(tag).value;
+        let checked = self.check(image, tag, value);
+        let checked = checked.and_then(|checked| self.not_overtaken(image, order, tag, checked));
         // What is shown and recorded is what the device will hold, not what was typed.
         let def = self.def.tag(tag);
-        let held = board.scaling_decimals(def).and_then(|decimals| scale::held(def, value, decimals));
+        let held = image.scaling_decimals(def).and_then(|decimals| scale::held(def, value, decimals));
         let command = Command::Write { tag, value: held.unwrap_or(value) };
         self.open(&Order { command, ..order.clone() }, old, at);
         match checked {
-            Err(outcome) => Err(self.close(order.id, outcome, board).map(Box::new)),
+            Err(outcome) => Err(self.close(order.id, outcome, image).map(Box::new)),
             Ok(Checked { raw, unlock, urgent }) => {
                 self.last_write += 1;
                 let id = WriteId(self.last_write);
@@ -95,16 +95,16 @@ impl Desk {
     }
 
     /// An order has come to its end.
-    pub fn end(&mut self, id: OrderId, outcome: Outcome, board: &Board) -> Option<ActionRecord> {
-        self.close(id, outcome, board)
+    pub fn end(&mut self, id: OrderId, outcome: Outcome, image: &ProcessImage) -> Option<ActionRecord> {
+        self.close(id, outcome, image)
     }
 
     /// A line is open (or trying to be) or closed: orders that wished so are done.
-    pub fn connected(&mut self, line: LineId, open: bool, board: &Board) -> Option<ActionRecord> {
+    pub fn connected(&mut self, line: LineId, open: bool, image: &ProcessImage) -> Option<ActionRecord> {
         let wished = Command::Connect(line, open);
         let waits = |status: &&OrderStatus| status.command == wished && status.outcome == Outcome::Pending;
         let id = self.orders.iter().find(waits)?.id;
-        self.close(id, Outcome::Verified, board)
+        self.close(id, Outcome::Verified, image)
     }
 
     /// How an order stands, unless it is forgotten.
@@ -118,9 +118,15 @@ impl Desk {
     }
 
     /// Takes an order that needs nothing but to be on record.
-    pub fn note(&mut self, order: &Order, outcome: Outcome, board: &Board, at: Timestamp) -> Option<ActionRecord> {
+    pub fn note(
+        &mut self,
+        order: &Order,
+        outcome: Outcome,
+        image: &ProcessImage,
+        at: Timestamp,
+    ) -> Option<ActionRecord> {
         self.open(order, None, at);
-        self.close(order.id, outcome, board)
+        self.close(order.id, outcome, image)
     }
 
     /// The key that a write needs was sent before it, which is an action of its own.
@@ -129,7 +135,7 @@ impl Desk {
         id: WriteId,
         key: TagId,
         result: &WriteResult,
-        board: &Board,
+        image: &ProcessImage,
         at: Timestamp,
     ) -> Option<ActionRecord> {
         let (_, order, tag, _) = self.writes.iter().find(|write| write.0 == id)?;
@@ -150,8 +156,8 @@ impl Desk {
             from: status.from.clone(),
             action: "unlock".into(),
             target: key.name.as_str().into(),
-            old: board.sample(key.id).value.map(|old| value_words(board, key, old).into()),
-            new: tag.write_unlock.map(|(_, new)| value_words(board, key, new).into()),
+            old: image.sample(key.id).value.map(|old| value_words(image, key, old).into()),
+            new: tag.write_unlock.map(|(_, new)| value_words(image, key, new).into()),
             outcome: format!("{}; for {}", outcome_words(&outcome), tag.name).into(),
             note: None,
             seal: None,
@@ -159,11 +165,11 @@ impl Desk {
     }
 
     /// A write came to its end on the wire.
-    pub fn wrote(&mut self, id: WriteId, result: WriteResult, board: &Board) -> Option<ActionRecord> {
+    pub fn wrote(&mut self, id: WriteId, result: WriteResult, image: &ProcessImage) -> Option<ActionRecord> {
         let index = self.writes.iter().position(|write| write.0 == id)?;
         let (_, order, tag, raw) = self.writes.swap_remove(index);
         let def = self.def.tag(tag);
-        let value = |back| scale::to_value(def, back, board.scaling_decimals(def).unwrap_or(0));
+        let value = |back| scale::to_value(def, back, image.scaling_decimals(def).unwrap_or(0));
         let outcome = match result {
             WriteResult::ReadBack(back) | WriteResult::Held(back) if scale::same_raw(def, raw, back) => {
                 Outcome::Verified
@@ -177,13 +183,13 @@ impl Desk {
             WriteResult::NotSent(fault) => Outcome::Refused(Refusal::NotSent(fault)),
             WriteResult::Overtaken => Outcome::Refused(Refusal::Overtaken),
         };
-        self.close(order, outcome, board)
+        self.close(order, outcome, image)
     }
 
     /// A line has taken a request: what asks for no answer is done.
-    pub fn delivered(&mut self, line: LineId, request: &BusRequest, board: &Board) -> Option<ActionRecord> {
+    pub fn delivered(&mut self, line: LineId, request: &BusRequest, image: &ProcessImage) -> Option<ActionRecord> {
         let id = self.of_line(line, request)?;
-        self.close(id, Outcome::Verified, board)
+        self.close(id, Outcome::Verified, image)
     }
 
     /// The order under way behind a request to a line that asks for no answer.
@@ -199,18 +205,18 @@ impl Desk {
     }
 
     /// The line had no room for a request: nothing was sent, and whoever wished it is told.
-    pub fn undeliverable(&mut self, line: LineId, request: &BusRequest, board: &Board) -> Option<ActionRecord> {
+    pub fn undeliverable(&mut self, line: LineId, request: &BusRequest, image: &ProcessImage) -> Option<ActionRecord> {
         let busy = Outcome::Refused(Refusal::Busy);
         match request {
             BusRequest::Write { id, .. } => {
                 let index = self.writes.iter().position(|write| write.0 == *id)?;
                 let (_, order, ..) = self.writes.swap_remove(index);
-                self.close(order, busy, board)
+                self.close(order, busy, image)
             }
             BusRequest::Connect(open) => {
                 let wished = Command::Connect(line, *open);
                 let id = self.orders.iter().find(|status| status.command == wished)?.id;
-                self.close(id, busy, board)
+                self.close(id, busy, image)
             }
             // One that nobody ordered is nobody's: the device is read again in its turn.
             BusRequest::Refresh { order, .. } => {
@@ -220,13 +226,13 @@ impl Desk {
             }
             BusRequest::Configure(_) | BusRequest::Test { .. } | BusRequest::StopTest => {
                 let id = self.of_line(line, request)?;
-                self.close(id, busy, board)
+                self.close(id, busy, image)
             }
         }
     }
 
     /// Gives up orders that nobody has answered for. The bus waits in real time, so `speed` is plant seconds per real one.
-    pub fn expire(&mut self, at: Timestamp, speed: f64, board: &Board) -> Vec<ActionRecord> {
+    pub fn expire(&mut self, at: Timestamp, speed: f64, image: &ProcessImage) -> Vec<ActionRecord> {
         let late = |status: &OrderStatus| {
             status.outcome == Outcome::Pending
                 // Its writes are given up one by one.
@@ -240,48 +246,54 @@ impl Desk {
         let late = self.orders.iter().filter(|status| late(status)).map(|status| (status.id, outcome(status)));
         let late: Vec<(OrderId, Outcome)> = late.collect();
         self.writes.retain(|write| late.iter().all(|(id, _)| *id != write.1));
-        late.into_iter().filter_map(|(id, outcome)| self.close(id, outcome, board)).collect()
+        late.into_iter().filter_map(|(id, outcome)| self.close(id, outcome, image)).collect()
     }
 
     /// The station ends: nobody can answer for what is still under way.
-    pub fn stop(&mut self, board: &Board) -> Vec<ActionRecord> {
+    pub fn stop(&mut self, image: &ProcessImage) -> Vec<ActionRecord> {
         self.writes.clear();
         let pending = self.orders.iter().rev().filter(|status| status.outcome == Outcome::Pending);
         let ids: Vec<OrderId> = pending.map(|status| status.id).collect();
         let stopped = || Outcome::NotConfirmed(NotConfirmed::StationStopped);
-        ids.into_iter().filter_map(|id| self.close(id, stopped(), board)).collect()
+        ids.into_iter().filter_map(|id| self.close(id, stopped(), image)).collect()
     }
 
     /// The record that a write is about to be sent: whatever ends the station then, it was tried.
-    pub fn intent(&self, request: &BusRequest, board: &Board) -> Option<ActionRecord> {
+    pub fn intent(&self, request: &BusRequest, image: &ProcessImage) -> Option<ActionRecord> {
         let BusRequest::Write { id, .. } = request else { return None };
         let order = self.writes.iter().find(|write| write.0 == *id)?.1;
         let status = self.orders.iter().find(|status| status.id == order)?;
-        Some(ActionRecord { action: ORDER.into(), outcome: "ordered".into(), ..record(&self.def, status, board) })
+        Some(ActionRecord { action: ORDER.into(), outcome: "ordered".into(), ..record(&self.def, status, image) })
     }
 
     /// Refuses a write over a value that its operator has not seen. A stop is right whatever stood there.
-    fn not_overtaken(&self, board: &Board, order: &Order, tag: TagId, checked: Checked) -> Result<Checked, Outcome> {
+    fn not_overtaken(
+        &self,
+        image: &ProcessImage,
+        order: &Order,
+        tag: TagId,
+        checked: Checked,
+    ) -> Result<Checked, Outcome> {
         let def = self.def.tag(tag);
-        let now = board.trusted_raw(tag).zip(board.scaling_decimals(def)).filter(|_| !checked.urgent);
+        let now = image.trusted_raw(tag).zip(image.scaling_decimals(def)).filter(|_| !checked.urgent);
         let Some((raw, decimals)) = now else { return Ok(checked) };
         let now = scale::to_value(def, raw, decimals);
         let same_raw = |seen| scale::to_raw(def, seen, decimals).is_some_and(|seen| scale::same_raw(def, seen, raw));
         match order.seen {
             Some(seen) if same_raw(seen) => Ok(checked),
-            Some(_) => Err(Outcome::Refused(Refusal::ChangedTo(value_words(board, def, now)))),
-            None => Err(Outcome::Refused(Refusal::NotSeen(value_words(board, def, now)))),
+            Some(_) => Err(Outcome::Refused(Refusal::ChangedTo(value_words(image, def, now)))),
+            None => Err(Outcome::Refused(Refusal::NotSeen(value_words(image, def, now)))),
         }
     }
 
     /// Checks a write against access, choices, bounds, type and what is under way.
-    fn check(&self, board: &Board, tag: TagId, value: f64) -> Result<Checked, Outcome> {
+    fn check(&self, image: &ProcessImage, tag: TagId, value: f64) -> Result<Checked, Outcome> {
         let refuse = |refusal| Err(Outcome::Refused(refusal));
         let def = self.def.tag(tag);
         if !def.writable() {
             return refuse(Refusal::ReadOnly);
         }
-        let decimals = board.scaling_decimals(def);
+        let decimals = image.scaling_decimals(def);
         let held = decimals.and_then(|decimals| scale::held(def, value, decimals));
         let urgent = held.is_some_and(|held| guard::is_stop(&self.def, tag, held));
         let mut under_way = self.writes.iter().filter(|write| write.2 == tag).map(|write| write.3).peekable();
@@ -294,10 +306,10 @@ impl Desk {
         if !def.labels.is_empty() && def.label_of(value).is_none() {
             return refuse(Refusal::NotAChoice);
         }
-        if let Some(lock) = self.def.guards.refusal(tag, held.unwrap_or(value), |tag| board.sample(tag)) {
+        if let Some(lock) = self.def.guards.refusal(tag, held.unwrap_or(value), |tag| image.sample(tag)) {
             return refuse(Refusal::Interlock(lock.text.clone()));
         }
-        let bound = |bound: Option<super::tag::Bound>| bound.map(|bound| board.bound(bound)).transpose();
+        let bound = |bound: Option<super::tag::Bound>| bound.map(|bound| image.bound(bound)).transpose();
         let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
         let (min, max) = (bound(def.min).map_err(unknown)?, bound(def.max).map_err(unknown)?);
         let Some(decimals) = decimals else {
@@ -307,12 +319,12 @@ impl Desk {
         let inside = scale::is_inside(min, max, value) && held.is_none_or(|held| scale::is_inside(min, max, held));
         let raw = scale::to_raw(def, value, decimals).filter(|_| inside);
         let Some(raw) = raw else {
-            let shown = usize::from(board.shown_decimals(def));
+            let shown = usize::from(image.shown_decimals(def));
             let text = |bound: Option<f64>, none: &str| bound.map_or(none.into(), |bound| format!("{bound:.shown$}"));
             return refuse(Refusal::OutOfRange { min: text(min, "−∞"), max: text(max, "∞") });
         };
         // What was read before the write under way says nothing about the time after it.
-        if !is_busy && board.trusted_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw)) {
+        if !is_busy && image.trusted_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw)) {
             return Err(Outcome::Unchanged);
         }
         let raw_of = |key, value| scale::to_raw(self.def.tag(key), value, 0).unwrap_or(value);
@@ -320,7 +332,7 @@ impl Desk {
         // A key that is turned already stays so, unless somebody is just turning it.
         let unlock = unlock.filter(|(key, turned)| {
             let moving = self.writes.iter().any(|write| write.2 == *key);
-            let now = board.trusted_raw(*key).filter(|_| !moving);
+            let now = image.trusted_raw(*key).filter(|_| !moving);
             now.is_none_or(|now| !scale::same_raw(self.def.tag(*key), now, *turned))
         });
         Ok(Checked { raw, unlock, urgent })
@@ -345,10 +357,10 @@ impl Desk {
         }
     }
 
-    fn close(&mut self, id: OrderId, outcome: Outcome, board: &Board) -> Option<ActionRecord> {
+    fn close(&mut self, id: OrderId, outcome: Outcome, image: &ProcessImage) -> Option<ActionRecord> {
         let status = self.orders.iter_mut().find(|status| status.id == id && status.outcome == Outcome::Pending)?;
         status.outcome = outcome;
-        Some(record(&self.def, status, board))
+        Some(record(&self.def, status, image))
     }
 }
 
@@ -376,11 +388,11 @@ pub fn outcome_word(outcome: &Outcome) -> &'static str {
     }
 }
 
-fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
+fn record(def: &PlantDef, status: &OrderStatus, image: &ProcessImage) -> ActionRecord {
     let (action, target, new): (&str, String, Option<String>) = match &status.command {
         Command::Write { tag, value } => {
             let tag = def.tag(*tag);
-            ("write", tag.name.clone(), Some(value_words(board, tag, *value)))
+            ("write", tag.name.clone(), Some(value_words(image, tag, *value)))
         }
         Command::Alarm(command) => alarm_words(def, command),
         Command::Refresh(device) => ("refresh", def.device(*device).name.clone(), None),
@@ -401,7 +413,7 @@ fn record(def: &PlantDef, status: &OrderStatus, board: &Board) -> ActionRecord {
         Command::TakeOver => (TAKE_OVER, def.name.clone(), None),
     };
     let old = status.old.zip(status.command.written());
-    let old = old.map(|(old, (tag, _))| value_words(board, def.tag(tag), old));
+    let old = old.map(|(old, (tag, _))| value_words(image, def.tag(tag), old));
     ActionRecord {
         at: status.at,
         by: status.by.clone(),
@@ -440,12 +452,12 @@ pub fn alarm_words(def: &PlantDef, command: &AlarmCommand) -> (&'static str, Str
 }
 
 /// A value as text with label or unit.
-fn value_words(board: &Board, tag: &TagDef, value: f64) -> String {
+fn value_words(image: &ProcessImage, tag: &TagDef, value: f64) -> String {
     match tag.label_of(value) {
         Some(label) => label.to_owned(),
         None => {
-            let unit = tag.unit_now(|tag| board.sample(tag));
-            format!("{value:.*} {unit}", usize::from(board.shown_decimals(tag))).trim_end().to_owned()
+            let unit = tag.unit_now(|tag| image.sample(tag));
+            format!("{value:.*} {unit}", usize::from(image.shown_decimals(tag))).trim_end().to_owned()
         }
     }
 }

@@ -60,7 +60,7 @@ pub struct StoredSet {
     pub set: Result<Arc<ParameterSet>, Vec<String>>,
 }
 
-/// The values that are trusted now, by tag: a snapshot's or the board's.
+/// The values that are trusted now, by tag: a snapshot's or the image's.
 pub type Trusted<'a> = &'a dyn Fn(TagId) -> Option<f64>;
 
 /// Most characters of a name.

@@ -15,7 +15,6 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::{
     alarm::{AlarmQuality, Book, Meter, command::check_words},
-    board::Board,
     command::{BusRequest, Command, Order, OrderId, Outcome, Refusal, WriteId},
     def::{DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
@@ -23,6 +22,7 @@ use super::{
     line_minute::LineWatch,
     orders::Desk,
     parameter_set::StoredSet,
+    process_image::ProcessImage,
     program::ProgramWatch,
     record::{ActionRecord, Record},
     restore::Restore,
@@ -55,7 +55,7 @@ pub struct Plant {
     at: Timestamp,
     /// Which run of the station, by the instant at which it began.
     run: u64,
-    board: Board,
+    image: ProcessImage,
     book: Book,
     /// Counts the steps of alarms; `quality` is what it said last.
     meter: Meter,
@@ -86,7 +86,7 @@ impl Plant {
     /// Nothing read, nothing connected, as of `at`. `speed` is plant seconds per real second, for display.
     pub fn new(def: Arc<PlantDef>, at: Timestamp, speed: f64) -> Plant {
         Plant {
-            board: Board::new(def.clone(), at),
+            image: ProcessImage::new(def.clone(), at),
             book: Book::new(def.clone()),
             meter: Meter::running(at),
             quality: AlarmQuality::default(),
@@ -119,8 +119,8 @@ impl Plant {
     pub fn on_event(&mut self, event: Event) -> Effects {
         let (at, action) = match event {
             Event::Read { at, device, values, texts, reply, exchange } => {
-                self.board.read(&values, at);
-                self.board.read_texts(&texts, at);
+                self.image.read(&values, at);
+                self.image.read_texts(&texts, at);
                 let tags = values.iter().map(|(tag, _)| *tag).chain(texts.iter().map(|(tag, _)| *tag));
                 self.keep_evidence(tags, exchange);
                 let status = &mut self.devices[device.index()];
@@ -152,9 +152,9 @@ impl Plant {
             }
             Event::Unlocked { at, id, key, result } => {
                 if !matches!(result, WriteResult::Refused(_)) {
-                    self.board.failed(&[key], Fault::Timeout, at);
+                    self.image.failed(&[key], Fault::Timeout, at);
                 }
-                (at, self.desk.unlocked(id, key, &result, &self.board, at))
+                (at, self.desk.unlocked(id, key, &result, &self.image, at))
             }
             Event::Wrote { at, id, result } => (at, self.wrote(id, result, at)),
         };
@@ -169,13 +169,13 @@ impl Plant {
     pub fn on_order(&mut self, order: Order, at: Timestamp) -> Effects {
         let mut effects = Effects::default();
         if let Some(why) = &order.refused {
-            let action = self.desk.note(&order, Outcome::Refused(why.clone()), &self.board, at);
+            let action = self.desk.note(&order, Outcome::Refused(why.clone()), &self.image, at);
             effects.records.extend(action.map(Record::Action));
             self.at = self.at.max(at);
             return effects;
         }
         let action = match order.command.clone() {
-            Command::Write { tag, value } => match self.desk.write(&self.board, &order, tag, value, at) {
+            Command::Write { tag, value } => match self.desk.write(&self.image, &order, tag, value, at) {
                 Ok(request) => {
                     effects.bus.push((self.line_of(tag), request));
                     None
@@ -186,13 +186,13 @@ impl Plant {
             Command::Refresh(device) => {
                 effects.bus.push((self.def.device(device).line, BusRequest::Refresh { device, order: Some(order.id) }));
                 // A read is not an operator action: it is shown, but not recorded.
-                let _ = self.desk.note(&order, Outcome::Verified, &self.board, at);
+                let _ = self.desk.note(&order, Outcome::Verified, &self.image, at);
                 None
             }
             Command::Connect(line, open) => {
                 let is_open = self.lines[line.index()].state != LineState::Disconnected;
                 if is_open == open {
-                    self.desk.note(&order, Outcome::Unchanged, &self.board, at)
+                    self.desk.note(&order, Outcome::Unchanged, &self.image, at)
                 } else {
                     self.desk.take(&order, at);
                     effects.bus.push((line, BusRequest::Connect(open)));
@@ -210,7 +210,7 @@ impl Plant {
                     Ok(()) => Outcome::Verified,
                     Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),
                 };
-                self.desk.note(&order, outcome, &self.board, at)
+                self.desk.note(&order, outcome, &self.image, at)
             }
         };
         effects.records.extend(action.map(Record::Action));
@@ -222,18 +222,18 @@ impl Plant {
 
     /// A line has taken a request.
     pub fn on_delivered(&mut self, line: LineId, request: &BusRequest) -> Effects {
-        let action = self.desk.delivered(line, request, &self.board);
+        let action = self.desk.delivered(line, request, &self.image);
         Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
     }
 
     /// The record that a write is about to be sent; none for other requests.
     pub fn intent(&self, request: &BusRequest) -> Option<ActionRecord> {
-        self.desk.intent(request, &self.board)
+        self.desk.intent(request, &self.image)
     }
 
     /// The station ends, and with it all that is under way.
     pub fn on_stop(&mut self) -> Effects {
-        let ended = self.desk.stop(&self.board);
+        let ended = self.desk.stop(&self.image);
         Effects { records: ended.into_iter().map(Record::Action).collect(), ..Effects::default() }
     }
 
@@ -241,7 +241,7 @@ impl Plant {
     pub fn on_undeliverable(&mut self, line: LineId, request: &BusRequest) -> Effects {
         let action = match self.restore_not_read(request) {
             true => None,
-            false => self.desk.undeliverable(line, request, &self.board),
+            false => self.desk.undeliverable(line, request, &self.image),
         };
         let mut effects = Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() };
         self.carry_on(self.at, &mut effects);
@@ -250,9 +250,9 @@ impl Plant {
 
     /// Time passes: values age, delays run out.
     pub fn on_tick(&mut self, at: Timestamp) -> Effects {
-        self.board.age(at);
+        self.image.age(at);
         self.faults.tick();
-        let expired = self.desk.expire(at, self.speed, &self.board);
+        let expired = self.desk.expire(at, self.speed, &self.image);
         let minutes = self.minutes(at);
         let mut effects = self.settle(at);
         effects.records.extend(minutes);
@@ -270,9 +270,9 @@ impl Plant {
             run: self.run,
             stepped: SignedDuration::ZERO,
             def: self.def.clone(),
-            samples: self.board.samples().to_vec(),
-            texts: self.board.texts().clone(),
-            decimals: self.def.tags.iter().map(|tag| self.board.shown_decimals(tag)).collect(),
+            samples: self.image.samples().to_vec(),
+            texts: self.image.texts().clone(),
+            decimals: self.def.tags.iter().map(|tag| self.image.shown_decimals(tag)).collect(),
             evidence: self.evidence.clone(),
             lines: self.lines.clone(),
             devices: self.diagnosed(),
@@ -316,13 +316,13 @@ impl Plant {
             | WriteResult::Overtaken => None,
         };
         if let Some(tag) = in_doubt {
-            self.board.failed(&[tag], Fault::Timeout, at);
+            self.image.failed(&[tag], Fault::Timeout, at);
         }
-        self.desk.wrote(id, result, &self.board)
+        self.desk.wrote(id, result, &self.image)
     }
 
     fn failed(&mut self, device: DeviceId, tags: &[TagId], fault: Fault, at: Timestamp) {
-        self.board.failed(tags, fault, at);
+        self.image.failed(tags, fault, at);
         let status = &mut self.devices[device.index()];
         let down = matches!(status.state, DeviceState::Down { .. });
         match fault {
@@ -331,7 +331,7 @@ impl Plant {
                 if !down {
                     status.state = DeviceState::Down { since: at };
                 }
-                self.board.gone(device, Cause::DeviceDown, at);
+                self.image.gone(device, Cause::DeviceDown, at);
                 return;
             }
             Fault::NotConnected => return,
@@ -382,14 +382,14 @@ impl Plant {
             LineState::Connecting | LineState::Connected => None,
         };
         self.lines[line.index()].state = state;
-        let action = self.desk.connected(line, open, &self.board);
+        let action = self.desk.connected(line, open, &self.image);
         let Some(device_state) = gone else { return action };
         for device in self.def.devices.iter().filter(|device| device.line == line) {
             let status = &mut self.devices[device.id.index()];
             if !matches!((status.state, device_state), (DeviceState::Down { .. }, DeviceState::Down { .. })) {
                 status.state = device_state;
             }
-            self.board.gone(device.id, Cause::NotConnected, at);
+            self.image.gone(device.id, Cause::NotConnected, at);
         }
         action
     }
@@ -398,10 +398,10 @@ impl Plant {
     fn settle(&mut self, at: Timestamp) -> Effects {
         self.at = self.at.max(at);
         let asked = self.watch_controllers();
-        let board = &self.board;
-        self.watch.look(&self.def.guards, |tag| board.sample(tag), self.at);
+        let image = &self.image;
+        self.watch.look(&self.def.guards, |tag| image.sample(tag), self.at);
         let steps = self.judge_alarms();
-        let mut records = self.board.records(self.at);
+        let mut records = self.image.records(self.at);
         records.extend(steps.into_iter().map(Record::Alarm));
         Effects { bus: asked, records, ..Effects::default() }
     }

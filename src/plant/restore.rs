@@ -71,7 +71,7 @@ pub struct Step {
 /// How a restore stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum State {
-    /// The device is read first: nobody knows how old what is on the board is.
+    /// The device is read first: nobody knows how old what is on the image is.
     Reading,
     /// Writing.
     Running,

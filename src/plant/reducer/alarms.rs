@@ -5,11 +5,11 @@ use jiff::Timestamp;
 use super::{Effects, Plant};
 use crate::plant::{
     alarm::{AlarmCommand, AlarmRefusal, condition::Facts},
-    board::Board,
     command::{NotConfirmed, Order, Outcome, Refusal},
     def::{AlarmDef, AlarmId, Condition, Subject},
     event::LineState,
     ne107::Signal,
+    process_image::ProcessImage,
     record::{ActionRecord, AlarmRecord, AlarmStep, Record},
     snapshot::{DeviceState, DeviceStatus, LineStatus},
     station::{STATION, StationFault, StationFaults},
@@ -40,7 +40,7 @@ impl Plant {
                 let each = seen.iter().map(|(alarm, seen)| book.acknowledge(*alarm, *seen, note, now, by));
                 let (steps, outcome) = together(each);
                 effects.records.extend(steps.into_iter().map(Record::Alarm));
-                return self.desk.note(order, outcome, &self.board, at);
+                return self.desk.note(order, outcome, &self.image, at);
             }
             AlarmCommand::Silence => match book.silence() {
                 true => Ok(Vec::new()),
@@ -48,9 +48,9 @@ impl Plant {
             },
             AlarmCommand::Reset(alarm) => book.reset(alarm, now, by).map(|step| vec![step]),
             AlarmCommand::Shelve { alarm, lasts } => book.shelve(alarm, lasts, note, now, by).map(|step| vec![step]),
-            AlarmCommand::Unshelve(alarm) => book.unshelve(alarm, value_of(&self.def, &self.board, alarm), now, by),
+            AlarmCommand::Unshelve(alarm) => book.unshelve(alarm, value_of(&self.def, &self.image, alarm), now, by),
             AlarmCommand::OutOfService(alarm) => book.out_of_service(alarm, note, now, by).map(|step| vec![step]),
-            AlarmCommand::InService(alarm) => book.in_service(alarm, value_of(&self.def, &self.board, alarm), now, by),
+            AlarmCommand::InService(alarm) => book.in_service(alarm, value_of(&self.def, &self.image, alarm), now, by),
         };
         let outcome = match done {
             Ok(steps) => {
@@ -59,14 +59,14 @@ impl Plant {
             }
             Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),
         };
-        self.desk.note(order, outcome, &self.board, at)
+        self.desk.note(order, outcome, &self.image, at)
     }
 
     /// Judges every alarm now.
     pub(super) fn judge_alarms(&mut self) -> Vec<AlarmRecord> {
         let asks_health = |alarm: &AlarmDef| matches!(alarm.condition, Condition::Health { .. });
         let diagnosed = if self.def.alarms.iter().any(asks_health) { self.diagnosed() } else { Vec::new() };
-        let (def, board, lines, devices) = (&self.def, &self.board, &self.lines, &self.devices);
+        let (def, image, lines, devices) = (&self.def, &self.image, &self.lines, &self.devices);
         let (faults, speed) = (&self.faults, self.speed);
         let ill = |alarm: &AlarmDef| match (alarm.subject, alarm.condition) {
             (Subject::Device(device), Condition::Health { signal }) => {
@@ -84,7 +84,7 @@ impl Plant {
             (Subject::Station, Condition::Station(fault)) => Some(faults.is_active(fault)),
             (Subject::Tag(_) | Subject::Station, _) => None,
         };
-        let mut steps = self.book.judge(self.at, |alarm| facts(board, ill(alarm), alarm));
+        let mut steps = self.book.judge(self.at, |alarm| facts(image, ill(alarm), alarm));
         steps.iter_mut().for_each(|step| explain(step, faults));
         steps
     }
@@ -100,8 +100,8 @@ fn explain(step: &mut AlarmRecord, faults: &StationFaults) {
 }
 
 /// What is known for an alarm. Only good values count: an uncertain one neither raises nor clears.
-fn facts(board: &Board, ill: Option<bool>, alarm: &AlarmDef) -> Facts {
-    let trusted = |tag| board.sample(tag).trusted();
+fn facts(image: &ProcessImage, ill: Option<bool>, alarm: &AlarmDef) -> Facts {
+    let trusted = |tag| image.sample(tag).trusted();
     let value = match alarm.subject {
         Subject::Tag(tag) => trusted(tag),
         Subject::Device(_) | Subject::Line(_) | Subject::Station => None,
@@ -112,8 +112,8 @@ fn facts(board: &Board, ill: Option<bool>, alarm: &AlarmDef) -> Facts {
 }
 
 /// The present value for an alarm that comes back.
-fn value_of(def: &crate::plant::PlantDef, board: &Board, alarm: AlarmId) -> Option<f64> {
-    facts(board, None, def.alarms.get(alarm.index())?).value
+fn value_of(def: &crate::plant::PlantDef, image: &ProcessImage, alarm: AlarmId) -> Option<f64> {
+    facts(image, None, def.alarms.get(alarm.index())?).value
 }
 
 /// A device that refuses everything is as good as silent.

@@ -25,12 +25,12 @@ impl Plant {
 
     /// Follows auto-tunings and programs; what a tuning has found is asked for as soon as it has ended.
     pub(super) fn watch_controllers(&mut self) -> Vec<(LineId, BusRequest)> {
-        let (board, at) = (&self.board, self.at);
-        let sample = |tag: TagId| board.sample(tag);
+        let (image, at) = (&self.image, self.at);
+        let sample = |tag: TagId| image.sample(tag);
         let mut asked = Vec::new();
         for device in &self.def.devices {
             let pv = device.faceplate.as_ref().map(|plate| self.def.tag(plate.pv));
-            let bound = |bound: Option<Bound>| board.bound(bound?).ok();
+            let bound = |bound: Option<Bound>| image.bound(bound?).ok();
             let span = pv.and_then(|pv| Some(bound(pv.max)? - bound(pv.min)?));
             if self.tunings[device.id.index()].take(device, &sample, span, at) == Noticed::Ended {
                 asked.push((device.line, BusRequest::Refresh { device: device.id, order: None }));

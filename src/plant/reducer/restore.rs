@@ -9,10 +9,10 @@ use jiff::Timestamp;
 
 use super::{Effects, Plant};
 use crate::plant::{
-    board::Board,
     command::{BusRequest, Command, NotConfirmed, Order, OrderId, Outcome, Refusal},
     def::{DeviceId, LineId, TagId},
     parameter_set::{self, Problem, StoredSet},
+    process_image::ProcessImage,
     record::{ActionRecord, Record},
     restore::{READ_MAX, Restore, RestoreWish, State, Step},
 };
@@ -43,11 +43,11 @@ impl Plant {
             Command::ReadSets => {
                 effects.sets = Some(SetWork::Read);
                 // A read is not an operator action.
-                let _ = self.desk.note(order, Outcome::Verified, &self.board, at);
+                let _ = self.desk.note(order, Outcome::Verified, &self.image, at);
                 None
             }
             Command::SaveSet { device, name, replace } => {
-                let trusted = trusted(&self.board);
+                let trusted = trusted(&self.image);
                 let set = parameter_set::take(&self.def, *device, name, order.by.clone(), at, &trusted);
                 let problem = match parameter_set::check_name(name) {
                     Err(why) => Some(why),
@@ -55,7 +55,7 @@ impl Plant {
                     Ok(()) => None,
                 };
                 if let Some(why) = problem {
-                    return self.desk.note(order, Outcome::Refused(Refusal::NotSaved(why)), &self.board, at);
+                    return self.desk.note(order, Outcome::Refused(Refusal::NotSaved(why)), &self.image, at);
                 }
                 self.desk.take(order, at);
                 effects.sets = Some(SetWork::Write { order: order.id, set: Box::new(set), replace: *replace });
@@ -71,7 +71,7 @@ impl Plant {
                     }
                     None => Outcome::Unchanged,
                 };
-                self.desk.note(order, outcome, &self.board, at)
+                self.desk.note(order, outcome, &self.image, at)
             }
             _ => None,
         }
@@ -88,11 +88,11 @@ impl Plant {
             Ok(()) => Outcome::Verified,
             Err(why) => Outcome::Refused(Refusal::NotSaved(why)),
         };
-        let action = self.desk.end(order, outcome, &self.board);
+        let action = self.desk.end(order, outcome, &self.image);
         Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
     }
 
-    /// A restore begins with a look at the device: what is on the board may be hours old where tags are read seldom.
+    /// A restore begins with a look at the device: what is on the image may be hours old where tags are read seldom.
     fn begin_restore(
         &mut self,
         order: &Order,
@@ -101,13 +101,13 @@ impl Plant {
         effects: &mut Effects,
     ) -> Option<ActionRecord> {
         if self.restores.iter().any(|run| run.device == wish.device && run.at_work()) {
-            return self.desk.note(order, Outcome::Refused(Refusal::UnderWay), &self.board, at);
+            return self.desk.note(order, Outcome::Refused(Refusal::UnderWay), &self.image, at);
         }
         if let Some(why) = self.unlike(wish.device, &wish.set, &wish.changes) {
-            return self.desk.note(order, Outcome::Refused(why), &self.board, at);
+            return self.desk.note(order, Outcome::Refused(why), &self.image, at);
         }
         if wish.changes.is_empty() {
-            return self.desk.note(order, Outcome::Unchanged, &self.board, at);
+            return self.desk.note(order, Outcome::Unchanged, &self.image, at);
         }
         self.desk.take(order, at);
         self.restores.retain(|run| run.device != wish.device);
@@ -124,7 +124,7 @@ impl Plant {
         set: &parameter_set::ParameterSet,
         confirmed: impl IntoIterator<Item = &'a parameter_set::Change>,
     ) -> Option<Refusal> {
-        match parameter_set::plan(&self.def, device, set, &trusted(&self.board)) {
+        match parameter_set::plan(&self.def, device, set, &trusted(&self.image)) {
             Err(problems) => Some(Refusal::NotFit(first_of(&problems))),
             Ok(changes) => (!changes.iter().eq(confirmed)).then_some(Refusal::Changed),
         }
@@ -185,19 +185,19 @@ impl Plant {
             let (tag, value) = (step.change.tag, step.change.new);
             let seen = Some(step.change.old);
             let order = Order { seen, ..Order::new(id, by, Command::Write { tag, value }) };
-            let refusal = if line_changed { Some(Refusal::LineChanged) } else { overtaken(step, &self.board) };
+            let refusal = if line_changed { Some(Refusal::LineChanged) } else { overtaken(step, &self.image) };
             if let Some(why) = refusal {
-                let action = self.desk.note(&order, Outcome::Refused(why), &self.board, at);
+                let action = self.desk.note(&order, Outcome::Refused(why), &self.image, at);
                 effects.records.extend(action.map(Record::Action));
                 continue;
             }
-            match self.desk.write(&self.board, &order, tag, value, at) {
+            match self.desk.write(&self.image, &order, tag, value, at) {
                 Ok(request) => effects.bus.push((self.line_of(tag), request)),
                 Err(action) => effects.records.extend(action.map(|action| Record::Action(*action))),
             }
         }
         if let Some(outcome) = run.outcome(&self.def) {
-            let action = self.desk.end(run.id, outcome, &self.board);
+            let action = self.desk.end(run.id, outcome, &self.image);
             effects.records.extend(action.map(Record::Action));
         }
     }
@@ -209,7 +209,7 @@ impl Plant {
             run.state = State::Stopped;
         } else if run.line_changed {
             run.give_up(Refusal::LineChanged);
-        } else if run.is_read(&self.def, |tag| self.board.sample(tag)) {
+        } else if run.is_read(&self.def, |tag| self.image.sample(tag)) {
             match self.unlike(run.device, &run.set, run.steps.iter().map(|step| &step.change)) {
                 Some(why) => run.give_up(why),
                 None => run.begin(),
@@ -227,13 +227,13 @@ impl Plant {
 }
 
 /// What is trusted now.
-fn trusted(board: &Board) -> impl Fn(TagId) -> Option<f64> + '_ {
-    |tag| board.sample(tag).trusted()
+fn trusted(image: &ProcessImage) -> impl Fn(TagId) -> Option<f64> + '_ {
+    |tag| image.sample(tag).trusted()
 }
 
 /// Why a step would write over something else than what was confirmed.
-fn overtaken(step: &Step, board: &Board) -> Option<Refusal> {
-    match board.sample(step.change.tag).trusted() {
+fn overtaken(step: &Step, image: &ProcessImage) -> Option<Refusal> {
+    match image.sample(step.change.tag).trusted() {
         None => Some(Refusal::NotKnownNow),
         Some(now) if now != step.change.old => Some(Refusal::ChangedSince),
         Some(_) => None,

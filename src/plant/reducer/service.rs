@@ -19,13 +19,13 @@ impl Plant {
             Command::Configure(settings)
                 if self.def.lines.get(settings.id.index()).is_none_or(|line| line.name != settings.name) =>
             {
-                return self.desk.note(order, Outcome::Refused(Refusal::NotALine), &self.board, at);
+                return self.desk.note(order, Outcome::Refused(Refusal::NotALine), &self.image, at);
             }
             Command::Configure(settings) if let Err(why) = valid(settings) => {
-                return self.desk.note(order, Outcome::Refused(Refusal::NotValid(why)), &self.board, at);
+                return self.desk.note(order, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
             }
             Command::Test(_, diagnostic) if let Err(why) = diagnostic.check() => {
-                return self.desk.note(order, Outcome::Refused(Refusal::NotValid(why)), &self.board, at);
+                return self.desk.note(order, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
             }
             Command::Configure(settings) => {
                 self.remember_settings(settings);
@@ -67,7 +67,7 @@ impl Plant {
             }
             Err(why) => Outcome::Refused(Refusal::NotSaved(why)),
         };
-        let action = self.desk.end(order, outcome, &self.board);
+        let action = self.desk.end(order, outcome, &self.image);
         Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
     }
 

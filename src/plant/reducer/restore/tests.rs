@@ -71,7 +71,7 @@ fn set(sv: f64, high: f64) -> Arc<ParameterSet> {
 }
 
 fn wish(plant: &Plant, set: Arc<ParameterSet>) -> RestoreWish {
-    let changes = plan(&plant.def, TIC, &set, &trusted(&plant.board)).expect("a set that fits");
+    let changes = plan(&plant.def, TIC, &set, &trusted(&plant.image)).expect("a set that fits");
     RestoreWish { device: TIC, from: "winter".into(), set, changes }
 }
 
@@ -161,7 +161,7 @@ fn a_device_that_has_changed_since_is_not_written() {
     let mut plant = plant();
     let wish = wish(&plant, set(40.0, 80.0));
     order(&mut plant, 1, Command::Restore(Box::new(wish.clone())));
-    // On the board it stood as it was confirmed; the device itself says otherwise.
+    // On the image it stood as it was confirmed; the device itself says otherwise.
     let effects = read(&mut plant, 1, 610.0, 100.0);
     let changed = Some(Outcome::Refused(Refusal::Changed));
     assert_eq!((written(&effects), outcome(&plant, 1)), (vec![], changed.clone()));
