@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::plant::{
     Snapshot,
-    alarm::book::subject_name,
+    alarm::manager::subject_name,
     command::{Command, Outcome},
     def::TagId,
     orders::outcome_words,

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::plant::{
     Snapshot,
-    alarm::book::subject_name,
+    alarm::manager::subject_name,
     event::LineState,
     sample::{Quality, Sample},
     snapshot::{ActiveAlarm, AsideAlarm, DeviceState},

@@ -5,7 +5,7 @@ use std::{collections::VecDeque, sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
-    alarm::{AlarmCommand, book::subject_name},
+    alarm::{AlarmCommand, manager::subject_name},
     command::{BusRequest, Command, NotConfirmed, Order, OrderId, OrderStatus, Outcome, Refusal, WriteId},
     def::{AlarmId, LineId, PlantDef, TagId},
     event::{Fault, WriteResult},

@@ -14,7 +14,7 @@ use std::{mem::discriminant, sync::Arc};
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    alarm::{AlarmQuality, Book, Meter, command::check_words},
+    alarm::{AlarmManager, AlarmQuality, Meter, command::check_words},
     command::{BusRequest, Command, Order, OrderId, Outcome, Refusal, WriteId},
     def::{DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
@@ -56,7 +56,7 @@ pub struct Plant {
     /// Which run of the station, by the instant at which it began.
     run: u64,
     image: ProcessImage,
-    book: Book,
+    alarm_manager: AlarmManager,
     /// Counts the steps of alarms; `quality` is what it said last.
     meter: Meter,
     quality: AlarmQuality,
@@ -87,7 +87,7 @@ impl Plant {
     pub fn new(def: Arc<PlantDef>, at: Timestamp, speed: f64) -> Plant {
         Plant {
             image: ProcessImage::new(def.clone(), at),
-            book: Book::new(def.clone()),
+            alarm_manager: AlarmManager::new(def.clone()),
             meter: Meter::running(at),
             quality: AlarmQuality::default(),
             desk: Desk::new(def.clone()),
@@ -264,7 +264,7 @@ impl Plant {
 
     /// The plant as of its last event, order or tick.
     pub fn snapshot(&self) -> Snapshot {
-        let lists = self.book.lists();
+        let lists = self.alarm_manager.lists();
         Snapshot {
             at: self.at,
             run: self.run,

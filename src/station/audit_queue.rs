@@ -21,7 +21,7 @@ use crate::{
     history::alarm_state::LatestSteps,
     plant::{
         Snapshot,
-        alarm::book::subject_name,
+        alarm::manager::subject_name,
         command::{OrderId, OrderStatus, Outcome},
         def::AlarmId,
         record::{ActionRecord, AlarmRecord, Seal},

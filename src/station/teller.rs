@@ -4,7 +4,7 @@ use std::{collections::HashMap, sync::Arc};
 
 use crate::plant::{
     Snapshot,
-    alarm::{AlarmState, book::subject_name},
+    alarm::{AlarmState, manager::subject_name},
     def::AlarmId,
     event::LineState,
     orders::outcome_words,

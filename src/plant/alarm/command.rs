@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::{Book, state::AlarmState};
+use super::{AlarmManager, state::AlarmState};
 use crate::plant::{
     def::{AlarmDef, AlarmId},
     record::{AlarmRecord, AlarmStep},
@@ -96,7 +96,7 @@ pub enum AlarmRefusal {
     InService,
 }
 
-impl Book {
+impl AlarmManager {
     /// Acknowledges one alarm as it was `seen`.
     pub fn acknowledge(
         &mut self,

@@ -20,7 +20,7 @@ pub struct Facts {
     pub enabled: Option<bool>,
 }
 
-/// What a condition that looks back remembers. Instants are of the book's own clock, which never goes back.
+/// What a condition that looks back remembers. Instants are of the manager's own clock, which never goes back.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Memory {
     /// Earlier values, or earlier changes, oldest first.
@@ -93,7 +93,7 @@ impl Memory {
 
 /// Whether the condition holds; while an alarm is already active the limit moves inwards by the deadband, so that
 /// a value that hovers at the limit does not chatter. `None`: it cannot be judged, nothing changes. `now` is an instant of
-/// the book's own clock.
+/// the manager's own clock.
 pub fn holds(condition: Condition, facts: Facts, active: bool, memory: &mut Memory, now: Duration) -> Option<bool> {
     let back = |deadband: f64| if active { deadband } else { 0.0 };
     let passed = |memory: &mut Memory| now.saturating_sub(memory.asked.replace(now).unwrap_or(now));

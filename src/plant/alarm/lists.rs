@@ -1,11 +1,11 @@
-//! What an operator should see of the book: alarms in order of urgency, what is put aside, and whether it sounds.
+//! What an operator should see of the manager: alarms in order of urgency, what is put aside, and whether it sounds.
 
 use std::{cmp::Reverse, sync::Arc};
 
 use jiff::Timestamp;
 
 use super::{
-    Book,
+    AlarmManager,
     state::{AlarmState, Machine, OperatorNote},
 };
 use crate::plant::{
@@ -13,7 +13,7 @@ use crate::plant::{
     snapshot::{ActiveAlarm, AsideAlarm},
 };
 
-/// What a snapshot shows of the book. Shared, because most snapshots show the same.
+/// What a snapshot shows of the manager. Shared, because most snapshots show the same.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Lists {
     /// Most urgent first; among equals those that wait for an acknowledgement, then the latest.
@@ -24,7 +24,7 @@ pub struct Lists {
     pub sound: bool,
 }
 
-impl Book {
+impl AlarmManager {
     /// What an operator should see.
     pub fn lists(&self) -> &Arc<Lists> {
         self.lists.get_or_init(|| Arc::new(self.listed()))

@@ -1,6 +1,6 @@
-//! Alarms: when a condition holds, what state follows, the book of all of them, and how good the alarm system is.
+//! Alarms: when a condition holds, what state follows, the manager of all of them, and how good the alarm system is.
 
-pub mod book;
+pub mod manager;
 pub mod command;
 pub mod condition;
 pub mod def;
@@ -12,8 +12,8 @@ pub mod state;
 #[cfg(test)]
 mod tests;
 
-pub use book::Book;
 pub use command::{AlarmCommand, AlarmRefusal};
+pub use manager::AlarmManager;
 pub use meter::Meter;
 pub use quality::{AlarmQuality, Figures};
 pub use state::AlarmState;

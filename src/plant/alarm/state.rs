@@ -132,7 +132,7 @@ pub struct Machine {
     suppressed: Option<Timestamp>,
     shelved: Option<Shelving>,
     out_of_service: Option<OperatorNote>,
-    /// Since when the condition differs from `active`: the delay runs. An instant of the book's own clock.
+    /// Since when the condition differs from `active`: the delay runs. An instant of the manager's own clock.
     pending_since: Option<Duration>,
     /// The last activation that was annunciated.
     pub raised_at: Option<Timestamp>,
@@ -210,7 +210,7 @@ impl Machine {
 
     /// Takes the judgement of an instant, and says which step follows. A condition must hold (or be gone) for the whole
     /// delay; a flap inside the delay leaves no trace. An unknown judgement (`None`) changes nothing and restarts no delay.
-    /// `now` is an instant of the book's own clock. The step is to be [applied](Machine::apply).
+    /// `now` is an instant of the manager's own clock. The step is to be [applied](Machine::apply).
     pub fn judge(&mut self, holds: Option<bool>, now: Duration, manner: Manner) -> Option<AlarmStep> {
         let holds = holds?;
         if holds == self.active {

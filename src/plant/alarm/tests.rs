@@ -1,11 +1,11 @@
-//! The book as a whole: what is told, acknowledged, put aside, reminded of and restored.
+//! The manager as a whole: what is told, acknowledged, put aside, reminded of and restored.
 
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use proptest::prelude::*;
 
-use super::{AlarmRefusal, AlarmState, Book, condition::Facts};
+use super::{AlarmManager, AlarmRefusal, AlarmState, condition::Facts};
 use crate::plant::{
     def::{AlarmDef, AlarmId, Condition, Level, PlantDef, Subject},
     fixture::{self, HIGH, PV, SILENT},
@@ -35,8 +35,8 @@ fn with(change: impl Fn(&mut AlarmDef)) -> Arc<PlantDef> {
     Arc::new(def)
 }
 
-fn state(book: &Book) -> AlarmState {
-    book.machine(HIGH).state()
+fn state(manager: &AlarmManager) -> AlarmState {
+    manager.machine(HIGH).state()
 }
 
 fn steps(records: &[AlarmRecord]) -> Vec<AlarmStep> {
@@ -45,15 +45,15 @@ fn steps(records: &[AlarmRecord]) -> Vec<AlarmStep> {
 
 #[test]
 fn an_alarm_is_told_with_value_and_limit_and_survives_a_restart() {
-    let mut book = Book::new(fixture::shared());
-    assert!(book.judge(at(0), facts(80.0, true)).is_empty(), "the on-delay runs");
-    let steps = book.judge(at(2), facts(81.0, true));
+    let mut manager = AlarmManager::new(fixture::shared());
+    assert!(manager.judge(at(0), facts(80.0, true)).is_empty(), "the on-delay runs");
+    let steps = manager.judge(at(2), facts(81.0, true));
     assert_eq!(steps.len(), 1);
     assert_eq!((&*steps[0].subject, steps[0].value, steps[0].limit), ("TIC-1.PV", Some(81.0), Some(75.0)));
 
-    let mut again = Book::new(fixture::shared());
+    let mut again = AlarmManager::new(fixture::shared());
     again.restore(&steps);
-    assert_eq!(again.lists(), book.lists());
+    assert_eq!(again.lists(), manager.lists());
     let ack = again.acknowledge(HIGH, at(2), Some(&why()), at(3), &by()).expect("it waits for an acknowledgement");
     assert_eq!((ack.by, ack.reason), (Some(by()), Some(why())));
     assert_eq!(again.acknowledge(HIGH, at(2), None, at(3), &by()), Err(AlarmRefusal::NothingToAcknowledge));
@@ -63,120 +63,123 @@ fn an_alarm_is_told_with_value_and_limit_and_survives_a_restart() {
 
 #[test]
 fn the_list_puts_what_waits_before_what_is_known() {
-    let mut book = Book::new(fixture::shared());
-    book.judge(at(0), facts(80.0, false));
-    book.judge(at(2), facts(80.0, false));
-    assert_eq!(book.active().iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [HIGH, SILENT], "latest first");
-    book.acknowledge(HIGH, at(2), None, at(3), &by()).expect("it waits");
-    assert_eq!(book.active().iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [SILENT, HIGH]);
+    let mut manager = AlarmManager::new(fixture::shared());
+    manager.judge(at(0), facts(80.0, false));
+    manager.judge(at(2), facts(80.0, false));
+    assert_eq!(manager.active().iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [HIGH, SILENT], "latest first");
+    manager.acknowledge(HIGH, at(2), None, at(3), &by()).expect("it waits");
+    assert_eq!(manager.active().iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [SILENT, HIGH]);
 }
 
 #[test]
 fn what_was_raised_after_the_operator_looked_stays_unacknowledged() {
     let def = with(|alarm| alarm.on_delay = Duration::ZERO);
-    let mut book = Book::new(def);
-    book.judge(at(0), facts(80.0, true));
-    let seen = book.active()[0].raised_at;
-    book.judge(at(1), facts(70.0, true));
-    book.judge(at(2), facts(80.0, true));
-    assert_eq!(book.acknowledge(HIGH, seen, None, at(3), &by()), Err(AlarmRefusal::RaisedSince));
-    assert_eq!(state(&book), AlarmState::Unacknowledged);
-    assert!(book.acknowledge(HIGH, at(2), None, at(3), &by()).is_ok());
+    let mut manager = AlarmManager::new(def);
+    manager.judge(at(0), facts(80.0, true));
+    let seen = manager.active()[0].raised_at;
+    manager.judge(at(1), facts(70.0, true));
+    manager.judge(at(2), facts(80.0, true));
+    assert_eq!(manager.acknowledge(HIGH, seen, None, at(3), &by()), Err(AlarmRefusal::RaisedSince));
+    assert_eq!(state(&manager), AlarmState::Unacknowledged);
+    assert!(manager.acknowledge(HIGH, at(2), None, at(3), &by()).is_ok());
 }
 
 #[test]
 fn a_note_is_asked_for_where_the_plant_wants_one() {
     let def = with(|alarm| (alarm.on_delay, alarm.note) = (Duration::ZERO, true));
-    let mut book = Book::new(def);
-    book.judge(at(0), facts(80.0, true));
+    let mut manager = AlarmManager::new(def);
+    manager.judge(at(0), facts(80.0, true));
     for note in [None, Some("".into()), Some("  ".into())] {
-        assert_eq!(book.acknowledge(HIGH, at(0), note.as_ref(), at(1), &by()), Err(AlarmRefusal::NoteNeeded));
+        assert_eq!(manager.acknowledge(HIGH, at(0), note.as_ref(), at(1), &by()), Err(AlarmRefusal::NoteNeeded));
     }
     let long: Arc<str> = "x".repeat(501).into();
-    assert_eq!(book.acknowledge(HIGH, at(0), Some(&long), at(1), &by()), Err(AlarmRefusal::TooLong));
-    assert!(book.acknowledge(HIGH, at(0), Some(&why()), at(1), &by()).is_ok());
+    assert_eq!(manager.acknowledge(HIGH, at(0), Some(&long), at(1), &by()), Err(AlarmRefusal::TooLong));
+    assert!(manager.acknowledge(HIGH, at(0), Some(&why()), at(1), &by()).is_ok());
 }
 
 #[test]
 fn silence_ends_what_sounds_and_a_return_never_sounds() {
-    let mut book = Book::new(with(|alarm| alarm.on_delay = Duration::ZERO));
-    assert!(!book.silence(), "nothing sounds");
-    book.judge(at(0), facts(80.0, true));
-    assert!(book.lists().sound);
-    assert!(book.silence());
-    assert!(!book.lists().sound);
-    assert_eq!(state(&book), AlarmState::Unacknowledged, "silence acknowledges nothing");
-    book.judge(at(1), facts(80.0, false));
-    assert!(book.lists().sound, "a new alarm sounds");
-    book.silence();
-    book.judge(at(2), facts(70.0, true));
-    assert!(!book.lists().sound, "both have returned");
+    let mut manager = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::ZERO));
+    assert!(!manager.silence(), "nothing sounds");
+    manager.judge(at(0), facts(80.0, true));
+    assert!(manager.lists().sound);
+    assert!(manager.silence());
+    assert!(!manager.lists().sound);
+    assert_eq!(state(&manager), AlarmState::Unacknowledged, "silence acknowledges nothing");
+    manager.judge(at(1), facts(80.0, false));
+    assert!(manager.lists().sound, "a new alarm sounds");
+    manager.silence();
+    manager.judge(at(2), facts(70.0, true));
+    assert!(!manager.lists().sound, "both have returned");
 }
 
 #[test]
 fn a_reset_does_nothing_while_the_cause_lasts() {
-    let mut book = Book::new(with(|alarm| (alarm.on_delay, alarm.latch) = (Duration::ZERO, true)));
-    assert_eq!(book.reset(HIGH, at(0), &by()), Err(AlarmRefusal::NothingToReset));
-    book.judge(at(0), facts(80.0, true));
-    assert_eq!(book.reset(HIGH, at(1), &by()), Err(AlarmRefusal::CauseLasts));
-    book.judge(at(2), facts(70.0, true));
-    assert_eq!(state(&book), AlarmState::LatchedUnacknowledged);
-    book.acknowledge(HIGH, at(0), None, at(3), &by()).expect("it waits");
-    assert_eq!(state(&book), AlarmState::LatchedAcknowledged);
-    book.reset(HIGH, at(4), &by()).expect("the cause has gone");
-    assert_eq!(state(&book), AlarmState::Normal);
+    let mut manager = AlarmManager::new(with(|alarm| (alarm.on_delay, alarm.latch) = (Duration::ZERO, true)));
+    assert_eq!(manager.reset(HIGH, at(0), &by()), Err(AlarmRefusal::NothingToReset));
+    manager.judge(at(0), facts(80.0, true));
+    assert_eq!(manager.reset(HIGH, at(1), &by()), Err(AlarmRefusal::CauseLasts));
+    manager.judge(at(2), facts(70.0, true));
+    assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged);
+    manager.acknowledge(HIGH, at(0), None, at(3), &by()).expect("it waits");
+    assert_eq!(state(&manager), AlarmState::LatchedAcknowledged);
+    manager.reset(HIGH, at(4), &by()).expect("the cause has gone");
+    assert_eq!(state(&manager), AlarmState::Normal);
 }
 
 #[test]
 fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
-    let mut book = Book::new(with(|alarm| alarm.on_delay = Duration::ZERO));
+    let mut manager = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::ZERO));
     let minute = Duration::from_secs(60);
-    let max = book.def.alarm_rules.shelve_max;
+    let max = manager.def.alarm_rules.shelve_max;
     for (lasts, reason, refusal) in [
         (minute, "", AlarmRefusal::ReasonNeeded),
         (Duration::ZERO, "leak", AlarmRefusal::ShelveTime { max }),
         (max + minute, "leak", AlarmRefusal::ShelveTime { max }),
     ] {
-        assert_eq!(book.shelve(HIGH, lasts, Some(&reason.into()), at(0), &by()), Err(refusal));
+        assert_eq!(manager.shelve(HIGH, lasts, Some(&reason.into()), at(0), &by()), Err(refusal));
     }
-    book.shelve(HIGH, minute, Some(&why()), at(0), &by()).expect("a minute, with a reason");
-    assert_eq!(steps(&book.judge(at(10), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
-    assert!(!book.lists().sound && book.active().is_empty());
-    let aside = book.lists().aside[0].clone();
+    manager.shelve(HIGH, minute, Some(&why()), at(0), &by()).expect("a minute, with a reason");
+    assert_eq!(steps(&manager.judge(at(10), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
+    assert!(!manager.lists().sound && manager.active().is_empty());
+    let aside = manager.lists().aside[0].clone();
     assert_eq!((aside.until, aside.active, aside.note.reason), (Some(at(60)), true, Some(why())));
-    assert_eq!(steps(&book.judge(at(59), facts(80.0, true))), []);
-    assert_eq!(steps(&book.judge(at(60), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
-    assert_eq!((state(&book), book.active()[0].raised_at), (AlarmState::Unacknowledged, at(60)));
-    book.shelve(HIGH, minute, Some(&why()), at(70), &by()).expect("again");
-    assert_eq!(steps(&book.judge(at(71), facts(70.0, true))), [AlarmStep::ReturnedQuietly]);
-    assert_eq!(steps(&book.unshelve(HIGH, None, at(72), &by()).expect("it is shelved")), [AlarmStep::Unshelved]);
-    assert_eq!(state(&book), AlarmState::Normal);
-    assert_eq!(book.unshelve(HIGH, None, at(73), &by()), Err(AlarmRefusal::NotShelved));
+    assert_eq!(steps(&manager.judge(at(59), facts(80.0, true))), []);
+    assert_eq!(steps(&manager.judge(at(60), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
+    assert_eq!((state(&manager), manager.active()[0].raised_at), (AlarmState::Unacknowledged, at(60)));
+    manager.shelve(HIGH, minute, Some(&why()), at(70), &by()).expect("again");
+    assert_eq!(steps(&manager.judge(at(71), facts(70.0, true))), [AlarmStep::ReturnedQuietly]);
+    assert_eq!(steps(&manager.unshelve(HIGH, None, at(72), &by()).expect("it is shelved")), [AlarmStep::Unshelved]);
+    assert_eq!(state(&manager), AlarmState::Normal);
+    assert_eq!(manager.unshelve(HIGH, None, at(73), &by()), Err(AlarmRefusal::NotShelved));
 }
 
 #[test]
 fn a_clock_that_goes_back_lengthens_no_shelf_and_no_delay() {
-    let mut book = Book::new(with(|alarm| alarm.on_delay = Duration::from_secs(10)));
-    book.judge(at(10_000), facts(80.0, true));
-    book.judge(at(10_006), facts(80.0, true));
-    book.judge(at(100), facts(80.0, true));
-    assert_eq!(steps(&book.judge(at(104), facts(80.0, true))), [AlarmStep::Raised], "6 s and 4 s");
-    book.shelve(HIGH, Duration::from_secs(600), Some(&why()), at(5_000), &by()).expect("ten minutes");
-    assert_eq!(steps(&book.judge(at(200), facts(80.0, true))), [AlarmStep::Shelved]);
-    assert_eq!(book.lists().aside[0].until, Some(at(800)));
-    assert_eq!(steps(&book.judge(at(800), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
+    let mut manager = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::from_secs(10)));
+    manager.judge(at(10_000), facts(80.0, true));
+    manager.judge(at(10_006), facts(80.0, true));
+    manager.judge(at(100), facts(80.0, true));
+    assert_eq!(steps(&manager.judge(at(104), facts(80.0, true))), [AlarmStep::Raised], "6 s and 4 s");
+    manager.shelve(HIGH, Duration::from_secs(600), Some(&why()), at(5_000), &by()).expect("ten minutes");
+    assert_eq!(steps(&manager.judge(at(200), facts(80.0, true))), [AlarmStep::Shelved]);
+    assert_eq!(manager.lists().aside[0].until, Some(at(800)));
+    assert_eq!(steps(&manager.judge(at(800), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
 }
 
 #[test]
 fn an_alarm_out_of_service_stays_so_until_somebody_puts_it_back() {
-    let mut book = Book::new(with(|alarm| alarm.on_delay = Duration::ZERO));
-    assert_eq!(book.out_of_service(HIGH, Some(&" ".into()), at(0), &by()), Err(AlarmRefusal::ReasonNeeded));
-    assert_eq!(book.in_service(HIGH, None, at(0), &by()), Err(AlarmRefusal::InService));
-    book.out_of_service(HIGH, Some(&why()), at(0), &by()).expect("with a reason");
-    assert_eq!(book.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()), Err(AlarmRefusal::OutOfService));
-    assert_eq!(steps(&book.judge(at(100_000), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
-    assert_eq!(book.lists().aside[0].state, AlarmState::OutOfService);
-    let back = book.in_service(HIGH, Some(80.0), at(100_001), &by()).expect("it is out of service");
+    let mut manager = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::ZERO));
+    assert_eq!(manager.out_of_service(HIGH, Some(&" ".into()), at(0), &by()), Err(AlarmRefusal::ReasonNeeded));
+    assert_eq!(manager.in_service(HIGH, None, at(0), &by()), Err(AlarmRefusal::InService));
+    manager.out_of_service(HIGH, Some(&why()), at(0), &by()).expect("with a reason");
+    assert_eq!(
+        manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()),
+        Err(AlarmRefusal::OutOfService)
+    );
+    assert_eq!(steps(&manager.judge(at(100_000), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
+    assert_eq!(manager.lists().aside[0].state, AlarmState::OutOfService);
+    let back = manager.in_service(HIGH, Some(80.0), at(100_001), &by()).expect("it is out of service");
     assert_eq!(steps(&back), [AlarmStep::InService, AlarmStep::Raised]);
     assert_eq!(back[1].value, Some(80.0));
 }
@@ -198,50 +201,51 @@ fn enabled_with(value: f64, enabled: bool) -> impl Fn(&AlarmDef) -> Facts {
 
 #[test]
 fn a_latching_alarm_that_came_and_went_while_suppressed_is_normal_on_release() {
-    let mut book = Book::new(enabled_by_design(|alarm| alarm.latch = true));
-    let mut journal = book.judge(at(0), enabled_with(80.0, false));
-    journal.extend(book.judge(at(1), enabled_with(70.0, false)));
+    let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.latch = true));
+    let mut journal = manager.judge(at(0), enabled_with(80.0, false));
+    journal.extend(manager.judge(at(1), enabled_with(70.0, false)));
     assert_eq!(steps(&journal), [AlarmStep::Suppressed, AlarmStep::RaisedQuietly, AlarmStep::ReturnedQuietly]);
-    assert_eq!(steps(&book.judge(at(2), enabled_with(70.0, true))), [AlarmStep::Released]);
-    assert_eq!((state(&book), book.active().len()), (AlarmState::Normal, 0));
-    assert_eq!(steps(&book.judge(at(3), enabled_with(80.0, true))), [AlarmStep::Raised]);
-    book.judge(at(4), enabled_with(70.0, true));
-    assert_eq!(state(&book), AlarmState::LatchedUnacknowledged, "it still latches");
+    assert_eq!(steps(&manager.judge(at(2), enabled_with(70.0, true))), [AlarmStep::Released]);
+    assert_eq!((state(&manager), manager.active().len()), (AlarmState::Normal, 0));
+    assert_eq!(steps(&manager.judge(at(3), enabled_with(80.0, true))), [AlarmStep::Raised]);
+    manager.judge(at(4), enabled_with(70.0, true));
+    assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged, "it still latches");
 }
 
 #[test]
 fn a_latching_alarm_released_while_shelved_comes_back_latched() {
-    let mut book = Book::new(enabled_by_design(|alarm| alarm.latch = true));
-    book.judge(at(0), enabled_with(80.0, false));
-    book.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()).expect("a minute, with a reason");
+    let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.latch = true));
+    manager.judge(at(0), enabled_with(80.0, false));
+    manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()).expect("a minute, with a reason");
     let quietly = [AlarmStep::Released, AlarmStep::RaisedQuietly];
-    assert_eq!(steps(&book.judge(at(2), enabled_with(80.0, true))), quietly);
-    assert_eq!(steps(&book.judge(at(3), enabled_with(70.0, true))), [AlarmStep::ReturnedQuietly]);
-    assert_eq!(steps(&book.judge(at(61), enabled_with(70.0, true))), [AlarmStep::Unshelved]);
-    assert_eq!(state(&book), AlarmState::LatchedUnacknowledged);
+    assert_eq!(steps(&manager.judge(at(2), enabled_with(80.0, true))), quietly);
+    assert_eq!(steps(&manager.judge(at(3), enabled_with(70.0, true))), [AlarmStep::ReturnedQuietly]);
+    assert_eq!(steps(&manager.judge(at(61), enabled_with(70.0, true))), [AlarmStep::Unshelved]);
+    assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged);
 }
 
 #[test]
 fn an_on_delay_begins_when_the_suppression_ends() {
     let delay = Duration::from_secs(30);
-    let mut book = Book::new(enabled_by_design(move |alarm| alarm.on_delay = delay));
-    assert_eq!(steps(&book.judge(at(0), enabled_with(70.0, false))), [AlarmStep::Suppressed]);
-    assert_eq!(steps(&book.judge(at(1), enabled_with(80.0, false))), []);
-    assert_eq!(steps(&book.judge(at(25), enabled_with(80.0, true))), [AlarmStep::Released]);
-    assert_eq!(steps(&book.judge(at(54), enabled_with(80.0, true))), [], "enabled for 29 s");
-    assert_eq!(steps(&book.judge(at(55), enabled_with(80.0, true))), [AlarmStep::Raised]);
+    let mut manager = AlarmManager::new(enabled_by_design(move |alarm| alarm.on_delay = delay));
+    assert_eq!(steps(&manager.judge(at(0), enabled_with(70.0, false))), [AlarmStep::Suppressed]);
+    assert_eq!(steps(&manager.judge(at(1), enabled_with(80.0, false))), []);
+    assert_eq!(steps(&manager.judge(at(25), enabled_with(80.0, true))), [AlarmStep::Released]);
+    assert_eq!(steps(&manager.judge(at(54), enabled_with(80.0, true))), [], "enabled for 29 s");
+    assert_eq!(steps(&manager.judge(at(55), enabled_with(80.0, true))), [AlarmStep::Raised]);
 }
 
 #[test]
 fn the_on_delay_of_a_rate_begins_when_the_suppression_ends() {
     let rate = Condition::Rate { limit: 6.0, over: Duration::from_secs(10), deadband: 0.0 };
     let delay = Duration::from_secs(30);
-    let mut book = Book::new(enabled_by_design(move |alarm| (alarm.condition, alarm.on_delay) = (rate, delay)));
+    let mut manager =
+        AlarmManager::new(enabled_by_design(move |alarm| (alarm.condition, alarm.on_delay) = (rate, delay)));
     let mut raised = Vec::new();
     for second in 0..100 {
         // The delay has run for 9 s when the alarm is suppressed.
         let enabled = !(20..40).contains(&second);
-        let records = book.judge(at(second), enabled_with(second as f64, enabled));
+        let records = manager.judge(at(second), enabled_with(second as f64, enabled));
         raised.extend(records.iter().filter(|record| record.step == AlarmStep::Raised).map(|_| second));
     }
     assert_eq!(raised, [80], "40 s, 10 s of window, 30 s of delay");
@@ -250,23 +254,23 @@ fn the_on_delay_of_a_rate_begins_when_the_suppression_ends() {
 #[test]
 fn shelving_and_out_of_service_acknowledge_no_latched_alarm() {
     for shelved in [true, false] {
-        let mut book = Book::new(with(|alarm| (alarm.on_delay, alarm.latch) = (Duration::ZERO, true)));
-        let mut journal = book.judge(at(0), facts(80.0, true));
-        journal.extend(book.judge(at(1), facts(70.0, true)));
-        assert_eq!(state(&book), AlarmState::LatchedUnacknowledged);
+        let mut manager = AlarmManager::new(with(|alarm| (alarm.on_delay, alarm.latch) = (Duration::ZERO, true)));
+        let mut journal = manager.judge(at(0), facts(80.0, true));
+        journal.extend(manager.judge(at(1), facts(70.0, true)));
+        assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged);
         let back = if shelved {
-            journal.extend(book.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(2), &by()));
-            book.unshelve(HIGH, None, at(3), &by())
+            journal.extend(manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(2), &by()));
+            manager.unshelve(HIGH, None, at(3), &by())
         } else {
-            journal.extend(book.out_of_service(HIGH, Some(&why()), at(2), &by()));
-            book.in_service(HIGH, None, at(3), &by())
+            journal.extend(manager.out_of_service(HIGH, Some(&why()), at(2), &by()));
+            manager.in_service(HIGH, None, at(3), &by())
         };
         journal.extend(back.expect("it is suppressed"));
-        assert_eq!(state(&book), AlarmState::LatchedUnacknowledged, "shelved: {shelved}");
-        let mut again = Book::new(book.def.clone());
+        assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged, "shelved: {shelved}");
+        let mut again = AlarmManager::new(manager.def.clone());
         again.restore(&journal);
-        assert_eq!(again.lists(), book.lists());
-        book.acknowledge(HIGH, at(0), None, at(4), &by()).expect("it waits");
+        assert_eq!(again.lists(), manager.lists());
+        manager.acknowledge(HIGH, at(0), None, at(4), &by()).expect("it waits");
     }
 }
 
@@ -274,14 +278,14 @@ fn shelving_and_out_of_service_acknowledge_no_latched_alarm() {
 fn an_alarm_that_is_not_enabled_tells_nobody_and_an_unknown_enabling_suppresses_nothing() {
     let when =
         |value: f64, enabled| move |_: &AlarmDef| Facts { enabled, ..facts(value, true)(&fixture::plant().alarms[0]) };
-    let mut book = Book::new(enabled_by_design(|_| ()));
+    let mut manager = AlarmManager::new(enabled_by_design(|_| ()));
     let quiet = [AlarmStep::Suppressed, AlarmStep::RaisedQuietly];
-    assert_eq!(steps(&book.judge(at(0), when(80.0, Some(false)))), quiet);
-    assert_eq!((state(&book), book.lists().sound), (AlarmState::Suppressed, false));
-    assert_eq!(steps(&book.judge(at(1), when(80.0, Some(true)))), [AlarmStep::Released, AlarmStep::Raised]);
-    let mut unknown = Book::new(enabled_by_design(|_| ()));
+    assert_eq!(steps(&manager.judge(at(0), when(80.0, Some(false)))), quiet);
+    assert_eq!((state(&manager), manager.lists().sound), (AlarmState::Suppressed, false));
+    assert_eq!(steps(&manager.judge(at(1), when(80.0, Some(true)))), [AlarmStep::Released, AlarmStep::Raised]);
+    let mut unknown = AlarmManager::new(enabled_by_design(|_| ()));
     assert_eq!(steps(&unknown.judge(at(0), when(80.0, None))), [AlarmStep::Raised]);
-    let mut delayed = Book::new(enabled_by_design(|alarm| alarm.on_delay = Duration::from_secs(5)));
+    let mut delayed = AlarmManager::new(enabled_by_design(|alarm| alarm.on_delay = Duration::from_secs(5)));
     delayed.judge(at(0), when(80.0, Some(false)));
     assert_eq!(steps(&delayed.judge(at(5), when(80.0, Some(false)))), [AlarmStep::RaisedQuietly]);
     let anew = [AlarmStep::Released, AlarmStep::ReturnedQuietly];
@@ -294,11 +298,11 @@ fn an_alarm_that_is_not_enabled_tells_nobody_and_an_unknown_enabling_suppresses_
 fn a_restart_or_a_lost_frame_brings_nothing_back_that_is_suppressed_but_a_long_silence_does() {
     let when =
         |value: f64, enabled| move |_: &AlarmDef| Facts { enabled, ..facts(value, true)(&fixture::plant().alarms[0]) };
-    let mut book = Book::new(enabled_by_design(|_| ()));
-    let journal = book.judge(at(0), when(80.0, Some(false)));
-    assert_eq!(steps(&book.judge(at(1), when(80.0, None))), [], "a lost frame");
-    assert_eq!(steps(&book.judge(at(2), when(80.0, Some(false)))), []);
-    let mut again = Book::new(enabled_by_design(|_| ()));
+    let mut manager = AlarmManager::new(enabled_by_design(|_| ()));
+    let journal = manager.judge(at(0), when(80.0, Some(false)));
+    assert_eq!(steps(&manager.judge(at(1), when(80.0, None))), [], "a lost frame");
+    assert_eq!(steps(&manager.judge(at(2), when(80.0, Some(false)))), []);
+    let mut again = AlarmManager::new(enabled_by_design(|_| ()));
     again.restore(&journal);
     for (second, enabled, expect) in [
         (1_000, None, vec![]),
@@ -311,7 +315,7 @@ fn a_restart_or_a_lost_frame_brings_nothing_back_that_is_suppressed_but_a_long_s
     ] {
         assert_eq!(steps(&again.judge(at(second), when(80.0, enabled))), expect, "at {second} s");
     }
-    let mut free = Book::new(with(|alarm| alarm.on_delay = Duration::ZERO));
+    let mut free = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::ZERO));
     free.restore(&journal);
     assert_eq!(steps(&free.judge(at(1), facts(70.0, true)))[0], AlarmStep::ReturnedQuietly);
     assert!(free.machine(HIGH).suppressed().is_none(), "the plant file enables it by nothing any more");
@@ -323,23 +327,23 @@ fn what_was_annunciated_stays_until_somebody_has_answered_to_it_though_its_enabl
         move |_: &AlarmDef| Facts { enabled: Some(enabled), ..facts(80.0, true)(&fixture::plant().alarms[0]) }
     };
     let latch = |alarm: &mut AlarmDef| (alarm.latch, alarm.on_delay) = (true, Duration::ZERO);
-    let mut book = Book::new(enabled_by_design(latch));
-    assert_eq!(steps(&book.judge(at(0), when(true))), [AlarmStep::Raised]);
-    assert_eq!(steps(&book.judge(at(1), when(false))), [AlarmStep::Returned]);
-    assert_eq!((state(&book), book.lists().sound), (AlarmState::LatchedUnacknowledged, false));
-    assert_eq!(steps(&book.judge(at(2), when(false))), [], "it is neither raised anew nor taken away");
-    book.acknowledge(HIGH, at(0), None, at(3), &by()).expect("it waits");
-    assert_eq!(steps(&book.judge(at(4), when(false))), []);
-    assert_eq!(state(&book), AlarmState::LatchedAcknowledged);
-    book.reset(HIGH, at(5), &by()).expect("its cause is gone");
-    assert_eq!(steps(&book.judge(at(6), when(false)))[0], AlarmStep::Suppressed);
-    assert_eq!(state(&book), AlarmState::Suppressed);
+    let mut manager = AlarmManager::new(enabled_by_design(latch));
+    assert_eq!(steps(&manager.judge(at(0), when(true))), [AlarmStep::Raised]);
+    assert_eq!(steps(&manager.judge(at(1), when(false))), [AlarmStep::Returned]);
+    assert_eq!((state(&manager), manager.lists().sound), (AlarmState::LatchedUnacknowledged, false));
+    assert_eq!(steps(&manager.judge(at(2), when(false))), [], "it is neither raised anew nor taken away");
+    manager.acknowledge(HIGH, at(0), None, at(3), &by()).expect("it waits");
+    assert_eq!(steps(&manager.judge(at(4), when(false))), []);
+    assert_eq!(state(&manager), AlarmState::LatchedAcknowledged);
+    manager.reset(HIGH, at(5), &by()).expect("its cause is gone");
+    assert_eq!(steps(&manager.judge(at(6), when(false)))[0], AlarmStep::Suppressed);
+    assert_eq!(state(&manager), AlarmState::Suppressed);
 }
 
 #[test]
 fn a_value_that_stood_still_before_the_heating_is_not_stuck() {
     let stuck = Condition::NoChange { lasts: Duration::from_secs(60), deadband: 0.1 };
-    let mut book = Book::new(enabled_by_design(|alarm| alarm.condition = stuck));
+    let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.condition = stuck));
     let when = |enabled| move |_: &AlarmDef| Facts { value: Some(20.0), enabled: Some(enabled), ..Facts::default() };
     for (second, enabled, expect) in [
         (0, false, vec![AlarmStep::Suppressed]),
@@ -349,7 +353,7 @@ fn a_value_that_stood_still_before_the_heating_is_not_stuck() {
         (661, true, vec![AlarmStep::Raised]),
         (662, false, vec![AlarmStep::Returned]),
     ] {
-        assert_eq!(steps(&book.judge(at(second), when(enabled))), expect, "at {second} s");
+        assert_eq!(steps(&manager.judge(at(second), when(enabled))), expect, "at {second} s");
     }
 }
 
@@ -358,25 +362,25 @@ fn an_acknowledged_alarm_that_lasts_is_reminded_of() {
     let remind = |alarm: &mut AlarmDef| {
         (alarm.on_delay, alarm.re_alarm) = (Duration::ZERO, Some(Duration::from_secs(1_800)));
     };
-    let mut book = Book::new(with(remind));
-    let mut journal = book.judge(at(0), facts(80.0, true));
-    journal.push(book.acknowledge(HIGH, at(0), None, at(10), &by()).expect("it waits"));
-    book.silence();
-    assert_eq!(steps(&book.judge(at(1_809), facts(80.0, true))), []);
-    let mut again = Book::new(with(remind));
+    let mut manager = AlarmManager::new(with(remind));
+    let mut journal = manager.judge(at(0), facts(80.0, true));
+    journal.push(manager.acknowledge(HIGH, at(0), None, at(10), &by()).expect("it waits"));
+    manager.silence();
+    assert_eq!(steps(&manager.judge(at(1_809), facts(80.0, true))), []);
+    let mut again = AlarmManager::new(with(remind));
     again.restore(&journal);
     assert_eq!(
         steps(&again.judge(at(1_810), facts(80.0, true))),
         [AlarmStep::RaisedAgain],
         "a restart forgets no time"
     );
-    assert_eq!(steps(&book.judge(at(1_810), facts(80.0, true))), [AlarmStep::RaisedAgain]);
-    assert_eq!((state(&book), book.lists().sound), (AlarmState::Unacknowledged, true));
-    assert_eq!(book.active()[0].raised_at, at(0), "it is the same activation");
-    let early = book.acknowledge(HIGH, at(0), None, at(1_811), &by());
+    assert_eq!(steps(&manager.judge(at(1_810), facts(80.0, true))), [AlarmStep::RaisedAgain]);
+    assert_eq!((state(&manager), manager.lists().sound), (AlarmState::Unacknowledged, true));
+    assert_eq!(manager.active()[0].raised_at, at(0), "it is the same activation");
+    let early = manager.acknowledge(HIGH, at(0), None, at(1_811), &by());
     assert_eq!(early, Err(AlarmRefusal::RaisedSince), "a window from before the reminder acknowledges nothing");
-    let seen = book.active()[0].annunciated_at;
-    assert!(book.acknowledge(HIGH, seen, None, at(1_812), &by()).is_ok());
+    let seen = manager.active()[0].annunciated_at;
+    assert!(manager.acknowledge(HIGH, seen, None, at(1_812), &by()).is_ok());
 }
 
 /// A plant with so many alarms on PV, each with a limit of its own.
@@ -392,17 +396,17 @@ fn many(count: u16) -> Arc<PlantDef> {
 
 #[test]
 fn of_a_storm_none_is_lost_and_the_first_out_is_marked() {
-    let mut book = Book::new(many(10_000));
+    let mut manager = AlarmManager::new(many(10_000));
     let mut raised = Vec::new();
     for second in 0..60 {
-        raised.extend(book.judge(at(second), facts(second as f64 * 500.0 / 59.0 + 0.5, true)));
+        raised.extend(manager.judge(at(second), facts(second as f64 * 500.0 / 59.0 + 0.5, true)));
     }
     assert_eq!(raised.len(), 501);
-    assert_eq!(book.active().len(), 501);
+    assert_eq!(manager.active().len(), 501);
     assert!(raised.iter().all(|record| record.burst.is_some_and(|burst| burst.began == at(0))), "one burst");
     let ranks: Vec<u32> = raised.iter().filter_map(|record| record.burst.map(|burst| burst.rank)).collect();
     assert_eq!(ranks, (1..=501).collect::<Vec<u32>>());
-    let later = book.judge(at(80), facts(501.5, true));
+    let later = manager.judge(at(80), facts(501.5, true));
     assert_eq!(later[0].burst.map(|burst| (burst.began, burst.rank)), Some((at(80), 1)), "another one");
 }
 
@@ -449,12 +453,12 @@ fn remembered(journal: &[AlarmRecord]) -> Vec<AlarmRecord> {
 }
 
 /// What a restart must bring back: all but the count since the start and what sounds.
-fn lasting(book: &Book) -> impl PartialEq + std::fmt::Debug {
+fn lasting(manager: &AlarmManager) -> impl PartialEq + std::fmt::Debug {
     let active =
-        book.lists().active.iter().map(|alarm| super::super::snapshot::ActiveAlarm { times: 0, ..alarm.clone() });
-    let machine = book.machine(HIGH);
+        manager.lists().active.iter().map(|alarm| super::super::snapshot::ActiveAlarm { times: 0, ..alarm.clone() });
+    let machine = manager.machine(HIGH);
     let kept = (machine.is_active(), machine.is_latched(), machine.suppressed(), machine.shelved().cloned());
-    (active.collect::<Vec<_>>(), book.lists().aside.clone(), kept)
+    (active.collect::<Vec<_>>(), manager.lists().aside.clone(), kept)
 }
 
 proptest! {
@@ -470,11 +474,11 @@ proptest! {
             alarm.re_alarm = Some(Duration::from_secs(900));
         };
         let def = if designed { enabled_by_design(manner) } else { with(manner) };
-        let mut book = Book::new(def.clone());
+        let mut manager = AlarmManager::new(def.clone());
         let (mut now, mut value, mut enabled) = (100_000, Some(70.0), Some(true));
         let mut journal: Vec<AlarmRecord> = Vec::new();
         for test_event in test_events {
-            let (before, sounded, known) = (book.machine(HIGH).clone(), book.lists().sound, journal.len());
+            let (before, sounded, known) = (manager.machine(HIGH).clone(), manager.lists().sound, journal.len());
             let by = by();
             match test_event.clone() {
                 TestEvent::Passes(seconds) => now = (now + seconds).max(0),
@@ -482,44 +486,44 @@ proptest! {
                 TestEvent::Enabled(next) => enabled = next,
                 TestEvent::Acknowledge => {
                     let seen = before.annunciated_at.unwrap_or(at(0));
-                    let done = book.acknowledge(HIGH, seen, None, at(now), &by);
+                    let done = manager.acknowledge(HIGH, seen, None, at(now), &by);
                     prop_assert_eq!(done.is_ok(), before.state().needs_acknowledgement());
                     journal.extend(done);
                 }
-                TestEvent::Silence => { book.silence(); }
+                TestEvent::Silence => { manager.silence(); }
                 TestEvent::Reset => {
-                    let done = book.reset(HIGH, at(now), &by);
+                    let done = manager.reset(HIGH, at(now), &by);
                     prop_assert!(done.is_err() || !before.is_active(), "a reset while the cause lasts");
                     journal.extend(done);
                 }
                 TestEvent::Shelve(seconds) => {
-                    journal.extend(book.shelve(HIGH, Duration::from_secs(seconds), Some(&why()), at(now), &by));
+                    journal.extend(manager.shelve(HIGH, Duration::from_secs(seconds), Some(&why()), at(now), &by));
                 }
-                TestEvent::Unshelve => journal.extend(book.unshelve(HIGH, value, at(now), &by).into_iter().flatten()),
-                TestEvent::OutOfService => journal.extend(book.out_of_service(HIGH, Some(&why()), at(now), &by)),
-                TestEvent::InService => journal.extend(book.in_service(HIGH, value, at(now), &by).into_iter().flatten()),
+                TestEvent::Unshelve => journal.extend(manager.unshelve(HIGH, value, at(now), &by).into_iter().flatten()),
+                TestEvent::OutOfService => journal.extend(manager.out_of_service(HIGH, Some(&why()), at(now), &by)),
+                TestEvent::InService => journal.extend(manager.in_service(HIGH, value, at(now), &by).into_iter().flatten()),
                 TestEvent::Restart => {
-                    let mut again = Book::new(def.clone());
+                    let mut again = AlarmManager::new(def.clone());
                     again.restore(&remembered(&journal));
-                    prop_assert_eq!(lasting(&again), lasting(&book));
-                    book = again;
+                    prop_assert_eq!(lasting(&again), lasting(&manager));
+                    manager = again;
                     continue;
                 }
             }
-            let told = book.judge(at(now), |alarm| Facts {
+            let told = manager.judge(at(now), |alarm| Facts {
                 value,
                 ill: Some(false),
                 enabled: enabled.filter(|_| alarm.enabled_when.is_some()),
                 ..Facts::default()
             });
             journal.extend(told);
-            let (machine, new) = (book.machine(HIGH), &journal[known..]);
+            let (machine, new) = (manager.machine(HIGH), &journal[known..]);
             let raised = new.iter().any(|step| matches!(step.step, AlarmStep::Raised | AlarmStep::RaisedAgain));
             // Who is told is told once, and only where something was raised in the open.
-            prop_assert!(!book.lists().sound || sounded || raised, "it sounds for nothing: {:?}", test_event);
-            prop_assert!(!(machine.state().is_aside() && book.lists().sound));
-            let shown = book.active().iter().any(|alarm| alarm.id == HIGH);
-            let aside = book.lists().aside.iter().any(|alarm| alarm.id == HIGH);
+            prop_assert!(!manager.lists().sound || sounded || raised, "it sounds for nothing: {:?}", test_event);
+            prop_assert!(!(machine.state().is_aside() && manager.lists().sound));
+            let shown = manager.active().iter().any(|alarm| alarm.id == HIGH);
+            let aside = manager.lists().aside.iter().any(|alarm| alarm.id == HIGH);
             prop_assert_eq!(machine.state() == AlarmState::Normal, !shown && !aside, "what is not normal is listed");
             prop_assert!(!(shown && aside));
             // Beyond the limit for longer than its delay it is active; inside the deadband nothing changes, unless its

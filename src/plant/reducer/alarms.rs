@@ -18,7 +18,7 @@ use crate::plant::{
 impl Plant {
     /// Takes up the alarms that the journal remembers from before a restart, oldest step first.
     pub fn restore(&mut self, steps: &[AlarmRecord]) {
-        self.book.restore(steps);
+        self.alarm_manager.restore(steps);
     }
 
     /// Takes an order about alarms.
@@ -31,26 +31,28 @@ impl Plant {
     ) -> Option<ActionRecord> {
         // The steps of one alarm must not go back in time, whatever the clock does.
         let now = self.at.max(at);
-        let (book, by, note) = (&mut self.book, &order.by, order.note.as_ref());
+        let (manager, by, note) = (&mut self.alarm_manager, &order.by, order.note.as_ref());
         let done = match command {
             AlarmCommand::Acknowledge { alarm, seen } => {
-                book.acknowledge(alarm, seen, note, now, by).map(|step| vec![step])
+                manager.acknowledge(alarm, seen, note, now, by).map(|step| vec![step])
             }
             AlarmCommand::AcknowledgeAll { seen } => {
-                let each = seen.iter().map(|(alarm, seen)| book.acknowledge(*alarm, *seen, note, now, by));
+                let each = seen.iter().map(|(alarm, seen)| manager.acknowledge(*alarm, *seen, note, now, by));
                 let (steps, outcome) = together(each);
                 effects.records.extend(steps.into_iter().map(Record::Alarm));
                 return self.desk.note(order, outcome, &self.image, at);
             }
-            AlarmCommand::Silence => match book.silence() {
+            AlarmCommand::Silence => match manager.silence() {
                 true => Ok(Vec::new()),
                 false => Err(AlarmRefusal::NothingSounds),
             },
-            AlarmCommand::Reset(alarm) => book.reset(alarm, now, by).map(|step| vec![step]),
-            AlarmCommand::Shelve { alarm, lasts } => book.shelve(alarm, lasts, note, now, by).map(|step| vec![step]),
-            AlarmCommand::Unshelve(alarm) => book.unshelve(alarm, value_of(&self.def, &self.image, alarm), now, by),
-            AlarmCommand::OutOfService(alarm) => book.out_of_service(alarm, note, now, by).map(|step| vec![step]),
-            AlarmCommand::InService(alarm) => book.in_service(alarm, value_of(&self.def, &self.image, alarm), now, by),
+            AlarmCommand::Reset(alarm) => manager.reset(alarm, now, by).map(|step| vec![step]),
+            AlarmCommand::Shelve { alarm, lasts } => manager.shelve(alarm, lasts, note, now, by).map(|step| vec![step]),
+            AlarmCommand::Unshelve(alarm) => manager.unshelve(alarm, value_of(&self.def, &self.image, alarm), now, by),
+            AlarmCommand::OutOfService(alarm) => manager.out_of_service(alarm, note, now, by).map(|step| vec![step]),
+            AlarmCommand::InService(alarm) => {
+                manager.in_service(alarm, value_of(&self.def, &self.image, alarm), now, by)
+            }
         };
         let outcome = match done {
             Ok(steps) => {
@@ -84,7 +86,7 @@ impl Plant {
             (Subject::Station, Condition::Station(fault)) => Some(faults.is_active(fault)),
             (Subject::Tag(_) | Subject::Station, _) => None,
         };
-        let mut steps = self.book.judge(self.at, |alarm| facts(image, ill(alarm), alarm));
+        let mut steps = self.alarm_manager.judge(self.at, |alarm| facts(image, ill(alarm), alarm));
         steps.iter_mut().for_each(|step| explain(step, faults));
         steps
     }

@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use super::{Scenario, Wish};
 use crate::plant::{
     Snapshot,
-    alarm::book::subject_name,
+    alarm::manager::subject_name,
     command::{Command, OrderStatus, Outcome},
     def::{AlarmId, PlantDef, TagId},
     record::{AlarmRecord, AlarmStep, Record},

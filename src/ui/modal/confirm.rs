@@ -13,7 +13,7 @@ use super::{
 use crate::{
     access::{Signature, control::sign},
     plant::{
-        alarm::{AlarmCommand, book::subject_name},
+        alarm::{AlarmCommand, manager::subject_name},
         command::Command,
         def::TagId,
         diagnostics::Diagnostic,

@@ -3,7 +3,7 @@
 use crate::{
     plant::{
         PlantDef,
-        alarm::book::subject_name,
+        alarm::manager::subject_name,
         def::{AlarmDef, AlarmId, Subject, TagId},
     },
     profile::{

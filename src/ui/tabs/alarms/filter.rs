@@ -2,7 +2,7 @@
 
 use crate::{
     plant::{
-        alarm::{AlarmState, book::subject_name},
+        alarm::{AlarmState, manager::subject_name},
         def::{AlarmDef, PlantDef, Priority},
         snapshot::ActiveAlarm,
     },

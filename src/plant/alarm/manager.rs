@@ -1,4 +1,4 @@
-//! The book of all alarms: judges them against the plant and lists what an operator should see.
+//! The manager of all alarms: judges them against the plant and lists what an operator should see.
 
 use std::{
     collections::HashMap,
@@ -25,17 +25,17 @@ const UNKNOWN_MAX: Duration = Duration::from_secs(60);
 
 /// The machines of all alarms, by [`AlarmId`].
 #[derive(Debug, Clone)]
-pub struct Book {
+pub struct AlarmManager {
     pub(super) def: Arc<PlantDef>,
     pub(super) machines: Vec<Machine>,
     /// What conditions that look back remember, by [`AlarmId`].
     memories: Vec<Memory>,
-    /// Since when it is unknown whether an alarm is enabled, on the book's own clock, by [`AlarmId`].
+    /// Since when it is unknown whether an alarm is enabled, on the manager's own clock, by [`AlarmId`].
     unknown: Vec<Option<Duration>>,
-    /// The book's own clock: what has passed while it was judged. It never goes back, whatever the station's clock does.
+    /// The manager's own clock: what has passed while it was judged. It never goes back, whatever the station's clock does.
     ran: Duration,
     judged_at: Option<Timestamp>,
-    /// The latest burst, and when its last alarm was raised on the book's own clock.
+    /// The latest burst, and when its last alarm was raised on the manager's own clock.
     burst: Option<(Burst, Duration)>,
     /// Counts what sounds, so that silence ends what was before it and nothing else.
     pub(super) edges: u64,
@@ -44,10 +44,10 @@ pub struct Book {
     pub(super) lists: OnceLock<Arc<Lists>>,
 }
 
-impl Book {
+impl AlarmManager {
     /// Every alarm normal.
-    pub fn new(def: Arc<PlantDef>) -> Book {
-        Book {
+    pub fn new(def: Arc<PlantDef>) -> AlarmManager {
+        AlarmManager {
             machines: vec![Machine::default(); def.alarms.len()],
             memories: vec![Memory::default(); def.alarms.len()],
             unknown: vec![None; def.alarms.len()],
