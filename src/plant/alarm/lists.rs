@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::{
     AlarmManager,
-    state::{AlarmState, Machine, OperatorNote},
+    state::{AlarmState, AlarmStateMachine, OperatorNote},
 };
 use crate::plant::{
     def::AlarmId,
@@ -70,7 +70,7 @@ impl AlarmManager {
     }
 }
 
-fn shown(id: AlarmId, machine: &Machine) -> ActiveAlarm {
+fn shown(id: AlarmId, machine: &AlarmStateMachine) -> ActiveAlarm {
     // Whatever the journal has lost, the alarm itself is not.
     let raised_at = machine.raised_at.or(machine.returned_at).unwrap_or(Timestamp::UNIX_EPOCH);
     ActiveAlarm {
@@ -86,7 +86,7 @@ fn shown(id: AlarmId, machine: &Machine) -> ActiveAlarm {
     }
 }
 
-fn put_aside(id: AlarmId, machine: &Machine) -> Option<AsideAlarm> {
+fn put_aside(id: AlarmId, machine: &AlarmStateMachine) -> Option<AsideAlarm> {
     let state = machine.state();
     let shelf = machine.shelved().filter(|_| state == AlarmState::Shelved);
     let note = match state {

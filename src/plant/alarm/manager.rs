@@ -11,7 +11,7 @@ use jiff::Timestamp;
 use super::{
     condition::{Facts, Memory, holds, limit_of},
     lists::Lists,
-    state::{AlarmState, Machine, Manner},
+    state::{AlarmDelays, AlarmState, AlarmStateMachine},
 };
 use crate::plant::{
     def::{AlarmDef, AlarmId, PlantDef, Subject},
@@ -27,7 +27,7 @@ const UNKNOWN_MAX: Duration = Duration::from_secs(60);
 #[derive(Debug, Clone)]
 pub struct AlarmManager {
     pub(super) def: Arc<PlantDef>,
-    pub(super) machines: Vec<Machine>,
+    pub(super) machines: Vec<AlarmStateMachine>,
     /// What conditions that look back remember, by [`AlarmId`].
     memories: Vec<Memory>,
     /// Since when it is unknown whether an alarm is enabled, on the manager's own clock, by [`AlarmId`].
@@ -48,7 +48,7 @@ impl AlarmManager {
     /// Every alarm normal.
     pub fn new(def: Arc<PlantDef>) -> AlarmManager {
         AlarmManager {
-            machines: vec![Machine::default(); def.alarms.len()],
+            machines: vec![AlarmStateMachine::default(); def.alarms.len()],
             memories: vec![Memory::default(); def.alarms.len()],
             unknown: vec![None; def.alarms.len()],
             def,
@@ -94,7 +94,7 @@ impl AlarmManager {
     }
 
     /// How an alarm stands.
-    pub fn machine(&self, id: AlarmId) -> &Machine {
+    pub fn machine(&self, id: AlarmId) -> &AlarmStateMachine {
         &self.machines[id.index()]
     }
 
@@ -123,10 +123,10 @@ impl AlarmManager {
         let step = if begins_anew {
             // What looks back starts when the alarm is enabled: a value may stand still while nothing is heated.
             memory.clear();
-            machine.judge(Some(false), self.ran, Manner::default())
+            machine.judge(Some(false), self.ran, AlarmDelays::default())
         } else {
             let holds = holds(alarm.condition, facts, machine.is_active(), memory, self.ran);
-            machine.judge(if returned { Some(false) } else { holds }, self.ran, manner(alarm))
+            machine.judge(if returned { Some(false) } else { holds }, self.ran, delays(alarm))
         };
         if let Some(step) = step {
             records.push(self.step(alarm, step, at, facts.value));
@@ -262,8 +262,8 @@ fn is_disabled(alarm: &AlarmDef, facts: Facts) -> bool {
     alarm.enabled_when.is_some() && facts.enabled == Some(false)
 }
 
-fn manner(alarm: &AlarmDef) -> Manner {
-    Manner { on_delay: alarm.on_delay, off_delay: alarm.off_delay }
+fn delays(alarm: &AlarmDef) -> AlarmDelays {
+    AlarmDelays { on_delay: alarm.on_delay, off_delay: alarm.off_delay }
 }
 
 /// Full name of what an alarm watches: tag, device, line or station.

@@ -116,7 +116,7 @@ impl Shelving {
 
 /// The delays of an alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Manner {
+pub struct AlarmDelays {
     /// The condition must hold this long before it is raised.
     pub on_delay: Duration,
     /// The condition must be gone this long before it returns.
@@ -125,7 +125,7 @@ pub struct Manner {
 
 /// The memory of one alarm.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Machine {
+pub struct AlarmStateMachine {
     active: bool,
     unacknowledged: bool,
     latched: bool,
@@ -154,7 +154,7 @@ pub struct Machine {
     pub edge: u64,
 }
 
-impl Machine {
+impl AlarmStateMachine {
     /// The state as an operator sees it.
     pub fn state(&self) -> AlarmState {
         if self.out_of_service.is_some() {
@@ -210,15 +210,15 @@ impl Machine {
 
     /// Takes the judgement of an instant, and says which step follows. A condition must hold (or be gone) for the whole
     /// delay; a flap inside the delay leaves no trace. An unknown judgement (`None`) changes nothing and restarts no delay.
-    /// `now` is an instant of the manager's own clock. The step is to be [applied](Machine::apply).
-    pub fn judge(&mut self, holds: Option<bool>, now: Duration, manner: Manner) -> Option<AlarmStep> {
+    /// `now` is an instant of the manager's own clock. The step is to be [applied](AlarmStateMachine::apply).
+    pub fn judge(&mut self, holds: Option<bool>, now: Duration, delays: AlarmDelays) -> Option<AlarmStep> {
         let holds = holds?;
         if holds == self.active {
             self.pending_since = None;
             return None;
         }
         let since = *self.pending_since.get_or_insert(now);
-        let delay = if holds { manner.on_delay } else { manner.off_delay };
+        let delay = if holds { delays.on_delay } else { delays.off_delay };
         if now.saturating_sub(since) < delay {
             return None;
         }
@@ -295,7 +295,7 @@ mod tests {
     use super::*;
     use crate::plant::def::Priority;
 
-    const MANNER: Manner = Manner { on_delay: Duration::from_secs(5), off_delay: Duration::from_secs(10) };
+    const DELAYS: AlarmDelays = AlarmDelays { on_delay: Duration::from_secs(5), off_delay: Duration::from_secs(10) };
 
     fn record(step: AlarmStep, second: i64) -> AlarmRecord {
         let at = Timestamp::from_second(second).expect("a small number");
@@ -304,15 +304,15 @@ mod tests {
     }
 
     /// The judgement of an instant, with what follows from it.
-    fn judged(machine: &mut Machine, holds: Option<bool>, second: u64) -> Option<AlarmStep> {
-        let step = machine.judge(holds, Duration::from_secs(second), MANNER)?;
+    fn judged(machine: &mut AlarmStateMachine, holds: Option<bool>, second: u64) -> Option<AlarmStep> {
+        let step = machine.judge(holds, Duration::from_secs(second), DELAYS)?;
         machine.apply(&record(step, second as i64), false);
         Some(step)
     }
 
     #[test]
     fn the_life_of_an_alarm() {
-        let mut machine = Machine::default();
+        let mut machine = AlarmStateMachine::default();
         for (second, holds, step, state) in [
             (0, Some(true), None, AlarmState::Normal),
             (4, Some(false), None, AlarmState::Normal),
@@ -335,7 +335,7 @@ mod tests {
         use AlarmState as S;
         use AlarmStep as T;
         let check = |latch: bool, steps: &[(T, S)]| {
-            let mut machine = Machine::default();
+            let mut machine = AlarmStateMachine::default();
             for (step, state) in steps {
                 machine.apply(&record(*step, 0), latch);
                 assert_eq!(machine.state(), *state, "{step:?} of {steps:?}");
