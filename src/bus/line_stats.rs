@@ -15,7 +15,7 @@ use crate::plant::{
     def::{DeviceId, LineDef, LineId, TagId},
     event::{Fault, LineCounters},
     line_report::{LineReport, PollReport},
-    tally::Tally,
+    request_stats::RequestStats,
     traffic::{Frame, Frames},
 };
 
@@ -45,8 +45,8 @@ pub struct Plan<'a> {
 #[derive(Debug, Clone)]
 pub struct LineStats {
     /// By block of the plan.
-    polls: Vec<Tally>,
-    devices: Vec<(DeviceId, Tally)>,
+    polls: Vec<RequestStats>,
+    devices: Vec<(DeviceId, RequestStats)>,
     busy: VecDeque<f32>,
     /// Seconds that the line was busy, of how many, since the last was closed.
     open: (f32, f32),
@@ -61,8 +61,8 @@ impl LineStats {
     pub fn new(def: &PlantDef, line: LineId, blocks: &[Block]) -> LineStats {
         let devices = def.devices.iter().filter(|device| device.line == line);
         LineStats {
-            polls: vec![Tally::default(); blocks.len()],
-            devices: devices.map(|device| (device.id, Tally::default())).collect(),
+            polls: vec![RequestStats::default(); blocks.len()],
+            devices: devices.map(|device| (device.id, RequestStats::default())).collect(),
             busy: VecDeque::new(),
             open: (0.0, 0.0),
             missed: 0,
@@ -71,7 +71,7 @@ impl LineStats {
         }
     }
 
-    /// The plan has changed: blocks that stay keep their tally, others begin anew.
+    /// The plan has changed: blocks that stay keep their stats, others begin anew.
     pub fn replan(&mut self, old: &[Block], new: &[Block]) {
         let kept = |block: &Block| {
             let place = old.iter().position(|old| old.request() == block.request() && old.poll == block.poll)?;
@@ -89,10 +89,10 @@ impl LineStats {
         reply: Option<Duration>,
         tries: u8,
     ) {
-        let of_device = self.devices.iter_mut().find(|(id, _)| *id == device).map(|(_, tally)| tally);
-        for tally in index.and_then(|index| self.polls.get_mut(index)).into_iter().chain(of_device) {
-            tally.count(outcome, reply);
-            tally.retries += u64::from(tries.saturating_sub(1));
+        let of_device = self.devices.iter_mut().find(|(id, _)| *id == device).map(|(_, stats)| stats);
+        for stats in index.and_then(|index| self.polls.get_mut(index)).into_iter().chain(of_device) {
+            stats.count(outcome, reply);
+            stats.retries += u64::from(tries.saturating_sub(1));
         }
     }
 
@@ -118,8 +118,8 @@ impl LineStats {
     /// Answers of these units came when they had been given up.
     pub fn late(&mut self, def: &PlantDef, units: &[u8]) {
         for unit in units {
-            for (device, tally) in &mut self.devices {
-                tally.late += u64::from(def.device(*device).unit == *unit);
+            for (device, stats) in &mut self.devices {
+                stats.late += u64::from(def.device(*device).unit == *unit);
             }
         }
     }
@@ -133,10 +133,10 @@ impl LineStats {
     /// A read began so long after its point of the grid, and came too late for some.
     pub fn served(&mut self, index: usize, jitter: Option<Duration>, missed: u32) {
         self.missed += u64::from(missed);
-        let tally = &mut self.polls[index];
-        tally.missed += u64::from(missed);
+        let stats = &mut self.polls[index];
+        stats.missed += u64::from(missed);
         if let Some(jitter) = jitter {
-            tally.jitter.add(jitter);
+            stats.jitter.add(jitter);
         }
     }
 
@@ -159,7 +159,7 @@ impl LineStats {
     /// All of it, for a snapshot.
     pub fn report(&self, def: &PlantDef, settings: &LineDef, plan: Plan, counters: LineCounters) -> Arc<LineReport> {
         let Plan { blocks, polls, refused, retries, load } = plan;
-        let poll = |(index, (block, tally)): (usize, (&Block, &Tally))| PollReport {
+        let poll = |(index, (block, stats)): (usize, (&Block, &RequestStats))| PollReport {
             class: block.class,
             factor: polls.get(index).map_or(1.0, |poll| poll.factor),
             shed: polls.get(index).is_some_and(|poll| poll.shed),
@@ -172,7 +172,7 @@ impl LineStats {
             cost: plan::cost(block, settings, def.device(block.device)),
             measured: polls.get(index).and_then(|poll| poll.measured),
             next: polls.get(index).and_then(|poll| poll.next),
-            tally: tally.clone(),
+            stats: stats.clone(),
         };
         Arc::new(LineReport {
             admission: self.admission.clone(),
@@ -217,7 +217,7 @@ mod tests {
             load: Load::Normal,
         };
         let report = stats.report(&def, &def.lines[0], plan, counters);
-        assert_eq!(report.polls[0].tally.requests, 1, "a block that stays keeps its tally");
-        assert_eq!(report.device(blocks[0].device).map(|tally| tally.timeouts), Some(1));
+        assert_eq!(report.polls[0].stats.requests, 1, "a block that stays keeps its stats");
+        assert_eq!(report.device(blocks[0].device).map(|stats| stats.timeouts), Some(1));
     }
 }

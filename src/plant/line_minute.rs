@@ -5,7 +5,7 @@ use std::sync::Arc;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::{id::DeviceId, line_report::LineReport, tally::Tally};
+use super::{id::DeviceId, line_report::LineReport, request_stats::RequestStats};
 
 /// What a line counted in one minute.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -79,18 +79,18 @@ pub fn minute(line: Arc<str>, before: &LineReport, after: &LineReport, at: Times
 }
 
 /// Retries and reply times of all devices of a line since an earlier report.
-fn devices(after: &LineReport, before: Option<&LineReport>) -> Tally {
-    let mut all = Tally::default();
-    for (device, tally) in &after.devices {
-        let since = since(tally, before.and_then(|before| before.device(*device)));
+fn devices(after: &LineReport, before: Option<&LineReport>) -> RequestStats {
+    let mut all = RequestStats::default();
+    for (device, stats) in &after.devices {
+        let since = since(stats, before.and_then(|before| before.device(*device)));
         all.retries += since.retries;
         all.reply.merge(&since.reply);
     }
     all
 }
 
-fn since(tally: &Tally, before: Option<&Tally>) -> Tally {
-    before.map_or_else(|| tally.clone(), |before| tally.since(before))
+fn since(stats: &RequestStats, before: Option<&RequestStats>) -> RequestStats {
+    before.map_or_else(|| stats.clone(), |before| stats.since(before))
 }
 
 /// Earlier reports of a line, to tell what was counted since.
@@ -127,7 +127,7 @@ impl LineWatch {
     }
 
     /// What a device has answered lately.
-    pub fn lately(&self, report: &LineReport, device: DeviceId) -> Tally {
+    pub fn lately(&self, report: &LineReport, device: DeviceId) -> RequestStats {
         // Since the start, as long as that is not long ago.
         let before = self.older.as_deref();
         let now = report.device(device).cloned().unwrap_or_default();
@@ -151,12 +151,12 @@ mod tests {
 
     /// So many good answers in `reply_ms`, so many timeouts.
     fn report(good: u64, reply_ms: u64, timeouts: u64) -> LineReport {
-        let mut tally = Tally::default();
+        let mut stats = RequestStats::default();
         for _ in 0..good {
-            tally.count(Ok(()), Some(Duration::from_millis(reply_ms)));
+            stats.count(Ok(()), Some(Duration::from_millis(reply_ms)));
         }
         for _ in 0..timeouts {
-            tally.count(Err(Fault::Timeout), None);
+            stats.count(Err(Fault::Timeout), None);
         }
         let requests = good + timeouts;
         LineReport {
@@ -169,7 +169,7 @@ mod tests {
                 utilisation_minute: 0.6,
                 ..LineCounters::default()
             },
-            devices: vec![(TIC, tally)],
+            devices: vec![(TIC, stats)],
             ..LineReport::new(fixture::plant().lines[0].clone())
         }
     }

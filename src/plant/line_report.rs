@@ -10,8 +10,8 @@ use super::{
     event::LineCounters,
     id::{DeviceId, TagId},
     line::LineDef,
+    request_stats::RequestStats,
     tag::{Class, Poll, Table},
-    tally::Tally,
     traffic::Frames,
 };
 
@@ -33,7 +33,7 @@ pub struct LineReport {
     /// Whether all polls can meet their periods.
     pub admission: Admission,
     /// What each device of the line has answered.
-    pub devices: Vec<(DeviceId, Tally)>,
+    pub devices: Vec<(DeviceId, RequestStats)>,
     /// Busy share of each of the last seconds, newest last, at most 60.
     pub busy: Vec<f32>,
     /// The latest frames.
@@ -43,7 +43,7 @@ pub struct LineReport {
 impl LineReport {
     /// Was none of the latest answers of a device a value, as [`super::ne107::Reason::NoValues`] has it?
     pub fn gives_no_values(&self, device: DeviceId) -> bool {
-        self.devices.iter().any(|(id, tally)| *id == device && tally.fails_since(super::ne107::NO_VALUES_AFTER))
+        self.devices.iter().any(|(id, stats)| *id == device && stats.fails_since(super::ne107::NO_VALUES_AFTER))
     }
 
     /// Nothing has gone over the line yet.
@@ -73,8 +73,8 @@ impl LineReport {
     }
 
     /// What a device has answered.
-    pub fn device(&self, id: DeviceId) -> Option<&Tally> {
-        self.devices.iter().find(|(device, _)| *device == id).map(|(_, tally)| tally)
+    pub fn device(&self, id: DeviceId) -> Option<&RequestStats> {
+        self.devices.iter().find(|(device, _)| *device == id).map(|(_, stats)| stats)
     }
 }
 
@@ -106,5 +106,5 @@ pub struct PollReport {
     /// When it is read next, if that is known.
     pub next: Option<Timestamp>,
     /// Counters.
-    pub tally: Tally,
+    pub stats: RequestStats,
 }

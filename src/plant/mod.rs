@@ -24,7 +24,7 @@ pub mod scale;
 pub mod parameter_set;
 pub mod admission;
 pub mod event;
-pub mod tally;
+pub mod request_stats;
 pub mod line_report;
 pub mod line_minute;
 pub mod diagnostics;

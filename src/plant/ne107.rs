@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     event::{ExceptionCode, LineState},
+    request_stats::RequestStats,
     snapshot::DeviceState,
-    tally::Tally,
 };
 
 /// The four status signals of NE 107. A device that is well has none.
@@ -129,7 +129,7 @@ pub struct Evidence<'a> {
     /// It is left alone after an action.
     pub settling: bool,
     /// What it has answered lately. Reads that its line had no time for are not its fault, so they do not count.
-    pub lately: &'a Tally,
+    pub lately: &'a RequestStats,
     /// How long is waited for an answer.
     pub timeout: Duration,
 }
@@ -166,7 +166,7 @@ pub fn judge(evidence: Evidence) -> Option<Reason> {
     }
 }
 
-fn out_of_specification(lately: &Tally, timeout: Duration) -> Option<Reason> {
+fn out_of_specification(lately: &RequestStats, timeout: Duration) -> Option<Reason> {
     let enough = REQUESTS_MIN <= lately.requests;
     let slow = lately.reply.p99().filter(|p99| enough && timeout * SLOW_PERCENT < *p99 * 100);
     if lately.fails_since(NO_VALUES_AFTER) {
@@ -182,7 +182,7 @@ fn out_of_specification(lately: &Tally, timeout: Duration) -> Option<Reason> {
     }
 }
 
-fn maintenance(lately: &Tally) -> Option<Reason> {
+fn maintenance(lately: &RequestStats) -> Option<Reason> {
     let parity = |(code, count): &(ExceptionCode, u64)| (code.0 == 0x08).then_some(*count);
     let parity: u64 = lately.exceptions.iter().filter_map(parity).sum();
     // What is repeated was corrupt: the greater of the two, not their sum.
@@ -207,18 +207,18 @@ mod tests {
     const DOWN: DeviceState = DeviceState::Down { since: Timestamp::UNIX_EPOCH };
 
     /// `good` answers in `reply_ms`, then these faults.
-    fn tally(good: usize, reply_ms: u64, faults: &[Fault]) -> Tally {
-        let mut tally = Tally::default();
+    fn stats(good: usize, reply_ms: u64, faults: &[Fault]) -> RequestStats {
+        let mut stats = RequestStats::default();
         for _ in 0..good {
-            tally.count(Ok(()), Some(Duration::from_millis(reply_ms)));
+            stats.count(Ok(()), Some(Duration::from_millis(reply_ms)));
         }
         for fault in faults {
-            tally.count(Err(*fault), None);
+            stats.count(Err(*fault), None);
         }
-        tally
+        stats
     }
 
-    fn check(line: &LineState, device: DeviceState, settling: bool, lately: &Tally, expect: &str) {
+    fn check(line: &LineState, device: DeviceState, settling: bool, lately: &RequestStats, expect: &str) {
         let timeout = Duration::from_millis(300);
         let reason = judge(Evidence { device, line, settling, lately, timeout });
         let words = reason.map(|reason| format!("{} {reason}", reason.signal().letter()));
@@ -227,11 +227,11 @@ mod tests {
 
     #[test]
     fn the_worst_comes_first() {
-        let well = tally(1_000, 12, &[]);
+        let well = stats(1_000, 12, &[]);
         let waiting = LineState::Waiting { why: "gone".into(), retry_at: Timestamp::UNIX_EPOCH };
         check(&LineState::Connected, UP, false, &well, "");
-        check(&LineState::Connected, DeviceState::Unknown, false, &Tally::default(), "");
-        check(&LineState::Connecting, DeviceState::Unknown, false, &Tally::default(), "");
+        check(&LineState::Connected, DeviceState::Unknown, false, &RequestStats::default(), "");
+        check(&LineState::Connecting, DeviceState::Unknown, false, &RequestStats::default(), "");
         check(&LineState::Connected, DOWN, false, &well, "F not answering");
         check(&waiting, DOWN, false, &well, "F line not connected");
         check(&LineState::Disconnected, DeviceState::Unknown, false, &well, "C line closed by an operator");
@@ -242,32 +242,32 @@ mod tests {
 
     #[test]
     fn late_and_missing_answers_are_out_of_specification() {
-        let check = |lately: &Tally, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
-        check(&tally(1_000, 200, &[]), "");
-        check(&tally(1_000, 260, &[]), "S answers take 260 of 300 ms");
-        check(&tally(10, 260, &[]), "");
-        check(&tally(94, 12, &[Fault::Timeout; 6]), "");
-        check(&tally(93, 12, &[Fault::Timeout; 7]), "S 7 of 64 requests failed");
-        check(&tally(3, 12, &[Fault::Timeout; 3]), "");
+        let check = |lately: &RequestStats, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
+        check(&stats(1_000, 200, &[]), "");
+        check(&stats(1_000, 260, &[]), "S answers take 260 of 300 ms");
+        check(&stats(10, 260, &[]), "");
+        check(&stats(94, 12, &[Fault::Timeout; 6]), "");
+        check(&stats(93, 12, &[Fault::Timeout; 7]), "S 7 of 64 requests failed");
+        check(&stats(3, 12, &[Fault::Timeout; 3]), "");
     }
 
     #[test]
     fn a_device_that_answers_without_values_has_failed() {
-        let check = |lately: &Tally, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
-        check(&tally(0, 12, &[Fault::Exception(ExceptionCode(4)); 12]), "F answers, but gives no values");
-        check(&tally(100, 12, &[Fault::Exception(ExceptionCode(4)); 12]), "F answers, but gives no values");
-        check(&tally(0, 12, &[Fault::Exception(ExceptionCode(4)); 11]), "");
+        let check = |lately: &RequestStats, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
+        check(&stats(0, 12, &[Fault::Exception(ExceptionCode(4)); 12]), "F answers, but gives no values");
+        check(&stats(100, 12, &[Fault::Exception(ExceptionCode(4)); 12]), "F answers, but gives no values");
+        check(&stats(0, 12, &[Fault::Exception(ExceptionCode(4)); 11]), "");
     }
 
     #[test]
     fn what_still_works_but_not_as_it_should_asks_for_maintenance() {
-        let check = |lately: &Tally, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
+        let check = |lately: &RequestStats, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
         let crc = Fault::Crc { got: 1, computed: 2 };
-        check(&tally(199, 12, &[crc]), "");
-        check(&tally(198, 12, &[crc, crc]), "M 2 of 200 answers corrupt or repeated");
-        check(&Tally { retries: 1, ..tally(100, 12, &[]) }, "M 1 of 100 answers corrupt or repeated");
-        check(&Tally { late: 1, ..tally(100, 12, &[]) }, "M 1 answers came too late");
-        check(&tally(100, 12, &[Fault::Exception(ExceptionCode(0x08))]), "M memory parity error (1)");
-        check(&tally(100, 12, &[Fault::Exception(ExceptionCode(0x06))]), "");
+        check(&stats(199, 12, &[crc]), "");
+        check(&stats(198, 12, &[crc, crc]), "M 2 of 200 answers corrupt or repeated");
+        check(&RequestStats { retries: 1, ..stats(100, 12, &[]) }, "M 1 of 100 answers corrupt or repeated");
+        check(&RequestStats { late: 1, ..stats(100, 12, &[]) }, "M 1 answers came too late");
+        check(&stats(100, 12, &[Fault::Exception(ExceptionCode(0x08))]), "M memory parity error (1)");
+        check(&stats(100, 12, &[Fault::Exception(ExceptionCode(0x06))]), "");
     }
 }

@@ -138,7 +138,7 @@ impl Fixture {
         plant
     }
 
-    /// The line has reported: plan, tallies, frames, all well.
+    /// The line has reported: plan, statistics, frames, all well.
     pub fn traffic() -> Fixture {
         let mut plant = Fixture::normal();
         traffic::good(&mut plant);

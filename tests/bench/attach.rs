@@ -26,8 +26,8 @@ use sightglass::{
         def::{DeviceDef, DeviceId, Framing, LineId, TagId},
         event::{Event, LineState},
         line_report::{LineReport, PollReport},
+        request_stats::RequestStats,
         tag::{ByteOrder, Class, Kind, Point, Poll, Table, TagDef},
-        tally::Tally,
         traffic::{Exchange, Frame},
     },
     profile::{self, Search},
@@ -117,7 +117,7 @@ async fn live(mut plant: Plant, def: Arc<PlantDef>, publish: watch::Sender<Arc<s
         let exchange = Some(Arc::new(exchange));
         plant.on_event(Event::Read { at, device: DeviceId(device), values, texts: Vec::new(), reply, exchange });
         let poll = &mut report.polls[usize::from(device)];
-        poll.tally.count(Ok(()), Some(reply + Duration::from_millis(round % 9)));
+        poll.stats.count(Ok(()), Some(reply + Duration::from_millis(round % 9)));
         poll.next = Some(at + jiff::SignedDuration::from_secs(1));
         let frame =
             |bytes, sent, number| Frame { at, sent, bytes, framing, verdict: "ok".into(), unit: Some(1), number };
@@ -185,7 +185,7 @@ fn poll(device: DeviceId) -> PollReport {
         factor: 1.0,
         shed: false,
         next: None,
-        tally: Tally::default(),
+        stats: RequestStats::default(),
     }
 }
 

@@ -12,8 +12,8 @@ use crate::plant::{
     diagnostics::DiagnosticRun,
     event::LineCounters,
     line_report::{LineReport, PollReport},
+    request_stats::RequestStats,
     snapshot::LineStatus,
-    tally::Tally,
     traffic::{Frame, Frames},
 };
 
@@ -35,7 +35,7 @@ struct ReportDelta {
     retries: Option<Vec<(DeviceId, Timestamp)>>,
     strain: Option<Option<String>>,
     admission: Option<Box<Admission>>,
-    devices: List<(DeviceId, Tally)>,
+    devices: List<(DeviceId, RequestStats)>,
     busy: List<f32>,
     frames: Option<NewFrames>,
 }

@@ -161,7 +161,7 @@ fn change_report(snapshot: &mut Snapshot, place: u16, amount: u32) {
     report.busy.push(amount as f32);
     report.busy.drain(..report.busy.len().saturating_sub(60));
     if let Some(poll) = report.polls.first_mut() {
-        poll.tally.count(Ok(()), Some(Duration::from_millis(amount.into())));
+        poll.stats.count(Ok(()), Some(Duration::from_millis(amount.into())));
     }
     let next = report.frames.iter().next_back().map_or(1, |frame| frame.number + 1);
     match place % 4 {

@@ -27,8 +27,8 @@ use crate::plant::{
     command::{BusRequest, WriteId},
     def::{DeviceId, LineDef, TagId},
     event::{Event, ExceptionCode, Fault, LineState, WriteResult},
+    request_stats::RequestStats,
     tag::{Access, TagDef},
-    tally::Tally,
 };
 
 /// Runs a line against a script until `polls` block reads have ended; gives good and failed ones.
@@ -528,9 +528,9 @@ async fn cured_and_late_answers_are_counted_with_their_device() {
     for _ in 0..10_000 {
         let event = line.events.recv().await.expect("the line runs");
         let Event::Report { report, .. } = event else { continue };
-        let sum = |of: fn(&Tally) -> u64| report.devices.iter().map(|(_, tally)| of(tally)).sum::<u64>();
-        if 0 < sum(|tally| tally.check) && 0 < sum(|tally| tally.retries) && 0 < sum(|tally| tally.late) {
-            assert_eq!(sum(|tally| tally.late), report.counters.late);
+        let sum = |of: fn(&RequestStats) -> u64| report.devices.iter().map(|(_, stats)| of(stats)).sum::<u64>();
+        if 0 < sum(|stats| stats.check) && 0 < sum(|stats| stats.retries) && 0 < sum(|stats| stats.late) {
+            assert_eq!(sum(|stats| stats.late), report.counters.late);
             return;
         }
     }

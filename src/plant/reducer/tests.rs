@@ -248,10 +248,10 @@ fn an_unplugged_line_takes_all_values_and_a_closed_one_raises_no_alarm() {
 fn a_device_that_refuses_everything_raises_the_alarm_of_a_silent_one() {
     let mut plant = running();
     let says = |plant: &mut Plant, second: i64, outcome: Result<(), Fault>| {
-        let mut tally = crate::plant::tally::Tally::default();
-        (0..20).for_each(|_| tally.count(Ok(()), None));
-        (0..12).for_each(|_| tally.count(outcome, None));
-        let report = LineReport { devices: vec![(TIC, tally)], ..LineReport::new(plant.def().line(L1).clone()) };
+        let mut stats = crate::plant::request_stats::RequestStats::default();
+        (0..20).for_each(|_| stats.count(Ok(()), None));
+        (0..12).for_each(|_| stats.count(outcome, None));
+        let report = LineReport { devices: vec![(TIC, stats)], ..LineReport::new(plant.def().line(L1).clone()) };
         plant.on_event(Event::Report { at: at(second), line: L1, report: Arc::new(report) });
         plant.on_tick(at(second + 10));
         plant.snapshot().alarms.iter().any(|alarm| alarm.id == SILENT && alarm.state == AlarmState::Unacknowledged)

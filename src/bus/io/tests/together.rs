@@ -192,7 +192,7 @@ async fn a_late_answer_over_tcp_is_known_and_its_unit_waited_for() {
             match line.events.recv().await.expect("the line runs") {
                 Event::Failed { .. } => failed += 1,
                 Event::Report { report, .. } => {
-                    late = report.device(DeviceId(0)).map_or(0, |tally| tally.late);
+                    late = report.device(DeviceId(0)).map_or(0, |stats| stats.late);
                     assert_eq!(late, report.counters.late);
                 }
                 _ => {}

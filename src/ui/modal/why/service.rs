@@ -27,12 +27,12 @@ pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, ex
     let theme = cx.theme;
     let status = cx.snapshot.device(device.id);
     let line = cx.snapshot.line(device.line);
-    let tally = line.report.as_ref().and_then(|report| report.device(device.id));
+    let stats = line.report.as_ref().and_then(|report| report.device(device.id));
     let mut text = device_words(cx, device.id);
-    if let Some(p99) = tally.and_then(|tally| tally.reply.p99()) {
+    if let Some(p99) = stats.and_then(|stats| stats.reply.p99()) {
         text += &format!(", 99 % within {}", span(p99));
     }
-    if let Some((failed, of)) = tally.map(|tally| tally.recent()).filter(|(failed, _)| 0 < *failed) {
+    if let Some((failed, of)) = stats.map(|stats| stats.recent()).filter(|(failed, _)| 0 < *failed) {
         text += &format!(", {failed} of the last {of} failed");
     }
     let well = matches!(status.state, DeviceState::Answering | DeviceState::Unknown);
@@ -74,15 +74,15 @@ pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
         (false, factor) if factor < 1.05 => String::new(),
         (false, factor) => format!(", now every {factor:.1} periods: the line is overloaded"),
     };
-    let mut text = format!("{period}{busy}{}, {} missed", next.unwrap_or_default(), poll.tally.missed);
-    if let Some(p99) = poll.tally.jitter.p99() {
+    let mut text = format!("{period}{busy}{}, {} missed", next.unwrap_or_default(), poll.stats.missed);
+    if let Some(p99) = poll.stats.jitter.p99() {
         text += &format!(", jitter {}", span(p99));
     }
     text += &format!(", costs {}", span(poll.cost));
     vec![row(
         "poll",
         text,
-        if poll.tally.missed == 0 && busy.is_empty() { cx.theme.normal() } else { cx.theme.trouble() },
+        if poll.stats.missed == 0 && busy.is_empty() { cx.theme.normal() } else { cx.theme.trouble() },
     )]
 }
 

@@ -12,10 +12,10 @@ use crate::{
         line::Framing,
         line_report::{LineReport, PollReport},
         ne107::Reason,
+        request_stats::RequestStats,
         sample::{Cause, Sample},
         snapshot::DeviceState,
         tag::{Decimals, Poll, Table},
-        tally::Tally,
         traffic::Exchange,
     },
     ui::{
@@ -35,12 +35,12 @@ fn fixture() -> Fixture {
     let (pv, sv) = (plant.tag("TIC-1.PV"), plant.tag("TIC-1.SV"));
     // PV counts in tenths, as SV says: no such device, but every step of the way is there.
     (plant.def.tags[pv.index()].decimals, plant.def.tags[pv.index()].scale) = (Decimals::From(sv), 1.0);
-    let mut tally = Tally::default();
+    let mut stats = RequestStats::default();
     for n in 0..200 {
         let outcome = if n % 100 == 7 { Err(Fault::Timeout) } else { Ok(()) };
-        tally.count(outcome, outcome.is_ok().then_some(Duration::from_millis(12)));
+        stats.count(outcome, outcome.is_ok().then_some(Duration::from_millis(12)));
     }
-    tally.jitter.add(Duration::from_millis(2));
+    stats.jitter.add(Duration::from_millis(2));
     let tags: Vec<_> = plant.def.tags_of(DeviceId(0)).map(|tag| tag.id).collect();
     plant.line.report = Some(Arc::new(LineReport {
         counters: plant.line.counters,
@@ -57,9 +57,9 @@ fn fixture() -> Fixture {
             class: crate::plant::tag::Class::Soft,
             factor: 1.0,
             shed: false,
-            tally: tally.clone(),
+            stats: stats.clone(),
         }],
-        devices: vec![(DeviceId(0), tally)],
+        devices: vec![(DeviceId(0), stats)],
         ..LineReport::new(plant.def.lines[0].clone())
     }));
     for device in &mut plant.devices {

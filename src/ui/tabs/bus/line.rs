@@ -13,9 +13,9 @@ use crate::{
         def::{DeviceDef, LineDef},
         event::{Fault, LineState},
         line_report::LineReport,
+        request_stats::RequestStats,
         snapshot::DeviceState,
         tag::Poll,
-        tally::Tally,
     },
     ui::{
         ViewContext,
@@ -157,7 +157,7 @@ fn missed_lately(report: &LineReport) -> bool {
 
 fn counters(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
     let (theme, counters) = (cx.theme, &report.counters);
-    let sum = Tallies::of(report);
+    let sum = DeviceStats::of(report);
     let ill = sum.lately;
     let mut flow = Flow::new("requests", theme.dim(), width);
     flow.add(plain(grouped(counters.requests), theme.normal()));
@@ -196,9 +196,9 @@ fn counters(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Ve
     rows
 }
 
-/// The tallies of all devices together.
+/// The statistics of all devices together.
 #[derive(Debug, Default)]
-struct Tallies {
+struct DeviceStats {
     check: u64,
     length: u64,
     foreign: u64,
@@ -208,16 +208,16 @@ struct Tallies {
     lately: bool,
 }
 
-impl Tallies {
-    fn of(report: &LineReport) -> Tallies {
-        let mut sum = Tallies::default();
-        for (_, tally) in &report.devices {
-            sum.check += tally.check;
-            sum.length += tally.length;
-            sum.foreign += tally.foreign;
-            sum.retries += tally.retries;
-            sum.lately |= 0 < tally.recent().0;
-            for (code, times) in &tally.exceptions {
+impl DeviceStats {
+    fn of(report: &LineReport) -> DeviceStats {
+        let mut sum = DeviceStats::default();
+        for (_, stats) in &report.devices {
+            sum.check += stats.check;
+            sum.length += stats.length;
+            sum.foreign += stats.foreign;
+            sum.retries += stats.retries;
+            sum.lately |= 0 < stats.recent().0;
+            for (code, times) in &stats.exceptions {
                 match sum.exceptions.iter_mut().find(|(known, _)| known == code) {
                     Some((_, count)) => *count += times,
                     None => sum.exceptions.push((*code, *times)),
@@ -245,28 +245,28 @@ fn devices(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Vec
     let mut styles = Vec::new();
     let mut lines = Vec::new();
     for device in cx.def().devices.iter().filter(|device| device.line == at.id) {
-        let Some(tally) = report.device(device.id) else { continue };
+        let Some(stats) = report.device(device.id) else { continue };
         let diagnosed = cx.snapshot.device(device.id).diagnosis.is_some();
-        let ill = diagnosed || is_ill(cx, device) || near(tally, report.settings.timeout).is_some();
+        let ill = diagnosed || is_ill(cx, device) || near(stats, report.settings.timeout).is_some();
         let mark = match cx.snapshot.device(device.id).diagnosis {
             Some(reason) => signal_mark(reason.signal()),
             None => if ill { "!" } else { "✓" }.to_owned(),
         };
         styles.push(if ill { cx.theme.trouble() } else { cx.theme.normal() });
         let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
-        let (failed, of) = tally.recent();
-        let share = tally.reply.p99().map(|p99| p99.as_secs_f64() / report.settings.timeout.as_secs_f64());
+        let (failed, of) = stats.recent();
+        let share = stats.reply.p99().map(|p99| p99.as_secs_f64() / report.settings.timeout.as_secs_f64());
         lines.push([
             mark,
             device.name.clone(),
             device.unit.to_string(),
             state(cx, device),
-            grouped(tally.ok),
-            grouped(tally.requests - tally.ok),
+            grouped(stats.ok),
+            grouped(stats.requests - stats.ok),
             format!("{failed}/{of}"),
-            span(tally.reply.last()),
-            span(tally.reply.p99()),
-            span(tally.reply.max()),
+            span(stats.reply.last()),
+            span(stats.reply.p99()),
+            span(stats.reply.max()),
             share.map_or(String::new(), |share| bar(cx, share, 8)),
         ]);
     }
@@ -295,8 +295,8 @@ fn is_ill(cx: &ViewContext, device: &DeviceDef) -> bool {
 }
 
 /// The longest usual reply, if it comes near the timeout.
-fn near(tally: &Tally, timeout: Duration) -> Option<Duration> {
-    tally.reply.p99().filter(|p99| timeout.mul_f64(NEAR) <= *p99)
+fn near(stats: &RequestStats, timeout: Duration) -> Option<Duration> {
+    stats.reply.p99().filter(|p99| timeout.mul_f64(NEAR) <= *p99)
 }
 
 /// What is wrong and what to do about it, a sentence each.
@@ -318,26 +318,32 @@ fn worries(cx: &ViewContext, at: &Place) -> Vec<String> {
         ));
     }
     for device in cx.def().devices.iter().filter(|device| device.line == at.id) {
-        let Some(tally) = report.device(device.id) else { continue };
+        let Some(stats) = report.device(device.id) else { continue };
         worries.extend(
-            of_device(cx, at.settings, report, device, tally).into_iter().map(|why| format!("{}: {why}", device.name)),
+            of_device(cx, at.settings, report, device, stats).into_iter().map(|why| format!("{}: {why}", device.name)),
         );
     }
     let uart = report.counters.uart.unwrap_or_default();
-    if 0 < uart.parity + uart.framing && Tallies::of(report).lately {
+    if 0 < uart.parity + uart.framing && DeviceStats::of(report).lately {
         worries
             .push("the port counts parity or framing errors: compare baud rate and parity with the devices".to_owned());
     }
     worries
 }
 
-fn of_device(cx: &ViewContext, line: &LineDef, report: &LineReport, device: &DeviceDef, tally: &Tally) -> Vec<String> {
+fn of_device(
+    cx: &ViewContext,
+    line: &LineDef,
+    report: &LineReport,
+    device: &DeviceDef,
+    stats: &RequestStats,
+) -> Vec<String> {
     let mut worries = Vec::new();
-    if let Some(p99) = near(tally, line.timeout) {
+    if let Some(p99) = near(stats, line.timeout) {
         worries.push(format!("replies take {} of {} ms: raise the timeout", p99.as_millis(), line.timeout.as_millis()));
     }
     let status = cx.snapshot.device(device.id);
-    let (true, Some((when, fault))) = (0 < tally.recent().0 && is_ill(cx, device), status.last_fault) else {
+    let (true, Some((when, fault))) = (0 < stats.recent().0 && is_ill(cx, device), status.last_fault) else {
         return worries;
     };
     let when = clock(when, &cx.def().time_zone);

@@ -122,7 +122,7 @@ const COLUMNS: [rows::Column; 15] = [
 ];
 
 fn cells(cx: &ViewContext, poll: &PollReport) -> [String; 15] {
-    let (code, tally) = (poll.table.read_fc(), &poll.tally);
+    let (code, stats) = (poll.table.read_fc(), &poll.stats);
     let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
     let next = poll.next.map_or("–".to_owned(), |next| format!("{:.1}", between(cx.now, next).as_secs_f64()));
     [
@@ -136,11 +136,11 @@ fn cells(cx: &ViewContext, poll: &PollReport) -> [String; 15] {
         pace(poll),
         short_ms(poll.cost),
         next,
-        grouped(tally.ok),
-        grouped(tally.requests - tally.ok),
-        span(tally.reply.last()),
-        span(tally.jitter.max()),
-        grouped(tally.missed),
+        grouped(stats.ok),
+        grouped(stats.requests - stats.ok),
+        span(stats.reply.last()),
+        span(stats.jitter.max()),
+        grouped(stats.missed),
     ]
 }
 
@@ -164,7 +164,7 @@ fn every(poll: Poll) -> String {
 }
 
 fn ill(poll: &PollReport) -> bool {
-    poll.tally.failed_last() && 0 < poll.tally.requests
+    poll.stats.failed_last() && 0 < poll.stats.requests
 }
 
 /// Blocks, load, and the verdict of the admission test; `true` if they do not fit.
@@ -193,14 +193,14 @@ pub fn plural<'a>(count: usize, one: &'a str, many: &'a str) -> &'a str {
 
 /// All that the table has no room for.
 fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<String> {
-    let (device, code, tally) = (cx.def().device(poll.device), poll.table.read_fc(), &poll.tally);
+    let (device, code, stats) = (cx.def().device(poll.device), poll.table.read_fc(), &poll.stats);
     let last = poll.address.saturating_add(poll.count.saturating_sub(1));
     let used: u16 = poll.tags.iter().map(|tag| cx.def().tag(*tag).point.len()).sum();
     let over = poll.count.saturating_sub(used);
     let over = if over == 0 { String::new() } else { format!(", {over} between them read over") };
     let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
     let late =
-        tally.jitter.max().map_or("never sent late".to_owned(), |late| format!("sent late by {} at most", ms(late)));
+        stats.jitter.max().map_or("never sent late".to_owned(), |late| format!("sent late by {} at most", ms(late)));
     let dead = report.admission.dead_cost(poll.device);
     let dead = dead.map_or(String::new(), |cost| format!("; while {} is dead a probe costs {}", device.name, ms(cost)));
     let mut lines = vec![
@@ -218,11 +218,11 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
         ),
         format!(
             "reply {} ms, p99 {}, max {}; {late}; missed {}; asked again {}{dead}",
-            span(tally.reply.last()),
-            span(tally.reply.p99()),
-            span(tally.reply.max()),
-            grouped(tally.missed),
-            grouped(tally.retries),
+            span(stats.reply.last()),
+            span(stats.reply.p99()),
+            span(stats.reply.max()),
+            grouped(stats.missed),
+            grouped(stats.retries),
         ),
     ];
     let fault = poll.tags.iter().find_map(|tag| {
@@ -230,7 +230,7 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
         exchange.outcome.err()
     });
     if let Some(fault) = fault.filter(|_| ill(poll)) {
-        let (failed, of) = tally.recent();
+        let (failed, of) = stats.recent();
         lines.push(format!("! {fault}; {failed} of the last {of} failed"));
     }
     lines

@@ -8,7 +8,7 @@ use super::event::{ExceptionCode, Fault};
 
 /// How requests ended.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Tally {
+pub struct RequestStats {
     /// Requests sent, retries included.
     pub requests: u64,
     /// Valid normal answers.
@@ -33,11 +33,11 @@ pub struct Tally {
     pub jitter: Spread,
     /// Releases of the poll that were skipped because the line had no time.
     pub missed: u64,
-    /// The latest outcomes, bit 0 the newest, 1 a failure; see [`Tally::recent`].
+    /// The latest outcomes, bit 0 the newest, 1 a failure; see [`RequestStats::recent`].
     pub(super) recent: u64,
 }
 
-impl Tally {
+impl RequestStats {
     /// Counts one request.
     pub fn count(&mut self, outcome: Result<(), Fault>, reply: Option<Duration>) {
         self.requests += 1;
@@ -83,11 +83,11 @@ impl Tally {
     }
 
     /// What was counted after `before`; all of it, if the counters have begun anew since.
-    pub fn since(&self, before: &Tally) -> Tally {
+    pub fn since(&self, before: &RequestStats) -> RequestStats {
         let Some(requests) = self.requests.checked_sub(before.requests) else { return self.clone() };
         let earlier = |code| before.exceptions.iter().find(|(known, _)| *known == code).map_or(0, |(_, count)| *count);
         let exceptions = self.exceptions.iter().map(|(code, count)| (*code, count.saturating_sub(earlier(*code))));
-        Tally {
+        RequestStats {
             requests,
             ok: self.ok.saturating_sub(before.ok),
             timeouts: self.timeouts.saturating_sub(before.timeouts),
@@ -220,20 +220,20 @@ mod tests {
 
     #[test]
     fn every_way_to_end_is_counted_once() {
-        let mut tally = Tally::default();
-        tally.count(Ok(()), Some(Duration::from_millis(12)));
-        tally.count(Err(Fault::Timeout), None);
-        tally.count(Err(Fault::Crc { got: 1, computed: 2 }), None);
-        tally.count(Err(Fault::WrongUnit { got: 1, asked: 2 }), None);
-        tally.count(Err(Fault::Truncated { got: 1, expected: 2 }), None);
+        let mut stats = RequestStats::default();
+        stats.count(Ok(()), Some(Duration::from_millis(12)));
+        stats.count(Err(Fault::Timeout), None);
+        stats.count(Err(Fault::Crc { got: 1, computed: 2 }), None);
+        stats.count(Err(Fault::WrongUnit { got: 1, asked: 2 }), None);
+        stats.count(Err(Fault::Truncated { got: 1, expected: 2 }), None);
         for _ in 0..2 {
-            tally.count(Err(Fault::Exception(ExceptionCode(2))), None);
+            stats.count(Err(Fault::Exception(ExceptionCode(2))), None);
         }
-        tally.count(Err(Fault::BackedOff), None);
-        let sum = tally.ok + tally.timeouts + tally.corrupt() + tally.exceptions_total();
-        assert_eq!((tally.requests, sum), (7, 7));
-        assert_eq!(tally.exceptions, [(ExceptionCode(2), 2)]);
-        assert!(tally.failed_last());
+        stats.count(Err(Fault::BackedOff), None);
+        let sum = stats.ok + stats.timeouts + stats.corrupt() + stats.exceptions_total();
+        assert_eq!((stats.requests, sum), (7, 7));
+        assert_eq!(stats.exceptions, [(ExceptionCode(2), 2)]);
+        assert!(stats.failed_last());
     }
 
     #[test]
