@@ -47,7 +47,7 @@ pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
         samples: vec![Sample::bad(Cause::Withheld, *at); def.tags.len()],
         texts: Arc::new(vec![None; def.tags.len()]),
         decimals: decimals.clone(),
-        evidence: Arc::new(vec![None; def.tags.len()]),
+        source_frames: Arc::new(vec![None; def.tags.len()]),
         lines: lines.iter().map(reached).collect(),
         devices: devices.iter().map(answering).collect(),
         alarms: Arc::new(alarms.iter().map(|alarm| ActiveAlarm { value: None, ..alarm.clone() }).collect()),

@@ -16,7 +16,7 @@
 //! | [`plan`], [`admission`], [`schedule`], [`backoff`] | what is read together, whether it can all be in time, what is read next |
 //! | [`line_stats`] | what is counted |
 //! | [`diagnostics`] | the steps of a diagnostic |
-//! | [`dissect`], [`names`], [`evidence`] | the fields of a frame and their meaning |
+//! | [`dissect`], [`names`], [`source_frame`] | the fields of a frame and their meaning |
 //! | [`hex_input`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
 
 pub mod ascii;
@@ -25,7 +25,7 @@ pub mod framing;
 pub mod names;
 pub mod request_lint;
 pub mod dissect;
-pub mod evidence;
+pub mod source_frame;
 pub mod hex_input;
 pub mod filter;
 pub mod capture;

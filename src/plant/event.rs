@@ -30,7 +30,7 @@ pub enum Event {
         texts: Vec<(TagId, Arc<str>)>,
         /// From the last byte sent to the first byte received.
         reply: Duration,
-        /// The evidence.
+        /// The exchange that brought them.
         exchange: Option<Arc<Exchange>>,
     },
     /// A block could not be read.
@@ -43,7 +43,7 @@ pub enum Event {
         tags: Vec<TagId>,
         /// Why.
         fault: Fault,
-        /// The evidence, if anything was sent.
+        /// The exchange, if anything was sent.
         exchange: Option<Arc<Exchange>>,
     },
     /// A line changed its state.

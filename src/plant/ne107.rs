@@ -121,7 +121,7 @@ impl fmt::Display for Reason {
 
 /// What the judgement stands on.
 #[derive(Debug, Clone, Copy)]
-pub struct Evidence<'a> {
+pub struct DiagnosisInput<'a> {
     /// The device.
     pub device: DeviceState,
     /// Its line.
@@ -146,22 +146,22 @@ pub const NO_VALUES_AFTER: u32 = 12;
 const CORRUPT_PERCENT: u64 = 1;
 
 /// The worst that can be said of a device; `None` while it is well, or nothing is known.
-pub fn judge(evidence: Evidence) -> Option<Reason> {
-    match evidence.line {
+pub fn judge(input: DiagnosisInput) -> Option<Reason> {
+    match input.line {
         LineState::Disconnected => return Some(Reason::LineClosed),
         LineState::Testing => return Some(Reason::LineTesting),
         LineState::Waiting { .. } => return Some(Reason::NotConnected),
         LineState::Connecting | LineState::Connected => {}
     }
     // A device that was told to be busy is not one that has failed.
-    if evidence.settling {
+    if input.settling {
         return Some(Reason::Settling);
     }
-    match evidence.device {
+    match input.device {
         DeviceState::Down { .. } => Some(Reason::Down),
         DeviceState::Unknown => None,
         DeviceState::Answering | DeviceState::Failing(_) => {
-            out_of_specification(evidence.lately, evidence.timeout).or_else(|| maintenance(evidence.lately))
+            out_of_specification(input.lately, input.timeout).or_else(|| maintenance(input.lately))
         }
     }
 }
@@ -220,7 +220,7 @@ mod tests {
 
     fn check(line: &LineState, device: DeviceState, settling: bool, lately: &RequestStats, expect: &str) {
         let timeout = Duration::from_millis(300);
-        let reason = judge(Evidence { device, line, settling, lately, timeout });
+        let reason = judge(DiagnosisInput { device, line, settling, lately, timeout });
         let words = reason.map(|reason| format!("{} {reason}", reason.signal().letter()));
         assert_eq!(words.as_deref().unwrap_or(""), expect);
     }

@@ -67,7 +67,7 @@ pub struct Plant {
     watches: Vec<LineWatch>,
     devices: Vec<DeviceStatus>,
     /// The last request for each tag, by [`TagId`].
-    evidence: Arc<Vec<Option<Arc<Exchange>>>>,
+    source_frames: Arc<Vec<Option<Arc<Exchange>>>>,
     history: HistoryStatus,
     faults: StationFaults,
     speed: f64,
@@ -95,7 +95,7 @@ impl Plant {
             lines: vec![LineStatus::default(); def.lines.len()],
             watches: vec![LineWatch::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); def.devices.len()],
-            evidence: Arc::new(vec![None; def.tags.len()]),
+            source_frames: Arc::new(vec![None; def.tags.len()]),
             history: HistoryStatus::default(),
             faults: StationFaults::default(),
             sets: Arc::default(),
@@ -273,7 +273,7 @@ impl Plant {
             samples: self.image.samples().to_vec(),
             texts: self.image.texts().clone(),
             decimals: self.def.tags.iter().map(|tag| self.image.shown_decimals(tag)).collect(),
-            evidence: self.evidence.clone(),
+            source_frames: self.source_frames.clone(),
             lines: self.lines.clone(),
             devices: self.diagnosed(),
             alarms: lists.active.clone(),
@@ -299,9 +299,9 @@ impl Plant {
     /// The bytes behind what was just learned of some tags. A value keeps its own when nothing was sent for it.
     fn keep_evidence(&mut self, tags: impl Iterator<Item = TagId>, exchange: Option<Arc<Exchange>>) {
         let Some(exchange) = exchange else { return };
-        let evidence = Arc::make_mut(&mut self.evidence);
+        let source_frames = Arc::make_mut(&mut self.source_frames);
         for tag in tags {
-            evidence[tag.index()] = Some(exchange.clone());
+            source_frames[tag.index()] = Some(exchange.clone());
         }
     }
 

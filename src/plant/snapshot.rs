@@ -46,7 +46,7 @@ pub struct Snapshot {
     /// Decimals to show, by [`TagId`] (they may come from the device).
     pub decimals: Vec<u8>,
     /// The last request that was made for each tag, with its answer, by [`TagId`]: why a value is what it is.
-    pub evidence: Arc<Vec<Option<Arc<Exchange>>>>,
+    pub source_frames: Arc<Vec<Option<Arc<Exchange>>>>,
     /// Lines, by [`LineId`].
     pub lines: Vec<LineStatus>,
     /// Devices, by [`DeviceId`].
@@ -90,7 +90,7 @@ impl Snapshot {
             samples: vec![Sample::bad(Cause::NotRead, Timestamp::UNIX_EPOCH); tags],
             texts: Arc::new(vec![None; tags]),
             decimals: vec![0; tags],
-            evidence: Arc::new(vec![None; tags]),
+            source_frames: Arc::new(vec![None; tags]),
             lines: vec![LineStatus::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); devices],
             alarms: Arc::default(),

@@ -1,4 +1,4 @@
-//! What went over a line: frames as bytes, requests with their answers. The evidence behind every value.
+//! What went over a line: frames as bytes, requests with their answers. The source frame of every value.
 
 use std::{borrow::Cow, collections::VecDeque, sync::Arc, time::Duration};
 

@@ -48,7 +48,7 @@ pub struct Fixture {
     /// The devices.
     pub devices: Vec<DeviceStatus>,
     /// The last request for each tag.
-    pub evidence: Vec<Option<Arc<Exchange>>>,
+    pub source_frames: Vec<Option<Arc<Exchange>>>,
     /// Sets in the station's folder.
     pub sets: Vec<StoredSet>,
     /// Details of faults of the station.
@@ -83,7 +83,7 @@ impl Fixture {
         };
         let devices = vec![answering; def.devices.len()];
         Fixture {
-            evidence: vec![None; def.tags.len()],
+            source_frames: vec![None; def.tags.len()],
             sets: Vec::new(),
             station: BTreeMap::new(),
             restores: Vec::new(),
@@ -170,7 +170,7 @@ impl Fixture {
         Arc::new(Snapshot {
             watch: crate::plant::guard::Watch::default(),
             texts: Arc::new(vec![None; self.def.tags.len()]),
-            evidence: Arc::new(self.evidence.clone()),
+            source_frames: Arc::new(self.source_frames.clone()),
             at: now(),
             run: 7,
             stepped: SignedDuration::ZERO,

@@ -26,7 +26,7 @@ use crate::plant::{
 };
 use line::LineDelta;
 use list::List;
-use readings::{Evidence, Readings};
+use readings::{Readings, SourceFrame};
 
 /// What has changed between two snapshots of one plant definition.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -37,7 +37,7 @@ pub struct Delta {
     samples: Vec<Readings>,
     texts: List<Option<Arc<str>>>,
     decimals: List<u8>,
-    evidence: Vec<Evidence>,
+    source_frames: Vec<SourceFrame>,
     /// Lines that have changed, by place.
     lines: Vec<(u16, LineDelta)>,
     devices: List<DeviceStatus>,
@@ -78,7 +78,7 @@ impl Delta {
             samples,
             texts,
             decimals,
-            evidence,
+            source_frames,
             lines,
             devices,
             alarms,
@@ -105,7 +105,7 @@ impl Delta {
             samples: readings::between(&old.samples, samples),
             texts: shared(&old.texts, texts),
             decimals: List::between(&old.decimals, decimals),
-            evidence: readings::evidence_between(&old.evidence, evidence),
+            source_frames: readings::source_frames_between(&old.source_frames, source_frames),
             lines: lines.collect(),
             devices: List::between(&old.devices, devices),
             alarms: shared(&old.alarms, alarms),
@@ -139,9 +139,9 @@ impl Delta {
             snapshot.texts = Arc::new(texts);
         }
         self.decimals.apply(&mut snapshot.decimals)?;
-        if !self.evidence.is_empty() {
-            let evidence: &mut Vec<_> = Arc::make_mut(&mut snapshot.evidence);
-            readings::apply_evidence(self.evidence, evidence)?;
+        if !self.source_frames.is_empty() {
+            let source_frames: &mut Vec<_> = Arc::make_mut(&mut snapshot.source_frames);
+            readings::apply_source_frames(self.source_frames, source_frames)?;
         }
         for (place, delta) in self.lines {
             let place = usize::from(place);

@@ -1,4 +1,4 @@
-//! Samples and evidence as they change: by the answer that many tags share, so that its time is told once.
+//! Samples and source frames as they change: by the answer that many tags share, so that its time is told once.
 
 use std::{
     collections::{BTreeMap, HashMap},
@@ -89,7 +89,7 @@ pub fn apply(readings: Vec<Readings>, samples: &mut [Sample]) -> Result<(), Unfi
 
 /// One request with its answer, and the tags that it speaks of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Evidence {
+pub struct SourceFrame {
     exchange: Option<Arc<Exchange>>,
     tags: Runs,
 }
@@ -97,9 +97,9 @@ pub struct Evidence {
 /// Requests with their answers, by tag.
 type Exchanges = [Option<Arc<Exchange>>];
 
-/// The evidence that has changed, each request once.
-pub fn evidence_between(old: &Exchanges, new: &Exchanges) -> Vec<Evidence> {
-    let mut found: Vec<Evidence> = Vec::new();
+/// The source frames that have changed, each request once.
+pub fn source_frames_between(old: &Exchanges, new: &Exchanges) -> Vec<SourceFrame> {
+    let mut found: Vec<SourceFrame> = Vec::new();
     let mut places: HashMap<Option<*const Exchange>, usize> = HashMap::new();
     for (tag, (old, new)) in old.iter().zip(new).enumerate() {
         let is_same = match (old, new) {
@@ -111,7 +111,7 @@ pub fn evidence_between(old: &Exchanges, new: &Exchanges) -> Vec<Evidence> {
             continue;
         }
         let place = *places.entry(new.as_ref().map(Arc::as_ptr)).or_insert_with(|| {
-            found.push(Evidence { exchange: new.clone(), tags: Runs::default() });
+            found.push(SourceFrame { exchange: new.clone(), tags: Runs::default() });
             found.len() - 1
         });
         found[place].tags.push(tag);
@@ -120,10 +120,10 @@ pub fn evidence_between(old: &Exchanges, new: &Exchanges) -> Vec<Evidence> {
 }
 
 /// Takes it in.
-pub fn apply_evidence(news: Vec<Evidence>, evidence: &mut Exchanges) -> Result<(), Unfit> {
-    for Evidence { exchange, tags } in news {
+pub fn apply_source_frames(news: Vec<SourceFrame>, source_frames: &mut Exchanges) -> Result<(), Unfit> {
+    for SourceFrame { exchange, tags } in news {
         for tag in tags.iter() {
-            *evidence.get_mut(tag).ok_or(Unfit)? = exchange.clone();
+            *source_frames.get_mut(tag).ok_or(Unfit)? = exchange.clone();
         }
     }
     Ok(())

@@ -90,8 +90,8 @@ fn change(snapshot: &mut Snapshot, (kind, place, amount): (u8, u16, u32)) {
                 reply: None,
                 tries: 1,
             });
-            let evidence = Arc::make_mut(&mut snapshot.evidence).iter_mut().skip(tag).take(5);
-            evidence.for_each(|place| *place = (amount % 4 != 0).then(|| exchange.clone()));
+            let source_frames = Arc::make_mut(&mut snapshot.source_frames).iter_mut().skip(tag).take(5);
+            source_frames.for_each(|place| *place = (amount % 4 != 0).then(|| exchange.clone()));
         }
         5 => (snapshot.devices[device].ok, snapshot.devices[device].state) = (amount.into(), DeviceState::Failing(1)),
         6 => {
@@ -241,7 +241,7 @@ fn without_a_login_no_value_leaves_the_station() {
     Arc::make_mut(&mut snapshot.alarms)[0].value = Some(72.1);
     let seen = alarms_only(&snapshot);
     assert!(seen.samples.iter().all(|sample| *sample == Sample::bad(Cause::Withheld, snapshot.at)));
-    assert!(seen.texts.iter().all(Option::is_none) && seen.evidence.iter().all(Option::is_none));
+    assert!(seen.texts.iter().all(Option::is_none) && seen.source_frames.iter().all(Option::is_none));
     assert!(seen.lines.iter().all(|line| line.report.is_none() && line.test.is_none()));
     assert!(seen.orders.is_empty() && seen.sets.is_empty() && seen.restores.is_empty());
     assert!(seen.alarms.iter().all(|alarm| alarm.value.is_none()));

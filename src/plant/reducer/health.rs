@@ -8,7 +8,7 @@ use super::Plant;
 use crate::plant::{
     command::{BusRequest, Command, Outcome},
     def::{DeviceId, LineId, TagId},
-    ne107::{self, Evidence},
+    ne107::{self, DiagnosisInput},
     record::Record,
     snapshot::DeviceStatus,
     tag::Bound,
@@ -52,8 +52,8 @@ impl Plant {
             let lately = report.map(|report| watch.lately(report, def.id)).unwrap_or_default();
             let timeout = report.map_or(self.def.line(def.line).timeout, |report| report.settings.timeout);
             let settling = self.settling(def.id);
-            let evidence = Evidence { device: status.state, line: &line.state, settling, lately: &lately, timeout };
-            DeviceStatus { diagnosis: ne107::judge(evidence), ..*status }
+            let input = DiagnosisInput { device: status.state, line: &line.state, settling, lately: &lately, timeout };
+            DeviceStatus { diagnosis: ne107::judge(input), ..*status }
         };
         self.def.devices.iter().zip(&self.devices).map(diagnosed).collect()
     }

@@ -34,7 +34,7 @@ pub(super) struct Outcome {
     /// The time of the line that it took.
     pub took: Duration,
     pub answer: Result<Answer, Fault>,
-    /// The evidence.
+    /// The exchange.
     pub exchange: Option<Arc<Exchange>>,
 }
 

@@ -6,7 +6,7 @@ use ratatui::style::Style;
 
 use super::{Row, service, value, wire};
 use crate::{
-    bus::evidence,
+    bus::source_frame,
     plant::{
         def::{LineDef, TagId},
         event::Fault,
@@ -19,8 +19,8 @@ use crate::{
 pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
     let def = cx.def().tag(tag);
     let device = cx.def().device(def.device);
-    let exchange = cx.snapshot.evidence[tag.index()].as_deref();
-    let found = exchange.and_then(|exchange| evidence::find(def.point, exchange));
+    let exchange = cx.snapshot.source_frames[tag.index()].as_deref();
+    let found = exchange.and_then(|exchange| source_frame::find(def.point, exchange));
     let mut rows = value::value_rows(cx, def, exchange, found.as_ref());
     let label = if def.is_text() { "text" } else { "number" };
     rows.push(row(label, value::number(cx, def, exchange, found.as_ref()), cx.theme.normal()));

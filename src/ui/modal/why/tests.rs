@@ -85,7 +85,7 @@ fn asked(plant: &mut Fixture, outcome: Result<(), Fault>, answer: Vec<u8>, tries
         tries,
     });
     for tag in plant.def.tags.iter().filter(|tag| tag.device == DeviceId(0)) {
-        plant.evidence[tag.id.index()] = Some(exchange.clone());
+        plant.source_frames[tag.id.index()] = Some(exchange.clone());
     }
 }
 
@@ -105,7 +105,7 @@ fn cases() -> Vec<(&'static str, Fixture)> {
     timeout.devices[0].last_fault = Some((ago(420), Fault::Timeout));
     timeout.devices[0].diagnosis = Some(Reason::Failing { failed: 8, of: 64 });
     let mut crc = fixture();
-    let mut corrupt = crc.evidence[0].as_ref().map(|exchange| exchange.answer.to_vec()).unwrap_or_default();
+    let mut corrupt = crc.source_frames[0].as_ref().map(|exchange| exchange.answer.to_vec()).unwrap_or_default();
     corrupt[5] ^= 0x40;
     let fault = frame::without_crc(&corrupt).expect_err("a corrupt frame");
     asked(&mut crc, Err(fault), corrupt, 2);
@@ -117,7 +117,7 @@ fn cases() -> Vec<(&'static str, Fixture)> {
     doubt(&mut exception, |sample| Sample::bad(Cause::Exception, sample.at));
     exception.devices[0].last_fault = Some((ago(420), fault));
     let mut never = fixture();
-    never.evidence.fill(None);
+    never.source_frames.fill(None);
     doubt(&mut never, |sample| Sample::bad(Cause::NotRead, sample.at));
     never.devices[0] = Default::default();
     never.line.report =
@@ -166,7 +166,7 @@ fn a_small_screen_has_the_essentials_without_scrolling() {
 fn it_can_be_asked_wherever_a_value_is_selected() {
     for keys in ["w", "→w", "→⏎w", "2w", "2vw", "3w", "4w", "4↓↓w"] {
         let mut fixture = Fixture::alarm();
-        fixture.evidence = self::fixture().evidence;
+        fixture.source_frames = self::fixture().source_frames;
         let mut model = model(&fixture, Theme::FULL);
         type_keys(&mut model, keys);
         let shown = screen(&mut model, 80, 24);

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     bus::{
         codec,
-        evidence::{self, Found},
+        source_frame::{self, Found},
     },
     plant::{
         def::TagId,
@@ -99,7 +99,7 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
     let device = cx.def().device(def.device);
     let fault = exchange.and_then(|exchange| exchange.outcome.err());
     let last = cx.snapshot.device(device.id).last_fault.map(|(_, fault)| fault);
-    let of = |fault: Fault| Some(evidence::advice(fault).to_owned());
+    let of = |fault: Fault| Some(source_frame::advice(fault).to_owned());
     match cause {
         Cause::NotConnected => match cx.snapshot.line(device.line).state {
             LineState::Disconnected => Some("connect the line again: tab 4, L".to_owned()),

@@ -7,7 +7,7 @@ use super::{
 use crate::{
     bus::{
         dissect::{self, Direction, Dissection},
-        evidence::Found,
+        source_frame::Found,
     },
     plant::{
         def::DeviceDef,

@@ -226,7 +226,7 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
         ),
     ];
     let fault = poll.tags.iter().find_map(|tag| {
-        let exchange = cx.snapshot.evidence.get(tag.index())?.as_ref()?;
+        let exchange = cx.snapshot.source_frames.get(tag.index())?.as_ref()?;
         exchange.outcome.err()
     });
     if let Some(fault) = fault.filter(|_| ill(poll)) {

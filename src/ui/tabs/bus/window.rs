@@ -279,7 +279,7 @@ fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, ad
     );
     let mut rows = vec![plain(what, cx.theme.normal()), plain(heading, cx.theme.dim())];
     rows.extend(poll.tags.iter().zip(lines).map(|(tag, line)| plain(line, value::show(cx, *tag).style)));
-    let last = poll.tags.first().and_then(|tag| cx.snapshot.evidence.get(tag.index())?.clone());
+    let last = poll.tags.first().and_then(|tag| cx.snapshot.source_frames.get(tag.index())?.clone());
     if let Some(exchange) = last {
         rows.push(Row::new());
         rows.push(plain(format!("last read: {}", hex(&exchange.answer)), cx.theme.dim()));
