@@ -35,7 +35,7 @@ use crate::{
     plant::{
         PlantDef,
         command::{Order, OrderId, Refusal},
-        guard,
+        interlock,
         record::ActionRecord,
         role::Role,
     },
@@ -220,7 +220,7 @@ impl AccessControl {
         request.id.terminal = terminal;
         request.note = request.note.map(|note| clean(&note).into());
         // A stop is never one request too many.
-        let stops = request.command.written().is_some_and(|(tag, value)| guard::is_stop(&self.def, tag, value));
+        let stops = request.command.written().is_some_and(|(tag, value)| interlock::is_stop(&self.def, tag, value));
         if !self.within_rate(terminal, at) && !stops {
             return self.undelivered(request.id, TOO_MANY);
         }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::plant::{
     Snapshot,
-    guard::Watch,
+    interlock::ActuatorTracker,
     sample::{Cause, Sample},
     snapshot::{ActiveAlarm, DeviceStatus, LineStatus},
 };
@@ -55,7 +55,7 @@ pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
         sound: *sound,
         alarm_quality: alarm_quality.clone(),
         orders: Vec::new(),
-        watch: Watch::default(),
+        watch: ActuatorTracker::default(),
         history: history.clone(),
         station: station.clone(),
         sets: Arc::default(),

@@ -286,7 +286,7 @@ pub enum BusRequest {
         unlock: Option<(TagId, f64)>,
         /// Read it back afterwards.
         verify: bool,
-        /// It switches something off: it goes before all that waits, see [`super::guard::is_stop`].
+        /// It switches something off: it goes before all that waits, see [`super::interlock::is_stop`].
         urgent: bool,
     },
     /// Read every block of a device as soon as possible.

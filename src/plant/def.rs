@@ -9,8 +9,8 @@ use super::tag::{Table, TagDef};
 
 pub use super::{
     alarm::def::{AlarmClass, AlarmDef, AlarmRules, Condition, Guidance, Level, Priority, Subject},
-    guard::Guards,
     id::{AlarmId, DeviceId, LineId, TagId},
+    interlock::ControlLogic,
     line::{Framing, LineDef, Parity, Rs485, Serial, Transport},
     program::{ProgramDef, ProgramStep},
     role::{AccessDef, Role, Sign},
@@ -39,7 +39,7 @@ pub struct PlantDef {
     /// What holds for all alarms.
     pub alarm_rules: AlarmRules,
     /// What stands between commands and their effect.
-    pub guards: Guards,
+    pub logic: ControlLogic,
     /// The mimic of the process.
     pub mimic: MimicDef,
     /// Groups of pens for the trends tab; at least one.

@@ -103,7 +103,7 @@ pub fn plant() -> PlantDef {
             alarm(SILENT, Subject::Device(TIC), Condition::NotAnswering, Duration::ZERO),
         ],
         alarm_rules: Default::default(),
-        guards: Default::default(),
+        logic: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),
         shifts: Vec::new(),

@@ -30,7 +30,7 @@ pub mod line_minute;
 pub mod diagnostics;
 pub mod command;
 pub mod record;
-pub mod guard;
+pub mod interlock;
 pub mod alarm;
 pub mod ne107;
 pub mod tuning;

@@ -9,7 +9,7 @@ use super::{
     command::{BusRequest, Command, NotConfirmed, Order, OrderId, OrderStatus, Outcome, Refusal, WriteId},
     def::{AlarmId, LineId, PlantDef, TagId},
     event::{Fault, WriteResult},
-    guard,
+    interlock,
     process_image::ProcessImage,
     record::{ActionRecord, ORDER},
     scale,
@@ -295,7 +295,7 @@ impl Desk {
         }
         let decimals = image.scaling_decimals(def);
         let held = decimals.and_then(|decimals| scale::held(def, value, decimals));
-        let urgent = held.is_some_and(|held| guard::is_stop(&self.def, tag, held));
+        let urgent = held.is_some_and(|held| interlock::is_stop(&self.def, tag, held));
         let mut under_way = self.writes.iter().filter(|write| write.2 == tag).map(|write| write.3).peekable();
         let is_busy = under_way.peek().is_some();
         // A stop need not wait for the start under way; the same stop twice would only take the line's time.
@@ -306,7 +306,7 @@ impl Desk {
         if !def.labels.is_empty() && def.label_of(value).is_none() {
             return refuse(Refusal::NotAChoice);
         }
-        if let Some(lock) = self.def.guards.refusal(tag, held.unwrap_or(value), |tag| image.sample(tag)) {
+        if let Some(lock) = self.def.logic.refusal(tag, held.unwrap_or(value), |tag| image.sample(tag)) {
             return refuse(Refusal::Interlock(lock.text.clone()));
         }
         let bound = |bound: Option<super::tag::Bound>| bound.map(|bound| image.bound(bound)).transpose();

@@ -18,7 +18,7 @@ use super::{
     command::{BusRequest, Command, Order, OrderId, Outcome, Refusal, WriteId},
     def::{DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
-    guard::Watch,
+    interlock::ActuatorTracker,
     line_minute::LineWatch,
     orders::Desk,
     parameter_set::StoredSet,
@@ -61,7 +61,7 @@ pub struct Plant {
     meter: Meter,
     quality: AlarmQuality,
     desk: Desk,
-    watch: Watch,
+    watch: ActuatorTracker,
     lines: Vec<LineStatus>,
     /// Earlier reports, by [`LineId`].
     watches: Vec<LineWatch>,
@@ -91,7 +91,7 @@ impl Plant {
             meter: Meter::running(at),
             quality: AlarmQuality::default(),
             desk: Desk::new(def.clone()),
-            watch: Watch::default(),
+            watch: ActuatorTracker::default(),
             lines: vec![LineStatus::default(); def.lines.len()],
             watches: vec![LineWatch::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); def.devices.len()],
@@ -399,7 +399,7 @@ impl Plant {
         self.at = self.at.max(at);
         let asked = self.watch_controllers();
         let image = &self.image;
-        self.watch.look(&self.def.guards, |tag| image.sample(tag), self.at);
+        self.watch.look(&self.def.logic, |tag| image.sample(tag), self.at);
         let steps = self.judge_alarms();
         let mut records = self.image.records(self.at);
         records.extend(steps.into_iter().map(Record::Alarm));

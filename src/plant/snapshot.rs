@@ -14,7 +14,7 @@ use super::{
     def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, TagId},
     diagnostics::DiagnosticRun,
     event::{Fault, LineCounters, LineState},
-    guard::Watch,
+    interlock::ActuatorTracker,
     line_report::LineReport,
     ne107,
     parameter_set::StoredSet,
@@ -62,7 +62,7 @@ pub struct Snapshot {
     /// The latest orders, newest first, at most 32.
     pub orders: Vec<OrderStatus>,
     /// Since when actuators have not obeyed.
-    pub watch: Watch,
+    pub watch: ActuatorTracker,
     /// The history store.
     pub history: HistoryStatus,
     /// The details of each fault that the station has or had.
@@ -98,7 +98,7 @@ impl Snapshot {
             sound: false,
             alarm_quality: AlarmQuality::default(),
             orders: Vec::new(),
-            watch: Watch::default(),
+            watch: ActuatorTracker::default(),
             history: HistoryStatus::default(),
             station: Arc::default(),
             sets: Arc::default(),

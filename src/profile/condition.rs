@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{
     diagnostic::{Problems, Span},
-    guard::bits_of,
+    interlock::bits_of,
     names::{Defs, number_of},
     reader::At,
     schema::AlarmTable,

@@ -18,7 +18,7 @@ mod device;
 pub(crate) mod diagnostic;
 mod edit;
 mod expr;
-mod guard;
+mod interlock;
 mod history;
 pub(crate) mod io;
 pub mod line;

@@ -7,7 +7,7 @@ use jiff::tz::TimeZone;
 use super::{
     access, alarm, device,
     diagnostic::{Errors, Problems},
-    guard, history, line, lint, mimic,
+    history, interlock, line, lint, mimic,
     names::{Defs, Names, Unique, check_name},
     program, reader,
     reader::{At, Node, Raw, text},
@@ -73,7 +73,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     lint::lint(&file.alarms, problems);
     let mimic = file.mimic.as_ref().map_or_else(MimicDef::default, |mimic| mimic::mimic(&mimic.value, &defs, problems));
     let access = access::access(file.access.as_ref().map(|table| &table.value), problems);
-    let guards = guard::guards(file, &defs, problems);
+    let logic = interlock::logic(file, &defs, problems);
     let trends = mimic::trends(&file.trends, &defs, problems);
     let shifts = report::shifts(&file.shifts, problems);
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, problems);
@@ -88,7 +88,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         alarm_rules: alarm::rules(file, problems),
         alarms,
         access,
-        guards,
+        logic,
         mimic,
         trends,
         shifts,

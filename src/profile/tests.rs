@@ -9,7 +9,7 @@ use super::{
 };
 use crate::plant::{
     def::{Condition, HistoryDef, LineId, PlantDef, Subject},
-    guard::Blocking,
+    interlock::InterlockCondition,
     station::StationFault,
     tag::{Bound, Class, Kind},
 };
@@ -367,18 +367,18 @@ fn nothing_counts_with_a_text() {
 }
 
 /// The small plant with more tables before its mimic.
-fn guarded(tables: &str) -> Result<PlantDef, Errors> {
+fn interlocked(tables: &str) -> Result<PlantDef, Errors> {
     load(PLANT.replace("[mimic]", &format!("{tables}\n[mimic]")).as_bytes(), METER, PLC)
 }
 
 #[test]
 fn an_interlock_says_what_blocks_which_value() {
     let lock = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"too hot\"\n";
-    let plant = guarded(lock).unwrap();
-    let found = &plant.guards.interlocks[0];
-    assert_eq!((found.value, found.when, found.refuse), (1.0, Blocking::Above(80.0), false));
-    let off = guarded(&lock.replace("\"on\"", "\"off\"")).unwrap();
-    assert!(!off.guards.interlocks[0].refuse, "switching off is told, never refused");
+    let plant = interlocked(lock).unwrap();
+    let found = &plant.logic.interlocks[0];
+    assert_eq!((found.value, found.when, found.refuse), (1.0, InterlockCondition::Above(80.0), false));
+    let off = interlocked(&lock.replace("\"on\"", "\"off\"")).unwrap();
+    assert!(!off.logic.interlocks[0].refuse, "switching off is told, never refused");
     for (from, to, expect) in [
         ("value = \"on\"", "value = \"off\"\nrefuse = true", "switching off is never refused"),
         ("value = \"on\"", "value = \"full\"", "`full` is not a state of D1.MODE"),
@@ -389,7 +389,7 @@ fn an_interlock_says_what_blocks_which_value() {
         ("tag = \"D1.MODE\"", "tag = \"D1.T\"", "D1.T cannot be commanded"),
         ("text = \"too hot\"", "", "an interlock needs `text`"),
     ] {
-        let text = guarded(&lock.replace(from, to)).expect_err(to).to_string();
+        let text = interlocked(&lock.replace(from, to)).expect_err(to).to_string();
         assert!(text.contains(expect), "{to}: {text}");
     }
 }
@@ -423,9 +423,9 @@ fn only_a_binary_number_that_is_not_scaled_has_bits() {
 #[test]
 fn an_actuator_has_one_command_and_one_output() {
     let table = "[[actuator]]\noutput = \"PLC.OUT\"\ncommand = \"D1.MODE\"\nneeds = [{ tag = \"PLC.STEP\", is = 1 }]\n";
-    let plant = guarded(table).unwrap();
-    assert_eq!(plant.guards.actuators[0].needs, [(plant.tag_named("PLC.STEP").unwrap(), 1.0)]);
-    assert_eq!(plant.guards.actuators[0].travel, None);
+    let plant = interlocked(table).unwrap();
+    assert_eq!(plant.logic.actuators[0].needs, [(plant.tag_named("PLC.STEP").unwrap(), 1.0)]);
+    assert_eq!(plant.logic.actuators[0].travel, None);
     let unsaid = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"hot\"\n";
     for (tables, refuse) in [
         (unsaid.to_owned(), false),
@@ -434,17 +434,17 @@ fn an_actuator_has_one_command_and_one_output() {
         (format!("{table}off = \"on\"\n{unsaid}"), false),
         (format!("{table}off = \"on\"\n{}", unsaid.replace("\"on\"", "\"off\"")), true),
     ] {
-        assert_eq!(guarded(&tables).unwrap().guards.interlocks[0].refuse, refuse, "{tables}");
+        assert_eq!(interlocked(&tables).unwrap().logic.interlocks[0].refuse, refuse, "{tables}");
     }
     // Where another value switches off, that one is never refused.
     let lock =
         "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"hot\"\nrefuse = true\n";
-    let text = guarded(&format!("{table}off = \"on\"\n{lock}")).expect_err("off is on").to_string();
+    let text = interlocked(&format!("{table}off = \"on\"\n{lock}")).expect_err("off is on").to_string();
     assert!(text.contains("switching off is never refused"), "{text}");
-    assert!(guarded(&format!("{table}{lock}")).is_ok());
-    let text = guarded(&format!("{table}{table}")).expect_err("twice").to_string();
+    assert!(interlocked(&format!("{table}{lock}")).is_ok());
+    let text = interlocked(&format!("{table}{table}")).expect_err("twice").to_string();
     assert!(text.contains("PLC.OUT belongs to another actuator"), "{text}");
-    let text = guarded(&table.replace("D1.MODE", "D1.T")).expect_err("read only").to_string();
+    let text = interlocked(&table.replace("D1.MODE", "D1.T")).expect_err("read only").to_string();
     assert!(text.contains("D1.T cannot be commanded"), "{text}");
 }
 

@@ -68,7 +68,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
         tags: ["PV", "SV", "MV"].iter().enumerate().map(|(i, short)| tag(i as u16, short)).collect(),
         alarms: Vec::new(),
         alarm_rules: Default::default(),
-        guards: Default::default(),
+        logic: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),
         shifts: shifts

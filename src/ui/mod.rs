@@ -5,7 +5,7 @@ pub mod chrome;
 pub mod last_frame;
 pub mod glyph_filter;
 pub mod io;
-pub mod guard;
+pub mod interlock;
 pub mod keys;
 pub mod modal;
 pub mod msg;

@@ -197,7 +197,7 @@ fn plant() -> Arc<PlantDef> {
     def.devices.clear();
     def.tags.clear();
     def.trends.clear();
-    (def.guards, def.mimic) = (Default::default(), Default::default());
+    (def.logic, def.mimic) = (Default::default(), Default::default());
     for id in 0..DEVICES {
         let name = format!("D{id}");
         let (id, unit) = (DeviceId(id), id as u8 + 1);

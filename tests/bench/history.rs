@@ -42,7 +42,7 @@ fn tank() -> Arc<PlantDef> {
         tags: (0..TAGS).map(tag).collect(),
         alarms: Vec::new(),
         alarm_rules: Default::default(),
-        guards: Default::default(),
+        logic: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),
         shifts: Vec::new(),

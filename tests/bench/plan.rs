@@ -79,7 +79,7 @@ fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
         tags,
         alarms: Vec::new(),
         alarm_rules: Default::default(),
-        guards: Default::default(),
+        logic: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),
         shifts: Vec::new(),

@@ -14,7 +14,7 @@ use crate::{
         PlantDef,
         command::{Command, Refusal},
         def::{Sign, TagId},
-        guard,
+        interlock,
     },
 };
 
@@ -115,7 +115,7 @@ impl AccessControl {
 pub fn needed(def: &PlantDef, command: &Command) -> Option<Sign> {
     let asks = |tag: TagId, value: f64| {
         let sign = def.tags.get(tag.index())?.sign?;
-        (!guard::is_stop(def, tag, value)).then_some(sign)
+        (!interlock::is_stop(def, tag, value)).then_some(sign)
     };
     let strictest = |one: Option<Sign>, other: Option<Sign>| match (one, other) {
         (Some(Sign::SecondPerson), _) | (_, Some(Sign::SecondPerson)) => Some(Sign::SecondPerson),

@@ -17,7 +17,7 @@ use crate::plant::{
     Snapshot,
     alarm::{AlarmQuality, Figures},
     command::OrderStatus,
-    guard::Watch,
+    interlock::ActuatorTracker,
     parameter_set::StoredSet,
     restore::Restore,
     snapshot::{ActiveAlarm, AsideAlarm, DeviceStatus, HistoryStatus},
@@ -48,7 +48,7 @@ pub struct Delta {
     /// The figures of the day: they change less often than the rates.
     day: Option<Arc<Figures>>,
     orders: List<OrderStatus>,
-    watch: Option<Watch>,
+    watch: Option<ActuatorTracker>,
     history: Option<HistoryStatus>,
     station: Option<Arc<BTreeMap<StationFault, Arc<str>>>>,
     sets: List<StoredSet>,

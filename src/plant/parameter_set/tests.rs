@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::plant::{
     fixture,
-    guard::{Blocking, InterlockDef},
+    interlock::{InterlockCondition, InterlockDef},
     tag::{Access, ByteOrder, Kind, Point, Table},
 };
 
@@ -175,11 +175,11 @@ fn a_value_in_another_unit_is_another_value_whoever_has_chosen_the_unit() {
 #[test]
 fn what_an_interlock_forbids_is_told_before_anything_is_written() {
     let mut def = def();
-    def.guards.interlocks.push(InterlockDef {
+    def.logic.interlocks.push(InterlockDef {
         tag: MODE,
         value: 1.0,
         of: SV,
-        when: Blocking::Above(40.0),
+        when: InterlockCondition::Above(40.0),
         text: "no FUZZY above 40".into(),
         refuse: true,
     });

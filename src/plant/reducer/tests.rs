@@ -9,7 +9,7 @@ use crate::plant::{
     def::{ActionDef, AlarmDef, AlarmId, Condition, Subject},
     event::ExceptionCode,
     fixture::{self, DP, FAULT, PLC, PV, RUN, SILENT, SV, TIC},
-    guard::{Blocking, InterlockDef},
+    interlock::{InterlockCondition, InterlockDef},
     line_report::LineReport,
     record::AlarmStep,
     sample::Quality,
@@ -318,11 +318,18 @@ fn a_full_queue_is_told_to_the_operator() {
 
 #[test]
 fn what_an_interlock_blocks_is_refused_with_its_reason_and_a_stop_never() {
-    use crate::plant::guard::Guards;
+    use crate::plant::interlock::ControlLogic;
     let mut def = fixture::plant();
     let text = "not above 60 °C".to_owned();
-    let lock = InterlockDef { tag: fixture::RUN, value: 1.0, of: PV, when: Blocking::Above(60.0), text, refuse: true };
-    def.guards = Guards { interlocks: vec![lock], ..Guards::default() };
+    let lock = InterlockDef {
+        tag: fixture::RUN,
+        value: 1.0,
+        of: PV,
+        when: InterlockCondition::Above(60.0),
+        text,
+        refuse: true,
+    };
+    def.logic = ControlLogic { interlocks: vec![lock], ..ControlLogic::default() };
     let mut plant = Plant::new(std::sync::Arc::new(def), at(0), 1.0);
     let order = |plant: &mut Plant, number: u32, value: f64, second: i64| {
         let effects = plant.on_order(shown(plant, number, fixture::RUN, value), at(second));
@@ -337,15 +344,15 @@ fn what_an_interlock_blocks_is_refused_with_its_reason_and_a_stop_never() {
 
 #[test]
 fn an_actuator_that_does_not_obey_is_in_the_snapshot() {
-    use crate::plant::guard::{ActuatorDef, Guards};
+    use crate::plant::interlock::{ActuatorDef, ControlLogic};
     let mut def = fixture::plant();
     let travel = Some(Duration::from_secs(5));
     let actuator = ActuatorDef { output: FAULT, command: fixture::RUN, off: 0.0, needs: Vec::new(), travel };
-    def.guards = Guards { actuators: vec![actuator], ..Guards::default() };
+    def.logic = ControlLogic { actuators: vec![actuator], ..ControlLogic::default() };
     let mut plant = Plant::new(std::sync::Arc::new(def), at(0), 1.0);
     let late = |plant: &Plant, second: i64| {
         let snapshot = plant.snapshot();
-        snapshot.watch.disobeys(&snapshot.def.guards, 0, at(second)).map(|span| span.as_secs())
+        snapshot.watch.disobeys(&snapshot.def.logic, 0, at(second)).map(|span| span.as_secs())
     };
     plant.on_event(read(0, &[(fixture::RUN, 1.0), (FAULT, 0.0)]));
     plant.on_event(read(3, &[(fixture::RUN, 1.0), (FAULT, 0.0)]));
@@ -418,8 +425,8 @@ fn what_will_be_sent_is_blocked_whatever_was_typed() {
     let mut def = fixture::plant();
     def.tags[RUN.index()].labels.clear();
     let text = "not while it is hot".to_owned();
-    let when = Blocking::Above(60.0);
-    def.guards.interlocks = vec![InterlockDef { tag: RUN, value: 1.0, of: PV, when, text, refuse: true }];
+    let when = InterlockCondition::Above(60.0);
+    def.logic.interlocks = vec![InterlockDef { tag: RUN, value: 1.0, of: PV, when, text, refuse: true }];
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
     plant.on_event(read(0, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
     for (value, refused) in [(1.0, true), (0.6, true), (0.4, false)] {

@@ -21,7 +21,7 @@ use crate::{
         tag::{Access, Confidence, TagDef},
     },
     ui::{
-        Confirmed, Effect, Leaving, UiAction, ViewContext, guard, keys, rights,
+        Confirmed, Effect, Leaving, UiAction, ViewContext, interlock, keys, rights,
         tabs::mimic,
         widgets::{
             text::{Canvas, width, wrap},
@@ -181,7 +181,7 @@ impl Confirm {
     /// Is it certainly without effect now?
     pub(super) fn is_refused(&self, cx: &ViewContext) -> bool {
         match &self.intent {
-            Intent::Order(Command::Write { tag, value }) => guard::is_refused(cx, *tag, *value),
+            Intent::Order(Command::Write { tag, value }) => interlock::is_refused(cx, *tag, *value),
             Intent::Order(_) | Intent::Quit => false,
         }
     }
@@ -298,7 +298,7 @@ impl Confirm {
         rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));
         if let Intent::Order(Command::Write { tag, value }) = &self.intent {
             // As it stands now: what was true when the window opened may have changed under it.
-            let told = guard::before_write(cx, *tag, *value).into_iter();
+            let told = interlock::before_write(cx, *tag, *value).into_iter();
             rows.extend(told.flat_map(|(note, style)| wrap(&note, room).into_iter().map(move |line| (line, style))));
         }
         let missing = match &self.intent {

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     plant::{command::Command, def::TagId},
     ui::{
-        Confirmed, UiAction, ViewContext, guard, keys, rights,
+        Confirmed, UiAction, ViewContext, interlock, keys, rights,
         widgets::{
             text::{width, wrap},
             value,
@@ -92,7 +92,7 @@ impl Entry {
             vec![(range_words(cx, self.tag), theme.normal()), (wire_words(def), theme.dim())];
         rows.push((number::help(cx, self.tag), theme.dim()));
         let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
-        let notes = notes.chain(guard::key_words(cx, self.tag));
+        let notes = notes.chain(interlock::key_words(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
         let missing = rights::missing(cx, &Command::Write { tag: self.tag, value: 0.0 });
         let told = self.problem.clone().or_else(|| self.expected.news(cx)).or(missing);

@@ -12,7 +12,7 @@ use crate::{
         tag::{Access, Poll},
     },
     ui::{
-        ViewContext, guard, keys,
+        ViewContext, interlock, keys,
         keys::Hint,
         tabs::mimic,
         widgets::{
@@ -81,20 +81,20 @@ impl Faceplate {
 
     /// The other state of the selected actuator: its command, and the value.
     fn toggle(&self, cx: &ViewContext) -> Option<(TagId, f64)> {
-        let command = cx.def().guards.actuator(self.tag())?.1.command;
-        Some((command, guard::other_state(cx, command)?))
+        let command = cx.def().logic.actuator(self.tag())?.1.command;
+        Some((command, interlock::other_state(cx, command)?))
     }
 
     /// The query for the other state; where the command would have no effect, the query for the state that it needs
     /// comes first, as a step of its own.
     fn asked(self, cx: &ViewContext) -> Option<Modal> {
-        let (_, actuator) = cx.def().guards.actuator(self.tag())?;
+        let (_, actuator) = cx.def().logic.actuator(self.tag())?;
         if let Some(notice) = Notice::unreachable(cx, cx.def().tag(actuator.command).device) {
             return Some(Modal::Notice(notice));
         }
         let Some((command, value)) = self.toggle(cx) else { return Modal::write(cx, actuator.command) };
-        let refused = guard::is_refused(cx, command, value);
-        let missing = guard::unmet(cx, actuator).filter(|(need, _)| {
+        let refused = interlock::is_refused(cx, command, value);
+        let missing = interlock::unmet(cx, actuator).filter(|(need, _)| {
             // A state that nobody knows is no reason to change it.
             cx.def().tag(*need).writable() && cx.snapshot.sample(*need).trusted().is_some() && !refused
         });
@@ -127,7 +127,7 @@ impl Faceplate {
             let x = canvas.text(x + 2, y, &shown.within(room), shown.style);
             let left = canvas.width().saturating_sub(x + 2);
             let x = canvas.text(x + 2, y, &fit(&def.label, left), cx.theme.dim());
-            if let Some((words, style)) = guard::mark(cx, *tag).filter(|_| 1 < self.tags.len()) {
+            if let Some((words, style)) = interlock::mark(cx, *tag).filter(|_| 1 < self.tags.len()) {
                 let left = canvas.width().saturating_sub(x + 2);
                 canvas.text(x + 2, y, &fit(&words, left), style);
             }
@@ -178,7 +178,7 @@ fn details(cx: &ViewContext, tag: TagId, room: u16) -> Vec<(&'static str, String
     };
     let device = cx.def().device(def.device);
     // What can be done comes first, what there is to know about the tag behind it.
-    let mut rows = guard::facts(cx, tag);
+    let mut rows = interlock::facts(cx, tag);
     rows.extend([
         ("quality", quality, theme.quality(sample.quality)),
         ("read", format!("{read} ({poll})"), theme.normal()),
@@ -216,7 +216,7 @@ fn command_tag(cx: &ViewContext, tag: TagId) -> Option<TagId> {
 
 /// The command of an output that is only read.
 fn command_of(cx: &ViewContext, tag: TagId) -> Option<TagId> {
-    let (_, actuator) = cx.def().guards.actuator(tag)?;
+    let (_, actuator) = cx.def().logic.actuator(tag)?;
     (actuator.output == tag).then_some(actuator.command)
 }
 

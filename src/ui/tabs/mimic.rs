@@ -12,7 +12,7 @@ use crate::{
         snapshot::Snapshot,
     },
     ui::{
-        UiAction, ViewContext, guard,
+        UiAction, ViewContext, interlock,
         keys::{self, Hint, Key, char, code},
         modal::{Choice, Confirm, Faceplate, Modal, Notice, Why},
         widgets::{
@@ -93,7 +93,7 @@ impl Mimic {
             Action::Move(dx, dy) => self.selected = neighbour(items, self.selected, (dx, dy)),
             Action::Motion => self.motion = !self.motion,
             Action::Actuators => {
-                let outputs = cx.def().guards.actuators.iter().map(|actuator| actuator.output).collect();
+                let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output).collect();
                 let faceplate = Faceplate::new("commands", outputs);
                 return faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect();
             }
@@ -280,11 +280,11 @@ fn intent(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
     if let Some(value) = command.value {
         return Some(Modal::Confirm(Confirm::write(cx, tag, value)));
     }
-    if let Some(new) = guard::other_state(cx, tag) {
+    if let Some(new) = interlock::other_state(cx, tag) {
         return Some(Modal::Confirm(Confirm::write(cx, tag, new)));
     }
     // Nobody knows whether it runs: what is asked is the stop, which never takes more than two keys.
-    if cx.def().guards.sequences.iter().any(|sequence| sequence.run == tag) {
+    if cx.def().logic.sequences.iter().any(|sequence| sequence.run == tag) {
         return Some(Modal::Confirm(Confirm::write(cx, tag, 0.0)));
     }
     match def.labels.as_slice() {

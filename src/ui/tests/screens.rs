@@ -11,7 +11,7 @@ use crate::{
         alarm::AlarmState,
         def::Priority,
         event::LineState,
-        guard::ActuatorDef,
+        interlock::ActuatorDef,
         ne107::Reason,
         sample::{Cause, Quality, Sample},
         snapshot::Snapshot,
@@ -86,15 +86,15 @@ fn commanded() -> Snapshot {
     fixture.set("PLC-1.AUTO", 0.0);
     fixture.set("PLC-1.TK-2", 19.5);
     fixture.set("PLC-1.SV-2", 1.0);
-    let pump = fixture.def.guards.actuators[0].clone();
+    let pump = fixture.def.logic.actuators[0].clone();
     // The fixture has no commands for the valves: the pump's stands in, which is OFF.
     for output in ["PLC-1.SV-2", "PLC-1.SV-1"] {
-        fixture.def.guards.actuators.push(ActuatorDef { output: fixture.tag(output), ..pump.clone() });
+        fixture.def.logic.actuators.push(ActuatorDef { output: fixture.tag(output), ..pump.clone() });
     }
     let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
     let samples = snapshot.samples.clone();
     let since = snapshot.at - SignedDuration::from_secs(8);
-    snapshot.watch.look(&snapshot.def.guards, |tag| samples[tag.index()], since);
+    snapshot.watch.look(&snapshot.def.logic, |tag| samples[tag.index()], since);
     snapshot
 }
 

@@ -276,13 +276,13 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
         };
         Some(format!("{} {words}", device.name))
     });
-    let sequences = def.guards.sequences.iter().filter_map(|sequence| {
+    let sequences = def.logic.sequences.iter().filter_map(|sequence| {
         let (tag, auto) = sequence.auto?;
         let now = snapshot.sample(tag).trusted().filter(|now| *now != auto)?;
         Some(format!("{} {}", def.tag(tag).name, snapshot.format(tag, now)))
     });
-    let stubborn = def.guards.actuators.iter().enumerate().filter_map(|(n, actuator)| {
-        let lasts = snapshot.watch.disobeys(&def.guards, n, cx.now)?;
+    let stubborn = def.logic.actuators.iter().enumerate().filter_map(|(n, actuator)| {
+        let lasts = snapshot.watch.disobeys(&def.logic, n, cx.now)?;
         Some(format!("{} has not obeyed for {}", def.tag(actuator.output).name, running(lasts)))
     });
     lines.chain(devices).chain(sequences).chain(stubborn).collect()

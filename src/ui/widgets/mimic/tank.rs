@@ -6,7 +6,7 @@ use super::{Bounds, alarm_mark, label_style, put_value};
 use crate::{
     plant::def::TagId,
     ui::{
-        ViewContext, guard,
+        ViewContext, interlock,
         theme::Colours,
         widgets::{
             text::{Canvas, fit, width},
@@ -175,7 +175,7 @@ fn liquid(cx: &ViewContext, canvas: &mut Canvas, eighths: u32) {
 
 /// The mark of an actuator inside the vessel: its shape alone, the faceplate has the words.
 fn shape_of_mark(cx: &ViewContext, canvas: &mut Canvas, x: u16, y: u16, output: TagId) {
-    if let Some((words, style)) = guard::mark(cx, output) {
+    if let Some((words, style)) = interlock::mark(cx, output) {
         canvas.text(x, y, words.split(' ').next().unwrap_or_default(), style);
     }
 }

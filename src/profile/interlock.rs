@@ -7,28 +7,33 @@ use super::{
     schema::{ActuatorTable, InterlockTable, NeedTable, PlantFile, SequenceTable},
 };
 use crate::plant::{
-    guard::{ActuatorDef, Blocking, Guards, InterlockDef, SequenceDef, stops},
+    interlock::{ActuatorDef, ControlLogic, InterlockCondition, InterlockDef, SequenceDef, stops},
     tag::{Access, Decimals, Kind, TagDef},
 };
 
 /// All that the plant file says about commands.
-pub(super) fn guards(file: &PlantFile, defs: &Defs, problems: &mut Problems) -> Guards {
+pub(super) fn logic(file: &PlantFile, defs: &Defs, problems: &mut Problems) -> ControlLogic {
     let mut seen = Unique::default();
     let actuators = file.actuators.iter().filter_map(|table| actuator(&table.value, &mut seen, defs, problems));
     let actuators: Vec<ActuatorDef> = actuators.collect();
     let sequences = file.sequences.iter().filter_map(|table| sequence(&table.value, defs, problems)).collect();
-    let guards = Guards { interlocks: Vec::new(), actuators, sequences };
-    let interlocks = file.interlocks.iter().filter_map(|table| interlock(&table.value, &guards, defs, problems));
-    Guards { interlocks: interlocks.collect(), ..guards.clone() }
+    let logic = ControlLogic { interlocks: Vec::new(), actuators, sequences };
+    let interlocks = file.interlocks.iter().filter_map(|table| interlock(&table.value, &logic, defs, problems));
+    ControlLogic { interlocks: interlocks.collect(), ..logic.clone() }
 }
 
-fn interlock(table: &InterlockTable, guards: &Guards, defs: &Defs, problems: &mut Problems) -> Option<InterlockDef> {
+fn interlock(
+    table: &InterlockTable,
+    logic: &ControlLogic,
+    defs: &Defs,
+    problems: &mut Problems,
+) -> Option<InterlockDef> {
     let tag = commanded(table.tag.as_ref()?, defs, problems)?;
     let of = defs.tag(table.of.as_ref()?, problems)?;
     let value = held_number_of(table.value.as_ref()?, tag, problems)?;
     let when = blocking(table, of, problems)?;
     let device = defs.devices.iter().find(|device| device.id == tag.device)?;
-    let stops: Vec<f64> = stops(guards, &device.actions, tag.id).collect();
+    let stops: Vec<f64> = stops(logic, &device.actions, tag.id).collect();
     // Where nothing says which value stops, 0 is taken for it, and another may be it all the same: that one is only told.
     let off = stops.contains(&value) || (stops.is_empty() && value == 0.0);
     if let Some(refuse) = table.refuse.filter(|refuse| refuse.value && off) {
@@ -42,12 +47,12 @@ fn interlock(table: &InterlockTable, guards: &Guards, defs: &Defs, problems: &mu
 }
 
 /// Exactly one of the four conditions.
-fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Option<Blocking> {
+fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Option<InterlockCondition> {
     let mut found = Vec::new();
-    found.extend(table.below.map(|limit| (limit.at, Some(Blocking::Below(limit.value)))));
-    found.extend(table.above.map(|limit| (limit.at, Some(Blocking::Above(limit.value)))));
-    found.extend(table.is.as_ref().map(|is| (is.at, number_of(is, of, problems).map(Blocking::Is))));
-    found.extend(table.bit.map(|bit| (bit.at, Some(Blocking::Bit(bit.value)))));
+    found.extend(table.below.map(|limit| (limit.at, Some(InterlockCondition::Below(limit.value)))));
+    found.extend(table.above.map(|limit| (limit.at, Some(InterlockCondition::Above(limit.value)))));
+    found.extend(table.is.as_ref().map(|is| (is.at, number_of(is, of, problems).map(InterlockCondition::Is))));
+    found.extend(table.bit.map(|bit| (bit.at, Some(InterlockCondition::Bit(bit.value)))));
     if let Some(bit) = table.bit {
         let bits = bits_of(of);
         if u16::from(bit.value) >= bits {

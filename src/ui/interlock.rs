@@ -12,7 +12,7 @@ use super::{
 use crate::plant::{
     command::{NotConfirmed, OrderStatus, Outcome},
     def::TagId,
-    guard::{ActuatorDef, Blocking, InterlockDef, Standing},
+    interlock::{ActuatorDef, InterlockCondition, InterlockDef, InterlockStatus},
     orders::{outcome_word, outcome_words},
     tag::{Kind, TagDef},
 };
@@ -42,7 +42,7 @@ fn two_states(def: &TagDef) -> Option<(f64, f64)> {
 
 /// Is this value of a tag certainly without effect, so that it is not to be sent?
 pub fn is_refused(cx: &ViewContext, tag: TagId, value: f64) -> bool {
-    cx.def().guards.refusal(tag, cx.snapshot.held(tag, value), |tag| cx.snapshot.sample(tag)).is_some()
+    cx.def().logic.refusal(tag, cx.snapshot.held(tag, value), |tag| cx.snapshot.sample(tag)).is_some()
 }
 
 /// All there is to say before a value is written, with its look.
@@ -50,7 +50,7 @@ pub fn before_write(cx: &ViewContext, tag: TagId, value: f64) -> Vec<(String, St
     let gone = Notice::why_unreachable(cx, cx.def().tag(tag).device);
     let gone = gone.map(|why| (format!("! Nothing can be written now. {why}"), cx.theme.trouble()));
     let locks =
-        cx.def().guards.interlocks_of(tag, cx.snapshot.held(tag, value)).filter_map(|lock| interlock_words(cx, lock));
+        cx.def().logic.interlocks_of(tag, cx.snapshot.held(tag, value)).filter_map(|lock| interlock_words(cx, lock));
     let mut rows: Vec<(String, Style)> = gone.into_iter().chain(locks).collect();
     if is_refused(cx, tag, value) {
         rows.push(("This is not sent: it would have no effect.".to_owned(), cx.theme.strong()));
@@ -77,16 +77,19 @@ pub fn key_words(cx: &ViewContext, tag: TagId) -> Option<String> {
 pub fn interlock_words(cx: &ViewContext, lock: &InterlockDef) -> Option<(String, Style)> {
     let mark = cx.theme.pick("⊘", "(/)");
     let name = &cx.def().tag(lock.of).name;
-    match (lock.standing(cx.snapshot.sample(lock.of)), lock.when) {
-        (Standing::Free, _) => None,
-        (Standing::Blocked, Blocking::Bit(_)) => {
+    match (lock.status(cx.snapshot.sample(lock.of)), lock.when) {
+        (InterlockStatus::Free, _) => None,
+        (InterlockStatus::Blocked, InterlockCondition::Bit(_)) => {
             Some((format!("{mark} {}: {name} says so", lock.text), cx.theme.strong()))
         }
-        (Standing::Blocked, Blocking::Below(_) | Blocking::Above(_) | Blocking::Is(_)) => {
+        (
+            InterlockStatus::Blocked,
+            InterlockCondition::Below(_) | InterlockCondition::Above(_) | InterlockCondition::Is(_),
+        ) => {
             let now = value::show(cx, lock.of).with_unit();
             Some((format!("{mark} {}: {name} is {now}", lock.text), cx.theme.strong()))
         }
-        (Standing::Unknown(cause), _) => {
+        (InterlockStatus::Unknown(cause), _) => {
             let words = format!("? cannot be told: {name} is not good ({}): {}", cause.words(), lock.text);
             Some((words, cx.theme.trouble()))
         }
@@ -100,7 +103,7 @@ pub fn unmet(cx: &ViewContext, actuator: &ActuatorDef) -> Option<(TagId, f64)> {
 
 /// `acts in MANUAL only, and PLC-1.AUTO is AUTO`, for the command of an actuator.
 pub fn unmet_words(cx: &ViewContext, tag: TagId) -> Option<String> {
-    let actuator = &cx.def().guards.actuators.iter().find(|actuator| actuator.command == tag)?;
+    let actuator = &cx.def().logic.actuators.iter().find(|actuator| actuator.command == tag)?;
     let (need, state) = unmet(cx, actuator)?;
     let now = match cx.snapshot.sample(need).trusted() {
         Some(now) => format!("is {}", cx.snapshot.format(need, now)),
@@ -111,7 +114,7 @@ pub fn unmet_words(cx: &ViewContext, tag: TagId) -> Option<String> {
 
 /// What starting or stopping a sequence does.
 fn sequence_words(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
-    let sequences = &cx.def().guards.sequences;
+    let sequences = &cx.def().logic.sequences;
     if let Some(sequence) = sequences.iter().find(|sequence| sequence.auto == Some((tag, value))) {
         return vec![match (value::is_on(cx, sequence.run), cx.snapshot.text(sequence.step)) {
             (Some(true), Some(step)) => format!("The sequence goes on with {step} and works the outputs."),
@@ -141,7 +144,7 @@ fn sequence_words(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
 
 /// `Off go: pump RUN, fill valve OPEN.`
 fn switched_off(cx: &ViewContext) -> String {
-    let outputs = cx.def().guards.actuators.iter().map(|actuator| actuator.output);
+    let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output);
     let (mut on, mut unknown) = (Vec::new(), Vec::new());
     for output in outputs {
         let def = cx.def().tag(output);
@@ -170,7 +173,7 @@ fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
             |(need, state): &(TagId, f64)| if *need == tag { value == *state } else { sample(*need) == Some(*state) };
         actuator.needs.iter().any(|(need, _)| *need == tag) && actuator.needs.iter().all(needs)
     };
-    let acting: Vec<&ActuatorDef> = cx.def().guards.actuators.iter().filter(acts).collect();
+    let acting: Vec<&ActuatorDef> = cx.def().logic.actuators.iter().filter(acts).collect();
     if acting.is_empty() {
         return Vec::new();
     }
@@ -181,8 +184,8 @@ fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
             (Some(command), Some(output)) if (command != actuator.off) != (output != 0.0) => {
                 let arrow = cx.theme.pick("→", "->");
                 let new = cx.snapshot.format(actuator.command, command);
-                let mut locks = cx.def().guards.interlocks_of(actuator.command, command);
-                let blocked = locks.any(|lock| lock.standing(cx.snapshot.sample(lock.of)) == Standing::Blocked);
+                let mut locks = cx.def().logic.interlocks_of(actuator.command, command);
+                let blocked = locks.any(|lock| lock.status(cx.snapshot.sample(lock.of)) == InterlockStatus::Blocked);
                 let but = if blocked { ", blocked" } else { "" };
                 changes.push(format!("{name} {} {arrow} {new}{but}", value::show(cx, actuator.output).with_unit()));
             }
@@ -221,15 +224,15 @@ fn news<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<(&'a Outcome, Option
 /// The mark of an actuator in the mimic, by its output: what does not obey, how the last command went, what is blocked.
 pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
     let theme = cx.theme;
-    let guards = &cx.def().guards;
-    let (place, actuator) = guards.actuator(output).filter(|(_, actuator)| actuator.output == output)?;
-    if cx.snapshot.watch.disobeys(guards, place, cx.snapshot.at).is_some() {
+    let logic = &cx.def().logic;
+    let (place, actuator) = logic.actuator(output).filter(|(_, actuator)| actuator.output == output)?;
+    if cx.snapshot.watch.disobeys(logic, place, cx.snapshot.at).is_some() {
         let commanded = cx.snapshot.text(actuator.command).unwrap_or_default();
         return Some((format!("{} not {commanded}", theme.pick("≠", "!=")), theme.trouble()));
     }
     let blocks = |lock: &&InterlockDef| lock.tag == actuator.command && lock.value != actuator.off;
-    let mut standings = guards.interlocks.iter().filter(blocks).map(|lock| lock.standing(cx.snapshot.sample(lock.of)));
-    let blocked = standings.any(|standing| standing == Standing::Blocked);
+    let mut standings = logic.interlocks.iter().filter(blocks).map(|lock| lock.status(cx.snapshot.sample(lock.of)));
+    let blocked = standings.any(|standing| standing == InterlockStatus::Blocked);
     match news(cx, actuator.command) {
         Some((_, None)) => return Some((theme.pick("… sent", ".. sent").to_owned(), theme.strong())),
         Some((outcome, Some(false))) => {
@@ -261,8 +264,8 @@ fn obeys(cx: &ViewContext, actuator: &ActuatorDef) -> bool {
 /// What a faceplate says of an actuator: (label, words, look).
 pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)> {
     let theme = cx.theme;
-    let guards = &cx.def().guards;
-    let Some((place, actuator)) = guards.actuator(tag) else { return Vec::new() };
+    let logic = &cx.def().logic;
+    let Some((place, actuator)) = logic.actuator(tag) else { return Vec::new() };
     let command = cx.def().tag(actuator.command);
     let told = value::show(cx, actuator.command);
     let mut rows = vec![("command", format!("{} {}", command.name, told.whole()), told.style)];
@@ -273,7 +276,7 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
         None if modes.is_empty() => {}
         None => rows.push(("mode", format!("{mode}: the command acts"), theme.normal())),
     }
-    let locks = guards.interlocks.iter().filter(|lock| lock.tag == actuator.command);
+    let locks = logic.interlocks.iter().filter(|lock| lock.tag == actuator.command);
     rows.extend(locks.filter_map(|lock| interlock_words(cx, lock)).map(|(words, style)| ("blocked", words, style)));
     if let Some(lasts) = guards_disobeyed(cx, place) {
         let (wanted, is) = (told.text, value::show(cx, actuator.output).with_unit());
@@ -289,5 +292,5 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
 }
 
 fn guards_disobeyed(cx: &ViewContext, place: usize) -> Option<Duration> {
-    cx.snapshot.watch.disobeys(&cx.def().guards, place, cx.snapshot.at)
+    cx.snapshot.watch.disobeys(&cx.def().logic, place, cx.snapshot.at)
 }

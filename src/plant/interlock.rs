@@ -14,7 +14,7 @@ use super::{
 
 /// What the plant file says about commands.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Guards {
+pub struct ControlLogic {
     /// What keeps a command from acting.
     pub interlocks: Vec<InterlockDef>,
     /// What is commanded, and how it tells that it obeys.
@@ -23,7 +23,7 @@ pub struct Guards {
     pub sequences: Vec<SequenceDef>,
 }
 
-/// A reason for which a command has no effect. The device is the guard; this tells the operator before it is tried.
+/// A reason for which a command has no effect. The device blocks it; the station says so before the write.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InterlockDef {
     /// The command.
@@ -33,7 +33,7 @@ pub struct InterlockDef {
     /// The tag that decides.
     pub of: TagId,
     /// When it blocks.
-    pub when: Blocking,
+    pub when: InterlockCondition,
     /// `no heating below 5 cm of water`.
     pub text: String,
     /// The station refuses the command while it is certainly blocked; else the operator is only told.
@@ -42,7 +42,7 @@ pub struct InterlockDef {
 
 /// When an interlock blocks; limits are in the unit of the tag that decides.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum Blocking {
+pub enum InterlockCondition {
     /// Below this.
     Below(f64),
     /// Above this.
@@ -55,7 +55,7 @@ pub enum Blocking {
 
 /// How an interlock stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Standing {
+pub enum InterlockStatus {
     /// It does not block.
     Free,
     /// It blocks.
@@ -66,17 +66,17 @@ pub enum Standing {
 
 impl InterlockDef {
     /// How it stands with this sample of the tag that decides.
-    pub fn standing(&self, sample: Sample) -> Standing {
+    pub fn status(&self, sample: Sample) -> InterlockStatus {
         let Some(value) = sample.trusted() else {
-            return Standing::Unknown(sample.quality.cause().unwrap_or(Cause::NotRead));
+            return InterlockStatus::Unknown(sample.quality.cause().unwrap_or(Cause::NotRead));
         };
         let blocked = match self.when {
-            Blocking::Below(limit) => value < limit,
-            Blocking::Above(limit) => limit < value,
-            Blocking::Is(state) => value == state,
-            Blocking::Bit(bit) => is_set(value, bit),
+            InterlockCondition::Below(limit) => value < limit,
+            InterlockCondition::Above(limit) => limit < value,
+            InterlockCondition::Is(state) => value == state,
+            InterlockCondition::Bit(bit) => is_set(value, bit),
         };
-        if blocked { Standing::Blocked } else { Standing::Free }
+        if blocked { InterlockStatus::Blocked } else { InterlockStatus::Free }
     }
 }
 
@@ -108,7 +108,7 @@ pub struct SequenceDef {
     pub first: f64,
 }
 
-impl Guards {
+impl ControlLogic {
     /// The interlocks of one value of a command, as the device will hold it or does.
     pub fn interlocks_of(&self, tag: TagId, value: f64) -> impl Iterator<Item = &InterlockDef> {
         self.interlocks.iter().filter(move |lock| lock.tag == tag && lock.value == value)
@@ -117,7 +117,7 @@ impl Guards {
     /// The interlock for which this command is certainly without effect and is not to be sent. What will be sent decides, not
     /// what was typed: `value` is as the device will hold it, [`super::scale::held`].
     pub fn refusal(&self, tag: TagId, value: f64, sample: impl Fn(TagId) -> Sample) -> Option<&InterlockDef> {
-        let blocks = |lock: &&InterlockDef| lock.refuse && lock.standing(sample(lock.of)) == Standing::Blocked;
+        let blocks = |lock: &&InterlockDef| lock.refuse && lock.status(sample(lock.of)) == InterlockStatus::Blocked;
         self.interlocks_of(tag, value).find(blocks)
     }
 
@@ -134,49 +134,49 @@ impl Guards {
         };
         let listens = actuator.needs.iter().all(|(tag, state)| sample(*tag).trusted() == Some(*state));
         let mut locks = self.interlocks_of(actuator.command, command);
-        let blocked = locks.any(|lock| lock.standing(sample(lock.of)) == Standing::Blocked);
+        let blocked = locks.any(|lock| lock.status(sample(lock.of)) == InterlockStatus::Blocked);
         actuator.travel.is_some() && listens && !blocked && (command != actuator.off) != (output != 0.0)
     }
 }
 
 /// The values of a command that switch something off: the `off` of an actuator, the zero of a sequence, the actions of its
 /// device that are marked as a stop.
-pub fn stops<'a>(guards: &'a Guards, actions: &'a [ActionDef], tag: TagId) -> impl Iterator<Item = f64> + 'a {
-    let actuators = guards.actuators.iter().map(|actuator| (actuator.command, actuator.off));
-    let sequences = guards.sequences.iter().map(|sequence| (sequence.run, 0.0));
+pub fn stops<'a>(logic: &'a ControlLogic, actions: &'a [ActionDef], tag: TagId) -> impl Iterator<Item = f64> + 'a {
+    let actuators = logic.actuators.iter().map(|actuator| (actuator.command, actuator.off));
+    let sequences = logic.sequences.iter().map(|sequence| (sequence.run, 0.0));
     let actions = actions.iter().filter(|action| action.stop).map(|action| (action.tag, action.value));
     actuators.chain(sequences).chain(actions).filter(move |(command, _)| *command == tag).map(|(_, off)| off)
 }
 
 /// Does this value of a command switch something off? It is as the device will hold it, [`super::scale::held`].
 pub fn is_stop(def: &PlantDef, tag: TagId, held: f64) -> bool {
-    stops(&def.guards, &def.device(def.tag(tag).device).actions, tag).any(|off| off == held)
+    stops(&def.logic, &def.device(def.tag(tag).device).actions, tag).any(|off| off == held)
 }
 
-/// Since when each actuator has not obeyed, by its place in [`Guards::actuators`].
+/// Since when each actuator has not obeyed, by its place in [`ControlLogic::actuators`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Watch {
+pub struct ActuatorTracker {
     since: Vec<Option<Timestamp>>,
 }
 
-impl Watch {
+impl ActuatorTracker {
     /// Its times.
     pub(super) fn times(&mut self) -> impl Iterator<Item = &mut Timestamp> {
         self.since.iter_mut().flatten()
     }
 
     /// Looks again at `at`.
-    pub fn look(&mut self, guards: &Guards, sample: impl Fn(TagId) -> Sample, at: Timestamp) {
-        self.since.resize(guards.actuators.len(), None);
-        for (actuator, since) in guards.actuators.iter().zip(&mut self.since) {
-            *since = guards.differs(actuator, &sample).then(|| since.unwrap_or(at));
+    pub fn look(&mut self, logic: &ControlLogic, sample: impl Fn(TagId) -> Sample, at: Timestamp) {
+        self.since.resize(logic.actuators.len(), None);
+        for (actuator, since) in logic.actuators.iter().zip(&mut self.since) {
+            *since = logic.differs(actuator, &sample).then(|| since.unwrap_or(at));
         }
     }
 
     /// How long the actuator in this place has not obeyed, once that is longer than its travel takes.
-    pub fn disobeys(&self, guards: &Guards, place: usize, at: Timestamp) -> Option<Duration> {
+    pub fn disobeys(&self, logic: &ControlLogic, place: usize, at: Timestamp) -> Option<Duration> {
         let since = (*self.since.get(place)?)?;
-        let travel = guards.actuators.get(place)?.travel?;
+        let travel = logic.actuators.get(place)?.travel?;
         let lasts = Duration::try_from(at.duration_since(since)).unwrap_or_default();
         (travel <= lasts).then_some(lasts)
     }
@@ -203,43 +203,44 @@ mod tests {
         Sample::bad(Cause::Timeout, at(0))
     }
 
-    fn guards(refuse: bool) -> Guards {
+    fn logic(refuse: bool) -> ControlLogic {
         let text = "no heating below 5 cm".to_owned();
-        let lock = InterlockDef { tag: COMMAND, value: 1.0, of: LEVEL, when: Blocking::Below(5.0), text, refuse };
+        let lock =
+            InterlockDef { tag: COMMAND, value: 1.0, of: LEVEL, when: InterlockCondition::Below(5.0), text, refuse };
         let travel = Some(Duration::from_secs(5));
         let actuator = ActuatorDef { output: OUTPUT, command: COMMAND, off: 0.0, needs: vec![(AUTO, 0.0)], travel };
-        Guards { interlocks: vec![lock], actuators: vec![actuator], sequences: Vec::new() }
+        ControlLogic { interlocks: vec![lock], actuators: vec![actuator], sequences: Vec::new() }
     }
 
     #[test]
     fn an_interlock_blocks_what_it_says_and_nothing_else() {
-        use Standing::{Blocked, Free, Unknown};
+        use InterlockStatus::{Blocked, Free, Unknown};
         for (when, sample, expect) in [
-            (Blocking::Below(5.0), good(4.9), Blocked),
-            (Blocking::Below(5.0), good(5.0), Free),
-            (Blocking::Above(20.0), good(20.1), Blocked),
-            (Blocking::Above(20.0), good(20.0), Free),
-            (Blocking::Is(1.0), good(1.0), Blocked),
-            (Blocking::Is(1.0), good(0.0), Free),
-            (Blocking::Bit(2), good(4.0), Blocked),
-            (Blocking::Bit(2), good(3.0), Free),
-            (Blocking::Bit(0), good(-1.0), Blocked),
-            (Blocking::Bit(15), good(-32_768.0), Blocked),
-            (Blocking::Bit(14), good(-32_768.0), Free),
-            (Blocking::Bit(200), good(4.0), Free),
-            (Blocking::Below(5.0), bad(), Unknown(Cause::Timeout)),
-            (Blocking::Below(5.0), good(1.0).doubted(Cause::Stale), Unknown(Cause::Stale)),
+            (InterlockCondition::Below(5.0), good(4.9), Blocked),
+            (InterlockCondition::Below(5.0), good(5.0), Free),
+            (InterlockCondition::Above(20.0), good(20.1), Blocked),
+            (InterlockCondition::Above(20.0), good(20.0), Free),
+            (InterlockCondition::Is(1.0), good(1.0), Blocked),
+            (InterlockCondition::Is(1.0), good(0.0), Free),
+            (InterlockCondition::Bit(2), good(4.0), Blocked),
+            (InterlockCondition::Bit(2), good(3.0), Free),
+            (InterlockCondition::Bit(0), good(-1.0), Blocked),
+            (InterlockCondition::Bit(15), good(-32_768.0), Blocked),
+            (InterlockCondition::Bit(14), good(-32_768.0), Free),
+            (InterlockCondition::Bit(200), good(4.0), Free),
+            (InterlockCondition::Below(5.0), bad(), Unknown(Cause::Timeout)),
+            (InterlockCondition::Below(5.0), good(1.0).doubted(Cause::Stale), Unknown(Cause::Stale)),
         ] {
-            let lock = InterlockDef { when, ..guards(true).interlocks[0].clone() };
-            assert_eq!(lock.standing(sample), expect, "{when:?} {sample:?}");
+            let lock = InterlockDef { when, ..logic(true).interlocks[0].clone() };
+            assert_eq!(lock.status(sample), expect, "{when:?} {sample:?}");
         }
     }
 
     #[test]
     fn only_what_is_certainly_blocked_is_refused() {
         let check = |refuse, value, level: Sample, refused: bool| {
-            let guards = guards(refuse);
-            assert_eq!(guards.refusal(COMMAND, value, |_| level).is_some(), refused, "{value} at {level:?}");
+            let logic = logic(refuse);
+            assert_eq!(logic.refusal(COMMAND, value, |_| level).is_some(), refused, "{value} at {level:?}");
         };
         check(true, 1.0, good(4.0), true);
         check(true, 1.0, good(6.0), false);
@@ -251,12 +252,12 @@ mod tests {
     #[test]
     fn an_actuator_that_does_not_obey_is_told_after_its_travel() {
         let check = |auto: Sample, command: Sample, output: Sample, level: Sample, expect: Option<u64>| {
-            let (guards, mut watch) = (guards(true), Watch::default());
+            let (logic, mut watch) = (logic(true), ActuatorTracker::default());
             let sample = |tag: TagId| [auto, command, output, level][tag.index()];
-            watch.look(&guards, sample, at(10));
-            assert_eq!(watch.disobeys(&guards, 0, at(14)), None, "it may still travel");
-            watch.look(&guards, sample, at(15));
-            assert_eq!(watch.disobeys(&guards, 0, at(15)).map(|span| span.as_secs()), expect);
+            watch.look(&logic, sample, at(10));
+            assert_eq!(watch.disobeys(&logic, 0, at(14)), None, "it may still travel");
+            watch.look(&logic, sample, at(15));
+            assert_eq!(watch.disobeys(&logic, 0, at(15)).map(|span| span.as_secs()), expect);
         };
         let (on, off, high) = (good(1.0), good(0.0), good(9.0));
         check(off, on, off, high, Some(5));
@@ -272,11 +273,11 @@ mod tests {
 
     #[test]
     fn an_actuator_that_obeys_again_starts_anew() {
-        let (guards, mut watch) = (guards(true), Watch::default());
+        let (logic, mut watch) = (logic(true), ActuatorTracker::default());
         for (second, output, expect) in [(0, 0.0, None), (5, 0.0, Some(5)), (6, 1.0, None), (7, 0.0, None)] {
             let sample = |tag: TagId| [good(0.0), good(1.0), good(output), good(9.0)][tag.index()];
-            watch.look(&guards, sample, at(second));
-            assert_eq!(watch.disobeys(&guards, 0, at(second)).map(|span| span.as_secs()), expect, "at {second} s");
+            watch.look(&logic, sample, at(second));
+            assert_eq!(watch.disobeys(&logic, 0, at(second)).map(|span| span.as_secs()), expect, "at {second} s");
         }
     }
 }
