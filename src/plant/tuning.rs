@@ -10,8 +10,8 @@ use super::{
     sample::Sample,
 };
 
-/// Most turns of PV that are kept; later ones are only counted.
-const TURNS_MAX: usize = 24;
+/// Most extrema of PV that are kept; later ones are only counted.
+const EXTREMA_MAX: usize = 24;
 /// PV has turned when it has come back from its extreme by this share of its range.
 const TURN_SHARE: f64 = 0.002;
 
@@ -29,11 +29,11 @@ pub struct Tuning {
     /// What it finds: tag, value before, value after (`None`: not read since, or not known).
     pub found: Vec<Found>,
     /// Where PV has turned, oldest first.
-    pub turns: Vec<Turn>,
+    pub extrema: Vec<Extremum>,
     /// Turns beyond those that are kept.
     pub more: u32,
-    /// The furthest PV since the last turn, and the least change that counts as one.
-    extreme: Option<Turn>,
+    /// The furthest PV since the last extremum, and the least change that counts as one.
+    extreme: Option<Extremum>,
     least: f64,
 }
 
@@ -50,7 +50,7 @@ pub struct Found {
 
 /// A place where PV has turned.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Turn {
+pub struct Extremum {
     /// When.
     pub at: Timestamp,
     /// The extreme.
@@ -62,8 +62,8 @@ pub struct Turn {
 impl Tuning {
     /// Its times.
     pub(super) fn times(&mut self) -> impl Iterator<Item = &mut Timestamp> {
-        let turns = self.turns.iter_mut().chain(&mut self.extreme).map(|turn| &mut turn.at);
-        [&mut self.began].into_iter().chain(&mut self.ended).chain(turns)
+        let extrema = self.extrema.iter_mut().chain(&mut self.extreme).map(|extremum| &mut extremum.at);
+        [&mut self.began].into_iter().chain(&mut self.ended).chain(extrema)
     }
 
     /// How long it took, or has taken by now.
@@ -74,9 +74,9 @@ impl Tuning {
     pub fn is_known(&self) -> bool {
         self.ended.is_some() && self.found.iter().all(|found| found.new.is_some())
     }
-    /// Time from one high turn to the next, of the last two.
+    /// Time from one high extremum to the next, of the last two.
     pub fn period(&self) -> Option<Duration> {
-        let mut highs = self.turns.iter().rev().filter(|turn| turn.high);
+        let mut highs = self.extrema.iter().rev().filter(|extremum| extremum.high);
         let (last, before) = (highs.next()?, highs.next()?);
         Duration::try_from(last.at.duration_since(before.at)).ok()
     }
@@ -136,7 +136,7 @@ fn begin(plate: &Faceplate, sample: &dyn Fn(TagId) -> Sample, span: Option<f64>,
         sv: sample(plate.sv).trusted(),
         ended: None,
         found: found.collect(),
-        turns: Vec::new(),
+        extrema: Vec::new(),
         more: 0,
         extreme: None,
         least: span.filter(|span| span.is_finite()).map_or(0.0, |span| span.abs() * TURN_SHARE),
@@ -146,10 +146,10 @@ fn begin(plate: &Faceplate, sample: &dyn Fn(TagId) -> Sample, span: Option<f64>,
 }
 
 impl Tuning {
-    /// A turn is an extreme that PV has left by more than noise.
+    /// A extremum is an extreme that PV has left by more than noise.
     fn follow(&mut self, pv: Sample) {
         let Some(value) = pv.trusted() else { return };
-        let here = |high| Turn { at: pv.at, pv: value, high };
+        let here = |high| Extremum { at: pv.at, pv: value, high };
         let Some(extreme) = self.extreme else {
             // Which way it goes is known when it has moved: around SV it rises to it first.
             let high = self.sv.is_none_or(|sv| value < sv);
@@ -160,8 +160,8 @@ impl Tuning {
         if ahead > 0.0 {
             self.extreme = Some(here(extreme.high));
         } else if -ahead > self.least.max(f64::EPSILON) {
-            if self.turns.len() < TURNS_MAX {
-                self.turns.push(extreme);
+            if self.extrema.len() < EXTREMA_MAX {
+                self.extrema.push(extreme);
             } else {
                 self.more = self.more.saturating_add(1);
             }
@@ -227,10 +227,15 @@ mod tests {
         for (at, pv) in swing {
             assert_eq!(take(&mut watch, at, pv, Some(1.0), 5.0), Noticed::Nothing);
         }
-        let turns = |watch: &TuningWatch| -> Vec<(f64, bool)> {
-            watch.tuning.iter().flat_map(|tuning| &tuning.turns).map(|turn| (turn.pv, turn.high)).collect()
+        let extrema = |watch: &TuningWatch| -> Vec<(f64, bool)> {
+            watch
+                .tuning
+                .iter()
+                .flat_map(|tuning| &tuning.extrema)
+                .map(|extremum| (extremum.pv, extremum.high))
+                .collect()
         };
-        assert_eq!(turns(&watch), [(72.4, true), (68.0, false), (73.0, true)], "0.1 °C of noise is no turn");
+        assert_eq!(extrema(&watch), [(72.4, true), (68.0, false), (73.0, true)], "0.1 °C of noise is no extremum");
         assert_eq!(take(&mut watch, 10, 69.0, Some(0.0), 5.0), Noticed::Ended);
         take(&mut watch, 11, 69.0, Some(0.0), 1.2);
         let tuning = watch.tuning.expect("one has ended");

@@ -212,7 +212,7 @@ pub fn tuning_words(cx: &ViewContext, faceplate: &Faceplate, tuning: &Tuning) ->
     let number = |value: f64| cx.snapshot.format(faceplate.pv, value);
     let Some(ended) = tuning.ended else {
         let around = tuning.sv.map_or(String::new(), |sv| format!(" around {}", number(sv)));
-        let turns = tuning.turns.iter().rev().take(4).rev();
+        let turns = tuning.extrema.iter().rev().take(4).rev();
         let arrow = |high| if high { cx.theme.pick("↑", "^") } else { cx.theme.pick("↓", "v") };
         let turns: Vec<String> = turns.map(|turn| format!("{}{}", arrow(turn.high), number(turn.pv))).collect();
         let swings = if turns.is_empty() { "no swing yet".to_owned() } else { format!("swings {}", turns.join(" ")) };
