@@ -106,7 +106,7 @@ fn readable<'a>(def: &'a PlantDef, device: &DeviceDef) -> impl Iterator<Item = &
 }
 
 fn is_refused(device: &DeviceDef, tag: &TagDef, unreadable: &UnreadableRanges) -> bool {
-    let alone = Extent::of(tag.point, end_of(tag.point), device);
+    let alone = AddressRange::of(tag.point, end_of(tag.point), device);
     unreadable.touch(device.id, alone.table, alone.start, alone.end)
 }
 
@@ -118,7 +118,7 @@ pub fn single(device: &DeviceDef, tag: &TagDef) -> Block {
 /// The block that reads these tags, which are sorted by address.
 fn together(device: &DeviceDef, tags: &[&TagDef]) -> Block {
     let first = tags[0];
-    let extent = Extent::of(first.point, tags.iter().map(|tag| end_of(tag.point)).max().unwrap_or(0), device);
+    let extent = AddressRange::of(first.point, tags.iter().map(|tag| end_of(tag.point)).max().unwrap_or(0), device);
     Block {
         device: device.id,
         unit: device.unit,
@@ -138,17 +138,17 @@ fn end_of(point: Point) -> u32 {
 
 /// The registers or bits of one request, moved outwards to multiples of the alignment (registers only).
 #[derive(Debug, Clone, Copy)]
-struct Extent {
+struct AddressRange {
     table: Table,
     start: u32,
     end: u32,
 }
 
-impl Extent {
-    fn of(first: Point, end: u32, device: &DeviceDef) -> Extent {
+impl AddressRange {
+    fn of(first: Point, end: u32, device: &DeviceDef) -> AddressRange {
         let (table, start) = (first.table, u32::from(first.address));
         let step = if table.is_bits() { 1 } else { u32::from(device.limits.alignment.max(1)) };
-        Extent { table, start: start - start % step, end: end.next_multiple_of(step).min(0x1_0000) }
+        AddressRange { table, start: start - start % step, end: end.next_multiple_of(step).min(0x1_0000) }
     }
 
     fn count(self) -> u32 {

@@ -208,7 +208,7 @@ pub struct MimicDef {
 
 /// A rectangle on the nominal canvas.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Place {
+pub struct MimicRect {
     /// Column of the left edge.
     pub x: u16,
     /// Row of the top edge.
@@ -225,7 +225,7 @@ pub enum MimicItem {
     /// A vessel with liquid that follows a level tag.
     Tank {
         /// Where.
-        place: Place,
+        place: MimicRect,
         /// `TK-1 control`.
         label: String,
         /// Level, if measured; its range is the height of the vessel.
@@ -240,7 +240,7 @@ pub enum MimicItem {
     /// A valve, open while its tag is not zero.
     Valve {
         /// Where (width and height unused).
-        place: Place,
+        place: MimicRect,
         /// `SV-1`.
         label: String,
         /// State.
@@ -251,7 +251,7 @@ pub enum MimicItem {
     /// A pump, running while its tag is not zero.
     Pump {
         /// Where.
-        place: Place,
+        place: MimicRect,
         /// `P-1`.
         label: String,
         /// State.
@@ -267,7 +267,7 @@ pub enum MimicItem {
     /// A value with unit and quality.
     Value {
         /// Where.
-        place: Place,
+        place: MimicRect,
         /// Shown before the value.
         label: String,
         /// What.
@@ -276,14 +276,14 @@ pub enum MimicItem {
     /// PV, SV, MV and bar of a controller.
     Controller {
         /// Where.
-        place: Place,
+        place: MimicRect,
         /// Which device; it has a faceplate.
         device: DeviceId,
     },
     /// The steps of a sequence, the present one marked.
     Sequence {
         /// Where.
-        place: Place,
+        place: MimicRect,
         /// Heading.
         label: String,
         /// The step tag; its enum labels are the steps.
@@ -296,7 +296,7 @@ pub enum MimicItem {
     /// A small trend of the last minutes.
     Trend {
         /// Where.
-        place: Place,
+        place: MimicRect,
         /// What.
         tag: TagId,
         /// How far back.
@@ -305,7 +305,7 @@ pub enum MimicItem {
     /// Plain words.
     Text {
         /// Where.
-        place: Place,
+        place: MimicRect,
         /// The words.
         text: String,
     },

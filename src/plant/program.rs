@@ -43,7 +43,7 @@ pub struct ProgramStep {
 
 /// Where a program is, in words of its definition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Place {
+pub enum ProgramPosition {
     /// Not running.
     Off,
     /// On its way to the target of a step, from 0.
@@ -56,13 +56,13 @@ pub enum Place {
 
 impl ProgramDef {
     /// What a value of the position means.
-    pub fn place(&self, position: f64) -> Place {
+    pub fn place(&self, position: f64) -> ProgramPosition {
         let number = position.max(0.0) as usize;
         match number.checked_sub(1) {
-            None => Place::Off,
-            Some(half) if half / 2 >= self.steps.len() => Place::Ended,
-            Some(half) if half % 2 == 0 => Place::Ramp(half / 2),
-            Some(half) => Place::Soak(half / 2),
+            None => ProgramPosition::Off,
+            Some(half) if half / 2 >= self.steps.len() => ProgramPosition::Ended,
+            Some(half) if half % 2 == 0 => ProgramPosition::Ramp(half / 2),
+            Some(half) => ProgramPosition::Soak(half / 2),
         }
     }
     /// The steps that a pattern runs, first and last, from 0; `None` for a pattern that nobody has described.
@@ -133,12 +133,12 @@ mod tests {
     #[test]
     fn a_position_is_a_ramp_or_a_soak_of_a_step() {
         let check = |position, expect| assert_eq!(def().place(position), expect, "{position}");
-        check(0.0, Place::Off);
-        check(1.0, Place::Ramp(0));
-        check(2.0, Place::Soak(0));
-        check(4.0, Place::Soak(1));
-        check(5.0, Place::Ended);
-        check(17.0, Place::Ended);
+        check(0.0, ProgramPosition::Off);
+        check(1.0, ProgramPosition::Ramp(0));
+        check(2.0, ProgramPosition::Soak(0));
+        check(4.0, ProgramPosition::Soak(1));
+        check(5.0, ProgramPosition::Ended);
+        check(17.0, ProgramPosition::Ended);
         assert_eq!(def().steps_of(Some(2.0)), Some((0, 1)));
         assert_eq!(def().steps_of(Some(3.0)), None, "nobody has said what pattern 3 is");
         assert_eq!(def().steps_of(None), None);

@@ -17,10 +17,10 @@ pub(super) enum Location {
 }
 
 /// Where an address leads: the table, if the name of the address tells it, and the 0-based number on the wire.
-pub(super) type Place = (Option<Table>, u16);
+pub(super) type TableAddress = (Option<Table>, u16);
 
 /// Resolves an address. `None` after the problem was added.
-pub(super) fn locate(location: &At<Location>, scheme: Scheme, problems: &mut Problems) -> Option<Place> {
+pub(super) fn locate(location: &At<Location>, scheme: Scheme, problems: &mut Problems) -> Option<TableAddress> {
     match (&location.value, scheme) {
         (Location::Wire(address), _) => Some((None, *address)),
         (Location::Name(name), Scheme::DirectLogic) => {

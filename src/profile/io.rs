@@ -85,12 +85,12 @@ pub(super) fn scenario(argument: &Path, search: &Search) -> Result<(String, Text
 }
 
 /// What is found by path or name: its kind, its folder, its word.
-type Sort = (Kind, &'static str, &'static str);
-const PLANT: Sort = (Kind::Plant, "plants", "plant");
-const SCENARIO: Sort = (Kind::Scenario, "scenarios", "scenario");
+type FileKind = (Kind, &'static str, &'static str);
+const PLANT: FileKind = (Kind::Plant, "plants", "plant");
+const SCENARIO: FileKind = (Kind::Scenario, "scenarios", "scenario");
 
-fn find(sort: Sort, argument: &Path, search: &Search) -> Result<Found, Errors> {
-    let folder = sort.1;
+fn find(kind: FileKind, argument: &Path, search: &Search) -> Result<Found, Errors> {
+    let folder = kind.1;
     let name = argument.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let by_name = argument.to_str().filter(|name| plain(name)).map(|name| format!("{name}.toml"));
     let in_folders = by_name.iter().flat_map(|file| search.folders.iter().map(move |f| f.join(folder).join(file)));
@@ -107,11 +107,11 @@ fn find(sort: Sort, argument: &Path, search: &Search) -> Result<Found, Errors> {
     };
     match inside {
         Some(file) => Ok(Found { name, text: shipped_text(file), path: None }),
-        None => Err(missing(sort, argument, &name, search)),
+        None => Err(missing(kind, argument, &name, search)),
     }
 }
 
-fn missing((kind, _, word): Sort, argument: &Path, name: &str, search: &Search) -> Errors {
+fn missing((kind, _, word): FileKind, argument: &Path, name: &str, search: &Search) -> Errors {
     let what = if argument.exists() { "is not a file" } else { "does not exist" };
     let known: Vec<String> = list(search).into_iter().filter(|l| l.kind == kind).map(|l| l.name).collect();
     let near = known.iter().find(|known| strsim::damerau_levenshtein(known, name) <= 1);
@@ -167,7 +167,7 @@ pub(super) fn list(search: &Search) -> Vec<Listed> {
 
 /// The text of a plant or profile by its name.
 pub(super) fn text_of(name: &str, search: &Search) -> Option<String> {
-    let named = |sort| find(sort, Path::new(name), search).ok().map(|found| found.text);
+    let named = |kind| find(kind, Path::new(name), search).ok().map(|found| found.text);
     let other = || plain(name).then(|| named(PLANT).or_else(|| named(SCENARIO))).flatten();
     let text = device(name, search).ok().flatten().or_else(other)?;
     Some(String::from_utf8_lossy(&text.bytes).into_owned())

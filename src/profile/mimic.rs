@@ -9,7 +9,7 @@ use super::{
     schema::{CommandTable, MimicTable, TrendTable},
 };
 use crate::plant::{
-    def::{MimicCommand, MimicDef, MimicItem, Pen, Place, TagId, TrendGroup},
+    def::{MimicCommand, MimicDef, MimicItem, MimicRect, Pen, TagId, TrendGroup},
     tag::{Poll, TagDef},
 };
 
@@ -46,9 +46,9 @@ macro_rules! items {
             }
         );
         impl $name {
-            fn place(&self) -> Place {
+            fn place(&self) -> MimicRect {
                 let cells = |value: Option<At<u16>>, usual| value.map_or(usual, |value| value.value);
-                Place { x: cells(self.x, 0), y: cells(self.y, 0), width: cells(self.width, 1), height: cells(self.height, 1) }
+                MimicRect { x: cells(self.x, 0), y: cells(self.y, 0), width: cells(self.width, 1), height: cells(self.height, 1) }
             }
         }
     )* };
@@ -195,7 +195,7 @@ fn sequence(item: SequenceItem, defs: &Defs, problems: &mut Problems) -> Option<
 
 /// Nothing is drawn outside the canvas, where nobody would miss it.
 fn check_inside(item: &MimicItem, at: Span, size: (u16, u16), problems: &mut Problems) {
-    let corner = |place: &Place| (place.x.saturating_add(place.width), place.y.saturating_add(place.height));
+    let corner = |place: &MimicRect| (place.x.saturating_add(place.width), place.y.saturating_add(place.height));
     let (right, bottom) = match item {
         MimicItem::Tank { place, .. }
         | MimicItem::Valve { place, .. }

@@ -14,7 +14,7 @@ use super::{
     report,
     schema::{DeviceTable, PlantFile, ProfileFile},
     sets,
-    tag::{self, Surroundings},
+    tag::{self, DeviceContext},
 };
 use crate::plant::{
     class,
@@ -113,7 +113,7 @@ fn time_zone(name: &Option<At<String>>, problems: &mut Problems) -> TimeZone {
 }
 
 /// A device whose name and profile are known.
-struct Known<'a> {
+struct ResolvedDevice<'a> {
     name: &'a str,
     table: &'a DeviceTable,
     profile: Rc<ProfileFile>,
@@ -155,10 +155,10 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     }
     let (mut devices, mut defined) = (Vec::new(), Vec::new());
     for (device, rows) in known.iter().zip(rows) {
-        let (mut def, around) = define_device(DeviceId(devices.len() as u16), device, lines, &names, problems);
+        let (mut def, context) = define_device(DeviceId(devices.len() as u16), device, lines, &names, problems);
         let first = defined.len();
         for row in rows {
-            defined.push(tag::define(TagId(defined.len() as u16), row.layers, &around, problems));
+            defined.push(tag::define(TagId(defined.len() as u16), row.layers, &context, problems));
         }
         device::check_overlaps(&defined[first..], problems);
         def.functions = device::functions(&device.profile, &defined[first..], problems);
@@ -182,7 +182,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
 /// Unit 0 of a serial line is everybody: it can be written, and nobody answers a read.
 fn check_broadcasts(
     devices: &[DeviceDef],
-    known: &[Known],
+    known: &[ResolvedDevice],
     lines: &[LineDef],
     tags: &[TagDef],
     problems: &mut Problems,
@@ -204,7 +204,7 @@ fn known_devices<'a>(
     library: &Library,
     names: &mut Names,
     problems: &mut Problems,
-) -> Vec<Known<'a>> {
+) -> Vec<ResolvedDevice<'a>> {
     let mut profiles = Profiles::new();
     let mut known = Vec::new();
     if file.devices.is_empty() {
@@ -213,7 +213,7 @@ fn known_devices<'a>(
     for table in file.devices.iter().map(|table| &table.value) {
         let profile = profile(&table.profile, library, &mut profiles, problems);
         match (&table.name, profile) {
-            (Some(name), Some(profile)) => known.push(Known { name: &name.value, table, profile }),
+            (Some(name), Some(profile)) => known.push(ResolvedDevice { name: &name.value, table, profile }),
             (Some(name), None) => names.unread(&name.value),
             (None, _) => {}
         }
@@ -224,12 +224,12 @@ fn known_devices<'a>(
 /// The device without its faceplate and actions, which need the tags; and what its tags must know of it.
 fn define_device<'a>(
     id: DeviceId,
-    known: &'a Known,
+    known: &'a ResolvedDevice,
     lines: &[LineDef],
     names: &'a Names,
     problems: &mut Problems,
-) -> (DeviceDef, Surroundings<'a>) {
-    let Known { name, table, profile } = known;
+) -> (DeviceDef, DeviceContext<'a>) {
+    let ResolvedDevice { name, table, profile } = known;
     let (limits, gap, write_gap) = device::limits(table, profile, problems);
     let def = DeviceDef {
         id,
@@ -247,7 +247,7 @@ fn define_device<'a>(
         actions: Vec::new(),
         program: None,
     };
-    let around = Surroundings {
+    let context = DeviceContext {
         device: id,
         device_name: name,
         scheme: profile.scheme.map(|scheme| scheme.value).unwrap_or_default(),
@@ -256,7 +256,7 @@ fn define_device<'a>(
         slow: period(table.slow, 10, problems),
         names,
     };
-    (def, around)
+    (def, context)
 }
 
 /// Most tags of a plant, those of its profiles with them; an id has 16 bits, and a terminal plant is far from it.

@@ -16,7 +16,7 @@ use crate::plant::{
 };
 
 /// What a tag must know of its device.
-pub(super) struct Surroundings<'a> {
+pub(super) struct DeviceContext<'a> {
     pub device: DeviceId,
     pub device_name: &'a str,
     pub scheme: Scheme,
@@ -44,20 +44,20 @@ pub(super) struct Defined {
 }
 
 /// Builds a tag from its layers. Where something is wrong a placeholder stands, and the problems keep it from getting out.
-pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, problems: &mut Problems) -> Defined {
+pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, problems: &mut Problems) -> Defined {
     for (first, second) in [("min", "min_from"), ("max", "max_from"), ("decimals", "decimals_from")] {
         either(&mut layers, first, second, problems);
     }
     // A plant file that moves a tag need not repeat the number of the manual.
     supersede(&mut layers, "address", "modicon");
     let row = TagTable::of(&layers, problems);
-    let point = point(&row, around, problems);
+    let point = point(&row, context, problems);
     let kind = point.map(|point| (point.kind, point.field.map(|(_, bits)| bits)));
     let is_text = point.is_some_and(|point| matches!(point.kind, Kind::Text(_)));
     if let Some(point) = point.filter(|_| is_text) {
         check_text(&row, point, problems);
     }
-    let links = links(&row, around, problems);
+    let links = links(&row, context, problems);
     let decimals = match links.decimals {
         Some(tag) => Decimals::From(tag),
         None => Decimals::Fixed(decimals(&row, kind, problems)),
@@ -65,8 +65,8 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
     check_scaling(&row, kind, decimals, problems);
     let access = access(&row, point, problems);
     let poll = match row.poll.map_or(PollWord::Slow, |poll| poll.value) {
-        PollWord::Fast => Poll::Every(around.fast),
-        PollWord::Slow => Poll::Every(around.slow),
+        PollWord::Fast => Poll::Every(context.fast),
+        PollWord::Slow => Poll::Every(context.slow),
         PollWord::Once => Poll::Once,
         PollWord::Never => Poll::Never,
     };
@@ -76,8 +76,8 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, around: &Surroundings, pro
     let short = text(&row.name);
     let tag = TagDef {
         id,
-        device: around.device,
-        name: format!("{}.{short}", around.device_name),
+        device: context.device,
+        name: format!("{}.{short}", context.device_name),
         label: row.label.as_ref().map_or_else(|| short.clone(), |label| label.value.clone()),
         short,
         meaning: text(&row.meaning),
@@ -136,16 +136,16 @@ struct Links {
     unlock: Option<(TagId, At<Choice>)>,
 }
 
-fn links(row: &TagTable, around: &Surroundings, problems: &mut Problems) -> Links {
+fn links(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Links {
     let mut needs = Vec::new();
     let mut refer = |name: &Option<At<String>>, what, problems: &mut Problems| {
         let name = name.as_ref()?;
-        let value = around.names.near(name, around.device_name, problems)?;
+        let value = context.names.near(name, context.device_name, problems)?;
         needs.push((At { value, at: name.at }, what));
         Some(value)
     };
     let unlock = row.write_unlock.as_ref().and_then(|unlock| {
-        let tag = around.names.near(unlock.value.tag.as_ref()?, around.device_name, problems)?;
+        let tag = context.names.near(unlock.value.tag.as_ref()?, context.device_name, problems)?;
         Some((tag, unlock.value.value.clone()?))
     });
     Links {
@@ -162,9 +162,9 @@ fn links(row: &TagTable, around: &Surroundings, problems: &mut Problems) -> Link
 /// Raw type and, for a field, its number of bits.
 type Raws = (Kind, Option<u8>);
 
-fn point(row: &TagTable, around: &Surroundings, problems: &mut Problems) -> Option<Point> {
+fn point(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Option<Point> {
     let location = row.address.as_ref().filter(|_| row.sound)?;
-    let (named, address) = locate(location, around.scheme, problems)?;
+    let (named, address) = locate(location, context.scheme, problems)?;
     let table = table(row, named, problems)?;
     if let Some(modicon) = &row.modicon {
         check_modicon(modicon, table, address, problems);
@@ -189,7 +189,7 @@ fn point(row: &TagTable, around: &Surroundings, problems: &mut Problems) -> Opti
         None => None,
     };
     let point = Point { table, address, kind, order: row.order.map(|order| order.value).unwrap_or_default(), field };
-    check_place(point, location.at, around.limits, problems).then_some(point)
+    check_place(point, location.at, context.limits, problems).then_some(point)
 }
 
 fn table(row: &TagTable, named: Option<Table>, problems: &mut Problems) -> Option<Table> {

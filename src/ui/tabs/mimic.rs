@@ -8,7 +8,7 @@ use super::Tab;
 use crate::{
     history::{Answer, HistoryError, Query, Series},
     plant::{
-        def::{MimicCommand, MimicItem, Place, TagId},
+        def::{MimicCommand, MimicItem, MimicRect, TagId},
         snapshot::Snapshot,
     },
     ui::{
@@ -295,7 +295,7 @@ fn intent(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
 
 /// The nearest item in a direction; the first one when none is selected; the same when there is none further on.
 fn neighbour(items: &[MimicItem], selected: Option<usize>, (dx, dy): (i32, i32)) -> Option<usize> {
-    let centre = |place: Place| {
+    let centre = |place: MimicRect| {
         let middle = |from: u16, length: u16| i32::from(from) * 2 + i32::from(length);
         // A row is about as high as two columns are wide.
         (middle(place.x, place.width), middle(place.y, place.height) * 2)

@@ -7,7 +7,7 @@ use crate::{
     history::{Bucket, Series},
     plant::{
         def::{DeviceDef, ProgramDef, TagId},
-        program::Place,
+        program::ProgramPosition,
     },
     ui::{
         ViewContext,
@@ -72,10 +72,10 @@ fn now_words(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Stri
     let command = value::show(cx, program.command).text;
     let Some(place) = place(cx, program) else { return format!("{command}, position not known") };
     let (what, length) = match place {
-        Place::Off => return command,
-        Place::Ended => return format!("{command}, ended"),
-        Place::Ramp(step) => (format!("ramp {}", step + 1), program.steps[step].ramp),
-        Place::Soak(step) => (format!("soak {}", step + 1), program.steps[step].soak),
+        ProgramPosition::Off => return command,
+        ProgramPosition::Ended => return format!("{command}, ended"),
+        ProgramPosition::Ramp(step) => (format!("ramp {}", step + 1), program.steps[step].ramp),
+        ProgramPosition::Soak(step) => (format!("soak {}", step + 1), program.steps[step].soak),
     };
     let into = cx.snapshot.programs.get(device.id.index()).copied().flatten();
     let into = match into {
@@ -87,7 +87,7 @@ fn now_words(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Stri
     format!("{command}, {what}, {into} of {}", value::show(cx, length).with_unit())
 }
 
-fn place(cx: &ViewContext, program: &ProgramDef) -> Option<Place> {
+fn place(cx: &ViewContext, program: &ProgramDef) -> Option<ProgramPosition> {
     cx.snapshot.sample(program.position).trusted().map(|position| program.place(position))
 }
 
@@ -105,13 +105,14 @@ fn table(cx: &ViewContext, canvas: &mut Canvas, program: &ProgramDef, cell: Cell
         let y = row as u16 + 1;
         let runs = chosen.is_none_or(|(first, last)| (first..=last).contains(&row));
         let style = if runs { theme.normal() } else { theme.dim() };
-        let here = matches!(now, Some(Place::Ramp(at) | Place::Soak(at)) if at == row);
+        let here = matches!(now, Some(ProgramPosition::Ramp(at) | ProgramPosition::Soak(at)) if at == row);
         let mark = if here { theme.pick("▸", ">") } else { " " };
         canvas.text(1, y, &format!("{mark} {}", row + 1), if here { theme.strong() } else { style });
         for (column, tag) in [step.sv, step.ramp, step.soak].into_iter().enumerate() {
             let shown = value::show(cx, tag);
             let x = 8 + column as u16 * (CELL + 1);
-            let at = (now == Some(Place::Ramp(row)) && column == 1) || (now == Some(Place::Soak(row)) && column == 2);
+            let at = (now == Some(ProgramPosition::Ramp(row)) && column == 1)
+                || (now == Some(ProgramPosition::Soak(row)) && column == 2);
             let text = format!("{}{}", if at { theme.pick("▸", ">") } else { "" }, shown.within(CELL - 1));
             let style = match (cell == Cell { row, column }, at) {
                 (true, _) => theme.focus(),
@@ -152,7 +153,7 @@ struct Segment {
     minutes: f64,
     from: Option<f64>,
     to: f64,
-    place: Place,
+    place: ProgramPosition,
 }
 
 /// The way of the set value, from PV as it is now; `None` while a part of it is not known.
@@ -161,13 +162,13 @@ fn segments(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Optio
     let trusted = |tag: TagId| cx.snapshot.sample(tag).trusted();
     // A ramp begins where the step before has ended; the first at PV as it is at the start. Once it runs that is past,
     // and the device does not tell it: the first ramp is a gap then.
-    let resting = matches!(place(cx, program), Some(Place::Off | Place::Ended));
+    let resting = matches!(place(cx, program), Some(ProgramPosition::Off | ProgramPosition::Ended));
     let mut from = device.faceplate.as_ref().and_then(|faceplate| trusted(faceplate.pv)).filter(|_| resting);
     let mut segments = Vec::new();
     for (n, step) in program.steps.iter().enumerate().take(last + 1).skip(first) {
         let (to, ramp, soak) = (trusted(step.sv)?, trusted(step.ramp)?, trusted(step.soak)?);
-        segments.push(Segment { minutes: ramp.max(0.0), from, to, place: Place::Ramp(n) });
-        segments.push(Segment { minutes: soak.max(0.0), from: Some(to), to, place: Place::Soak(n) });
+        segments.push(Segment { minutes: ramp.max(0.0), from, to, place: ProgramPosition::Ramp(n) });
+        segments.push(Segment { minutes: soak.max(0.0), from: Some(to), to, place: ProgramPosition::Soak(n) });
         from = Some(to);
     }
     Some(segments)

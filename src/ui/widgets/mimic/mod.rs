@@ -11,7 +11,7 @@ use ratatui::style::Style;
 
 use super::text::Canvas;
 use crate::{
-    plant::def::{MimicItem, Place, TagId},
+    plant::def::{MimicItem, MimicRect, TagId},
     ui::ViewContext,
 };
 
@@ -58,14 +58,14 @@ impl CanvasScale {
         middle(self.row(y), self.row(y.saturating_add(1)))
     }
     /// A nominal rectangle.
-    pub fn place(self, place: Place) -> Bounds {
+    pub fn place(self, place: MimicRect) -> Bounds {
         let (x, y) = (self.column(place.x), self.row(place.y));
         let right = self.column(place.x.saturating_add(place.width.max(1)));
         let bottom = self.row(place.y.saturating_add(place.height.max(1)));
         Bounds { x, y, width: right.saturating_sub(x).max(1), height: bottom.saturating_sub(y).max(1) }
     }
     /// Where a single symbol stands.
-    pub fn spot(self, place: Place) -> (u16, u16) {
+    pub fn spot(self, place: MimicRect) -> (u16, u16) {
         (self.middle_column(place.x), self.middle_row(place.y))
     }
 }
@@ -124,7 +124,7 @@ pub fn title(cx: &ViewContext, item: &MimicItem) -> String {
 }
 
 /// The place of an item that can be selected.
-pub fn place(item: &MimicItem) -> Option<Place> {
+pub fn place(item: &MimicItem) -> Option<MimicRect> {
     match item {
         MimicItem::Tank { place, .. }
         | MimicItem::Valve { place, .. }
@@ -179,8 +179,8 @@ mod tests {
     fn neighbours_stay_neighbours_at_every_size() {
         for room in [(80, 18), (97, 18), (120, 34), (200, 54)] {
             let scale = CanvasScale::new((80, 18), room);
-            let tank = scale.place(Place { x: 14, y: 6, width: 16, height: 6 });
-            let below = scale.place(Place { x: 14, y: 12, width: 16, height: 1 });
+            let tank = scale.place(MimicRect { x: 14, y: 6, width: 16, height: 6 });
+            let below = scale.place(MimicRect { x: 14, y: 12, width: 16, height: 1 });
             assert_eq!(tank.y + tank.height, below.y, "{room:?}");
             assert_eq!(tank.x + tank.width, scale.column(30), "{room:?}");
             assert!(scale.middle_column(14) >= tank.x && scale.middle_column(29) < tank.x + tank.width);
@@ -192,7 +192,7 @@ mod tests {
         for rows in 18..80 {
             let scale = CanvasScale::new((80, 18), (80, rows));
             for y in 0..18 {
-                let pump = scale.place(Place { x: 15, y, width: 15, height: 1 });
+                let pump = scale.place(MimicRect { x: 15, y, width: 15, height: 1 });
                 assert_eq!(scale.middle_row(y), pump.y + pump.height / 2, "row {y} of {rows}");
             }
         }
@@ -202,7 +202,7 @@ mod tests {
     fn a_small_screen_cuts_and_never_squeezes() {
         let scale = CanvasScale::new((80, 18), (60, 10));
         assert_eq!(
-            scale.place(Place { x: 54, y: 6, width: 26, height: 6 }),
+            scale.place(MimicRect { x: 54, y: 6, width: 26, height: 6 }),
             Bounds { x: 54, y: 6, width: 26, height: 6 }
         );
     }
