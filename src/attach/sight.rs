@@ -44,7 +44,7 @@ pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
         at: *at,
         run: *run,
         stepped: *stepped,
-        samples: vec![Sample::bad(Cause::Withheld, *at); def.tags.len()],
+        samples: vec![Sample::bad(Cause::NotAuthorised, *at); def.tags.len()],
         texts: Arc::new(vec![None; def.tags.len()]),
         decimals: decimals.clone(),
         source_frames: Arc::new(vec![None; def.tags.len()]),

@@ -84,7 +84,7 @@ async fn attach_with_password(plant: Option<&str>, login: &Login) -> Result<(Ses
 
 /// Are the values shown after a login only?
 pub fn is_withheld(snapshot: &Snapshot) -> bool {
-    snapshot.samples.iter().any(|sample| sample.quality == Quality::Bad(Cause::Withheld))
+    snapshot.samples.iter().any(|sample| sample.quality == Quality::Bad(Cause::NotAuthorised))
 }
 
 /// The same for somebody who wants to act: nobody may without a login.

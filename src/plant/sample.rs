@@ -43,7 +43,7 @@ pub enum Cause {
     /// The station was not running.
     StationOff = 11,
     /// There is a value, but nobody who may see it is logged in here. Never stored.
-    Withheld = 12,
+    NotAuthorised = 12,
     /// It was stored, but the file is damaged there. Never stored.
     Unreadable = 13,
 }
@@ -73,7 +73,7 @@ impl Cause {
         Cause::Unscaled,
         Cause::OutOfRange,
         Cause::StationOff,
-        Cause::Withheld,
+        Cause::NotAuthorised,
         Cause::Unreadable,
     ];
 
@@ -91,7 +91,7 @@ impl Cause {
             Cause::Unscaled => "scale not known",
             Cause::OutOfRange => "out of range",
             Cause::StationOff => "station was off",
-            Cause::Withheld => "shown after login",
+            Cause::NotAuthorised => "not authorised: log in",
             Cause::Unreadable => "history damaged",
         }
     }

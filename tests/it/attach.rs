@@ -237,7 +237,7 @@ async fn without_a_login_a_terminal_is_told_no_value_and_after_a_logout_none_sta
     stand.view.send_replace(false);
     stand.set(1.0);
     let mut session = stand.session().await;
-    let hidden = |snapshot: &Snapshot| snapshot.samples[0].quality.cause() == Some(Cause::Withheld);
+    let hidden = |snapshot: &Snapshot| snapshot.samples[0].quality.cause() == Some(Cause::NotAuthorised);
     assert!(hidden(&session.snapshots.borrow()));
     stand.view.send_replace(true);
     sees(&mut session, 1.0).await;

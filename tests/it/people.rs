@@ -78,7 +78,7 @@ async fn a_script_with_wrong_passwords_waits_longer_each_time_is_locked_out_as_c
     let alarmed = until(&mut looks.snapshots, "an alarm", |snapshot| !snapshot.alarms.is_empty()).await;
     let why = login(&script, "tom", PASSWORD).await.unwrap_err();
     assert!(why.starts_with(NOT_CHECKED), "it is still locked out when the alarm is there: {why}");
-    assert!(alarmed.samples.iter().all(|sample| sample.quality.cause() == Some(Cause::Withheld)));
+    assert!(alarmed.samples.iter().all(|sample| sample.quality.cause() == Some(Cause::NotAuthorised)));
 
     let let_in = login_at_last(&guarded, &script, "tom").await;
     let shut = let_in.duration_since(locked.utc).unsigned_abs();

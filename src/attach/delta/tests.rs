@@ -240,7 +240,7 @@ fn without_a_login_no_value_leaves_the_station() {
     (0..19).for_each(|kind| change(&mut snapshot, (kind, 1, 1)));
     Arc::make_mut(&mut snapshot.alarms)[0].value = Some(72.1);
     let seen = alarms_only(&snapshot);
-    assert!(seen.samples.iter().all(|sample| *sample == Sample::bad(Cause::Withheld, snapshot.at)));
+    assert!(seen.samples.iter().all(|sample| *sample == Sample::bad(Cause::NotAuthorised, snapshot.at)));
     assert!(seen.texts.iter().all(Option::is_none) && seen.source_frames.iter().all(Option::is_none));
     assert!(seen.lines.iter().all(|line| line.report.is_none() && line.test.is_none()));
     assert!(seen.orders.is_empty() && seen.sets.is_empty() && seen.restores.is_empty());

@@ -90,7 +90,7 @@ fn because(
         },
         // The verdict on the last answer says it all.
         Cause::Corrupt | Cause::Exception | Cause::Timeout | Cause::DeviceDown => None,
-        Cause::NotRead | Cause::OutOfRange | Cause::StationOff | Cause::Withheld | Cause::Unreadable => None,
+        Cause::NotRead | Cause::OutOfRange | Cause::StationOff | Cause::NotAuthorised | Cause::Unreadable => None,
     }
 }
 
@@ -121,7 +121,7 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
             Poll::Never => Some("read it now: tab 4, u".to_owned()),
         },
         Cause::OutOfRange => Some("compare the value with the range of the device".to_owned()),
-        Cause::Withheld => Some("log in: tab 0".to_owned()),
+        Cause::NotAuthorised => Some("log in: tab 0".to_owned()),
         Cause::StationOff | Cause::Unreadable => None,
     }
 }
