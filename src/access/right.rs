@@ -91,7 +91,7 @@ pub fn needs_for_question(query: &Query) -> Role {
         | Query::Journal { .. }
         | Query::Actions { .. }
         | Query::LineMinutes { .. }
-        | Query::AlarmQuality { .. }
+        | Query::AlarmMetrics { .. }
         | Query::Values { .. }
         | Query::Report { .. } => Right::Look,
         Query::Audit { .. } => Right::People,

@@ -121,7 +121,7 @@ pub fn query(def: &PlantDef, query: &Query) -> Result<(), String> {
         Query::Report { period } if REPORT_MAX < period.to.duration_since(period.from) => {
             Err(format!("a report of more than {} days, choose a shorter period", REPORT_MAX.as_hours() / 24))
         }
-        Query::Report { .. } | Query::AlarmQuality { .. } => Ok(()),
+        Query::Report { .. } | Query::AlarmMetrics { .. } => Ok(()),
     }
 }
 

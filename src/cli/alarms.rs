@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     history::{Answer, HistoryError, Query},
     plant::PlantDef,
-    report::alarm_quality,
+    report::alarm_metrics,
 };
 
 use super::{CliError, StationArgs, client, in_runtime, load, say, source::Source};
@@ -48,16 +48,16 @@ pub fn main(args: Args) -> Result<(), CliError> {
 async fn tell(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     let source = Source::open(&def, &args.station, &args.login).await?;
     let period = source.period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref())?;
-    let query = Query::AlarmQuality { from: period.from, to: period.to };
-    let Answer::AlarmQuality(figures) = source.ask(query).await? else {
+    let query = Query::AlarmMetrics { from: period.from, to: period.to };
+    let Answer::AlarmMetrics(figures) = source.ask(query).await? else {
         return Err(CliError::History(HistoryError::Engine("answered another query".into())));
     };
     if args.json {
-        let quality = alarm_quality::quality(&figures, &def, &period);
-        let json = serde_json::to_string_pretty(&quality).expect("its keys are words and its numbers are finite");
+        let metrics = alarm_metrics::metrics(&figures, &def, &period);
+        let json = serde_json::to_string_pretty(&metrics).expect("its keys are words and its numbers are finite");
         say(&json);
     } else {
-        say(&alarm_quality::quality_text(&figures, &def, &period));
+        say(&alarm_metrics::metrics_text(&figures, &def, &period));
     }
     Ok(())
 }

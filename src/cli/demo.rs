@@ -147,7 +147,7 @@ async fn ask_report(session: &Session, period: Period) -> Result<Box<ShiftReport
         | Answer::Journal(_)
         | Answer::Actions(_)
         | Answer::LineMinutes(_)
-        | Answer::AlarmQuality(_)
+        | Answer::AlarmMetrics(_)
         | Answer::Values(_) => Err(HistoryError::Engine("answered another query".into())),
     }
 }

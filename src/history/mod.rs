@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     plant::{
-        alarm::Figures,
+        alarm::PeriodMetrics,
         def::{LineId, TagId},
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord},
@@ -84,7 +84,7 @@ pub enum Query {
         period: Period,
     },
     /// How good the alarm system was, up to now at the latest.
-    AlarmQuality {
+    AlarmMetrics {
         /// From.
         from: Timestamp,
         /// To.
@@ -117,7 +117,7 @@ pub enum Answer {
     /// The report.
     Report(Box<ShiftReport>),
     /// The figures of the alarm system.
-    AlarmQuality(Box<Figures>),
+    AlarmMetrics(Box<PeriodMetrics>),
     /// By tag the value in force at each instant; `None` where nothing is stored, or nothing recent enough.
     Values(Vec<Vec<Option<HeldValue>>>),
 }

@@ -77,8 +77,8 @@ impl Snapshot {
         self.devices.iter_mut().for_each(|device| device.shift(by));
         Arc::make_mut(&mut self.alarms).iter_mut().for_each(|alarm| alarm.shift(by));
         Arc::make_mut(&mut self.aside).iter_mut().for_each(|alarm| alarm.shift(by));
-        self.alarm_quality.flood_since.iter_mut().for_each(|since| shift(since, by));
-        let day = Arc::make_mut(&mut self.alarm_quality.day);
+        self.alarm_metrics.flood_since.iter_mut().for_each(|since| shift(since, by));
+        let day = Arc::make_mut(&mut self.alarm_metrics.day);
         shift(&mut day.from, by);
         shift(&mut day.until, by);
         self.orders.iter_mut().for_each(|order| {

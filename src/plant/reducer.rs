@@ -14,7 +14,7 @@ use std::{mem::discriminant, sync::Arc};
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    alarm::{AlarmManager, AlarmQuality, Meter, command::check_words},
+    alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_words},
     command::{BusRequest, Command, Order, OrderId, Outcome, Refusal, WriteId},
     def::{DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
@@ -57,9 +57,9 @@ pub struct Plant {
     run: u64,
     image: ProcessImage,
     alarm_manager: AlarmManager,
-    /// Counts the steps of alarms; `quality` is what it said last.
-    meter: Meter,
-    quality: AlarmQuality,
+    /// Counts the steps of alarms; `alarm_metrics` are its latest.
+    alarm_monitor: AlarmMonitor,
+    alarm_metrics: AlarmMetrics,
     desk: Desk,
     watch: ActuatorTracker,
     lines: Vec<LineStatus>,
@@ -88,8 +88,8 @@ impl Plant {
         Plant {
             image: ProcessImage::new(def.clone(), at),
             alarm_manager: AlarmManager::new(def.clone()),
-            meter: Meter::running(at),
-            quality: AlarmQuality::default(),
+            alarm_monitor: AlarmMonitor::running(at),
+            alarm_metrics: AlarmMetrics::default(),
             desk: Desk::new(def.clone()),
             watch: ActuatorTracker::default(),
             lines: vec![LineStatus::default(); def.lines.len()],
@@ -279,7 +279,7 @@ impl Plant {
             alarms: lists.active.clone(),
             aside: lists.aside.clone(),
             sound: lists.sound,
-            alarm_quality: self.quality.clone(),
+            alarm_metrics: self.alarm_metrics.clone(),
             orders: self.desk.shown(),
             watch: self.watch.clone(),
             history: self.history.clone(),

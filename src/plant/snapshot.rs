@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     alarm::{
-        AlarmCommand, AlarmQuality,
+        AlarmCommand, AlarmMetrics,
         state::{AlarmState, OperatorNote},
     },
     command::{Command, OrderStatus},
@@ -58,7 +58,7 @@ pub struct Snapshot {
     /// An active alarm that nobody has acknowledged came after the last silence.
     pub sound: bool,
     /// How good the alarm system is: the rates of this moment, and the figures of the last 24 hours.
-    pub alarm_quality: AlarmQuality,
+    pub alarm_metrics: AlarmMetrics,
     /// The latest orders, newest first, at most 32.
     pub orders: Vec<OrderStatus>,
     /// Since when actuators have not obeyed.
@@ -96,7 +96,7 @@ impl Snapshot {
             alarms: Arc::default(),
             aside: Arc::default(),
             sound: false,
-            alarm_quality: AlarmQuality::default(),
+            alarm_metrics: AlarmMetrics::default(),
             orders: Vec::new(),
             watch: ActuatorTracker::default(),
             history: HistoryStatus::default(),

@@ -4,7 +4,7 @@ use jiff::{Timestamp, tz::TimeZone};
 
 use super::{
     Gap, Period, RecordRow, ShiftReport, SuppressedAlarm, TagFigures,
-    alarm_quality::{self, Culprit, Row},
+    alarm_metrics::{self, BadActor, Row},
 };
 use crate::plant::{
     def::{CsvDialect, PlantDef, Priority},
@@ -12,7 +12,7 @@ use crate::plant::{
     tag::Decimals,
 };
 
-/// The whole report: facts, tags, what could not be read, alarm counts, suppressed alarms, alarm quality, alarm list,
+/// The whole report: facts, tags, what could not be read, alarm counts, suppressed alarms, alarm metrics, alarm list,
 /// operator actions, raw record. Every section has a title row, a header row and its rows; every row has as many columns
 /// as the widest. The same report gives the same bytes.
 pub fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u8> {
@@ -47,10 +47,10 @@ pub fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> V
     }
     table.section("suppressed alarms", &["priority", "subject", "alarm", "raised", "minutes active"]);
     report.suppressed.iter().for_each(|alarm| table.row(suppressed_row(alarm, dialect)));
-    table.section("alarm quality", &["measure", "figure", "target", "limit", "verdict"]);
-    alarm_quality::rows(&report.quality).iter().for_each(|row| table.row(quality_row(row, dialect)));
+    table.section("alarm metrics", &["measure", "figure", "target", "limit", "verdict"]);
+    alarm_metrics::rows(&report.alarm_metrics).iter().for_each(|row| table.row(metric_row(row, dialect)));
     table.section("alarms to look into", &["kind", "subject", "alarm", "raised"]);
-    alarm_quality::culprits(&report.quality).iter().for_each(|alarm| table.row(culprit_row(alarm)));
+    alarm_metrics::bad_actors(&report.alarm_metrics).iter().for_each(|alarm| table.row(bad_actor_row(alarm)));
     table.section("alarms", &["time", "priority", "subject", "alarm", "step", "value", "limit", "by", "reason"]);
     report.alarms.iter().for_each(|alarm| table.row(alarm_row(alarm, zone, dialect)));
     table.section("operator actions", &["time", "by", "action", "target", "old", "new", "outcome"]);
@@ -122,7 +122,7 @@ fn suppressed_row(alarm: &SuppressedAlarm, dialect: CsvDialect) -> Vec<String> {
     ]
 }
 
-fn quality_row(row: &Row, dialect: CsvDialect) -> Vec<String> {
+fn metric_row(row: &Row, dialect: CsvDialect) -> Vec<String> {
     vec![
         plain(row.measure),
         number(row.value, row.decimals, dialect),
@@ -132,7 +132,7 @@ fn quality_row(row: &Row, dialect: CsvDialect) -> Vec<String> {
     ]
 }
 
-fn culprit_row(alarm: &Culprit) -> Vec<String> {
+fn bad_actor_row(alarm: &BadActor) -> Vec<String> {
     let raised = alarm.raised.map(|raised| raised.to_string()).unwrap_or_default();
     vec![plain(alarm.kind), text(&alarm.subject), text(&alarm.alarm), plain(raised)]
 }

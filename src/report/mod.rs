@@ -4,7 +4,7 @@ pub mod shift;
 pub mod period_parser;
 pub mod step_series;
 pub mod figures;
-pub mod alarm_quality;
+pub mod alarm_metrics;
 pub mod csv;
 pub mod export;
 pub mod text;
@@ -17,7 +17,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use crate::plant::{
-    alarm::Figures,
+    alarm::PeriodMetrics,
     def::Priority,
     record::{ActionRecord, AlarmRecord, Seal},
 };
@@ -65,7 +65,7 @@ pub struct ShiftReport {
     /// Steps of alarms in the period, oldest first.
     pub alarms: Vec<AlarmRecord>,
     /// How good the alarm system was in the period.
-    pub quality: Figures,
+    pub alarm_metrics: PeriodMetrics,
     /// Operator actions in the period, oldest first.
     pub actions: Vec<ActionRecord>,
     /// The thesis's raw record at a fixed interval.

@@ -108,7 +108,7 @@ mod tests {
             }],
             suppressed: Vec::new(),
             alarms: Vec::new(),
-            quality: crate::plant::alarm::Figures::default(),
+            alarm_metrics: crate::plant::alarm::PeriodMetrics::default(),
             actions: Vec::new(),
             record: Vec::new(),
             record_of: None,

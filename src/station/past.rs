@@ -65,7 +65,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        history::io::quality::Recent,
+        history::io::alarm_metrics::Recent,
         plant::{def::Priority, record::AlarmStep},
     };
 

@@ -12,7 +12,7 @@ pub use traffic::more_frames;
 
 use super::{ViewContext, theme::Theme};
 use crate::plant::{
-    alarm::{AlarmQuality, AlarmState},
+    alarm::{AlarmMetrics, AlarmState},
     def::*,
     event::{Fault, LineCounters, LineState},
     parameter_set::StoredSet,
@@ -42,7 +42,7 @@ pub struct Fixture {
     /// Alarms that are put aside.
     pub aside: Vec<AsideAlarm>,
     /// The figures of the alarm system.
-    pub alarm_quality: AlarmQuality,
+    pub alarm_metrics: AlarmMetrics,
     /// The line.
     pub line: LineStatus,
     /// The devices.
@@ -93,7 +93,7 @@ impl Fixture {
             samples,
             alarms: Vec::new(),
             aside: Vec::new(),
-            alarm_quality: AlarmQuality::default(),
+            alarm_metrics: AlarmMetrics::default(),
             line: LineStatus { state: LineState::Connected, counters, ..LineStatus::default() },
             devices,
         }
@@ -181,7 +181,7 @@ impl Fixture {
             alarms: Arc::new(self.alarms.clone()),
             aside: Arc::new(self.aside.clone()),
             sound: self.alarms.iter().any(|alarm| alarm.state == AlarmState::Unacknowledged),
-            alarm_quality: self.alarm_quality.clone(),
+            alarm_metrics: self.alarm_metrics.clone(),
             orders: Vec::new(),
             sets: Arc::new(self.sets.clone()),
             restores: self.restores.iter().cloned().map(Arc::new).collect(),

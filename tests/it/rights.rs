@@ -339,7 +339,7 @@ fn of_question(query: &Query) -> Row {
         Query::Actions { .. } => look("", "-VTSL-"),
         Query::LineMinutes { .. } => look("", "-VTSL-"),
         Query::Values { .. } => look("", "-VTSL-"),
-        Query::AlarmQuality { .. } => look("", "-VTSL-"),
+        Query::AlarmMetrics { .. } => look("", "-VTSL-"),
         Query::Report { .. } => look("", "-VTSL-"),
         Query::Audit { .. } => look("read audit log", "---S--"),
     }
@@ -354,7 +354,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
         Query::Actions { from, to, limit },
         Query::LineMinutes { line: LineId(0), from, to, limit },
         Query::Values { tags: vec![def.tags[0].id], from, every: std::time::Duration::from_secs(10), count: 6 },
-        Query::AlarmQuality { from, to },
+        Query::AlarmMetrics { from, to },
         Query::Report { period: Period { name: "period".into(), from, to } },
         Query::Audit { from, to, words, by, action, limit },
     ]

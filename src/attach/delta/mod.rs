@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::plant::{
     Snapshot,
-    alarm::{AlarmQuality, Figures},
+    alarm::{AlarmMetrics, PeriodMetrics},
     command::OrderStatus,
     interlock::ActuatorTracker,
     parameter_set::StoredSet,
@@ -46,7 +46,7 @@ pub struct Delta {
     sound: bool,
     rates: Option<AlarmRates>,
     /// The figures of the day: they change less often than the rates.
-    day: Option<Arc<Figures>>,
+    day: Option<Arc<PeriodMetrics>>,
     orders: List<OrderStatus>,
     watch: Option<ActuatorTracker>,
     history: Option<HistoryStatus>,
@@ -82,7 +82,7 @@ impl Delta {
             lines,
             devices,
             alarms,
-            alarm_quality,
+            alarm_metrics,
             aside,
             sound,
             orders,
@@ -111,8 +111,8 @@ impl Delta {
             alarms: shared(&old.alarms, alarms),
             aside: shared(&old.aside, aside),
             sound: *sound,
-            rates: (rates(&old.alarm_quality) != rates(alarm_quality)).then(|| rates(alarm_quality)),
-            day: (old.alarm_quality.day != alarm_quality.day).then(|| alarm_quality.day.clone()),
+            rates: (rates(&old.alarm_metrics) != rates(alarm_metrics)).then(|| rates(alarm_metrics)),
+            day: (old.alarm_metrics.day != alarm_metrics.day).then(|| alarm_metrics.day.clone()),
             orders: List::between(&old.orders, orders),
             watch: (old.watch != *watch).then(|| watch.clone()),
             history: (old.history != *history).then(|| history.clone()),
@@ -156,7 +156,7 @@ impl Delta {
             snapshot.aside = Arc::new(aside);
         }
         snapshot.sound = self.sound;
-        let quality = &mut snapshot.alarm_quality;
+        let quality = &mut snapshot.alarm_metrics;
         if let Some((last_10_min, last_hour, flood_since)) = self.rates {
             (quality.last_10_min, quality.last_hour, quality.flood_since) = (last_10_min, last_hour, flood_since);
         }
@@ -190,8 +190,8 @@ impl Delta {
     }
 }
 
-fn rates(quality: &AlarmQuality) -> AlarmRates {
-    let AlarmQuality { last_10_min, last_hour, flood_since, day: _ } = quality;
+fn rates(quality: &AlarmMetrics) -> AlarmRates {
+    let AlarmMetrics { last_10_min, last_hour, flood_since, day: _ } = quality;
     (*last_10_min, *last_hour, *flood_since)
 }
 

@@ -23,7 +23,7 @@ pub mod open;
 pub mod read;
 pub mod samples;
 pub mod report;
-pub mod quality;
+pub mod alarm_metrics;
 pub mod seals;
 pub mod writer;
 pub mod reader;

@@ -6,9 +6,9 @@ use duckdb::{AccessMode, Config, Connection, params};
 use jiff::Timestamp;
 
 use super::{
+    alarm_metrics::Recent,
     files::{self, Failure, Opening, Part},
     last::{self, LastCommit, Noted},
-    quality::Recent,
     sql,
     store::{Store, after, engine},
 };

@@ -70,8 +70,8 @@ impl Store {
                     .map(Answer::LineMinutes)
             }
             Query::Report { period } => self.report(period, now).map(|report| Answer::Report(Box::new(report))),
-            Query::AlarmQuality { from, to } => {
-                self.alarm_quality(*from, *to, now).map(|figures| Answer::AlarmQuality(Box::new(figures)))
+            Query::AlarmMetrics { from, to } => {
+                self.alarm_metrics(*from, *to, now).map(|figures| Answer::AlarmMetrics(Box::new(figures)))
             }
         }
     }

@@ -100,7 +100,7 @@ impl Store {
             Some(gathered.get_mut(tag)?.figures.take()?.end(label, in_alarm))
         };
         let tags = reported.iter().filter_map(row).collect();
-        let quality = self.alarm_quality(from, until, now)?;
+        let alarm_metrics = self.alarm_metrics(from, until, now)?;
         let period = period.clone();
         Ok(ShiftReport {
             period,
@@ -110,7 +110,7 @@ impl Store {
             tags,
             suppressed,
             alarms,
-            quality,
+            alarm_metrics,
             actions,
             record,
             record_of,

@@ -1,37 +1,37 @@
-//! The quality meter in the reducer: it counts every step of an alarm, and after a restart those of the last day.
+//! The alarm monitor in the reducer: it counts every step of an alarm, and after a restart those of the last day.
 
 use jiff::Timestamp;
 
 use super::Plant;
 use crate::plant::{
-    alarm::Meter,
+    alarm::AlarmMonitor,
     record::{AlarmRecord, Record},
 };
 
 impl Plant {
-    /// Lets the quality meter count what the journal remembers of the last day. `active` are the raising steps of alarms
+    /// Lets the alarm monitor count what the journal remembers of the last day. `active` are the raising steps of alarms
     /// that were active before it, `steps` what came since; both oldest first, none after `now`. `watched` are the windows
     /// of that day in which a station ran.
     pub fn remeasure(&mut self, active: &[AlarmRecord], steps: &[AlarmRecord], watched: &[i64], now: Timestamp) {
         let began = steps.first().map_or(now, |step| step.at.min(now));
-        self.meter = Meter::running(began);
-        watched.iter().for_each(|window| self.meter.watched(*window));
-        active.iter().for_each(|step| self.meter.already(step));
-        steps.iter().for_each(|step| self.meter.take(step));
-        self.meter.advance(now);
-        self.quality = self.meter.quality();
+        self.alarm_monitor = AlarmMonitor::running(began);
+        watched.iter().for_each(|window| self.alarm_monitor.watched(*window));
+        active.iter().for_each(|step| self.alarm_monitor.already(step));
+        steps.iter().for_each(|step| self.alarm_monitor.take(step));
+        self.alarm_monitor.advance(now);
+        self.alarm_metrics = self.alarm_monitor.metrics();
     }
 
     /// Counts the steps of alarms among what is to be stored.
     pub(super) fn measure(&mut self, records: &[Record]) {
-        self.meter.advance(self.at);
+        self.alarm_monitor.advance(self.at);
         for record in records {
             match record {
-                Record::Alarm(step) => self.meter.take(step),
+                Record::Alarm(step) => self.alarm_monitor.take(step),
                 Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::ClockSet => {}
             }
         }
-        self.quality = self.meter.quality();
+        self.alarm_metrics = self.alarm_monitor.metrics();
     }
 }
 
@@ -69,18 +69,18 @@ mod tests {
             let hot = second % 4 != 3;
             journal.extend(read(&mut plant, second, if hot { 80.0 } else { 20.0 }));
         }
-        let quality = plant.snapshot().alarm_quality;
-        assert_eq!((quality.last_10_min, quality.last_hour, quality.flood_since), (11, 11, Some(at(42))));
+        let metrics = plant.snapshot().alarm_metrics;
+        assert_eq!((metrics.last_10_min, metrics.last_hour, metrics.flood_since), (11, 11, Some(at(42))));
         let mut again = Plant::new(fixture::shared(), at(50), 1.0);
         again.restore(&journal);
         again.remeasure(&[], &journal, &[], at(50));
         plant.on_tick(at(53));
         again.on_tick(at(53));
-        assert_eq!(again.snapshot().alarm_quality.last_10_min, 11);
-        assert_eq!(again.snapshot().alarm_quality.flood_since, Some(at(42)));
-        assert_eq!(again.snapshot().alarm_quality.day.chattering, plant.snapshot().alarm_quality.day.chattering);
+        assert_eq!(again.snapshot().alarm_metrics.last_10_min, 11);
+        assert_eq!(again.snapshot().alarm_metrics.flood_since, Some(at(42)));
+        assert_eq!(again.snapshot().alarm_metrics.day.chattering, plant.snapshot().alarm_metrics.day.chattering);
         plant.on_tick(at(700));
-        assert_eq!(plant.snapshot().alarm_quality.last_10_min, 0);
-        assert_eq!(plant.snapshot().alarm_quality.flood_since, None);
+        assert_eq!(plant.snapshot().alarm_metrics.last_10_min, 0);
+        assert_eq!(plant.snapshot().alarm_metrics.flood_since, None);
     }
 }

@@ -79,7 +79,7 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
 /// Why more may be wrong than can be seen: the station judges nothing, or there is a flood.
 fn worry_words(model: &Model, cx: &ViewContext) -> String {
     let blind = if silent_words(model).is_some() { "alarms not judged   " } else { "" };
-    let flood = if cx.snapshot.alarm_quality.flood_since.is_some() { "FLOOD   " } else { "" };
+    let flood = if cx.snapshot.alarm_metrics.flood_since.is_some() { "FLOOD   " } else { "" };
     format!("{blind}{flood}")
 }
 

@@ -8,7 +8,7 @@ mod handover;
 mod journal;
 mod keys;
 mod list;
-mod quality;
+mod metrics;
 mod span;
 mod view;
 
@@ -40,7 +40,7 @@ use journal::Journal;
 use keys::Action;
 #[cfg(test)]
 pub use keys::all_chords;
-use quality::Quality;
+use metrics::Metrics;
 
 /// A view of the tab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -55,14 +55,14 @@ pub enum Page {
     /// What was.
     Journal,
     /// The alarm meter.
-    Quality,
+    Metrics,
     /// What the next shift must know.
     Handover,
 }
 
 impl Page {
     /// Every view, in the order of the key.
-    pub const ALL: [Page; 6] = [Page::Active, Page::Aside, Page::System, Page::Journal, Page::Quality, Page::Handover];
+    pub const ALL: [Page; 6] = [Page::Active, Page::Aside, Page::System, Page::Journal, Page::Metrics, Page::Handover];
 
     /// Its heading.
     pub fn title(self) -> &'static str {
@@ -71,7 +71,7 @@ impl Page {
             Page::Aside => "suppressed",
             Page::System => "system",
             Page::Journal => "journal",
-            Page::Quality => "quality",
+            Page::Metrics => "metrics",
             Page::Handover => "handover",
         }
     }
@@ -87,7 +87,7 @@ pub struct Alarms {
     unfolded: Vec<Timestamp>,
     filter: Filter,
     journal: Journal,
-    quality: Quality,
+    metrics: Metrics,
     handover: Handover,
     /// Queries asked so far.
     asked: u32,
@@ -121,7 +121,7 @@ impl Alarms {
                 Rows::of(cx.snapshot.aside.iter().map(|aside| (aside.id, aside.state, aside.note.at)), place)
             }
             // Nothing is done with a row of these.
-            Page::Journal | Page::Quality | Page::Handover => Rows::default(),
+            Page::Journal | Page::Metrics | Page::Handover => Rows::default(),
         }
     }
 
@@ -180,7 +180,7 @@ impl Alarms {
         match self.page {
             Page::Active | Page::System => self.filter.type_words(text),
             Page::Journal => self.journal.search(cx, text)?,
-            Page::Aside | Page::Quality | Page::Handover => {}
+            Page::Aside | Page::Metrics | Page::Handover => {}
         }
         Ok(self.on_snapshot(cx))
     }
@@ -229,20 +229,20 @@ impl Alarms {
         match self.page {
             Page::Active | Page::Aside | Page::System => Vec::new(),
             Page::Journal => self.journal.ask(cx, &mut self.asked),
-            Page::Quality => self.quality.ask(cx, &mut self.asked),
+            Page::Metrics => self.metrics.ask(cx, &mut self.asked),
             Page::Handover => self.handover.ask(cx, &mut self.asked),
         }
     }
 
     /// Is the answer to query `number` waited for?
     pub fn awaits(&self, number: u32) -> bool {
-        self.journal.awaits(number) || self.quality.awaits(number) || self.handover.awaits(number)
+        self.journal.awaits(number) || self.metrics.awaits(number) || self.handover.awaits(number)
     }
 
     /// The history answered query `number`; an answer to an older one is ignored.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.journal.on_answer(cx, number, &answer);
-        self.quality.on_answer(cx, number, &answer);
+        self.metrics.on_answer(cx, number, &answer);
         self.handover.on_answer(cx, number, &answer);
         Vec::new()
     }
@@ -273,7 +273,7 @@ impl Alarms {
     fn page_rows(&self, cx: &ViewContext) -> usize {
         match self.page {
             Page::Active | Page::System | Page::Aside => view::room(cx, cx.area.width, cx.area.height),
-            Page::Journal | Page::Quality | Page::Handover => usize::from(cx.area.height.saturating_sub(3)).max(1),
+            Page::Journal | Page::Metrics | Page::Handover => usize::from(cx.area.height.saturating_sub(3)).max(1),
         }
     }
 
@@ -301,7 +301,7 @@ impl Alarms {
             Page::Active | Page::System => self.rows(cx).iter().map(|row| row.alarm.id).collect(),
             Page::Aside => cx.snapshot.aside.iter().map(|aside| aside.id).collect(),
             Page::Journal => return self.journal.step(cx, by),
-            Page::Quality => return self.quality.step(cx, by),
+            Page::Metrics => return self.metrics.step(cx, by),
             Page::Handover => return self.handover.step(cx, by),
         };
         let place = ids.iter().position(|id| Some(*id) == self.selected).unwrap_or(0);
@@ -331,7 +331,7 @@ impl Alarms {
     fn shift(&mut self, cx: &ViewContext, by: isize) {
         match self.page {
             Page::Journal => self.journal.shift(cx, by),
-            Page::Quality => self.quality.shift(cx, by),
+            Page::Metrics => self.metrics.shift(cx, by),
             Page::Handover => self.handover.shift(cx, by),
             Page::Active | Page::Aside | Page::System => {}
         }
@@ -350,7 +350,7 @@ impl Alarms {
     fn ask_words(&self) -> Vec<UiAction> {
         let prompt = match self.page {
             Page::Journal => Prompt::new("search the journal", journal::FORMS, &self.journal.typed()),
-            Page::Active | Page::Aside | Page::System | Page::Quality | Page::Handover => {
+            Page::Active | Page::Aside | Page::System | Page::Metrics | Page::Handover => {
                 Prompt::new("show only alarms with", filter::FORMS, &self.filter.typed())
             }
         };
@@ -388,7 +388,7 @@ fn is_on(page: Page, def: &crate::plant::def::AlarmDef) -> bool {
     match page {
         Page::Active => def.class == AlarmClass::Process || urgent,
         Page::System => def.class == AlarmClass::System,
-        Page::Aside | Page::Journal | Page::Quality | Page::Handover => false,
+        Page::Aside | Page::Journal | Page::Metrics | Page::Handover => false,
     }
 }
 

@@ -175,7 +175,7 @@ impl Mimic {
                     | Answer::Actions(_)
                     | Answer::LineMinutes(_)
                     | Answer::Report(_)
-                    | Answer::AlarmQuality(_)
+                    | Answer::AlarmMetrics(_)
                     | Answer::Values(_),
                 )
                 | Err(_) => None,

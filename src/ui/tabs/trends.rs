@@ -206,7 +206,7 @@ impl Trends {
             | Answer::Actions(_)
             | Answer::LineMinutes(_)
             | Answer::Report(_)
-            | Answer::AlarmQuality(_)
+            | Answer::AlarmMetrics(_)
             | Answer::Values(_) => {}
         }
         self.ask(cx)

@@ -484,7 +484,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
             | Query::Audit { .. }
             | Query::LineMinutes { .. }
             | Query::Report { .. }
-            | Query::AlarmQuality { .. }
+            | Query::AlarmMetrics { .. }
             | Query::Values { .. } => continue,
         };
         update(&mut model, Msg::Answer(id, Ok(answer)));

@@ -4,7 +4,7 @@
 mod absent;
 mod damage;
 mod flips;
-mod quality;
+mod alarm_metrics;
 mod pieces;
 mod reading;
 

@@ -300,7 +300,7 @@ fn the_longest_lists_that_are_answered_fit_in_the_memory_of_the_engine() {
     let Ok(Answer::Report(report)) = store.answer(&Query::Report { period }, to) else { panic!("no report") };
     assert_eq!((report.alarms.len() as u64, report.actions.len() as u64), (ROWS_MAX, ROWS_MAX));
     let lists = [
-        Query::AlarmQuality { from, to },
+        Query::AlarmMetrics { from, to },
         Query::Journal { from, to, limit: ROWS_MAX as usize },
         Query::Actions { from, to, limit: ROWS_MAX as usize },
     ];

@@ -122,7 +122,7 @@ impl Handover {
             Ok(
                 Answer::Series(_)
                 | Answer::Journal(_)
-                | Answer::AlarmQuality(_)
+                | Answer::AlarmMetrics(_)
                 | Answer::Values(_)
                 | Answer::LineMinutes(_)
                 | Answer::Report(_),

@@ -143,7 +143,7 @@ impl Journal {
                 Answer::Series(_)
                 | Answer::LineMinutes(_)
                 | Answer::Report(_)
-                | Answer::AlarmQuality(_)
+                | Answer::AlarmMetrics(_)
                 | Answer::Values(_),
             ) => {}
             Err(error) => self.trouble = Some(error.to_string()),

@@ -76,7 +76,7 @@ const MOVE: [Row; 6] = [
 ];
 
 const VIEWS: [Row; 3] = [
-    row(char('v'), "view", "next view: active, suppressed, system, journal, quality, handover", Action::View(1)),
+    row(char('v'), "view", "next view: active, suppressed, system, journal, metrics, handover", Action::View(1)),
     row(char('V'), "", "view before", Action::View(-1)),
     row(char('b'), "", "bell for new alarms on or off", Action::Bell),
 ];
@@ -139,7 +139,7 @@ pub fn table(page: Page) -> Vec<Row> {
         Page::Active | Page::System => &[&OPEN, &ACTIONS, &VIEWS, &MOVE, &GO, &AREA],
         Page::Aside => &[&BACK, &OPEN, &VIEWS, &MOVE, &GO],
         Page::Journal => &[&SEARCH, &SHIFT, &VIEWS, &MOVE],
-        Page::Quality => &[&SHIFT, &VIEWS, &MOVE],
+        Page::Metrics => &[&SHIFT, &VIEWS, &MOVE],
         Page::Handover => &[&HANDOVER, &SHIFT, &VIEWS, &MOVE],
     };
     parts.concat()
@@ -153,7 +153,7 @@ pub fn told(page: Page) -> Vec<Hint> {
             Hint::new("a", "ack", "acknowledge the selected alarm"),
             Hint::new("A", "all", "acknowledge all that are listed (asks first)"),
         ],
-        Page::Aside | Page::Journal | Page::Quality | Page::Handover => Vec::new(),
+        Page::Aside | Page::Journal | Page::Metrics | Page::Handover => Vec::new(),
     };
     everywhere.into_iter().chain(hints(&table(page))).collect()
 }

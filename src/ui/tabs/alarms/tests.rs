@@ -8,8 +8,8 @@ use crate::{
     history::{Answer, Query},
     plant::{
         alarm::{
-            AlarmCommand, AlarmState, Figures,
-            quality::{Frequent, Named},
+            AlarmCommand, AlarmState, PeriodMetrics,
+            metrics::{Frequent, Named},
             state::OperatorNote,
         },
         command::Command,
@@ -112,10 +112,10 @@ fn put_aside() -> Fixture {
 }
 
 /// A day with a flood behind it.
-fn figures() -> Figures {
+fn figures() -> PeriodMetrics {
     let named = |subject: &str, text: &str| Named { subject: subject.into(), text: text.into() };
     let frequent = |subject, text, raised| Frequent { alarm: named(subject, text), raised };
-    Figures {
+    PeriodMetrics {
         from: ago(86_400),
         until: now(),
         by_priority: [0, 12, 30, 178],
@@ -192,21 +192,21 @@ fn what_is_put_aside_is_listed_and_counted_on_every_page() {
 #[test]
 fn the_meter_is_shown_with_target_limit_and_verdict() {
     let mut fixture = storm();
-    fixture.alarm_quality.day = Arc::new(figures());
-    (fixture.alarm_quality.last_10_min, fixture.alarm_quality.last_hour) = (15, 22);
-    fixture.alarm_quality.flood_since = Some(ago(50));
-    pictures("quality", &fixture, "vvvv");
+    fixture.alarm_metrics.day = Arc::new(figures());
+    (fixture.alarm_metrics.last_10_min, fixture.alarm_metrics.last_hour) = (15, 22);
+    fixture.alarm_metrics.flood_since = Some(ago(50));
+    pictures("metrics", &fixture, "vvvv");
     let mut model = shown(&fixture, Theme::FULL, "");
     let banner = screen(&mut model, 80, 24).lines().nth(2).map(str::to_owned).unwrap_or_default();
     assert!(banner.contains("FLOOD") && banner.contains("UNACK"), "{banner}");
     // A past shift is asked of the history, and its figures stand under its name only.
     let effects = type_keys(&mut model, "vvvv←←");
-    let Some(Effect::Query(id, Query::AlarmQuality { from, to })) = effects.last() else { panic!("{effects:?}") };
+    let Some(Effect::Query(id, Query::AlarmMetrics { from, to })) = effects.last() else { panic!("{effects:?}") };
     let span = [from, to].map(ToString::to_string);
     assert_eq!(span, ["2026-11-20T23:00:00Z", "2026-11-21T07:00:00Z"]);
     assert!(screen(&mut model, 80, 24).contains("reading …"));
-    let past = Figures { by_priority: [0, 0, 0, 7], ..figures() };
-    update(&mut model, Msg::Answer(*id, Ok(Answer::AlarmQuality(Box::new(past)))));
+    let past = PeriodMetrics { by_priority: [0, 0, 0, 7], ..figures() };
+    update(&mut model, Msg::Answer(*id, Ok(Answer::AlarmMetrics(Box::new(past)))));
     assert!(
         screen(&mut model, 80, 24).contains("morning 2026-11-21 06:00–14:00: 7 alarms"),
         "{}",

@@ -33,7 +33,7 @@ pub(super) fn draw(tab: &Alarms, cx: &ViewContext, frame: &mut Frame, area: Rect
         Page::Active | Page::System => list(tab, cx, &mut rest),
         Page::Aside => aside(tab, cx, &mut rest),
         Page::Journal => tab.journal.view(cx, &mut rest),
-        Page::Quality => tab.quality.view(cx, &mut rest),
+        Page::Metrics => tab.metrics.view(cx, &mut rest),
         Page::Handover => tab.handover.view(cx, &mut rest),
     }
 }
@@ -84,7 +84,7 @@ fn views(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let counts = Page::ALL.map(|page| match page {
         Page::Active | Page::System => Some(count(page)),
         Page::Aside => Some((cx.snapshot.aside.len(), 0)),
-        Page::Journal | Page::Quality | Page::Handover => None,
+        Page::Journal | Page::Metrics | Page::Handover => None,
     });
     let names = |word: &str| -> Vec<String> {
         let name = |(page, count): (Page, Option<(usize, usize)>)| match count {

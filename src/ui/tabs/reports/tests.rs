@@ -152,7 +152,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
         ],
         suppressed: Vec::new(),
         alarms: if full { alarms } else { Vec::new() },
-        quality: crate::plant::alarm::Figures::default(),
+        alarm_metrics: crate::plant::alarm::PeriodMetrics::default(),
         actions: if full { vec![action] } else { Vec::new() },
         record: Vec::new(),
         record_of: full.then(|| ("TIC-1".to_owned(), "°C".to_owned())),

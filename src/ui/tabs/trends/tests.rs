@@ -239,7 +239,7 @@ fn kinds(asked: &[(QueryId, Query)]) -> String {
         | Query::Audit { .. }
         | Query::LineMinutes { .. }
         | Query::Report { .. }
-        | Query::AlarmQuality { .. }
+        | Query::AlarmMetrics { .. }
         | Query::Values { .. } => "other",
     };
     asked.iter().map(|(_, query)| kind(query)).collect::<Vec<_>>().join(" ")

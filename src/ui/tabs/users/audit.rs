@@ -205,7 +205,7 @@ impl Audit {
                 | Answer::Journal(_)
                 | Answer::LineMinutes(_)
                 | Answer::Report(_)
-                | Answer::AlarmQuality(_)
+                | Answer::AlarmMetrics(_)
                 | Answer::Values(_),
             ) => {}
             Err(error) => self.trouble = Some(error.to_string()),

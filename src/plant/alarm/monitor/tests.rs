@@ -1,9 +1,9 @@
-//! The meter as an operator would check it with pencil and paper.
+//! The monitor as an operator would check it with pencil and paper.
 
 use proptest::prelude::*;
 
 use super::*;
-use crate::plant::{alarm::quality::Measure, def::Priority};
+use crate::plant::{alarm::metrics::Metric, def::Priority};
 
 /// A Saturday, 06:00 UTC.
 const START: i64 = 1_795_240_800;
@@ -28,18 +28,18 @@ fn step(second: f64, name: &str, step: AlarmStep) -> AlarmRecord {
     }
 }
 
-/// A meter of a period in which a station always ran.
-fn of_period(from: f64, until: f64) -> Meter {
-    let mut meter = Meter::of_period(at(from), at(until));
-    (second(at(from)).div_euclid(WINDOW_S)..=second(at(until)).div_euclid(WINDOW_S)).for_each(|n| meter.watched(n));
-    meter
+/// A monitor of a period in which a station always ran.
+fn of_period(from: f64, until: f64) -> AlarmMonitor {
+    let mut monitor = AlarmMonitor::of_period(at(from), at(until));
+    (second(at(from)).div_euclid(WINDOW_S)..=second(at(until)).div_euclid(WINDOW_S)).for_each(|n| monitor.watched(n));
+    monitor
 }
 
 /// The figures of 06:00 to a second after it.
-fn figures(until: f64, steps: &[(f64, &str, AlarmStep)]) -> Figures {
-    let mut meter = of_period(0.0, until);
-    steps.iter().for_each(|(second, name, kind)| meter.take(&step(*second, name, *kind)));
-    meter.figures()
+fn figures(until: f64, steps: &[(f64, &str, AlarmStep)]) -> PeriodMetrics {
+    let mut monitor = of_period(0.0, until);
+    steps.iter().for_each(|(second, name, kind)| monitor.take(&step(*second, name, *kind)));
+    monitor.figures()
 }
 
 fn names(alarms: &[Named]) -> Vec<&str> {
@@ -61,26 +61,26 @@ fn only_activations_within_the_period_count_and_windows_without_any_do_too() {
     ];
     let got = figures(7_200.0, &steps);
     assert_eq!((got.annunciated(), got.windows, got.most, got.windows_over), (3, 12, 2, 0));
-    assert_eq!(got.value(Measure::PerWindow), Some(0.25));
+    assert_eq!(got.value(Metric::PerWindow), Some(0.25));
     assert_eq!(got.top.iter().map(|alarm| (&*alarm.alarm.text, alarm.raised)).collect::<Vec<_>>()[0], ("first", 2));
     // A period that begins and ends within windows touches 14 of them.
-    let mut meter = of_period(-1.0, 7_200.5);
-    steps.iter().for_each(|(second, name, kind)| meter.take(&step(*second, name, *kind)));
-    let got = meter.figures();
+    let mut monitor = of_period(-1.0, 7_200.5);
+    steps.iter().for_each(|(second, name, kind)| monitor.take(&step(*second, name, *kind)));
+    let got = monitor.figures();
     assert_eq!((got.annunciated(), got.windows), (5, 14));
 }
 
 #[test]
 fn time_in_which_no_station_ran_thins_no_figure_out() {
-    let mut meter = Meter::of_period(at(300.0), at(86_400.0));
-    [0, 1, 2].into_iter().for_each(|window| meter.watched(START / WINDOW_S + window));
-    meter.take(&step(400.0, "x", Raised));
-    let got = meter.figures();
+    let mut monitor = AlarmMonitor::of_period(at(300.0), at(86_400.0));
+    [0, 1, 2].into_iter().for_each(|window| monitor.watched(START / WINDOW_S + window));
+    monitor.take(&step(400.0, "x", Raised));
+    let got = monitor.figures();
     assert_eq!((got.windows, got.watched.as_secs()), (3, 1_500));
-    let mut running = Meter::running(at(0.0));
+    let mut running = AlarmMonitor::running(at(0.0));
     running.advance(at(0.0));
     running.advance(at(900.0));
-    let day = running.quality().day;
+    let day = running.metrics().day;
     assert_eq!((day.windows, day.watched.as_secs()), (2, 900), "the day before it started is not watched");
 }
 
@@ -126,9 +126,9 @@ fn alarms_are_stale_after_a_day_and_the_most_at_one_time_count() {
     assert_eq!(figures(day + 11.0, &steps[..2]).stale, 1);
     assert_eq!(figures(day + 60.0, &steps).stale, 1);
     assert_eq!(figures(day + 60.0, &steps[..2]).stale, 2);
-    let mut meter = Meter::of_period(at(0.0), at(600.0));
-    meter.already(&step(-100_000.0, "old", Raised));
-    let got = meter.figures();
+    let mut monitor = AlarmMonitor::of_period(at(0.0), at(600.0));
+    monitor.already(&step(-100_000.0, "old", Raised));
+    let got = monitor.figures();
     assert_eq!((got.stale, got.annunciated()), (1, 0), "what was there before the period is stale, not new");
 }
 
@@ -142,17 +142,17 @@ fn the_flood_of_a_period_has_its_whole_seconds_within_the_period() {
 
 #[test]
 fn memory_does_not_grow_with_the_storms_it_has_seen() {
-    let mut meter = Meter::running(at(0.0));
+    let mut monitor = AlarmMonitor::running(at(0.0));
     for day in 0..10 {
         for second in 0..2_000 {
             let name = format!("alarm {}", second % 500);
-            meter.take(&step(f64::from(day) * 86_400.0 + f64::from(second), &name, Raised));
-            meter.take(&step(f64::from(day) * 86_400.0 + f64::from(second) + 0.5, &name, Returned));
+            monitor.take(&step(f64::from(day) * 86_400.0 + f64::from(second), &name, Raised));
+            monitor.take(&step(f64::from(day) * 86_400.0 + f64::from(second) + 0.5, &name, Returned));
         }
     }
-    meter.advance(at(12.0 * 86_400.0));
-    assert_eq!((meter.sums.len(), meter.habits.len(), meter.stale.len()), (0, 0, 0));
-    assert_eq!(meter.watched.len(), 1);
+    monitor.advance(at(12.0 * 86_400.0));
+    assert_eq!((monitor.sums.len(), monitor.alarms.len(), monitor.stale.len()), (0, 0, 0));
+    assert_eq!(monitor.watched.len(), 1);
 }
 
 fn steps() -> impl Strategy<Value = Vec<AlarmRecord>> {
@@ -175,20 +175,20 @@ fn steps() -> impl Strategy<Value = Vec<AlarmRecord>> {
 proptest! {
     #[test]
     fn what_the_screen_shows_now_is_what_the_report_of_the_same_span_says(steps in steps(), rest in 0.0..5_000.0f64) {
-        let mut running = Meter::running(at(0.0));
+        let mut running = AlarmMonitor::running(at(0.0));
         steps.iter().for_each(|step| running.take(step));
         let now = steps.last().map_or(at(0.0), |step| step.at) + Duration::from_secs_f64(rest);
         // The running figures are of whole seconds.
         let now = Timestamp::from_second(second(now) + 1).expect("within the calendar");
         running.advance(now);
-        let quality = running.quality();
-        let mut period = Meter::of_period(quality.day.from, quality.day.until);
-        let known = quality.day.from - LEAD;
+        let metrics = running.metrics();
+        let mut period = AlarmMonitor::of_period(metrics.day.from, metrics.day.until);
+        let known = metrics.day.from - LEAD;
         running.watched.iter().for_each(|window| period.watched(*window));
         steps.iter().filter(|step| step.at < known).for_each(|step| period.already(step));
         steps.iter().filter(|step| known <= step.at).for_each(|step| period.take(step));
         let in_window = steps.iter().filter(|step| step.step == Raised && second(now) - 600 < second(step.at));
-        prop_assert_eq!(quality.last_10_min as usize, in_window.count());
-        prop_assert_eq!(&*quality.day, &period.figures());
+        prop_assert_eq!(metrics.last_10_min as usize, in_window.count());
+        prop_assert_eq!(&*metrics.day, &period.figures());
     }
 }

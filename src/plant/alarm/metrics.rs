@@ -20,7 +20,7 @@ pub const WATCHED_MIN: Duration = Duration::from_secs(3_600);
 
 /// The alarm system as it is now: the rates of this moment, and the figures of the last 24 hours.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct AlarmQuality {
+pub struct AlarmMetrics {
     /// Activations in the last 10 minutes.
     pub last_10_min: u32,
     /// Activations in the last hour.
@@ -28,13 +28,13 @@ pub struct AlarmQuality {
     /// Since when there is a flood: it begins above 10 in 10 minutes and ends below 5.
     pub flood_since: Option<Timestamp>,
     /// The running hour and the 23 before it; some seconds old, `until` says how old.
-    pub day: Arc<Figures>,
+    pub day: Arc<PeriodMetrics>,
 }
 
 /// The figures of a span of time. Windows are 10 minutes of the UTC clock, those without an alarm included, but not those in
 /// which no station ran; one that lies only partly in the span counts with what is in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Figures {
+pub struct PeriodMetrics {
     /// From, inclusive.
     pub from: Timestamp,
     /// Until, exclusive.
@@ -81,10 +81,10 @@ pub struct Frequent {
     pub raised: u64,
 }
 
-impl Default for Figures {
-    fn default() -> Figures {
+impl Default for PeriodMetrics {
+    fn default() -> PeriodMetrics {
         let (from, until) = (Timestamp::UNIX_EPOCH, Timestamp::UNIX_EPOCH);
-        Figures {
+        PeriodMetrics {
             from,
             until,
             by_priority: [0; 4],
@@ -104,7 +104,7 @@ impl Default for Figures {
 
 /// What is measured, in the order of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Measure {
+pub enum Metric {
     /// Activations a day, on average.
     PerDay,
     /// Activations an hour, on average.
@@ -129,26 +129,23 @@ pub enum Measure {
     Share(Priority),
 }
 
-impl Measure {
+impl Metric {
     /// So much in a time.
     fn is_rate(self) -> bool {
         match self {
-            Measure::PerDay | Measure::PerHour | Measure::PerWindow | Measure::WindowsOver | Measure::Flood => true,
-            Measure::Most
-            | Measure::Top
-            | Measure::Chattering
-            | Measure::Fleeting
-            | Measure::Stale
-            | Measure::Share(_) => false,
+            Metric::PerDay | Metric::PerHour | Metric::PerWindow | Metric::WindowsOver | Metric::Flood => true,
+            Metric::Most | Metric::Top | Metric::Chattering | Metric::Fleeting | Metric::Stale | Metric::Share(_) => {
+                false
+            }
         }
     }
 }
 
 /// What a figure should be, and what it must not pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Goal {
+pub struct MetricTarget {
     /// What is measured.
-    pub measure: Measure,
+    pub measure: Metric,
     /// In words, with its unit last.
     pub words: &'static str,
     /// The target.
@@ -169,11 +166,11 @@ pub enum Bound {
 }
 
 /// Targets and limits (ISA-18.2-2016, clause 16.5; the order of the screens).
-pub const GOALS: [Goal; 14] = {
+pub const METRIC_TARGETS: [MetricTarget; 14] = {
     use Bound::{AtLeast, AtMost, Below};
-    use Measure::{Chattering, Fleeting, Flood, Most, PerDay, PerHour, PerWindow, Share, Stale, Top, WindowsOver};
-    const fn goal(measure: Measure, words: &'static str, target: Bound, limit: Option<Bound>) -> Goal {
-        Goal { measure, words, target, limit }
+    use Metric::{Chattering, Fleeting, Flood, Most, PerDay, PerHour, PerWindow, Share, Stale, Top, WindowsOver};
+    const fn goal(measure: Metric, words: &'static str, target: Bound, limit: Option<Bound>) -> MetricTarget {
+        MetricTarget { measure, words, target, limit }
     }
     [
         goal(PerDay, "alarms a day", AtMost(150.0), Some(AtMost(300.0))),
@@ -242,14 +239,14 @@ impl std::fmt::Display for Bound {
     }
 }
 
-impl Goal {
+impl MetricTarget {
     /// How a figure stands against it; `None` is a figure that could not be formed.
-    pub fn verdict(&self, figures: &Figures) -> Verdict {
+    pub fn verdict(&self, figures: &PeriodMetrics) -> Verdict {
         if self.measure.is_rate() && figures.watched < WATCHED_MIN {
             return Verdict::TooShort;
         }
         let Some(value) = figures.value(self.measure) else { return Verdict::TooFew };
-        let share = matches!(self.measure, Measure::Top | Measure::Share(_));
+        let share = matches!(self.measure, Metric::Top | Metric::Share(_));
         if share && figures.annunciated() < SHARED_MIN {
             Verdict::TooFew
         } else if self.target.holds(value) {
@@ -262,28 +259,28 @@ impl Goal {
     }
 }
 
-impl Figures {
+impl PeriodMetrics {
     /// Activations of all priorities.
     pub fn annunciated(&self) -> u64 {
         self.by_priority.iter().sum()
     }
     /// A figure; `None` if it cannot be formed, as a share of nothing.
-    pub fn value(&self, measure: Measure) -> Option<f64> {
+    pub fn value(&self, measure: Metric) -> Option<f64> {
         let all = self.annunciated() as f64;
         let seconds = self.watched.as_secs_f64();
         let of = |part: f64, whole: f64| (0.0 < whole).then(|| part / whole);
         match measure {
-            Measure::PerDay => of(all * 86_400.0, seconds),
-            Measure::PerHour => of(all * 3_600.0, seconds),
-            Measure::PerWindow => of(all * 600.0, seconds),
-            Measure::WindowsOver => of(self.windows_over as f64 * 100.0, self.windows as f64),
-            Measure::Most => Some(self.most as f64),
-            Measure::Flood => of(self.flood.as_secs_f64() * 100.0, seconds),
-            Measure::Top => of(self.top.iter().map(|alarm| alarm.raised).sum::<u64>() as f64 * 100.0, all),
-            Measure::Chattering => Some(self.chattering.len() as f64),
-            Measure::Fleeting => Some(self.fleeting.len() as f64),
-            Measure::Stale => Some(self.stale as f64),
-            Measure::Share(priority) => of(self.by_priority[place(priority)] as f64 * 100.0, all),
+            Metric::PerDay => of(all * 86_400.0, seconds),
+            Metric::PerHour => of(all * 3_600.0, seconds),
+            Metric::PerWindow => of(all * 600.0, seconds),
+            Metric::WindowsOver => of(self.windows_over as f64 * 100.0, self.windows as f64),
+            Metric::Most => Some(self.most as f64),
+            Metric::Flood => of(self.flood.as_secs_f64() * 100.0, seconds),
+            Metric::Top => of(self.top.iter().map(|alarm| alarm.raised).sum::<u64>() as f64 * 100.0, all),
+            Metric::Chattering => Some(self.chattering.len() as f64),
+            Metric::Fleeting => Some(self.fleeting.len() as f64),
+            Metric::Stale => Some(self.stale as f64),
+            Metric::Share(priority) => of(self.by_priority[place(priority)] as f64 * 100.0, all),
         }
     }
 }
@@ -297,14 +294,14 @@ pub fn place(priority: Priority) -> usize {
 mod tests {
     use super::*;
 
-    fn figures(by_priority: [u64; 4]) -> Figures {
+    fn figures(by_priority: [u64; 4]) -> PeriodMetrics {
         let until = Timestamp::UNIX_EPOCH + Duration::from_secs(86_400);
         let watched = Duration::from_secs(86_400);
-        Figures { by_priority, until, windows: 144, watched, ..Figures::default() }
+        PeriodMetrics { by_priority, until, windows: 144, watched, ..PeriodMetrics::default() }
     }
 
-    fn verdict(figures: &Figures, measure: Measure) -> Verdict {
-        GOALS.iter().find(|goal| goal.measure == measure).expect("every measure has a goal").verdict(figures)
+    fn verdict(figures: &PeriodMetrics, measure: Metric) -> Verdict {
+        METRIC_TARGETS.iter().find(|goal| goal.measure == measure).expect("every measure has a goal").verdict(figures)
     }
 
     #[test]
@@ -316,42 +313,43 @@ mod tests {
             (300, Verdict::Beyond),
             (301, Verdict::Over),
         ] {
-            assert_eq!(verdict(&figures([0, 0, 0, a_day]), Measure::PerDay), expect, "{a_day}");
+            assert_eq!(verdict(&figures([0, 0, 0, a_day]), Metric::PerDay), expect, "{a_day}");
         }
-        assert_eq!(figures([0, 0, 0, 144]).value(Measure::PerWindow), Some(1.0));
-        assert_eq!(figures([0, 0, 0, 144]).value(Measure::PerHour), Some(6.0));
+        assert_eq!(figures([0, 0, 0, 144]).value(Metric::PerWindow), Some(1.0));
+        assert_eq!(figures([0, 0, 0, 144]).value(Metric::PerHour), Some(6.0));
     }
 
     #[test]
     fn a_rate_is_of_the_time_that_was_watched_and_of_less_than_an_hour_it_is_not_judged() {
-        let hours = |hours: u64| Figures { watched: Duration::from_secs(hours * 3_600), ..figures([0, 0, 0, 24]) };
-        assert_eq!(hours(2).value(Measure::PerHour), Some(12.0));
-        assert_eq!(verdict(&hours(1), Measure::PerHour), Verdict::Over);
-        let short = Figures { watched: Duration::from_secs(3_599), ..hours(1) };
-        assert_eq!(verdict(&short, Measure::PerHour), Verdict::TooShort);
-        assert_eq!(verdict(&short, Measure::Most), Verdict::Good, "that much is certain");
-        assert_eq!(verdict(&hours(0), Measure::PerDay), Verdict::TooShort);
+        let hours =
+            |hours: u64| PeriodMetrics { watched: Duration::from_secs(hours * 3_600), ..figures([0, 0, 0, 24]) };
+        assert_eq!(hours(2).value(Metric::PerHour), Some(12.0));
+        assert_eq!(verdict(&hours(1), Metric::PerHour), Verdict::Over);
+        let short = PeriodMetrics { watched: Duration::from_secs(3_599), ..hours(1) };
+        assert_eq!(verdict(&short, Metric::PerHour), Verdict::TooShort);
+        assert_eq!(verdict(&short, Metric::Most), Verdict::Good, "that much is certain");
+        assert_eq!(verdict(&hours(0), Metric::PerDay), Verdict::TooShort);
     }
 
     #[test]
     fn the_split_is_judged_from_a_handful_of_alarms_up() {
         let split = figures([0, 5, 15, 80]);
         for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
-            assert_eq!(verdict(&split, Measure::Share(priority)), Verdict::Good, "{}", priority.word());
+            assert_eq!(verdict(&split, Metric::Share(priority)), Verdict::Good, "{}", priority.word());
         }
         let urgent = figures([2, 10, 10, 10]);
         for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
-            assert_eq!(verdict(&urgent, Measure::Share(priority)), Verdict::Beyond, "{}", priority.word());
+            assert_eq!(verdict(&urgent, Metric::Share(priority)), Verdict::Beyond, "{}", priority.word());
         }
-        assert_eq!(verdict(&figures([0, 19, 0, 0]), Measure::Share(Priority::High)), Verdict::TooFew);
-        assert_eq!(verdict(&figures([0; 4]), Measure::Share(Priority::Low)), Verdict::TooFew);
+        assert_eq!(verdict(&figures([0, 19, 0, 0]), Metric::Share(Priority::High)), Verdict::TooFew);
+        assert_eq!(verdict(&figures([0; 4]), Metric::Share(Priority::Low)), Verdict::TooFew);
     }
 
     #[test]
     fn fewer_than_five_stale_alarms_and_less_than_one_percent_of_flood_are_good() {
         for (stale, flood, expect) in [(4, 863, Verdict::Good), (5, 864, Verdict::Beyond)] {
-            let figures = Figures { stale, flood: Duration::from_secs(flood), ..figures([0; 4]) };
-            assert_eq!([Measure::Stale, Measure::Flood].map(|measure| verdict(&figures, measure)), [expect; 2]);
+            let figures = PeriodMetrics { stale, flood: Duration::from_secs(flood), ..figures([0; 4]) };
+            assert_eq!([Metric::Stale, Metric::Flood].map(|measure| verdict(&figures, measure)), [expect; 2]);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! How good the alarm system was: the journal, day by day, through the meter that also measures the running plant.
+//! How good the alarm system was: the journal, day by day, through the monitor that also measures the running plant.
 
 use std::{collections::BTreeSet, time::Duration};
 
@@ -15,8 +15,8 @@ use crate::{
     history::HistoryError,
     plant::{
         alarm::{
-            Figures, Meter,
-            meter::{LEAD, RUNNING},
+            AlarmMonitor, PeriodMetrics,
+            monitor::{LEAD, RUNNING},
         },
         record::AlarmRecord,
     },
@@ -24,34 +24,34 @@ use crate::{
 
 /// The journal in memory at a time.
 const CHUNK: Duration = Duration::from_secs(86_400);
-/// A window of the meter, in microseconds.
+/// A window of the monitor, in microseconds.
 const WINDOW: i64 = 600_000_000;
 /// Windows that are looked into one by one: two days.
 const LOOKED_INTO_MAX: i64 = 288;
 /// Steps of alarms behind the figures of one answer: years of a plant that is run well.
 const STEPS_MAX: u64 = 2_000_000;
 
-/// What the meter of a plant that starts again must know.
+/// What the monitor of a plant that starts again must know.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recent {
     /// The raising steps of the alarms that were active before the last day.
     pub active: Vec<AlarmRecord>,
     /// The steps of the last day, oldest first.
     pub steps: Vec<AlarmRecord>,
-    /// The windows of the last day in which a station ran, see [`Meter::watched`].
+    /// The windows of the last day in which a station ran, see [`AlarmMonitor::watched`].
     pub watched: Vec<i64>,
 }
 
 impl Store {
     /// The figures of the alarm system from `from` to `to`, or to `now` if that is earlier. The journal is read a day at
     /// a time, so that months of it need no more memory than a day.
-    pub fn alarm_quality(&self, from: Timestamp, to: Timestamp, now: Timestamp) -> Result<Figures, HistoryError> {
+    pub fn alarm_metrics(&self, from: Timestamp, to: Timestamp, now: Timestamp) -> Result<PeriodMetrics, HistoryError> {
         let until = to.min(now);
         check_span(from, until)?;
         let known = from.checked_sub(LEAD).unwrap_or(Timestamp::MIN);
-        let mut meter = Meter::of_period(from, until);
-        self.standing_at(known)?.iter().for_each(|step| meter.already(step));
-        self.watched(from, until)?.into_iter().for_each(|window| meter.watched(window));
+        let mut monitor = AlarmMonitor::of_period(from, until);
+        self.standing_at(known)?.iter().for_each(|step| monitor.already(step));
+        self.watched(from, until)?.into_iter().for_each(|window| monitor.watched(window));
         let journaled = |row: &duckdb::Row| Ok((row.get(0)?, row.get(1)?));
         let (first, last): (Option<i64>, Option<i64>) =
             self.db.query_row(sql::JOURNALED, [], journaled).map_err(engine)?;
@@ -64,13 +64,13 @@ impl Store {
             let steps = self.steps(next, to)?;
             rows += steps.len() as u64;
             within(rows, STEPS_MAX)?;
-            steps.iter().for_each(|step| meter.take(step));
+            steps.iter().for_each(|step| monitor.take(step));
             next = to;
         }
-        Ok(meter.figures())
+        Ok(monitor.figures())
     }
 
-    /// What the meter of a plant that starts `now` must know of the time before.
+    /// What the monitor of a plant that starts `now` must know of the time before.
     pub fn recent(&self, now: Timestamp) -> Result<Recent, HistoryError> {
         let since = now.checked_sub(RUNNING).unwrap_or(Timestamp::MIN);
         if now <= since {

@@ -11,10 +11,10 @@ use super::{
 use crate::{
     history::{Answer, HistoryError, Query},
     plant::alarm::{
-        AlarmState, Figures,
-        quality::{GOALS, Verdict},
+        AlarmState, PeriodMetrics,
+        metrics::{METRIC_TARGETS, Verdict},
     },
-    report::{Period, alarm_quality},
+    report::{Period, alarm_metrics},
     ui::{
         UiAction, ViewContext,
         modal::confirm::subject,
@@ -32,16 +32,16 @@ const TABLE: u16 = 76;
 
 /// State of the page.
 #[derive(Debug, Default)]
-pub struct Quality {
+pub struct Metrics {
     /// The chosen shift; `None` is now: the last 24 hours, from the snapshot.
     period: Option<Period>,
-    figures: Option<Box<Figures>>,
+    figures: Option<Box<PeriodMetrics>>,
     trouble: Option<String>,
     first: usize,
     periodic: PeriodicQuery,
 }
 
-impl Quality {
+impl Metrics {
     /// So many shifts later; `0` is the present.
     pub fn shift(&mut self, cx: &ViewContext, by: isize) {
         self.period = match by {
@@ -49,7 +49,7 @@ impl Quality {
             by if by < 0 => span::earlier(cx, self.period.as_ref()),
             _ => span::later(cx, self.period.as_ref()),
         };
-        // Figures of one period must not stand under the name of another.
+        // PeriodMetrics of one period must not stand under the name of another.
         (self.figures, self.trouble, self.first, self.periodic) = (None, None, 0, PeriodicQuery::default());
     }
 
@@ -68,7 +68,7 @@ impl Quality {
         }
         *number = number.wrapping_add(1);
         self.periodic.asked(*number, cx.steady());
-        vec![UiAction::query(Tab::Alarms, *number, Query::AlarmQuality { from: period.from, to: period.to })]
+        vec![UiAction::query(Tab::Alarms, *number, Query::AlarmMetrics { from: period.from, to: period.to })]
     }
 
     /// Is the answer to query `number` waited for?
@@ -82,7 +82,7 @@ impl Quality {
             return;
         }
         match answer {
-            Ok(Answer::AlarmQuality(figures)) => (self.figures, self.trouble) = (Some(figures.clone()), None),
+            Ok(Answer::AlarmMetrics(figures)) => (self.figures, self.trouble) = (Some(figures.clone()), None),
             Ok(
                 Answer::Series(_)
                 | Answer::Journal(_)
@@ -96,10 +96,10 @@ impl Quality {
     }
 
     /// The figures shown: of the chosen shift, or of the last 24 hours.
-    fn figures<'a>(&'a self, cx: &ViewContext<'a>) -> Option<&'a Figures> {
+    fn figures<'a>(&'a self, cx: &ViewContext<'a>) -> Option<&'a PeriodMetrics> {
         match self.period {
             Some(_) => self.figures.as_deref(),
-            None => Some(&cx.snapshot.alarm_quality.day),
+            None => Some(&cx.snapshot.alarm_metrics.day),
         }
     }
 
@@ -115,8 +115,8 @@ impl Quality {
             Some(period) => span::words(cx, period),
         };
         let count = self.figures(cx).map(|figures| match figures.annunciated() {
-            1 => format!(": 1 alarm{}", alarm_quality::quiet(figures)),
-            many => format!(": {many} alarms{}", alarm_quality::quiet(figures)),
+            1 => format!(": 1 alarm{}", alarm_metrics::quiet(figures)),
+            many => format!(": {many} alarms{}", alarm_metrics::quiet(figures)),
         });
         let wait = if self.trouble.is_none() { ": reading …" } else { "" };
         let x = canvas.text(1, 1, &format!("{what}{}", count.as_deref().unwrap_or(wait)), theme.strong());
@@ -130,7 +130,7 @@ impl Quality {
         }
         if 2 * TABLE <= width {
             let mut side = canvas.part(TABLE + 1, 2, width - TABLE - 1, height.saturating_sub(3));
-            for (y, (text, style)) in self.culprits(cx).iter().enumerate() {
+            for (y, (text, style)) in self.bad_actors(cx).iter().enumerate() {
                 side.text(0, y as u16, text, *style);
             }
         }
@@ -148,7 +148,7 @@ impl Quality {
         let Some(figures) = self.figures(cx) else { return Vec::new() };
         let head = line(cx.theme, ["measure", "figure", "target", "limit", "verdict"]);
         let mut lines = vec![(head, cx.theme.dim())];
-        for (goal, row) in GOALS.iter().zip(alarm_quality::rows(figures)) {
+        for (goal, row) in METRIC_TARGETS.iter().zip(alarm_metrics::rows(figures)) {
             let value = row.value.map_or("–".into(), |value| format!("{value:.*}", usize::from(row.decimals)));
             let text = line(cx.theme, [row.measure, &value, &row.target, &row.limit, row.verdict]);
             let style = match goal.verdict(figures) {
@@ -161,21 +161,21 @@ impl Quality {
         }
         if width < 2 * TABLE {
             lines.push((String::new(), cx.theme.normal()));
-            lines.extend(self.culprits(cx));
+            lines.extend(self.bad_actors(cx));
         }
         lines
     }
 
     /// The most frequent alarms and their share, those that chattered, were fleeting, or have been active for a day.
-    fn culprits(&self, cx: &ViewContext) -> Vec<(String, Style)> {
+    fn bad_actors(&self, cx: &ViewContext) -> Vec<(String, Style)> {
         let Some(figures) = self.figures(cx) else { return Vec::new() };
         let all = figures.annunciated().max(1) as f64;
         let mut lines = vec![("alarms to look into".to_owned(), cx.theme.dim())];
         let style = cx.theme.normal();
-        for culprit in alarm_quality::culprits(figures) {
-            let share = culprit.raised.map(|raised| format!("{raised:>5} {:>3.0} %", raised as f64 * 100.0 / all));
+        for bad_actor in alarm_metrics::bad_actors(figures) {
+            let share = bad_actor.raised.map(|raised| format!("{raised:>5} {:>3.0} %", raised as f64 * 100.0 / all));
             let share = share.unwrap_or_default();
-            let text = format!("{} {share:11}  {}  {}", pad(culprit.kind, 10), culprit.subject, culprit.alarm);
+            let text = format!("{} {share:11}  {}  {}", pad(bad_actor.kind, 10), bad_actor.subject, bad_actor.alarm);
             lines.push((fit_words(&text, TABLE), style));
         }
         if self.period.is_none() {
@@ -204,13 +204,13 @@ impl Quality {
 
 /// The rates of this moment, and whether there is a flood.
 fn now_words(cx: &ViewContext) -> (String, bool) {
-    let quality = &cx.snapshot.alarm_quality;
-    let flood = match quality.flood_since {
+    let metrics = &cx.snapshot.alarm_metrics;
+    let flood = match metrics.flood_since {
         Some(since) => format!("FLOOD since {}", clock(since, &cx.def().time_zone)),
         None => "no flood".to_owned(),
     };
-    let words = format!("last 10 min {}   last hour {}   {flood}", quality.last_10_min, quality.last_hour);
-    (words, quality.flood_since.is_some())
+    let words = format!("last 10 min {}   last hour {}   {flood}", metrics.last_10_min, metrics.last_hour);
+    (words, metrics.flood_since.is_some())
 }
 
 fn line(theme: &Theme, [measure, figure, target, limit, verdict]: [&str; 5]) -> String {

@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::{Period, csv::iso};
 use crate::plant::{
     alarm::{
-        Figures,
-        quality::{GOALS, Goal, Measure, Named},
+        PeriodMetrics,
+        metrics::{METRIC_TARGETS, Metric, MetricTarget, Named},
     },
     def::PlantDef,
 };
@@ -31,7 +31,7 @@ pub struct Row {
 
 /// An alarm that somebody should look into, and why.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Culprit {
+pub struct BadActor {
     /// `frequent`, `chattering` or `fleeting`.
     pub kind: &'static str,
     /// Full name of the tag or device.
@@ -44,7 +44,7 @@ pub struct Culprit {
 
 /// All that is told of a period, as `--json` prints it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Quality {
+pub struct AlarmMetricsReport {
     /// Name of the plant.
     pub plant: String,
     /// Name of the period.
@@ -59,15 +59,15 @@ pub struct Quality {
     pub raised: u64,
     /// Activations that were not annunciated.
     pub suppressed: u64,
-    /// Figures against targets and limits.
+    /// PeriodMetrics against targets and limits.
     pub figures: Vec<Row>,
     /// The alarms to look into.
-    pub alarms: Vec<Culprit>,
+    pub alarms: Vec<BadActor>,
 }
 
 /// The figures of a period with names and times.
-pub fn quality(figures: &Figures, def: &PlantDef, period: &Period) -> Quality {
-    Quality {
+pub fn metrics(figures: &PeriodMetrics, def: &PlantDef, period: &Period) -> AlarmMetricsReport {
+    AlarmMetricsReport {
         plant: def.name.clone(),
         period: period.name.clone(),
         from: iso(&def.time_zone, figures.from),
@@ -76,32 +76,32 @@ pub fn quality(figures: &Figures, def: &PlantDef, period: &Period) -> Quality {
         raised: figures.annunciated(),
         suppressed: figures.suppressed,
         figures: rows(figures),
-        alarms: culprits(figures),
+        alarms: bad_actors(figures),
     }
 }
 
 /// Every figure, in the order of the table of goals.
-pub fn rows(figures: &Figures) -> Vec<Row> {
-    GOALS.iter().map(|goal| row(goal, figures)).collect()
+pub fn rows(figures: &PeriodMetrics) -> Vec<Row> {
+    METRIC_TARGETS.iter().map(|goal| row(goal, figures)).collect()
 }
 
 /// The most frequent alarms, then those that chattered, then those that were fleeting.
-pub fn culprits(figures: &Figures) -> Vec<Culprit> {
-    let culprit = |kind, alarm: &Named, raised| Culprit {
+pub fn bad_actors(figures: &PeriodMetrics) -> Vec<BadActor> {
+    let bad_actor = |kind, alarm: &Named, raised| BadActor {
         kind,
         subject: alarm.subject.to_string(),
         alarm: alarm.text.to_string(),
         raised,
     };
-    let frequent = figures.top.iter().map(|frequent| culprit("frequent", &frequent.alarm, Some(frequent.raised)));
-    let chattering = figures.chattering.iter().map(|alarm| culprit("chattering", alarm, None));
-    let fleeting = figures.fleeting.iter().map(|alarm| culprit("fleeting", alarm, None));
+    let frequent = figures.top.iter().map(|frequent| bad_actor("frequent", &frequent.alarm, Some(frequent.raised)));
+    let chattering = figures.chattering.iter().map(|alarm| bad_actor("chattering", alarm, None));
+    let fleeting = figures.fleeting.iter().map(|alarm| bad_actor("fleeting", alarm, None));
     frequent.chain(chattering).chain(fleeting).collect()
 }
 
 /// The figures as lines for a terminal.
-pub fn quality_text(figures: &Figures, def: &PlantDef, period: &Period) -> String {
-    let all = quality(figures, def, period);
+pub fn metrics_text(figures: &PeriodMetrics, def: &PlantDef, period: &Period) -> String {
+    let all = metrics(figures, def, period);
     let mut lines = vec![
         format!("{}, alarms of {}", def.title, all.period),
         format!("{} to {}: {} alarms{}{}", all.from, all.until, all.raised, quiet(figures), gaps(figures)),
@@ -125,7 +125,7 @@ pub fn quality_text(figures: &Figures, def: &PlantDef, period: &Period) -> Strin
 }
 
 /// How many were not annunciated.
-pub fn quiet(figures: &Figures) -> String {
+pub fn quiet(figures: &PeriodMetrics) -> String {
     match figures.suppressed {
         0 => String::new(),
         many => format!(", {many} more while suppressed"),
@@ -133,7 +133,7 @@ pub fn quiet(figures: &Figures) -> String {
 }
 
 /// How much of the span was watched, if not all of it.
-fn gaps(figures: &Figures) -> String {
+fn gaps(figures: &PeriodMetrics) -> String {
     let (watched, whole) = (figures.watched.as_secs(), figures.until.duration_since(figures.from).as_secs());
     let minutes = watched / 60;
     match i64::try_from(watched).is_ok_and(|watched| watched < whole) {
@@ -142,16 +142,16 @@ fn gaps(figures: &Figures) -> String {
     }
 }
 
-fn row(goal: &Goal, figures: &Figures) -> Row {
+fn row(goal: &MetricTarget, figures: &PeriodMetrics) -> Row {
     let decimals = match goal.measure {
-        Measure::Most | Measure::Chattering | Measure::Fleeting | Measure::Stale => 0,
-        Measure::PerDay
-        | Measure::PerHour
-        | Measure::PerWindow
-        | Measure::WindowsOver
-        | Measure::Flood
-        | Measure::Top
-        | Measure::Share(_) => 1,
+        Metric::Most | Metric::Chattering | Metric::Fleeting | Metric::Stale => 0,
+        Metric::PerDay
+        | Metric::PerHour
+        | Metric::PerWindow
+        | Metric::WindowsOver
+        | Metric::Flood
+        | Metric::Top
+        | Metric::Share(_) => 1,
     };
     Row {
         measure: goal.words,
@@ -169,15 +169,15 @@ pub(super) mod tests {
 
     use super::*;
     use crate::{
-        plant::alarm::quality::Frequent,
+        plant::alarm::metrics::Frequent,
         report::testing::{THREE, at, plant},
     };
 
     /// Eight hours with 24 alarms, six of them of one that chatters.
-    pub fn figures() -> Figures {
+    pub fn figures() -> PeriodMetrics {
         let name = |subject: &str, text: &str| Named { subject: subject.into(), text: text.into() };
         let high = name("TIC-1.PV", "temperature high");
-        Figures {
+        PeriodMetrics {
             from: at("2026-11-21T06:00+07"),
             until: at("2026-11-21T14:00+07"),
             by_priority: [0, 6, 3, 15],
@@ -204,7 +204,7 @@ pub(super) mod tests {
             from: at("2026-11-21T06:00+07"),
             to: at("2026-11-21T14:00+07"),
         };
-        let text = quality_text(&figures(), &plant("Asia/Bangkok", &THREE), &period);
+        let text = metrics_text(&figures(), &plant("Asia/Bangkok", &THREE), &period);
         let expect = "\
 Water tank, alarms of morning 2026-11-21
 2026-11-21T06:00:00+07:00 to 2026-11-21T14:00:00+07:00: 24 alarms
@@ -231,10 +231,10 @@ chattering         TIC-1.PV  temperature high
 
 targets and limits: ISA-18.2 for one operator, meant for 30 days or more";
         assert_eq!(text, expect);
-        let short = Figures { watched: std::time::Duration::from_secs(5_460), ..figures() };
-        let short = quality_text(&short, &plant("Asia/Bangkok", &THREE), &period);
+        let short = PeriodMetrics { watched: std::time::Duration::from_secs(5_460), ..figures() };
+        let short = metrics_text(&short, &plant("Asia/Bangkok", &THREE), &period);
         assert!(short.contains(": 24 alarms; a station ran for 1 h 31 min\n"), "{short}");
-        let none = quality_text(&Figures::default(), &plant("Asia/Bangkok", &THREE), &period);
+        let none = metrics_text(&PeriodMetrics::default(), &plant("Asia/Bangkok", &THREE), &period);
         assert!(
             none.contains("alarms a day                              —  at most 150   at most 300   watched < 1 h"),
             "{none}"

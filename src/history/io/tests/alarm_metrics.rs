@@ -9,8 +9,8 @@ use super::*;
 use crate::{
     history::io::store::utc,
     plant::alarm::{
-        Figures,
-        quality::{Frequent, Named, place},
+        PeriodMetrics,
+        metrics::{Frequent, Named, place},
     },
 };
 
@@ -80,7 +80,7 @@ const STALE: &str = "WITH activations AS (
 const SUPPRESSED: &str = "SELECT count(*) FROM alarm_journal WHERE step = 'raised quietly' AND utc >= $1 AND utc < $2";
 
 /// The figures as SQL counts them.
-fn counted(store: &Store, from: Timestamp, until: Timestamp) -> Figures {
+fn counted(store: &Store, from: Timestamp, until: Timestamp) -> PeriodMetrics {
     let db = &store.db;
     let span = params![utc(from), utc(until)];
     let number = |sql: &str| db.query_row(sql, span, |row| row.get::<_, u64>(0)).unwrap();
@@ -94,7 +94,7 @@ fn counted(store: &Store, from: Timestamp, until: Timestamp) -> Figures {
     let top = |row: &duckdb::Row| Ok(Frequent { alarm: named(row)?, raised: row.get(2)? });
     let (windows, windows_over, most, micros) =
         db.query_row(WINDOWS, span, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))).unwrap();
-    Figures {
+    PeriodMetrics {
         from,
         until,
         by_priority: db
@@ -161,9 +161,9 @@ proptest! {
         store.append(&journal.iter().cloned().map(Record::Alarm).collect::<Vec<_>>()).unwrap();
         let from = instant(&journal, a, from_step);
         let until = instant(&journal, a + (1.0 - a) * b, until_step).max(from + Duration::from_secs(1));
-        let query = Query::AlarmQuality { from, to: until };
+        let query = Query::AlarmMetrics { from, to: until };
         let answer = store.answer(&query, until).unwrap();
-        prop_assert_eq!(answer, Answer::AlarmQuality(Box::new(counted(&store, from, until))));
+        prop_assert_eq!(answer, Answer::AlarmMetrics(Box::new(counted(&store, from, until))));
     }
 }
 
@@ -182,7 +182,7 @@ fn a_storm_an_alarm_from_the_day_before_and_an_empty_night_are_counted_as_sql_co
     // A station ran all the time but for the last hour.
     store.append(&(-48..42).map(|n| good(PV, START + n * 600, 27.0)).collect::<Vec<_>>()).unwrap();
     let (from, until) = (at(-28_800.0), at(28_800.0));
-    let figures = store.alarm_quality(from, until, until).unwrap();
+    let figures = store.alarm_metrics(from, until, until).unwrap();
     assert_eq!(figures, counted(&store, from, until));
     assert_eq!((figures.annunciated(), figures.windows, figures.windows_over, figures.most), (500, 90, 1, 500));
     assert_eq!(figures.watched.as_secs(), 15 * 3_600);
@@ -190,7 +190,7 @@ fn a_storm_an_alarm_from_the_day_before_and_an_empty_night_are_counted_as_sql_co
     assert_eq!(figures.by_priority[place(Priority::High)], 500);
     // From second 1, the eleventh alarm, until the last but four are ten minutes old.
     assert_eq!(figures.flood.as_secs(), 658);
-    assert_eq!(store.alarm_quality(until, until, until), Err(HistoryError::EmptyPeriod));
+    assert_eq!(store.alarm_metrics(until, until, until), Err(HistoryError::EmptyPeriod));
 }
 
 #[test]
@@ -220,6 +220,6 @@ fn an_alarm_that_was_put_aside_before_a_period_is_not_stale_in_it() {
     }
     store.append(&pair(-200_000.0, "quiet", Suppressed, RaisedQuietly)).unwrap();
     store.append(&pair(-200_000.0, "back", Shelved, Raised)).unwrap();
-    assert_eq!(store.alarm_quality(at(0.0), at(3_600.0), at(3_600.0)).unwrap().stale, 1);
+    assert_eq!(store.alarm_metrics(at(0.0), at(3_600.0), at(3_600.0)).unwrap().stale, 1);
     assert_eq!(store.recent(at(0.0)).unwrap().active.len(), 1);
 }

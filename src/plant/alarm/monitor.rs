@@ -1,4 +1,4 @@
-//! The quality meter: a fold over the steps of alarms that counts them for the last 24 hours, or for any past period.
+//! The alarm monitor: a fold over the steps of alarms that counts them for the last 24 hours, or for any past period.
 //!
 //! One fold for both, so that what the screen shows now is what the report says tomorrow. Memory is bounded: counts per
 //! second of the last hour, at most 24 sums, and a few times for each alarm.
@@ -12,7 +12,7 @@ use std::{
 use jiff::Timestamp;
 
 use super::{
-    quality::{AlarmQuality, Figures, Frequent, Named, TOP, place},
+    metrics::{AlarmMetrics, Frequent, Named, PeriodMetrics, TOP, place},
     rate::Rate,
 };
 use crate::plant::record::{AlarmRecord, AlarmStep};
@@ -35,17 +35,17 @@ const STALE_S: i64 = 86_400;
 /// What happened so long before a period is looked at too, to know whether a flood was under way; longer floods begin
 /// at the period.
 pub const LEAD: Duration = Duration::from_secs(86_400);
-/// What a meter that starts again must be told of the time before: the hours of the running figures.
+/// What a monitor that starts again must be told of the time before: the hours of the running figures.
 pub const RUNNING: Duration = Duration::from_secs((HOURS * HOUR_S) as u64);
 /// The running figures are formed anew after so many seconds.
 const REFRESH_S: i64 = 10;
 
 /// Counts activations. Steps come in order of time.
 #[derive(Debug, Clone)]
-pub struct Meter {
+pub struct AlarmMonitor {
     span: Span,
     rate: Rate,
-    habits: BTreeMap<Named, Habit>,
+    alarms: BTreeMap<Named, AlarmHistory>,
     /// By the second in which they begin, oldest first: the only one of a period, or one an hour.
     sums: VecDeque<(i64, Sum)>,
     /// Times (from, until), in seconds, in which an alarm was stale that is not any more.
@@ -53,7 +53,7 @@ pub struct Meter {
     /// The numbers of the windows in which a station ran.
     watched: BTreeSet<i64>,
     /// The latest figures of the running day.
-    day: Arc<Figures>,
+    day: Arc<PeriodMetrics>,
 }
 
 /// What is counted.
@@ -67,7 +67,7 @@ enum Span {
 
 /// What is remembered of an alarm.
 #[derive(Debug, Clone, Default)]
-struct Habit {
+struct AlarmHistory {
     /// Since when it is active.
     active: Option<Timestamp>,
     acknowledged: bool,
@@ -90,25 +90,25 @@ struct Sum {
     fleeting: BTreeSet<Named>,
 }
 
-impl Meter {
+impl AlarmMonitor {
     /// Counts from now on, for as long as the plant runs.
-    pub fn running(at: Timestamp) -> Meter {
-        Meter::new(Span::Running, second(at))
+    pub fn running(at: Timestamp) -> AlarmMonitor {
+        AlarmMonitor::new(Span::Running, second(at))
     }
 
     /// Counts what lies from `from` until before `until`. It is fed from [`LEAD`] before `from` on.
-    pub fn of_period(from: Timestamp, until: Timestamp) -> Meter {
+    pub fn of_period(from: Timestamp, until: Timestamp) -> AlarmMonitor {
         let start = second(from) - LEAD.as_secs() as i64;
-        let mut meter = Meter::new(Span::Period { from, until }, start);
-        meter.sums.push_back((second(from), Sum::default()));
-        meter
+        let mut monitor = AlarmMonitor::new(Span::Period { from, until }, start);
+        monitor.sums.push_back((second(from), Sum::default()));
+        monitor
     }
 
-    fn new(span: Span, start: i64) -> Meter {
-        Meter {
+    fn new(span: Span, start: i64) -> AlarmMonitor {
+        AlarmMonitor {
             span,
             rate: Rate::new(start),
-            habits: BTreeMap::new(),
+            alarms: BTreeMap::new(),
             sums: VecDeque::new(),
             stale: Vec::new(),
             watched: BTreeSet::new(),
@@ -116,22 +116,22 @@ impl Meter {
         }
     }
 
-    /// A station ran in this window, by its number since 1970. A running meter knows of those in which it runs itself.
+    /// A station ran in this window, by its number since 1970. A running monitor knows of those in which it runs itself.
     pub fn watched(&mut self, window: i64) {
         self.watched.insert(window);
     }
 
     /// Takes up an alarm that was active before anything is counted.
     pub fn already(&mut self, step: &AlarmRecord) {
-        let habit = self.habits.entry(named(step)).or_default();
+        let history = self.alarms.entry(named(step)).or_default();
         match step.step {
-            AlarmStep::Raised => (habit.active, habit.acknowledged) = (Some(step.at), false),
-            AlarmStep::Acknowledged => habit.acknowledged = true,
+            AlarmStep::Raised => (history.active, history.acknowledged) = (Some(step.at), false),
+            AlarmStep::Acknowledged => history.acknowledged = true,
             AlarmStep::Returned
             | AlarmStep::ReturnedQuietly
             | AlarmStep::Shelved
             | AlarmStep::Suppressed
-            | AlarmStep::OutOfService => habit.active = None,
+            | AlarmStep::OutOfService => history.active = None,
             AlarmStep::RaisedQuietly
             | AlarmStep::RaisedAgain
             | AlarmStep::Reset
@@ -146,11 +146,11 @@ impl Meter {
         self.pass(step.at);
         match step.step {
             AlarmStep::Raised => self.raised(step),
-            AlarmStep::Acknowledged => self.habits.entry(named(step)).or_default().acknowledged = true,
+            AlarmStep::Acknowledged => self.alarms.entry(named(step)).or_default().acknowledged = true,
             AlarmStep::Returned => self.returned(step),
             // What is put aside burdens nobody: it neither stands nor has it come and gone.
             AlarmStep::ReturnedQuietly | AlarmStep::Shelved | AlarmStep::Suppressed | AlarmStep::OutOfService => {
-                self.habits.entry(named(step)).or_default().acknowledged = true;
+                self.alarms.entry(named(step)).or_default().acknowledged = true;
                 self.returned(step);
             }
             AlarmStep::RaisedQuietly => {
@@ -191,8 +191,8 @@ impl Meter {
     }
 
     /// The alarm system as of the last step; the figures of the day as of some seconds ago.
-    pub fn quality(&self) -> AlarmQuality {
-        AlarmQuality {
+    pub fn metrics(&self) -> AlarmMetrics {
+        AlarmMetrics {
             last_10_min: self.rate.in_window(),
             last_hour: self.rate.in_hour(),
             flood_since: self.rate.flood_since().and_then(|since| Timestamp::from_second(since).ok()),
@@ -201,7 +201,7 @@ impl Meter {
     }
 
     /// The figures of the period, once every step of it has been taken.
-    pub fn figures(mut self) -> Figures {
+    pub fn figures(mut self) -> PeriodMetrics {
         match self.span {
             Span::Period { from, until } => {
                 self.advance(until);
@@ -215,14 +215,14 @@ impl Meter {
         self.rate.raised();
         let name = named(step);
         self.end(&name, step.at);
-        let habit = self.habits.entry(name.clone()).or_default();
-        (habit.active, habit.acknowledged) = (Some(step.at), false);
-        habit.raised.push_back(step.at);
-        if habit.raised.len() > CHATTER {
-            habit.raised.pop_front();
+        let history = self.alarms.entry(name.clone()).or_default();
+        (history.active, history.acknowledged) = (Some(step.at), false);
+        history.raised.push_back(step.at);
+        if history.raised.len() > CHATTER {
+            history.raised.pop_front();
         }
-        let spread = habit.raised.front().map(|first| span(*first, step.at)).unwrap_or_default();
-        let chatters = habit.raised.len() == CHATTER && spread < CHATTER_TIME;
+        let spread = history.raised.front().map(|first| span(*first, step.at)).unwrap_or_default();
+        let chatters = history.raised.len() == CHATTER && spread < CHATTER_TIME;
         let window = second(step.at).div_euclid(WINDOW_S);
         let Some(sum) = self.sum(step.at) else { return };
         sum.by_priority[place(step.priority)] += 1;
@@ -237,8 +237,8 @@ impl Meter {
 
     fn returned(&mut self, step: &AlarmRecord) {
         let name = named(step);
-        let habit = self.habits.entry(name.clone()).or_default();
-        let fleeting = habit.active.is_some_and(|since| span(since, step.at) < FLEETING) && !habit.acknowledged;
+        let history = self.alarms.entry(name.clone()).or_default();
+        let fleeting = history.active.is_some_and(|since| span(since, step.at) < FLEETING) && !history.acknowledged;
         self.end(&name, step.at);
         if let Some(sum) = self.sum(step.at).filter(|_| fleeting) {
             sum.fleeting.insert(name);
@@ -247,7 +247,7 @@ impl Meter {
 
     /// Ends the activation of an alarm, if there is one.
     fn end(&mut self, name: &Named, at: Timestamp) {
-        let active = self.habits.get_mut(name).and_then(|habit| habit.active.take());
+        let active = self.alarms.get_mut(name).and_then(|history| history.active.take());
         let stale = active.map(|since| second(since) + STALE_S).filter(|stale| *stale < second(at));
         self.stale.extend(stale.map(|from| (from, second(at))));
     }
@@ -304,20 +304,20 @@ impl Meter {
             self.stale.retain(|(_, until)| first < *until);
             // Nothing is lost with an alarm that has not come for an hour: it counts anew.
             let recent = |at: &Timestamp| self.rate.now() - HOUR_S < second(*at);
-            self.habits.retain(|_, habit| habit.active.is_some() || habit.raised.back().is_some_and(recent));
+            self.alarms.retain(|_, history| history.active.is_some() || history.raised.back().is_some_and(recent));
         }
     }
 
-    fn figures_of(&self, from: Timestamp, until: Timestamp) -> Figures {
+    fn figures_of(&self, from: Timestamp, until: Timestamp) -> PeriodMetrics {
         let mut all = Sum::default();
         self.sums.iter().for_each(|(_, sum)| all.add(sum));
         let (first, last) = (second(from), second(until));
         let (windows, watched) = self.watched_in(from, until);
-        let now_stale = self.habits.values().filter_map(|habit| habit.active);
+        let now_stale = self.alarms.values().filter_map(|history| history.active);
         let now_stale = now_stale.map(|since| (second(since) + STALE_S, last));
         let stale = self.stale.iter().copied().chain(now_stale);
         let stale = stale.map(|(a, b)| (a.max(first), b.min(last))).filter(|(a, b)| a < b).collect();
-        Figures {
+        PeriodMetrics {
             from,
             until,
             by_priority: all.by_priority,
@@ -335,7 +335,7 @@ impl Meter {
     }
 }
 
-impl Meter {
+impl AlarmMonitor {
     /// The windows of a span in which a station ran, and the time of the span that lies in them.
     fn watched_in(&self, from: Timestamp, until: Timestamp) -> (u64, Duration) {
         let (from, until, width) = (from.as_microsecond(), until.as_microsecond(), WINDOW_S * 1_000_000);
