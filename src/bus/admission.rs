@@ -13,7 +13,7 @@ use super::{
 use crate::plant::{
     admission::{Admission, DeadDevice, OverloadInterval, PollWords, Verdict, Warning},
     def::{DeviceId, Framing, LineDef, LineId, Parity, PlantDef, Transport},
-    tag::{Class, Poll},
+    tag::{Poll, PollClass},
 };
 
 /// A device that is given up is probed this often.
@@ -108,7 +108,7 @@ fn by_period(tasks: &[Task]) -> Vec<(u64, u64, usize)> {
 /// A periodic poll of a line: its class and device, and how an engineer knows it.
 struct Load {
     device: DeviceId,
-    class: Class,
+    class: PollClass,
     words: PollWords,
 }
 
@@ -121,13 +121,13 @@ pub fn admit(def: &PlantDef, line: LineId, blocks: &[Block]) -> Admission {
 pub fn admit_as(def: &PlantDef, line: &LineDef, blocks: &[Block]) -> Admission {
     let loads = loads(def, line, blocks);
     let all: Vec<&Load> = loads.iter().collect();
-    let hard: Vec<&Load> = loads.iter().filter(|load| load.class == Class::Hard).collect();
+    let critical: Vec<&Load> = loads.iter().filter(|load| load.class == PollClass::Critical).collect();
     let utilisation = load_of(&all);
     Admission {
         line: line.id,
         utilisation,
         verdict: judge(&all, None),
-        hard: judge(&hard, None),
+        critical: judge(&critical, None),
         factor: factor(&loads),
         cycle: loads.iter().map(|load| load.words.cost).sum(),
         dead: dead(def, line, blocks, &loads),
@@ -182,10 +182,14 @@ fn judge(loads: &[&Load], extra: Option<&PollWords>) -> Verdict {
     }
 }
 
-/// By what the schedule will stretch the soft polls.
+/// By what the schedule will stretch the normal polls.
 fn factor(loads: &[Load]) -> Option<f64> {
     let of = |class| load_of(&loads.iter().filter(|load| load.class == class).collect::<Vec<_>>());
-    let demand = Demand { hard: of(Class::Hard), soft: of(Class::Soft), idle: of(Class::Idle) };
+    let demand = Demand {
+        critical: of(PollClass::Critical),
+        normal: of(PollClass::Normal),
+        background: of(PollClass::Background),
+    };
     if demand.total() <= 1.0 { Some(1.0) } else { Some(demand.factor()).filter(|factor| *factor < FACTOR_MAX) }
 }
 

@@ -7,8 +7,8 @@
 //!                                   unreadable: what the device refused (unreadable)
 //! ```
 //!
-//! Tags of different [`Class`] share blocks, and the block has the most important of them: a word that is read along costs
-//! two characters, a request of its own twenty, so to leave it out would make the line slower for the hard ones as well.
+//! Tags of different [`PollClass`] share blocks, and the block has the most important of them: a word that is read along costs
+//! two characters, a request of its own twenty, so to leave it out would make the line slower for the critical ones as well.
 
 pub mod cost;
 pub mod gaps;
@@ -26,7 +26,7 @@ use std::{sync::Arc, time::Duration};
 use crate::plant::{
     PlantDef,
     def::{DeviceDef, DeviceId, LineId, TagId},
-    tag::{Access, Class, Point, Poll, Table, TagDef},
+    tag::{Access, Point, Poll, PollClass, Table, TagDef},
 };
 
 /// A tag that its device has refused is asked for this often.
@@ -50,7 +50,7 @@ pub struct Block {
     /// How often.
     pub poll: Poll,
     /// The most important class of its tags.
-    pub class: Class,
+    pub class: PollClass,
     /// Address and count are multiples of this (registers only).
     pub alignment: u16,
 }
@@ -91,7 +91,7 @@ fn asked_again(device: &DeviceDef, tag: &TagDef) -> Block {
         Poll::Every(period) => period.max(REFUSED_EVERY),
         Poll::Once | Poll::Never => REFUSED_EVERY,
     };
-    Block { poll: Poll::Every(period), class: Class::Idle, ..single(device, tag) }
+    Block { poll: Poll::Every(period), class: PollClass::Background, ..single(device, tag) }
 }
 
 /// The tags of a line that its devices do not have, as their refusals told.

@@ -2,7 +2,7 @@
 //!
 //! A transaction cannot be pre-empted, so this is non-preemptive EDF: whatever is released and has the nearest deadline
 //! (release + period) goes first. A release that is missed is counted and skipped, never piled up. On a line with too much
-//! to do (see [`overload`]) idle polls are shed, hard polls go before soft ones, and soft ones share what is left. A device
+//! to do (see [`overload`]) background polls are shed, critical polls go before normal ones, and normal ones share what is left. A device
 //! that does not answer (`device`) is asked with one block only, within a small share of the line's time for all of them.
 
 pub mod budget;
@@ -35,11 +35,11 @@ use super::plan::Block;
 use crate::plant::{
     def::{DeviceId, LineDef},
     event::ExceptionCode,
-    tag::Class,
+    tag::PollClass,
 };
 
 /// On an overloaded line even what is shed or always comes last is read once it has waited so long. Only a line that its
-/// hard polls alone fill to the brim gets that far.
+/// critical polls alone fill to the brim gets that far.
 const STARVED_AFTER: Duration = Duration::from_secs(60);
 
 /// Tier of what has waited so long.
@@ -72,7 +72,7 @@ pub struct Schedule {
     overload: Overload,
     /// The time for devices that do not answer.
     probes: Budget,
-    /// A hard poll was late since the demand was last looked at, and when that was.
+    /// A critical poll was late since the demand was last looked at, and when that was.
     late: bool,
     judged_at: Timestamp,
     /// The last read was one that had starved: the next is not.
@@ -162,11 +162,13 @@ impl Schedule {
         };
         let starves_at = Some(from + STARVED_AFTER);
         Some(match (self.overload.load(), poll.class) {
-            (Load::Normal, _) | (Load::Overload { .. }, Class::Hard) => {
+            (Load::Normal, _) | (Load::Overload { .. }, PollClass::Critical) => {
                 Spot { from, tier: 1, deadline, starves_at: None }
             }
-            (Load::Overload { .. }, Class::Soft) => Spot { from, tier: 2, deadline, starves_at },
-            (Load::Overload { .. }, Class::Idle) => Spot { from: from + STARVED_AFTER, tier: 3, deadline, starves_at },
+            (Load::Overload { .. }, PollClass::Normal) => Spot { from, tier: 2, deadline, starves_at },
+            (Load::Overload { .. }, PollClass::Background) => {
+                Spot { from: from + STARVED_AFTER, tier: 3, deadline, starves_at }
+            }
         })
     }
 
@@ -190,9 +192,9 @@ impl Schedule {
 
     fn pace_of(&self, poll: &Pending) -> Pace {
         match (self.overload.load(), poll.class, poll.period) {
-            (Load::Overload { factor }, Class::Soft, Some(period)) => Pace::Stretched(period.mul_f64(factor)),
-            (Load::Overload { .. }, Class::Idle, _) => Pace::Shed,
-            (Load::Overload { .. }, Class::Hard | Class::Soft, _) | (Load::Normal, _, _) => Pace::Normal,
+            (Load::Overload { factor }, PollClass::Normal, Some(period)) => Pace::Stretched(period.mul_f64(factor)),
+            (Load::Overload { .. }, PollClass::Background, _) => Pace::Shed,
+            (Load::Overload { .. }, PollClass::Critical | PollClass::Normal, _) | (Load::Normal, _, _) => Pace::Normal,
         }
     }
 
@@ -240,7 +242,7 @@ impl Schedule {
         // A probe begins late because its device does not answer, not because the line has no time.
         let free = if probed { started } else { rests_until.max(poll.not_before) };
         let served = poll.serve(pace, free, started, now);
-        self.late |= poll.class == Class::Hard && poll.is_late();
+        self.late |= poll.class == PollClass::Critical && poll.is_late();
         self.devices[self.polls[index].place].tried(now);
         self.requeue(index);
         let urgent = self.late && self.overload.load() == Load::Normal;
@@ -255,9 +257,9 @@ impl Schedule {
         let mut demand = Demand::default();
         for poll in self.polls.iter().filter(|poll| self.devices[poll.place].probe_at.is_none()) {
             let share = match poll.class {
-                Class::Hard => &mut demand.hard,
-                Class::Soft => &mut demand.soft,
-                Class::Idle => &mut demand.idle,
+                PollClass::Critical => &mut demand.critical,
+                PollClass::Normal => &mut demand.normal,
+                PollClass::Background => &mut demand.background,
             };
             *share += poll.demand();
         }
@@ -267,8 +269,8 @@ impl Schedule {
         }
         self.stale = true;
         if self.overload.load() == Load::Normal {
-            let soft = self.polls.iter_mut().filter(|poll| poll.class == Class::Soft);
-            soft.for_each(|poll| poll.back_on_grid(self.origin, now));
+            let normal = self.polls.iter_mut().filter(|poll| poll.class == PollClass::Normal);
+            normal.for_each(|poll| poll.back_on_grid(self.origin, now));
         }
     }
 
@@ -395,7 +397,7 @@ impl Schedule {
         Some(affordable.max(health.rests_until))
     }
 
-    /// How the line copes: what is shed, and by what soft polls are stretched.
+    /// How the line copes: what is shed, and by what normal polls are stretched.
     pub fn load(&self) -> Load {
         self.overload.load()
     }

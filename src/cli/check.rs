@@ -53,7 +53,7 @@ fn describe(def: &PlantDef, line: LineId) -> Vec<String> {
     let mut text = vec![
         String::new(),
         format!("line {}: {}, timeout {} ms", line.name, line.transport, line.timeout.as_millis()),
-        "  device      function     wire address             Modicon         count  tags  class  every    worst case  share"
+        "  device      function     wire address             Modicon         count  tags  class       every    worst case  share"
             .into(),
     ];
     text.extend(blocks.iter().map(|block| block_words(def, line, block)));
@@ -82,7 +82,7 @@ fn block_words(def: &PlantDef, line: &LineDef, block: &Block) -> String {
         Poll::Never => ("never".into(), String::new()),
     };
     let text = format!(
-        "  {:10}  {:11}  {:23}  {:14}  {:5}  {:4}  {:5}  {:7}  {:7.1} ms  {share}",
+        "  {:10}  {:11}  {:23}  {:14}  {:5}  {:4}  {:10}  {:7}  {:7.1} ms  {share}",
         device.name,
         format!("{function} / 0x{function:02X}"),
         format!("{}–{} / 0x{:04X}", block.address, last, block.address),
@@ -102,14 +102,14 @@ fn verdict_words(admission: &Admission) -> Vec<String> {
     if admission.verdict.fits() {
         return text;
     }
-    let consequence = match (admission.factor, admission.hard.fits()) {
+    let consequence = match (admission.factor, admission.critical.fits()) {
         (Some(factor), true) if factor < 1.05 => {
             "some polls will start late; those of alarm inputs go first if they are late again and again".into()
         }
         (Some(factor), true) => format!(
             "polls of alarm inputs keep their period; identification is left out, process values are read every {factor:.1} periods"
         ),
-        (Some(_), false) | (None, _) => format!("even the alarm inputs alone do not fit: {}", admission.hard),
+        (Some(_), false) | (None, _) => format!("even the alarm inputs alone do not fit: {}", admission.critical),
     };
     text.push(format!("  then: {consequence}"));
     text

@@ -16,8 +16,8 @@ pub struct Admission {
     /// Can all polls meet their periods?
     pub verdict: Verdict,
     /// Can those of the alarm inputs, if all others are left out?
-    pub hard: Verdict,
-    /// By what the periods of process values grow where the line has too much to do; 1 is not at all. `None`: the hard
+    pub critical: Verdict,
+    /// By what the periods of process values grow where the line has too much to do; 1 is not at all. `None`: the critical
     /// polls leave nothing for them.
     pub factor: Option<f64>,
     /// Time of one read of every periodic block.
@@ -40,7 +40,7 @@ impl Admission {
             line,
             utilisation: 0.0,
             verdict: Verdict::Fits,
-            hard: Verdict::Fits,
+            critical: Verdict::Fits,
             factor: Some(1.0),
             cycle: Duration::ZERO,
             dead: Vec::new(),

@@ -11,7 +11,7 @@ use super::{
     id::{DeviceId, TagId},
     line::LineDef,
     request_stats::RequestStats,
-    tag::{Class, Poll, Table},
+    tag::{Poll, PollClass, Table},
     traffic::Frames,
 };
 
@@ -98,7 +98,7 @@ pub struct PollReport {
     /// What its answered reads have really taken of late (plant time); `None` before the first.
     pub measured: Option<Duration>,
     /// What happens to it when the line has too much to do.
-    pub class: Class,
+    pub class: PollClass,
     /// Its period is stretched to so many now; 1 is not at all.
     pub factor: f32,
     /// It is left out now, because the line has too much to do.

@@ -19,7 +19,7 @@ pub mod traffic;
 pub mod def;
 pub mod simulate;
 pub mod tag;
-pub mod class;
+pub mod poll_class;
 pub mod scale;
 pub mod parameter_set;
 pub mod admission;

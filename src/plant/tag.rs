@@ -65,7 +65,7 @@ pub struct TagDef {
     /// How often it is read.
     pub poll: Poll,
     /// What happens to its reading on a line with too much to do.
-    pub class: Class,
+    pub class: PollClass,
     /// Smallest change that is stored; 0 stores every change.
     pub deadband: f64,
     /// Stored in the history.
@@ -114,7 +114,7 @@ impl TagDef {
             write_unlock: None,
             group: String::new(),
             poll: Poll::Every(Duration::from_secs(1)),
-            class: Class::Soft,
+            class: PollClass::Normal,
             deadband: 0.0,
             store: true,
             counter: None,
@@ -350,25 +350,25 @@ pub enum Poll {
     Never,
 }
 
-/// How important it is that a tag is read in time, the most important first. On a line with too much to do idle polls are
-/// shed, then the periods of soft polls are stretched; hard polls keep theirs.
+/// How important it is that a tag is read in time, the most important first. On an overloaded line background polls are
+/// shed, then the periods of normal polls are stretched; critical polls keep theirs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Class {
+pub enum PollClass {
     /// An alarm is judged by it.
-    Hard,
+    Critical,
     /// A process value.
-    Soft,
+    Normal,
     /// Identification.
-    Idle,
+    Background,
 }
 
-impl Class {
+impl PollClass {
     /// The word in TOML and on screen.
     pub fn word(self) -> &'static str {
         match self {
-            Class::Hard => "hard",
-            Class::Soft => "soft",
-            Class::Idle => "idle",
+            PollClass::Critical => "critical",
+            PollClass::Normal => "normal",
+            PollClass::Background => "background",
         }
     }
 }

@@ -17,9 +17,9 @@ use super::{
     tag::{self, DeviceContext},
 };
 use crate::plant::{
-    class,
     def::{DeviceDef, DeviceId, Framing, LineDef, LineId, MimicDef, PlantDef, TagId},
-    tag::{Access, Class, TagDef},
+    poll_class,
+    tag::{Access, PollClass, TagDef},
 };
 
 /// A text and the name the user knows it by.
@@ -78,7 +78,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let shifts = report::shifts(&file.shifts, problems);
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, problems);
     let history = history::history(file.history.as_ref().map(|history| &history.value), problems);
-    let classes = class::classes(&tags, &alarms, &classes);
+    let classes = poll_class::classes(&tags, &alarms, &classes);
     tags.iter_mut().zip(classes).for_each(|(tag, class)| tag.class = class);
     Some(PlantDef {
         name: name.to_owned(),
@@ -125,7 +125,7 @@ struct Devices {
     tags: Vec<TagDef>,
     names: Names,
     /// The classes that are written, by tag.
-    classes: Vec<Option<Class>>,
+    classes: Vec<Option<PollClass>>,
 }
 
 /// `None` where they have too many tags together.

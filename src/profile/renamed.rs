@@ -15,6 +15,10 @@ const RENAMED: &[(&str, &str, &str)] = &[
     ("simulate", "leg", "reactive"),
     ("simulate", "per", "time_base"),
     ("an alarm", "respond", "response_time"),
+    ("a tag", "class", "poll_class"),
+    ("poll class", "hard", "critical"),
+    ("poll class", "soft", "normal"),
+    ("poll class", "idle", "background"),
 ];
 
 /// The name that a key or keyword has now, if it had another one.

@@ -12,7 +12,7 @@ use super::{
 use crate::plant::{
     def::{AlarmClass, Parity, Priority, Role, Rs485, Sign},
     ne107::Signal,
-    tag::{Access, ByteOrder, Class, Confidence, Kind, Table},
+    tag::{Access, ByteOrder, Confidence, Kind, PollClass, Table},
 };
 
 table!(
@@ -161,7 +161,7 @@ table!(
         opt "write_unlock" write_unlock: UnlockTable,
         opt "group" group: String,
         opt "poll" poll: PollWord,
-        opt "class" class: Class,
+        opt "poll_class" poll_class: PollClass,
         opt "deadband" deadband: f64,
         opt "store" store: bool,
         /// Counts up, or not: by its unit if this is not said.
@@ -506,7 +506,7 @@ words!(Role, "role" {
 
 words!(Sign, "sign" { "password" => Sign::Password, "second person" => Sign::SecondPerson, });
 
-words!(Class, "class" { "hard" => Class::Hard, "soft" => Class::Soft, "idle" => Class::Idle, });
+words!(PollClass, "poll class" { "critical" => PollClass::Critical, "normal" => PollClass::Normal, "background" => PollClass::Background, });
 
 words!(AlarmClass, "class of alarms" {
     "process" => AlarmClass::Process, "system" => AlarmClass::System,

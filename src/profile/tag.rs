@@ -12,7 +12,7 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceId, Limits, TagId},
-    tag::{Access, Bound, ByteOrder, Class, Confidence, Decimals, Kind, Point, Poll, Table, TagDef},
+    tag::{Access, Bound, ByteOrder, Confidence, Decimals, Kind, Point, Poll, PollClass, Table, TagDef},
 };
 
 /// What a tag must know of its device.
@@ -30,7 +30,7 @@ pub(super) struct DeviceContext<'a> {
 pub(super) struct Defined {
     pub tag: TagDef,
     /// The class, if it is written.
-    pub class: Option<Class>,
+    pub class: Option<PollClass>,
     /// Whether it is part of parameter sets, if that is written.
     pub in_sets: Option<At<bool>>,
     /// Where its address stands; `None` if it has no valid point.
@@ -101,7 +101,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         group: text(&row.group),
         poll,
         // Known when all tags and alarms are.
-        class: Class::Soft,
+        class: PollClass::Normal,
         deadband: row.deadband.map_or(0.0, |deadband| deadband.value),
         store: !is_text
             && row.store.map_or(access != Access::Write && matches!(poll, Poll::Every(_)), |store| store.value),
@@ -116,7 +116,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     let default = row.default.as_ref().and_then(|default| number_of(default, &tag, problems));
     let tag = TagDef { default, ..tag };
     let address_at = point.and(row.address.map(|address| address.at));
-    let class = row.class.map(|class| class.value);
+    let class = row.poll_class.map(|class| class.value);
     let simulate = row.simulate.map(|simulate| simulate.value);
     Defined { tag, class, in_sets: row.in_sets, address_at, needs: links.needs, unlock: links.unlock, simulate }
 }

@@ -11,7 +11,7 @@ use crate::plant::{
     def::{Condition, HistoryDef, LineId, PlantDef, Subject},
     interlock::InterlockCondition,
     station::StationFault,
-    tag::{Bound, Class, Kind},
+    tag::{Bound, Kind, PollClass},
 };
 
 /// A small plant that is right. Each case changes some words of it.
@@ -576,14 +576,16 @@ fn alarm_inputs_are_hard_unless_a_file_says_otherwise() {
         let def = load(plant.as_bytes(), METER, PLC).unwrap();
         def.tag(def.tag_named(tag).unwrap()).class
     };
-    for (tag, class) in [("D1.T", Class::Hard), ("D1.DP", Class::Hard), ("D1.MODE", Class::Soft)] {
+    for (tag, class) in [("D1.T", PollClass::Critical), ("D1.DP", PollClass::Critical), ("D1.MODE", PollClass::Normal)]
+    {
         assert_eq!(class_of(PLANT, tag), class, "{tag}: an alarm watches T, and DP says where its point is");
     }
-    let written = PLANT.replace("fast = \"1s\"\n", "fast = \"1s\"\n[[device.tag]]\nname = \"T\"\nclass = \"idle\"\n");
-    assert_eq!(class_of(&written, "D1.T"), Class::Idle);
-    let wrong = written.replace("idle", "idel");
+    let written =
+        PLANT.replace("fast = \"1s\"\n", "fast = \"1s\"\n[[device.tag]]\nname = \"T\"\npoll_class = \"background\"\n");
+    assert_eq!(class_of(&written, "D1.T"), PollClass::Background);
+    let wrong = written.replace("background", "backgroun");
     let error = load(wrong.as_bytes(), METER, PLC).unwrap_err().to_string();
-    assert!(error.contains("did you mean `idle`?"), "{error}");
+    assert!(error.contains("did you mean `background`?"), "{error}");
 }
 
 #[test]

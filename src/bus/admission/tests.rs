@@ -101,7 +101,7 @@ fn what_is_too_much_says_how_far_process_values_will_be_stretched() {
     def.lines[0].timeout = Duration::from_millis(20);
     let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &UnreadableRanges::default()));
     assert!(matches!(admission.verdict, Verdict::TooMuch { utilisation } if utilisation > 1.0), "{admission:?}");
-    assert!(admission.hard.fits(), "no tag of the fixture is hard");
+    assert!(admission.critical.fits(), "no tag of the fixture is critical");
     assert!(admission.factor.is_some_and(|factor| factor > 1.0));
     let timeout = |warning: &Warning| matches!(warning, Warning::TimeoutBelowAnswer { .. });
     assert!(admission.warnings.iter().any(timeout), "an answer of 8 words takes 21 characters, 21.9 ms");

@@ -27,9 +27,9 @@ fn neighbours_share_a_block_and_tables_do_not() {
 #[test]
 fn a_block_is_as_important_as_its_most_important_tag() {
     let mut def = fixture::plant();
-    def.tags[fixture::PV.index()].class = Class::Idle;
-    def.tags[fixture::FAULT.index()].class = Class::Hard;
-    assert_eq!(blocks(&def, LineId(0), &UnreadableRanges::default())[0].class, Class::Hard);
+    def.tags[fixture::PV.index()].class = PollClass::Background;
+    def.tags[fixture::FAULT.index()].class = PollClass::Critical;
+    assert_eq!(blocks(&def, LineId(0), &UnreadableRanges::default())[0].class, PollClass::Critical);
 }
 
 fn serial_line(baud: u32, stop_bits: u8, framing: Framing) -> Transport {
@@ -179,7 +179,14 @@ fn what_is_refused_is_asked_for_seldom_and_believed_when_it_answers() {
     let plan = blocks(&def, LineId(0), &unreadable);
     let seen: Vec<_> = plan.iter().map(|block| (block.range(), block.poll, block.class)).collect();
     let minute = Poll::Every(Duration::from_secs(60));
-    assert_eq!(seen, [((0, 1), SECOND, Class::Soft), ((2, 3), SECOND, Class::Soft), ((1, 2), minute, Class::Idle)]);
+    assert_eq!(
+        seen,
+        [
+            ((0, 1), SECOND, PollClass::Normal),
+            ((2, 3), SECOND, PollClass::Normal),
+            ((1, 2), minute, PollClass::Background)
+        ]
+    );
     let mut search = RangeBisection::default();
     assert_eq!(search.refused(&def, &unreadable, &plan[2]), None, "that is known");
     assert!(!unreadable.disproved(&plan[0]) && unreadable.disproved(&plan[2]));

@@ -13,13 +13,13 @@ struct Unit {
     period: i64,
     /// What a read takes, ms.
     cost: i64,
-    class: Class,
+    class: PollClass,
     /// It does not answer in this time, ms.
     dead: std::ops::Range<i64>,
 }
 
 fn unit(period: i64, cost: i64) -> Unit {
-    Unit { period, cost, class: Class::Soft, dead: 0..0 }
+    Unit { period, cost, class: PollClass::Normal, dead: 0..0 }
 }
 
 struct Model {
@@ -163,32 +163,32 @@ fn a_unit_that_starts_slowly_is_found_while_others_are_dead() {
     assert!(found.into_iter().zip([5_000, 45_000, 45_000]).all(|(found, most)| found <= most), "{found:?} ms later");
 }
 
-/// Soft units of an overloaded line.
-const SOFT: usize = 24;
+/// Normal units of an overloaded line.
+const NORMAL: usize = 24;
 
 #[test]
 fn an_overloaded_line_is_used_and_shared_fairly() {
     let mut poor = Vec::new();
-    for (demand, hard) in [102, 115, 153, 300].into_iter().flat_map(|demand| [(demand, false), (demand, true)]) {
+    for (demand, critical) in [102, 115, 153, 300].into_iter().flat_map(|demand| [(demand, false), (demand, true)]) {
         // Six units each at 250, 500, 1000 and 2000 ms that want the same share each; and an alarm input of 10 %.
-        let mut units: Vec<Unit> = (0..SOFT).map(|n| unit(250 << (n / 6), 0)).collect();
-        let hard_share = if hard { 10 } else { 0 };
+        let mut units: Vec<Unit> = (0..NORMAL).map(|n| unit(250 << (n / 6), 0)).collect();
+        let critical_share = if critical { 10 } else { 0 };
         for (n, unit) in units.iter_mut().enumerate() {
             // Whole milliseconds, and what is left over goes to the last of them.
-            let wanted = |n: usize| unit.period * (demand - hard_share) * n as i64 / SOFT as i64 / 100;
+            let wanted = |n: usize| unit.period * (demand - critical_share) * n as i64 / NORMAL as i64 / 100;
             unit.cost = wanted(n + 1) - wanted(n);
         }
-        if hard {
-            units.push(Unit { class: Class::Hard, ..unit(400, 40) });
+        if critical {
+            units.push(Unit { class: PollClass::Critical, ..unit(400, 40) });
         }
         let mut model = Model::new(units);
         model.play(300_000);
         let span = 30_000..300_000;
         let used = model.used(span.clone());
-        let kept: Vec<f64> = (0..SOFT).map(|unit| model.kept(unit, &span)).collect();
+        let kept: Vec<f64> = (0..NORMAL).map(|unit| model.kept(unit, &span)).collect();
         let (least, most) =
             kept.iter().fold((f64::MAX, 0.0f64), |(least, most), kept| (least.min(*kept), most.max(*kept)));
-        if used < 0.95 || most > 1.1 * least || (hard && model.kept(SOFT, &span) < 0.999) {
+        if used < 0.95 || most > 1.1 * least || (critical && model.kept(NORMAL, &span) < 0.999) {
             poor.push(format!("{demand} %: used {used:.3}, kept {least:.3}–{most:.3}"));
         }
     }

@@ -1,13 +1,13 @@
-//! What gives way on a line with too much to do: idle polls are left out, soft polls are stretched. Hard polls never.
+//! What gives way on a line with too much to do: background polls are left out, normal polls are stretched. Critical polls never.
 //!
 //! ```text
-//!            demand > 1 for 2 s, or a hard poll late three times running
-//!   normal ───────────────────────────────────────────────> overload: idle shed, hard first, soft share what is left
+//!            demand > 1 for 2 s, or a critical poll late three times running
+//!   normal ───────────────────────────────────────────────> overload: background shed, critical first, normal share what is left
 //!          <───────────────────────────────────────────────
 //!            demand ≤ 0.95 for the hold time (10 s, doubled each time it comes back too soon)
 //! ```
 //!
-//! All soft periods grow by one factor, so that what the hard polls leave is shared alike and nearly all of it is used.
+//! All normal periods grow by one factor, so that what the critical polls leave is shared alike and nearly all of it is used.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use jiff::Timestamp;
 
 /// The line is back to normal when the reads take at most this share of its time.
 const FITS: f64 = 0.95;
-/// Soft polls are stretched at most to so many times their period.
+/// Normal polls are stretched at most to so many times their period.
 pub const FACTOR_MAX: f64 = 32.0;
 /// A demand above this is overload.
 const FULL: f64 = 1.0;
@@ -32,24 +32,24 @@ const FACTOR_SPARE: f64 = 0.02;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Demand {
     /// Alarm inputs.
-    pub hard: f64,
+    pub critical: f64,
     /// Process values.
-    pub soft: f64,
+    pub normal: f64,
     /// Identification that is read again and again.
-    pub idle: f64,
+    pub background: f64,
 }
 
 impl Demand {
     /// Of all polls.
     pub fn total(self) -> f64 {
-        self.hard + self.soft + self.idle
+        self.critical + self.normal + self.background
     }
 
-    /// By what soft periods grow where idle polls are left out; 1 is not at all.
+    /// By what normal periods grow where background polls are left out; 1 is not at all.
     pub fn factor(self) -> f64 {
-        let left = FULL - self.hard;
-        let soft = self.soft * (1.0 + FACTOR_SPARE);
-        if left <= soft / FACTOR_MAX { FACTOR_MAX } else { (soft / left).max(1.0) }
+        let left = FULL - self.critical;
+        let normal = self.normal * (1.0 + FACTOR_SPARE);
+        if left <= normal / FACTOR_MAX { FACTOR_MAX } else { (normal / left).max(1.0) }
     }
 }
 
@@ -58,9 +58,9 @@ impl Demand {
 pub enum Load {
     /// Every poll at its period.
     Normal,
-    /// Idle polls are shed, hard polls go first, soft ones share what is left.
+    /// Background polls are shed, critical polls go first, normal ones share what is left.
     Overload {
-        /// By what soft periods grow, 1 to [`FACTOR_MAX`].
+        /// By what normal periods grow, 1 to [`FACTOR_MAX`].
         factor: f64,
     },
 }
@@ -100,7 +100,7 @@ impl Overload {
         self.load
     }
 
-    /// Judges the present demand; `late` when a hard poll cannot keep its period. `true` if the state has changed.
+    /// Judges the present demand; `late` when a critical poll cannot keep its period. `true` if the state has changed.
     pub fn judge(&mut self, demand: Demand, late: bool, now: Timestamp) -> bool {
         let (before, total) = (self.load, demand.total());
         match self.load {

@@ -9,13 +9,13 @@ use crate::{
     plant::{
         def::DeviceId,
         event::ExceptionCode,
-        tag::{Class, Poll, Table},
+        tag::{Poll, PollClass, Table},
     },
 };
 
 /// A block that is read once should be read within this time.
 pub(super) const ONCE_WITHIN: Duration = Duration::from_secs(5);
-/// A hard poll that was late so often in a row means overload, whatever the costs say.
+/// A critical poll that was late so often in a row means overload, whatever the costs say.
 const LATE_MAX: u32 = 3;
 /// A device that has acknowledged (05) wants to be left alone for a while.
 const ACKNOWLEDGED: Duration = Duration::from_secs(1);
@@ -36,7 +36,7 @@ pub struct Served {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PollInfo {
     /// What happens to it under overload.
-    pub class: Class,
+    pub class: PollClass,
     /// Its period, unstretched; `None` for a block that is read once.
     pub period: Option<Duration>,
     /// Its period is stretched to so many now; 1 is not at all.
@@ -67,7 +67,7 @@ pub(super) struct Pending {
     block: (DeviceId, Table, u16, u16),
     /// Place of its device among those of the schedule.
     pub place: usize,
-    pub class: Class,
+    pub class: PollClass,
     pub period: Option<Duration>,
     /// Next point of its grid; `None` for a block that is read once and has been.
     pub release: Option<Timestamp>,

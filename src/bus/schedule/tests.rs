@@ -16,10 +16,10 @@ pub(super) fn at(ms: i64) -> Timestamp {
 }
 
 fn block(device: u16, poll: Poll) -> Block {
-    classed(device, poll, Class::Soft)
+    classed(device, poll, PollClass::Normal)
 }
 
-fn classed(device: u16, poll: Poll, class: Class) -> Block {
+fn classed(device: u16, poll: Poll, class: PollClass) -> Block {
     let (unit, tags) = (device as u8 + 1, vec![TagId(0)]);
     let device = DeviceId(device);
     Block { device, unit, table: Table::Input, address: 0, count: 1, tags: tags.into(), poll, class, alignment: 1 }
@@ -243,23 +243,23 @@ fn a_new_plan_keeps_the_grid_of_what_stays_and_the_health_of_devices() {
     assert_eq!(play(&mut schedule, 300, 1005, |_, _| 10), [(300, 1), (1000, 0)]);
 }
 
-/// Two hard polls, one soft that fills the line, one idle.
+/// Two critical polls, one normal that fills the line, one background.
 fn crowd() -> [Block; 4] {
     [
-        classed(0, every(200), Class::Hard),
-        classed(1, every(400), Class::Hard),
-        classed(2, every(100), Class::Soft),
-        classed(3, every(1000), Class::Idle),
+        classed(0, every(200), PollClass::Critical),
+        classed(1, every(400), PollClass::Critical),
+        classed(2, every(100), PollClass::Normal),
+        classed(3, every(1000), PollClass::Background),
     ]
 }
 
 #[test]
-fn overload_sheds_idle_then_stretches_soft_and_returns_when_it_is_over() {
+fn overload_sheds_background_then_stretches_normal_and_returns_when_it_is_over() {
     let mut schedule = Schedule::new(&crowd(), at(0));
-    // 20 % + 10 % hard, 85 % soft, 4 % idle.
+    // 20 % + 10 % critical, 85 % normal, 4 % background.
     let heavy = |index: usize, _| [40, 40, 85, 40][index];
     play(&mut schedule, 0, 20_000, heavy);
-    // What the hard polls leave is 70 %.
+    // What the critical polls leave is 70 %.
     assert!(matches!(schedule.load(), Load::Overload { factor } if (factor / (85.0 / 70.0) - 1.0).abs() < 0.05));
     let told: Vec<_> = schedule.polls().map(|poll| (1.0 < poll.factor, poll.shed)).collect();
     assert_eq!(told, [(false, false), (false, false), (true, false), (false, true)]);
@@ -267,9 +267,9 @@ fn overload_sheds_idle_then_stretches_soft_and_returns_when_it_is_over() {
     let before = missed(&schedule);
     let log = play(&mut schedule, 20_000, 60_000, heavy);
     let reads = |log: &[Read], poll| log.iter().filter(|(_, index)| *index == poll).count();
-    assert_eq!((reads(&log, 0), reads(&log, 1)), (200, 100), "hard at full rate");
-    let soft = reads(&log, 2) * 85;
-    assert!((26_900..=28_000).contains(&soft), "soft has what is left of 40 s: {soft} ms");
+    assert_eq!((reads(&log, 0), reads(&log, 1)), (200, 100), "critical at full rate");
+    let normal = reads(&log, 2) * 85;
+    assert!((26_900..=28_000).contains(&normal), "normal has what is left of 40 s: {normal} ms");
     assert_eq!(missed(&schedule), before, "what was told to be stretched is not missed");
     // The device has become faster: everything fits again.
     let light = |index: usize, _| [40, 40, 20, 40][index];
@@ -281,8 +281,9 @@ fn overload_sheds_idle_then_stretches_soft_and_returns_when_it_is_over() {
 
 #[test]
 fn a_device_that_does_not_answer_does_not_overload_its_line() {
-    let (hard, idle) = (|device| classed(device, every(1_000), Class::Hard), classed(1, every(10_000), Class::Idle));
-    let mut schedule = Schedule::new(&[hard(0), hard(1), idle], at(0));
+    let (critical, background) =
+        (|device| classed(device, every(1_000), PollClass::Critical), classed(1, every(10_000), PollClass::Background));
+    let mut schedule = Schedule::new(&[critical(0), critical(1), background], at(0));
     let mut now = 0;
     while now < 120_000 {
         match schedule.next(at(now)) {
@@ -309,7 +310,11 @@ fn a_device_that_does_not_answer_does_not_overload_its_line() {
 
 #[test]
 fn identification_is_read_even_on_a_line_that_is_always_too_full() {
-    let blocks = [classed(0, every(100), Class::Hard), classed(1, Poll::Once, Class::Idle), block(2, every(100))];
+    let blocks = [
+        classed(0, every(100), PollClass::Critical),
+        classed(1, Poll::Once, PollClass::Background),
+        block(2, every(100)),
+    ];
     let mut schedule = Schedule::new(&blocks, at(0));
     schedule.done(1, at(0), at(1));
     let cost = |index: usize, _| [90, 30, 90][index];
@@ -327,8 +332,8 @@ fn a_load_that_swings_is_overload_without_coming_and_going() {
     let mut overloaded = false;
     for second in 0..3600 {
         // Four seconds too much, twelve seconds little.
-        let soft = if second % 16 < 4 { 90 } else { 10 };
-        play(&mut schedule, second * 1000, second * 1000 + 1000, |index, _| [40, 40, soft, 40][index]);
+        let normal = if second % 16 < 4 { 90 } else { 10 };
+        play(&mut schedule, second * 1000, second * 1000 + 1000, |index, _| [40, 40, normal, 40][index]);
         changes += usize::from(overloaded != (schedule.load() != Load::Normal));
         overloaded = schedule.load() != Load::Normal;
     }
@@ -382,7 +387,7 @@ proptest! {
         let block_of = |n: usize| {
             let (class, device, once) = classes[n];
             let poll = if once == 0 { Poll::Once } else { every(load[n].0) };
-            Block { address: n as u16, ..classed(device, poll, [Class::Hard, Class::Soft, Class::Idle][class]) }
+            Block { address: n as u16, ..classed(device, poll, [PollClass::Critical, PollClass::Normal, PollClass::Background][class]) }
         };
         let blocks: Vec<Block> = (0..load.len()).map(block_of).collect();
         let mut schedule = Schedule::new(&blocks, at(0));
@@ -425,7 +430,7 @@ proptest! {
 
     #[test]
     fn nobody_starves_whatever_the_classes(load in polls(1..12), classes in proptest::collection::vec(0usize..3, 12)) {
-        let class = |n: usize| [Class::Hard, Class::Soft, Class::Idle][classes[n]];
+        let class = |n: usize| [PollClass::Critical, PollClass::Normal, PollClass::Background][classes[n]];
         let blocks: Vec<Block> =
             load.iter().enumerate().map(|(n, (period, _))| classed(n as u16, every(*period), class(n))).collect();
         let mut schedule = Schedule::new(&blocks, at(0));
@@ -441,28 +446,28 @@ proptest! {
     }
 
     #[test]
-    fn hard_polls_keep_their_period_if_they_alone_are_admissible(
-        hard in polls(1..5), soft in proptest::collection::vec((50u64..200, 20i64..80), 4..9),
+    fn critical_polls_keep_their_period_if_they_alone_are_admissible(
+        critical in polls(1..5), normal in proptest::collection::vec((50u64..200, 20i64..80), 4..9),
     ) {
-        // Any one of the others may be under way when a hard poll falls due.
+        // Any one of the others may be under way when a critical poll falls due.
         let mut tasks: Vec<Task> =
-            hard.iter().map(|(period, cost)| Task { cost: *cost as u64, period: *period }).collect();
-        let blocking = soft.iter().map(|(_, cost)| *cost as u64).max().unwrap_or(0);
+            critical.iter().map(|(period, cost)| Task { cost: *cost as u64, period: *period }).collect();
+        let blocking = normal.iter().map(|(_, cost)| *cost as u64).max().unwrap_or(0);
         tasks.push(Task { cost: blocking, period: 600_000 });
         prop_assume!(admission::test(&tasks) == Test::Accept && admission::utilisation(&tasks) < 0.9);
-        let load: Vec<(u64, i64)> = hard.iter().chain(&soft).copied().collect();
+        let load: Vec<(u64, i64)> = critical.iter().chain(&normal).copied().collect();
         let all: Vec<Task> = load.iter().map(|(period, cost)| Task { cost: *cost as u64, period: *period }).collect();
         prop_assume!(admission::utilisation(&all) > 1.02);
-        let class = |n: usize| if n < hard.len() { Class::Hard } else { Class::Soft };
+        let class = |n: usize| if n < critical.len() { PollClass::Critical } else { PollClass::Normal };
         let blocks: Vec<Block> =
             load.iter().enumerate().map(|(n, (period, _))| classed(n as u16, every(*period), class(n))).collect();
         let mut schedule = Schedule::new(&blocks, at(0));
         play(&mut schedule, 0, 20_000, |index, _| load[index].1);
         prop_assert!(schedule.load() > Load::Normal);
-        let missed_hard = |schedule: &Schedule| schedule.polls().take(hard.len()).map(|poll| poll.missed).sum::<u64>();
-        let before = missed_hard(&schedule);
+        let missed_critical = |schedule: &Schedule| schedule.polls().take(critical.len()).map(|poll| poll.missed).sum::<u64>();
+        let before = missed_critical(&schedule);
         play(&mut schedule, 20_000, 200_000, |index, _| load[index].1);
-        prop_assert_eq!(missed_hard(&schedule), before);
+        prop_assert_eq!(missed_critical(&schedule), before);
     }
 
     #[test]

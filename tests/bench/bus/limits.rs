@@ -12,7 +12,7 @@ use std::{
 use sightglass::plant::{
     PlantDef,
     def::{Serial, Transport},
-    tag::{Class, Poll},
+    tag::{Poll, PollClass},
 };
 
 use super::{WORDS, plant, support::PacedSlave, with_station};
@@ -35,9 +35,9 @@ const DEATHS: [(&str, &[(u8, usize)]); 5] = [
 ];
 /// What the polls want of the wire, in hundredths.
 const DEMANDS: [u32; 4] = [102, 115, 153, 300];
-/// Soft units of an overloaded line: four each at one, two and four times the shortest period; one hard unit beside them.
-const SOFT: u8 = 12;
-const HARD_PERIOD: Duration = Duration::from_secs(1);
+/// Normal units of an overloaded line: four each at one, two and four times the shortest period; one critical unit beside them.
+const NORMAL: u8 = 12;
+const CRITICAL_PERIOD: Duration = Duration::from_secs(1);
 /// Overload is known, and the costs are measured, after this time; then it is counted for so long.
 const SETTLED_AFTER: usize = 15;
 const COUNTED_FOR: usize = 30;
@@ -147,23 +147,23 @@ pub fn dead(libmodbus: Option<&Path>) {
 /// Use of the wire and shares of the polls where they want more than it can carry.
 pub fn overload(libmodbus: Option<&Path>) {
     let read = SERIAL.char_time() * (8 + 5 + 2 * u32::from(WORDS)) + 2 * SERIAL.silence();
-    let hard = SOFT + 1;
+    let critical = NORMAL + 1;
     let sets: Vec<Vec<Unit>> = DEMANDS.iter().map(|demand| wanted(*demand, read)).collect();
     let lines = vec![Transport::rtu("", SERIAL); DEMANDS.len()];
-    let mut def = PlantDef::clone(&plant(lines, hard.into(), 1, PERIOD, 1));
+    let mut def = PlantDef::clone(&plant(lines, critical.into(), 1, PERIOD, 1));
     for tag in &mut def.tags {
         let device = &def.devices[tag.device.index()];
         let (unit, period) = sets[device.line.index()][usize::from(device.unit) - 1];
         tag.poll = Poll::Every(period);
-        tag.class = if unit == hard { Class::Hard } else { Class::Soft };
+        tag.class = if unit == critical { PollClass::Critical } else { PollClass::Normal };
     }
     let [ours, theirs] = run(&sets, SETTLED_AFTER + COUNTED_FOR, libmodbus, def, |_, _, _| {});
     println!(
-        "overloaded line, 12 soft units and a hard one at 19200 baud, {:.1} ms a read on the wire:",
+        "overloaded line, 12 normal units and a critical one at 19200 baud, {:.1} ms a read on the wire:",
         read.as_secs_f64() * 1e3
     );
     println!(
-        "  {:<28}{:>12}{:>12}{:>8}   soft units keep (libmodbus), hard one keeps (libmodbus)",
+        "  {:<28}{:>12}{:>12}{:>8}   normal units keep (libmodbus), critical one keeps (libmodbus)",
         "", "wire used", "libmodbus", "ratio"
     );
     for (case, units) in sets.iter().enumerate() {
@@ -174,17 +174,17 @@ pub fn overload(libmodbus: Option<&Path>) {
         };
         let kept = |line: &Paced| {
             let share = |(unit, period): &Unit| answers(line, *unit) * period.as_secs_f64() / COUNTED_FOR as f64;
-            let (soft, hard) = units.split_at(usize::from(SOFT));
-            let shares: Vec<f64> = soft.iter().map(share).collect();
+            let (normal, critical) = units.split_at(usize::from(NORMAL));
+            let shares: Vec<f64> = normal.iter().map(share).collect();
             let least = shares.iter().copied().fold(f64::MAX, f64::min);
             let most = shares.iter().copied().fold(0.0, f64::max);
-            (format!("{least:.2}–{most:.2}"), format!("{:.2}", share(&hard[0])))
+            (format!("{least:.2}–{most:.2}"), format!("{:.2}", share(&critical[0])))
         };
         let ours = &ours[case];
-        let (soft, hard) = kept(ours);
-        let (their_soft, their_hard) = theirs.get(case).map_or(("–".into(), "–".into()), kept);
+        let (normal, critical) = kept(ours);
+        let (their_normal, their_critical) = theirs.get(case).map_or(("–".into(), "–".into()), kept);
         println!(
-            "  {:<28}{}   {soft} ({their_soft}), {hard} ({their_hard})",
+            "  {:<28}{}   {normal} ({their_normal}), {critical} ({their_critical})",
             format!("demand {} %", DEMANDS[case]),
             columns(used(ours), theirs.get(case).map(used))
         );
@@ -193,10 +193,10 @@ pub fn overload(libmodbus: Option<&Path>) {
 
 /// The units of a line with their periods, so that together they want so many hundredths of the wire.
 fn wanted(demand: u32, read: Duration) -> Vec<Unit> {
-    let hard_share = read.as_secs_f64() / HARD_PERIOD.as_secs_f64();
-    let shortest = read.mul_f64(f64::from(SOFT / 3) * 1.75 / (f64::from(demand) / 100.0 - hard_share));
-    let soft = (0..SOFT).map(|n| (n + 1, shortest * (1 << (n / (SOFT / 3)))));
-    soft.chain([(SOFT + 1, HARD_PERIOD)]).collect()
+    let critical_share = read.as_secs_f64() / CRITICAL_PERIOD.as_secs_f64();
+    let shortest = read.mul_f64(f64::from(NORMAL / 3) * 1.75 / (f64::from(demand) / 100.0 - critical_share));
+    let normal = (0..NORMAL).map(|n| (n + 1, shortest * (1 << (n / (NORMAL / 3)))));
+    normal.chain([(NORMAL + 1, CRITICAL_PERIOD)]).collect()
 }
 
 /// A figure, that of libmodbus, and their ratio.

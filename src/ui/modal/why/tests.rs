@@ -54,7 +54,7 @@ fn fixture() -> Fixture {
             cost: Duration::from_millis(64),
             measured: Some(Duration::from_millis(61)),
             next: Some(fixture::now() + SignedDuration::from_millis(600)),
-            class: crate::plant::tag::Class::Soft,
+            class: crate::plant::tag::PollClass::Normal,
             factor: 1.0,
             shed: false,
             stats: stats.clone(),

@@ -3,24 +3,24 @@
 use super::{
     def::{AlarmDef, Subject},
     id::TagId,
-    tag::{Class, Poll, TagDef},
+    tag::{Poll, PollClass, TagDef},
 };
 
-/// The class of each tag, by [`TagId`]: hard if an alarm watches it, compares with it or needs it to judge such a tag; idle
-/// if it is read once; else soft. What is `written` for a tag in a file stands above all that.
-pub fn classes(tags: &[TagDef], alarms: &[AlarmDef], written: &[Option<Class>]) -> Vec<Class> {
-    let mut hard = vec![false; tags.len()];
+/// The class of each tag, by [`TagId`]: critical if an alarm watches it, compares with it or needs it to judge such a tag; background
+/// if it is read once; else normal. What is `written` for a tag in a file stands above all that.
+pub fn classes(tags: &[TagDef], alarms: &[AlarmDef], written: &[Option<PollClass>]) -> Vec<PollClass> {
+    let mut critical = vec![false; tags.len()];
     let mut found: Vec<TagId> = alarms.iter().flat_map(inputs).collect();
     while let Some(tag) = found.pop() {
-        if !std::mem::replace(&mut hard[tag.index()], true) {
+        if !std::mem::replace(&mut critical[tag.index()], true) {
             found.extend(tags[tag.index()].needs());
         }
     }
     let of = |tag: &TagDef| match (written.get(tag.id.index()).copied().flatten(), tag.poll) {
         (Some(class), _) => class,
-        (None, _) if hard[tag.id.index()] => Class::Hard,
-        (None, Poll::Once) => Class::Idle,
-        (None, Poll::Every(_) | Poll::Never) => Class::Soft,
+        (None, _) if critical[tag.id.index()] => PollClass::Critical,
+        (None, Poll::Once) => PollClass::Background,
+        (None, Poll::Every(_) | Poll::Never) => PollClass::Normal,
     };
     tags.iter().map(of).collect()
 }
@@ -44,18 +44,23 @@ mod tests {
     #[test]
     fn what_an_alarm_needs_is_hard_and_identification_is_idle() {
         let mut def = fixture::plant();
-        let of = |def: &crate::plant::PlantDef, written: &[Option<Class>], tag: TagId| {
+        let of = |def: &crate::plant::PlantDef, written: &[Option<PollClass>], tag: TagId| {
             classes(&def.tags, &def.alarms, written)[tag.index()]
         };
-        for (tag, class) in [(PV, Class::Hard), (DP, Class::Hard), (FAULT, Class::Hard), (SV, Class::Soft)] {
+        for (tag, class) in [
+            (PV, PollClass::Critical),
+            (DP, PollClass::Critical),
+            (FAULT, PollClass::Critical),
+            (SV, PollClass::Normal),
+        ] {
             assert_eq!(of(&def, &[], tag), class, "{tag:?}");
         }
         def.alarms[0].condition = Condition::Deviation { from: SV, limit: 5.0, deadband: 1.0 };
-        assert_eq!(of(&def, &[], SV), Class::Hard, "PV is compared with it");
+        assert_eq!(of(&def, &[], SV), PollClass::Critical, "PV is compared with it");
         def.tags[RUN.index()].poll = Poll::Once;
-        assert_eq!(of(&def, &[], RUN), Class::Idle);
+        assert_eq!(of(&def, &[], RUN), PollClass::Background);
         def.tags[DP.index()].poll = Poll::Once;
-        assert_eq!(of(&def, &[], DP), Class::Hard, "read once, but nothing can be judged without it");
-        assert_eq!(of(&def, &[Some(Class::Soft)], PV), Class::Soft, "the engineer knows better");
+        assert_eq!(of(&def, &[], DP), PollClass::Critical, "read once, but nothing can be judged without it");
+        assert_eq!(of(&def, &[Some(PollClass::Normal)], PV), PollClass::Normal, "the engineer knows better");
     }
 }
