@@ -220,7 +220,7 @@ impl AccessControl {
         request.id.terminal = terminal;
         request.note = request.note.map(|note| clean(&note).into());
         // A stop is never one request too many.
-        let stops = request.command.written().is_some_and(|(tag, value)| interlock::is_stop(&self.def, tag, value));
+        let stops = request.kind.written().is_some_and(|(tag, value)| interlock::is_stop(&self.def, tag, value));
         if !self.within_rate(terminal, at) && !stops {
             return self.undelivered(request.id, TOO_MANY);
         }
@@ -238,7 +238,7 @@ impl AccessControl {
         if !session.locked {
             session.active = at;
         }
-        match self.may(terminal, Some(right::needs(&request.command))) {
+        match self.may(terminal, Some(right::needs(&request.kind))) {
             Err(why) => self.refuse_order(terminal, request, Refusal::NotPermitted(why), at),
             Ok(_) => self.signed(terminal, request, at),
         }
@@ -252,9 +252,9 @@ impl AccessControl {
             (None, Some(signer)) => Some(format!("signed by {signer}").into()),
             (Some(note), Some(signer)) => Some(format!("{note}; signed by {signer}").into()),
         };
-        let OrderRequest { id, command, seen, .. } = request;
+        let OrderRequest { id, kind, seen, .. } = request;
         let (by, from) = (actor_name(session), session.peer.from.clone());
-        vec![Effect::Order(Order { id, by, from, command, seen, note, refused: None })]
+        vec![Effect::Order(Order { id, by, from, kind, seen, note, refused: None })]
     }
 
     /// An order did not reach the plant: no snapshot tells its outcome, so its terminal is told with how it stands.

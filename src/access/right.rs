@@ -3,7 +3,7 @@
 use super::Wish;
 use crate::{
     history::Query,
-    plant::{alarm::AlarmCommand, command::Command, diagnostics::Diagnostic, role::Role},
+    plant::{alarm::AlarmCommand, command::CommandKind, diagnostics::Diagnostic, role::Role},
 };
 
 /// What a person may do. A role has the rights of those before it.
@@ -39,10 +39,10 @@ impl Right {
 }
 
 /// The right that a command needs.
-pub fn of_command(command: &Command) -> Right {
-    match command {
-        Command::Write { .. }
-        | Command::Alarm(
+pub fn of_command(kind: &CommandKind) -> Right {
+    match kind {
+        CommandKind::Write { .. }
+        | CommandKind::Alarm(
             AlarmCommand::Acknowledge { .. }
             | AlarmCommand::AcknowledgeAll { .. }
             | AlarmCommand::Silence
@@ -50,19 +50,19 @@ pub fn of_command(command: &Command) -> Right {
             | AlarmCommand::Shelve { .. }
             | AlarmCommand::Unshelve(_),
         )
-        | Command::Refresh(_)
-        | Command::Connect(..)
-        | Command::StopTest(_)
-        | Command::ReadSets
-        | Command::SaveSet { .. }
-        | Command::Restore(_)
-        | Command::StopRestore(_)
-        | Command::HandOver
-        | Command::TakeOver => Right::Operate,
-        Command::Alarm(AlarmCommand::OutOfService(_) | AlarmCommand::InService(_))
-        | Command::Configure(_)
-        | Command::SaveSettings(_) => Right::Engineer,
-        Command::Test(_, diagnostic) => of_diagnostic(diagnostic),
+        | CommandKind::Refresh(_)
+        | CommandKind::Connect(..)
+        | CommandKind::StopTest(_)
+        | CommandKind::ReadSets
+        | CommandKind::SaveSet { .. }
+        | CommandKind::Restore(_)
+        | CommandKind::StopRestore(_)
+        | CommandKind::HandOver
+        | CommandKind::TakeOver => Right::Operate,
+        CommandKind::Alarm(AlarmCommand::OutOfService(_) | AlarmCommand::InService(_))
+        | CommandKind::Configure(_)
+        | CommandKind::SaveSettings(_) => Right::Engineer,
+        CommandKind::Test(_, diagnostic) => of_diagnostic(diagnostic),
     }
 }
 
@@ -80,8 +80,8 @@ fn of_diagnostic(diagnostic: &Diagnostic) -> Right {
 }
 
 /// The least role that may give a command.
-pub fn needs(command: &Command) -> Role {
-    of_command(command).role()
+pub fn needs(kind: &CommandKind) -> Role {
+    of_command(kind).role()
 }
 
 /// The least role that may ask a query.
@@ -139,33 +139,33 @@ mod tests {
             |serials| Diagnostic::Scan(Scan { first: 1, last: 9, serials, timeout: std::time::Duration::from_secs(1) });
         let serial = crate::plant::def::Serial::USUAL;
         let technician = [
-            Command::Write { tag: TagId(1), value: 1.0 },
-            Command::Alarm(AlarmCommand::Acknowledge { alarm: AlarmId(0), seen: jiff::Timestamp::UNIX_EPOCH }),
-            Command::Alarm(AlarmCommand::AcknowledgeAll { seen: Arc::from([]) }),
-            Command::Alarm(AlarmCommand::Silence),
-            Command::Alarm(AlarmCommand::Reset(AlarmId(0))),
-            Command::Refresh(DeviceId(0)),
-            Command::Connect(LineId(0), true),
-            Command::StopTest(LineId(0)),
-            Command::ReadSets,
-            Command::SaveSet { device: DeviceId(0), name: Arc::from("winter"), replace: true },
-            Command::StopRestore(DeviceId(0)),
-            Command::HandOver,
-            Command::TakeOver,
-            Command::Test(LineId(0), Diagnostic::Loopback { unit: 1, data: 7, count: 1 }),
-            Command::Test(LineId(0), Diagnostic::Identify { unit: 1 }),
-            Command::Test(LineId(0), Diagnostic::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
-            Command::Test(LineId(0), scan(Vec::new())),
+            CommandKind::Write { tag: TagId(1), value: 1.0 },
+            CommandKind::Alarm(AlarmCommand::Acknowledge { alarm: AlarmId(0), seen: jiff::Timestamp::UNIX_EPOCH }),
+            CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen: Arc::from([]) }),
+            CommandKind::Alarm(AlarmCommand::Silence),
+            CommandKind::Alarm(AlarmCommand::Reset(AlarmId(0))),
+            CommandKind::Refresh(DeviceId(0)),
+            CommandKind::Connect(LineId(0), true),
+            CommandKind::StopTest(LineId(0)),
+            CommandKind::ReadSets,
+            CommandKind::SaveSet { device: DeviceId(0), name: Arc::from("winter"), replace: true },
+            CommandKind::StopRestore(DeviceId(0)),
+            CommandKind::HandOver,
+            CommandKind::TakeOver,
+            CommandKind::Test(LineId(0), Diagnostic::Loopback { unit: 1, data: 7, count: 1 }),
+            CommandKind::Test(LineId(0), Diagnostic::Identify { unit: 1 }),
+            CommandKind::Test(LineId(0), Diagnostic::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
+            CommandKind::Test(LineId(0), scan(Vec::new())),
         ];
         let supervisor = [
-            Command::Configure(Box::new(line)),
-            Command::SaveSettings(LineId(0)),
-            Command::Test(LineId(0), Diagnostic::Send(vec![1])),
-            Command::Test(LineId(0), scan(vec![serial])),
+            CommandKind::Configure(Box::new(line)),
+            CommandKind::SaveSettings(LineId(0)),
+            CommandKind::Test(LineId(0), Diagnostic::Send(vec![1])),
+            CommandKind::Test(LineId(0), scan(vec![serial])),
         ];
         for (commands, role) in [(&technician[..], Role::Technician), (&supervisor[..], Role::Supervisor)] {
-            for command in commands {
-                assert_eq!(needs(command), role, "{command:?}");
+            for kind in commands {
+                assert_eq!(needs(kind), role, "{kind:?}");
             }
         }
     }

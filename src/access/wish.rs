@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::plant::{
     Snapshot,
-    command::{Command, OrderId},
+    command::{CommandKind, OrderId},
     role::Role,
 };
 
@@ -134,7 +134,7 @@ pub struct OrderRequest {
     /// another run: the plant file may have changed.
     pub run: u64,
     /// What.
-    pub command: Command,
+    pub kind: CommandKind,
     /// The value of the tag that the operator saw when he confirmed.
     pub seen: Option<f64>,
     /// Why, in his words.
@@ -145,13 +145,13 @@ pub struct OrderRequest {
 
 impl OrderRequest {
     /// An order without seen value, note and signature.
-    pub fn new(run: u64, id: OrderId, command: Command) -> OrderRequest {
-        OrderRequest { id, run, command, seen: None, note: None, sign: None }
+    pub fn new(run: u64, id: OrderId, kind: CommandKind) -> OrderRequest {
+        OrderRequest { id, run, kind, seen: None, note: None, sign: None }
     }
 
     /// An order made on what a snapshot shows.
-    pub fn on(snapshot: &Snapshot, id: OrderId, command: Command) -> OrderRequest {
-        OrderRequest { seen: snapshot.seen(&command), ..OrderRequest::new(snapshot.run, id, command) }
+    pub fn on(snapshot: &Snapshot, id: OrderId, kind: CommandKind) -> OrderRequest {
+        OrderRequest { seen: snapshot.seen(&kind), ..OrderRequest::new(snapshot.run, id, kind) }
     }
 }
 

@@ -9,7 +9,7 @@ use crate::{
     plant::{
         PlantDef,
         alarm::AlarmCommand,
-        command::Command,
+        command::CommandKind,
         def::{AlarmId, DeviceId, LineId, TagId},
         line_check::valid,
         parameter_set::NAME_MAX,
@@ -34,27 +34,27 @@ const ROWS_MAX: usize = 10_000;
 const REPORT_MAX: SignedDuration = SignedDuration::from_hours(92 * 24);
 
 /// `Err` says what a command names that this plant does not have.
-pub fn command(def: &PlantDef, command: &Command) -> Result<(), String> {
-    match command {
-        Command::Write { tag: id, value: _ } => tag(def, *id),
-        Command::Alarm(command) => of_alarms(def, command),
-        Command::ReadSets | Command::HandOver | Command::TakeOver => Ok(()),
-        Command::Refresh(id) | Command::StopRestore(id) => device(def, *id),
-        Command::SaveSet { device: id, name, replace: _ } => {
+pub fn command(def: &PlantDef, kind: &CommandKind) -> Result<(), String> {
+    match kind {
+        CommandKind::Write { tag: id, value: _ } => tag(def, *id),
+        CommandKind::Alarm(alarm_command) => of_alarms(def, alarm_command),
+        CommandKind::ReadSets | CommandKind::HandOver | CommandKind::TakeOver => Ok(()),
+        CommandKind::Refresh(id) | CommandKind::StopRestore(id) => device(def, *id),
+        CommandKind::SaveSet { device: id, name, replace: _ } => {
             short("name", name, NAME_MAX)?;
             device(def, *id)
         }
-        Command::Connect(id, _) | Command::SaveSettings(id) | Command::StopTest(id) => line(def, *id),
-        Command::Test(id, diagnostic) => {
+        CommandKind::Connect(id, _) | CommandKind::SaveSettings(id) | CommandKind::StopTest(id) => line(def, *id),
+        CommandKind::Test(id, diagnostic) => {
             diagnostic.check()?;
             line(def, *id)
         }
-        Command::Configure(settings) => {
+        CommandKind::Configure(settings) => {
             encode(settings, SETTINGS_BYTES_MAX).map_err(|error| format!("settings: {error}"))?;
             valid(settings)?;
             line(def, settings.id)
         }
-        Command::Restore(wish) => of_restore(def, wish),
+        CommandKind::Restore(wish) => of_restore(def, wish),
     }
 }
 
@@ -78,8 +78,8 @@ fn short(what: &str, text: &str, max: usize) -> Result<(), String> {
     if chars <= max { Ok(()) } else { Err(format!("{what} of {chars} characters, expected at most {max}")) }
 }
 
-fn of_alarms(def: &PlantDef, command: &AlarmCommand) -> Result<(), String> {
-    match command {
+fn of_alarms(def: &PlantDef, alarm_command: &AlarmCommand) -> Result<(), String> {
+    match alarm_command {
         AlarmCommand::AcknowledgeAll { seen } => {
             let (many, count) = (seen.len(), def.alarms.len());
             if count < many {
@@ -168,7 +168,11 @@ mod tests {
     fn a_test_asks_for_no_more_than_a_line_can_carry() {
         let def = fixture::plant();
         let check = |diagnostic: Diagnostic, expect: bool| {
-            assert_eq!(command(&def, &Command::Test(LineId(0), diagnostic.clone())).is_ok(), expect, "{diagnostic:?}");
+            assert_eq!(
+                command(&def, &CommandKind::Test(LineId(0), diagnostic.clone())).is_ok(),
+                expect,
+                "{diagnostic:?}"
+            );
         };
         let usual = Duration::from_millis(100);
         let scan = |serials, timeout| Diagnostic::Scan(Scan { first: 0, last: 255, serials, timeout });
@@ -197,7 +201,7 @@ mod tests {
     fn settings_that_no_line_can_have_do_not_pass_the_socket() {
         let def = fixture::plant();
         let used = def.lines[0].clone();
-        let check = |settings: LineDef| command(&def, &Command::Configure(Box::new(settings)));
+        let check = |settings: LineDef| command(&def, &CommandKind::Configure(Box::new(settings)));
         assert_eq!(check(used.clone()), Ok(()));
         for wait in [Duration::ZERO, Duration::from_secs(11), Duration::MAX] {
             assert!(check(LineDef { timeout: wait, ..used.clone() }).is_err(), "timeout {wait:?}");

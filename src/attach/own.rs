@@ -148,8 +148,8 @@ impl Own {
 }
 
 fn status(request: &OrderRequest, by: Arc<str>, at: Timestamp, outcome: Outcome) -> OrderStatus {
-    let OrderRequest { id, run: _, command, seen, note, sign: _ } = request.clone();
-    OrderStatus { id, by, from: "".into(), note, command, at, old: seen, outcome, recorded: true }
+    let OrderRequest { id, run: _, kind, seen, note, sign: _ } = request.clone();
+    OrderStatus { id, by, from: "".into(), note, kind, at, old: seen, outcome, recorded: true }
 }
 
 fn push<T>(list: &mut VecDeque<T>, element: T, max: usize) {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::plant::{
     Snapshot,
     alarm::manager::subject_name,
-    command::{Command, Outcome},
+    command::{CommandKind, Outcome},
     def::TagId,
     orders::outcome_words,
 };
@@ -59,11 +59,11 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
             .tag_named(&args.tag)
             .ok_or_else(|| CliError::Usage(format!("no tag `{}` in {}", args.tag, snapshot.def.name)))?;
         let value = value(&snapshot, tag, &args.value).map_err(CliError::Usage)?;
-        let command = Command::Write { tag, value };
-        let status = client::ordered(&mut session, 1, command, args.note.as_deref(), password).await?;
+        let kind = CommandKind::Write { tag, value };
+        let status = client::ordered(&mut session, 1, kind, args.note.as_deref(), password).await?;
         let words = |value: Option<f64>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
         // What the station says that the device holds, which need not be what was typed.
-        let new = status.command.written().map(|(_, held)| held);
+        let new = status.kind.written().map(|(_, held)| held);
         let (old, new, unit) = (words(status.old), words(new), snapshot.unit(tag));
         let recorded = client::recorded_words(status.recorded);
         let line = format!("{} {old} → {new} {unit}: {}{recorded}", args.tag, outcome_words(&status.outcome));
@@ -99,8 +99,8 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
             })
             .collect();
         for (number, seen) in (1..).zip(&waiting) {
-            let (alarm, command) = (snapshot.def.alarm(seen.id), seen.acknowledge());
-            let status = client::ordered(&mut session, number, command, args.note.as_deref(), password.clone()).await?;
+            let (alarm, kind) = (snapshot.def.alarm(seen.id), seen.acknowledge());
+            let status = client::ordered(&mut session, number, kind, args.note.as_deref(), password.clone()).await?;
             let line = format!("{} {}: ", subject_name(&snapshot.def, alarm.subject), alarm.text);
             if status.outcome != Outcome::Verified {
                 return Err(CliError::Failed(line + &outcome_words(&status.outcome)));

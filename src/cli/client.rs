@@ -7,7 +7,7 @@ use crate::{
     attach::io::{connect, find},
     plant::{
         Snapshot,
-        command::{Command, OrderId, OrderStatus, Outcome},
+        command::{CommandKind, OrderId, OrderStatus, Outcome},
         role::Sign,
         sample::{Cause, Quality},
     },
@@ -136,18 +136,18 @@ fn password(user: &str) -> Result<String, CliError> {
 pub async fn ordered(
     session: &mut Session,
     number: u32,
-    command: Command,
+    kind: CommandKind,
     note: Option<&str>,
     password: Option<Secret>,
 ) -> Result<OrderStatus, CliError> {
     let id = OrderId { terminal: session.terminal, number };
     // Whoever acts has just given his password: where a tag asks for it again, this is it.
-    let sign = sign::needed(&session.snapshots.borrow().def, &command) == Some(Sign::Password);
+    let sign = sign::needed(&session.snapshots.borrow().def, &kind) == Some(Sign::Password);
     let sign = password.filter(|_| sign).map(|password| Signature { user: None, password });
     let request = crate::access::OrderRequest {
         sign,
         note: note.map(Into::into),
-        ..crate::access::OrderRequest::on(&session.snapshots.borrow(), id, command)
+        ..crate::access::OrderRequest::on(&session.snapshots.borrow(), id, kind)
     };
     session.send(crate::station::Request::Order(request)).map_err(|why| CliError::Failed(why.to_owned()))?;
     let ended = |snapshot: &Snapshot| {

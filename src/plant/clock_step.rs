@@ -9,7 +9,7 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::{
     alarm::{AlarmCommand, state::OperatorNote},
-    command::Command,
+    command::CommandKind,
     event::LineState,
     record::{AlarmRecord, Burst, Record},
     restore::Restore,
@@ -51,12 +51,12 @@ fn shift_note(note: &mut OperatorNote, by: SignedDuration) {
     shift(&mut note.at, by);
 }
 
-impl Command {
+impl CommandKind {
     /// The same in the plant's own time: what names an alarm by the instant that a snapshot showed.
     pub fn unshift(&mut self, by: SignedDuration) {
         match self {
-            Command::Alarm(AlarmCommand::Acknowledge { seen, .. }) => shift(seen, -by),
-            Command::Alarm(AlarmCommand::AcknowledgeAll { seen }) => {
+            CommandKind::Alarm(AlarmCommand::Acknowledge { seen, .. }) => shift(seen, -by),
+            CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen }) => {
                 *seen = seen.iter().map(|(alarm, at)| (*alarm, at.checked_sub(by).unwrap_or(*at))).collect();
             }
             _ => {}
@@ -83,7 +83,7 @@ impl Snapshot {
         shift(&mut day.until, by);
         self.orders.iter_mut().for_each(|order| {
             shift(&mut order.at, by);
-            order.command.unshift(-by);
+            order.kind.unshift(-by);
         });
         self.watch.times().for_each(|since| shift(since, by));
         self.restores.iter_mut().for_each(|run| {
@@ -178,10 +178,10 @@ mod tests {
             snapshot.shift(by);
             assert_eq!((raised.at, snapshot.alarms[0].raised_at), (at(1_000_004) + by, at(1_000_004) + by));
             // What a terminal sends is what it was shown.
-            let mut command = snapshot.alarms[0].acknowledge();
-            command.unshift(by);
+            let mut kind = snapshot.alarms[0].acknowledge();
+            kind.unshift(by);
             let id = OrderId { terminal: 1, number: 1 };
-            plant.on_order(Order::new(id, "anna", command), at(1_000_005));
+            plant.on_order(Order::new(id, "anna", kind), at(1_000_005));
             let mut snapshot = plant.snapshot();
             snapshot.shift(by);
             assert_eq!(snapshot.orders[0].outcome, Outcome::Verified);

@@ -24,7 +24,7 @@ pub struct Order {
     /// From where: `pts/3 from 10.0.0.5, user panel`; empty for the station itself.
     pub from: Arc<str>,
     /// What.
-    pub command: Command,
+    pub kind: CommandKind,
     /// The value of the tag to be written that he saw when he confirmed.
     pub seen: Option<f64>,
     /// Why, in his words.
@@ -35,8 +35,8 @@ pub struct Order {
 
 impl Order {
     /// An order that may be carried out, without note.
-    pub fn new(id: OrderId, by: impl Into<Arc<str>>, command: Command) -> Order {
-        Order { id, by: by.into(), from: "".into(), command, seen: None, note: None, refused: None }
+    pub fn new(id: OrderId, by: impl Into<Arc<str>>, kind: CommandKind) -> Order {
+        Order { id, by: by.into(), from: "".into(), kind, seen: None, note: None, refused: None }
     }
 }
 
@@ -49,9 +49,9 @@ pub struct OrderId {
     pub number: u32,
 }
 
-/// What an operator can wish for.
+/// What a command does, to what and with which value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Command {
+pub enum CommandKind {
     /// Write a value, in the tag's unit, and verify it.
     Write {
         /// What.
@@ -94,24 +94,24 @@ pub enum Command {
     TakeOver,
 }
 
-impl Command {
+impl CommandKind {
     /// The tag and the value that it writes, if it writes one.
     pub fn written(&self) -> Option<(TagId, f64)> {
         match self {
-            Command::Write { tag, value } => Some((*tag, *value)),
-            Command::Alarm(_)
-            | Command::Refresh(_)
-            | Command::Connect(..)
-            | Command::Configure(_)
-            | Command::SaveSettings(_)
-            | Command::Test(..)
-            | Command::StopTest(_)
-            | Command::ReadSets
-            | Command::SaveSet { .. }
-            | Command::Restore(_)
-            | Command::StopRestore(_)
-            | Command::HandOver
-            | Command::TakeOver => None,
+            CommandKind::Write { tag, value } => Some((*tag, *value)),
+            CommandKind::Alarm(_)
+            | CommandKind::Refresh(_)
+            | CommandKind::Connect(..)
+            | CommandKind::Configure(_)
+            | CommandKind::SaveSettings(_)
+            | CommandKind::Test(..)
+            | CommandKind::StopTest(_)
+            | CommandKind::ReadSets
+            | CommandKind::SaveSet { .. }
+            | CommandKind::Restore(_)
+            | CommandKind::StopRestore(_)
+            | CommandKind::HandOver
+            | CommandKind::TakeOver => None,
         }
     }
 }
@@ -128,7 +128,7 @@ pub struct OrderStatus {
     /// Why, in his words.
     pub note: Option<Arc<str>>,
     /// What was wished.
-    pub command: Command,
+    pub kind: CommandKind,
     /// When it was taken.
     pub at: Timestamp,
     /// The tag's value when it was taken, for a write.

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::{
     alarm::{AlarmCommand, manager::subject_name},
-    command::{BusRequest, Command, NotConfirmed, Order, OrderId, OrderStatus, Outcome, Refusal, WriteId},
+    command::{BusRequest, CommandKind, NotConfirmed, Order, OrderId, OrderStatus, Outcome, Refusal, WriteId},
     def::{AlarmId, LineId, PlantDef, TagId},
     event::{Fault, WriteResult},
     interlock,
@@ -75,8 +75,8 @@ impl Desk {
         // What is shown and recorded is what the device will hold, not what was typed.
         let def = self.def.tag(tag);
         let held = image.scaling_decimals(def).and_then(|decimals| scale::held(def, value, decimals));
-        let command = Command::Write { tag, value: held.unwrap_or(value) };
-        self.open(&Order { command, ..order.clone() }, old, at);
+        let kind = CommandKind::Write { tag, value: held.unwrap_or(value) };
+        self.open(&Order { kind, ..order.clone() }, old, at);
         match checked {
             Err(outcome) => Err(self.close(order.id, outcome, image).map(Box::new)),
             Ok(Checked { raw, unlock, urgent }) => {
@@ -101,8 +101,8 @@ impl Desk {
 
     /// A line is open (or trying to be) or closed: orders that wished so are done.
     pub fn connected(&mut self, line: LineId, open: bool, image: &ProcessImage) -> Option<ActionRecord> {
-        let wished = Command::Connect(line, open);
-        let waits = |status: &&OrderStatus| status.command == wished && status.outcome == Outcome::Pending;
+        let wished = CommandKind::Connect(line, open);
+        let waits = |status: &&OrderStatus| status.kind == wished && status.outcome == Outcome::Pending;
         let id = self.orders.iter().find(waits)?.id;
         self.close(id, Outcome::Verified, image)
     }
@@ -194,10 +194,10 @@ impl Desk {
 
     /// The order under way behind a request to a line that asks for no answer.
     fn of_line(&self, line: LineId, request: &BusRequest) -> Option<OrderId> {
-        let asks = |status: &&OrderStatus| match (request, &status.command) {
+        let asks = |status: &&OrderStatus| match (request, &status.kind) {
             (BusRequest::Test { id, .. }, _) => status.id == *id,
-            (BusRequest::Configure(wished), Command::Configure(settings)) => wished == settings,
-            (BusRequest::StopTest, Command::StopTest(tested)) => *tested == line,
+            (BusRequest::Configure(wished), CommandKind::Configure(settings)) => wished == settings,
+            (BusRequest::StopTest, CommandKind::StopTest(tested)) => *tested == line,
             _ => false,
         };
         let mut under_way = self.orders.iter().filter(|status| status.outcome == Outcome::Pending);
@@ -214,8 +214,8 @@ impl Desk {
                 self.close(order, busy, image)
             }
             BusRequest::Connect(open) => {
-                let wished = Command::Connect(line, *open);
-                let id = self.orders.iter().find(|status| status.command == wished)?.id;
+                let wished = CommandKind::Connect(line, *open);
+                let id = self.orders.iter().find(|status| status.kind == wished)?.id;
                 self.close(id, busy, image)
             }
             // One that nobody ordered is nobody's: the device is read again in its turn.
@@ -236,10 +236,10 @@ impl Desk {
         let late = |status: &OrderStatus| {
             status.outcome == Outcome::Pending
                 // Its writes are given up one by one.
-                && !matches!(status.command, Command::Restore(_))
+                && !matches!(status.kind, CommandKind::Restore(_))
                 && PENDING_MAX.mul_f64(speed) < Duration::try_from(at.duration_since(status.at)).unwrap_or_default()
         };
-        let outcome = |status: &OrderStatus| match status.command.written() {
+        let outcome = |status: &OrderStatus| match status.kind.written() {
             Some(_) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)),
             None => Outcome::Failed(Fault::Timeout),
         };
@@ -344,7 +344,7 @@ impl Desk {
             by: order.by.clone(),
             from: order.from.clone(),
             note: order.note.clone(),
-            command: order.command.clone(),
+            kind: order.kind.clone(),
             at,
             old,
             outcome: Outcome::Pending,
@@ -389,30 +389,32 @@ pub fn outcome_word(outcome: &Outcome) -> &'static str {
 }
 
 fn record(def: &PlantDef, status: &OrderStatus, image: &ProcessImage) -> ActionRecord {
-    let (action, target, new): (&str, String, Option<String>) = match &status.command {
-        Command::Write { tag, value } => {
+    let (action, target, new): (&str, String, Option<String>) = match &status.kind {
+        CommandKind::Write { tag, value } => {
             let tag = def.tag(*tag);
             ("write", tag.name.clone(), Some(value_words(image, tag, *value)))
         }
-        Command::Alarm(command) => alarm_words(def, command),
-        Command::Refresh(device) => ("refresh", def.device(*device).name.clone(), None),
-        Command::Connect(line, true) => ("connect", def.line(*line).name.clone(), None),
-        Command::Connect(line, false) => ("disconnect", def.line(*line).name.clone(), None),
-        Command::Configure(settings) => ("configure", settings.name.clone(), Some(settings.transport.to_string())),
-        Command::SaveSettings(line) => ("save settings", def.line(*line).name.clone(), None),
-        Command::Test(line, diagnostic) => ("test", def.line(*line).name.clone(), Some(diagnostic.to_string())),
-        Command::StopTest(line) => ("stop test", def.line(*line).name.clone(), None),
-        Command::ReadSets => ("read sets", "parameter sets".into(), None),
-        Command::SaveSet { device, name, .. } => ("save set", def.device(*device).name.clone(), Some(name.to_string())),
-        Command::Restore(wish) => {
+        CommandKind::Alarm(alarm_command) => alarm_words(def, alarm_command),
+        CommandKind::Refresh(device) => ("refresh", def.device(*device).name.clone(), None),
+        CommandKind::Connect(line, true) => ("connect", def.line(*line).name.clone(), None),
+        CommandKind::Connect(line, false) => ("disconnect", def.line(*line).name.clone(), None),
+        CommandKind::Configure(settings) => ("configure", settings.name.clone(), Some(settings.transport.to_string())),
+        CommandKind::SaveSettings(line) => ("save settings", def.line(*line).name.clone(), None),
+        CommandKind::Test(line, diagnostic) => ("test", def.line(*line).name.clone(), Some(diagnostic.to_string())),
+        CommandKind::StopTest(line) => ("stop test", def.line(*line).name.clone(), None),
+        CommandKind::ReadSets => ("read sets", "parameter sets".into(), None),
+        CommandKind::SaveSet { device, name, .. } => {
+            ("save set", def.device(*device).name.clone(), Some(name.to_string()))
+        }
+        CommandKind::Restore(wish) => {
             let new = format!("{}: {} changes", wish.from, wish.changes.len());
             ("restore set", def.device(wish.device).name.clone(), Some(new))
         }
-        Command::StopRestore(device) => ("stop restore", def.device(*device).name.clone(), None),
-        Command::HandOver => (HAND_OVER, def.name.clone(), None),
-        Command::TakeOver => (TAKE_OVER, def.name.clone(), None),
+        CommandKind::StopRestore(device) => ("stop restore", def.device(*device).name.clone(), None),
+        CommandKind::HandOver => (HAND_OVER, def.name.clone(), None),
+        CommandKind::TakeOver => (TAKE_OVER, def.name.clone(), None),
     };
-    let old = status.old.zip(status.command.written());
+    let old = status.old.zip(status.kind.written());
     let old = old.map(|(old, (tag, _))| value_words(image, def.tag(tag), old));
     ActionRecord {
         at: status.at,
@@ -429,12 +431,12 @@ fn record(def: &PlantDef, status: &OrderStatus, image: &ProcessImage) -> ActionR
 }
 
 /// Action, target and new state of an action on alarms.
-pub fn alarm_words(def: &PlantDef, command: &AlarmCommand) -> (&'static str, String, Option<String>) {
+pub fn alarm_words(def: &PlantDef, alarm_command: &AlarmCommand) -> (&'static str, String, Option<String>) {
     let name = |alarm: &AlarmId| match def.alarms.get(alarm.index()) {
         Some(alarm) => format!("{} {}", subject_name(def, alarm.subject), alarm.text),
         None => format!("alarm {}", alarm.0),
     };
-    match command {
+    match alarm_command {
         AlarmCommand::Acknowledge { alarm, .. } => ("acknowledge", name(alarm), None),
         AlarmCommand::AcknowledgeAll { seen } => {
             let target = if let [(one, _)] = &**seen { name(one) } else { format!("{} alarms", seen.len()) };

@@ -15,7 +15,7 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::{
     alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_words},
-    command::{BusRequest, Command, Order, OrderId, Outcome, Refusal, WriteId},
+    command::{BusRequest, CommandKind, Order, OrderId, Outcome, Refusal, WriteId},
     def::{DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
     interlock::ActuatorTracker,
@@ -174,22 +174,22 @@ impl Plant {
             self.at = self.at.max(at);
             return effects;
         }
-        let action = match order.command.clone() {
-            Command::Write { tag, value } => match self.desk.write(&self.image, &order, tag, value, at) {
+        let action = match order.kind.clone() {
+            CommandKind::Write { tag, value } => match self.desk.write(&self.image, &order, tag, value, at) {
                 Ok(request) => {
                     effects.bus.push((self.line_of(tag), request));
                     None
                 }
                 Err(action) => action.map(|action| *action),
             },
-            Command::Alarm(command) => self.alarm_order(&order, command, at, &mut effects),
-            Command::Refresh(device) => {
+            CommandKind::Alarm(alarm_command) => self.alarm_order(&order, alarm_command, at, &mut effects),
+            CommandKind::Refresh(device) => {
                 effects.bus.push((self.def.device(device).line, BusRequest::Refresh { device, order: Some(order.id) }));
                 // A read is not an operator action: it is shown, but not recorded.
                 let _ = self.desk.note(&order, Outcome::Verified, &self.image, at);
                 None
             }
-            Command::Connect(line, open) => {
+            CommandKind::Connect(line, open) => {
                 let is_open = self.lines[line.index()].state != LineState::Disconnected;
                 if is_open == open {
                     self.desk.note(&order, Outcome::Unchanged, &self.image, at)
@@ -199,13 +199,15 @@ impl Plant {
                     None
                 }
             }
-            Command::Configure(_) | Command::SaveSettings(_) | Command::Test(..) | Command::StopTest(_) => {
-                self.line_order(&order, at, &mut effects)
-            }
-            Command::ReadSets | Command::SaveSet { .. } | Command::Restore(_) | Command::StopRestore(_) => {
-                self.set_order(&order, at, &mut effects)
-            }
-            Command::HandOver | Command::TakeOver => {
+            CommandKind::Configure(_)
+            | CommandKind::SaveSettings(_)
+            | CommandKind::Test(..)
+            | CommandKind::StopTest(_) => self.line_order(&order, at, &mut effects),
+            CommandKind::ReadSets
+            | CommandKind::SaveSet { .. }
+            | CommandKind::Restore(_)
+            | CommandKind::StopRestore(_) => self.set_order(&order, at, &mut effects),
+            CommandKind::HandOver | CommandKind::TakeOver => {
                 let outcome = match check_words(order.note.as_ref()) {
                     Ok(()) => Outcome::Verified,
                     Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),

@@ -10,7 +10,7 @@ use super::{
         AlarmCommand, AlarmMetrics,
         state::{AlarmState, OperatorNote},
     },
-    command::{Command, OrderStatus},
+    command::{CommandKind, OrderStatus},
     def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, TagId},
     diagnostics::DiagnosticRun,
     event::{Fault, LineCounters, LineState},
@@ -147,8 +147,8 @@ impl Snapshot {
         }
     }
     /// The displayed value of the tag that a command writes; `None` where it writes none, or none is displayed.
-    pub fn seen(&self, command: &Command) -> Option<f64> {
-        let (tag, _) = command.written()?;
+    pub fn seen(&self, kind: &CommandKind) -> Option<f64> {
+        let (tag, _) = kind.written()?;
         self.samples.get(tag.index())?.value
     }
     /// The unit of a tag, which the device may choose (°C or °F).
@@ -181,10 +181,10 @@ impl Snapshot {
         self.tunings.get(id.index())?.as_deref()
     }
     /// The order to acknowledge all that waits here, as it is seen; `None` if nothing does.
-    pub fn acknowledge_all(&self) -> Option<Command> {
+    pub fn acknowledge_all(&self) -> Option<CommandKind> {
         let waits = self.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement());
         let seen: Arc<[_]> = waits.map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
-        (!seen.is_empty()).then_some(Command::Alarm(AlarmCommand::AcknowledgeAll { seen }))
+        (!seen.is_empty()).then_some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen }))
     }
     /// The details of a fault of the station, as of the last time it was active.
     pub fn fault_details(&self, alarm: AlarmId) -> &str {
@@ -284,8 +284,8 @@ impl ActiveAlarm {
         ActiveAlarm { id, state, raised_at, annunciated_at, returned_at, value, acknowledged, times, burst }
     }
     /// The order to acknowledge it, as it is seen here.
-    pub fn acknowledge(&self) -> Command {
-        Command::Alarm(AlarmCommand::Acknowledge { alarm: self.id, seen: self.annunciated_at })
+    pub fn acknowledge(&self) -> CommandKind {
+        CommandKind::Alarm(AlarmCommand::Acknowledge { alarm: self.id, seen: self.annunciated_at })
     }
 }
 

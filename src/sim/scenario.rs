@@ -14,7 +14,7 @@ use std::time::Duration;
 use super::faults::{Fault, FaultTarget};
 use crate::plant::{
     Snapshot,
-    command::Command,
+    command::CommandKind,
     def::{AlarmId, TagId},
     record::AlarmStep,
     snapshot::ActiveAlarm,
@@ -92,13 +92,13 @@ pub enum OperatorWish {
 
 impl OperatorWish {
     /// The order that an operator gives who looks at this; `None` if there is nothing to do.
-    pub fn command(self, seen: &Snapshot) -> Option<Command> {
+    pub fn command_kind(self, seen: &Snapshot) -> Option<CommandKind> {
         match self {
             OperatorWish::Acknowledge(id) => {
                 seen.alarms.iter().find(|alarm| alarm.id == id).map(ActiveAlarm::acknowledge)
             }
             OperatorWish::AcknowledgeAll => seen.acknowledge_all(),
-            OperatorWish::Write(tag, value) => Some(Command::Write { tag, value }),
+            OperatorWish::Write(tag, value) => Some(CommandKind::Write { tag, value }),
         }
     }
 }

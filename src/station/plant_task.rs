@@ -144,7 +144,7 @@ impl PlantTask {
                     (changed, next) = (false, Instant::now() + SNAPSHOT_EVERY);
                 }
                 Some(mut order) = orders.recv() => {
-                    order.command.unshift(self.clock.behind_utc());
+                    order.kind.unshift(self.clock.behind_utc());
                     let effects = self.plant.on_order(order, self.clock.now());
                     self.carry_out(effects);
                     (changed, next) = (true, Instant::now());

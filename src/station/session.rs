@@ -9,7 +9,7 @@ use crate::{
     history::io::QueryRequest,
     plant::{
         Snapshot,
-        command::{Command, OrderId},
+        command::{CommandKind, OrderId},
     },
     sim::io::Port,
 };
@@ -56,9 +56,9 @@ impl Session {
     }
 
     /// Gives an order without note and signature; its outcome is seen in a later snapshot.
-    pub fn order(&self, number: u32, command: Command) -> Result<OrderId, &'static str> {
+    pub fn order(&self, number: u32, kind: CommandKind) -> Result<OrderId, &'static str> {
         let id = OrderId { terminal: self.terminal, number };
-        let request = OrderRequest::on(&self.snapshots.borrow(), id, command);
+        let request = OrderRequest::on(&self.snapshots.borrow(), id, kind);
         self.send(Request::Order(request))?;
         Ok(id)
     }

@@ -130,7 +130,7 @@ fn order_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
             && before.orders.iter().find(|old| old.id == order.id).is_none_or(|old| old.outcome != order.outcome)
     });
     news.filter_map(|order| {
-        let (tag, value) = order.command.written()?;
+        let (tag, value) = order.kind.written()?;
         let (name, unit) = (&after.def.tag(tag).name, after.unit(tag));
         let value = after.format(tag, value);
         Some(format!("{}: {name} := {value} {unit} {}", order.by, outcome_words(&order.outcome)))

@@ -16,7 +16,7 @@ use super::{
     widgets::text::{Canvas, between, clock, fit, fit_words, running, width},
 };
 use crate::plant::{
-    command::{Command, NotConfirmed, Outcome},
+    command::{CommandKind, NotConfirmed, Outcome},
     def::LineDef,
     event::LineState,
     orders::alarm_words as alarm_words_of,
@@ -307,28 +307,28 @@ fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
 pub fn pending_label(cx: &ViewContext, pending: &PendingCommand) -> (String, Style) {
     let theme = cx.theme;
     // As the station took it: a write of what the device can hold.
-    let (command, old) =
-        pending.status.as_ref().map_or((&pending.command, None), |status| (&status.command, status.old));
-    let what = order_words(cx, command, old);
+    let (kind, old) = pending.status.as_ref().map_or((&pending.kind, None), |status| (&status.kind, status.old));
+    let what = order_words(cx, kind, old);
     let Some(status) = &pending.status else {
         return match pending.undelivered {
             Some(why) => (format!("{what}  NOT SENT: {why}"), theme.trouble()),
             None => (format!("{what}  sent …"), theme.normal()),
         };
     };
-    let (words, trouble) = match (&status.command, &status.outcome) {
+    let (words, trouble) = match (&status.kind, &status.outcome) {
         // The line has taken it; what comes of it stands on the bus tab.
-        (Command::Test(..), Outcome::Verified) => ("begun".to_owned(), false),
-        (Command::StopTest(_), Outcome::Verified) => ("done".to_owned(), false),
+        (CommandKind::Test(..), Outcome::Verified) => ("begun".to_owned(), false),
+        (CommandKind::StopTest(_), Outcome::Verified) => ("done".to_owned(), false),
         // Whether they are the right ones only the devices can tell.
-        (Command::Configure(_), Outcome::Verified) => ("in use".to_owned(), false),
-        (Command::SaveSettings(_), Outcome::Verified) => ("written into the plant file".to_owned(), false),
+        (CommandKind::Configure(_), Outcome::Verified) => ("in use".to_owned(), false),
+        (CommandKind::SaveSettings(_), Outcome::Verified) => ("written into the plant file".to_owned(), false),
         // The line has been asked to; only the device tells whether it answers.
-        (Command::Refresh(_), Outcome::Verified) => ("requested".to_owned(), false),
+        (CommandKind::Refresh(_), Outcome::Verified) => ("requested".to_owned(), false),
         // Nothing was written that could be read back.
-        (Command::Alarm(_) | Command::HandOver | Command::TakeOver | Command::Connect(..), Outcome::Verified) => {
-            ("done".to_owned(), false)
-        }
+        (
+            CommandKind::Alarm(_) | CommandKind::HandOver | CommandKind::TakeOver | CommandKind::Connect(..),
+            Outcome::Verified,
+        ) => ("done".to_owned(), false),
         (_, outcome) => outcome_words(outcome),
     };
     let at = clock(status.at, &cx.def().time_zone);
@@ -362,9 +362,9 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
 }
 
 /// What was wished, in words: `TIC-1.SV 60.0 → 70.0 °C`.
-pub fn order_words(cx: &ViewContext, command: &Command, old: Option<f64>) -> String {
-    match command {
-        Command::Write { tag, value } => {
+pub fn order_words(cx: &ViewContext, kind: &CommandKind, old: Option<f64>) -> String {
+    match kind {
+        CommandKind::Write { tag, value } => {
             let old = old.map_or("?".to_owned(), |old| cx.snapshot.format(*tag, old));
             let text = format!(
                 "{} {old} → {} {}",
@@ -374,25 +374,25 @@ pub fn order_words(cx: &ViewContext, command: &Command, old: Option<f64>) -> Str
             );
             text.trim_end().to_owned()
         }
-        Command::Alarm(command) => {
-            let (action, target, _) = alarm_words_of(cx.def(), command);
+        CommandKind::Alarm(alarm_command) => {
+            let (action, target, _) = alarm_words_of(cx.def(), alarm_command);
             format!("{action} {target}")
         }
-        Command::Refresh(device) => format!("refresh {}", cx.def().device(*device).name),
-        Command::Connect(line, true) => format!("connect {}", cx.def().line(*line).name),
-        Command::Connect(line, false) => format!("disconnect {}", cx.def().line(*line).name),
-        Command::Configure(settings) => format!("settings of {}", settings.name),
-        Command::SaveSettings(line) => format!("save settings of {}", cx.def().line(*line).name),
-        Command::Test(line, diagnostic) => format!("{} {diagnostic}", cx.def().line(*line).name),
-        Command::StopTest(line) => format!("stop test of {}", cx.def().line(*line).name),
-        Command::ReadSets => "read parameter sets".to_owned(),
-        Command::SaveSet { device, name, .. } => format!("save set {name} of {}", cx.def().device(*device).name),
-        Command::Restore(wish) => {
+        CommandKind::Refresh(device) => format!("refresh {}", cx.def().device(*device).name),
+        CommandKind::Connect(line, true) => format!("connect {}", cx.def().line(*line).name),
+        CommandKind::Connect(line, false) => format!("disconnect {}", cx.def().line(*line).name),
+        CommandKind::Configure(settings) => format!("settings of {}", settings.name),
+        CommandKind::SaveSettings(line) => format!("save settings of {}", cx.def().line(*line).name),
+        CommandKind::Test(line, diagnostic) => format!("{} {diagnostic}", cx.def().line(*line).name),
+        CommandKind::StopTest(line) => format!("stop test of {}", cx.def().line(*line).name),
+        CommandKind::ReadSets => "read parameter sets".to_owned(),
+        CommandKind::SaveSet { device, name, .. } => format!("save set {name} of {}", cx.def().device(*device).name),
+        CommandKind::Restore(wish) => {
             format!("{} to {}, {} changes", wish.from, cx.def().device(wish.device).name, wish.changes.len())
         }
-        Command::StopRestore(device) => format!("stop restore of {}", cx.def().device(*device).name),
-        Command::HandOver => "hand over".to_owned(),
-        Command::TakeOver => "take over".to_owned(),
+        CommandKind::StopRestore(device) => format!("stop restore of {}", cx.def().device(*device).name),
+        CommandKind::HandOver => "hand over".to_owned(),
+        CommandKind::TakeOver => "take over".to_owned(),
     }
 }
 

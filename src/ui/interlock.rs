@@ -202,7 +202,7 @@ fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
 
 /// The latest order for a command.
 fn last_order<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<&'a OrderStatus> {
-    let of_command = |status: &&OrderStatus| status.command.written().is_some_and(|(tag, _)| tag == command);
+    let of_command = |status: &&OrderStatus| status.kind.written().is_some_and(|(tag, _)| tag == command);
     cx.snapshot.orders.iter().find(of_command)
 }
 

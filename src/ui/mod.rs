@@ -29,7 +29,7 @@ use ratatui::{Frame, layout::Rect};
 
 use crate::{
     access::Standing,
-    plant::{alarm::AlarmCommand, command::Command, def::PlantDef, sample::Cause, snapshot::Snapshot},
+    plant::{alarm::AlarmCommand, command::CommandKind, def::PlantDef, sample::Cause, snapshot::Snapshot},
     sim::drill,
 };
 use keys::Global;
@@ -333,7 +333,7 @@ fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             }
         }
         // Where nothing sounds there is nothing to silence.
-        Global::Silence if model.snapshot.sound => vec![UiAction::Order(Command::Alarm(AlarmCommand::Silence))],
+        Global::Silence if model.snapshot.sound => vec![UiAction::Order(CommandKind::Alarm(AlarmCommand::Silence))],
         Global::Silence => Vec::new(),
         Global::Redraw => vec![UiAction::Do(Effect::Redraw)],
         Global::Dismiss => {
@@ -409,7 +409,7 @@ fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
                 });
                 effects.extend(show(model, Tab::Trends));
             }
-            UiAction::Order(command) => effects.extend(model.order(command.into())),
+            UiAction::Order(kind) => effects.extend(model.order(kind.into())),
             UiAction::Confirmed(confirmed) => effects.extend(model.order(confirmed)),
             UiAction::Wish(tab, wish) => {
                 // Nought is nobody's: whoever waits has a number.

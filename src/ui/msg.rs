@@ -10,7 +10,7 @@ use crate::{
     access::{Durability, OrderRequest, Standing, Wish},
     history::{Answer, HistoryError, Query},
     plant::{
-        command::{Command, OrderId},
+        command::{CommandKind, OrderId},
         def::{DeviceId, TagId},
         snapshot::Snapshot,
     },
@@ -102,7 +102,7 @@ pub enum UiAction {
     /// Show the curve of a tag with the cursor at a moment.
     ShowOnTrends(TagId, Timestamp),
     /// Give an order and watch its outcome.
-    Order(Command),
+    Order(CommandKind),
     /// The same with what its operator has seen and signed.
     Confirmed(Confirmed),
     /// Wish something of the station; the answer goes to the window that waits for one, else to this tab.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{Effect, Model, chrome, modal::Modal};
 use crate::{
     access::{OrderRequest, Signature},
-    plant::command::{Command, OrderId, OrderStatus, Outcome, Refusal},
+    plant::command::{CommandKind, OrderId, OrderStatus, Outcome, Refusal},
 };
 
 /// An outcome that is no worry is shown for so many ticks: a minute of real time.
@@ -15,7 +15,7 @@ const OUTCOME_TICKS: u32 = 120;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Confirmed {
     /// What.
-    pub command: Command,
+    pub kind: CommandKind,
     /// The displayed value of the tag to be written; `None` where it was not known.
     pub expected: Option<f64>,
     /// What a tag asks for again.
@@ -24,10 +24,10 @@ pub struct Confirmed {
     pub note: Option<Arc<str>>,
 }
 
-impl From<Command> for Confirmed {
+impl From<CommandKind> for Confirmed {
     /// A command that nothing was asked about.
-    fn from(command: Command) -> Confirmed {
-        Confirmed { command, expected: None, sign: None, note: None }
+    fn from(kind: CommandKind) -> Confirmed {
+        Confirmed { kind, expected: None, sign: None, note: None }
     }
 }
 
@@ -37,7 +37,7 @@ pub struct PendingCommand {
     /// Which.
     pub id: OrderId,
     /// What was wished.
-    pub command: Command,
+    pub kind: CommandKind,
     /// As last seen in a snapshot.
     pub status: Option<OrderStatus>,
     /// Tick at which it was given, and at which its outcome last changed.
@@ -69,14 +69,13 @@ impl PendingCommand {
 impl Model {
     /// Gives an order and watches it. A station that has gone takes none: that is said at once.
     pub(super) fn order(&mut self, confirmed: Confirmed) -> Option<Effect> {
-        let Confirmed { command, expected, sign, note } = confirmed;
+        let Confirmed { kind, expected, sign, note } = confirmed;
         self.ordered = self.ordered.wrapping_add(1);
         let id = OrderId { terminal: self.terminal, number: self.ordered };
         let undelivered = self.standing.gone.as_ref().map(|_| "the station has gone");
         let changed_at = self.clock.phase;
-        self.pending_command =
-            Some(PendingCommand { id, command: command.clone(), status: None, changed_at, undelivered });
-        let request = OrderRequest::on(&self.snapshot, id, command);
+        self.pending_command = Some(PendingCommand { id, kind: kind.clone(), status: None, changed_at, undelivered });
+        let request = OrderRequest::on(&self.snapshot, id, kind);
         let request = OrderRequest { seen: expected.or(request.seen), sign, note, ..request };
         undelivered.is_none().then_some(Effect::Order(request))
     }

@@ -3,7 +3,7 @@
 use super::{ViewContext, keys::Hint, tabs::Tab};
 use crate::{
     access::right,
-    plant::{command::Command, role::Role},
+    plant::{command::CommandKind, role::Role},
 };
 
 /// `Technician`.
@@ -25,8 +25,8 @@ pub fn words(role: Role) -> &'static str {
 }
 
 /// Why whoever sits here may not give this command: `needs Technician, tom is Viewer`.
-pub fn missing(cx: &ViewContext, command: &Command) -> Option<String> {
-    lacks(cx, right::needs(command))
+pub fn missing(cx: &ViewContext, kind: &CommandKind) -> Option<String> {
+    lacks(cx, right::needs(kind))
 }
 
 /// The same for a role.

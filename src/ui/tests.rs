@@ -9,7 +9,7 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::{Terminal, backend::TestBackend, buffer::Buffer};
 
 use super::{Effect, Model, Msg, fixture::Fixture, theme::Theme, update, view};
-use crate::{access::Wish, plant::command::Command};
+use crate::{access::Wish, plant::command::CommandKind};
 
 pub fn model(fixture: &Fixture, theme: Theme) -> Model {
     let mut model = Model::new(fixture.snapshot(), theme, 1, crate::ui::fixture::standing());
@@ -65,9 +65,9 @@ pub fn acts_only_on_what_was_drawn(model: &mut Model, change: impl FnOnce(&mut M
     assert!(!effects.is_empty() || model.modal.is_some(), "{key} does nothing once the change is drawn");
 }
 
-pub fn order_of(effects: &[Effect]) -> Option<&Command> {
+pub fn order_of(effects: &[Effect]) -> Option<&CommandKind> {
     effects.iter().find_map(|effect| match effect {
-        Effect::Order(order) => Some(&order.command),
+        Effect::Order(order) => Some(&order.kind),
         Effect::Wish(..) => None,
         Effect::Query(..)
         | Effect::Drill(_)

@@ -25,7 +25,7 @@ use sightglass::{
     plant::alarm::AlarmCommand,
     plant::{
         PlantDef, Snapshot,
-        command::{Command, NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
+        command::{CommandKind, NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
         def::TagId,
         sample::{Cause, Sample},
     },
@@ -136,7 +136,7 @@ impl Stand {
 
 fn answer(request: Request, orders: &watch::Sender<Arc<Snapshot>>) {
     match request {
-        Request::Order(OrderRequest { id, command, note, seen, .. }) => orders.send_modify(|snapshot| {
+        Request::Order(OrderRequest { id, kind, note, seen, .. }) => orders.send_modify(|snapshot| {
             let snapshot = Arc::make_mut(snapshot);
             let (at, outcome) = (snapshot.at, Outcome::Verified);
             let status = OrderStatus {
@@ -144,7 +144,7 @@ fn answer(request: Request, orders: &watch::Sender<Arc<Snapshot>>) {
                 by: "anna".into(),
                 from: "".into(),
                 note,
-                command,
+                kind,
                 at,
                 old: seen,
                 outcome,
@@ -218,7 +218,7 @@ async fn a_terminal_sees_the_plant_gives_orders_and_is_told_where_it_is() {
     let ours = protocol::encode(&**session.snapshots.borrow(), usize::MAX);
     assert_eq!(ours, protocol::encode(&**stand.publish.borrow(), usize::MAX), "all of it, by its bytes");
 
-    session.order(7, Command::Alarm(AlarmCommand::Silence)).unwrap();
+    session.order(7, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
     until(&mut session, "the order has an outcome", |snapshot| !snapshot.orders.is_empty()).await;
     assert_eq!(of(&session, 7), Some(Outcome::Verified));
     assert_eq!(session.wish(Wish::Stop).await, Ok(Durability::Recorded));
@@ -278,7 +278,7 @@ async fn a_terminal_says_at_once_that_the_station_has_gone_and_finds_it_again() 
     let mut session = stand.session().await;
     let folder = stand.end().await;
     until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
-    assert_eq!(session.order(1, Command::Alarm(AlarmCommand::Silence)), Err("station has gone"));
+    assert_eq!(session.order(1, CommandKind::Alarm(AlarmCommand::Silence)), Err("station has gone"));
     assert_eq!(session.wish(Wish::Stop).await, Err("station has gone".to_owned()));
     assert_eq!(session.snapshots.borrow().samples[0].value, Some(1.0), "the last snapshot stays");
 
@@ -287,7 +287,7 @@ async fn a_terminal_says_at_once_that_the_station_has_gone_and_finds_it_again() 
     stand.set(2.0);
     until_standing(&mut session, "back", |standing| standing.gone.is_none()).await;
     sees(&mut session, 2.0).await;
-    session.order(2, Command::Alarm(AlarmCommand::Silence)).unwrap();
+    session.order(2, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
     until(&mut session, "the order has an outcome", |snapshot| !snapshot.orders.is_empty()).await;
     assert_eq!(of(&session, 2), Some(Outcome::Verified), "under the number that the terminal has always had");
     drop((session, other));
@@ -300,7 +300,7 @@ async fn an_order_on_its_way_when_the_station_goes_is_called_uncertain() {
     let mut session = stand.session().await;
     // The station takes it and dies before it tells.
     stand.tasks[1].abort();
-    session.order(1, Command::Alarm(AlarmCommand::Silence)).unwrap();
+    session.order(1, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
     tokio::task::yield_now().await;
     let _folder = stand.end().await;
     until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
@@ -426,12 +426,11 @@ async fn an_order_with_the_number_of_another_terminal_or_of_no_tag_never_arrives
     let mut stream = UnixStream::connect(stand.path()).await.unwrap();
     stream.write_all(&hello()).await.unwrap();
     let own = protocol::welcome(&next(&mut stream).await).unwrap().unwrap().terminal;
-    let order = |terminal, command| {
-        asked(&Asked::Order(Box::new(OrderRequest::new(0, OrderId { terminal, number: 1 }, command))))
-    };
+    let order =
+        |terminal, kind| asked(&Asked::Order(Box::new(OrderRequest::new(0, OrderId { terminal, number: 1 }, kind))));
     for (bytes, expected) in [
-        (order(own + 1, Command::Alarm(AlarmCommand::Silence)), "this is terminal"),
-        (order(own, Command::Write { tag: TagId(u16::MAX), value: 1.0 }), "tag number 65535"),
+        (order(own + 1, CommandKind::Alarm(AlarmCommand::Silence)), "this is terminal"),
+        (order(own, CommandKind::Write { tag: TagId(u16::MAX), value: 1.0 }), "tag number 65535"),
     ] {
         stream.write_all(&bytes).await.unwrap();
         let why = loop {

@@ -18,7 +18,7 @@ use sightglass::{
     bus::io::{clock::Clock, transport::Connector},
     plant::{
         PlantDef, Snapshot,
-        command::{Command, OrderId, OrderStatus, Outcome},
+        command::{CommandKind, OrderId, OrderStatus, Outcome},
         def::{TagId, Transport},
         role::Role,
         snapshot::DeviceState,
@@ -200,8 +200,8 @@ pub async fn login(session: &Session, user: &str, password: &str) -> Result<(), 
 }
 
 /// An order of this terminal.
-pub fn request(session: &Session, number: u32, command: Command) -> OrderRequest {
-    OrderRequest::on(&session.snapshots.borrow(), OrderId { terminal: session.terminal, number }, command)
+pub fn request(session: &Session, number: u32, kind: CommandKind) -> OrderRequest {
+    OrderRequest::on(&session.snapshots.borrow(), OrderId { terminal: session.terminal, number }, kind)
 }
 
 /// Waits until a snapshot is so, and gives it.

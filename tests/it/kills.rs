@@ -37,7 +37,7 @@ use sightglass::{
     plant::{
         Snapshot,
         alarm::AlarmCommand,
-        command::{Command, OrderId, Outcome},
+        command::{CommandKind, OrderId, Outcome},
         def::AlarmId,
         record::{AlarmRecord, AlarmStep, SEAL_LOG},
         role::Role,
@@ -210,13 +210,13 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> R
         let value = (VALUES[writes % 2] + (round * 37 + u64::from(number)) % SPREAD) as f64 / 10.0;
         let id = OrderId { terminal: session.terminal, number };
         let shelve = AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(1_800) };
-        let command = match to_acknowledge(&session.snapshots.borrow()) {
+        let kind = match to_acknowledge(&session.snapshots.borrow()) {
             Some(acknowledge) => acknowledge,
-            None if number % 2 == 0 => Command::Alarm(shelve),
-            None => Command::Write { tag, value },
+            None if number % 2 == 0 => CommandKind::Alarm(shelve),
+            None => CommandKind::Write { tag, value },
         };
-        writes += usize::from(command.written().is_some());
-        let order = OrderRequest::on(&session.snapshots.borrow(), id, command.clone());
+        writes += usize::from(kind.written().is_some());
+        let order = OrderRequest::on(&session.snapshots.borrow(), id, kind.clone());
         let order = OrderRequest { note: Some(note.as_str().into()), ..order };
         if session.send(Request::Order(order)).is_err() {
             break;
@@ -231,9 +231,9 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> R
         let ended = tokio::time::timeout(PATIENCE, ended).await;
         assert!(ended.is_ok_and(|ended| ended.is_ok()), "`{note}` never had an outcome");
         match outcome {
-            Some(Outcome::Verified) => match command {
-                Command::Alarm(AlarmCommand::Shelve { .. }) => reported.shelved = number,
-                Command::Alarm(_) => {
+            Some(Outcome::Verified) => match kind {
+                CommandKind::Alarm(AlarmCommand::Shelve { .. }) => reported.shelved = number,
+                CommandKind::Alarm(_) => {
                     reported.last_acknowledged = number;
                     reported.acknowledged.push(note);
                 }
@@ -249,7 +249,7 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> R
 }
 
 /// The command to acknowledge [`ALARM`], if it waits for that.
-fn to_acknowledge(snapshot: &Snapshot) -> Option<Command> {
+fn to_acknowledge(snapshot: &Snapshot) -> Option<CommandKind> {
     let is_it = |alarm: &&ActiveAlarm| snapshot.def.alarm(alarm.id).text == ALARM;
     let alarm = snapshot.alarms.iter().find(is_it).filter(|alarm| alarm.state.needs_acknowledgement())?;
     Some(alarm.acknowledge())

@@ -8,7 +8,7 @@ use sightglass::{
     access::{OrderRequest, Signature, Wish},
     plant::{
         PlantDef,
-        command::{Command, Outcome, Refusal},
+        command::{CommandKind, Outcome, Refusal},
         def::Sign,
         sample::Cause,
     },
@@ -158,7 +158,7 @@ async fn a_terminal_that_nobody_touches_is_locked_shows_alarms_and_opens_to_the_
     while idle.wish(Wish::Unlock(PASSWORD.into())).await.is_err() {
         guarded.pass(Duration::from_secs(1)).await;
     }
-    let again = request(&idle, 2, acknowledge.command);
+    let again = request(&idle, 2, acknowledge.kind);
     assert_eq!(guarded.order(&idle, again).await.outcome, Outcome::Verified);
     let writes: Vec<_> = guarded.entries().into_iter().filter(|entry| &*entry.who == "sue").collect();
     let words: Vec<String> = writes.iter().map(|entry| format!("{}: {}", entry.action, entry.outcome)).collect();
@@ -183,7 +183,7 @@ async fn a_tag_for_two_persons_is_written_once_a_second_one_who_may_has_signed()
     let tag = guarded.tag("TIC-1.SV");
     let signed = |number: u32, by: Option<(&str, &str)>| OrderRequest {
         sign: by.map(|(user, password)| Signature { user: Some(user.into()), password: password.into() }),
-        ..request(&tom, number, Command::Write { tag, value: 61.0 })
+        ..request(&tom, number, CommandKind::Write { tag, value: 61.0 })
     };
     let refused = [
         (None, "this tag asks for a second person".to_owned()),
@@ -211,8 +211,10 @@ async fn of_two_operators_at_once_the_second_is_told_that_the_value_has_changed_
     let guarded = Guarded::start(|_| {}).await;
     let (tom, tina) = (guarded.person("tom").await, guarded.person("tina").await);
     let (tag, seen) = (guarded.tag("TIC-1.SV"), guarded.value("TIC-1.SV"));
-    let write =
-        |session, number, value, seen| OrderRequest { seen, ..request(session, number, Command::Write { tag, value }) };
+    let write = |session, number, value, seen| OrderRequest {
+        seen,
+        ..request(session, number, CommandKind::Write { tag, value })
+    };
     assert_eq!(guarded.order(&tom, write(&tom, 1, 61.0, seen)).await.outcome, Outcome::Verified);
     let second = guarded.order(&tina, write(&tina, 1, 62.0, seen)).await;
     let Outcome::Refused(Refusal::ChangedTo(now)) = &second.outcome else { panic!("{:?}", second.outcome) };

@@ -10,7 +10,7 @@ use sightglass::{
     plant::{
         PlantDef,
         alarm::AlarmCommand,
-        command::{Command, OrderStatus, Outcome, Refusal},
+        command::{CommandKind, OrderStatus, Outcome, Refusal},
         def::{AlarmId, DeviceId, LineId, Serial},
         diagnostics::{Diagnostic, Scan},
         orders::outcome_words,
@@ -68,23 +68,23 @@ fn look(action: &'static str, by: &'static str) -> Row {
 }
 
 /// A new command does not compile until it has a row here; put it into [`commands`] as well.
-fn of_command(command: &Command) -> Row {
-    match command {
-        Command::Write { .. } => row("write", "--TS--"),
-        Command::Alarm(AlarmCommand::Acknowledge { .. }) => row("acknowledge", "--TS--"),
-        Command::Alarm(AlarmCommand::AcknowledgeAll { .. }) => row("acknowledge", "--TS--"),
-        Command::Alarm(AlarmCommand::Silence) => row("silence", "--TS--"),
-        Command::Alarm(AlarmCommand::Reset(_)) => row("reset", "--TS--"),
-        Command::Alarm(AlarmCommand::Shelve { .. }) => row("shelve", "--TS--"),
-        Command::Alarm(AlarmCommand::Unshelve(_)) => row("unshelve", "--TS--"),
-        Command::Alarm(AlarmCommand::OutOfService(_)) => row("out of service", "---S--"),
-        Command::Alarm(AlarmCommand::InService(_)) => row("in service", "---S--"),
-        Command::Refresh(_) => look("refresh", "--TS--"),
-        Command::Connect(_, false) => row("disconnect", "--TS--"),
-        Command::Connect(_, true) => row("connect", "--TS--"),
-        Command::Configure(_) => row("configure", "---S--"),
-        Command::SaveSettings(_) => row("save settings", "---S--"),
-        Command::Test(_, diagnostic) => match diagnostic {
+fn of_command(kind: &CommandKind) -> Row {
+    match kind {
+        CommandKind::Write { .. } => row("write", "--TS--"),
+        CommandKind::Alarm(AlarmCommand::Acknowledge { .. }) => row("acknowledge", "--TS--"),
+        CommandKind::Alarm(AlarmCommand::AcknowledgeAll { .. }) => row("acknowledge", "--TS--"),
+        CommandKind::Alarm(AlarmCommand::Silence) => row("silence", "--TS--"),
+        CommandKind::Alarm(AlarmCommand::Reset(_)) => row("reset", "--TS--"),
+        CommandKind::Alarm(AlarmCommand::Shelve { .. }) => row("shelve", "--TS--"),
+        CommandKind::Alarm(AlarmCommand::Unshelve(_)) => row("unshelve", "--TS--"),
+        CommandKind::Alarm(AlarmCommand::OutOfService(_)) => row("out of service", "---S--"),
+        CommandKind::Alarm(AlarmCommand::InService(_)) => row("in service", "---S--"),
+        CommandKind::Refresh(_) => look("refresh", "--TS--"),
+        CommandKind::Connect(_, false) => row("disconnect", "--TS--"),
+        CommandKind::Connect(_, true) => row("connect", "--TS--"),
+        CommandKind::Configure(_) => row("configure", "---S--"),
+        CommandKind::SaveSettings(_) => row("save settings", "---S--"),
+        CommandKind::Test(_, diagnostic) => match diagnostic {
             Diagnostic::Send(_) => row("test", "---S--"),
             Diagnostic::Scan(Scan { serials, .. }) if !serials.is_empty() => row("test", "---S--"),
             Diagnostic::Scan(_)
@@ -92,17 +92,17 @@ fn of_command(command: &Command) -> Row {
             | Diagnostic::Identify { .. }
             | Diagnostic::Read { .. } => row("test", "--TS--"),
         },
-        Command::StopTest(_) => row("stop test", "--TS--"),
-        Command::ReadSets => look("read sets", "--TS--"),
-        Command::SaveSet { .. } => row("save set", "--TS--"),
-        Command::Restore(_) => row("restore set", "--TS--"),
-        Command::StopRestore(_) => row("stop restore", "--TS--"),
-        Command::HandOver => row("hand over", "--TS--"),
-        Command::TakeOver => row("take over", "--TS--"),
+        CommandKind::StopTest(_) => row("stop test", "--TS--"),
+        CommandKind::ReadSets => look("read sets", "--TS--"),
+        CommandKind::SaveSet { .. } => row("save set", "--TS--"),
+        CommandKind::Restore(_) => row("restore set", "--TS--"),
+        CommandKind::StopRestore(_) => row("stop restore", "--TS--"),
+        CommandKind::HandOver => row("hand over", "--TS--"),
+        CommandKind::TakeOver => row("take over", "--TS--"),
     }
 }
 
-fn commands(def: &PlantDef, person: usize) -> Vec<Command> {
+fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
     let (alarm, device, line) = (AlarmId(0), DeviceId(0), LineId(0));
     let seen = Timestamp::UNIX_EPOCH;
     let scan = |serials| Diagnostic::Scan(Scan { first: 40, last: 40, serials, timeout: Duration::from_millis(50) });
@@ -119,33 +119,33 @@ fn commands(def: &PlantDef, person: usize) -> Vec<Command> {
     };
     let (from, changes) = ("none".into(), Vec::new());
     vec![
-        Command::Write { tag: def.tag_named("TIC-1.SV").unwrap(), value: 60.0 + person as f64 },
-        Command::Alarm(AlarmCommand::Acknowledge { alarm, seen }),
-        Command::Alarm(AlarmCommand::AcknowledgeAll { seen: Arc::from([(alarm, seen)]) }),
-        Command::Alarm(AlarmCommand::Silence),
-        Command::Alarm(AlarmCommand::Reset(alarm)),
-        Command::Alarm(AlarmCommand::Shelve { alarm, lasts: Duration::from_secs(60) }),
-        Command::Alarm(AlarmCommand::Unshelve(alarm)),
-        Command::Alarm(AlarmCommand::OutOfService(alarm)),
-        Command::Alarm(AlarmCommand::InService(alarm)),
-        Command::Refresh(device),
-        Command::HandOver,
-        Command::TakeOver,
-        Command::Test(line, Diagnostic::Loopback { unit: 1, data: 7, count: 1 }),
-        Command::Test(line, Diagnostic::Identify { unit: 1 }),
-        Command::Test(line, Diagnostic::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
-        Command::Test(line, scan(Vec::new())),
-        Command::Test(line, scan(vec![Serial::USUAL])),
-        Command::Test(line, Diagnostic::Send(vec![1, 3, 0, 0, 0, 1])),
-        Command::StopTest(line),
-        Command::ReadSets,
-        Command::SaveSet { device, name: format!("of {person}").into(), replace: false },
-        Command::Restore(Box::new(RestoreWish { device, from, set: Arc::new(set), changes })),
-        Command::StopRestore(device),
-        Command::Connect(line, false),
-        Command::Connect(line, true),
-        Command::Configure(Box::new(def.lines[0].clone())),
-        Command::SaveSettings(line),
+        CommandKind::Write { tag: def.tag_named("TIC-1.SV").unwrap(), value: 60.0 + person as f64 },
+        CommandKind::Alarm(AlarmCommand::Acknowledge { alarm, seen }),
+        CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen: Arc::from([(alarm, seen)]) }),
+        CommandKind::Alarm(AlarmCommand::Silence),
+        CommandKind::Alarm(AlarmCommand::Reset(alarm)),
+        CommandKind::Alarm(AlarmCommand::Shelve { alarm, lasts: Duration::from_secs(60) }),
+        CommandKind::Alarm(AlarmCommand::Unshelve(alarm)),
+        CommandKind::Alarm(AlarmCommand::OutOfService(alarm)),
+        CommandKind::Alarm(AlarmCommand::InService(alarm)),
+        CommandKind::Refresh(device),
+        CommandKind::HandOver,
+        CommandKind::TakeOver,
+        CommandKind::Test(line, Diagnostic::Loopback { unit: 1, data: 7, count: 1 }),
+        CommandKind::Test(line, Diagnostic::Identify { unit: 1 }),
+        CommandKind::Test(line, Diagnostic::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
+        CommandKind::Test(line, scan(Vec::new())),
+        CommandKind::Test(line, scan(vec![Serial::USUAL])),
+        CommandKind::Test(line, Diagnostic::Send(vec![1, 3, 0, 0, 0, 1])),
+        CommandKind::StopTest(line),
+        CommandKind::ReadSets,
+        CommandKind::SaveSet { device, name: format!("of {person}").into(), replace: false },
+        CommandKind::Restore(Box::new(RestoreWish { device, from, set: Arc::new(set), changes })),
+        CommandKind::StopRestore(device),
+        CommandKind::Connect(line, false),
+        CommandKind::Connect(line, true),
+        CommandKind::Configure(Box::new(def.lines[0].clone())),
+        CommandKind::SaveSettings(line),
     ]
 }
 
@@ -181,13 +181,13 @@ async fn every_command_is_let_through_or_refused_as_the_table_says_and_nothing_r
             assert_eq!(after, before, "something that was refused has reached the line");
         }
         let session = sits(&guarded, person).await;
-        for (number, command) in (1..).zip(commands(&guarded.def, person)) {
-            let row = of_command(&command);
-            let said = format!("{command:?} by {}", PEOPLE[person]);
+        for (number, kind) in (1..).zip(commands(&guarded.def, person)) {
+            let row = of_command(&kind);
+            let said = format!("{kind:?} by {}", PEOPLE[person]);
             // So slow that each refusal is on record by itself.
             guarded.pass(Duration::from_secs(2)).await;
             let written = guarded.entries().len();
-            let status = guarded.order(&session, request(&session, number, command)).await;
+            let status = guarded.order(&session, request(&session, number, kind)).await;
             assert_eq!(is_permitted(&status), row.lets(person), "{said}: {:?}", status.outcome);
             if !row.lets(person) {
                 assert_eq!(status.outcome, Outcome::Refused(Refusal::NotPermitted(row.why(person))), "{said}");
@@ -274,8 +274,8 @@ async fn every_wish_is_granted_or_refused_as_the_table_says_and_is_on_record() {
     // What the command line does when a terminal wishes something of the station as a whole, but for the doing.
     let heard = tokio::spawn(async move {
         let mut heard = Vec::new();
-        while let Some(command) = asked.recv().await {
-            match command {
+        while let Some(request) = asked.recv().await {
+            match request {
                 station::LifecycleRequest::Reload(reply) => {
                     heard.push("reload");
                     reply.send(Ok(())).unwrap();

@@ -12,7 +12,7 @@ use sightglass::{
     },
     plant::{
         PlantDef,
-        command::{Command as Wish, Outcome},
+        command::{CommandKind, Outcome},
         def::{CsvDialect, LineId},
     },
     profile::{self, Search},
@@ -151,12 +151,12 @@ async fn wait(session: &Session, clock: Clock, seconds: u64) {
 }
 
 async fn write(session: &Session, def: &PlantDef, tag: &str, value: f64, number: u32) {
-    order(session, Wish::Write { tag: def.tag_named(tag).unwrap(), value }, number).await;
+    order(session, CommandKind::Write { tag: def.tag_named(tag).unwrap(), value }, number).await;
 }
 
 /// Sends an order and waits for its good end.
-async fn order(session: &Session, command: Wish, number: u32) {
-    let id = session.order(number, command).unwrap();
+async fn order(session: &Session, kind: CommandKind, number: u32) {
+    let id = session.order(number, kind).unwrap();
     let mut snapshots = session.snapshots.clone();
     let outcome = loop {
         let status = snapshots.borrow_and_update().orders.iter().find(|order| order.id == id).cloned();

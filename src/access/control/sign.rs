@@ -12,7 +12,7 @@ use crate::{
     access::{OrderRequest, Signature, user},
     plant::{
         PlantDef,
-        command::{Command, Refusal},
+        command::{CommandKind, Refusal},
         def::{Sign, TagId},
         interlock,
     },
@@ -21,7 +21,7 @@ use crate::{
 impl AccessControl {
     /// Lets an order through whose role is enough, once it is signed as its tag asks.
     pub(super) fn signed(&mut self, terminal: u32, mut request: OrderRequest, at: Timestamp) -> Vec<Effect> {
-        let needed = needed(&self.def, &request.command).filter(|_| self.people.is_some());
+        let needed = needed(&self.def, &request.kind).filter(|_| self.people.is_some());
         let sign = request.sign.take();
         let (Some(needed), Some(session)) = (needed, self.sessions.get(&terminal)) else {
             return self.let_through(terminal, request, None);
@@ -80,7 +80,7 @@ impl AccessControl {
             effects.extend(self.not_signed(terminal, request, told, at));
             return effects;
         }
-        let needed = right::needs(&request.command);
+        let needed = right::needs(&request.kind);
         // Meanwhile the terminal may have been locked.
         if let Err(why) = self.may(terminal, Some(needed)) {
             return self.refuse_order(terminal, request, Refusal::NotPermitted(why), at);
@@ -112,7 +112,7 @@ impl AccessControl {
 }
 
 /// What a command must be signed with. A stop never waits for a signature.
-pub fn needed(def: &PlantDef, command: &Command) -> Option<Sign> {
+pub fn needed(def: &PlantDef, kind: &CommandKind) -> Option<Sign> {
     let asks = |tag: TagId, value: f64| {
         let sign = def.tags.get(tag.index())?.sign?;
         (!interlock::is_stop(def, tag, value)).then_some(sign)
@@ -122,20 +122,22 @@ pub fn needed(def: &PlantDef, command: &Command) -> Option<Sign> {
         (Some(Sign::Password), _) | (_, Some(Sign::Password)) => Some(Sign::Password),
         (None, None) => None,
     };
-    match command {
-        Command::Write { tag, value } => asks(*tag, *value),
-        Command::Restore(wish) => wish.changes.iter().map(|change| asks(change.tag, change.new)).fold(None, strictest),
-        Command::Alarm(_)
-        | Command::Refresh(_)
-        | Command::Connect(..)
-        | Command::Configure(_)
-        | Command::SaveSettings(_)
-        | Command::Test(..)
-        | Command::StopTest(_)
-        | Command::ReadSets
-        | Command::SaveSet { .. }
-        | Command::StopRestore(_)
-        | Command::HandOver
-        | Command::TakeOver => None,
+    match kind {
+        CommandKind::Write { tag, value } => asks(*tag, *value),
+        CommandKind::Restore(wish) => {
+            wish.changes.iter().map(|change| asks(change.tag, change.new)).fold(None, strictest)
+        }
+        CommandKind::Alarm(_)
+        | CommandKind::Refresh(_)
+        | CommandKind::Connect(..)
+        | CommandKind::Configure(_)
+        | CommandKind::SaveSettings(_)
+        | CommandKind::Test(..)
+        | CommandKind::StopTest(_)
+        | CommandKind::ReadSets
+        | CommandKind::SaveSet { .. }
+        | CommandKind::StopRestore(_)
+        | CommandKind::HandOver
+        | CommandKind::TakeOver => None,
     }
 }

@@ -7,7 +7,7 @@ use super::*;
 use crate::{
     access::{Signature, tries::Key, user::Change},
     plant::{
-        command::{Command, OrderId},
+        command::{CommandKind, OrderId},
         def::Sign,
         fixture,
         role::AccessDef,
@@ -113,10 +113,10 @@ impl Bench {
     }
 
     /// `None`: nothing reached the plant. `Some(None)`: permitted.
-    fn order(&mut self, terminal: u32, command: Command, sign: Option<Signature>) -> Option<(Order, Option<Refusal>)> {
+    fn order(&mut self, terminal: u32, kind: CommandKind, sign: Option<Signature>) -> Option<(Order, Option<Refusal>)> {
         self.last_order += 1;
         let id = OrderId { terminal, number: self.last_order };
-        let request = OrderRequest { sign, note: Some("why".into()), ..OrderRequest::new(0, id, command) };
+        let request = OrderRequest { sign, note: Some("why".into()), ..OrderRequest::new(0, id, kind) };
         let effects = self.access.order(terminal, request, self.now);
         let effects = self.work(effects);
         let order = effects.into_iter().find_map(|effect| match effect {
@@ -137,8 +137,8 @@ impl Bench {
     }
 }
 
-const RUN: Command = Command::Write { tag: fixture::RUN, value: 1.0 };
-const SV: Command = Command::Write { tag: fixture::SV, value: 50.0 };
+const RUN: CommandKind = CommandKind::Write { tag: fixture::RUN, value: 1.0 };
+const SV: CommandKind = CommandKind::Write { tag: fixture::SV, value: 50.0 };
 
 #[test]
 fn wrong_user_wrong_password_and_locked_out_look_the_same_and_the_book_knows_which() {

@@ -12,7 +12,7 @@ use crate::{
     plant::{
         Snapshot,
         alarm::AlarmState,
-        command::{Command, OrderId, OrderStatus, Outcome},
+        command::{CommandKind, OrderId, OrderStatus, Outcome},
         def::{AlarmId, Framing, TagId},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState},
         event::{Fault, LineState},
@@ -113,7 +113,7 @@ fn change(snapshot: &mut Snapshot, (kind, place, amount): (u8, u16, u32)) {
                 by: "anna".into(),
                 from: "pts/3".into(),
                 note: None,
-                command: Command::Write { tag: TagId(place), value: 1.0 },
+                kind: CommandKind::Write { tag: TagId(place), value: 1.0 },
                 at,
                 old: None,
                 outcome: Outcome::Pending,

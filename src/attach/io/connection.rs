@@ -118,7 +118,7 @@ impl Asking {
     async fn order(&self, order: OrderRequest) {
         let id = order.id;
         let sent = if id.terminal == self.session.terminal {
-            check::command(&self.def, &order.command)
+            check::command(&self.def, &order.kind)
         } else {
             Err(format!("an order of terminal {}, this is terminal {}", id.terminal, self.session.terminal))
         };

@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use super::*;
 use crate::plant::alarm::AlarmCommand;
-use crate::{plant::command::Command, ui::fixture::Fixture};
+use crate::{plant::command::CommandKind, ui::fixture::Fixture};
 
 const NOT_CONFIRMED: Outcome = Outcome::NotConfirmed(NotConfirmed::ConnectionLost);
 
 fn request(terminal: u32, number: u32) -> OrderRequest {
-    OrderRequest::new(1, OrderId { terminal, number }, Command::Alarm(AlarmCommand::Silence))
+    OrderRequest::new(1, OrderId { terminal, number }, CommandKind::Alarm(AlarmCommand::Silence))
 }
 
 fn snapshot(orders: &[(u32, u32, Outcome)]) -> Arc<Snapshot> {

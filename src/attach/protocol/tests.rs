@@ -8,7 +8,7 @@ use crate::plant::alarm::AlarmCommand;
 use crate::{
     attach::check,
     plant::{
-        command::Command,
+        command::CommandKind,
         def::{AlarmId, DeviceId, LineDef, LineId, TagId},
         diagnostics::Diagnostic,
         role::Role,
@@ -79,7 +79,8 @@ fn what_a_terminal_says_of_itself_cannot_disturb_a_screen_or_say_who_it_is() {
 
 #[test]
 fn requests_and_news_survive_the_way() {
-    let order = OrderRequest::new(7, OrderId { terminal: 1, number: 2 }, Command::Write { tag: TagId(0), value: 0.1 });
+    let order =
+        OrderRequest::new(7, OrderId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(0), value: 0.1 });
     let asked = [
         Asked::Order(Box::new(order)),
         Asked::Ask { ticket: 1, query: Query::Journal { from: now(), to: now(), limit: 5 } },
@@ -120,30 +121,30 @@ fn what_this_plant_does_not_have_never_reaches_it() {
     let def = Fixture::normal().snapshot().def.clone();
     let far = u16::MAX;
     let commands = [
-        Command::Write { tag: TagId(far), value: 1.0 },
-        Command::Alarm(AlarmCommand::Reset(AlarmId(far))),
-        Command::Refresh(DeviceId(far)),
-        Command::Connect(LineId(far), true),
-        Command::SaveSettings(LineId(far)),
-        Command::StopTest(LineId(far)),
-        Command::SaveSet { device: DeviceId(far), name: "x".into(), replace: false },
-        Command::StopRestore(DeviceId(far)),
+        CommandKind::Write { tag: TagId(far), value: 1.0 },
+        CommandKind::Alarm(AlarmCommand::Reset(AlarmId(far))),
+        CommandKind::Refresh(DeviceId(far)),
+        CommandKind::Connect(LineId(far), true),
+        CommandKind::SaveSettings(LineId(far)),
+        CommandKind::StopTest(LineId(far)),
+        CommandKind::SaveSet { device: DeviceId(far), name: "x".into(), replace: false },
+        CommandKind::StopRestore(DeviceId(far)),
     ];
-    for command in commands {
-        let why = check::command(&def, &command).unwrap_err();
-        assert!(why.contains("number 65535"), "{command:?}: {why}");
+    for kind in commands {
+        let why = check::command(&def, &kind).unwrap_err();
+        assert!(why.contains("number 65535"), "{kind:?}: {why}");
     }
     let long = [
-        Command::SaveSet { device: DeviceId(0), name: "x".repeat(33).into(), replace: false },
-        Command::Test(LineId(0), Diagnostic::Send(vec![0; 514])),
-        Command::Configure(Box::new(LineDef { name: "x".repeat(5_000), ..def.lines[0].clone() })),
+        CommandKind::SaveSet { device: DeviceId(0), name: "x".repeat(33).into(), replace: false },
+        CommandKind::Test(LineId(0), Diagnostic::Send(vec![0; 514])),
+        CommandKind::Configure(Box::new(LineDef { name: "x".repeat(5_000), ..def.lines[0].clone() })),
     ];
-    for command in long {
-        let why = check::command(&def, &command).unwrap_err();
+    for kind in long {
+        let why = check::command(&def, &kind).unwrap_err();
         assert!(why.contains("expected"), "{why}");
     }
-    assert_eq!(check::command(&def, &Command::Configure(Box::new(def.lines[0].clone()))), Ok(()));
-    assert_eq!(check::command(&def, &Command::Write { tag: TagId(0), value: 1.0 }), Ok(()));
+    assert_eq!(check::command(&def, &CommandKind::Configure(Box::new(def.lines[0].clone()))), Ok(()));
+    assert_eq!(check::command(&def, &CommandKind::Write { tag: TagId(0), value: 1.0 }), Ok(()));
     let series = |tags: Vec<TagId>, buckets| Query::Series { tags, from: now(), to: now(), buckets };
     let report = |days: i64| {
         let to = now() + jiff::SignedDuration::from_hours(24 * days);
@@ -182,14 +183,14 @@ proptest! {
         let order = OrderRequest {
             note: Some("because".into()),
             sign: Some(signature),
-            ..OrderRequest::new(7, OrderId { terminal: 1, number: 2 }, Command::Write { tag: TagId(3), value: 7.5 })
+            ..OrderRequest::new(7, OrderId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(3), value: 7.5 })
         };
         let mut bytes = body(encode(&Asked::Order(Box::new(order)), REQUEST_BYTES_MAX).unwrap());
         let place = place % bytes.len();
         bytes[place] = byte;
         bytes.truncate(bytes.len() - end % bytes.len());
         if let Ok(Asked::Order(order)) = decode::<Asked>(&bytes, "message") {
-            let _ = check::command(&Fixture::normal().def, &order.command);
+            let _ = check::command(&Fixture::normal().def, &order.kind);
         }
     }
 }

@@ -25,14 +25,14 @@ impl Plant {
     pub(super) fn alarm_order(
         &mut self,
         order: &Order,
-        command: AlarmCommand,
+        alarm_command: AlarmCommand,
         at: Timestamp,
         effects: &mut Effects,
     ) -> Option<ActionRecord> {
         // The steps of one alarm must not go back in time, whatever the clock does.
         let now = self.at.max(at);
         let (manager, by, note) = (&mut self.alarm_manager, &order.by, order.note.as_ref());
-        let done = match command {
+        let done = match alarm_command {
             AlarmCommand::Acknowledge { alarm, seen } => {
                 manager.acknowledge(alarm, seen, note, now, by).map(|step| vec![step])
             }

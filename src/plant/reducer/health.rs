@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::Plant;
 use crate::plant::{
-    command::{BusRequest, Command, Outcome},
+    command::{BusRequest, CommandKind, Outcome},
     def::{DeviceId, LineId, TagId},
     ne107::{self, DiagnosisInput},
     record::Record,
@@ -61,8 +61,8 @@ impl Plant {
     /// Is a device left alone because an action takes it some time (saving its settings)?
     fn settling(&self, device: DeviceId) -> bool {
         let actions = &self.def.device(device).actions;
-        self.desk.orders().any(|order| match (&order.command, &order.outcome) {
-            (Command::Write { tag, value }, Outcome::Verified | Outcome::NotConfirmed(_) | Outcome::Failed(_)) => {
+        self.desk.orders().any(|order| match (&order.kind, &order.outcome) {
+            (CommandKind::Write { tag, value }, Outcome::Verified | Outcome::NotConfirmed(_) | Outcome::Failed(_)) => {
                 let age = Duration::try_from(self.at.duration_since(order.at)).unwrap_or_default();
                 actions.iter().any(|action| action.tag == *tag && action.value == *value && age < action.settle)
             }
@@ -109,7 +109,7 @@ mod tests {
         plant.on_event(Event::Read { at: at(0), device: TIC, values, texts: Vec::new(), reply, exchange: None });
         assert_eq!(plant.snapshot().device(TIC).diagnosis, None);
         let id = OrderId { terminal: 1, number: 1 };
-        plant.on_order(Order::new(id, "anna", Command::Write { tag: SV, value: 1.0 }), at(1));
+        plant.on_order(Order::new(id, "anna", CommandKind::Write { tag: SV, value: 1.0 }), at(1));
         plant.on_event(Event::Wrote { at: at(1), id: WriteId(1), result: WriteResult::ReadBack(10.0) });
         assert_eq!(plant.snapshot().device(TIC).diagnosis, Some(Reason::Settling));
         assert_eq!(plant.snapshot().device(PLC).diagnosis, None);

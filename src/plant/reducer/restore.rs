@@ -9,7 +9,7 @@ use jiff::Timestamp;
 
 use super::{Effects, Plant};
 use crate::plant::{
-    command::{BusRequest, Command, NotConfirmed, Order, OrderId, Outcome, Refusal},
+    command::{BusRequest, CommandKind, NotConfirmed, Order, OrderId, Outcome, Refusal},
     def::{DeviceId, LineId, TagId},
     parameter_set::{self, Problem, StoredSet},
     process_image::ProcessImage,
@@ -39,14 +39,14 @@ pub enum SetWork {
 impl Plant {
     /// Takes an order about sets; others are not for this place.
     pub(super) fn set_order(&mut self, order: &Order, at: Timestamp, effects: &mut Effects) -> Option<ActionRecord> {
-        match &order.command {
-            Command::ReadSets => {
+        match &order.kind {
+            CommandKind::ReadSets => {
                 effects.sets = Some(SetWork::Read);
                 // A read is not an operator action.
                 let _ = self.desk.note(order, Outcome::Verified, &self.image, at);
                 None
             }
-            Command::SaveSet { device, name, replace } => {
+            CommandKind::SaveSet { device, name, replace } => {
                 let trusted = trusted(&self.image);
                 let set = parameter_set::take(&self.def, *device, name, order.by.clone(), at, &trusted);
                 let problem = match parameter_set::check_name(name) {
@@ -61,8 +61,8 @@ impl Plant {
                 effects.sets = Some(SetWork::Write { order: order.id, set: Box::new(set), replace: *replace });
                 None
             }
-            Command::Restore(wish) => self.begin_restore(order, wish, at, effects),
-            Command::StopRestore(device) => {
+            CommandKind::Restore(wish) => self.begin_restore(order, wish, at, effects),
+            CommandKind::StopRestore(device) => {
                 let running = self.restores.iter_mut().find(|run| run.device == *device && run.at_work());
                 let outcome = match running {
                     Some(run) => {
@@ -184,7 +184,7 @@ impl Plant {
             step.order = Some(id);
             let (tag, value) = (step.change.tag, step.change.new);
             let seen = Some(step.change.old);
-            let order = Order { seen, ..Order::new(id, by, Command::Write { tag, value }) };
+            let order = Order { seen, ..Order::new(id, by, CommandKind::Write { tag, value }) };
             let refusal = if line_changed { Some(Refusal::LineChanged) } else { overtaken(step, &self.image) };
             if let Some(why) = refusal {
                 let action = self.desk.note(&order, Outcome::Refused(why), &self.image, at);

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::{Effects, Plant};
 use crate::plant::{
-    command::{BusRequest, Command, Order, OrderId, Outcome, Refusal},
+    command::{BusRequest, CommandKind, Order, OrderId, Outcome, Refusal},
     def::{LineDef, LineId},
     line_check::valid,
     record::{ActionRecord, Record},
@@ -15,43 +15,43 @@ use crate::plant::{
 impl Plant {
     /// Takes an order for a line itself; others are not for this place.
     pub(super) fn line_order(&mut self, order: &Order, at: Timestamp, effects: &mut Effects) -> Option<ActionRecord> {
-        match &order.command {
-            Command::Configure(settings)
+        match &order.kind {
+            CommandKind::Configure(settings)
                 if self.def.lines.get(settings.id.index()).is_none_or(|line| line.name != settings.name) =>
             {
                 return self.desk.note(order, Outcome::Refused(Refusal::NotALine), &self.image, at);
             }
-            Command::Configure(settings) if let Err(why) = valid(settings) => {
+            CommandKind::Configure(settings) if let Err(why) = valid(settings) => {
                 return self.desk.note(order, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
             }
-            Command::Test(_, diagnostic) if let Err(why) = diagnostic.check() => {
+            CommandKind::Test(_, diagnostic) if let Err(why) = diagnostic.check() => {
                 return self.desk.note(order, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
             }
-            Command::Configure(settings) => {
+            CommandKind::Configure(settings) => {
                 self.remember_settings(settings);
                 self.restores_lose_line(settings.id);
                 effects.bus.push((settings.id, BusRequest::Configure(settings.clone())));
             }
-            Command::Test(line, diagnostic) => {
+            CommandKind::Test(line, diagnostic) => {
                 let request = BusRequest::Test { id: order.id, by: order.by.clone(), diagnostic: diagnostic.clone() };
                 effects.bus.push((*line, request));
             }
-            Command::StopTest(line) => effects.bus.push((*line, BusRequest::StopTest)),
-            Command::SaveSettings(line) => {
+            CommandKind::StopTest(line) => effects.bus.push((*line, BusRequest::StopTest)),
+            CommandKind::SaveSettings(line) => {
                 effects.save = Some((order.id, self.settings(*line).clone()));
                 self.desk.take(order, at);
                 return None;
             }
-            Command::Write { .. }
-            | Command::Alarm(_)
-            | Command::Refresh(_)
-            | Command::Connect(..)
-            | Command::ReadSets
-            | Command::SaveSet { .. }
-            | Command::Restore(_)
-            | Command::StopRestore(_)
-            | Command::HandOver
-            | Command::TakeOver => return None,
+            CommandKind::Write { .. }
+            | CommandKind::Alarm(_)
+            | CommandKind::Refresh(_)
+            | CommandKind::Connect(..)
+            | CommandKind::ReadSets
+            | CommandKind::SaveSet { .. }
+            | CommandKind::Restore(_)
+            | CommandKind::StopRestore(_)
+            | CommandKind::HandOver
+            | CommandKind::TakeOver => return None,
         }
         self.desk.take(order, at);
         None
@@ -118,14 +118,14 @@ mod tests {
         plant.on_event(Event::Report { at: at(1), line: L1, report });
     }
 
-    fn order(plant: &mut Plant, number: u32, command: Command) -> Effects {
+    fn order(plant: &mut Plant, number: u32, kind: CommandKind) -> Effects {
         let id = OrderId { terminal: 1, number };
-        plant.on_order(Order::new(id, "anna", command), at(i64::from(number)))
+        plant.on_order(Order::new(id, "anna", kind), at(i64::from(number)))
     }
 
     /// Orders other settings and lets the line take them.
     fn try_out(plant: &mut Plant, number: u32, settings: LineDef) -> Effects {
-        let mut effects = order(plant, number, Command::Configure(Box::new(settings.clone())));
+        let mut effects = order(plant, number, CommandKind::Configure(Box::new(settings.clone())));
         assert_eq!(actions(&effects), [], "not before the line has it");
         effects.records.extend(plant.on_delivered(L1, &effects.bus[0].1).records);
         works_with(plant, &settings);
@@ -167,15 +167,15 @@ mod tests {
     fn what_no_line_can_carry_is_refused_and_never_sent() {
         let used = fixture::plant().lines[0].clone();
         let scan = Scan { first: 1, last: 2, serials: Vec::new(), timeout: Duration::MAX };
-        for command in [
-            Command::Configure(Box::new(LineDef { timeout: Duration::MAX, ..used.clone() })),
-            Command::Configure(Box::new(LineDef { timeout: Duration::ZERO, ..used })),
-            Command::Configure(Box::new(baud(0))),
-            Command::Test(L1, Diagnostic::Scan(scan)),
+        for kind in [
+            CommandKind::Configure(Box::new(LineDef { timeout: Duration::MAX, ..used.clone() })),
+            CommandKind::Configure(Box::new(LineDef { timeout: Duration::ZERO, ..used })),
+            CommandKind::Configure(Box::new(baud(0))),
+            CommandKind::Test(L1, Diagnostic::Scan(scan)),
         ] {
             let mut plant = plant();
-            let effects = order(&mut plant, 1, command.clone());
-            assert_eq!(effects.bus, [], "{command:?} goes to the line");
+            let effects = order(&mut plant, 1, kind.clone());
+            assert_eq!(effects.bus, [], "{kind:?} goes to the line");
             let refused = actions(&effects);
             assert!(refused.len() == 1 && refused[0].3.starts_with("refused: "), "{refused:?}");
             assert_eq!(before(&plant), None, "nothing to take back");
@@ -188,7 +188,7 @@ mod tests {
         let record = actions(&try_out(&mut plant, 1, baud(19_200)));
         let new = "RTU /dev/null 19200 8N1";
         assert_eq!(record, [("anna".into(), "configure".into(), new.into(), "verified".into())]);
-        let effects = order(&mut plant, 2, Command::StopTest(L1));
+        let effects = order(&mut plant, 2, CommandKind::StopTest(L1));
         let record = actions(&plant.on_delivered(L1, &effects.bus[0].1));
         assert_eq!(record, [("anna".into(), "stop test".into(), String::new(), "verified".into())]);
     }
@@ -196,11 +196,11 @@ mod tests {
     #[test]
     fn an_order_that_the_line_had_no_room_for_is_on_record_as_refused() {
         let mut plant = plant();
-        let test = Command::Test(L1, crate::plant::diagnostics::Diagnostic::Identify { unit: 1 });
-        for (number, command) in
-            [(1, Command::Configure(Box::new(baud(19_200)))), (2, test), (3, Command::StopTest(L1))]
+        let test = CommandKind::Test(L1, crate::plant::diagnostics::Diagnostic::Identify { unit: 1 });
+        for (number, kind) in
+            [(1, CommandKind::Configure(Box::new(baud(19_200)))), (2, test), (3, CommandKind::StopTest(L1))]
         {
-            let effects = order(&mut plant, number, command);
+            let effects = order(&mut plant, number, kind);
             assert_eq!(actions(&effects), []);
             let refused = actions(&plant.on_undeliverable(L1, &effects.bus[0].1));
             assert!(refused.len() == 1 && refused[0].3.starts_with("refused"), "{refused:?}");
@@ -211,7 +211,7 @@ mod tests {
     fn what_is_saved_is_what_the_line_works_with() {
         let mut plant = plant();
         try_out(&mut plant, 1, baud(19_200));
-        let effects = order(&mut plant, 2, Command::SaveSettings(L1));
+        let effects = order(&mut plant, 2, CommandKind::SaveSettings(L1));
         let id = OrderId { terminal: 1, number: 2 };
         assert_eq!(effects.save, Some((id, baud(19_200))));
         assert_eq!(actions(&effects), [], "not before it is done");
@@ -226,7 +226,7 @@ mod tests {
     fn settings_that_were_not_saved_can_still_be_taken_back() {
         let mut plant = plant();
         try_out(&mut plant, 1, baud(19_200));
-        order(&mut plant, 2, Command::SaveSettings(L1));
+        order(&mut plant, 2, CommandKind::SaveSettings(L1));
         let effects = plant.on_saved(OrderId { terminal: 1, number: 2 }, &baud(19_200), Err("the disk is full".into()));
         assert_eq!(actions(&effects)[0].3, "refused: not saved: the disk is full");
         assert!(before(&plant).is_some());

@@ -43,14 +43,14 @@ fn running() -> Plant {
     plant
 }
 
-fn order(number: u32, command: Command) -> Order {
-    Order::new(OrderId { terminal: 1, number }, "anna", command)
+fn order(number: u32, kind: CommandKind) -> Order {
+    Order::new(OrderId { terminal: 1, number }, "anna", kind)
 }
 
 /// A write by an operator who sees the plant's present values.
 fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> Order {
-    let command = Command::Write { tag, value };
-    Order { seen: plant.snapshot().seen(&command), ..order(number, command) }
+    let kind = CommandKind::Write { tag, value };
+    Order { seen: plant.snapshot().seen(&kind), ..order(number, kind) }
 }
 
 /// Orders `SV := value`, answers with `result`, and gives the outcome and the raw number that was sent.
@@ -115,8 +115,8 @@ fn after_a_write_that_may_have_failed_the_old_value_is_not_trusted() {
 #[test]
 fn a_handover_is_on_record_with_its_note() {
     let mut plant = running();
-    let mut action = |number, command, note: Option<String>| {
-        let order = Order { note: note.map(Into::into), ..order(number, command) };
+    let mut action = |number, kind, note: Option<String>| {
+        let order = Order { note: note.map(Into::into), ..order(number, kind) };
         let effects = plant.on_order(order, at(1));
         let [Record::Action(action)] = &effects.records[..] else { panic!("{effects:?}") };
         (action.action.to_string(), action.note.as_deref().map(str::to_owned), action.outcome.to_string())
@@ -125,18 +125,18 @@ fn a_handover_is_on_record_with_its_note() {
         (action.to_owned(), note.map(str::to_owned), outcome.to_owned())
     };
     assert_eq!(
-        action(1, Command::HandOver, Some("pump is loud".to_owned())),
+        action(1, CommandKind::HandOver, Some("pump is loud".to_owned())),
         told("hand over", Some("pump is loud"), "verified")
     );
-    assert_eq!(action(2, Command::TakeOver, None), told("take over", None, "verified"));
-    let (_, _, outcome) = action(3, Command::HandOver, Some("x".repeat(501)));
+    assert_eq!(action(2, CommandKind::TakeOver, None), told("take over", None, "verified"));
+    let (_, _, outcome) = action(3, CommandKind::HandOver, Some("x".repeat(501)));
     assert_eq!(outcome, "refused: more than 500 characters");
 }
 
 #[test]
 fn a_line_is_closed_when_it_says_so() {
     let mut plant = running();
-    let effects = plant.on_order(order(1, Command::Connect(L1, false)), at(1));
+    let effects = plant.on_order(order(1, CommandKind::Connect(L1, false)), at(1));
     assert_eq!((effects.bus.len(), effects.records.len()), (1, 0));
     assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Pending);
     let effects = plant.on_event(Event::Line { at: at(2), line: L1, state: LineState::Disconnected });
@@ -147,9 +147,9 @@ fn a_line_is_closed_when_it_says_so() {
             .iter()
             .any(|record| matches!(record, Record::Action(action) if &*action.action == "disconnect"))
     );
-    plant.on_order(order(2, Command::Connect(L1, false)), at(3));
+    plant.on_order(order(2, CommandKind::Connect(L1, false)), at(3));
     assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Unchanged);
-    let effects = plant.on_order(order(3, Command::Connect(L1, true)), at(4));
+    let effects = plant.on_order(order(3, CommandKind::Connect(L1, true)), at(4));
     plant.on_undeliverable(L1, &effects.bus[0].1);
     assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Busy));
 }
@@ -439,10 +439,10 @@ fn what_will_be_sent_is_blocked_whatever_was_typed() {
 #[test]
 fn a_lost_refresh_that_nobody_ordered_falsifies_no_order() {
     let mut plant = running();
-    let effects = plant.on_order(order(1, Command::Refresh(TIC)), at(1));
+    let effects = plant.on_order(order(1, CommandKind::Refresh(TIC)), at(1));
     plant.on_undeliverable(L1, &BusRequest::Refresh { device: TIC, order: None });
     assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Verified);
-    plant.on_order(order(2, Command::Refresh(TIC)), at(2));
+    plant.on_order(order(2, CommandKind::Refresh(TIC)), at(2));
     plant.on_undeliverable(L1, &effects.bus[0].1);
     let outcomes = plant.snapshot().orders.into_iter().map(|status| status.outcome).collect::<Vec<_>>();
     assert_eq!(outcomes, [Outcome::Verified, Outcome::Refused(Refusal::Busy)], "newest first");
@@ -474,7 +474,7 @@ fn a_write_is_recorded_with_the_value_that_the_device_holds() {
     let effects = plant.on_order(shown(&plant, 1, SV, 72.3), at(1));
     let BusRequest::Write { id, raw, .. } = effects.bus[0].1 else { panic!("a write was ordered") };
     assert_eq!(raw, 145.0, "72.5 °C goes out");
-    assert_eq!(plant.snapshot().orders[0].command, Command::Write { tag: SV, value: 72.5 }, "screens show it too");
+    assert_eq!(plant.snapshot().orders[0].kind, CommandKind::Write { tag: SV, value: 72.5 }, "screens show it too");
     let effects = plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(raw) });
     let action = action_of(&effects);
     assert_eq!((action.new.as_deref(), &*action.outcome), (Some("72.5 °C"), "verified"));
@@ -536,7 +536,7 @@ fn an_unchanged_double_is_not_refused_as_changed() {
 #[test]
 fn a_write_that_saw_no_value_is_asked_again_and_a_stop_is_not() {
     let mut plant = running();
-    let blind = |number, tag, value| order(number, Command::Write { tag, value });
+    let blind = |number, tag, value| order(number, CommandKind::Write { tag, value });
     let effects = plant.on_order(blind(1, SV, 65.0), at(1));
     assert_eq!(effects.bus, []);
     assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::NotSeen("70.0 °C".into())));

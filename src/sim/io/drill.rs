@@ -198,11 +198,11 @@ impl Task {
             ScenarioEvent::OperatorStep(step) => {
                 let Some(orders) = &self.trainer.operator else { return };
                 let snapshot = self.trainer.snapshots.borrow().clone();
-                let Some(command) = step.wish.command(&snapshot) else { return };
+                let Some(kind) = step.wish.command_kind(&snapshot) else { return };
                 self.ordered += 1;
                 let id = OrderId { terminal: OPERATOR, number: self.ordered };
-                let seen = snapshot.seen(&command);
-                let order = command::Order { seen, ..command::Order::new(id, "operator of the drill", command) };
+                let seen = snapshot.seen(&kind);
+                let order = command::Order { seen, ..command::Order::new(id, "operator of the drill", kind) };
                 if orders.try_send(order).is_err() {
                     tracing::error!("the station has not taken an order of the drill");
                 }

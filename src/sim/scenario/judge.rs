@@ -8,7 +8,7 @@ use super::{Scenario, Wish};
 use crate::plant::{
     Snapshot,
     alarm::manager::subject_name,
-    command::{Command, OrderStatus, Outcome},
+    command::{CommandKind, OrderStatus, Outcome},
     def::{AlarmId, PlantDef, TagId},
     record::{AlarmRecord, AlarmStep, Record},
 };
@@ -151,7 +151,7 @@ impl Judge {
     }
 
     fn on_order(&mut self, order: &OrderStatus) {
-        let (Some(at), Command::Write { tag, value }) = (self.elapsed(order.at), &order.command) else { return };
+        let (Some(at), CommandKind::Write { tag, value }) = (self.elapsed(order.at), &order.kind) else { return };
         let done = matches!(order.outcome, Outcome::Verified | Outcome::Unchanged);
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
             let Wish::Written(wanted, number) = expect.wish else { continue };

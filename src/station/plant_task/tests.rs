@@ -9,7 +9,7 @@ use crate::{
     history::io::alarm_file::{self, AlarmFile},
     plant::{
         alarm::AlarmCommand,
-        command::{Command, Outcome},
+        command::{CommandKind, Outcome},
         def::{AlarmId, TagId},
         event::Fault,
         fixture,
@@ -70,9 +70,9 @@ impl Station {
         let is_silent = |snapshot: &Arc<Snapshot>| snapshot.alarms.iter().any(|alarm| alarm.id == fixture::SILENT);
         let snapshot = self.snapshots.wait_for(is_silent).await.unwrap().clone();
         let silent = snapshot.alarms.iter().find(|alarm| alarm.id == fixture::SILENT).unwrap();
-        let command = silent.acknowledge();
-        assert!(matches!(command, Command::Alarm(AlarmCommand::Acknowledge { .. })));
-        self.orders.send(Order::new(ORDER, "anna", command)).await.unwrap();
+        let kind = silent.acknowledge();
+        assert!(matches!(kind, CommandKind::Alarm(AlarmCommand::Acknowledge { .. })));
+        self.orders.send(Order::new(ORDER, "anna", kind)).await.unwrap();
     }
 
     /// The first snapshot in which the acknowledgement has its end, recorded or not.

@@ -13,7 +13,7 @@ use super::*;
 use crate::access::{OrderRequest, Standing, Who};
 use crate::{plant::role::Role, station::Request};
 use crate::{
-    plant::{alarm::AlarmCommand, command::Command},
+    plant::{alarm::AlarmCommand, command::CommandKind},
     ui::fixture::Fixture,
 };
 
@@ -38,10 +38,10 @@ fn on_the_pty() {
             watch::channel(Arc::new(Standing { who: Some(who), view: true, ..Standing::default() }));
         tokio::spawn(async move {
             while let Some((_, request)) = taken.recv().await {
-                let Request::Order(OrderRequest { command, .. }) = request else { continue };
+                let Request::Order(OrderRequest { kind, .. }) = request else { continue };
                 let mut snapshot = Arc::unwrap_or_clone(Fixture::alarm().snapshot());
-                match command {
-                    Command::Alarm(AlarmCommand::Acknowledge { .. }) => {
+                match kind {
+                    CommandKind::Alarm(AlarmCommand::Acknowledge { .. }) => {
                         let panicked = tokio::spawn(async { panic!("a task of the station") }).await;
                         assert!(panicked.is_err());
                         snapshot.alarms = Arc::default();

@@ -60,7 +60,7 @@ impl ConfirmedValue {
         let unit = cx.snapshot.unit(self.tag);
         let by = cx.snapshot.orders.iter().find(|order| {
             order.outcome == Outcome::Verified
-                && order.command.written().is_some_and(|(tag, new)| tag == self.tag && Some(new) == now)
+                && order.kind.written().is_some_and(|(tag, new)| tag == self.tag && Some(new) == now)
         });
         let by = by.map_or(String::new(), |order| format!(" by {} {}", order.by, clock(order.at, &cx.def().time_zone)));
         let now = format!("{} {unit}", text(now));

@@ -12,7 +12,7 @@ use super::{
     window,
 };
 use crate::{
-    plant::{command::Command, def::TagId},
+    plant::{command::CommandKind, def::TagId},
     ui::{
         Confirmed, UiAction, ViewContext, interlock, keys, rights,
         widgets::{
@@ -55,8 +55,8 @@ impl Entry {
                 }
                 Ok(value) => {
                     let expected = self.expected.shown(cx);
-                    let command = Command::Write { tag: self.tag, value };
-                    return Next::Do(vec![UiAction::Confirmed(Confirmed { expected, ..command.into() })]);
+                    let kind = CommandKind::Write { tag: self.tag, value };
+                    return Next::Do(vec![UiAction::Confirmed(Confirmed { expected, ..kind.into() })]);
                 }
                 Err(problem) => self.problem = Some(problem),
             }
@@ -94,7 +94,7 @@ impl Entry {
         let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
         let notes = notes.chain(interlock::key_words(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
-        let missing = rights::missing(cx, &Command::Write { tag: self.tag, value: 0.0 });
+        let missing = rights::missing(cx, &CommandKind::Write { tag: self.tag, value: 0.0 });
         let told = self.problem.clone().or_else(|| self.expected.news(cx)).or(missing);
         let problem = wrap(&told.map_or(String::new(), |words| theme.enter(&words)), room);
         let inner = rows

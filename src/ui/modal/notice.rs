@@ -5,7 +5,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, window};
 use crate::{
-    plant::{command::Command, def::DeviceId, event::LineState, snapshot::DeviceState},
+    plant::{command::CommandKind, def::DeviceId, event::LineState, snapshot::DeviceState},
     ui::{
         UiAction, ViewContext, rights,
         widgets::text::{clock, width, wrap},
@@ -48,8 +48,8 @@ impl Notice {
     }
 
     /// Opens a form that ends in this command, or says why the present user may not give it, before anything is filled in.
-    pub fn or(cx: &ViewContext, title: &str, command: &Command, window: Modal) -> UiAction {
-        UiAction::Open(match rights::missing(cx, command) {
+    pub fn or(cx: &ViewContext, title: &str, kind: &CommandKind, window: Modal) -> UiAction {
+        UiAction::Open(match rights::missing(cx, kind) {
             Some(why) => Modal::Notice(Notice::new(title, vec![why])),
             None => window,
         })

@@ -3,7 +3,7 @@
 use crate::{
     access::control::sign,
     plant::{
-        command::Command,
+        command::CommandKind,
         def::{Condition, Level, Subject, TagId},
         scale,
     },
@@ -68,7 +68,7 @@ pub fn help(cx: &ViewContext, tag: TagId) -> String {
 /// Is a number for this tag asked again in a window of its own? What must be signed is.
 pub fn asks(cx: &ViewContext, tag: TagId, value: f64) -> bool {
     cx.def().tag(tag).confirm.is_some()
-        || sign::needed(cx.def(), &Command::Write { tag, value }).is_some()
+        || sign::needed(cx.def(), &CommandKind::Write { tag, value }).is_some()
         || rounded_words(cx, tag, value).is_some()
         || !worries(cx, tag, value).is_empty()
 }

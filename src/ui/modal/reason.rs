@@ -9,7 +9,7 @@ use super::{Modal, Next, line::Line, window};
 use crate::{
     plant::{
         alarm::{AlarmCommand, command::WORDS_MAX},
-        command::Command,
+        command::CommandKind,
         def::AlarmId,
     },
     ui::{Confirmed, UiAction, ViewContext, keys, rights, widgets::text::wrap},
@@ -22,7 +22,7 @@ pub struct Reason {
     /// What it is about.
     notes: Vec<String>,
     /// What is done, one for each time that can be chosen; never empty.
-    choices: Vec<(String, Command)>,
+    choices: Vec<(String, CommandKind)>,
     chosen: usize,
     /// The time that is typed where none of the choices is wanted: the last one then.
     time: Option<Time>,
@@ -36,17 +36,17 @@ pub struct Reason {
 
 impl Reason {
     /// An action with a text, which is required if `needed`.
-    pub fn new(title: &str, verb: &'static str, notes: Vec<String>, command: Command, needed: bool) -> Reason {
-        let choices = vec![(String::new(), command)];
+    pub fn new(title: &str, verb: &'static str, notes: Vec<String>, kind: CommandKind, needed: bool) -> Reason {
+        let choices = vec![(String::new(), kind)];
         let (title, line) = (title.to_owned(), Line::long("", WORDS_MAX));
         Reason { title, notes, choices, chosen: 0, time: None, line, needed, verb, problem: None }
     }
 
     /// Shelve an alarm for one of these times, each with its words, or for any other up to `max`.
     pub fn shelve(notes: Vec<String>, alarm: AlarmId, times: Vec<(String, Duration)>, max: Duration) -> Reason {
-        let command = |lasts| Command::Alarm(AlarmCommand::Shelve { alarm, lasts });
-        let mut choices: Vec<_> = times.into_iter().map(|(words, lasts)| (words, command(lasts))).collect();
-        choices.push(("other:".to_owned(), command(max)));
+        let kind = |lasts| CommandKind::Alarm(AlarmCommand::Shelve { alarm, lasts });
+        let mut choices: Vec<_> = times.into_iter().map(|(words, lasts)| (words, kind(lasts))).collect();
+        choices.push(("other:".to_owned(), kind(max)));
         let time = Some(Time { alarm, max, line: Line::default(), typing: choices.len() == 1 });
         let first = choices[0].1.clone();
         Reason { choices, time, ..Reason::new("shelve an alarm", "shelve", notes, first, true) }
@@ -72,11 +72,11 @@ impl Reason {
     }
 
     /// What is done, once a time that is typed is one.
-    fn command(&self) -> Result<Command, String> {
+    fn command_kind(&self) -> Result<CommandKind, String> {
         match self.other() {
             Some(time) => {
                 let lasts = typed_time(&time.line.text(), time.max)?;
-                Ok(Command::Alarm(AlarmCommand::Shelve { alarm: time.alarm, lasts }))
+                Ok(CommandKind::Alarm(AlarmCommand::Shelve { alarm: time.alarm, lasts }))
             }
             None => Ok(self.choices[self.chosen].1.clone()),
         }
@@ -116,8 +116,8 @@ impl Reason {
     }
 
     fn finish(mut self, cx: &ViewContext) -> Next {
-        let command = match self.command() {
-            Ok(command) => command,
+        let kind = match self.command_kind() {
+            Ok(kind) => kind,
             Err(why) => {
                 self.problem = Some(why);
                 return Next::Stay(Modal::Reason(Box::new(self)));
@@ -135,13 +135,13 @@ impl Reason {
             // Typed for the time, while another one was selected.
             Some("a time is no reason: select \"other\" to type a time".to_owned())
         } else {
-            rights::missing(cx, &command)
+            rights::missing(cx, &kind)
         };
         if self.problem.is_some() {
             return Next::Stay(Modal::Reason(Box::new(self)));
         }
         let note = (!words.is_empty()).then(|| Arc::from(words));
-        Next::Do(vec![UiAction::Confirmed(Confirmed { note, ..command.into() })])
+        Next::Do(vec![UiAction::Confirmed(Confirmed { note, ..kind.into() })])
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {

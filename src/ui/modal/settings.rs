@@ -10,7 +10,7 @@ use ratatui::{Frame, layout::Rect, style::Style};
 use super::{Modal, Next, faceplate::device_words, window};
 use crate::{
     plant::{
-        command::{Command, Outcome},
+        command::{CommandKind, Outcome},
         def::{LineDef, LineId},
         event::LineState,
         snapshot::DeviceState,
@@ -71,7 +71,7 @@ impl Settings {
         let enter = keys::code(KeyCode::Enter).is(event);
         if let Some(action) = self.asking.take() {
             let yes = enter || keys::char('y').is(event);
-            let acts = if yes { vec![UiAction::Order(self.command(action))] } else { Vec::new() };
+            let acts = if yes { vec![UiAction::Order(self.command_kind(action))] } else { Vec::new() };
             // Off the text field, so that u and S are keys again.
             self.row = 0;
             return Next::Both(Modal::Settings(Box::new(self)), acts);
@@ -213,10 +213,10 @@ impl Settings {
         }
     }
 
-    fn command(&self, action: SettingsAction) -> Command {
+    fn command_kind(&self, action: SettingsAction) -> CommandKind {
         match action {
-            SettingsAction::Use(settings) | SettingsAction::TakeBack(settings) => Command::Configure(settings),
-            SettingsAction::Save => Command::SaveSettings(self.line),
+            SettingsAction::Use(settings) | SettingsAction::TakeBack(settings) => CommandKind::Configure(settings),
+            SettingsAction::Save => CommandKind::SaveSettings(self.line),
         }
     }
 
@@ -309,7 +309,7 @@ fn answers(cx: &ViewContext, line: LineId) -> (String, bool) {
 
 /// Why the last wish to save the settings of a line was refused, in full.
 fn not_saved(cx: &ViewContext, line: LineId) -> Option<String> {
-    let saved = cx.snapshot.orders.iter().find(|order| order.command == Command::SaveSettings(line))?;
+    let saved = cx.snapshot.orders.iter().find(|order| order.kind == CommandKind::SaveSettings(line))?;
     match &saved.outcome {
         Outcome::Refused(why) => Some(format!("! {why}")),
         Outcome::Pending | Outcome::Verified | Outcome::Unchanged | Outcome::NotConfirmed(_) | Outcome::Failed(_) => {

@@ -25,7 +25,7 @@ use super::{Tab, periodic_query::PeriodicQuery};
 use crate::{
     history::{Answer, HistoryError},
     plant::{
-        command::Command,
+        command::CommandKind,
         def::{DeviceDef, LineDef, LineId},
         event::LineState,
         line_minute::LineMinute,
@@ -219,9 +219,9 @@ impl Bus {
             Action::Stop => return test::stop(&at),
             Action::Retry => return retry(cx, Some(self.line)),
             Action::Settings => {
-                let command = Command::Configure(Box::new(at.settings.clone()));
+                let kind = CommandKind::Configure(Box::new(at.settings.clone()));
                 let window = Modal::Settings(Box::new(Settings::new(cx, self.line)));
-                return vec![Notice::or(cx, "settings of the line", &command, window)];
+                return vec![Notice::or(cx, "settings of the line", &kind, window)];
             }
         }
         self.on_snapshot(cx)
@@ -424,7 +424,7 @@ pub fn retry(cx: &ViewContext, line: Option<LineId>) -> Vec<UiAction> {
         DeviceState::Failing(_) | DeviceState::Down { .. } => line.is_none_or(|line| line == device.line),
         DeviceState::Unknown | DeviceState::Answering => false,
     };
-    cx.def().devices.iter().filter(silent).map(|device| UiAction::Order(Command::Refresh(device.id))).collect()
+    cx.def().devices.iter().filter(silent).map(|device| UiAction::Order(CommandKind::Refresh(device.id))).collect()
 }
 
 /// `connected since 13:02:11`, `DOWN 00:12: No such file or directory, next try in 4s`.

@@ -34,7 +34,7 @@ use super::{Tab, periodic_query::PeriodicQuery};
 use crate::{
     history::{Answer, HistoryError, Query, Series},
     plant::{
-        command::Command,
+        command::CommandKind,
         def::{DeviceDef, DeviceId, ProgramDef, TagId},
         parameter_set,
         snapshot::Snapshot,
@@ -221,9 +221,9 @@ impl Controllers {
                 vec![UiAction::Open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")))]
             }
             Action::All | Action::Turnaround => self.in_compare(cx, action),
-            Action::Stop => vec![UiAction::Order(Command::StopRestore(device.id))],
-            Action::ReadSets => vec![UiAction::Order(Command::ReadSets)],
-            Action::Command(which) => device.program.as_ref().map_or(Vec::new(), |program| {
+            Action::Stop => vec![UiAction::Order(CommandKind::StopRestore(device.id))],
+            Action::ReadSets => vec![UiAction::Order(CommandKind::ReadSets)],
+            Action::CommandKind(which) => device.program.as_ref().map_or(Vec::new(), |program| {
                 let value = match which {
                     keys::Wish::Run => Some(program.run),
                     keys::Wish::Hold => program.halt,
@@ -399,10 +399,10 @@ impl Controllers {
             Asked::SetName => {
                 parameter_set::check_name(text)?;
                 let there = cx.snapshot.sets.iter().find(|stored| stored.name == text);
-                let command = Command::SaveSet { device: self.device, name: text.into(), replace: there.is_some() };
-                let Some(there) = there else { return Ok(vec![UiAction::Order(command)]) };
+                let kind = CommandKind::SaveSet { device: self.device, name: text.into(), replace: there.is_some() };
+                let Some(there) = there else { return Ok(vec![UiAction::Order(kind)]) };
                 let words = sets::replace_words(cx, there);
-                Ok(vec![UiAction::Open(Modal::Confirm(Confirm::order(format!("save set {text}"), words, command)))])
+                Ok(vec![UiAction::Open(Modal::Confirm(Confirm::order(format!("save set {text}"), words, kind)))])
             }
         }
     }

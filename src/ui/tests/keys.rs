@@ -10,7 +10,7 @@ use crate::{
     access::OrderRequest,
     history::{Answer, HistoryError, Query},
     plant::{
-        command::{Command, NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
+        command::{CommandKind, NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
         def::{AlarmId, Priority},
         event::{Fault, LineState},
         record::{ActionRecord, AlarmRecord, AlarmStep},
@@ -34,7 +34,7 @@ fn a_number_is_written_only_after_enter() {
     let mut model = model(&fixture, Theme::FULL);
     assert_eq!(type_keys(&mut model, "s65.5"), []);
     let effects = type_keys(&mut model, "⏎");
-    assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
+    assert_eq!(order_of(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
     assert_eq!(model.modal, None);
     assert!(screen(&mut model, 80, 24).contains("TIC-1.SV ? → 65.5 °C  sent"));
 }
@@ -47,7 +47,7 @@ fn what_is_typed_is_what_is_written_or_refused() {
         let order = order_of(&type_keys(&mut model, keys)).cloned();
         let shown = screen(&mut model, 80, 24);
         match expect {
-            Ok(value) => assert_eq!(order, Some(Command::Write { tag: fixture.tag("TIC-1.SV"), value }), "{keys}"),
+            Ok(value) => assert_eq!(order, Some(CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value }), "{keys}"),
             Err(words) => {
                 assert_eq!(order, None, "{keys}");
                 assert!(shown.contains(words), "{words} is missing:\n{shown}");
@@ -134,7 +134,7 @@ fn a_pump_is_switched_by_its_manual_command() {
         assert_eq!(order_of(&type_keys(&mut model, "⏎↓⏎")), None, "asks first");
         let shown = screen(&mut model, 80, 24);
         assert_eq!(shown.contains("! acts in MANUAL only, and PLC-1.AUTO is AUTO"), told, "{shown}");
-        let order = Command::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
+        let order = CommandKind::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
         assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
     }
     // One without such a command has nothing to write.
@@ -153,7 +153,7 @@ fn in_auto_the_change_to_manual_is_a_step_of_its_own() {
     assert!(shown.contains("old AUTO  →  new MANUAL"), "{shown}");
     assert!(shown.contains("PLC-1.MAN.P-1 has no effect now"), "{shown}");
     assert!(shown.contains("The commands by hand take over; no output changes."), "{shown}");
-    let order = Command::Write { tag: fixture.tag("PLC-1.AUTO"), value: 0.0 };
+    let order = CommandKind::Write { tag: fixture.tag("PLC-1.AUTO"), value: 0.0 };
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
     assert!(matches!(model.modal, Some(Modal::Faceplate(_))), "back where it was asked from");
     assert_eq!(order_of(&type_keys(&mut model, "⏎⏎")), None, "further Enters send nothing that was not asked");
@@ -166,7 +166,7 @@ fn in_auto_the_change_to_manual_is_a_step_of_its_own() {
     fixture.set("PLC-1.AUTO", 0.0);
     let mut model = faceplate(&fixture, "PLC-1.P-1");
     assert_eq!(order_of(&type_keys(&mut model, "tt")), None, "a key pressed twice sends nothing");
-    let order = Command::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
+    let order = CommandKind::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
 }
 
@@ -266,7 +266,7 @@ fn a_key_that_is_sent_first_is_named_before_it_is() {
 fn a_stop_takes_two_keys_and_says_what_it_switches_off() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.P-1", 1.0);
-    let stop = Command::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 };
+    let stop = CommandKind::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 };
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "r");
     let shown = screen(&mut model, 80, 24);
@@ -283,7 +283,7 @@ fn a_stop_takes_two_keys_and_says_what_it_switches_off() {
 fn a_stop_need_not_wait_for_a_window_to_close() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
-    let stop = Command::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 };
+    let stop = CommandKind::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 };
     for before in ["", "t"] {
         let mut model = faceplate(&fixture, "PLC-1.P-1");
         type_keys(&mut model, before);
@@ -326,14 +326,14 @@ fn the_mimic_shows_how_a_command_went() {
     let id = OrderId { terminal: 9, number: 1 };
     let check = |fixture: &Fixture, outcome: Option<Outcome>, disobeys: bool, expect: &str| {
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
-        let command = Command::Write { tag, value: 1.0 };
+        let kind = CommandKind::Write { tag, value: 1.0 };
         let at = snapshot.at;
         let status = |outcome| OrderStatus {
             from: "".into(),
             note: None,
             id,
             by: Arc::from("b"),
-            command,
+            kind,
             at,
             old: Some(0.0),
             outcome,
@@ -387,7 +387,7 @@ fn a_toggle_is_asked_and_does_what_it_said() {
     assert_eq!(type_keys(&mut model, "⏎"), []);
     assert!(screen(&mut model, 80, 24).contains("changed to STOP (was RUN)"));
     let effects = type_keys(&mut model, "⏎");
-    assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 }));
+    assert_eq!(order_of(&effects), Some(&CommandKind::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 }));
 }
 
 #[test]
@@ -437,7 +437,7 @@ fn closing_a_line_is_asked_and_opening_it_too() {
         fixture.line.state = state;
         let mut model = model(&fixture, Theme::FULL);
         assert_eq!(order_of(&type_keys(&mut model, "4L")), None);
-        assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&Command::Connect(line, open)));
+        assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&CommandKind::Connect(line, open)));
     }
 }
 
@@ -567,7 +567,7 @@ fn the_outcome_of_an_order_is_told_until_it_is_dismissed() {
     let check = |outcome: Outcome, expect: &str| {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, "s60⏎");
-        let Some(Effect::Order(OrderRequest { id, command, .. })) = effects.first().cloned() else {
+        let Some(Effect::Order(OrderRequest { id, kind, .. })) = effects.first().cloned() else {
             panic!("{effects:?}")
         };
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
@@ -576,7 +576,7 @@ fn the_outcome_of_an_order_is_told_until_it_is_dismissed() {
             note: None,
             id,
             by: Arc::from("tech1"),
-            command,
+            kind,
             at: snapshot.at,
             old: Some(70.0),
             outcome,
@@ -603,16 +603,16 @@ fn the_outcome_of_an_order_is_told_until_it_is_dismissed() {
 fn only_what_was_read_back_is_called_verified() {
     let fixture = Fixture::alarm();
     let device = fixture.def.devices[0].id;
-    let check = |command: Command, expect: &str| {
+    let check = |kind: CommandKind, expect: &str| {
         let mut model = model(&fixture, Theme::FULL);
-        perform(&mut model, vec![UiAction::Order(command.clone())]);
+        perform(&mut model, vec![UiAction::Order(kind.clone())]);
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
         snapshot.orders = vec![OrderStatus {
             from: "".into(),
             note: None,
             id: model.pending_command.as_ref().expect("the order is watched").id,
             by: Arc::from("tech1"),
-            command,
+            kind,
             at: snapshot.at,
             old: None,
             outcome: Outcome::Verified,
@@ -622,7 +622,7 @@ fn only_what_was_read_back_is_called_verified() {
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains(expect), "{expect} is missing:\n{shown}");
     };
-    check(Command::Refresh(device), "refresh TIC-1  requested 14:02:31");
+    check(CommandKind::Refresh(device), "refresh TIC-1  requested 14:02:31");
     check(fixture.alarms[0].acknowledge(), "temperature high  done 14:02:31");
 }
 
@@ -632,7 +632,7 @@ fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
     let check = |outcome: Outcome, stays: bool| {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, "s60⏎");
-        let Some(Effect::Order(OrderRequest { id, command, .. })) = effects.first().cloned() else {
+        let Some(Effect::Order(OrderRequest { id, kind, .. })) = effects.first().cloned() else {
             panic!("{effects:?}")
         };
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
@@ -641,7 +641,7 @@ fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
             note: None,
             id,
             by: Arc::from("tech1"),
-            command,
+            kind,
             at: snapshot.at,
             old: Some(70.0),
             outcome,
@@ -786,5 +786,5 @@ fn a_number_that_the_device_rounds_is_shown_rounded_before_it_is_written() {
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("72.3 → the device holds steps of 0.5: 72.5"), "{shown}");
     assert!(shown.contains("new 72.5 °C"), "{shown}");
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&Command::Write { tag: sv, value: 72.5 }));
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&CommandKind::Write { tag: sv, value: 72.5 }));
 }

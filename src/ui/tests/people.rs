@@ -12,7 +12,7 @@ use crate::{
     },
     history::{Answer, Query},
     plant::{
-        command::{Command, OrderId, OrderStatus, Outcome, Refusal},
+        command::{CommandKind, OrderId, OrderStatus, Outcome, Refusal},
         record::{ActionRecord, Seal},
         role::{Role, Sign},
         sample::Quality,
@@ -236,7 +236,7 @@ fn work_waits_while_the_terminal_is_locked() {
     assert_eq!(model.tabs.shown, Tab::Mimic);
     shows(&mut model, "new 65");
     let effects = type_keys(&mut model, ".5⏎");
-    assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
+    assert_eq!(order_of(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
 }
 
 #[test]
@@ -390,7 +390,7 @@ fn a_refused_signature_is_asked_again_in_its_window() {
             by: "anna".into(),
             from: "".into(),
             note: None,
-            command: request.command.clone(),
+            kind: request.kind.clone(),
             at: fixture::now(),
             old: Some(70.0),
             outcome,
@@ -422,7 +422,7 @@ fn a_value_that_changes_under_an_open_window_is_told_at_once_and_asked_again() {
         by: "anna".into(),
         from: "".into(),
         note: None,
-        command: Command::Write { tag: fixture.tag("TIC-1.SV"), value: 65.0 },
+        kind: CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.0 },
         at: fixture::now(),
         old: Some(70.0),
         outcome: Outcome::Verified,

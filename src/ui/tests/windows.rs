@@ -7,7 +7,7 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use super::{model, order_of, screen, type_keys};
 use crate::{
     access::{Standing, Who},
-    plant::{alarm::AlarmCommand, command::Command, role::Role},
+    plant::{alarm::AlarmCommand, command::CommandKind, role::Role},
     ui::{Leaving, Model, Msg, fixture::Fixture, fixture::standing, modal::Modal, tabs::Tab, theme::Theme, update},
 };
 
@@ -154,7 +154,7 @@ fn an_alarm_is_shelved_for_half_an_hour_or_for_any_time_typed() {
         let shown = screen(&mut model, 80, 24);
         let order = order_of(&type_keys(&mut model, "⏎")).cloned();
         let lasts = match order {
-            Some(Command::Alarm(AlarmCommand::Shelve { lasts, .. })) => Some(lasts.as_secs() / 60),
+            Some(CommandKind::Alarm(AlarmCommand::Shelve { lasts, .. })) => Some(lasts.as_secs() / 60),
             _ => None,
         };
         (lasts, shown)

@@ -63,6 +63,6 @@ fn a_stop_is_never_one_request_too_many() {
         bench.order(1, RUN, None);
     }
     assert!(bench.order(1, RUN, None).is_none());
-    let off = Command::Write { tag: fixture::RUN, value: 0.0 };
+    let off = CommandKind::Write { tag: fixture::RUN, value: 0.0 };
     assert_eq!(bench.order(1, off, None).unwrap().1, None);
 }

@@ -112,7 +112,7 @@ fn only_a_verified_write_of_the_right_value_counts() {
             note: None,
             id: OrderId { terminal: 1, number: 1 },
             by: "tech1".into(),
-            command: Command::Write { tag: SV, value },
+            kind: CommandKind::Write { tag: SV, value },
             at: at(second),
             old: None,
             outcome,

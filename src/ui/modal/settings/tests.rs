@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use crate::{
     plant::{
-        command::Command,
+        command::CommandKind,
         def::{Framing, LineDef, LineId, Parity, Serial, Transport},
         event::LineState,
         snapshot::DeviceState,
@@ -28,7 +28,7 @@ fn tried(keys: &str) -> Option<LineDef> {
     let mut model = open(&Fixture::normal());
     type_keys(&mut model, keys);
     match order_of(&type_keys(&mut model, "⏎⏎")) {
-        Some(Command::Configure(settings)) => Some((**settings).clone()),
+        Some(CommandKind::Configure(settings)) => Some((**settings).clone()),
         Some(other) => panic!("{other:?}"),
         None => None,
     }
@@ -109,9 +109,9 @@ fn tried_out() -> Fixture {
 fn settings_can_be_taken_back_and_saved() {
     let mut model = open(&tried_out());
     let effects = type_keys(&mut model, "u⏎");
-    assert_eq!(order_of(&effects), Some(&Command::Configure(Box::new(line()))));
+    assert_eq!(order_of(&effects), Some(&CommandKind::Configure(Box::new(line()))));
     let mut model = open(&tried_out());
-    assert_eq!(order_of(&type_keys(&mut model, "S⏎")), Some(&Command::SaveSettings(LineId(0))));
+    assert_eq!(order_of(&type_keys(&mut model, "S⏎")), Some(&CommandKind::SaveSettings(LineId(0))));
 }
 
 #[test]

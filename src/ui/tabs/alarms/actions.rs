@@ -6,7 +6,7 @@ use super::super::reports::period;
 use crate::{
     plant::{
         alarm::{AlarmCommand, AlarmState},
-        command::Command,
+        command::CommandKind,
         def::AlarmId,
         snapshot::{ActiveAlarm, AsideAlarm},
     },
@@ -67,14 +67,14 @@ pub fn acknowledge_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a Ac
         notes.push(format!("… and {} more", waiting.len() - NAMED));
     }
     let seen = waiting.iter().map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
-    let command = Command::Alarm(AlarmCommand::AcknowledgeAll { seen });
+    let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen });
     let title = "acknowledge all";
     if needed {
         notes.insert(0, asked);
         notes.push("At least one of them needs a note.".to_owned());
-        return open(Modal::Reason(Box::new(Reason::new(title, "acknowledge", notes, command, true))));
+        return open(Modal::Reason(Box::new(Reason::new(title, "acknowledge", notes, kind, true))));
     }
-    open(Modal::Confirm(Confirm::order(title, asked, command).with_notes(notes)))
+    open(Modal::Confirm(Confirm::order(title, asked, kind).with_notes(notes)))
 }
 
 /// Asks for how long an alarm is shelved, and why.
@@ -88,25 +88,25 @@ pub fn shelve(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
         times.push((format!("rest of the shift, {}", running(rest)), rest));
     }
     let notes = vec![name(cx, alarm), "It is not annunciated for this time, and comes back by itself:".to_owned()];
-    let command = Command::Alarm(AlarmCommand::Shelve { alarm, lasts: max });
+    let kind = CommandKind::Alarm(AlarmCommand::Shelve { alarm, lasts: max });
     let window = Modal::Reason(Box::new(Reason::shelve(notes, alarm, times, max)));
-    vec![Notice::or(cx, "shelve an alarm", &command, window)]
+    vec![Notice::or(cx, "shelve an alarm", &kind, window)]
 }
 
 /// Asks why an alarm is taken out of service.
 pub fn out_of_service(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
     let notes = vec![name(cx, alarm), "It is not annunciated until it is put back in service.".to_owned()];
-    let command = Command::Alarm(AlarmCommand::OutOfService(alarm));
-    let reason = Reason::new("out of service", "put out of service", notes, command.clone(), true);
-    vec![Notice::or(cx, "out of service", &command, Modal::Reason(Box::new(reason)))]
+    let kind = CommandKind::Alarm(AlarmCommand::OutOfService(alarm));
+    let reason = Reason::new("out of service", "put out of service", notes, kind.clone(), true);
+    vec![Notice::or(cx, "out of service", &kind, Modal::Reason(Box::new(reason)))]
 }
 
 /// Asks whether to let go an alarm that latches.
 pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     let why = match alarm.state {
         AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
-            let command = Command::Alarm(AlarmCommand::Reset(alarm.id));
-            return open(Modal::Confirm(Confirm::order("reset a latched alarm", name(cx, alarm.id), command)));
+            let kind = CommandKind::Alarm(AlarmCommand::Reset(alarm.id));
+            return open(Modal::Confirm(Confirm::order("reset a latched alarm", name(cx, alarm.id), kind)));
         }
         AlarmState::Unacknowledged | AlarmState::Acknowledged if cx.def().alarm(alarm.id).latch => {
             "Its cause lasts: it can be reset once that is gone."
@@ -124,7 +124,7 @@ pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
 
 /// Asks whether to take back what was put aside.
 pub fn put_back(cx: &ViewContext, aside: &AsideAlarm) -> Vec<UiAction> {
-    let (title, command) = match aside.state {
+    let (title, alarm_command) = match aside.state {
         AlarmState::Shelved => ("take back from the shelf", AlarmCommand::Unshelve(aside.id)),
         AlarmState::OutOfService => ("put in service", AlarmCommand::InService(aside.id)),
         AlarmState::Suppressed => {
@@ -139,15 +139,15 @@ pub fn put_back(cx: &ViewContext, aside: &AsideAlarm) -> Vec<UiAction> {
         | AlarmState::LatchedAcknowledged => return Vec::new(),
     };
     let holds = aside.active.then(|| "Its condition holds: it will be annunciated at once.".to_owned());
-    let command = Command::Alarm(command);
-    let confirm = Confirm::order(title, name(cx, aside.id), command.clone());
-    vec![Notice::or(cx, title, &command, Modal::Confirm(confirm.with_notes(holds)))]
+    let kind = CommandKind::Alarm(alarm_command);
+    let confirm = Confirm::order(title, name(cx, aside.id), kind.clone());
+    vec![Notice::or(cx, title, &kind, Modal::Confirm(confirm.with_notes(holds)))]
 }
 
 /// Asks for what the next shift should know.
 pub fn hand_over() -> Vec<UiAction> {
     let notes = vec!["What the next shift should know besides what stands on this page:".to_owned()];
-    let reason = Reason::new("hand over", "hand over", notes, Command::HandOver, false);
+    let reason = Reason::new("hand over", "hand over", notes, CommandKind::HandOver, false);
     open(Modal::Reason(Box::new(reason)))
 }
 
@@ -161,7 +161,7 @@ pub fn own_handover() -> Vec<UiAction> {
 pub fn take_over(cx: &ViewContext) -> Vec<UiAction> {
     let who = cx.standing.who.as_ref().map_or("nobody", |who| &who.user);
     let words = format!("{who} has read this page and takes the plant over.");
-    open(Modal::Confirm(Confirm::order("take over", words, Command::TakeOver)))
+    open(Modal::Confirm(Confirm::order("take over", words, CommandKind::TakeOver)))
 }
 
 fn open(modal: Modal) -> Vec<UiAction> {

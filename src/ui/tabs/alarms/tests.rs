@@ -12,7 +12,7 @@ use crate::{
             metrics::{Frequent, Named},
             state::OperatorNote,
         },
-        command::Command,
+        command::CommandKind,
         def::{AlarmClass, AlarmDef, AlarmId, Priority},
         record::{ActionRecord, Burst},
         role::Role,
@@ -281,9 +281,9 @@ fn a_shift_is_handed_over_with_a_note_and_taken_over() {
     let mut model = shown(&Fixture::normal(), Theme::FULL, "V");
     let effects = type_keys(&mut model, "nP-1 is loud⏎");
     let Some(Effect::Order(order)) = effects.last() else { panic!("{effects:?}") };
-    assert_eq!((&order.command, order.note.as_deref()), (&Command::HandOver, Some("P-1 is loud")));
+    assert_eq!((&order.kind, order.note.as_deref()), (&CommandKind::HandOver, Some("P-1 is loud")));
     assert_eq!(order_of(&type_keys(&mut model, "o")), None, "asks first");
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&Command::TakeOver));
+    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&CommandKind::TakeOver));
 }
 
 #[test]
@@ -302,7 +302,9 @@ fn the_filter_in_force_is_written_and_hides_nothing_silently() {
     type_keys(&mut model, "/level⏎A");
     let effects = type_keys(&mut model, "⏎");
     let low = &Fixture::alarm().alarms[2];
-    let Some(Command::Alarm(AlarmCommand::AcknowledgeAll { seen })) = order_of(&effects) else { panic!("{effects:?}") };
+    let Some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen })) = order_of(&effects) else {
+        panic!("{effects:?}")
+    };
     assert_eq!(**seen, [(low.id, low.raised_at)]);
 }
 
@@ -312,7 +314,9 @@ fn a_page_acknowledges_only_what_was_on_the_screen() {
     screen(&mut model, 80, 24);
     type_keys(&mut model, "p");
     let effects = type_keys(&mut model, "⏎");
-    let Some(Command::Alarm(AlarmCommand::AcknowledgeAll { seen })) = order_of(&effects) else { panic!("{effects:?}") };
+    let Some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen })) = order_of(&effects) else {
+        panic!("{effects:?}")
+    };
     let picture = screen(&mut model, 80, 24);
     let on_screen = picture.lines().filter(|line| line.contains("UNACK ") || line.contains("LATCHED ")).count();
     // The banner is one of those lines.
@@ -327,7 +331,7 @@ fn a_note_is_asked_for_where_the_plant_wants_one() {
         let mut model = shown(fixture, Theme::FULL, "");
         let effects = type_keys(&mut model, keys);
         let order = effects.into_iter().find_map(|effect| match effect {
-            Effect::Order(order) => Some((order.command, order.note)),
+            Effect::Order(order) => Some((order.kind, order.note)),
             _ => None,
         });
         (order, model.modal)
@@ -339,7 +343,7 @@ fn a_note_is_asked_for_where_the_plant_wants_one() {
     assert!(matches!(order(&fixture, "a  ⏎"), (None, Some(Modal::Reason(_)))), "blanks are no note");
     assert_eq!(order(&fixture, "adoor was open⏎").0, Some((alarm.acknowledge(), Some("door was open".into()))));
     let (all, _) = order(&fixture, "Adoor was open⏎");
-    assert_eq!(all, fixture.snapshot().acknowledge_all().map(|command| (command, Some("door was open".into()))));
+    assert_eq!(all, fixture.snapshot().acknowledge_all().map(|kind| (kind, Some("door was open".into()))));
 }
 
 #[test]
@@ -352,7 +356,7 @@ fn an_alarm_is_shelved_for_a_chosen_time_with_a_reason() {
     let effects = type_keys(&mut model, "↓↓sensor is cleaned⏎");
     let Some(Effect::Order(order)) = effects.last() else { panic!("{effects:?}") };
     let shelve = AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(3_600) };
-    assert_eq!((&order.command, order.note.as_deref()), (&Command::Alarm(shelve), Some("sensor is cleaned")));
+    assert_eq!((&order.kind, order.note.as_deref()), (&CommandKind::Alarm(shelve), Some("sensor is cleaned")));
     // No time is offered that the plant does not allow.
     let mut short = Fixture::alarm();
     short.def.alarm_rules.shelve_max = Duration::from_secs(1_800);
@@ -368,8 +372,8 @@ fn what_was_put_aside_is_taken_back() {
         assert_eq!(order_of(&type_keys(&mut model, keys)), None, "asks first");
         order_of(&type_keys(&mut model, "⏎")).cloned()
     };
-    assert_eq!(back("u"), Some(Command::Alarm(AlarmCommand::Unshelve(AlarmId(1)))));
-    assert_eq!(back("↓u"), Some(Command::Alarm(AlarmCommand::InService(AlarmId(2)))));
+    assert_eq!(back("u"), Some(CommandKind::Alarm(AlarmCommand::Unshelve(AlarmId(1)))));
+    assert_eq!(back("↓u"), Some(CommandKind::Alarm(AlarmCommand::InService(AlarmId(2)))));
     assert_eq!(back("↓↓u"), None, "suppressed by design");
 }
 
@@ -470,7 +474,7 @@ fn silence_is_one_key_on_every_tab_and_acknowledges_nothing() {
     use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
     let press = |model: &mut Model| update(model, Msg::Key(KeyEvent::new(KeyCode::Char('s'), KeyModifiers::CONTROL)));
     let mut model = super::super::super::tests::model(&Fixture::alarm(), Theme::FULL);
-    assert_eq!(order_of(&press(&mut model)), Some(&Command::Alarm(AlarmCommand::Silence)));
+    assert_eq!(order_of(&press(&mut model)), Some(&CommandKind::Alarm(AlarmCommand::Silence)));
     let mut snapshot = Arc::unwrap_or_clone(Fixture::alarm().snapshot());
     snapshot.sound = false;
     update(&mut model, Msg::Snapshot(Arc::new(snapshot)));

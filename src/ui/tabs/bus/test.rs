@@ -19,7 +19,7 @@ use crate::{
         hex_input, request_lint,
     },
     plant::{
-        command::Command,
+        command::CommandKind,
         def::{Framing, LineId},
         diagnostics::Diagnostic,
         event::LineState,
@@ -111,7 +111,7 @@ impl Bench {
             Tried::Bytes | Tried::Request => Diagnostic::Send(Vec::new()),
             Tried::Registers | Tried::Loopback | Tried::Identify | Tried::Scan => Diagnostic::Identify { unit: 1 },
         };
-        vec![Notice::or(cx, "test", &Command::Test(at.id, diagnostic), Modal::Bus(Box::new(window)))]
+        vec![Notice::or(cx, "test", &CommandKind::Test(at.id, diagnostic), Modal::Bus(Box::new(window)))]
     }
 
     /// Single rows move the selection; screens scroll the results.
@@ -183,7 +183,7 @@ pub fn start(at: &Place, diagnostic: Diagnostic) -> Result<UiAction, String> {
         return Err(why);
     }
     let query = danger(at, &diagnostic);
-    let order = Command::Test(at.id, diagnostic);
+    let order = CommandKind::Test(at.id, diagnostic);
     Ok(match query {
         Some(words) => {
             UiAction::Open(Modal::Confirm(Confirm::order(format!("test of {}", at.settings.name), words, order)))
@@ -244,7 +244,7 @@ pub fn again(_cx: &ViewContext, at: &Place) -> Vec<UiAction> {
 
 /// Stops the test at work.
 pub fn stop(at: &Place) -> Vec<UiAction> {
-    if at.is_testing() { vec![UiAction::Order(Command::StopTest(at.id))] } else { Vec::new() }
+    if at.is_testing() { vec![UiAction::Order(CommandKind::StopTest(at.id))] } else { Vec::new() }
 }
 
 /// Bytes on their way onto a line.
@@ -275,10 +275,10 @@ impl Send {
             self.problem = None;
         } else if keys::code(KeyCode::Enter).is(event) {
             match self.send(cx) {
-                Ok(UiAction::Order(command)) => {
+                Ok(UiAction::Order(kind)) => {
                     bench.first = None;
                     return Next::Do(vec![
-                        UiAction::Order(command),
+                        UiAction::Order(kind),
                         UiAction::Open(Modal::Bus(Box::new(Window::Send(self)))),
                     ]);
                 }

@@ -9,7 +9,7 @@ use crate::{
     bus::frame::with_crc,
     history::{Answer, Query},
     plant::{
-        command::{Command, OrderId},
+        command::{CommandKind, OrderId},
         def::{Framing, LineId, Serial},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
         event::{ExceptionCode, Fault, LineState},
@@ -93,7 +93,7 @@ fn a_silent_device_shows_when_it_is_asked_next_and_r_asks_it_now() {
         let mut model = bus(&fixture, Theme::FULL, "L");
         let shown = screen(&mut model, width, height);
         assert!(shown.contains("retry in 12 s"), "{shown}");
-        assert_eq!(order_of(&type_keys(&mut model, "r")), Some(&Command::Refresh(device)));
+        assert_eq!(order_of(&type_keys(&mut model, "r")), Some(&CommandKind::Refresh(device)));
         type_keys(&mut model, "4⏎");
         let shown = screen(&mut model, width, height);
         assert!(shown.contains("not answering, retry in 12 s"), "{shown}");
@@ -283,7 +283,7 @@ fn typed_bytes_are_told_at_once_and_never_act_as_keys() {
     assert_eq!(type_keys(&mut model, "01 03 03 EA 00 01"), []);
     insta::assert_snapshot!("window_send", screen(&mut model, 80, 24));
     let effects = type_keys(&mut model, "⏎");
-    assert_eq!(order_of(&effects), Some(&Command::Test(L1, Diagnostic::Send(with_crc(&[1, 3, 3, 0xEA, 0, 1])))));
+    assert_eq!(order_of(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(with_crc(&[1, 3, 3, 0xEA, 0, 1])))));
     assert!(matches!(model.modal, Some(Modal::Bus(_))), "the entry stays for the next one");
     type_keys(&mut model, "⎋⏎");
     assert!(screen(&mut model, 80, 24).contains("01 03 03 EA 00 01"), "it is remembered");
@@ -298,7 +298,7 @@ fn bytes_go_out_as_typed_where_no_check_is_wanted() {
     assert!(shown.contains("These bytes are no good request: CRC"), "{shown}");
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), None, "a second Enter sends nothing");
     let effects = type_keys(&mut model, "y");
-    assert_eq!(order_of(&effects), Some(&Command::Test(L1, Diagnostic::Send(vec![1, 3, 3, 0xEA, 0, 1, 0, 0]))));
+    assert_eq!(order_of(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(vec![1, 3, 3, 0xEA, 0, 1, 0, 0]))));
 }
 
 #[test]
@@ -315,7 +315,7 @@ fn writes_and_broadcasts_are_asked_first() {
         let shown = screen(&mut model, 120, 40).replace("│", " ").split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(shown.contains(words) || before.contains(words), "{words}:\n{before}\n{shown}");
         let effects = type_keys(&mut model, "y");
-        assert_eq!(order_of(&effects), Some(&Command::Test(L1, Diagnostic::Send(with_crc(&bytes)))), "{typed}");
+        assert_eq!(order_of(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(with_crc(&bytes)))), "{typed}");
     }
 }
 
@@ -327,7 +327,7 @@ fn a_request_is_built_of_fields_with_either_kind_of_address() {
         if matches!(model.modal, Some(Modal::Confirm(_))) {
             effects = type_keys(&mut model, "y");
         }
-        assert_eq!(order_of(&effects), Some(&Command::Test(L1, Diagnostic::Send(with_crc(expect)))), "{keys}");
+        assert_eq!(order_of(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(with_crc(expect)))), "{keys}");
     };
     let clear = "\u{8}".repeat(6);
     check(&format!("↓↓{clear}41003"), &[1, 3, 3, 0xEA, 0, 1]);
@@ -358,7 +358,9 @@ fn a_scan_of_all_settings_is_asked_and_shows_how_far_it_is() {
     assert_eq!(order_of(&type_keys(&mut model, "⏎")), None);
     assert!(screen(&mut model, 80, 24).contains("Polling of L1 pauses while other settings are tried"));
     let effects = type_keys(&mut model, "y");
-    let Some(Command::Test(_, diagnostic @ Diagnostic::Scan(scan))) = order_of(&effects) else { panic!("{effects:?}") };
+    let Some(CommandKind::Test(_, diagnostic @ Diagnostic::Scan(scan))) = order_of(&effects) else {
+        panic!("{effects:?}")
+    };
     assert_eq!((scan.first, scan.last, scan.serials.len()), (1, 247, 32));
     let mut fixture = Fixture::traffic();
     fixture.line.state = LineState::Testing;
@@ -367,7 +369,7 @@ fn a_scan_of_all_settings_is_asked_and_shows_how_far_it_is() {
     fixture.line.test = Some(run(diagnostic.clone(), DiagnosticState::Running, 40, 7_904, vec![found]));
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     insta::assert_snapshot!("scan_at_work", screen(&mut model, 80, 24));
-    assert_eq!(order_of(&type_keys(&mut model, "x")), Some(&Command::StopTest(L1)));
+    assert_eq!(order_of(&type_keys(&mut model, "x")), Some(&CommandKind::StopTest(L1)));
 }
 
 #[test]
@@ -428,7 +430,7 @@ fn registers_are_browsed_in_all_four_orders() {
     let mut model = bus(&fixture, Theme::FULL, &format!("Tb↓↓{clear}41003↓{clear}3"));
     let effects = type_keys(&mut model, "⏎");
     let run = read_of_three();
-    assert_eq!(order_of(&effects), Some(&Command::Test(L1, run.diagnostic.clone())));
+    assert_eq!(order_of(&effects), Some(&CommandKind::Test(L1, run.diagnostic.clone())));
     fixture.line.test = Some(run);
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     insta::assert_snapshot!("window_registers", screen(&mut model, 80, 24));

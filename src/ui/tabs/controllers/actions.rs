@@ -3,7 +3,7 @@
 use super::{Action, Controllers, Page};
 use crate::{
     plant::{
-        command::Command,
+        command::CommandKind,
         def::{DeviceDef, LineId, TagId},
         event::LineState,
     },
@@ -25,7 +25,7 @@ impl Controllers {
                 let tags = self.table.rows(cx, device.id).into_iter().map(|tag| tag.id).collect();
                 Why::open(Why::new(tags, self.table.selected))
             }
-            Action::Refresh => vec![UiAction::Order(Command::Refresh(device.id))],
+            Action::Refresh => vec![UiAction::Order(CommandKind::Refresh(device.id))],
             Action::Actions => {
                 let actions = Choice::actions(cx, device.id).map(Modal::Choice);
                 let window = actions.map(|list| Notice::unreachable(cx, device.id).map_or(list, Modal::Notice));
@@ -76,12 +76,12 @@ fn connect(cx: &ViewContext, line: LineId) -> Confirm {
         return Confirm::order(
             format!("connect {name}"),
             format!("Open line {name} and read its devices again?"),
-            Command::Connect(line, true),
+            CommandKind::Connect(line, true),
         );
     }
     let devices: Vec<&str> =
         cx.def().devices.iter().filter(|device| device.line == line).map(|device| device.name.as_str()).collect();
     let words =
         format!("Close line {name}? {} will be read no more, and their alarms cannot be seen.", devices.join(", "));
-    Confirm::order(format!("disconnect {name}"), words, Command::Connect(line, false))
+    Confirm::order(format!("disconnect {name}"), words, CommandKind::Connect(line, false))
 }

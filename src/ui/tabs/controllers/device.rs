@@ -131,9 +131,8 @@ pub fn signal_mark(signal: Signal) -> String {
 /// The latest write to this device and its outcome, and whether that is a worry.
 fn last_write(cx: &ViewContext, device: DeviceId) -> Option<(String, bool)> {
     let to_device = |tag| cx.def().tag(tag).device == device;
-    let order =
-        cx.snapshot.orders.iter().find(|order| order.command.written().is_some_and(|(tag, _)| to_device(tag)))?;
+    let order = cx.snapshot.orders.iter().find(|order| order.kind.written().is_some_and(|(tag, _)| to_device(tag)))?;
     let (words, trouble) = outcome_words(&order.outcome);
-    let what = order_words(cx, &order.command, order.old);
+    let what = order_words(cx, &order.kind, order.old);
     Some((format!("last: {what}  {words} {} by {}", clock(order.at, &cx.def().time_zone), order.by), trouble))
 }

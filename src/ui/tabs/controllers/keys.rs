@@ -43,7 +43,7 @@ pub enum Action {
     /// So many pages of them on.
     Turn(isize),
     /// Run, hold or stop the program.
-    Command(Wish),
+    CommandKind(Wish),
     /// What the program does at its end.
     Mode,
     /// Which steps it runs.
@@ -144,9 +144,9 @@ const PROGRAM: &[Key<Action>] = &[
     UP,
     DOWN,
     key(code(KeyCode::Enter), "edit", "change the target or time", Action::Open),
-    key(char('r'), "run", "run the program, or go on after a hold (asks first)", Action::Command(Wish::Run)),
-    key(char('p'), "hold", "hold the program where it is (asks first)", Action::Command(Wish::Hold)),
-    key(char('o'), "off", "stop the program (asks first)", Action::Command(Wish::Off)),
+    key(char('r'), "run", "run the program, or go on after a hold (asks first)", Action::CommandKind(Wish::Run)),
+    key(char('p'), "hold", "hold the program where it is (asks first)", Action::CommandKind(Wish::Hold)),
+    key(char('o'), "off", "stop the program (asks first)", Action::CommandKind(Wish::Off)),
     key(char('t'), "pattern", "which steps are run", Action::Pattern),
     key(char('m'), "mode", "what happens at the end and at power-on", Action::Mode),
     REFRESH,

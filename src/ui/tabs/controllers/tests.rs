@@ -8,7 +8,7 @@ use crate::{
     access::OrderRequest,
     plant::{
         alarm::AlarmState,
-        command::{Command, OrderId, OrderStatus, Outcome, Refusal},
+        command::{CommandKind, OrderId, OrderStatus, Outcome, Refusal},
         def::{ActionDef, AlarmId, DeviceId},
         ne107::Reason,
         parameter_set::StoredSet,
@@ -137,7 +137,7 @@ fn a_tuning_at_work_is_stopped_by_the_key_that_starts_one() {
     fixture.set("TIC-1.AT", 1.0);
     update(&mut stopped, Msg::Snapshot(fixture.snapshot()));
     let effects = type_keys(&mut stopped, "4T⏎");
-    assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("TIC-1.AT"), value: 0.0 }));
+    assert_eq!(order_of(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.AT"), value: 0.0 }));
 }
 
 /// A restore of two changes whose first is done.
@@ -258,7 +258,7 @@ fn a_restore_asks_what_each_of_its_writes_would_have_asked() {
 /// The restore that these keys order.
 fn restored(model: &mut Model, keys: &str) -> Option<RestoreWish> {
     match order_of(&type_keys(model, keys)) {
-        Some(Command::Restore(wish)) => Some((**wish).clone()),
+        Some(CommandKind::Restore(wish)) => Some((**wish).clone()),
         Some(_) | None => None,
     }
 }
@@ -316,7 +316,7 @@ fn a_name_is_asked_before_a_set_is_saved_and_again_before_one_is_replaced() {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, &format!("4⏎sn{keys}"));
         let orders = effects.into_iter().filter_map(|effect| match effect {
-            Effect::Order(OrderRequest { command: Command::SaveSet { name, replace, .. }, .. }) => {
+            Effect::Order(OrderRequest { kind: CommandKind::SaveSet { name, replace, .. }, .. }) => {
                 Some((name.to_string(), replace))
             }
             _ => None,
@@ -344,7 +344,7 @@ fn a_cell_of_the_program_is_written_and_the_program_commanded() {
     let check = |keys: &str, tag: &str, value: f64| {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, &format!("4g{keys}"));
-        assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag(tag), value }), "{keys}");
+        assert_eq!(order_of(&effects), Some(&CommandKind::Write { tag: fixture.tag(tag), value }), "{keys}");
     };
     check("↓→⏎25⏎", "TIC-1.TM2R", 25.0);
     check("⏎80⏎", "TIC-1.SV-1", 80.0);
@@ -367,7 +367,7 @@ fn a_value_that_another_has_changed_meanwhile_is_asked_again() {
         note: None,
         id: OrderId { terminal: 2, number: 1 },
         by: "boris".into(),
-        command: Command::Write { tag: fixture.tag("TIC-1.P"), value: 3.0 },
+        kind: CommandKind::Write { tag: fixture.tag("TIC-1.P"), value: 3.0 },
         at: fixture::now(),
         old: Some(1.2),
         outcome: Outcome::Verified,
@@ -378,7 +378,7 @@ fn a_value_that_another_has_changed_meanwhile_is_asked_again() {
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("changed to 3.0 % by boris 14:02:31 (was 1.2)"), "{shown}");
     let effects = type_keys(&mut model, "⏎");
-    assert_eq!(order_of(&effects), Some(&Command::Write { tag: fixture.tag("TIC-1.P"), value: 7.5 }));
+    assert_eq!(order_of(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.P"), value: 7.5 }));
 }
 
 #[test]

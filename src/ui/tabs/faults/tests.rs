@@ -108,16 +108,16 @@ fn faults_go_on_and_off_by_enter_with_their_numbers() {
 
 #[test]
 fn devices_that_do_not_answer_are_asked_at_once_when_their_faults_are_cleared() {
-    use crate::plant::{command::Command, def::DeviceId, snapshot::DeviceState};
+    use crate::plant::{command::CommandKind, def::DeviceId, snapshot::DeviceState};
     let mut fixture = Fixture::normal();
     fixture.devices[0].state = DeviceState::Down { since: fixture::now() };
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
     let retried = |effects: Vec<Effect>| -> Vec<DeviceId> {
         let order = |effect| match effect {
-            Effect::Order(request) => Some(request.command),
+            Effect::Order(request) => Some(request.kind),
             _ => None,
         };
-        let refreshed = |command| if let Command::Refresh(device) = command { Some(device) } else { None };
+        let refreshed = |kind| if let CommandKind::Refresh(device) = kind { Some(device) } else { None };
         effects.into_iter().filter_map(order).filter_map(refreshed).collect()
     };
     assert_eq!(retried(type_keys(&mut model, "c")), [DeviceId(0)]);
