@@ -22,12 +22,12 @@
 //!
 //!   device <──> link task                 one per serial line / TCP endpoint, owns the port
 //!                  │   ▲
-//!    Event         │   │ BusRequest         mpsc, try_send: full = the order is refused, visibly
+//!    Event         │   │ BusRequest         mpsc, try_send: full = the command is refused, visibly
 //!    mpsc          │   │
 //!    send().await  ▼   │
 //!               plant task                sole owner of Plant; the only writer of facts
 //!                  │   │   ▲
-//!                  │   │   │ Order           mpsc, try_send: full = refused, visibly
+//!                  │   │   │ Command         mpsc, try_send: full = refused, visibly
 //!    Record        │   │   └────────────────────┐
 //!    mpsc,         │   │ watch<Arc<Snapshot>>   │
 //!    loss counted  ▼   ▼   latest only          │
@@ -37,7 +37,7 @@
 //! ```
 //!
 //! Every request of a terminal goes through the **session server**, the task around [`access::AccessControl`], which
-//! alone decides what is permitted. What it refuses goes on to the plant as a refused order, so that it is seen and on
+//! alone decides what is permitted. What it refuses goes on to the plant as a refused command, so that it is seen and on
 //! record like any other. Actions are in the audit log and alarms in their state file, on disk, before a snapshot shows an
 //! outcome as recorded; the history follows within a second.
 //! The history thread only writes; a second one answers queries, each on a connection of its own and for a bounded time.
@@ -50,7 +50,7 @@
 //!
 //! 1. **One owner per fact.** The plant task owns what is true, each link task its port, the history thread the database
 //!    file, the terminal only what its operator looks at.
-//! 2. **One way.** device → [`bus`] → [`plant`] → snapshot → ([`history`], terminals). Back only as orders, whose
+//! 2. **One way.** device → [`bus`] → [`plant`] → snapshot → ([`history`], terminals). Back only as commands, whose
 //!    outcome comes back inside a later snapshot.
 //! 3. **Three pure reducers**: [`plant::Plant`] for facts, [`access::AccessControl`] for users and sessions, [`ui::update`] for the view.
 //!    Everything asynchronous is a thin loop around one of them.

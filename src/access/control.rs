@@ -26,7 +26,7 @@ use self::{
     work::Errand,
 };
 use super::{
-    OrderRequest, Secret, Who, Wish, right,
+    CommandRequest, Secret, Who, Wish, right,
     tries::Tries,
     user::{Change, Users},
 };
@@ -34,7 +34,7 @@ use crate::{
     history::Query,
     plant::{
         PlantDef,
-        command::{Order, OrderId, Refusal},
+        command::{Command, CommandId, Refusal},
         interlock,
         record::ActionRecord,
         role::Role,
@@ -46,7 +46,7 @@ pub use work::{Job, Outcome, Work};
 /// Said where a terminal asks more than it may.
 const TOO_MANY: &str = "too many requests from this terminal, wait a moment";
 
-/// Said of an order that was made before the station was started again, with the same plant file or with another.
+/// Said of a command that was made before the station was started again, with the same plant file or with another.
 const OTHER_RUN: &str = "the station was started again since this was shown: look and confirm again";
 
 /// Where a terminal is.
@@ -63,8 +63,8 @@ pub struct Peer {
 /// What must happen because of what was asked.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
-    /// Hand this order to the plant, permitted or refused.
-    Order(Order),
+    /// Hand this command to the plant, permitted or refused.
+    Command(Command),
     /// Put this into the book.
     Record(ActionRecord),
     /// Answer a wish.
@@ -87,7 +87,7 @@ pub enum Effect {
 #[derive(Debug)]
 pub struct AccessControl {
     def: Arc<PlantDef>,
-    /// The run of the station: orders made in another one are refused.
+    /// The run of the station: commands made in another one are refused.
     run: u64,
     /// What its times lack of UTC.
     behind_utc: SignedDuration,
@@ -214,8 +214,8 @@ impl AccessControl {
         effects
     }
 
-    /// A terminal gives an order.
-    pub fn order(&mut self, terminal: u32, mut request: OrderRequest, at: Timestamp) -> Vec<Effect> {
+    /// A terminal gives a command.
+    pub fn on_command(&mut self, terminal: u32, mut request: CommandRequest, at: Timestamp) -> Vec<Effect> {
         // A terminal speaks for itself only.
         request.id.terminal = terminal;
         request.note = request.note.map(|note| clean(&note).into());
@@ -230,43 +230,43 @@ impl AccessControl {
         }
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let number = request.id.number;
-        if session.last_order.is_some_and(|last| number <= last) {
-            // Its outcome would be taken for that of the order that had the number first.
-            return self.undelivered(request.id, "this order has the number of an earlier one, give it again");
+        if session.last_command.is_some_and(|last| number <= last) {
+            // Its outcome would be taken for that of the command that had the number first.
+            return self.undelivered(request.id, "this command has the number of an earlier one, give it again");
         }
-        session.last_order = Some(number);
+        session.last_command = Some(number);
         if !session.locked {
             session.active = at;
         }
         match self.may(terminal, Some(right::needs(&request.kind))) {
-            Err(why) => self.refuse_order(terminal, request, Refusal::NotPermitted(why), at),
+            Err(why) => self.refuse_command(terminal, request, Refusal::NotPermitted(why), at),
             Ok(_) => self.signed(terminal, request, at),
         }
     }
 
     /// The role is enough, and so is the signature.
-    fn let_through(&self, terminal: u32, request: OrderRequest, signer: Option<&str>) -> Vec<Effect> {
+    fn let_through(&self, terminal: u32, request: CommandRequest, signer: Option<&str>) -> Vec<Effect> {
         let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
         let note = match (request.note, signer) {
             (note, None) => note,
             (None, Some(signer)) => Some(format!("signed by {signer}").into()),
             (Some(note), Some(signer)) => Some(format!("{note}; signed by {signer}").into()),
         };
-        let OrderRequest { id, kind, seen, .. } = request;
+        let CommandRequest { id, kind, seen, .. } = request;
         let (by, from) = (actor_name(session), session.peer.from.clone());
-        vec![Effect::Order(Order { id, by, from, kind, seen, note, refused: None })]
+        vec![Effect::Command(Command { id, by, from, kind, seen, note, refused: None })]
     }
 
-    /// An order did not reach the plant: no snapshot tells its outcome, so its terminal is told with how it stands.
-    pub fn undelivered(&mut self, id: OrderId, why: &str) -> Vec<Effect> {
+    /// A command did not reach the plant: no snapshot tells its outcome, so its terminal is told with how it stands.
+    pub fn undelivered(&mut self, id: CommandId, why: &str) -> Vec<Effect> {
         let Some(session) = self.sessions.get_mut(&id.terminal) else { return Vec::new() };
         session.undelivered(id, why);
         vec![Effect::Standing(id.terminal)]
     }
 
-    /// The plant puts it on record and into the snapshot, so that whoever gave the order sees what became of it. Too many of
+    /// The plant puts it on record and into the snapshot, so that whoever gave the command sees what became of it. Too many of
     /// them are only told.
-    fn refuse_order(&mut self, terminal: u32, request: OrderRequest, why: Refusal, at: Timestamp) -> Vec<Effect> {
+    fn refuse_command(&mut self, terminal: u32, request: CommandRequest, why: Refusal, at: Timestamp) -> Vec<Effect> {
         let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
         let (origin, own) = (session.origin.clone(), session.peer.own);
         if !own && !self.may_record(&origin, at) {
@@ -274,8 +274,8 @@ impl AccessControl {
         }
         let mut effects = self.let_through(terminal, request, None);
         for effect in &mut effects {
-            if let Effect::Order(order) = effect {
-                order.refused = Some(why.clone());
+            if let Effect::Command(command) = effect {
+                command.refused = Some(why.clone());
             }
         }
         effects

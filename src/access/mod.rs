@@ -12,4 +12,4 @@ pub mod io;
 
 pub use control::{AccessControl, Effect, Peer};
 pub use user::Users;
-pub use wish::{Durability, OrderRequest, Secret, SessionRow, Signature, Standing, UserRow, Who, Wish};
+pub use wish::{CommandRequest, Durability, Secret, SessionRow, Signature, Standing, UserRow, Who, Wish};

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::plant::{
     Snapshot,
-    command::{CommandKind, OrderId},
+    command::{CommandId, CommandKind},
     role::Role,
 };
 
@@ -125,11 +125,11 @@ pub struct Signature {
     pub password: Secret,
 }
 
-/// An order as a terminal gives it: who gives it, the station knows.
+/// A command as a terminal gives it: who gives it, the station knows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct OrderRequest {
+pub struct CommandRequest {
     /// Chosen by the terminal.
-    pub id: OrderId,
+    pub id: CommandId,
     /// The run of the station whose snapshot it was made on, see [`Snapshot::run`]. The ids in the command mean nothing in
     /// another run: the plant file may have changed.
     pub run: u64,
@@ -143,15 +143,15 @@ pub struct OrderRequest {
     pub sign: Option<Signature>,
 }
 
-impl OrderRequest {
-    /// An order without seen value, note and signature.
-    pub fn new(run: u64, id: OrderId, kind: CommandKind) -> OrderRequest {
-        OrderRequest { id, run, kind, seen: None, note: None, sign: None }
+impl CommandRequest {
+    /// A command without seen value, note and signature.
+    pub fn new(run: u64, id: CommandId, kind: CommandKind) -> CommandRequest {
+        CommandRequest { id, run, kind, seen: None, note: None, sign: None }
     }
 
-    /// An order made on what a snapshot shows.
-    pub fn on(snapshot: &Snapshot, id: OrderId, kind: CommandKind) -> OrderRequest {
-        OrderRequest { seen: snapshot.seen(&kind), ..OrderRequest::new(snapshot.run, id, kind) }
+    /// A command made on what a snapshot shows.
+    pub fn on(snapshot: &Snapshot, id: CommandId, kind: CommandKind) -> CommandRequest {
+        CommandRequest { seen: snapshot.seen(&kind), ..CommandRequest::new(snapshot.run, id, kind) }
     }
 }
 
@@ -189,8 +189,8 @@ pub struct Standing {
     pub users: Arc<Vec<UserRow>>,
     /// Who is attached; only for a Supervisor.
     pub sessions: Arc<Vec<SessionRow>>,
-    /// Its latest orders that the plant never saw, and why: no snapshot tells their outcome. The latest stands last.
-    pub undelivered: Vec<(OrderId, Arc<str>)>,
+    /// Its latest commands that the plant never saw, and why: no snapshot tells their outcome. The latest stands last.
+    pub undelivered: Vec<(CommandId, Arc<str>)>,
     /// The station has gone, and why; set by the terminal's own end of the socket.
     pub gone: Option<Arc<str>>,
 }

@@ -1,39 +1,39 @@
-//! A terminal's own orders over all its connections: the station may number it anew, its operator sees one terminal.
+//! A terminal's own commands over all its connections: the station may number it anew, its operator sees one terminal.
 
 use std::{collections::VecDeque, sync::Arc};
 
 use jiff::Timestamp;
 
 use crate::{
-    access::OrderRequest,
+    access::CommandRequest,
     plant::{
         Snapshot,
-        command::{NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
+        command::{CommandId, CommandStatus, NotConfirmed, Outcome, Refusal},
         diagnostics::DiagnosticRun,
     },
 };
 
-/// Said of an order that never left this terminal.
+/// Said of a command that never left this terminal.
 pub const GONE: &str = "station has gone";
 /// Numbers of earlier connections that are still known as one's own.
 const NUMBERS_MAX: usize = 64;
-/// Own orders that are remembered; a snapshot has no more.
-const ORDERS_MAX: usize = 32;
+/// Own commands that are remembered; a snapshot has no more.
+const COMMANDS_MAX: usize = 32;
 
 /// What a terminal remembers of itself.
 #[derive(Debug)]
 pub struct Own {
-    /// The number that its operator's orders have here, for as long as the terminal lives.
+    /// The number that its operator's commands have here, for as long as the terminal lives.
     terminal: u32,
     /// Which run of the station gave the numbers below.
     run: u64,
     /// The numbers that the station has given it, the present one last.
     numbers: VecDeque<u32>,
     /// Sent, and their end not seen in a snapshot yet.
-    sent: VecDeque<OrderStatus>,
-    /// Orders that no snapshot of the station will ever tell the end of.
-    lost: VecDeque<OrderStatus>,
-    /// The station is there: what its snapshots say of an order under way is still true.
+    sent: VecDeque<CommandStatus>,
+    /// Commands that no snapshot of the station will ever tell the end of.
+    lost: VecDeque<CommandStatus>,
+    /// The station is there: what its snapshots say of a command under way is still true.
     connected: bool,
 }
 
@@ -43,7 +43,7 @@ impl Own {
         Own { terminal, run, numbers: [terminal].into(), sent: VecDeque::new(), lost: VecDeque::new(), connected: true }
     }
 
-    /// The number of the terminal as its operator's orders have it.
+    /// The number of the terminal as its operator's commands have it.
     pub fn terminal(&self) -> u32 {
         self.terminal
     }
@@ -58,65 +58,66 @@ impl Own {
         self.connected = true;
     }
 
-    /// An order on its way out: with the number that the station knows.
-    pub fn send(&mut self, mut request: OrderRequest, by: Arc<str>, at: Timestamp) -> OrderRequest {
-        push(&mut self.sent, status(&request, by, at, Outcome::Pending), ORDERS_MAX);
+    /// A command on its way out: with the number that the station knows.
+    pub fn send(&mut self, mut request: CommandRequest, by: Arc<str>, at: Timestamp) -> CommandRequest {
+        push(&mut self.sent, status(&request, by, at, Outcome::Pending), COMMANDS_MAX);
         request.id.terminal = *self.numbers.back().expect("a connection has a number");
         request
     }
 
-    /// An order did not leave this terminal.
-    pub fn refuse(&mut self, request: &OrderRequest, by: Arc<str>, at: Timestamp, why: &str) {
+    /// A command did not leave this terminal.
+    pub fn refuse(&mut self, request: &CommandRequest, by: Arc<str>, at: Timestamp, why: &str) {
         let outcome = Outcome::Refused(Refusal::NotPermitted(why.to_owned()));
-        push(&mut self.lost, status(request, by, at, outcome), ORDERS_MAX);
+        push(&mut self.lost, status(request, by, at, outcome), COMMANDS_MAX);
     }
 
-    /// The station says that it did not take an order.
-    pub fn undelivered(&mut self, id: OrderId, why: String) {
-        if let Some(place) = self.sent.iter().position(|order| order.id.number == id.number)
-            && let Some(order) = self.sent.remove(place)
+    /// The station says that it did not take a command.
+    pub fn undelivered(&mut self, id: CommandId, why: String) {
+        if let Some(place) = self.sent.iter().position(|command| command.id.number == id.number)
+            && let Some(command) = self.sent.remove(place)
         {
             let outcome = Outcome::Refused(Refusal::NotPermitted(why));
-            push(&mut self.lost, OrderStatus { outcome, ..order }, ORDERS_MAX);
+            push(&mut self.lost, CommandStatus { outcome, ..command }, COMMANDS_MAX);
         }
     }
 
     /// The connection has ended: what was sent and not seen may or may not have been done.
     pub fn gone(&mut self) {
         self.connected = false;
-        while let Some(order) = self.sent.pop_front() {
+        while let Some(command) = self.sent.pop_front() {
             let outcome = Outcome::NotConfirmed(NotConfirmed::ConnectionLost);
-            push(&mut self.lost, OrderStatus { outcome, ..order }, ORDERS_MAX);
+            push(&mut self.lost, CommandStatus { outcome, ..command }, COMMANDS_MAX);
         }
     }
 
-    /// A snapshot of the station as this terminal is to see it: own orders under the own number, lost ones among them.
+    /// A snapshot of the station as this terminal is to see it: own commands under the own number, lost ones among them.
     pub fn see(&mut self, snapshot: &Arc<Snapshot>) -> Arc<Snapshot> {
         let told = |number: u32| {
-            let own = |order: &&OrderStatus| order.id.number == number && self.numbers.contains(&order.id.terminal);
-            snapshot.orders.iter().find(own).map(|order| order.outcome != Outcome::Pending)
+            let own =
+                |command: &&CommandStatus| command.id.number == number && self.numbers.contains(&command.id.terminal);
+            snapshot.commands.iter().find(own).map(|command| command.outcome != Outcome::Pending)
         };
-        self.sent.retain(|order| told(order.id.number) != Some(true));
+        self.sent.retain(|command| told(command.id.number) != Some(true));
         if self.connected {
             // The station remembers it after all: what it says counts again.
-            let (known, lost) = self.lost.drain(..).partition(|order| told(order.id.number).is_some());
-            let known: VecDeque<OrderStatus> = known;
-            let under_way = known.into_iter().filter(|order| told(order.id.number) == Some(false));
-            self.sent.extend(under_way.map(|order| OrderStatus { outcome: Outcome::Pending, ..order }));
+            let (known, lost) = self.lost.drain(..).partition(|command| told(command.id.number).is_some());
+            let known: VecDeque<CommandStatus> = known;
+            let under_way = known.into_iter().filter(|command| told(command.id.number) == Some(false));
+            self.sent.extend(under_way.map(|command| CommandStatus { outcome: Outcome::Pending, ..command }));
             self.lost = lost;
         }
         if self.lost.is_empty() && self.numbers.iter().all(|number| *number == self.terminal) {
             return snapshot.clone();
         }
         let mut seen = Snapshot::clone(snapshot);
-        for order in &mut seen.orders {
-            order.id = self.renumbered(order.id);
+        for command in &mut seen.commands {
+            command.id = self.renumbered(command.id);
         }
         for restore in &mut seen.restores {
             let restore = Arc::make_mut(restore);
             restore.id = self.renumbered(restore.id);
             for step in &mut restore.steps {
-                step.order = step.order.map(|id| self.renumbered(id));
+                step.command = step.command.map(|id| self.renumbered(id));
             }
         }
         for line in &mut seen.lines {
@@ -127,15 +128,15 @@ impl Own {
         }
         // The last snapshot of a station that has gone shows as under way what nobody will hear the end of.
         let is_lost =
-            |id: OrderId| id.terminal == self.terminal && self.lost.iter().any(|lost| lost.id.number == id.number);
-        seen.orders.retain(|order| !is_lost(order.id));
-        seen.orders.splice(0..0, self.lost.iter().rev().cloned());
-        seen.orders.truncate(ORDERS_MAX);
+            |id: CommandId| id.terminal == self.terminal && self.lost.iter().any(|lost| lost.id.number == id.number);
+        seen.commands.retain(|command| !is_lost(command.id));
+        seen.commands.splice(0..0, self.lost.iter().rev().cloned());
+        seen.commands.truncate(COMMANDS_MAX);
         Arc::new(seen)
     }
 
     /// All own numbers become the own one; whoever has the own one by chance gets one that is nobody's.
-    fn renumbered(&self, id: OrderId) -> OrderId {
+    fn renumbered(&self, id: CommandId) -> CommandId {
         let terminal = if self.numbers.contains(&id.terminal) {
             self.terminal
         } else if id.terminal == self.terminal {
@@ -143,13 +144,13 @@ impl Own {
         } else {
             id.terminal
         };
-        OrderId { terminal, ..id }
+        CommandId { terminal, ..id }
     }
 }
 
-fn status(request: &OrderRequest, by: Arc<str>, at: Timestamp, outcome: Outcome) -> OrderStatus {
-    let OrderRequest { id, run: _, kind, seen, note, sign: _ } = request.clone();
-    OrderStatus { id, by, from: "".into(), note, kind, at, old: seen, outcome, recorded: true }
+fn status(request: &CommandRequest, by: Arc<str>, at: Timestamp, outcome: Outcome) -> CommandStatus {
+    let CommandRequest { id, run: _, kind, seen, note, sign: _ } = request.clone();
+    CommandStatus { id, by, from: "".into(), note, kind, at, old: seen, outcome, recorded: true }
 }
 
 fn push<T>(list: &mut VecDeque<T>, element: T, max: usize) {

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::delta::Delta;
 use crate::{
-    access::{Durability, OrderRequest, Standing, Wish},
+    access::{CommandRequest, Durability, Standing, Wish},
     history::{Answer, HistoryError, Query},
-    plant::{PlantDef, command::OrderId, visible::acts},
+    plant::{PlantDef, command::CommandId, visible::acts},
 };
 
 /// The number of this protocol; goes up with every change of a message.
@@ -68,8 +68,8 @@ pub struct Welcome {
 /// What a terminal says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Asked {
-    /// An order to the plant.
-    Order(Box<OrderRequest>),
+    /// A command to the plant.
+    Command(Box<CommandRequest>),
     /// A query to the history.
     Ask {
         /// Comes back with the answer.
@@ -112,10 +112,10 @@ pub enum Told {
         /// Done, or why not.
         answer: Result<Durability, String>,
     },
-    /// An order did not reach the plant.
+    /// A command did not reach the plant.
     Undelivered {
         /// Which.
-        id: OrderId,
+        id: CommandId,
         /// Why.
         why: String,
     },

@@ -10,7 +10,7 @@ use crate::plant::{
 };
 
 /// Alarms, clock, trouble of the history, and which lines and devices are reached; no value of the process, no text, no
-/// bytes, no order. What is left out is absent, not hidden: it does not leave the station.
+/// bytes, no command. What is left out is absent, not hidden: it does not leave the station.
 pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
     let Snapshot {
         at,
@@ -54,7 +54,7 @@ pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
         aside: aside.clone(),
         sound: *sound,
         alarm_metrics: alarm_metrics.clone(),
-        orders: Vec::new(),
+        commands: Vec::new(),
         watch: ActuatorTracker::default(),
         history: history.clone(),
         station: station.clone(),

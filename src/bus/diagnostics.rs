@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::names;
 use crate::plant::{
-    command::OrderId,
+    command::CommandId,
     def::Serial,
     diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, FINDINGS_MAX, Finding, Scan},
     event::Fault,
@@ -64,7 +64,7 @@ pub struct Job {
 
 impl Job {
     /// Ready for its first step.
-    pub fn new(id: OrderId, by: Arc<str>, diagnostic: Diagnostic, at: Timestamp) -> Job {
+    pub fn new(id: CommandId, by: Arc<str>, diagnostic: Diagnostic, at: Timestamp) -> Job {
         let planned = steps_in(&diagnostic);
         let run = DiagnosticRun {
             id,
@@ -390,7 +390,7 @@ mod tests {
 
     /// Runs a diagnostic against a device given as a function from request to answer.
     fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>) -> DiagnosticRun {
-        let id = OrderId { terminal: 1, number: 1 };
+        let id = CommandId { terminal: 1, number: 1 };
         let mut job = Job::new(id, "anna".into(), diagnostic, Timestamp::UNIX_EPOCH);
         for _ in 0..10_000 {
             let Some(next) = job.next() else { return job.run().clone() };
@@ -448,8 +448,12 @@ mod tests {
     fn a_scan_over_several_settings_needs_the_line_for_itself() {
         let serials = vec![Serial::USUAL, Serial { baud: 19_200, ..Serial::USUAL }];
         let scan = Scan { first: 1, last: 3, serials, timeout: Duration::from_millis(100) };
-        let job =
-            Job::new(OrderId { terminal: 1, number: 1 }, "anna".into(), Diagnostic::Scan(scan), Timestamp::UNIX_EPOCH);
+        let job = Job::new(
+            CommandId { terminal: 1, number: 1 },
+            "anna".into(),
+            Diagnostic::Scan(scan),
+            Timestamp::UNIX_EPOCH,
+        );
         assert!(job.is_exclusive());
         assert_eq!(job.run().total, 6);
     }

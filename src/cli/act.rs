@@ -6,8 +6,8 @@ use crate::plant::{
     Snapshot,
     alarm::manager::subject_name,
     command::{CommandKind, Outcome},
+    commands::outcome_words,
     def::TagId,
-    orders::outcome_words,
 };
 
 use super::{CliError, client, in_runtime, say};
@@ -60,7 +60,7 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
             .ok_or_else(|| CliError::Usage(format!("no tag `{}` in {}", args.tag, snapshot.def.name)))?;
         let value = value(&snapshot, tag, &args.value).map_err(CliError::Usage)?;
         let kind = CommandKind::Write { tag, value };
-        let status = client::ordered(&mut session, 1, kind, args.note.as_deref(), password).await?;
+        let status = client::send_command(&mut session, 1, kind, args.note.as_deref(), password).await?;
         let words = |value: Option<f64>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
         // What the station says that the device holds, which need not be what was typed.
         let new = status.kind.written().map(|(_, held)| held);
@@ -100,7 +100,8 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
             .collect();
         for (number, seen) in (1..).zip(&waiting) {
             let (alarm, kind) = (snapshot.def.alarm(seen.id), seen.acknowledge());
-            let status = client::ordered(&mut session, number, kind, args.note.as_deref(), password.clone()).await?;
+            let status =
+                client::send_command(&mut session, number, kind, args.note.as_deref(), password.clone()).await?;
             let line = format!("{} {}: ", subject_name(&snapshot.def, alarm.subject), alarm.text);
             if status.outcome != Outcome::Verified {
                 return Err(CliError::Failed(line + &outcome_words(&status.outcome)));

@@ -7,7 +7,7 @@ use crate::{
     attach::io::{connect, find},
     plant::{
         Snapshot,
-        command::{CommandKind, OrderId, OrderStatus, Outcome},
+        command::{CommandId, CommandKind, CommandStatus, Outcome},
         role::Sign,
         sample::{Cause, Quality},
     },
@@ -16,7 +16,7 @@ use crate::{
 
 use super::CliError;
 
-/// An order that has no outcome after so long is left; the station follows it further.
+/// A command that has no outcome after so long is left; the station follows it further.
 const OUTCOME_MAX: Duration = Duration::from_secs(150);
 
 /// A login is seen everywhere within this time.
@@ -132,26 +132,26 @@ fn password(user: &str) -> Result<String, CliError> {
     Ok(line.to_owned())
 }
 
-/// Gives an order and waits for its outcome. `Err` unless it was done.
-pub async fn ordered(
+/// Gives a command and waits for its outcome. `Err` unless it was done.
+pub async fn send_command(
     session: &mut Session,
     number: u32,
     kind: CommandKind,
     note: Option<&str>,
     password: Option<Secret>,
-) -> Result<OrderStatus, CliError> {
-    let id = OrderId { terminal: session.terminal, number };
+) -> Result<CommandStatus, CliError> {
+    let id = CommandId { terminal: session.terminal, number };
     // Whoever acts has just given his password: where a tag asks for it again, this is it.
     let sign = sign::needed(&session.snapshots.borrow().def, &kind) == Some(Sign::Password);
     let sign = password.filter(|_| sign).map(|password| Signature { user: None, password });
-    let request = crate::access::OrderRequest {
+    let request = crate::access::CommandRequest {
         sign,
         note: note.map(Into::into),
-        ..crate::access::OrderRequest::on(&session.snapshots.borrow(), id, kind)
+        ..crate::access::CommandRequest::on(&session.snapshots.borrow(), id, kind)
     };
-    session.send(crate::station::Request::Order(request)).map_err(|why| CliError::Failed(why.to_owned()))?;
+    session.send(crate::station::Request::Command(request)).map_err(|why| CliError::Failed(why.to_owned()))?;
     let ended = |snapshot: &Snapshot| {
-        snapshot.orders.iter().find(|order| order.id == id && order.outcome != Outcome::Pending).cloned()
+        snapshot.commands.iter().find(|command| command.id == id && command.outcome != Outcome::Pending).cloned()
     };
     let wait = async {
         let snapshot = session.snapshots.wait_for(|snapshot| ended(snapshot).is_some()).await;

@@ -83,7 +83,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
             snapshots: session.snapshots.clone(),
             journal,
             // Without a terminal nobody else is there to act.
-            operator: (args.headless && scenario.is_some()).then(|| station.orders.clone()),
+            operator: (args.headless && scenario.is_some()).then(|| station.commands.clone()),
             scenario: scenario.clone(),
             exam: args.exam,
         };

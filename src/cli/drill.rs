@@ -106,15 +106,15 @@ fn rehearse(
         let (listener, journal) = journal();
         let station = station::rehearse(def.clone(), time, in_memory(&def, &simulator), listener);
         let session = station.session("drill");
-        // Without an operator his orders lead nowhere.
-        let orders = if with_operator { station.orders.clone() } else { mpsc::channel(1).0 };
+        // Without an operator his commands lead nowhere.
+        let commands = if with_operator { station.commands.clone() } else { mpsc::channel(1).0 };
         let trainer = Trainer {
             def,
             simulator,
             snapshots: session.snapshots.clone(),
             journal,
             scenario: Some(scenario),
-            operator: Some(orders),
+            operator: Some(commands),
             exam: false,
         };
         let (_port, mut work) = trainer.spawn();

@@ -81,9 +81,9 @@ impl Snapshot {
         let day = Arc::make_mut(&mut self.alarm_metrics.day);
         shift(&mut day.from, by);
         shift(&mut day.until, by);
-        self.orders.iter_mut().for_each(|order| {
-            shift(&mut order.at, by);
-            order.kind.unshift(-by);
+        self.commands.iter_mut().for_each(|command| {
+            shift(&mut command.at, by);
+            command.kind.unshift(-by);
         });
         self.watch.times().for_each(|since| shift(since, by));
         self.restores.iter_mut().for_each(|run| {
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
     use crate::plant::{
         Plant,
-        command::{Order, OrderId, Outcome},
+        command::{Command, CommandId, Outcome},
         event::{Event, Fault},
         fixture::{self, DP, FAULT, PV, SV, TIC},
     };
@@ -180,11 +180,11 @@ mod tests {
             // What a terminal sends is what it was shown.
             let mut kind = snapshot.alarms[0].acknowledge();
             kind.unshift(by);
-            let id = OrderId { terminal: 1, number: 1 };
-            plant.on_order(Order::new(id, "anna", kind), at(1_000_005));
+            let id = CommandId { terminal: 1, number: 1 };
+            plant.on_command(Command::new(id, "anna", kind), at(1_000_005));
             let mut snapshot = plant.snapshot();
             snapshot.shift(by);
-            assert_eq!(snapshot.orders[0].outcome, Outcome::Verified);
+            assert_eq!(snapshot.commands[0].outcome, Outcome::Verified);
             assert_eq!(snapshot.alarms[0].acknowledged.as_ref().map(|note| note.at), Some(at(1_000_005) + by));
         }
     }

@@ -16,9 +16,9 @@ use super::{
 
 /// One wish of one operator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Order {
+pub struct Command {
     /// Chosen by the terminal, so that it finds the outcome in a later snapshot.
-    pub id: OrderId,
+    pub id: CommandId,
     /// Who wishes.
     pub by: Arc<str>,
     /// From where: `pts/3 from 10.0.0.5, user panel`; empty for the station itself.
@@ -33,16 +33,16 @@ pub struct Order {
     pub refused: Option<Refusal>,
 }
 
-impl Order {
-    /// An order that may be carried out, without note.
-    pub fn new(id: OrderId, by: impl Into<Arc<str>>, kind: CommandKind) -> Order {
-        Order { id, by: by.into(), from: "".into(), kind, seen: None, note: None, refused: None }
+impl Command {
+    /// A command that may be carried out, without note.
+    pub fn new(id: CommandId, by: impl Into<Arc<str>>, kind: CommandKind) -> Command {
+        Command { id, by: by.into(), from: "".into(), kind, seen: None, note: None, refused: None }
     }
 }
 
-/// Identifies an order: the terminal's number and its running count.
+/// Identifies a command: the terminal's number and its running count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct OrderId {
+pub struct CommandId {
     /// Which terminal.
     pub terminal: u32,
     /// Its running count.
@@ -88,7 +88,7 @@ pub enum CommandKind {
     Restore(Box<RestoreWish>),
     /// Stop the restore of a device after the write under way.
     StopRestore(DeviceId),
-    /// Hand the plant over to the next shift; what its people should know is the note of the order.
+    /// Hand the plant over to the next shift; what its people should know is the note of the command.
     HandOver,
     /// Take the plant over from the shift before.
     TakeOver,
@@ -116,11 +116,11 @@ impl CommandKind {
     }
 }
 
-/// How an order stands.
+/// How a command stands.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct OrderStatus {
+pub struct CommandStatus {
     /// Which.
-    pub id: OrderId,
+    pub id: CommandId,
     /// Who.
     pub by: Arc<str>,
     /// From where.
@@ -135,11 +135,11 @@ pub struct OrderStatus {
     pub old: Option<f64>,
     /// How it stands.
     pub outcome: Outcome,
-    /// Its end is in the audit log, on disk. Said of ended orders only.
+    /// Its end is in the audit log, on disk. Said of ended commands only.
     pub recorded: bool,
 }
 
-/// The outcome of an order. A write is never retried by itself.
+/// The outcome of a command. A write is never retried by itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
     /// Under way.
@@ -151,13 +151,13 @@ pub enum Outcome {
     /// Not done, and certainly without effect on what was to be written; a key that was sent before it has a line of its own
     /// in the journal.
     Refused(Refusal),
-    /// A write that may or may not have taken effect, or has taken another one than was ordered.
+    /// A write that may or may not have taken effect, or has taken another one than was requested.
     NotConfirmed(NotConfirmed),
     /// No answer to what is no write.
     Failed(Fault),
 }
 
-/// Why an order was refused.
+/// Why a command was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum Refusal {
     /// His role does not permit it, or nobody is logged in.
@@ -169,7 +169,7 @@ pub enum Refusal {
     /// Somebody or something has changed the value since the operator looked; this is what it is now.
     #[error("it was changed to {0} since you looked")]
     ChangedTo(String),
-    /// The order does not say which value it replaces; this is what it is now.
+    /// The command does not say which value it replaces; this is what it is now.
     #[error("it is {0} now; look and confirm again")]
     NotSeen(String),
     /// The profile says read-only.
@@ -293,8 +293,8 @@ pub enum BusRequest {
     Refresh {
         /// Which.
         device: DeviceId,
-        /// The order it comes by; `None` for one that the plant itself wishes.
-        order: Option<OrderId>,
+        /// The command it comes by; `None` for one that the plant itself wishes.
+        command: Option<CommandId>,
     },
     /// Open or close the port.
     Connect(bool),
@@ -302,9 +302,9 @@ pub enum BusRequest {
     Configure(Box<LineDef>),
     /// Start a diagnostic; the one at work is stopped.
     Test {
-        /// The order it comes by.
-        id: OrderId,
-        /// Who ordered it.
+        /// The command it comes by.
+        id: CommandId,
+        /// Who requested it.
         by: Arc<str>,
         /// What.
         diagnostic: Diagnostic,

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    command::OrderId,
+    command::CommandId,
     event::Fault,
     line::Serial,
     line_check::{TIMEOUT_MIN, WAIT_MAX},
@@ -134,9 +134,9 @@ impl Scan {
 /// A running diagnostic, or done.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosticRun {
-    /// The order it came by.
-    pub id: OrderId,
-    /// Who ordered it.
+    /// The command it came by.
+    pub id: CommandId,
+    /// Who requested it.
     pub by: Arc<str>,
     /// What.
     pub diagnostic: Diagnostic,

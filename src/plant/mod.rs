@@ -1,10 +1,10 @@
 //! What is true. No I/O, no clock: events and time come in as arguments, effects go out as values.
 //!
 //! ```text
-//!  Event ──┐                       ┌──> Effects { bus requests, records }
-//!  Order ──┼──> Plant (reducer) ───┤
-//!  tick  ──┘    image alarms desk  └──> Snapshot
-//!               values alarms orders
+//! Event ───┐                       ┌──> Effects { bus requests, records }
+//! Command ─┼──> Plant (reducer) ───┤
+//! tick  ───┘    image alarms desk  └──> Snapshot
+//!               values alarms commands
 //! ```
 
 pub mod visible;
@@ -39,7 +39,7 @@ pub mod station;
 pub mod snapshot;
 pub mod clock_step;
 pub mod process_image;
-pub mod orders;
+pub mod commands;
 pub mod reducer;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Named values of a device's settings: taken from a device, compared with one, and brought into an order of writes.
+//! Named values of a device's settings: taken from a device, compared with one, and brought into a sequence of writes.
 
 mod plan;
 #[cfg(test)]

@@ -151,7 +151,7 @@ impl AlarmStep {
 /// An operator action, written when its outcome is known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionRecord {
-    /// When the order was taken.
+    /// When the command was taken.
     pub at: Timestamp,
     /// Who.
     pub by: Arc<str>,
@@ -174,7 +174,7 @@ pub struct ActionRecord {
 }
 
 /// The word on record for a write that is about to be sent; its outcome has a line of its own.
-pub const ORDER: &str = "order";
+pub const WRITE_REQUESTED: &str = "write requested";
 
 /// The word on record for a seal over the entries of the audit log.
 pub const SEAL_LOG: &str = "seal audit log";
@@ -182,7 +182,7 @@ pub const SEAL_LOG: &str = "seal audit log";
 /// Actions on users, terminals and the station, not on the plant: for the audit log and the list of a Supervisor,
 /// not for shift reports and curves. So it is with the intent of a write, whose outcome is there already.
 pub const ELSEWHERE: [&str; 26] = [
-    ORDER,
+    WRITE_REQUESTED,
     SEAL_LOG,
     "attach",
     "detach",

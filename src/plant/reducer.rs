@@ -1,4 +1,4 @@
-//! The reducer of facts: event, order or tick in, effects out. The only place where the plant changes.
+//! The reducer of facts: event, command or tick in, effects out. The only place where the plant changes.
 
 mod alarms;
 mod health;
@@ -15,12 +15,12 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::{
     alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_words},
-    command::{BusRequest, CommandKind, Order, OrderId, Outcome, Refusal, WriteId},
+    command::{BusRequest, Command, CommandId, CommandKind, Outcome, Refusal, WriteId},
+    commands::Desk,
     def::{DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
     interlock::ActuatorTracker,
     line_minute::LineWatch,
-    orders::Desk,
     parameter_set::StoredSet,
     process_image::ProcessImage,
     program::ProgramWatch,
@@ -42,8 +42,8 @@ pub struct Effects {
     pub bus: Vec<(LineId, BusRequest)>,
     /// Lines of the history.
     pub records: Vec<Record>,
-    /// Settings of a line for the plant file, and the order that wishes it.
-    pub save: Option<(OrderId, LineDef)>,
+    /// Settings of a line for the plant file, and the command that wishes it.
+    pub save: Option<(CommandId, LineDef)>,
     /// Work with the folder of parameter sets.
     pub sets: Option<SetWork>,
 }
@@ -75,7 +75,7 @@ pub struct Plant {
     sets: Arc<Vec<StoredSet>>,
     /// The latest restore of each device that had one.
     restores: Vec<Arc<Restore>>,
-    /// Writes that the plant itself has ordered for its restores.
+    /// Writes that the plant itself has requested for its restores.
     numbers: u32,
     /// Auto-tuning and program of each device, by [`DeviceId`].
     tunings: Vec<TuningWatch>,
@@ -166,35 +166,37 @@ impl Plant {
     }
 
     /// Takes a wish of an operator.
-    pub fn on_order(&mut self, order: Order, at: Timestamp) -> Effects {
+    pub fn on_command(&mut self, command: Command, at: Timestamp) -> Effects {
         let mut effects = Effects::default();
-        if let Some(why) = &order.refused {
-            let action = self.desk.note(&order, Outcome::Refused(why.clone()), &self.image, at);
+        if let Some(why) = &command.refused {
+            let action = self.desk.note(&command, Outcome::Refused(why.clone()), &self.image, at);
             effects.records.extend(action.map(Record::Action));
             self.at = self.at.max(at);
             return effects;
         }
-        let action = match order.kind.clone() {
-            CommandKind::Write { tag, value } => match self.desk.write(&self.image, &order, tag, value, at) {
+        let action = match command.kind.clone() {
+            CommandKind::Write { tag, value } => match self.desk.write(&self.image, &command, tag, value, at) {
                 Ok(request) => {
                     effects.bus.push((self.line_of(tag), request));
                     None
                 }
                 Err(action) => action.map(|action| *action),
             },
-            CommandKind::Alarm(alarm_command) => self.alarm_order(&order, alarm_command, at, &mut effects),
+            CommandKind::Alarm(alarm_command) => self.alarm_command(&command, alarm_command, at, &mut effects),
             CommandKind::Refresh(device) => {
-                effects.bus.push((self.def.device(device).line, BusRequest::Refresh { device, order: Some(order.id) }));
+                effects
+                    .bus
+                    .push((self.def.device(device).line, BusRequest::Refresh { device, command: Some(command.id) }));
                 // A read is not an operator action: it is shown, but not recorded.
-                let _ = self.desk.note(&order, Outcome::Verified, &self.image, at);
+                let _ = self.desk.note(&command, Outcome::Verified, &self.image, at);
                 None
             }
             CommandKind::Connect(line, open) => {
                 let is_open = self.lines[line.index()].state != LineState::Disconnected;
                 if is_open == open {
-                    self.desk.note(&order, Outcome::Unchanged, &self.image, at)
+                    self.desk.note(&command, Outcome::Unchanged, &self.image, at)
                 } else {
-                    self.desk.take(&order, at);
+                    self.desk.take(&command, at);
                     effects.bus.push((line, BusRequest::Connect(open)));
                     None
                 }
@@ -202,17 +204,17 @@ impl Plant {
             CommandKind::Configure(_)
             | CommandKind::SaveSettings(_)
             | CommandKind::Test(..)
-            | CommandKind::StopTest(_) => self.line_order(&order, at, &mut effects),
+            | CommandKind::StopTest(_) => self.line_command(&command, at, &mut effects),
             CommandKind::ReadSets
             | CommandKind::SaveSet { .. }
             | CommandKind::Restore(_)
-            | CommandKind::StopRestore(_) => self.set_order(&order, at, &mut effects),
+            | CommandKind::StopRestore(_) => self.set_command(&command, at, &mut effects),
             CommandKind::HandOver | CommandKind::TakeOver => {
-                let outcome = match check_words(order.note.as_ref()) {
+                let outcome = match check_words(command.note.as_ref()) {
                     Ok(()) => Outcome::Verified,
                     Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),
                 };
-                self.desk.note(&order, outcome, &self.image, at)
+                self.desk.note(&command, outcome, &self.image, at)
             }
         };
         effects.records.extend(action.map(Record::Action));
@@ -264,7 +266,7 @@ impl Plant {
         effects
     }
 
-    /// The plant as of its last event, order or tick.
+    /// The plant as of its last event, command or tick.
     pub fn snapshot(&self) -> Snapshot {
         let lists = self.alarm_manager.lists();
         Snapshot {
@@ -282,7 +284,7 @@ impl Plant {
             aside: lists.aside.clone(),
             sound: lists.sound,
             alarm_metrics: self.alarm_metrics.clone(),
-            orders: self.desk.shown(),
+            commands: self.desk.shown(),
             watch: self.watch.clone(),
             history: self.history.clone(),
             station: self.faults.details().clone(),

@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    command::{NotConfirmed, OrderId, Outcome, Refusal},
+    command::{CommandId, NotConfirmed, Outcome, Refusal},
     def::{DeviceId, PlantDef, TagId},
     parameter_set::{Change, ParameterSet},
     sample::Sample,
@@ -33,8 +33,8 @@ pub struct RestoreWish {
 /// A restore as it stands.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Restore {
-    /// The order that it carries out.
-    pub id: OrderId,
+    /// The command that it carries out.
+    pub id: CommandId,
     /// Who wished it.
     pub by: Arc<str>,
     /// Where the values come from.
@@ -62,8 +62,8 @@ pub struct Restore {
 pub struct Step {
     /// What.
     pub change: Change,
-    /// The order that writes it; `None` before its turn.
-    pub order: Option<OrderId>,
+    /// The command that writes it; `None` before its turn.
+    pub command: Option<CommandId>,
     /// How that ended; `None` before it has.
     pub outcome: Option<Outcome>,
 }
@@ -85,8 +85,8 @@ pub enum State {
 
 impl Restore {
     /// Begins with reading the device.
-    pub fn new(id: OrderId, by: Arc<str>, wish: &RestoreWish, at: Timestamp) -> Restore {
-        let step = |change: &Change| Step { change: *change, order: None, outcome: None };
+    pub fn new(id: CommandId, by: Arc<str>, wish: &RestoreWish, at: Timestamp) -> Restore {
+        let step = |change: &Change| Step { change: *change, command: None, outcome: None };
         let steps = wish.changes.iter().map(step).collect();
         Restore {
             id,
@@ -108,7 +108,7 @@ impl Restore {
         matches!(self.state, State::Reading | State::Running)
     }
 
-    /// Has every tag of the set been read since it was ordered, and what the set rests on too?
+    /// Has every tag of the set been read since it was requested, and what the set rests on too?
     pub fn is_read(&self, def: &PlantDef, sample: impl Fn(TagId) -> Sample) -> bool {
         let named = |short: &str| self.set.values.iter().chain(&self.set.given).any(|held| held.tag == short);
         let fresh = |tag: TagId| {
@@ -136,13 +136,13 @@ impl Restore {
     }
 
     /// The write under way.
-    pub fn current(&self) -> Option<OrderId> {
-        self.steps.iter().find(|step| step.order.is_some() && step.outcome.is_none()).and_then(|step| step.order)
+    pub fn current(&self) -> Option<CommandId> {
+        self.steps.iter().find(|step| step.command.is_some() && step.outcome.is_none()).and_then(|step| step.command)
     }
 
     /// The write under way has ended.
     pub fn take(&mut self, outcome: Outcome) {
-        let Some(step) = self.steps.iter_mut().find(|step| step.order.is_some() && step.outcome.is_none()) else {
+        let Some(step) = self.steps.iter_mut().find(|step| step.command.is_some() && step.outcome.is_none()) else {
             return;
         };
         if !is_done(&outcome) {
@@ -156,7 +156,7 @@ impl Restore {
         if self.state != State::Running || self.current().is_some() {
             return None;
         }
-        let next = self.steps.iter().position(|step| step.order.is_none());
+        let next = self.steps.iter().position(|step| step.command.is_none());
         match next {
             None => self.state = State::Done,
             Some(_) if self.stopping => self.state = State::Stopped,

@@ -10,7 +10,7 @@ use super::{
         AlarmCommand, AlarmMetrics,
         state::{AlarmState, OperatorNote},
     },
-    command::{CommandKind, OrderStatus},
+    command::{CommandKind, CommandStatus},
     def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, TagId},
     diagnostics::DiagnosticRun,
     event::{Fault, LineCounters, LineState},
@@ -59,8 +59,8 @@ pub struct Snapshot {
     pub sound: bool,
     /// How good the alarm system is: the rates of this moment, and the figures of the last 24 hours.
     pub alarm_metrics: AlarmMetrics,
-    /// The latest orders, newest first, at most 32.
-    pub orders: Vec<OrderStatus>,
+    /// The latest commands, newest first, at most 32.
+    pub commands: Vec<CommandStatus>,
     /// Since when actuators have not obeyed.
     pub watch: ActuatorTracker,
     /// The history store.
@@ -97,7 +97,7 @@ impl Snapshot {
             aside: Arc::default(),
             sound: false,
             alarm_metrics: AlarmMetrics::default(),
-            orders: Vec::new(),
+            commands: Vec::new(),
             watch: ActuatorTracker::default(),
             history: HistoryStatus::default(),
             station: Arc::default(),
@@ -180,7 +180,7 @@ impl Snapshot {
     pub fn tuning(&self, id: DeviceId) -> Option<&Tuning> {
         self.tunings.get(id.index())?.as_deref()
     }
-    /// The order to acknowledge all that waits here, as it is seen; `None` if nothing does.
+    /// The command to acknowledge all that waits here, as it is seen; `None` if nothing does.
     pub fn acknowledge_all(&self) -> Option<CommandKind> {
         let waits = self.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement());
         let seen: Arc<[_]> = waits.map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
@@ -283,7 +283,7 @@ impl ActiveAlarm {
         let annunciated_at = raised_at;
         ActiveAlarm { id, state, raised_at, annunciated_at, returned_at, value, acknowledged, times, burst }
     }
-    /// The order to acknowledge it, as it is seen here.
+    /// The command to acknowledge it, as it is seen here.
     pub fn acknowledge(&self) -> CommandKind {
         CommandKind::Alarm(AlarmCommand::Acknowledge { alarm: self.id, seen: self.annunciated_at })
     }

@@ -296,7 +296,7 @@ impl Kind {
     pub const TEXT_MAX: u8 = 250;
 }
 
-/// Order of the bytes A B C D (A most significant) on the wire.
+/// Sequence of the bytes A B C D (A most significant) on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub enum ByteOrder {
     /// Big-endian, the default of the Modbus world.

@@ -91,7 +91,7 @@ pub enum OperatorWish {
 }
 
 impl OperatorWish {
-    /// The order that an operator gives who looks at this; `None` if there is nothing to do.
+    /// The command that an operator gives who looks at this; `None` if there is nothing to do.
     pub fn command_kind(self, seen: &Snapshot) -> Option<CommandKind> {
         match self {
             OperatorWish::Acknowledge(id) => {

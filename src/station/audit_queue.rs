@@ -22,7 +22,7 @@ use crate::{
     plant::{
         Snapshot,
         alarm::manager::subject_name,
-        command::{OrderId, OrderStatus, Outcome},
+        command::{CommandId, CommandStatus, Outcome},
         def::AlarmId,
         record::{ActionRecord, AlarmRecord, Seal},
     },
@@ -34,12 +34,12 @@ use crate::{
 const WAIT_MAX: Duration = Duration::from_secs(1);
 /// Actions that wait for a place in the queue; the oldest of more go to the history alone.
 const BACKLOG_MAX: usize = 1_000;
-/// Ended orders whose place on disk is remembered: twice what a snapshot shows.
-const ORDERS_MAX: usize = 64;
+/// Ended commands whose place on disk is remembered: twice what a snapshot shows.
+const COMMANDS_MAX: usize = 64;
 /// Answers that wait for the audit log; one more, and the oldest waits no longer.
 const ANSWERS_MAX: usize = 64;
 
-/// A message of the session server; order matters.
+/// A message of the session server; command matters.
 #[derive(Debug)]
 pub enum AuditMessage {
     /// Put this into the audit log.
@@ -80,8 +80,8 @@ pub struct AuditQueue {
     sent: u64,
     needed: u64,
     behind: Instant,
-    /// Orders that have ended, and the batch with the action of each.
-    ended: VecDeque<(OrderId, u64)>,
+    /// Commands that have ended, and the batch with the action of each.
+    ended: VecDeque<(CommandId, u64)>,
     /// Alarms, by subject and text, with the batch of the last step of an operator that is not on disk.
     steps: HashMap<(Arc<str>, Arc<str>), u64>,
     /// Actions that the queue had no room for: they are in the history only.
@@ -226,19 +226,19 @@ impl AuditQueue {
         if alive && self.recorded.borrow().batches < self.needed { next.max(self.behind + WAIT_MAX) } else { next }
     }
 
-    /// Marks in a snapshot what is not on disk: ended orders, and what operators did with alarms.
+    /// Marks in a snapshot what is not on disk: ended commands, and what operators did with alarms.
     pub fn mark(&mut self, snapshot: &mut Snapshot) {
         let (recorded, needed) = (self.recorded.borrow().batches, self.needed);
-        let has_ended = |order: &&mut OrderStatus| order.outcome != Outcome::Pending;
-        for order in snapshot.orders.iter_mut().rev().filter(has_ended) {
-            let known = self.ended.iter().find(|(id, _)| *id == order.id).map(|(_, batch)| *batch);
+        let has_ended = |command: &&mut CommandStatus| command.outcome != Outcome::Pending;
+        for command in snapshot.commands.iter_mut().rev().filter(has_ended) {
+            let known = self.ended.iter().find(|(id, _)| *id == command.id).map(|(_, batch)| *batch);
             let batch = known.unwrap_or_else(|| {
-                self.ended.push_back((order.id, needed));
+                self.ended.push_back((command.id, needed));
                 needed
             });
-            order.recorded = batch <= recorded;
+            command.recorded = batch <= recorded;
         }
-        let excess = self.ended.len().saturating_sub(ORDERS_MAX);
+        let excess = self.ended.len().saturating_sub(COMMANDS_MAX);
         self.ended.drain(..excess);
         self.steps.retain(|_, batch| recorded < *batch);
         if self.steps.is_empty() {

@@ -19,7 +19,7 @@ use crate::{
     },
     plant::{
         Plant, PlantDef,
-        command::Order,
+        command::Command,
         record::Seal,
         snapshot::HistoryStatus,
         station::{FaultState, StationFault},
@@ -39,10 +39,10 @@ use super::{
 
 /// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
 const EVENTS: usize = 256;
-/// Requests waiting for one link; a full queue refuses the order.
+/// Requests waiting for one link; a full queue refuses the command.
 const REQUESTS: usize = 16 + KEPT_FOR_STOPS;
-/// Orders waiting for the plant; a full queue refuses the order.
-const ORDERS: usize = 64;
+/// Commands waiting for the plant; a full queue refuses the command.
+const COMMANDS_MAX: usize = 64;
 /// What a station is started with.
 #[derive(Debug)]
 pub struct Options {
@@ -63,7 +63,7 @@ pub struct Options {
 pub struct Station {
     acceptor: SessionAcceptor,
     /// Bypasses access control: for the scripted operator of a drill.
-    pub orders: mpsc::Sender<Order>,
+    pub commands: mpsc::Sender<Command>,
     /// What terminals wish of the station as a whole.
     pub lifecycle: mpsc::Receiver<session_server::LifecycleRequest>,
     /// `None` for a rehearsal, which keeps nothing.
@@ -181,7 +181,7 @@ fn assemble(
     let Threads { queries, history, book } = threads;
     let (stop, stopped) = watch::channel(false);
     let (events, event_queue) = mpsc::channel(EVENTS);
-    let (orders, order_queue) = mpsc::channel(ORDERS);
+    let (commands, command_queue) = mpsc::channel(COMMANDS_MAX);
     let mut tasks = Vec::new();
     let mut links = Vec::new();
     for (line, connector) in def.lines.iter().zip(connectors) {
@@ -202,10 +202,10 @@ fn assemble(
     let run = first.run;
     let (publish, snapshots) = watch::channel(Arc::new(first));
     let desk = PlantTask::new(plant, clock, links, file, keeping, publish);
-    let (audit, audit_messages) = mpsc::channel(ORDERS);
-    tasks.push(tokio::spawn(desk.run(event_queue, order_queue, audit_messages)));
+    let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
+    tasks.push(tokio::spawn(desk.run(event_queue, command_queue, audit_messages)));
     let (lifecycle_sender, lifecycle) = mpsc::channel(session_server::LIFECYCLE_REQUESTS_MAX);
-    let outputs = Outputs { orders: orders.clone(), queries, audit, lifecycle: lifecycle_sender };
+    let outputs = Outputs { commands: commands.clone(), queries, audit, lifecycle: lifecycle_sender };
     let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
     let open = guarded.is_none();
     let (access, users) = guarded.map_or_else(
@@ -214,7 +214,7 @@ fn assemble(
     );
     let server = SessionServer::new(access.in_run(run), clock, outputs, users);
     tasks.push(tokio::spawn(server.run(attach_requests, requests, stopped)));
-    Station { acceptor, orders, lifecycle, history, book, open, stop, tasks }
+    Station { acceptor, commands, lifecycle, history, book, open, stop, tasks }
 }
 
 impl Station {
@@ -232,10 +232,10 @@ impl Station {
 
     /// Stops downstream and waits until the last record is on disk. Gives the last entry of the audit log.
     pub async fn stop(self) -> Option<Seal> {
-        let Station { acceptor, orders, lifecycle, history, book, open: _, stop, tasks } = self;
+        let Station { acceptor, commands, lifecycle, history, book, open: _, stop, tasks } = self;
         // Links may have ended already; then nobody listens, which is fine.
         let _ = stop.send(true);
-        drop((acceptor, orders, lifecycle));
+        drop((acceptor, commands, lifecycle));
         for task in tasks {
             if let Err(error) = task.await {
                 tracing::error!(%error, "a task of the station ended badly");

@@ -1,4 +1,4 @@
-//! The loop around the reducer of facts: events, orders and ticks in; requests, records and snapshots out.
+//! The loop around the reducer of facts: events, commands and ticks in; requests, records and snapshots out.
 
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
@@ -20,7 +20,7 @@ use crate::{
     history::io::{open::Restored, thread::offer},
     plant::{
         Effects, Plant, SetWork, Snapshot,
-        command::{BusRequest, Order, OrderId},
+        command::{BusRequest, Command, CommandId},
         def::{LineDef, LineId},
         event::Event,
         record::{ActionRecord, AlarmRecord, Record},
@@ -63,18 +63,18 @@ const NO_FILE: &str =
 
 /// The plant file on its way to the disk, and for whom.
 struct Saving {
-    order: OrderId,
+    command: CommandId,
     settings: LineDef,
     work: JoinHandle<(PlantFile, Result<(), String>)>,
 }
 
 /// For whom, and how it ended.
-type Saved = (OrderId, LineDef, Result<(PlantFile, Result<(), String>), tokio::task::JoinError>);
+type Saved = (CommandId, LineDef, Result<(PlantFile, Result<(), String>), tokio::task::JoinError>);
 
 /// Waits for the end of a save; for ever without one.
 async fn saved(saving: &mut Option<Saving>) -> Saved {
-    let Some(Saving { order, settings, work }) = saving else { return std::future::pending().await };
-    let saved = (*order, settings.clone(), work.await);
+    let Some(Saving { command, settings, work }) = saving else { return std::future::pending().await };
+    let saved = (*command, settings.clone(), work.await);
     *saving = None;
     saved
 }
@@ -120,7 +120,7 @@ impl PlantTask {
     pub async fn run(
         mut self,
         mut events: mpsc::Receiver<Event>,
-        mut orders: mpsc::Receiver<Order>,
+        mut commands: mpsc::Receiver<Command>,
         mut messages: mpsc::Receiver<AuditMessage>,
     ) {
         let tick_every = self.clock.real_span(Duration::from_secs(1)).max(TICK_MIN);
@@ -143,9 +143,9 @@ impl PlantTask {
                     self.publish();
                     (changed, next) = (false, Instant::now() + SNAPSHOT_EVERY);
                 }
-                Some(mut order) = orders.recv() => {
-                    order.kind.unshift(self.clock.behind_utc());
-                    let effects = self.plant.on_order(order, self.clock.now());
+                Some(mut command) = commands.recv() => {
+                    command.kind.unshift(self.clock.behind_utc());
+                    let effects = self.plant.on_command(command, self.clock.now());
                     self.carry_out(effects);
                     (changed, next) = (true, Instant::now());
                 }
@@ -171,7 +171,7 @@ impl PlantTask {
                     self.hear_store();
                     changed = true;
                 }
-                // Before the events: however many there are, values age and orders expire.
+                // Before the events: however many there are, values age and commands expire.
                 _ = tick.tick() => {
                     let effects = self.plant.on_tick(self.clock.now());
                     self.carry_out(effects);
@@ -286,8 +286,8 @@ impl PlantTask {
             self.send(line, request);
         }
         self.keep(effects.records);
-        if let Some((order, settings)) = effects.save {
-            self.save(order, settings);
+        if let Some((command, settings)) = effects.save {
+            self.save(command, settings);
         }
         if let Some(work) = effects.sets {
             self.file_sets(work);
@@ -306,8 +306,8 @@ impl PlantTask {
             (None, _) => "this station keeps nothing",
         };
         // What is being done ends with the folder read, so a wish to read is granted already.
-        if let SetWork::Write { order, .. } = work {
-            let effects = self.plant.on_set_written(order, Err(refused.to_owned()));
+        if let SetWork::Write { command, .. } = work {
+            let effects = self.plant.on_set_written(command, Err(refused.to_owned()));
             self.keep(effects.records);
         }
     }
@@ -315,18 +315,18 @@ impl PlantTask {
     fn take_filed(&mut self, done: Result<sets::Done, tokio::task::JoinError>) {
         let (written, sets) = match done {
             Ok(done) => done,
-            // Whoever has ordered it hears of it when his order is given up.
+            // Whoever has requested it hears of it when his command is given up.
             Err(error) => return tracing::error!(%error, "the work with the sets ended badly"),
         };
         self.plant.on_sets(sets);
-        if let Some((order, result)) = written {
-            let effects = self.plant.on_set_written(order, result);
+        if let Some((command, result)) = written {
+            let effects = self.plant.on_set_written(command, result);
             self.keep(effects.records);
         }
     }
 
     /// Has the plant file written beside the loop; the outcome comes to [`PlantTask::take_saved`].
-    fn save(&mut self, order: OrderId, settings: LineDef) {
+    fn save(&mut self, command: CommandId, settings: LineDef) {
         match (self.file.take(), &self.saving) {
             (Some(mut file), _) => {
                 let saved = settings.clone();
@@ -334,14 +334,14 @@ impl PlantTask {
                     let result = file.save(&settings);
                     (file, result)
                 });
-                self.saving = Some(Saving { order, settings: saved, work });
+                self.saving = Some(Saving { command, settings: saved, work });
             }
-            (None, Some(_)) => self.tell_saved(order, &settings, Err("other settings are just being saved".into())),
-            (None, None) => self.tell_saved(order, &settings, Err(NO_FILE.into())),
+            (None, Some(_)) => self.tell_saved(command, &settings, Err("other settings are just being saved".into())),
+            (None, None) => self.tell_saved(command, &settings, Err(NO_FILE.into())),
         }
     }
 
-    fn take_saved(&mut self, (order, settings, done): Saved) {
+    fn take_saved(&mut self, (command, settings, done): Saved) {
         let result = match done {
             Ok((file, result)) => {
                 let now = self.clock.utc();
@@ -355,11 +355,11 @@ impl PlantTask {
                 Err("internal error, see the log".to_owned())
             }
         };
-        self.tell_saved(order, &settings, result);
+        self.tell_saved(command, &settings, result);
     }
 
-    fn tell_saved(&mut self, order: OrderId, settings: &LineDef, result: Result<(), String>) {
-        let effects = self.plant.on_saved(order, settings, result);
+    fn tell_saved(&mut self, command: CommandId, settings: &LineDef, result: Result<(), String>) {
+        let effects = self.plant.on_saved(command, settings, result);
         self.keep(effects.records);
     }
 

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::{
-    access::{Durability, OrderRequest, Standing, Wish},
+    access::{CommandRequest, Durability, Standing, Wish},
     history::io::QueryRequest,
     plant::{
         Snapshot,
-        command::{CommandKind, OrderId},
+        command::{CommandId, CommandKind},
     },
     sim::io::Port,
 };
@@ -26,7 +26,7 @@ pub struct Session {
     pub standing: watch::Receiver<Arc<Standing>>,
     /// Requests; a full queue is a refusal.
     pub requests: mpsc::Sender<(u32, Request)>,
-    /// Number of this terminal, the first part of its order ids.
+    /// Number of this terminal, the first part of its command ids.
     pub terminal: u32,
     /// The simulation behind the plant; a real plant has none.
     pub drill: Option<Port>,
@@ -35,8 +35,8 @@ pub struct Session {
 /// What a terminal asks of its station.
 #[derive(Debug)]
 pub enum Request {
-    /// An order to the plant. Its outcome is seen in a later snapshot, also that it was not permitted.
-    Order(OrderRequest),
+    /// A command to the plant. Its outcome is seen in a later snapshot, also that it was not permitted.
+    Command(CommandRequest),
     /// A query to the history.
     Ask(QueryRequest),
     /// A wish about people or the station.
@@ -55,11 +55,11 @@ impl Session {
         })
     }
 
-    /// Gives an order without note and signature; its outcome is seen in a later snapshot.
-    pub fn order(&self, number: u32, kind: CommandKind) -> Result<OrderId, &'static str> {
-        let id = OrderId { terminal: self.terminal, number };
-        let request = OrderRequest::on(&self.snapshots.borrow(), id, kind);
-        self.send(Request::Order(request))?;
+    /// Gives a command without note and signature; its outcome is seen in a later snapshot.
+    pub fn send_command(&self, number: u32, kind: CommandKind) -> Result<CommandId, &'static str> {
+        let id = CommandId { terminal: self.terminal, number };
+        let request = CommandRequest::on(&self.snapshots.borrow(), id, kind);
+        self.send(Request::Command(request))?;
         Ok(id)
     }
 

@@ -25,7 +25,7 @@ use crate::{
     access::{AccessControl, Durability, Effect, Peer, Standing},
     bus::io::clock::Clock,
     history::{HistoryError, io::QueryRequest},
-    plant::{Snapshot, command::Order},
+    plant::{Snapshot, command::Command},
 };
 
 /// Requests of all terminals that may wait; more are refused.
@@ -61,7 +61,7 @@ pub enum LifecycleRequest {
 #[derive(Debug)]
 pub struct Outputs {
     /// To the plant.
-    pub orders: mpsc::Sender<Order>,
+    pub commands: mpsc::Sender<Command>,
     /// To the history.
     pub queries: mpsc::Sender<(u32, QueryRequest)>,
     /// To the audit log.
@@ -201,8 +201,8 @@ impl SessionServer {
     fn take(&mut self, terminal: u32, request: Request) {
         let now = self.clock.now();
         match request {
-            Request::Order(order) => {
-                let effects = self.access.order(terminal, order, now);
+            Request::Command(command) => {
+                let effects = self.access.on_command(terminal, command, now);
                 self.carry_out(effects);
             }
             Request::Ask(query) => match self.access.may_ask(terminal, &query.query, now) {
@@ -233,11 +233,12 @@ impl SessionServer {
         let mut answers = Vec::new();
         for effect in effects {
             match effect {
-                Effect::Order(order) => {
-                    if let Err(error) = self.outputs.orders.try_send(order) {
-                        tracing::error!(%error, "an order did not reach the plant");
-                        let (mpsc::error::TrySendError::Full(order) | mpsc::error::TrySendError::Closed(order)) = error;
-                        let told = self.access.undelivered(order.id, "station too busy");
+                Effect::Command(command) => {
+                    if let Err(error) = self.outputs.commands.try_send(command) {
+                        tracing::error!(%error, "a command did not reach the plant");
+                        let (mpsc::error::TrySendError::Full(command) | mpsc::error::TrySendError::Closed(command)) =
+                            error;
+                        let told = self.access.undelivered(command.id, "station too busy");
                         self.carry_out(told);
                     }
                 }

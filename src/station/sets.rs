@@ -10,7 +10,7 @@ use std::{
 use crate::{
     plant::{
         PlantDef, SetWork,
-        command::OrderId,
+        command::CommandId,
         parameter_set::{ParameterSet, StoredSet, check_name},
     },
     profile::{io::atomic, read_set, text_of_set},
@@ -22,7 +22,7 @@ const SETS_MAX: usize = 200;
 const BYTES_MAX: u64 = 256 << 10;
 
 /// What was written for whom, and all sets that lie in the folder.
-pub type Done = (Option<(OrderId, Result<(), String>)>, Vec<StoredSet>);
+pub type Done = (Option<(CommandId, Result<(), String>)>, Vec<StoredSet>);
 
 /// `DIR/sets/PLANT` beside the history file.
 pub fn folder(history: &Path, plant: &str) -> PathBuf {
@@ -33,7 +33,7 @@ pub fn folder(history: &Path, plant: &str) -> PathBuf {
 pub fn work(folder: &Path, def: &PlantDef, work: SetWork) -> Done {
     let written = match work {
         SetWork::Read => None,
-        SetWork::Write { order, set, replace } => Some((order, write(folder, def, &set, replace))),
+        SetWork::Write { command, set, replace } => Some((command, write(folder, def, &set, replace))),
     };
     (written, read_all(folder, def))
 }
@@ -125,7 +125,7 @@ mod tests {
     use super::*;
     use crate::profile::{Search, load};
 
-    const ORDER: OrderId = OrderId { terminal: 1, number: 1 };
+    const COMMAND: CommandId = CommandId { terminal: 1, number: 1 };
 
     fn winter(sv: f64) -> ParameterSet {
         let value = crate::plant::parameter_set::SetValue { tag: "SV".into(), value: sv };
@@ -149,7 +149,7 @@ mod tests {
         let folder = folder(&home.path().join("tank.duckdb"), "tank");
         assert_eq!(work(&folder, &def, SetWork::Read), (None, Vec::new()));
         let save = |sv, replace| {
-            let work_to_do = SetWork::Write { order: ORDER, set: Box::new(winter(sv)), replace };
+            let work_to_do = SetWork::Write { command: COMMAND, set: Box::new(winter(sv)), replace };
             let (written, sets) = work(&folder, &def, work_to_do);
             let held = sets.first().and_then(|stored| stored.set.as_ref().ok()).map(|set| set.values[0].value);
             (written.unwrap().1, held, fs::read_dir(&folder).unwrap().count())

@@ -5,19 +5,19 @@ use std::{collections::HashMap, sync::Arc};
 use crate::plant::{
     Snapshot,
     alarm::{AlarmState, manager::subject_name},
+    commands::outcome_words,
     def::AlarmId,
     event::LineState,
-    orders::outcome_words,
     snapshot::DeviceState,
 };
 
-/// One line a change: lines, devices, alarms, orders, troubles of the store. Without time stamps.
+/// One line a change: lines, devices, alarms, commands, troubles of the store. Without time stamps.
 pub fn changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
     let mut lines = Vec::new();
     lines.extend(line_changes(before, after));
     lines.extend(device_changes(before, after));
     lines.extend(alarm_changes(before, after));
-    lines.extend(order_changes(before, after));
+    lines.extend(command_changes(before, after));
     if before.history.trouble != after.history.trouble {
         lines.push(match &after.history.trouble {
             Some(trouble) => format!("history: {trouble}"),
@@ -123,17 +123,17 @@ fn alarm_word(old: AlarmState, new: AlarmState) -> &'static str {
     }
 }
 
-fn order_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
+fn command_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
     use crate::plant::command::Outcome;
-    let news = after.orders.iter().rev().filter(|order| {
-        order.outcome != Outcome::Pending
-            && before.orders.iter().find(|old| old.id == order.id).is_none_or(|old| old.outcome != order.outcome)
+    let news = after.commands.iter().rev().filter(|command| {
+        command.outcome != Outcome::Pending
+            && before.commands.iter().find(|old| old.id == command.id).is_none_or(|old| old.outcome != command.outcome)
     });
-    news.filter_map(|order| {
-        let (tag, value) = order.kind.written()?;
+    news.filter_map(|command| {
+        let (tag, value) = command.kind.written()?;
         let (name, unit) = (&after.def.tag(tag).name, after.unit(tag));
         let value = after.format(tag, value);
-        Some(format!("{}: {name} := {value} {unit} {}", order.by, outcome_words(&order.outcome)))
+        Some(format!("{}: {name} := {value} {unit} {}", command.by, outcome_words(&command.outcome)))
     })
     .collect()
 }

@@ -54,8 +54,8 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
     session.wish(Wish::Logout).await.unwrap();
     let mut other = station.session("whoever");
     other.standing.wait_for(|standing| !standing.first && standing.password_chars_min > 0).await.unwrap();
-    let order = other.order(1, CommandKind::Alarm(crate::plant::alarm::AlarmCommand::Silence)).unwrap();
-    let shown = |snapshot: &Arc<crate::plant::Snapshot>| snapshot.orders.iter().any(|status| status.id == order);
+    let command = other.send_command(1, CommandKind::Alarm(crate::plant::alarm::AlarmCommand::Silence)).unwrap();
+    let shown = |snapshot: &Arc<crate::plant::Snapshot>| snapshot.commands.iter().any(|status| status.id == command);
     let snapshot = other.snapshots.wait_for(shown).await.unwrap().clone();
     let line = std::fs::read_to_string(book::beside(&history)).unwrap();
     assert!(line.contains("refused: log in first"), "what a snapshot shows is in the book");

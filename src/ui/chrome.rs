@@ -1,4 +1,4 @@
-//! What every tab shares: header, tab bar, alarm banner, the last order's outcome, and the keys of the moment.
+//! What every tab shares: header, tab bar, alarm banner, the last command's outcome, and the keys of the moment.
 
 mod banner;
 
@@ -17,9 +17,9 @@ use super::{
 };
 use crate::plant::{
     command::{CommandKind, NotConfirmed, Outcome},
+    commands::alarm_words as alarm_words_of,
     def::LineDef,
     event::LineState,
-    orders::alarm_words as alarm_words_of,
     role::Role,
     snapshot::LineStatus,
 };
@@ -41,7 +41,7 @@ pub struct Layout {
     pub rule: Rect,
     /// The tab.
     pub body: Rect,
-    /// Outcome of the last order.
+    /// Outcome of the last command.
     pub status: Rect,
     /// Keys.
     pub footer: Rect,
@@ -303,12 +303,12 @@ fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     }
 }
 
-/// An order and how it stands: `TIC-1.SV 60.0 → 70.0 °C verified 13:40:02`.
+/// A command and how it stands: `TIC-1.SV 60.0 → 70.0 °C verified 13:40:02`.
 pub fn pending_label(cx: &ViewContext, pending: &PendingCommand) -> (String, Style) {
     let theme = cx.theme;
     // As the station took it: a write of what the device can hold.
     let (kind, old) = pending.status.as_ref().map_or((&pending.kind, None), |status| (&status.kind, status.old));
-    let what = order_words(cx, kind, old);
+    let what = command_label(cx, kind, old);
     let Some(status) = &pending.status else {
         return match pending.undelivered {
             Some(why) => (format!("{what}  NOT SENT: {why}"), theme.trouble()),
@@ -362,7 +362,7 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
 }
 
 /// What was wished, in words: `TIC-1.SV 60.0 → 70.0 °C`.
-pub fn order_words(cx: &ViewContext, kind: &CommandKind, old: Option<f64>) -> String {
+pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<f64>) -> String {
     match kind {
         CommandKind::Write { tag, value } => {
             let old = old.map_or("?".to_owned(), |old| cx.snapshot.format(*tag, old));

@@ -182,7 +182,7 @@ impl Fixture {
             aside: Arc::new(self.aside.clone()),
             sound: self.alarms.iter().any(|alarm| alarm.state == AlarmState::Unacknowledged),
             alarm_metrics: self.alarm_metrics.clone(),
-            orders: Vec::new(),
+            commands: Vec::new(),
             sets: Arc::new(self.sets.clone()),
             restores: self.restores.iter().cloned().map(Arc::new).collect(),
             tunings: self.tunings.iter().cloned().map(|tuning| tuning.map(Arc::new)).collect(),

@@ -10,10 +10,10 @@ use super::{
     widgets::{text::age, value},
 };
 use crate::plant::{
-    command::{NotConfirmed, OrderStatus, Outcome},
+    command::{CommandStatus, NotConfirmed, Outcome},
+    commands::{outcome_word, outcome_words},
     def::TagId,
     interlock::{ActuatorDef, InterlockCondition, InterlockDef, InterlockStatus},
-    orders::{outcome_word, outcome_words},
     tag::{Kind, TagDef},
 };
 
@@ -200,15 +200,15 @@ fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     }]
 }
 
-/// The latest order for a command.
-fn last_order<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<&'a OrderStatus> {
-    let of_command = |status: &&OrderStatus| status.kind.written().is_some_and(|(tag, _)| tag == command);
-    cx.snapshot.orders.iter().find(of_command)
+/// The latest command for a tag.
+fn last_command<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<&'a CommandStatus> {
+    let of_command = |status: &&CommandStatus| status.kind.written().is_some_and(|(tag, _)| tag == command);
+    cx.snapshot.commands.iter().find(of_command)
 }
 
-/// The latest order for a command, while how it ended is news, and whether it went well.
+/// The latest command for a tag, while how it ended is news, and whether it went well.
 fn news<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<(&'a Outcome, Option<bool>)> {
-    let status = last_order(cx, command)?;
+    let status = last_command(cx, command)?;
     let real = Duration::try_from(cx.now.duration_since(status.at)).unwrap_or_default().as_secs_f64();
     let passed = real / cx.snapshot.speed.clamp(0.01, 1e6);
     let (well, lasts) = match status.outcome {

@@ -1,4 +1,4 @@
-//! The terminal's loop: keys, snapshots, answers and ticks become messages; effects become orders, queries and frames.
+//! The terminal's loop: keys, snapshots, answers and ticks become messages; effects become commands, queries and frames.
 
 mod screen;
 #[cfg(test)]
@@ -181,9 +181,9 @@ impl Loop {
         self.cancel();
         for effect in effects {
             match effect {
-                Effect::Order(order) => {
-                    let id = order.id;
-                    if let Err(why) = self.session.send(Request::Order(order)) {
+                Effect::Command(command) => {
+                    let id = command.id;
+                    if let Err(why) = self.session.send(Request::Command(command)) {
                         own(|| update(&mut self.model, Msg::Undelivered(id, why)));
                     }
                 }

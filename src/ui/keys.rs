@@ -122,7 +122,7 @@ pub enum Global {
     Silence,
     /// Draw everything anew.
     Redraw,
-    /// Take the outcome of the last order off the screen.
+    /// Take the outcome of the last command off the screen.
     Dismiss,
     /// Lock this terminal at once.
     Lock,

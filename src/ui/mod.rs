@@ -59,7 +59,7 @@ pub struct Model {
     pub screen: Rect,
     /// What time it is and how the animation stands.
     pub clock: Clock,
-    /// The last order of this terminal and its outcome.
+    /// The last command of this terminal and its outcome.
     pub pending_command: Option<PendingCommand>,
     /// Number of this terminal.
     pub terminal: u32,
@@ -69,8 +69,8 @@ pub struct Model {
     pub session_lock: SessionLock,
     /// The window with work in it that waits for an unlock, and the tab that it stood on.
     pub kept: Option<(Tab, Modal)>,
-    /// Orders given so far.
-    pub ordered: u32,
+    /// Commands given so far.
+    pub commands_sent: u32,
     /// How often the station has come with another plant file: an answer to what was asked before is not heard.
     pub plants: u32,
     /// The simulation behind the plant; `None` at a real one.
@@ -146,7 +146,7 @@ impl Model {
             standing: Arc::default(),
             session_lock: SessionLock::default(),
             kept: None,
-            ordered: 0,
+            commands_sent: 0,
             plants: 0,
             drill: None,
             last_frame: None,
@@ -301,7 +301,7 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     }
     match keys::find(keys::GLOBAL, event) {
         Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw)) => on_global(model, global),
-        // Nobody gives orders to what cannot be seen.
+        // Nobody gives commands to what cannot be seen.
         Some(_) | None if model.small() => Vec::new(),
         Some(global) => on_global(model, global),
         None if !model.may_act(event) => Vec::new(),
@@ -333,7 +333,7 @@ fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             }
         }
         // Where nothing sounds there is nothing to silence.
-        Global::Silence if model.snapshot.sound => vec![UiAction::Order(CommandKind::Alarm(AlarmCommand::Silence))],
+        Global::Silence if model.snapshot.sound => vec![UiAction::Command(CommandKind::Alarm(AlarmCommand::Silence))],
         Global::Silence => Vec::new(),
         Global::Redraw => vec![UiAction::Do(Effect::Redraw)],
         Global::Dismiss => {
@@ -409,8 +409,8 @@ fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
                 });
                 effects.extend(show(model, Tab::Trends));
             }
-            UiAction::Order(kind) => effects.extend(model.order(kind.into())),
-            UiAction::Confirmed(confirmed) => effects.extend(model.order(confirmed)),
+            UiAction::Command(kind) => effects.extend(model.send_command(kind.into())),
+            UiAction::Confirmed(confirmed) => effects.extend(model.send_command(confirmed)),
             UiAction::Wish(tab, wish) => {
                 // Nought is nobody's: whoever waits has a number.
                 model.session_lock.wished = model.session_lock.wished.checked_add(1).unwrap_or(1);
@@ -440,7 +440,7 @@ fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         | UiAction::ShowParameter(_)
         | UiAction::ShowOnMimic(_)
         | UiAction::ShowOnTrends(..)
-        | UiAction::Order(_)
+        | UiAction::Command(_)
         | UiAction::Confirmed(_)
         | UiAction::Wish(..) => None,
     });

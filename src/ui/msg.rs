@@ -7,10 +7,10 @@ use jiff::Timestamp;
 
 use super::{Confirmed, modal::Modal, tabs::Tab};
 use crate::{
-    access::{Durability, OrderRequest, Standing, Wish},
+    access::{CommandRequest, Durability, Standing, Wish},
     history::{Answer, HistoryError, Query},
     plant::{
-        command::{CommandKind, OrderId},
+        command::{CommandId, CommandKind},
         def::{DeviceId, TagId},
         snapshot::Snapshot,
     },
@@ -38,8 +38,8 @@ pub enum Msg {
     Answer(QueryId, Result<Answer, HistoryError>),
     /// A file of this tab was written, or why not.
     Saved(Tab, Result<PathBuf, String>),
-    /// The station did not take this order: its queue is full, or it has gone.
-    Undelivered(OrderId, &'static str),
+    /// The station did not take this command: its queue is full, or it has gone.
+    Undelivered(CommandId, &'static str),
     /// A frame was drawn: what it showed may be meant by the next key.
     Drawn,
     /// Half a second passed; so long ago (real time) came the last snapshot.
@@ -52,8 +52,8 @@ pub enum Msg {
 /// What a terminal wants done.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
-    /// Give the station an order.
-    Order(OrderRequest),
+    /// Give the station a command.
+    Command(CommandRequest),
     /// Wish something of the station; answered by [`Msg::Granted`].
     Wish(QueryId, Wish),
     /// Ask the history.
@@ -101,8 +101,8 @@ pub enum UiAction {
     ShowOnMimic(Vec<TagId>),
     /// Show the curve of a tag with the cursor at a moment.
     ShowOnTrends(TagId, Timestamp),
-    /// Give an order and watch its outcome.
-    Order(CommandKind),
+    /// Give a command and watch its outcome.
+    Command(CommandKind),
     /// The same with what its operator has seen and signed.
     Confirmed(Confirmed),
     /// Wish something of the station; the answer goes to the window that waits for one, else to this tab.

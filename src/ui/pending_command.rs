@@ -1,17 +1,17 @@
-//! The last order of this terminal, from the key to its outcome.
+//! The last command of this terminal, from the key to its outcome.
 
 use std::sync::Arc;
 
 use super::{Effect, Model, chrome, modal::Modal};
 use crate::{
-    access::{OrderRequest, Signature},
-    plant::command::{CommandKind, OrderId, OrderStatus, Outcome, Refusal},
+    access::{CommandRequest, Signature},
+    plant::command::{CommandId, CommandKind, CommandStatus, Outcome, Refusal},
 };
 
 /// An outcome that is no worry is shown for so many ticks: a minute of real time.
 const OUTCOME_TICKS: u32 = 120;
 
-/// An order as its operator confirmed it.
+/// A command as its operator confirmed it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Confirmed {
     /// What.
@@ -31,15 +31,15 @@ impl From<CommandKind> for Confirmed {
     }
 }
 
-/// An order of this terminal on its way.
+/// A command of this terminal on its way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PendingCommand {
     /// Which.
-    pub id: OrderId,
+    pub id: CommandId,
     /// What was wished.
     pub kind: CommandKind,
     /// As last seen in a snapshot.
-    pub status: Option<OrderStatus>,
+    pub status: Option<CommandStatus>,
     /// Tick at which it was given, and at which its outcome last changed.
     pub changed_at: u32,
     /// Why it never left the terminal.
@@ -67,23 +67,23 @@ impl PendingCommand {
 }
 
 impl Model {
-    /// Gives an order and watches it. A station that has gone takes none: that is said at once.
-    pub(super) fn order(&mut self, confirmed: Confirmed) -> Option<Effect> {
+    /// Gives a command and watches it. A station that has gone takes none: that is said at once.
+    pub(super) fn send_command(&mut self, confirmed: Confirmed) -> Option<Effect> {
         let Confirmed { kind, expected, sign, note } = confirmed;
-        self.ordered = self.ordered.wrapping_add(1);
-        let id = OrderId { terminal: self.terminal, number: self.ordered };
+        self.commands_sent = self.commands_sent.wrapping_add(1);
+        let id = CommandId { terminal: self.terminal, number: self.commands_sent };
         let undelivered = self.standing.gone.as_ref().map(|_| "the station has gone");
         let changed_at = self.clock.phase;
         self.pending_command = Some(PendingCommand { id, kind: kind.clone(), status: None, changed_at, undelivered });
-        let request = OrderRequest::on(&self.snapshot, id, kind);
-        let request = OrderRequest { seen: expected.or(request.seen), sign, note, ..request };
-        undelivered.is_none().then_some(Effect::Order(request))
+        let request = CommandRequest::on(&self.snapshot, id, kind);
+        let request = CommandRequest { seen: expected.or(request.seen), sign, note, ..request };
+        undelivered.is_none().then_some(Effect::Command(request))
     }
 
-    /// Takes the outcome of the watched order from the snapshot that has come.
+    /// Takes the outcome of the watched command from the snapshot that has come.
     pub(super) fn follow(&mut self) {
         if let Some(pending) = &mut self.pending_command
-            && let Some(status) = self.snapshot.orders.iter().find(|status| status.id == pending.id)
+            && let Some(status) = self.snapshot.commands.iter().find(|status| status.id == pending.id)
         {
             if pending.status.as_ref() != Some(status) {
                 pending.changed_at = self.clock.phase;

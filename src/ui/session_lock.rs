@@ -164,7 +164,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
     for action in actions {
         match action {
             UiAction::Open(modal) if !modal.only_looks() && !modal.is_unlock() => held = Some(Some(modal)),
-            UiAction::Order(_)
+            UiAction::Command(_)
             | UiAction::Confirmed(_)
             | UiAction::Wish(_, Wish::Exported { .. })
             | UiAction::Do(Effect::SaveReport { .. } | Effect::Drill(_)) => held = held.or(Some(None)),

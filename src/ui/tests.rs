@@ -65,9 +65,9 @@ pub fn acts_only_on_what_was_drawn(model: &mut Model, change: impl FnOnce(&mut M
     assert!(!effects.is_empty() || model.modal.is_some(), "{key} does nothing once the change is drawn");
 }
 
-pub fn order_of(effects: &[Effect]) -> Option<&CommandKind> {
+pub fn sent_kind(effects: &[Effect]) -> Option<&CommandKind> {
     effects.iter().find_map(|effect| match effect {
-        Effect::Order(order) => Some(&order.kind),
+        Effect::Command(command) => Some(&command.kind),
         Effect::Wish(..) => None,
         Effect::Query(..)
         | Effect::Drill(_)

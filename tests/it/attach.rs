@@ -9,7 +9,7 @@ use std::{
 };
 
 use sightglass::{
-    access::{Durability, OrderRequest, Standing, Wish},
+    access::{CommandRequest, Durability, Standing, Wish},
     attach::{
         callers::TERMINALS_MAX,
         io::{
@@ -25,7 +25,7 @@ use sightglass::{
     plant::alarm::AlarmCommand,
     plant::{
         PlantDef, Snapshot,
-        command::{CommandKind, NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
+        command::{CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
         def::TagId,
         sample::{Cause, Sample},
     },
@@ -72,7 +72,7 @@ impl Stand {
         let (acceptor, mut attach_requests, mut requests) = SessionAcceptor::new(snapshots);
         let mut listener = listen(&folder.path().join("tank.sock")).unwrap();
         let serving = tokio::spawn(async move { listener.serve(&acceptor).await });
-        let orders = publish.clone();
+        let commands = publish.clone();
         let server = tokio::spawn(async move {
             let mut may = may;
             let mut terminals = Vec::new();
@@ -85,7 +85,7 @@ impl Stand {
                         terminals.push(request.standing);
                     }
                     Some((_, request)) = requests.recv() => {
-                        answer(request, &orders);
+                        answer(request, &commands);
                         ask.send_modify(|count| *count += 1);
                     }
                     Ok(()) = may.changed() => {
@@ -134,12 +134,12 @@ impl Stand {
     }
 }
 
-fn answer(request: Request, orders: &watch::Sender<Arc<Snapshot>>) {
+fn answer(request: Request, commands: &watch::Sender<Arc<Snapshot>>) {
     match request {
-        Request::Order(OrderRequest { id, kind, note, seen, .. }) => orders.send_modify(|snapshot| {
+        Request::Command(CommandRequest { id, kind, note, seen, .. }) => commands.send_modify(|snapshot| {
             let snapshot = Arc::make_mut(snapshot);
             let (at, outcome) = (snapshot.at, Outcome::Verified);
-            let status = OrderStatus {
+            let status = CommandStatus {
                 id,
                 by: "anna".into(),
                 from: "".into(),
@@ -150,8 +150,8 @@ fn answer(request: Request, orders: &watch::Sender<Arc<Snapshot>>) {
                 outcome,
                 recorded: true,
             };
-            snapshot.orders.insert(0, status);
-            snapshot.orders.truncate(32);
+            snapshot.commands.insert(0, status);
+            snapshot.commands.truncate(32);
         }),
         Request::Ask(query) => drop(query.reply.send(Err(HistoryError::EmptyPeriod))),
         Request::Wish(Wish::Stop, reply) => drop(reply.send(Ok(Durability::Recorded))),
@@ -175,8 +175,8 @@ async fn until_standing(session: &mut Session, what: &str, so: impl Fn(&Standing
 }
 
 fn of(session: &Session, number: u32) -> Option<Outcome> {
-    let id = OrderId { terminal: session.terminal, number };
-    session.snapshots.borrow().orders.iter().find(|order| order.id == id).map(|order| order.outcome.clone())
+    let id = CommandId { terminal: session.terminal, number };
+    session.snapshots.borrow().commands.iter().find(|command| command.id == id).map(|command| command.outcome.clone())
 }
 
 fn hello() -> Vec<u8> {
@@ -204,7 +204,7 @@ async fn next(stream: &mut UnixStream) -> Vec<u8> {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_terminal_sees_the_plant_gives_orders_and_is_told_where_it_is() {
+async fn a_terminal_sees_the_plant_and_sends_commands() {
     let mut stand = Stand::start();
     stand.set(1.0);
     let mut session = stand.session().await;
@@ -218,8 +218,8 @@ async fn a_terminal_sees_the_plant_gives_orders_and_is_told_where_it_is() {
     let ours = protocol::encode(&**session.snapshots.borrow(), usize::MAX);
     assert_eq!(ours, protocol::encode(&**stand.publish.borrow(), usize::MAX), "all of it, by its bytes");
 
-    session.order(7, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
-    until(&mut session, "the order has an outcome", |snapshot| !snapshot.orders.is_empty()).await;
+    session.send_command(7, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
+    until(&mut session, "the command has an outcome", |snapshot| !snapshot.commands.is_empty()).await;
     assert_eq!(of(&session, 7), Some(Outcome::Verified));
     assert_eq!(session.wish(Wish::Stop).await, Ok(Durability::Recorded));
     assert_eq!(session.wish(Wish::Logout).await, Err("not yet".to_owned()));
@@ -278,7 +278,7 @@ async fn a_terminal_says_at_once_that_the_station_has_gone_and_finds_it_again() 
     let mut session = stand.session().await;
     let folder = stand.end().await;
     until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
-    assert_eq!(session.order(1, CommandKind::Alarm(AlarmCommand::Silence)), Err("station has gone"));
+    assert_eq!(session.send_command(1, CommandKind::Alarm(AlarmCommand::Silence)), Err("station has gone"));
     assert_eq!(session.wish(Wish::Stop).await, Err("station has gone".to_owned()));
     assert_eq!(session.snapshots.borrow().samples[0].value, Some(1.0), "the last snapshot stays");
 
@@ -287,24 +287,24 @@ async fn a_terminal_says_at_once_that_the_station_has_gone_and_finds_it_again() 
     stand.set(2.0);
     until_standing(&mut session, "back", |standing| standing.gone.is_none()).await;
     sees(&mut session, 2.0).await;
-    session.order(2, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
-    until(&mut session, "the order has an outcome", |snapshot| !snapshot.orders.is_empty()).await;
+    session.send_command(2, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
+    until(&mut session, "the command has an outcome", |snapshot| !snapshot.commands.is_empty()).await;
     assert_eq!(of(&session, 2), Some(Outcome::Verified), "under the number that the terminal has always had");
     drop((session, other));
     stand.until_present(0).await;
 }
 
 #[tokio::test(start_paused = true)]
-async fn an_order_on_its_way_when_the_station_goes_is_called_uncertain() {
+async fn a_command_in_flight_is_uncertain_when_the_station_goes() {
     let stand = Stand::start();
     let mut session = stand.session().await;
     // The station takes it and dies before it tells.
     stand.tasks[1].abort();
-    session.order(1, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
+    session.send_command(1, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
     tokio::task::yield_now().await;
     let _folder = stand.end().await;
     until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
-    until(&mut session, "an outcome", |snapshot| !snapshot.orders.is_empty()).await;
+    until(&mut session, "an outcome", |snapshot| !snapshot.commands.is_empty()).await;
     let outcome = of(&session, 1).unwrap();
     let honest = [
         Outcome::NotConfirmed(NotConfirmed::ConnectionLost),
@@ -383,19 +383,19 @@ async fn hostile_connections_are_closed_and_the_others_see_the_plant_go_on() {
     let mut session = stand.session().await;
     let mut long = hello();
     long[..4].copy_from_slice(&u32::MAX.to_le_bytes());
-    let order = asked(&Asked::Wish { ticket: 1, wish: Wish::Stop });
+    let command = asked(&Asked::Wish { ticket: 1, wish: Wish::Stop });
     let hostile: Vec<(&str, Vec<u8>)> = vec![
         ("nothing at all", Vec::new()),
         ("random bytes", (0..4_000u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect()),
         ("a giant length", long),
         ("a length and nothing", 4_000u32.to_le_bytes().to_vec()),
         ("half a hello", hello()[..9].to_vec()),
-        ("a right message before the hello", order.clone()),
+        ("a right message before the hello", command.clone()),
         ("an empty message", vec![0; 4]),
         ("a giant message after the hello", [hello(), u32::MAX.to_le_bytes().to_vec()].concat()),
         ("noise after the hello", [hello(), vec![3, 0, 0, 0, 250, 251, 252]].concat()),
         ("the hello twice", [hello(), hello()].concat()),
-        ("half a message after the hello", [hello(), order[..5].to_vec()].concat()),
+        ("half a message after the hello", [hello(), command[..5].to_vec()].concat()),
     ];
     for (index, (what, bytes)) in hostile.into_iter().enumerate() {
         let mut stream = UnixStream::connect(stand.path()).await.unwrap();
@@ -421,16 +421,17 @@ async fn an_old_terminal_is_told_in_words_what_to_do() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn an_order_with_the_number_of_another_terminal_or_of_no_tag_never_arrives() {
+async fn a_command_of_another_terminal_or_unknown_tag_is_rejected() {
     let stand = Stand::start();
     let mut stream = UnixStream::connect(stand.path()).await.unwrap();
     stream.write_all(&hello()).await.unwrap();
     let own = protocol::welcome(&next(&mut stream).await).unwrap().unwrap().terminal;
-    let order =
-        |terminal, kind| asked(&Asked::Order(Box::new(OrderRequest::new(0, OrderId { terminal, number: 1 }, kind))));
+    let command = |terminal, kind| {
+        asked(&Asked::Command(Box::new(CommandRequest::new(0, CommandId { terminal, number: 1 }, kind))))
+    };
     for (bytes, expected) in [
-        (order(own + 1, CommandKind::Alarm(AlarmCommand::Silence)), "this is terminal"),
-        (order(own, CommandKind::Write { tag: TagId(u16::MAX), value: 1.0 }), "tag number 65535"),
+        (command(own + 1, CommandKind::Alarm(AlarmCommand::Silence)), "this is terminal"),
+        (command(own, CommandKind::Write { tag: TagId(u16::MAX), value: 1.0 }), "tag number 65535"),
     ] {
         stream.write_all(&bytes).await.unwrap();
         let why = loop {

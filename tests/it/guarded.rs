@@ -8,7 +8,7 @@ use std::{
 
 use sightglass::{
     access::{
-        OrderRequest, Peer, Users, Wish,
+        CommandRequest, Peer, Users, Wish,
         book::{Check, Entry, Summary},
         io::{book, users, users_beside},
         password::{SALT_BYTES, hash},
@@ -18,7 +18,7 @@ use sightglass::{
     bus::io::{clock::Clock, transport::Connector},
     plant::{
         PlantDef, Snapshot,
-        command::{CommandKind, OrderId, OrderStatus, Outcome},
+        command::{CommandId, CommandKind, CommandStatus, Outcome},
         def::{TagId, Transport},
         role::Role,
         snapshot::DeviceState,
@@ -121,14 +121,14 @@ impl Guarded {
         until(&mut self.truth.clone(), "time passes", |snapshot| end <= snapshot.at).await;
     }
 
-    /// Gives an order and waits for what becomes of it.
-    pub async fn order(&self, session: &Session, request: OrderRequest) -> OrderStatus {
+    /// Gives a command and waits for what becomes of it.
+    pub async fn send_command(&self, session: &Session, request: CommandRequest) -> CommandStatus {
         let id = request.id;
-        session.send(Request::Order(request)).unwrap();
+        session.send(Request::Command(request)).unwrap();
         // A terminal where nobody has logged in is not told: what is true is told here.
         let mut truth = self.truth.clone();
         let of = |snapshot: &Arc<Snapshot>| {
-            snapshot.orders.iter().find(|order| order.id == id && order.outcome != Outcome::Pending).cloned()
+            snapshot.commands.iter().find(|command| command.id == id && command.outcome != Outcome::Pending).cloned()
         };
         let told = until(&mut truth, &format!("an outcome of {id:?}"), |snapshot| of(snapshot).is_some()).await;
         of(&told).unwrap()
@@ -199,9 +199,9 @@ pub async fn login(session: &Session, user: &str, password: &str) -> Result<(), 
     session.wish(Wish::Login { user: user.into(), password: password.into() }).await.map(drop)
 }
 
-/// An order of this terminal.
-pub fn request(session: &Session, number: u32, kind: CommandKind) -> OrderRequest {
-    OrderRequest::on(&session.snapshots.borrow(), OrderId { terminal: session.terminal, number }, kind)
+/// A command of this terminal.
+pub fn request(session: &Session, number: u32, kind: CommandKind) -> CommandRequest {
+    CommandRequest::on(&session.snapshots.borrow(), CommandId { terminal: session.terminal, number }, kind)
 }
 
 /// Waits until a snapshot is so, and gives it.

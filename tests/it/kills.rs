@@ -19,7 +19,7 @@ use tokio::{
 
 use sightglass::{
     access::{
-        Durability, OrderRequest, Users, Wish,
+        CommandRequest, Durability, Users, Wish,
         book::{Check, Entry},
         io::{book, sealing, users, users_beside},
         sealing::VerificationKey,
@@ -37,7 +37,7 @@ use sightglass::{
     plant::{
         Snapshot,
         alarm::AlarmCommand,
-        command::{CommandKind, OrderId, Outcome},
+        command::{CommandId, CommandKind, Outcome},
         def::AlarmId,
         record::{AlarmRecord, AlarmStep, SEAL_LOG},
         role::Role,
@@ -208,7 +208,7 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> R
     for number in 1.. {
         let note = format!("action {number} of round {round}");
         let value = (VALUES[writes % 2] + (round * 37 + u64::from(number)) % SPREAD) as f64 / 10.0;
-        let id = OrderId { terminal: session.terminal, number };
+        let id = CommandId { terminal: session.terminal, number };
         let shelve = AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(1_800) };
         let kind = match to_acknowledge(&session.snapshots.borrow()) {
             Some(acknowledge) => acknowledge,
@@ -216,16 +216,16 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> R
             None => CommandKind::Write { tag, value },
         };
         writes += usize::from(kind.written().is_some());
-        let order = OrderRequest::on(&session.snapshots.borrow(), id, kind.clone());
-        let order = OrderRequest { note: Some(note.as_str().into()), ..order };
-        if session.send(Request::Order(order)).is_err() {
+        let command = CommandRequest::on(&session.snapshots.borrow(), id, kind.clone());
+        let command = CommandRequest { note: Some(note.as_str().into()), ..command };
+        if session.send(Request::Command(command)).is_err() {
             break;
         }
         let mut outcome = None;
         let ended = session.snapshots.wait_for(|snapshot| {
-            let order = snapshot.orders.iter().find(|order| order.id == id);
-            let ended = order.filter(|order| order.outcome != Outcome::Pending && order.recorded);
-            outcome = ended.map(|order| order.outcome.clone());
+            let command = snapshot.commands.iter().find(|command| command.id == id);
+            let ended = command.filter(|command| command.outcome != Outcome::Pending && command.recorded);
+            outcome = ended.map(|command| command.outcome.clone());
             outcome.is_some()
         });
         let ended = tokio::time::timeout(PATIENCE, ended).await;

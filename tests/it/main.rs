@@ -20,7 +20,7 @@
 //! | `hostile` | text of others, by every command: nothing of it acts on a terminal |
 //! | `tools` | the tools for a line against peers that echo, chatter and lie |
 //! | `endings` | every way in which a terminal or its station can end, in a pseudo-terminal |
-//! | `settings` | settings of a line: tried out, saved into the plant file; orders made before a reload |
+//! | `settings` | settings of a line: tried out, saved into the plant file; commands made before a reload |
 //! | `durability` | killed, unplugged, locked, damaged |
 //! | `guarded` | a station whose people must log in, for `rights` and `people` |
 //! | `pty` | the program in a pseudo-terminal, for `terminal` and `endings` |

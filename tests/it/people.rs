@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use sightglass::{
-    access::{OrderRequest, Signature, Wish},
+    access::{CommandRequest, Signature, Wish},
     plant::{
         PlantDef,
         command::{CommandKind, Outcome, Refusal},
@@ -152,14 +152,14 @@ async fn a_terminal_that_nobody_touches_is_locked_shows_alarms_and_opens_to_the_
     guarded.tap.mute();
     let alarmed = until(&mut idle.snapshots, "an alarm", |snapshot| !snapshot.alarms.is_empty()).await;
     let acknowledge = request(&idle, 1, alarmed.alarms[0].acknowledge());
-    let status = guarded.order(&idle, acknowledge.clone()).await;
+    let status = guarded.send_command(&idle, acknowledge.clone()).await;
     assert_eq!(status.outcome, Outcome::Refused(Refusal::NotPermitted("this terminal is locked".into())));
     assert_eq!(idle.wish(Wish::Unlock("wrong".into())).await, Err(wait(1)));
     while idle.wish(Wish::Unlock(PASSWORD.into())).await.is_err() {
         guarded.pass(Duration::from_secs(1)).await;
     }
     let again = request(&idle, 2, acknowledge.kind);
-    assert_eq!(guarded.order(&idle, again).await.outcome, Outcome::Verified);
+    assert_eq!(guarded.send_command(&idle, again).await.outcome, Outcome::Verified);
     let writes: Vec<_> = guarded.entries().into_iter().filter(|entry| &*entry.who == "sue").collect();
     let words: Vec<String> = writes.iter().map(|entry| format!("{}: {}", entry.action, entry.outcome)).collect();
     for expected in [
@@ -181,7 +181,7 @@ async fn a_tag_for_two_persons_is_written_once_a_second_one_who_may_has_signed()
     .await;
     let tom = guarded.person("tom").await;
     let tag = guarded.tag("TIC-1.SV");
-    let signed = |number: u32, by: Option<(&str, &str)>| OrderRequest {
+    let signed = |number: u32, by: Option<(&str, &str)>| CommandRequest {
         sign: by.map(|(user, password)| Signature { user: Some(user.into()), password: password.into() }),
         ..request(&tom, number, CommandKind::Write { tag, value: 61.0 })
     };
@@ -194,13 +194,13 @@ async fn a_tag_for_two_persons_is_written_once_a_second_one_who_may_has_signed()
         (Some(("nobody-here", PASSWORD)), wait(1)),
     ];
     for (number, (by, why)) in (1..).zip(refused) {
-        let status = guarded.order(&tom, signed(number, by)).await;
+        let status = guarded.send_command(&tom, signed(number, by)).await;
         assert_eq!(status.outcome, Outcome::Refused(Refusal::NotSigned(why)), "{by:?}");
         waited(&guarded, 2).await;
     }
     assert!(guarded.tap.writes().is_empty(), "something has reached the line: {:?}", guarded.tap.writes());
     let written = guarded.entries().len();
-    assert_eq!(guarded.order(&tom, signed(9, Some(("sue", PASSWORD)))).await.outcome, Outcome::Verified);
+    assert_eq!(guarded.send_command(&tom, signed(9, Some(("sue", PASSWORD)))).await.outcome, Outcome::Verified);
     let line = guarded.written(written, "the write", |entry| &*entry.action == "write").await;
     assert_eq!((&*line.who, line.note.as_deref(), &*line.outcome), ("tom", Some("signed by sue"), "verified"));
     guarded.end().await;
@@ -211,12 +211,12 @@ async fn of_two_operators_at_once_the_second_is_told_that_the_value_has_changed_
     let guarded = Guarded::start(|_| {}).await;
     let (tom, tina) = (guarded.person("tom").await, guarded.person("tina").await);
     let (tag, seen) = (guarded.tag("TIC-1.SV"), guarded.value("TIC-1.SV"));
-    let write = |session, number, value, seen| OrderRequest {
+    let write = |session, number, value, seen| CommandRequest {
         seen,
         ..request(session, number, CommandKind::Write { tag, value })
     };
-    assert_eq!(guarded.order(&tom, write(&tom, 1, 61.0, seen)).await.outcome, Outcome::Verified);
-    let second = guarded.order(&tina, write(&tina, 1, 62.0, seen)).await;
+    assert_eq!(guarded.send_command(&tom, write(&tom, 1, 61.0, seen)).await.outcome, Outcome::Verified);
+    let second = guarded.send_command(&tina, write(&tina, 1, 62.0, seen)).await;
     let Outcome::Refused(Refusal::ChangedTo(now)) = &second.outcome else { panic!("{:?}", second.outcome) };
     assert!(now.starts_with("61.0"), "{now}");
     assert_eq!(guarded.value("TIC-1.SV"), Some(61.0), "the first one's value stands");
@@ -224,13 +224,13 @@ async fn of_two_operators_at_once_the_second_is_told_that_the_value_has_changed_
     assert!(line.outcome.contains("it was changed to 61.0"), "{}", line.outcome);
 
     // Once he has looked again it is his.
-    assert_eq!(guarded.order(&tina, write(&tina, 2, 62.0, Some(61.0))).await.outcome, Outcome::Verified);
+    assert_eq!(guarded.send_command(&tina, write(&tina, 2, 62.0, Some(61.0))).await.outcome, Outcome::Verified);
 
     // Both at the very same moment: one of them, never both.
     let seen = Some(62.0);
     let (one, other) = tokio::join!(
-        guarded.order(&tom, write(&tom, 3, 63.0, seen)),
-        guarded.order(&tina, write(&tina, 3, 64.0, seen))
+        guarded.send_command(&tom, write(&tom, 3, 63.0, seen)),
+        guarded.send_command(&tina, write(&tina, 3, 64.0, seen))
     );
     let done = [&one, &other].iter().filter(|status| status.outcome == Outcome::Verified).count();
     assert_eq!(done, 1, "{:?} and {:?}", one.outcome, other.outcome);

@@ -10,10 +10,10 @@ use sightglass::{
     plant::{
         PlantDef,
         alarm::AlarmCommand,
-        command::{CommandKind, OrderStatus, Outcome, Refusal},
+        command::{CommandKind, CommandStatus, Outcome, Refusal},
+        commands::outcome_words,
         def::{AlarmId, DeviceId, LineId, Serial},
         diagnostics::{Diagnostic, Scan},
-        orders::outcome_words,
         parameter_set::ParameterSet,
         restore::RestoreWish,
         role::Role,
@@ -161,7 +161,7 @@ async fn sits(guarded: &Guarded, person: usize) -> Session {
     session
 }
 
-fn is_permitted(status: &OrderStatus) -> bool {
+fn is_permitted(status: &CommandStatus) -> bool {
     !matches!(status.outcome, Outcome::Refused(Refusal::NotPermitted(_)))
 }
 
@@ -187,7 +187,7 @@ async fn every_command_is_let_through_or_refused_as_the_table_says_and_nothing_r
             // So slow that each refusal is on record by itself.
             guarded.pass(Duration::from_secs(2)).await;
             let written = guarded.entries().len();
-            let status = guarded.order(&session, request(&session, number, kind)).await;
+            let status = guarded.send_command(&session, request(&session, number, kind)).await;
             assert_eq!(is_permitted(&status), row.lets(person), "{said}: {:?}", status.outcome);
             if !row.lets(person) {
                 assert_eq!(status.outcome, Outcome::Refused(Refusal::NotPermitted(row.why(person))), "{said}");

@@ -1,16 +1,16 @@
 //! Settings of a line: tried out on a running station, saved into its plant file, and what is said where that cannot be.
-//! Orders made before a reload of the plant file.
+//! Commands made before a reload of the plant file.
 
 use std::{fs, path::Path, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use sightglass::{
-    access::OrderRequest,
+    access::CommandRequest,
     attach::io::{connect::connect, serve::listen},
     bus::io::{clock::Clock, transport::Connector},
     plant::{
         PlantDef, Snapshot,
-        command::{CommandKind, OrderId, Outcome, Refusal},
+        command::{CommandId, CommandKind, Outcome, Refusal},
         def::{LineDef, LineId, Serial, Transport},
         snapshot::DeviceState,
     },
@@ -60,17 +60,17 @@ async fn until(session: &mut Session, what: &str, so: impl Fn(&Snapshot) -> bool
     assert!(reached.is_ok_and(|reached| reached.is_ok()), "never: {what}");
 }
 
-async fn order(session: &mut Session, number: u32, kind: CommandKind) -> Outcome {
-    let id = OrderId { terminal: session.terminal, number };
-    let request = OrderRequest::on(&session.snapshots.borrow(), id, kind);
-    session.send(Request::Order(request)).unwrap();
-    let of = move |snapshot: &Snapshot| snapshot.orders.iter().find(|order| order.id == id).cloned();
-    until(session, "the order has ended", |snapshot| {
-        of(snapshot).is_some_and(|order| order.outcome != Outcome::Pending)
+async fn send_command(session: &mut Session, number: u32, kind: CommandKind) -> Outcome {
+    let id = CommandId { terminal: session.terminal, number };
+    let request = CommandRequest::on(&session.snapshots.borrow(), id, kind);
+    session.send(Request::Command(request)).unwrap();
+    let of = move |snapshot: &Snapshot| snapshot.commands.iter().find(|command| command.id == id).cloned();
+    until(session, "the command has ended", |snapshot| {
+        of(snapshot).is_some_and(|command| command.outcome != Outcome::Pending)
     })
     .await;
-    let order = of(&session.snapshots.borrow()).unwrap();
-    order.outcome
+    let command = of(&session.snapshots.borrow()).unwrap();
+    command.outcome
 }
 
 fn all_answer(snapshot: &Snapshot) -> bool {
@@ -95,7 +95,7 @@ async fn settings_that_were_tried_out_are_in_the_plant_file_after_they_were_save
     until(&mut session, "all answer", all_answer).await;
 
     let new = faster(&def);
-    assert_eq!(order(&mut session, 1, CommandKind::Configure(Box::new(new.clone()))).await, Outcome::Verified);
+    assert_eq!(send_command(&mut session, 1, CommandKind::Configure(Box::new(new.clone()))).await, Outcome::Verified);
     until(&mut session, "the line works with the new settings", |snapshot| {
         let report = snapshot.lines[0].report.as_ref();
         report.is_some_and(|report| report.settings == new) && all_answer(snapshot)
@@ -104,14 +104,14 @@ async fn settings_that_were_tried_out_are_in_the_plant_file_after_they_were_save
     assert_eq!(session.snapshots.borrow().lines[0].settings_before.as_deref(), Some(&def.lines[0]));
     assert_eq!(fs::read_to_string(&path).unwrap(), text, "trying out writes nothing");
 
-    assert_eq!(order(&mut session, 2, CommandKind::SaveSettings(L1)).await, Outcome::Verified);
+    assert_eq!(send_command(&mut session, 2, CommandKind::SaveSettings(L1)).await, Outcome::Verified);
     assert_eq!(fs::read_to_string(&path).unwrap(), text.replace("baud = 9600", "baud = 19200"), "comments and all");
     assert_eq!(session.snapshots.borrow().lines[0].settings_before, None);
     assert_eq!(profile::load(&path, &Search::shipped()).unwrap().lines[0], new);
 
     // Somebody edits the file meanwhile: theirs is not overwritten.
     fs::write(&path, &text).unwrap();
-    let outcome = order(&mut session, 3, CommandKind::SaveSettings(L1)).await;
+    let outcome = send_command(&mut session, 3, CommandKind::SaveSettings(L1)).await;
     let Outcome::Refused(Refusal::NotSaved(why)) = outcome else { panic!("{outcome:?}") };
     assert!(why.contains("was changed by somebody"), "{why}");
     assert_eq!(fs::read_to_string(&path).unwrap(), text);
@@ -125,7 +125,7 @@ async fn a_plant_without_a_file_says_that_nothing_can_be_saved() {
     let (def, file) = profile::load_with_file(Path::new("tank"), &Search::shipped()).unwrap();
     let station = start(&def, file, &folder.path().join("tank.duckdb"));
     let mut session = station.session("anna");
-    let outcome = order(&mut session, 1, CommandKind::SaveSettings(L1)).await;
+    let outcome = send_command(&mut session, 1, CommandKind::SaveSettings(L1)).await;
     let Outcome::Refused(Refusal::NotSaved(why)) = outcome else { panic!("{outcome:?}") };
     assert!(why.contains("part of the program"), "{why}");
     drop(session);
@@ -133,13 +133,13 @@ async fn a_plant_without_a_file_says_that_nothing_can_be_saved() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn an_order_that_was_made_before_a_reload_is_refused_and_writes_nothing() {
+async fn a_command_made_before_a_reload_is_refused() {
     let folder = folder();
     let (socket, history) = (folder.path().join("tank.sock"), folder.path().join("tank.duckdb"));
     let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
     let write = |snapshot: &Snapshot, number| {
         let kind = CommandKind::Write { tag: snapshot.def.tag_named("TIC-1.SV").unwrap(), value: 61.0 };
-        OrderRequest::on(snapshot, OrderId { terminal: 1, number }, kind)
+        CommandRequest::on(snapshot, CommandId { terminal: 1, number }, kind)
     };
     let mut listener = listen(&socket).unwrap();
     let station = start(&def, None, &history);
@@ -163,9 +163,9 @@ async fn an_order_that_was_made_before_a_reload_is_refused_and_writes_nothing() 
         .await;
 
     let (id, before) = (open.id, session.snapshots.borrow().sample(changed.tag_named("TIC-1.SV").unwrap()).value);
-    session.send(Request::Order(open)).unwrap();
-    let of = |snapshot: &Snapshot, id| snapshot.orders.iter().find(|order| order.id == id).cloned();
-    let ended = |snapshot: &Snapshot, id| of(snapshot, id).is_some_and(|order| order.outcome != Outcome::Pending);
+    session.send(Request::Command(open)).unwrap();
+    let of = |snapshot: &Snapshot, id| snapshot.commands.iter().find(|command| command.id == id).cloned();
+    let ended = |snapshot: &Snapshot, id| of(snapshot, id).is_some_and(|command| command.outcome != Outcome::Pending);
     until(&mut session, "an outcome", |snapshot| ended(snapshot, id)).await;
     let outcome = of(&session.snapshots.borrow(), id).unwrap().outcome;
     let Outcome::Refused(Refusal::NotPermitted(why)) = outcome else { panic!("{outcome:?}") };
@@ -175,7 +175,7 @@ async fn an_order_that_was_made_before_a_reload_is_refused_and_writes_nothing() 
     let again = write(&session.snapshots.borrow(), 2);
     assert_eq!(again.seen, before, "nothing was written");
     let id = again.id;
-    session.send(Request::Order(again)).unwrap();
+    session.send(Request::Command(again)).unwrap();
     until(&mut session, "an outcome", |snapshot| ended(snapshot, id)).await;
     assert_eq!(of(&session.snapshots.borrow(), id).unwrap().outcome, Outcome::Verified);
     drop(session);

@@ -60,7 +60,7 @@ async fn a_shift_of_eight_hours_is_reported_truly() {
     wait(&session, clock, 3600).await;
     let high =
         session.snapshots.borrow().alarms.first().map(|alarm| alarm.acknowledge()).expect("the high alarm is there");
-    order(&session, high, 2).await;
+    send_command(&session, high, 2).await;
     write(&session, &def, "TIC-1.SV", 70.0, 3).await;
     wait(&session, clock, 5 * 3600 + 600).await;
     let last = session.snapshots.borrow().clone();
@@ -151,15 +151,15 @@ async fn wait(session: &Session, clock: Clock, seconds: u64) {
 }
 
 async fn write(session: &Session, def: &PlantDef, tag: &str, value: f64, number: u32) {
-    order(session, CommandKind::Write { tag: def.tag_named(tag).unwrap(), value }, number).await;
+    send_command(session, CommandKind::Write { tag: def.tag_named(tag).unwrap(), value }, number).await;
 }
 
-/// Sends an order and waits for its good end.
-async fn order(session: &Session, kind: CommandKind, number: u32) {
-    let id = session.order(number, kind).unwrap();
+/// Sends a command and waits for its good end.
+async fn send_command(session: &Session, kind: CommandKind, number: u32) {
+    let id = session.send_command(number, kind).unwrap();
     let mut snapshots = session.snapshots.clone();
     let outcome = loop {
-        let status = snapshots.borrow_and_update().orders.iter().find(|order| order.id == id).cloned();
+        let status = snapshots.borrow_and_update().commands.iter().find(|command| command.id == id).cloned();
         match status.map(|status| status.outcome) {
             None | Some(Outcome::Pending) => snapshots.changed().await.unwrap(),
             Some(outcome) => break outcome,

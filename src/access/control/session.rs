@@ -5,14 +5,14 @@ use std::{collections::VecDeque, sync::Arc};
 use jiff::Timestamp;
 
 use super::Peer;
-use crate::{access::Who, plant::command::OrderId};
+use crate::{access::Who, plant::command::CommandId};
 
 /// Requests a second of one terminal that are answered in the long run, and so many at once.
 const REQUESTS: (f64, f64) = (20.0, 40.0);
 /// Refusals a second of one place that are put on record each by itself, and so many at once.
 const REFUSALS: (f64, f64) = (0.5, 20.0);
 
-/// Orders that did not reach the plant and are remembered for their terminal: as many as may come at once.
+/// Commands that did not reach the plant and are remembered for their terminal: as many as may come at once.
 const UNDELIVERED_MAX: usize = 64;
 
 /// The session of a terminal.
@@ -36,10 +36,10 @@ pub struct SessionState {
     pub active: Timestamp,
     /// What it may still ask.
     pub requests: Bucket,
-    /// The number of its last order: each has a higher one.
-    pub last_order: Option<u32>,
-    /// Its latest orders that did not reach the plant, and why.
-    pub undelivered: VecDeque<(OrderId, Arc<str>)>,
+    /// The number of its last command: each has a higher one.
+    pub last_command: Option<u32>,
+    /// Its latest commands that did not reach the plant, and why.
+    pub undelivered: VecDeque<(CommandId, Arc<str>)>,
 }
 
 impl SessionState {
@@ -57,7 +57,7 @@ impl SessionState {
             locked: false,
             active: at,
             requests,
-            last_order: None,
+            last_command: None,
             undelivered: VecDeque::new(),
         }
     }
@@ -67,8 +67,8 @@ impl SessionState {
         self.who.as_ref().filter(|_| !self.locked)
     }
 
-    /// An order that did not reach the plant.
-    pub fn undelivered(&mut self, id: OrderId, why: &str) {
+    /// A command that did not reach the plant.
+    pub fn undelivered(&mut self, id: CommandId, why: &str) {
         if UNDELIVERED_MAX <= self.undelivered.len() {
             self.undelivered.pop_front();
         }

@@ -9,7 +9,7 @@ use super::{
     work::{What, Wrong},
 };
 use crate::{
-    access::{OrderRequest, Signature, user},
+    access::{CommandRequest, Signature, user},
     plant::{
         PlantDef,
         command::{CommandKind, Refusal},
@@ -19,8 +19,8 @@ use crate::{
 };
 
 impl AccessControl {
-    /// Lets an order through whose role is enough, once it is signed as its tag asks.
-    pub(super) fn signed(&mut self, terminal: u32, mut request: OrderRequest, at: Timestamp) -> Vec<Effect> {
+    /// Lets a command through whose role is enough, once it is signed as its tag asks.
+    pub(super) fn signed(&mut self, terminal: u32, mut request: CommandRequest, at: Timestamp) -> Vec<Effect> {
         let needed = needed(&self.def, &request.kind).filter(|_| self.people.is_some());
         let sign = request.sign.take();
         let (Some(needed), Some(session)) = (needed, self.sessions.get(&terminal)) else {
@@ -61,7 +61,7 @@ impl AccessControl {
         terminal: u32,
         by: Arc<str>,
         signer: Option<Arc<str>>,
-        request: OrderRequest,
+        request: CommandRequest,
         wrong: Option<Wrong>,
         at: Timestamp,
     ) -> Vec<Effect> {
@@ -83,7 +83,7 @@ impl AccessControl {
         let needed = right::needs(&request.kind);
         // Meanwhile the terminal may have been locked.
         if let Err(why) = self.may(terminal, Some(needed)) {
-            return self.refuse_order(terminal, request, Refusal::NotPermitted(why), at);
+            return self.refuse_command(terminal, request, Refusal::NotPermitted(why), at);
         }
         let other = signer.as_ref().filter(|signer| **signer != by);
         let other = other.and_then(|signer| self.people.as_ref()?.get(signer));
@@ -103,11 +103,11 @@ impl AccessControl {
     pub(super) fn not_signed(
         &mut self,
         terminal: u32,
-        request: OrderRequest,
+        request: CommandRequest,
         why: String,
         at: Timestamp,
     ) -> Vec<Effect> {
-        self.refuse_order(terminal, request, Refusal::NotSigned(why), at)
+        self.refuse_command(terminal, request, Refusal::NotSigned(why), at)
     }
 }
 

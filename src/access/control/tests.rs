@@ -7,7 +7,7 @@ use super::*;
 use crate::{
     access::{Signature, tries::Key, user::Change},
     plant::{
-        command::{CommandKind, OrderId},
+        command::{CommandId, CommandKind},
         def::Sign,
         fixture,
         role::AccessDef,
@@ -23,7 +23,7 @@ struct Bench {
     access: AccessControl,
     now: Timestamp,
     last_ticket: u64,
-    last_order: u32,
+    last_command: u32,
     /// What was kept by the last save.
     kept: Option<Users>,
     disk_full: bool,
@@ -47,7 +47,7 @@ impl Bench {
 
     fn of(access: AccessControl) -> Bench {
         let now = Timestamp::from_second(1_000_000).unwrap();
-        Bench { access, now, last_ticket: 0, last_order: 0, kept: None, disk_full: false, records: Vec::new() }
+        Bench { access, now, last_ticket: 0, last_command: 0, kept: None, disk_full: false, records: Vec::new() }
     }
 
     fn open(&mut self, terminal: u32, host: &str) -> Vec<Effect> {
@@ -113,18 +113,23 @@ impl Bench {
     }
 
     /// `None`: nothing reached the plant. `Some(None)`: permitted.
-    fn order(&mut self, terminal: u32, kind: CommandKind, sign: Option<Signature>) -> Option<(Order, Option<Refusal>)> {
-        self.last_order += 1;
-        let id = OrderId { terminal, number: self.last_order };
-        let request = OrderRequest { sign, note: Some("why".into()), ..OrderRequest::new(0, id, kind) };
-        let effects = self.access.order(terminal, request, self.now);
+    fn send_command(
+        &mut self,
+        terminal: u32,
+        kind: CommandKind,
+        sign: Option<Signature>,
+    ) -> Option<(Command, Option<Refusal>)> {
+        self.last_command += 1;
+        let id = CommandId { terminal, number: self.last_command };
+        let request = CommandRequest { sign, note: Some("why".into()), ..CommandRequest::new(0, id, kind) };
+        let effects = self.access.on_command(terminal, request, self.now);
         let effects = self.work(effects);
-        let order = effects.into_iter().find_map(|effect| match effect {
-            Effect::Order(order) => Some(order),
+        let command = effects.into_iter().find_map(|effect| match effect {
+            Effect::Command(command) => Some(command),
             _ => None,
         })?;
-        let refused = order.refused.clone();
-        Some((order, refused))
+        let refused = command.refused.clone();
+        Some((command, refused))
     }
 
     fn who(&self, terminal: u32) -> Option<String> {
@@ -180,7 +185,7 @@ fn five_wrong_passwords_lock_the_name_out_for_that_system_user_and_who_is_in_sta
     assert!(bench.login(3, "TECH", TECH).is_err(), "the right password elsewhere does not help");
     assert!(bench.access.standing(1, bench.now).view, "alarms and process stay to be seen");
     assert_eq!(bench.who(2).as_deref(), Some("tech"));
-    assert_eq!(bench.order(2, RUN, None).unwrap().1, None, "who is in goes on working");
+    assert_eq!(bench.send_command(2, RUN, None).unwrap().1, None, "who is in goes on working");
     bench.wish(2, Wish::Lock).unwrap();
     bench.wish(2, Wish::Unlock(TECH.into())).unwrap();
     bench.later(300);
@@ -202,7 +207,7 @@ fn a_supervisor_ends_a_lock_out() {
 }
 
 #[test]
-fn each_role_may_what_is_its_own_and_refused_orders_go_to_the_plant_as_refused() {
+fn refused_commands_reach_the_plant_as_refused() {
     let roles = [
         (None, Role::Viewer, true),
         (Some(("view", VIEW)), Role::Viewer, true),
@@ -214,10 +219,10 @@ fn each_role_may_what_is_its_own_and_refused_orders_go_to_the_plant_as_refused()
         if let Some((user, password)) = login {
             bench.login(1, user, password).unwrap();
         }
-        let (order, why) = bench.order(1, RUN, None).unwrap();
+        let (command, why) = bench.send_command(1, RUN, None).unwrap();
         assert_eq!(why.is_some(), refused, "{login:?} {why:?}");
-        assert_eq!(&*order.by, login.map_or("not logged in (panel)", |login| login.0));
-        assert_eq!(&*order.from, "pts/1 from 10.0.0.1, user panel");
+        assert_eq!(&*command.by, login.map_or("not logged in (panel)", |login| login.0));
+        assert_eq!(&*command.from, "pts/1 from 10.0.0.1, user panel");
         let stop = bench.wish(1, Wish::Stop);
         assert!(stop.is_err());
         assert!(bench.last().0.ends_with("stop station") && bench.last().2.starts_with("refused: "));
@@ -260,17 +265,17 @@ fn an_untouched_terminal_is_locked_shows_it_and_may_only_look_until_the_password
     bench.later(850);
     let standing = bench.access.standing(1, bench.now);
     assert_eq!((standing.locked, standing.locks_in), (false, Some(Duration::from_secs(50))));
-    bench.order(1, RUN, None).unwrap();
+    bench.send_command(1, RUN, None).unwrap();
     bench.later(899);
-    assert!(!bench.access.standing(1, bench.now).locked, "an order is a sign of life");
+    assert!(!bench.access.standing(1, bench.now).locked, "a command is a sign of life");
     bench.later(1);
     let standing = bench.access.standing(1, bench.now);
     assert!(standing.locked && standing.view);
-    assert!(bench.order(1, RUN, None).unwrap().1.is_some());
+    assert!(bench.send_command(1, RUN, None).unwrap().1.is_some());
     assert!(bench.wish(1, Wish::Unlock("guess".into())).is_err());
     bench.later(1);
     bench.wish(1, Wish::Unlock(TECH.into())).unwrap();
-    assert_eq!(bench.order(1, RUN, None).unwrap().1, None);
+    assert_eq!(bench.send_command(1, RUN, None).unwrap().1, None);
     bench.wish(1, Wish::Lock).unwrap();
     bench.login(1, "boss", BOSS).unwrap();
     assert_eq!(bench.who(1).as_deref(), Some("boss"), "somebody else may sit down at a locked terminal");
@@ -308,11 +313,11 @@ fn whoever_got_a_password_from_somebody_must_first_choose_his_own() {
     let (given, own) = ("given by the boss", "chosen by dora herself");
     bench.wish(1, Wish::AddUser { user: "dora".into(), role: Role::Supervisor, password: given.into() }).unwrap();
     bench.login(2, "dora", given).unwrap();
-    assert!(bench.order(2, RUN, None).unwrap().1.is_some());
+    assert!(bench.send_command(2, RUN, None).unwrap().1.is_some());
     assert!(bench.wish(2, Wish::Stop).is_err());
     bench.wish(2, Wish::ChangePassword { old: given.into(), new: given.into() }).unwrap_err();
     bench.wish(2, Wish::ChangePassword { old: given.into(), new: own.into() }).unwrap();
-    assert_eq!(bench.order(2, RUN, None).unwrap().1, None);
+    assert_eq!(bench.send_command(2, RUN, None).unwrap().1, None);
     assert_eq!(&*bench.kept.as_ref().unwrap().get("dora").unwrap().hash, own);
 }
 
@@ -381,12 +386,12 @@ fn a_tag_that_asks_for_a_second_person_is_written_only_with_one() {
         (sign(Some("nobody"), BOSS), "wrong name or password; wait 1 s"),
     ];
     for (sign, why) in refused {
-        let (_, refused) = bench.order(1, SV, sign).unwrap();
+        let (_, refused) = bench.send_command(1, SV, sign).unwrap();
         assert_eq!(refused, Some(Refusal::NotSigned(why.into())));
         bench.later(2);
     }
-    let (order, refused) = bench.order(1, SV, sign(Some("BOSS"), BOSS)).unwrap();
-    assert_eq!((refused, order.note.as_deref()), (None, Some("why; signed by boss")));
+    let (command, refused) = bench.send_command(1, SV, sign(Some("BOSS"), BOSS)).unwrap();
+    assert_eq!((refused, command.note.as_deref()), (None, Some("why; signed by boss")));
 }
 
 #[test]
@@ -395,7 +400,7 @@ fn a_user_whom_the_operating_system_knows_is_in_without_a_password() {
     let mut bench = Bench::new(AccessDef { trusted, ..AccessDef::default() });
     bench.open(1, "10.0.0.1");
     assert_eq!(bench.who(1).as_deref(), Some("panel"));
-    assert_eq!(bench.order(1, RUN, None).unwrap().1, None);
+    assert_eq!(bench.send_command(1, RUN, None).unwrap().1, None);
     bench.later(5000);
     assert!(!bench.access.standing(1, bench.now).locked, "he would have no password to unlock it with");
     assert!(bench.wish(1, Wish::Lock).is_err());
@@ -429,15 +434,15 @@ fn no_more_terminals_come_in_than_permitted_but_the_stations_own_always_does() {
 fn a_hostile_terminal_can_neither_flood_the_plant_nor_fill_the_book() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "evil");
-    let mut orders = 0;
+    let mut commands = 0;
     for _ in 0..600 {
         for _ in 0..100 {
-            orders += usize::from(bench.order(1, RUN, None).is_some());
+            commands += usize::from(bench.send_command(1, RUN, None).is_some());
         }
         bench.later(1);
     }
-    // Ten minutes, 60,000 orders.
-    assert!((20..=330).contains(&orders), "{orders}");
+    // Ten minutes, 60,000 commands.
+    assert!((20..=330).contains(&commands), "{commands}");
     let told = bench.records.iter().filter(|record| record.0.ends_with("too many requests")).count();
     assert!((9..=10).contains(&told), "{told}");
     let mut coming = 0;
@@ -473,15 +478,15 @@ fn a_demonstration_asks_nobody() {
     let own = Peer { from: "this process".into(), unix_user: Some("anna".into()), own: true };
     bench.access.open(1, own, bench.now);
     assert_eq!(bench.who(1).as_deref(), Some("anna"));
-    assert_eq!(bench.order(1, RUN, None).unwrap().1, None);
+    assert_eq!(bench.send_command(1, RUN, None).unwrap().1, None);
     bench.open(2, "10.0.0.1");
-    assert!(bench.order(2, RUN, None).unwrap().1.is_some(), "only at its own terminal");
+    assert!(bench.send_command(2, RUN, None).unwrap().1.is_some(), "only at its own terminal");
 }
 
 mod file;
 mod guessing;
 mod late;
-mod orders;
+mod commands;
 mod place;
 mod room;
 

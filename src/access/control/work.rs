@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{AccessControl, Effect, people::Hashing};
-use crate::access::{OrderRequest, Secret, password, tries::Key, user};
+use crate::access::{CommandRequest, Secret, password, tries::Key, user};
 
 /// Passwords of all users of the operating system that may be checked or wait; more are refused as [`BUSY`].
 pub(super) const JOBS_MAX: usize = 64;
@@ -80,8 +80,8 @@ pub(super) enum What {
     Unlock { ticket: u64, user: Arc<str> },
     /// Of who sits there, before he may have a new one.
     Change { ticket: u64, user: Arc<str>, new: Secret },
-    /// Of who signs an order.
-    Sign { by: Arc<str>, signer: Option<Arc<str>>, request: Box<OrderRequest> },
+    /// Of who signs a command.
+    Sign { by: Arc<str>, signer: Option<Arc<str>>, request: Box<CommandRequest> },
     /// A new one is hashed.
     Hash { ticket: u64, hashing: Hashing },
 }

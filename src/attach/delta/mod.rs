@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::plant::{
     Snapshot,
     alarm::{AlarmMetrics, PeriodMetrics},
-    command::OrderStatus,
+    command::CommandStatus,
     interlock::ActuatorTracker,
     parameter_set::StoredSet,
     restore::Restore,
@@ -47,7 +47,7 @@ pub struct Delta {
     rates: Option<AlarmRates>,
     /// The figures of the day: they change less often than the rates.
     day: Option<Arc<PeriodMetrics>>,
-    orders: List<OrderStatus>,
+    commands: List<CommandStatus>,
     watch: Option<ActuatorTracker>,
     history: Option<HistoryStatus>,
     station: Option<Arc<BTreeMap<StationFault, Arc<str>>>>,
@@ -85,7 +85,7 @@ impl Delta {
             alarm_metrics,
             aside,
             sound,
-            orders,
+            commands,
             watch,
             history,
             station,
@@ -113,7 +113,7 @@ impl Delta {
             sound: *sound,
             rates: (rates(&old.alarm_metrics) != rates(alarm_metrics)).then(|| rates(alarm_metrics)),
             day: (old.alarm_metrics.day != alarm_metrics.day).then(|| alarm_metrics.day.clone()),
-            orders: List::between(&old.orders, orders),
+            commands: List::between(&old.commands, commands),
             watch: (old.watch != *watch).then(|| watch.clone()),
             history: (old.history != *history).then(|| history.clone()),
             station: (old.station != *station).then(|| station.clone()),
@@ -163,7 +163,7 @@ impl Delta {
         if let Some(day) = self.day {
             quality.day = day;
         }
-        self.orders.apply(&mut snapshot.orders)?;
+        self.commands.apply(&mut snapshot.commands)?;
         if let Some(watch) = self.watch {
             snapshot.watch = watch;
         }

@@ -12,7 +12,7 @@ use crate::{
     plant::{
         Snapshot,
         alarm::AlarmState,
-        command::{CommandKind, OrderId, OrderStatus, Outcome},
+        command::{CommandId, CommandKind, CommandStatus, Outcome},
         def::{AlarmId, Framing, TagId},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState},
         event::{Fault, LineState},
@@ -108,8 +108,8 @@ fn change(snapshot: &mut Snapshot, (kind, place, amount): (u8, u16, u32)) {
             Arc::make_mut(&mut snapshot.alarms).remove(place);
         }
         8 => {
-            let order = OrderStatus {
-                id: OrderId { terminal: u32::from(place), number: amount },
+            let command = CommandStatus {
+                id: CommandId { terminal: u32::from(place), number: amount },
                 by: "anna".into(),
                 from: "pts/3".into(),
                 note: None,
@@ -119,16 +119,16 @@ fn change(snapshot: &mut Snapshot, (kind, place, amount): (u8, u16, u32)) {
                 outcome: Outcome::Pending,
                 recorded: true,
             };
-            snapshot.orders.insert(0, order);
-            snapshot.orders.truncate(32);
+            snapshot.commands.insert(0, command);
+            snapshot.commands.truncate(32);
         }
-        9 if !snapshot.orders.is_empty() => snapshot.orders[0].outcome = Outcome::Verified,
+        9 if !snapshot.commands.is_empty() => snapshot.commands[0].outcome = Outcome::Verified,
         10 => snapshot.lines[0].state = LineState::Waiting { why: "gone".into(), retry_at: at },
         11 => change_report(snapshot, place, amount),
         12 => snapshot.lines[0].report = None,
         13 => {
             snapshot.lines[0].test = Some(Arc::new(DiagnosticRun {
-                id: OrderId { terminal: 1, number: amount },
+                id: CommandId { terminal: 1, number: amount },
                 by: "anna".into(),
                 diagnostic: Diagnostic::Send(vec![1, 2]),
                 started: at,
@@ -243,7 +243,7 @@ fn without_a_login_no_value_leaves_the_station() {
     assert!(seen.samples.iter().all(|sample| *sample == Sample::bad(Cause::NotAuthorised, snapshot.at)));
     assert!(seen.texts.iter().all(Option::is_none) && seen.source_frames.iter().all(Option::is_none));
     assert!(seen.lines.iter().all(|line| line.report.is_none() && line.test.is_none()));
-    assert!(seen.orders.is_empty() && seen.sets.is_empty() && seen.restores.is_empty());
+    assert!(seen.commands.is_empty() && seen.sets.is_empty() && seen.restores.is_empty());
     assert!(seen.alarms.iter().all(|alarm| alarm.value.is_none()));
     let known = |snapshot: &Snapshot| -> Vec<(AlarmId, AlarmState, Timestamp)> {
         snapshot.alarms.iter().map(|alarm| (alarm.id, alarm.state, alarm.raised_at)).collect()

@@ -14,7 +14,7 @@ use super::{
     wire::{self, WireError},
 };
 use crate::{
-    access::{OrderRequest, Standing, Wish},
+    access::{CommandRequest, Standing, Wish},
     attach::{
         check,
         delta::Delta,
@@ -107,7 +107,7 @@ impl Asking {
             let asked = protocol::decode(&bytes, "message of a terminal").map_err(WireError::from)?;
             pace.step().await;
             match asked {
-                Asked::Order(order) => self.order(*order).await,
+                Asked::Command(command) => self.send_command(*command).await,
                 Asked::Ask { ticket, query } => self.ask(ticket, query).await,
                 Asked::Cancel { ticket } => self.cancel(ticket),
                 Asked::Wish { ticket, wish } => self.wish(ticket, wish).await,
@@ -115,14 +115,14 @@ impl Asking {
         }
     }
 
-    async fn order(&self, order: OrderRequest) {
-        let id = order.id;
+    async fn send_command(&self, command: CommandRequest) {
+        let id = command.id;
         let sent = if id.terminal == self.session.terminal {
-            check::command(&self.def, &order.kind)
+            check::command(&self.def, &command.kind)
         } else {
-            Err(format!("an order of terminal {}, this is terminal {}", id.terminal, self.session.terminal))
+            Err(format!("a command of terminal {}, this is terminal {}", id.terminal, self.session.terminal))
         };
-        let sent = sent.and_then(|()| self.session.send(Request::Order(order)).map_err(str::to_owned));
+        let sent = sent.and_then(|()| self.session.send(Request::Command(command)).map_err(str::to_owned));
         if let Err(why) = sent {
             // Only a terminal that has ended does not hear it.
             let _ = self.replies.send((Told::Undelivered { id, why }, Vec::new())).await;
@@ -138,7 +138,7 @@ impl Asking {
         while self.queries.try_join_next().is_some() {}
         self.tickets.retain(|_, query| !query.is_finished());
         let query = self.queries.spawn(async move {
-            // A query waits here for those before it, so that what comes behind it, an order perhaps, does not.
+            // A query waits here for those before it, so that what comes behind it, a command perhaps, does not.
             let Ok(turn) = asked.acquire_owned().await else { return };
             let sent = sent.and_then(|()| session.ask(query).map_err(str::to_owned));
             // The station takes a terminal for gone when nobody holds its session any more.
@@ -219,12 +219,12 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
         }
     }
 
-    /// What the terminal has ordered itself is told at once.
+    /// What the terminal has requested itself is told at once.
     fn has_news_of_own(&self, sent: &Snapshot, snapshot: &Snapshot) -> bool {
         let terminal = self.session.terminal;
         let own = |snapshot: &'_ Snapshot| -> Vec<(u32, Outcome)> {
-            let own = snapshot.orders.iter().filter(|order| order.id.terminal == terminal);
-            own.map(|order| (order.id.number, order.outcome.clone())).collect()
+            let own = snapshot.commands.iter().filter(|command| command.id.terminal == terminal);
+            own.map(|command| (command.id.number, command.outcome.clone())).collect()
         };
         self.session.standing.borrow().view && own(sent) != own(snapshot)
     }

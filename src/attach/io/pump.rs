@@ -53,7 +53,7 @@ pub struct Pump {
     path: PathBuf,
     place: Place,
     own: Own,
-    /// The latest snapshot as the station has it; what is published may differ by own orders.
+    /// The latest snapshot as the station has it; what is published may differ by own commands.
     latest: Arc<Snapshot>,
     publish: watch::Sender<Arc<Snapshot>>,
     stand: watch::Sender<Arc<Standing>>,
@@ -168,7 +168,7 @@ impl Pump {
         Ok(())
     }
 
-    /// Publishes the latest snapshot, with what became of own orders.
+    /// Publishes the latest snapshot, with what became of own commands.
     fn show(&mut self) {
         let seen = self.own.see(&self.latest);
         self.publish.send_replace(seen);
@@ -177,11 +177,11 @@ impl Pump {
     /// Sends a request on its way, or refuses it.
     fn send(&mut self, request: Request, out: &mpsc::Sender<Vec<u8>>) {
         match request {
-            Request::Order(order) => {
+            Request::Command(command) => {
                 let (by, at) = (self.by(), self.latest.at);
-                let order = self.own.send(order, by, at);
-                let id = order.id;
-                if let Err(why) = hand_over(&Asked::Order(Box::new(order)), out) {
+                let command = self.own.send(command, by, at);
+                let id = command.id;
+                if let Err(why) = hand_over(&Asked::Command(Box::new(command)), out) {
                     self.own.undelivered(id, why);
                     self.show();
                 }
@@ -257,9 +257,9 @@ impl Pump {
 
     fn refuse(&mut self, request: Request) {
         match request {
-            Request::Order(order) => {
+            Request::Command(command) => {
                 let (by, at) = (self.by(), self.latest.at);
-                self.own.refuse(&order, by, at, GONE);
+                self.own.refuse(&command, by, at, GONE);
                 self.show();
             }
             Request::Ask(query) => Waiting::Ask(query.reply).refuse(GONE),

@@ -79,10 +79,10 @@ fn what_a_terminal_says_of_itself_cannot_disturb_a_screen_or_say_who_it_is() {
 
 #[test]
 fn requests_and_news_survive_the_way() {
-    let order =
-        OrderRequest::new(7, OrderId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(0), value: 0.1 });
+    let command =
+        CommandRequest::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(0), value: 0.1 });
     let asked = [
-        Asked::Order(Box::new(order)),
+        Asked::Command(Box::new(command)),
         Asked::Ask { ticket: 1, query: Query::Journal { from: now(), to: now(), limit: 5 } },
         Asked::Cancel { ticket: 1 },
         Asked::Wish { ticket: 2, wish: Wish::Login { user: "anna".into(), password: "long and secret".into() } },
@@ -96,7 +96,7 @@ fn requests_and_news_survive_the_way() {
         Told::Answer { ticket: 1, answer: Ok(Answer::Journal(Vec::new())) },
         Told::Answer { ticket: 1, answer: Err(HistoryError::EmptyPeriod) },
         Told::Granted { ticket: 2, answer: Err("no".into()) },
-        Told::Undelivered { id: OrderId { terminal: 1, number: 2 }, why: "busy".into() },
+        Told::Undelivered { id: CommandId { terminal: 1, number: 2 }, why: "busy".into() },
     ];
     for told in told {
         assert_eq!(decode(&body(encode(&told, NEWS_BYTES_MAX).unwrap()), "message"), Ok(told));
@@ -180,17 +180,17 @@ proptest! {
     #[test]
     fn a_corrupt_message_is_refused_without_harm(place in 0usize..200, byte: u8, end in 0usize..200) {
         let signature = crate::access::Signature { user: Some("somchai".into()), password: "secret".into() };
-        let order = OrderRequest {
+        let command = CommandRequest {
             note: Some("because".into()),
             sign: Some(signature),
-            ..OrderRequest::new(7, OrderId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(3), value: 7.5 })
+            ..CommandRequest::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(3), value: 7.5 })
         };
-        let mut bytes = body(encode(&Asked::Order(Box::new(order)), REQUEST_BYTES_MAX).unwrap());
+        let mut bytes = body(encode(&Asked::Command(Box::new(command)), REQUEST_BYTES_MAX).unwrap());
         let place = place % bytes.len();
         bytes[place] = byte;
         bytes.truncate(bytes.len() - end % bytes.len());
-        if let Ok(Asked::Order(order)) = decode::<Asked>(&bytes, "message") {
-            let _ = check::command(&Fixture::normal().def, &order.kind);
+        if let Ok(Asked::Command(command)) = decode::<Asked>(&bytes, "message") {
+            let _ = check::command(&Fixture::normal().def, &command.kind);
         }
     }
 }

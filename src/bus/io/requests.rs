@@ -116,7 +116,7 @@ impl Requests {
         }
     }
 
-    /// The writes of a tag that still wait, taken out: they were ordered before a stop, and would undo it.
+    /// The writes of a tag that still wait, taken out: they were requested before a stop, and would undo it.
     pub fn take_writes_of(&mut self, stopped: TagId) -> Vec<WriteId> {
         self.take_writes(|tag| tag == stopped)
     }

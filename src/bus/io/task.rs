@@ -334,7 +334,7 @@ impl Task<'_> {
             }
             BusRequest::StopTest => self.stop_test().await.map(Ok),
             BusRequest::Write { id, tag, raw, unlock, verify, urgent } => {
-                // What was ordered before a stop and still waits for this tag would undo it.
+                // What was requested before a stop and still waits for this tag would undo it.
                 let overtaken = if urgent { self.requests.take_writes_of(tag) } else { Vec::new() };
                 for id in overtaken {
                     self.tell_wrote(id, WriteResult::Overtaken).await?;

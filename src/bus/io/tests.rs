@@ -215,7 +215,7 @@ async fn a_repaired_unit_is_read_as_soon_as_an_operator_retries() {
     let minutes = Timestamp::from_second(300).expect("a small number");
     let now = line.until(&def, |event| of_other(event, minutes)).await;
     repaired.store(1, Ordering::Relaxed);
-    line.requests.send(BusRequest::Refresh { device: DeviceId(0), order: None }).await.expect("the line runs");
+    line.requests.send(BusRequest::Refresh { device: DeviceId(0), command: None }).await.expect("the line runs");
     let read = |event: &Event| match event {
         Event::Read { at, device: DeviceId(0), .. } => Some(*at),
         _ => None,
@@ -537,7 +537,7 @@ async fn cured_and_late_answers_are_counted_with_their_device() {
     panic!("never counted")
 }
 
-/// Writes that got no answer have used up their share of a full line. A stop goes all the same, and what was ordered before
+/// Writes that got no answer have used up their share of a full line. A stop goes all the same, and what was requested before
 /// it and still waits does not undo it.
 #[tokio::test(start_paused = true)]
 async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {

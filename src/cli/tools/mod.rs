@@ -12,7 +12,7 @@ use jiff::Timestamp;
 use crate::{
     bus::{diagnostics::Job, dissect, frame::hex, io::testing},
     plant::{
-        command::OrderId,
+        command::CommandId,
         def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
         traffic::Exchange,
@@ -133,7 +133,7 @@ pub fn run(
     diagnostic: Diagnostic,
     tell: impl Fn(&Finding) -> Vec<String>,
 ) -> Result<DiagnosticRun, CliError> {
-    let job = Job::new(OrderId { terminal: 0, number: 0 }, Arc::from("cli"), diagnostic, Timestamp::now());
+    let job = Job::new(CommandId { terminal: 0, number: 0 }, Arc::from("cli"), diagnostic, Timestamp::now());
     let shown = std::io::stderr().is_terminal();
     let mut told = 0;
     let run = runtime()?.block_on(async {

@@ -14,7 +14,7 @@ use crate::plant::{
 /// Most characters of a note or reason.
 pub const WORDS_MAX: usize = 500;
 
-/// A wish of an operator about alarms. The note of its order is the note of an acknowledgement, and the reason without which
+/// A wish of an operator about alarms. The note of its command is the note of an acknowledgement, and the reason without which
 /// nothing is shelved or put out of service.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum AlarmCommand {

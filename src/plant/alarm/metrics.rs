@@ -165,7 +165,7 @@ pub enum Bound {
     AtLeast(f64),
 }
 
-/// Targets and limits (ISA-18.2-2016, clause 16.5; the order of the screens).
+/// Targets and limits (ISA-18.2-2016, clause 16.5; the command of the screens).
 pub const METRIC_TARGETS: [MetricTarget; 14] = {
     use Bound::{AtLeast, AtMost, Below};
     use Metric::{Chattering, Fleeting, Flood, Most, PerDay, PerHour, PerWindow, Share, Stale, Top, WindowsOver};

@@ -83,12 +83,12 @@ pub enum Problem {
         /// What the plant file says about it.
         text: String,
     },
-    /// The limits forbid every order.
-    #[error("{0}: no order of writes keeps within the limits")]
+    /// The limits forbid every sorted.
+    #[error("{0}: no sequence of writes keeps within the limits")]
     NoOrder(String),
 }
 
-/// The writes that bring the device to the set, in an order in which each is within the limits of its moment; or every
+/// The writes that bring the device to the set, in a sequence in which each is within the limits of its moment; or every
 /// reason why not. A setting that is the same is not written; one that is missing in the set stays as it is.
 pub fn plan(
     def: &PlantDef,
@@ -212,7 +212,7 @@ fn in_order(
     trusted: Trusted,
 ) -> Result<Vec<Change>, Vec<Change>> {
     let mut now: BTreeMap<TagId, f64> = BTreeMap::new();
-    let mut order = Vec::with_capacity(left.len());
+    let mut sorted = Vec::with_capacity(left.len());
     while !left.is_empty() {
         let value = |tag: TagId| now.get(&tag).copied().or_else(|| trusted(tag));
         let own = |change: &Change| inside(def.tag(change.tag), change.new, &value);
@@ -228,9 +228,9 @@ fn in_order(
         let Some(next) = next else { return Err(left) };
         let change = left.remove(next);
         now.insert(change.tag, change.new);
-        order.push(change);
+        sorted.push(change);
     }
-    Ok(order)
+    Ok(sorted)
 }
 
 /// Is the value within the limits as these tags stand? Limits that are not known forbid it.

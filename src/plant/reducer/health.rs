@@ -33,7 +33,7 @@ impl Plant {
             let bound = |bound: Option<Bound>| image.bound(bound?).ok();
             let span = pv.and_then(|pv| Some(bound(pv.max)? - bound(pv.min)?));
             if self.tunings[device.id.index()].take(device, &sample, span, at) == Noticed::Ended {
-                asked.push((device.line, BusRequest::Refresh { device: device.id, order: None }));
+                asked.push((device.line, BusRequest::Refresh { device: device.id, command: None }));
             }
             if let Some(program) = &device.program {
                 let (position, command) = (sample(program.position).trusted(), sample(program.command).trusted());
@@ -61,9 +61,9 @@ impl Plant {
     /// Is a device left alone because an action takes it some time (saving its settings)?
     fn settling(&self, device: DeviceId) -> bool {
         let actions = &self.def.device(device).actions;
-        self.desk.orders().any(|order| match (&order.kind, &order.outcome) {
+        self.desk.commands().any(|command| match (&command.kind, &command.outcome) {
             (CommandKind::Write { tag, value }, Outcome::Verified | Outcome::NotConfirmed(_) | Outcome::Failed(_)) => {
-                let age = Duration::try_from(self.at.duration_since(order.at)).unwrap_or_default();
+                let age = Duration::try_from(self.at.duration_since(command.at)).unwrap_or_default();
                 actions.iter().any(|action| action.tag == *tag && action.value == *value && age < action.settle)
             }
             _ => false,
@@ -77,7 +77,7 @@ mod tests {
 
     use super::*;
     use crate::plant::{
-        command::{Order, OrderId},
+        command::{Command, CommandId},
         def::{ActionDef, LineId},
         event::{Event, LineState, WriteResult},
         fixture::{self, DP, PLC, PV, SV, TIC},
@@ -108,8 +108,8 @@ mod tests {
         let reply = Duration::from_millis(12);
         plant.on_event(Event::Read { at: at(0), device: TIC, values, texts: Vec::new(), reply, exchange: None });
         assert_eq!(plant.snapshot().device(TIC).diagnosis, None);
-        let id = OrderId { terminal: 1, number: 1 };
-        plant.on_order(Order::new(id, "anna", CommandKind::Write { tag: SV, value: 1.0 }), at(1));
+        let id = CommandId { terminal: 1, number: 1 };
+        plant.on_command(Command::new(id, "anna", CommandKind::Write { tag: SV, value: 1.0 }), at(1));
         plant.on_event(Event::Wrote { at: at(1), id: WriteId(1), result: WriteResult::ReadBack(10.0) });
         assert_eq!(plant.snapshot().device(TIC).diagnosis, Some(Reason::Settling));
         assert_eq!(plant.snapshot().device(PLC).diagnosis, None);

@@ -9,7 +9,7 @@ use jiff::Timestamp;
 
 use super::{Effects, Plant};
 use crate::plant::{
-    command::{BusRequest, CommandKind, NotConfirmed, Order, OrderId, Outcome, Refusal},
+    command::{BusRequest, Command, CommandId, CommandKind, NotConfirmed, Outcome, Refusal},
     def::{DeviceId, LineId, TagId},
     parameter_set::{self, Problem, StoredSet},
     process_image::ProcessImage,
@@ -17,7 +17,7 @@ use crate::plant::{
     restore::{READ_MAX, Restore, RestoreWish, State, Step},
 };
 
-/// The terminal number of writes that the plant itself orders for somebody; terminals count from 1.
+/// The terminal number of writes that the plant itself commands for somebody; terminals count from 1.
 const PLANT: u32 = 0;
 
 /// What the station is asked to do with the folder of sets. Whatever it was, the folder is read anew.
@@ -28,7 +28,7 @@ pub enum SetWork {
     /// Write a set; answered by [`Plant::on_set_written`].
     Write {
         /// For whom.
-        order: OrderId,
+        command: CommandId,
         /// What.
         set: Box<parameter_set::ParameterSet>,
         /// A set of this name may be there already.
@@ -37,31 +37,36 @@ pub enum SetWork {
 }
 
 impl Plant {
-    /// Takes an order about sets; others are not for this place.
-    pub(super) fn set_order(&mut self, order: &Order, at: Timestamp, effects: &mut Effects) -> Option<ActionRecord> {
-        match &order.kind {
+    /// Takes a command about sets; others are not for this place.
+    pub(super) fn set_command(
+        &mut self,
+        command: &Command,
+        at: Timestamp,
+        effects: &mut Effects,
+    ) -> Option<ActionRecord> {
+        match &command.kind {
             CommandKind::ReadSets => {
                 effects.sets = Some(SetWork::Read);
                 // A read is not an operator action.
-                let _ = self.desk.note(order, Outcome::Verified, &self.image, at);
+                let _ = self.desk.note(command, Outcome::Verified, &self.image, at);
                 None
             }
             CommandKind::SaveSet { device, name, replace } => {
                 let trusted = trusted(&self.image);
-                let set = parameter_set::take(&self.def, *device, name, order.by.clone(), at, &trusted);
+                let set = parameter_set::take(&self.def, *device, name, command.by.clone(), at, &trusted);
                 let problem = match parameter_set::check_name(name) {
                     Err(why) => Some(why),
                     Ok(()) if set.values.is_empty() => Some("no setting of the device is known now".to_owned()),
                     Ok(()) => None,
                 };
                 if let Some(why) = problem {
-                    return self.desk.note(order, Outcome::Refused(Refusal::NotSaved(why)), &self.image, at);
+                    return self.desk.note(command, Outcome::Refused(Refusal::NotSaved(why)), &self.image, at);
                 }
-                self.desk.take(order, at);
-                effects.sets = Some(SetWork::Write { order: order.id, set: Box::new(set), replace: *replace });
+                self.desk.take(command, at);
+                effects.sets = Some(SetWork::Write { command: command.id, set: Box::new(set), replace: *replace });
                 None
             }
-            CommandKind::Restore(wish) => self.begin_restore(order, wish, at, effects),
+            CommandKind::Restore(wish) => self.begin_restore(command, wish, at, effects),
             CommandKind::StopRestore(device) => {
                 let running = self.restores.iter_mut().find(|run| run.device == *device && run.at_work());
                 let outcome = match running {
@@ -71,7 +76,7 @@ impl Plant {
                     }
                     None => Outcome::Unchanged,
                 };
-                self.desk.note(order, outcome, &self.image, at)
+                self.desk.note(command, outcome, &self.image, at)
             }
             _ => None,
         }
@@ -83,36 +88,36 @@ impl Plant {
     }
 
     /// A set was written into the folder, or not, with the reason.
-    pub fn on_set_written(&mut self, order: OrderId, result: Result<(), String>) -> Effects {
+    pub fn on_set_written(&mut self, command: CommandId, result: Result<(), String>) -> Effects {
         let outcome = match result {
             Ok(()) => Outcome::Verified,
             Err(why) => Outcome::Refused(Refusal::NotSaved(why)),
         };
-        let action = self.desk.end(order, outcome, &self.image);
+        let action = self.desk.end(command, outcome, &self.image);
         Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
     }
 
     /// A restore begins with a look at the device: what is on the image may be hours old where tags are read seldom.
     fn begin_restore(
         &mut self,
-        order: &Order,
+        command: &Command,
         wish: &RestoreWish,
         at: Timestamp,
         effects: &mut Effects,
     ) -> Option<ActionRecord> {
         if self.restores.iter().any(|run| run.device == wish.device && run.at_work()) {
-            return self.desk.note(order, Outcome::Refused(Refusal::UnderWay), &self.image, at);
+            return self.desk.note(command, Outcome::Refused(Refusal::UnderWay), &self.image, at);
         }
         if let Some(why) = self.unlike(wish.device, &wish.set, &wish.changes) {
-            return self.desk.note(order, Outcome::Refused(why), &self.image, at);
+            return self.desk.note(command, Outcome::Refused(why), &self.image, at);
         }
         if wish.changes.is_empty() {
-            return self.desk.note(order, Outcome::Unchanged, &self.image, at);
+            return self.desk.note(command, Outcome::Unchanged, &self.image, at);
         }
-        self.desk.take(order, at);
+        self.desk.take(command, at);
         self.restores.retain(|run| run.device != wish.device);
-        self.restores.push(Arc::new(Restore::new(order.id, order.by.clone(), wish, at)));
-        let look = BusRequest::Refresh { device: wish.device, order: Some(order.id) };
+        self.restores.push(Arc::new(Restore::new(command.id, command.by.clone(), wish, at)));
+        let look = BusRequest::Refresh { device: wish.device, command: Some(command.id) };
         effects.bus.push((self.def.device(wish.device).line, look));
         None
     }
@@ -141,14 +146,14 @@ impl Plant {
 
     /// The line had no room for a request. Was it the look at the device that a restore begins with?
     pub(super) fn restore_not_read(&mut self, request: &BusRequest) -> bool {
-        let BusRequest::Refresh { order: Some(id), .. } = request else { return false };
+        let BusRequest::Refresh { command: Some(id), .. } = request else { return false };
         let reading = |run: &&mut Arc<Restore>| run.id == *id && run.state == State::Reading;
         let Some(run) = self.restores.iter_mut().find(reading) else { return false };
         Arc::make_mut(run).give_up(Refusal::Busy);
         true
     }
 
-    /// Lets every restore go on that nobody was told the end of: takes the end of its write, orders the next, or ends it.
+    /// Lets every restore go on that nobody was told the end of: takes the end of its write, commands the next, or ends it.
     pub(super) fn carry_on(&mut self, at: Timestamp, effects: &mut Effects) {
         for place in 0..self.restores.len() {
             if self.desk.outcome_of(self.restores[place].id) == Some(&Outcome::Pending) {
@@ -167,8 +172,8 @@ impl Plant {
             self.look(run, at);
         }
         loop {
-            if let Some(order) = run.current() {
-                match self.desk.outcome_of(order) {
+            if let Some(command) = run.current() {
+                match self.desk.outcome_of(command) {
                     Some(Outcome::Pending) => return,
                     Some(ended) => run.take(ended.clone()),
                     // It cannot be followed any more, so nobody can say that it was written.
@@ -180,18 +185,18 @@ impl Plant {
             let (by, line_changed, numbers) = (run.by.clone(), run.line_changed, &mut self.numbers);
             let Some(step) = run.begin_next() else { break };
             *numbers = numbers.wrapping_add(1);
-            let id = OrderId { terminal: PLANT, number: *numbers };
-            step.order = Some(id);
+            let id = CommandId { terminal: PLANT, number: *numbers };
+            step.command = Some(id);
             let (tag, value) = (step.change.tag, step.change.new);
             let seen = Some(step.change.old);
-            let order = Order { seen, ..Order::new(id, by, CommandKind::Write { tag, value }) };
+            let command = Command { seen, ..Command::new(id, by, CommandKind::Write { tag, value }) };
             let refusal = if line_changed { Some(Refusal::LineChanged) } else { overtaken(step, &self.image) };
             if let Some(why) = refusal {
-                let action = self.desk.note(&order, Outcome::Refused(why), &self.image, at);
+                let action = self.desk.note(&command, Outcome::Refused(why), &self.image, at);
                 effects.records.extend(action.map(Record::Action));
                 continue;
             }
-            match self.desk.write(&self.image, &order, tag, value, at) {
+            match self.desk.write(&self.image, &command, tag, value, at) {
                 Ok(request) => effects.bus.push((self.line_of(tag), request)),
                 Err(action) => effects.records.extend(action.map(|action| Record::Action(*action))),
             }

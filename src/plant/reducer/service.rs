@@ -1,4 +1,4 @@
-//! Orders of a technician for a line itself: other settings, tests.
+//! Commands of a technician for a line itself: other settings, tests.
 
 use std::sync::Arc;
 
@@ -6,26 +6,31 @@ use jiff::Timestamp;
 
 use super::{Effects, Plant};
 use crate::plant::{
-    command::{BusRequest, CommandKind, Order, OrderId, Outcome, Refusal},
+    command::{BusRequest, Command, CommandId, CommandKind, Outcome, Refusal},
     def::{LineDef, LineId},
     line_check::valid,
     record::{ActionRecord, Record},
 };
 
 impl Plant {
-    /// Takes an order for a line itself; others are not for this place.
-    pub(super) fn line_order(&mut self, order: &Order, at: Timestamp, effects: &mut Effects) -> Option<ActionRecord> {
-        match &order.kind {
+    /// Takes a command for a line itself; others are not for this place.
+    pub(super) fn line_command(
+        &mut self,
+        command: &Command,
+        at: Timestamp,
+        effects: &mut Effects,
+    ) -> Option<ActionRecord> {
+        match &command.kind {
             CommandKind::Configure(settings)
                 if self.def.lines.get(settings.id.index()).is_none_or(|line| line.name != settings.name) =>
             {
-                return self.desk.note(order, Outcome::Refused(Refusal::NotALine), &self.image, at);
+                return self.desk.note(command, Outcome::Refused(Refusal::NotALine), &self.image, at);
             }
             CommandKind::Configure(settings) if let Err(why) = valid(settings) => {
-                return self.desk.note(order, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
+                return self.desk.note(command, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
             }
             CommandKind::Test(_, diagnostic) if let Err(why) = diagnostic.check() => {
-                return self.desk.note(order, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
+                return self.desk.note(command, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
             }
             CommandKind::Configure(settings) => {
                 self.remember_settings(settings);
@@ -33,13 +38,14 @@ impl Plant {
                 effects.bus.push((settings.id, BusRequest::Configure(settings.clone())));
             }
             CommandKind::Test(line, diagnostic) => {
-                let request = BusRequest::Test { id: order.id, by: order.by.clone(), diagnostic: diagnostic.clone() };
+                let request =
+                    BusRequest::Test { id: command.id, by: command.by.clone(), diagnostic: diagnostic.clone() };
                 effects.bus.push((*line, request));
             }
             CommandKind::StopTest(line) => effects.bus.push((*line, BusRequest::StopTest)),
             CommandKind::SaveSettings(line) => {
-                effects.save = Some((order.id, self.settings(*line).clone()));
-                self.desk.take(order, at);
+                effects.save = Some((command.id, self.settings(*line).clone()));
+                self.desk.take(command, at);
                 return None;
             }
             CommandKind::Write { .. }
@@ -53,12 +59,12 @@ impl Plant {
             | CommandKind::HandOver
             | CommandKind::TakeOver => return None,
         }
-        self.desk.take(order, at);
+        self.desk.take(command, at);
         None
     }
 
     /// The plant file was written, or not, with the reason.
-    pub fn on_saved(&mut self, order: OrderId, saved: &LineDef, result: Result<(), String>) -> Effects {
+    pub fn on_saved(&mut self, command: CommandId, saved: &LineDef, result: Result<(), String>) -> Effects {
         let outcome = match result {
             Ok(()) => {
                 let tried_since = self.settings(saved.id) != saved;
@@ -67,7 +73,7 @@ impl Plant {
             }
             Err(why) => Outcome::Refused(Refusal::NotSaved(why)),
         };
-        let action = self.desk.end(order, outcome, &self.image);
+        let action = self.desk.end(command, outcome, &self.image);
         Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
     }
 
@@ -118,14 +124,14 @@ mod tests {
         plant.on_event(Event::Report { at: at(1), line: L1, report });
     }
 
-    fn order(plant: &mut Plant, number: u32, kind: CommandKind) -> Effects {
-        let id = OrderId { terminal: 1, number };
-        plant.on_order(Order::new(id, "anna", kind), at(i64::from(number)))
+    fn command(plant: &mut Plant, number: u32, kind: CommandKind) -> Effects {
+        let id = CommandId { terminal: 1, number };
+        plant.on_command(Command::new(id, "anna", kind), at(i64::from(number)))
     }
 
-    /// Orders other settings and lets the line take them.
+    /// Commands other settings and lets the line take them.
     fn try_out(plant: &mut Plant, number: u32, settings: LineDef) -> Effects {
-        let mut effects = order(plant, number, CommandKind::Configure(Box::new(settings.clone())));
+        let mut effects = command(plant, number, CommandKind::Configure(Box::new(settings.clone())));
         assert_eq!(actions(&effects), [], "not before the line has it");
         effects.records.extend(plant.on_delivered(L1, &effects.bus[0].1).records);
         works_with(plant, &settings);
@@ -174,7 +180,7 @@ mod tests {
             CommandKind::Test(L1, Diagnostic::Scan(scan)),
         ] {
             let mut plant = plant();
-            let effects = order(&mut plant, 1, kind.clone());
+            let effects = command(&mut plant, 1, kind.clone());
             assert_eq!(effects.bus, [], "{kind:?} goes to the line");
             let refused = actions(&effects);
             assert!(refused.len() == 1 && refused[0].3.starts_with("refused: "), "{refused:?}");
@@ -188,19 +194,19 @@ mod tests {
         let record = actions(&try_out(&mut plant, 1, baud(19_200)));
         let new = "RTU /dev/null 19200 8N1";
         assert_eq!(record, [("anna".into(), "configure".into(), new.into(), "verified".into())]);
-        let effects = order(&mut plant, 2, CommandKind::StopTest(L1));
+        let effects = command(&mut plant, 2, CommandKind::StopTest(L1));
         let record = actions(&plant.on_delivered(L1, &effects.bus[0].1));
         assert_eq!(record, [("anna".into(), "stop test".into(), String::new(), "verified".into())]);
     }
 
     #[test]
-    fn an_order_that_the_line_had_no_room_for_is_on_record_as_refused() {
+    fn a_command_refused_by_a_full_line_is_recorded() {
         let mut plant = plant();
         let test = CommandKind::Test(L1, crate::plant::diagnostics::Diagnostic::Identify { unit: 1 });
         for (number, kind) in
             [(1, CommandKind::Configure(Box::new(baud(19_200)))), (2, test), (3, CommandKind::StopTest(L1))]
         {
-            let effects = order(&mut plant, number, kind);
+            let effects = command(&mut plant, number, kind);
             assert_eq!(actions(&effects), []);
             let refused = actions(&plant.on_undeliverable(L1, &effects.bus[0].1));
             assert!(refused.len() == 1 && refused[0].3.starts_with("refused"), "{refused:?}");
@@ -211,8 +217,8 @@ mod tests {
     fn what_is_saved_is_what_the_line_works_with() {
         let mut plant = plant();
         try_out(&mut plant, 1, baud(19_200));
-        let effects = order(&mut plant, 2, CommandKind::SaveSettings(L1));
-        let id = OrderId { terminal: 1, number: 2 };
+        let effects = command(&mut plant, 2, CommandKind::SaveSettings(L1));
+        let id = CommandId { terminal: 1, number: 2 };
         assert_eq!(effects.save, Some((id, baud(19_200))));
         assert_eq!(actions(&effects), [], "not before it is done");
         assert!(before(&plant).is_some());
@@ -226,8 +232,9 @@ mod tests {
     fn settings_that_were_not_saved_can_still_be_taken_back() {
         let mut plant = plant();
         try_out(&mut plant, 1, baud(19_200));
-        order(&mut plant, 2, CommandKind::SaveSettings(L1));
-        let effects = plant.on_saved(OrderId { terminal: 1, number: 2 }, &baud(19_200), Err("the disk is full".into()));
+        command(&mut plant, 2, CommandKind::SaveSettings(L1));
+        let effects =
+            plant.on_saved(CommandId { terminal: 1, number: 2 }, &baud(19_200), Err("the disk is full".into()));
         assert_eq!(actions(&effects)[0].3, "refused: not saved: the disk is full");
         assert!(before(&plant).is_some());
     }

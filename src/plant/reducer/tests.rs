@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::*;
 use crate::plant::{
     alarm::AlarmState,
-    command::{NotConfirmed, OrderId, Refusal},
+    command::{CommandId, NotConfirmed, Refusal},
     def::{ActionDef, AlarmDef, AlarmId, Condition, Subject},
     event::ExceptionCode,
     fixture::{self, DP, FAULT, PLC, PV, RUN, SILENT, SV, TIC},
@@ -43,28 +43,28 @@ fn running() -> Plant {
     plant
 }
 
-fn order(number: u32, kind: CommandKind) -> Order {
-    Order::new(OrderId { terminal: 1, number }, "anna", kind)
+fn command(number: u32, kind: CommandKind) -> Command {
+    Command::new(CommandId { terminal: 1, number }, "anna", kind)
 }
 
 /// A write by an operator who sees the plant's present values.
-fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> Order {
+fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> Command {
     let kind = CommandKind::Write { tag, value };
-    Order { seen: plant.snapshot().seen(&kind), ..order(number, kind) }
+    Command { seen: plant.snapshot().seen(&kind), ..command(number, kind) }
 }
 
-/// Orders `SV := value`, answers with `result`, and gives the outcome and the raw number that was sent.
+/// Writes `SV := value`, answers with `result`, and gives the outcome and the raw number that was sent.
 fn write(plant: &mut Plant, value: f64, result: WriteResult) -> (Outcome, Option<f64>) {
-    let effects = plant.on_order(shown(plant, 1, SV, value), at(1));
+    let effects = plant.on_command(shown(plant, 1, SV, value), at(1));
     let sent = effects.bus.first().map(|(_, request)| match request {
         BusRequest::Write { id, raw, .. } => (*id, *raw),
         other => panic!("not a write: {other:?}"),
     });
     if let Some((id, _)) = sent {
-        assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Pending);
+        assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Pending);
         plant.on_event(Event::Wrote { at: at(2), id, result });
     }
-    (plant.snapshot().orders[0].outcome.clone(), sent.map(|(_, raw)| raw))
+    (plant.snapshot().commands[0].outcome.clone(), sent.map(|(_, raw)| raw))
 }
 
 #[test]
@@ -116,8 +116,8 @@ fn after_a_write_that_may_have_failed_the_old_value_is_not_trusted() {
 fn a_handover_is_on_record_with_its_note() {
     let mut plant = running();
     let mut action = |number, kind, note: Option<String>| {
-        let order = Order { note: note.map(Into::into), ..order(number, kind) };
-        let effects = plant.on_order(order, at(1));
+        let command = Command { note: note.map(Into::into), ..command(number, kind) };
+        let effects = plant.on_command(command, at(1));
         let [Record::Action(action)] = &effects.records[..] else { panic!("{effects:?}") };
         (action.action.to_string(), action.note.as_deref().map(str::to_owned), action.outcome.to_string())
     };
@@ -136,30 +136,30 @@ fn a_handover_is_on_record_with_its_note() {
 #[test]
 fn a_line_is_closed_when_it_says_so() {
     let mut plant = running();
-    let effects = plant.on_order(order(1, CommandKind::Connect(L1, false)), at(1));
+    let effects = plant.on_command(command(1, CommandKind::Connect(L1, false)), at(1));
     assert_eq!((effects.bus.len(), effects.records.len()), (1, 0));
-    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Pending);
+    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Pending);
     let effects = plant.on_event(Event::Line { at: at(2), line: L1, state: LineState::Disconnected });
-    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Verified);
+    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Verified);
     assert!(
         effects
             .records
             .iter()
             .any(|record| matches!(record, Record::Action(action) if &*action.action == "disconnect"))
     );
-    plant.on_order(order(2, CommandKind::Connect(L1, false)), at(3));
-    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Unchanged);
-    let effects = plant.on_order(order(3, CommandKind::Connect(L1, true)), at(4));
+    plant.on_command(command(2, CommandKind::Connect(L1, false)), at(3));
+    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Unchanged);
+    let effects = plant.on_command(command(3, CommandKind::Connect(L1, true)), at(4));
     plant.on_undeliverable(L1, &effects.bus[0].1);
-    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Busy));
+    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::Busy));
 }
 
 #[test]
 fn a_write_leaves_a_trace_before_it_is_sent_and_is_closed_when_the_station_stops() {
     let mut plant = running();
-    let effects = plant.on_order(shown(&plant, 1, SV, 61.0), at(1));
+    let effects = plant.on_command(shown(&plant, 1, SV, 61.0), at(1));
     let intent = plant.intent(&effects.bus[0].1).expect("a write is about to be sent");
-    assert_eq!((&*intent.action, &*intent.target, &*intent.outcome), ("order", "TIC-1.SV", "ordered"));
+    assert_eq!((&*intent.action, &*intent.target, &*intent.outcome), ("write requested", "TIC-1.SV", "pending"));
     assert!(crate::plant::record::ELSEWHERE.contains(&&*intent.action), "a shift report has the outcome alone");
     assert_eq!(plant.intent(&BusRequest::StopTest), None);
     let ended = plant.on_stop().records;
@@ -182,20 +182,20 @@ fn nothing_is_written_blindly() {
     let unknown = Outcome::Refused(Refusal::Unknown("number of decimals".into()));
     assert_eq!(write(&mut plant, 50.0, WriteResult::Accepted), (unknown, None));
     for (tag, value, refusal) in [(PV, 1.0, Refusal::ReadOnly), (RUN, 2.0, Refusal::NotAChoice)] {
-        let effects = plant.on_order(shown(&plant, 2, tag, value), at(1));
+        let effects = plant.on_command(shown(&plant, 2, tag, value), at(1));
         assert!(effects.bus.is_empty());
-        assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(refusal));
+        assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Refused(refusal));
     }
 }
 
 #[test]
 fn a_second_write_waits_for_the_first_and_a_lost_one_is_given_up() {
     let mut plant = running();
-    plant.on_order(shown(&plant, 1, SV, 71.0), at(1));
-    plant.on_order(shown(&plant, 2, SV, 72.0), at(2));
-    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::UnderWay));
+    plant.on_command(shown(&plant, 1, SV, 71.0), at(1));
+    plant.on_command(shown(&plant, 2, SV, 72.0), at(2));
+    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::UnderWay));
     let effects = plant.on_tick(at(122));
-    let outcome = plant.snapshot().orders[1].outcome.clone();
+    let outcome = plant.snapshot().commands[1].outcome.clone();
     assert_eq!(outcome, Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)));
     assert!(effects.records.iter().any(|record| matches!(record, Record::Action(_))), "failures are on record too");
 }
@@ -203,8 +203,8 @@ fn a_second_write_waits_for_the_first_and_a_lost_one_is_given_up() {
 #[test]
 fn the_record_of_a_write_has_old_new_and_outcome() {
     let mut plant = running();
-    let effects = plant.on_order(shown(&plant, 1, SV, 72.5), at(1));
-    let BusRequest::Write { id, .. } = effects.bus[0].1 else { panic!("a write was ordered") };
+    let effects = plant.on_command(shown(&plant, 1, SV, 72.5), at(1));
+    let BusRequest::Write { id, .. } = effects.bus[0].1 else { panic!("a write was requested") };
     let effects = plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(725.0) });
     let Some(Record::Action(action)) = effects.records.last() else { panic!("no action on record") };
     assert_eq!(
@@ -297,10 +297,10 @@ fn an_alarm_is_raised_acknowledged_by_name_and_returns() {
     plant.on_event(read(3, &[(PV, 761.0)]));
     assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Unacknowledged);
     let seen = plant.snapshot();
-    let effects = plant.on_order(order(1, seen.alarms[0].acknowledge()), at(4));
+    let effects = plant.on_command(command(1, seen.alarms[0].acknowledge()), at(4));
     assert!(matches!(&effects.records[0], Record::Alarm(step) if step.by.as_deref() == Some("anna")));
     let all = seen.acknowledge_all().expect("one waited when it was seen");
-    let effects = plant.on_order(order(2, all), at(4));
+    let effects = plant.on_command(command(2, all), at(4));
     assert!(!effects.records.iter().any(|record| matches!(record, Record::Alarm(_))), "it was acknowledged already");
     plant.on_event(fail(5, &[PV], Fault::Timeout));
     assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Acknowledged, "no answer is no return");
@@ -311,9 +311,9 @@ fn an_alarm_is_raised_acknowledged_by_name_and_returns() {
 #[test]
 fn a_full_queue_is_told_to_the_operator() {
     let mut plant = running();
-    let effects = plant.on_order(shown(&plant, 1, SV, 72.5), at(1));
+    let effects = plant.on_command(shown(&plant, 1, SV, 72.5), at(1));
     plant.on_undeliverable(effects.bus[0].0, &effects.bus[0].1);
-    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Busy));
+    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::Busy));
 }
 
 #[test]
@@ -331,15 +331,15 @@ fn what_an_interlock_blocks_is_refused_with_its_reason_and_a_stop_never() {
     };
     def.logic = ControlLogic { interlocks: vec![lock], ..ControlLogic::default() };
     let mut plant = Plant::new(std::sync::Arc::new(def), at(0), 1.0);
-    let order = |plant: &mut Plant, number: u32, value: f64, second: i64| {
-        let effects = plant.on_order(shown(plant, number, fixture::RUN, value), at(second));
-        let outcome = plant.snapshot().orders[0].outcome.clone();
+    let command = |plant: &mut Plant, number: u32, value: f64, second: i64| {
+        let effects = plant.on_command(shown(plant, number, fixture::RUN, value), at(second));
+        let outcome = plant.snapshot().commands[0].outcome.clone();
         (effects.bus.len(), outcome)
     };
     plant.on_event(read(0, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
     let refused = Outcome::Refused(Refusal::Interlock("not above 60 °C".to_owned()));
-    assert_eq!(order(&mut plant, 1, 1.0, 1), (0, refused));
-    assert_eq!(order(&mut plant, 2, 0.0, 1), (1, Outcome::Pending), "a stop goes out");
+    assert_eq!(command(&mut plant, 1, 1.0, 1), (0, refused));
+    assert_eq!(command(&mut plant, 2, 0.0, 1), (1, Outcome::Pending), "a stop goes out");
 }
 
 #[test]
@@ -376,19 +376,19 @@ fn with_stop() -> Plant {
 fn a_stop_is_sent_though_a_start_is_under_way() {
     let mut plant = with_stop();
     let mut check = |number, value, expect: Option<(f64, bool)>| {
-        let effects = plant.on_order(shown(&plant, number, RUN, value), at(1));
+        let effects = plant.on_command(shown(&plant, number, RUN, value), at(1));
         let sent = effects.bus.first().map(|(_, request)| match request {
             BusRequest::Write { raw, urgent, .. } => (*raw, *urgent),
             other => panic!("not a write: {other:?}"),
         });
-        assert_eq!(sent, expect, "order {number}: {:?}", plant.snapshot().orders[0].outcome);
+        assert_eq!(sent, expect, "command {number}: {:?}", plant.snapshot().commands[0].outcome);
     };
     check(1, 1.0, Some((1.0, false)));
     // The PLC was read as stopped before the start: that makes the stop no less needed.
     check(2, 0.0, Some((0.0, true)));
     check(3, 0.0, None);
     check(4, 1.0, None);
-    assert_eq!(plant.snapshot().orders[1].outcome, Outcome::Refused(Refusal::UnderWay));
+    assert_eq!(plant.snapshot().commands[1].outcome, Outcome::Refused(Refusal::UnderWay));
 }
 
 #[test]
@@ -397,7 +397,7 @@ fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
     def.tags[SV.index()].write_unlock = Some((FAULT, 1.0));
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
     let keyed = |plant: &mut Plant, number, value| {
-        let effects = plant.on_order(shown(plant, number, SV, value), at(1));
+        let effects = plant.on_command(shown(plant, number, SV, value), at(1));
         match &effects.bus[0].1 {
             BusRequest::Write { id, unlock, .. } => (*id, *unlock),
             other => panic!("not a write: {other:?}"),
@@ -430,21 +430,21 @@ fn what_will_be_sent_is_blocked_whatever_was_typed() {
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
     plant.on_event(read(0, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
     for (value, refused) in [(1.0, true), (0.6, true), (0.4, false)] {
-        let effects = plant.on_order(shown(&plant, 1, RUN, value), at(1));
-        assert_eq!(effects.bus.is_empty(), refused, "{value}: {:?}", plant.snapshot().orders[0].outcome);
-        assert!(!refused || matches!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::Interlock(_))));
+        let effects = plant.on_command(shown(&plant, 1, RUN, value), at(1));
+        assert_eq!(effects.bus.is_empty(), refused, "{value}: {:?}", plant.snapshot().commands[0].outcome);
+        assert!(!refused || matches!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::Interlock(_))));
     }
 }
 
 #[test]
-fn a_lost_refresh_that_nobody_ordered_falsifies_no_order() {
+fn a_lost_refresh_of_the_plant_fails_no_command() {
     let mut plant = running();
-    let effects = plant.on_order(order(1, CommandKind::Refresh(TIC)), at(1));
-    plant.on_undeliverable(L1, &BusRequest::Refresh { device: TIC, order: None });
-    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Verified);
-    plant.on_order(order(2, CommandKind::Refresh(TIC)), at(2));
+    let effects = plant.on_command(command(1, CommandKind::Refresh(TIC)), at(1));
+    plant.on_undeliverable(L1, &BusRequest::Refresh { device: TIC, command: None });
+    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Verified);
+    plant.on_command(command(2, CommandKind::Refresh(TIC)), at(2));
     plant.on_undeliverable(L1, &effects.bus[0].1);
-    let outcomes = plant.snapshot().orders.into_iter().map(|status| status.outcome).collect::<Vec<_>>();
+    let outcomes = plant.snapshot().commands.into_iter().map(|status| status.outcome).collect::<Vec<_>>();
     assert_eq!(outcomes, [Outcome::Verified, Outcome::Refused(Refusal::Busy)], "newest first");
 }
 
@@ -471,10 +471,10 @@ fn action_of(effects: &Effects) -> &ActionRecord {
 #[test]
 fn a_write_is_recorded_with_the_value_that_the_device_holds() {
     let mut plant = in_steps(100.0);
-    let effects = plant.on_order(shown(&plant, 1, SV, 72.3), at(1));
-    let BusRequest::Write { id, raw, .. } = effects.bus[0].1 else { panic!("a write was ordered") };
+    let effects = plant.on_command(shown(&plant, 1, SV, 72.3), at(1));
+    let BusRequest::Write { id, raw, .. } = effects.bus[0].1 else { panic!("a write was requested") };
     assert_eq!(raw, 145.0, "72.5 °C goes out");
-    assert_eq!(plant.snapshot().orders[0].kind, CommandKind::Write { tag: SV, value: 72.5 }, "screens show it too");
+    assert_eq!(plant.snapshot().commands[0].kind, CommandKind::Write { tag: SV, value: 72.5 }, "screens show it too");
     let effects = plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(raw) });
     let action = action_of(&effects);
     assert_eq!((action.new.as_deref(), &*action.outcome), (Some("72.5 °C"), "verified"));
@@ -489,12 +489,12 @@ fn rounding_never_leads_beyond_a_limit() {
         (99.9, None, Outcome::Refused(range)),
     ] {
         let mut plant = in_steps(99.8);
-        let effects = plant.on_order(shown(&plant, 1, SV, value), at(1));
+        let effects = plant.on_command(shown(&plant, 1, SV, value), at(1));
         let raw = effects.bus.first().map(|(_, request)| match request {
             BusRequest::Write { raw, .. } => *raw,
             other => panic!("not a write: {other:?}"),
         });
-        assert_eq!((raw, plant.snapshot().orders[0].outcome.clone()), (sent, outcome), "{value}");
+        assert_eq!((raw, plant.snapshot().commands[0].outcome.clone()), (sent, outcome), "{value}");
     }
 }
 
@@ -506,8 +506,8 @@ fn a_limit_itself_may_be_written_whatever_the_scale() {
         (sv.scale, sv.max) = (scale, Some(crate::plant::tag::Bound::Fixed(max)));
         let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
         plant.on_event(read(0, &[(SV, 0.0), (DP, 0.0), (FAULT, 0.0)]));
-        plant.on_order(shown(&plant, 1, SV, max), at(1));
-        assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Pending, "{max} in steps of {scale}");
+        plant.on_command(shown(&plant, 1, SV, max), at(1));
+        assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Pending, "{max} in steps of {scale}");
     }
 }
 
@@ -520,35 +520,35 @@ fn an_unchanged_double_is_not_refused_as_changed() {
         (sv.scale, sv.offset, sv.min, sv.max) = (scale, offset, None, None);
         let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
         plant.on_event(read(0, &[(SV, raw), (DP, 1.0), (FAULT, 0.0)]));
-        plant.on_order(shown(&plant, 1, SV, 5.0), at(1));
-        assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Pending, "raw {raw}");
+        plant.on_command(shown(&plant, 1, SV, 5.0), at(1));
+        assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Pending, "raw {raw}");
         // What it holds already is not written, however its number came about.
         let mut again = plant.clone();
         again.on_event(read(2, &[(SV, raw + raw * f64::EPSILON)]));
         let held = again.snapshot().sample(SV).value.expect("it was read");
         let mut fresh = Plant::new(again.def().clone(), at(0), 1.0);
         fresh.on_event(read(0, &[(SV, raw), (DP, 1.0), (FAULT, 0.0)]));
-        fresh.on_order(shown(&fresh, 1, SV, held), at(1));
-        assert_eq!(fresh.snapshot().orders[0].outcome, Outcome::Unchanged, "raw {raw}");
+        fresh.on_command(shown(&fresh, 1, SV, held), at(1));
+        assert_eq!(fresh.snapshot().commands[0].outcome, Outcome::Unchanged, "raw {raw}");
     }
 }
 
 #[test]
 fn a_write_that_saw_no_value_is_asked_again_and_a_stop_is_not() {
     let mut plant = running();
-    let blind = |number, tag, value| order(number, CommandKind::Write { tag, value });
-    let effects = plant.on_order(blind(1, SV, 65.0), at(1));
+    let blind = |number, tag, value| command(number, CommandKind::Write { tag, value });
+    let effects = plant.on_command(blind(1, SV, 65.0), at(1));
     assert_eq!(effects.bus, []);
-    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::NotSeen("70.0 °C".into())));
-    plant.on_order(blind(2, SV, 70.0), at(1));
-    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Unchanged, "there is nothing to overwrite");
+    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::NotSeen("70.0 °C".into())));
+    plant.on_command(blind(2, SV, 70.0), at(1));
+    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Unchanged, "there is nothing to overwrite");
     plant.on_event(fail(2, &[SV], Fault::Timeout));
-    plant.on_order(blind(3, SV, 65.0), at(3));
-    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Pending, "the station does not know it either");
+    plant.on_command(blind(3, SV, 65.0), at(3));
+    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Pending, "the station does not know it either");
     let mut stopped = with_stop();
     stopped.on_event(read(1, &[(RUN, 1.0)]));
-    stopped.on_order(blind(1, RUN, 0.0), at(1));
-    assert_eq!(stopped.snapshot().orders[0].outcome, Outcome::Pending);
+    stopped.on_command(blind(1, RUN, 0.0), at(1));
+    assert_eq!(stopped.snapshot().commands[0].outcome, Outcome::Pending);
 }
 
 #[test]
@@ -558,6 +558,6 @@ fn a_write_over_a_value_that_came_back_as_another_one_is_refused() {
     let write = shown(&plant, 1, SV, 65.0);
     assert_eq!(write.seen, Some(70.0), "a doubted value was shown as well");
     plant.on_event(read(2, &[(SV, 800.0)]));
-    plant.on_order(write, at(3));
-    assert_eq!(plant.snapshot().orders[0].outcome, Outcome::Refused(Refusal::ChangedTo("80.0 °C".into())));
+    plant.on_command(write, at(3));
+    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::ChangedTo("80.0 °C".into())));
 }

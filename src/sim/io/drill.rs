@@ -15,7 +15,7 @@ use super::SimulatorHandle;
 use crate::{
     plant::{
         PlantDef, Snapshot,
-        command::{self, OrderId},
+        command::{self, CommandId},
         record::Record,
     },
     sim::{
@@ -32,7 +32,7 @@ use crate::{
 const COMMANDS_MAX: usize = 32;
 /// Steps that may wait for the judge, counted as they were told.
 const STEPS_MAX: usize = 4096;
-/// The number of the terminal by which the operator of a scenario gives orders; real terminals count from 1.
+/// The number of the terminal by which the operator of a scenario gives commands; real terminals count from 1.
 const OPERATOR: u32 = u32::MAX;
 
 /// Where a station tells the steps of its alarms to a judge.
@@ -97,8 +97,8 @@ pub struct Trainer {
     pub journal: Journal,
     /// The drill, if there is one.
     pub scenario: Option<Arc<Scenario>>,
-    /// Where the operator of the scenario gives his orders; `None` where a person sits.
-    pub operator: Option<mpsc::Sender<command::Order>>,
+    /// Where the operator of the scenario gives his commands; `None` where a person sits.
+    pub operator: Option<mpsc::Sender<command::Command>>,
     /// Nothing is told before the drill is over.
     pub exam: bool,
 }
@@ -112,7 +112,7 @@ impl Trainer {
         let timeline =
             self.scenario.as_ref().map(|scenario| scenario.timeline(self.operator.is_some())).unwrap_or_default();
         let available: Arc<[AvailableFaults]> = available_faults(&self.def).into();
-        let task = Task { timeline: timeline.into(), judge, began, available, trainer: self, ordered: 0 };
+        let task = Task { timeline: timeline.into(), judge, began, available, trainer: self, commands_sent: 0 };
         let (publish, status) = watch::channel(Arc::new(task.status(Vec::new(), Default::default(), began)));
         let work = tokio::spawn(task.run(inbox, publish));
         (Port { commands, status }, work)
@@ -125,7 +125,7 @@ struct Task {
     judge: Option<Judge>,
     began: Timestamp,
     available: Arc<[AvailableFaults]>,
-    ordered: u32,
+    commands_sent: u32,
 }
 
 impl Task {
@@ -196,15 +196,15 @@ impl Task {
                 self.trainer.simulator.clear(target, fault).await
             }
             ScenarioEvent::OperatorStep(step) => {
-                let Some(orders) = &self.trainer.operator else { return };
+                let Some(commands) = &self.trainer.operator else { return };
                 let snapshot = self.trainer.snapshots.borrow().clone();
                 let Some(kind) = step.wish.command_kind(&snapshot) else { return };
-                self.ordered += 1;
-                let id = OrderId { terminal: OPERATOR, number: self.ordered };
+                self.commands_sent += 1;
+                let id = CommandId { terminal: OPERATOR, number: self.commands_sent };
                 let seen = snapshot.seen(&kind);
-                let order = command::Order { seen, ..command::Order::new(id, "operator of the drill", kind) };
-                if orders.try_send(order).is_err() {
-                    tracing::error!("the station has not taken an order of the drill");
+                let command = command::Command { seen, ..command::Command::new(id, "operator of the drill", kind) };
+                if commands.try_send(command).is_err() {
+                    tracing::error!("the station has not taken a command of the drill");
                 }
             }
         }

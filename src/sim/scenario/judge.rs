@@ -1,4 +1,4 @@
-//! Judges a drill by what became true: steps of alarms, orders of operators, values shown and values that are really so.
+//! Judges a drill by what became true: steps of alarms, commands of operators, values shown and values that are really so.
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -8,7 +8,7 @@ use super::{Scenario, Wish};
 use crate::plant::{
     Snapshot,
     alarm::manager::subject_name,
-    command::{CommandKind, OrderStatus, Outcome},
+    command::{CommandKind, CommandStatus, Outcome},
     def::{AlarmId, PlantDef, TagId},
     record::{AlarmRecord, AlarmStep, Record},
 };
@@ -119,8 +119,8 @@ impl Judge {
     pub fn on_values(&mut self, snapshot: &Snapshot, actual: &ActualValues) {
         let Some(at) = self.elapsed(snapshot.at) else { return };
         self.now = self.now.max(at);
-        for order in snapshot.orders.iter().rev() {
-            self.on_order(order);
+        for command in snapshot.commands.iter().rev() {
+            self.on_command(command);
         }
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
             if expect.from <= at && at <= expect.until {
@@ -150,9 +150,9 @@ impl Judge {
         }
     }
 
-    fn on_order(&mut self, order: &OrderStatus) {
-        let (Some(at), CommandKind::Write { tag, value }) = (self.elapsed(order.at), &order.kind) else { return };
-        let done = matches!(order.outcome, Outcome::Verified | Outcome::Unchanged);
+    fn on_command(&mut self, command: &CommandStatus) {
+        let (Some(at), CommandKind::Write { tag, value }) = (self.elapsed(command.at), &command.kind) else { return };
+        let done = matches!(command.outcome, Outcome::Verified | Outcome::Unchanged);
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
             let Wish::Written(wanted, number) = expect.wish else { continue };
             if done && wanted == *tag && number == *value && expect.from <= at && at <= expect.until {

@@ -17,12 +17,12 @@ use crate::{
     },
 };
 
-const ORDER: OrderId = OrderId { terminal: 1, number: 1 };
+const COMMAND: CommandId = CommandId { terminal: 1, number: 1 };
 
 /// A plant with an alarm that waits for its acknowledgement, beside a history that takes nothing.
 struct Station {
     events: mpsc::Sender<Event>,
-    orders: mpsc::Sender<Order>,
+    commands: mpsc::Sender<Command>,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     task: JoinHandle<()>,
     recorder: std::thread::JoinHandle<Option<Seal>>,
@@ -51,13 +51,13 @@ impl Station {
         let (request, requests) = mpsc::channel(8);
         let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
         let (events, event_queue) = mpsc::channel(8);
-        let (orders, order_queue) = mpsc::channel(8);
+        let (commands, command_queue) = mpsc::channel(8);
         let (messages, message_queue) = mpsc::channel(8);
         let task = PlantTask::new(plant, clock, vec![request], None, keeping, publish);
-        let task = tokio::spawn(task.run(event_queue, order_queue, message_queue));
+        let task = tokio::spawn(task.run(event_queue, command_queue, message_queue));
         let recorder = recorder.join;
         let station =
-            Station { events, orders, snapshots, task, recorder, _blocked: blocked, messages, _requests: requests };
+            Station { events, commands, snapshots, task, recorder, _blocked: blocked, messages, _requests: requests };
         let tags: Vec<TagId> = def.tags_of(fixture::TIC).map(|tag| tag.id).collect();
         let silent =
             Event::Failed { at: clock.now(), device: fixture::TIC, tags, fault: Fault::BackedOff, exchange: None };
@@ -72,14 +72,14 @@ impl Station {
         let silent = snapshot.alarms.iter().find(|alarm| alarm.id == fixture::SILENT).unwrap();
         let kind = silent.acknowledge();
         assert!(matches!(kind, CommandKind::Alarm(AlarmCommand::Acknowledge { .. })));
-        self.orders.send(Order::new(ORDER, "anna", kind)).await.unwrap();
+        self.commands.send(Command::new(COMMAND, "anna", kind)).await.unwrap();
     }
 
     /// The first snapshot in which the acknowledgement has its end, recorded or not.
     async fn ended(&mut self, recorded: impl Fn(bool) -> bool) -> Arc<Snapshot> {
         let ended = |snapshot: &Arc<Snapshot>| {
-            let own = snapshot.orders.iter().find(|order| order.id == ORDER);
-            own.is_some_and(|order| order.outcome == Outcome::Verified && recorded(order.recorded))
+            let own = snapshot.commands.iter().find(|command| command.id == COMMAND);
+            own.is_some_and(|command| command.outcome == Outcome::Verified && recorded(command.recorded))
         };
         self.snapshots.wait_for(ended).await.unwrap().clone()
     }
@@ -105,7 +105,7 @@ async fn an_acknowledgement_that_is_shown_is_on_disk_also_while_the_history_take
     let mut station = Station::start(&history).await;
     station.acknowledge().await;
     let snapshot = station.ended(|_| true).await;
-    assert!(snapshot.orders[0].recorded);
+    assert!(snapshot.commands[0].recorded);
     // A kill at this very moment leaves these files.
     assert_eq!(steps(&history), [AlarmStep::Raised, AlarmStep::Acknowledged]);
     let log = fs::read_to_string(book::beside(&history)).unwrap();
@@ -123,7 +123,7 @@ async fn what_the_disk_does_not_take_is_done_and_shown_as_not_recorded_until_it_
     let mut station = Station::start(&history).await;
     station.acknowledge().await;
     let snapshot = station.ended(|_| true).await;
-    assert!(!snapshot.orders[0].recorded, "it is done, and not shown as recorded");
+    assert!(!snapshot.commands[0].recorded, "it is done, and not shown as recorded");
     let silent = snapshot.alarms.iter().find(|alarm| alarm.id == fixture::SILENT).unwrap();
     assert!(!silent.state.needs_acknowledgement());
     assert!(!silent.acknowledged.as_ref().unwrap().recorded, "and the alarm says so");
@@ -183,7 +183,7 @@ async fn a_clock_that_is_set_while_the_station_runs_is_followed_recorded_and_ala
     assert!(snapshot.alarms.iter().all(|alarm| off(alarm.raised_at) < jiff::SignedDuration::from_secs(60)));
     station.acknowledge().await;
     let snapshot = station.ended(|_| true).await;
-    assert!(off(snapshot.orders[0].at) < jiff::SignedDuration::from_secs(60));
+    assert!(off(snapshot.commands[0].at) < jiff::SignedDuration::from_secs(60));
     station.stop().await;
     let log = fs::read_to_string(book::beside(&history)).unwrap();
     let line = log.lines().find(|line| line.contains("clock step")).unwrap_or_else(|| panic!("{log}"));

@@ -10,7 +10,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use tokio::sync::watch;
 
 use super::*;
-use crate::access::{OrderRequest, Standing, Who};
+use crate::access::{CommandRequest, Standing, Who};
 use crate::{plant::role::Role, station::Request};
 use crate::{
     plant::{alarm::AlarmCommand, command::CommandKind},
@@ -38,7 +38,7 @@ fn on_the_pty() {
             watch::channel(Arc::new(Standing { who: Some(who), view: true, ..Standing::default() }));
         tokio::spawn(async move {
             while let Some((_, request)) = taken.recv().await {
-                let Request::Order(OrderRequest { kind, .. }) = request else { continue };
+                let Request::Command(CommandRequest { kind, .. }) = request else { continue };
                 let mut snapshot = Arc::unwrap_or_clone(Fixture::alarm().snapshot());
                 match kind {
                     CommandKind::Alarm(AlarmCommand::Acknowledge { .. }) => {

@@ -44,7 +44,7 @@ pub struct Confirm {
     sign: Option<Form>,
     /// Why the last Enter was not taken.
     problem: Option<String>,
-    /// The signed order is on its way: whether the signature is taken is told by the station.
+    /// The signed command is on its way: whether the signature is taken is told by the station.
     waiting: bool,
 }
 
@@ -53,8 +53,8 @@ pub struct Confirm {
 pub enum Intent {
     /// Leave the terminal.
     Quit,
-    /// Give an order.
-    Order(CommandKind),
+    /// Give a command.
+    Command(CommandKind),
 }
 
 impl Confirm {
@@ -92,7 +92,7 @@ impl Confirm {
         let def = cx.def().tag(tag);
         let rounded = rounded_words(cx, tag, value);
         let value = if rounded.is_some() { cx.snapshot.held(tag, value) } else { value };
-        let intent = Intent::Order(CommandKind::Write { tag, value });
+        let intent = Intent::Command(CommandKind::Write { tag, value });
         let notes = rounded.into_iter().chain(write_notes(def)).collect();
         let confirm = Confirm::new(intent, format!("write {}", def.name), notes);
         Confirm { expected: Some(ConfirmedValue::new(cx, tag)), ..confirm }.signed(cx)
@@ -112,15 +112,15 @@ impl Confirm {
         Confirm { title: format!("{name} {}", cx.def().device(cx.def().tag(tag).device).name), notes, ..confirm }
     }
 
-    /// Open or close a line, or any other order, with words of its own.
-    pub fn order(title: impl Into<String>, words: impl Into<String>, kind: CommandKind) -> Confirm {
-        Confirm::new(Intent::Order(kind), title, vec![words.into()])
+    /// Open or close a line, or any other command, with words of its own.
+    pub fn command(title: impl Into<String>, words: impl Into<String>, kind: CommandKind) -> Confirm {
+        Confirm::new(Intent::Command(kind), title, vec![words.into()])
     }
 
     /// The same with a signature, where a tag that it writes asks for one.
     pub fn signed(self, cx: &ViewContext) -> Confirm {
         let sign = match &self.intent {
-            Intent::Order(kind) => sign::needed(cx.def(), kind).map(sign_form),
+            Intent::Command(kind) => sign::needed(cx.def(), kind).map(sign_form),
             Intent::Quit => None,
         };
         Confirm { sign, ..self }
@@ -141,8 +141,8 @@ impl Confirm {
     pub fn verb(&self) -> &'static str {
         match &self.intent {
             Intent::Quit => "quit",
-            Intent::Order(CommandKind::Write { .. }) => "write and verify",
-            Intent::Order(CommandKind::Alarm(alarm_command)) => match alarm_command {
+            Intent::Command(CommandKind::Write { .. }) => "write and verify",
+            Intent::Command(CommandKind::Alarm(alarm_command)) => match alarm_command {
                 AlarmCommand::Acknowledge { .. } | AlarmCommand::AcknowledgeAll { .. } => "acknowledge",
                 AlarmCommand::Silence => "silence",
                 AlarmCommand::Reset(_) => "reset",
@@ -151,26 +151,26 @@ impl Confirm {
                 AlarmCommand::OutOfService(_) => "put out of service",
                 AlarmCommand::InService(_) => "put in service",
             },
-            Intent::Order(CommandKind::Refresh(_)) => "refresh",
-            Intent::Order(CommandKind::Connect(_, true)) => "connect",
-            Intent::Order(CommandKind::Connect(_, false)) => "disconnect",
-            Intent::Order(CommandKind::Configure(_)) => "use these settings",
-            Intent::Order(CommandKind::SaveSettings(_)) => "save",
-            Intent::Order(CommandKind::Test(_, Diagnostic::Scan(_))) => "scan",
-            Intent::Order(CommandKind::Test(..)) => "send",
-            Intent::Order(CommandKind::StopTest(_) | CommandKind::StopRestore(_)) => "stop",
-            Intent::Order(CommandKind::ReadSets) => "read",
-            Intent::Order(CommandKind::HandOver) => "hand over",
-            Intent::Order(CommandKind::TakeOver) => "take over",
-            Intent::Order(CommandKind::SaveSet { replace: true, .. }) => "replace it",
-            Intent::Order(CommandKind::SaveSet { replace: false, .. }) => "save",
-            Intent::Order(CommandKind::Restore(_)) => "write and verify",
+            Intent::Command(CommandKind::Refresh(_)) => "refresh",
+            Intent::Command(CommandKind::Connect(_, true)) => "connect",
+            Intent::Command(CommandKind::Connect(_, false)) => "disconnect",
+            Intent::Command(CommandKind::Configure(_)) => "use these settings",
+            Intent::Command(CommandKind::SaveSettings(_)) => "save",
+            Intent::Command(CommandKind::Test(_, Diagnostic::Scan(_))) => "scan",
+            Intent::Command(CommandKind::Test(..)) => "send",
+            Intent::Command(CommandKind::StopTest(_) | CommandKind::StopRestore(_)) => "stop",
+            Intent::Command(CommandKind::ReadSets) => "read",
+            Intent::Command(CommandKind::HandOver) => "hand over",
+            Intent::Command(CommandKind::TakeOver) => "take over",
+            Intent::Command(CommandKind::SaveSet { replace: true, .. }) => "replace it",
+            Intent::Command(CommandKind::SaveSet { replace: false, .. }) => "save",
+            Intent::Command(CommandKind::Restore(_)) => "write and verify",
         }
     }
 
     /// What is sent to a line past all limits of the plant file comes behind an Enter: a second one must not send it.
     fn wants_y(&self) -> bool {
-        matches!(&self.intent, Intent::Order(CommandKind::Test(..)))
+        matches!(&self.intent, Intent::Command(CommandKind::Test(..)))
     }
 
     /// What Esc does.
@@ -181,8 +181,8 @@ impl Confirm {
     /// Is it certainly without effect now?
     pub(super) fn is_refused(&self, cx: &ViewContext) -> bool {
         match &self.intent {
-            Intent::Order(CommandKind::Write { tag, value }) => interlock::is_refused(cx, *tag, *value),
-            Intent::Order(_) | Intent::Quit => false,
+            Intent::Command(CommandKind::Write { tag, value }) => interlock::is_refused(cx, *tag, *value),
+            Intent::Command(_) | Intent::Quit => false,
         }
     }
 
@@ -208,7 +208,7 @@ impl Confirm {
                 None => Next::Close,
             }
         } else {
-            let write = matches!(self.intent, Intent::Order(CommandKind::Write { .. }));
+            let write = matches!(self.intent, Intent::Command(CommandKind::Write { .. }));
             let other = mimic::command_of(cx, event).filter(|_| write);
             Next::Stay(other.unwrap_or(Modal::Confirm(self)))
         }
@@ -226,7 +226,7 @@ impl Confirm {
         }
         let act = match &self.intent {
             Intent::Quit => UiAction::Do(Effect::Quit),
-            Intent::Order(kind) => {
+            Intent::Command(kind) => {
                 let expected = self.expected.as_ref().and_then(|expected| expected.shown(cx));
                 let sign = self.sign.as_ref().map(signature);
                 UiAction::Confirmed(Confirmed { expected, sign, ..kind.clone().into() })
@@ -289,20 +289,20 @@ impl Confirm {
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let room = body.width.saturating_sub(8).min(68);
         let mut rows: Vec<(String, Style)> = Vec::new();
-        if let Intent::Order(CommandKind::Write { tag, value }) = &self.intent {
+        if let Intent::Command(CommandKind::Write { tag, value }) = &self.intent {
             let change = old_and_new(cx, *tag, *value);
             let lines = if width(&change) <= room { vec![change] } else { wrap(&change, room) };
             rows.extend(lines.into_iter().map(|line| (line, cx.theme.strong())));
             rows.push((wire_words(cx.def().tag(*tag)), cx.theme.dim()));
         }
         rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));
-        if let Intent::Order(CommandKind::Write { tag, value }) = &self.intent {
+        if let Intent::Command(CommandKind::Write { tag, value }) = &self.intent {
             // As it stands now: what was true when the window opened may have changed under it.
             let told = interlock::before_write(cx, *tag, *value).into_iter();
             rows.extend(told.flat_map(|(note, style)| wrap(&note, room).into_iter().map(move |line| (line, style))));
         }
         let missing = match &self.intent {
-            Intent::Order(kind) => rights::missing(cx, kind),
+            Intent::Command(kind) => rights::missing(cx, kind),
             Intent::Quit => None,
         };
         let news = self.expected.as_ref().and_then(|expected| expected.news(cx)).map(|words| cx.theme.enter(&words));

@@ -71,7 +71,7 @@ impl Settings {
         let enter = keys::code(KeyCode::Enter).is(event);
         if let Some(action) = self.asking.take() {
             let yes = enter || keys::char('y').is(event);
-            let acts = if yes { vec![UiAction::Order(self.command_kind(action))] } else { Vec::new() };
+            let acts = if yes { vec![UiAction::Command(self.command_kind(action))] } else { Vec::new() };
             // Off the text field, so that u and S are keys again.
             self.row = 0;
             return Next::Both(Modal::Settings(Box::new(self)), acts);
@@ -309,7 +309,7 @@ fn answers(cx: &ViewContext, line: LineId) -> (String, bool) {
 
 /// Why the last wish to save the settings of a line was refused, in full.
 fn not_saved(cx: &ViewContext, line: LineId) -> Option<String> {
-    let saved = cx.snapshot.orders.iter().find(|order| order.kind == CommandKind::SaveSettings(line))?;
+    let saved = cx.snapshot.commands.iter().find(|command| command.kind == CommandKind::SaveSettings(line))?;
     match &saved.outcome {
         Outcome::Refused(why) => Some(format!("! {why}")),
         Outcome::Pending | Outcome::Verified | Outcome::Unchanged | Outcome::NotConfirmed(_) | Outcome::Failed(_) => {

@@ -424,7 +424,7 @@ pub fn retry(cx: &ViewContext, line: Option<LineId>) -> Vec<UiAction> {
         DeviceState::Failing(_) | DeviceState::Down { .. } => line.is_none_or(|line| line == device.line),
         DeviceState::Unknown | DeviceState::Answering => false,
     };
-    cx.def().devices.iter().filter(silent).map(|device| UiAction::Order(CommandKind::Refresh(device.id))).collect()
+    cx.def().devices.iter().filter(silent).map(|device| UiAction::Command(CommandKind::Refresh(device.id))).collect()
 }
 
 /// `connected since 13:02:11`, `DOWN 00:12: No such file or directory, next try in 4s`.

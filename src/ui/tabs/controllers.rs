@@ -221,8 +221,8 @@ impl Controllers {
                 vec![UiAction::Open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")))]
             }
             Action::All | Action::Turnaround => self.in_compare(cx, action),
-            Action::Stop => vec![UiAction::Order(CommandKind::StopRestore(device.id))],
-            Action::ReadSets => vec![UiAction::Order(CommandKind::ReadSets)],
+            Action::Stop => vec![UiAction::Command(CommandKind::StopRestore(device.id))],
+            Action::ReadSets => vec![UiAction::Command(CommandKind::ReadSets)],
             Action::CommandKind(which) => device.program.as_ref().map_or(Vec::new(), |program| {
                 let value = match which {
                     keys::Wish::Run => Some(program.run),
@@ -400,9 +400,9 @@ impl Controllers {
                 parameter_set::check_name(text)?;
                 let there = cx.snapshot.sets.iter().find(|stored| stored.name == text);
                 let kind = CommandKind::SaveSet { device: self.device, name: text.into(), replace: there.is_some() };
-                let Some(there) = there else { return Ok(vec![UiAction::Order(kind)]) };
+                let Some(there) = there else { return Ok(vec![UiAction::Command(kind)]) };
                 let words = sets::replace_words(cx, there);
-                Ok(vec![UiAction::Open(Modal::Confirm(Confirm::order(format!("save set {text}"), words, kind)))])
+                Ok(vec![UiAction::Open(Modal::Confirm(Confirm::command(format!("save set {text}"), words, kind)))])
             }
         }
     }

@@ -152,7 +152,7 @@ fn rows(status: &Status) -> Vec<(FaultTarget, Fault)> {
 
 /// A silent device may answer again: it is asked at once, if the present user may do that.
 fn cleared(cx: &ViewContext, command: SimCommand) -> Vec<UiAction> {
-    let allowed = |act: &UiAction| matches!(act, UiAction::Order(kind) if rights::missing(cx, kind).is_none());
+    let allowed = |act: &UiAction| matches!(act, UiAction::Command(kind) if rights::missing(cx, kind).is_none());
     send(command).into_iter().chain(bus::retry(cx, None).into_iter().filter(allowed)).collect()
 }
 

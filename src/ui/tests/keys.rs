@@ -5,12 +5,12 @@ use std::{sync::Arc, time::Duration};
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use jiff::SignedDuration;
 
-use super::{model, order_of, screen, type_keys};
+use super::{model, screen, sent_kind, type_keys};
 use crate::{
-    access::OrderRequest,
+    access::CommandRequest,
     history::{Answer, HistoryError, Query},
     plant::{
-        command::{CommandKind, NotConfirmed, OrderId, OrderStatus, Outcome, Refusal},
+        command::{CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
         def::{AlarmId, Priority},
         event::{Fault, LineState},
         record::{ActionRecord, AlarmRecord, AlarmStep},
@@ -34,7 +34,7 @@ fn a_number_is_written_only_after_enter() {
     let mut model = model(&fixture, Theme::FULL);
     assert_eq!(type_keys(&mut model, "s65.5"), []);
     let effects = type_keys(&mut model, "⏎");
-    assert_eq!(order_of(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
     assert_eq!(model.modal, None);
     assert!(screen(&mut model, 80, 24).contains("TIC-1.SV ? → 65.5 °C  sent"));
 }
@@ -44,12 +44,14 @@ fn what_is_typed_is_what_is_written_or_refused() {
     let fixture = Fixture::normal();
     let check = |keys: &str, expect: Result<f64, &str>| {
         let mut model = model(&fixture, Theme::FULL);
-        let order = order_of(&type_keys(&mut model, keys)).cloned();
+        let command = sent_kind(&type_keys(&mut model, keys)).cloned();
         let shown = screen(&mut model, 80, 24);
         match expect {
-            Ok(value) => assert_eq!(order, Some(CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value }), "{keys}"),
+            Ok(value) => {
+                assert_eq!(command, Some(CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value }), "{keys}")
+            }
             Err(words) => {
-                assert_eq!(order, None, "{keys}");
+                assert_eq!(command, None, "{keys}");
                 assert!(shown.contains(words), "{words} is missing:\n{shown}");
             }
         }
@@ -75,7 +77,7 @@ fn a_device_that_does_not_answer_is_said_so_before_anything_is_typed() {
         assert!(matches!(model.modal, Some(Modal::Notice(_))), "{keys}: {:?}", model.modal);
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains(expect), "{expect} is missing:\n{shown}");
-        assert_eq!(order_of(&type_keys(&mut model, "70⏎")), None);
+        assert_eq!(sent_kind(&type_keys(&mut model, "70⏎")), None);
     };
     let mut silent = Fixture::normal();
     silent.devices[0].state = DeviceState::Down { since: fixture::now() };
@@ -89,7 +91,7 @@ fn a_device_that_does_not_answer_is_said_so_before_anything_is_typed() {
 }
 
 #[test]
-fn a_screen_too_small_to_see_takes_no_orders() {
+fn a_screen_too_small_to_see_takes_no_commands() {
     let fixture = Fixture::alarm();
     let small = |keys: &str| {
         let mut model = model(&fixture, Theme::FULL);
@@ -109,7 +111,7 @@ fn a_screen_too_small_to_see_takes_no_orders() {
         assert_eq!(type_keys(&mut model, "⏎"), [], "{keys}");
     }
     let mut model = small("3↓↓");
-    assert_eq!(order_of(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()), "the banner's");
+    assert_eq!(sent_kind(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()), "the banner's");
     type_keys(&mut model, "q");
     assert!(screen(&mut model, 50, 10).contains("Quit? ⏎ quit  Esc stay"));
     assert_eq!(type_keys(&mut model, "⎋"), []);
@@ -131,11 +133,11 @@ fn a_pump_is_switched_by_its_manual_command() {
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains("t ON P-1"), "{shown}");
         assert_eq!(shown.contains("acts in MANUAL only, and PLC-1.AUTO is AUTO"), told, "{shown}");
-        assert_eq!(order_of(&type_keys(&mut model, "⏎↓⏎")), None, "asks first");
+        assert_eq!(sent_kind(&type_keys(&mut model, "⏎↓⏎")), None, "asks first");
         let shown = screen(&mut model, 80, 24);
         assert_eq!(shown.contains("! acts in MANUAL only, and PLC-1.AUTO is AUTO"), told, "{shown}");
-        let order = CommandKind::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
-        assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
+        let command = CommandKind::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
+        assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&command));
     }
     // One without such a command has nothing to write.
     let mut model = faceplate(&fixture, "PLC-1.SV-1");
@@ -153,10 +155,10 @@ fn in_auto_the_change_to_manual_is_a_step_of_its_own() {
     assert!(shown.contains("old AUTO  →  new MANUAL"), "{shown}");
     assert!(shown.contains("PLC-1.MAN.P-1 has no effect now"), "{shown}");
     assert!(shown.contains("The commands by hand take over; no output changes."), "{shown}");
-    let order = CommandKind::Write { tag: fixture.tag("PLC-1.AUTO"), value: 0.0 };
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
+    let command = CommandKind::Write { tag: fixture.tag("PLC-1.AUTO"), value: 0.0 };
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&command));
     assert!(matches!(model.modal, Some(Modal::Faceplate(_))), "back where it was asked from");
-    assert_eq!(order_of(&type_keys(&mut model, "⏎⏎")), None, "further Enters send nothing that was not asked");
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎⏎")), None, "further Enters send nothing that was not asked");
     let mut model = faceplate(&fixture, "PLC-1.P-1");
     type_keys(&mut model, "t⎋");
     assert!(matches!(model.modal, Some(Modal::Faceplate(_))), "Esc takes one step back");
@@ -165,9 +167,9 @@ fn in_auto_the_change_to_manual_is_a_step_of_its_own() {
     // In MANUAL the same key asks for the command itself, and only the Enter after it sends it.
     fixture.set("PLC-1.AUTO", 0.0);
     let mut model = faceplate(&fixture, "PLC-1.P-1");
-    assert_eq!(order_of(&type_keys(&mut model, "tt")), None, "a key pressed twice sends nothing");
-    let order = CommandKind::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&order));
+    assert_eq!(sent_kind(&type_keys(&mut model, "tt")), None, "a key pressed twice sends nothing");
+    let command = CommandKind::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&command));
 }
 
 #[test]
@@ -209,7 +211,7 @@ fn a_line_that_goes_down_under_the_question_is_told_in_it() {
     let mut model = faceplate(&Fixture::line_down(), "PLC-1.P-1");
     type_keys(&mut model, "t");
     assert!(matches!(model.modal, Some(Modal::Notice(_))));
-    assert_eq!(order_of(&type_keys(&mut model, "⏎⏎t⏎")), None);
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎⏎t⏎")), None);
 }
 
 #[test]
@@ -232,11 +234,11 @@ fn what_an_interlock_blocks_is_told_and_not_sent() {
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains(reason) && shown.contains("This is not sent"), "{shown}");
     assert!(!shown.contains("write and verify"), "no key is offered that does nothing");
-    assert_eq!(order_of(&type_keys(&mut model, "⏎y")), None);
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎y")), None);
     // The tank is emptied while the query stands: then it may be sent.
     fixture.set("PLC-1.TK-2", 12.0);
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
-    assert!(order_of(&type_keys(&mut model, "⏎")).is_some());
+    assert!(sent_kind(&type_keys(&mut model, "⏎")).is_some());
     // What nobody can tell is told, and left to the PLC.
     let level = fixture.tag("PLC-1.TK-2");
     fixture.samples[level.index()] = Sample::bad(Cause::Timeout, fixture::now());
@@ -244,7 +246,7 @@ fn what_an_interlock_blocks_is_told_and_not_sent() {
     type_keys(&mut model, "t");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("? cannot be told: PLC-1.TK-2 is not good"), "{shown}");
-    assert!(order_of(&type_keys(&mut model, "⏎")).is_some());
+    assert!(sent_kind(&type_keys(&mut model, "⏎")).is_some());
 }
 
 #[test]
@@ -271,12 +273,12 @@ fn a_stop_takes_two_keys_and_says_what_it_switches_off() {
     type_keys(&mut model, "r");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("The sequence stops in HEAT.") && shown.contains("Off go: P-1 RUN."), "{shown}");
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&stop));
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&stop));
     // Also while nobody knows whether it runs.
     let run = fixture.tag("PLC-1.RUN");
     fixture.samples[run.index()] = Sample::bad(Cause::NotRead, fixture::now());
     let mut model = self::model(&fixture, Theme::FULL);
-    assert_eq!(order_of(&type_keys(&mut model, "r⏎")), Some(&stop));
+    assert_eq!(sent_kind(&type_keys(&mut model, "r⏎")), Some(&stop));
 }
 
 #[test]
@@ -287,8 +289,8 @@ fn a_stop_need_not_wait_for_a_window_to_close() {
     for before in ["", "t"] {
         let mut model = faceplate(&fixture, "PLC-1.P-1");
         type_keys(&mut model, before);
-        assert_eq!(order_of(&type_keys(&mut model, "r")), None, "it asks all the same");
-        assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&stop));
+        assert_eq!(sent_kind(&type_keys(&mut model, "r")), None, "it asks all the same");
+        assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&stop));
     }
 }
 
@@ -323,12 +325,12 @@ fn the_mimic_shows_how_a_command_went() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
     let tag = fixture.tag("PLC-1.MAN.P-1");
-    let id = OrderId { terminal: 9, number: 1 };
+    let id = CommandId { terminal: 9, number: 1 };
     let check = |fixture: &Fixture, outcome: Option<Outcome>, disobeys: bool, expect: &str| {
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
         let kind = CommandKind::Write { tag, value: 1.0 };
         let at = snapshot.at;
-        let status = |outcome| OrderStatus {
+        let status = |outcome| CommandStatus {
             from: "".into(),
             note: None,
             id,
@@ -339,7 +341,7 @@ fn the_mimic_shows_how_a_command_went() {
             outcome,
             recorded: true,
         };
-        snapshot.orders = outcome.map(status).into_iter().collect();
+        snapshot.commands = outcome.map(status).into_iter().collect();
         if disobeys {
             let samples = snapshot.samples.clone();
             let since = at - SignedDuration::from_secs(8);
@@ -387,7 +389,7 @@ fn a_toggle_is_asked_and_does_what_it_said() {
     assert_eq!(type_keys(&mut model, "⏎"), []);
     assert!(screen(&mut model, 80, 24).contains("changed to STOP (was RUN)"));
     let effects = type_keys(&mut model, "⏎");
-    assert_eq!(order_of(&effects), Some(&CommandKind::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 }));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 }));
 }
 
 #[test]
@@ -413,18 +415,18 @@ fn a_paste_never_acts() {
     type_keys(&mut model, "1s");
     assert_eq!(update(&mut model, Msg::Paste("66\r\n".to_owned())), []);
     assert!(model.modal.is_some(), "the pasted line end did not confirm");
-    assert!(order_of(&type_keys(&mut model, "⏎")).is_some());
+    assert!(sent_kind(&type_keys(&mut model, "⏎")).is_some());
 }
 
 proptest::proptest! {
     #![proptest_config(proptest::prelude::ProptestConfig::with_cases(200))]
 
     #[test]
-    fn no_key_by_accident_gives_an_order(keys in "[1-5smrqA?fTSLjcM0-9.hlx↑↓←→⎋⇥ ]{1,60}") {
+    fn no_key_by_accident_sends_a_command(keys in "[1-5smrqA?fTSLjcM0-9.hlx↑↓←→⎋⇥ ]{1,60}") {
         let mut model = model(&Fixture::alarm(), Theme::FULL);
         screen(&mut model, 80, 24);
         let effects = type_keys(&mut model, &keys);
-        proptest::prop_assert_eq!(order_of(&effects), None);
+        proptest::prop_assert_eq!(sent_kind(&effects), None);
         screen(&mut model, 80, 24);
     }
 }
@@ -436,8 +438,8 @@ fn closing_a_line_is_asked_and_opening_it_too() {
     for (state, open) in [(LineState::Connected, false), (LineState::Disconnected, true)] {
         fixture.line.state = state;
         let mut model = model(&fixture, Theme::FULL);
-        assert_eq!(order_of(&type_keys(&mut model, "4L")), None);
-        assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&CommandKind::Connect(line, open)));
+        assert_eq!(sent_kind(&type_keys(&mut model, "4L")), None);
+        assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&CommandKind::Connect(line, open)));
     }
 }
 
@@ -510,17 +512,17 @@ fn leaving_is_asked() {
 fn acknowledging_takes_the_most_urgent_or_the_selected() {
     let fixture = Fixture::alarm();
     let mut model = model(&fixture, Theme::FULL);
-    assert_eq!(order_of(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()));
-    assert_eq!(order_of(&type_keys(&mut model, "3↓↓a")), Some(&fixture.alarms[2].acknowledge()));
-    assert_eq!(order_of(&type_keys(&mut model, "↑a")), None, "already acknowledged");
+    assert_eq!(sent_kind(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()));
+    assert_eq!(sent_kind(&type_keys(&mut model, "3↓↓a")), Some(&fixture.alarms[2].acknowledge()));
+    assert_eq!(sent_kind(&type_keys(&mut model, "↑a")), None, "already acknowledged");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("already acknowledged"), "{shown}");
     assert!(
         !shown.lines().nth(2).is_some_and(|banner| banner.contains("a ack")),
         "it is not for the banner's: {shown}"
     );
-    assert_eq!(order_of(&type_keys(&mut model, "⎋A")), None, "all: asks first");
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), fixture.snapshot().acknowledge_all().as_ref());
+    assert_eq!(sent_kind(&type_keys(&mut model, "⎋A")), None, "all: asks first");
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), fixture.snapshot().acknowledge_all().as_ref());
     let mut quiet = super::model(&Fixture::normal(), Theme::FULL);
     assert_eq!(type_keys(&mut quiet, "aA"), []);
     assert_eq!(quiet.modal, None);
@@ -537,9 +539,9 @@ fn what_came_after_the_last_frame_is_not_acknowledged_unseen() {
         let mut later = fixture.clone();
         later.alarms.insert(0, newer.clone());
         update(&mut model, Msg::Snapshot(later.snapshot()));
-        assert_eq!(order_of(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()), "as it was seen");
+        assert_eq!(sent_kind(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()), "as it was seen");
         screen(&mut model, 80, 24);
-        assert_eq!(order_of(&type_keys(&mut model, "a")), Some(&newer.acknowledge()), "now it is seen");
+        assert_eq!(sent_kind(&type_keys(&mut model, "a")), Some(&newer.acknowledge()), "now it is seen");
     }
     fixture.alarms.clear();
     let mut model = model(&fixture, Theme::FULL);
@@ -562,16 +564,16 @@ fn a_selected_alarm_stays_selected_when_the_list_moves() {
 }
 
 #[test]
-fn the_outcome_of_an_order_is_told_until_it_is_dismissed() {
+fn the_outcome_of_a_command_stays_until_dismissed() {
     let fixture = Fixture::normal();
     let check = |outcome: Outcome, expect: &str| {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, "s60⏎");
-        let Some(Effect::Order(OrderRequest { id, kind, .. })) = effects.first().cloned() else {
+        let Some(Effect::Command(CommandRequest { id, kind, .. })) = effects.first().cloned() else {
             panic!("{effects:?}")
         };
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
-        snapshot.orders = vec![OrderStatus {
+        snapshot.commands = vec![CommandStatus {
             from: "".into(),
             note: None,
             id,
@@ -583,7 +585,7 @@ fn the_outcome_of_an_order_is_told_until_it_is_dismissed() {
             recorded: true,
         }];
         update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
-        // The station forgets old orders; the terminal still knows its own.
+        // The station forgets old commands; the terminal still knows its own.
         update(&mut model, Msg::Snapshot(fixture.snapshot()));
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains(expect), "{expect} is missing:\n{shown}");
@@ -605,12 +607,12 @@ fn only_what_was_read_back_is_called_verified() {
     let device = fixture.def.devices[0].id;
     let check = |kind: CommandKind, expect: &str| {
         let mut model = model(&fixture, Theme::FULL);
-        perform(&mut model, vec![UiAction::Order(kind.clone())]);
+        perform(&mut model, vec![UiAction::Command(kind.clone())]);
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
-        snapshot.orders = vec![OrderStatus {
+        snapshot.commands = vec![CommandStatus {
             from: "".into(),
             note: None,
-            id: model.pending_command.as_ref().expect("the order is watched").id,
+            id: model.pending_command.as_ref().expect("the command is watched").id,
             by: Arc::from("tech1"),
             kind,
             at: snapshot.at,
@@ -632,11 +634,11 @@ fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
     let check = |outcome: Outcome, stays: bool| {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, "s60⏎");
-        let Some(Effect::Order(OrderRequest { id, kind, .. })) = effects.first().cloned() else {
+        let Some(Effect::Command(CommandRequest { id, kind, .. })) = effects.first().cloned() else {
             panic!("{effects:?}")
         };
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
-        let status = OrderStatus {
+        let status = CommandStatus {
             from: "".into(),
             note: None,
             id,
@@ -647,7 +649,7 @@ fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
             outcome,
             recorded: true,
         };
-        snapshot.orders = vec![status];
+        snapshot.commands = vec![status];
         update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
         let mut after = |ticks: usize| {
             (0..ticks).for_each(|_| drop(update(&mut model, Msg::Tick { silent: Duration::ZERO })));
@@ -662,10 +664,10 @@ fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
 }
 
 #[test]
-fn an_order_that_never_left_is_told() {
+fn a_command_that_was_never_sent_is_reported() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
     let effects = type_keys(&mut model, "s60⏎");
-    let Some(Effect::Order(OrderRequest { id, .. })) = effects.first() else { panic!("{effects:?}") };
+    let Some(Effect::Command(CommandRequest { id, .. })) = effects.first() else { panic!("{effects:?}") };
     update(&mut model, Msg::Undelivered(*id, "station too busy"));
     assert!(screen(&mut model, 80, 24).contains("NOT SENT: station too busy"));
 }
@@ -724,10 +726,10 @@ fn a_key_for_an_alarm_that_has_left_the_list_acknowledges_no_other() {
     // The frame with it is on the screen; now a colleague's acknowledgement takes it from the list.
     fixture.alarms.retain(|alarm| alarm.id != chosen);
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
-    assert_eq!(order_of(&type_keys(&mut model, "a")), None);
+    assert_eq!(sent_kind(&type_keys(&mut model, "a")), None);
     assert!(screen(&mut model, 80, 24).contains("The list has changed, press again"));
     // What is on the screen now is what the next press is for.
-    assert!(order_of(&type_keys(&mut model, "a")).is_some());
+    assert!(sent_kind(&type_keys(&mut model, "a")).is_some());
     assert!(!screen(&mut model, 80, 24).contains("press again"));
 }
 
@@ -742,7 +744,7 @@ fn a_chosen_alarm_that_was_raised_again_is_not_acknowledged_unseen() {
         (alarm.raised_at, alarm.annunciated_at) = (fixture::now(), fixture::now());
     }
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
-    assert_eq!(order_of(&type_keys(&mut model, "a")), None);
+    assert_eq!(sent_kind(&type_keys(&mut model, "a")), None);
 }
 
 #[test]
@@ -757,7 +759,7 @@ fn rows_that_move_between_two_frames_take_no_key_meant_for_another() {
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     for keys in ["z", "↓a", "o"] {
         // Moving the selection is possible, but what a key means then is unknown until it is drawn.
-        assert_eq!(order_of(&type_keys(&mut model, keys)), None, "{keys}");
+        assert_eq!(sent_kind(&type_keys(&mut model, keys)), None, "{keys}");
         assert_eq!(model.modal, None, "{keys}");
     }
 }
@@ -770,7 +772,7 @@ fn what_was_seen_is_sent_though_the_values_are_doubted_meanwhile() {
     update(&mut model, Msg::Tick { silent: Duration::from_secs(4) });
     let effects = type_keys(&mut model, "⏎");
     let seen = effects.iter().find_map(|effect| match effect {
-        Effect::Order(request) => Some(request.seen),
+        Effect::Command(request) => Some(request.seen),
         _ => None,
     });
     assert_eq!(seen, Some(Some(70.0)), "the window showed `old 70.0`");
@@ -782,9 +784,9 @@ fn a_number_that_the_device_rounds_is_shown_rounded_before_it_is_written() {
     let sv = fixture.tag("TIC-1.SV");
     fixture.def.tags[sv.index()].scale = 0.5;
     let mut model = model(&fixture, Theme::FULL);
-    assert_eq!(order_of(&type_keys(&mut model, "s72.3⏎")), None);
+    assert_eq!(sent_kind(&type_keys(&mut model, "s72.3⏎")), None);
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("72.3 → the device holds steps of 0.5: 72.5"), "{shown}");
     assert!(shown.contains("new 72.5 °C"), "{shown}");
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&CommandKind::Write { tag: sv, value: 72.5 }));
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&CommandKind::Write { tag: sv, value: 72.5 }));
 }

@@ -4,15 +4,15 @@ use std::{sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
-use super::{acts_only_on_what_was_drawn, model, order_of, screen, type_keys};
+use super::{acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys};
 use crate::{
     access::{
-        Durability, OrderRequest, Standing, Who, Wish,
+        CommandRequest, Durability, Standing, Who, Wish,
         wish::{SessionRow, UserRow},
     },
     history::{Answer, Query},
     plant::{
-        command::{CommandKind, OrderId, OrderStatus, Outcome, Refusal},
+        command::{CommandId, CommandKind, CommandStatus, Outcome, Refusal},
         record::{ActionRecord, Seal},
         role::{Role, Sign},
         sample::Quality,
@@ -152,7 +152,7 @@ fn before_a_login_every_other_tab_is_closed_and_alarms_are_seen() {
     let mut model = with(&Fixture::alarm(), closed());
     for keys in ["1", "⇥", "⎋1", "3", "a", "A"] {
         let effects = type_keys(&mut model, keys);
-        assert_eq!((model.tabs.shown, order_of(&effects), &model.modal), (Tab::Login, None, &None), "{keys}");
+        assert_eq!((model.tabs.shown, sent_kind(&effects), &model.modal), (Tab::Login, None, &None), "{keys}");
     }
     shows(&mut model, "TIC-1.PV temperature high");
     shows(&mut model, "alarms 3");
@@ -227,7 +227,7 @@ fn work_waits_while_the_terminal_is_locked() {
     stand(&mut model, |standing| standing.locked = true);
     shows(&mut model, "LOCKED by anna");
     assert_eq!(model.modal, None, "nothing hides the process");
-    assert_eq!(order_of(&type_keys(&mut model, "⏎⎋3a")), None);
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎⎋3a")), None);
     insta::assert_snapshot!("locked_80x24", screen(&mut model, 80, 24));
     assert_eq!(wish(&type_keys(&mut model, "horse⏎")), Some(&Wish::Unlock("horse".into())));
     answer(&mut model, Err("wrong password; wait 2 s"));
@@ -236,7 +236,7 @@ fn work_waits_while_the_terminal_is_locked() {
     assert_eq!(model.tabs.shown, Tab::Mimic);
     shows(&mut model, "new 65");
     let effects = type_keys(&mut model, ".5⏎");
-    assert_eq!(order_of(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
 }
 
 #[test]
@@ -262,8 +262,8 @@ fn a_form_that_waits_when_the_terminal_is_locked_takes_its_answer() {
 fn a_signature_that_waits_when_the_terminal_is_locked_takes_its_answer() {
     let mut model = with(&signed(Sign::SecondPerson), person("anna", Role::Technician));
     let effects = type_keys(&mut model, "s65⏎boris⏎horse⏎");
-    let Some(Effect::Order(order)) = effects.last() else { panic!("no order: {effects:?}") };
-    let id = order.id;
+    let Some(Effect::Command(command)) = effects.last() else { panic!("no command: {effects:?}") };
+    let id = command.id;
     stand(&mut model, |standing| standing.locked = true);
     update(&mut model, Msg::Undelivered(id, "station too busy"));
     stand(&mut model, |standing| standing.locked = false);
@@ -276,7 +276,7 @@ fn a_locked_terminal_looks_and_does_nothing() {
     stand(&mut model, |standing| standing.locked = true);
     for keys in ["a", "A", "s", "r", "4⏎f", "4⏎↓⏎"] {
         let effects = type_keys(&mut model, keys);
-        assert!(order_of(&effects).is_none() && wish(&effects).is_none(), "{keys}: {effects:?}");
+        assert!(sent_kind(&effects).is_none() && wish(&effects).is_none(), "{keys}: {effects:?}");
         assert!(model.modal.as_ref().is_some_and(Modal::is_unlock), "{keys}: {:?}", model.modal);
         type_keys(&mut model, "⎋⎋⎋1");
         assert_eq!((model.tabs.shown, &model.modal), (Tab::Mimic, &None), "{keys}");
@@ -355,19 +355,19 @@ fn signed(sign: Sign) -> Fixture {
 fn a_tag_that_asks_for_a_signature_gets_one() {
     let request = |effects: &[Effect]| {
         effects.iter().find_map(|effect| match effect {
-            Effect::Order(request) => Some(request.clone()),
+            Effect::Command(request) => Some(request.clone()),
             _ => None,
         })
     };
-    let sent = |sign: Sign, keys: &str| -> Option<OrderRequest> {
+    let sent = |sign: Sign, keys: &str| -> Option<CommandRequest> {
         let mut model = with(&signed(sign), person("anna", Role::Technician));
         request(&type_keys(&mut model, keys))
     };
     assert_eq!(sent(Sign::Password, "s65⏎⏎"), None, "without the password");
-    let order = sent(Sign::Password, "s65⏎yes n q⏎").expect("an order");
-    let sign = order.sign.expect("a signature");
-    assert_eq!((sign.user, sign.password, order.seen), (None, "yes n q".into(), Some(70.0)));
-    let sign = sent(Sign::SecondPerson, "s65⏎boris⏎horse⏎").and_then(|order| order.sign).expect("a signature");
+    let command = sent(Sign::Password, "s65⏎yes n q⏎").expect("a command");
+    let sign = command.sign.expect("a signature");
+    assert_eq!((sign.user, sign.password, command.seen), (None, "yes n q".into(), Some(70.0)));
+    let sign = sent(Sign::SecondPerson, "s65⏎boris⏎horse⏎").and_then(|command| command.sign).expect("a signature");
     assert_eq!((sign.user.as_deref(), sign.password), (Some("boris"), "horse".into()));
 
     let mut model = with(&signed(Sign::SecondPerson), person("anna", Role::Technician));
@@ -380,12 +380,12 @@ fn a_refused_signature_is_asked_again_in_its_window() {
     let fixture = signed(Sign::Password);
     let mut model = with(&fixture, person("anna", Role::Technician));
     let effects = type_keys(&mut model, "s65⏎hors⏎");
-    let Some(Effect::Order(first)) = effects.last() else { panic!("no order: {effects:?}") };
+    let Some(Effect::Command(first)) = effects.last() else { panic!("no command: {effects:?}") };
     shows(&mut model, "asking the station");
     assert_eq!(type_keys(&mut model, "1q⏎"), [], "while the answer is awaited");
-    let told = |request: &OrderRequest, outcome: Outcome| {
+    let told = |request: &CommandRequest, outcome: Outcome| {
         let mut snapshot = fixture.snapshot();
-        Arc::make_mut(&mut snapshot).orders = vec![OrderStatus {
+        Arc::make_mut(&mut snapshot).commands = vec![CommandStatus {
             id: request.id,
             by: "anna".into(),
             from: "".into(),
@@ -403,7 +403,7 @@ fn a_refused_signature_is_asked_again_in_its_window() {
     let effects = type_keys(&mut model, "r1q 3a⏎");
     assert_eq!((model.tabs.shown, effects.len()), (Tab::Mimic, 1), "no letter of it was a key: {effects:?}");
     assert!(!screen(&mut model, 80, 24).contains("r1q"));
-    let Some(Effect::Order(second)) = effects.last() else { panic!("no order: {effects:?}") };
+    let Some(Effect::Command(second)) = effects.last() else { panic!("no command: {effects:?}") };
     assert_eq!(second.sign.as_ref().map(|sign| sign.password.clone()), Some("r1q 3a".into()));
     update(&mut model, told(second, Outcome::Pending));
     assert_eq!(model.modal, None);
@@ -417,8 +417,8 @@ fn a_value_that_changes_under_an_open_window_is_told_at_once_and_asked_again() {
     let mut later = fixture.clone();
     later.set("TIC-1.SV", 65.0);
     let mut snapshot = later.snapshot();
-    Arc::make_mut(&mut snapshot).orders = vec![OrderStatus {
-        id: OrderId { terminal: 2, number: 1 },
+    Arc::make_mut(&mut snapshot).commands = vec![CommandStatus {
+        id: CommandId { terminal: 2, number: 1 },
         by: "anna".into(),
         from: "".into(),
         note: None,
@@ -431,14 +431,14 @@ fn a_value_that_changes_under_an_open_window_is_told_at_once_and_asked_again() {
     update(&mut model, Msg::Snapshot(snapshot));
     shows(&mut model, "changed to 65.0 °C by anna 14:02:31 (was 70.0)");
     insta::assert_snapshot!("changed_under_you_80x24", screen(&mut model, 80, 24));
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), None);
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), None);
     let effects = type_keys(&mut model, "⏎");
-    let Some(Effect::Order(request)) = effects.first() else { panic!("no order: {effects:?}") };
+    let Some(Effect::Command(request)) = effects.first() else { panic!("no command: {effects:?}") };
     assert_eq!(request.seen, Some(65.0), "what was seen when it was confirmed");
 }
 
 #[test]
-fn a_station_that_has_gone_is_said_at_once_and_takes_no_orders() {
+fn a_station_that_has_gone_is_shown_and_takes_no_commands() {
     let mut model = with(&Fixture::normal(), person("anna", Role::Technician));
     stand(&mut model, |standing| standing.gone = Some("the socket was closed".into()));
     assert!(model.snapshot.samples.iter().all(|sample| !matches!(sample.quality, Quality::Good)));
@@ -467,7 +467,7 @@ fn another_plant_file_builds_everything_anew() {
     update(&mut model, Msg::Snapshot(other.snapshot()));
     shows(&mut model, "The plant file changed");
     shows(&mut model, "Another tank");
-    assert_eq!((model.plants, order_of(&type_keys(&mut model, "⏎"))), (1, None));
+    assert_eq!((model.plants, sent_kind(&type_keys(&mut model, "⏎"))), (1, None));
 }
 
 fn supervisor() -> Standing {

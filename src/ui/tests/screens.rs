@@ -80,7 +80,7 @@ fn windows_on_top() {
     }
 }
 
-/// In MANUAL, with TK-2 full, one actuator more than the fixture has, and an order that failed.
+/// In MANUAL, with TK-2 full, one actuator more than the fixture has, and a command that failed.
 fn commanded() -> Snapshot {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);

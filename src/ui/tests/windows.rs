@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
-use super::{model, order_of, screen, type_keys};
+use super::{model, screen, sent_kind, type_keys};
 use crate::{
     access::{Standing, Who},
     plant::{alarm::AlarmCommand, command::CommandKind, role::Role},
@@ -152,8 +152,8 @@ fn an_alarm_is_shelved_for_half_an_hour_or_for_any_time_typed() {
         let mut model = model(&Fixture::alarm(), Theme::FULL);
         type_keys(&mut model, keys);
         let shown = screen(&mut model, 80, 24);
-        let order = order_of(&type_keys(&mut model, "⏎")).cloned();
-        let lasts = match order {
+        let command = sent_kind(&type_keys(&mut model, "⏎")).cloned();
+        let lasts = match command {
             Some(CommandKind::Alarm(AlarmCommand::Shelve { lasts, .. })) => Some(lasts.as_secs() / 60),
             _ => None,
         };

@@ -77,10 +77,10 @@ fn an_unlock_or_a_signature_counts_only_in_the_session_it_was_given_in() {
 
     bench.login(2, "tech", TECH).unwrap();
     let sign = Some(Signature { user: Some("boss".to_owned()), password: BOSS.into() });
-    let id = OrderId { terminal: 2, number: 50 };
-    let effects = bench.access.order(2, OrderRequest { sign, ..OrderRequest::new(0, id, SV) }, bench.now);
+    let id = CommandId { terminal: 2, number: 50 };
+    let effects = bench.access.on_command(2, CommandRequest { sign, ..CommandRequest::new(0, id, SV) }, bench.now);
     bench.wish(2, Wish::Logout).unwrap();
     let effects = bench.access.done(under_way(&effects), Outcome::Verified(true), bench.now);
-    let given = effects.iter().any(|effect| matches!(effect, Effect::Order(Order { refused: None, .. })));
+    let given = effects.iter().any(|effect| matches!(effect, Effect::Command(Command { refused: None, .. })));
     assert!(!given, "{effects:?}");
 }

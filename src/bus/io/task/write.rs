@@ -96,7 +96,7 @@ impl Task<'_> {
             WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Overtaken | WriteResult::Held(_) => {}
         }
         match result {
-            // A stop may be ordered again at once.
+            // A stop may be requested again at once.
             WriteResult::Lost(fault) | WriteResult::NotRead(fault) if wish.verify && !wish.urgent => {
                 self.confirm_later(id, tag.id, result, fault).await?;
             }

@@ -9,14 +9,14 @@ use tokio::{
 
 use super::slave::{Line, MS, Mode, SlaveAction, line, plant, until_silent};
 use crate::plant::{
-    command::{BusRequest, OrderId, WriteId},
+    command::{BusRequest, CommandId, WriteId},
     def::{Serial, TagId},
     diagnostics::{Diagnostic, DiagnosticState, Finding, Scan},
     event::{Event, LineState, WriteResult},
 };
 
 async fn start(line: &Line, diagnostic: Diagnostic) {
-    let id = OrderId { terminal: 1, number: 1 };
+    let id = CommandId { terminal: 1, number: 1 };
     line.requests.send(BusRequest::Test { id, by: "anna".into(), diagnostic }).await.expect("the line runs");
 }
 
@@ -29,7 +29,7 @@ async fn a_line_can_be_closed_while_a_scan_has_it_for_itself() {
     line.plug(Mode::Rtu, |_, _| SlaveAction::Silent);
     let serials = vec![Serial::USUAL, Serial { baud: 19_200, ..Serial::USUAL }];
     let diagnostic = Diagnostic::Scan(Scan { first: 1, last: 247, serials, timeout: 100 * MS });
-    let (id, by) = (OrderId { terminal: 1, number: 1 }, "anna".into());
+    let (id, by) = (CommandId { terminal: 1, number: 1 }, "anna".into());
     line.requests.send(BusRequest::Test { id, by, diagnostic }).await.expect("the line runs");
     line.until(&def, |event| matches!(event, Event::Line { state: LineState::Testing, .. }).then_some(())).await;
     line.requests.send(BusRequest::Connect(false)).await.expect("the line runs");
@@ -50,7 +50,7 @@ async fn nonsense_is_sent_and_nonsense_is_told() {
                 let _ = theirs.write_all(&[0x55, 1, 2, 3, 0xAA, 0, 9]).await;
             }
         });
-        let (id, by) = (OrderId { terminal: 1, number: 1 }, "anna".into());
+        let (id, by) = (CommandId { terminal: 1, number: 1 }, "anna".into());
         let diagnostic = Diagnostic::Send(vec![0xFF, 1, 2]);
         line.requests.send(BusRequest::Test { id, by, diagnostic }).await.expect("the line runs");
         let run = line

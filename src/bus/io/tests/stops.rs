@@ -88,12 +88,12 @@ async fn a_stop_is_not_held_by_a_poll_that_is_not_answered() {
         line.read(&def).await;
         silent.store(true, Ordering::Relaxed);
         until_silent(&mut line, &def).await;
-        let ordered = Instant::now();
+        let sent_at = Instant::now();
         // Nor by what was asked for before.
         line.requests.send(BusRequest::StopTest).await.expect("the line runs");
         line.requests.send(write(1, FIRST_OF[1], true)).await.expect("the line runs");
         assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::ReadBack(10.0), "{mode:?}");
-        let waited = stops.lock().expect("no panic")[0] - ordered;
+        let waited = stops.lock().expect("no panic")[0] - sent_at;
         assert!(waited < 600 * MS, "{mode:?}: {waited:?}");
         // What was cut short is read later, and nothing of it lands elsewhere: every value is checked.
         silent.store(false, Ordering::Relaxed);
@@ -113,10 +113,10 @@ async fn a_stop_is_not_held_by_a_write_that_is_not_answered() {
         silent.store(true, Ordering::Relaxed);
         line.requests.send(write(1, FIRST_OF[0], false)).await.expect("the line runs");
         until_silent(&mut line, &def).await;
-        let ordered = Instant::now();
+        let sent_at = Instant::now();
         line.requests.send(write(2, FIRST_OF[1], true)).await.expect("the line runs");
         assert_eq!(end_of(&mut line, &def, 2).await, WriteResult::ReadBack(10.0), "{mode:?}");
-        let waited = stops.lock().expect("no panic")[0] - ordered;
+        let waited = stops.lock().expect("no panic")[0] - sent_at;
         assert!(waited < 600 * MS, "{mode:?}: {waited:?}");
         silent.store(false, Ordering::Relaxed);
         assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::Held(10.0), "{mode:?}");

@@ -45,12 +45,12 @@ fn read(plant: &mut Plant, second: i64, sv: f64, high: f64) -> Effects {
 
 /// The look at the device that a restore begins with.
 fn look(number: u32) -> BusRequest {
-    BusRequest::Refresh { device: TIC, order: Some(OrderId { terminal: 1, number }) }
+    BusRequest::Refresh { device: TIC, command: Some(CommandId { terminal: 1, number }) }
 }
 
-/// Orders a restore and lets the device be read as it was; the first write follows.
+/// Commands a restore and lets the device be read as it was; the first write follows.
 fn begin(plant: &mut Plant, number: u32, wish: RestoreWish) -> Effects {
-    let asked = order(plant, number, CommandKind::Restore(Box::new(wish)));
+    let asked = command(plant, number, CommandKind::Restore(Box::new(wish)));
     assert_eq!(asked.bus, [(plant.def.device(TIC).line, look(number))], "the device is read first");
     read(plant, 1, 500.0, 100.0)
 }
@@ -75,12 +75,12 @@ fn wish(plant: &Plant, set: Arc<ParameterSet>) -> RestoreWish {
     RestoreWish { device: TIC, from: "winter".into(), set, changes }
 }
 
-fn order(plant: &mut Plant, number: u32, kind: CommandKind) -> Effects {
-    plant.on_order(Order::new(OrderId { terminal: 1, number }, "anna", kind), at(1))
+fn command(plant: &mut Plant, number: u32, kind: CommandKind) -> Effects {
+    plant.on_command(Command::new(CommandId { terminal: 1, number }, "anna", kind), at(1))
 }
 
 fn outcome(plant: &Plant, number: u32) -> Option<Outcome> {
-    plant.desk.outcome_of(OrderId { terminal: 1, number }).cloned()
+    plant.desk.outcome_of(CommandId { terminal: 1, number }).cloned()
 }
 
 /// The tags and raw numbers that went to the bus.
@@ -149,7 +149,7 @@ fn the_first_failure_stops_it_and_says_what_was_written() {
     assert_eq!(written(&second), [(HIGH, 80.0)]);
     let last = end(&mut plant, &second, |_| WriteResult::Lost(Fault::Timeout));
     assert_eq!(
-        outcome(&plant, 1).map(|o| crate::plant::orders::outcome_words(&o)).as_deref(),
+        outcome(&plant, 1).map(|o| crate::plant::commands::outcome_words(&o)).as_deref(),
         Some("not confirmed: 1 of 2 written, then SV-H failed")
     );
     assert_eq!(actions(&last).len(), 2, "the write and the whole: {:?}", actions(&last));
@@ -160,13 +160,13 @@ fn the_first_failure_stops_it_and_says_what_was_written() {
 fn a_device_that_has_changed_since_is_not_written() {
     let mut plant = plant();
     let wish = wish(&plant, set(40.0, 80.0));
-    order(&mut plant, 1, CommandKind::Restore(Box::new(wish.clone())));
+    command(&mut plant, 1, CommandKind::Restore(Box::new(wish.clone())));
     // On the image it stood as it was confirmed; the device itself says otherwise.
     let effects = read(&mut plant, 1, 610.0, 100.0);
     let changed = Some(Outcome::Refused(Refusal::Changed));
     assert_eq!((written(&effects), outcome(&plant, 1)), (vec![], changed.clone()));
     assert_eq!(actions(&effects), [format!("anna restore set TIC-1 refused: {}", Refusal::Changed)]);
-    let effects = order(&mut plant, 2, CommandKind::Restore(Box::new(wish)));
+    let effects = command(&mut plant, 2, CommandKind::Restore(Box::new(wish)));
     assert_eq!((effects.bus, outcome(&plant, 2)), (vec![], changed));
 }
 
@@ -174,7 +174,7 @@ fn a_device_that_has_changed_since_is_not_written() {
 fn nothing_is_written_before_every_value_of_the_set_was_read_anew() {
     let mut plant = plant();
     let wish = wish(&plant, set(40.0, 80.0));
-    order(&mut plant, 1, CommandKind::Restore(Box::new(wish.clone())));
+    command(&mut plant, 1, CommandKind::Restore(Box::new(wish.clone())));
     let only_sv = |plant: &mut Plant, second| {
         let (values, reply) = (vec![(SV, 500.0), (DP, 1.0)], std::time::Duration::from_millis(12));
         plant.on_event(Event::Read { at: at(second), device: TIC, values, texts: Vec::new(), reply, exchange: None })
@@ -194,18 +194,18 @@ fn a_restore_that_still_reads_can_be_stopped_and_a_full_line_ends_it() {
     let check = |end: &dyn Fn(&mut Plant), expect: Refusal| {
         let mut plant = plant();
         let wish = wish(&plant, set(40.0, 80.0));
-        order(&mut plant, 1, CommandKind::Restore(Box::new(wish)));
+        command(&mut plant, 1, CommandKind::Restore(Box::new(wish)));
         end(&mut plant);
         assert_eq!(outcome(&plant, 1), Some(Outcome::Refused(expect)));
         assert_eq!(written(&read(&mut plant, 2, 500.0, 100.0)), []);
     };
-    let stop = |plant: &mut Plant| drop(order(plant, 2, CommandKind::StopRestore(TIC)));
+    let stop = |plant: &mut Plant| drop(command(plant, 2, CommandKind::StopRestore(TIC)));
     check(&stop, Refusal::Stopped);
     let busy = |plant: &mut Plant| drop(plant.on_undeliverable(plant.def.device(TIC).line, &look(1)));
     check(&busy, Refusal::Busy);
     let configure = |plant: &mut Plant| {
         let line = plant.def.line(plant.def.device(TIC).line).clone();
-        drop(order(plant, 2, CommandKind::Configure(Box::new(line))));
+        drop(command(plant, 2, CommandKind::Configure(Box::new(line))));
     };
     check(&configure, Refusal::LineChanged);
 }
@@ -236,7 +236,7 @@ fn a_value_that_changes_while_a_restore_runs_is_not_written_over() {
     check(&silent, "anna write TIC-1.SV-H refused: not known now");
     let other_line = |plant: &mut Plant| {
         let line = plant.def.line(plant.def.device(TIC).line).clone();
-        drop(order(plant, 7, CommandKind::Configure(Box::new(line))));
+        drop(command(plant, 7, CommandKind::Configure(Box::new(line))));
     };
     check(&other_line, "anna write TIC-1.SV-H refused: the settings of the line were changed meanwhile");
 }
@@ -246,13 +246,13 @@ fn limits_are_checked_in_the_station_whatever_a_terminal_sends() {
     let mut plant = plant();
     let wish = RestoreWish { changes: Vec::new(), ..wish(&plant, set(50.0, 100.0)) };
     let too_high = RestoreWish { set: set(600.0, 100.0), ..wish.clone() };
-    let effects = order(&mut plant, 1, CommandKind::Restore(Box::new(too_high)));
+    let effects = command(&mut plant, 1, CommandKind::Restore(Box::new(too_high)));
     let why = "SV 600 is outside −∞ … 100";
     let refused = |why: &str| Some(Outcome::Refused(Refusal::NotFit(why.to_owned())));
     let min = plant.def.tag(SV).min;
     assert_eq!(min, Some(Bound::Fixed(0.0)));
     assert_eq!((written(&effects), outcome(&plant, 1)), (vec![], refused(&why.replace("−∞", "0"))));
-    order(&mut plant, 2, CommandKind::Restore(Box::new(wish)));
+    command(&mut plant, 2, CommandKind::Restore(Box::new(wish)));
     assert_eq!(outcome(&plant, 2), Some(Outcome::Unchanged));
 }
 
@@ -261,13 +261,13 @@ fn an_operator_stops_it_between_two_writes_and_two_never_run_at_once() {
     let mut plant = plant();
     let wish = wish(&plant, set(40.0, 80.0));
     let first = begin(&mut plant, 1, wish.clone());
-    order(&mut plant, 2, CommandKind::Restore(Box::new(wish)));
+    command(&mut plant, 2, CommandKind::Restore(Box::new(wish)));
     assert_eq!(outcome(&plant, 2), Some(Outcome::Refused(Refusal::UnderWay)));
-    order(&mut plant, 3, CommandKind::StopRestore(TIC));
+    command(&mut plant, 3, CommandKind::StopRestore(TIC));
     let rest = end(&mut plant, &first, WriteResult::ReadBack);
     assert_eq!(written(&rest), []);
     assert_eq!(plant.restore_of(TIC).map(|run| (run.state, run.done())), Some((State::Stopped, 1)));
-    order(&mut plant, 4, CommandKind::StopRestore(TIC));
+    command(&mut plant, 4, CommandKind::StopRestore(TIC));
     assert_eq!(outcome(&plant, 4), Some(Outcome::Unchanged));
 }
 
@@ -286,12 +286,12 @@ fn a_set_is_taken_with_what_is_known_and_saving_it_is_on_record() {
     let mut plant = plant();
     let name: Arc<str> = "winter".into();
     let save = CommandKind::SaveSet { device: DeviceId(0), name, replace: false };
-    let effects = order(&mut plant, 1, save);
+    let effects = command(&mut plant, 1, save);
     let Some(SetWork::Write { set, replace: false, .. }) = effects.sets else { panic!("{:?}", effects.sets) };
     assert_eq!((set.values.len(), set.missing.len()), (2, 0));
-    let id = OrderId { terminal: 1, number: 1 };
+    let id = CommandId { terminal: 1, number: 1 };
     let done = plant.on_set_written(id, Err("the disk is full".into()));
     assert_eq!(actions(&done), ["anna save set TIC-1 refused: not saved: the disk is full"]);
     let bad = CommandKind::SaveSet { device: DeviceId(0), name: "../x".into(), replace: false };
-    assert_eq!(order(&mut plant, 2, bad).sets, None, "no path leaves the folder");
+    assert_eq!(command(&mut plant, 2, bad).sets, None, "no path leaves the folder");
 }

@@ -6,7 +6,7 @@ use super::*;
 use crate::{
     plant::{
         Plant,
-        command::{OrderId, Refusal},
+        command::{CommandId, Refusal},
         def::Priority,
         fixture::{self, HIGH, PV, SV},
         sample::{Cause, Sample},
@@ -40,11 +40,11 @@ fn judge(wish: Wish) -> Judge {
     Judge::new(Arc::new(scenario), fixture::shared(), BEGAN)
 }
 
-/// What the screens show at a second: PV as given, and the orders.
-fn shown(second: u64, pv: Sample, orders: Vec<OrderStatus>) -> Snapshot {
+/// What the screens show at a second: PV as given, and the commands.
+fn shown(second: u64, pv: Sample, commands: Vec<CommandStatus>) -> Snapshot {
     let mut snapshot = Plant::new(fixture::shared(), at(second), 1.0).snapshot();
     snapshot.samples[PV.index()] = pv;
-    snapshot.orders = orders;
+    snapshot.commands = commands;
     snapshot
 }
 
@@ -107,10 +107,10 @@ fn an_alarm_counts_in_its_time_and_in_its_step_only() {
 fn only_a_verified_write_of_the_right_value_counts() {
     let check = |second: u64, value: f64, outcome: Outcome, expect: Standing| {
         let mut judge = judge(Wish::Written(SV, 60.0));
-        let order = OrderStatus {
+        let command = CommandStatus {
             from: "".into(),
             note: None,
-            id: OrderId { terminal: 1, number: 1 },
+            id: CommandId { terminal: 1, number: 1 },
             by: "tech1".into(),
             kind: CommandKind::Write { tag: SV, value },
             at: at(second),
@@ -118,7 +118,7 @@ fn only_a_verified_write_of_the_right_value_counts() {
             outcome,
             recorded: true,
         };
-        judge.on_values(&shown(50, good(50.0), vec![order]), &ActualValues::new());
+        judge.on_values(&shown(50, good(50.0), vec![command]), &ActualValues::new());
         assert_eq!(is_over(&mut judge), expect);
     };
     check(15, 60.0, Outcome::Verified, met(15));

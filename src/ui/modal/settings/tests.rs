@@ -12,7 +12,7 @@ use crate::{
     ui::{
         Model,
         fixture::Fixture,
-        tests::{model, order_of, screen, type_keys},
+        tests::{model, screen, sent_kind, type_keys},
         theme::Theme,
     },
 };
@@ -27,7 +27,7 @@ fn open(fixture: &Fixture) -> Model {
 fn tried(keys: &str) -> Option<LineDef> {
     let mut model = open(&Fixture::normal());
     type_keys(&mut model, keys);
-    match order_of(&type_keys(&mut model, "⏎⏎")) {
+    match sent_kind(&type_keys(&mut model, "⏎⏎")) {
         Some(CommandKind::Configure(settings)) => Some((**settings).clone()),
         Some(other) => panic!("{other:?}"),
         None => None,
@@ -47,7 +47,7 @@ fn serial(serial: Serial) -> Option<LineDef> {
 }
 
 #[test]
-fn what_is_chosen_is_what_is_ordered() {
+fn what_is_chosen_is_what_is_sent() {
     let usual = Serial::USUAL;
     assert_eq!(tried("→"), serial(Serial { baud: 19_200, ..usual }));
     assert_eq!(tried("←"), serial(Serial { baud: 4_800, ..usual }));
@@ -79,7 +79,7 @@ fn what_cannot_be_is_told_before_anything_is_sent() {
     ] {
         let mut model = open(&Fixture::normal());
         let effects = type_keys(&mut model, keys);
-        assert_eq!(order_of(&effects), None, "{keys}");
+        assert_eq!(sent_kind(&effects), None, "{keys}");
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains(expect), "{keys}: no `{expect}` in\n{shown}");
     }
@@ -88,9 +88,9 @@ fn what_cannot_be_is_told_before_anything_is_sent() {
 #[test]
 fn nothing_is_done_that_was_not_asked_twice() {
     let mut model = open(&Fixture::normal());
-    assert_eq!(order_of(&type_keys(&mut model, "→⏎n")), None);
+    assert_eq!(sent_kind(&type_keys(&mut model, "→⏎n")), None);
     assert!(screen(&mut model, 80, 24).contains("19200"), "the form stays as it was");
-    assert_eq!(order_of(&type_keys(&mut model, "⏎⎋")), None);
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎⎋")), None);
     assert!(model.modal.is_none());
 }
 
@@ -109,9 +109,9 @@ fn tried_out() -> Fixture {
 fn settings_can_be_taken_back_and_saved() {
     let mut model = open(&tried_out());
     let effects = type_keys(&mut model, "u⏎");
-    assert_eq!(order_of(&effects), Some(&CommandKind::Configure(Box::new(line()))));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Configure(Box::new(line()))));
     let mut model = open(&tried_out());
-    assert_eq!(order_of(&type_keys(&mut model, "S⏎")), Some(&CommandKind::SaveSettings(LineId(0))));
+    assert_eq!(sent_kind(&type_keys(&mut model, "S⏎")), Some(&CommandKind::SaveSettings(LineId(0))));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What an operator does with alarms: the windows that ask, and the orders that need no query.
+//! What an operator does with alarms: the windows that ask, and the commands that need no query.
 
 use std::time::Duration;
 
@@ -26,7 +26,7 @@ const NAMED: usize = 6;
 pub fn acknowledge(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     match cx.def().alarm(alarm.id).note {
         true => note(cx, alarm),
-        false => vec![UiAction::Order(alarm.acknowledge())],
+        false => vec![UiAction::Command(alarm.acknowledge())],
     }
 }
 
@@ -74,7 +74,7 @@ pub fn acknowledge_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a Ac
         notes.push("At least one of them needs a note.".to_owned());
         return open(Modal::Reason(Box::new(Reason::new(title, "acknowledge", notes, kind, true))));
     }
-    open(Modal::Confirm(Confirm::order(title, asked, kind).with_notes(notes)))
+    open(Modal::Confirm(Confirm::command(title, asked, kind).with_notes(notes)))
 }
 
 /// Asks for how long an alarm is shelved, and why.
@@ -106,7 +106,7 @@ pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     let why = match alarm.state {
         AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
             let kind = CommandKind::Alarm(AlarmCommand::Reset(alarm.id));
-            return open(Modal::Confirm(Confirm::order("reset a latched alarm", name(cx, alarm.id), kind)));
+            return open(Modal::Confirm(Confirm::command("reset a latched alarm", name(cx, alarm.id), kind)));
         }
         AlarmState::Unacknowledged | AlarmState::Acknowledged if cx.def().alarm(alarm.id).latch => {
             "Its cause lasts: it can be reset once that is gone."
@@ -140,7 +140,7 @@ pub fn put_back(cx: &ViewContext, aside: &AsideAlarm) -> Vec<UiAction> {
     };
     let holds = aside.active.then(|| "Its condition holds: it will be annunciated at once.".to_owned());
     let kind = CommandKind::Alarm(alarm_command);
-    let confirm = Confirm::order(title, name(cx, aside.id), kind.clone());
+    let confirm = Confirm::command(title, name(cx, aside.id), kind.clone());
     vec![Notice::or(cx, title, &kind, Modal::Confirm(confirm.with_notes(holds)))]
 }
 
@@ -161,7 +161,7 @@ pub fn own_handover() -> Vec<UiAction> {
 pub fn take_over(cx: &ViewContext) -> Vec<UiAction> {
     let who = cx.standing.who.as_ref().map_or("nobody", |who| &who.user);
     let words = format!("{who} has read this page and takes the plant over.");
-    open(Modal::Confirm(Confirm::order("take over", words, CommandKind::TakeOver)))
+    open(Modal::Confirm(Confirm::command("take over", words, CommandKind::TakeOver)))
 }
 
 fn open(modal: Modal) -> Vec<UiAction> {

@@ -12,8 +12,8 @@ use crate::{
     history::{Answer, HistoryError, Query},
     plant::{
         alarm::AlarmState,
+        commands::{HAND_OVER, TAKE_OVER},
         event::LineState,
-        orders::{HAND_OVER, TAKE_OVER},
         record::ActionRecord,
         sample::Quality,
         snapshot::{AsideAlarm, DeviceState},

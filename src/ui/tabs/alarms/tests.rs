@@ -23,7 +23,7 @@ use crate::{
         fixture::{self, Fixture, now},
         modal::Modal,
         tabs::Tab,
-        tests::{acts_only_on_what_was_drawn, model, order_of, screen, type_keys},
+        tests::{acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys},
         theme::{Colours, Glyphs, Theme},
         update,
     },
@@ -263,7 +263,7 @@ fn the_handover_tells_what_the_next_shift_must_know() {
             assert!(picture.contains("another person does, with o"), "{picture}");
             type_keys(&mut model, "o");
             assert!(screen(&mut model, 120, 40).contains("You have handed over yourself."));
-            assert_eq!(order_of(&type_keys(&mut model, "⏎⏎")), None);
+            assert_eq!(sent_kind(&type_keys(&mut model, "⏎⏎")), None);
         }
     }
 }
@@ -280,10 +280,10 @@ fn an_alarm_of_more_than_a_day_is_handed_over_whether_acknowledged_or_not() {
 fn a_shift_is_handed_over_with_a_note_and_taken_over() {
     let mut model = shown(&Fixture::normal(), Theme::FULL, "V");
     let effects = type_keys(&mut model, "nP-1 is loud⏎");
-    let Some(Effect::Order(order)) = effects.last() else { panic!("{effects:?}") };
-    assert_eq!((&order.kind, order.note.as_deref()), (&CommandKind::HandOver, Some("P-1 is loud")));
-    assert_eq!(order_of(&type_keys(&mut model, "o")), None, "asks first");
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), Some(&CommandKind::TakeOver));
+    let Some(Effect::Command(command)) = effects.last() else { panic!("{effects:?}") };
+    assert_eq!((&command.kind, command.note.as_deref()), (&CommandKind::HandOver, Some("P-1 is loud")));
+    assert_eq!(sent_kind(&type_keys(&mut model, "o")), None, "asks first");
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&CommandKind::TakeOver));
 }
 
 #[test]
@@ -302,7 +302,7 @@ fn the_filter_in_force_is_written_and_hides_nothing_silently() {
     type_keys(&mut model, "/level⏎A");
     let effects = type_keys(&mut model, "⏎");
     let low = &Fixture::alarm().alarms[2];
-    let Some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen })) = order_of(&effects) else {
+    let Some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen })) = sent_kind(&effects) else {
         panic!("{effects:?}")
     };
     assert_eq!(**seen, [(low.id, low.raised_at)]);
@@ -314,7 +314,7 @@ fn a_page_acknowledges_only_what_was_on_the_screen() {
     screen(&mut model, 80, 24);
     type_keys(&mut model, "p");
     let effects = type_keys(&mut model, "⏎");
-    let Some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen })) = order_of(&effects) else {
+    let Some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen })) = sent_kind(&effects) else {
         panic!("{effects:?}")
     };
     let picture = screen(&mut model, 80, 24);
@@ -327,22 +327,22 @@ fn a_page_acknowledges_only_what_was_on_the_screen() {
 fn a_note_is_asked_for_where_the_plant_wants_one() {
     let mut fixture = Fixture::alarm();
     let alarm = fixture.alarms[0].clone();
-    let order = |fixture: &Fixture, keys: &str| {
+    let command = |fixture: &Fixture, keys: &str| {
         let mut model = shown(fixture, Theme::FULL, "");
         let effects = type_keys(&mut model, keys);
-        let order = effects.into_iter().find_map(|effect| match effect {
-            Effect::Order(order) => Some((order.kind, order.note)),
+        let command = effects.into_iter().find_map(|effect| match effect {
+            Effect::Command(command) => Some((command.kind, command.note)),
             _ => None,
         });
-        (order, model.modal)
+        (command, model.modal)
     };
-    assert_eq!(order(&fixture, "nSV was raised⏎").0, Some((alarm.acknowledge(), Some("SV was raised".into()))));
-    assert_eq!(order(&fixture, "n⏎").0, Some((alarm.acknowledge(), None)), "here it may be left out");
+    assert_eq!(command(&fixture, "nSV was raised⏎").0, Some((alarm.acknowledge(), Some("SV was raised".into()))));
+    assert_eq!(command(&fixture, "n⏎").0, Some((alarm.acknowledge(), None)), "here it may be left out");
     fixture.def.alarms[0].note = true;
-    assert!(matches!(order(&fixture, "a"), (None, Some(Modal::Reason(_)))), "asks before it is refused");
-    assert!(matches!(order(&fixture, "a  ⏎"), (None, Some(Modal::Reason(_)))), "blanks are no note");
-    assert_eq!(order(&fixture, "adoor was open⏎").0, Some((alarm.acknowledge(), Some("door was open".into()))));
-    let (all, _) = order(&fixture, "Adoor was open⏎");
+    assert!(matches!(command(&fixture, "a"), (None, Some(Modal::Reason(_)))), "asks before it is refused");
+    assert!(matches!(command(&fixture, "a  ⏎"), (None, Some(Modal::Reason(_)))), "blanks are no note");
+    assert_eq!(command(&fixture, "adoor was open⏎").0, Some((alarm.acknowledge(), Some("door was open".into()))));
+    let (all, _) = command(&fixture, "Adoor was open⏎");
     assert_eq!(all, fixture.snapshot().acknowledge_all().map(|kind| (kind, Some("door was open".into()))));
 }
 
@@ -354,9 +354,9 @@ fn an_alarm_is_shelved_for_a_chosen_time_with_a_reason() {
     type_keys(&mut model, "⏎");
     assert!(screen(&mut model, 80, 24).contains("say why"), "nothing is shelved without a reason");
     let effects = type_keys(&mut model, "↓↓sensor is cleaned⏎");
-    let Some(Effect::Order(order)) = effects.last() else { panic!("{effects:?}") };
+    let Some(Effect::Command(command)) = effects.last() else { panic!("{effects:?}") };
     let shelve = AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(3_600) };
-    assert_eq!((&order.kind, order.note.as_deref()), (&CommandKind::Alarm(shelve), Some("sensor is cleaned")));
+    assert_eq!((&command.kind, command.note.as_deref()), (&CommandKind::Alarm(shelve), Some("sensor is cleaned")));
     // No time is offered that the plant does not allow.
     let mut short = Fixture::alarm();
     short.def.alarm_rules.shelve_max = Duration::from_secs(1_800);
@@ -369,8 +369,8 @@ fn an_alarm_is_shelved_for_a_chosen_time_with_a_reason() {
 fn what_was_put_aside_is_taken_back() {
     let back = |keys: &str| {
         let mut model = shown(&put_aside(), Theme::FULL, "v");
-        assert_eq!(order_of(&type_keys(&mut model, keys)), None, "asks first");
-        order_of(&type_keys(&mut model, "⏎")).cloned()
+        assert_eq!(sent_kind(&type_keys(&mut model, keys)), None, "asks first");
+        sent_kind(&type_keys(&mut model, "⏎")).cloned()
     };
     assert_eq!(back("u"), Some(CommandKind::Alarm(AlarmCommand::Unshelve(AlarmId(1)))));
     assert_eq!(back("↓u"), Some(CommandKind::Alarm(AlarmCommand::InService(AlarmId(2)))));
@@ -387,7 +387,7 @@ fn a_technician_is_told_that_out_of_service_needs_a_supervisor() {
     assert!(footer.contains("z shelve") && !footer.contains("o out of service"), "{footer}");
     type_keys(&mut model, "o");
     assert!(screen(&mut model, 80, 24).contains("needs Supervisor; tech1 is Technician"), "before a reason is typed");
-    assert_eq!(order_of(&type_keys(&mut model, "broken⏎")), None);
+    assert_eq!(sent_kind(&type_keys(&mut model, "broken⏎")), None);
 }
 
 #[test]
@@ -474,11 +474,11 @@ fn silence_is_one_key_on_every_tab_and_acknowledges_nothing() {
     use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
     let press = |model: &mut Model| update(model, Msg::Key(KeyEvent::new(KeyCode::Char('s'), KeyModifiers::CONTROL)));
     let mut model = super::super::super::tests::model(&Fixture::alarm(), Theme::FULL);
-    assert_eq!(order_of(&press(&mut model)), Some(&CommandKind::Alarm(AlarmCommand::Silence)));
+    assert_eq!(sent_kind(&press(&mut model)), Some(&CommandKind::Alarm(AlarmCommand::Silence)));
     let mut snapshot = Arc::unwrap_or_clone(Fixture::alarm().snapshot());
     snapshot.sound = false;
     update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
-    assert_eq!(order_of(&press(&mut model)), None, "nothing sounds any more");
+    assert_eq!(sent_kind(&press(&mut model)), None, "nothing sounds any more");
     assert!(screen(&mut model, 120, 40).lines().nth(2).is_some_and(|banner| banner.contains("silenced")));
 }
 

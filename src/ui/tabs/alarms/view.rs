@@ -178,11 +178,11 @@ fn filter_line(
         words.push(format!("{folded} folded, space unfolds"));
     }
     if tab.filter.is_off() && words.is_empty() && all > 0 {
-        let order = match rows.iter().any(|row| row.first || row.under) {
+        let sorted = match rows.iter().any(|row| row.first || row.under) {
             true => "a burst under its first alarm",
             false => "the most urgent first",
         };
-        words.push(format!("{all} shown, {order}"));
+        words.push(format!("{all} shown, {sorted}"));
     }
     let room = end.saturating_sub(3 + width(&more));
     let style = if tab.filter.is_off() { theme.dim() } else { theme.strong() };

@@ -183,12 +183,12 @@ pub fn start(at: &Place, diagnostic: Diagnostic) -> Result<UiAction, String> {
         return Err(why);
     }
     let query = danger(at, &diagnostic);
-    let order = CommandKind::Test(at.id, diagnostic);
+    let command = CommandKind::Test(at.id, diagnostic);
     Ok(match query {
         Some(words) => {
-            UiAction::Open(Modal::Confirm(Confirm::order(format!("test of {}", at.settings.name), words, order)))
+            UiAction::Open(Modal::Confirm(Confirm::command(format!("test of {}", at.settings.name), words, command)))
         }
-        None => UiAction::Order(order),
+        None => UiAction::Command(command),
     })
 }
 
@@ -244,7 +244,7 @@ pub fn again(_cx: &ViewContext, at: &Place) -> Vec<UiAction> {
 
 /// Stops the test at work.
 pub fn stop(at: &Place) -> Vec<UiAction> {
-    if at.is_testing() { vec![UiAction::Order(CommandKind::StopTest(at.id))] } else { Vec::new() }
+    if at.is_testing() { vec![UiAction::Command(CommandKind::StopTest(at.id))] } else { Vec::new() }
 }
 
 /// Bytes on their way onto a line.
@@ -275,10 +275,10 @@ impl Send {
             self.problem = None;
         } else if keys::code(KeyCode::Enter).is(event) {
             match self.send(cx) {
-                Ok(UiAction::Order(kind)) => {
+                Ok(UiAction::Command(kind)) => {
                     bench.first = None;
                     return Next::Do(vec![
-                        UiAction::Order(kind),
+                        UiAction::Command(kind),
                         UiAction::Open(Modal::Bus(Box::new(Window::Send(self)))),
                     ]);
                 }

@@ -9,7 +9,7 @@ use crate::{
     bus::frame::with_crc,
     history::{Answer, Query},
     plant::{
-        command::{CommandKind, OrderId},
+        command::{CommandId, CommandKind},
         def::{Framing, LineId, Serial},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
         event::{ExceptionCode, Fault, LineState},
@@ -24,7 +24,7 @@ use crate::{
         fixture::{Fixture, now},
         modal::Modal,
         tabs::Tab,
-        tests::{acts_only_on_what_was_drawn, model, order_of, screen, type_keys},
+        tests::{acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys},
         theme::Theme,
         update,
     },
@@ -46,7 +46,7 @@ fn run(
     total: u32,
     findings: Vec<Finding>,
 ) -> Arc<DiagnosticRun> {
-    let id = OrderId { terminal: 1, number: 1 };
+    let id = CommandId { terminal: 1, number: 1 };
     let started = now() - jiff::SignedDuration::from_secs(8);
     let words = "unit 17, function 3 / 0x03 at 9600 8E1".to_owned();
     Arc::new(DiagnosticRun { id, by: "tech1".into(), diagnostic, started, done, total, now: words, state, findings })
@@ -93,7 +93,7 @@ fn a_silent_device_shows_when_it_is_asked_next_and_r_asks_it_now() {
         let mut model = bus(&fixture, Theme::FULL, "L");
         let shown = screen(&mut model, width, height);
         assert!(shown.contains("retry in 12 s"), "{shown}");
-        assert_eq!(order_of(&type_keys(&mut model, "r")), Some(&CommandKind::Refresh(device)));
+        assert_eq!(sent_kind(&type_keys(&mut model, "r")), Some(&CommandKind::Refresh(device)));
         type_keys(&mut model, "4⏎");
         let shown = screen(&mut model, width, height);
         assert!(shown.contains("not answering, retry in 12 s"), "{shown}");
@@ -239,7 +239,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
         .into_iter()
         .filter_map(|effect| match effect {
             Effect::SaveReport { tab, path, bytes } => Some((tab, path, bytes)),
-            Effect::Order(..)
+            Effect::Command(..)
             | Effect::Wish(..)
             | Effect::Query(..)
             | Effect::Drill(_)
@@ -283,7 +283,7 @@ fn typed_bytes_are_told_at_once_and_never_act_as_keys() {
     assert_eq!(type_keys(&mut model, "01 03 03 EA 00 01"), []);
     insta::assert_snapshot!("window_send", screen(&mut model, 80, 24));
     let effects = type_keys(&mut model, "⏎");
-    assert_eq!(order_of(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(with_crc(&[1, 3, 3, 0xEA, 0, 1])))));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(with_crc(&[1, 3, 3, 0xEA, 0, 1])))));
     assert!(matches!(model.modal, Some(Modal::Bus(_))), "the entry stays for the next one");
     type_keys(&mut model, "⎋⏎");
     assert!(screen(&mut model, 80, 24).contains("01 03 03 EA 00 01"), "it is remembered");
@@ -296,9 +296,9 @@ fn bytes_go_out_as_typed_where_no_check_is_wanted() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "Tt⇥01 03 03 EA 00 01 00 00⏎");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("These bytes are no good request: CRC"), "{shown}");
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), None, "a second Enter sends nothing");
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), None, "a second Enter sends nothing");
     let effects = type_keys(&mut model, "y");
-    assert_eq!(order_of(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(vec![1, 3, 3, 0xEA, 0, 1, 0, 0]))));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(vec![1, 3, 3, 0xEA, 0, 1, 0, 0]))));
 }
 
 #[test]
@@ -311,11 +311,11 @@ fn writes_and_broadcasts_are_asked_first() {
     ] {
         let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Tt{typed}"));
         let before = screen(&mut model, 80, 24);
-        assert_eq!(order_of(&type_keys(&mut model, "⏎")), None, "{typed}");
+        assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), None, "{typed}");
         let shown = screen(&mut model, 120, 40).replace("│", " ").split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(shown.contains(words) || before.contains(words), "{words}:\n{before}\n{shown}");
         let effects = type_keys(&mut model, "y");
-        assert_eq!(order_of(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(with_crc(&bytes)))), "{typed}");
+        assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(with_crc(&bytes)))), "{typed}");
     }
 }
 
@@ -327,7 +327,7 @@ fn a_request_is_built_of_fields_with_either_kind_of_address() {
         if matches!(model.modal, Some(Modal::Confirm(_))) {
             effects = type_keys(&mut model, "y");
         }
-        assert_eq!(order_of(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(with_crc(expect)))), "{keys}");
+        assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(with_crc(expect)))), "{keys}");
     };
     let clear = "\u{8}".repeat(6);
     check(&format!("↓↓{clear}41003"), &[1, 3, 3, 0xEA, 0, 1]);
@@ -345,7 +345,7 @@ fn a_closed_line_says_so_instead_of_sending() {
     fixture.line.state = LineState::Disconnected;
     for keys in ["Tt01 03 00 00 00 01⏎", "Tl⏎", "Ti⏎", "Tb⏎", "Ts⏎"] {
         let mut model = bus(&fixture, Theme::FULL, "");
-        assert_eq!(order_of(&type_keys(&mut model, keys)), None, "{keys}");
+        assert_eq!(sent_kind(&type_keys(&mut model, keys)), None, "{keys}");
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains("line L1 is closed: connect it first"), "{keys}:\n{shown}");
     }
@@ -355,10 +355,10 @@ fn a_closed_line_says_so_instead_of_sending() {
 fn a_scan_of_all_settings_is_asked_and_shows_how_far_it_is() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "Ts↓↓→");
     insta::assert_snapshot!("window_scan", screen(&mut model, 80, 24));
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), None);
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), None);
     assert!(screen(&mut model, 80, 24).contains("Polling of L1 pauses while other settings are tried"));
     let effects = type_keys(&mut model, "y");
-    let Some(CommandKind::Test(_, diagnostic @ Diagnostic::Scan(scan))) = order_of(&effects) else {
+    let Some(CommandKind::Test(_, diagnostic @ Diagnostic::Scan(scan))) = sent_kind(&effects) else {
         panic!("{effects:?}")
     };
     assert_eq!((scan.first, scan.last, scan.serials.len()), (1, 247, 32));
@@ -369,7 +369,7 @@ fn a_scan_of_all_settings_is_asked_and_shows_how_far_it_is() {
     fixture.line.test = Some(run(diagnostic.clone(), DiagnosticState::Running, 40, 7_904, vec![found]));
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     insta::assert_snapshot!("scan_at_work", screen(&mut model, 80, 24));
-    assert_eq!(order_of(&type_keys(&mut model, "x")), Some(&CommandKind::StopTest(L1)));
+    assert_eq!(sent_kind(&type_keys(&mut model, "x")), Some(&CommandKind::StopTest(L1)));
 }
 
 #[test]
@@ -430,12 +430,12 @@ fn registers_are_browsed_in_all_four_orders() {
     let mut model = bus(&fixture, Theme::FULL, &format!("Tb↓↓{clear}41003↓{clear}3"));
     let effects = type_keys(&mut model, "⏎");
     let run = read_of_three();
-    assert_eq!(order_of(&effects), Some(&CommandKind::Test(L1, run.diagnostic.clone())));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(L1, run.diagnostic.clone())));
     fixture.line.test = Some(run);
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     insta::assert_snapshot!("window_registers", screen(&mut model, 80, 24));
     let effects = type_keys(&mut model, "↓r");
-    assert!(order_of(&effects).is_some() && matches!(model.modal, Some(Modal::Bus(_))), "read again, still open");
+    assert!(sent_kind(&effects).is_some() && matches!(model.modal, Some(Modal::Bus(_))), "read again, still open");
     let mut refused = (*read_of_three()).clone();
     refused.findings.pop();
     refused.findings.push(Finding::Failed { what: "unit 1".to_owned(), fault: Fault::Exception(ExceptionCode(2)) });

@@ -25,7 +25,7 @@ impl Controllers {
                 let tags = self.table.rows(cx, device.id).into_iter().map(|tag| tag.id).collect();
                 Why::open(Why::new(tags, self.table.selected))
             }
-            Action::Refresh => vec![UiAction::Order(CommandKind::Refresh(device.id))],
+            Action::Refresh => vec![UiAction::Command(CommandKind::Refresh(device.id))],
             Action::Actions => {
                 let actions = Choice::actions(cx, device.id).map(Modal::Choice);
                 let window = actions.map(|list| Notice::unreachable(cx, device.id).map_or(list, Modal::Notice));
@@ -73,7 +73,7 @@ pub(super) fn notice(device: &DeviceDef, words: &str) -> Vec<UiAction> {
 fn connect(cx: &ViewContext, line: LineId) -> Confirm {
     let name = &cx.def().line(line).name;
     if cx.snapshot.line(line).state == LineState::Disconnected {
-        return Confirm::order(
+        return Confirm::command(
             format!("connect {name}"),
             format!("Open line {name} and read its devices again?"),
             CommandKind::Connect(line, true),
@@ -83,5 +83,5 @@ fn connect(cx: &ViewContext, line: LineId) -> Confirm {
         cx.def().devices.iter().filter(|device| device.line == line).map(|device| device.name.as_str()).collect();
     let words =
         format!("Close line {name}? {} will be read no more, and their alarms cannot be seen.", devices.join(", "));
-    Confirm::order(format!("disconnect {name}"), words, CommandKind::Connect(line, false))
+    Confirm::command(format!("disconnect {name}"), words, CommandKind::Connect(line, false))
 }

@@ -47,7 +47,7 @@ pub fn query(
     notes.extend(warnings);
     let title = format!("{from} → {}", device.name);
     let wish = RestoreWish { device: device.id, from, set, changes };
-    Confirm::order(title, query, CommandKind::Restore(Box::new(wish))).with_notes(notes).signed(cx)
+    Confirm::command(title, query, CommandKind::Restore(Box::new(wish))).with_notes(notes).signed(cx)
 }
 
 fn change_words(cx: &ViewContext, change: &Change) -> String {

@@ -152,7 +152,7 @@ impl Compare {
         let step = run.and_then(|run| run.steps.iter().find(|step| Some(step.change.tag) == row.tag));
         let label = row.tag.map_or("no such setting", |tag| cx.def().tag(tag).label.as_str());
         let (note, trouble) = match (step, run) {
-            (Some(step), Some(_)) => match (&step.outcome, step.order) {
+            (Some(step), Some(_)) => match (&step.outcome, step.command) {
                 (Some(outcome), _) => outcome_words(outcome),
                 (None, Some(_)) => ("writing …".to_owned(), false),
                 (None, None) => ("waits".to_owned(), false),

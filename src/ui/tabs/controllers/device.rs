@@ -15,7 +15,7 @@ use crate::{
     },
     ui::{
         ViewContext,
-        chrome::{order_words, outcome_words},
+        chrome::{command_label, outcome_words},
         modal::faceplate::{device_words, retry_words},
         widgets::text::{Canvas, clock, fit_words, width, wrap},
     },
@@ -131,8 +131,9 @@ pub fn signal_mark(signal: Signal) -> String {
 /// The latest write to this device and its outcome, and whether that is a worry.
 fn last_write(cx: &ViewContext, device: DeviceId) -> Option<(String, bool)> {
     let to_device = |tag| cx.def().tag(tag).device == device;
-    let order = cx.snapshot.orders.iter().find(|order| order.kind.written().is_some_and(|(tag, _)| to_device(tag)))?;
-    let (words, trouble) = outcome_words(&order.outcome);
-    let what = order_words(cx, &order.kind, order.old);
-    Some((format!("last: {what}  {words} {} by {}", clock(order.at, &cx.def().time_zone), order.by), trouble))
+    let command =
+        cx.snapshot.commands.iter().find(|command| command.kind.written().is_some_and(|(tag, _)| to_device(tag)))?;
+    let (words, trouble) = outcome_words(&command.outcome);
+    let what = command_label(cx, &command.kind, command.old);
+    Some((format!("last: {what}  {words} {} by {}", clock(command.at, &cx.def().time_zone), command.by), trouble))
 }

@@ -5,10 +5,10 @@ use std::{sync::Arc, time::Duration};
 use jiff::SignedDuration;
 
 use crate::{
-    access::OrderRequest,
+    access::CommandRequest,
     plant::{
         alarm::AlarmState,
-        command::{CommandKind, OrderId, OrderStatus, Outcome, Refusal},
+        command::{CommandId, CommandKind, CommandStatus, Outcome, Refusal},
         def::{ActionDef, AlarmId, DeviceId},
         ne107::Reason,
         parameter_set::StoredSet,
@@ -24,7 +24,7 @@ use crate::{
             self, Fixture,
             controllers::{many, set},
         },
-        tests::{model, order_of, screen, type_keys},
+        tests::{model, screen, sent_kind, type_keys},
         theme::Theme,
         update,
     },
@@ -137,7 +137,7 @@ fn a_tuning_at_work_is_stopped_by_the_key_that_starts_one() {
     fixture.set("TIC-1.AT", 1.0);
     update(&mut stopped, Msg::Snapshot(fixture.snapshot()));
     let effects = type_keys(&mut stopped, "4T⏎");
-    assert_eq!(order_of(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.AT"), value: 0.0 }));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.AT"), value: 0.0 }));
 }
 
 /// A restore of two changes whose first is done.
@@ -146,12 +146,12 @@ fn half_done(fixture: &Fixture, state: State) -> Restore {
     let trusted = |tag: crate::plant::def::TagId| fixture.samples[tag.index()].trusted();
     let changes = crate::plant::parameter_set::plan(&fixture.def, DeviceId(0), &set, &trusted).expect("it fits");
     let wish = RestoreWish { device: DeviceId(0), from: "set winter".into(), set, changes };
-    let id = OrderId { terminal: 1, number: 9 };
+    let id = CommandId { terminal: 1, number: 9 };
     let mut run = Restore::new(id, "anna".into(), &wish, fixture::now());
     run.begin();
-    run.steps[0].order = Some(id);
+    run.steps[0].command = Some(id);
     run.steps[0].outcome = Some(Outcome::Verified);
-    run.steps[1].order = Some(id);
+    run.steps[1].command = Some(id);
     if state == State::Failed {
         run.take(Outcome::Refused(Refusal::NotSent(crate::plant::event::Fault::BackedOff)));
     }
@@ -183,7 +183,7 @@ fn a_restore_of_this_morning_hides_nothing_of_what_the_device_holds_now() {
     let mut run = half_done(&fixture, State::Running);
     let id = run.id;
     for step in &mut run.steps {
-        (step.order, step.outcome) = (Some(id), Some(Outcome::Verified));
+        (step.command, step.outcome) = (Some(id), Some(Outcome::Verified));
     }
     run.state = State::Done;
     // It wrote P 5.0; since then somebody has set it to 7.7 at the panel.
@@ -255,9 +255,9 @@ fn a_restore_asks_what_each_of_its_writes_would_have_asked() {
     }
 }
 
-/// The restore that these keys order.
+/// The restore that these keys command.
 fn restored(model: &mut Model, keys: &str) -> Option<RestoreWish> {
-    match order_of(&type_keys(model, keys)) {
+    match sent_kind(&type_keys(model, keys)) {
         Some(CommandKind::Restore(wish)) => Some((**wish).clone()),
         Some(_) | None => None,
     }
@@ -315,27 +315,27 @@ fn a_name_is_asked_before_a_set_is_saved_and_again_before_one_is_replaced() {
     let saved = |keys: &str| {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, &format!("4⏎sn{keys}"));
-        let orders = effects.into_iter().filter_map(|effect| match effect {
-            Effect::Order(OrderRequest { kind: CommandKind::SaveSet { name, replace, .. }, .. }) => {
+        let commands = effects.into_iter().filter_map(|effect| match effect {
+            Effect::Command(CommandRequest { kind: CommandKind::SaveSet { name, replace, .. }, .. }) => {
                 Some((name.to_string(), replace))
             }
             _ => None,
         });
-        (orders.collect::<Vec<_>>(), screen(&mut model, 80, 24))
+        (commands.collect::<Vec<_>>(), screen(&mut model, 80, 24))
     };
     assert_eq!(saved("autumn⏎").0, [("autumn".to_owned(), false)]);
-    let (orders, shown) = saved("winter⏎");
-    assert_eq!(orders, []);
+    let (commands, shown) = saved("winter⏎");
+    assert_eq!(commands, []);
     for words in
         ["There is a set winter already: of TIC-1, profile fixture, saved", "2026-11-21 14:02 by anna. Replace it?"]
     {
         assert!(shown.contains(words), "{words} in {shown}");
     }
-    let (orders, shown) = saved("summer⏎");
-    assert!(orders.is_empty() && shown.contains("summer.toml already that is no usable set"), "{shown}");
+    let (commands, shown) = saved("summer⏎");
+    assert!(commands.is_empty() && shown.contains("summer.toml already that is no usable set"), "{shown}");
     assert_eq!(saved("winter⏎⏎").0, [("winter".to_owned(), true)]);
-    let (orders, shown) = saved("../x⏎");
-    assert!(orders.is_empty() && shown.contains("no dot at its beginning"), "{shown}");
+    let (commands, shown) = saved("../x⏎");
+    assert!(commands.is_empty() && shown.contains("no dot at its beginning"), "{shown}");
 }
 
 #[test]
@@ -344,7 +344,7 @@ fn a_cell_of_the_program_is_written_and_the_program_commanded() {
     let check = |keys: &str, tag: &str, value: f64| {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, &format!("4g{keys}"));
-        assert_eq!(order_of(&effects), Some(&CommandKind::Write { tag: fixture.tag(tag), value }), "{keys}");
+        assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag(tag), value }), "{keys}");
     };
     check("↓→⏎25⏎", "TIC-1.TM2R", 25.0);
     check("⏎80⏎", "TIC-1.SV-1", 80.0);
@@ -362,10 +362,10 @@ fn a_value_that_another_has_changed_meanwhile_is_asked_again() {
     let mut later = fixture.clone();
     later.set("TIC-1.P", 3.0);
     let mut snapshot = later.snapshot();
-    Arc::make_mut(&mut snapshot).orders = vec![OrderStatus {
+    Arc::make_mut(&mut snapshot).commands = vec![CommandStatus {
         from: "".into(),
         note: None,
-        id: OrderId { terminal: 2, number: 1 },
+        id: CommandId { terminal: 2, number: 1 },
         by: "boris".into(),
         kind: CommandKind::Write { tag: fixture.tag("TIC-1.P"), value: 3.0 },
         at: fixture::now(),
@@ -374,11 +374,11 @@ fn a_value_that_another_has_changed_meanwhile_is_asked_again() {
         recorded: true,
     }];
     update(&mut model, Msg::Snapshot(snapshot));
-    assert_eq!(order_of(&type_keys(&mut model, "⏎")), None);
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), None);
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("changed to 3.0 % by boris 14:02:31 (was 1.2)"), "{shown}");
     let effects = type_keys(&mut model, "⏎");
-    assert_eq!(order_of(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.P"), value: 7.5 }));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.P"), value: 7.5 }));
 }
 
 #[test]

@@ -85,11 +85,11 @@ fn with(fixture: &Fixture, status: Status, theme: Theme) -> Model {
 }
 
 fn press(model: &mut Model, keys: &str) -> Vec<SimCommand> {
-    let order = |effect| match effect {
+    let command = |effect| match effect {
         Effect::Drill(command) => Some(command),
         _ => None,
     };
-    type_keys(model, keys).into_iter().filter_map(order).collect()
+    type_keys(model, keys).into_iter().filter_map(command).collect()
 }
 
 #[test]
@@ -113,12 +113,12 @@ fn devices_that_do_not_answer_are_asked_at_once_when_their_faults_are_cleared() 
     fixture.devices[0].state = DeviceState::Down { since: fixture::now() };
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
     let retried = |effects: Vec<Effect>| -> Vec<DeviceId> {
-        let order = |effect| match effect {
-            Effect::Order(request) => Some(request.kind),
+        let command = |effect| match effect {
+            Effect::Command(request) => Some(request.kind),
             _ => None,
         };
         let refreshed = |kind| if let CommandKind::Refresh(device) = kind { Some(device) } else { None };
-        effects.into_iter().filter_map(order).filter_map(refreshed).collect()
+        effects.into_iter().filter_map(command).filter_map(refreshed).collect()
     };
     assert_eq!(retried(type_keys(&mut model, "c")), [DeviceId(0)]);
     assert_eq!(retried(type_keys(&mut model, "↓⏎")), [DeviceId(0)], "also when one fault is cleared");

@@ -48,7 +48,7 @@ impl Stand {
                     self.send(Msg::Granted(id, self.granted.clone()));
                 }
                 Effect::Query(..)
-                | Effect::Order(..)
+                | Effect::Command(..)
                 | Effect::Wish(..)
                 | Effect::Drill(_)
                 | Effect::Bell

@@ -1,4 +1,4 @@
-//! Orders of operators: checked, sent on, followed to their outcome and put on record.
+//! Commands of operators: checked, sent on, followed to their outcome and put on record.
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
@@ -6,12 +6,12 @@ use jiff::Timestamp;
 
 use super::{
     alarm::{AlarmCommand, manager::subject_name},
-    command::{BusRequest, CommandKind, NotConfirmed, Order, OrderId, OrderStatus, Outcome, Refusal, WriteId},
+    command::{BusRequest, Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal, WriteId},
     def::{AlarmId, LineId, PlantDef, TagId},
     event::{Fault, WriteResult},
     interlock,
     process_image::ProcessImage,
-    record::{ActionRecord, ORDER},
+    record::{ActionRecord, WRITE_REQUESTED},
     scale,
     tag::TagDef,
 };
@@ -21,7 +21,7 @@ pub const HAND_OVER: &str = "hand over";
 /// The word on record for a plant that was taken over from the shift before.
 pub const TAKE_OVER: &str = "take over";
 
-/// Orders that a snapshot shows.
+/// Commands that a snapshot shows.
 const SHOWN: usize = 32;
 /// A write that has heard nothing for so long is given up: it may or may not have taken effect.
 const PENDING_MAX: Duration = Duration::from_secs(120);
@@ -33,83 +33,83 @@ struct Checked {
     urgent: bool,
 }
 
-/// The desk where orders lie until their outcome is known.
+/// The desk where commands lie until their outcome is known.
 #[derive(Debug, Clone)]
 pub struct Desk {
     def: Arc<PlantDef>,
     /// Newest first.
-    orders: VecDeque<OrderStatus>,
-    /// Writes under way: id on the bus, order, tag, raw number sent.
-    writes: Vec<(WriteId, OrderId, TagId, f64)>,
+    commands: VecDeque<CommandStatus>,
+    /// Writes under way: id on the bus, command, tag, raw number sent.
+    writes: Vec<(WriteId, CommandId, TagId, f64)>,
     last_write: u64,
 }
 
 impl Desk {
-    /// Nothing ordered yet.
+    /// No command yet.
     pub fn new(def: Arc<PlantDef>) -> Desk {
-        Desk { def, orders: VecDeque::new(), writes: Vec::new(), last_write: 0 }
+        Desk { def, commands: VecDeque::new(), writes: Vec::new(), last_write: 0 }
     }
 
-    /// The latest orders, newest first.
-    pub fn orders(&self) -> impl Iterator<Item = &OrderStatus> {
-        self.orders.iter()
+    /// The latest commands, newest first.
+    pub fn commands(&self) -> impl Iterator<Item = &CommandStatus> {
+        self.commands.iter()
     }
 
     /// The same, for a snapshot.
-    pub fn shown(&self) -> Vec<OrderStatus> {
-        self.orders.iter().cloned().collect()
+    pub fn shown(&self) -> Vec<CommandStatus> {
+        self.commands.iter().cloned().collect()
     }
 
-    /// Checks a write. `Ok` is the request for the bus; an order that needs none, or may not be, is closed at once.
+    /// Checks a write. `Ok` is the request for the bus; a command that needs none, or may not be, is closed at once.
     pub fn write(
         &mut self,
         image: &ProcessImage,
-        order: &Order,
+        command: &Command,
         tag: TagId,
         value: f64,
         at: Timestamp,
     ) -> Result<BusRequest, Option<Box<ActionRecord>>> {
         let old = image.sample(tag).value;
         let checked = self.check(image, tag, value);
-        let checked = checked.and_then(|checked| self.not_overtaken(image, order, tag, checked));
+        let checked = checked.and_then(|checked| self.not_overtaken(image, command, tag, checked));
         // What is shown and recorded is what the device will hold, not what was typed.
         let def = self.def.tag(tag);
         let held = image.scaling_decimals(def).and_then(|decimals| scale::held(def, value, decimals));
         let kind = CommandKind::Write { tag, value: held.unwrap_or(value) };
-        self.open(&Order { kind, ..order.clone() }, old, at);
+        self.open(&Command { kind, ..command.clone() }, old, at);
         match checked {
-            Err(outcome) => Err(self.close(order.id, outcome, image).map(Box::new)),
+            Err(outcome) => Err(self.close(command.id, outcome, image).map(Box::new)),
             Ok(Checked { raw, unlock, urgent }) => {
                 self.last_write += 1;
                 let id = WriteId(self.last_write);
-                self.writes.push((id, order.id, tag, raw));
+                self.writes.push((id, command.id, tag, raw));
                 let verify = self.def.tag(tag).access != super::tag::Access::Write;
                 Ok(BusRequest::Write { id, tag, raw, unlock, verify, urgent })
             }
         }
     }
 
-    /// Takes an order whose outcome somebody else will tell.
-    pub fn take(&mut self, order: &Order, at: Timestamp) {
-        self.open(order, None, at);
+    /// Takes a command whose outcome somebody else will tell.
+    pub fn take(&mut self, command: &Command, at: Timestamp) {
+        self.open(command, None, at);
     }
 
-    /// An order has come to its end.
-    pub fn end(&mut self, id: OrderId, outcome: Outcome, image: &ProcessImage) -> Option<ActionRecord> {
+    /// A command has come to its end.
+    pub fn end(&mut self, id: CommandId, outcome: Outcome, image: &ProcessImage) -> Option<ActionRecord> {
         self.close(id, outcome, image)
     }
 
-    /// A line is open (or trying to be) or closed: orders that wished so are done.
+    /// A line is open (or trying to be) or closed: commands that wished so are done.
     pub fn connected(&mut self, line: LineId, open: bool, image: &ProcessImage) -> Option<ActionRecord> {
         let wished = CommandKind::Connect(line, open);
-        let waits = |status: &&OrderStatus| status.kind == wished && status.outcome == Outcome::Pending;
-        let id = self.orders.iter().find(waits)?.id;
+        let waits = |status: &&CommandStatus| status.kind == wished && status.outcome == Outcome::Pending;
+        let id = self.commands.iter().find(waits)?.id;
         self.close(id, Outcome::Verified, image)
     }
 
-    /// How an order stands, unless it is forgotten.
-    pub fn outcome_of(&self, id: OrderId) -> Option<&Outcome> {
-        self.orders.iter().find(|status| status.id == id).map(|status| &status.outcome)
+    /// How a command stands, unless it is forgotten.
+    pub fn outcome_of(&self, id: CommandId) -> Option<&Outcome> {
+        self.commands.iter().find(|status| status.id == id).map(|status| &status.outcome)
     }
 
     /// The tag that a write under way writes.
@@ -117,16 +117,16 @@ impl Desk {
         self.writes.iter().find(|write| write.0 == id).map(|write| write.2)
     }
 
-    /// Takes an order that needs nothing but to be on record.
+    /// Takes a command that needs nothing but to be on record.
     pub fn note(
         &mut self,
-        order: &Order,
+        command: &Command,
         outcome: Outcome,
         image: &ProcessImage,
         at: Timestamp,
     ) -> Option<ActionRecord> {
-        self.open(order, None, at);
-        self.close(order.id, outcome, image)
+        self.open(command, None, at);
+        self.close(command.id, outcome, image)
     }
 
     /// The key that a write needs was sent before it, which is an action of its own.
@@ -138,8 +138,8 @@ impl Desk {
         image: &ProcessImage,
         at: Timestamp,
     ) -> Option<ActionRecord> {
-        let (_, order, tag, _) = self.writes.iter().find(|write| write.0 == id)?;
-        let status = self.orders.iter().find(|status| status.id == *order)?;
+        let (_, command, tag, _) = self.writes.iter().find(|write| write.0 == id)?;
+        let status = self.commands.iter().find(|status| status.id == *command)?;
         let (key, tag) = (self.def.tag(key), self.def.tag(*tag));
         let outcome = match result {
             WriteResult::Refused(code) => Outcome::Refused(Refusal::Exception(*code)),
@@ -167,7 +167,7 @@ impl Desk {
     /// A write came to its end on the wire.
     pub fn wrote(&mut self, id: WriteId, result: WriteResult, image: &ProcessImage) -> Option<ActionRecord> {
         let index = self.writes.iter().position(|write| write.0 == id)?;
-        let (_, order, tag, raw) = self.writes.swap_remove(index);
+        let (_, command, tag, raw) = self.writes.swap_remove(index);
         let def = self.def.tag(tag);
         let value = |back| scale::to_value(def, back, image.scaling_decimals(def).unwrap_or(0));
         let outcome = match result {
@@ -183,7 +183,7 @@ impl Desk {
             WriteResult::NotSent(fault) => Outcome::Refused(Refusal::NotSent(fault)),
             WriteResult::Overtaken => Outcome::Refused(Refusal::Overtaken),
         };
-        self.close(order, outcome, image)
+        self.close(command, outcome, image)
     }
 
     /// A line has taken a request: what asks for no answer is done.
@@ -192,15 +192,15 @@ impl Desk {
         self.close(id, Outcome::Verified, image)
     }
 
-    /// The order under way behind a request to a line that asks for no answer.
-    fn of_line(&self, line: LineId, request: &BusRequest) -> Option<OrderId> {
-        let asks = |status: &&OrderStatus| match (request, &status.kind) {
+    /// The command under way behind a request to a line that asks for no answer.
+    fn of_line(&self, line: LineId, request: &BusRequest) -> Option<CommandId> {
+        let asks = |status: &&CommandStatus| match (request, &status.kind) {
             (BusRequest::Test { id, .. }, _) => status.id == *id,
             (BusRequest::Configure(wished), CommandKind::Configure(settings)) => wished == settings,
             (BusRequest::StopTest, CommandKind::StopTest(tested)) => *tested == line,
             _ => false,
         };
-        let mut under_way = self.orders.iter().filter(|status| status.outcome == Outcome::Pending);
+        let mut under_way = self.commands.iter().filter(|status| status.outcome == Outcome::Pending);
         under_way.find(asks).map(|status| status.id)
     }
 
@@ -210,18 +210,18 @@ impl Desk {
         match request {
             BusRequest::Write { id, .. } => {
                 let index = self.writes.iter().position(|write| write.0 == *id)?;
-                let (_, order, ..) = self.writes.swap_remove(index);
-                self.close(order, busy, image)
+                let (_, command, ..) = self.writes.swap_remove(index);
+                self.close(command, busy, image)
             }
             BusRequest::Connect(open) => {
                 let wished = CommandKind::Connect(line, *open);
-                let id = self.orders.iter().find(|status| status.kind == wished)?.id;
+                let id = self.commands.iter().find(|status| status.kind == wished)?.id;
                 self.close(id, busy, image)
             }
-            // One that nobody ordered is nobody's: the device is read again in its turn.
-            BusRequest::Refresh { order, .. } => {
-                let order = (*order)?;
-                self.orders.iter_mut().find(|status| status.id == order)?.outcome = busy;
+            // One that nobody requested is nobody's: the device is read again in its turn.
+            BusRequest::Refresh { command, .. } => {
+                let command = (*command)?;
+                self.commands.iter_mut().find(|status| status.id == command)?.outcome = busy;
                 None
             }
             BusRequest::Configure(_) | BusRequest::Test { .. } | BusRequest::StopTest => {
@@ -231,20 +231,20 @@ impl Desk {
         }
     }
 
-    /// Gives up orders that nobody has answered for. The bus waits in real time, so `speed` is plant seconds per real one.
+    /// Gives up commands that nobody has answered for. The bus waits in real time, so `speed` is plant seconds per real one.
     pub fn expire(&mut self, at: Timestamp, speed: f64, image: &ProcessImage) -> Vec<ActionRecord> {
-        let late = |status: &OrderStatus| {
+        let late = |status: &CommandStatus| {
             status.outcome == Outcome::Pending
                 // Its writes are given up one by one.
                 && !matches!(status.kind, CommandKind::Restore(_))
                 && PENDING_MAX.mul_f64(speed) < Duration::try_from(at.duration_since(status.at)).unwrap_or_default()
         };
-        let outcome = |status: &OrderStatus| match status.kind.written() {
+        let outcome = |status: &CommandStatus| match status.kind.written() {
             Some(_) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)),
             None => Outcome::Failed(Fault::Timeout),
         };
-        let late = self.orders.iter().filter(|status| late(status)).map(|status| (status.id, outcome(status)));
-        let late: Vec<(OrderId, Outcome)> = late.collect();
+        let late = self.commands.iter().filter(|status| late(status)).map(|status| (status.id, outcome(status)));
+        let late: Vec<(CommandId, Outcome)> = late.collect();
         self.writes.retain(|write| late.iter().all(|(id, _)| *id != write.1));
         late.into_iter().filter_map(|(id, outcome)| self.close(id, outcome, image)).collect()
     }
@@ -252,8 +252,8 @@ impl Desk {
     /// The station ends: nobody can answer for what is still under way.
     pub fn stop(&mut self, image: &ProcessImage) -> Vec<ActionRecord> {
         self.writes.clear();
-        let pending = self.orders.iter().rev().filter(|status| status.outcome == Outcome::Pending);
-        let ids: Vec<OrderId> = pending.map(|status| status.id).collect();
+        let pending = self.commands.iter().rev().filter(|status| status.outcome == Outcome::Pending);
+        let ids: Vec<CommandId> = pending.map(|status| status.id).collect();
         let stopped = || Outcome::NotConfirmed(NotConfirmed::StationStopped);
         ids.into_iter().filter_map(|id| self.close(id, stopped(), image)).collect()
     }
@@ -261,16 +261,20 @@ impl Desk {
     /// The record that a write is about to be sent: whatever ends the station then, it was tried.
     pub fn intent(&self, request: &BusRequest, image: &ProcessImage) -> Option<ActionRecord> {
         let BusRequest::Write { id, .. } = request else { return None };
-        let order = self.writes.iter().find(|write| write.0 == *id)?.1;
-        let status = self.orders.iter().find(|status| status.id == order)?;
-        Some(ActionRecord { action: ORDER.into(), outcome: "ordered".into(), ..record(&self.def, status, image) })
+        let command = self.writes.iter().find(|write| write.0 == *id)?.1;
+        let status = self.commands.iter().find(|status| status.id == command)?;
+        Some(ActionRecord {
+            action: WRITE_REQUESTED.into(),
+            outcome: outcome_word(&Outcome::Pending).into(),
+            ..record(&self.def, status, image)
+        })
     }
 
     /// Refuses a write over a value that its operator has not seen. A stop is right whatever stood there.
     fn not_overtaken(
         &self,
         image: &ProcessImage,
-        order: &Order,
+        command: &Command,
         tag: TagId,
         checked: Checked,
     ) -> Result<Checked, Outcome> {
@@ -279,7 +283,7 @@ impl Desk {
         let Some((raw, decimals)) = now else { return Ok(checked) };
         let now = scale::to_value(def, raw, decimals);
         let same_raw = |seen| scale::to_raw(def, seen, decimals).is_some_and(|seen| scale::same_raw(def, seen, raw));
-        match order.seen {
+        match command.seen {
             Some(seen) if same_raw(seen) => Ok(checked),
             Some(_) => Err(Outcome::Refused(Refusal::ChangedTo(value_words(image, def, now)))),
             None => Err(Outcome::Refused(Refusal::NotSeen(value_words(image, def, now)))),
@@ -338,27 +342,29 @@ impl Desk {
         Ok(Checked { raw, unlock, urgent })
     }
 
-    fn open(&mut self, order: &Order, old: Option<f64>, at: Timestamp) {
-        self.orders.push_front(OrderStatus {
-            id: order.id,
-            by: order.by.clone(),
-            from: order.from.clone(),
-            note: order.note.clone(),
-            kind: order.kind.clone(),
+    fn open(&mut self, command: &Command, old: Option<f64>, at: Timestamp) {
+        self.commands.push_front(CommandStatus {
+            id: command.id,
+            by: command.by.clone(),
+            from: command.from.clone(),
+            note: command.note.clone(),
+            kind: command.kind.clone(),
             at,
             old,
             outcome: Outcome::Pending,
             recorded: true,
         });
-        // An order under way is never forgotten, however many come after it.
-        while SHOWN < self.orders.len() {
-            let Some(index) = self.orders.iter().rposition(|status| status.outcome != Outcome::Pending) else { break };
-            self.orders.remove(index);
+        // A command under way is never forgotten, however many come after it.
+        while SHOWN < self.commands.len() {
+            let Some(index) = self.commands.iter().rposition(|status| status.outcome != Outcome::Pending) else {
+                break;
+            };
+            self.commands.remove(index);
         }
     }
 
-    fn close(&mut self, id: OrderId, outcome: Outcome, image: &ProcessImage) -> Option<ActionRecord> {
-        let status = self.orders.iter_mut().find(|status| status.id == id && status.outcome == Outcome::Pending)?;
+    fn close(&mut self, id: CommandId, outcome: Outcome, image: &ProcessImage) -> Option<ActionRecord> {
+        let status = self.commands.iter_mut().find(|status| status.id == id && status.outcome == Outcome::Pending)?;
         status.outcome = outcome;
         Some(record(&self.def, status, image))
     }
@@ -388,7 +394,7 @@ pub fn outcome_word(outcome: &Outcome) -> &'static str {
     }
 }
 
-fn record(def: &PlantDef, status: &OrderStatus, image: &ProcessImage) -> ActionRecord {
+fn record(def: &PlantDef, status: &CommandStatus, image: &ProcessImage) -> ActionRecord {
     let (action, target, new): (&str, String, Option<String>) = match &status.kind {
         CommandKind::Write { tag, value } => {
             let tag = def.tag(*tag);

@@ -1,10 +1,10 @@
-//! What becomes of orders that do not reach the plant: whoever gave them is told.
+//! What becomes of commands that do not reach the plant: whoever gave them is told.
 
 use super::*;
 use crate::plant::def::ActionDef;
 
 impl Bench {
-    /// The orders of a terminal that did not reach the plant, and why.
+    /// The commands of a terminal that did not reach the plant, and why.
     fn undelivered(&self, terminal: u32) -> Vec<(u32, String)> {
         let told = self.access.standing(terminal, self.now).undelivered;
         told.iter().map(|(id, why)| (id.number, why.to_string())).collect()
@@ -12,38 +12,38 @@ impl Bench {
 }
 
 #[test]
-fn an_order_with_the_number_of_an_earlier_one_is_not_carried_out_and_its_terminal_is_told() {
+fn a_command_with_a_used_number_is_reported_undelivered() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "a");
     bench.login(1, "boss", BOSS).unwrap();
-    bench.last_order = 6;
-    assert_eq!(bench.order(1, RUN, None).unwrap().1, None);
+    bench.last_command = 6;
+    assert_eq!(bench.send_command(1, RUN, None).unwrap().1, None);
     for last in [6, 3] {
-        bench.last_order = last;
-        assert!(bench.order(1, RUN, None).is_none(), "number {} came after 7", last + 1);
+        bench.last_command = last;
+        assert!(bench.send_command(1, RUN, None).is_none(), "number {} came after 7", last + 1);
     }
     let told = bench.undelivered(1);
     assert_eq!(told.iter().map(|(number, _)| *number).collect::<Vec<_>>(), [7, 4]);
     assert!(told[0].1.contains("number of an earlier one"));
     bench.open(2, "b");
     bench.login(2, "boss", BOSS).unwrap();
-    bench.last_order = 6;
-    assert_eq!(bench.order(2, RUN, None).unwrap().1, None, "each terminal counts for itself");
+    bench.last_command = 6;
+    assert_eq!(bench.send_command(2, RUN, None).unwrap().1, None, "each terminal counts for itself");
 }
 
 #[test]
-fn every_order_of_a_terminal_that_asks_too_fast_reaches_the_plant_or_is_told_to_it() {
+fn a_command_over_the_rate_limit_is_reported_to_its_terminal() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "a");
     // Nobody is logged in: 20 refusals, the coming among them, are on record, the next ones are only told, and from the 41st
     // request on it is too many.
-    let reached = (0..60).filter(|_| bench.order(1, RUN, None).is_some()).count();
+    let reached = (0..60).filter(|_| bench.send_command(1, RUN, None).is_some()).count();
     let told = bench.undelivered(1);
     assert_eq!((reached, told.len()), (19, 41));
     assert_eq!(told[0], (20, "log in first".to_owned()));
     assert_eq!(told[40], (60, TOO_MANY.to_owned()));
     for _ in 0..1_000 {
-        bench.order(1, RUN, None);
+        bench.send_command(1, RUN, None);
     }
     assert_eq!(bench.undelivered(1).len(), 64, "only the latest are remembered");
 }
@@ -60,9 +60,9 @@ fn a_stop_is_never_one_request_too_many() {
     bench.open(1, "a");
     bench.login(1, "tech", TECH).unwrap();
     for _ in 0..100 {
-        bench.order(1, RUN, None);
+        bench.send_command(1, RUN, None);
     }
-    assert!(bench.order(1, RUN, None).is_none());
+    assert!(bench.send_command(1, RUN, None).is_none());
     let off = CommandKind::Write { tag: fixture::RUN, value: 0.0 };
-    assert_eq!(bench.order(1, off, None).unwrap().1, None);
+    assert_eq!(bench.send_command(1, off, None).unwrap().1, None);
 }
