@@ -33,9 +33,9 @@ struct Checked {
     urgent: bool,
 }
 
-/// The desk where commands lie until their outcome is known.
+/// Tracks commands from request to outcome.
 #[derive(Debug, Clone)]
-pub struct Desk {
+pub struct CommandTracker {
     def: Arc<PlantDef>,
     /// Newest first.
     commands: VecDeque<CommandStatus>,
@@ -44,10 +44,10 @@ pub struct Desk {
     last_write: u64,
 }
 
-impl Desk {
+impl CommandTracker {
     /// No command yet.
-    pub fn new(def: Arc<PlantDef>) -> Desk {
-        Desk { def, commands: VecDeque::new(), writes: Vec::new(), last_write: 0 }
+    pub fn new(def: Arc<PlantDef>) -> CommandTracker {
+        CommandTracker { def, commands: VecDeque::new(), writes: Vec::new(), last_write: 0 }
     }
 
     /// The latest commands, newest first.

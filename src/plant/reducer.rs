@@ -16,7 +16,7 @@ use jiff::{SignedDuration, Timestamp};
 use super::{
     alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_words},
     command::{BusRequest, Command, CommandId, CommandKind, Outcome, Refusal, WriteId},
-    commands::Desk,
+    commands::CommandTracker,
     def::{DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
     interlock::ActuatorTracker,
@@ -60,7 +60,7 @@ pub struct Plant {
     /// Counts the steps of alarms; `alarm_metrics` are its latest.
     alarm_monitor: AlarmMonitor,
     alarm_metrics: AlarmMetrics,
-    desk: Desk,
+    commands: CommandTracker,
     watch: ActuatorTracker,
     lines: Vec<LineStatus>,
     /// Earlier reports, by [`LineId`].
@@ -90,7 +90,7 @@ impl Plant {
             alarm_manager: AlarmManager::new(def.clone()),
             alarm_monitor: AlarmMonitor::running(at),
             alarm_metrics: AlarmMetrics::default(),
-            desk: Desk::new(def.clone()),
+            commands: CommandTracker::new(def.clone()),
             watch: ActuatorTracker::default(),
             lines: vec![LineStatus::default(); def.lines.len()],
             watches: vec![LineWatch::default(); def.lines.len()],
@@ -154,7 +154,7 @@ impl Plant {
                 if !matches!(result, WriteResult::Refused(_)) {
                     self.image.failed(&[key], Fault::Timeout, at);
                 }
-                (at, self.desk.unlocked(id, key, &result, &self.image, at))
+                (at, self.commands.unlocked(id, key, &result, &self.image, at))
             }
             Event::Wrote { at, id, result } => (at, self.wrote(id, result, at)),
         };
@@ -169,13 +169,13 @@ impl Plant {
     pub fn on_command(&mut self, command: Command, at: Timestamp) -> Effects {
         let mut effects = Effects::default();
         if let Some(why) = &command.refused {
-            let action = self.desk.note(&command, Outcome::Refused(why.clone()), &self.image, at);
+            let action = self.commands.note(&command, Outcome::Refused(why.clone()), &self.image, at);
             effects.records.extend(action.map(Record::Action));
             self.at = self.at.max(at);
             return effects;
         }
         let action = match command.kind.clone() {
-            CommandKind::Write { tag, value } => match self.desk.write(&self.image, &command, tag, value, at) {
+            CommandKind::Write { tag, value } => match self.commands.write(&self.image, &command, tag, value, at) {
                 Ok(request) => {
                     effects.bus.push((self.line_of(tag), request));
                     None
@@ -188,15 +188,15 @@ impl Plant {
                     .bus
                     .push((self.def.device(device).line, BusRequest::Refresh { device, command: Some(command.id) }));
                 // A read is not an operator action: it is shown, but not recorded.
-                let _ = self.desk.note(&command, Outcome::Verified, &self.image, at);
+                let _ = self.commands.note(&command, Outcome::Verified, &self.image, at);
                 None
             }
             CommandKind::Connect(line, open) => {
                 let is_open = self.lines[line.index()].state != LineState::Disconnected;
                 if is_open == open {
-                    self.desk.note(&command, Outcome::Unchanged, &self.image, at)
+                    self.commands.note(&command, Outcome::Unchanged, &self.image, at)
                 } else {
-                    self.desk.take(&command, at);
+                    self.commands.take(&command, at);
                     effects.bus.push((line, BusRequest::Connect(open)));
                     None
                 }
@@ -214,7 +214,7 @@ impl Plant {
                     Ok(()) => Outcome::Verified,
                     Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),
                 };
-                self.desk.note(&command, outcome, &self.image, at)
+                self.commands.note(&command, outcome, &self.image, at)
             }
         };
         effects.records.extend(action.map(Record::Action));
@@ -226,18 +226,18 @@ impl Plant {
 
     /// A line has taken a request.
     pub fn on_delivered(&mut self, line: LineId, request: &BusRequest) -> Effects {
-        let action = self.desk.delivered(line, request, &self.image);
+        let action = self.commands.delivered(line, request, &self.image);
         Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
     }
 
     /// The record that a write is about to be sent; none for other requests.
     pub fn intent(&self, request: &BusRequest) -> Option<ActionRecord> {
-        self.desk.intent(request, &self.image)
+        self.commands.intent(request, &self.image)
     }
 
     /// The station ends, and with it all that is under way.
     pub fn on_stop(&mut self) -> Effects {
-        let ended = self.desk.stop(&self.image);
+        let ended = self.commands.stop(&self.image);
         Effects { records: ended.into_iter().map(Record::Action).collect(), ..Effects::default() }
     }
 
@@ -245,7 +245,7 @@ impl Plant {
     pub fn on_undeliverable(&mut self, line: LineId, request: &BusRequest) -> Effects {
         let action = match self.restore_not_read(request) {
             true => None,
-            false => self.desk.undeliverable(line, request, &self.image),
+            false => self.commands.undeliverable(line, request, &self.image),
         };
         let mut effects = Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() };
         self.carry_on(self.at, &mut effects);
@@ -256,7 +256,7 @@ impl Plant {
     pub fn on_tick(&mut self, at: Timestamp) -> Effects {
         self.image.age(at);
         self.faults.tick();
-        let expired = self.desk.expire(at, self.speed, &self.image);
+        let expired = self.commands.expire(at, self.speed, &self.image);
         let minutes = self.minutes(at);
         let mut effects = self.settle(at);
         effects.records.extend(minutes);
@@ -284,7 +284,7 @@ impl Plant {
             aside: lists.aside.clone(),
             sound: lists.sound,
             alarm_metrics: self.alarm_metrics.clone(),
-            commands: self.desk.shown(),
+            commands: self.commands.shown(),
             watch: self.watch.clone(),
             history: self.history.clone(),
             station: self.faults.details().clone(),
@@ -312,7 +312,7 @@ impl Plant {
     /// A write ended. Unless it was read back or certainly had no effect, the value held until now is in doubt.
     fn wrote(&mut self, id: WriteId, result: WriteResult, at: Timestamp) -> Option<ActionRecord> {
         let in_doubt = match &result {
-            WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => self.desk.tag_of(id),
+            WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => self.commands.tag_of(id),
             WriteResult::ReadBack(_)
             | WriteResult::Held(_)
             | WriteResult::Refused(_)
@@ -322,7 +322,7 @@ impl Plant {
         if let Some(tag) = in_doubt {
             self.image.failed(&[tag], Fault::Timeout, at);
         }
-        self.desk.wrote(id, result, &self.image)
+        self.commands.wrote(id, result, &self.image)
     }
 
     fn failed(&mut self, device: DeviceId, tags: &[TagId], fault: Fault, at: Timestamp) {
@@ -386,7 +386,7 @@ impl Plant {
             LineState::Connecting | LineState::Connected => None,
         };
         self.lines[line.index()].state = state;
-        let action = self.desk.connected(line, open, &self.image);
+        let action = self.commands.connected(line, open, &self.image);
         let Some(device_state) = gone else { return action };
         for device in self.def.devices.iter().filter(|device| device.line == line) {
             let status = &mut self.devices[device.id.index()];

@@ -201,9 +201,9 @@ fn assemble(
     let first = plant.snapshot();
     let run = first.run;
     let (publish, snapshots) = watch::channel(Arc::new(first));
-    let desk = PlantTask::new(plant, clock, links, file, keeping, publish);
+    let plant_task = PlantTask::new(plant, clock, links, file, keeping, publish);
     let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
-    tasks.push(tokio::spawn(desk.run(event_queue, command_queue, audit_messages)));
+    tasks.push(tokio::spawn(plant_task.run(event_queue, command_queue, audit_messages)));
     let (lifecycle_sender, lifecycle) = mpsc::channel(session_server::LIFECYCLE_REQUESTS_MAX);
     let outputs = Outputs { commands: commands.clone(), queries, audit, lifecycle: lifecycle_sender };
     let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);

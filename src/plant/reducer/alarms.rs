@@ -40,7 +40,7 @@ impl Plant {
                 let each = seen.iter().map(|(alarm, seen)| manager.acknowledge(*alarm, *seen, note, now, by));
                 let (steps, outcome) = together(each);
                 effects.records.extend(steps.into_iter().map(Record::Alarm));
-                return self.desk.note(command, outcome, &self.image, at);
+                return self.commands.note(command, outcome, &self.image, at);
             }
             AlarmCommand::Silence => match manager.silence() {
                 true => Ok(Vec::new()),
@@ -61,7 +61,7 @@ impl Plant {
             }
             Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),
         };
-        self.desk.note(command, outcome, &self.image, at)
+        self.commands.note(command, outcome, &self.image, at)
     }
 
     /// Judges every alarm now.

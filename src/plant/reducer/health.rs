@@ -61,7 +61,7 @@ impl Plant {
     /// Is a device left alone because an action takes it some time (saving its settings)?
     fn settling(&self, device: DeviceId) -> bool {
         let actions = &self.def.device(device).actions;
-        self.desk.commands().any(|command| match (&command.kind, &command.outcome) {
+        self.commands.commands().any(|command| match (&command.kind, &command.outcome) {
             (CommandKind::Write { tag, value }, Outcome::Verified | Outcome::NotConfirmed(_) | Outcome::Failed(_)) => {
                 let age = Duration::try_from(self.at.duration_since(command.at)).unwrap_or_default();
                 actions.iter().any(|action| action.tag == *tag && action.value == *value && age < action.settle)

@@ -48,7 +48,7 @@ impl Plant {
             CommandKind::ReadSets => {
                 effects.sets = Some(SetWork::Read);
                 // A read is not an operator action.
-                let _ = self.desk.note(command, Outcome::Verified, &self.image, at);
+                let _ = self.commands.note(command, Outcome::Verified, &self.image, at);
                 None
             }
             CommandKind::SaveSet { device, name, replace } => {
@@ -60,9 +60,9 @@ impl Plant {
                     Ok(()) => None,
                 };
                 if let Some(why) = problem {
-                    return self.desk.note(command, Outcome::Refused(Refusal::NotSaved(why)), &self.image, at);
+                    return self.commands.note(command, Outcome::Refused(Refusal::NotSaved(why)), &self.image, at);
                 }
-                self.desk.take(command, at);
+                self.commands.take(command, at);
                 effects.sets = Some(SetWork::Write { command: command.id, set: Box::new(set), replace: *replace });
                 None
             }
@@ -76,7 +76,7 @@ impl Plant {
                     }
                     None => Outcome::Unchanged,
                 };
-                self.desk.note(command, outcome, &self.image, at)
+                self.commands.note(command, outcome, &self.image, at)
             }
             _ => None,
         }
@@ -93,7 +93,7 @@ impl Plant {
             Ok(()) => Outcome::Verified,
             Err(why) => Outcome::Refused(Refusal::NotSaved(why)),
         };
-        let action = self.desk.end(command, outcome, &self.image);
+        let action = self.commands.end(command, outcome, &self.image);
         Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
     }
 
@@ -106,15 +106,15 @@ impl Plant {
         effects: &mut Effects,
     ) -> Option<ActionRecord> {
         if self.restores.iter().any(|run| run.device == wish.device && run.at_work()) {
-            return self.desk.note(command, Outcome::Refused(Refusal::UnderWay), &self.image, at);
+            return self.commands.note(command, Outcome::Refused(Refusal::UnderWay), &self.image, at);
         }
         if let Some(why) = self.unlike(wish.device, &wish.set, &wish.changes) {
-            return self.desk.note(command, Outcome::Refused(why), &self.image, at);
+            return self.commands.note(command, Outcome::Refused(why), &self.image, at);
         }
         if wish.changes.is_empty() {
-            return self.desk.note(command, Outcome::Unchanged, &self.image, at);
+            return self.commands.note(command, Outcome::Unchanged, &self.image, at);
         }
-        self.desk.take(command, at);
+        self.commands.take(command, at);
         self.restores.retain(|run| run.device != wish.device);
         self.restores.push(Arc::new(Restore::new(command.id, command.by.clone(), wish, at)));
         let look = BusRequest::Refresh { device: wish.device, command: Some(command.id) };
@@ -156,7 +156,7 @@ impl Plant {
     /// Lets every restore go on that nobody was told the end of: takes the end of its write, commands the next, or ends it.
     pub(super) fn carry_on(&mut self, at: Timestamp, effects: &mut Effects) {
         for place in 0..self.restores.len() {
-            if self.desk.outcome_of(self.restores[place].id) == Some(&Outcome::Pending) {
+            if self.commands.outcome_of(self.restores[place].id) == Some(&Outcome::Pending) {
                 let mut run = (*self.restores[place]).clone();
                 self.go_on(&mut run, at, effects);
                 if run != *self.restores[place] {
@@ -173,7 +173,7 @@ impl Plant {
         }
         loop {
             if let Some(command) = run.current() {
-                match self.desk.outcome_of(command) {
+                match self.commands.outcome_of(command) {
                     Some(Outcome::Pending) => return,
                     Some(ended) => run.take(ended.clone()),
                     // It cannot be followed any more, so nobody can say that it was written.
@@ -192,17 +192,17 @@ impl Plant {
             let command = Command { seen, ..Command::new(id, by, CommandKind::Write { tag, value }) };
             let refusal = if line_changed { Some(Refusal::LineChanged) } else { overtaken(step, &self.image) };
             if let Some(why) = refusal {
-                let action = self.desk.note(&command, Outcome::Refused(why), &self.image, at);
+                let action = self.commands.note(&command, Outcome::Refused(why), &self.image, at);
                 effects.records.extend(action.map(Record::Action));
                 continue;
             }
-            match self.desk.write(&self.image, &command, tag, value, at) {
+            match self.commands.write(&self.image, &command, tag, value, at) {
                 Ok(request) => effects.bus.push((self.line_of(tag), request)),
                 Err(action) => effects.records.extend(action.map(|action| Record::Action(*action))),
             }
         }
         if let Some(outcome) = run.outcome(&self.def) {
-            let action = self.desk.end(run.id, outcome, &self.image);
+            let action = self.commands.end(run.id, outcome, &self.image);
             effects.records.extend(action.map(Record::Action));
         }
     }

@@ -24,13 +24,13 @@ impl Plant {
             CommandKind::Configure(settings)
                 if self.def.lines.get(settings.id.index()).is_none_or(|line| line.name != settings.name) =>
             {
-                return self.desk.note(command, Outcome::Refused(Refusal::NotALine), &self.image, at);
+                return self.commands.note(command, Outcome::Refused(Refusal::NotALine), &self.image, at);
             }
             CommandKind::Configure(settings) if let Err(why) = valid(settings) => {
-                return self.desk.note(command, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
+                return self.commands.note(command, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
             }
             CommandKind::Test(_, diagnostic) if let Err(why) = diagnostic.check() => {
-                return self.desk.note(command, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
+                return self.commands.note(command, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
             }
             CommandKind::Configure(settings) => {
                 self.remember_settings(settings);
@@ -45,7 +45,7 @@ impl Plant {
             CommandKind::StopTest(line) => effects.bus.push((*line, BusRequest::StopTest)),
             CommandKind::SaveSettings(line) => {
                 effects.save = Some((command.id, self.settings(*line).clone()));
-                self.desk.take(command, at);
+                self.commands.take(command, at);
                 return None;
             }
             CommandKind::Write { .. }
@@ -59,7 +59,7 @@ impl Plant {
             | CommandKind::HandOver
             | CommandKind::TakeOver => return None,
         }
-        self.desk.take(command, at);
+        self.commands.take(command, at);
         None
     }
 
@@ -73,7 +73,7 @@ impl Plant {
             }
             Err(why) => Outcome::Refused(Refusal::NotSaved(why)),
         };
-        let action = self.desk.end(command, outcome, &self.image);
+        let action = self.commands.end(command, outcome, &self.image);
         Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
     }
 

@@ -80,7 +80,7 @@ fn command(plant: &mut Plant, number: u32, kind: CommandKind) -> Effects {
 }
 
 fn outcome(plant: &Plant, number: u32) -> Option<Outcome> {
-    plant.desk.outcome_of(CommandId { terminal: 1, number }).cloned()
+    plant.commands.outcome_of(CommandId { terminal: 1, number }).cloned()
 }
 
 /// The tags and raw numbers that went to the bus.
