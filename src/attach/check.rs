@@ -13,7 +13,7 @@ use crate::{
         def::{AlarmId, DeviceId, LineId, TagId},
         line_check::valid,
         parameter_set::NAME_MAX,
-        restore::RestoreWish,
+        restore::RestoreRequest,
     },
 };
 
@@ -54,22 +54,24 @@ pub fn command(def: &PlantDef, kind: &CommandKind) -> Result<(), String> {
             valid(settings)?;
             line(def, settings.id)
         }
-        CommandKind::Restore(wish) => of_restore(def, wish),
+        CommandKind::Restore(request) => of_restore(def, request),
     }
 }
 
-fn of_restore(def: &PlantDef, wish: &RestoreWish) -> Result<(), String> {
-    device(def, wish.device)?;
-    short("origin", &wish.from, WORDS_MAX)?;
-    for (what, name) in [("name", &wish.set.name), ("device", &wish.set.device), ("profile", &wish.set.profile)] {
+fn of_restore(def: &PlantDef, request: &RestoreRequest) -> Result<(), String> {
+    device(def, request.device)?;
+    short("origin", &request.from, WORDS_MAX)?;
+    for (what, name) in
+        [("name", &request.set.name), ("device", &request.set.device), ("profile", &request.set.profile)]
+    {
         short(what, name, WORDS_MAX)?;
     }
-    short("name", &wish.set.by, WORDS_MAX)?;
-    let (many, count) = (wish.changes.len(), def.tags.len());
+    short("name", &request.set.by, WORDS_MAX)?;
+    let (many, count) = (request.changes.len(), def.tags.len());
     if count < many {
         return Err(format!("{many} changes, this plant has {count} tags"));
     }
-    wish.changes.iter().try_for_each(|change| tag(def, change.tag))
+    request.changes.iter().try_for_each(|change| tag(def, change.tag))
 }
 
 /// A text that is no longer than it can be.

@@ -11,7 +11,7 @@ use super::{
     def::{DeviceId, LineDef, LineId, TagId},
     diagnostics::Diagnostic,
     event::{ExceptionCode, Fault},
-    restore::RestoreWish,
+    restore::RestoreRequest,
 };
 
 /// One wish of one operator.
@@ -85,7 +85,7 @@ pub enum CommandKind {
         replace: bool,
     },
     /// Write a parameter set to a device: what differs, one verified write after the other.
-    Restore(Box<RestoreWish>),
+    Restore(Box<RestoreRequest>),
     /// Stop the restore of a device after the write under way.
     StopRestore(DeviceId),
     /// Hand the plant over to the next shift; what its people should know is the note of the command.

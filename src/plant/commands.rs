@@ -412,9 +412,9 @@ fn record(def: &PlantDef, status: &CommandStatus, image: &ProcessImage) -> Actio
         CommandKind::SaveSet { device, name, .. } => {
             ("save set", def.device(*device).name.clone(), Some(name.to_string()))
         }
-        CommandKind::Restore(wish) => {
-            let new = format!("{}: {} changes", wish.from, wish.changes.len());
-            ("restore set", def.device(wish.device).name.clone(), Some(new))
+        CommandKind::Restore(request) => {
+            let new = format!("{}: {} changes", request.from, request.changes.len());
+            ("restore set", def.device(request.device).name.clone(), Some(new))
         }
         CommandKind::StopRestore(device) => ("stop restore", def.device(*device).name.clone(), None),
         CommandKind::HandOver => (HAND_OVER, def.name.clone(), None),

@@ -19,7 +19,7 @@ pub const READ_MAX: Duration = Duration::from_secs(60);
 
 /// What an operator has confirmed: this set, and the changes that it meant when he looked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RestoreWish {
+pub struct RestoreRequest {
     /// The device that is written.
     pub device: DeviceId,
     /// Where the values come from, in words: `winter`, `copy of TIC-2`.
@@ -35,7 +35,7 @@ pub struct RestoreWish {
 pub struct Restore {
     /// The command that it carries out.
     pub id: CommandId,
-    /// Who wished it.
+    /// Who requested it.
     pub by: Arc<str>,
     /// Where the values come from.
     pub from: Arc<str>,
@@ -85,15 +85,15 @@ pub enum State {
 
 impl Restore {
     /// Begins with reading the device.
-    pub fn new(id: CommandId, by: Arc<str>, wish: &RestoreWish, at: Timestamp) -> Restore {
+    pub fn new(id: CommandId, by: Arc<str>, request: &RestoreRequest, at: Timestamp) -> Restore {
         let step = |change: &Change| Step { change: *change, command: None, outcome: None };
-        let steps = wish.changes.iter().map(step).collect();
+        let steps = request.changes.iter().map(step).collect();
         Restore {
             id,
             by,
-            from: wish.from.clone(),
-            set: wish.set.clone(),
-            device: wish.device,
+            from: request.from.clone(),
+            set: request.set.clone(),
+            device: request.device,
             at,
             steps,
             state: State::Reading,

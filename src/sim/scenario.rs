@@ -76,12 +76,12 @@ pub struct OperatorStep {
     /// When.
     pub at: Duration,
     /// What.
-    pub wish: OperatorWish,
+    pub action: OperatorAction,
 }
 
-/// What an operator wishes; alarms are acknowledged as they are seen at that moment.
+/// A scripted operator action; alarms are acknowledged as they are seen at that moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum OperatorWish {
+pub enum OperatorAction {
     /// Acknowledge this alarm.
     Acknowledge(AlarmId),
     /// Acknowledge all that wait.
@@ -90,15 +90,15 @@ pub enum OperatorWish {
     Write(TagId, f64),
 }
 
-impl OperatorWish {
+impl OperatorAction {
     /// The command that an operator gives who looks at this; `None` if there is nothing to do.
     pub fn command_kind(self, seen: &Snapshot) -> Option<CommandKind> {
         match self {
-            OperatorWish::Acknowledge(id) => {
+            OperatorAction::Acknowledge(id) => {
                 seen.alarms.iter().find(|alarm| alarm.id == id).map(ActiveAlarm::acknowledge)
             }
-            OperatorWish::AcknowledgeAll => seen.acknowledge_all(),
-            OperatorWish::Write(tag, value) => Some(CommandKind::Write { tag, value }),
+            OperatorAction::AcknowledgeAll => seen.acknowledge_all(),
+            OperatorAction::Write(tag, value) => Some(CommandKind::Write { tag, value }),
         }
     }
 }
@@ -115,12 +115,12 @@ pub struct Expect {
     /// Until when.
     pub until: Duration,
     /// What.
-    pub wish: Wish,
+    pub expectation: Expectation,
 }
 
 /// What can be expected between two times.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Wish {
+pub enum Expectation {
     /// This alarm makes this step.
     Alarm(AlarmId, AlarmStep),
     /// This alarm is never raised.

@@ -387,8 +387,8 @@ pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<f64>) -> 
         CommandKind::StopTest(line) => format!("stop test of {}", cx.def().line(*line).name),
         CommandKind::ReadSets => "read parameter sets".to_owned(),
         CommandKind::SaveSet { device, name, .. } => format!("save set {name} of {}", cx.def().device(*device).name),
-        CommandKind::Restore(wish) => {
-            format!("{} to {}, {} changes", wish.from, cx.def().device(wish.device).name, wish.changes.len())
+        CommandKind::Restore(request) => {
+            format!("{} to {}, {} changes", request.from, cx.def().device(request.device).name, request.changes.len())
         }
         CommandKind::StopRestore(device) => format!("stop restore of {}", cx.def().device(*device).name),
         CommandKind::HandOver => "hand over".to_owned(),

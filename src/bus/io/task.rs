@@ -353,8 +353,8 @@ impl Task<'_> {
                 }
                 let (tag, unlock) = (def.tag(tag), unlock.map(|(tag, raw)| (def.tag(tag), raw)));
                 let started = self.clock.now();
-                let wish = write::Wish { tag, raw, unlock, verify, urgent };
-                let turn = self.write(link, schedule, id, wish).await;
+                let job = write::WriteJob { tag, raw, unlock, verify, urgent };
+                let turn = self.write(link, schedule, id, job).await;
                 let now = self.clock.now();
                 self.budget.spent(Duration::try_from(now.duration_since(started)).unwrap_or_default(), now);
                 turn

@@ -14,7 +14,7 @@ use crate::plant::{
     parameter_set::{self, Problem, StoredSet},
     process_image::ProcessImage,
     record::{ActionRecord, Record},
-    restore::{READ_MAX, Restore, RestoreWish, State, Step},
+    restore::{READ_MAX, Restore, RestoreRequest, State, Step},
 };
 
 /// The terminal number of writes that the plant itself commands for somebody; terminals count from 1.
@@ -66,7 +66,7 @@ impl Plant {
                 effects.sets = Some(SetWork::Write { command: command.id, set: Box::new(set), replace: *replace });
                 None
             }
-            CommandKind::Restore(wish) => self.begin_restore(command, wish, at, effects),
+            CommandKind::Restore(request) => self.begin_restore(command, request, at, effects),
             CommandKind::StopRestore(device) => {
                 let running = self.restores.iter_mut().find(|run| run.device == *device && run.at_work());
                 let outcome = match running {
@@ -101,24 +101,24 @@ impl Plant {
     fn begin_restore(
         &mut self,
         command: &Command,
-        wish: &RestoreWish,
+        request: &RestoreRequest,
         at: Timestamp,
         effects: &mut Effects,
     ) -> Option<ActionRecord> {
-        if self.restores.iter().any(|run| run.device == wish.device && run.at_work()) {
+        if self.restores.iter().any(|run| run.device == request.device && run.at_work()) {
             return self.commands.note(command, Outcome::Refused(Refusal::UnderWay), &self.image, at);
         }
-        if let Some(why) = self.unlike(wish.device, &wish.set, &wish.changes) {
+        if let Some(why) = self.unlike(request.device, &request.set, &request.changes) {
             return self.commands.note(command, Outcome::Refused(why), &self.image, at);
         }
-        if wish.changes.is_empty() {
+        if request.changes.is_empty() {
             return self.commands.note(command, Outcome::Unchanged, &self.image, at);
         }
         self.commands.take(command, at);
-        self.restores.retain(|run| run.device != wish.device);
-        self.restores.push(Arc::new(Restore::new(command.id, command.by.clone(), wish, at)));
-        let look = BusRequest::Refresh { device: wish.device, command: Some(command.id) };
-        effects.bus.push((self.def.device(wish.device).line, look));
+        self.restores.retain(|run| run.device != request.device);
+        self.restores.push(Arc::new(Restore::new(command.id, command.by.clone(), request, at)));
+        let look = BusRequest::Refresh { device: request.device, command: Some(command.id) };
+        effects.bus.push((self.def.device(request.device).line, look));
         None
     }
 

@@ -198,7 +198,7 @@ impl Task {
             ScenarioEvent::OperatorStep(step) => {
                 let Some(commands) = &self.trainer.operator else { return };
                 let snapshot = self.trainer.snapshots.borrow().clone();
-                let Some(kind) = step.wish.command_kind(&snapshot) else { return };
+                let Some(kind) = step.action.command_kind(&snapshot) else { return };
                 self.commands_sent += 1;
                 let id = CommandId { terminal: OPERATOR, number: self.commands_sent };
                 let seen = snapshot.seen(&kind);

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{Scenario, Wish};
+use super::{Expectation, Scenario};
 use crate::plant::{
     Snapshot,
     alarm::manager::subject_name,
@@ -124,7 +124,7 @@ impl Judge {
         }
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
             if expect.from <= at && at <= expect.until {
-                mark.take(at, expect.wish, snapshot, actual);
+                mark.take(at, expect.expectation, snapshot, actual);
             }
         }
     }
@@ -138,11 +138,13 @@ impl Judge {
         let Some(at) = self.elapsed(step.at) else { return };
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
             let inside = expect.from <= at && at <= expect.until;
-            match expect.wish {
-                Wish::Alarm(alarm, wanted) if inside && wanted == step.step && is(&self.def, alarm, step) => {
+            match expect.expectation {
+                Expectation::Alarm(alarm, wanted) if inside && wanted == step.step && is(&self.def, alarm, step) => {
                     mark.met.get_or_insert(at);
                 }
-                Wish::NoAlarm(alarm) if inside && step.step == AlarmStep::Raised && is(&self.def, alarm, step) => {
+                Expectation::NoAlarm(alarm)
+                    if inside && step.step == AlarmStep::Raised && is(&self.def, alarm, step) =>
+                {
                     mark.broken.get_or_insert((at, step.value));
                 }
                 _ => {}
@@ -154,7 +156,7 @@ impl Judge {
         let (Some(at), CommandKind::Write { tag, value }) = (self.elapsed(command.at), &command.kind) else { return };
         let done = matches!(command.outcome, Outcome::Verified | Outcome::Unchanged);
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
-            let Wish::Written(wanted, number) = expect.wish else { continue };
+            let Expectation::Written(wanted, number) = expect.expectation else { continue };
             if done && wanted == *tag && number == *value && expect.from <= at && at <= expect.until {
                 mark.met.get_or_insert(at);
             }
@@ -172,7 +174,11 @@ impl Judge {
             .map(|(expect, mark)| Row {
                 text: expect.text.clone(),
                 points: expect.points,
-                standing: mark.standing(expect.wish, over || self.now > expect.until, self.now.min(expect.until)),
+                standing: mark.standing(
+                    expect.expectation,
+                    over || self.now > expect.until,
+                    self.now.min(expect.until),
+                ),
             })
             .collect();
         let met = rows.iter().filter(|row| matches!(row.standing, Standing::Met(_)));
@@ -195,15 +201,15 @@ fn is(def: &PlantDef, alarm: AlarmId, step: &AlarmRecord) -> bool {
 }
 
 impl Mark {
-    fn take(&mut self, at: Duration, wish: Wish, snapshot: &Snapshot, actual: &ActualValues) {
-        match wish {
-            Wish::NotGood(tag) if !snapshot.sample(tag).quality.is_good() => {
+    fn take(&mut self, at: Duration, expectation: Expectation, snapshot: &Snapshot, actual: &ActualValues) {
+        match expectation {
+            Expectation::NotGood(tag) if !snapshot.sample(tag).quality.is_good() => {
                 self.met.get_or_insert(at);
             }
-            Wish::Good(tag) if snapshot.sample(tag).quality.is_good() => {
+            Expectation::Good(tag) if snapshot.sample(tag).quality.is_good() => {
                 self.met.get_or_insert(at);
             }
-            Wish::Within { tag, low, high } => {
+            Expectation::Within { tag, low, high } => {
                 if let Some(value) = actual.get(&tag).copied() {
                     self.seen = true;
                     if value < low || high < value {
@@ -211,7 +217,7 @@ impl Mark {
                     }
                 }
             }
-            Wish::True(tag, allowed) => {
+            Expectation::True(tag, allowed) => {
                 let (shown, truth) = (snapshot.sample(tag).trusted(), actual.get(&tag).copied());
                 self.seen |= truth.is_some();
                 match (shown, truth) {
@@ -224,30 +230,42 @@ impl Mark {
                     _ => self.differs = None,
                 }
             }
-            Wish::Alarm(..) | Wish::NoAlarm(_) | Wish::Written(..) | Wish::NotGood(_) | Wish::Good(_) => {}
+            Expectation::Alarm(..)
+            | Expectation::NoAlarm(_)
+            | Expectation::Written(..)
+            | Expectation::NotGood(_)
+            | Expectation::Good(_) => {}
         }
     }
 
-    fn standing(&self, wish: Wish, over: bool, now: Duration) -> Standing {
+    fn standing(&self, expectation: Expectation, over: bool, now: Duration) -> Standing {
         let value = |value: Option<f64>| value.map_or(String::new(), |value| format!(": {value:.1}"));
-        match (wish, self.met, self.broken) {
-            (Wish::Alarm(..) | Wish::Written(..) | Wish::NotGood(_) | Wish::Good(_), Some(at), _) => Standing::Met(at),
-            (Wish::Alarm(..) | Wish::Written(..) | Wish::NotGood(_) | Wish::Good(_), None, _) if over => {
-                Standing::Missed("did not happen in time".to_owned())
-            }
-            (Wish::NoAlarm(_), _, Some((at, number))) => {
+        match (expectation, self.met, self.broken) {
+            (
+                Expectation::Alarm(..) | Expectation::Written(..) | Expectation::NotGood(_) | Expectation::Good(_),
+                Some(at),
+                _,
+            ) => Standing::Met(at),
+            (
+                Expectation::Alarm(..) | Expectation::Written(..) | Expectation::NotGood(_) | Expectation::Good(_),
+                None,
+                _,
+            ) if over => Standing::Missed("did not happen in time".to_owned()),
+            (Expectation::NoAlarm(_), _, Some((at, number))) => {
                 Standing::Missed(format!("raised at {}{}", clock(at), value(number)))
             }
-            (Wish::Within { .. }, _, Some((at, number))) => {
+            (Expectation::Within { .. }, _, Some((at, number))) => {
                 Standing::Missed(format!("left at {}{}", clock(at), value(number)))
             }
-            (Wish::True(..), _, Some((at, number))) => {
+            (Expectation::True(..), _, Some((at, number))) => {
                 Standing::Missed(format!("shown as good and wrong from {}{}", clock(at), value(number)))
             }
-            (Wish::Within { .. } | Wish::True(..), _, None) if over && !self.seen => {
+            (Expectation::Within { .. } | Expectation::True(..), _, None) if over && !self.seen => {
                 Standing::Missed("could not be judged: the simulation does not know it".to_owned())
             }
-            (Wish::NoAlarm(_) | Wish::Within { .. } | Wish::True(..), _, None) if over => Standing::Met(now),
+            (Expectation::NoAlarm(_) | Expectation::Within { .. } | Expectation::True(..), _, None) if over => {
+                Standing::Met(now)
+            }
             _ => Standing::Open,
         }
     }

@@ -8,7 +8,7 @@ mod tests;
 use std::{path::Path, sync::Arc, time::Duration};
 
 use self::names::{alarm, tag, unknown, value};
-use super::{Expect, FaultEvent, OperatorStep, OperatorWish, Scenario, Start, judge::clock};
+use super::{Expect, FaultEvent, OperatorAction, OperatorStep, Scenario, Start, judge::clock};
 use crate::{
     plant::{PlantDef, record::AlarmStep},
     profile::{
@@ -243,13 +243,13 @@ fn target(table: &EventTable, def: &PlantDef, problems: &mut Problems) -> Option
 
 fn step(table: &OperatorTable, duration: Duration, def: &PlantDef, problems: &mut Problems) -> Option<OperatorStep> {
     let at = in_time(table.at_time, duration, problems);
-    let wish = match (&table.acknowledge, &table.write) {
-        (Some(all), None) if all.value == "all" => OperatorWish::AcknowledgeAll,
-        (Some(subject), None) => OperatorWish::Acknowledge(alarm(subject, &table.text, def, problems)?),
+    let action = match (&table.acknowledge, &table.write) {
+        (Some(all), None) if all.value == "all" => OperatorAction::AcknowledgeAll,
+        (Some(subject), None) => OperatorAction::Acknowledge(alarm(subject, &table.text, def, problems)?),
         (None, Some(name)) => {
             let tag = tag(name, def, problems)?;
             let value = value(&table.value, name, tag, def, problems)?;
-            OperatorWish::Write(tag, value)
+            OperatorAction::Write(tag, value)
         }
         (Some(_), Some(write)) => {
             problems.add(write.at, "one action at a time").label("needs an [[operator]] of its own");
@@ -260,7 +260,7 @@ fn step(table: &OperatorTable, duration: Duration, def: &PlantDef, problems: &mu
             return None;
         }
     };
-    Some(OperatorStep { at: at?, wish })
+    Some(OperatorStep { at: at?, action })
 }
 
 fn in_time(at: Option<At<Duration>>, duration: Duration, problems: &mut Problems) -> Option<Duration> {

@@ -225,9 +225,9 @@ impl Controllers {
             Action::ReadSets => vec![UiAction::Command(CommandKind::ReadSets)],
             Action::CommandKind(which) => device.program.as_ref().map_or(Vec::new(), |program| {
                 let value = match which {
-                    keys::Wish::Run => Some(program.run),
-                    keys::Wish::Hold => program.halt,
-                    keys::Wish::Off => Some(program.off),
+                    keys::ProgramCommand::Run => Some(program.run),
+                    keys::ProgramCommand::Hold => program.halt,
+                    keys::ProgramCommand::Off => Some(program.off),
                 };
                 value.map_or_else(
                     || notice(device, "this program cannot be held"),

@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// What is to be written: a tag, its raw number, and how.
-pub(super) struct Wish<'a> {
+pub(super) struct WriteJob<'a> {
     pub tag: &'a TagDef,
     pub raw: f64,
     /// What is written first.
@@ -33,9 +33,9 @@ pub(super) struct Wish<'a> {
     pub urgent: bool,
 }
 
-impl Wish<'_> {
+impl WriteJob<'_> {
     fn request(&self, id: WriteId) -> BusRequest {
-        let &Wish { tag, raw, unlock, verify, urgent } = self;
+        let &WriteJob { tag, raw, unlock, verify, urgent } = self;
         BusRequest::Write { id, tag: tag.id, raw, unlock: unlock.map(|(key, raw)| (key.id, raw)), verify, urgent }
     }
 }
@@ -47,19 +47,19 @@ impl Task<'_> {
         link: &mut Link,
         schedule: &mut Schedule,
         id: WriteId,
-        wish: Wish<'_>,
+        job: WriteJob<'_>,
     ) -> Turn {
-        let tag = wish.tag;
-        if wish.urgent {
+        let tag = job.tag;
+        if job.urgent {
             link.hurry();
         }
-        let locked = match wish.unlock {
-            Some(key) => self.unlock(link, schedule, id, key, &wish).await?,
+        let locked = match job.unlock {
+            Some(key) => self.unlock(link, schedule, id, key, &job).await?,
             None => Ok(None),
         };
         let result = match locked {
             Ok(None) => {
-                self.write_once(link, schedule, &wish).await.map_err(|why| (WriteResult::Lost as fn(Fault) -> _, why))
+                self.write_once(link, schedule, &job).await.map_err(|why| (WriteResult::Lost as fn(Fault) -> _, why))
             }
             Ok(Some(result)) => Ok(result),
             Err(why) => Err((WriteResult::NotSent as fn(Fault) -> _, why)),
@@ -67,7 +67,7 @@ impl Task<'_> {
         let result = match result {
             // It waits again, unless the stop is one of its tag.
             Ok(WriteResult::Overtaken) => {
-                self.requests.put_off(wish.request(id));
+                self.requests.put_off(job.request(id));
                 return Ok(Ok(()));
             }
             Ok(result) => result,
@@ -97,7 +97,7 @@ impl Task<'_> {
         }
         match result {
             // A stop may be requested again at once.
-            WriteResult::Lost(fault) | WriteResult::NotRead(fault) if wish.verify && !wish.urgent => {
+            WriteResult::Lost(fault) | WriteResult::NotRead(fault) if job.verify && !job.urgent => {
                 self.confirm_later(id, tag.id, result, fault).await?;
             }
             result => self.tell_wrote(id, result).await?,
@@ -116,13 +116,13 @@ impl Task<'_> {
         schedule: &mut Schedule,
         id: WriteId,
         (key, raw): (&TagDef, f64),
-        wish: &Wish<'_>,
+        job: &WriteJob<'_>,
     ) -> Result<Result<Option<WriteResult>, String>, Ended> {
         // A key of another device would be written to an address of this one.
-        if key.device != wish.tag.device {
+        if key.device != job.tag.device {
             return Ok(Ok(Some(WriteResult::NotSent(Fault::NotANumber))));
         }
-        let sent = self.send_number(link, schedule, key, raw, wish.urgent).await;
+        let sent = self.send_number(link, schedule, key, raw, job.urgent).await;
         if let Ok(WriteResult::NotSent(_) | WriteResult::Overtaken) = &sent {
             return Ok(sent.map(Some));
         }
@@ -132,7 +132,7 @@ impl Task<'_> {
         Ok(sent.map(|result| match result {
             WriteResult::Accepted => None,
             // A stop is tried all the same: what was not answered may have been heard.
-            WriteResult::Lost(_) if wish.urgent => None,
+            WriteResult::Lost(_) if job.urgent => None,
             // The value itself was never on the wire.
             WriteResult::Lost(fault) => Some(WriteResult::NotSent(fault)),
             refused => Some(refused),
@@ -181,7 +181,7 @@ impl Task<'_> {
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
-        &Wish { tag, raw, verify, urgent, .. }: &Wish<'_>,
+        &WriteJob { tag, raw, verify, urgent, .. }: &WriteJob<'_>,
     ) -> Result<WriteResult, String> {
         match self.send_number(link, schedule, tag, raw, urgent).await? {
             WriteResult::Accepted => {}

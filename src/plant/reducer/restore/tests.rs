@@ -49,8 +49,8 @@ fn look(number: u32) -> BusRequest {
 }
 
 /// Commands a restore and lets the device be read as it was; the first write follows.
-fn begin(plant: &mut Plant, number: u32, wish: RestoreWish) -> Effects {
-    let asked = command(plant, number, CommandKind::Restore(Box::new(wish)));
+fn begin(plant: &mut Plant, number: u32, request: RestoreRequest) -> Effects {
+    let asked = command(plant, number, CommandKind::Restore(Box::new(request)));
     assert_eq!(asked.bus, [(plant.def.device(TIC).line, look(number))], "the device is read first");
     read(plant, 1, 500.0, 100.0)
 }
@@ -70,9 +70,9 @@ fn set(sv: f64, high: f64) -> Arc<ParameterSet> {
     })
 }
 
-fn wish(plant: &Plant, set: Arc<ParameterSet>) -> RestoreWish {
+fn restore_request(plant: &Plant, set: Arc<ParameterSet>) -> RestoreRequest {
     let changes = plan(&plant.def, TIC, &set, &trusted(&plant.image)).expect("a set that fits");
-    RestoreWish { device: TIC, from: "winter".into(), set, changes }
+    RestoreRequest { device: TIC, from: "winter".into(), set, changes }
 }
 
 fn command(plant: &mut Plant, number: u32, kind: CommandKind) -> Effects {
@@ -127,8 +127,8 @@ fn actions(effects: &Effects) -> Vec<String> {
 #[test]
 fn one_write_after_the_other_each_on_record_and_then_the_whole() {
     let mut plant = plant();
-    let wish = wish(&plant, set(150.0, 200.0));
-    let first = begin(&mut plant, 1, wish);
+    let request = restore_request(&plant, set(150.0, 200.0));
+    let first = begin(&mut plant, 1, request);
     assert_eq!(written(&first), [(HIGH, 200.0)], "the limit first, and nothing else yet");
     let second = end(&mut plant, &first, WriteResult::ReadBack);
     assert_eq!(actions(&second), ["anna write TIC-1.SV-H verified"]);
@@ -142,8 +142,8 @@ fn one_write_after_the_other_each_on_record_and_then_the_whole() {
 #[test]
 fn the_first_failure_stops_it_and_says_what_was_written() {
     let mut plant = plant();
-    let wish = wish(&plant, set(40.0, 80.0));
-    let first = begin(&mut plant, 1, wish);
+    let request = restore_request(&plant, set(40.0, 80.0));
+    let first = begin(&mut plant, 1, request);
     assert_eq!(written(&first), [(SV, 400.0)]);
     let second = end(&mut plant, &first, WriteResult::ReadBack);
     assert_eq!(written(&second), [(HIGH, 80.0)]);
@@ -159,22 +159,22 @@ fn the_first_failure_stops_it_and_says_what_was_written() {
 #[test]
 fn a_device_that_has_changed_since_is_not_written() {
     let mut plant = plant();
-    let wish = wish(&plant, set(40.0, 80.0));
-    command(&mut plant, 1, CommandKind::Restore(Box::new(wish.clone())));
+    let request = restore_request(&plant, set(40.0, 80.0));
+    command(&mut plant, 1, CommandKind::Restore(Box::new(request.clone())));
     // On the image it stood as it was confirmed; the device itself says otherwise.
     let effects = read(&mut plant, 1, 610.0, 100.0);
     let changed = Some(Outcome::Refused(Refusal::Changed));
     assert_eq!((written(&effects), outcome(&plant, 1)), (vec![], changed.clone()));
     assert_eq!(actions(&effects), [format!("anna restore set TIC-1 refused: {}", Refusal::Changed)]);
-    let effects = command(&mut plant, 2, CommandKind::Restore(Box::new(wish)));
+    let effects = command(&mut plant, 2, CommandKind::Restore(Box::new(request)));
     assert_eq!((effects.bus, outcome(&plant, 2)), (vec![], changed));
 }
 
 #[test]
 fn nothing_is_written_before_every_value_of_the_set_was_read_anew() {
     let mut plant = plant();
-    let wish = wish(&plant, set(40.0, 80.0));
-    command(&mut plant, 1, CommandKind::Restore(Box::new(wish.clone())));
+    let request = restore_request(&plant, set(40.0, 80.0));
+    command(&mut plant, 1, CommandKind::Restore(Box::new(request.clone())));
     let only_sv = |plant: &mut Plant, second| {
         let (values, reply) = (vec![(SV, 500.0), (DP, 1.0)], std::time::Duration::from_millis(12));
         plant.on_event(Event::Read { at: at(second), device: TIC, values, texts: Vec::new(), reply, exchange: None })
@@ -193,8 +193,8 @@ fn nothing_is_written_before_every_value_of_the_set_was_read_anew() {
 fn a_restore_that_still_reads_can_be_stopped_and_a_full_line_ends_it() {
     let check = |end: &dyn Fn(&mut Plant), expect: Refusal| {
         let mut plant = plant();
-        let wish = wish(&plant, set(40.0, 80.0));
-        command(&mut plant, 1, CommandKind::Restore(Box::new(wish)));
+        let request = restore_request(&plant, set(40.0, 80.0));
+        command(&mut plant, 1, CommandKind::Restore(Box::new(request)));
         end(&mut plant);
         assert_eq!(outcome(&plant, 1), Some(Outcome::Refused(expect)));
         assert_eq!(written(&read(&mut plant, 2, 500.0, 100.0)), []);
@@ -214,8 +214,8 @@ fn a_restore_that_still_reads_can_be_stopped_and_a_full_line_ends_it() {
 fn a_value_that_changes_while_a_restore_runs_is_not_written_over() {
     let check = |meanwhile: &dyn Fn(&mut Plant), expect: &str| {
         let mut plant = plant();
-        let wish = wish(&plant, set(40.0, 80.0));
-        let first = begin(&mut plant, 1, wish);
+        let request = restore_request(&plant, set(40.0, 80.0));
+        let first = begin(&mut plant, 1, request);
         meanwhile(&mut plant);
         let last = end(&mut plant, &first, WriteResult::ReadBack);
         assert_eq!(written(&last), [], "{expect}");
@@ -244,24 +244,24 @@ fn a_value_that_changes_while_a_restore_runs_is_not_written_over() {
 #[test]
 fn limits_are_checked_in_the_station_whatever_a_terminal_sends() {
     let mut plant = plant();
-    let wish = RestoreWish { changes: Vec::new(), ..wish(&plant, set(50.0, 100.0)) };
-    let too_high = RestoreWish { set: set(600.0, 100.0), ..wish.clone() };
+    let request = RestoreRequest { changes: Vec::new(), ..restore_request(&plant, set(50.0, 100.0)) };
+    let too_high = RestoreRequest { set: set(600.0, 100.0), ..request.clone() };
     let effects = command(&mut plant, 1, CommandKind::Restore(Box::new(too_high)));
     let why = "SV 600 is outside −∞ … 100";
     let refused = |why: &str| Some(Outcome::Refused(Refusal::NotFit(why.to_owned())));
     let min = plant.def.tag(SV).min;
     assert_eq!(min, Some(Bound::Fixed(0.0)));
     assert_eq!((written(&effects), outcome(&plant, 1)), (vec![], refused(&why.replace("−∞", "0"))));
-    command(&mut plant, 2, CommandKind::Restore(Box::new(wish)));
+    command(&mut plant, 2, CommandKind::Restore(Box::new(request)));
     assert_eq!(outcome(&plant, 2), Some(Outcome::Unchanged));
 }
 
 #[test]
 fn an_operator_stops_it_between_two_writes_and_two_never_run_at_once() {
     let mut plant = plant();
-    let wish = wish(&plant, set(40.0, 80.0));
-    let first = begin(&mut plant, 1, wish.clone());
-    command(&mut plant, 2, CommandKind::Restore(Box::new(wish)));
+    let request = restore_request(&plant, set(40.0, 80.0));
+    let first = begin(&mut plant, 1, request.clone());
+    command(&mut plant, 2, CommandKind::Restore(Box::new(request)));
     assert_eq!(outcome(&plant, 2), Some(Outcome::Refused(Refusal::UnderWay)));
     command(&mut plant, 3, CommandKind::StopRestore(TIC));
     let rest = end(&mut plant, &first, WriteResult::ReadBack);
@@ -274,8 +274,8 @@ fn an_operator_stops_it_between_two_writes_and_two_never_run_at_once() {
 #[test]
 fn a_line_too_busy_ends_it_without_effect() {
     let mut plant = plant();
-    let wish = wish(&plant, set(40.0, 100.0));
-    let first = begin(&mut plant, 1, wish);
+    let request = restore_request(&plant, set(40.0, 100.0));
+    let first = begin(&mut plant, 1, request);
     let (line, request) = first.bus.into_iter().next().expect("a write");
     plant.on_undeliverable(line, &request);
     assert_eq!(outcome(&plant, 1), Some(Outcome::Refused(Refusal::Busy)));

@@ -20,10 +20,10 @@ fn at(second: u64) -> Timestamp {
     BEGAN + SignedDuration::from_secs(second as i64)
 }
 
-/// A drill of 100 s with one wish from 10 to 20 s.
-fn judge(wish: Wish) -> Judge {
+/// A drill of 100 s with one expectation from 10 to 20 s.
+fn judge(expectation: Expectation) -> Judge {
     let s = Duration::from_secs;
-    let expect = Expect { text: "it".to_owned(), points: 10, from: s(10), until: s(20), wish };
+    let expect = Expect { text: "it".to_owned(), points: 10, from: s(10), until: s(20), expectation };
     let scenario = Scenario {
         name: String::new(),
         title: "drill".to_owned(),
@@ -71,8 +71,8 @@ fn late() -> Standing {
 
 #[test]
 fn an_alarm_counts_in_its_time_and_in_its_step_only() {
-    let check = |wish: Wish, steps: &[(u64, AlarmStep, &str)], expect: Standing| {
-        let mut judge = judge(wish);
+    let check = |expectation: Expectation, steps: &[(u64, AlarmStep, &str)], expect: Standing| {
+        let mut judge = judge(expectation);
         let text = judge.def.alarm(HIGH).text.clone();
         let subject: Arc<str> = judge.def.tag(PV).name.as_str().into();
         for (second, step, by_text) in steps {
@@ -91,22 +91,26 @@ fn an_alarm_counts_in_its_time_and_in_its_step_only() {
                 burst: None,
             })]);
         }
-        assert_eq!(is_over(&mut judge), expect, "{wish:?} {steps:?}");
+        assert_eq!(is_over(&mut judge), expect, "{expectation:?} {steps:?}");
     };
-    let raised = Wish::Alarm(HIGH, AlarmStep::Raised);
+    let raised = Expectation::Alarm(HIGH, AlarmStep::Raised);
     check(raised, &[(12, AlarmStep::Raised, "")], met(12));
     check(raised, &[(9, AlarmStep::Raised, ""), (21, AlarmStep::Raised, "")], late());
     check(raised, &[(12, AlarmStep::Returned, "")], late());
     check(raised, &[(12, AlarmStep::Raised, "another alarm of this tag")], late());
-    check(Wish::Alarm(HIGH, AlarmStep::Acknowledged), &[(20, AlarmStep::Acknowledged, "")], met(20));
-    check(Wish::NoAlarm(HIGH), &[], met(20));
-    check(Wish::NoAlarm(HIGH), &[(12, AlarmStep::Raised, "")], Standing::Missed("raised at 00:12: 76.0".to_owned()));
+    check(Expectation::Alarm(HIGH, AlarmStep::Acknowledged), &[(20, AlarmStep::Acknowledged, "")], met(20));
+    check(Expectation::NoAlarm(HIGH), &[], met(20));
+    check(
+        Expectation::NoAlarm(HIGH),
+        &[(12, AlarmStep::Raised, "")],
+        Standing::Missed("raised at 00:12: 76.0".to_owned()),
+    );
 }
 
 #[test]
 fn only_a_verified_write_of_the_right_value_counts() {
     let check = |second: u64, value: f64, outcome: Outcome, expect: Standing| {
-        let mut judge = judge(Wish::Written(SV, 60.0));
+        let mut judge = judge(Expectation::Written(SV, 60.0));
         let command = CommandStatus {
             from: "".into(),
             note: None,
@@ -130,36 +134,36 @@ fn only_a_verified_write_of_the_right_value_counts() {
 
 #[test]
 fn a_value_is_judged_by_what_is_shown_and_by_what_is_so() {
-    let check = |wish: Wish, seconds: &[(u64, Sample, f64)], expect: Standing| {
-        let mut judge = judge(wish);
+    let check = |expectation: Expectation, seconds: &[(u64, Sample, f64)], expect: Standing| {
+        let mut judge = judge(expectation);
         for (second, sample, truth) in seconds {
             judge.on_values(&shown(*second, *sample, Vec::new()), &ActualValues::from([(PV, *truth)]));
         }
-        assert_eq!(is_over(&mut judge), expect, "{wish:?}");
+        assert_eq!(is_over(&mut judge), expect, "{expectation:?}");
     };
     let bad = Sample::bad(Cause::SensorFault, BEGAN);
-    let within = Wish::Within { tag: PV, low: 0.0, high: 90.0 };
-    check(Wish::NotGood(PV), &[(9, bad, 50.0), (12, good(50.0), 50.0), (14, bad, 50.0)], met(14));
-    check(Wish::NotGood(PV), &[(12, good(50.0), 50.0)], late());
-    check(Wish::Good(PV), &[(12, bad, 50.0), (13, good(50.0), 50.0)], met(13));
+    let within = Expectation::Within { tag: PV, low: 0.0, high: 90.0 };
+    check(Expectation::NotGood(PV), &[(9, bad, 50.0), (12, good(50.0), 50.0), (14, bad, 50.0)], met(14));
+    check(Expectation::NotGood(PV), &[(12, good(50.0), 50.0)], late());
+    check(Expectation::Good(PV), &[(12, bad, 50.0), (13, good(50.0), 50.0)], met(13));
     check(within, &[(12, bad, 89.0)], met(20));
     check(within, &[(12, good(70.0), 91.0)], Standing::Missed("left at 00:12: 91.0".to_owned()));
     let unknown = Standing::Missed("could not be judged: the simulation does not know it".to_owned());
     check(within, &[], unknown);
     // A moment's difference is the way from probe to screen; a lasting one is a wrong value shown as a right one.
     let wrong = |second| (second, good(50.0), 60.0);
-    check(Wish::True(PV, 2.0), &[wrong(10), wrong(14), (15, good(60.0), 60.0), wrong(16), wrong(20)], met(20));
+    check(Expectation::True(PV, 2.0), &[wrong(10), wrong(14), (15, good(60.0), 60.0), wrong(16), wrong(20)], met(20));
     check(
-        Wish::True(PV, 2.0),
+        Expectation::True(PV, 2.0),
         &[wrong(11), wrong(14), wrong(18)],
         Standing::Missed("shown as good and wrong from 00:11: 50.0".to_owned()),
     );
-    check(Wish::True(PV, 2.0), &[(11, bad, 60.0), (18, bad, 60.0)], met(20));
+    check(Expectation::True(PV, 2.0), &[(11, bad, 60.0), (18, bad, 60.0)], met(20));
 }
 
 #[test]
 fn a_verdict_is_open_until_its_time_is_over_and_then_a_sum() {
-    let mut judge = judge(Wish::NotGood(PV));
+    let mut judge = judge(Expectation::NotGood(PV));
     judge.on_values(&shown(15, good(50.0), Vec::new()), &ActualValues::new());
     assert_eq!(standing(&judge), Standing::Open);
     assert_eq!(judge.verdict().summary(), "so far 0 of 10 points, 100 % needed");
@@ -175,7 +179,7 @@ fn a_verdict_is_open_until_its_time_is_over_and_then_a_sum() {
 
 #[test]
 fn a_drill_of_which_steps_were_lost_is_not_passed() {
-    let mut judge = judge(Wish::NoAlarm(HIGH));
+    let mut judge = judge(Expectation::NoAlarm(HIGH));
     judge.on_values(&shown(100, Sample::good(60.0, at(100)), Vec::new()), &ActualValues::new());
     assert!(judge.verdict().passed(), "{:?}", judge.verdict());
     judge.on_lost(3);

@@ -1,9 +1,9 @@
-//! Reads an `[[expect]]`: what is wished, when, and words for it.
+//! Reads an `[[expect]]`: what is expected, when, and its label.
 
 use std::time::Duration;
 
 use super::{
-    super::{Expect, Wish, judge::clock},
+    super::{Expect, Expectation, judge::clock},
     ExpectTable,
     names::{alarm, tag, value},
 };
@@ -22,7 +22,7 @@ pub(super) fn expectation(
     def: &PlantDef,
     problems: &mut Problems,
 ) -> Option<Expect> {
-    let (wish, words) = wish(table, def, problems)?;
+    let (expectation, words) = expected(table, def, problems)?;
     let from = table.after.map_or(Duration::ZERO, |after| after.value);
     let until = table.within.map_or(duration, |within| from + within.value);
     if let Some(late) = table.within.or(table.after).filter(|_| until > duration || from > duration) {
@@ -37,11 +37,11 @@ pub(super) fn expectation(
     };
     let text = if given.is_empty() { format!("{words}{window}") } else { format!("{given}{window}") };
     let points = table.points.map_or(10, |points| u32::from(points.value));
-    Some(Expect { text, points, from, until, wish })
+    Some(Expect { text, points, from, until, expectation })
 }
 
 /// What is expected, with words for it.
-fn wish(table: &ExpectTable, def: &PlantDef, problems: &mut Problems) -> Option<(Wish, String)> {
+fn expected(table: &ExpectTable, def: &PlantDef, problems: &mut Problems) -> Option<(Expectation, String)> {
     let keys = [
         ("alarm", &table.alarm),
         ("written", &table.written),
@@ -65,10 +65,10 @@ fn wish(table: &ExpectTable, def: &PlantDef, problems: &mut Problems) -> Option<
         let alarm = alarm(name, &table.text, def, problems)?;
         let words = &def.alarm(alarm).text;
         if table.never.is_some_and(|never| never.value) {
-            return Some((Wish::NoAlarm(alarm), format!("no alarm {} {words}", name.value)));
+            return Some((Expectation::NoAlarm(alarm), format!("no alarm {} {words}", name.value)));
         }
         let step = table.step.map_or(AlarmStep::Raised, |step| step.value);
-        return Some((Wish::Alarm(alarm, step), format!("alarm {} {words} {}", name.value, step.word())));
+        return Some((Expectation::Alarm(alarm, step), format!("alarm {} {words} {}", name.value, step.word())));
     }
     let tag = tag(name, def, problems)?;
     let unit = &def.tag(tag).unit;
@@ -76,10 +76,10 @@ fn wish(table: &ExpectTable, def: &PlantDef, problems: &mut Problems) -> Option<
         "written" => {
             let value = value(&table.value, name, tag, def, problems)?;
             let shown = def.tag(tag).label_of(value).map_or_else(|| format!("{value} {unit}"), str::to_owned);
-            Some((Wish::Written(tag, value), format!("{} set to {}", name.value, shown.trim_end())))
+            Some((Expectation::Written(tag, value), format!("{} set to {}", name.value, shown.trim_end())))
         }
-        "not_good" => Some((Wish::NotGood(tag), format!("{} shown as not good", name.value))),
-        "good" => Some((Wish::Good(tag), format!("{} shown as good", name.value))),
+        "not_good" => Some((Expectation::NotGood(tag), format!("{} shown as not good", name.value))),
+        "good" => Some((Expectation::Good(tag), format!("{} shown as good", name.value))),
         "displayed_within" => {
             if let Some(tolerance) = table.tolerance.filter(|tolerance| tolerance.value < 0.0) {
                 problems
@@ -89,7 +89,7 @@ fn wish(table: &ExpectTable, def: &PlantDef, problems: &mut Problems) -> Option<
             }
             let tolerance = table.tolerance.map_or(0.0, |tolerance| tolerance.value);
             Some((
-                Wish::True(tag, tolerance),
+                Expectation::True(tag, tolerance),
                 format!("{} never shown wrong by more than {tolerance} {unit}", name.value),
             ))
         }
@@ -103,7 +103,7 @@ fn within(
     tag: TagId,
     def: &PlantDef,
     problems: &mut Problems,
-) -> Option<(Wish, String)> {
+) -> Option<(Expectation, String)> {
     let unit = &def.tag(tag).unit;
     let (low, high) = (table.never_below.map(|low| low.value), table.never_above.map(|high| high.value));
     let words = match (low, high) {
@@ -115,6 +115,7 @@ fn within(
         (Some(low), None) => format!("really never below {low} {unit}"),
         (Some(low), Some(high)) => format!("really between {low} and {high} {unit}"),
     };
-    let wish = Wish::Within { tag, low: low.unwrap_or(f64::NEG_INFINITY), high: high.unwrap_or(f64::INFINITY) };
-    Some((wish, format!("{} {words}", name.value)))
+    let expectation =
+        Expectation::Within { tag, low: low.unwrap_or(f64::NEG_INFINITY), high: high.unwrap_or(f64::INFINITY) };
+    Some((expectation, format!("{} {words}", name.value)))
 }

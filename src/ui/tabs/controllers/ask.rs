@@ -8,7 +8,7 @@ use crate::{
         command::CommandKind,
         def::{DeviceDef, PlantDef},
         parameter_set::{Change, ParameterSet},
-        restore::RestoreWish,
+        restore::RestoreRequest,
         tag::{Confidence, TagDef},
     },
     ui::{
@@ -46,8 +46,8 @@ pub fn query(
     }
     notes.extend(warnings);
     let title = format!("{from} → {}", device.name);
-    let wish = RestoreWish { device: device.id, from, set, changes };
-    Confirm::command(title, query, CommandKind::Restore(Box::new(wish))).with_notes(notes).signed(cx)
+    let request = RestoreRequest { device: device.id, from, set, changes };
+    Confirm::command(title, query, CommandKind::Restore(Box::new(request))).with_notes(notes).signed(cx)
 }
 
 fn change_words(cx: &ViewContext, change: &Change) -> String {

@@ -43,7 +43,7 @@ pub enum Action {
     /// So many pages of them on.
     Turn(isize),
     /// Run, hold or stop the program.
-    CommandKind(Wish),
+    CommandKind(ProgramCommand),
     /// What the program does at its end.
     Mode,
     /// Which steps it runs.
@@ -62,7 +62,7 @@ pub enum Action {
 
 /// What a program is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wish {
+pub enum ProgramCommand {
     /// From the beginning, or on from a halt.
     Run,
     /// Stand still.
@@ -144,9 +144,14 @@ const PROGRAM: &[Key<Action>] = &[
     UP,
     DOWN,
     key(code(KeyCode::Enter), "edit", "change the target or time", Action::Open),
-    key(char('r'), "run", "run the program, or go on after a hold (asks first)", Action::CommandKind(Wish::Run)),
-    key(char('p'), "hold", "hold the program where it is (asks first)", Action::CommandKind(Wish::Hold)),
-    key(char('o'), "off", "stop the program (asks first)", Action::CommandKind(Wish::Off)),
+    key(
+        char('r'),
+        "run",
+        "run the program, or go on after a hold (asks first)",
+        Action::CommandKind(ProgramCommand::Run),
+    ),
+    key(char('p'), "hold", "hold the program where it is (asks first)", Action::CommandKind(ProgramCommand::Hold)),
+    key(char('o'), "off", "stop the program (asks first)", Action::CommandKind(ProgramCommand::Off)),
     key(char('t'), "pattern", "which steps are run", Action::Pattern),
     key(char('m'), "mode", "what happens at the end and at power-on", Action::Mode),
     REFRESH,

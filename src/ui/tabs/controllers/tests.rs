@@ -12,7 +12,7 @@ use crate::{
         def::{ActionDef, AlarmId, DeviceId},
         ne107::Reason,
         parameter_set::StoredSet,
-        restore::{Restore, RestoreWish, State},
+        restore::{Restore, RestoreRequest, State},
         sample::{Cause, Sample},
         snapshot::{ActiveAlarm, DeviceState},
         tag::Confidence,
@@ -145,9 +145,9 @@ fn half_done(fixture: &Fixture, state: State) -> Restore {
     let set = fixture.sets[1].set.clone().expect("a good set");
     let trusted = |tag: crate::plant::def::TagId| fixture.samples[tag.index()].trusted();
     let changes = crate::plant::parameter_set::plan(&fixture.def, DeviceId(0), &set, &trusted).expect("it fits");
-    let wish = RestoreWish { device: DeviceId(0), from: "set winter".into(), set, changes };
+    let request = RestoreRequest { device: DeviceId(0), from: "set winter".into(), set, changes };
     let id = CommandId { terminal: 1, number: 9 };
-    let mut run = Restore::new(id, "anna".into(), &wish, fixture::now());
+    let mut run = Restore::new(id, "anna".into(), &request, fixture::now());
     run.begin();
     run.steps[0].command = Some(id);
     run.steps[0].outcome = Some(Outcome::Verified);
@@ -256,9 +256,9 @@ fn a_restore_asks_what_each_of_its_writes_would_have_asked() {
 }
 
 /// The restore that these keys command.
-fn restored(model: &mut Model, keys: &str) -> Option<RestoreWish> {
+fn restored(model: &mut Model, keys: &str) -> Option<RestoreRequest> {
     match sent_kind(&type_keys(model, keys)) {
-        Some(CommandKind::Restore(wish)) => Some((**wish).clone()),
+        Some(CommandKind::Restore(request)) => Some((**request).clone()),
         Some(_) | None => None,
     }
 }
@@ -268,8 +268,8 @@ fn a_set_is_written_only_after_its_differences_were_shown_and_confirmed() {
     let fixture = with_sets();
     let mut model = model(&fixture, Theme::FULL);
     assert_eq!(restored(&mut model, "4⏎s↓⏎⏎"), None);
-    let wish = restored(&mut model, "⏎").expect("it was confirmed");
-    let names = wish.changes.iter().map(|change| fixture.def.tag(change.tag).short.clone());
+    let request = restored(&mut model, "⏎").expect("it was confirmed");
+    let names = request.changes.iter().map(|change| fixture.def.tag(change.tag).short.clone());
     assert_eq!(names.collect::<Vec<_>>(), ["P", "SV-H", "SV"], "the limit before the value that needs it");
 }
 
@@ -282,9 +282,9 @@ fn a_copy_goes_from_one_controller_to_the_other_and_can_be_turned_around() {
     assert!(screen(&mut model, 80, 24).contains("copy of TIC-2 → TIC-1"));
     type_keys(&mut model, "t");
     assert!(screen(&mut model, 80, 24).contains("copy of TIC-1 → TIC-2"));
-    let wish = restored(&mut model, "⏎⏎").expect("it was confirmed");
-    let written: Vec<_> = wish.changes.iter().map(|change| (change.tag, change.old, change.new)).collect();
-    assert_eq!((wish.device, written), (DeviceId(1), vec![(fixture.tag("TIC-2.P"), 9.0, 1.2)]));
+    let request = restored(&mut model, "⏎⏎").expect("it was confirmed");
+    let written: Vec<_> = request.changes.iter().map(|change| (change.tag, change.old, change.new)).collect();
+    assert_eq!((request.device, written), (DeviceId(1), vec![(fixture.tag("TIC-2.P"), 9.0, 1.2)]));
 }
 
 #[test]
